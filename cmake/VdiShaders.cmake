@@ -1,0 +1,36 @@
+# Compiles GLSL to SPIR-V at build time, checks it, and embeds it.
+
+find_program(GLSLANG_VALIDATOR glslangValidator REQUIRED)
+find_program(SPIRV_VAL spirv-val REQUIRED)
+
+# vdi_embed_shaders(<target> <folder> name ...): compiles <folder>/<name>.comp for Vulkan 1.3, runs spirv-val on the
+# result, and adds to the target a source that defines vdi::gpu::shaderCode for those names. What a shader includes is
+# tracked: a changed header recompiles just the shaders that use it.
+function(vdi_embed_shaders target folder)
+  set(outputDir "${CMAKE_CURRENT_BINARY_DIR}/shaders")
+  file(MAKE_DIRECTORY "${outputDir}")
+  set(table "")
+  set(includes "")
+  set(headers "")
+  foreach(name IN LISTS ARGN)
+    set(source "${folder}/${name}.comp")
+    set(header "${outputDir}/${name}.spv.h")
+    add_custom_command(
+      OUTPUT "${header}"
+      COMMAND ${GLSLANG_VALIDATOR} --quiet -V --target-env vulkan1.3 "-I${folder}" --depfile "${outputDir}/${name}.d" -o
+              "${outputDir}/${name}.spv" "${source}"
+      COMMAND ${SPIRV_VAL} --target-env vulkan1.3 --scalar-block-layout "${outputDir}/${name}.spv"
+      COMMAND ${CMAKE_COMMAND} "-DINPUT=${outputDir}/${name}.spv" "-DOUTPUT=${header}" "-DNAME=${name}" -P
+              "${CMAKE_SOURCE_DIR}/cmake/EmbedSpirv.cmake"
+      DEPENDS "${source}" "${CMAKE_SOURCE_DIR}/cmake/EmbedSpirv.cmake"
+      DEPFILE "${outputDir}/${name}.d"
+      COMMENT "Shader ${name}.comp"
+      VERBATIM)
+    list(APPEND headers "${header}")
+    string(APPEND includes "#include \"${name}.spv.h\"\n")
+    string(APPEND table "      {\"${name}\", spirv_${name}},\n")
+  endforeach()
+  configure_file("${CMAKE_SOURCE_DIR}/cmake/ShaderCode.cpp.in" "${outputDir}/ShaderCode.cpp" @ONLY)
+  target_sources(${target} PRIVATE "${outputDir}/ShaderCode.cpp" ${headers})
+  target_include_directories(${target} PRIVATE "${outputDir}")
+endfunction()

@@ -1,0 +1,61 @@
+# Functions that make the project's libraries, programs and tests, all with the same warnings and sanitizers.
+
+# Warnings and sanitizers for one target of ours.
+function(vdi_target_options target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra)
+  target_include_directories(${target} PUBLIC "${CMAKE_SOURCE_DIR}")
+  if(VDI_SANITIZE)
+    target_compile_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE} -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE})
+  endif()
+endfunction()
+
+# vdi_add_library(core SOURCES ... [LINK public libraries] [LINK_PRIVATE libraries]): static library vdi_core, alias
+# vdi::core.
+function(vdi_add_library name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LINK;LINK_PRIVATE")
+  add_library(vdi_${name} STATIC ${arg_SOURCES})
+  add_library(vdi::${name} ALIAS vdi_${name})
+  target_link_libraries(vdi_${name} PUBLIC ${arg_LINK} PRIVATE ${arg_LINK_PRIVATE})
+  vdi_target_options(vdi_${name})
+endfunction()
+
+# vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 1 2 3] [TIMEOUT seconds] [LABELS ...]): program test_<name> with
+# Catch2's main (or tests/MpiMain.cpp when RANKS is given) and one ctest per rank count. Every test has a time limit.
+function(vdi_add_catch_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;LABELS;ENVIRONMENT")
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 120)
+  endif()
+  if(arg_RANKS)
+    set(main "${CMAKE_SOURCE_DIR}/tests/MpiMain.cpp")
+  else()
+    set(main "${CMAKE_SOURCE_DIR}/tests/Main.cpp")
+  endif()
+  add_executable(test_${name} ${arg_SOURCES} ${main})
+  target_link_libraries(test_${name} PRIVATE Catch2::Catch2 ${arg_LINK})
+  vdi_target_options(test_${name})
+  if(arg_RANKS)
+    target_link_libraries(test_${name} PRIVATE MPI::MPI_CXX)
+    foreach(ranks IN LISTS arg_RANKS)
+      set(test ${name}_np${ranks})
+      add_test(NAME ${test} COMMAND ${MPIEXEC_EXECUTABLE} --oversubscribe ${MPIEXEC_NUMPROC_FLAG} ${ranks}
+                                    $<TARGET_FILE:test_${name}>)
+      vdi_test_properties(${test} TIMEOUT ${arg_TIMEOUT} LABELS ${arg_LABELS} ENVIRONMENT ${arg_ENVIRONMENT})
+    endforeach()
+  else()
+    add_test(NAME ${name} COMMAND test_${name})
+    vdi_test_properties(${name} TIMEOUT ${arg_TIMEOUT} LABELS ${arg_LABELS} ENVIRONMENT ${arg_ENVIRONMENT})
+  endif()
+endfunction()
+
+# The environment that every test needs: mpirun as root in a container, no interference between ranks on few cores.
+function(vdi_test_properties test)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "LABELS;ENVIRONMENT")
+  set_tests_properties(
+    ${test}
+    PROPERTIES
+      TIMEOUT "${arg_TIMEOUT}" LABELS "${arg_LABELS}" ENVIRONMENT
+      "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1;OMPI_MCA_btl_vader_single_copy_mechanism=none;${arg_ENVIRONMENT}"
+  )
+endfunction()

@@ -1,0 +1,38 @@
+// Who composites which list, and the exchange of compact sub-VDIs (paper, section 5.2): direct send, then gather.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vdi/comm/Communicator.h"
+#include "vdi/core/Scene.h"
+#include "vdi/core/Vdi.h"
+
+namespace vdi::comm {
+
+/// Lists [first, last) of the image belong to one rank. Pure arithmetic: no communication.
+struct ListRange {
+  std::uint64_t first = 0;
+  std::uint64_t last = 0;
+  std::uint64_t count() const { return last - first; }
+  bool operator==(const ListRange&) const = default;
+};
+/// Contiguous, in rank order, sizes differ by at most one; empty for surplus ranks when ranks > lists.
+ListRange ownedLists(std::uint64_t listCount, int rank, int size);
+
+/// What the owner received: subLists[r] is rank r's part of the owner's lists (owner's range count lists each).
+struct Received {
+  std::vector<SupersegmentLists> subLists;
+  std::uint64_t bytesSent = 0;      // by this rank to other ranks: supersegments and counts
+  std::uint64_t bytesReceived = 0;  // from other ranks
+};
+/// Collective. `sub` holds all lists of the image on every rank.
+Received distribute(const Communicator& comm, const SupersegmentLists& sub);
+
+/// Collective. `owned` holds this rank's ownedLists; the root's result holds all lists, the others' none.
+SupersegmentLists gatherLists(const Communicator& comm, const SupersegmentLists& owned, int root);
+
+/// Collective: the union of every rank's localScene.
+Scene globalScene(const Communicator& comm, const Scene& local);
+
+}  // namespace vdi::comm

@@ -1,0 +1,78 @@
+// Camera and the rays it casts. Spaces and conventions, the same in C++, GLSL and VTK:
+//   * world space: the coordinates of the data set, any unit, double precision;
+//   * view space: x right, y up, z = *depth* along the view axis, positive in front, in world units;
+//   * pixels: column x from the left, row y from the *bottom* (as vtkImageData and OpenGL), centres at +0.5.
+// A ray is p(depth) = origin + depth * direction, where direction has unit view-space z. The world length of a depth
+// interval is therefore depth interval * |direction|.
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "vdi/core/Box.h"
+
+namespace vdi {
+
+/// The parameters of vtkCamera that shape a picture (vtkCamera.h has the meaning of each).
+struct Camera {
+  glm::dvec3 position{0.0, 0.0, 1.0};
+  glm::dvec3 focalPoint{0.0, 0.0, 0.0};
+  glm::dvec3 viewUp{0.0, 1.0, 0.0};
+  double viewAngle = 30.0;  // vertical, degrees, in (0, 180); perspective only
+  bool parallelProjection = false;
+  double parallelScale = 1.0;  // half the height of the viewport in world units, > 0; parallel only
+
+  bool operator==(const Camera&) const = default;
+
+  /// The camera turned by `degrees` about the focal point, around the view-up axis made orthogonal to the view
+  /// direction (vtkCamera::Azimuth, positive moves the camera to its own right).
+  Camera azimuth(double degrees) const;
+
+  /// A camera looking along `direction` at the whole of `bounds`, as vtkRenderer::ResetCamera places it.
+  static Camera framing(const Box& bounds, const glm::dvec3& direction, const glm::dvec3& viewUp,
+                        double viewAngle = 30.0);
+};
+
+struct Ray {
+  glm::dvec3 origin;     // world; its depth is 0
+  glm::dvec3 direction;  // world per unit of depth
+};
+
+/// A camera with a viewport of width x height pixels: the orthonormal view basis and the mapping between pixels and
+/// rays. Square pixels; the vertical extent is the camera's, as in VTK.
+class View {
+ public:
+  /// Throws Error{InvalidArgument} for a viewport outside 1 .. 32768, a view angle outside (0, 180), a parallel scale
+  /// <= 0, values that aren't finite, or a position equal to the focal point. A view-up parallel to the view direction
+  /// is replaced by the axis most orthogonal to it.
+  View(const Camera& camera, int width, int height);
+
+  const Camera& camera() const { return camera_; }
+  int width() const { return width_; }
+  int height() const { return height_; }
+  bool parallel() const { return camera_.parallelProjection; }
+
+  const glm::dvec3& right() const { return right_; }      // world, unit
+  const glm::dvec3& up() const { return up_; }            // world, unit
+  const glm::dvec3& forward() const { return forward_; }  // world, unit: the axis of depth
+
+  /// Half the height of the image plane: at depth 1 (perspective) or anywhere (parallel), in world units.
+  double halfHeight() const { return halfHeight_; }
+  double halfWidth() const { return halfHeight_ * width_ / height_; }
+
+  double depthOf(const glm::dvec3& world) const { return glm::dot(world - camera_.position, forward_); }
+  glm::dvec3 toView(const glm::dvec3& world) const;
+
+  /// The ray through pixel coordinates (x, y); the centre of pixel (i, j) is (i + 0.5, j + 0.5).
+  Ray rayThrough(double x, double y) const;
+
+ private:
+  Camera camera_;
+  int width_;
+  int height_;
+  glm::dvec3 right_;
+  glm::dvec3 up_;
+  glm::dvec3 forward_;
+  double halfHeight_;
+};
+
+}  // namespace vdi

@@ -1,0 +1,33 @@
+// What a user chooses about a VDI besides camera and transfer function.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace vdi {
+
+/// How samples become supersegments.
+enum class Algorithm : std::uint32_t {
+  Bisection = 0,  // the paper's: a search for the sensitivity per list (section 2.4)
+};
+
+const char* toString(Algorithm algorithm);  // "bisection"
+/// Throws Error{InvalidArgument} that lists the names there are.
+Algorithm algorithmFromString(const std::string& name);
+
+struct GenerateSettings {
+  int width = 1280;
+  int height = 720;
+  std::uint32_t supersegments = 25;  // N_S, 1 .. 1024
+  double samplesPerVoxel = 1.0;      // [1/64, 64]
+  Algorithm algorithm = Algorithm::Bisection;
+  /// A ray ends once it has accumulated this opacity: (0, 1]; 1 never ends early. What's hidden behind it at V_O is
+  /// missing when seen from V_N.
+  double terminationOpacity = 0.9999;
+  bool operator==(const GenerateSettings&) const = default;
+};
+
+/// Throws Error{InvalidArgument} naming the field, its value and its range.
+void validate(const GenerateSettings& settings);
+
+}  // namespace vdi

@@ -1,0 +1,68 @@
+// Transfer functions: scalar -> colour and opacity per unit distance, as vtkColorTransferFunction and
+// vtkPiecewiseFunction with vtkVolumeProperty::ScalarOpacityUnitDistance.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+namespace vdi {
+
+struct ColorNode {
+  double x = 0.0;          // scalar
+  glm::dvec3 color{0.0};   // straight RGB in [0, 1]
+  bool operator==(const ColorNode&) const = default;
+};
+
+struct OpacityNode {
+  double x = 0.0;        // scalar
+  double opacity = 0.0;  // in [0, 1], accumulated over unitDistance of material
+  bool operator==(const OpacityNode&) const = default;
+};
+
+/// Piecewise linear in both parts, constant beyond the outermost nodes. Two nodes with equal x make a step. Nodes are in
+/// ascending order of x.
+struct TransferFunction {
+  std::vector<ColorNode> colors;
+  std::vector<OpacityNode> opacities;
+  double unitDistance = 1.0;  // world units, > 0
+
+  bool operator==(const TransferFunction&) const = default;
+
+  glm::dvec3 colorAt(double x) const;
+  double opacityAt(double x) const;
+};
+
+/// Throws Error{InvalidArgument}: no nodes, nodes out of order, values outside [0, 1] or not finite, unit distance <= 0.
+void validate(const TransferFunction& transferFunction);
+
+/// One entry of the table that both the reference and the shaders read. `extinction` is -log2(1 - opacity) per unit
+/// distance, so a sample of length d has alpha = 1 - exp2(-extinction * d / unitDistance). Opacity 1 is stored as an
+/// extinction of maxExtinction, which is opaque for any practical length.
+struct TransferTableEntry {
+  float red = 0.0F;
+  float green = 0.0F;
+  float blue = 0.0F;
+  float extinction = 0.0F;
+};
+
+inline constexpr float maxExtinction = 64.0F;
+
+/// The function sampled at `entries.size()` evenly spaced scalars from `min` to `max`, linear in between, clamped
+/// outside. Everything in the library that classifies a scalar does it through this table.
+struct TransferTable {
+  double min = 0.0;
+  double max = 1.0;  // > min
+  double unitDistance = 1.0;
+  std::vector<TransferTableEntry> entries;  // at least 2
+
+  /// NaN and infinite scalars are transparent black.
+  TransferTableEntry lookup(double scalar) const;
+  /// True if some scalar in [lo, hi] has opacity > 0: what empty-space skipping asks.
+  bool visible(double lo, double hi) const;
+};
+
+/// Size: a power of two from 1024 to 16384, large enough for two entries between neighbouring nodes where that's
+/// possible.
+TransferTable bake(const TransferFunction& transferFunction);
+
+}  // namespace vdi

@@ -1,0 +1,79 @@
+// One reusable command buffer with its fence and timestamps. begin, record, submit, wait; then begin again.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace vdi::gpu {
+
+class Buffer;
+class ComputePipeline;
+class Device;
+class Image3D;
+
+struct StageTime {
+  std::string name;
+  double milliseconds = 0.0;
+};
+
+class Commands {
+ public:
+  explicit Commands(std::shared_ptr<Device> device);
+  ~Commands();  // waits for what was submitted
+  Commands(const Commands&) = delete;
+  Commands& operator=(const Commands&) = delete;
+  Commands(Commands&&) = delete;
+  Commands& operator=(Commands&&) = delete;
+
+  void begin();  // waits for the previous submission, then resets
+  void submit();
+  /// Returns when the submission is done. Throws Error{DeviceFailure} on device loss.
+  void wait();
+  void submitAndWait() {
+    submit();
+    wait();
+  }
+
+  template <typename PushConstants>
+  void dispatch(const ComputePipeline& pipeline, const PushConstants& constants, std::uint32_t x, std::uint32_t y = 1,
+                std::uint32_t z = 1) {
+    dispatchBytes(pipeline, std::as_bytes(std::span(&constants, 1)), x, y, z);
+  }
+  void dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
+                     std::uint32_t y, std::uint32_t z);
+
+  /// Everything recorded so far (shader, transfer and host writes) is finished and visible to everything recorded later,
+  /// host reads after wait() included.
+  void barrier();
+
+  void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset, std::uint64_t bytes);
+  void fill(const Buffer& buffer, std::uint32_t word);  // whole buffer
+  /// Image to layout GENERAL, contents undefined. Once after it was made.
+  void prepare(const Image3D& image);
+  /// Tightly packed texels, x fastest, from the buffer into a box of the image.
+  void copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to, const glm::uvec3& texelOffset,
+                   const glm::uvec3& texelExtent);
+
+  /// Marks the start of a named stage on the device's clock; it ends at the next mark, or at submit. Up to 64 a
+  /// submission; ignored where the device has no timestamps.
+  void mark(std::string name);
+  /// Device time of each stage of the last finished submission, in order. Valid after wait().
+  std::vector<StageTime> stageTimes() const;
+
+ private:
+  std::shared_ptr<Device> device_;
+  VkCommandPool pool_ = VK_NULL_HANDLE;
+  VkCommandBuffer buffer_ = VK_NULL_HANDLE;
+  VkFence fence_ = VK_NULL_HANDLE;
+  VkQueryPool queries_ = VK_NULL_HANDLE;
+  std::vector<std::string> marks_;
+  bool submitted_ = false;
+};
+
+}  // namespace vdi::gpu

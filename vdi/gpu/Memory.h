@@ -1,0 +1,106 @@
+// Buffers and 3-D images: RAII, one VkDeviceMemory each (the library makes few and large ones).
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <span>
+
+namespace vdi::gpu {
+
+class Device;
+
+enum class MemoryKind {
+  DeviceLocal,  // storage and transfer, not mapped
+  Upload,       // host-visible and coherent, written by the host in order
+  Readback,     // host-visible, cached where there's such a type; coherent
+};
+
+/// A storage buffer with a device address. Usage: storage, transfer source and destination.
+class Buffer {
+ public:
+  Buffer() = default;
+  /// Size 0 is rounded up to 16 bytes. Throws Error{OutOfMemory} with the figure asked for and the device's size.
+  Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind kind);
+  ~Buffer();
+  Buffer(Buffer&& other) noexcept;
+  Buffer& operator=(Buffer&& other) noexcept;
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+
+  explicit operator bool() const { return buffer_ != VK_NULL_HANDLE; }
+  VkBuffer handle() const { return buffer_; }
+  std::uint64_t size() const { return size_; }
+  VkDeviceAddress address() const { return address_; }
+  /// Mapped memory of Upload and Readback buffers, `size()` bytes; empty for DeviceLocal.
+  std::span<std::byte> mapped() const { return mapped_; }
+  template <typename T>
+  std::span<T> mappedAs() const {
+    return {reinterpret_cast<T*>(mapped_.data()), mapped_.size() / sizeof(T)};
+  }
+
+  /// Makes the buffer hold at least `bytes`: keeps it when it's large enough, else replaces it (contents lost, a half more
+  /// than asked so that slow growth doesn't reallocate every frame). Returns true if it was replaced.
+  bool reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes, MemoryKind kind);
+
+ private:
+  void release() noexcept;
+  std::shared_ptr<Device> device_;
+  VkBuffer buffer_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  std::uint64_t size_ = 0;
+  std::uint64_t allocated_ = 0;
+  VkDeviceAddress address_ = 0;
+  std::span<std::byte> mapped_;
+};
+
+/// A sampled 3-D image with one mip level, optimal tiling, and its view. The layout is GENERAL from the first use on (see
+/// Commands::prepare). Usage: sampled, storage, transfer destination and source.
+class Image3D {
+ public:
+  Image3D() = default;
+  /// Throws Error{OutOfMemory} with the figure, Error{InvalidArgument} for an extent beyond maxImageDimension3D.
+  Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format);
+  ~Image3D();
+  Image3D(Image3D&& other) noexcept;
+  Image3D& operator=(Image3D&& other) noexcept;
+  Image3D(const Image3D&) = delete;
+  Image3D& operator=(const Image3D&) = delete;
+
+  explicit operator bool() const { return image_ != VK_NULL_HANDLE; }
+  VkImage handle() const { return image_; }
+  VkImageView view() const { return view_; }
+  const glm::uvec3& extent() const { return extent_; }
+  VkFormat format() const { return format_; }
+
+ private:
+  void release() noexcept;
+  std::shared_ptr<Device> device_;
+  VkImage image_ = VK_NULL_HANDLE;
+  VkImageView view_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  std::uint64_t allocated_ = 0;
+  glm::uvec3 extent_{0};
+  VkFormat format_ = VK_FORMAT_UNDEFINED;
+};
+
+/// Linear, clamp to edge, normalised coordinates.
+class Sampler {
+ public:
+  explicit Sampler(std::shared_ptr<Device> device);
+  ~Sampler();
+  Sampler(const Sampler&) = delete;
+  Sampler& operator=(const Sampler&) = delete;
+  Sampler(Sampler&&) = delete;
+  Sampler& operator=(Sampler&&) = delete;
+  VkSampler handle() const { return sampler_; }
+
+ private:
+  std::shared_ptr<Device> device_;
+  VkSampler sampler_ = VK_NULL_HANDLE;
+};
+
+}  // namespace vdi::gpu

@@ -1,0 +1,104 @@
+// One frame from end to end: blocks -> sub-VDI -> distribute -> composite -> gather -> VDI (paper, section 5). The only
+// place where gpu, comm and io meet; plugin, adaptor and command line call nothing below it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vdi/comm/Communicator.h"
+#include "vdi/core/Block.h"
+#include "vdi/core/Camera.h"
+#include "vdi/core/GenerateSettings.h"
+#include "vdi/core/Image.h"
+#include "vdi/core/Scene.h"
+#include "vdi/core/TransferFunction.h"
+#include "vdi/core/Vdi.h"
+#include "vdi/gpu/Device.h"
+
+namespace vdi {
+
+/// Wall-clock seconds and bytes of one rank in the last frame.
+struct RankReport {
+  double uploadSeconds = 0.0;
+  double generateSeconds = 0.0;
+  double distributeSeconds = 0.0;
+  double compositeSeconds = 0.0;
+  double gatherSeconds = 0.0;
+  std::uint64_t blocks = 0;
+  std::uint64_t volumeBytes = 0;
+  std::uint64_t subSupersegments = 0;
+  std::uint64_t bytesSent = 0;
+  std::uint64_t deviceBytes = 0;  // device memory held
+};
+
+/// Called on every rank with the share done, 0 .. 1; returns false to ask for an abort, which all ranks then obey
+/// together at the next stage (Error{Cancelled}).
+using Progress = std::function<bool(double)>;
+
+/// Makes VDIs of distributed volumes. Collective throughout: every rank of the communicator makes one, with its own device,
+/// and calls the same functions in the same order. When a call throws, it throws on every rank (Communicator::agree), and
+/// the object stays usable.
+class VdiGenerator {
+ public:
+  VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm);
+  ~VdiGenerator();
+  VdiGenerator(const VdiGenerator&) = delete;
+  VdiGenerator& operator=(const VdiGenerator&) = delete;
+  VdiGenerator(VdiGenerator&&) = delete;
+  VdiGenerator& operator=(VdiGenerator&&) = delete;
+
+  /// This rank's blocks, none included; the scalars are copied to the device before it returns. With `fillGhosts`, missing
+  /// layers are exchanged first (comm/GhostExchange.h). Blocks of the same shapes reuse the device's memory.
+  void setBlocks(std::vector<Block> blocks, bool fillGhosts = true);
+
+  const Scene& scene() const;                  // global
+  const ScalarRange& scalarRange() const;      // global, finite values
+
+  /// The VDI on rank 0, nullopt on the others. Camera, transfer function and settings must be equal on all ranks
+  /// (Error{InvalidArgument} on all of them otherwise). A scene that's empty or out of sight gives a VDI with empty lists.
+  std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
+                              const GenerateSettings& settings, const Progress& progress = {});
+
+  /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0. supersegments and
+  /// algorithm of the settings are ignored.
+  std::optional<Image> renderVolume(const Camera& camera, const TransferFunction& transferFunction,
+                                    const GenerateSettings& settings, const Progress& progress = {});
+
+  /// Of the last generate or renderVolume: all ranks' on rank 0, empty on the others.
+  const std::vector<RankReport>& reports() const;
+  const gpu::Device& device() const;
+  const comm::Communicator& communicator() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Renders a VDI from anywhere, on one device. Not collective.
+class VdiRenderer {
+ public:
+  explicit VdiRenderer(std::shared_ptr<gpu::Device> device);
+  ~VdiRenderer();
+  VdiRenderer(const VdiRenderer&) = delete;
+  VdiRenderer& operator=(const VdiRenderer&) = delete;
+  VdiRenderer(VdiRenderer&&) = delete;
+  VdiRenderer& operator=(VdiRenderer&&) = delete;
+
+  /// Uploads; the host copy isn't needed afterwards.
+  void setVdi(const Vdi& vdi);
+  Image render(const Camera& camera, int width, int height);
+  double renderMilliseconds() const;  // device time of the last render
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The VDI seen from V_O: each list composited front to back, on the host. Equals DVR.
+Image flatten(const Vdi& vdi);
+
+}  // namespace vdi
