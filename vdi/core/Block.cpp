@@ -1,0 +1,112 @@
+#include "vdi/core/Block.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <utility>
+
+#include "vdi/core/Error.h"
+
+namespace vdi {
+
+namespace {
+
+constexpr std::array<std::pair<const char*, std::size_t>, 8> scalarTypes{
+    {{"u8", 1}, {"i8", 1}, {"u16", 2}, {"i16", 2}, {"u32", 4}, {"i32", 4}, {"f32", 4}, {"f64", 8}}};
+
+/// Calls `function` with the data as a pointer to its own type.
+template <typename Function>
+auto withTyped(const Block& block, Function function) {
+  switch (block.type) {
+    case ScalarType::U8: return function(static_cast<const std::uint8_t*>(block.data));
+    case ScalarType::I8: return function(static_cast<const std::int8_t*>(block.data));
+    case ScalarType::U16: return function(static_cast<const std::uint16_t*>(block.data));
+    case ScalarType::I16: return function(static_cast<const std::int16_t*>(block.data));
+    case ScalarType::U32: return function(static_cast<const std::uint32_t*>(block.data));
+    case ScalarType::I32: return function(static_cast<const std::int32_t*>(block.data));
+    case ScalarType::F32: return function(static_cast<const float*>(block.data));
+    case ScalarType::F64: break;
+  }
+  return function(static_cast<const double*>(block.data));
+}
+
+bool finite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+}  // namespace
+
+std::size_t sizeOf(ScalarType type) { return scalarTypes[static_cast<std::size_t>(type)].second; }
+
+const char* toString(ScalarType type) { return scalarTypes[static_cast<std::size_t>(type)].first; }
+
+ScalarType scalarTypeFromString(const std::string& name) {
+  for (std::size_t i = 0; i < scalarTypes.size(); ++i) {
+    if (name == scalarTypes[i].first) return static_cast<ScalarType>(i);
+  }
+  throw Error(ErrorCode::InvalidArgument,
+              "no scalar type '" + name + "'; there are u8, i8, u16, i16, u32, i32, f32 and f64");
+}
+
+Block Block::fromPoints(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing, ScalarType type,
+                        const void* data, const GhostLayers& ghosts) {
+  Block block{dims, origin, spacing, {}, type, data, {}};
+  block.owned.lo = origin + spacing * glm::dvec3(ghosts.lo);
+  block.owned.hi = origin + spacing * glm::dvec3(dims - 1 - ghosts.hi);
+  return block;
+}
+
+Block Block::fromCells(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing, ScalarType type,
+                       const void* data, const GhostLayers& ghosts) {
+  Block block{dims, origin + 0.5 * spacing, spacing, {}, type, data, {}};
+  block.owned.lo = origin + spacing * glm::dvec3(ghosts.lo);
+  block.owned.hi = origin + spacing * glm::dvec3(dims - ghosts.hi);
+  return block;
+}
+
+double valueAt(const Block& block, int i, int j, int k) {
+  assert(i >= 0 && j >= 0 && k >= 0 && i < block.dims.x && j < block.dims.y && k < block.dims.z);
+  const auto row = static_cast<std::size_t>(k) * static_cast<std::size_t>(block.dims.y) + static_cast<std::size_t>(j);
+  const std::size_t index = row * static_cast<std::size_t>(block.dims.x) + static_cast<std::size_t>(i);
+  return withTyped(block, [index](const auto* values) { return static_cast<double>(values[index]); });
+}
+
+ScalarRange finiteRange(const Block& block) {
+  return withTyped(block, [count = block.valueCount()](const auto* values) {
+    ScalarRange range;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto value = static_cast<double>(values[i]);
+      if (!std::isfinite(value)) continue;
+      range.min = std::min(range.min, value);
+      range.max = std::max(range.max, value);
+    }
+    return range;
+  });
+}
+
+void validate(std::span<const Block> blocks) {
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const Block& block = blocks[i];
+    const std::string context = fmt::format("block {}", i);
+    if (glm::any(glm::lessThan(block.dims, glm::ivec3(1)))) {
+      throw Error(ErrorCode::InvalidArgument,
+                  fmt::format("a block needs at least one value per axis, it has {} x {} x {}", block.dims.x,
+                              block.dims.y, block.dims.z),
+                  context);
+    }
+    if (!finite(block.spacing) || glm::any(glm::lessThanEqual(block.spacing, glm::dvec3(0.0)))) {
+      throw Error(ErrorCode::InvalidArgument,
+                  fmt::format("spacing must be finite and > 0, it is ({}, {}, {})", block.spacing.x, block.spacing.y,
+                              block.spacing.z),
+                  context);
+    }
+    const bool ownsNothing = block.owned.empty();
+    if (!finite(block.origin) || (!ownsNothing && (!finite(block.owned.lo) || !finite(block.owned.hi)))) {
+      throw Error(ErrorCode::InvalidArgument, "origin and owned box must be finite", context);
+    }
+    if (block.data == nullptr) throw Error(ErrorCode::InvalidArgument, "a block without data", context);
+  }
+}
+
+}  // namespace vdi

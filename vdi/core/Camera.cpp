@@ -1,0 +1,109 @@
+#include "vdi/core/Camera.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "vdi/core/Error.h"
+
+namespace vdi {
+
+namespace {
+
+constexpr int maxViewportSide = 32768;
+
+bool finite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
+
+/// The up direction made orthogonal to `forward`; any orthogonal direction where `up` doesn't say.
+glm::dvec3 orthogonalUp(const glm::dvec3& up, const glm::dvec3& forward) {
+  const double length = glm::length(up);
+  if (length > 0.0) {
+    const glm::dvec3 unit = up / length;
+    const glm::dvec3 rest = unit - glm::dot(unit, forward) * forward;
+    if (glm::length(rest) > 1e-9) return glm::normalize(rest);
+  }
+  const glm::dvec3 magnitude = glm::abs(forward);
+  glm::dvec3 axis{0.0, 0.0, 1.0};
+  if (magnitude.x <= magnitude.y && magnitude.x <= magnitude.z) {
+    axis = {1.0, 0.0, 0.0};
+  } else if (magnitude.y <= magnitude.z) {
+    axis = {0.0, 1.0, 0.0};
+  }
+  return glm::normalize(axis - glm::dot(axis, forward) * forward);
+}
+
+void validateCamera(const Camera& camera) {
+  if (!finite(camera.position) || !finite(camera.focalPoint) || !finite(camera.viewUp)) {
+    throw Error(ErrorCode::InvalidArgument, "the camera's position, focal point and view-up must be finite");
+  }
+  const double distance = glm::length(camera.focalPoint - camera.position);
+  if (!(distance > 0.0) || !std::isfinite(distance)) {
+    throw Error(ErrorCode::InvalidArgument, "the camera's position equals its focal point");
+  }
+  if (camera.parallelProjection) {
+    if (!(camera.parallelScale > 0.0) || !std::isfinite(camera.parallelScale)) {
+      throw Error(ErrorCode::InvalidArgument,
+                  fmt::format("the parallel scale must be > 0, it is {}", camera.parallelScale));
+    }
+  } else if (!(camera.viewAngle > 0.0 && camera.viewAngle < 180.0)) {
+    throw Error(ErrorCode::InvalidArgument,
+                fmt::format("the view angle must lie in (0, 180) degrees, it is {}", camera.viewAngle));
+  }
+}
+
+}  // namespace
+
+Camera Camera::azimuth(double degrees) const {
+  const glm::dvec3 fromFocal = position - focalPoint;
+  const double distance = glm::length(fromFocal);
+  if (!(distance > 0.0)) return *this;
+  const glm::dvec3 axis = orthogonalUp(viewUp, -fromFocal / distance);
+  const double angle = radians(degrees);
+  // Rodrigues' rotation; fromFocal is orthogonal to the axis.
+  Camera turned = *this;
+  turned.position = focalPoint + std::cos(angle) * fromFocal + std::sin(angle) * glm::cross(axis, fromFocal);
+  turned.viewUp = axis;
+  return turned;
+}
+
+Camera Camera::framing(const Box& bounds, const glm::dvec3& direction, const glm::dvec3& viewUp, double viewAngle) {
+  const double radius = bounds.empty() ? 1.0 : 0.5 * glm::length(bounds.size());
+  const glm::dvec3 center = bounds.empty() ? glm::dvec3(0.0) : bounds.center();
+  Camera camera;
+  camera.focalPoint = center;
+  camera.position = center - glm::normalize(direction) * (radius / std::sin(radians(viewAngle) * 0.5));
+  camera.viewUp = viewUp;
+  camera.viewAngle = viewAngle;
+  camera.parallelScale = radius;
+  return camera;
+}
+
+View::View(const Camera& camera, int width, int height) : camera_(camera), width_(width), height_(height) {
+  if (width < 1 || height < 1 || width > maxViewportSide || height > maxViewportSide) {
+    throw Error(ErrorCode::InvalidArgument,
+                fmt::format("the viewport must be 1 to {} pixels wide and high, it is {} x {}", maxViewportSide, width,
+                            height));
+  }
+  validateCamera(camera);
+  forward_ = glm::normalize(camera.focalPoint - camera.position);
+  up_ = orthogonalUp(camera.viewUp, forward_);
+  right_ = glm::cross(forward_, up_);
+  halfHeight_ = camera.parallelProjection ? camera.parallelScale : std::tan(radians(camera.viewAngle) * 0.5);
+}
+
+glm::dvec3 View::toView(const glm::dvec3& world) const {
+  const glm::dvec3 fromEye = world - camera_.position;
+  return {glm::dot(fromEye, right_), glm::dot(fromEye, up_), glm::dot(fromEye, forward_)};
+}
+
+Ray View::rayThrough(double x, double y) const {
+  const double scale = 2.0 * halfHeight_ / height_;  // square pixels
+  const glm::dvec3 offset = (x - 0.5 * width_) * scale * right_ + (y - 0.5 * height_) * scale * up_;
+  if (parallel()) return {camera_.position + offset, forward_};
+  return {camera_.position, forward_ + offset};
+}
+
+}  // namespace vdi
