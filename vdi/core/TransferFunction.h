@@ -45,7 +45,7 @@ struct TransferTableEntry {
   float extinction = 0.0F;
 };
 
-inline constexpr float maxExtinction = 64.0F;
+inline constexpr float maxExtinction = 65536.0F;
 
 /// The function sampled at `entries.size()` evenly spaced scalars from `min` to `max`, linear in between, clamped
 /// outside. Everything in the library that classifies a scalar does it through this table.

@@ -1,0 +1,32 @@
+// One list from intervals to stored supersegments: search in one dispatch, write in a later one.
+//
+// Needs: push.params.value with sensitivities, counts, offsets, segments, status; void walk().
+
+uint listIndex;
+
+void emitSegment(float front, float back, vec3 color, float opacity);
+#include "optical.glsl"
+#include "segmenter.glsl"
+#include "search.glsl"
+
+void emitSegment(float front, float back, vec3 color, float opacity) {
+  if (search.writing && search.emitted < push.params.value.counts.at[listIndex]) {
+    uint slot = push.params.value.offsets.at[listIndex] + search.emitted;
+    push.params.value.segments.at[slot] = Segment(front, back, color.r, color.g, color.b, opacity);
+  }
+  ++search.emitted;
+}
+
+void searchOrWriteList(bool write) {
+  segmenterStep = push.params.value.step;
+  segmenterCutAtGaps = push.params.value.cutAtGaps != 0u;
+  if (write && push.params.value.counts.at[listIndex] == 0u) return;
+  float known = write ? push.params.value.sensitivities.at[listIndex] : 0.0;
+  SearchResult result = searchList(write, known, push.params.value.budget, push.params.value.runsOnly != 0u);
+  if (write) {
+    if (result.count != push.params.value.counts.at[listIndex]) atomicAdd(push.params.value.status.at[0], 1u);
+  } else {
+    push.params.value.sensitivities.at[listIndex] = result.sensitivity;
+    push.params.value.counts.at[listIndex] = result.count;
+  }
+}

@@ -1,0 +1,85 @@
+// The sensitivity search of vdi/reference/Segmenter.h, and writing with what it found. One function does both, so that
+// the very same instructions count and write.
+//
+// Needs: segmenter.glsl; void walk(): feeds every interval of the list to searchAdd, front to back.
+
+const float smallestSensitivity = 1e-4;
+const float largestSensitivity = 2.0;
+const int mostTries = 22;
+const float goodFill = 0.85;
+const float closeBounds = 1.001;
+
+struct SearchState {
+  bool writing;
+  uint emitted;
+  uint visible;  // intervals that aren't transparent
+  uint runs;
+  float runReach;
+  bool runVisible;
+};
+
+SearchState search;
+
+void walk();
+
+void searchAdd(float front, float back, vec3 color, float opticalDepth) {
+  if (front > search.runReach) search.runVisible = false;
+  if (opticalDepth > 0.0) {
+    ++search.visible;
+    if (!search.runVisible) ++search.runs;
+    search.runVisible = true;
+  }
+  search.runReach = back;
+  segmenterAdd(front, back, color, opticalDepth);
+}
+
+// Walks once. Returns the number of supersegments.
+uint searchTry(float sensitivity) {
+  search.emitted = 0u;
+  search.visible = 0u;
+  search.runs = 0u;
+  search.runReach = -1.0;
+  search.runVisible = false;
+  segmenterBegin(sensitivity);
+  walk();
+  segmenterEnd();
+  return search.emitted;
+}
+
+struct SearchResult {
+  float sensitivity;
+  uint count;
+};
+
+// With `write`, walks once with `known` and lets emitSegment write; else searches. `runsOnly`: no search, one supersegment
+// a run, which is all that a flat image needs (paper, section 5.3).
+SearchResult searchList(bool write, float known, uint budget, bool runsOnly) {
+  search.writing = write;
+  float tooFine = smallestSensitivity;
+  float fits = largestSensitivity;
+  uint most = budget;
+  SearchResult best = SearchResult(largestSensitivity, 0u);
+  float sensitivity = write ? known : runsOnly ? largestSensitivity : smallestSensitivity;
+  // Try 0 is the first one, try 1 the one that always fits, the others bisect. One loop, so that there's one copy of walk.
+  for (int i = 0; i < mostTries + 2; ++i) {
+    uint count = searchTry(sensitivity);
+    if (write || runsOnly) return SearchResult(sensitivity, count);
+    if (i == 0) {
+      most = segmenterCutAtGaps ? max(budget, search.runs) : budget;
+      if (search.visible <= most) return SearchResult(-1.0, search.visible);
+      if (count <= most) return SearchResult(sensitivity, count);
+      sensitivity = largestSensitivity;
+      continue;
+    }
+    if (count <= most) {
+      fits = sensitivity;
+      best = SearchResult(sensitivity, count);
+      if (i > 1 && float(count) >= goodFill * float(most)) break;
+    } else {
+      tooFine = sensitivity;
+    }
+    if (!(fits > closeBounds * tooFine)) break;
+    sensitivity = sqrt(tooFine * fits);
+  }
+  return best;
+}

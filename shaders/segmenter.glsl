@@ -1,0 +1,78 @@
+// How intervals become supersegments, for one sensitivity: the exchangeable piece. The algorithm is
+// segmentWithSensitivity of vdi/reference/Segmenter.cpp, as a state machine that's fed interval by interval.
+//
+// Needs: optical.glsl; void emitSegment(float front, float back, vec3 color, float opacity).
+
+struct SegmenterState {
+  float sensitivity;
+  bool open;
+  float front;
+  float reach;  // end of the last interval absorbed
+  float back;   // end of the last one that isn't transparent
+  vec3 color;
+  float opticalDepth;
+};
+
+SegmenterState segmenter;
+float segmenterStep;      // depth that both sides of Eq. 1 are normalised to
+bool segmenterCutAtGaps;
+
+void segmenterBegin(float sensitivity) {
+  segmenter.sensitivity = sensitivity;
+  segmenter.open = false;
+  segmenter.reach = -1.0;
+  segmenter.opticalDepth = 0.0;
+}
+
+void segmenterClose() {
+  emitSegment(segmenter.front, segmenter.back, segmenter.color, opacityOf(segmenter.opticalDepth));
+  segmenter.open = false;
+}
+
+// (colour, opacity) of `opticalDepth` over `length`, brought to one sample.
+vec4 overOneSample(vec3 color, float opticalDepth, float length) {
+  float whole = opacityOf(opticalDepth);
+  float part = opacityOf(opticalDepth * segmenterStep / length);
+  return vec4(whole > 0.0 ? color * (part / whole) : vec3(0.0), part);
+}
+
+void segmenterAbsorb(float back, vec3 color, float opticalDepth) {
+  segmenter.reach = back;
+  if (!(opticalDepth > 0.0)) return;
+  segmenter.back = back;
+  segmenter.color += (1.0 - opacityOf(segmenter.opticalDepth)) * color;
+  segmenter.opticalDepth = min(segmenter.opticalDepth + opticalDepth, maxOpticalDepth);
+}
+
+void segmenterAdd(float front, float back, vec3 color, float opticalDepth) {
+  if (segmenter.open) {
+    vec4 mine = overOneSample(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front);
+    if (front > segmenter.reach) {
+      // The gap is a transparent sample.
+      if (segmenterCutAtGaps || length(mine) > segmenter.sensitivity) {
+        segmenterClose();
+      } else {
+        segmenter.reach = front;
+        mine = overOneSample(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front);
+      }
+    }
+    if (segmenter.open) {
+      vec4 other = overOneSample(color, opticalDepth, back - front);
+      if (length(mine - other) > segmenter.sensitivity) segmenterClose();
+    }
+  }
+  if (segmenter.open) {
+    segmenterAbsorb(back, color, opticalDepth);
+  } else if (opticalDepth > 0.0) {
+    segmenter.open = true;
+    segmenter.front = front;
+    segmenter.reach = back;
+    segmenter.back = back;
+    segmenter.color = color;
+    segmenter.opticalDepth = opticalDepth;
+  }
+}
+
+void segmenterEnd() {
+  if (segmenter.open) segmenterClose();
+}

@@ -1,0 +1,79 @@
+// Parameters of cast.comp: ray casting the blocks of a rank.
+#ifndef VDI_SHARED_CAST_H
+#define VDI_SHARED_CAST_H
+#include "lists.h"
+#include "volume.h"
+
+#ifndef __cplusplus
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BrickArray { Brick at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer KdNodeArray { KdNode at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer TableArray { TableEntry at[]; };
+#endif
+
+VDI_SHARED_BEGIN
+
+#ifdef __cplusplus
+inline constexpr uint castGroupX = 8;
+inline constexpr uint castGroupY = 8;
+inline constexpr uint castMaxPages = 8;
+inline constexpr uint castModeVolume = 0;
+inline constexpr uint castModeSearch = 1;
+inline constexpr uint castModeWrite = 2;
+#else
+const uint castGroupX = 8;
+const uint castGroupY = 8;
+const uint castMaxPages = 8;
+const uint castModeVolume = 0;  // DVR: colours and depths
+const uint castModeSearch = 1;  // sensitivities and counts
+const uint castModeWrite = 2;   // supersegments
+#endif
+
+struct CastParams {
+  VDI_ADDRESS(BrickArray) bricks;
+  VDI_ADDRESS(KdNodeArray) nodes;  // node 0 is the root
+  VDI_ADDRESS(TableArray) table;
+  VDI_ADDRESS(FloatArray) sensitivities;  // [h][w]
+  VDI_ADDRESS(UintArray) counts;          // [h][w]
+  VDI_ADDRESS(UintArray) offsets;         // [h][w], exclusive prefix sum of counts
+  VDI_ADDRESS(SegmentArray) segments;     // compact
+  VDI_ADDRESS(Vec4Array) colors;          // [h][w], premultiplied
+  VDI_ADDRESS(FloatArray) depths;         // [h][w]
+  VDI_ADDRESS(UintArray) status;          // [1]: lists whose written count differs from the stored one
+  // Ray of pixel (x, y): start = startBase + u * startRight + v * startUp, direction likewise, with u = x + 0.5 - w/2 and
+  // v = y + 0.5 - h/2. Start: at the front of the sample lattice, relative to the scene's centre.
+  vec3 startBase;
+  float step;  // depth between samples
+  vec3 startRight;
+  float first;  // depth of the lattice's front
+  vec3 startUp;
+  float perUnitDistance;  // step / unit distance
+  vec3 directionBase;
+  float enough;  // optical depth at which a ray ends
+  vec3 directionRight;
+  float coordinateError;  // bound on the rounding error of a position
+  vec3 directionUp;
+  uint sampleCount;
+  uint width;
+  uint height;
+  uint budget;
+  uint tableSize;
+  uint cutAtGaps;
+  uint runsOnly;
+  uint nodeCount;  // 0: no bricks
+};
+
+#ifndef __cplusplus
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer CastParamsRef { CastParams value; };
+#endif
+
+struct CastConstants {
+  VDI_ADDRESS(CastParamsRef) params;
+  uint mode;
+  uint firstRow;  // of the band of rows that this dispatch covers
+  uint lastRow;
+  uint pad;
+};
+
+VDI_SHARED_END
+
+#endif

@@ -1,0 +1,31 @@
+// Parameters of scan.comp: exclusive prefix sums, level by level.
+#ifndef VDI_SHARED_SCAN_H
+#define VDI_SHARED_SCAN_H
+#include "lists.h"
+
+VDI_SHARED_BEGIN
+
+#ifdef __cplusplus
+inline constexpr uint scanGroup = 256;
+inline constexpr uint scanPerThread = 8;
+inline constexpr uint scanModeSum = 0;
+inline constexpr uint scanModeAdd = 1;
+#else
+const uint scanGroup = 256;
+const uint scanPerThread = 8;
+const uint scanModeSum = 0;  // values -> prefix within each workgroup's part, sums[group] = total of the part
+const uint scanModeAdd = 1;  // prefix += sums[group], sums being scanned by then
+#endif
+
+struct ScanConstants {
+  VDI_ADDRESS(UintArray) values;
+  VDI_ADDRESS(UintArray) prefix;  // count + 1 entries at the lowest level
+  VDI_ADDRESS(UintArray) sums;
+  VDI_ADDRESS(UintArray) overflow;  // [1], set to 1 when a total doesn't fit 32 bits
+  uint count;
+  uint mode;
+};
+
+VDI_SHARED_END
+
+#endif

@@ -1,0 +1,44 @@
+// A rank's blocks on the device, as vdi/gpu/VolumeStore lays them out.
+#ifndef VDI_SHARED_VOLUME_H
+#define VDI_SHARED_VOLUME_H
+#include "interop.h"
+
+VDI_SHARED_BEGIN
+
+// A box of samples that one piece of one texture page serves. Positions are relative to the scene's centre, snapped to
+// the scene's lattice (core/Scene.h).
+struct Brick {
+  vec3 lo;           // owned, half-open
+  float tableScale;  // table position = (texel value - tableOrigin) * tableScale
+  vec3 hi;
+  float tableOrigin;
+  vec3 texelScale;  // normalised texture coordinate = position * texelScale + texelOffset
+  uint page;
+  vec3 texelOffset;
+  uint piece;  // of vdi/gpu/VolumeStore; the shaders don't read it
+  vec3 texelLo;  // centre of the outermost texels: coordinates are clamped to these
+  uint pad0;
+  vec3 texelHi;
+  uint pad1;
+};
+
+// Node of a kd-tree over bricks. Inner: samples with p[axis] < split lie in child `first`, the others in `first + 1`.
+// Leaf: axis == 3, bricks [first, first + count); count is 0 or 1.
+struct KdNode {
+  float split;
+  uint axis;
+  uint first;
+  uint count;
+};
+
+// TransferTableEntry of core/TransferFunction.h.
+struct TableEntry {
+  float red;
+  float green;
+  float blue;
+  float extinction;
+};
+
+VDI_SHARED_END
+
+#endif

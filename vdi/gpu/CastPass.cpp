@@ -1,0 +1,74 @@
+#include "vdi/gpu/CastPass.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+
+#include "vdi/core/Scene.h"
+#include "vdi/gpu/VolumeStore.h"
+
+namespace vdi::gpu {
+
+shared::CastParams castGeometry(const Scene& scene, const View& view, const DepthLattice& lattice) {
+  shared::CastParams params{};
+  const Ray middle = view.rayThrough(0.5 * view.width(), 0.5 * view.height());
+  const Ray right = view.rayThrough(0.5 * view.width() + 1.0, 0.5 * view.height());
+  const Ray up = view.rayThrough(0.5 * view.width(), 0.5 * view.height() + 1.0);
+  const auto start = [&](const Ray& ray) { return ray.origin + lattice.first * ray.direction; };
+  params.startBase = start(middle) - scene.bounds.center();
+  params.startRight = start(right) - start(middle);
+  params.startUp = start(up) - start(middle);
+  params.directionBase = middle.direction;
+  params.directionRight = right.direction - middle.direction;
+  params.directionUp = up.direction - middle.direction;
+  params.step = static_cast<float>(lattice.step);
+  params.first = static_cast<float>(lattice.first);
+  params.sampleCount = lattice.count;
+  params.width = static_cast<std::uint32_t>(view.width());
+  params.height = static_cast<std::uint32_t>(view.height());
+  // A position is the sum of a start and a depth times a direction, each rounded to 24 bits.
+  const glm::dvec3 half = 0.5 * scene.bounds.size();
+  const double reach = glm::length(glm::dvec3(params.startBase)) + lattice.count * lattice.step +
+                       glm::length(half) + std::max(view.width(), view.height()) * glm::length(params.startRight);
+  params.coordinateError = static_cast<float>(reach * 0x1p-21);
+  return params;
+}
+
+CastPass::CastPass(std::shared_ptr<Device> device) : device_(std::move(device)), sampler_(device_) {}
+
+void CastPass::bind(const VolumeStore& volume) {
+  const std::size_t pageCount = volume.pages().size();
+  assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
+  if (bound_ != nullptr && boundVersion_ == volume.pagesVersion()) return;
+  Pipelines& pipelines = pipelines_[pageCount];
+  if (!pipelines.volume) {
+    const auto make = [&](bool volumeOnly) {
+      ComputePipelineInfo info;
+      info.shader = "cast";
+      info.pushConstantBytes = sizeof(shared::CastConstants);
+      info.imageCount = shared::castMaxPages;
+      info.specialization = {volumeOnly ? 1U : 0U, static_cast<std::uint32_t>(pageCount)};
+      return std::make_unique<ComputePipeline>(device_, info);
+    };
+    pipelines.volume = make(true);
+    pipelines.lists = make(false);
+  }
+  std::array<const Image3D*, shared::castMaxPages> images{};
+  for (std::size_t i = 0; i < images.size(); ++i) images[i] = &volume.pages()[std::min(i, pageCount - 1)];
+  pipelines.volume->bindImages(images, sampler_);
+  pipelines.lists->bindImages(images, sampler_);
+  bound_ = &pipelines;
+  boundVersion_ = volume.pagesVersion();
+}
+
+void CastPass::record(Commands& commands, VkDeviceAddress params, std::uint32_t mode, std::uint32_t width,
+                      std::uint32_t firstRow, std::uint32_t lastRow) const {
+  assert(bound_ != nullptr && firstRow < lastRow);
+  const shared::CastConstants constants{params, mode, firstRow, lastRow, 0};
+  const ComputePipeline& pipeline = mode == shared::castModeVolume ? *bound_->volume : *bound_->lists;
+  commands.dispatch(pipeline, constants, (width + shared::castGroupX - 1) / shared::castGroupX,
+                    (lastRow - firstRow + shared::castGroupY - 1) / shared::castGroupY);
+}
+
+}  // namespace vdi::gpu

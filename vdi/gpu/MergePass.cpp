@@ -1,0 +1,23 @@
+#include "vdi/gpu/MergePass.h"
+
+namespace vdi::gpu {
+
+namespace {
+
+ComputePipelineInfo pipelineInfo() {
+  ComputePipelineInfo info;
+  info.shader = "merge";
+  info.pushConstantBytes = sizeof(shared::MergeConstants);
+  return info;
+}
+
+}  // namespace
+
+MergePass::MergePass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
+
+void MergePass::record(Commands& commands, const shared::MergeConstants& constants) const {
+  commands.dispatch(pipeline_, constants,
+                    (constants.listCount + shared::compositeGroup - 1) / shared::compositeGroup);
+}
+
+}  // namespace vdi::gpu

@@ -1,0 +1,22 @@
+// Dispatches merge.comp: the ranks' sub-supersegments of each list in order of depth.
+#pragma once
+
+#include <memory>
+
+#include "shaders/shared/composite.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/ComputePipeline.h"
+
+namespace vdi::gpu {
+
+class MergePass {
+ public:
+  explicit MergePass(std::shared_ptr<Device> device);
+  /// constants.mode: mergeModeCount, then (after a scan) mergeModeMerge.
+  void record(Commands& commands, const shared::MergeConstants& constants) const;
+
+ private:
+  ComputePipeline pipeline_;
+};
+
+}  // namespace vdi::gpu

@@ -1,0 +1,375 @@
+#include "vdi/gpu/VolumeStore.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <numeric>
+#include <tuple>
+
+#include "shaders/shared/cast.h"
+#include "vdi/core/Error.h"
+#include "vdi/gpu/Device.h"
+#include "vdi/gpu/KdTree.h"
+
+namespace vdi::gpu {
+
+namespace {
+
+constexpr std::uint64_t stagingBytes = 64ULL << 20;
+
+std::uint64_t texelBytes(VkFormat format) {
+  if (format == VK_FORMAT_R8_UNORM) return 1;
+  return format == VK_FORMAT_R16_UNORM ? 2 : 4;
+}
+
+std::uint64_t volumeOf(const glm::uvec3& extent) { return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z; }
+
+/// `count` values as texels: the unsigned integer formats shift signed values up, the float format is relative to the
+/// block's range (valueOffset, valueScale) except for f32, which is stored as it is.
+template <typename From, typename To, typename Convert>
+void convertRow(const void* from, std::size_t first, std::size_t count, std::byte* to, Convert convert) {
+  const auto* values = static_cast<const From*>(from) + first;
+  auto* texels = reinterpret_cast<To*>(to);
+  for (std::size_t i = 0; i < count; ++i) texels[i] = convert(values[i]);
+}
+
+void writeRow(const Block& block, VkFormat format, double offset, double scale, std::size_t first, std::size_t count,
+              std::byte* to) {
+  const auto relative = [offset, scale](auto value) {
+    return static_cast<float>((static_cast<double>(value) - offset) / scale);
+  };
+  const bool wide = format == VK_FORMAT_R16_UNORM;
+  using U8 = std::uint8_t;
+  using U16 = std::uint16_t;
+  switch (block.type) {
+    case ScalarType::U8:
+      if (wide) {
+        return convertRow<U8, U16>(block.data, first, count, to, [](U8 v) { return static_cast<U16>(v * 257); });
+      }
+      std::memcpy(to, static_cast<const U8*>(block.data) + first, count);
+      return;
+    case ScalarType::I8:
+      if (wide) {
+        return convertRow<std::int8_t, U16>(block.data, first, count, to,
+                                            [](std::int8_t v) { return static_cast<U16>((v + 128) * 257); });
+      }
+      return convertRow<std::int8_t, U8>(block.data, first, count, to,
+                                         [](std::int8_t v) { return static_cast<U8>(v + 128); });
+    case ScalarType::U16: std::memcpy(to, static_cast<const U16*>(block.data) + first, count * 2); return;
+    case ScalarType::I16:
+      return convertRow<std::int16_t, U16>(block.data, first, count, to,
+                                           [](std::int16_t v) { return static_cast<U16>(v + 32768); });
+    case ScalarType::F32: std::memcpy(to, static_cast<const float*>(block.data) + first, count * 4); return;
+    case ScalarType::U32: return convertRow<std::uint32_t, float>(block.data, first, count, to, relative);
+    case ScalarType::I32: return convertRow<std::int32_t, float>(block.data, first, count, to, relative);
+    case ScalarType::F64: return convertRow<double, float>(block.data, first, count, to, relative);
+  }
+}
+
+/// value = texel * scale + offset for the normalised formats and for f32.
+struct ValueMap {
+  double scale = 1.0;
+  double offset = 0.0;
+};
+
+ValueMap valueMapOf(const Block& block) {
+  switch (block.type) {
+    case ScalarType::U8: return {255.0, 0.0};
+    case ScalarType::I8: return {255.0, -128.0};
+    case ScalarType::U16: return {65535.0, 0.0};
+    case ScalarType::I16: return {65535.0, -32768.0};
+    case ScalarType::F32: return {};
+    case ScalarType::U32:
+    case ScalarType::I32:
+    case ScalarType::F64: break;
+  }
+  const ScalarRange range = finiteRange(block);
+  if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0};
+  return {range.max - range.min, range.min};
+}
+
+/// Places boxes of one format into pages: rows of boxes along x, rows beside each other along y, layers on top of each other
+/// along z. Boxes come in descending order of height, so blocks of one shape, the usual case, waste next to nothing.
+class Packer {
+ public:
+  Packer(std::uint32_t side, std::uint32_t maxDepth, std::uint64_t maxTexels)
+      : side_(side), maxDepth_(std::min<std::uint64_t>(maxDepth, maxTexels / (std::uint64_t{side} * side))) {}
+
+  /// False when the page is full.
+  bool place(const glm::uvec3& dims, glm::uvec3& at) {
+    if (cursor_.x + dims.x > side_) {
+      cursor_ = {0, cursor_.y + rowHeight_, cursor_.z};
+      rowHeight_ = 0;
+    }
+    if (cursor_.y + dims.y > side_) {
+      cursor_ = {0, 0, cursor_.z + layerDepth_};
+      rowHeight_ = 0;
+      layerDepth_ = 0;
+    }
+    if (cursor_.z + dims.z > maxDepth_) return false;
+    at = cursor_;
+    cursor_.x += dims.x;
+    rowHeight_ = std::max(rowHeight_, dims.y);
+    layerDepth_ = std::max(layerDepth_, dims.z);
+    used_ = glm::max(used_, at + dims);
+    return true;
+  }
+  const glm::uvec3& used() const { return used_; }
+
+ private:
+  std::uint32_t side_;
+  std::uint64_t maxDepth_;
+  glm::uvec3 cursor_{0};
+  std::uint32_t rowHeight_ = 0;
+  std::uint32_t layerDepth_ = 0;
+  glm::uvec3 used_{0};
+};
+
+}  // namespace
+
+VolumeStore::VolumeStore(std::shared_ptr<Device> device) : device_(std::move(device)), commands_(device_) {}
+
+VkFormat VolumeStore::formatOf(ScalarType type) const {
+  switch (sizeOf(type)) {
+    case 1: return device_->isCpu() ? VK_FORMAT_R16_UNORM : VK_FORMAT_R8_UNORM;
+    case 2: return VK_FORMAT_R16_UNORM;
+    default: return VK_FORMAT_R32_SFLOAT;
+  }
+}
+
+/// Pieces overlap by one value, so that each interpolates by itself.
+std::vector<VolumeStore::Piece> VolumeStore::cut(const Block& block) const {
+  const VkFormat format = formatOf(block.type);
+  const std::uint64_t maxTexels = device_->limits().maxAllocationBytes / texelBytes(format) / 2;
+  glm::uvec3 largest = glm::min(glm::uvec3(block.dims), glm::uvec3(device_->limits().maxImageDimension3D));
+  while (volumeOf(largest) > maxTexels) {
+    const int axis = largest.z >= largest.x && largest.z >= largest.y ? 2 : largest.y >= largest.x ? 1 : 0;
+    largest[axis] = (largest[axis] + 1) / 2;
+  }
+  const ValueMap map = valueMapOf(block);
+  std::vector<Piece> pieces;
+  const glm::ivec3 stride = glm::max(glm::ivec3(largest) - 1, glm::ivec3(1));
+  for (int z = 0; z == 0 || z < block.dims.z - 1; z += stride.z) {
+    for (int y = 0; y == 0 || y < block.dims.y - 1; y += stride.y) {
+      for (int x = 0; x == 0 || x < block.dims.x - 1; x += stride.x) {
+        const glm::ivec3 first{x, y, z};
+        const glm::uvec3 dims = glm::min(largest, glm::uvec3(block.dims - first));
+        pieces.push_back({&block, first, dims, format, 0, {}, map.scale, map.offset});
+      }
+    }
+  }
+  return pieces;
+}
+
+void VolumeStore::pack(std::vector<Piece>& pieces) {
+  const bool sameShapes =
+      pieces.size() == pieces_.size() &&
+      std::equal(pieces.begin(), pieces.end(), pieces_.begin(),
+                 [](const Piece& a, const Piece& b) { return a.samePlaceAs(b); });
+  if (sameShapes) {
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      pieces[i].page = pieces_[i].page;
+      pieces[i].place = pieces_[i].place;
+    }
+    return;
+  }
+  pages_.clear();
+  ++pagesVersion_;
+  std::vector<std::size_t> order(pieces.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    const auto key = [&](std::size_t i) {
+      return std::tuple(pieces[i].format, ~pieces[i].dims.z, ~pieces[i].dims.y, ~pieces[i].dims.x);
+    };
+    return key(a) < key(b);
+  });
+  for (std::size_t begin = 0; begin < order.size();) {
+    const VkFormat format = pieces[order[begin]].format;
+    std::size_t end = begin;
+    std::uint64_t texels = 0;
+    std::uint32_t widest = 1;
+    for (; end < order.size() && pieces[order[end]].format == format; ++end) {
+      const glm::uvec3& dims = pieces[order[end]].dims;
+      texels += volumeOf(dims);
+      widest = std::max({widest, dims.x, dims.y});
+    }
+    const auto cube = static_cast<std::uint32_t>(std::ceil(std::cbrt(static_cast<double>(texels))));
+    const std::uint32_t side =
+        std::min((std::max(cube, widest) + widest - 1) / widest * widest, device_->limits().maxImageDimension3D);
+    const std::uint64_t maxTexels = device_->limits().maxAllocationBytes / texelBytes(format);
+    while (begin < end) {
+      Packer packer(side, device_->limits().maxImageDimension3D, maxTexels);
+      const std::size_t pageBegin = begin;
+      while (begin < end && packer.place(pieces[order[begin]].dims, pieces[order[begin]].place)) {
+        pieces[order[begin]].page = static_cast<std::uint32_t>(pages_.size());
+        ++begin;
+      }
+      if (begin == pageBegin || pages_.size() == shared::castMaxPages) {
+        throw Error(ErrorCode::OutOfMemory,
+                    fmt::format("{} MiB of volume don't fit {} textures", texels * texelBytes(format) >> 20,
+                                shared::castMaxPages),
+                    device_->name());
+      }
+      pages_.emplace_back(device_, packer.used(), format);
+    }
+  }
+}
+
+/// Texels of a box of the piece, tightly packed.
+void VolumeStore::writeBox(const Piece& piece, const glm::uvec3& at, const glm::uvec3& box, std::byte* to) {
+  const Block& block = *piece.block;
+  const std::uint64_t rowBytes = box.x * texelBytes(piece.format);
+  const auto blockDims = glm::u64vec3(block.dims);
+  const glm::u64vec3 start = glm::u64vec3(piece.first) + glm::u64vec3(at);
+  for (std::uint32_t z = 0; z < box.z; ++z) {
+    for (std::uint32_t y = 0; y < box.y; ++y) {
+      const std::uint64_t first = ((start.z + z) * blockDims.y + start.y + y) * blockDims.x + start.x;
+      writeRow(block, piece.format, piece.valueOffset, piece.valueScale, first, box.x, to);
+      to += rowBytes;
+    }
+  }
+}
+
+void VolumeStore::upload(std::span<const Piece> pieces) {
+  staging_.reserve(device_, stagingBytes, MemoryKind::Upload);
+  commands_.begin();
+  for (const Image3D& page : pages_) commands_.prepare(page);
+  commands_.barrier();
+  std::uint64_t filled = 0;
+  const auto flush = [&] {
+    commands_.submitAndWait();
+    commands_.begin();
+    filled = 0;
+  };
+  for (const Piece& piece : pieces) {
+    const std::uint64_t bytes = texelBytes(piece.format);
+    const std::uint64_t rowBytes = piece.dims.x * bytes;
+    const std::uint64_t sliceBytes = rowBytes * piece.dims.y;
+    // As many whole slices at a time as the staging buffer has room for, or as many whole rows of one slice. Vulkan wants
+    // offsets in multiples of 4.
+    glm::uvec3 at{0};
+    while (at.z < piece.dims.z) {
+      filled = (filled + 3) / 4 * 4;
+      const bool slices = at.y == 0 && sliceBytes <= staging_.size();
+      if (filled + (slices ? sliceBytes : rowBytes) > staging_.size()) flush();
+      const std::uint64_t room = staging_.size() - filled;
+      glm::uvec3 box{piece.dims.x, piece.dims.y, 1};
+      if (slices) {
+        box.z = static_cast<std::uint32_t>(std::min<std::uint64_t>(piece.dims.z - at.z, room / sliceBytes));
+      } else {
+        box.y = static_cast<std::uint32_t>(std::min<std::uint64_t>(piece.dims.y - at.y, room / rowBytes));
+      }
+      writeBox(piece, at, box, staging_.mapped().data() + filled);
+      commands_.copyToImage(staging_, filled, pages_[piece.page], piece.place + at, box);
+      filled += rowBytes * box.y * box.z;
+      at.y += box.y;
+      if (at.y == piece.dims.y) at = {0, 0, at.z + box.z};
+    }
+  }
+  commands_.barrier();
+  commands_.submitAndWait();
+}
+
+void VolumeStore::layBricks(std::span<const Block> blocks, std::span<const PieceRange> piecesOf, const Scene& scene) {
+  const glm::dvec3 center = scene.bounds.center();
+  std::vector<shared::Brick> bricks;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const Block& block = blocks[i];
+    for (std::uint32_t index = piecesOf[i].first; index < piecesOf[i].last; ++index) {
+      const Piece& piece = pieces_[index];
+      shared::Brick brick{};
+      brick.page = piece.page;
+      brick.piece = index;
+      const glm::dvec3 extent = glm::dvec3(pages_[piece.page].extent());
+      const glm::dvec3 pieceOrigin = block.origin + glm::dvec3(piece.first) * block.spacing;
+      for (int axis = 0; axis < 3; ++axis) {
+        // An owned box may reach beyond the outermost values (cells do); only inner cuts bound a piece.
+        double lo = block.owned.lo[axis];
+        double hi = block.owned.hi[axis];
+        if (piece.first[axis] > 0) lo = std::max(lo, pieceOrigin[axis]);
+        const auto end = piece.first[axis] + static_cast<int>(piece.dims[axis]);
+        if (end < block.dims[axis]) hi = std::min(hi, pieceOrigin[axis] + (piece.dims[axis] - 1) * block.spacing[axis]);
+        brick.lo[axis] = snapToScene(scene, lo, axis);
+        brick.hi[axis] = snapToScene(scene, hi, axis);
+        const double scale = 1.0 / (block.spacing[axis] * extent[axis]);
+        brick.texelScale[axis] = static_cast<float>(scale);
+        brick.texelOffset[axis] = static_cast<float>((center[axis] - pieceOrigin[axis]) * scale +
+                                                     (piece.place[axis] + 0.5) / extent[axis]);
+        brick.texelLo[axis] = static_cast<float>((piece.place[axis] + 0.5) / extent[axis]);
+        brick.texelHi[axis] = static_cast<float>((piece.place[axis] + piece.dims[axis] - 0.5) / extent[axis]);
+      }
+      if (glm::all(glm::lessThan(brick.lo, brick.hi))) bricks.push_back(brick);
+    }
+  }
+  KdTree tree = buildKdTree(std::move(bricks));
+  tree_ = std::move(tree.nodes);
+  bricks_ = std::move(tree.bricks);
+  pieceOfBrick_.clear();
+  for (const shared::Brick& brick : bricks_) pieceOfBrick_.push_back(brick.piece);
+  nodeBuffer_.reserve(device_, std::span(tree_).size_bytes(), MemoryKind::Upload);
+  if (!tree_.empty()) std::memcpy(nodeBuffer_.mapped().data(), tree_.data(), std::span(tree_).size_bytes());
+}
+
+void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
+  validate(blocks);
+  tree_.clear();
+  bricks_.clear();
+  try {
+    std::vector<Piece> pieces;
+    std::vector<PieceRange> piecesOf;  // of each block
+    // Blocks that share their values (the parts of a box with holes) share their pieces.
+    std::map<std::tuple<const void*, double, double, double>, PieceRange> known;
+    for (const Block& block : blocks) {
+      PieceRange range;
+      if (!block.owned.empty()) {
+        const std::tuple key(block.data, block.origin.x, block.origin.y, block.origin.z);
+        const auto [place, isNew] = known.try_emplace(key);
+        if (isNew) {
+          const std::vector<Piece> parts = cut(block);
+          place->second.first = static_cast<std::uint32_t>(pieces.size());
+          pieces.insert(pieces.end(), parts.begin(), parts.end());
+          place->second.last = static_cast<std::uint32_t>(pieces.size());
+        }
+        range = place->second;
+      }
+      piecesOf.push_back(range);
+    }
+    pack(pieces);
+    pieces_ = std::move(pieces);
+    if (!pieces_.empty()) upload(pieces_);
+    layBricks(blocks, piecesOf, scene);
+    if (!table_.entries.empty()) placeTable();
+  } catch (...) {
+    pages_.clear();
+    pieces_.clear();
+    tree_.clear();
+    bricks_.clear();
+    ++pagesVersion_;
+    throw;
+  }
+  for (Piece& piece : pieces_) piece.block = nullptr;  // not ours beyond this call
+}
+
+void VolumeStore::setTable(const TransferTable& table) {
+  table_ = table;
+  const auto bytes = std::span(table_.entries).size_bytes();
+  tableBuffer_.reserve(device_, bytes, MemoryKind::Upload);
+  std::memcpy(tableBuffer_.mapped().data(), table_.entries.data(), bytes);
+  placeTable();
+}
+
+void VolumeStore::placeTable() {
+  const double perScalar = static_cast<double>(table_.entries.size() - 1) / (table_.max - table_.min);
+  for (std::size_t i = 0; i < bricks_.size(); ++i) {
+    const Piece& piece = pieces_[pieceOfBrick_[i]];
+    bricks_[i].tableOrigin = static_cast<float>((table_.min - piece.valueOffset) / piece.valueScale);
+    bricks_[i].tableScale = static_cast<float>(piece.valueScale * perScalar);
+  }
+  brickBuffer_.reserve(device_, std::span(bricks_).size_bytes(), MemoryKind::Upload);
+  if (!bricks_.empty()) std::memcpy(brickBuffer_.mapped().data(), bricks_.data(), std::span(bricks_).size_bytes());
+}
+
+}  // namespace vdi::gpu

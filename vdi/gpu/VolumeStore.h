@@ -1,0 +1,89 @@
+// A rank's blocks and the transfer table on the device. Blocks are packed into a few 3-D textures ("pages"), so that any
+// number of them costs no descriptors.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "shaders/shared/volume.h"
+#include "vdi/core/Block.h"
+#include "vdi/core/Scene.h"
+#include "vdi/core/TransferFunction.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/Memory.h"
+
+namespace vdi::gpu {
+
+class Device;
+
+class VolumeStore {
+ public:
+  explicit VolumeStore(std::shared_ptr<Device> device);
+
+  /// Copies the scalars to the device; host data isn't needed afterwards. Pages are kept when the blocks' shapes and types
+  /// are those of the last call. 8-bit data takes 1 byte a value (2 on a CPU device, whose 8-bit filter rounds to 8 bits),
+  /// 16-bit data 2, all other types 4 (u32, i32 and f64 relative to the block's own range). Throws Error: OutOfMemory
+  /// with figures; InvalidArgument for overlapping blocks or too many pages. After a throw the store is empty.
+  void setBlocks(std::span<const Block> blocks, const Scene& scene);
+
+  /// Cheap when the table is the one of the last call.
+  void setTable(const TransferTable& table);
+
+  bool empty() const { return tree_.empty(); }
+  std::uint32_t nodeCount() const { return static_cast<std::uint32_t>(tree_.size()); }
+  std::uint32_t tableSize() const { return static_cast<std::uint32_t>(table_.entries.size()); }
+  VkDeviceAddress bricks() const { return brickBuffer_.address(); }
+  VkDeviceAddress nodes() const { return nodeBuffer_.address(); }
+  VkDeviceAddress table() const { return tableBuffer_.address(); }
+  std::span<const Image3D> pages() const { return pages_; }
+  /// Changes whenever pages were made anew: descriptor sets that name them must be written again.
+  std::uint64_t pagesVersion() const { return pagesVersion_; }
+
+ private:
+  /// A box of a block's values that fits one page.
+  struct Piece {
+    const Block* block = nullptr;
+    glm::ivec3 first{0};  // index of its first value in the block
+    glm::uvec3 dims{0};
+    VkFormat format = VK_FORMAT_UNDEFINED;
+    std::uint32_t page = 0;
+    glm::uvec3 place{0};        // in the page, texels
+    double valueScale = 1.0;    // value = texel * valueScale + valueOffset
+    double valueOffset = 0.0;
+    bool samePlaceAs(const Piece& other) const {
+      return dims == other.dims && format == other.format;
+    }
+  };
+
+  /// Pieces [first, last) are a block's.
+  struct PieceRange {
+    std::uint32_t first = 0;
+    std::uint32_t last = 0;
+  };
+
+  VkFormat formatOf(ScalarType type) const;
+  std::vector<Piece> cut(const Block& block) const;
+  void pack(std::vector<Piece>& pieces);
+  void upload(std::span<const Piece> pieces);
+  static void writeBox(const Piece& piece, const glm::uvec3& at, const glm::uvec3& box, std::byte* to);
+  void layBricks(std::span<const Block> blocks, std::span<const PieceRange> piecesOf, const Scene& scene);
+  void placeTable();
+
+  std::shared_ptr<Device> device_;
+  Commands commands_;
+  Buffer staging_;
+  std::vector<Image3D> pages_;
+  std::uint64_t pagesVersion_ = 0;
+  std::vector<Piece> pieces_;
+  std::vector<shared::Brick> bricks_;      // leaves; table fields are filled by placeTable
+  std::vector<std::uint32_t> pieceOfBrick_;
+  std::vector<shared::KdNode> tree_;
+  TransferTable table_;
+  Buffer brickBuffer_;
+  Buffer nodeBuffer_;
+  Buffer tableBuffer_;
+};
+
+}  // namespace vdi::gpu
