@@ -61,12 +61,15 @@ class Commands {
                    const glm::uvec3& texelExtent);
 
   /// Marks the start of a named stage on the device's clock; it ends at the next mark, or at submit. Up to 64 a
-  /// submission; ignored where the device has no timestamps.
+  /// submission.
   void mark(std::string name);
   /// Device time of each stage of the last finished submission, in order. Valid after wait().
   std::vector<StageTime> stageTimes() const;
 
  private:
+  void release() noexcept;
+  void writeTimestamp(std::uint32_t query);
+
   std::shared_ptr<Device> device_;
   VkCommandPool pool_ = VK_NULL_HANDLE;
   VkCommandBuffer buffer_ = VK_NULL_HANDLE;

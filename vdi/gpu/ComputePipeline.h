@@ -44,6 +44,10 @@ class ComputePipeline {
   VkDescriptorSet descriptorSet() const { return set_; }  // VK_NULL_HANDLE without images
 
  private:
+  void makeDescriptorSet();
+  void makePipeline(const ComputePipelineInfo& info);
+  void release() noexcept;
+
   std::shared_ptr<Device> device_;
   std::uint32_t imageCount_ = 0;
   VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;

@@ -4,6 +4,7 @@
 #include <vulkan/vulkan.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -24,13 +25,13 @@ struct DeviceLimits {
   std::uint64_t memoryBytes = 0;         // of the largest device-local heap
   std::uint64_t maxAllocationBytes = 0;  // VkPhysicalDeviceMaintenance3Properties / 4
   std::uint32_t maxImageDimension3D = 0;
-  float timestampPeriodNs = 0.0F;        // 0: no timestamps
+  float timestampPeriodNs = 0.0F;
 };
 
 class Device {
  public:
   /// Throws Error{DeviceUnavailable}; the text lists every device of the machine and why it was refused, or that there's
-  /// no Vulkan driver at all. What's demanded: Vulkan 1.3, compute queue, bufferDeviceAddress, scalarBlockLayout,
+  /// no Vulkan driver at all. What's demanded: Vulkan 1.3, a compute queue with timestamps, hostQueryReset, bufferDeviceAddress, scalarBlockLayout,
   /// shaderInt64, timelineSemaphore, synchronization2, maintenance4, linear filtering of 3-D R32_SFLOAT, R16_UNORM and
   /// R8_UNORM images. Preference: discrete, integrated, virtual, CPU.
   static std::shared_ptr<Device> create(const DeviceRequest& request);
@@ -70,6 +71,8 @@ class Device {
  private:
   struct State;
   explicit Device(std::unique_ptr<State> state);
+  void listen();  // to the validation layer
+  std::function<void(const char*)> messageSink_;
   std::unique_ptr<State> state_;
 };
 

@@ -58,7 +58,7 @@ class Buffer {
 };
 
 /// A sampled 3-D image with one mip level, optimal tiling, and its view. The layout is GENERAL from the first use on (see
-/// Commands::prepare). Usage: sampled, storage, transfer destination and source.
+/// Commands::prepare). Usage: sampled, transfer destination.
 class Image3D {
  public:
   Image3D() = default;

@@ -1,0 +1,171 @@
+#include "vdi/gpu/Commands.h"
+
+#include <cassert>
+#include <utility>
+
+#include "vdi/gpu/ComputePipeline.h"
+#include "vdi/gpu/Device.h"
+#include "vdi/gpu/Memory.h"
+
+namespace vdi::gpu {
+
+namespace {
+
+constexpr std::uint32_t maxMarks = 64;
+
+void memoryBarrier(VkCommandBuffer commands) {
+  constexpr VkPipelineStageFlags2 stages =
+      VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT | VK_PIPELINE_STAGE_2_HOST_BIT;
+  constexpr VkAccessFlags2 writes =
+      VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_TRANSFER_WRITE_BIT | VK_ACCESS_2_HOST_WRITE_BIT;
+  constexpr VkAccessFlags2 reads =
+      VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_TRANSFER_READ_BIT | VK_ACCESS_2_HOST_READ_BIT;
+  const VkMemoryBarrier2 barrier{
+      VK_STRUCTURE_TYPE_MEMORY_BARRIER_2, nullptr, stages, writes, stages, reads | writes};
+  const VkDependencyInfo info{
+      VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 1, &barrier, 0, nullptr, 0, nullptr};
+  vkCmdPipelineBarrier2(commands, &info);
+}
+
+}  // namespace
+
+Commands::Commands(std::shared_ptr<Device> device) : device_(std::move(device)) {
+  try {
+    const VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr,
+                                           VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT, device_->queueFamily()};
+    check(vkCreateCommandPool(device_->handle(), &poolInfo, nullptr, &pool_), "vkCreateCommandPool");
+    const VkCommandBufferAllocateInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr, pool_,
+                                                 VK_COMMAND_BUFFER_LEVEL_PRIMARY, 1};
+    check(vkAllocateCommandBuffers(device_->handle(), &bufferInfo, &buffer_), "vkAllocateCommandBuffers");
+    const VkFenceCreateInfo fenceInfo{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, nullptr, 0};
+    check(vkCreateFence(device_->handle(), &fenceInfo, nullptr, &fence_), "vkCreateFence");
+    const VkQueryPoolCreateInfo queryInfo{
+        VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO, nullptr, 0, VK_QUERY_TYPE_TIMESTAMP, maxMarks + 1, 0};
+    check(vkCreateQueryPool(device_->handle(), &queryInfo, nullptr, &queries_), "vkCreateQueryPool");
+  } catch (...) {
+    release();
+    throw;
+  }
+}
+
+Commands::~Commands() {
+  if (submitted_) vkWaitForFences(device_->handle(), 1, &fence_, VK_TRUE, UINT64_MAX);
+  release();
+}
+
+void Commands::release() noexcept {
+  VkDevice device = device_->handle();
+  if (queries_ != VK_NULL_HANDLE) vkDestroyQueryPool(device, queries_, nullptr);
+  if (fence_ != VK_NULL_HANDLE) vkDestroyFence(device, fence_, nullptr);
+  if (pool_ != VK_NULL_HANDLE) vkDestroyCommandPool(device, pool_, nullptr);
+}
+
+void Commands::begin() {
+  wait();
+  marks_.clear();
+  vkResetQueryPool(device_->handle(), queries_, 0, maxMarks + 1);
+  const VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr,
+                                      VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT, nullptr};
+  check(vkBeginCommandBuffer(buffer_, &info), "vkBeginCommandBuffer");
+}
+
+void Commands::submit() {
+  if (!marks_.empty()) writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
+  // Makes what was written visible to the host after wait().
+  memoryBarrier(buffer_);
+  check(vkEndCommandBuffer(buffer_), "vkEndCommandBuffer");
+  const VkCommandBufferSubmitInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO, nullptr, buffer_, 0};
+  const VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2, nullptr, 0, 0, nullptr, 1, &bufferInfo, 0, nullptr};
+  device_->submit(info, fence_);
+  submitted_ = true;
+}
+
+void Commands::wait() {
+  if (!submitted_) return;
+  submitted_ = false;
+  check(vkWaitForFences(device_->handle(), 1, &fence_, VK_TRUE, UINT64_MAX), "vkWaitForFences");
+  check(vkResetFences(device_->handle(), 1, &fence_), "vkResetFences");
+}
+
+void Commands::dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
+                             std::uint32_t y, std::uint32_t z) {
+  vkCmdBindPipeline(buffer_, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.handle());
+  VkDescriptorSet set = pipeline.descriptorSet();
+  if (set != VK_NULL_HANDLE) {
+    vkCmdBindDescriptorSets(buffer_, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout(), 0, 1, &set, 0, nullptr);
+  }
+  vkCmdPushConstants(buffer_, pipeline.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                     static_cast<std::uint32_t>(constants.size()), constants.data());
+  vkCmdDispatch(buffer_, x, y, z);
+}
+
+void Commands::barrier() { memoryBarrier(buffer_); }
+
+void Commands::copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
+                    std::uint64_t bytes) {
+  assert(fromOffset + bytes <= from.size() && toOffset + bytes <= to.size());
+  if (bytes == 0) return;
+  const VkBufferCopy region{fromOffset, toOffset, bytes};
+  vkCmdCopyBuffer(buffer_, from.handle(), to.handle(), 1, &region);
+}
+
+void Commands::fill(const Buffer& buffer, std::uint32_t word) {
+  vkCmdFillBuffer(buffer_, buffer.handle(), 0, VK_WHOLE_SIZE, word);
+}
+
+void Commands::prepare(const Image3D& image) {
+  const VkImageMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
+                                      nullptr,
+                                      VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,
+                                      0,
+                                      VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,
+                                      VK_ACCESS_2_MEMORY_READ_BIT | VK_ACCESS_2_MEMORY_WRITE_BIT,
+                                      VK_IMAGE_LAYOUT_UNDEFINED,
+                                      VK_IMAGE_LAYOUT_GENERAL,
+                                      VK_QUEUE_FAMILY_IGNORED,
+                                      VK_QUEUE_FAMILY_IGNORED,
+                                      image.handle(),
+                                      {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
+  const VkDependencyInfo info{
+      VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 0, nullptr, 0, nullptr, 1, &barrier};
+  vkCmdPipelineBarrier2(buffer_, &info);
+}
+
+void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to,
+                           const glm::uvec3& texelOffset, const glm::uvec3& texelExtent) {
+  const glm::ivec3 offset(texelOffset);
+  const VkBufferImageCopy region{fromOffset,
+                                 0,
+                                 0,
+                                 {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+                                 {offset.x, offset.y, offset.z},
+                                 {texelExtent.x, texelExtent.y, texelExtent.z}};
+  vkCmdCopyBufferToImage(buffer_, from.handle(), to.handle(), VK_IMAGE_LAYOUT_GENERAL, 1, &region);
+}
+
+void Commands::mark(std::string name) {
+  if (marks_.size() >= maxMarks) return;
+  writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
+  marks_.push_back(std::move(name));
+}
+
+void Commands::writeTimestamp(std::uint32_t query) {
+  vkCmdWriteTimestamp2(buffer_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, query);
+}
+
+std::vector<StageTime> Commands::stageTimes() const {
+  std::vector<StageTime> times;
+  if (marks_.empty()) return times;
+  std::vector<std::uint64_t> ticks(marks_.size() + 1);
+  check(vkGetQueryPoolResults(device_->handle(), queries_, 0, static_cast<std::uint32_t>(ticks.size()),
+                              ticks.size() * sizeof(std::uint64_t), ticks.data(), sizeof(std::uint64_t),
+                              VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
+        "vkGetQueryPoolResults");
+  for (std::size_t i = 0; i < marks_.size(); ++i) {
+    const auto elapsed = static_cast<double>(ticks[i + 1] - ticks[i]);
+    times.push_back({marks_[i], elapsed * static_cast<double>(device_->limits().timestampPeriodNs) * 1e-6});
+  }
+  return times;
+}
+
+}  // namespace vdi::gpu

@@ -1,0 +1,118 @@
+#include "vdi/gpu/ComputePipeline.h"
+
+#include <cassert>
+#include <utility>
+
+#include "vdi/gpu/Device.h"
+#include "vdi/gpu/Memory.h"
+
+namespace vdi::gpu {
+
+namespace {
+
+constexpr std::uint32_t guaranteedPushConstantBytes = 128;
+
+/// Exists just while the pipeline is made.
+class ShaderModule {
+ public:
+  ShaderModule(const Device& device, std::span<const std::uint32_t> code) : device_(device.handle()) {
+    const VkShaderModuleCreateInfo info{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO, nullptr, 0, code.size_bytes(),
+                                        code.data()};
+    check(vkCreateShaderModule(device_, &info, nullptr, &module_), "vkCreateShaderModule");
+  }
+  ~ShaderModule() { vkDestroyShaderModule(device_, module_, nullptr); }
+  ShaderModule(const ShaderModule&) = delete;
+  ShaderModule& operator=(const ShaderModule&) = delete;
+  VkShaderModule handle() const { return module_; }
+
+ private:
+  VkDevice device_;
+  VkShaderModule module_ = VK_NULL_HANDLE;
+};
+
+}  // namespace
+
+ComputePipeline::ComputePipeline(std::shared_ptr<Device> device, const ComputePipelineInfo& info)
+    : device_(std::move(device)), imageCount_(info.imageCount) {
+  assert(info.pushConstantBytes <= guaranteedPushConstantBytes);
+  try {
+    if (imageCount_ > 0) makeDescriptorSet();
+    makePipeline(info);
+  } catch (...) {
+    release();
+    throw;
+  }
+}
+
+ComputePipeline::~ComputePipeline() { release(); }
+
+void ComputePipeline::makeDescriptorSet() {
+  const VkDescriptorSetLayoutBinding binding{0, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, imageCount_,
+                                             VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+  const VkDescriptorSetLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO, nullptr, 0, 1,
+                                                   &binding};
+  check(vkCreateDescriptorSetLayout(device_->handle(), &layoutInfo, nullptr, &setLayout_), "vkCreateDescriptorSetLayout");
+  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, imageCount_};
+  const VkDescriptorPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, nullptr, 0, 1, 1, &size};
+  check(vkCreateDescriptorPool(device_->handle(), &poolInfo, nullptr, &pool_), "vkCreateDescriptorPool");
+  const VkDescriptorSetAllocateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO, nullptr, pool_, 1, &setLayout_};
+  check(vkAllocateDescriptorSets(device_->handle(), &setInfo, &set_), "vkAllocateDescriptorSets");
+}
+
+void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
+  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, info.pushConstantBytes};
+  const VkPipelineLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
+                                              nullptr,
+                                              0,
+                                              imageCount_ > 0 ? 1U : 0U,
+                                              &setLayout_,
+                                              info.pushConstantBytes > 0 ? 1U : 0U,
+                                              &range};
+  check(vkCreatePipelineLayout(device_->handle(), &layoutInfo, nullptr, &layout_), "vkCreatePipelineLayout");
+  std::vector<VkSpecializationMapEntry> entries;
+  for (std::uint32_t id = 0; id < info.specialization.size(); ++id) {
+    entries.push_back({id, id * static_cast<std::uint32_t>(sizeof(std::uint32_t)), sizeof(std::uint32_t)});
+  }
+  const VkSpecializationInfo specialization{static_cast<std::uint32_t>(entries.size()), entries.data(),
+                                            info.specialization.size() * sizeof(std::uint32_t),
+                                            info.specialization.data()};
+  const ShaderModule module(*device_, shaderCode(info.shader));
+  const VkComputePipelineCreateInfo pipelineInfo{
+      VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
+      nullptr,
+      0,
+      {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO, nullptr, 0, VK_SHADER_STAGE_COMPUTE_BIT, module.handle(), "main",
+       &specialization},
+      layout_,
+      VK_NULL_HANDLE,
+      -1};
+  check(vkCreateComputePipelines(device_->handle(), device_->pipelineCache(), 1, &pipelineInfo, nullptr, &pipeline_),
+        "vkCreateComputePipelines");
+}
+
+void ComputePipeline::bindImages(std::span<const Image3D* const> images, const Sampler& sampler) {
+  assert(images.size() == imageCount_);
+  std::vector<VkDescriptorImageInfo> infos;
+  for (const Image3D* image : images) infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_GENERAL});
+  const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
+                                   nullptr,
+                                   set_,
+                                   0,
+                                   0,
+                                   imageCount_,
+                                   VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+                                   infos.data(),
+                                   nullptr,
+                                   nullptr};
+  vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
+}
+
+void ComputePipeline::release() noexcept {
+  VkDevice device = device_->handle();
+  if (pipeline_ != VK_NULL_HANDLE) vkDestroyPipeline(device, pipeline_, nullptr);
+  if (layout_ != VK_NULL_HANDLE) vkDestroyPipelineLayout(device, layout_, nullptr);
+  if (pool_ != VK_NULL_HANDLE) vkDestroyDescriptorPool(device, pool_, nullptr);
+  if (setLayout_ != VK_NULL_HANDLE) vkDestroyDescriptorSetLayout(device, setLayout_, nullptr);
+}
+
+}  // namespace vdi::gpu
