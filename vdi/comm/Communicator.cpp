@@ -1,0 +1,263 @@
+#include "vdi/comm/Communicator.h"
+
+#include <fmt/format.h>
+#include <mpi.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstring>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "vdi/core/Error.h"
+
+namespace vdi::comm {
+
+namespace {
+
+void check(int result, const char* call) {
+  if (result == MPI_SUCCESS) return;
+  std::array<char, MPI_MAX_ERROR_STRING> text{};
+  int length = 0;
+  MPI_Error_string(result, text.data(), &length);
+  throw Error(ErrorCode::Communication, fmt::format("{} failed: {}", call, text.data()));
+}
+
+/// Elements of `bytes` bytes as one MPI datatype, so that counts stay below 2^31 where byte counts don't.
+class ElementType {
+ public:
+  explicit ElementType(std::size_t bytes) {
+    check(MPI_Type_contiguous(static_cast<int>(bytes), MPI_BYTE, &type_), "MPI_Type_contiguous");
+    check(MPI_Type_commit(&type_), "MPI_Type_commit");
+  }
+  ~ElementType() { MPI_Type_free(&type_); }
+  ElementType(const ElementType&) = delete;
+  ElementType& operator=(const ElementType&) = delete;
+  MPI_Datatype handle() const { return type_; }
+
+ private:
+  MPI_Datatype type_ = MPI_DATATYPE_NULL;
+};
+
+constexpr std::uint64_t mostElements = std::numeric_limits<int>::max();
+
+/// Counts and displacements as MPI takes them.
+struct Layout {
+  std::vector<int> counts;
+  std::vector<int> starts;
+  std::uint64_t total = 0;
+
+  explicit Layout(std::span<const std::uint64_t> sizes) {
+    for (const std::uint64_t size : sizes) {
+      starts.push_back(static_cast<int>(std::min(total, mostElements)));
+      counts.push_back(static_cast<int>(std::min(size, mostElements)));
+      total += size;
+    }
+  }
+  bool fits() const { return total <= mostElements; }
+};
+
+Gathered emptyGathered(const Layout& layout, std::size_t elementBytes) {
+  Gathered result;
+  result.bytes.resize(layout.total * elementBytes);
+  result.offsets.push_back(0);
+  for (const int count : layout.counts) {
+    result.offsets.push_back(result.offsets.back() + static_cast<std::uint64_t>(count) * elementBytes);
+  }
+  return result;
+}
+
+std::string describe(const std::exception_ptr& error) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const std::exception& e) {
+    return e.what();
+  } catch (...) {
+    return "an unknown exception";
+  }
+}
+
+}  // namespace
+
+struct Communicator::State {
+  MPI_Comm comm = MPI_COMM_NULL;  // null: serial
+  int rank = 0;
+  int size = 1;
+  int localRank = 0;
+
+  State() = default;
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  ~State() {
+    if (comm == MPI_COMM_NULL) return;
+    int finalized = 0;
+    MPI_Finalized(&finalized);
+    if (finalized == 0) MPI_Comm_free(&comm);
+  }
+  bool serial() const { return comm == MPI_COMM_NULL; }
+
+  /// Every rank throws if a count doesn't fit on any of them.
+  void demandFits(bool fits) const {
+    int good = fits ? 1 : 0;
+    check(MPI_Allreduce(MPI_IN_PLACE, &good, 1, MPI_INT, MPI_MIN, comm), "MPI_Allreduce");
+    if (good == 0) throw Error(ErrorCode::Communication, "more than 2^31 - 1 elements for one rank in one exchange");
+  }
+
+  template <typename T>
+  void allReduce(std::span<T> values, MPI_Datatype type, MPI_Op operation) const {
+    if (serial()) return;
+    check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), type, operation, comm),
+          "MPI_Allreduce");
+  }
+};
+
+Communicator::Communicator(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Communicator::~Communicator() = default;
+Communicator::Communicator(Communicator&&) noexcept = default;
+Communicator& Communicator::operator=(Communicator&&) noexcept = default;
+
+Communicator Communicator::serial() { return Communicator(std::make_unique<State>()); }
+
+Communicator Communicator::fromMpi(int fortranHandle) {
+  auto state = std::make_unique<State>();
+  check(MPI_Comm_dup(MPI_Comm_f2c(fortranHandle), &state->comm), "MPI_Comm_dup");
+  check(MPI_Comm_set_errhandler(state->comm, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+  check(MPI_Comm_rank(state->comm, &state->rank), "MPI_Comm_rank");
+  check(MPI_Comm_size(state->comm, &state->size), "MPI_Comm_size");
+  MPI_Comm node = MPI_COMM_NULL;
+  check(MPI_Comm_split_type(state->comm, MPI_COMM_TYPE_SHARED, state->rank, MPI_INFO_NULL, &node), "MPI_Comm_split_type");
+  check(MPI_Comm_rank(node, &state->localRank), "MPI_Comm_rank");
+  check(MPI_Comm_free(&node), "MPI_Comm_free");
+  return Communicator(std::move(state));
+}
+
+Communicator Communicator::world() {
+  int initialized = 0;
+  int finalized = 0;
+  MPI_Initialized(&initialized);
+  MPI_Finalized(&finalized);
+  return initialized != 0 && finalized == 0 ? fromMpi(MPI_Comm_c2f(MPI_COMM_WORLD)) : serial();
+}
+
+int Communicator::rank() const { return state_->rank; }
+int Communicator::size() const { return state_->size; }
+int Communicator::localRank() const { return state_->localRank; }
+
+void Communicator::barrier() const {
+  if (!state_->serial()) check(MPI_Barrier(state_->comm), "MPI_Barrier");
+}
+
+void Communicator::allReduceMin(std::span<double> values) const { state_->allReduce(values, MPI_DOUBLE, MPI_MIN); }
+void Communicator::allReduceMax(std::span<double> values) const { state_->allReduce(values, MPI_DOUBLE, MPI_MAX); }
+void Communicator::allReduceSum(std::span<double> values) const { state_->allReduce(values, MPI_DOUBLE, MPI_SUM); }
+void Communicator::allReduceSum(std::span<std::uint64_t> values) const {
+  state_->allReduce(values, MPI_UINT64_T, MPI_SUM);
+}
+void Communicator::allReduceMax(std::span<std::uint64_t> values) const {
+  state_->allReduce(values, MPI_UINT64_T, MPI_MAX);
+}
+
+std::vector<std::byte> Communicator::broadcast(std::vector<std::byte> bytes, int root) const {
+  if (state_->serial()) return bytes;
+  std::uint64_t size = bytes.size();
+  check(MPI_Bcast(&size, 1, MPI_UINT64_T, root, state_->comm), "MPI_Bcast");
+  bytes.resize(size);
+  constexpr std::uint64_t chunk = 1ULL << 30;
+  for (std::uint64_t done = 0; done < size; done += chunk) {
+    const auto part = static_cast<int>(std::min(chunk, size - done));
+    check(MPI_Bcast(bytes.data() + done, part, MPI_BYTE, root, state_->comm), "MPI_Bcast");
+  }
+  return bytes;
+}
+
+Gathered Communicator::allGather(std::span<const std::byte> bytes) const {
+  std::vector<std::uint64_t> sizes(static_cast<std::size_t>(size()));
+  if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
+  const std::uint64_t mine = bytes.size();
+  check(MPI_Allgather(&mine, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, state_->comm), "MPI_Allgather");
+  const Layout layout(sizes);
+  state_->demandFits(layout.fits());
+  Gathered result = emptyGathered(layout, 1);
+  check(MPI_Allgatherv(bytes.data(), static_cast<int>(mine), MPI_BYTE, result.bytes.data(), layout.counts.data(),
+                       layout.starts.data(), MPI_BYTE, state_->comm),
+        "MPI_Allgatherv");
+  return result;
+}
+
+Gathered Communicator::gather(std::span<const std::byte> bytes, std::size_t elementBytes, int root) const {
+  assert(elementBytes > 0 && bytes.size() % elementBytes == 0);
+  if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
+  const std::uint64_t mine = bytes.size() / elementBytes;
+  std::vector<std::uint64_t> sizes(static_cast<std::size_t>(size()));
+  check(MPI_Allgather(&mine, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, state_->comm), "MPI_Allgather");
+  const Layout layout(sizes);
+  state_->demandFits(layout.fits());
+  const ElementType type(elementBytes);
+  Gathered result;
+  if (rank() == root) result = emptyGathered(layout, elementBytes);
+  check(MPI_Gatherv(bytes.data(), static_cast<int>(mine), type.handle(), result.bytes.data(), layout.counts.data(),
+                    layout.starts.data(), type.handle(), root, state_->comm),
+        "MPI_Gatherv");
+  return result;
+}
+
+Gathered Communicator::allToAll(std::span<const std::byte> bytes, std::span<const std::uint64_t> counts,
+                                std::size_t elementBytes) const {
+  assert(counts.size() == static_cast<std::size_t>(size()));
+  assert(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}) * elementBytes == bytes.size());
+  if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
+  std::vector<std::uint64_t> incoming(counts.size());
+  check(MPI_Alltoall(counts.data(), 1, MPI_UINT64_T, incoming.data(), 1, MPI_UINT64_T, state_->comm), "MPI_Alltoall");
+  const Layout out(counts);
+  const Layout in(incoming);
+  state_->demandFits(out.fits() && in.fits());
+  const ElementType type(elementBytes);
+  Gathered result = emptyGathered(in, elementBytes);
+  check(MPI_Alltoallv(bytes.data(), out.counts.data(), out.starts.data(), type.handle(), result.bytes.data(),
+                      in.counts.data(), in.starts.data(), type.handle(), state_->comm),
+        "MPI_Alltoallv");
+  return result;
+}
+
+void Communicator::agree(std::exception_ptr mine) const {
+  if (state_->serial()) {
+    if (mine) std::rethrow_exception(mine);
+    return;
+  }
+  int firstFailing = mine ? rank() : size();
+  check(MPI_Allreduce(MPI_IN_PLACE, &firstFailing, 1, MPI_INT, MPI_MIN, state_->comm), "MPI_Allreduce");
+  if (firstFailing == size()) return;
+  std::vector<std::byte> text;
+  if (rank() == firstFailing) {
+    const std::string message = describe(mine);
+    const auto* begin = reinterpret_cast<const std::byte*>(message.data());
+    text.assign(begin, begin + message.size());
+  }
+  text = broadcast(std::move(text), firstFailing);
+  if (mine) std::rethrow_exception(mine);
+  const std::string message(reinterpret_cast<const char*>(text.data()), text.size());
+  throw Error(ErrorCode::RemoteRank, fmt::format("rank {} failed: {}", firstFailing, message));
+}
+
+void Communicator::together(const std::function<void()>& work) const {
+  std::exception_ptr error;
+  try {
+    work();
+  } catch (...) {
+    error = std::current_exception();
+  }
+  agree(error);
+}
+
+void Communicator::demandEqual(std::uint64_t fingerprint, const std::string& what) const {
+  // The largest of x and of ~x are x and ~x on every rank only if all have the same x.
+  std::array<std::uint64_t, 2> extremes{fingerprint, ~fingerprint};
+  allReduceMax(extremes);
+  if (extremes[0] != ~extremes[1]) {
+    throw Error(ErrorCode::InvalidArgument, fmt::format("the ranks were given different values: {}", what));
+  }
+}
+
+}  // namespace vdi::comm

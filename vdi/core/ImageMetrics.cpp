@@ -1,0 +1,138 @@
+#include "vdi/core/ImageMetrics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "vdi/core/Error.h"
+
+namespace vdi {
+
+namespace {
+
+constexpr int radius = 5;
+constexpr double sigma = 1.5;
+constexpr double c1 = (0.01 * 255.0) * (0.01 * 255.0);
+constexpr double c2 = (0.03 * 255.0) * (0.03 * 255.0);
+
+/// Moments of two windows.
+struct Moments {
+  double a = 0.0;
+  double b = 0.0;
+  double aa = 0.0;
+  double bb = 0.0;
+  double ab = 0.0;
+
+  void add(double weight, double x, double y) {
+    a += weight * x;
+    b += weight * y;
+    aa += weight * x * x;
+    bb += weight * y * y;
+    ab += weight * x * y;
+  }
+  void add(double weight, const Moments& other) {
+    a += weight * other.a;
+    b += weight * other.b;
+    aa += weight * other.aa;
+    bb += weight * other.bb;
+    ab += weight * other.ab;
+  }
+  double ssim() const {
+    const double varianceA = aa - a * a;
+    const double varianceB = bb - b * b;
+    const double covariance = ab - a * b;
+    return (2.0 * a * b + c1) * (2.0 * covariance + c2) / ((a * a + b * b + c1) * (varianceA + varianceB + c2));
+  }
+};
+
+class Channel {
+ public:
+  Channel(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int channels, int channel)
+      : a_(a), b_(b), width_(width), channels_(channels), channel_(channel) {}
+  Moments at(int x, int y) const {
+    const auto i = (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)) *
+                       static_cast<std::size_t>(channels_) +
+                   static_cast<std::size_t>(channel_);
+    Moments m;
+    m.add(1.0, a_[i], b_[i]);
+    return m;
+  }
+
+ private:
+  std::span<const std::uint8_t> a_;
+  std::span<const std::uint8_t> b_;
+  int width_;
+  int channels_;
+  int channel_;
+};
+
+double smallSsim(const Channel& channel, int width, int height) {
+  Moments all;
+  const double weight = 1.0 / (static_cast<double>(width) * height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) all.add(weight, channel.at(x, y));
+  }
+  return all.ssim();
+}
+
+/// The Gaussian is separable: columns first, a row of results at a time.
+double windowedSsim(const Channel& channel, int width, int height) {
+  double kernel[2 * radius + 1];
+  double total = 0.0;
+  for (int i = -radius; i <= radius; ++i) total += kernel[i + radius] = std::exp(-0.5 * i * i / (sigma * sigma));
+  for (double& weight : kernel) weight /= total;
+  std::vector<Moments> columns(static_cast<std::size_t>(width));
+  double sum = 0.0;
+  for (int y = radius; y < height - radius; ++y) {
+    for (int x = 0; x < width; ++x) {
+      Moments m;
+      for (int i = -radius; i <= radius; ++i) m.add(kernel[i + radius], channel.at(x, y + i));
+      columns[static_cast<std::size_t>(x)] = m;
+    }
+    for (int x = radius; x < width - radius; ++x) {
+      Moments m;
+      for (int i = -radius; i <= radius; ++i) m.add(kernel[i + radius], columns[static_cast<std::size_t>(x + i)]);
+      sum += m.ssim();
+    }
+  }
+  return sum / (static_cast<double>(width - 2 * radius) * (height - 2 * radius));
+}
+
+}  // namespace
+
+ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int height,
+                        int channels) {
+  const auto expected =
+      static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * static_cast<std::size_t>(channels);
+  if (width < 1 || height < 1 || channels < 1 || a.size() != expected || b.size() != expected) {
+    throw Error(ErrorCode::InvalidArgument, "the pictures aren't of one size");
+  }
+  ImageDifference difference;
+  double squares = 0.0;
+  double absolute = 0.0;
+  std::size_t wrong = 0;
+  for (std::size_t pixel = 0; pixel < expected; pixel += static_cast<std::size_t>(channels)) {
+    int worst = 0;
+    for (std::size_t i = pixel; i < pixel + static_cast<std::size_t>(channels); ++i) {
+      const int d = std::abs(static_cast<int>(a[i]) - static_cast<int>(b[i]));
+      squares += static_cast<double>(d) * d;
+      absolute += d;
+      worst = std::max(worst, d);
+    }
+    difference.maxError = std::max(difference.maxError, worst);
+    if (worst > 16) ++wrong;
+  }
+  const double mean = squares / static_cast<double>(expected);
+  difference.psnrDb = mean > 0.0 ? 10.0 * std::log10(255.0 * 255.0 / mean) : std::numeric_limits<double>::infinity();
+  difference.meanError = absolute / static_cast<double>(expected);
+  difference.wrongShare = static_cast<double>(wrong) / (static_cast<double>(width) * height);
+  const bool small = width <= 2 * radius || height <= 2 * radius;
+  for (int c = 0; c < channels; ++c) {
+    const Channel channel(a, b, width, channels, c);
+    difference.ssim += (small ? smallSsim(channel, width, height) : windowedSsim(channel, width, height)) / channels;
+  }
+  return difference;
+}
+
+}  // namespace vdi

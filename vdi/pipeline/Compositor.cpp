@@ -1,0 +1,128 @@
+#include "vdi/pipeline/Compositor.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace vdi::detail {
+
+using gpu::MemoryKind;
+namespace shared = gpu::shared;
+
+Compositor::Compositor(std::shared_ptr<gpu::Device> device)
+    : device_(std::move(device)),
+      commands_(device_),
+      scan_(device_),
+      mergePass_(device_),
+      compositePass_(device_),
+      builder_(device_),
+      params_(device_, sizeof(shared::CompositeParams), MemoryKind::Upload) {}
+
+SupersegmentLists Compositor::composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
+                                        double sampleStep) {
+  settings_.step = static_cast<float>(sampleStep);
+  settings_.budget = budget;
+  const std::size_t listCount = subLists.front().listCount();
+  SupersegmentLists result;
+  result.offsets.reserve(listCount + 1);
+  // Bands of lists whose supersegments, received, merged and composited, take at most an eighth of the device each.
+  const std::uint64_t most = std::max<std::uint64_t>(device_->limits().memoryBytes / 8 / sizeof(Supersegment), 1);
+  for (std::size_t first = 0; first < listCount;) {
+    std::size_t last = first;
+    for (std::uint64_t total = 0; last < listCount; ++last) {
+      std::uint64_t next = 0;
+      for (const SupersegmentLists& sub : subLists) next += sub.countOf(last);
+      if (last > first && total + next > most) break;
+      total += next;
+    }
+    compositeBand(subLists, first, last, result);
+    first = last;
+  }
+  return result;
+}
+
+/// Lists [first, last) of all ranks: supersegments to received_, offsets from 0 to subOffsets_.
+void Compositor::upload(std::span<const SupersegmentLists> subLists, std::size_t first, std::size_t last) {
+  const std::size_t listCount = last - first;
+  std::uint64_t total = 0;
+  for (const SupersegmentLists& sub : subLists) total += sub.offsets[last] - sub.offsets[first];
+  staging_.reserve(device_, total * sizeof(Supersegment), MemoryKind::Upload);
+  received_.reserve(device_, total * sizeof(Supersegment), MemoryKind::DeviceLocal);
+  rankAddresses_.reserve(device_, subLists.size() * sizeof(std::uint64_t), MemoryKind::Upload);
+  subOffsets_.reserve(device_, subLists.size() * (listCount + 1) * sizeof(std::uint32_t), MemoryKind::Upload);
+  std::uint64_t at = 0;
+  for (std::size_t rank = 0; rank < subLists.size(); ++rank) {
+    const SupersegmentLists& sub = subLists[rank];
+    const std::uint32_t begin = sub.offsets[first];
+    const std::uint64_t bytes = (sub.offsets[last] - begin) * sizeof(Supersegment);
+    if (bytes > 0) std::memcpy(staging_.mapped().data() + at, sub.segments.data() + begin, bytes);
+    rankAddresses_.mappedAs<std::uint64_t>()[rank] = received_.address() + at;
+    const auto offsets = subOffsets_.mappedAs<std::uint32_t>().subspan(rank * (listCount + 1), listCount + 1);
+    for (std::size_t i = 0; i <= listCount; ++i) offsets[i] = sub.offsets[first + i] - begin;
+    at += bytes;
+  }
+}
+
+void Compositor::compositeBand(std::span<const SupersegmentLists> subLists, std::size_t first, std::size_t last,
+                               SupersegmentLists& result) {
+  const auto listCount = static_cast<std::uint32_t>(last - first);
+  upload(subLists, first, last);
+  std::uint64_t total = 0;
+  for (const SupersegmentLists& sub : subLists) total += sub.offsets[last] - sub.offsets[first];
+  const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
+  heads_.reserve(device_, subLists.size() * words, MemoryKind::DeviceLocal);
+  mergedCounts_.reserve(device_, words, MemoryKind::DeviceLocal);
+  mergedOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
+  merged_.reserve(device_, total * sizeof(Supersegment), MemoryKind::DeviceLocal);
+
+  shared::MergeConstants merge{};
+  merge.received = rankAddresses_.address();
+  merge.subOffsets = subOffsets_.address();
+  merge.heads = heads_.address();
+  merge.counts = mergedCounts_.address();
+  merge.offsets = mergedOffsets_.address();
+  merge.merged = merged_.address();
+  merge.listCount = listCount;
+  merge.rankCount = static_cast<std::uint32_t>(subLists.size());
+  commands_.begin();
+  commands_.copy(staging_, 0, received_, 0, total * sizeof(Supersegment));
+  merge.mode = shared::mergeModeCount;
+  mergePass_.record(commands_, merge);
+  commands_.barrier();
+  scan_.record(commands_, mergedCounts_, mergedOffsets_, listCount);
+  merge.mode = shared::mergeModeMerge;
+  mergePass_.record(commands_, merge);
+  commands_.submitAndWait();
+
+  settings_.merged = merged_.address();
+  settings_.mergedOffsets = mergedOffsets_.address();
+  settings_.listCount = listCount;
+  const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
+    settings_.sensitivities = targets.sensitivities;
+    settings_.counts = targets.counts;
+    settings_.offsets = targets.offsets;
+    settings_.segments = targets.segments;
+    settings_.status = targets.status;
+    std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
+    compositePass_.record(commands, params_.address(), write ? shared::compositeModeWrite : shared::compositeModeSearch,
+                          listCount);
+  };
+  builder_.build(listCount, record, result);
+}
+
+void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::vec4> rgba, std::span<float> depth) {
+  std::vector<Supersegment> merged;
+  for (std::size_t i = 0; i < rgba.size(); ++i) {
+    merged.clear();
+    for (const SupersegmentLists& sub : subLists) {
+      const auto list = sub.list(i);
+      merged.insert(merged.end(), list.begin(), list.end());
+    }
+    std::sort(merged.begin(), merged.end(), [](const Supersegment& a, const Supersegment& b) { return a.front < b.front; });
+    glm::vec4 sum(0.0F);
+    for (const Supersegment& s : merged) sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
+    rgba[i] = sum;
+    depth[i] = merged.empty() ? Image::noDepth : merged.front().front;
+  }
+}
+
+}  // namespace vdi::detail

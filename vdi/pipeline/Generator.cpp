@@ -1,0 +1,278 @@
+// VdiGenerator: the four stages in order, and who waits for whom.
+#include <fmt/format.h>
+
+#include <array>
+#include <chrono>
+#include <cstring>
+#include <type_traits>
+
+#include "vdi/comm/DirectSend.h"
+#include "vdi/comm/GhostExchange.h"
+#include "vdi/core/Error.h"
+#include "vdi/pipeline/Compositor.h"
+#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/RayCaster.h"
+
+namespace vdi {
+
+namespace {
+
+constexpr int root = 0;
+
+/// Seconds since it was made or last asked.
+class Stopwatch {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - start_).count();
+    start_ = now;
+    return seconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// FNV-1a over the bytes of plain values: equal parameters have equal fingerprints on every rank.
+class Fingerprint {
+ public:
+  template <typename T>
+  void add(const T& value) {
+    static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
+    std::array<unsigned char, sizeof(T)> bytes{};
+    std::memcpy(bytes.data(), &value, sizeof(T));
+    for (const unsigned char byte : bytes) hash_ = (hash_ ^ byte) * 0x100000001b3ULL;
+  }
+  void add(const glm::dvec3& v) {
+    for (int axis = 0; axis < 3; ++axis) add(v[axis]);
+  }
+  std::uint64_t value() const { return hash_; }
+
+ private:
+  std::uint64_t hash_ = 0xcbf29ce484222325ULL;
+};
+
+std::uint64_t fingerprintOf(const Camera& camera) {
+  Fingerprint print;
+  print.add(camera.position);
+  print.add(camera.focalPoint);
+  print.add(camera.viewUp);
+  print.add(camera.viewAngle);
+  print.add(camera.parallelProjection);
+  print.add(camera.parallelScale);
+  return print.value();
+}
+
+std::uint64_t fingerprintOf(const TransferFunction& function) {
+  Fingerprint print;
+  for (const ColorNode& node : function.colors) {
+    print.add(node.x);
+    print.add(node.color);
+  }
+  for (const OpacityNode& node : function.opacities) {
+    print.add(node.x);
+    print.add(node.opacity);
+  }
+  print.add(function.unitDistance);
+  return print.value();
+}
+
+std::uint64_t fingerprintOf(const GenerateSettings& settings) {
+  Fingerprint print;
+  print.add(settings.width);
+  print.add(settings.height);
+  print.add(settings.supersegments);
+  print.add(settings.samplesPerVoxel);
+  print.add(settings.algorithm);
+  print.add(settings.terminationOpacity);
+  return print.value();
+}
+
+}  // namespace
+
+struct VdiGenerator::State {
+  State(std::shared_ptr<gpu::Device> theDevice, comm::Communicator theComm)
+      : device(std::move(theDevice)), comm(std::move(theComm)) {
+    comm.together([&] {
+      caster = std::make_unique<detail::RayCaster>(device);
+      compositor = std::make_unique<detail::Compositor>(device);
+    });
+  }
+
+  std::shared_ptr<gpu::Device> device;
+  comm::Communicator comm;
+  std::unique_ptr<detail::RayCaster> caster;
+  std::unique_ptr<detail::Compositor> compositor;
+  Scene scene;
+  ScalarRange range;
+  RankReport mine;
+  std::vector<RankReport> reports;
+
+  /// What generate and renderVolume have in common: checked parameters and this rank's lists.
+  struct Prepared {
+    View view;
+    DepthLattice lattice;
+    TransferTable table;
+  };
+
+  std::unique_ptr<Prepared> prepare(const Camera& camera, const TransferFunction& function,
+                                    const GenerateSettings& settings) {
+    std::unique_ptr<Prepared> prepared;
+    comm.together([&] {
+      validate(settings);
+      const View view(camera, settings.width, settings.height);
+      prepared = std::make_unique<Prepared>(
+          Prepared{view, depthLattice(scene, view, settings.samplesPerVoxel), bake(function)});
+    });
+    comm.demandEqual(fingerprintOf(camera), "camera");
+    comm.demandEqual(fingerprintOf(function), "transfer function");
+    comm.demandEqual(fingerprintOf(settings), "resolution, supersegments, sampling rate or algorithm");
+    mine.generateSeconds = mine.distributeSeconds = mine.compositeSeconds = mine.gatherSeconds = 0.0;
+    mine.subSupersegments = mine.bytesSent = 0;
+    return prepared;
+  }
+
+  /// Runs a stage that asks for progress; all ranks throw Cancelled together if any was told to stop.
+  template <typename Work>
+  void cancellable(const Progress& progress, double share, Work work) {
+    bool cancelled = false;
+    comm.together([&] {
+      work([&](double done) {
+        if (progress && !progress(done * share)) cancelled = true;
+        return !cancelled;
+      });
+    });
+    std::array<std::uint64_t, 1> any{cancelled ? 1U : 0U};
+    comm.allReduceMax(any);
+    if (any[0] != 0) throw Error(ErrorCode::Cancelled, "stopped on request");
+  }
+
+  void shareReports() {
+    static_assert(std::is_trivially_copyable_v<RankReport>);
+    mine.deviceBytes = device->allocatedBytes();
+    const comm::Gathered all = comm.gather(std::as_bytes(std::span(&mine, 1)), sizeof(RankReport), root);
+    reports.resize(all.bytes.size() / sizeof(RankReport));
+    if (!reports.empty()) std::memcpy(reports.data(), all.bytes.data(), all.bytes.size());
+  }
+};
+
+VdiGenerator::VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm)
+    : state_(std::make_unique<State>(std::move(device), std::move(comm))) {}
+
+VdiGenerator::~VdiGenerator() = default;
+
+void VdiGenerator::setBlocks(std::vector<Block> blocks, bool fillGhosts) {
+  State& s = *state_;
+  Stopwatch watch;
+  s.comm.together([&] { validate(blocks); });
+  if (fillGhosts) blocks = comm::exchangeGhosts(s.comm, std::move(blocks));
+  s.scene = comm::globalScene(s.comm, localScene(blocks));
+  ScalarRange range;
+  s.mine = {};
+  for (const Block& block : blocks) {
+    const ScalarRange part = finiteRange(block);
+    range.min = std::min(range.min, part.min);
+    range.max = std::max(range.max, part.max);
+    s.mine.volumeBytes += block.byteCount();
+  }
+  std::array<double, 2> least{range.min, -range.max};
+  s.comm.allReduceMin(least);
+  s.range = {least[0], -least[1]};
+  s.comm.together([&] { s.caster->setBlocks(blocks, s.scene); });
+  s.mine.blocks = blocks.size();
+  s.mine.uploadSeconds = watch.lap();
+}
+
+std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFunction& transferFunction,
+                                          const GenerateSettings& settings, const Progress& progress) {
+  State& s = *state_;
+  const auto prepared = s.prepare(camera, transferFunction, settings);
+  const bool alone = s.comm.size() == 1;
+  Stopwatch watch;
+  SupersegmentLists lists;
+  s.cancellable(progress, 0.8, [&](const detail::RayCaster::Progress& report) {
+    lists = s.caster->lists({s.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, false}, report);
+  });
+  s.mine.subSupersegments = lists.segments.size();
+  s.mine.generateSeconds = watch.lap();
+  if (!alone) {
+    comm::Received received = comm::distribute(s.comm, lists);
+    s.mine.bytesSent = received.bytesSent;
+    s.mine.distributeSeconds = watch.lap();
+    s.cancellable(progress, 0.95, [&](const detail::RayCaster::Progress& report) {
+      lists = s.compositor->composite(received.subLists, settings.supersegments, prepared->lattice.step);
+      report(1.0);
+    });
+    received = {};
+    s.mine.compositeSeconds = watch.lap();
+    lists = comm::gatherLists(s.comm, lists, root);
+    s.mine.gatherSeconds = watch.lap();
+  }
+  s.shareReports();
+  if (progress) progress(1.0);
+  if (s.comm.rank() != root) return std::nullopt;
+  Vdi vdi;
+  vdi.camera = camera;
+  vdi.width = settings.width;
+  vdi.height = settings.height;
+  vdi.budget = settings.supersegments;
+  vdi.bounds = s.scene.bounds;
+  vdi.sampleStep = prepared->lattice.step;
+  vdi.lists = std::move(lists);
+  return vdi;
+}
+
+std::optional<Image> VdiGenerator::renderVolume(const Camera& camera, const TransferFunction& transferFunction,
+                                                const GenerateSettings& settings, const Progress& progress) {
+  State& s = *state_;
+  const auto prepared = s.prepare(camera, transferFunction, settings);
+  const bool alone = s.comm.size() == 1;
+  Stopwatch watch;
+  const detail::RayCaster::Request request{s.scene,         prepared->view, prepared->lattice,
+                                           prepared->table, settings,       !alone,
+                                           !alone};
+  Image image;
+  SupersegmentLists lists;
+  s.cancellable(progress, 0.9, [&](const detail::RayCaster::Progress& report) {
+    if (alone) {
+      image = s.caster->image(request, report);
+    } else {
+      lists = s.caster->lists(request, report);
+    }
+  });
+  s.mine.subSupersegments = lists.segments.size();
+  s.mine.generateSeconds = watch.lap();
+  if (!alone) {
+    // The limit case of the paper's section 5.3: one supersegment a run, composited in order of depth.
+    const comm::Received received = comm::distribute(s.comm, lists);
+    s.mine.bytesSent = received.bytesSent;
+    s.mine.distributeSeconds = watch.lap();
+    const std::size_t owned = received.subLists.front().listCount();
+    std::vector<glm::vec4> rgba(owned);
+    std::vector<float> depth(owned);
+    detail::flattenMerged(received.subLists, rgba, depth);
+    s.mine.compositeSeconds = watch.lap();
+    const auto colors = s.comm.gather(std::as_bytes(std::span(rgba)), sizeof(glm::vec4), root);
+    const auto depths = s.comm.gather(std::as_bytes(std::span(depth)), sizeof(float), root);
+    if (s.comm.rank() == root) {
+      image = {settings.width, settings.height, {}, {}};
+      image.rgba.resize(image.pixelCount());
+      image.depth.resize(image.pixelCount());
+      std::memcpy(image.rgba.data(), colors.bytes.data(), colors.bytes.size());
+      std::memcpy(image.depth.data(), depths.bytes.data(), depths.bytes.size());
+    }
+    s.mine.gatherSeconds = watch.lap();
+  }
+  s.shareReports();
+  if (progress) progress(1.0);
+  if (s.comm.rank() != root) return std::nullopt;
+  return image;
+}
+
+const Scene& VdiGenerator::scene() const { return state_->scene; }
+const ScalarRange& VdiGenerator::scalarRange() const { return state_->range; }
+const std::vector<RankReport>& VdiGenerator::reports() const { return state_->reports; }
+const gpu::Device& VdiGenerator::device() const { return *state_->device; }
+const comm::Communicator& VdiGenerator::communicator() const { return state_->comm; }
+
+}  // namespace vdi

@@ -1,0 +1,117 @@
+#include "vdi/pipeline/RayCaster.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace vdi::detail {
+
+using gpu::MemoryKind;
+namespace shared = gpu::shared;
+
+namespace {
+
+/// Twin of reference::opticalDepthOf.
+float opticalDepthOf(double opacity) {
+  return opacity >= 1.0 ? maxExtinction * 2.0F : static_cast<float>(-std::log2(1.0 - opacity));
+}
+
+}  // namespace
+
+RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
+    : device_(std::move(device)),
+      volume_(device_),
+      pass_(device_),
+      builder_(device_),
+      commands_(device_),
+      params_(device_, sizeof(shared::CastParams), MemoryKind::Upload) {}
+
+void RayCaster::setBlocks(std::span<const Block> blocks, const Scene& scene) { volume_.setBlocks(blocks, scene); }
+
+shared::CastParams RayCaster::prepare(const Request& request) {
+  volume_.setTable(request.table);
+  shared::CastParams params = gpu::castGeometry(request.scene, request.view, request.lattice);
+  params.bricks = volume_.bricks();
+  params.nodes = volume_.nodes();
+  params.table = volume_.table();
+  params.tableSize = volume_.tableSize();
+  params.nodeCount = volume_.nodeCount();
+  params.perUnitDistance = static_cast<float>(request.lattice.step / request.table.unitDistance);
+  params.enough = opticalDepthOf(request.settings.terminationOpacity);
+  params.budget = request.settings.supersegments;
+  params.cutAtGaps = request.cutAtGaps ? 1U : 0U;
+  params.runsOnly = request.runsOnly ? 1U : 0U;
+  if (!volume_.empty()) pass_.bind(volume_);
+  return params;
+}
+
+/// The whole picture at once where memory allows; on a CPU device in eighths, so that progress shows and an abort is heard.
+std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytesPerPixel) const {
+  const auto height = static_cast<std::uint64_t>(request.view.height());
+  const std::uint64_t rowBytes = static_cast<std::uint64_t>(request.view.width()) * bytesPerPixel;
+  const std::uint64_t room = std::max<std::uint64_t>(device_->limits().memoryBytes / 8, rowBytes);
+  std::uint64_t rows = std::min(height, room / rowBytes);
+  if (device_->isCpu()) rows = std::min(rows, std::max<std::uint64_t>((height + 7) / 8, 1));
+  return static_cast<std::uint32_t>(rows);
+}
+
+SupersegmentLists RayCaster::lists(const Request& request, const Progress& progress) {
+  const auto width = static_cast<std::uint32_t>(request.view.width());
+  const auto height = static_cast<std::uint32_t>(request.view.height());
+  SupersegmentLists result;
+  const bool nothingThere = volume_.empty() || request.lattice.count == 0;
+  if (nothingThere) {
+    result.offsets.assign(static_cast<std::size_t>(width) * height + 1, 0);
+    return result;
+  }
+  result.offsets.reserve(static_cast<std::size_t>(width) * height + 1);
+  shared::CastParams params = prepare(request);
+  const std::uint32_t band = rowsPerBand(request, std::uint64_t{request.settings.supersegments} * sizeof(Supersegment));
+  for (std::uint32_t row = 0; row < height; row += band) {
+    const std::uint32_t end = std::min(height, row + band);
+    const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
+      // The shader counts lists from the picture's first; the targets hold just this band's.
+      const std::uint64_t skipped = std::uint64_t{row} * width * sizeof(std::uint32_t);
+      params.sensitivities = targets.sensitivities - skipped;
+      params.counts = targets.counts - skipped;
+      params.offsets = targets.offsets - skipped;
+      params.segments = targets.segments;
+      params.status = targets.status;
+      std::memcpy(params_.mapped().data(), &params, sizeof(params));
+      pass_.record(commands, params_.address(), write ? shared::castModeWrite : shared::castModeSearch, width, row, end);
+    };
+    builder_.build((end - row) * width, record, result);
+    if (!progress(static_cast<double>(end) / height)) break;
+  }
+  return result;
+}
+
+Image RayCaster::image(const Request& request, const Progress& progress) {
+  const auto width = static_cast<std::uint32_t>(request.view.width());
+  const auto height = static_cast<std::uint32_t>(request.view.height());
+  Image image{request.view.width(), request.view.height(), {}, {}};
+  image.rgba.assign(image.pixelCount(), glm::vec4(0.0F));
+  image.depth.assign(image.pixelCount(), Image::noDepth);
+  if (volume_.empty() || request.lattice.count == 0) return image;
+  shared::CastParams params = prepare(request);
+  const std::uint32_t band = rowsPerBand(request, sizeof(glm::vec4) + sizeof(float));
+  colors_.reserve(device_, std::uint64_t{band} * width * sizeof(glm::vec4), MemoryKind::Readback);
+  depths_.reserve(device_, std::uint64_t{band} * width * sizeof(float), MemoryKind::Readback);
+  for (std::uint32_t row = 0; row < height; row += band) {
+    const std::uint32_t end = std::min(height, row + band);
+    const std::uint64_t first = std::uint64_t{row} * width;
+    params.colors = colors_.address() - first * sizeof(glm::vec4);
+    params.depths = depths_.address() - first * sizeof(float);
+    std::memcpy(params_.mapped().data(), &params, sizeof(params));
+    commands_.begin();
+    pass_.record(commands_, params_.address(), shared::castModeVolume, width, row, end);
+    commands_.submitAndWait();
+    const std::size_t count = std::size_t{end - row} * width;
+    std::memcpy(image.rgba.data() + first, colors_.mapped().data(), count * sizeof(glm::vec4));
+    std::memcpy(image.depth.data() + first, depths_.mapped().data(), count * sizeof(float));
+    if (!progress(static_cast<double>(end) / height)) break;
+  }
+  return image;
+}
+
+}  // namespace vdi::detail

@@ -1,0 +1,59 @@
+// One rank's part of a frame on the device: sub-VDI or DVR of its blocks. Not part of the library's interface.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+
+#include "vdi/core/Block.h"
+#include "vdi/core/Camera.h"
+#include "vdi/core/GenerateSettings.h"
+#include "vdi/core/Image.h"
+#include "vdi/core/Scene.h"
+#include "vdi/core/TransferFunction.h"
+#include "vdi/core/Vdi.h"
+#include "vdi/gpu/CastPass.h"
+#include "vdi/gpu/VolumeStore.h"
+#include "vdi/pipeline/ListBuilder.h"
+
+namespace vdi::detail {
+
+class RayCaster {
+ public:
+  explicit RayCaster(std::shared_ptr<gpu::Device> device);
+
+  void setBlocks(std::span<const Block> blocks, const Scene& scene);
+
+  struct Request {
+    const Scene& scene;
+    const View& view;
+    const DepthLattice& lattice;
+    const TransferTable& table;
+    const GenerateSettings& settings;
+    bool cutAtGaps;
+    bool runsOnly;  // one supersegment a run, no search
+  };
+  /// Called with the share done; returning false ends the work early with what's there.
+  using Progress = std::function<bool(double)>;
+
+  /// One list per pixel.
+  SupersegmentLists lists(const Request& request, const Progress& progress);
+  /// DVR.
+  Image image(const Request& request, const Progress& progress);
+
+ private:
+  gpu::shared::CastParams prepare(const Request& request);
+  std::uint32_t rowsPerBand(const Request& request, std::uint64_t bytesPerPixel) const;
+
+  std::shared_ptr<gpu::Device> device_;
+  gpu::VolumeStore volume_;
+  gpu::CastPass pass_;
+  ListBuilder builder_;
+  gpu::Commands commands_;
+  gpu::Buffer params_;
+  gpu::Buffer colors_;
+  gpu::Buffer depths_;
+};
+
+}  // namespace vdi::detail

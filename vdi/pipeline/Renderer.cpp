@@ -1,0 +1,118 @@
+// VdiRenderer and flatten: what a viewer does with a VDI.
+#include <algorithm>
+#include <cstring>
+
+#include "vdi/core/Error.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/Memory.h"
+#include "vdi/gpu/RenderPass.h"
+#include "vdi/pipeline/Pipeline.h"
+
+namespace vdi {
+
+using gpu::MemoryKind;
+namespace shared = gpu::shared;
+
+struct VdiRenderer::State {
+  explicit State(std::shared_ptr<gpu::Device> theDevice)
+      : device(std::move(theDevice)),
+        commands(device),
+        pass(device),
+        params(device, sizeof(shared::RenderParams), MemoryKind::Upload) {}
+
+  std::shared_ptr<gpu::Device> device;
+  gpu::Commands commands;
+  gpu::RenderPass pass;
+  gpu::Buffer params;
+  gpu::Buffer staging;
+  gpu::Buffer offsets;
+  gpu::Buffer segments;
+  gpu::Buffer colors;
+  gpu::Buffer depths;
+  std::unique_ptr<View> original;  // none until there's a VDI
+  float nearest = 0.0F;
+  float farthest = 0.0F;
+  double milliseconds = 0.0;
+
+  template <typename T>
+  void upload(const std::vector<T>& values, gpu::Buffer& to) {
+    constexpr std::uint64_t chunk = 64ULL << 20;
+    const std::uint64_t bytes = values.size() * sizeof(T);
+    to.reserve(device, bytes, MemoryKind::DeviceLocal);
+    staging.reserve(device, std::min(bytes, chunk), MemoryKind::Upload);
+    const auto* data = reinterpret_cast<const std::byte*>(values.data());
+    for (std::uint64_t done = 0; done < bytes; done += chunk) {
+      const std::uint64_t part = std::min(chunk, bytes - done);
+      std::memcpy(staging.mapped().data(), data + done, part);
+      commands.begin();
+      commands.copy(staging, 0, to, done, part);
+      commands.submitAndWait();
+    }
+  }
+};
+
+VdiRenderer::VdiRenderer(std::shared_ptr<gpu::Device> device) : state_(std::make_unique<State>(std::move(device))) {}
+
+VdiRenderer::~VdiRenderer() = default;
+
+void VdiRenderer::setVdi(const Vdi& vdi) {
+  State& s = *state_;
+  s.original.reset();
+  s.upload(vdi.lists.offsets, s.offsets);
+  s.upload(vdi.lists.segments, s.segments);
+  s.nearest = Image::noDepth;
+  s.farthest = 0.0F;
+  for (const Supersegment& segment : vdi.lists.segments) {
+    s.nearest = std::min(s.nearest, segment.front);
+    s.farthest = std::max(s.farthest, segment.back);
+  }
+  // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
+  if (!vdi.camera.parallelProjection) s.nearest = std::max(s.nearest, s.farthest * 1e-6F);
+  s.original = std::make_unique<View>(vdi.view());
+}
+
+Image VdiRenderer::render(const Camera& camera, int width, int height) {
+  State& s = *state_;
+  if (!s.original) throw Error(ErrorCode::InvalidArgument, "there is no VDI to render yet");
+  const View view(camera, width, height);
+  Image image{width, height, {}, {}};
+  const std::uint64_t pixels = image.pixelCount();
+  s.colors.reserve(s.device, pixels * sizeof(glm::vec4), MemoryKind::Readback);
+  s.depths.reserve(s.device, pixels * sizeof(float), MemoryKind::Readback);
+  shared::RenderParams params = gpu::renderGeometry(*s.original, view);
+  params.offsets = s.offsets.address();
+  params.segments = s.segments.address();
+  params.colors = s.colors.address();
+  params.depths = s.depths.address();
+  params.nearest = s.nearest;
+  params.farthest = s.farthest;
+  std::memcpy(s.params.mapped().data(), &params, sizeof(params));
+  s.commands.begin();
+  s.commands.mark("render");
+  s.pass.record(s.commands, s.params.address(), params.width, params.height);
+  s.commands.submitAndWait();
+  s.milliseconds = s.commands.stageTimes().front().milliseconds;
+  image.rgba.resize(pixels);
+  image.depth.resize(pixels);
+  std::memcpy(image.rgba.data(), s.colors.mapped().data(), pixels * sizeof(glm::vec4));
+  std::memcpy(image.depth.data(), s.depths.mapped().data(), pixels * sizeof(float));
+  return image;
+}
+
+double VdiRenderer::renderMilliseconds() const { return state_->milliseconds; }
+
+Image flatten(const Vdi& vdi) {
+  Image image{vdi.width, vdi.height, {}, {}};
+  image.rgba.resize(image.pixelCount());
+  image.depth.resize(image.pixelCount());
+  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+    const auto list = vdi.lists.list(i);
+    glm::vec4 sum(0.0F);
+    for (const Supersegment& s : list) sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
+    image.rgba[i] = sum;
+    image.depth[i] = list.empty() ? Image::noDepth : list.front().front;
+  }
+  return image;
+}
+
+}  // namespace vdi
