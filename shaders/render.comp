@@ -49,11 +49,11 @@ vec2 pixelAt(float t) {
   return p.xy * scale + 0.5 * vec2(push.params.value.lists);
 }
 
-// Where the ray crosses the plane between columns or rows at image coordinate `pixel`.
-float crossing(int axis, int pixel) {
-  float slope = (float(pixel) - 0.5 * float(push.params.value.lists[axis])) * push.params.value.pixelSize;
-  if (push.params.value.parallel != 0u) return (slope - rayOrigin[axis]) / rayDirection[axis];
-  return (slope * rayOrigin.z - rayOrigin[axis]) / (rayDirection[axis] - slope * rayDirection.z);
+// Where the ray crosses the planes between columns and between rows at image coordinates `pixel`.
+vec2 crossings(ivec2 pixel) {
+  vec2 slope = (vec2(pixel) - 0.5 * vec2(push.params.value.lists)) * push.params.value.pixelSize;
+  if (push.params.value.parallel != 0u) return (slope - rayOrigin.xy) / rayDirection.xy;
+  return (slope * rayOrigin.z - rayOrigin.xy) / (rayDirection.xy - slope * rayDirection.z);
 }
 
 // World length of a unit of depth in the list's pixel.
@@ -118,20 +118,15 @@ void walkLists(vec2 stretch) {
   // At most one step per column and row.
   int most = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
   for (int i = 0; i < most; ++i) {
-    int axis = -1;
-    float leave = stretch.y;
-    for (int a = 0; a < 2; ++a) {
-      if (pixel[a] == last[a]) continue;
-      float t = crossing(a, direction[a] > 0 ? pixel[a] + 1 : pixel[a]);
-      if (axis < 0 || t < leave) {
-        leave = t;
-        axis = a;
-      }
-    }
-    leave = clamp(leave, enter, stretch.y);
+    vec2 t = crossings(pixel + max(direction, ivec2(0)));
+    bool movesX = pixel.x != last.x;
+    bool movesY = pixel.y != last.y;
+    bool stepX = movesX && (!movesY || t.x <= t.y);
+    bool stepY = movesY && !stepX;
+    float leave = clamp(stepX ? t.x : stepY ? t.y : stretch.y, enter, stretch.y);
     if (leave > enter) addList(pixel, vec2(enter, leave));
-    if (axis < 0 || accumulated.a >= opaque) return;
-    pixel[axis] += direction[axis];
+    if (!(stepX || stepY) || accumulated.a >= opaque) return;
+    pixel += ivec2(stepX ? direction.x : 0, stepY ? direction.y : 0);
     enter = leave;
   }
 }

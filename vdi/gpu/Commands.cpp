@@ -27,6 +27,24 @@ void memoryBarrier(VkCommandBuffer commands) {
   vkCmdPipelineBarrier2(commands, &info);
 }
 
+/// Waits for everything before; everything after waits for it.
+void changeLayout(VkCommandBuffer commands, const Image3D& image, VkImageLayout from, VkImageLayout to) {
+  const VkImageMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
+                                      nullptr,
+                                      VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,
+                                      VK_ACCESS_2_MEMORY_WRITE_BIT,
+                                      VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,
+                                      VK_ACCESS_2_MEMORY_READ_BIT | VK_ACCESS_2_MEMORY_WRITE_BIT,
+                                      from,
+                                      to,
+                                      VK_QUEUE_FAMILY_IGNORED,
+                                      VK_QUEUE_FAMILY_IGNORED,
+                                      image.handle(),
+                                      {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
+  const VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 0, nullptr, 0, nullptr, 1, &barrier};
+  vkCmdPipelineBarrier2(commands, &info);
+}
+
 }  // namespace
 
 Commands::Commands(std::shared_ptr<Device> device) : device_(std::move(device)) {
@@ -113,22 +131,12 @@ void Commands::fill(const Buffer& buffer, std::uint32_t word) {
   vkCmdFillBuffer(buffer_, buffer.handle(), 0, VK_WHOLE_SIZE, word);
 }
 
-void Commands::prepare(const Image3D& image) {
-  const VkImageMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
-                                      nullptr,
-                                      VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,
-                                      0,
-                                      VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,
-                                      VK_ACCESS_2_MEMORY_READ_BIT | VK_ACCESS_2_MEMORY_WRITE_BIT,
-                                      VK_IMAGE_LAYOUT_UNDEFINED,
-                                      VK_IMAGE_LAYOUT_GENERAL,
-                                      VK_QUEUE_FAMILY_IGNORED,
-                                      VK_QUEUE_FAMILY_IGNORED,
-                                      image.handle(),
-                                      {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
-  const VkDependencyInfo info{
-      VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 0, nullptr, 0, nullptr, 1, &barrier};
-  vkCmdPipelineBarrier2(buffer_, &info);
+void Commands::beginUpload(const Image3D& image) {
+  changeLayout(buffer_, image, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+}
+
+void Commands::endUpload(const Image3D& image) {
+  changeLayout(buffer_, image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
 }
 
 void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to,
@@ -140,7 +148,7 @@ void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const I
                                  {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
                                  {offset.x, offset.y, offset.z},
                                  {texelExtent.x, texelExtent.y, texelExtent.z}};
-  vkCmdCopyBufferToImage(buffer_, from.handle(), to.handle(), VK_IMAGE_LAYOUT_GENERAL, 1, &region);
+  vkCmdCopyBufferToImage(buffer_, from.handle(), to.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
 }
 
 void Commands::mark(std::string name) {

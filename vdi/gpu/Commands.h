@@ -54,8 +54,10 @@ class Commands {
 
   void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset, std::uint64_t bytes);
   void fill(const Buffer& buffer, std::uint32_t word);  // whole buffer
-  /// Image to layout GENERAL, contents undefined. Once after it was made.
-  void prepare(const Image3D& image);
+  /// Makes the image ready for copyToImage; its contents are undefined afterwards.
+  void beginUpload(const Image3D& image);
+  /// Makes the image ready to be sampled by what's recorded later.
+  void endUpload(const Image3D& image);
   /// Tightly packed texels, x fastest, from the buffer into a box of the image.
   void copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to, const glm::uvec3& texelOffset,
                    const glm::uvec3& texelExtent);

@@ -93,7 +93,7 @@ void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
 void ComputePipeline::bindImages(std::span<const Image3D* const> images, const Sampler& sampler) {
   assert(images.size() == imageCount_);
   std::vector<VkDescriptorImageInfo> infos;
-  for (const Image3D* image : images) infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_GENERAL});
+  for (const Image3D* image : images) infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
   const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
                                    nullptr,
                                    set_,

@@ -57,8 +57,8 @@ class Buffer {
   std::span<std::byte> mapped_;
 };
 
-/// A sampled 3-D image with one mip level, optimal tiling, and its view. The layout is GENERAL from the first use on (see
-/// Commands::prepare). Usage: sampled, transfer destination.
+/// A sampled 3-D image with one mip level, optimal tiling, and its view. Filled between
+/// Commands::beginUpload and endUpload. Usage: sampled, transfer destination.
 class Image3D {
  public:
   Image3D() = default;

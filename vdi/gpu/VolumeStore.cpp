@@ -236,8 +236,7 @@ void VolumeStore::writeBox(const Piece& piece, const glm::uvec3& at, const glm::
 void VolumeStore::upload(std::span<const Piece> pieces) {
   staging_.reserve(device_, stagingBytes, MemoryKind::Upload);
   commands_.begin();
-  for (const Image3D& page : pages_) commands_.prepare(page);
-  commands_.barrier();
+  for (const Image3D& page : pages_) commands_.beginUpload(page);
   std::uint64_t filled = 0;
   const auto flush = [&] {
     commands_.submitAndWait();
@@ -269,7 +268,7 @@ void VolumeStore::upload(std::span<const Piece> pieces) {
       if (at.y == piece.dims.y) at = {0, 0, at.z + box.z};
     }
   }
-  commands_.barrier();
+  for (const Image3D& page : pages_) commands_.endUpload(page);
   commands_.submitAndWait();
 }
 

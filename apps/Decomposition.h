@@ -1,0 +1,74 @@
+// Cuts a lattice into blocks and deals them to ranks, in ways that simulations do and in ways that hurt.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "vdi/core/Block.h"
+
+namespace vdi::apps {
+
+/// Who holds which block.
+enum class Layout { Slabs, Bricks, Interleaved, Checkerboard, Random, OnOneRank };
+/// "slabs", "bricks", "interleaved", "checkerboard", "random", "one-rank"; throws Error{InvalidArgument} that lists them.
+Layout layoutFromString(const std::string& name);
+std::vector<std::string> layoutNames();
+
+/// How the values at the cuts are shared.
+enum class Joint {
+  SharedPoints,  // point data; neighbours both hold the points of their common face
+  Gap,           // point data; no point twice, so a cell between blocks belongs to nobody
+  Cells,         // cell data; no cell twice
+};
+
+/// Part of a lattice of `size` values (points or cells).
+struct Part {
+  glm::ivec3 first;  // index of the first value held
+  glm::ivec3 dims;   // values held
+  int owner;         // rank
+};
+
+/// `blocks` per axis (clamped so that each holds at least two values); deterministic, equal on every rank.
+std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, Layout layout, Joint joint, int ranks,
+                            std::uint32_t seed);
+
+/// The whole lattice that a Part is of.
+struct Lattice {
+  glm::ivec3 size{0};  // values per axis
+  glm::dvec3 origin{0.0};  // lower corner of the domain
+  glm::dvec3 spacing{1.0};
+  ScalarType type = ScalarType::F32;
+  Joint joint = Joint::SharedPoints;
+};
+
+/// A block for a part, with its own copy of the values. `valueAt(index)` gives the value at a lattice index; integers are
+/// rounded.
+template <typename ValueAt>
+Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt);
+
+/// The block without data: geometry and ownership only.
+Block emptyBlock(const Lattice& lattice, const Part& part, const void* data);
+/// Writes one value of the given type.
+void storeValue(ScalarType type, void* data, std::size_t index, double value);
+
+template <typename ValueAt>
+Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt) {
+  const auto count = static_cast<std::size_t>(part.dims.x) * static_cast<std::size_t>(part.dims.y) *
+                     static_cast<std::size_t>(part.dims.z);
+  const std::shared_ptr<std::byte[]> data(new std::byte[count * sizeOf(lattice.type)]);
+  std::size_t index = 0;
+  for (int z = 0; z < part.dims.z; ++z) {
+    for (int y = 0; y < part.dims.y; ++y) {
+      for (int x = 0; x < part.dims.x; ++x) {
+        storeValue(lattice.type, data.get(), index++, valueAt(part.first + glm::ivec3(x, y, z)));
+      }
+    }
+  }
+  Block block = emptyBlock(lattice, part, data.get());
+  block.keepAlive = std::shared_ptr<const void>(data, data.get());
+  return block;
+}
+
+}  // namespace vdi::apps

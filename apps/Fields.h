@@ -1,0 +1,25 @@
+// Procedural scalar fields: deterministic, defined everywhere, so that every rank fills its blocks by itself.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+namespace vdi::apps {
+
+/// Scalar in [0, 1] at a point of the unit cube.
+using Field = std::function<double(const glm::dvec3&)>;
+
+/// Names with a line about each.
+struct FieldInfo {
+  std::string name;
+  std::string description;
+};
+const std::vector<FieldInfo>& fields();
+
+/// Throws Error{InvalidArgument} that lists the names there are. `seed` changes the ones with random parts.
+Field makeField(const std::string& name, std::uint32_t seed);
+
+}  // namespace vdi::apps

@@ -1,0 +1,65 @@
+// Data that several tests share.
+#pragma once
+
+#include <vector>
+
+#include "apps/Decomposition.h"
+#include "apps/Fields.h"
+#include "vdi/core/Camera.h"
+#include "vdi/core/GenerateSettings.h"
+#include "vdi/core/TransferFunction.h"
+
+namespace vdi::test {
+
+/// Low and high values of the scalar type that a field's [0, 1] is stretched over.
+inline double topOf(ScalarType type) { return sizeOf(type) == 1 ? 100.0 : type == ScalarType::F32 ? 1.0 : 1000.0; }
+
+/// The blocks that `rank` of `ranks` holds of a field on a lattice whose longest side is 1.
+struct Dealt {
+  apps::Lattice lattice;
+  std::vector<Block> mine;
+  std::vector<Block> all;
+};
+
+inline Dealt deal(const char* field, const glm::ivec3& size, const glm::ivec3& blocks, apps::Layout layout,
+                  apps::Joint joint, ScalarType type, int rank, int ranks) {
+  Dealt dealt;
+  const bool cells = joint == apps::Joint::Cells;
+  const double spacing = 1.0 / (glm::max(size.x, glm::max(size.y, size.z)) - (cells ? 0 : 1));
+  dealt.lattice = {size, glm::dvec3(0.0), glm::dvec3(spacing), type, joint};
+  const apps::Field value = apps::makeField(field, 7);
+  for (const apps::Part& part : apps::decompose(size, blocks, layout, joint, ranks, 3)) {
+    Block block = apps::makeBlock(dealt.lattice, part, [&](const glm::ivec3& index) {
+      return value((glm::dvec3(index) + (cells ? 0.5 : 0.0)) * spacing) * topOf(type);
+    });
+    dealt.all.push_back(block);
+    if (part.owner == rank) dealt.mine.push_back(block);
+  }
+  return dealt;
+}
+
+/// Three hues; transparent below a third; `top` is the scalar of full opacity. Unit distance: a twentieth of the scene.
+inline TransferFunction threeHues(double top, double unitDistance = 0.05) {
+  TransferFunction function;
+  function.colors = {{0.0, {0.1, 0.2, 0.9}}, {0.5 * top, {0.9, 0.9, 0.2}}, {top, {0.9, 0.1, 0.1}}};
+  function.opacities = {{0.0, 0.0}, {0.33 * top, 0.0}, {0.6 * top, 0.25}, {top, 0.8}};
+  function.unitDistance = unitDistance;
+  return function;
+}
+
+inline GenerateSettings smallSettings(int width = 64, int height = 48, std::uint32_t supersegments = 12) {
+  GenerateSettings settings;
+  settings.width = width;
+  settings.height = height;
+  settings.supersegments = supersegments;
+  return settings;
+}
+
+/// Looks at the unit cube from an oblique direction.
+inline Camera oblique(bool parallel = false) {
+  Camera camera = Camera::framing({glm::dvec3(0.0), glm::dvec3(1.0)}, {-0.5, -0.35, -1.0}, {0.0, 1.0, 0.0});
+  camera.parallelProjection = parallel;
+  return camera;
+}
+
+}  // namespace vdi::test

@@ -1,0 +1,194 @@
+// Each device pass against the reference, and a VDI against DVR.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+
+#include "tests/Scenes.h"
+#include "vdi/core/Error.h"
+#include "vdi/core/ImageMetrics.h"
+#include "vdi/io/Png.h"
+#include "vdi/pipeline/Compositor.h"
+#include "vdi/pipeline/Pipeline.h"
+#include "vdi/reference/Reference.h"
+
+using namespace vdi;
+using apps::Joint;
+using apps::Layout;
+
+namespace {
+
+std::shared_ptr<gpu::Device> device() {
+  static const std::shared_ptr<gpu::Device> instance = [] {
+    gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
+    request.validation = true;
+    return gpu::Device::create(request);
+  }();
+  return instance;
+}
+
+float largestDifference(const Image& a, const Image& b) {
+  REQUIRE(a.rgba.size() == b.rgba.size());
+  float worst = 0.0F;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i) {
+    for (int c = 0; c < 4; ++c) worst = std::max(worst, std::abs(a.rgba[i][c] - b.rgba[i][c]));
+  }
+  return worst * 255.0F;
+}
+
+ImageDifference differenceOf(const Image& a, const Image& b) {
+  return compare(io::toPicture(a).rgb, io::toPicture(b).rgb, a.width, a.height, 3);
+}
+
+std::size_t listsOfOtherLength(const SupersegmentLists& a, const SupersegmentLists& b) {
+  REQUIRE(a.listCount() == b.listCount());
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.listCount(); ++i) count += a.countOf(i) != b.countOf(i) ? 1 : 0;
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("DVR, generation and rendering on the device equal the reference") {
+  for (const bool parallel : {false, true}) {
+    for (const ScalarType type : {ScalarType::U8, ScalarType::I8, ScalarType::U16, ScalarType::I16, ScalarType::U32,
+                                  ScalarType::I32, ScalarType::F32, ScalarType::F64}) {
+      if (parallel && type != ScalarType::F32) continue;
+      INFO(toString(type) << (parallel ? ", parallel" : ", perspective"));
+      const auto dealt =
+          test::deal("turbulence", {26, 22, 24}, {2, 2, 2}, Layout::OnOneRank, Joint::SharedPoints, type, 0, 1);
+      const TransferFunction function = test::threeHues(test::topOf(type) * 0.8);
+      const GenerateSettings settings = test::smallSettings(48, 36, 8);
+      const Camera camera = test::oblique(parallel);
+      VdiGenerator generator(device(), comm::Communicator::serial());
+      generator.setBlocks(dealt.mine);
+      const reference::Frame frame(generator.scene(), camera, function, settings);
+
+      const auto image = generator.renderVolume(camera, function, settings);
+      const Image expected = reference::renderVolume(frame, dealt.mine);
+      CHECK(largestDifference(*image, expected) < 0.1F);
+      std::size_t depthsOff = 0;
+      for (std::size_t i = 0; i < image->depth.size(); ++i) depthsOff += image->depth[i] != expected.depth[i] ? 1 : 0;
+      CHECK(depthsOff <= image->depth.size() / 100);
+
+      const auto vdi = generator.generate(camera, function, settings);
+      CHECK_NOTHROW(validate(*vdi));
+      const SupersegmentLists lists = reference::generate(frame, dealt.mine, false);
+      CHECK(lists.segments.size() > lists.listCount());
+      CHECK(listsOfOtherLength(vdi->lists, lists) <= lists.listCount() / 50);
+      CHECK(largestDifference(flatten(*vdi), expected) < 0.1F);
+
+      VdiRenderer renderer(device());
+      renderer.setVdi(*vdi);
+      for (const double angle : {0.0, 7.0, 35.0, 100.0, 180.0}) {
+        INFO("from " << angle << " degrees");
+        const Camera other = camera.azimuth(angle);
+        const Image seen = renderer.render(other, 40, 30);
+        CHECK(largestDifference(seen, reference::render(*vdi, View(other, 40, 30))) < 2.0F);
+      }
+    }
+  }
+  CHECK(device()->validationMessages() == "");
+}
+
+TEST_CASE("merging and compositing on the device equal the reference") {
+  const auto dealt = test::deal("turbulence", {26, 22, 24}, {3, 3, 3}, Layout::Random, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  const TransferFunction function = test::threeHues(0.8);
+  const GenerateSettings settings = test::smallSettings(40, 30, 6);
+  const Scene scene = localScene(dealt.all);
+  const reference::Frame frame(scene, test::oblique(), function, settings);
+  std::vector<SupersegmentLists> subLists;
+  for (std::size_t rank = 0; rank < 3; ++rank) {
+    std::vector<Block> mine;
+    for (std::size_t i = rank; i < dealt.all.size(); i += 3) mine.push_back(dealt.all[i]);
+    subLists.push_back(reference::generate(frame, mine, true));
+  }
+  const SupersegmentLists expected = reference::composite(subLists, 6, frame.lattice.step, Algorithm::Bisection);
+  detail::Compositor compositor(device());
+  const SupersegmentLists result = compositor.composite(subLists, 6, frame.lattice.step);
+  CHECK(listsOfOtherLength(result, expected) <= expected.listCount() / 50);
+  std::vector<glm::vec4> rgba(result.listCount());
+  std::vector<float> depth(result.listCount());
+  detail::flattenMerged(subLists, rgba, depth);
+  for (std::size_t i = 0; i < result.listCount(); ++i) {
+    CHECK(result.countOf(i) <= 6);
+    glm::vec4 sum(0.0F);
+    for (const Supersegment& s : result.list(i)) sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
+    for (int c = 0; c < 4; ++c) CHECK(std::abs(sum[c] - rgba[i][c]) < 0.5F / 255.0F);
+  }
+  CHECK(device()->validationMessages() == "");
+}
+
+TEST_CASE("a VDI equals DVR at V_O and stays close around it") {
+  const auto dealt =
+      test::deal("mixing", {48, 48, 48}, {2, 2, 2}, Layout::OnOneRank, Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const TransferFunction function = test::threeHues(1.0);
+  const GenerateSettings settings = test::smallSettings(128, 96, 20);
+  const Camera camera = test::oblique();
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  const auto vdi = generator.generate(camera, function, settings);
+  VdiRenderer renderer(device());
+  renderer.setVdi(*vdi);
+  const std::pair<double, double> leastSsim[] = {{0.0, 0.995}, {5.0, 0.98}, {20.0, 0.96}, {50.0, 0.90}};
+  for (const auto& [angle, least] : leastSsim) {
+    INFO(angle << " degrees");
+    const Camera other = camera.azimuth(angle);
+    const auto truth = generator.renderVolume(other, function, settings);
+    const ImageDifference difference = differenceOf(renderer.render(other, 128, 96), *truth);
+    CHECK(difference.ssim >= least);
+    if (angle == 0.0) CHECK(difference.meanError < 0.5);
+  }
+}
+
+TEST_CASE("nothing is made anew between frames of the same size") {
+  const auto dealt =
+      test::deal("shells", {20, 20, 20}, {2, 2, 2}, Layout::OnOneRank, Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const GenerateSettings settings = test::smallSettings();
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  const auto first = generator.generate(test::oblique(), test::threeHues(1.0), settings);
+  const std::uint64_t held = device()->allocatedBytes();
+  for (int i = 0; i < 3; ++i) {
+    generator.setBlocks(dealt.mine);
+    const auto again = generator.generate(test::oblique(), test::threeHues(1.0), settings);
+    CHECK(*again == *first);
+    CHECK(device()->allocatedBytes() == held);
+  }
+}
+
+TEST_CASE("thousands of small blocks in one pass") {
+  const auto dealt = test::deal("turbulence", {61, 61, 61}, {15, 15, 15}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::U8, 0, 1);
+  CHECK(dealt.mine.size() == 3375);
+  const auto whole =
+      test::deal("turbulence", {61, 61, 61}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints, ScalarType::U8, 0, 1);
+  const TransferFunction function = test::threeHues(80.0);
+  const GenerateSettings settings = test::smallSettings();
+  VdiGenerator many(device(), comm::Communicator::serial());
+  VdiGenerator one(device(), comm::Communicator::serial());
+  many.setBlocks(dealt.mine, false);
+  one.setBlocks(whole.mine);
+  const auto image = many.renderVolume(test::oblique(), function, settings);
+  CHECK(largestDifference(*image, *one.renderVolume(test::oblique(), function, settings)) < 1.0F);
+}
+
+TEST_CASE("blocks of different spacing side by side") {
+  // The upper half at twice the resolution.
+  const apps::Field ramp = apps::makeField("ramp", 0);
+  const auto make = [&](const glm::ivec3& dims, double z, double spacing) {
+    const apps::Lattice lattice{dims, {0.0, 0.0, z}, glm::dvec3(spacing), ScalarType::F32, Joint::SharedPoints};
+    return apps::makeBlock(lattice, {{0, 0, 0}, dims, 0}, [&, lattice](const glm::ivec3& i) {
+      return ramp(lattice.origin + glm::dvec3(i) * spacing);
+    });
+  };
+  const Block coarse = make({11, 11, 6}, 0.0, 0.1);
+  const Block fine = make({21, 21, 11}, 0.5, 0.05);
+  const Block all = make({21, 21, 21}, 0.0, 0.05);
+  const TransferFunction function = test::threeHues(0.9);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks({coarse, fine});
+  const auto image = generator.renderVolume(test::oblique(), function, test::smallSettings());
+  generator.setBlocks({all});
+  CHECK(largestDifference(*image, *generator.renderVolume(test::oblique(), function, test::smallSettings())) < 1.0F);
+}

@@ -1,0 +1,150 @@
+// N ranks against one: the decomposition must not show.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdio>
+
+#include "tests/Scenes.h"
+#include "vdi/core/Error.h"
+#include "vdi/pipeline/Pipeline.h"
+
+using namespace vdi;
+using apps::Joint;
+using apps::Layout;
+
+namespace {
+
+std::shared_ptr<gpu::Device> device() {
+  static const std::shared_ptr<gpu::Device> instance = gpu::Device::create(gpu::requestFromEnvironment(0));
+  return instance;
+}
+
+float largestDifference(const Image& a, const Image& b) {
+  REQUIRE(a.rgba.size() == b.rgba.size());
+  float worst = 0.0F;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i) {
+    for (int c = 0; c < 4; ++c) worst = std::max(worst, std::abs(a.rgba[i][c] - b.rgba[i][c]));
+  }
+  return worst * 255.0F;
+}
+
+bool anythingSeen(const Image& image) {
+  std::size_t seen = 0;
+  for (const glm::vec4& pixel : image.rgba) seen += pixel.a > 0.1F ? 1 : 0;
+  return seen > image.rgba.size() / 20;
+}
+
+struct Case {
+  const char* name;
+  Layout layout;
+  Joint joint;
+  ScalarType type;
+  glm::ivec3 blocks;
+  bool parallel;
+};
+
+const Case cases[] = {
+    {"slabs", Layout::Slabs, Joint::SharedPoints, ScalarType::F32, {1, 1, 8}, false},
+    {"bricks", Layout::Bricks, Joint::SharedPoints, ScalarType::U8, {3, 2, 2}, false},
+    {"interleaved, cells", Layout::Interleaved, Joint::Cells, ScalarType::U16, {4, 4, 4}, false},
+    {"checkerboard, parallel", Layout::Checkerboard, Joint::SharedPoints, ScalarType::F32, {5, 5, 5}, true},
+    {"random, gaps", Layout::Random, Joint::Gap, ScalarType::F32, {4, 3, 5}, false},
+    {"random, cells, parallel", Layout::Random, Joint::Cells, ScalarType::F64, {3, 3, 3}, true},
+    {"one rank holds all", Layout::OnOneRank, Joint::SharedPoints, ScalarType::I16, {2, 2, 2}, false},
+};
+
+}  // namespace
+
+TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
+  const comm::Communicator world = comm::Communicator::world();
+  for (const Case& c : cases) {
+    INFO(c.name);
+    // A field with structure up to the domain's faces, so that a lost or doubled sample shows.
+    const glm::ivec3 size{34, 30, 37};
+    const auto dealt = test::deal("turbulence", size, c.blocks, c.layout, c.joint, c.type, world.rank(), world.size());
+    const auto whole = test::deal("turbulence", size, {1, 1, 1}, Layout::OnOneRank, c.joint, c.type, 0, 1);
+    const TransferFunction function = test::threeHues(test::topOf(c.type) * 0.8);
+    const GenerateSettings settings = test::smallSettings();
+    const Camera camera = test::oblique(c.parallel);
+
+    VdiGenerator one(device(), comm::Communicator::serial());
+    one.setBlocks(whole.mine);
+    const auto truth = one.renderVolume(camera, function, settings);
+    REQUIRE(anythingSeen(*truth));
+
+    VdiGenerator many(device(), comm::Communicator::world());
+    many.setBlocks(dealt.mine);
+    const auto volume = many.renderVolume(camera, function, settings);
+    const auto vdi = many.generate(camera, function, settings);
+    CHECK(vdi.has_value() == (world.rank() == 0));
+    if (world.rank() != 0) continue;
+    CHECK_NOTHROW(validate(*vdi));
+    CHECK(largestDifference(*volume, *truth) < 1.0F);
+    CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
+    VdiRenderer renderer(device());
+    renderer.setVdi(*vdi);
+    CHECK(largestDifference(renderer.render(camera, settings.width, settings.height), *truth) < 1.0F);
+    CHECK(many.reports().size() == static_cast<std::size_t>(world.size()));
+  }
+}
+
+TEST_CASE("tiny pictures: more ranks than rows and pixels") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto dealt = test::deal("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved, Joint::SharedPoints,
+                                ScalarType::F32, world.rank(), world.size());
+  VdiGenerator generator(device(), comm::Communicator::world());
+  generator.setBlocks(dealt.mine);
+  for (const auto& [width, height] : {std::pair(1, 1), std::pair(3, 1), std::pair(1, 2)}) {
+    for (const std::uint32_t budget : {1U, 7U}) {
+      const auto vdi =
+          generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(width, height, budget));
+      if (world.rank() == 0) CHECK_NOTHROW(validate(*vdi));
+    }
+  }
+}
+
+TEST_CASE("a rank that fails takes nobody down, and the next frame works") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto dealt = test::deal("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved, Joint::SharedPoints,
+                                ScalarType::F32, world.rank(), world.size());
+  VdiGenerator generator(device(), comm::Communicator::world());
+  auto broken = dealt.mine;
+  if (world.rank() == world.size() - 1) {
+    broken.emplace_back();  // no data, no dims
+  }
+  CHECK_THROWS_AS(generator.setBlocks(broken), Error);
+  CHECK_NOTHROW(generator.setBlocks(dealt.mine));
+  GenerateSettings settings = test::smallSettings(16, 12);
+  if (world.rank() == 0) settings.supersegments = 0;
+  CHECK_THROWS_AS(generator.generate(test::oblique(), test::threeHues(1.0), settings), Error);
+  CHECK_NOTHROW(generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(16, 12)));
+}
+
+TEST_CASE("parameters that differ between ranks are refused on every rank") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto dealt = test::deal("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved, Joint::SharedPoints,
+                                ScalarType::F32, world.rank(), world.size());
+  VdiGenerator generator(device(), comm::Communicator::world());
+  generator.setBlocks(dealt.mine);
+  const GenerateSettings settings = test::smallSettings(16, 12);
+  Camera camera = test::oblique();
+  if (world.rank() == 1) camera.viewAngle += 1e-9;
+  const auto codeOf = [&](auto call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      return error.code();
+    }
+    return ErrorCode::Io;
+  };
+  CHECK(codeOf([&] { generator.generate(camera, test::threeHues(1.0), settings); }) == ErrorCode::InvalidArgument);
+  const TransferFunction function = test::threeHues(world.rank() == 1 ? 1.5 : 1.0);
+  CHECK(codeOf([&] { generator.generate(test::oblique(), function, settings); }) == ErrorCode::InvalidArgument);
+  CHECK(codeOf([&] {
+          generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(world.rank() == 1 ? 15 : 16, 12));
+        }) == ErrorCode::InvalidArgument);
+  // One rank is told to stop: all stop.
+  CHECK(codeOf([&] {
+          generator.generate(test::oblique(), test::threeHues(1.0), settings, [&](double) { return world.rank() != 1; });
+        }) == ErrorCode::Cancelled);
+  CHECK_NOTHROW(generator.generate(test::oblique(), test::threeHues(1.0), settings));
+}
