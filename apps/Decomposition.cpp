@@ -22,17 +22,25 @@ const std::array<std::pair<const char*, Layout>, 6> layouts{{{"slabs", Layout::S
                                                              {"one-rank", Layout::OnOneRank}}};
 
 /// Where piece i of n begins when `size` steps are dealt out evenly.
-int cut(int size, int n, int i) { return static_cast<int>(static_cast<std::int64_t>(size) * i / n); }
+int cut(int size, int n, int i) {
+  return static_cast<int>(static_cast<std::int64_t>(size) * i / n);
+}
 
 int ownerOf(Layout layout, const glm::ivec3& at, const glm::ivec3& blocks, int index, int total, int ranks,
             std::mt19937& generator) {
   switch (layout) {
-    case Layout::Slabs: return cut(ranks, blocks.z, at.z);
-    case Layout::Bricks: return cut(ranks, total, index);
-    case Layout::Interleaved: return index % ranks;
-    case Layout::Checkerboard: return (at.x + at.y + at.z) % ranks;
-    case Layout::Random: return static_cast<int>(generator() % static_cast<unsigned>(ranks));
-    case Layout::OnOneRank: break;
+    case Layout::Slabs:
+      return cut(ranks, blocks.z, at.z);
+    case Layout::Bricks:
+      return cut(ranks, total, index);
+    case Layout::Interleaved:
+      return index % ranks;
+    case Layout::Checkerboard:
+      return (at.x + at.y + at.z) % ranks;
+    case Layout::Random:
+      return static_cast<int>(generator() % static_cast<unsigned>(ranks));
+    case Layout::OnOneRank:
+      break;
   }
   return ranks - 1;
 }
@@ -54,12 +62,13 @@ std::vector<std::string> layoutNames() {
   return names;
 }
 
-std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, Layout layout, Joint joint, int ranks,
-                            std::uint32_t seed) {
+std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, Layout layout, Joint joint,
+                            int ranks, std::uint32_t seed) {
   // Shared points: cells are dealt out, and a piece holds the points of its cells. Otherwise values are.
   const bool shared = joint == Joint::SharedPoints;
   const glm::ivec3 steps = shared ? size - 1 : size;
-  const glm::ivec3 count = glm::clamp(blocks, glm::ivec3(1), glm::max(steps / (shared ? 1 : 2), glm::ivec3(1)));
+  const glm::ivec3 count =
+      glm::clamp(blocks, glm::ivec3(1), glm::max(steps / (shared ? 1 : 2), glm::ivec3(1)));
   std::mt19937 generator(seed);
   std::vector<Part> parts;
   const int total = count.x * count.y * count.z;
@@ -82,8 +91,9 @@ std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, La
 
 Block emptyBlock(const Lattice& lattice, const Part& part, const void* data) {
   const glm::dvec3 origin = lattice.origin + glm::dvec3(part.first) * lattice.spacing;
-  return lattice.joint == Joint::Cells ? Block::fromCells(part.dims, origin, lattice.spacing, lattice.type, data)
-                                       : Block::fromPoints(part.dims, origin, lattice.spacing, lattice.type, data);
+  return lattice.joint == Joint::Cells
+             ? Block::fromCells(part.dims, origin, lattice.spacing, lattice.type, data)
+             : Block::fromPoints(part.dims, origin, lattice.spacing, lattice.type, data);
 }
 
 void storeValue(ScalarType type, void* data, std::size_t index, double value) {
@@ -99,14 +109,22 @@ void storeValue(ScalarType type, void* data, std::size_t index, double value) {
     }
   };
   switch (type) {
-    case ScalarType::U8: return store(std::uint8_t{});
-    case ScalarType::I8: return store(std::int8_t{});
-    case ScalarType::U16: return store(std::uint16_t{});
-    case ScalarType::I16: return store(std::int16_t{});
-    case ScalarType::U32: return store(std::uint32_t{});
-    case ScalarType::I32: return store(std::int32_t{});
-    case ScalarType::F32: return store(float{});
-    case ScalarType::F64: return store(double{});
+    case ScalarType::U8:
+      return store(std::uint8_t{});
+    case ScalarType::I8:
+      return store(std::int8_t{});
+    case ScalarType::U16:
+      return store(std::uint16_t{});
+    case ScalarType::I16:
+      return store(std::int16_t{});
+    case ScalarType::U32:
+      return store(std::uint32_t{});
+    case ScalarType::I32:
+      return store(std::int32_t{});
+    case ScalarType::F32:
+      return store(float{});
+    case ScalarType::F64:
+      return store(double{});
   }
 }
 

@@ -12,7 +12,8 @@ namespace vdi::apps {
 
 /// Who holds which block.
 enum class Layout { Slabs, Bricks, Interleaved, Checkerboard, Random, OnOneRank };
-/// "slabs", "bricks", "interleaved", "checkerboard", "random", "one-rank"; throws Error{InvalidArgument} that lists them.
+/// "slabs", "bricks", "interleaved", "checkerboard", "random", "one-rank"; throws Error{InvalidArgument} that
+/// lists them.
 Layout layoutFromString(const std::string& name);
 std::vector<std::string> layoutNames();
 
@@ -31,20 +32,20 @@ struct Part {
 };
 
 /// `blocks` per axis (clamped so that each holds at least two values); deterministic, equal on every rank.
-std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, Layout layout, Joint joint, int ranks,
-                            std::uint32_t seed);
+std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, Layout layout, Joint joint,
+                            int ranks, std::uint32_t seed);
 
 /// The whole lattice that a Part is of.
 struct Lattice {
-  glm::ivec3 size{0};  // values per axis
+  glm::ivec3 size{0};      // values per axis
   glm::dvec3 origin{0.0};  // lower corner of the domain
   glm::dvec3 spacing{1.0};
   ScalarType type = ScalarType::F32;
   Joint joint = Joint::SharedPoints;
 };
 
-/// A block for a part, with its own copy of the values. `valueAt(index)` gives the value at a lattice index; integers are
-/// rounded.
+/// A block for a part, with its own copy of the values. `valueAt(index)` gives the value at a lattice index;
+/// integers are rounded.
 template <typename ValueAt>
 Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt);
 

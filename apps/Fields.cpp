@@ -51,7 +51,9 @@ double octaves(const glm::dvec3& p, int count, std::uint32_t seed) {
   return std::clamp(sum / (1.0 - std::pow(0.5, count)), 0.0, 1.0);
 }
 
-double sphere(const glm::dvec3& p) { return std::clamp(1.0 - 2.0 * glm::length(p - 0.5), 0.0, 1.0); }
+double sphere(const glm::dvec3& p) {
+  return std::clamp(1.0 - 2.0 * glm::length(p - 0.5), 0.0, 1.0);
+}
 
 double shells(const glm::dvec3& p) {
   const double r = glm::length(p - 0.5);
@@ -69,8 +71,8 @@ double marschnerLobb(const glm::dvec3& p) {
 double mixing(const glm::dvec3& p, std::uint32_t seed) {
   const double front = 0.5 + 0.35 * (octaves(p * glm::dvec3(5.0, 5.0, 3.0), 5, seed) - 0.5);
   const double layer = (p.z - front) / 0.12;
-  return std::clamp(0.5 + 0.5 * std::tanh(layer) + 0.15 * (octaves(p * 24.0, 3, seed + 77) - 0.5) *
-                              std::exp(-layer * layer),
+  return std::clamp(0.5 + 0.5 * std::tanh(layer) +
+                        0.15 * (octaves(p * 24.0, 3, seed + 77) - 0.5) * std::exp(-layer * layer),
                     0.0, 1.0);
 }
 

@@ -12,7 +12,9 @@
 namespace vdi::test {
 
 /// Low and high values of the scalar type that a field's [0, 1] is stretched over.
-inline double topOf(ScalarType type) { return sizeOf(type) == 1 ? 100.0 : type == ScalarType::F32 ? 1.0 : 1000.0; }
+inline double topOf(ScalarType type) {
+  return sizeOf(type) == 1 ? 100.0 : type == ScalarType::F32 ? 1.0 : 1000.0;
+}
 
 /// The blocks that `rank` of `ranks` holds of a field on a lattice whose longest side is 1.
 struct Dealt {
@@ -38,7 +40,8 @@ inline Dealt deal(const char* field, const glm::ivec3& size, const glm::ivec3& b
   return dealt;
 }
 
-/// Three hues; transparent below a third; `top` is the scalar of full opacity. Unit distance: a twentieth of the scene.
+/// Three hues; transparent below a third; `top` is the scalar of full opacity. Unit distance: a twentieth of
+/// the scene.
 inline TransferFunction threeHues(double top, double unitDistance = 0.05) {
   TransferFunction function;
   function.colors = {{0.0, {0.1, 0.2, 0.9}}, {0.5 * top, {0.9, 0.9, 0.2}}, {top, {0.9, 0.1, 0.1}}};

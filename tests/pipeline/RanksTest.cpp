@@ -60,7 +60,8 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
     INFO(c.name);
     // A field with structure up to the domain's faces, so that a lost or doubled sample shows.
     const glm::ivec3 size{34, 30, 37};
-    const auto dealt = test::deal("turbulence", size, c.blocks, c.layout, c.joint, c.type, world.rank(), world.size());
+    const auto dealt =
+        test::deal("turbulence", size, c.blocks, c.layout, c.joint, c.type, world.rank(), world.size());
     const auto whole = test::deal("turbulence", size, {1, 1, 1}, Layout::OnOneRank, c.joint, c.type, 0, 1);
     const TransferFunction function = test::threeHues(test::topOf(c.type) * 0.8);
     const GenerateSettings settings = test::smallSettings();
@@ -95,8 +96,8 @@ TEST_CASE("tiny pictures: more ranks than rows and pixels") {
   generator.setBlocks(dealt.mine);
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(3, 1), std::pair(1, 2)}) {
     for (const std::uint32_t budget : {1U, 7U}) {
-      const auto vdi =
-          generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(width, height, budget));
+      const auto vdi = generator.generate(test::oblique(), test::threeHues(1.0),
+                                          test::smallSettings(width, height, budget));
       if (world.rank() == 0) CHECK_NOTHROW(validate(*vdi));
     }
   }
@@ -136,15 +137,19 @@ TEST_CASE("parameters that differ between ranks are refused on every rank") {
     }
     return ErrorCode::Io;
   };
-  CHECK(codeOf([&] { generator.generate(camera, test::threeHues(1.0), settings); }) == ErrorCode::InvalidArgument);
+  CHECK(codeOf([&] { generator.generate(camera, test::threeHues(1.0), settings); }) ==
+        ErrorCode::InvalidArgument);
   const TransferFunction function = test::threeHues(world.rank() == 1 ? 1.5 : 1.0);
-  CHECK(codeOf([&] { generator.generate(test::oblique(), function, settings); }) == ErrorCode::InvalidArgument);
+  CHECK(codeOf([&] { generator.generate(test::oblique(), function, settings); }) ==
+        ErrorCode::InvalidArgument);
   CHECK(codeOf([&] {
-          generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(world.rank() == 1 ? 15 : 16, 12));
+          generator.generate(test::oblique(), test::threeHues(1.0),
+                             test::smallSettings(world.rank() == 1 ? 15 : 16, 12));
         }) == ErrorCode::InvalidArgument);
   // One rank is told to stop: all stop.
   CHECK(codeOf([&] {
-          generator.generate(test::oblique(), test::threeHues(1.0), settings, [&](double) { return world.rank() != 1; });
+          generator.generate(test::oblique(), test::threeHues(1.0), settings,
+                             [&](double) { return world.rank() != 1; });
         }) == ErrorCode::Cancelled);
   CHECK_NOTHROW(generator.generate(test::oblique(), test::threeHues(1.0), settings));
 }

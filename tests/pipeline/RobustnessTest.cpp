@@ -19,7 +19,8 @@ std::shared_ptr<gpu::Device> device() {
 }
 
 Block cube(int n, double spacing, const std::function<float(const glm::ivec3&)>& value) {
-  const apps::Lattice lattice{glm::ivec3(n), glm::dvec3(0.0), glm::dvec3(spacing), ScalarType::F32, Joint::SharedPoints};
+  const apps::Lattice lattice{glm::ivec3(n), glm::dvec3(0.0), glm::dvec3(spacing), ScalarType::F32,
+                              Joint::SharedPoints};
   return apps::makeBlock(lattice, {{0, 0, 0}, glm::ivec3(n), 0}, value);
 }
 
@@ -79,7 +80,8 @@ TEST_CASE("cameras inside, behind and looking away") {
   CHECK(highestOpacity(flatten(*inside)) > 0.5F);
   VdiRenderer renderer(device());
   renderer.setVdi(*inside);
-  for (const glm::dvec3& position : {glm::dvec3(0.5, 0.5, 0.3), glm::dvec3(0.4, 0.6, -3.0), glm::dvec3(0.5, 0.5, 9.0)}) {
+  for (const glm::dvec3& position :
+       {glm::dvec3(0.5, 0.5, 0.3), glm::dvec3(0.4, 0.6, -3.0), glm::dvec3(0.5, 0.5, 9.0)}) {
     Camera other;
     other.position = position;
     other.focalPoint = {0.5, 0.5, 0.25};
@@ -111,13 +113,16 @@ TEST_CASE("no blocks, empty blocks, a transparent function, one supersegment, co
   for (OpacityNode& node : transparent.opacities) node.opacity = 0.0;
   CHECK(generator.generate(test::oblique(), transparent, settings)->lists.segments.empty());
 
-  const auto single = generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(64, 48, 1));
+  const auto single =
+      generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(64, 48, 1));
   CHECK_NOTHROW(validate(*single));
   CHECK(highestOpacity(flatten(*single)) > 0.5F);
 }
 
 TEST_CASE("scales of 1e-9 and 1e9 give the picture of scale 1") {
-  const auto value = [](const glm::ivec3& i) { return static_cast<float>((i.x * 7 + i.y * 3 + i.z * 5) % 11) / 11.0F; };
+  const auto value = [](const glm::ivec3& i) {
+    return static_cast<float>((i.x * 7 + i.y * 3 + i.z * 5) % 11) / 11.0F;
+  };
   const GenerateSettings settings = test::smallSettings();
   Image unit;
   std::size_t segments = 0;
@@ -136,7 +141,8 @@ TEST_CASE("scales of 1e-9 and 1e9 give the picture of scale 1") {
       CHECK(highestOpacity(image) > 0.5F);
       continue;
     }
-    CHECK(std::abs(static_cast<double>(vdi->lists.segments.size()) / static_cast<double>(segments) - 1.0) < 0.01);
+    CHECK(std::abs(static_cast<double>(vdi->lists.segments.size()) / static_cast<double>(segments) - 1.0) <
+          0.01);
     for (std::size_t i = 0; i < image.rgba.size(); ++i) {
       CHECK(glm::length(image.rgba[i] - unit.rgba[i]) < 2.0F / 255.0F);
     }
@@ -174,5 +180,6 @@ TEST_CASE("wrong arguments are refused with their names") {
   CHECK(codeOf([&] { generator.generate(test::oblique(), empty, test::smallSettings()); }) ==
         ErrorCode::InvalidArgument);
   // After all that it still works.
-  CHECK(!generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings())->lists.segments.empty());
+  CHECK(!generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings())
+             ->lists.segments.empty());
 }

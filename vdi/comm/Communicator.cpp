@@ -102,7 +102,8 @@ struct Communicator::State {
   void demandFits(bool fits) const {
     int good = fits ? 1 : 0;
     check(MPI_Allreduce(MPI_IN_PLACE, &good, 1, MPI_INT, MPI_MIN, comm), "MPI_Allreduce");
-    if (good == 0) throw Error(ErrorCode::Communication, "more than 2^31 - 1 elements for one rank in one exchange");
+    if (good == 0)
+      throw Error(ErrorCode::Communication, "more than 2^31 - 1 elements for one rank in one exchange");
   }
 
   template <typename T>
@@ -118,7 +119,9 @@ Communicator::~Communicator() = default;
 Communicator::Communicator(Communicator&&) noexcept = default;
 Communicator& Communicator::operator=(Communicator&&) noexcept = default;
 
-Communicator Communicator::serial() { return Communicator(std::make_unique<State>()); }
+Communicator Communicator::serial() {
+  return Communicator(std::make_unique<State>());
+}
 
 Communicator Communicator::fromMpi(int fortranHandle) {
   auto state = std::make_unique<State>();
@@ -127,7 +130,8 @@ Communicator Communicator::fromMpi(int fortranHandle) {
   check(MPI_Comm_rank(state->comm, &state->rank), "MPI_Comm_rank");
   check(MPI_Comm_size(state->comm, &state->size), "MPI_Comm_size");
   MPI_Comm node = MPI_COMM_NULL;
-  check(MPI_Comm_split_type(state->comm, MPI_COMM_TYPE_SHARED, state->rank, MPI_INFO_NULL, &node), "MPI_Comm_split_type");
+  check(MPI_Comm_split_type(state->comm, MPI_COMM_TYPE_SHARED, state->rank, MPI_INFO_NULL, &node),
+        "MPI_Comm_split_type");
   check(MPI_Comm_rank(node, &state->localRank), "MPI_Comm_rank");
   check(MPI_Comm_free(&node), "MPI_Comm_free");
   return Communicator(std::move(state));
@@ -141,17 +145,29 @@ Communicator Communicator::world() {
   return initialized != 0 && finalized == 0 ? fromMpi(MPI_Comm_c2f(MPI_COMM_WORLD)) : serial();
 }
 
-int Communicator::rank() const { return state_->rank; }
-int Communicator::size() const { return state_->size; }
-int Communicator::localRank() const { return state_->localRank; }
+int Communicator::rank() const {
+  return state_->rank;
+}
+int Communicator::size() const {
+  return state_->size;
+}
+int Communicator::localRank() const {
+  return state_->localRank;
+}
 
 void Communicator::barrier() const {
   if (!state_->serial()) check(MPI_Barrier(state_->comm), "MPI_Barrier");
 }
 
-void Communicator::allReduceMin(std::span<double> values) const { state_->allReduce(values, MPI_DOUBLE, MPI_MIN); }
-void Communicator::allReduceMax(std::span<double> values) const { state_->allReduce(values, MPI_DOUBLE, MPI_MAX); }
-void Communicator::allReduceSum(std::span<double> values) const { state_->allReduce(values, MPI_DOUBLE, MPI_SUM); }
+void Communicator::allReduceMin(std::span<double> values) const {
+  state_->allReduce(values, MPI_DOUBLE, MPI_MIN);
+}
+void Communicator::allReduceMax(std::span<double> values) const {
+  state_->allReduce(values, MPI_DOUBLE, MPI_MAX);
+}
+void Communicator::allReduceSum(std::span<double> values) const {
+  state_->allReduce(values, MPI_DOUBLE, MPI_SUM);
+}
 void Communicator::allReduceSum(std::span<std::uint64_t> values) const {
   state_->allReduce(values, MPI_UINT64_T, MPI_SUM);
 }
@@ -180,8 +196,8 @@ Gathered Communicator::allGather(std::span<const std::byte> bytes) const {
   const Layout layout(sizes);
   state_->demandFits(layout.fits());
   Gathered result = emptyGathered(layout, 1);
-  check(MPI_Allgatherv(bytes.data(), static_cast<int>(mine), MPI_BYTE, result.bytes.data(), layout.counts.data(),
-                       layout.starts.data(), MPI_BYTE, state_->comm),
+  check(MPI_Allgatherv(bytes.data(), static_cast<int>(mine), MPI_BYTE, result.bytes.data(),
+                       layout.counts.data(), layout.starts.data(), MPI_BYTE, state_->comm),
         "MPI_Allgatherv");
   return result;
 }
@@ -197,8 +213,8 @@ Gathered Communicator::gather(std::span<const std::byte> bytes, std::size_t elem
   const ElementType type(elementBytes);
   Gathered result;
   if (rank() == root) result = emptyGathered(layout, elementBytes);
-  check(MPI_Gatherv(bytes.data(), static_cast<int>(mine), type.handle(), result.bytes.data(), layout.counts.data(),
-                    layout.starts.data(), type.handle(), root, state_->comm),
+  check(MPI_Gatherv(bytes.data(), static_cast<int>(mine), type.handle(), result.bytes.data(),
+                    layout.counts.data(), layout.starts.data(), type.handle(), root, state_->comm),
         "MPI_Gatherv");
   return result;
 }
@@ -209,7 +225,8 @@ Gathered Communicator::allToAll(std::span<const std::byte> bytes, std::span<cons
   assert(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}) * elementBytes == bytes.size());
   if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
   std::vector<std::uint64_t> incoming(counts.size());
-  check(MPI_Alltoall(counts.data(), 1, MPI_UINT64_T, incoming.data(), 1, MPI_UINT64_T, state_->comm), "MPI_Alltoall");
+  check(MPI_Alltoall(counts.data(), 1, MPI_UINT64_T, incoming.data(), 1, MPI_UINT64_T, state_->comm),
+        "MPI_Alltoall");
   const Layout out(counts);
   const Layout in(incoming);
   state_->demandFits(out.fits() && in.fits());

@@ -12,7 +12,8 @@
 
 namespace vdi::comm {
 
-/// Byte blocks of every rank, concatenated in rank order: rank r's part is bytes[offsets[r] .. offsets[r + 1]).
+/// Byte blocks of every rank, concatenated in rank order: rank r's part is bytes[offsets[r] .. offsets[r +
+/// 1]).
 struct Gathered {
   std::vector<std::byte> bytes;
   std::vector<std::uint64_t> offsets;  // size() + 1
@@ -22,15 +23,17 @@ struct Gathered {
   }
 };
 
-/// RAII over a duplicate of an MPI communicator, or over no MPI at all (one rank). Movable, not copyable. All functions
-/// marked collective must be called by every rank in the same order. MPI errors become Error{Communication}.
+/// RAII over a duplicate of an MPI communicator, or over no MPI at all (one rank). Movable, not copyable. All
+/// functions marked collective must be called by every rank in the same order. MPI errors become
+/// Error{Communication}.
 class Communicator {
  public:
   /// One rank, never touches MPI.
   static Communicator serial();
   /// Duplicates the communicator (collective). `fortranHandle` = MPI_Comm_c2f(comm). MPI must be initialised.
   static Communicator fromMpi(int fortranHandle);
-  /// MPI_COMM_WORLD if MPI is initialised and not finalised, else serial(). For programs of ours; never for a plugin.
+  /// MPI_COMM_WORLD if MPI is initialised and not finalised, else serial(). For programs of ours; never for a
+  /// plugin.
   static Communicator world();
 
   ~Communicator();  // frees the duplicate unless MPI was finalised before
@@ -52,22 +55,24 @@ class Communicator {
   void allReduceSum(std::span<std::uint64_t> values) const;
   void allReduceMax(std::span<std::uint64_t> values) const;
 
-  std::vector<std::byte> broadcast(std::vector<std::byte> bytes, int root) const;  // collective; size is root's
-  Gathered allGather(std::span<const std::byte> bytes) const;                      // collective
-  /// Collective. Elements of `elementBytes` each; counts may differ by rank; only the root's result isn't empty. More than
-  /// 2 GiB in all is fine (datatypes), as long as each rank has fewer than 2^31 elements.
+  std::vector<std::byte> broadcast(std::vector<std::byte> bytes,
+                                   int root) const;            // collective; size is root's
+  Gathered allGather(std::span<const std::byte> bytes) const;  // collective
+  /// Collective. Elements of `elementBytes` each; counts may differ by rank; only the root's result isn't
+  /// empty. More than 2 GiB in all is fine (datatypes), as long as each rank has fewer than 2^31 elements.
   Gathered gather(std::span<const std::byte> bytes, std::size_t elementBytes, int root) const;
   /// Collective. `counts[r]` elements go to rank r, taken from `bytes` in rank order. Sizes as for gather.
   Gathered allToAll(std::span<const std::byte> bytes, std::span<const std::uint64_t> counts,
                     std::size_t elementBytes) const;
 
-  /// Collective: nobody leaves alone. With no error on any rank it returns. Otherwise every rank throws: a rank with an
-  /// error rethrows its own, the others throw Error{RemoteRank} with the lowest failing rank's number and text.
+  /// Collective: nobody leaves alone. With no error on any rank it returns. Otherwise every rank throws: a
+  /// rank with an error rethrows its own, the others throw Error{RemoteRank} with the lowest failing rank's
+  /// number and text.
   void agree(std::exception_ptr mine) const;
   /// Runs `work`, then agree() with what it threw. Collective; `work` itself must not communicate.
   void together(const std::function<void()>& work) const;
-  /// Collective: throws Error{InvalidArgument} on every rank if `fingerprint` differs between ranks; `what` says what was
-  /// compared.
+  /// Collective: throws Error{InvalidArgument} on every rank if `fingerprint` differs between ranks; `what`
+  /// says what was compared.
   void demandEqual(std::uint64_t fingerprint, const std::string& what) const;
 
  private:

@@ -65,7 +65,8 @@ Received distribute(const Communicator& comm, const SupersegmentLists& sub) {
     segmentsTo[r] = sub.offsets[range.last] - sub.offsets[range.first];
   }
   const std::vector<std::uint32_t> counts = countsOf(sub);
-  const Gathered receivedCounts = comm.allToAll(std::as_bytes(std::span(counts)), listsTo, sizeof(std::uint32_t));
+  const Gathered receivedCounts =
+      comm.allToAll(std::as_bytes(std::span(counts)), listsTo, sizeof(std::uint32_t));
   const Gathered receivedSegments =
       comm.allToAll(std::as_bytes(std::span(sub.segments)), segmentsTo, sizeof(Supersegment));
 
@@ -76,7 +77,8 @@ Received distribute(const Communicator& comm, const SupersegmentLists& sub) {
       if (part.size() != listsTo[me]) {
         throw Error(ErrorCode::Communication, "the ranks' sub-VDIs have different numbers of lists");
       }
-      received.subLists.push_back(assemble(part, copyAs<Supersegment>(receivedSegments.of(static_cast<int>(r)))));
+      received.subLists.push_back(
+          assemble(part, copyAs<Supersegment>(receivedSegments.of(static_cast<int>(r)))));
       if (r == me) continue;
       received.bytesSent += listsTo[r] * sizeof(std::uint32_t) + segmentsTo[r] * sizeof(Supersegment);
       received.bytesReceived +=
@@ -89,7 +91,8 @@ Received distribute(const Communicator& comm, const SupersegmentLists& sub) {
 SupersegmentLists gatherLists(const Communicator& comm, const SupersegmentLists& owned, int root) {
   const std::vector<std::uint32_t> counts = countsOf(owned);
   const Gathered allCounts = comm.gather(std::as_bytes(std::span(counts)), sizeof(std::uint32_t), root);
-  const Gathered allSegments = comm.gather(std::as_bytes(std::span(owned.segments)), sizeof(Supersegment), root);
+  const Gathered allSegments =
+      comm.gather(std::as_bytes(std::span(owned.segments)), sizeof(Supersegment), root);
   SupersegmentLists lists;
   comm.together([&] {
     if (comm.rank() == root) {
@@ -100,9 +103,14 @@ SupersegmentLists gatherLists(const Communicator& comm, const SupersegmentLists&
 }
 
 Scene globalScene(const Communicator& comm, const Scene& local) {
-  std::array<double, 7> least{local.bounds.lo.x, local.bounds.lo.y, local.bounds.lo.z, -local.bounds.hi.x,
-                              -local.bounds.hi.y, -local.bounds.hi.z,
-                              local.minSpacing > 0.0 ? local.minSpacing : std::numeric_limits<double>::infinity()};
+  std::array<double, 7> least{
+      local.bounds.lo.x,
+      local.bounds.lo.y,
+      local.bounds.lo.z,
+      -local.bounds.hi.x,
+      -local.bounds.hi.y,
+      -local.bounds.hi.z,
+      local.minSpacing > 0.0 ? local.minSpacing : std::numeric_limits<double>::infinity()};
   comm.allReduceMin(least);
   Scene scene;
   scene.bounds.lo = {least[0], least[1], least[2]};

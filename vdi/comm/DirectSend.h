@@ -1,4 +1,5 @@
-// Who composites which list, and the exchange of compact sub-VDIs (paper, section 5.2): direct send, then gather.
+// Who composites which list, and the exchange of compact sub-VDIs (paper, section 5.2): direct send, then
+// gather.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +21,8 @@ struct ListRange {
 /// Contiguous, in rank order, sizes differ by at most one; empty for surplus ranks when ranks > lists.
 ListRange ownedLists(std::uint64_t listCount, int rank, int size);
 
-/// What the owner received: subLists[r] is rank r's part of the owner's lists (owner's range count lists each).
+/// What the owner received: subLists[r] is rank r's part of the owner's lists (owner's range count lists
+/// each).
 struct Received {
   std::vector<SupersegmentLists> subLists;
   std::uint64_t bytesSent = 0;      // by this rank to other ranks: supersegments and counts

@@ -28,13 +28,16 @@ struct Description {
   std::int32_t index;  // on its rank
 };
 
-/// The values of a block that are its own to give, as a half-open box of lattice indices of its lattice. For points the
-/// owned box runs from value to value, for cells from half a spacing before to half a spacing behind.
+/// The values of a block that are its own to give, as a half-open box of lattice indices of its lattice. For
+/// points the owned box runs from value to value, for cells from half a spacing before to half a spacing
+/// behind.
 struct IndexBox {
   glm::i64vec3 lo{0};
   glm::i64vec3 hi{0};
   bool empty() const { return lo.x >= hi.x || lo.y >= hi.y || lo.z >= hi.z; }
-  IndexBox intersection(const IndexBox& other) const { return {glm::max(lo, other.lo), glm::min(hi, other.hi)}; }
+  IndexBox intersection(const IndexBox& other) const {
+    return {glm::max(lo, other.lo), glm::min(hi, other.hi)};
+  }
   std::uint64_t count() const {
     if (empty()) return 0;
     const auto size = glm::u64vec3(hi - lo);
@@ -50,7 +53,9 @@ struct LatticeKey {
   auto operator<=>(const LatticeKey&) const = default;
 };
 
-glm::i64vec3 round64(const glm::dvec3& v) { return glm::i64vec3(glm::round(v)); }
+glm::i64vec3 round64(const glm::dvec3& v) {
+  return glm::i64vec3(glm::round(v));
+}
 
 LatticeKey keyOf(const Description& block, const glm::dvec3& anchor) {
   LatticeKey key{block.type, {}, {}};
@@ -61,7 +66,8 @@ LatticeKey keyOf(const Description& block, const glm::dvec3& anchor) {
     const double magnitude = std::pow(10.0, std::floor(std::log10(block.spacing[axis])) - 9.0);
     key.spacing[a] = std::round(block.spacing[axis] / magnitude) * magnitude;
     const double position = (block.origin[axis] - anchor[axis]) / block.spacing[axis];
-    const auto phase = static_cast<std::int64_t>(std::llround((position - std::floor(position)) * static_cast<double>(steps)));
+    const auto phase = static_cast<std::int64_t>(
+        std::llround((position - std::floor(position)) * static_cast<double>(steps)));
     key.phase[a] = (phase + 1) / 2 % (steps / 2);  // neighbouring steps fall together, 1 and 0 too
   }
   return key;
@@ -82,7 +88,8 @@ IndexBox givenBox(const Description& block, const glm::dvec3& anchor) {
   const glm::i64vec3 first = firstIndex(block, anchor);
   IndexBox box;
   box.lo = first + glm::i64vec3(glm::ceil((block.owned.lo - block.origin) / block.spacing - 0.01));
-  box.hi = first + glm::i64vec3(glm::floor((block.owned.hi - block.origin) / block.spacing + 0.01)) + std::int64_t{1};
+  box.hi = first + glm::i64vec3(glm::floor((block.owned.hi - block.origin) / block.spacing + 0.01)) +
+           std::int64_t{1};
   return box.intersection(storedBox(block, anchor));
 }
 
@@ -92,15 +99,17 @@ bool isCellLike(const Description& block) {
   return std::abs(position - std::floor(position) - 0.5) < 0.25;
 }
 
-/// Blocks of one lattice by the cells of a coarse grid that they touch, so that neighbours are found without comparing all
-/// pairs.
+/// Blocks of one lattice by the cells of a coarse grid that they touch, so that neighbours are found without
+/// comparing all pairs.
 class Neighbourhood {
  public:
-  Neighbourhood(std::span<const Description> blocks, std::span<const std::size_t> members, const glm::dvec3& anchor)
+  Neighbourhood(std::span<const Description> blocks, std::span<const std::size_t> members,
+                const glm::dvec3& anchor)
       : cell_(1) {
     for (const std::size_t i : members) cell_ = glm::max(cell_, glm::i64vec3(blocks[i].dims));
     for (const std::size_t i : members) {
-      forEachCell(givenBox(blocks[i], anchor), [&](const glm::i64vec3& at) { cells_[hash(at)].push_back(i); });
+      forEachCell(givenBox(blocks[i], anchor),
+                  [&](const glm::i64vec3& at) { cells_[hash(at)].push_back(i); });
     }
   }
   /// Every block whose given box may intersect `box`, each once.
@@ -119,7 +128,9 @@ class Neighbourhood {
   template <typename Visit>
   void forEachCell(const IndexBox& box, Visit visit) const {
     if (box.empty()) return;
-    const auto cellOf = [&](const glm::i64vec3& p) { return glm::i64vec3(glm::floor(glm::dvec3(p) / glm::dvec3(cell_))); };
+    const auto cellOf = [&](const glm::i64vec3& p) {
+      return glm::i64vec3(glm::floor(glm::dvec3(p) / glm::dvec3(cell_)));
+    };
     const glm::i64vec3 lo = cellOf(box.lo);
     const glm::i64vec3 hi = cellOf(box.hi - std::int64_t{1});
     for (std::int64_t z = lo.z; z <= hi.z; ++z) {
@@ -274,7 +285,8 @@ class Exchange {
 
   static std::size_t position(const IndexBox& within, std::int64_t x, std::int64_t y, std::int64_t z) {
     const glm::i64vec3 size = within.hi - within.lo;
-    return static_cast<std::size_t>(((z - within.lo.z) * size.y + (y - within.lo.y)) * size.x + (x - within.lo.x));
+    return static_cast<std::size_t>(((z - within.lo.z) * size.y + (y - within.lo.y)) * size.x +
+                                    (x - within.lo.x));
   }
 
   void copyOut(const Transfer& transfer, std::vector<std::byte>& to) const {
@@ -296,15 +308,16 @@ class Exchange {
     forEachRow(transfer.box, [&](std::int64_t y, std::int64_t z) {
       for (std::int64_t x = transfer.box.lo.x; x < transfer.box.hi.x; ++x, from += size) {
         const glm::i64vec3 at{x, y, z};
-        const bool own = glm::all(glm::greaterThanEqual(at, stored.lo)) && glm::all(glm::lessThan(at, stored.hi));
+        const bool own =
+            glm::all(glm::greaterThanEqual(at, stored.lo)) && glm::all(glm::lessThan(at, stored.hi));
         if (!own) std::memcpy(storage + position(grown, x, y, z) * size, from, size);
       }
     });
     return static_cast<std::uint64_t>(from - start);
   }
 
-  /// Replaces the block by a larger copy, the new layers filled with the nearest own values. Returns the copy's storage,
-  /// nullptr if the block lacked nothing.
+  /// Replaces the block by a larger copy, the new layers filled with the nearest own values. Returns the
+  /// copy's storage, nullptr if the block lacked nothing.
   std::byte* grow(std::size_t i, Block& block) const {
     const Plan& plan = plans_[i];
     const IndexBox stored = storedBox(all_[i], anchor_);
@@ -314,7 +327,8 @@ class Exchange {
     const auto* data = static_cast<const std::byte*>(block.data);
     forEachRow(plan.grown, [&](std::int64_t y, std::int64_t z) {
       for (std::int64_t x = plan.grown.lo.x; x < plan.grown.hi.x; ++x) {
-        const glm::i64vec3 nearest = glm::clamp(glm::i64vec3(x, y, z), stored.lo, stored.hi - std::int64_t{1});
+        const glm::i64vec3 nearest =
+            glm::clamp(glm::i64vec3(x, y, z), stored.lo, stored.hi - std::int64_t{1});
         std::memcpy(storage.get() + position(plan.grown, x, y, z) * size,
                     data + position(stored, nearest.x, nearest.y, nearest.z) * size, size);
       }

@@ -21,25 +21,39 @@ constexpr std::array<std::pair<const char*, std::size_t>, 8> scalarTypes{
 template <typename Function>
 auto withTyped(const Block& block, Function function) {
   switch (block.type) {
-    case ScalarType::U8: return function(static_cast<const std::uint8_t*>(block.data));
-    case ScalarType::I8: return function(static_cast<const std::int8_t*>(block.data));
-    case ScalarType::U16: return function(static_cast<const std::uint16_t*>(block.data));
-    case ScalarType::I16: return function(static_cast<const std::int16_t*>(block.data));
-    case ScalarType::U32: return function(static_cast<const std::uint32_t*>(block.data));
-    case ScalarType::I32: return function(static_cast<const std::int32_t*>(block.data));
-    case ScalarType::F32: return function(static_cast<const float*>(block.data));
-    case ScalarType::F64: break;
+    case ScalarType::U8:
+      return function(static_cast<const std::uint8_t*>(block.data));
+    case ScalarType::I8:
+      return function(static_cast<const std::int8_t*>(block.data));
+    case ScalarType::U16:
+      return function(static_cast<const std::uint16_t*>(block.data));
+    case ScalarType::I16:
+      return function(static_cast<const std::int16_t*>(block.data));
+    case ScalarType::U32:
+      return function(static_cast<const std::uint32_t*>(block.data));
+    case ScalarType::I32:
+      return function(static_cast<const std::int32_t*>(block.data));
+    case ScalarType::F32:
+      return function(static_cast<const float*>(block.data));
+    case ScalarType::F64:
+      break;
   }
   return function(static_cast<const double*>(block.data));
 }
 
-bool finite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 }  // namespace
 
-std::size_t sizeOf(ScalarType type) { return scalarTypes[static_cast<std::size_t>(type)].second; }
+std::size_t sizeOf(ScalarType type) {
+  return scalarTypes[static_cast<std::size_t>(type)].second;
+}
 
-const char* toString(ScalarType type) { return scalarTypes[static_cast<std::size_t>(type)].first; }
+const char* toString(ScalarType type) {
+  return scalarTypes[static_cast<std::size_t>(type)].first;
+}
 
 ScalarType scalarTypeFromString(const std::string& name) {
   for (std::size_t i = 0; i < scalarTypes.size(); ++i) {
@@ -49,16 +63,16 @@ ScalarType scalarTypeFromString(const std::string& name) {
               "no scalar type '" + name + "'; there are u8, i8, u16, i16, u32, i32, f32 and f64");
 }
 
-Block Block::fromPoints(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing, ScalarType type,
-                        const void* data, const GhostLayers& ghosts) {
+Block Block::fromPoints(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
+                        ScalarType type, const void* data, const GhostLayers& ghosts) {
   Block block{dims, origin, spacing, {}, type, data, {}};
   block.owned.lo = origin + spacing * glm::dvec3(ghosts.lo);
   block.owned.hi = origin + spacing * glm::dvec3(dims - 1 - ghosts.hi);
   return block;
 }
 
-Block Block::fromCells(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing, ScalarType type,
-                       const void* data, const GhostLayers& ghosts) {
+Block Block::fromCells(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
+                       ScalarType type, const void* data, const GhostLayers& ghosts) {
   Block block{dims, origin + 0.5 * spacing, spacing, {}, type, data, {}};
   block.owned.lo = origin + spacing * glm::dvec3(ghosts.lo);
   block.owned.hi = origin + spacing * glm::dvec3(dims - ghosts.hi);
@@ -67,7 +81,8 @@ Block Block::fromCells(const glm::ivec3& dims, const glm::dvec3& origin, const g
 
 double valueAt(const Block& block, int i, int j, int k) {
   assert(i >= 0 && j >= 0 && k >= 0 && i < block.dims.x && j < block.dims.y && k < block.dims.z);
-  const auto row = static_cast<std::size_t>(k) * static_cast<std::size_t>(block.dims.y) + static_cast<std::size_t>(j);
+  const auto row =
+      static_cast<std::size_t>(k) * static_cast<std::size_t>(block.dims.y) + static_cast<std::size_t>(j);
   const std::size_t index = row * static_cast<std::size_t>(block.dims.x) + static_cast<std::size_t>(i);
   return withTyped(block, [index](const auto* values) { return static_cast<double>(values[index]); });
 }
@@ -97,8 +112,8 @@ void validate(std::span<const Block> blocks) {
     }
     if (!finite(block.spacing) || glm::any(glm::lessThanEqual(block.spacing, glm::dvec3(0.0)))) {
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("spacing must be finite and > 0, it is ({}, {}, {})", block.spacing.x, block.spacing.y,
-                              block.spacing.z),
+                  fmt::format("spacing must be finite and > 0, it is ({}, {}, {})", block.spacing.x,
+                              block.spacing.y, block.spacing.z),
                   context);
     }
     const bool ownsNothing = block.owned.empty();

@@ -13,7 +13,16 @@
 namespace vdi {
 
 /// The values are part of the .vdi-free raw volume sidecar and of the C API: don't renumber.
-enum class ScalarType : std::uint32_t { U8 = 0, I8 = 1, U16 = 2, I16 = 3, U32 = 4, I32 = 5, F32 = 6, F64 = 7 };
+enum class ScalarType : std::uint32_t {
+  U8 = 0,
+  I8 = 1,
+  U16 = 2,
+  I16 = 3,
+  U32 = 4,
+  I32 = 5,
+  F32 = 6,
+  F64 = 7
+};
 
 std::size_t sizeOf(ScalarType type);
 const char* toString(ScalarType type);  // "u8" ... "f64"
@@ -27,11 +36,12 @@ struct GhostLayers {
   bool operator==(const GhostLayers&) const = default;
 };
 
-/// One axis-aligned lattice of scalars. Values are interpolated trilinearly between lattice points and clamped
-/// beyond the outermost ones. `owned` says which samples are this block's: the owned boxes of all blocks of all ranks
-/// must not overlap (touching is fine, they're half-open).
+/// One axis-aligned lattice of scalars. Values are interpolated trilinearly between lattice points and
+/// clamped beyond the outermost ones. `owned` says which samples are this block's: the owned boxes of all
+/// blocks of all ranks must not overlap (touching is fine, they're half-open).
 ///
-/// Ownership of memory: `data` is read, never copied on the host by the core; `keepAlive`, if set, is what owns it.
+/// Ownership of memory: `data` is read, never copied on the host by the core; `keepAlive`, if set, is what
+/// owns it.
 struct Block {
   glm::ivec3 dims{0};       // stored values per axis, ghost layers included; each >= 1
   glm::dvec3 origin{0.0};   // world position of value (0, 0, 0); for cell data the centre of that cell
@@ -42,17 +52,19 @@ struct Block {
   std::shared_ptr<const void> keepAlive;
 
   std::size_t valueCount() const {
-    return static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
+    return static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) *
+           static_cast<std::size_t>(dims.z);
   }
   std::size_t byteCount() const { return valueCount() * sizeOf(type); }
 
-  /// Point data: `origin` is the position of the first stored point. Owned: from the first to the last non-ghost point.
-  static Block fromPoints(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing, ScalarType type,
-                          const void* data, const GhostLayers& ghosts = {});
+  /// Point data: `origin` is the position of the first stored point. Owned: from the first to the last
+  /// non-ghost point.
+  static Block fromPoints(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
+                          ScalarType type, const void* data, const GhostLayers& ghosts = {});
   /// Cell data: `dims` counts stored cells, `origin` is the lower corner of the first stored cell. Owned: all
   /// non-ghost cells, whole.
-  static Block fromCells(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing, ScalarType type,
-                         const void* data, const GhostLayers& ghosts = {});
+  static Block fromCells(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
+                         ScalarType type, const void* data, const GhostLayers& ghosts = {});
 };
 
 /// Value (i, j, k) of a block as double. Slow: for tests, reference code and metadata.
@@ -66,8 +78,9 @@ struct ScalarRange {
 };
 ScalarRange finiteRange(const Block& block);
 
-/// Throws Error{InvalidArgument} naming the block's index for: dims < 1, spacing that isn't finite and > 0, an origin or
-/// owned box that isn't finite, null data. A block with an empty owned box is legal and owns no sample.
+/// Throws Error{InvalidArgument} naming the block's index for: dims < 1, spacing that isn't finite and > 0,
+/// an origin or owned box that isn't finite, null data. A block with an empty owned box is legal and owns no
+/// sample.
 void validate(std::span<const Block> blocks);
 
 }  // namespace vdi

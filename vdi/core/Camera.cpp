@@ -13,9 +13,13 @@ namespace {
 
 constexpr int maxViewportSide = 32768;
 
-bool finite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
-double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
+double radians(double degrees) {
+  return degrees * std::numbers::pi / 180.0;
+}
 
 /// The up direction made orthogonal to `forward`; any orthogonal direction where `up` doesn't say.
 glm::dvec3 orthogonalUp(const glm::dvec3& up, const glm::dvec3& forward) {
@@ -69,7 +73,8 @@ Camera Camera::azimuth(double degrees) const {
   return turned;
 }
 
-Camera Camera::framing(const Box& bounds, const glm::dvec3& direction, const glm::dvec3& viewUp, double viewAngle) {
+Camera Camera::framing(const Box& bounds, const glm::dvec3& direction, const glm::dvec3& viewUp,
+                       double viewAngle) {
   const double radius = bounds.empty() ? 1.0 : 0.5 * glm::length(bounds.size());
   const glm::dvec3 center = bounds.empty() ? glm::dvec3(0.0) : bounds.center();
   Camera camera;
@@ -84,8 +89,8 @@ Camera Camera::framing(const Box& bounds, const glm::dvec3& direction, const glm
 View::View(const Camera& camera, int width, int height) : camera_(camera), width_(width), height_(height) {
   if (width < 1 || height < 1 || width > maxViewportSide || height > maxViewportSide) {
     throw Error(ErrorCode::InvalidArgument,
-                fmt::format("the viewport must be 1 to {} pixels wide and high, it is {} x {}", maxViewportSide, width,
-                            height));
+                fmt::format("the viewport must be 1 to {} pixels wide and high, it is {} x {}",
+                            maxViewportSide, width, height));
   }
   validateCamera(camera);
   forward_ = glm::normalize(camera.focalPoint - camera.position);

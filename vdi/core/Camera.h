@@ -2,8 +2,8 @@
 //   * world space: the coordinates of the data set, any unit, double precision;
 //   * view space: x right, y up, z = *depth* along the view axis, positive in front, in world units;
 //   * pixels: column x from the left, row y from the *bottom* (as vtkImageData and OpenGL), centres at +0.5.
-// A ray is p(depth) = origin + depth * direction, where direction has unit view-space z. The world length of a depth
-// interval is therefore depth interval * |direction|.
+// A ray is p(depth) = origin + depth * direction, where direction has unit view-space z. The world length of
+// a depth interval is therefore depth interval * |direction|.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -23,8 +23,8 @@ struct Camera {
 
   bool operator==(const Camera&) const = default;
 
-  /// The camera turned by `degrees` about the focal point, around the view-up axis made orthogonal to the view
-  /// direction (vtkCamera::Azimuth, positive moves the camera to its own right).
+  /// The camera turned by `degrees` about the focal point, around the view-up axis made orthogonal to the
+  /// view direction (vtkCamera::Azimuth, positive moves the camera to its own right).
   Camera azimuth(double degrees) const;
 
   /// A camera looking along `direction` at the whole of `bounds`, as vtkRenderer::ResetCamera places it.
@@ -37,13 +37,14 @@ struct Ray {
   glm::dvec3 direction;  // world per unit of depth
 };
 
-/// A camera with a viewport of width x height pixels: the orthonormal view basis and the mapping between pixels and
-/// rays. Square pixels; the vertical extent is the camera's, as in VTK.
+/// A camera with a viewport of width x height pixels: the orthonormal view basis and the mapping between
+/// pixels and rays. Square pixels; the vertical extent is the camera's, as in VTK.
 class View {
  public:
-  /// Throws Error{InvalidArgument} for a viewport outside 1 .. 32768, a view angle outside (0, 180), a parallel scale
-  /// <= 0, values that aren't finite, or a position equal to the focal point. A view-up parallel to the view direction
-  /// is replaced by the axis most orthogonal to it.
+  /// Throws Error{InvalidArgument} for a viewport outside 1 .. 32768, a view angle outside (0, 180), a
+  /// parallel scale
+  /// <= 0, values that aren't finite, or a position equal to the focal point. A view-up parallel to the view
+  /// direction is replaced by the axis most orthogonal to it.
   View(const Camera& camera, int width, int height);
 
   const Camera& camera() const { return camera_; }

@@ -9,7 +9,8 @@
 namespace vdi {
 
 enum class ErrorCode {
-  InvalidArgument,    // a value that the caller passed can't be used: N_S = 0, zero spacing, mismatch between ranks
+  InvalidArgument,    // a value that the caller passed can't be used: N_S = 0, zero spacing, mismatch between
+                      // ranks
   DeviceUnavailable,  // no Vulkan device fits; the message lists every device and why it was refused
   OutOfMemory,        // the device or the host can't hold what was asked for; the message has the figure
   DeviceFailure,      // a Vulkan call failed
@@ -23,7 +24,8 @@ enum class ErrorCode {
 /// "InvalidArgument" and so on, for messages.
 const char* toString(ErrorCode code);
 
-/// what() reads "<what> (<context>)"; context names the file, device, rank or property in question and may be empty.
+/// what() reads "<what> (<context>)"; context names the file, device, rank or property in question and may be
+/// empty.
 class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& what, std::string context = {})

@@ -8,7 +8,8 @@ namespace vdi {
 
 const char* toString(Algorithm algorithm) {
   switch (algorithm) {
-    case Algorithm::Bisection: return "bisection";
+    case Algorithm::Bisection:
+      return "bisection";
   }
   return "unknown";
 }
@@ -20,12 +21,14 @@ Algorithm algorithmFromString(const std::string& name) {
 
 void validate(const GenerateSettings& settings) {
   const auto demand = [](bool good, const char* field, auto value, const char* range) {
-    if (!good) throw Error(ErrorCode::InvalidArgument, fmt::format("{} must lie in {}, it is {}", field, range, value));
+    if (!good)
+      throw Error(ErrorCode::InvalidArgument,
+                  fmt::format("{} must lie in {}, it is {}", field, range, value));
   };
   demand(settings.width >= 1 && settings.width <= 32768, "width", settings.width, "[1, 32768]");
   demand(settings.height >= 1 && settings.height <= 32768, "height", settings.height, "[1, 32768]");
-  demand(settings.supersegments >= 1 && settings.supersegments <= 1024, "supersegments", settings.supersegments,
-         "[1, 1024]");
+  demand(settings.supersegments >= 1 && settings.supersegments <= 1024, "supersegments",
+         settings.supersegments, "[1, 1024]");
   demand(settings.samplesPerVoxel >= 1.0 / 64.0 && settings.samplesPerVoxel <= 64.0, "samples per voxel",
          settings.samplesPerVoxel, "[1/64, 64]");
   demand(settings.terminationOpacity > 0.0 && settings.terminationOpacity <= 1.0, "termination opacity",

@@ -21,8 +21,8 @@ struct GenerateSettings {
   std::uint32_t supersegments = 25;  // N_S, 1 .. 1024
   double samplesPerVoxel = 1.0;      // [1/64, 64]
   Algorithm algorithm = Algorithm::Bisection;
-  /// A ray ends once it has accumulated this opacity: (0, 1]; 1 never ends early. What's hidden behind it at V_O is
-  /// missing when seen from V_N.
+  /// A ray ends once it has accumulated this opacity: (0, 1]; 1 never ends early. What's hidden behind it at
+  /// V_O is missing when seen from V_N.
   double terminationOpacity = 0.9999;
   bool operator==(const GenerateSettings&) const = default;
 };

@@ -13,13 +13,15 @@ struct Image {
   int width = 0;
   int height = 0;
   std::vector<glm::vec4> rgba;  // [height][width], premultiplied
-  /// [height][width]: view-space depth of the front of the first sample or supersegment that isn't transparent, world
-  /// units; noDepth where there's none. May be empty when depth wasn't asked for.
+  /// [height][width]: view-space depth of the front of the first sample or supersegment that isn't
+  /// transparent, world units; noDepth where there's none. May be empty when depth wasn't asked for.
   std::vector<float> depth;
 
   static constexpr float noDepth = std::numeric_limits<float>::infinity();
 
-  std::size_t pixelCount() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+  std::size_t pixelCount() const {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  }
 };
 
 }  // namespace vdi

@@ -42,18 +42,21 @@ struct Moments {
     const double varianceA = aa - a * a;
     const double varianceB = bb - b * b;
     const double covariance = ab - a * b;
-    return (2.0 * a * b + c1) * (2.0 * covariance + c2) / ((a * a + b * b + c1) * (varianceA + varianceB + c2));
+    return (2.0 * a * b + c1) * (2.0 * covariance + c2) /
+           ((a * a + b * b + c1) * (varianceA + varianceB + c2));
   }
 };
 
 class Channel {
  public:
-  Channel(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int channels, int channel)
+  Channel(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int channels,
+          int channel)
       : a_(a), b_(b), width_(width), channels_(channels), channel_(channel) {}
   Moments at(int x, int y) const {
-    const auto i = (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)) *
-                       static_cast<std::size_t>(channels_) +
-                   static_cast<std::size_t>(channel_);
+    const auto i =
+        (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)) *
+            static_cast<std::size_t>(channels_) +
+        static_cast<std::size_t>(channel_);
     Moments m;
     m.add(1.0, a_[i], b_[i]);
     return m;
@@ -80,7 +83,8 @@ double smallSsim(const Channel& channel, int width, int height) {
 double windowedSsim(const Channel& channel, int width, int height) {
   double kernel[2 * radius + 1];
   double total = 0.0;
-  for (int i = -radius; i <= radius; ++i) total += kernel[i + radius] = std::exp(-0.5 * i * i / (sigma * sigma));
+  for (int i = -radius; i <= radius; ++i)
+    total += kernel[i + radius] = std::exp(-0.5 * i * i / (sigma * sigma));
   for (double& weight : kernel) weight /= total;
   std::vector<Moments> columns(static_cast<std::size_t>(width));
   double sum = 0.0;
@@ -92,7 +96,8 @@ double windowedSsim(const Channel& channel, int width, int height) {
     }
     for (int x = radius; x < width - radius; ++x) {
       Moments m;
-      for (int i = -radius; i <= radius; ++i) m.add(kernel[i + radius], columns[static_cast<std::size_t>(x + i)]);
+      for (int i = -radius; i <= radius; ++i)
+        m.add(kernel[i + radius], columns[static_cast<std::size_t>(x + i)]);
       sum += m.ssim();
     }
   }
@@ -101,8 +106,8 @@ double windowedSsim(const Channel& channel, int width, int height) {
 
 }  // namespace
 
-ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int height,
-                        int channels) {
+ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width,
+                        int height, int channels) {
   const auto expected =
       static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * static_cast<std::size_t>(channels);
   if (width < 1 || height < 1 || channels < 1 || a.size() != expected || b.size() != expected) {
@@ -124,13 +129,15 @@ ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::ui
     if (worst > 16) ++wrong;
   }
   const double mean = squares / static_cast<double>(expected);
-  difference.psnrDb = mean > 0.0 ? 10.0 * std::log10(255.0 * 255.0 / mean) : std::numeric_limits<double>::infinity();
+  difference.psnrDb =
+      mean > 0.0 ? 10.0 * std::log10(255.0 * 255.0 / mean) : std::numeric_limits<double>::infinity();
   difference.meanError = absolute / static_cast<double>(expected);
   difference.wrongShare = static_cast<double>(wrong) / (static_cast<double>(width) * height);
   const bool small = width <= 2 * radius || height <= 2 * radius;
   for (int c = 0; c < channels; ++c) {
     const Channel channel(a, b, width, channels, c);
-    difference.ssim += (small ? smallSsim(channel, width, height) : windowedSsim(channel, width, height)) / channels;
+    difference.ssim +=
+        (small ? smallSsim(channel, width, height) : windowedSsim(channel, width, height)) / channels;
   }
   return difference;
 }

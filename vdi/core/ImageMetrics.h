@@ -7,19 +7,20 @@
 namespace vdi {
 
 struct ImageDifference {
-  double ssim = 0.0;      // 1 = equal; mean over pixels and channels
-  double psnrDb = 0.0;    // +infinity for equal pictures
-  double meanError = 0.0; // mean absolute difference, in 1/255
-  int maxError = 0;       // largest absolute difference of a channel, in 1/255
+  double ssim = 0.0;        // 1 = equal; mean over pixels and channels
+  double psnrDb = 0.0;      // +infinity for equal pictures
+  double meanError = 0.0;   // mean absolute difference, in 1/255
+  int maxError = 0;         // largest absolute difference of a channel, in 1/255
   double wrongShare = 0.0;  // share of pixels with a channel off by more than 16/255
 };
 
-/// 8-bit interleaved pictures [height][width][channels]. SSIM is Wang et al. 2004 with their Gaussian window (sigma 1.5,
-/// 11 x 11), K1 = 0.01, K2 = 0.03, population covariance, borders of 5 pixels left out: the figures of scikit-image's
-/// structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=255). Pictures smaller
-/// than the window are compared with one window of their own size, uniform weights. Throws Error{InvalidArgument} for
-/// pictures that aren't of one size.
-ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int height,
-                        int channels);
+/// 8-bit interleaved pictures [height][width][channels]. SSIM is Wang et al. 2004 with their Gaussian window
+/// (sigma 1.5, 11 x 11), K1 = 0.01, K2 = 0.03, population covariance, borders of 5 pixels left out: the
+/// figures of scikit-image's structural_similarity(gaussian_weights=True, sigma=1.5,
+/// use_sample_covariance=False, data_range=255). Pictures smaller than the window are compared with one
+/// window of their own size, uniform weights. Throws Error{InvalidArgument} for pictures that aren't of one
+/// size.
+ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width,
+                        int height, int channels);
 
 }  // namespace vdi

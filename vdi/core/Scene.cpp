@@ -49,8 +49,8 @@ DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPe
   const double samples = std::ceil((farthest - lattice.first) / lattice.step);
   if (samples > 0x1p24) {
     throw Error(ErrorCode::InvalidArgument,
-                fmt::format("a ray would need {:.3g} samples: the scene is {:.3g} deep and one sample {:.3g}", samples,
-                            farthest - lattice.first, lattice.step));
+                fmt::format("a ray would need {:.3g} samples: the scene is {:.3g} deep and one sample {:.3g}",
+                            samples, farthest - lattice.first, lattice.step));
   }
   lattice.count = static_cast<std::uint32_t>(samples);
   return lattice;

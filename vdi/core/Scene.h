@@ -19,13 +19,14 @@ struct Scene {
 
 Scene localScene(std::span<const Block> blocks);
 
-/// Coordinate `value` of an owned box rounded to a lattice of 2^-20 of the scene's extent around the scene's centre, and
-/// given relative to that centre in single precision. Two blocks that share a face, computed on two ranks with other
-/// rounding, get the same float: every sample has exactly one owner.
+/// Coordinate `value` of an owned box rounded to a lattice of 2^-20 of the scene's extent around the scene's
+/// centre, and given relative to that centre in single precision. Two blocks that share a face, computed on
+/// two ranks with other rounding, get the same float: every sample has exactly one owner.
 float snapToScene(const Scene& scene, double value, int axis);
 
-/// Sample k of every ray covers the depths [first + k * step, first + (k + 1) * step] and is taken at the middle. The
-/// lattice depends on the scene and the camera alone, so any decomposition of the data yields the same samples.
+/// Sample k of every ray covers the depths [first + k * step, first + (k + 1) * step] and is taken at the
+/// middle. The lattice depends on the scene and the camera alone, so any decomposition of the data yields the
+/// same samples.
 struct DepthLattice {
   double first = 0.0;       // depth, >= 0: nothing at or behind the eye is sampled
   double step = 0.0;        // depth, > 0 unless count == 0
@@ -34,8 +35,8 @@ struct DepthLattice {
   double frontOf(std::uint32_t k) const { return first + k * step; }
 };
 
-/// step = scene.minSpacing / samplesPerVoxel. Throws Error{InvalidArgument} when samplesPerVoxel isn't in [1/64, 64] or
-/// when a ray would need more than 2^24 samples.
+/// step = scene.minSpacing / samplesPerVoxel. Throws Error{InvalidArgument} when samplesPerVoxel isn't in
+/// [1/64, 64] or when a ray would need more than 2^24 samples.
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel);
 
 }  // namespace vdi

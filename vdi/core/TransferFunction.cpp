@@ -16,12 +16,13 @@ namespace {
 constexpr std::size_t smallestTable = 1024;
 constexpr std::size_t largestTable = 16384;
 
-/// Piecewise linear through nodes in ascending x; `valueOf` reads a node's value. Of two nodes at x the later one counts.
+/// Piecewise linear through nodes in ascending x; `valueOf` reads a node's value. Of two nodes at x the later
+/// one counts.
 template <typename Node, typename ValueOf>
 auto piecewiseLinear(const std::vector<Node>& nodes, double x, ValueOf valueOf) {
   assert(!nodes.empty());
-  const auto above =
-      std::upper_bound(nodes.begin(), nodes.end(), x, [](double value, const Node& node) { return value < node.x; });
+  const auto above = std::upper_bound(nodes.begin(), nodes.end(), x,
+                                      [](double value, const Node& node) { return value < node.x; });
   if (above == nodes.begin()) return valueOf(nodes.front());
   const auto below = std::prev(above);
   if (above == nodes.end()) return valueOf(*below);
@@ -35,12 +36,15 @@ void validateNodes(const std::vector<Node>& nodes, const char* what) {
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (!std::isfinite(nodes[i].x) || (i > 0 && nodes[i].x < nodes[i - 1].x)) {
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("the nodes of the {} must be finite and ascend; node {} is at {}", what, i, nodes[i].x));
+                  fmt::format("the nodes of the {} must be finite and ascend; node {} is at {}", what, i,
+                              nodes[i].x));
     }
   }
 }
 
-bool isShare(double value) { return value >= 0.0 && value <= 1.0; }
+bool isShare(double value) {
+  return value >= 0.0 && value <= 1.0;
+}
 
 float extinctionOf(double opacity) {
   if (opacity >= 1.0) return maxExtinction;
@@ -77,12 +81,13 @@ void validate(const TransferFunction& transferFunction) {
   }
   for (const OpacityNode& node : transferFunction.opacities) {
     if (!isShare(node.opacity)) {
-      throw Error(ErrorCode::InvalidArgument, fmt::format("the opacity at {} is {}, not in [0, 1]", node.x, node.opacity));
+      throw Error(ErrorCode::InvalidArgument,
+                  fmt::format("the opacity at {} is {}, not in [0, 1]", node.x, node.opacity));
     }
   }
   if (!(transferFunction.unitDistance > 0.0) || !std::isfinite(transferFunction.unitDistance)) {
-    throw Error(ErrorCode::InvalidArgument,
-                fmt::format("the opacity unit distance must be > 0, it is {}", transferFunction.unitDistance));
+    throw Error(ErrorCode::InvalidArgument, fmt::format("the opacity unit distance must be > 0, it is {}",
+                                                        transferFunction.unitDistance));
   }
 }
 
@@ -99,7 +104,8 @@ TransferTable bake(const TransferFunction& transferFunction) {
     table.max += half;
   }
   const double range = table.max - table.min;
-  const double closest = closestNodes(transferFunction.opacities, closestNodes(transferFunction.colors, range));
+  const double closest =
+      closestNodes(transferFunction.opacities, closestNodes(transferFunction.colors, range));
   std::size_t size = smallestTable;
   while (size < largestTable && closest * static_cast<double>(size - 1) < 2.0 * range) size *= 2;
   table.entries.resize(size);

@@ -8,8 +8,8 @@
 namespace vdi {
 
 struct ColorNode {
-  double x = 0.0;          // scalar
-  glm::dvec3 color{0.0};   // straight RGB in [0, 1]
+  double x = 0.0;         // scalar
+  glm::dvec3 color{0.0};  // straight RGB in [0, 1]
   bool operator==(const ColorNode&) const = default;
 };
 
@@ -19,8 +19,8 @@ struct OpacityNode {
   bool operator==(const OpacityNode&) const = default;
 };
 
-/// Piecewise linear in both parts, constant beyond the outermost nodes. Two nodes with equal x make a step. Nodes are in
-/// ascending order of x.
+/// Piecewise linear in both parts, constant beyond the outermost nodes. Two nodes with equal x make a step.
+/// Nodes are in ascending order of x.
 struct TransferFunction {
   std::vector<ColorNode> colors;
   std::vector<OpacityNode> opacities;
@@ -32,12 +32,13 @@ struct TransferFunction {
   double opacityAt(double x) const;
 };
 
-/// Throws Error{InvalidArgument}: no nodes, nodes out of order, values outside [0, 1] or not finite, unit distance <= 0.
+/// Throws Error{InvalidArgument}: no nodes, nodes out of order, values outside [0, 1] or not finite, unit
+/// distance <= 0.
 void validate(const TransferFunction& transferFunction);
 
-/// One entry of the table that both the reference and the shaders read. `extinction` is -log2(1 - opacity) per unit
-/// distance, so a sample of length d has alpha = 1 - exp2(-extinction * d / unitDistance). Opacity 1 is stored as an
-/// extinction of maxExtinction, which is opaque for any practical length.
+/// One entry of the table that both the reference and the shaders read. `extinction` is -log2(1 - opacity)
+/// per unit distance, so a sample of length d has alpha = 1 - exp2(-extinction * d / unitDistance). Opacity 1
+/// is stored as an extinction of maxExtinction, which is opaque for any practical length.
 struct TransferTableEntry {
   float red = 0.0F;
   float green = 0.0F;
@@ -47,8 +48,8 @@ struct TransferTableEntry {
 
 inline constexpr float maxExtinction = 65536.0F;
 
-/// The function sampled at `entries.size()` evenly spaced scalars from `min` to `max`, linear in between, clamped
-/// outside. Everything in the library that classifies a scalar does it through this table.
+/// The function sampled at `entries.size()` evenly spaced scalars from `min` to `max`, linear in between,
+/// clamped outside. Everything in the library that classifies a scalar does it through this table.
 struct TransferTable {
   double min = 0.0;
   double max = 1.0;  // > min
@@ -61,8 +62,8 @@ struct TransferTable {
   bool visible(double lo, double hi) const;
 };
 
-/// Size: a power of two from 1024 to 16384, large enough for two entries between neighbouring nodes where that's
-/// possible.
+/// Size: a power of two from 1024 to 16384, large enough for two entries between neighbouring nodes where
+/// that's possible.
 TransferTable bake(const TransferFunction& transferFunction);
 
 }  // namespace vdi

@@ -10,8 +10,9 @@
 
 namespace vdi {
 
-/// One depth interval of a list. The colour is premultiplied and accumulated over the whole interval, and so is the
-/// opacity. A part of length l' of an interval of length l has opacity a' = 1 - (1 - a)^(l'/l), colour scaled by a'/a.
+/// One depth interval of a list. The colour is premultiplied and accumulated over the whole interval, and so
+/// is the opacity. A part of length l' of an interval of length l has opacity a' = 1 - (1 - a)^(l'/l), colour
+/// scaled by a'/a.
 struct Supersegment {
   float front = 0.0F;  // view-space depth of V_O, world units
   float back = 0.0F;   // > front
@@ -36,7 +37,8 @@ struct SupersegmentLists {
   bool operator==(const SupersegmentLists&) const = default;
 };
 
-/// A whole VDI with everything that is needed to render it. List (x, y) has the index y * width + x, row 0 at the bottom.
+/// A whole VDI with everything that is needed to render it. List (x, y) has the index y * width + x, row 0 at
+/// the bottom.
 struct Vdi {
   Camera camera;  // V_O
   int width = 0;
@@ -52,8 +54,9 @@ struct Vdi {
   bool operator==(const Vdi&) const = default;
 };
 
-/// Throws Error{Format} unless: the offsets ascend from 0 to segments.size(), there are width * height lists, each list
-/// holds at most `budget` supersegments with finite values, 0 <= front < back, ascending and disjoint, opacity in (0, 1].
+/// Throws Error{Format} unless: the offsets ascend from 0 to segments.size(), there are width * height lists,
+/// each list holds at most `budget` supersegments with finite values, 0 <= front < back, ascending and
+/// disjoint, opacity in (0, 1].
 void validate(const Vdi& vdi);
 
 }  // namespace vdi

@@ -20,19 +20,21 @@ namespace vdi::gpu {
 
 class VolumeStore;
 
-/// The part of CastParams that follows from camera and scene; `perUnitDistance`, addresses and list fields are left 0.
+/// The part of CastParams that follows from camera and scene; `perUnitDistance`, addresses and list fields
+/// are left 0.
 shared::CastParams castGeometry(const Scene& scene, const View& view, const DepthLattice& lattice);
 
 class CastPass {
  public:
   explicit CastPass(std::shared_ptr<Device> device);
 
-  /// Chooses the pipelines for the store's pages and binds these. Cheap when nothing changed. No dispatch may be in flight.
+  /// Chooses the pipelines for the store's pages and binds these. Cheap when nothing changed. No dispatch may
+  /// be in flight.
   void bind(const VolumeStore& volume);
 
   /// Rows [firstRow, lastRow) in one of the castMode's. `params` is the address of a CastParams.
-  void record(Commands& commands, VkDeviceAddress params, std::uint32_t mode, std::uint32_t width, std::uint32_t firstRow,
-              std::uint32_t lastRow) const;
+  void record(Commands& commands, VkDeviceAddress params, std::uint32_t mode, std::uint32_t width,
+              std::uint32_t firstRow, std::uint32_t lastRow) const;
 
  private:
   struct Pipelines {

@@ -14,8 +14,9 @@ namespace {
 constexpr std::uint32_t maxMarks = 64;
 
 void memoryBarrier(VkCommandBuffer commands) {
-  constexpr VkPipelineStageFlags2 stages =
-      VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT | VK_PIPELINE_STAGE_2_HOST_BIT;
+  constexpr VkPipelineStageFlags2 stages = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT |
+                                           VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT |
+                                           VK_PIPELINE_STAGE_2_HOST_BIT;
   constexpr VkAccessFlags2 writes =
       VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_TRANSFER_WRITE_BIT | VK_ACCESS_2_HOST_WRITE_BIT;
   constexpr VkAccessFlags2 reads =
@@ -41,7 +42,8 @@ void changeLayout(VkCommandBuffer commands, const Image3D& image, VkImageLayout 
                                       VK_QUEUE_FAMILY_IGNORED,
                                       image.handle(),
                                       {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
-  const VkDependencyInfo info{VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 0, nullptr, 0, nullptr, 1, &barrier};
+  const VkDependencyInfo info{
+      VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 0, nullptr, 0, nullptr, 1, &barrier};
   vkCmdPipelineBarrier2(commands, &info);
 }
 
@@ -50,10 +52,11 @@ void changeLayout(VkCommandBuffer commands, const Image3D& image, VkImageLayout 
 Commands::Commands(std::shared_ptr<Device> device) : device_(std::move(device)) {
   try {
     const VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr,
-                                           VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT, device_->queueFamily()};
+                                           VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT,
+                                           device_->queueFamily()};
     check(vkCreateCommandPool(device_->handle(), &poolInfo, nullptr, &pool_), "vkCreateCommandPool");
-    const VkCommandBufferAllocateInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr, pool_,
-                                                 VK_COMMAND_BUFFER_LEVEL_PRIMARY, 1};
+    const VkCommandBufferAllocateInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr,
+                                                 pool_, VK_COMMAND_BUFFER_LEVEL_PRIMARY, 1};
     check(vkAllocateCommandBuffers(device_->handle(), &bufferInfo, &buffer_), "vkAllocateCommandBuffers");
     const VkFenceCreateInfo fenceInfo{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, nullptr, 0};
     check(vkCreateFence(device_->handle(), &fenceInfo, nullptr, &fence_), "vkCreateFence");
@@ -92,8 +95,10 @@ void Commands::submit() {
   // Makes what was written visible to the host after wait().
   memoryBarrier(buffer_);
   check(vkEndCommandBuffer(buffer_), "vkEndCommandBuffer");
-  const VkCommandBufferSubmitInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO, nullptr, buffer_, 0};
-  const VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2, nullptr, 0, 0, nullptr, 1, &bufferInfo, 0, nullptr};
+  const VkCommandBufferSubmitInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO, nullptr, buffer_,
+                                             0};
+  const VkSubmitInfo2 info{
+      VK_STRUCTURE_TYPE_SUBMIT_INFO_2, nullptr, 0, 0, nullptr, 1, &bufferInfo, 0, nullptr};
   device_->submit(info, fence_);
   submitted_ = true;
 }
@@ -105,19 +110,22 @@ void Commands::wait() {
   check(vkResetFences(device_->handle(), 1, &fence_), "vkResetFences");
 }
 
-void Commands::dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
-                             std::uint32_t y, std::uint32_t z) {
+void Commands::dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants,
+                             std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   vkCmdBindPipeline(buffer_, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.handle());
   VkDescriptorSet set = pipeline.descriptorSet();
   if (set != VK_NULL_HANDLE) {
-    vkCmdBindDescriptorSets(buffer_, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout(), 0, 1, &set, 0, nullptr);
+    vkCmdBindDescriptorSets(buffer_, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout(), 0, 1, &set, 0,
+                            nullptr);
   }
   vkCmdPushConstants(buffer_, pipeline.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
                      static_cast<std::uint32_t>(constants.size()), constants.data());
   vkCmdDispatch(buffer_, x, y, z);
 }
 
-void Commands::barrier() { memoryBarrier(buffer_); }
+void Commands::barrier() {
+  memoryBarrier(buffer_);
+}
 
 void Commands::copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
                     std::uint64_t bytes) {
@@ -133,10 +141,15 @@ void Commands::fill(const Buffer& buffer, std::uint32_t word) {
 
 void Commands::beginUpload(const Image3D& image) {
   changeLayout(buffer_, image, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+  const VkClearColorValue zero{};
+  const VkImageSubresourceRange all{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+  vkCmdClearColorImage(buffer_, image.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &zero, 1, &all);
+  memoryBarrier(buffer_);
 }
 
 void Commands::endUpload(const Image3D& image) {
-  changeLayout(buffer_, image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
+  changeLayout(buffer_, image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+               VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
 }
 
 void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to,
@@ -148,7 +161,8 @@ void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const I
                                  {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
                                  {offset.x, offset.y, offset.z},
                                  {texelExtent.x, texelExtent.y, texelExtent.z}};
-  vkCmdCopyBufferToImage(buffer_, from.handle(), to.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
+  vkCmdCopyBufferToImage(buffer_, from.handle(), to.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1,
+                         &region);
 }
 
 void Commands::mark(std::string name) {

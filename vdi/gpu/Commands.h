@@ -41,29 +41,31 @@ class Commands {
   }
 
   template <typename PushConstants>
-  void dispatch(const ComputePipeline& pipeline, const PushConstants& constants, std::uint32_t x, std::uint32_t y = 1,
-                std::uint32_t z = 1) {
+  void dispatch(const ComputePipeline& pipeline, const PushConstants& constants, std::uint32_t x,
+                std::uint32_t y = 1, std::uint32_t z = 1) {
     dispatchBytes(pipeline, std::as_bytes(std::span(&constants, 1)), x, y, z);
   }
   void dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
                      std::uint32_t y, std::uint32_t z);
 
-  /// Everything recorded so far (shader, transfer and host writes) is finished and visible to everything recorded later,
-  /// host reads after wait() included.
+  /// Everything recorded so far (shader, transfer and host writes) is finished and visible to everything
+  /// recorded later, host reads after wait() included.
   void barrier();
 
-  void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset, std::uint64_t bytes);
+  void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
+            std::uint64_t bytes);
   void fill(const Buffer& buffer, std::uint32_t word);  // whole buffer
-  /// Makes the image ready for copyToImage; its contents are undefined afterwards.
+  /// Makes the image ready for copyToImage and fills it with zeros: texels that nothing is copied to would
+  /// otherwise hold anything, NaN included, and a NaN spoils its neighbours even with weight 0.
   void beginUpload(const Image3D& image);
   /// Makes the image ready to be sampled by what's recorded later.
   void endUpload(const Image3D& image);
   /// Tightly packed texels, x fastest, from the buffer into a box of the image.
-  void copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to, const glm::uvec3& texelOffset,
-                   const glm::uvec3& texelExtent);
+  void copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to,
+                   const glm::uvec3& texelOffset, const glm::uvec3& texelExtent);
 
-  /// Marks the start of a named stage on the device's clock; it ends at the next mark, or at submit. Up to 64 a
-  /// submission.
+  /// Marks the start of a named stage on the device's clock; it ends at the next mark, or at submit. Up to 64
+  /// a submission.
   void mark(std::string name);
   /// Device time of each stage of the last finished submission, in order. Valid after wait().
   std::vector<StageTime> stageTimes() const;

@@ -13,7 +13,8 @@ namespace vdi::gpu {
 class CompositePass {
  public:
   explicit CompositePass(std::shared_ptr<Device> device);
-  /// `params` is the address of a CompositeParams; mode compositeModeSearch, then (after a scan) compositeModeWrite.
+  /// `params` is the address of a CompositeParams; mode compositeModeSearch, then (after a scan)
+  /// compositeModeWrite.
   void record(Commands& commands, VkDeviceAddress params, std::uint32_t mode, std::uint32_t listCount) const;
 
  private:

@@ -16,8 +16,8 @@ constexpr std::uint32_t guaranteedPushConstantBytes = 128;
 class ShaderModule {
  public:
   ShaderModule(const Device& device, std::span<const std::uint32_t> code) : device_(device.handle()) {
-    const VkShaderModuleCreateInfo info{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO, nullptr, 0, code.size_bytes(),
-                                        code.data()};
+    const VkShaderModuleCreateInfo info{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO, nullptr, 0,
+                                        code.size_bytes(), code.data()};
     check(vkCreateShaderModule(device_, &info, nullptr, &module_), "vkCreateShaderModule");
   }
   ~ShaderModule() { vkDestroyShaderModule(device_, module_, nullptr); }
@@ -44,30 +44,31 @@ ComputePipeline::ComputePipeline(std::shared_ptr<Device> device, const ComputePi
   }
 }
 
-ComputePipeline::~ComputePipeline() { release(); }
+ComputePipeline::~ComputePipeline() {
+  release();
+}
 
 void ComputePipeline::makeDescriptorSet() {
   const VkDescriptorSetLayoutBinding binding{0, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, imageCount_,
                                              VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
-  const VkDescriptorSetLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO, nullptr, 0, 1,
-                                                   &binding};
-  check(vkCreateDescriptorSetLayout(device_->handle(), &layoutInfo, nullptr, &setLayout_), "vkCreateDescriptorSetLayout");
+  const VkDescriptorSetLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
+                                                   nullptr, 0, 1, &binding};
+  check(vkCreateDescriptorSetLayout(device_->handle(), &layoutInfo, nullptr, &setLayout_),
+        "vkCreateDescriptorSetLayout");
   const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, imageCount_};
-  const VkDescriptorPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, nullptr, 0, 1, 1, &size};
+  const VkDescriptorPoolCreateInfo poolInfo{
+      VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, nullptr, 0, 1, 1, &size};
   check(vkCreateDescriptorPool(device_->handle(), &poolInfo, nullptr, &pool_), "vkCreateDescriptorPool");
-  const VkDescriptorSetAllocateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO, nullptr, pool_, 1, &setLayout_};
+  const VkDescriptorSetAllocateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO, nullptr, pool_, 1,
+                                            &setLayout_};
   check(vkAllocateDescriptorSets(device_->handle(), &setInfo, &set_), "vkAllocateDescriptorSets");
 }
 
 void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
   const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, info.pushConstantBytes};
-  const VkPipelineLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
-                                              nullptr,
-                                              0,
-                                              imageCount_ > 0 ? 1U : 0U,
-                                              &setLayout_,
-                                              info.pushConstantBytes > 0 ? 1U : 0U,
-                                              &range};
+  const VkPipelineLayoutCreateInfo layoutInfo{
+      VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO, nullptr, 0, imageCount_ > 0 ? 1U : 0U, &setLayout_,
+      info.pushConstantBytes > 0 ? 1U : 0U,          &range};
   check(vkCreatePipelineLayout(device_->handle(), &layoutInfo, nullptr, &layout_), "vkCreatePipelineLayout");
   std::vector<VkSpecializationMapEntry> entries;
   for (std::uint32_t id = 0; id < info.specialization.size(); ++id) {
@@ -81,29 +82,24 @@ void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
       VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
       nullptr,
       0,
-      {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO, nullptr, 0, VK_SHADER_STAGE_COMPUTE_BIT, module.handle(), "main",
-       &specialization},
+      {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO, nullptr, 0, VK_SHADER_STAGE_COMPUTE_BIT,
+       module.handle(), "main", &specialization},
       layout_,
       VK_NULL_HANDLE,
       -1};
-  check(vkCreateComputePipelines(device_->handle(), device_->pipelineCache(), 1, &pipelineInfo, nullptr, &pipeline_),
+  check(vkCreateComputePipelines(device_->handle(), device_->pipelineCache(), 1, &pipelineInfo, nullptr,
+                                 &pipeline_),
         "vkCreateComputePipelines");
 }
 
 void ComputePipeline::bindImages(std::span<const Image3D* const> images, const Sampler& sampler) {
   assert(images.size() == imageCount_);
   std::vector<VkDescriptorImageInfo> infos;
-  for (const Image3D* image : images) infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
-  const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-                                   nullptr,
-                                   set_,
-                                   0,
-                                   0,
-                                   imageCount_,
-                                   VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-                                   infos.data(),
-                                   nullptr,
-                                   nullptr};
+  for (const Image3D* image : images)
+    infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
+  const VkWriteDescriptorSet write{
+      VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,    nullptr,      set_,    0,      0, imageCount_,
+      VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, infos.data(), nullptr, nullptr};
   vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
 }
 

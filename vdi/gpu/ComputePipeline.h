@@ -1,5 +1,5 @@
-// A compute shader ready to be dispatched. Buffers reach shaders as device addresses inside the push constants, so the
-// only descriptors are the sampled 3-D images, in one set that is written when they change.
+// A compute shader ready to be dispatched. Buffers reach shaders as device addresses inside the push
+// constants, so the only descriptors are the sampled 3-D images, in one set that is written when they change.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -16,14 +16,15 @@ class Device;
 class Image3D;
 class Sampler;
 
-/// SPIR-V of `shaders/<name>.comp`, compiled at build time and embedded in the library; asserts that the name exists.
+/// SPIR-V of `shaders/<name>.comp`, compiled at build time and embedded in the library; asserts that the name
+/// exists.
 std::span<const std::uint32_t> shaderCode(std::string_view name);
 
 struct ComputePipelineInfo {
-  std::string_view shader;                       // name without ".comp"
-  std::uint32_t pushConstantBytes = 0;           // at most 128
-  std::uint32_t imageCount = 0;                  // size of the sampler3D array at set 0, binding 0; 0: no descriptor set
-  std::vector<std::uint32_t> specialization;     // constant_id 0, 1, ... as raw 32-bit words
+  std::string_view shader;              // name without ".comp"
+  std::uint32_t pushConstantBytes = 0;  // at most 128
+  std::uint32_t imageCount = 0;  // size of the sampler3D array at set 0, binding 0; 0: no descriptor set
+  std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
 };
 
 class ComputePipeline {
@@ -35,8 +36,8 @@ class ComputePipeline {
   ComputePipeline(ComputePipeline&&) = delete;
   ComputePipeline& operator=(ComputePipeline&&) = delete;
 
-  /// Writes the descriptor set: exactly imageCount images. Must not be called while a dispatch of this pipeline is in
-  /// flight.
+  /// Writes the descriptor set: exactly imageCount images. Must not be called while a dispatch of this
+  /// pipeline is in flight.
   void bindImages(std::span<const Image3D* const> images, const Sampler& sampler);
 
   VkPipeline handle() const { return pipeline_; }

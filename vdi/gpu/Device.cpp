@@ -27,21 +27,31 @@ std::string lower(std::string text) {
 
 const char* typeName(VkPhysicalDeviceType type) {
   switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU: return "discrete";
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU: return "integrated";
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU: return "virtual";
-    case VK_PHYSICAL_DEVICE_TYPE_CPU: return "CPU";
-    default: return "other";
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+      return "discrete";
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+      return "integrated";
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+      return "virtual";
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+      return "CPU";
+    default:
+      return "other";
   }
 }
 
 int preference(VkPhysicalDeviceType type) {
   switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU: return 4;
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU: return 3;
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU: return 2;
-    case VK_PHYSICAL_DEVICE_TYPE_CPU: return 1;
-    default: return 0;
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+      return 4;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+      return 3;
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+      return 2;
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+      return 1;
+    default:
+      return 0;
   }
 }
 
@@ -111,15 +121,19 @@ Candidate inspect(VkPhysicalDevice device) {
   candidate.memoryBytes = largestDeviceHeap(device);
   auto& refusals = candidate.refusals;
   if (candidate.properties.apiVersion < VK_API_VERSION_1_3) {
-    refusals.push_back(fmt::format("Vulkan {}.{}, 1.3 is needed", VK_API_VERSION_MAJOR(candidate.properties.apiVersion),
+    refusals.push_back(fmt::format("Vulkan {}.{}, 1.3 is needed",
+                                   VK_API_VERSION_MAJOR(candidate.properties.apiVersion),
                                    VK_API_VERSION_MINOR(candidate.properties.apiVersion)));
     return candidate;
   }
-  VkPhysicalDeviceMaintenance3Properties m3{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES, nullptr, 0, 0};
-  VkPhysicalDeviceMaintenance4Properties m4{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES, &m3, 0};
+  VkPhysicalDeviceMaintenance3Properties m3{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES,
+                                            nullptr, 0, 0};
+  VkPhysicalDeviceMaintenance4Properties m4{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES, &m3,
+                                            0};
   VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &m4, {}};
   vkGetPhysicalDeviceProperties2(device, &properties);
-  // Several drivers report 4 GiB here and allocate more; what's really there decides. The Vulkan limits of buffers stay.
+  // Several drivers report 4 GiB here and allocate more; what's really there decides. The Vulkan limits of
+  // buffers stay.
   candidate.maxAllocationBytes = std::max<std::uint64_t>(m3.maxMemoryAllocationSize, m4.maxBufferSize);
   Features features;
   vkGetPhysicalDeviceFeatures2(device, &features.core);
@@ -135,9 +149,11 @@ Candidate inspect(VkPhysicalDevice device) {
   for (const auto& [present, name] : demands) {
     if (present == VK_FALSE) refusals.push_back(fmt::format("no {}", name));
   }
-  if (!findComputeFamily(device, candidate.queueFamily)) refusals.emplace_back("no compute queue with timestamps");
-  for (const auto& [format, name] : {std::pair(VK_FORMAT_R8_UNORM, "R8_UNORM"), std::pair(VK_FORMAT_R16_UNORM, "R16_UNORM"),
-                                     std::pair(VK_FORMAT_R32_SFLOAT, "R32_SFLOAT")}) {
+  if (!findComputeFamily(device, candidate.queueFamily))
+    refusals.emplace_back("no compute queue with timestamps");
+  for (const auto& [format, name] :
+       {std::pair(VK_FORMAT_R8_UNORM, "R8_UNORM"), std::pair(VK_FORMAT_R16_UNORM, "R16_UNORM"),
+        std::pair(VK_FORMAT_R32_SFLOAT, "R32_SFLOAT")}) {
     if (!filtersLinearly(device, format)) refusals.push_back(fmt::format("no linear filtering of {}", name));
   }
   return candidate;
@@ -148,8 +164,9 @@ std::string describe(const std::vector<Candidate>& candidates) {
   std::string text;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Candidate& c = candidates[i];
-    text += fmt::format("{}: {} ({}, {} MiB): {}\n", i, c.properties.deviceName, typeName(c.properties.deviceType),
-                        c.memoryBytes >> 20, c.refusals.empty() ? "usable" : fmt::format("{}", fmt::join(c.refusals, ", ")));
+    text += fmt::format("{}: {} ({}, {} MiB): {}\n", i, c.properties.deviceName,
+                        typeName(c.properties.deviceType), c.memoryBytes >> 20,
+                        c.refusals.empty() ? "usable" : fmt::format("{}", fmt::join(c.refusals, ", ")));
   }
   return text;
 }
@@ -158,8 +175,10 @@ std::string describe(const std::vector<Candidate>& candidates) {
 class Instance {
  public:
   explicit Instance(bool validation) {
-    VkApplicationInfo application{VK_STRUCTURE_TYPE_APPLICATION_INFO, nullptr, "pv-vdi", 0, nullptr, 0, VK_API_VERSION_1_3};
-    VkInstanceCreateInfo info{VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO, nullptr, 0, &application, 0, nullptr, 0, nullptr};
+    VkApplicationInfo application{
+        VK_STRUCTURE_TYPE_APPLICATION_INFO, nullptr, "pv-vdi", 0, nullptr, 0, VK_API_VERSION_1_3};
+    VkInstanceCreateInfo info{
+        VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO, nullptr, 0, &application, 0, nullptr, 0, nullptr};
     const char* extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
     if (validation) {
       info.enabledLayerCount = 1;
@@ -212,7 +231,8 @@ const Candidate& choose(const std::vector<Candidate>& candidates, const DeviceRe
     best.push_back(&c);
   }
   if (best.empty()) {
-    const std::string wanted = request.selector.empty() ? "" : fmt::format(" that matches VDI_DEVICE='{}'", request.selector);
+    const std::string wanted =
+        request.selector.empty() ? "" : fmt::format(" that matches VDI_DEVICE='{}'", request.selector);
     throw Error(ErrorCode::DeviceUnavailable,
                 fmt::format("no usable Vulkan device{}; the devices are:\n{}", wanted, describe(candidates)));
   }
@@ -253,7 +273,8 @@ struct Device::State {
 
 namespace {
 
-VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
+VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT,
+                                         VkDebugUtilsMessageTypeFlagsEXT,
                                          const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
   auto* sink = static_cast<std::function<void(const char*)>*>(user);
   (*sink)(data->pMessage);
@@ -287,7 +308,8 @@ std::string Device::describeAll() {
 std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
   Instance instance(request.validation);
   if (instance.result() == VK_ERROR_LAYER_NOT_PRESENT) {
-    throw Error(ErrorCode::DeviceUnavailable, "validation was asked for, but its layer isn't installed", validationLayer);
+    throw Error(ErrorCode::DeviceUnavailable, "validation was asked for, but its layer isn't installed",
+                validationLayer);
   }
   const std::vector<Candidate> candidates =
       instance.result() == VK_SUCCESS ? instance.candidates() : std::vector<Candidate>();
@@ -314,11 +336,20 @@ std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
   features.v12.hostQueryReset = VK_TRUE;
   features.v13.synchronization2 = VK_TRUE;
   features.v13.maintenance4 = VK_TRUE;
-  VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features.core, 0, 1, &queueInfo, 0, nullptr, 0, nullptr,
+  VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                          &features.core,
+                          0,
+                          1,
+                          &queueInfo,
+                          0,
+                          nullptr,
+                          0,
+                          nullptr,
                           nullptr};
   check(vkCreateDevice(chosen.handle, &info, nullptr, &state->device), "vkCreateDevice");
   vkGetDeviceQueue(state->device, chosen.queueFamily, 0, &state->queue);
-  const VkPipelineCacheCreateInfo cacheInfo{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO, nullptr, 0, 0, nullptr};
+  const VkPipelineCacheCreateInfo cacheInfo{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO, nullptr, 0, 0,
+                                            nullptr};
   check(vkCreatePipelineCache(state->device, &cacheInfo, nullptr, &state->cache), "vkCreatePipelineCache");
   std::shared_ptr<Device> device(new Device(std::move(state)));
   if (request.validation) device->listen();
@@ -352,15 +383,33 @@ void Device::listen() {
         "vkCreateDebugUtilsMessengerEXT");
 }
 
-const std::string& Device::name() const { return state_->name; }
-bool Device::isCpu() const { return state_->cpu; }
-const DeviceLimits& Device::limits() const { return state_->limits; }
-VkInstance Device::instance() const { return state_->instance; }
-VkPhysicalDevice Device::physicalDevice() const { return state_->physical; }
-VkDevice Device::handle() const { return state_->device; }
-VkQueue Device::queue() const { return state_->queue; }
-std::uint32_t Device::queueFamily() const { return state_->queueFamily; }
-VkPipelineCache Device::pipelineCache() const { return state_->cache; }
+const std::string& Device::name() const {
+  return state_->name;
+}
+bool Device::isCpu() const {
+  return state_->cpu;
+}
+const DeviceLimits& Device::limits() const {
+  return state_->limits;
+}
+VkInstance Device::instance() const {
+  return state_->instance;
+}
+VkPhysicalDevice Device::physicalDevice() const {
+  return state_->physical;
+}
+VkDevice Device::handle() const {
+  return state_->device;
+}
+VkQueue Device::queue() const {
+  return state_->queue;
+}
+std::uint32_t Device::queueFamily() const {
+  return state_->queueFamily;
+}
+VkPipelineCache Device::pipelineCache() const {
+  return state_->cache;
+}
 
 std::uint32_t Device::memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const {
   for (std::uint32_t i = 0; i < state_->memory.memoryTypeCount; ++i) {
@@ -370,8 +419,12 @@ std::uint32_t Device::memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags w
   throw Error(ErrorCode::OutOfMemory, fmt::format("no memory type with properties {:#x}", wanted), name());
 }
 
-std::uint64_t Device::allocatedBytes() const { return static_cast<std::uint64_t>(state_->allocated.load()); }
-void Device::accountAllocation(std::int64_t bytes) { state_->allocated += bytes; }
+std::uint64_t Device::allocatedBytes() const {
+  return static_cast<std::uint64_t>(state_->allocated.load());
+}
+void Device::accountAllocation(std::int64_t bytes) {
+  state_->allocated += bytes;
+}
 
 std::uint32_t Device::validationMessageCount() const {
   const std::lock_guard lock(state_->messageMutex);

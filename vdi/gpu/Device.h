@@ -11,14 +11,15 @@
 namespace vdi::gpu {
 
 struct DeviceRequest {
-  /// Index (as `vdi info --devices` lists them) or part of the name, case-insensitive. Empty: the best device; equal
-  /// ones are dealt out by localRank.
+  /// Index (as `vdi info --devices` lists them) or part of the name, case-insensitive. Empty: the best
+  /// device; equal ones are dealt out by localRank.
   std::string selector;
   int localRank = 0;        // rank among the ranks of this node
   bool validation = false;  // VK_LAYER_KHRONOS_validation; every message of severity warning or error is kept
 };
 
-/// The request that the environment asks for: VDI_DEVICE is the selector, VDI_VALIDATION=1 turns validation on.
+/// The request that the environment asks for: VDI_DEVICE is the selector, VDI_VALIDATION=1 turns validation
+/// on.
 DeviceRequest requestFromEnvironment(int localRank);
 
 struct DeviceLimits {
@@ -30,10 +31,11 @@ struct DeviceLimits {
 
 class Device {
  public:
-  /// Throws Error{DeviceUnavailable}; the text lists every device of the machine and why it was refused, or that there's
-  /// no Vulkan driver at all. What's demanded: Vulkan 1.3, a compute queue with timestamps, hostQueryReset, bufferDeviceAddress, scalarBlockLayout,
-  /// shaderInt64, timelineSemaphore, synchronization2, maintenance4, linear filtering of 3-D R32_SFLOAT, R16_UNORM and
-  /// R8_UNORM images. Preference: discrete, integrated, virtual, CPU.
+  /// Throws Error{DeviceUnavailable}; the text lists every device of the machine and why it was refused, or
+  /// that there's no Vulkan driver at all. What's demanded: Vulkan 1.3, a compute queue with timestamps,
+  /// hostQueryReset, bufferDeviceAddress, scalarBlockLayout, shaderInt64, timelineSemaphore,
+  /// synchronization2, maintenance4, linear filtering of 3-D R32_SFLOAT, R16_UNORM and R8_UNORM images.
+  /// Preference: discrete, integrated, virtual, CPU.
   static std::shared_ptr<Device> create(const DeviceRequest& request);
   /// A line per device: index, name, type, driver, memory, "usable" or why not. Never throws.
   static std::string describeAll();
@@ -55,7 +57,8 @@ class Device {
   std::uint32_t queueFamily() const;
   VkPipelineCache pipelineCache() const;
 
-  /// Index of a memory type that `typeBits` allows and that has `wanted`; throws Error{OutOfMemory} if there's none.
+  /// Index of a memory type that `typeBits` allows and that has `wanted`; throws Error{OutOfMemory} if
+  /// there's none.
   std::uint32_t memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
   /// Bytes of device memory that Buffers and Images of this device hold now.
   std::uint64_t allocatedBytes() const;
@@ -76,7 +79,8 @@ class Device {
   std::unique_ptr<State> state_;
 };
 
-/// Throws Error: OutOfMemory for the two out-of-memory results, DeviceFailure otherwise; `call` names the function.
+/// Throws Error: OutOfMemory for the two out-of-memory results, DeviceFailure otherwise; `call` names the
+/// function.
 void check(VkResult result, const char* call);
 
 }  // namespace vdi::gpu

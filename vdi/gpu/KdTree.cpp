@@ -33,8 +33,10 @@ Plane choosePlane(const std::vector<Brick>& bricks) {
     std::sort(hi.begin(), hi.end());
     for (const auto* faces : {&lo, &hi}) {
       for (const float position : *faces) {
-        const auto below = static_cast<std::size_t>(std::lower_bound(lo.begin(), lo.end(), position) - lo.begin());
-        const auto above = static_cast<std::size_t>(hi.end() - std::upper_bound(hi.begin(), hi.end(), position));
+        const auto below =
+            static_cast<std::size_t>(std::lower_bound(lo.begin(), lo.end(), position) - lo.begin());
+        const auto above =
+            static_cast<std::size_t>(hi.end() - std::upper_bound(hi.begin(), hi.end(), position));
         if (below == count || above == count) continue;  // separates nothing
         const std::size_t cut = below + above > count ? below + above - count : 0;
         const std::size_t cost = std::max(below, above) + cut;
@@ -78,7 +80,8 @@ class Builder {
     bricks = {};
     const std::size_t children = tree_.nodes.size();
     tree_.nodes.resize(children + 2);
-    tree_.nodes[node] = {plane.position, static_cast<std::uint32_t>(plane.axis), static_cast<std::uint32_t>(children), 0};
+    tree_.nodes[node] = {plane.position, static_cast<std::uint32_t>(plane.axis),
+                         static_cast<std::uint32_t>(children), 0};
     build(children, std::move(below), depth + 1);
     build(children + 1, std::move(above), depth + 1);
   }

@@ -15,8 +15,8 @@ struct KdTree {
 /// The deepest tree that cast.comp has stack for.
 inline constexpr int kdMaxDepth = 40;
 
-/// Splits space by faces of bricks until every leaf holds one brick or none, cutting as few bricks as it can. Disjoint boxes
-/// can always be separated so; throws Error{InvalidArgument} when two overlap.
+/// Splits space by faces of bricks until every leaf holds one brick or none, cutting as few bricks as it can.
+/// Disjoint boxes can always be separated so; throws Error{InvalidArgument} when two overlap.
 KdTree buildKdTree(std::vector<shared::Brick> bricks);
 
 }  // namespace vdi::gpu

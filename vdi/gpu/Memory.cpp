@@ -15,15 +15,17 @@ namespace {
 constexpr std::uint64_t smallestBuffer = 16;
 
 /// Memory for a resource; throws with the figures that a user needs.
-VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::uint32_t type, const void* chain) {
+VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::uint32_t type,
+                        const void* chain) {
   const VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, chain, needs.size, type};
   VkDeviceMemory memory = VK_NULL_HANDLE;
   const VkResult result = vkAllocateMemory(device.handle(), &info, nullptr, &memory);
   if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY) {
-    throw Error(ErrorCode::OutOfMemory,
-                fmt::format("{} MiB of device memory were refused; {} MiB of {} MiB are in use by this process",
-                            needs.size >> 20, device.allocatedBytes() >> 20, device.limits().memoryBytes >> 20),
-                device.name());
+    throw Error(
+        ErrorCode::OutOfMemory,
+        fmt::format("{} MiB of device memory were refused; {} MiB of {} MiB are in use by this process",
+                    needs.size >> 20, device.allocatedBytes() >> 20, device.limits().memoryBytes >> 20),
+        device.name());
   }
   check(result, "vkAllocateMemory");
   device.accountAllocation(static_cast<std::int64_t>(needs.size));
@@ -40,8 +42,10 @@ void demandFits(const Device& device, std::uint64_t bytes) {
 }
 
 std::uint32_t memoryTypeFor(const Device& device, std::uint32_t typeBits, MemoryKind kind) {
-  constexpr VkMemoryPropertyFlags host = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
-  if (kind == MemoryKind::DeviceLocal) return device.memoryType(typeBits, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
+  constexpr VkMemoryPropertyFlags host =
+      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+  if (kind == MemoryKind::DeviceLocal)
+    return device.memoryType(typeBits, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
   if (kind == MemoryKind::Upload) return device.memoryType(typeBits, host);
   try {
     return device.memoryType(typeBits, host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
@@ -61,7 +65,8 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
                                   0,
                                   size_,
                                   VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
-                                      VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT,
+                                      VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+                                      VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT,
                                   VK_SHARING_MODE_EXCLUSIVE,
                                   0,
                                   nullptr};
@@ -73,7 +78,8 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
     memory_ = allocate(*device_, needs, memoryTypeFor(*device_, needs.memoryTypeBits, kind), &flags);
     allocated_ = needs.size;
     check(vkBindBufferMemory(device_->handle(), buffer_, memory_, 0), "vkBindBufferMemory");
-    const VkBufferDeviceAddressInfo addressInfo{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, nullptr, buffer_};
+    const VkBufferDeviceAddressInfo addressInfo{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, nullptr,
+                                                buffer_};
     address_ = vkGetBufferDeviceAddress(device_->handle(), &addressInfo);
     if (kind != MemoryKind::DeviceLocal) {
       void* data = nullptr;
@@ -86,9 +92,13 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
   }
 }
 
-Buffer::~Buffer() { release(); }
+Buffer::~Buffer() {
+  release();
+}
 
-Buffer::Buffer(Buffer&& other) noexcept { *this = std::move(other); }
+Buffer::Buffer(Buffer&& other) noexcept {
+  *this = std::move(other);
+}
 
 Buffer& Buffer::operator=(Buffer&& other) noexcept {
   if (this == &other) return *this;
@@ -131,8 +141,8 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
   const std::uint32_t longest = device_->limits().maxImageDimension3D;
   if (glm::any(glm::greaterThan(extent, glm::uvec3(longest)))) {
     throw Error(ErrorCode::InvalidArgument,
-                fmt::format("a texture of {} x {} x {} is beyond the device's {} per axis", extent.x, extent.y, extent.z,
-                            longest),
+                fmt::format("a texture of {} x {} x {} is beyond the device's {} per axis", extent.x,
+                            extent.y, extent.z, longest),
                 device_->name());
   }
   try {
@@ -154,17 +164,13 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
     check(vkCreateImage(device_->handle(), &info, nullptr, &image_), "vkCreateImage");
     VkMemoryRequirements needs;
     vkGetImageMemoryRequirements(device_->handle(), image_, &needs);
-    memory_ = allocate(*device_, needs, memoryTypeFor(*device_, needs.memoryTypeBits, MemoryKind::DeviceLocal), nullptr);
+    memory_ = allocate(*device_, needs,
+                       memoryTypeFor(*device_, needs.memoryTypeBits, MemoryKind::DeviceLocal), nullptr);
     allocated_ = needs.size;
     check(vkBindImageMemory(device_->handle(), image_, memory_, 0), "vkBindImageMemory");
-    const VkImageViewCreateInfo viewInfo{VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO,
-                                         nullptr,
-                                         0,
-                                         image_,
-                                         VK_IMAGE_VIEW_TYPE_3D,
-                                         format,
-                                         {},
-                                         {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
+    const VkImageViewCreateInfo viewInfo{
+        VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO, nullptr, 0, image_, VK_IMAGE_VIEW_TYPE_3D, format, {},
+        {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
     check(vkCreateImageView(device_->handle(), &viewInfo, nullptr, &view_), "vkCreateImageView");
   } catch (...) {
     release();
@@ -172,9 +178,13 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
   }
 }
 
-Image3D::~Image3D() { release(); }
+Image3D::~Image3D() {
+  release();
+}
 
-Image3D::Image3D(Image3D&& other) noexcept { *this = std::move(other); }
+Image3D::Image3D(Image3D&& other) noexcept {
+  *this = std::move(other);
+}
 
 Image3D& Image3D::operator=(Image3D&& other) noexcept {
   if (this == &other) return *this;
@@ -214,6 +224,8 @@ Sampler::Sampler(std::shared_ptr<Device> device) : device_(std::move(device)) {
   check(vkCreateSampler(device_->handle(), &info, nullptr, &sampler_), "vkCreateSampler");
 }
 
-Sampler::~Sampler() { vkDestroySampler(device_->handle(), sampler_, nullptr); }
+Sampler::~Sampler() {
+  vkDestroySampler(device_->handle(), sampler_, nullptr);
+}
 
 }  // namespace vdi::gpu

@@ -23,7 +23,8 @@ enum class MemoryKind {
 class Buffer {
  public:
   Buffer() = default;
-  /// Size 0 is rounded up to 16 bytes. Throws Error{OutOfMemory} with the figure asked for and the device's size.
+  /// Size 0 is rounded up to 16 bytes. Throws Error{OutOfMemory} with the figure asked for and the device's
+  /// size.
   Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind kind);
   ~Buffer();
   Buffer(Buffer&& other) noexcept;
@@ -42,8 +43,9 @@ class Buffer {
     return {reinterpret_cast<T*>(mapped_.data()), mapped_.size() / sizeof(T)};
   }
 
-  /// Makes the buffer hold at least `bytes`: keeps it when it's large enough, else replaces it (contents lost, a half more
-  /// than asked so that slow growth doesn't reallocate every frame). Returns true if it was replaced.
+  /// Makes the buffer hold at least `bytes`: keeps it when it's large enough, else replaces it (contents
+  /// lost, a half more than asked so that slow growth doesn't reallocate every frame). Returns true if it was
+  /// replaced.
   bool reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes, MemoryKind kind);
 
  private:
@@ -62,7 +64,8 @@ class Buffer {
 class Image3D {
  public:
   Image3D() = default;
-  /// Throws Error{OutOfMemory} with the figure, Error{InvalidArgument} for an extent beyond maxImageDimension3D.
+  /// Throws Error{OutOfMemory} with the figure, Error{InvalidArgument} for an extent beyond
+  /// maxImageDimension3D.
   Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format);
   ~Image3D();
   Image3D(Image3D&& other) noexcept;

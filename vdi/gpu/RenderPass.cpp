@@ -40,8 +40,10 @@ shared::RenderParams renderGeometry(const View& original, const View& view) {
 
 RenderPass::RenderPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
 
-void RenderPass::record(Commands& commands, VkDeviceAddress params, std::uint32_t width, std::uint32_t height) const {
-  commands.dispatch(pipeline_, shared::RenderConstants{params}, (width + shared::renderGroupX - 1) / shared::renderGroupX,
+void RenderPass::record(Commands& commands, VkDeviceAddress params, std::uint32_t width,
+                        std::uint32_t height) const {
+  commands.dispatch(pipeline_, shared::RenderConstants{params},
+                    (width + shared::renderGroupX - 1) / shared::renderGroupX,
                     (height + shared::renderGroupY - 1) / shared::renderGroupY);
 }
 

@@ -17,7 +17,9 @@ ComputePipelineInfo pipelineInfo() {
 
 constexpr std::uint32_t perGroup = shared::scanGroup * shared::scanPerThread;
 
-std::uint32_t groupsFor(std::uint32_t count) { return (count + perGroup - 1) / perGroup; }
+std::uint32_t groupsFor(std::uint32_t count) {
+  return (count + perGroup - 1) / perGroup;
+}
 
 }  // namespace
 
@@ -47,8 +49,8 @@ void ScanPass::record(Commands& commands, const Buffer& values, const Buffer& pr
     if (sums_.size() <= index) sums_.emplace_back();
     sums_[index].reserve(device_, std::uint64_t{groups} * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
     commands.dispatch(pipeline_,
-                      shared::ScanConstants{level.values, level.prefix, sums_[index].address(), overflow_.address(),
-                                            level.count, shared::scanModeSum},
+                      shared::ScanConstants{level.values, level.prefix, sums_[index].address(),
+                                            overflow_.address(), level.count, shared::scanModeSum},
                       groups);
     commands.barrier();
     if (groups == 1) break;
@@ -56,8 +58,8 @@ void ScanPass::record(Commands& commands, const Buffer& values, const Buffer& pr
   }
   for (std::size_t i = levels.size() - 1; i-- > 0;) {
     commands.dispatch(pipeline_,
-                      shared::ScanConstants{levels[i].values, levels[i].prefix, sums_[i].address(), overflow_.address(),
-                                            levels[i].count, shared::scanModeAdd},
+                      shared::ScanConstants{levels[i].values, levels[i].prefix, sums_[i].address(),
+                                            overflow_.address(), levels[i].count, shared::scanModeAdd},
                       groupsFor(levels[i].count));
     commands.barrier();
   }

@@ -1,4 +1,5 @@
-// Dispatches scan.comp: the prefix sum that says where each list starts in the compact array (paper, section 4).
+// Dispatches scan.comp: the prefix sum that says where each list starts in the compact array (paper, section
+// 4).
 #pragma once
 
 #include <cstdint>
@@ -15,8 +16,9 @@ class ScanPass {
  public:
   explicit ScanPass(std::shared_ptr<Device> device);
 
-  /// prefix[0 .. count] = exclusive prefix sum of values[0 .. count - 1], prefix[count] being the total; `values` has room
-  /// for count + 1 entries too. Records its barriers, also one at the end. Values are below 2^21.
+  /// prefix[0 .. count] = exclusive prefix sum of values[0 .. count - 1], prefix[count] being the total;
+  /// `values` has room for count + 1 entries too. Records its barriers, also one at the end. Values are below
+  /// 2^21.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count);
 
   /// Throws Error{OutOfMemory} if the total of the last finished scan didn't fit 32 bits.

@@ -20,15 +20,22 @@ namespace {
 
 constexpr std::uint64_t stagingBytes = 64ULL << 20;
 
+/// Coordinates stay this many texels inside the outermost texel centres, two steps of a filter with 8-bit
+/// weights: nearer, the filter would read texels of the neighbour in the page, if only with weight 0, and NaN
+/// times 0 is NaN.
+constexpr double filterGuard = 2.0 / 256.0;
+
 std::uint64_t texelBytes(VkFormat format) {
   if (format == VK_FORMAT_R8_UNORM) return 1;
   return format == VK_FORMAT_R16_UNORM ? 2 : 4;
 }
 
-std::uint64_t volumeOf(const glm::uvec3& extent) { return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z; }
+std::uint64_t volumeOf(const glm::uvec3& extent) {
+  return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z;
+}
 
-/// `count` values as texels: the unsigned integer formats shift signed values up, the float format is relative to the
-/// block's range (valueOffset, valueScale) except for f32, which is stored as it is.
+/// `count` values as texels: the unsigned integer formats shift signed values up, the float format is
+/// relative to the block's range (valueOffset, valueScale) except for f32, which is stored as it is.
 template <typename From, typename To, typename Convert>
 void convertRow(const void* from, std::size_t first, std::size_t count, std::byte* to, Convert convert) {
   const auto* values = static_cast<const From*>(from) + first;
@@ -36,8 +43,8 @@ void convertRow(const void* from, std::size_t first, std::size_t count, std::byt
   for (std::size_t i = 0; i < count; ++i) texels[i] = convert(values[i]);
 }
 
-void writeRow(const Block& block, VkFormat format, double offset, double scale, std::size_t first, std::size_t count,
-              std::byte* to) {
+void writeRow(const Block& block, VkFormat format, double offset, double scale, std::size_t first,
+              std::size_t count, std::byte* to) {
   const auto relative = [offset, scale](auto value) {
     return static_cast<float>((static_cast<double>(value) - offset) / scale);
   };
@@ -47,7 +54,8 @@ void writeRow(const Block& block, VkFormat format, double offset, double scale, 
   switch (block.type) {
     case ScalarType::U8:
       if (wide) {
-        return convertRow<U8, U16>(block.data, first, count, to, [](U8 v) { return static_cast<U16>(v * 257); });
+        return convertRow<U8, U16>(block.data, first, count, to,
+                                   [](U8 v) { return static_cast<U16>(v * 257); });
       }
       std::memcpy(to, static_cast<const U8*>(block.data) + first, count);
       return;
@@ -58,14 +66,21 @@ void writeRow(const Block& block, VkFormat format, double offset, double scale, 
       }
       return convertRow<std::int8_t, U8>(block.data, first, count, to,
                                          [](std::int8_t v) { return static_cast<U8>(v + 128); });
-    case ScalarType::U16: std::memcpy(to, static_cast<const U16*>(block.data) + first, count * 2); return;
+    case ScalarType::U16:
+      std::memcpy(to, static_cast<const U16*>(block.data) + first, count * 2);
+      return;
     case ScalarType::I16:
       return convertRow<std::int16_t, U16>(block.data, first, count, to,
                                            [](std::int16_t v) { return static_cast<U16>(v + 32768); });
-    case ScalarType::F32: std::memcpy(to, static_cast<const float*>(block.data) + first, count * 4); return;
-    case ScalarType::U32: return convertRow<std::uint32_t, float>(block.data, first, count, to, relative);
-    case ScalarType::I32: return convertRow<std::int32_t, float>(block.data, first, count, to, relative);
-    case ScalarType::F64: return convertRow<double, float>(block.data, first, count, to, relative);
+    case ScalarType::F32:
+      std::memcpy(to, static_cast<const float*>(block.data) + first, count * 4);
+      return;
+    case ScalarType::U32:
+      return convertRow<std::uint32_t, float>(block.data, first, count, to, relative);
+    case ScalarType::I32:
+      return convertRow<std::int32_t, float>(block.data, first, count, to, relative);
+    case ScalarType::F64:
+      return convertRow<double, float>(block.data, first, count, to, relative);
   }
 }
 
@@ -77,22 +92,29 @@ struct ValueMap {
 
 ValueMap valueMapOf(const Block& block) {
   switch (block.type) {
-    case ScalarType::U8: return {255.0, 0.0};
-    case ScalarType::I8: return {255.0, -128.0};
-    case ScalarType::U16: return {65535.0, 0.0};
-    case ScalarType::I16: return {65535.0, -32768.0};
-    case ScalarType::F32: return {};
+    case ScalarType::U8:
+      return {255.0, 0.0};
+    case ScalarType::I8:
+      return {255.0, -128.0};
+    case ScalarType::U16:
+      return {65535.0, 0.0};
+    case ScalarType::I16:
+      return {65535.0, -32768.0};
+    case ScalarType::F32:
+      return {};
     case ScalarType::U32:
     case ScalarType::I32:
-    case ScalarType::F64: break;
+    case ScalarType::F64:
+      break;
   }
   const ScalarRange range = finiteRange(block);
   if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0};
   return {range.max - range.min, range.min};
 }
 
-/// Places boxes of one format into pages: rows of boxes along x, rows beside each other along y, layers on top of each other
-/// along z. Boxes come in descending order of height, so blocks of one shape, the usual case, waste next to nothing.
+/// Places boxes of one format into pages: rows of boxes along x, rows beside each other along y, layers on
+/// top of each other along z. Boxes come in descending order of height, so blocks of one shape, the usual
+/// case, waste next to nothing.
 class Packer {
  public:
   Packer(std::uint32_t side, std::uint32_t maxDepth, std::uint64_t maxTexels)
@@ -134,9 +156,12 @@ VolumeStore::VolumeStore(std::shared_ptr<Device> device) : device_(std::move(dev
 
 VkFormat VolumeStore::formatOf(ScalarType type) const {
   switch (sizeOf(type)) {
-    case 1: return device_->isCpu() ? VK_FORMAT_R16_UNORM : VK_FORMAT_R8_UNORM;
-    case 2: return VK_FORMAT_R16_UNORM;
-    default: return VK_FORMAT_R32_SFLOAT;
+    case 1:
+      return device_->isCpu() ? VK_FORMAT_R16_UNORM : VK_FORMAT_R8_UNORM;
+    case 2:
+      return VK_FORMAT_R16_UNORM;
+    default:
+      return VK_FORMAT_R32_SFLOAT;
   }
 }
 
@@ -165,10 +190,9 @@ std::vector<VolumeStore::Piece> VolumeStore::cut(const Block& block) const {
 }
 
 void VolumeStore::pack(std::vector<Piece>& pieces) {
-  const bool sameShapes =
-      pieces.size() == pieces_.size() &&
-      std::equal(pieces.begin(), pieces.end(), pieces_.begin(),
-                 [](const Piece& a, const Piece& b) { return a.samePlaceAs(b); });
+  const bool sameShapes = pieces.size() == pieces_.size() &&
+                          std::equal(pieces.begin(), pieces.end(), pieces_.begin(),
+                                     [](const Piece& a, const Piece& b) { return a.samePlaceAs(b); });
   if (sameShapes) {
     for (std::size_t i = 0; i < pieces.size(); ++i) {
       pieces[i].page = pieces_[i].page;
@@ -197,8 +221,8 @@ void VolumeStore::pack(std::vector<Piece>& pieces) {
       widest = std::max({widest, dims.x, dims.y});
     }
     const auto cube = static_cast<std::uint32_t>(std::ceil(std::cbrt(static_cast<double>(texels))));
-    const std::uint32_t side =
-        std::min((std::max(cube, widest) + widest - 1) / widest * widest, device_->limits().maxImageDimension3D);
+    const std::uint32_t side = std::min((std::max(cube, widest) + widest - 1) / widest * widest,
+                                        device_->limits().maxImageDimension3D);
     const std::uint64_t maxTexels = device_->limits().maxAllocationBytes / texelBytes(format);
     while (begin < end) {
       Packer packer(side, device_->limits().maxImageDimension3D, maxTexels);
@@ -247,8 +271,8 @@ void VolumeStore::upload(std::span<const Piece> pieces) {
     const std::uint64_t bytes = texelBytes(piece.format);
     const std::uint64_t rowBytes = piece.dims.x * bytes;
     const std::uint64_t sliceBytes = rowBytes * piece.dims.y;
-    // As many whole slices at a time as the staging buffer has room for, or as many whole rows of one slice. Vulkan wants
-    // offsets in multiples of 4.
+    // As many whole slices at a time as the staging buffer has room for, or as many whole rows of one slice.
+    // Vulkan wants offsets in multiples of 4.
     glm::uvec3 at{0};
     while (at.z < piece.dims.z) {
       filled = (filled + 3) / 4 * 4;
@@ -272,7 +296,8 @@ void VolumeStore::upload(std::span<const Piece> pieces) {
   commands_.submitAndWait();
 }
 
-void VolumeStore::layBricks(std::span<const Block> blocks, std::span<const PieceRange> piecesOf, const Scene& scene) {
+void VolumeStore::layBricks(std::span<const Block> blocks, std::span<const PieceRange> piecesOf,
+                            const Scene& scene) {
   const glm::dvec3 center = scene.bounds.center();
   std::vector<shared::Brick> bricks;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
@@ -290,15 +315,18 @@ void VolumeStore::layBricks(std::span<const Block> blocks, std::span<const Piece
         double hi = block.owned.hi[axis];
         if (piece.first[axis] > 0) lo = std::max(lo, pieceOrigin[axis]);
         const auto end = piece.first[axis] + static_cast<int>(piece.dims[axis]);
-        if (end < block.dims[axis]) hi = std::min(hi, pieceOrigin[axis] + (piece.dims[axis] - 1) * block.spacing[axis]);
+        if (end < block.dims[axis])
+          hi = std::min(hi, pieceOrigin[axis] + (piece.dims[axis] - 1) * block.spacing[axis]);
         brick.lo[axis] = snapToScene(scene, lo, axis);
         brick.hi[axis] = snapToScene(scene, hi, axis);
         const double scale = 1.0 / (block.spacing[axis] * extent[axis]);
         brick.texelScale[axis] = static_cast<float>(scale);
         brick.texelOffset[axis] = static_cast<float>((center[axis] - pieceOrigin[axis]) * scale +
                                                      (piece.place[axis] + 0.5) / extent[axis]);
-        brick.texelLo[axis] = static_cast<float>((piece.place[axis] + 0.5) / extent[axis]);
-        brick.texelHi[axis] = static_cast<float>((piece.place[axis] + piece.dims[axis] - 0.5) / extent[axis]);
+        const double edge = piece.dims[axis] > 1 ? 0.5 + filterGuard : 0.5;
+        brick.texelLo[axis] = static_cast<float>((piece.place[axis] + edge) / extent[axis]);
+        brick.texelHi[axis] =
+            static_cast<float>((piece.place[axis] + piece.dims[axis] - edge) / extent[axis]);
       }
       if (glm::all(glm::lessThan(brick.lo, brick.hi))) bricks.push_back(brick);
     }
@@ -368,7 +396,8 @@ void VolumeStore::placeTable() {
     bricks_[i].tableScale = static_cast<float>(piece.valueScale * perScalar);
   }
   brickBuffer_.reserve(device_, std::span(bricks_).size_bytes(), MemoryKind::Upload);
-  if (!bricks_.empty()) std::memcpy(brickBuffer_.mapped().data(), bricks_.data(), std::span(bricks_).size_bytes());
+  if (!bricks_.empty())
+    std::memcpy(brickBuffer_.mapped().data(), bricks_.data(), std::span(bricks_).size_bytes());
 }
 
 }  // namespace vdi::gpu

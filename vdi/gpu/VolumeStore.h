@@ -1,5 +1,5 @@
-// A rank's blocks and the transfer table on the device. Blocks are packed into a few 3-D textures ("pages"), so that any
-// number of them costs no descriptors.
+// A rank's blocks and the transfer table on the device. Blocks are packed into a few 3-D textures ("pages"),
+// so that any number of them costs no descriptors.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +22,11 @@ class VolumeStore {
  public:
   explicit VolumeStore(std::shared_ptr<Device> device);
 
-  /// Copies the scalars to the device; host data isn't needed afterwards. Pages are kept when the blocks' shapes and types
-  /// are those of the last call. 8-bit data takes 1 byte a value (2 on a CPU device, whose 8-bit filter rounds to 8 bits),
-  /// 16-bit data 2, all other types 4 (u32, i32 and f64 relative to the block's own range). Throws Error: OutOfMemory
-  /// with figures; InvalidArgument for overlapping blocks or too many pages. After a throw the store is empty.
+  /// Copies the scalars to the device; host data isn't needed afterwards. Pages are kept when the blocks'
+  /// shapes and types are those of the last call. 8-bit data takes 1 byte a value (2 on a CPU device, whose
+  /// 8-bit filter rounds to 8 bits), 16-bit data 2, all other types 4 (u32, i32 and f64 relative to the
+  /// block's own range). Throws Error: OutOfMemory with figures; InvalidArgument for overlapping blocks or
+  /// too many pages. After a throw the store is empty.
   void setBlocks(std::span<const Block> blocks, const Scene& scene);
 
   /// Cheap when the table is the one of the last call.
@@ -49,12 +50,10 @@ class VolumeStore {
     glm::uvec3 dims{0};
     VkFormat format = VK_FORMAT_UNDEFINED;
     std::uint32_t page = 0;
-    glm::uvec3 place{0};        // in the page, texels
-    double valueScale = 1.0;    // value = texel * valueScale + valueOffset
+    glm::uvec3 place{0};      // in the page, texels
+    double valueScale = 1.0;  // value = texel * valueScale + valueOffset
     double valueOffset = 0.0;
-    bool samePlaceAs(const Piece& other) const {
-      return dims == other.dims && format == other.format;
-    }
+    bool samePlaceAs(const Piece& other) const { return dims == other.dims && format == other.format; }
   };
 
   /// Pieces [first, last) are a block's.
@@ -77,7 +76,7 @@ class VolumeStore {
   std::vector<Image3D> pages_;
   std::uint64_t pagesVersion_ = 0;
   std::vector<Piece> pieces_;
-  std::vector<shared::Brick> bricks_;      // leaves; table fields are filled by placeTable
+  std::vector<shared::Brick> bricks_;  // leaves; table fields are filled by placeTable
   std::vector<std::uint32_t> pieceOfBrick_;
   std::vector<shared::KdNode> tree_;
   TransferTable table_;

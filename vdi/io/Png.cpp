@@ -46,14 +46,16 @@ void writePng(const std::filesystem::path& path, const Picture& picture) {
   if (written == 0 || error) {
     std::error_code ignored;
     std::filesystem::remove(temporary, ignored);
-    throw Error(ErrorCode::Io, fmt::format("can't write the PNG: {}", written == 0 ? image.message : error.message()),
+    throw Error(ErrorCode::Io,
+                fmt::format("can't write the PNG: {}", written == 0 ? image.message : error.message()),
                 path.string());
   }
 }
 
 Picture readPng(const std::filesystem::path& path) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) throw Error(ErrorCode::Io, "can't open the file", path.string());
+  if (!std::filesystem::is_regular_file(path, error))
+    throw Error(ErrorCode::Io, "can't open the file", path.string());
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   if (png_image_begin_read_from_file(&image, path.c_str()) == 0) {

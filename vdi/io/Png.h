@@ -21,6 +21,6 @@ struct Picture {
 Picture toPicture(const Image& image, const glm::vec3& background = glm::vec3(0.0F));
 
 void writePng(const std::filesystem::path& path, const Picture& picture);  // atomic; throws Error{Io}
-Picture readPng(const std::filesystem::path& path);                       // any PNG; throws Error{Io}, Error{Format}
+Picture readPng(const std::filesystem::path& path);  // any PNG; throws Error{Io}, Error{Format}
 
 }  // namespace vdi::io

@@ -19,7 +19,8 @@ namespace vdi::io {
 
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the .vdi file is little-endian and read as it lies");
+static_assert(std::endian::native == std::endian::little,
+              "the .vdi file is little-endian and read as it lies");
 
 constexpr std::array<char, 8> magic{'V', 'D', 'I', '-', 'F', 'I', 'L', 'E'};
 constexpr std::uint32_t currentVersion = 1;
@@ -67,7 +68,9 @@ struct ChunkEntry {
 };
 static_assert(sizeof(ChunkEntry) == 16);
 
-[[noreturn]] void fail(const std::string& what) { throw Error(ErrorCode::Format, "not a sound .vdi file: " + what); }
+[[noreturn]] void fail(const std::string& what) {
+  throw Error(ErrorCode::Format, "not a sound .vdi file: " + what);
+}
 
 std::uint64_t headerChecksum(const Header& header, std::span<const ChunkEntry> table) {
   const std::uint64_t first = XXH64(&header, offsetof(Header, checksum), 0);
@@ -91,8 +94,8 @@ void join(const std::byte* planes, std::span<std::uint32_t> values) {
   }
 }
 
-/// One chunk before compression: the counts of its lists, then six columns (front, back, red, green, blue, opacity) of its
-/// supersegments, each value as the XOR with the one before, each column in byte planes.
+/// One chunk before compression: the counts of its lists, then six columns (front, back, red, green, blue,
+/// opacity) of its supersegments, each value as the XOR with the one before, each column in byte planes.
 std::vector<std::byte> layOut(const SupersegmentLists& lists, std::size_t first, std::size_t last) {
   const std::size_t listCount = last - first;
   const std::size_t begin = lists.offsets[first];
@@ -115,7 +118,8 @@ std::vector<std::byte> layOut(const SupersegmentLists& lists, std::size_t first,
   return bytes;
 }
 
-void takeIn(std::span<const std::byte> bytes, std::size_t listCount, std::size_t count, SupersegmentLists& lists) {
+void takeIn(std::span<const std::byte> bytes, std::size_t listCount, std::size_t count,
+            SupersegmentLists& lists) {
   std::vector<std::uint32_t> column(listCount);
   join(bytes.data(), column);
   const std::uint64_t before = lists.segments.size();
@@ -165,7 +169,8 @@ Header headerOf(const Vdi& vdi) {
   return header;
 }
 
-/// Header and table of a file whose bytes are all there; everything checked that can be without decompressing.
+/// Header and table of a file whose bytes are all there; everything checked that can be without
+/// decompressing.
 struct Parsed {
   Header header;
   std::vector<ChunkEntry> table;
@@ -188,8 +193,8 @@ Parsed parse(std::span<const std::byte> bytes) {
     fail(fmt::format("version {}; this program reads version {}", header.version, currentVersion));
   }
   if (header.encoding != encodingFull) fail(fmt::format("unknown encoding {}", header.encoding));
-  const bool sane = header.width >= 1 && header.width <= 32768 && header.height >= 1 && header.height <= 32768 &&
-                    header.listsPerChunk >= 1 && header.budget >= 1;
+  const bool sane = header.width >= 1 && header.width <= 32768 && header.height >= 1 &&
+                    header.height <= 32768 && header.listsPerChunk >= 1 && header.budget >= 1;
   if (!sane) fail("impossible sizes in the header");
   const std::uint64_t chunks = (parsed.listCount() + header.listsPerChunk - 1) / header.listsPerChunk;
   if (chunks != header.chunkCount) fail("the number of chunks doesn't match the number of lists");
@@ -204,12 +209,15 @@ Parsed parse(std::span<const std::byte> bytes) {
     const ChunkEntry& entry = parsed.table[i];
     stored += entry.compressedBytes;
     segments += entry.segmentCount;
-    const std::uint64_t expanded = (parsed.listsIn(i) + std::uint64_t{entry.segmentCount} * floatsPerSegment) * 4;
-    if (expanded > (std::uint64_t{entry.compressedBytes} + 16) * lz4MaxRatio || expanded > LZ4_MAX_INPUT_SIZE) {
+    const std::uint64_t expanded =
+        (parsed.listsIn(i) + std::uint64_t{entry.segmentCount} * floatsPerSegment) * 4;
+    if (expanded > (std::uint64_t{entry.compressedBytes} + 16) * lz4MaxRatio ||
+        expanded > LZ4_MAX_INPUT_SIZE) {
       fail("a chunk claims to be larger than its bytes can hold");
     }
   }
-  if (segments != header.supersegmentCount || segments > UINT32_MAX) fail("the chunks don't add up to the header's count");
+  if (segments != header.supersegmentCount || segments > UINT32_MAX)
+    fail("the chunks don't add up to the header's count");
   if (stored != bytes.size()) fail(fmt::format("{} bytes, {} were announced", bytes.size(), stored));
   return parsed;
 }
@@ -275,9 +283,9 @@ std::vector<std::byte> encode(const Vdi& vdi) {
     const std::size_t last = std::min<std::size_t>(first + listsPerChunk, vdi.lists.listCount());
     const std::vector<std::byte> plain = layOut(vdi.lists, first, last);
     packed.resize(static_cast<std::size_t>(LZ4_compressBound(static_cast<int>(plain.size()))));
-    const int size =
-        LZ4_compress_default(reinterpret_cast<const char*>(plain.data()), reinterpret_cast<char*>(packed.data()),
-                             static_cast<int>(plain.size()), static_cast<int>(packed.size()));
+    const int size = LZ4_compress_default(reinterpret_cast<const char*>(plain.data()),
+                                          reinterpret_cast<char*>(packed.data()),
+                                          static_cast<int>(plain.size()), static_cast<int>(packed.size()));
     if (size <= 0) throw Error(ErrorCode::Io, "LZ4 couldn't compress a chunk");
     table[i] = {vdi.lists.offsets[last] - vdi.lists.offsets[first], static_cast<std::uint32_t>(size),
                 XXH64(packed.data(), static_cast<std::size_t>(size), 0)};
@@ -299,11 +307,14 @@ Vdi decode(std::span<const std::byte> bytes) {
   for (std::uint32_t i = 0; i < parsed.table.size(); ++i) {
     const ChunkEntry& entry = parsed.table[i];
     const std::byte* packed = bytes.data() + at;
-    if (XXH64(packed, entry.compressedBytes, 0) != entry.checksum) fail(fmt::format("the checksum of chunk {} is wrong", i));
+    if (XXH64(packed, entry.compressedBytes, 0) != entry.checksum)
+      fail(fmt::format("the checksum of chunk {} is wrong", i));
     plain.resize((parsed.listsIn(i) + std::uint64_t{entry.segmentCount} * floatsPerSegment) * 4);
-    const int size = LZ4_decompress_safe(reinterpret_cast<const char*>(packed), reinterpret_cast<char*>(plain.data()),
-                                         static_cast<int>(entry.compressedBytes), static_cast<int>(plain.size()));
-    if (size < 0 || static_cast<std::size_t>(size) != plain.size()) fail(fmt::format("chunk {} doesn't decompress", i));
+    const int size =
+        LZ4_decompress_safe(reinterpret_cast<const char*>(packed), reinterpret_cast<char*>(plain.data()),
+                            static_cast<int>(entry.compressedBytes), static_cast<int>(plain.size()));
+    if (size < 0 || static_cast<std::size_t>(size) != plain.size())
+      fail(fmt::format("chunk {} doesn't decompress", i));
     takeIn(plain, parsed.listsIn(i), entry.segmentCount, vdi.lists);
     at += entry.compressedBytes;
   }
@@ -318,7 +329,8 @@ VdiFileInfo decodeInfo(std::span<const std::byte> bytes) {
   info.header = vdiOf(parsed.header);
   info.supersegmentCount = parsed.header.supersegmentCount;
   info.storedBytes = bytes.size();
-  info.expandedBytes = (parsed.listCount() + 1) * sizeof(std::uint32_t) + info.supersegmentCount * sizeof(Supersegment);
+  info.expandedBytes =
+      (parsed.listCount() + 1) * sizeof(std::uint32_t) + info.supersegmentCount * sizeof(Supersegment);
   return info;
 }
 

@@ -21,12 +21,14 @@ struct VdiFileInfo {
 
 /// LZ4, checksummed. Deterministic: equal VDIs give equal bytes on every machine (little-endian).
 std::vector<std::byte> encode(const Vdi& vdi);
-/// Throws Error{Format} for bytes that are truncated, altered, of another version, or whose header asks for more memory
-/// than the file's own size can justify (before anything is allocated). The result has passed validate(Vdi).
+/// Throws Error{Format} for bytes that are truncated, altered, of another version, or whose header asks for
+/// more memory than the file's own size can justify (before anything is allocated). The result has passed
+/// validate(Vdi).
 Vdi decode(std::span<const std::byte> bytes);
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes);
 
-/// Written under a temporary name beside `path`, then renamed: a reader never sees half a file. Throws Error{Io}.
+/// Written under a temporary name beside `path`, then renamed: a reader never sees half a file. Throws
+/// Error{Io}.
 void writeVdi(const std::filesystem::path& path, const Vdi& vdi);
 /// Throws Error{Io} or Error{Format} with the path as context.
 Vdi readVdi(const std::filesystem::path& path);

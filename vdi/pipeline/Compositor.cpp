@@ -24,8 +24,10 @@ SupersegmentLists Compositor::composite(std::span<const SupersegmentLists> subLi
   const std::size_t listCount = subLists.front().listCount();
   SupersegmentLists result;
   result.offsets.reserve(listCount + 1);
-  // Bands of lists whose supersegments, received, merged and composited, take at most an eighth of the device each.
-  const std::uint64_t most = std::max<std::uint64_t>(device_->limits().memoryBytes / 8 / sizeof(Supersegment), 1);
+  // Bands of lists whose supersegments, received, merged and composited, take at most an eighth of the device
+  // each.
+  const std::uint64_t most =
+      std::max<std::uint64_t>(device_->limits().memoryBytes / 8 / sizeof(Supersegment), 1);
   for (std::size_t first = 0; first < listCount;) {
     std::size_t last = first;
     for (std::uint64_t total = 0; last < listCount; ++last) {
@@ -62,8 +64,8 @@ void Compositor::upload(std::span<const SupersegmentLists> subLists, std::size_t
   }
 }
 
-void Compositor::compositeBand(std::span<const SupersegmentLists> subLists, std::size_t first, std::size_t last,
-                               SupersegmentLists& result) {
+void Compositor::compositeBand(std::span<const SupersegmentLists> subLists, std::size_t first,
+                               std::size_t last, SupersegmentLists& result) {
   const auto listCount = static_cast<std::uint32_t>(last - first);
   upload(subLists, first, last);
   std::uint64_t total = 0;
@@ -103,13 +105,14 @@ void Compositor::compositeBand(std::span<const SupersegmentLists> subLists, std:
     settings_.segments = targets.segments;
     settings_.status = targets.status;
     std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
-    compositePass_.record(commands, params_.address(), write ? shared::compositeModeWrite : shared::compositeModeSearch,
-                          listCount);
+    compositePass_.record(commands, params_.address(),
+                          write ? shared::compositeModeWrite : shared::compositeModeSearch, listCount);
   };
   builder_.build(listCount, record, result);
 }
 
-void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::vec4> rgba, std::span<float> depth) {
+void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::vec4> rgba,
+                   std::span<float> depth) {
   std::vector<Supersegment> merged;
   for (std::size_t i = 0; i < rgba.size(); ++i) {
     merged.clear();
@@ -117,7 +120,8 @@ void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::v
       const auto list = sub.list(i);
       merged.insert(merged.end(), list.begin(), list.end());
     }
-    std::sort(merged.begin(), merged.end(), [](const Supersegment& a, const Supersegment& b) { return a.front < b.front; });
+    std::sort(merged.begin(), merged.end(),
+              [](const Supersegment& a, const Supersegment& b) { return a.front < b.front; });
     glm::vec4 sum(0.0F);
     for (const Supersegment& s : merged) sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
     rgba[i] = sum;

@@ -1,5 +1,5 @@
-// The owner's part of compositing, on the device: merge by depth, segment again (paper, section 5.2). Not part of the
-// library's interface.
+// The owner's part of compositing, on the device: merge by depth, segment again (paper, section 5.2). Not
+// part of the library's interface.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,8 @@ class Compositor {
   explicit Compositor(std::shared_ptr<gpu::Device> device);
 
   /// subLists[r] are rank r's supersegments of the owner's lists. The result has at most `budget` a list.
-  SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget, double sampleStep);
+  SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
+                              double sampleStep);
 
  private:
   void compositeBand(std::span<const SupersegmentLists> subLists, std::size_t first, std::size_t last,
@@ -44,7 +45,9 @@ class Compositor {
   gpu::shared::CompositeParams settings_{};
 };
 
-/// The flat picture of the owner's lists: all ranks' supersegments of each list composited in order of depth. Host code.
-void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::vec4> rgba, std::span<float> depth);
+/// The flat picture of the owner's lists: all ranks' supersegments of each list composited in order of depth.
+/// Host code.
+void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::vec4> rgba,
+                   std::span<float> depth);
 
 }  // namespace vdi::detail

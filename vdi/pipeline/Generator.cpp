@@ -191,7 +191,8 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
   Stopwatch watch;
   SupersegmentLists lists;
   s.cancellable(progress, 0.8, [&](const detail::RayCaster::Progress& report) {
-    lists = s.caster->lists({s.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, false}, report);
+    lists = s.caster->lists(
+        {s.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, false}, report);
   });
   s.mine.subSupersegments = lists.segments.size();
   s.mine.generateSeconds = watch.lap();
@@ -222,15 +223,15 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
   return vdi;
 }
 
-std::optional<Image> VdiGenerator::renderVolume(const Camera& camera, const TransferFunction& transferFunction,
+std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
+                                                const TransferFunction& transferFunction,
                                                 const GenerateSettings& settings, const Progress& progress) {
   State& s = *state_;
   const auto prepared = s.prepare(camera, transferFunction, settings);
   const bool alone = s.comm.size() == 1;
   Stopwatch watch;
-  const detail::RayCaster::Request request{s.scene,         prepared->view, prepared->lattice,
-                                           prepared->table, settings,       !alone,
-                                           !alone};
+  const detail::RayCaster::Request request{
+      s.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, !alone};
   Image image;
   SupersegmentLists lists;
   s.cancellable(progress, 0.9, [&](const detail::RayCaster::Progress& report) {
@@ -269,10 +270,20 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera, const Tran
   return image;
 }
 
-const Scene& VdiGenerator::scene() const { return state_->scene; }
-const ScalarRange& VdiGenerator::scalarRange() const { return state_->range; }
-const std::vector<RankReport>& VdiGenerator::reports() const { return state_->reports; }
-const gpu::Device& VdiGenerator::device() const { return *state_->device; }
-const comm::Communicator& VdiGenerator::communicator() const { return state_->comm; }
+const Scene& VdiGenerator::scene() const {
+  return state_->scene;
+}
+const ScalarRange& VdiGenerator::scalarRange() const {
+  return state_->range;
+}
+const std::vector<RankReport>& VdiGenerator::reports() const {
+  return state_->reports;
+}
+const gpu::Device& VdiGenerator::device() const {
+  return *state_->device;
+}
+const comm::Communicator& VdiGenerator::communicator() const {
+  return state_->comm;
+}
 
 }  // namespace vdi

@@ -54,7 +54,8 @@ void ListBuilder::build(std::uint32_t listCount, const Record& record, Supersegm
   commands_.copy(segments_, 0, readback_, 0, bytes);
   commands_.submitAndWait();
   if (const std::uint32_t wrong = status_.mappedAs<std::uint32_t>()[0]; wrong != 0) {
-    throw Error(ErrorCode::DeviceFailure, fmt::format("{} lists were written with another count than was stored", wrong),
+    throw Error(ErrorCode::DeviceFailure,
+                fmt::format("{} lists were written with another count than was stored", wrong),
                 device_->name());
   }
   const auto written = readback_.mappedAs<Supersegment>().first(total);

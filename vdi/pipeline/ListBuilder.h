@@ -1,5 +1,5 @@
-// From intervals to compact lists on the device, band by band: search, prefix sum, write, download (paper, section 4).
-// What casts rays and what composites share it; not part of the library's interface.
+// From intervals to compact lists on the device, band by band: search, prefix sum, write, download (paper,
+// section 4). What casts rays and what composites share it; not part of the library's interface.
 #pragma once
 
 #include <cstdint>
@@ -30,8 +30,9 @@ class ListBuilder {
   /// Records the dispatch that fills sensitivities and counts, or (write) segments.
   using Record = std::function<void(gpu::Commands&, const BandTargets&, bool write)>;
 
-  /// Runs both steps for `listCount` lists and appends what was written to `result`. Throws Error{OutOfMemory} when the
-  /// supersegments don't fit, Error{DeviceFailure} if a list's written count isn't its stored count.
+  /// Runs both steps for `listCount` lists and appends what was written to `result`. Throws
+  /// Error{OutOfMemory} when the supersegments don't fit, Error{DeviceFailure} if a list's written count
+  /// isn't its stored count.
   void build(std::uint32_t listCount, const Record& record, SupersegmentLists& result);
 
  private:

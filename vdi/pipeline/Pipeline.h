@@ -1,5 +1,5 @@
-// One frame from end to end: blocks -> sub-VDI -> distribute -> composite -> gather -> VDI (paper, section 5). The only
-// place where gpu, comm and io meet; plugin, adaptor and command line call nothing below it.
+// One frame from end to end: blocks -> sub-VDI -> distribute -> composite -> gather -> VDI (paper, section
+// 5). The only place where gpu, comm and io meet; plugin, adaptor and command line call nothing below it.
 #pragma once
 
 #include <cstdint>
@@ -35,13 +35,13 @@ struct RankReport {
   std::uint64_t deviceBytes = 0;  // device memory held
 };
 
-/// Called on every rank with the share done, 0 .. 1; returns false to ask for an abort, which all ranks then obey
-/// together at the next stage (Error{Cancelled}).
+/// Called on every rank with the share done, 0 .. 1; returns false to ask for an abort, which all ranks then
+/// obey together at the next stage (Error{Cancelled}).
 using Progress = std::function<bool(double)>;
 
-/// Makes VDIs of distributed volumes. Collective throughout: every rank of the communicator makes one, with its own device,
-/// and calls the same functions in the same order. When a call throws, it throws on every rank (Communicator::agree), and
-/// the object stays usable.
+/// Makes VDIs of distributed volumes. Collective throughout: every rank of the communicator makes one, with
+/// its own device, and calls the same functions in the same order. When a call throws, it throws on every
+/// rank (Communicator::agree), and the object stays usable.
 class VdiGenerator {
  public:
   VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm);
@@ -51,20 +51,22 @@ class VdiGenerator {
   VdiGenerator(VdiGenerator&&) = delete;
   VdiGenerator& operator=(VdiGenerator&&) = delete;
 
-  /// This rank's blocks, none included; the scalars are copied to the device before it returns. With `fillGhosts`, missing
-  /// layers are exchanged first (comm/GhostExchange.h). Blocks of the same shapes reuse the device's memory.
+  /// This rank's blocks, none included; the scalars are copied to the device before it returns. With
+  /// `fillGhosts`, missing layers are exchanged first (comm/GhostExchange.h). Blocks of the same shapes reuse
+  /// the device's memory.
   void setBlocks(std::vector<Block> blocks, bool fillGhosts = true);
 
-  const Scene& scene() const;                  // global
-  const ScalarRange& scalarRange() const;      // global, finite values
+  const Scene& scene() const;              // global
+  const ScalarRange& scalarRange() const;  // global, finite values
 
-  /// The VDI on rank 0, nullopt on the others. Camera, transfer function and settings must be equal on all ranks
-  /// (Error{InvalidArgument} on all of them otherwise). A scene that's empty or out of sight gives a VDI with empty lists.
+  /// The VDI on rank 0, nullopt on the others. Camera, transfer function and settings must be equal on all
+  /// ranks (Error{InvalidArgument} on all of them otherwise). A scene that's empty or out of sight gives a
+  /// VDI with empty lists.
   std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
                               const GenerateSettings& settings, const Progress& progress = {});
 
-  /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0. supersegments and
-  /// algorithm of the settings are ignored.
+  /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0.
+  /// supersegments and algorithm of the settings are ignored.
   std::optional<Image> renderVolume(const Camera& camera, const TransferFunction& transferFunction,
                                     const GenerateSettings& settings, const Progress& progress = {});
 

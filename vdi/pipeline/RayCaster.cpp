@@ -26,7 +26,9 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
       commands_(device_),
       params_(device_, sizeof(shared::CastParams), MemoryKind::Upload) {}
 
-void RayCaster::setBlocks(std::span<const Block> blocks, const Scene& scene) { volume_.setBlocks(blocks, scene); }
+void RayCaster::setBlocks(std::span<const Block> blocks, const Scene& scene) {
+  volume_.setBlocks(blocks, scene);
+}
 
 shared::CastParams RayCaster::prepare(const Request& request) {
   volume_.setTable(request.table);
@@ -45,7 +47,8 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   return params;
 }
 
-/// The whole picture at once where memory allows; on a CPU device in eighths, so that progress shows and an abort is heard.
+/// The whole picture at once where memory allows; on a CPU device in eighths, so that progress shows and an
+/// abort is heard.
 std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytesPerPixel) const {
   const auto height = static_cast<std::uint64_t>(request.view.height());
   const std::uint64_t rowBytes = static_cast<std::uint64_t>(request.view.width()) * bytesPerPixel;
@@ -66,7 +69,8 @@ SupersegmentLists RayCaster::lists(const Request& request, const Progress& progr
   }
   result.offsets.reserve(static_cast<std::size_t>(width) * height + 1);
   shared::CastParams params = prepare(request);
-  const std::uint32_t band = rowsPerBand(request, std::uint64_t{request.settings.supersegments} * sizeof(Supersegment));
+  const std::uint32_t band =
+      rowsPerBand(request, std::uint64_t{request.settings.supersegments} * sizeof(Supersegment));
   for (std::uint32_t row = 0; row < height; row += band) {
     const std::uint32_t end = std::min(height, row + band);
     const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
@@ -78,7 +82,8 @@ SupersegmentLists RayCaster::lists(const Request& request, const Progress& progr
       params.segments = targets.segments;
       params.status = targets.status;
       std::memcpy(params_.mapped().data(), &params, sizeof(params));
-      pass_.record(commands, params_.address(), write ? shared::castModeWrite : shared::castModeSearch, width, row, end);
+      pass_.record(commands, params_.address(), write ? shared::castModeWrite : shared::castModeSearch, width,
+                   row, end);
     };
     builder_.build((end - row) * width, record, result);
     if (!progress(static_cast<double>(end) / height)) break;

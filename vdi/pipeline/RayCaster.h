@@ -1,4 +1,5 @@
-// One rank's part of a frame on the device: sub-VDI or DVR of its blocks. Not part of the library's interface.
+// One rank's part of a frame on the device: sub-VDI or DVR of its blocks. Not part of the library's
+// interface.
 #pragma once
 
 #include <cstdint>

@@ -51,7 +51,8 @@ struct VdiRenderer::State {
   }
 };
 
-VdiRenderer::VdiRenderer(std::shared_ptr<gpu::Device> device) : state_(std::make_unique<State>(std::move(device))) {}
+VdiRenderer::VdiRenderer(std::shared_ptr<gpu::Device> device)
+    : state_(std::make_unique<State>(std::move(device))) {}
 
 VdiRenderer::~VdiRenderer() = default;
 
@@ -99,7 +100,9 @@ Image VdiRenderer::render(const Camera& camera, int width, int height) {
   return image;
 }
 
-double VdiRenderer::renderMilliseconds() const { return state_->milliseconds; }
+double VdiRenderer::renderMilliseconds() const {
+  return state_->milliseconds;
+}
 
 Image flatten(const Vdi& vdi) {
   Image image{vdi.width, vdi.height, {}, {}};

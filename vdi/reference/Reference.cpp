@@ -31,14 +31,17 @@ Image blankImage(int width, int height) {
   return image;
 }
 
-// ---- sampling a block ------------------------------------------------------------------------------------------------
+// ---- sampling a block
+// ------------------------------------------------------------------------------------------------
 
 struct SceneRay {
   glm::vec3 start;  // relative to the scene's centre, at the front of the sample lattice
   glm::vec3 direction;
   float step;
 
-  glm::vec3 sample(std::uint32_t k) const { return start + (static_cast<float>(k) + 0.5F) * step * direction; }
+  glm::vec3 sample(std::uint32_t k) const {
+    return start + (static_cast<float>(k) + 0.5F) * step * direction;
+  }
 };
 
 SceneRay rayOf(const Frame& frame, int x, int y) {
@@ -87,7 +90,8 @@ struct SampleRange {
 };
 
 SampleRange samplesIn(const OwnedBox& box, const SceneRay& ray, std::uint32_t count) {
-  // Where the ray is in the box, in units of samples, with two samples to spare; then exactly, sample by sample.
+  // Where the ray is in the box, in units of samples, with two samples to spare; then exactly, sample by
+  // sample.
   float enter = 0.0F;
   auto leave = static_cast<float>(count);
   for (int axis = 0; axis < 3; ++axis) {
@@ -107,7 +111,8 @@ SampleRange samplesIn(const OwnedBox& box, const SceneRay& ray, std::uint32_t co
   return range;
 }
 
-// ---- walking a ray through a VDI -----------------------------------------------------------------------------------------
+// ---- walking a ray through a VDI
+// -----------------------------------------------------------------------------------------
 
 /// A ray p(t) = origin + t * direction in the view space of V_O, t being the new view's depth.
 struct ViewRay {
@@ -116,8 +121,8 @@ struct ViewRay {
   double worldPerT = 1.0;  // world length per unit of t
 };
 
-/// Where the ray crosses the plane between pixel columns (or rows) at image coordinate `pixel`. In V_O's view space that
-/// plane is  p[axis] = slope * p.z (perspective) or p[axis] = slope (parallel).
+/// Where the ray crosses the plane between pixel columns (or rows) at image coordinate `pixel`. In V_O's view
+/// space that plane is  p[axis] = slope * p.z (perspective) or p[axis] = slope (parallel).
 double crossing(const ViewRay& ray, const View& view, int axis, int pixel) {
   const double extent = axis == 0 ? view.width() : view.height();
   const double slope = (pixel - 0.5 * extent) * 2.0 * view.halfHeight() / view.height();
@@ -157,7 +162,8 @@ Stretch insideFrustum(const ViewRay& ray, const View& view, double nearest, doub
     for (const double side : {-1.0, 1.0}) {
       // side * p[axis] <= half * (p.z or 1)
       const double value = half[axis] * (view.parallel() ? 1.0 : ray.origin.z) - side * ray.origin[axis];
-      const double slope = half[axis] * (view.parallel() ? 0.0 : ray.direction.z) - side * ray.direction[axis];
+      const double slope =
+          half[axis] * (view.parallel() ? 0.0 : ray.direction.z) - side * ray.direction[axis];
       clip(stretch, value, slope);
     }
   }
@@ -183,7 +189,8 @@ void addList(Accumulator& sum, std::span<const Supersegment> list, const ViewRay
     const double whole = (segment.back - segment.front) * pixelLength;
     const float opacity = opacityOf(opticalDepthOf(segment.opacity) * static_cast<float>(met / whole));
     const float scale = opacity / segment.opacity;
-    sum.add(scale * glm::vec3(segment.red, segment.green, segment.blue), opacity, static_cast<float>(part.enter));
+    sum.add(scale * glm::vec3(segment.red, segment.green, segment.blue), opacity,
+            static_cast<float>(part.enter));
   }
 }
 
@@ -256,8 +263,9 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
       const TransferTableEntry entry = frame.table.lookup(interpolate(*piece.block, world));
       const float opticalDepth = std::min(entry.extinction * lengthInUnits, maxExtinction);
       const float opacity = opacityOf(opticalDepth);
-      samples.push_back({static_cast<float>(frame.lattice.frontOf(k)), static_cast<float>(frame.lattice.frontOf(k + 1)),
-                         entry.red * opacity, entry.green * opacity, entry.blue * opacity, opticalDepth});
+      samples.push_back({static_cast<float>(frame.lattice.frontOf(k)),
+                         static_cast<float>(frame.lattice.frontOf(k + 1)), entry.red * opacity,
+                         entry.green * opacity, entry.blue * opacity, opticalDepth});
       total += opticalDepth;
       if (total >= enough) return samples;
     }
@@ -273,7 +281,8 @@ Image renderVolume(const Frame& frame, std::span<const Block> blocks) {
       for (const Interval& sample : castRay(frame, blocks, x, y)) {
         sum.add({sample.red, sample.green, sample.blue}, opacityOf(sample.opticalDepth), sample.front);
       }
-      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
+      const auto pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
       image.rgba[pixel] = sum.rgba();
       image.depth[pixel] = sum.depth();
     }
@@ -294,8 +303,8 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
   return lists;
 }
 
-SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget, double sampleStep,
-                            Algorithm algorithm) {
+SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
+                            double sampleStep, Algorithm algorithm) {
   const SegmentRules rules{budget, static_cast<float>(sampleStep), false};
   SupersegmentLists result;
   const std::size_t listCount = subLists.empty() ? 0 : subLists.front().listCount();
@@ -331,13 +340,15 @@ Image render(const Vdi& vdi, const View& view) {
   for (int y = 0; y < view.height(); ++y) {
     for (int x = 0; x < view.width(); ++x) {
       const Ray world = view.rayThrough(x + 0.5, y + 0.5);
-      const glm::dvec3 direction{glm::dot(world.direction, original.right()), glm::dot(world.direction, original.up()),
+      const glm::dvec3 direction{glm::dot(world.direction, original.right()),
+                                 glm::dot(world.direction, original.up()),
                                  glm::dot(world.direction, original.forward())};
       const ViewRay ray{original.toView(world.origin), direction, glm::length(world.direction)};
       const Stretch stretch = insideFrustum(ray, original, smallest, farthest);
       if (stretch.empty()) continue;
       const Accumulator sum = walkLists(vdi, original, ray, stretch);
-      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
+      const auto pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
       image.rgba[pixel] = sum.rgba();
       image.depth[pixel] = sum.depth();
     }

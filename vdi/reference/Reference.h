@@ -1,5 +1,5 @@
-// The algorithm in readable form: every stage of a frame on the CPU, one ray at a time, nothing clever. It's the oracle of
-// the tests and the best explanation of what the shaders do. Slow.
+// The algorithm in readable form: every stage of a frame on the CPU, one ray at a time, nothing clever. It's
+// the oracle of the tests and the best explanation of what the shaders do. Slow.
 #pragma once
 
 #include <cstdint>
@@ -30,24 +30,24 @@ struct Frame {
         const GenerateSettings& settings);
 };
 
-/// The samples of the ray through the centre of pixel (x, y) that `blocks` own, front to back, transparent ones included,
-/// up to the one with which the ray's opacity reaches the termination opacity.
+/// The samples of the ray through the centre of pixel (x, y) that `blocks` own, front to back, transparent
+/// ones included, up to the one with which the ray's opacity reaches the termination opacity.
 std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y);
 
 /// DVR: the ground truth. Depth as Image says.
 Image renderVolume(const Frame& frame, std::span<const Block> blocks);
 
-/// The (sub-)VDI of these blocks, one list per pixel. `cutAtGaps`: see SegmentRules; false when these are all blocks
-/// there are.
+/// The (sub-)VDI of these blocks, one list per pixel. `cutAtGaps`: see SegmentRules; false when these are all
+/// blocks there are.
 SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bool cutAtGaps);
 
-/// The ranks' lists of each pixel merged by depth and segmented again to at most `budget` (paper, section 5.2). All inputs
-/// have the same number of lists.
-SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget, double sampleStep,
-                            Algorithm algorithm);
+/// The ranks' lists of each pixel merged by depth and segmented again to at most `budget` (paper,
+/// section 5.2). All inputs have the same number of lists.
+SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
+                            double sampleStep, Algorithm algorithm);
 
-/// The VDI seen by `view`. Each supersegment fills the part of its pixel's frustum between its two depths; rays walk
-/// through the frusta of V_O's pixels in order, whatever their direction.
+/// The VDI seen by `view`. Each supersegment fills the part of its pixel's frustum between its two depths;
+/// rays walk through the frusta of V_O's pixels in order, whatever their direction.
 Image render(const Vdi& vdi, const View& view);
 
 }  // namespace vdi::reference

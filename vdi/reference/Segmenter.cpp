@@ -13,7 +13,10 @@ namespace {
 class OpenSegment {
  public:
   explicit OpenSegment(const Interval& first)
-      : front_(first.front), reach_(first.back), back_(first.back), color_{first.red, first.green, first.blue},
+      : front_(first.front),
+        reach_(first.back),
+        back_(first.back),
+        color_{first.red, first.green, first.blue},
         opticalDepth_(first.opticalDepth) {}
 
   float reach() const { return reach_; }
@@ -86,7 +89,8 @@ float opacityOf(float opticalDepth) {
 float opticalDepthOf(float opacity) {
   if (opacity >= 1.0F) return maxExtinction;
   constexpr float perLn2 = 1.44269504F;
-  const float depth = opacity < 1e-3F ? opacity * (1.0F + 0.5F * opacity) * perLn2 : -std::log2(1.0F - opacity);
+  const float depth =
+      opacity < 1e-3F ? opacity * (1.0F + 0.5F * opacity) * perLn2 : -std::log2(1.0F - opacity);
   return std::min(depth, maxExtinction);
 }
 
@@ -148,7 +152,8 @@ std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals
 std::vector<Supersegment> segment(std::span<const Interval> intervals, const SegmentRules& rules,
                                   Algorithm algorithm) {
   switch (algorithm) {
-    case Algorithm::Bisection: break;
+    case Algorithm::Bisection:
+      break;
   }
   return segmentByBisection(intervals, rules);
 }

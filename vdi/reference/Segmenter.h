@@ -1,6 +1,6 @@
-// How the intervals along one ray become supersegments: the exchangeable piece of generation and compositing. Generation
-// feeds it samples, compositing feeds it sub-supersegments; both are intervals of constant colour (paper, section 5.2).
-// The shaders' twin is shaders/segmenter.glsl and shaders/search.glsl.
+// How the intervals along one ray become supersegments: the exchangeable piece of generation and compositing.
+// Generation feeds it samples, compositing feeds it sub-supersegments; both are intervals of constant colour
+// (paper, section 5.2). The shaders' twin is shaders/segmenter.glsl and shaders/search.glsl.
 #pragma once
 
 #include <cstdint>
@@ -31,26 +31,31 @@ float opticalDepthOf(float opacity);
 struct SegmentRules {
   std::uint32_t budget = 1;  // N_S
   float sampleStep = 1.0F;   // DepthLattice::step: the length that Eq. 1 is normalised to
-  /// True for a sub-VDI that other ranks' supersegments will be merged with: a supersegment then never spans a gap, for
-  /// another rank's material may lie there. False: a gap is a transparent sample, as in the paper.
+  /// True for a sub-VDI that other ranks' supersegments will be merged with: a supersegment then never spans
+  /// a gap, for another rank's material may lie there. False: a gap is a transparent sample, as in the paper.
   bool cutAtGaps = false;
 };
 
-/// Segments for one sensitivity (Eq. 1). Two sides are compared by their premultiplied colour *and* opacity, both
-/// normalised to the length of one sample; the opacity is in because dark material would otherwise equal empty space.
-///   * A transparent interval never opens a supersegment. An open one absorbs it if Eq. 1 allows; a transparent tail is
+/// Segments for one sensitivity (Eq. 1). Two sides are compared by their premultiplied colour *and* opacity,
+/// both normalised to the length of one sample; the opacity is in because dark material would otherwise equal
+/// empty space.
+///   * A transparent interval never opens a supersegment. An open one absorbs it if Eq. 1 allows; a
+///   transparent tail is
 ///     trimmed when the supersegment closes.
 ///   * A negative sensitivity cuts at every interval.
 std::vector<Supersegment> segmentWithSensitivity(std::span<const Interval> intervals, float sensitivity,
                                                  const SegmentRules& rules);
 
 /// The sensitivity search, per list:
-///   * the list may hold max(budget, runs) supersegments, runs being the pieces that gaps force (1 without cutAtGaps);
-///   * if no more intervals than that aren't transparent, each becomes a supersegment of its own: nothing is lost;
+///   * the list may hold max(budget, runs) supersegments, runs being the pieces that gaps force (1 without
+///   cutAtGaps);
+///   * if no more intervals than that aren't transparent, each becomes a supersegment of its own: nothing is
+///   lost;
 ///   * else the first try is smallestSensitivity, accepted if it fits;
-///   * else bisection of the exponent between it and largestSensitivity, which always fits, until a try fills at least
-///     85 % of what the list may hold, or the bounds are closer than a factor of 1.001, or after 22 tries. The smallest
-///     sensitivity that was seen to fit wins.
+///   * else bisection of the exponent between it and largestSensitivity, which always fits, until a try fills
+///   at least
+///     85 % of what the list may hold, or the bounds are closer than a factor of 1.001, or after 22 tries.
+///     The smallest sensitivity that was seen to fit wins.
 inline constexpr float smallestSensitivity = 1e-4F;
 inline constexpr float largestSensitivity = 2.0F;  // the norm of a difference of two vectors in [0, 1]^4
 inline constexpr int mostTries = 22;
@@ -59,6 +64,7 @@ inline constexpr float closeBounds = 1.001F;
 std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals, const SegmentRules& rules);
 
 /// The algorithm of that name.
-std::vector<Supersegment> segment(std::span<const Interval> intervals, const SegmentRules& rules, Algorithm algorithm);
+std::vector<Supersegment> segment(std::span<const Interval> intervals, const SegmentRules& rules,
+                                  Algorithm algorithm);
 
 }  // namespace vdi::reference
