@@ -65,7 +65,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
 
       const auto image = generator.renderVolume(camera, function, settings);
       const Image expected = reference::renderVolume(frame, dealt.mine);
-      CHECK(largestDifference(*image, expected) < 0.1F);
+      CHECK(largestDifference(*image, expected) < 0.5F);
       std::size_t depthsOff = 0;
       for (std::size_t i = 0; i < image->depth.size(); ++i) {
         const float a = image->depth[i];
@@ -79,7 +79,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
       const SupersegmentLists lists = reference::generate(frame, dealt.mine, false);
       CHECK(lists.segments.size() > lists.listCount());
       CHECK(listsOfOtherLength(vdi->lists, lists) <= lists.listCount() / 50);
-      CHECK(largestDifference(flatten(*vdi), expected) < 0.1F);
+      CHECK(largestDifference(flatten(*vdi), expected) < 0.5F);
 
       VdiRenderer renderer(device());
       renderer.setVdi(*vdi);

@@ -1,0 +1,36 @@
+// VTK data sets and colour maps as the library knows them.
+#ifndef VDIBlocks_h
+#define VDIBlocks_h
+
+#include <string>
+#include <vector>
+
+#include "vdi/core/Block.h"
+#include "vdi/core/TransferFunction.h"
+
+class vtkDataObject;
+class vtkPiecewiseFunction;
+class vtkScalarsToColors;
+
+namespace pv {
+
+/// Which scalars of a data set.
+struct ArrayChoice {
+  std::string name;
+  bool cells = false;   // of cells, else of points
+  int component = 0;    // -1: magnitude
+};
+
+/// The blocks of an image, or of all images of a composite data set. Scalars are shared, not copied, where VTK has them
+/// contiguous with one component and of a type that the library knows. Ghost and blanked cells aren't owned. Throws
+/// vdi::Error{InvalidArgument}: a data set that isn't vtkImageData, a rotated image, a missing array.
+std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice);
+
+/// ParaView's colour map and opacity function, sampled densely enough for any colour space. Without a colour map: "Cool to
+/// Warm" over [low, high]; without an opacity function: the colour map's own if it has one, else a ramp from 0 to 1.
+vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity, double low,
+                                         double high, double unitDistance);
+
+}  // namespace pv
+
+#endif

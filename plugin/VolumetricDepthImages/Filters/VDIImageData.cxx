@@ -1,0 +1,142 @@
+#include "VDIImageData.h"
+
+#include <vtkDataArray.h>
+#include <vtkDoubleArray.h>
+#include <vtkFieldData.h>
+#include <vtkFloatArray.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkUnsignedIntArray.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "vdi/core/Error.h"
+#include "vdi/pipeline/Pipeline.h"
+
+namespace pv {
+
+namespace {
+
+template <typename Array>
+auto* addField(vtkFieldData* fields, const char* name, int components, vtkIdType tuples) {
+  vtkNew<Array> array;
+  array->SetName(name);
+  array->SetNumberOfComponents(components);
+  array->SetNumberOfTuples(tuples);
+  fields->AddArray(array);
+  return array->GetPointer(0);
+}
+
+/// The field array of that name, type and number of components; throws if it's there in another shape.
+template <typename Array>
+Array* field(vtkFieldData* fields, const char* name, int components, vtkIdType tuples) {
+  auto* array = Array::SafeDownCast(fields->GetAbstractArray(name));
+  const bool good = array != nullptr && array->GetNumberOfComponents() == components &&
+                    (tuples < 0 || array->GetNumberOfTuples() == tuples);
+  if (!good) throw vdi::Error(vdi::ErrorCode::Format, "the data set's VDI is incomplete", name);
+  return array;
+}
+
+unsigned char toByte(float share) {
+  return static_cast<unsigned char>(std::lround(std::clamp(share, 0.0F, 1.0F) * 255.0F));
+}
+
+}  // namespace
+
+void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth) {
+  image->SetDimensions(picture.width, picture.height, 1);
+  vtkNew<vtkUnsignedCharArray> colors;
+  colors->SetName("RGBA");
+  colors->SetNumberOfComponents(4);
+  colors->SetNumberOfTuples(static_cast<vtkIdType>(picture.pixelCount()));
+  unsigned char* out = colors->GetPointer(0);
+  for (const glm::vec4& pixel : picture.rgba) {
+    const float unmultiply = pixel.a > 0.0F ? 1.0F / pixel.a : 0.0F;
+    for (int c = 0; c < 3; ++c) *out++ = toByte(pixel[c] * unmultiply);
+    *out++ = toByte(pixel.a);
+  }
+  image->GetPointData()->SetScalars(colors);
+  if (!withDepth) return;
+  vtkNew<vtkFloatArray> depth;
+  depth->SetName("Depth");
+  depth->SetNumberOfTuples(static_cast<vtkIdType>(picture.depth.size()));
+  std::copy(picture.depth.begin(), picture.depth.end(), depth->GetPointer(0));
+  image->GetPointData()->AddArray(depth);
+}
+
+void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
+  setPicture(image, vdi::flatten(vdi), false);
+  vtkNew<vtkUnsignedIntArray> counts;
+  counts->SetName("SupersegmentCount");
+  counts->SetNumberOfTuples(static_cast<vtkIdType>(vdi.lists.listCount()));
+  for (std::size_t i = 0; i < vdi.lists.listCount(); ++i) counts->SetValue(static_cast<vtkIdType>(i), vdi.lists.countOf(i));
+  image->GetPointData()->AddArray(counts);
+
+  vtkFieldData* fields = image->GetFieldData();
+  std::copy(vdi.lists.offsets.begin(), vdi.lists.offsets.end(),
+            addField<vtkUnsignedIntArray>(fields, "VDI.offsets", 1, static_cast<vtkIdType>(vdi.lists.offsets.size())));
+  float* segments =
+      addField<vtkFloatArray>(fields, "VDI.supersegments", 6, static_cast<vtkIdType>(vdi.lists.segments.size()));
+  const std::size_t bytes = vdi.lists.segments.size() * sizeof(vdi::Supersegment);
+  if (bytes > 0) std::memcpy(segments, vdi.lists.segments.data(), bytes);
+  double* camera = addField<vtkDoubleArray>(fields, "VDI.camera", 1, 12);
+  double* bounds = addField<vtkDoubleArray>(fields, "VDI.bounds", 1, 6);
+  for (int axis = 0; axis < 3; ++axis) {
+    camera[axis] = vdi.camera.position[axis];
+    camera[3 + axis] = vdi.camera.focalPoint[axis];
+    camera[6 + axis] = vdi.camera.viewUp[axis];
+    bounds[2 * axis] = vdi.bounds.lo[axis];
+    bounds[2 * axis + 1] = vdi.bounds.hi[axis];
+  }
+  camera[9] = vdi.camera.viewAngle;
+  camera[10] = vdi.camera.parallelProjection ? 1.0 : 0.0;
+  camera[11] = vdi.camera.parallelScale;
+  double* parameters = addField<vtkDoubleArray>(fields, "VDI.parameters", 1, 4);
+  parameters[0] = vdi.budget;
+  parameters[1] = vdi.sampleStep;
+  parameters[2] = vdi.time;
+  parameters[3] = static_cast<double>(vdi.timeStep);
+}
+
+bool getVdi(vtkDataObject* data, vdi::Vdi& vdi) {
+  auto* image = vtkImageData::SafeDownCast(data);
+  if (image == nullptr || image->GetFieldData()->GetAbstractArray("VDI.offsets") == nullptr) return false;
+  vtkFieldData* fields = image->GetFieldData();
+  auto* offsets = field<vtkUnsignedIntArray>(fields, "VDI.offsets", 1, -1);
+  auto* segments = field<vtkFloatArray>(fields, "VDI.supersegments", 6, -1);
+  const double* camera = field<vtkDoubleArray>(fields, "VDI.camera", 1, 12)->GetPointer(0);
+  const double* bounds = field<vtkDoubleArray>(fields, "VDI.bounds", 1, 6)->GetPointer(0);
+  const double* parameters = field<vtkDoubleArray>(fields, "VDI.parameters", 1, 4)->GetPointer(0);
+  int dimensions[3];
+  image->GetDimensions(dimensions);
+  vdi.width = dimensions[0];
+  vdi.height = dimensions[1];
+  for (int axis = 0; axis < 3; ++axis) {
+    vdi.camera.position[axis] = camera[axis];
+    vdi.camera.focalPoint[axis] = camera[3 + axis];
+    vdi.camera.viewUp[axis] = camera[6 + axis];
+    vdi.bounds.lo[axis] = bounds[2 * axis];
+    vdi.bounds.hi[axis] = bounds[2 * axis + 1];
+  }
+  vdi.camera.viewAngle = camera[9];
+  vdi.camera.parallelProjection = camera[10] != 0.0;
+  vdi.camera.parallelScale = camera[11];
+  vdi.budget = static_cast<std::uint32_t>(parameters[0]);
+  vdi.sampleStep = parameters[1];
+  vdi.time = parameters[2];
+  vdi.timeStep = static_cast<std::uint64_t>(parameters[3]);
+  const unsigned int* first = offsets->GetPointer(0);
+  vdi.lists.offsets.assign(first, first + offsets->GetNumberOfTuples());
+  vdi.lists.segments.resize(static_cast<std::size_t>(segments->GetNumberOfTuples()));
+  const std::size_t bytes = vdi.lists.segments.size() * sizeof(vdi::Supersegment);
+  if (bytes > 0) std::memcpy(static_cast<void*>(vdi.lists.segments.data()), segments->GetPointer(0), bytes);
+  validate(vdi);
+  return true;
+}
+
+}  // namespace pv

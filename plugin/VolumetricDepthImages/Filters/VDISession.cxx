@@ -1,0 +1,26 @@
+#include "VDISession.h"
+
+#include <mpi.h>
+#include <vtkMPI.h>
+#include <vtkMPICommunicator.h>
+#include <vtkMultiProcessController.h>
+
+namespace pv {
+
+vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller) {
+  auto* communicator = controller != nullptr ? vtkMPICommunicator::SafeDownCast(controller->GetCommunicator()) : nullptr;
+  if (communicator == nullptr || controller->GetNumberOfProcesses() == 1) return vdi::comm::Communicator::serial();
+  return vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(*communicator->GetMPIComm()->GetHandle()));
+}
+
+std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank) {
+  static std::weak_ptr<vdi::gpu::Device> existing;
+  std::shared_ptr<vdi::gpu::Device> device = existing.lock();
+  if (!device) {
+    device = vdi::gpu::Device::create(vdi::gpu::requestFromEnvironment(localRank));
+    existing = device;
+  }
+  return device;
+}
+
+}  // namespace pv

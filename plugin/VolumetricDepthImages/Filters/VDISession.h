@@ -1,0 +1,23 @@
+// What the filters of one process share: the Vulkan device, and the communicator behind a VTK controller.
+#ifndef VDISession_h
+#define VDISession_h
+
+#include <memory>
+
+#include "vdi/comm/Communicator.h"
+#include "vdi/gpu/Device.h"
+
+class vtkMultiProcessController;
+
+namespace pv {
+
+/// A communicator over the controller's MPI communicator (a duplicate: collective), or over this process alone when there's
+/// none.
+vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller);
+
+/// The process's device, made at the first call and kept while anybody holds it. Throws vdi::Error{DeviceUnavailable}.
+std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank);
+
+}  // namespace pv
+
+#endif

@@ -1,0 +1,226 @@
+#include "vtkVDIGenerator.h"
+
+#include <fmt/format.h>
+#include <vtkCompositeDataSet.h>
+#include <vtkDataObject.h>
+#include <vtkDataSetAttributes.h>
+#include <vtkExtentTranslator.h>
+#include <vtkImageData.h>
+#include <vtkInformation.h>
+#include <vtkInformationVector.h>
+#include <vtkMultiProcessController.h>
+#include <vtkNew.h>
+#include <vtkObjectFactory.h>
+#include <vtkPiecewiseFunction.h>
+#include <vtkScalarsToColors.h>
+#include <vtkStreamingDemandDrivenPipeline.h>
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "VDIBlocks.h"
+#include "VDIImageData.h"
+#include "VDISession.h"
+#include "vdi/core/Error.h"
+#include "vdi/pipeline/Pipeline.h"
+
+vtkStandardNewMacro(vtkVDIGenerator);
+
+struct vtkVDIGenerator::Internals {
+  std::unique_ptr<vdi::VdiGenerator> Generator;  // none until the first update
+};
+
+vtkVDIGenerator::vtkVDIGenerator()
+    : Internal(new Internals), Controller(vtkMultiProcessController::GetGlobalController()) {
+  this->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
+}
+
+vtkVDIGenerator::~vtkVDIGenerator() { this->SetReport(nullptr); }
+
+void vtkVDIGenerator::SetReport(const char* text) {
+  delete[] this->Report;
+  this->Report = nullptr;
+  if (text == nullptr) return;
+  this->Report = new char[std::strlen(text) + 1];
+  std::strcpy(this->Report, text);
+}
+
+void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Resolution: " << this->Resolution[0] << " x " << this->Resolution[1] << "\n"
+     << indent << "Supersegments: " << this->Supersegments << "\n"
+     << indent << "SamplingRate: " << this->SamplingRate << "\n"
+     << indent << "ScalarOpacityUnitDistance: " << this->ScalarOpacityUnitDistance << "\n";
+}
+
+void vtkVDIGenerator::SetLookupTable(vtkScalarsToColors* table) {
+  if (this->LookupTable == table) return;
+  this->LookupTable = table;
+  this->Modified();
+}
+
+void vtkVDIGenerator::SetScalarOpacityFunction(vtkPiecewiseFunction* function) {
+  if (this->ScalarOpacityFunction == function) return;
+  this->ScalarOpacityFunction = function;
+  this->Modified();
+}
+
+void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
+  if (this->Controller == controller) return;
+  this->Controller = controller;
+  this->Internal->Generator.reset();
+  this->Modified();
+}
+
+vtkMTimeType vtkVDIGenerator::GetMTime() {
+  vtkMTimeType time = this->Superclass::GetMTime();
+  if (this->LookupTable) time = std::max(time, this->LookupTable->GetMTime());
+  if (this->ScalarOpacityFunction) time = std::max(time, this->ScalarOpacityFunction->GetMTime());
+  return time;
+}
+
+int vtkVDIGenerator::FillInputPortInformation(int, vtkInformation* info) {
+  // Any data object: RequestData says clearly what it can't take, and composite ones come whole instead of leaf by leaf.
+  info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject");
+  return 1;
+}
+
+int vtkVDIGenerator::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) {
+  // The other ranks' pictures are empty; announcing that keeps the pipeline from asking them for more again and again.
+  const bool root = this->Controller == nullptr || this->Controller->GetLocalProcessId() == 0;
+  const int extent[6] = {0, root ? this->Resolution[0] - 1 : -1, 0, root ? this->Resolution[1] - 1 : -1,
+                         0, root ? 0 : -1};
+  vtkInformation* info = outputs->GetInformationObject(0);
+  info->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent, 6);
+  info->Set(vtkDataObject::SPACING(), 1.0, 1.0, 1.0);
+  info->Set(vtkDataObject::ORIGIN(), 0.0, 0.0, 0.0);
+  vtkDataObject::SetPointDataActiveScalarInfo(info, VTK_UNSIGNED_CHAR, 4);
+  return 1;
+}
+
+int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*) {
+  using Pipeline = vtkStreamingDemandDrivenPipeline;
+  vtkInformation* info = inputs[0]->GetInformationObject(0);
+  const int rank = this->Controller ? this->Controller->GetLocalProcessId() : 0;
+  const int ranks = this->Controller ? this->Controller->GetNumberOfProcesses() : 1;
+  // Cell data needs a neighbour's cells to interpolate up to the common face; points on the face are both blocks' anyway.
+  int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
+  if (vtkInformation* array = this->GetInputArrayInformation(0)) {
+    if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) association = array->Get(vtkDataObject::FIELD_ASSOCIATION());
+  }
+  const int ghosts = ranks > 1 && association == vtkDataObject::FIELD_ASSOCIATION_CELLS ? 1 : 0;
+  info->Set(Pipeline::UPDATE_PIECE_NUMBER(), rank);
+  info->Set(Pipeline::UPDATE_NUMBER_OF_PIECES(), ranks);
+  info->Set(Pipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), ghosts);
+  if (info->Has(Pipeline::WHOLE_EXTENT())) {
+    int whole[6];
+    int mine[6];
+    info->Get(Pipeline::WHOLE_EXTENT(), whole);
+    vtkNew<vtkExtentTranslator> translator;
+    translator->PieceToExtentThreadSafe(rank, ranks, ghosts, whole, mine, vtkExtentTranslator::BLOCK_MODE, 0);
+    info->Set(Pipeline::UPDATE_EXTENT(), mine, 6);
+  }
+  return 1;
+}
+
+namespace {
+
+vdi::Camera cameraOf(const double* position, const double* focalPoint, const double* viewUp, double angle, bool parallel,
+                     double scale) {
+  const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
+  return {vector(position), vector(focalPoint), vector(viewUp), angle, parallel, scale};
+}
+
+std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
+  std::string text = "rank  blocks  volume MiB  upload s  generate s  distribute s  composite s  gather s  sent MiB  device MiB\n";
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    const vdi::RankReport& r = reports[i];
+    constexpr double mib = 1024.0 * 1024.0;
+    text += fmt::format("{:4}  {:6}  {:10.1f}  {:8.3f}  {:10.3f}  {:12.3f}  {:11.3f}  {:8.3f}  {:8.2f}  {:10.1f}\n", i, r.blocks,
+                        static_cast<double>(r.volumeBytes) / mib, r.uploadSeconds, r.generateSeconds,
+                        r.distributeSeconds, r.compositeSeconds, r.gatherSeconds, static_cast<double>(r.bytesSent) / mib,
+                        static_cast<double>(r.deviceBytes) / mib);
+  }
+  return text + "device of rank 0: " + device + "\n";
+}
+
+}  // namespace
+
+int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) {
+  vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
+  vtkImageData* output = vtkImageData::GetData(outputs);
+  output->Initialize();
+  double time = 0.0;
+  if (input != nullptr && input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP())) {
+    time = input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
+  }
+  try {
+    this->Generate(input, time, output);
+  } catch (const vdi::Error& error) {
+    output->Initialize();
+    if (error.code() == vdi::ErrorCode::Cancelled) return 1;
+    vtkErrorMacro(<< error.what());
+    return 0;
+  } catch (const std::exception& error) {
+    output->Initialize();
+    vtkErrorMacro(<< error.what());
+    return 0;
+  }
+  return 1;
+}
+
+void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* output) {
+  if (!this->Internal->Generator) {
+    vdi::comm::Communicator comm = pv::communicatorOf(this->Controller);
+    std::shared_ptr<vdi::gpu::Device> device;
+    comm.together([&] { device = pv::sharedDevice(comm.localRank()); });
+    this->Internal->Generator = std::make_unique<vdi::VdiGenerator>(std::move(device), std::move(comm));
+  }
+  vdi::VdiGenerator& generator = *this->Internal->Generator;
+  std::vector<vdi::Block> blocks;
+  generator.communicator().together([&] {
+    pv::ArrayChoice choice;
+    if (vtkInformation* array = this->GetInputArrayInformation(0)) {
+      if (array->Has(vtkDataObject::FIELD_NAME())) choice.name = array->Get(vtkDataObject::FIELD_NAME());
+      if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) {
+        choice.cells = array->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_CELLS;
+      }
+    }
+    choice.component = this->Component;
+    blocks = pv::blocksOf(input, choice);
+  });
+  this->UpdateProgress(0.05);
+  generator.setBlocks(std::move(blocks), this->FillGhosts);
+  this->UpdateProgress(0.1);
+
+  const vdi::Scene& scene = generator.scene();
+  const double diagonal = scene.bounds.empty() ? 1.0 : glm::length(scene.bounds.size());
+  const double unit = this->ScalarOpacityUnitDistance > 0.0 ? this->ScalarOpacityUnitDistance : 0.01 * diagonal;
+  vdi::ScalarRange range = generator.scalarRange();
+  if (!(range.min < range.max)) {
+    const double low = range.min <= range.max ? range.min : 0.0;
+    range = {low, low + 1.0};
+  }
+  const vdi::TransferFunction function =
+      pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min, range.max, unit);
+  const vdi::Camera camera =
+      cameraOf(this->CameraPosition, this->CameraFocalPoint, this->CameraViewUp, this->CameraViewAngle,
+               this->CameraParallelProjection, this->CameraParallelScale);
+  vdi::GenerateSettings settings;
+  settings.width = this->Resolution[0];
+  settings.height = this->Resolution[1];
+  settings.supersegments = static_cast<std::uint32_t>(std::max(this->Supersegments, 0));
+  settings.samplesPerVoxel = this->SamplingRate;
+  const auto progress = [this](double done) {
+    this->UpdateProgress(0.1 + 0.9 * done);
+    return !this->CheckAbort();
+  };
+  std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
+  this->SetReport(generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
+  if (!vdi) return;
+  vdi->time = time;
+  pv::setVdi(output, *vdi);
+  output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+}

@@ -1,0 +1,113 @@
+/**
+ * @class vtkVDIGenerator
+ * @brief makes a Volumetric Depth Image (VDI) of a distributed volume
+ *
+ * Input: vtkImageData, or images in vtkPartitionedDataSet(Collection), vtkMultiBlockDataSet, vtkOverlappingAMR or
+ * vtkNonOverlappingAMR. Each rank brings the blocks it has, in any arrangement. Output on rank 0: a vtkImageData of
+ * Resolution with the picture seen from the camera, and the VDI in its field data (VDIImageData.h has the arrays); empty on
+ * other ranks. Collective: all ranks of the controller update together; when one fails, all return 0.
+ */
+#ifndef vtkVDIGenerator_h
+#define vtkVDIGenerator_h
+
+#include <vtkImageAlgorithm.h>
+#include <vtkSmartPointer.h>
+
+#include <memory>
+
+#include "vtkVolumetricDepthImagesModule.h"
+
+class vtkMultiProcessController;
+class vtkPiecewiseFunction;
+class vtkScalarsToColors;
+
+class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm {
+ public:
+  static vtkVDIGenerator* New();
+  vtkTypeMacro(vtkVDIGenerator, vtkImageAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /**
+   * Colour map; its scalar opacity function is used unless SetScalarOpacityFunction gave another one. None: "Cool to Warm"
+   * over the scalars' range.
+   */
+  void SetLookupTable(vtkScalarsToColors* table);
+  void SetScalarOpacityFunction(vtkPiecewiseFunction* function);
+  ///@}
+
+  ///@{
+  /**
+   * Distance over which the opacity function holds, in world units; 0 (default): a hundredth of the scene's diagonal.
+   */
+  vtkSetClampMacro(ScalarOpacityUnitDistance, double, 0.0, VTK_DOUBLE_MAX);
+  vtkGetMacro(ScalarOpacityUnitDistance, double);
+  ///@}
+
+  /// Component of a multi-component array; -1: magnitude.
+  vtkSetMacro(Component, int);
+  /// Lists of the VDI: columns and rows.
+  vtkSetVector2Macro(Resolution, int);
+  /// N_S, the most supersegments in a list.
+  vtkSetMacro(Supersegments, int);
+  /// Samples per voxel.
+  vtkSetMacro(SamplingRate, double);
+  /// Exchange ghost layers where blocks lack them.
+  vtkSetMacro(FillGhosts, bool);
+
+  ///@{
+  /**
+   * The viewpoint V_O, as vtkCamera has it.
+   */
+  vtkSetVector3Macro(CameraPosition, double);
+  vtkSetVector3Macro(CameraFocalPoint, double);
+  vtkSetVector3Macro(CameraViewUp, double);
+  vtkSetMacro(CameraViewAngle, double);
+  vtkSetMacro(CameraParallelProjection, bool);
+  vtkSetMacro(CameraParallelScale, double);
+  ///@}
+
+  void SetController(vtkMultiProcessController* controller);
+
+  /// Time and memory of the last frame, a line per rank; empty on ranks other than 0.
+  vtkGetStringMacro(Report);
+
+  vtkMTimeType GetMTime() override;
+
+ protected:
+  vtkVDIGenerator();
+  ~vtkVDIGenerator() override;
+
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  int RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+  int RequestUpdateExtent(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+
+ private:
+  vtkVDIGenerator(const vtkVDIGenerator&) = delete;
+  void operator=(const vtkVDIGenerator&) = delete;
+
+  struct Internals;
+  void Generate(vtkDataObject* input, double time, vtkImageData* output);
+  void SetReport(const char* text);
+
+  std::unique_ptr<Internals> Internal;
+  vtkSmartPointer<vtkMultiProcessController> Controller;
+  vtkSmartPointer<vtkScalarsToColors> LookupTable;
+  vtkSmartPointer<vtkPiecewiseFunction> ScalarOpacityFunction;
+  double ScalarOpacityUnitDistance = 0.0;
+  int Component = 0;
+  int Resolution[2] = {1280, 720};
+  int Supersegments = 25;
+  double SamplingRate = 1.0;
+  bool FillGhosts = true;
+  double CameraPosition[3] = {0.0, 0.0, 1.0};
+  double CameraFocalPoint[3] = {0.0, 0.0, 0.0};
+  double CameraViewUp[3] = {0.0, 1.0, 0.0};
+  double CameraViewAngle = 30.0;
+  bool CameraParallelProjection = false;
+  double CameraParallelScale = 1.0;
+  char* Report = nullptr;
+};
+
+#endif

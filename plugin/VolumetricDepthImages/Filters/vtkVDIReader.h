@@ -1,0 +1,41 @@
+/**
+ * @class vtkVDIReader
+ * @brief reads a .vdi file
+ *
+ * Output as vtkVDIGenerator's: a vtkImageData with the flat picture and the VDI in field data, on rank 0; empty elsewhere.
+ * docs/format.md describes the file. Series of files become time steps by vtkFileSeriesReader.
+ */
+#ifndef vtkVDIReader_h
+#define vtkVDIReader_h
+
+#include <vtkImageAlgorithm.h>
+
+#include "vtkVolumetricDepthImagesModule.h"
+
+class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
+ public:
+  static vtkVDIReader* New();
+  vtkTypeMacro(vtkVDIReader, vtkImageAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  vtkSetFilePathMacro(FileName);
+  vtkGetFilePathMacro(FileName);
+
+  /// 1 if the file starts as a .vdi file does.
+  int CanReadFile(const char* name);
+
+ protected:
+  vtkVDIReader();
+  ~vtkVDIReader() override;
+
+  int RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+
+ private:
+  vtkVDIReader(const vtkVDIReader&) = delete;
+  void operator=(const vtkVDIReader&) = delete;
+
+  char* FileName = nullptr;
+};
+
+#endif

@@ -1,0 +1,117 @@
+#include "vtkVDIRenderer.h"
+
+#include <vtkImageData.h>
+#include <vtkInformation.h>
+#include <vtkInformationVector.h>
+#include <vtkObjectFactory.h>
+#include <vtkStreamingDemandDrivenPipeline.h>
+
+#include "VDIImageData.h"
+#include "VDISession.h"
+#include "vdi/core/Error.h"
+#include "vdi/pipeline/Pipeline.h"
+
+vtkStandardNewMacro(vtkVDIRenderer);
+
+struct vtkVDIRenderer::Internals {
+  std::unique_ptr<vdi::VdiRenderer> Renderer;  // none until there's a VDI
+  vtkDataObject* Uploaded = nullptr;           // whose VDI the renderer has; compared, never followed
+  vtkMTimeType UploadedTime = 0;
+  vdi::Camera Original;
+  int Width = 0;
+  int Height = 0;
+};
+
+vtkVDIRenderer::vtkVDIRenderer() : Internal(new Internals) {}
+
+vtkVDIRenderer::~vtkVDIRenderer() = default;
+
+void vtkVDIRenderer::PrintSelf(ostream& os, vtkIndent indent) {
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Resolution: " << this->Resolution[0] << " x " << this->Resolution[1] << "\n"
+     << indent << "UseOriginalCamera: " << this->UseOriginalCamera << "\n"
+     << indent << "Azimuth: " << this->Azimuth << "\n";
+}
+
+int vtkVDIRenderer::FillInputPortInformation(int, vtkInformation* info) {
+  info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkImageData");
+  return 1;
+}
+
+int vtkVDIRenderer::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) {
+  using Pipeline = vtkStreamingDemandDrivenPipeline;
+  int extent[6] = {0, -1, 0, -1, 0, -1};
+  vtkInformation* in = inputs[0]->GetInformationObject(0);
+  if (in->Has(Pipeline::WHOLE_EXTENT())) in->Get(Pipeline::WHOLE_EXTENT(), extent);
+  const bool something = extent[1] >= extent[0];
+  if (something && this->Resolution[0] > 0 && this->Resolution[1] > 0) {
+    extent[1] = this->Resolution[0] - 1;
+    extent[3] = this->Resolution[1] - 1;
+  }
+  vtkInformation* out = outputs->GetInformationObject(0);
+  out->Set(Pipeline::WHOLE_EXTENT(), extent, 6);
+  out->Set(vtkDataObject::SPACING(), 1.0, 1.0, 1.0);
+  out->Set(vtkDataObject::ORIGIN(), 0.0, 0.0, 0.0);
+  vtkDataObject::SetPointDataActiveScalarInfo(out, VTK_UNSIGNED_CHAR, 4);
+  return 1;
+}
+
+int vtkVDIRenderer::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*) {
+  // A VDI is one thing: always all of it.
+  using Pipeline = vtkStreamingDemandDrivenPipeline;
+  vtkInformation* info = inputs[0]->GetInformationObject(0);
+  info->Set(Pipeline::UPDATE_PIECE_NUMBER(), 0);
+  info->Set(Pipeline::UPDATE_NUMBER_OF_PIECES(), 1);
+  info->Set(Pipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), 0);
+  int whole[6];
+  if (info->Has(Pipeline::WHOLE_EXTENT())) {
+    info->Get(Pipeline::WHOLE_EXTENT(), whole);
+    info->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
+  }
+  return 1;
+}
+
+int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) {
+  vtkImageData* output = vtkImageData::GetData(outputs);
+  output->Initialize();
+  try {
+    this->Render(vtkDataObject::GetData(inputs[0]), output);
+  } catch (const std::exception& error) {
+    output->Initialize();
+    vtkErrorMacro(<< error.what());
+    return 0;
+  }
+  return 1;
+}
+
+void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
+  Internals& internal = *this->Internal;
+  if (input != internal.Uploaded || input->GetMTime() != internal.UploadedTime) {
+    internal.Uploaded = nullptr;
+    vdi::Vdi vdi;
+    if (!pv::getVdi(input, vdi)) {
+      if (vtkImageData::SafeDownCast(input)->GetNumberOfPoints() == 0) return;  // another rank has it
+      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                       "the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
+    }
+    if (!internal.Renderer) internal.Renderer = std::make_unique<vdi::VdiRenderer>(pv::sharedDevice(0));
+    internal.Renderer->setVdi(vdi);
+    internal.Uploaded = input;
+    internal.UploadedTime = input->GetMTime();
+    internal.Original = vdi.camera;
+    internal.Width = vdi.width;
+    internal.Height = vdi.height;
+  }
+  vdi::Camera camera = internal.Original.azimuth(this->Azimuth);
+  if (!this->UseOriginalCamera) {
+    const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
+    camera = {vector(this->CameraPosition), vector(this->CameraFocalPoint), vector(this->CameraViewUp),
+              this->CameraViewAngle, this->CameraParallelProjection, this->CameraParallelScale};
+  } else if (this->Azimuth == 0.0) {
+    camera = internal.Original;
+  }
+  const bool own = this->Resolution[0] <= 0 || this->Resolution[1] <= 0;
+  const vdi::Image picture = internal.Renderer->render(camera, own ? internal.Width : this->Resolution[0],
+                                                       own ? internal.Height : this->Resolution[1]);
+  pv::setPicture(output, picture, true);
+}

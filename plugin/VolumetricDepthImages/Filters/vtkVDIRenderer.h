@@ -1,0 +1,69 @@
+/**
+ * @class vtkVDIRenderer
+ * @brief renders a Volumetric Depth Image from a viewpoint
+ *
+ * Input: the output of vtkVDIGenerator or vtkVDIReader. Output: a vtkImageData with point data RGBA and Depth (view-space
+ * depth of what's seen first, infinity where there's nothing). Runs where the VDI is, on rank 0; empty on other ranks.
+ */
+#ifndef vtkVDIRenderer_h
+#define vtkVDIRenderer_h
+
+#include <vtkImageAlgorithm.h>
+
+#include <memory>
+
+#include "vtkVolumetricDepthImagesModule.h"
+
+class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm {
+ public:
+  static vtkVDIRenderer* New();
+  vtkTypeMacro(vtkVDIRenderer, vtkImageAlgorithm);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  ///@{
+  /**
+   * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off) the VDI's own is used, turned by Azimuth
+   * degrees about its focal point.
+   */
+  vtkSetVector3Macro(CameraPosition, double);
+  vtkSetVector3Macro(CameraFocalPoint, double);
+  vtkSetVector3Macro(CameraViewUp, double);
+  vtkSetMacro(CameraViewAngle, double);
+  vtkSetMacro(CameraParallelProjection, bool);
+  vtkSetMacro(CameraParallelScale, double);
+  vtkSetMacro(UseOriginalCamera, bool);
+  vtkSetMacro(Azimuth, double);
+  ///@}
+
+  /// Of the picture; 0 0: the VDI's.
+  vtkSetVector2Macro(Resolution, int);
+
+ protected:
+  vtkVDIRenderer();
+  ~vtkVDIRenderer() override;
+
+  int RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+  int RequestUpdateExtent(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+
+ private:
+  vtkVDIRenderer(const vtkVDIRenderer&) = delete;
+  void operator=(const vtkVDIRenderer&) = delete;
+
+  struct Internals;
+  void Render(vtkDataObject* input, vtkImageData* output);
+
+  std::unique_ptr<Internals> Internal;
+  double CameraPosition[3] = {0.0, 0.0, 1.0};
+  double CameraFocalPoint[3] = {0.0, 0.0, 0.0};
+  double CameraViewUp[3] = {0.0, 1.0, 0.0};
+  double CameraViewAngle = 30.0;
+  bool CameraParallelProjection = false;
+  double CameraParallelScale = 1.0;
+  bool UseOriginalCamera = false;
+  double Azimuth = 0.0;
+  int Resolution[2] = {0, 0};
+};
+
+#endif

@@ -1,0 +1,38 @@
+/**
+ * @class vtkVDIWriter
+ * @brief writes the VDI of its input as a .vdi file
+ *
+ * Input: the output of vtkVDIGenerator or vtkVDIReader. The rank that has the VDI writes, under a temporary name that is
+ * renamed when the file is whole; other ranks do nothing.
+ */
+#ifndef vtkVDIWriter_h
+#define vtkVDIWriter_h
+
+#include <vtkWriter.h>
+
+#include "vtkVolumetricDepthImagesModule.h"
+
+class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIWriter : public vtkWriter {
+ public:
+  static vtkVDIWriter* New();
+  vtkTypeMacro(vtkVDIWriter, vtkWriter);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  vtkSetFilePathMacro(FileName);
+  vtkGetFilePathMacro(FileName);
+
+ protected:
+  vtkVDIWriter();
+  ~vtkVDIWriter() override;
+
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  void WriteData() override;
+
+ private:
+  vtkVDIWriter(const vtkVDIWriter&) = delete;
+  void operator=(const vtkVDIWriter&) = delete;
+
+  char* FileName = nullptr;
+};
+
+#endif
