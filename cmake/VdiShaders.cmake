@@ -15,16 +15,21 @@ function(vdi_embed_shaders target folder)
   foreach(name IN LISTS ARGN)
     set(source "${folder}/${name}.comp")
     set(header "${outputDir}/${name}.spv.h")
+    set(spirv "${outputDir}/${name}.spv")
+    add_custom_command(
+      OUTPUT "${spirv}"
+      COMMAND ${GLSLANG_VALIDATOR} --quiet -V --target-env vulkan1.3 "-I${folder}" --depfile "${spirv}.d" -o "${spirv}"
+              "${source}"
+      COMMAND ${SPIRV_VAL} --target-env vulkan1.3 --scalar-block-layout "${spirv}"
+      DEPENDS "${source}"
+      DEPFILE "${spirv}.d"
+      COMMENT "Shader ${name}.comp"
+      VERBATIM)
     add_custom_command(
       OUTPUT "${header}"
-      COMMAND ${GLSLANG_VALIDATOR} --quiet -V --target-env vulkan1.3 "-I${folder}" --depfile "${outputDir}/${name}.d" -o
-              "${outputDir}/${name}.spv" "${source}"
-      COMMAND ${SPIRV_VAL} --target-env vulkan1.3 --scalar-block-layout "${outputDir}/${name}.spv"
-      COMMAND ${CMAKE_COMMAND} "-DINPUT=${outputDir}/${name}.spv" "-DOUTPUT=${header}" "-DNAME=${name}" -P
+      COMMAND ${CMAKE_COMMAND} "-DINPUT=${spirv}" "-DOUTPUT=${header}" "-DNAME=${name}" -P
               "${CMAKE_SOURCE_DIR}/cmake/EmbedSpirv.cmake"
-      DEPENDS "${source}" "${CMAKE_SOURCE_DIR}/cmake/EmbedSpirv.cmake"
-      DEPFILE "${outputDir}/${name}.d"
-      COMMENT "Shader ${name}.comp"
+      DEPENDS "${spirv}" "${CMAKE_SOURCE_DIR}/cmake/EmbedSpirv.cmake"
       VERBATIM)
     list(APPEND headers "${header}")
     string(APPEND includes "#include \"${name}.spv.h\"\n")
