@@ -217,10 +217,20 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
     this->UpdateProgress(0.1 + 0.9 * done);
     return !this->CheckAbort();
   };
-  std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
-  this->SetReport(generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
-  if (!vdi) return;
-  vdi->time = time;
-  pv::setVdi(output, *vdi);
+  const auto takeReport = [&] {
+    this->SetReport(generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
+  };
+  if (this->PictureOnly) {
+    const std::optional<vdi::Image> picture = generator.renderVolume(camera, function, settings, progress);
+    takeReport();
+    if (picture) pv::setPicture(output, *picture, true);
+  } else {
+    std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
+    takeReport();
+    if (!vdi) return;
+    vdi->time = time;
+    vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));
+    pv::setVdi(output, *vdi);
+  }
   output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
 }

@@ -55,6 +55,11 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   /// Exchange ghost layers where blocks lack them.
   vtkSetMacro(FillGhosts, bool);
 
+  /// Plain volume rendering of the blocks, right for any arrangement, without a VDI beside the picture; default off.
+  vtkSetMacro(PictureOnly, bool);
+  /// The simulation's step, kept in the VDI.
+  vtkSetMacro(TimeStep, int);
+
   ///@{
   /**
    * The viewpoint V_O, as vtkCamera has it.
@@ -101,6 +106,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   int Supersegments = 25;
   double SamplingRate = 1.0;
   bool FillGhosts = true;
+  bool PictureOnly = false;
+  int TimeStep = 0;
   double CameraPosition[3] = {0.0, 0.0, 1.0};
   double CameraFocalPoint[3] = {0.0, 0.0, 0.0};
   double CameraViewUp[3] = {0.0, 1.0, 0.0};
