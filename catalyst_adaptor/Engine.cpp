@@ -70,25 +70,35 @@ struct Engine::State {
   vtkNew<vtkCallbackCommand> listener;
   std::string firstError;
 
-  /// Errors that filters report reach no script: they're taken from VTK's output.
+  /// Errors that filters report reach no script: they're taken from VTK's output, where Python's standard
+  /// error lands too.
   static void onError(vtkObject*, unsigned long, void* state, void* text) {
     auto& self = *static_cast<State*>(state);
     const std::string message = text != nullptr ? static_cast<const char*>(text) : "";
-    if (self.firstError.empty() && message.find(harmless) == std::string::npos) self.firstError = message;
+    const bool reported = message.starts_with("ERROR: In ") && message.find(harmless) == std::string::npos;
+    if (!reported || !self.firstError.empty()) return;
+    // "ERROR: In FILE, line N", then the text.
+    const std::size_t body = message.find('\n');
+    self.firstError = body == std::string::npos ? message : message.substr(body + 1);
+    while (!self.firstError.empty() && self.firstError.back() == '\n') self.firstError.pop_back();
   }
 };
 
-Engine::Engine(int fortranCommunicator, const std::vector<std::string>& scripts) : state_(std::make_unique<State>()) {
+Engine::Engine(int fortranCommunicator, const std::vector<std::string>& scripts)
+    : state_(std::make_unique<State>()) {
   using Helper = vtkInSituInitializationHelper;
-  if (Helper::IsInitialized()) throw std::runtime_error("ParaView's in situ engine is in use in this process");
+  if (Helper::IsInitialized())
+    throw std::runtime_error("ParaView's in situ engine is in use in this process");
   Helper::Initialize(static_cast<vtkTypeUInt64>(fortranCommunicator));
-  if (!Helper::IsInitialized()) throw std::runtime_error("ParaView's in situ engine can't be started (again)");
+  if (!Helper::IsInitialized())
+    throw std::runtime_error("ParaView's in situ engine can't be started (again)");
   if (!Helper::IsPythonSupported()) throw std::runtime_error("this ParaView was built without Python");
   state_->listener->SetCallback(&State::onError);
   state_->listener->SetClientData(state_.get());
   vtkOutputWindow::GetInstance()->AddObserver(vtkCommand::ErrorEvent, state_->listener);
   auto* proxies = vtkSMProxyManager::GetProxyManager()->GetActiveSessionProxyManager();
-  state_->producer.TakeReference(vtkSMSourceProxy::SafeDownCast(proxies->NewProxy("sources", "PVTrivialProducer")));
+  state_->producer.TakeReference(
+      vtkSMSourceProxy::SafeDownCast(proxies->NewProxy("sources", "PVTrivialProducer")));
   state_->producer->UpdateVTKObjects();
   Helper::SetProducer(channel, state_->producer);
   for (const std::string& script : scripts) {

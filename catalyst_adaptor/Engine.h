@@ -21,8 +21,8 @@ class Engine {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  /// Runs every script on `grid`. Returns what went wrong on this rank, "" if nothing did. A script that fails is called
-  /// again at the next step.
+  /// Runs every script on `grid`. Returns what went wrong on this rank, "" if nothing did. A script that
+  /// fails is called again at the next step.
   std::string execute(vtkDataObject* grid, std::int64_t step, double time);
 
  private:

@@ -33,8 +33,8 @@ struct vdi_catalyst {
 
 namespace {
 
-/// What a failing call comes to: the highest code of any rank, and the text of the lowest rank that has it, on all ranks;
-/// printed by rank 0.
+/// What a failing call comes to: the highest code of any rank, and the text of the lowest rank that has it,
+/// on all ranks; printed by rank 0.
 int conclude(vdi_catalyst& self, int code, const std::string& text) {
   int worst = code;
   MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_INT, MPI_MAX, self.comm);
@@ -80,7 +80,8 @@ void checkBlock(const vdi_catalyst_block& block) {
   for (int axis = 0; axis < 3; ++axis) {
     demand(block.cells[axis] >= 1, "a block needs at least one cell per axis");
     demand(block.ghost_lo[axis] >= 0 && block.ghost_hi[axis] >= 0, "ghost layers can't be negative");
-    demand(block.ghost_lo[axis] + block.ghost_hi[axis] < block.cells[axis], "a block of nothing but ghost cells");
+    demand(block.ghost_lo[axis] + block.ghost_hi[axis] < block.cells[axis],
+           "a block of nothing but ghost cells");
     demand(std::isfinite(block.spacing[axis]) && block.spacing[axis] > 0.0, "spacing must be finite and > 0");
     demand(std::isfinite(block.origin[axis]), "the origin must be finite");
   }
@@ -110,15 +111,24 @@ void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
 
 int vtkTypeOf(int type) {
   switch (type) {
-    case VDI_CATALYST_U8: return VTK_UNSIGNED_CHAR;
-    case VDI_CATALYST_I8: return VTK_SIGNED_CHAR;
-    case VDI_CATALYST_U16: return VTK_UNSIGNED_SHORT;
-    case VDI_CATALYST_I16: return VTK_SHORT;
-    case VDI_CATALYST_U32: return VTK_UNSIGNED_INT;
-    case VDI_CATALYST_I32: return VTK_INT;
-    case VDI_CATALYST_F32: return VTK_FLOAT;
-    case VDI_CATALYST_F64: return VTK_DOUBLE;
-    default: throw std::invalid_argument("unknown scalar type");
+    case VDI_CATALYST_U8:
+      return VTK_UNSIGNED_CHAR;
+    case VDI_CATALYST_I8:
+      return VTK_SIGNED_CHAR;
+    case VDI_CATALYST_U16:
+      return VTK_UNSIGNED_SHORT;
+    case VDI_CATALYST_I16:
+      return VTK_SHORT;
+    case VDI_CATALYST_U32:
+      return VTK_UNSIGNED_INT;
+    case VDI_CATALYST_I32:
+      return VTK_INT;
+    case VDI_CATALYST_F32:
+      return VTK_FLOAT;
+    case VDI_CATALYST_F64:
+      return VTK_DOUBLE;
+    default:
+      throw std::invalid_argument("unknown scalar type");
   }
 }
 
@@ -129,7 +139,8 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
   if (catalyst == nullptr) return VDI_CATALYST_BAD_ARGUMENT;
   *catalyst = nullptr;
   auto self = std::make_unique<vdi_catalyst>();
-  if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS) return VDI_CATALYST_BAD_ARGUMENT;
+  if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
+    return VDI_CATALYST_BAD_ARGUMENT;
   std::vector<std::string> paths;
   int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     demand(script_count >= 0 && (script_count == 0 || scripts != nullptr), "no scripts given");
@@ -190,8 +201,10 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
       array->SetName(name);
       array->SetNumberOfComponents(1);
       // VTK only reads through this pointer; `save` = 1 leaves the memory the simulation's.
-      array->SetVoidArray(const_cast<void*>(data[i]), cells ? image->GetNumberOfCells() : image->GetNumberOfPoints(), 1);
-      auto* attributes = cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
+      array->SetVoidArray(const_cast<void*>(data[i]),
+                          cells ? image->GetNumberOfCells() : image->GetNumberOfPoints(), 1);
+      auto* attributes =
+          cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
       attributes->AddArray(array);
       image->Modified();
     }
@@ -200,12 +213,13 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
 
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   if (catalyst == nullptr) return VDI_CATALYST_BAD_ARGUMENT;
-  const int code =
-      guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] { demand(catalyst->haveBlocks, "no blocks were given yet"); });
+  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT,
+                           [&] { demand(catalyst->haveBlocks, "no blocks were given yet"); });
   if (code != VDI_CATALYST_OK) return code;
   return guarded(*catalyst, VDI_CATALYST_SCRIPT, [&] {
     // The values behind the pointers have changed, whether or not the pointers have.
-    for (unsigned int i = 0; i < catalyst->grid->GetNumberOfPartitions(); ++i) catalyst->grid->GetPartition(i)->Modified();
+    for (unsigned int i = 0; i < catalyst->grid->GetNumberOfPartitions(); ++i)
+      catalyst->grid->GetPartition(i)->Modified();
     catalyst->grid->Modified();
     const std::string failure = catalyst->engine->execute(catalyst->grid, step, time);
     if (!failure.empty()) throw std::runtime_error(failure);
@@ -221,4 +235,6 @@ int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
   return code;
 }
 
-const char* vdi_catalyst_error(const vdi_catalyst* catalyst) { return catalyst != nullptr ? catalyst->error.c_str() : ""; }
+const char* vdi_catalyst_error(const vdi_catalyst* catalyst) {
+  return catalyst != nullptr ? catalyst->error.c_str() : "";
+}

@@ -10,12 +10,14 @@
  *     }
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
- * All functions are collective over the communicator. None ends the process: they return VDI_CATALYST_OK or a code below, the
- * same one on all ranks, and rank 0 prints one line to standard error; after an error the next step works again. Nothing is
- * copied on the host: pointers must stay valid, and their data unchanged, until vdi_catalyst_execute returns.
+ * All functions are collective over the communicator. None ends the process: they return VDI_CATALYST_OK or a
+ * code below, the same one on all ranks, and rank 0 prints one line to standard error; after an error the
+ * next step works again. Nothing is copied on the host: pointers must stay valid, and their data unchanged,
+ * until vdi_catalyst_execute returns.
  *
- * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a vtkPartitionedDataSet with one
- * vtkImageData a block, under the name "grid":  TrivialProducer(registrationName="grid").
+ * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
+ * vtkPartitionedDataSet with one vtkImageData a block, under the name "grid":
+ * TrivialProducer(registrationName="grid").
  */
 #ifndef VDI_CATALYST_H
 #define VDI_CATALYST_H
@@ -36,8 +38,8 @@ extern "C" {
 enum {
   VDI_CATALYST_OK = 0,
   VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer, a size below 1, an unknown type, arrays before blocks */
-  VDI_CATALYST_ENGINE = 2,       /* ParaView's engine can't be started, or was started before in this process */
-  VDI_CATALYST_SCRIPT = 3        /* a script, or a filter or extractor in it, failed in this step */
+  VDI_CATALYST_ENGINE = 2, /* ParaView's engine can't be started, or was started before in this process */
+  VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed in this step */
 };
 
 /* Scalar types. */
@@ -55,9 +57,10 @@ enum {
 /* Where values lie. */
 enum { VDI_CATALYST_POINTS = 0, VDI_CATALYST_CELLS = 1 };
 
-/* One block of a uniform lattice. `cells` counts cells per axis, ghost cells included; point arrays have one value more per
- * axis. `origin` is the lower corner of the first cell, ghost or not. Values lie x fastest, then y, then z. Neighbours either
- * share the points of their common face, or have ghost layers, or neither (then a layer is exchanged between ranks). */
+/* One block of a uniform lattice. `cells` counts cells per axis, ghost cells included; point arrays have one
+ * value more per axis. `origin` is the lower corner of the first cell, ghost or not. Values lie x fastest,
+ * then y, then z. Neighbours either share the points of their common face, or have ghost layers, or neither
+ * (then a layer is exchanged between ranks). */
 typedef struct vdi_catalyst_block {
   int32_t cells[3];
   int32_t ghost_lo[3]; /* layers of ghost cells at the lower side of each axis */
@@ -68,17 +71,20 @@ typedef struct vdi_catalyst_block {
 
 typedef struct vdi_catalyst vdi_catalyst;
 
-/* Starts the engine on a duplicate of the communicator (its Fortran handle) and adds the scripts. Once a process. On failure
- * *catalyst is null, and the other functions, given null, do nothing but return VDI_CATALYST_BAD_ARGUMENT. */
-VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
-                                             vdi_catalyst** catalyst);
+/* Starts the engine on a duplicate of the communicator (its Fortran handle) and adds the scripts. Once a
+ * process. On failure *catalyst is null, and the other functions, given null, do nothing but return
+ * VDI_CATALYST_BAD_ARGUMENT. */
+VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
+                                             const char* const* scripts, vdi_catalyst** catalyst);
 
 /* This rank's blocks, none included; forgets all arrays. */
-VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks);
+VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count,
+                                             const vdi_catalyst_block* blocks);
 
-/* The values of one named array: data[i] belongs to block i. Calling it again with the same name replaces the pointers. */
-VDI_CATALYST_API int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
-                                            const void* const* data);
+/* The values of one named array: data[i] belongs to block i. Calling it again with the same name replaces the
+ * pointers. */
+VDI_CATALYST_API int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type,
+                                            int32_t association, const void* const* data);
 
 /* Runs the scripts on the blocks as they are now. */
 VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time);

@@ -1,5 +1,5 @@
-// Catch2's main for tests that run under mpirun: every rank runs every test case, in the same order. A rank whose test
-// failed makes the whole run fail.
+// Catch2's main for tests that run under mpirun: every rank runs every test case, in the same order. A rank
+// whose test failed makes the whole run fail.
 #define CATCH_CONFIG_RUNNER
 #include <mpi.h>
 

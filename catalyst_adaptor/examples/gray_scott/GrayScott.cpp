@@ -15,14 +15,14 @@ namespace {
 
 struct Options {
   gray_scott::Parameters parameters;
-  int steps = 1200;
-  int every = 300;
+  int steps = 600;
+  int every = 200;
   std::vector<std::string> scripts;
 };
 
-/// The blocks of this rank as the adaptor takes them: cell data with one layer of ghost cells all around, except at the faces
-/// of the domain, where periodic neighbours aren't neighbours in space. The halo is there all the same, so the ghost layer
-/// is announced and merely lies outside.
+/// The blocks of this rank as the adaptor takes them: cell data with one layer of ghost cells all around,
+/// except at the faces of the domain, where periodic neighbours aren't neighbours in space. The halo is there
+/// all the same, so the ghost layer is announced and merely lies outside.
 std::vector<vdi_catalyst_block> describe(const gray_scott::Simulation& simulation, int size) {
   std::vector<vdi_catalyst_block> blocks;
   const int n = simulation.cellsPerBlock();
@@ -50,8 +50,8 @@ int simulate(const Options& options) {
   vdi_catalyst* catalyst = nullptr;
   int worst = 0;
   if (!scripts.empty()) {
-    worst = vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), static_cast<int>(scripts.size()), scripts.data(),
-                                    &catalyst);
+    worst = vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), static_cast<int>(scripts.size()),
+                                    scripts.data(), &catalyst);
   }
   double simulated = 0.0;
   double visualised = 0.0;
@@ -72,12 +72,13 @@ int simulate(const Options& options) {
     if (code == VDI_CATALYST_OK) {
       code = vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_CELLS, data.data());
     }
-    if (code == VDI_CATALYST_OK) code = vdi_catalyst_execute(catalyst, step, step * options.parameters.timeStep);
+    if (code == VDI_CATALYST_OK)
+      code = vdi_catalyst_execute(catalyst, step, step * options.parameters.timeStep);
     worst = worst > code ? worst : code;
     visualised += seconds();
     if (rank == 0) {
-      std::printf("gray_scott: step %d of %d, simulated %.1f s, visualised %.1f s%s\n", step, options.steps, simulated,
-                  visualised, code == VDI_CATALYST_OK ? "" : ", this step's visualisation failed");
+      std::printf("gray_scott: step %d of %d, simulated %.1f s, visualised %.1f s%s\n", step, options.steps,
+                  simulated, visualised, code == VDI_CATALYST_OK ? "" : ", this step's visualisation failed");
       std::fflush(stdout);
     }
   }
@@ -95,8 +96,11 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app("Gray-Scott reaction-diffusion on blocks scattered over MPI ranks, visualised in situ");
   app.add_option("--size", options.parameters.size, "cells per axis")->capture_default_str();
-  app.add_option("--blocks", options.parameters.blocks, "blocks per axis; divides the size")->capture_default_str();
-  app.add_option("--steps", options.steps, "steps to simulate")->capture_default_str()->check(CLI::PositiveNumber);
+  app.add_option("--blocks", options.parameters.blocks, "blocks per axis; divides the size")
+      ->capture_default_str();
+  app.add_option("--steps", options.steps, "steps to simulate")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
   app.add_option("--every", options.every, "steps between two visualisations")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);

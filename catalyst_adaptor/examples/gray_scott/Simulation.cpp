@@ -34,8 +34,11 @@ float seededV(double x, double y, double z) {
 }  // namespace
 
 Simulation::Simulation(MPI_Comm comm, const Parameters& parameters)
-    : comm_(comm), parameters_(parameters), n_(parameters.blocks > 0 ? parameters.size / parameters.blocks : 0) {
-  if (parameters.blocks < 1 || parameters.size < parameters.blocks || parameters.size % parameters.blocks != 0) {
+    : comm_(comm),
+      parameters_(parameters),
+      n_(parameters.blocks > 0 ? parameters.size / parameters.blocks : 0) {
+  if (parameters.blocks < 1 || parameters.size < parameters.blocks ||
+      parameters.size % parameters.blocks != 0) {
     throw std::invalid_argument("the number of blocks per axis must divide the size");
   }
   int ranks = 1;
@@ -99,7 +102,8 @@ void Simulation::react(Block& block) const {
   const std::size_t strideY = cell(0, 1, 0);
   const std::size_t strideZ = cell(0, 0, 1);
   const auto laplacian = [&](const std::vector<float>& f, std::size_t i) {
-    return f[i - 1] + f[i + 1] + f[i - strideY] + f[i + strideY] + f[i - strideZ] + f[i + strideZ] - 6.0F * f[i];
+    return (f[i - 1] + f[i + 1] + f[i - strideY] + f[i + strideY] + f[i - strideZ] + f[i + strideZ]) / 6.0F -
+           f[i];
   };
   for (int z = 1; z <= n_; ++z) {
     for (int y = 1; y <= n_; ++y) {
@@ -121,9 +125,12 @@ int Simulation::indexOf(const std::array<int, 3>& at) const {
   return (wrap(at[2]) * b + wrap(at[1])) * b + wrap(at[0]);
 }
 
-int Simulation::ownerOf(const std::array<int, 3>& at) const { return owners_[static_cast<std::size_t>(indexOf(at))]; }
+int Simulation::ownerOf(const std::array<int, 3>& at) const {
+  return owners_[static_cast<std::size_t>(indexOf(at))];
+}
 
-/// One axis after the other, each time with the halo of the axes before: edges and corners arrive by way of faces.
+/// One axis after the other, each time with the halo of the axes before: edges and corners arrive by way of
+/// faces.
 void Simulation::exchangeHalos() {
   for (int axis = 0; axis < 3; ++axis) exchangeAxis(axis);
 }
@@ -153,14 +160,15 @@ void Simulation::exchangeAxis(int axis) {
       in.emplace_back(out.back().size());
       recipients.emplace_back(&block, Face{axis, above});
       requests.resize(requests.size() + 2);
-      MPI_Irecv(in.back().data(), size, MPI_FLOAT, ownerOf(neighbour), indexOf(block.at) * 2 + (above ? 1 : 0), comm_,
-                &requests[requests.size() - 2]);
-      MPI_Isend(out.back().data(), size, MPI_FLOAT, ownerOf(neighbour), indexOf(neighbour) * 2 + (above ? 0 : 1), comm_,
-                &requests[requests.size() - 1]);
+      MPI_Irecv(in.back().data(), size, MPI_FLOAT, ownerOf(neighbour),
+                indexOf(block.at) * 2 + (above ? 1 : 0), comm_, &requests[requests.size() - 2]);
+      MPI_Isend(out.back().data(), size, MPI_FLOAT, ownerOf(neighbour),
+                indexOf(neighbour) * 2 + (above ? 0 : 1), comm_, &requests[requests.size() - 1]);
     }
   }
   MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
-  for (std::size_t i = 0; i < recipients.size(); ++i) unpack(*recipients[i].first, recipients[i].second, in[i].data());
+  for (std::size_t i = 0; i < recipients.size(); ++i)
+    unpack(*recipients[i].first, recipients[i].second, in[i].data());
 }
 
 void Simulation::pack(const Block& block, const Face& face, std::vector<float>& out) const {
@@ -168,7 +176,9 @@ void Simulation::pack(const Block& block, const Face& face, std::vector<float>& 
   for (const std::vector<float>* field : {&block.u, &block.v}) {
     for (int b = 0; b < n_ + 2; ++b) {
       for (int a = 0; a < n_ + 2; ++a) {
-        out.push_back((*field)[face.axis == 0 ? cell(layer, a, b) : face.axis == 1 ? cell(a, layer, b) : cell(a, b, layer)]);
+        out.push_back((*field)[face.axis == 0   ? cell(layer, a, b)
+                               : face.axis == 1 ? cell(a, layer, b)
+                                                : cell(a, b, layer)]);
       }
     }
   }
@@ -179,7 +189,9 @@ void Simulation::unpack(Block& block, const Face& face, const float* in) const {
   for (std::vector<float>* field : {&block.u, &block.v}) {
     for (int b = 0; b < n_ + 2; ++b) {
       for (int a = 0; a < n_ + 2; ++a) {
-        (*field)[face.axis == 0 ? cell(layer, a, b) : face.axis == 1 ? cell(a, layer, b) : cell(a, b, layer)] = *in++;
+        (*field)[face.axis == 0   ? cell(layer, a, b)
+                 : face.axis == 1 ? cell(a, layer, b)
+                                  : cell(a, b, layer)] = *in++;
       }
     }
   }

@@ -1,4 +1,5 @@
-// Gray-Scott reaction-diffusion in three dimensions (Pearson, Science 261, 1993), on blocks dealt to MPI ranks.
+// Gray-Scott reaction-diffusion in three dimensions (Pearson, Science 261, 1993), on blocks dealt to MPI
+// ranks.
 #pragma once
 
 #include <mpi.h>
@@ -12,11 +13,11 @@ namespace gray_scott {
 struct Parameters {
   int size = 96;            // cells per axis of the cubic, periodic domain
   int blocks = 6;           // blocks per axis; divides size
-  double feed = 0.03;       // F
-  double kill = 0.062;      // k
-  double diffusionU = 0.2;  // cells^2 per unit of time
+  double feed = 0.01;       // F
+  double kill = 0.05;       // k
+  double diffusionU = 0.2;  // per unit of time, towards the mean of the six neighbours
   double diffusionV = 0.1;
-  double timeStep = 0.9;
+  double timeStep = 2.0;
 };
 
 /// One cube of cells with a layer of halo cells around it.
@@ -29,8 +30,8 @@ struct Block {
   std::vector<float> nextV;
 };
 
-/// Blocks are numbered along a Morton curve and dealt to the ranks one after the other, so each rank's region is scattered all
-/// over the domain: far from convex, as decompositions that balance load are.
+/// Blocks are numbered along a Morton curve and dealt to the ranks one after the other, so each rank's region
+/// is scattered all over the domain: far from convex, as decompositions that balance load are.
 class Simulation {
  public:
   Simulation(MPI_Comm comm, const Parameters& parameters);
@@ -56,15 +57,16 @@ class Simulation {
   void react(Block& block) const;
   std::size_t cell(int x, int y, int z) const {
     const auto side = static_cast<std::size_t>(n_) + 2;
-    return (static_cast<std::size_t>(z) * side + static_cast<std::size_t>(y)) * side + static_cast<std::size_t>(x);
+    return (static_cast<std::size_t>(z) * side + static_cast<std::size_t>(y)) * side +
+           static_cast<std::size_t>(x);
   }
 
   MPI_Comm comm_;
   Parameters parameters_;
   int n_;
   int rank_ = 0;
-  std::vector<int> owners_;       // of all blocks
-  std::vector<int> localIndex_;   // of all blocks; -1: another rank's
+  std::vector<int> owners_;      // of all blocks
+  std::vector<int> localIndex_;  // of all blocks; -1: another rank's
   std::vector<Block> blocks_;
 };
 

@@ -34,16 +34,35 @@ struct TypedArray {
 /// The library's type for a VTK type of that size; false for 64-bit integers and what isn't a number.
 bool scalarTypeOf(int vtkType, vdi::ScalarType& type) {
   switch (vtkType) {
-    case VTK_UNSIGNED_CHAR: type = vdi::ScalarType::U8; return true;
-    case VTK_CHAR: type = std::is_signed_v<char> ? vdi::ScalarType::I8 : vdi::ScalarType::U8; return true;
-    case VTK_SIGNED_CHAR: type = vdi::ScalarType::I8; return true;
-    case VTK_UNSIGNED_SHORT: type = vdi::ScalarType::U16; return true;
-    case VTK_SHORT: type = vdi::ScalarType::I16; return true;
-    case VTK_UNSIGNED_INT: type = vdi::ScalarType::U32; return true;
-    case VTK_INT: type = vdi::ScalarType::I32; return true;
-    case VTK_FLOAT: type = vdi::ScalarType::F32; return true;
-    case VTK_DOUBLE: type = vdi::ScalarType::F64; return true;
-    default: return false;
+    case VTK_UNSIGNED_CHAR:
+      type = vdi::ScalarType::U8;
+      return true;
+    case VTK_CHAR:
+      type = std::is_signed_v<char> ? vdi::ScalarType::I8 : vdi::ScalarType::U8;
+      return true;
+    case VTK_SIGNED_CHAR:
+      type = vdi::ScalarType::I8;
+      return true;
+    case VTK_UNSIGNED_SHORT:
+      type = vdi::ScalarType::U16;
+      return true;
+    case VTK_SHORT:
+      type = vdi::ScalarType::I16;
+      return true;
+    case VTK_UNSIGNED_INT:
+      type = vdi::ScalarType::U32;
+      return true;
+    case VTK_INT:
+      type = vdi::ScalarType::I32;
+      return true;
+    case VTK_FLOAT:
+      type = vdi::ScalarType::F32;
+      return true;
+    case VTK_DOUBLE:
+      type = vdi::ScalarType::F64;
+      return true;
+    default:
+      return false;
   }
 }
 
@@ -52,7 +71,8 @@ vtkSmartPointer<vtkDataArray> magnitudeOf(vtkDataArray* array) {
   result->SetNumberOfTuples(array->GetNumberOfTuples());
   for (vtkIdType i = 0; i < array->GetNumberOfTuples(); ++i) {
     double sum = 0.0;
-    for (int c = 0; c < array->GetNumberOfComponents(); ++c) sum += array->GetComponent(i, c) * array->GetComponent(i, c);
+    for (int c = 0; c < array->GetNumberOfComponents(); ++c)
+      sum += array->GetComponent(i, c) * array->GetComponent(i, c);
     result->SetValue(i, std::sqrt(sum));
   }
   return result;
@@ -63,7 +83,8 @@ TypedArray typed(vtkDataArray* array, int component) {
   if (array->GetNumberOfComponents() > 1) {
     if (component >= array->GetNumberOfComponents()) {
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("there is no component {}, the array has {}", component, array->GetNumberOfComponents()),
+                  fmt::format("there is no component {}, the array has {}", component,
+                              array->GetNumberOfComponents()),
                   array->GetName());
     }
     if (component < 0) {
@@ -86,8 +107,9 @@ TypedArray typed(vtkDataArray* array, int component) {
   return result;
 }
 
-/// Cells of the image that are its own, as disjoint boxes [lo, hi) of cell indices: all of them in one box unless ghost or
-/// blanked cells say otherwise. Boxes grow along x, then y, then z, so that whole ghost layers leave one box.
+/// Cells of the image that are its own, as disjoint boxes [lo, hi) of cell indices: all of them in one box
+/// unless ghost or blanked cells say otherwise. Boxes grow along x, then y, then z, so that whole ghost
+/// layers leave one box.
 struct CellBox {
   glm::ivec3 lo;
   glm::ivec3 hi;
@@ -146,12 +168,16 @@ std::vector<CellBox> ownCells(vtkImageData* image, const glm::ivec3& cells) {
 void addImage(vtkImageData* image, const ArrayChoice& choice, std::vector<vdi::Block>& blocks) {
   if (image->GetNumberOfPoints() == 0) return;
   if (!image->GetDirectionMatrix()->IsIdentity()) {
-    throw Error(ErrorCode::InvalidArgument, "rotated images (a direction matrix) can't be handled; resample them first");
+    throw Error(ErrorCode::InvalidArgument,
+                "rotated images (a direction matrix) can't be handled; resample them first");
   }
-  auto* attributes = choice.cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
-  vtkDataArray* array = choice.name.empty() ? attributes->GetScalars() : attributes->GetArray(choice.name.c_str());
+  auto* attributes =
+      choice.cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
+  vtkDataArray* array =
+      choice.name.empty() ? attributes->GetScalars() : attributes->GetArray(choice.name.c_str());
   if (array == nullptr) {
-    throw Error(ErrorCode::InvalidArgument, fmt::format("a block has no {} array '{}'", choice.cells ? "cell" : "point", choice.name));
+    throw Error(ErrorCode::InvalidArgument,
+                fmt::format("a block has no {} array '{}'", choice.cells ? "cell" : "point", choice.name));
   }
   const TypedArray scalars = typed(array, choice.component);
   int extent[6];
@@ -166,8 +192,8 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, std::vector<vdi::B
   }
   const glm::ivec3 cells = glm::max(points - 1, glm::ivec3(1));
   // The deleter's copy of the smart pointer is what keeps the array alive.
-  const std::shared_ptr<const void> keepAlive(scalars.array->GetVoidPointer(0),
-                                              [array = scalars.array](const void*) mutable { array = nullptr; });
+  const std::shared_ptr<const void> keepAlive(
+      scalars.array->GetVoidPointer(0), [array = scalars.array](const void*) mutable { array = nullptr; });
   for (const CellBox& box : ownCells(image, cells)) {
     vdi::Block block = choice.cells
                            ? vdi::Block::fromCells(cells, origin, spacing, scalars.type, keepAlive.get())
@@ -187,10 +213,12 @@ void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, std::vector<vdi::Bl
   if (leaf == nullptr) return;
   auto* image = vtkImageData::SafeDownCast(leaf);
   if (image == nullptr) {
-    throw Error(ErrorCode::InvalidArgument,
-                fmt::format("{} can't be turned into a VDI; what can is vtkImageData, alone or in multiblock, partitioned "
-                            "or AMR data sets (Resample To Image makes it of anything)",
-                            leaf->GetClassName()));
+    throw Error(
+        ErrorCode::InvalidArgument,
+        fmt::format(
+            "{} can't be turned into a VDI; what can is vtkImageData, alone or in multiblock, partitioned "
+            "or AMR data sets (Resample To Image makes it of anything)",
+            leaf->GetClassName()));
   }
   addImage(image, choice, blocks);
 }
@@ -213,8 +241,8 @@ std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice)
   return blocks;
 }
 
-vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity, double low,
-                                         double high, double unitDistance) {
+vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity,
+                                         double low, double high, double unitDistance) {
   vdi::TransferFunction function;
   function.unitDistance = unitDistance;
   vtkSmartPointer<vtkScalarsToColors> map = colors;

@@ -17,19 +17,21 @@ namespace pv {
 /// Which scalars of a data set.
 struct ArrayChoice {
   std::string name;
-  bool cells = false;   // of cells, else of points
-  int component = 0;    // -1: magnitude
+  bool cells = false;  // of cells, else of points
+  int component = 0;   // -1: magnitude
 };
 
-/// The blocks of an image, or of all images of a composite data set. Scalars are shared, not copied, where VTK has them
-/// contiguous with one component and of a type that the library knows. Ghost and blanked cells aren't owned. Throws
-/// vdi::Error{InvalidArgument}: a data set that isn't vtkImageData, a rotated image, a missing array.
+/// The blocks of an image, or of all images of a composite data set. Scalars are shared, not copied, where
+/// VTK has them contiguous with one component and of a type that the library knows. Ghost and blanked cells
+/// aren't owned. Throws vdi::Error{InvalidArgument}: a data set that isn't vtkImageData, a rotated image, a
+/// missing array.
 std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice);
 
-/// ParaView's colour map and opacity function, sampled densely enough for any colour space. Without a colour map: "Cool to
-/// Warm" over [low, high]; without an opacity function: the colour map's own if it has one, else a ramp from 0 to 1.
-vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity, double low,
-                                         double high, double unitDistance);
+/// ParaView's colour map and opacity function, sampled densely enough for any colour space. Without a colour
+/// map: "Cool to Warm" over [low, high]; without an opacity function: the colour map's own if it has one,
+/// else a ramp from 0 to 1.
+vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity,
+                                         double low, double high, double unitDistance);
 
 }  // namespace pv
 

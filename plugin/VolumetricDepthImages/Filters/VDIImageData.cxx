@@ -74,14 +74,16 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
   vtkNew<vtkUnsignedIntArray> counts;
   counts->SetName("SupersegmentCount");
   counts->SetNumberOfTuples(static_cast<vtkIdType>(vdi.lists.listCount()));
-  for (std::size_t i = 0; i < vdi.lists.listCount(); ++i) counts->SetValue(static_cast<vtkIdType>(i), vdi.lists.countOf(i));
+  for (std::size_t i = 0; i < vdi.lists.listCount(); ++i)
+    counts->SetValue(static_cast<vtkIdType>(i), vdi.lists.countOf(i));
   image->GetPointData()->AddArray(counts);
 
   vtkFieldData* fields = image->GetFieldData();
   std::copy(vdi.lists.offsets.begin(), vdi.lists.offsets.end(),
-            addField<vtkUnsignedIntArray>(fields, "VDI.offsets", 1, static_cast<vtkIdType>(vdi.lists.offsets.size())));
-  float* segments =
-      addField<vtkFloatArray>(fields, "VDI.supersegments", 6, static_cast<vtkIdType>(vdi.lists.segments.size()));
+            addField<vtkUnsignedIntArray>(fields, "VDI.offsets", 1,
+                                          static_cast<vtkIdType>(vdi.lists.offsets.size())));
+  float* segments = addField<vtkFloatArray>(fields, "VDI.supersegments", 6,
+                                            static_cast<vtkIdType>(vdi.lists.segments.size()));
   const std::size_t bytes = vdi.lists.segments.size() * sizeof(vdi::Supersegment);
   if (bytes > 0) std::memcpy(segments, vdi.lists.segments.data(), bytes);
   double* camera = addField<vtkDoubleArray>(fields, "VDI.camera", 1, 12);

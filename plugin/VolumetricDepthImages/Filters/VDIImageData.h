@@ -1,13 +1,14 @@
-// A VDI as standard VTK data: an image with the flat picture, and the VDI beside it in field data. Writers, extractors, Live
-// and pipelines then work as with any image.
-//   point data  RGBA               unsigned char [h][w][4], straight colour (VTK blends with alpha), row 0 at the bottom
+// A VDI as standard VTK data: an image with the flat picture, and the VDI beside it in field data. Writers,
+// extractors, Live and pipelines then work as with any image.
+//   point data  RGBA               unsigned char [h][w][4], straight colour (VTK blends with alpha), row 0 at
+//   the bottom
 //               SupersegmentCount  unsigned int [h][w]
 //               Depth              float [h][w], of RenderVDI only
 //   field data  VDI.offsets        unsigned int [w*h + 1]
 //               VDI.supersegments  float [n][6]: front, back, red, green, blue, opacity
-//               VDI.camera         double [12]: position, focal point, view-up, view angle, parallel projection, scale
-//               VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ...
-//               VDI.parameters     double [4]: N_S, sample step, time, time step
+//               VDI.camera         double [12]: position, focal point, view-up, view angle, parallel
+//               projection, scale VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ... VDI.parameters
+//               double [4]: N_S, sample step, time, time step
 #ifndef VDIImageData_h
 #define VDIImageData_h
 
@@ -25,8 +26,8 @@ namespace pv {
 void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth);
 /// The flat picture of the VDI and the VDI itself.
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi);
-/// False if the data object carries no VDI (what a rank other than the root has). Throws vdi::Error{Format} for one that
-/// isn't sound.
+/// False if the data object carries no VDI (what a rank other than the root has). Throws vdi::Error{Format}
+/// for one that isn't sound.
 bool getVdi(vtkDataObject* data, vdi::Vdi& vdi);
 
 }  // namespace pv

@@ -8,8 +8,10 @@
 namespace pv {
 
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller) {
-  auto* communicator = controller != nullptr ? vtkMPICommunicator::SafeDownCast(controller->GetCommunicator()) : nullptr;
-  if (communicator == nullptr || controller->GetNumberOfProcesses() == 1) return vdi::comm::Communicator::serial();
+  auto* communicator =
+      controller != nullptr ? vtkMPICommunicator::SafeDownCast(controller->GetCommunicator()) : nullptr;
+  if (communicator == nullptr || controller->GetNumberOfProcesses() == 1)
+    return vdi::comm::Communicator::serial();
   return vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(*communicator->GetMPIComm()->GetHandle()));
 }
 

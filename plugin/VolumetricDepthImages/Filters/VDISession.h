@@ -11,11 +11,12 @@ class vtkMultiProcessController;
 
 namespace pv {
 
-/// A communicator over the controller's MPI communicator (a duplicate: collective), or over this process alone when there's
-/// none.
+/// A communicator over the controller's MPI communicator (a duplicate: collective), or over this process
+/// alone when there's none.
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller);
 
-/// The process's device, made at the first call and kept while anybody holds it. Throws vdi::Error{DeviceUnavailable}.
+/// The process's device, made at the first call and kept while anybody holds it. Throws
+/// vdi::Error{DeviceUnavailable}.
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank);
 
 }  // namespace pv

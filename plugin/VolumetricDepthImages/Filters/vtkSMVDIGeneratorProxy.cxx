@@ -1,5 +1,6 @@
 #include "vtkSMVDIGeneratorProxy.h"
 
+#include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkPVArrayInformation.h>
 #include <vtkPVDataInformation.h>
@@ -9,7 +10,6 @@
 #include <vtkSMTransferFunctionManager.h>
 #include <vtkSMTransferFunctionProxy.h>
 #include <vtkSmartPointer.h>
-#include <vtkNew.h>
 
 vtkStandardNewMacro(vtkSMVDIGeneratorProxy);
 
@@ -27,7 +27,8 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable() {
   vtkSMPropertyHelper table(this, "LookupTable");
   vtkSMPropertyHelper scalars(this, "SelectInputScalars");
   const char* name = scalars.GetNumberOfElements() > 4 ? scalars.GetAsString(4) : nullptr;
-  const bool ours = table.GetNumberOfElements() == 0 || table.GetAsProxy() == nullptr || !this->Chosen.empty();
+  const bool ours =
+      table.GetNumberOfElements() == 0 || table.GetAsProxy() == nullptr || !this->Chosen.empty();
   if (!ours || name == nullptr || *name == '\0' || this->Chosen == name) return;
   vtkNew<vtkSMTransferFunctionManager> manager;
   vtkSMProxy* map = manager->GetColorTransferFunction(name, this->GetSessionProxyManager());
@@ -36,7 +37,8 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable() {
   auto* input = vtkSMSourceProxy::SafeDownCast(vtkSMPropertyHelper(this, "Input").GetAsProxy());
   if (input != nullptr && vtkSMPropertyHelper(map, "ScalarRangeInitialized", true).GetAsInt() == 0) {
     input->UpdatePipeline();
-    vtkPVDataInformation* data = input->GetDataInformation(vtkSMPropertyHelper(this, "Input").GetOutputPort());
+    vtkPVDataInformation* data =
+        input->GetDataInformation(vtkSMPropertyHelper(this, "Input").GetOutputPort());
     vtkPVArrayInformation* array = data->GetArrayInformation(name, scalars.GetAsInt(3));
     if (array != nullptr) {
       double range[2];

@@ -2,8 +2,9 @@
  * @class vtkSMVDIGeneratorProxy
  * @brief gives VolumetricDepthImage the colour map of its array
  *
- * When nobody has set LookupTable, the proxy takes ParaView's colour map for the chosen array, the one that a representation
- * would use, with its opacity function. A user who sets another one, or none after that, is left alone.
+ * When nobody has set LookupTable, the proxy takes ParaView's colour map for the chosen array, the one that a
+ * representation would use, with its opacity function. A user who sets another one, or none after that, is
+ * left alone.
  */
 #ifndef vtkSMVDIGeneratorProxy_h
 #define vtkSMVDIGeneratorProxy_h

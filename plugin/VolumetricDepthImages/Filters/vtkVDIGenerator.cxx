@@ -34,10 +34,13 @@ struct vtkVDIGenerator::Internals {
 
 vtkVDIGenerator::vtkVDIGenerator()
     : Internal(new Internals), Controller(vtkMultiProcessController::GetGlobalController()) {
-  this->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, vtkDataSetAttributes::SCALARS);
+  this->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS,
+                               vtkDataSetAttributes::SCALARS);
 }
 
-vtkVDIGenerator::~vtkVDIGenerator() { this->SetReport(nullptr); }
+vtkVDIGenerator::~vtkVDIGenerator() {
+  this->SetReport(nullptr);
+}
 
 void vtkVDIGenerator::SetReport(const char* text) {
   delete[] this->Report;
@@ -82,16 +85,19 @@ vtkMTimeType vtkVDIGenerator::GetMTime() {
 }
 
 int vtkVDIGenerator::FillInputPortInformation(int, vtkInformation* info) {
-  // Any data object: RequestData says clearly what it can't take, and composite ones come whole instead of leaf by leaf.
+  // Any data object: RequestData says clearly what it can't take, and composite ones come whole instead of
+  // leaf by leaf.
   info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject");
   return 1;
 }
 
-int vtkVDIGenerator::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) {
-  // The other ranks' pictures are empty; announcing that keeps the pipeline from asking them for more again and again.
+int vtkVDIGenerator::RequestInformation(vtkInformation*, vtkInformationVector**,
+                                        vtkInformationVector* outputs) {
+  // The other ranks' pictures are empty; announcing that keeps the pipeline from asking them for more again
+  // and again.
   const bool root = this->Controller == nullptr || this->Controller->GetLocalProcessId() == 0;
-  const int extent[6] = {0, root ? this->Resolution[0] - 1 : -1, 0, root ? this->Resolution[1] - 1 : -1,
-                         0, root ? 0 : -1};
+  const int extent[6] = {
+      0, root ? this->Resolution[0] - 1 : -1, 0, root ? this->Resolution[1] - 1 : -1, 0, root ? 0 : -1};
   vtkInformation* info = outputs->GetInformationObject(0);
   info->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent, 6);
   info->Set(vtkDataObject::SPACING(), 1.0, 1.0, 1.0);
@@ -100,15 +106,18 @@ int vtkVDIGenerator::RequestInformation(vtkInformation*, vtkInformationVector**,
   return 1;
 }
 
-int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*) {
+int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs,
+                                         vtkInformationVector*) {
   using Pipeline = vtkStreamingDemandDrivenPipeline;
   vtkInformation* info = inputs[0]->GetInformationObject(0);
   const int rank = this->Controller ? this->Controller->GetLocalProcessId() : 0;
   const int ranks = this->Controller ? this->Controller->GetNumberOfProcesses() : 1;
-  // Cell data needs a neighbour's cells to interpolate up to the common face; points on the face are both blocks' anyway.
+  // Cell data needs a neighbour's cells to interpolate up to the common face; points on the face are both
+  // blocks' anyway.
   int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
   if (vtkInformation* array = this->GetInputArrayInformation(0)) {
-    if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) association = array->Get(vtkDataObject::FIELD_ASSOCIATION());
+    if (array->Has(vtkDataObject::FIELD_ASSOCIATION()))
+      association = array->Get(vtkDataObject::FIELD_ASSOCIATION());
   }
   const int ghosts = ranks > 1 && association == vtkDataObject::FIELD_ASSOCIATION_CELLS ? 1 : 0;
   info->Set(Pipeline::UPDATE_PIECE_NUMBER(), rank);
@@ -127,28 +136,32 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
 
 namespace {
 
-vdi::Camera cameraOf(const double* position, const double* focalPoint, const double* viewUp, double angle, bool parallel,
-                     double scale) {
+vdi::Camera cameraOf(const double* position, const double* focalPoint, const double* viewUp, double angle,
+                     bool parallel, double scale) {
   const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
   return {vector(position), vector(focalPoint), vector(viewUp), angle, parallel, scale};
 }
 
 std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
-  std::string text = "rank  blocks  volume MiB  upload s  generate s  distribute s  composite s  gather s  sent MiB  device MiB\n";
+  std::string text =
+      "rank  blocks  volume MiB  upload s  generate s  distribute s  composite s  gather s  sent MiB  device "
+      "MiB\n";
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const vdi::RankReport& r = reports[i];
     constexpr double mib = 1024.0 * 1024.0;
-    text += fmt::format("{:4}  {:6}  {:10.1f}  {:8.3f}  {:10.3f}  {:12.3f}  {:11.3f}  {:8.3f}  {:8.2f}  {:10.1f}\n", i, r.blocks,
-                        static_cast<double>(r.volumeBytes) / mib, r.uploadSeconds, r.generateSeconds,
-                        r.distributeSeconds, r.compositeSeconds, r.gatherSeconds, static_cast<double>(r.bytesSent) / mib,
-                        static_cast<double>(r.deviceBytes) / mib);
+    text += fmt::format(
+        "{:4}  {:6}  {:10.1f}  {:8.3f}  {:10.3f}  {:12.3f}  {:11.3f}  {:8.3f}  {:8.2f}  {:10.1f}\n", i,
+        r.blocks, static_cast<double>(r.volumeBytes) / mib, r.uploadSeconds, r.generateSeconds,
+        r.distributeSeconds, r.compositeSeconds, r.gatherSeconds, static_cast<double>(r.bytesSent) / mib,
+        static_cast<double>(r.deviceBytes) / mib);
   }
   return text + "device of rank 0: " + device + "\n";
 }
 
 }  // namespace
 
-int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) {
+int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
+                                 vtkInformationVector* outputs) {
   vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
@@ -185,7 +198,8 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
     if (vtkInformation* array = this->GetInputArrayInformation(0)) {
       if (array->Has(vtkDataObject::FIELD_NAME())) choice.name = array->Get(vtkDataObject::FIELD_NAME());
       if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) {
-        choice.cells = array->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_CELLS;
+        choice.cells =
+            array->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_CELLS;
       }
     }
     choice.component = this->Component;
@@ -197,7 +211,8 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
 
   const vdi::Scene& scene = generator.scene();
   const double diagonal = scene.bounds.empty() ? 1.0 : glm::length(scene.bounds.size());
-  const double unit = this->ScalarOpacityUnitDistance > 0.0 ? this->ScalarOpacityUnitDistance : 0.01 * diagonal;
+  const double unit =
+      this->ScalarOpacityUnitDistance > 0.0 ? this->ScalarOpacityUnitDistance : 0.01 * diagonal;
   vdi::ScalarRange range = generator.scalarRange();
   if (!(range.min < range.max)) {
     const double low = range.min <= range.max ? range.min : 0.0;
@@ -218,7 +233,8 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
     return !this->CheckAbort();
   };
   const auto takeReport = [&] {
-    this->SetReport(generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
+    this->SetReport(
+        generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
   };
   if (this->PictureOnly) {
     const std::optional<vdi::Image> picture = generator.renderVolume(camera, function, settings, progress);

@@ -2,10 +2,11 @@
  * @class vtkVDIGenerator
  * @brief makes a Volumetric Depth Image (VDI) of a distributed volume
  *
- * Input: vtkImageData, or images in vtkPartitionedDataSet(Collection), vtkMultiBlockDataSet, vtkOverlappingAMR or
- * vtkNonOverlappingAMR. Each rank brings the blocks it has, in any arrangement. Output on rank 0: a vtkImageData of
- * Resolution with the picture seen from the camera, and the VDI in its field data (VDIImageData.h has the arrays); empty on
- * other ranks. Collective: all ranks of the controller update together; when one fails, all return 0.
+ * Input: vtkImageData, or images in vtkPartitionedDataSet(Collection), vtkMultiBlockDataSet,
+ * vtkOverlappingAMR or vtkNonOverlappingAMR. Each rank brings the blocks it has, in any arrangement. Output
+ * on rank 0: a vtkImageData of Resolution with the picture seen from the camera, and the VDI in its field
+ * data (VDIImageData.h has the arrays); empty on other ranks. Collective: all ranks of the controller update
+ * together; when one fails, all return 0.
  */
 #ifndef vtkVDIGenerator_h
 #define vtkVDIGenerator_h
@@ -29,8 +30,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   ///@{
   /**
-   * Colour map; its scalar opacity function is used unless SetScalarOpacityFunction gave another one. None: "Cool to Warm"
-   * over the scalars' range.
+   * Colour map; its scalar opacity function is used unless SetScalarOpacityFunction gave another one. None:
+   * "Cool to Warm" over the scalars' range.
    */
   void SetLookupTable(vtkScalarsToColors* table);
   void SetScalarOpacityFunction(vtkPiecewiseFunction* function);
@@ -38,7 +39,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   ///@{
   /**
-   * Distance over which the opacity function holds, in world units; 0 (default): a hundredth of the scene's diagonal.
+   * Distance over which the opacity function holds, in world units; 0 (default): a hundredth of the scene's
+   * diagonal.
    */
   vtkSetClampMacro(ScalarOpacityUnitDistance, double, 0.0, VTK_DOUBLE_MAX);
   vtkGetMacro(ScalarOpacityUnitDistance, double);
@@ -55,7 +57,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   /// Exchange ghost layers where blocks lack them.
   vtkSetMacro(FillGhosts, bool);
 
-  /// Plain volume rendering of the blocks, right for any arrangement, without a VDI beside the picture; default off.
+  /// Plain volume rendering of the blocks, right for any arrangement, without a VDI beside the picture;
+  /// default off.
   vtkSetMacro(PictureOnly, bool);
   /// The simulation's step, kept in the VDI.
   vtkSetMacro(TimeStep, int);

@@ -22,9 +22,13 @@ bool isRoot() {
 
 }  // namespace
 
-vtkVDIReader::vtkVDIReader() { this->SetNumberOfInputPorts(0); }
+vtkVDIReader::vtkVDIReader() {
+  this->SetNumberOfInputPorts(0);
+}
 
-vtkVDIReader::~vtkVDIReader() { this->SetFileName(nullptr); }
+vtkVDIReader::~vtkVDIReader() {
+  this->SetFileName(nullptr);
+}
 
 void vtkVDIReader::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);

@@ -2,8 +2,9 @@
  * @class vtkVDIReader
  * @brief reads a .vdi file
  *
- * Output as vtkVDIGenerator's: a vtkImageData with the flat picture and the VDI in field data, on rank 0; empty elsewhere.
- * docs/format.md describes the file. Series of files become time steps by vtkFileSeriesReader.
+ * Output as vtkVDIGenerator's: a vtkImageData with the flat picture and the VDI in field data, on rank 0;
+ * empty elsewhere. docs/format.md describes the file. Series of files become time steps by
+ * vtkFileSeriesReader.
  */
 #ifndef vtkVDIReader_h
 #define vtkVDIReader_h

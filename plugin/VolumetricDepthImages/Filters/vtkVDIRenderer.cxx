@@ -38,7 +38,8 @@ int vtkVDIRenderer::FillInputPortInformation(int, vtkInformation* info) {
   return 1;
 }
 
-int vtkVDIRenderer::RequestInformation(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) {
+int vtkVDIRenderer::RequestInformation(vtkInformation*, vtkInformationVector** inputs,
+                                       vtkInformationVector* outputs) {
   using Pipeline = vtkStreamingDemandDrivenPipeline;
   int extent[6] = {0, -1, 0, -1, 0, -1};
   vtkInformation* in = inputs[0]->GetInformationObject(0);
@@ -56,7 +57,8 @@ int vtkVDIRenderer::RequestInformation(vtkInformation*, vtkInformationVector** i
   return 1;
 }
 
-int vtkVDIRenderer::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector*) {
+int vtkVDIRenderer::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs,
+                                        vtkInformationVector*) {
   // A VDI is one thing: always all of it.
   using Pipeline = vtkStreamingDemandDrivenPipeline;
   vtkInformation* info = inputs[0]->GetInformationObject(0);
@@ -71,7 +73,8 @@ int vtkVDIRenderer::RequestUpdateExtent(vtkInformation*, vtkInformationVector** 
   return 1;
 }
 
-int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs, vtkInformationVector* outputs) {
+int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs,
+                                vtkInformationVector* outputs) {
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
   try {
@@ -106,7 +109,7 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
   if (!this->UseOriginalCamera) {
     const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
     camera = {vector(this->CameraPosition), vector(this->CameraFocalPoint), vector(this->CameraViewUp),
-              this->CameraViewAngle, this->CameraParallelProjection, this->CameraParallelScale};
+              this->CameraViewAngle,        this->CameraParallelProjection, this->CameraParallelScale};
   } else if (this->Azimuth == 0.0) {
     camera = internal.Original;
   }

@@ -2,8 +2,9 @@
  * @class vtkVDIRenderer
  * @brief renders a Volumetric Depth Image from a viewpoint
  *
- * Input: the output of vtkVDIGenerator or vtkVDIReader. Output: a vtkImageData with point data RGBA and Depth (view-space
- * depth of what's seen first, infinity where there's nothing). Runs where the VDI is, on rank 0; empty on other ranks.
+ * Input: the output of vtkVDIGenerator or vtkVDIReader. Output: a vtkImageData with point data RGBA and Depth
+ * (view-space depth of what's seen first, infinity where there's nothing). Runs where the VDI is, on rank 0;
+ * empty on other ranks.
  */
 #ifndef vtkVDIRenderer_h
 #define vtkVDIRenderer_h
@@ -22,8 +23,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
 
   ///@{
   /**
-   * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off) the VDI's own is used, turned by Azimuth
-   * degrees about its focal point.
+   * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off) the VDI's own is used,
+   * turned by Azimuth degrees about its focal point.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);

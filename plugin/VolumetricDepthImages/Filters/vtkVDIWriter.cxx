@@ -13,7 +13,9 @@ vtkStandardNewMacro(vtkVDIWriter);
 
 vtkVDIWriter::vtkVDIWriter() = default;
 
-vtkVDIWriter::~vtkVDIWriter() { this->SetFileName(nullptr); }
+vtkVDIWriter::~vtkVDIWriter() {
+  this->SetFileName(nullptr);
+}
 
 void vtkVDIWriter::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);

@@ -2,8 +2,8 @@
  * @class vtkVDIWriter
  * @brief writes the VDI of its input as a .vdi file
  *
- * Input: the output of vtkVDIGenerator or vtkVDIReader. The rank that has the VDI writes, under a temporary name that is
- * renamed when the file is whole; other ranks do nothing.
+ * Input: the output of vtkVDIGenerator or vtkVDIReader. The rank that has the VDI writes, under a temporary
+ * name that is renamed when the file is whole; other ranks do nothing.
  */
 #ifndef vtkVDIWriter_h
 #define vtkVDIWriter_h
