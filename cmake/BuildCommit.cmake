@@ -1,0 +1,17 @@
+# Writes OUTPUT with the short commit of SOURCE_DIR ("unknown" outside a checkout, "-dirty" with uncommitted changes).
+execute_process(
+  COMMAND git describe --always --dirty --exclude=*
+  WORKING_DIRECTORY "${SOURCE_DIR}"
+  OUTPUT_VARIABLE commit
+  OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+if(NOT commit)
+  set(commit "unknown")
+endif()
+set(text "inline constexpr const char* buildCommit = \"${commit}\";\n")
+set(existing "")
+if(EXISTS "${OUTPUT}")
+  file(READ "${OUTPUT}" existing)
+endif()
+if(NOT text STREQUAL existing)
+  file(WRITE "${OUTPUT}" "${text}")
+endif()
