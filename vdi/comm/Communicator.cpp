@@ -6,9 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <cstring>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <string_view>
 #include <utility>
 
 #include "vdi/core/Error.h"
@@ -56,7 +57,12 @@ struct Layout {
       total += size;
     }
   }
-  bool fits() const { return total <= mostElements; }
+  void demandFits() const {
+    if (total <= mostElements) return;
+    throw Error(
+        ErrorCode::Communication,
+        fmt::format("{} elements for one rank in one exchange; MPI's counts end at {}", total, mostElements));
+  }
 };
 
 Gathered emptyGathered(const Layout& layout, std::size_t elementBytes) {
@@ -69,48 +75,66 @@ Gathered emptyGathered(const Layout& layout, std::size_t elementBytes) {
   return result;
 }
 
-std::string describe(const std::exception_ptr& error) {
+/// An exception's text in a fixed size: telling the others that memory ran out needs none.
+using Text = std::array<char, 1024>;
+
+Text describe(const std::exception_ptr& error) {
+  Text text{};
+  const auto put = [&text](const char* what) { std::string_view(what).copy(text.data(), text.size() - 1); };
   try {
     std::rethrow_exception(error);
   } catch (const std::exception& e) {
-    return e.what();
+    put(e.what());
   } catch (...) {
-    return "an unknown exception";
+    put("an unknown exception");
   }
+  return text;
 }
+
+/// Frees a communicator, unless MPI has gone already.
+class OwnedComm {
+ public:
+  OwnedComm() = default;
+  OwnedComm(const OwnedComm&) = delete;
+  OwnedComm& operator=(const OwnedComm&) = delete;
+  ~OwnedComm() {
+    if (comm_ == MPI_COMM_NULL) return;
+    int finalized = 0;
+    MPI_Finalized(&finalized);
+    if (finalized == 0) MPI_Comm_free(&comm_);
+  }
+  MPI_Comm handle() const { return comm_; }
+  MPI_Comm* out() { return &comm_; }
+
+ private:
+  MPI_Comm comm_ = MPI_COMM_NULL;
+};
 
 }  // namespace
 
 struct Communicator::State {
-  MPI_Comm comm = MPI_COMM_NULL;  // null: serial
+  OwnedComm owned;  // null: serial
   int rank = 0;
   int size = 1;
   int localRank = 0;
 
-  State() = default;
-  State(const State&) = delete;
-  State& operator=(const State&) = delete;
-  ~State() {
-    if (comm == MPI_COMM_NULL) return;
-    int finalized = 0;
-    MPI_Finalized(&finalized);
-    if (finalized == 0) MPI_Comm_free(&comm);
-  }
-  bool serial() const { return comm == MPI_COMM_NULL; }
-
-  /// Every rank throws if a count doesn't fit on any of them.
-  void demandFits(bool fits) const {
-    int good = fits ? 1 : 0;
-    check(MPI_Allreduce(MPI_IN_PLACE, &good, 1, MPI_INT, MPI_MIN, comm), "MPI_Allreduce");
-    if (good == 0)
-      throw Error(ErrorCode::Communication, "more than 2^31 - 1 elements for one rank in one exchange");
-  }
+  MPI_Comm comm() const { return owned.handle(); }
+  bool serial() const { return comm() == MPI_COMM_NULL; }
 
   template <typename T>
   void allReduce(std::span<T> values, MPI_Datatype type, MPI_Op operation) const {
+    assert(values.size() <= mostElements);
     if (serial()) return;
-    check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), type, operation, comm),
-          "MPI_Allreduce");
+    check(
+        MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), type, operation, comm()),
+        "MPI_Allreduce");
+  }
+
+  /// Every rank's value, on every rank.
+  std::vector<std::uint64_t> allGatherSize(std::uint64_t mine) const {
+    std::vector<std::uint64_t> sizes(static_cast<std::size_t>(size));
+    check(MPI_Allgather(&mine, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, comm()), "MPI_Allgather");
+    return sizes;
   }
 };
 
@@ -124,16 +148,20 @@ Communicator Communicator::serial() {
 }
 
 Communicator Communicator::fromMpi(int fortranHandle) {
+  int initialized = 0;
+  MPI_Initialized(&initialized);
+  if (initialized == 0) throw Error(ErrorCode::Communication, "MPI isn't initialised");
+  MPI_Comm given = MPI_Comm_f2c(fortranHandle);
+  if (given == MPI_COMM_NULL) throw Error(ErrorCode::InvalidArgument, "not a communicator");
   auto state = std::make_unique<State>();
-  check(MPI_Comm_dup(MPI_Comm_f2c(fortranHandle), &state->comm), "MPI_Comm_dup");
-  check(MPI_Comm_set_errhandler(state->comm, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
-  check(MPI_Comm_rank(state->comm, &state->rank), "MPI_Comm_rank");
-  check(MPI_Comm_size(state->comm, &state->size), "MPI_Comm_size");
-  MPI_Comm node = MPI_COMM_NULL;
-  check(MPI_Comm_split_type(state->comm, MPI_COMM_TYPE_SHARED, state->rank, MPI_INFO_NULL, &node),
+  check(MPI_Comm_dup(given, state->owned.out()), "MPI_Comm_dup");
+  check(MPI_Comm_set_errhandler(state->comm(), MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+  check(MPI_Comm_rank(state->comm(), &state->rank), "MPI_Comm_rank");
+  check(MPI_Comm_size(state->comm(), &state->size), "MPI_Comm_size");
+  OwnedComm node;
+  check(MPI_Comm_split_type(state->comm(), MPI_COMM_TYPE_SHARED, state->rank, MPI_INFO_NULL, node.out()),
         "MPI_Comm_split_type");
-  check(MPI_Comm_rank(node, &state->localRank), "MPI_Comm_rank");
-  check(MPI_Comm_free(&node), "MPI_Comm_free");
+  check(MPI_Comm_rank(node.handle(), &state->localRank), "MPI_Comm_rank");
   return Communicator(std::move(state));
 }
 
@@ -156,7 +184,7 @@ int Communicator::localRank() const {
 }
 
 void Communicator::barrier() const {
-  if (!state_->serial()) check(MPI_Barrier(state_->comm), "MPI_Barrier");
+  if (!state_->serial()) check(MPI_Barrier(state_->comm()), "MPI_Barrier");
 }
 
 void Communicator::allReduceMin(std::span<double> values) const {
@@ -175,46 +203,56 @@ void Communicator::allReduceMax(std::span<std::uint64_t> values) const {
   state_->allReduce(values, MPI_UINT64_T, MPI_MAX);
 }
 
+// Memory is taken under together() before each exchange: a rank that has too little makes all fail, instead
+// of leaving the others waiting in a call that it never makes.
+
 std::vector<std::byte> Communicator::broadcast(std::vector<std::byte> bytes, int root) const {
+  assert(root >= 0 && root < size());
   if (state_->serial()) return bytes;
   std::uint64_t size = bytes.size();
-  check(MPI_Bcast(&size, 1, MPI_UINT64_T, root, state_->comm), "MPI_Bcast");
-  bytes.resize(size);
+  check(MPI_Bcast(&size, 1, MPI_UINT64_T, root, state_->comm()), "MPI_Bcast");
+  together([&] { bytes.resize(size); });
   constexpr std::uint64_t chunk = 1ULL << 30;
   for (std::uint64_t done = 0; done < size; done += chunk) {
     const auto part = static_cast<int>(std::min(chunk, size - done));
-    check(MPI_Bcast(bytes.data() + done, part, MPI_BYTE, root, state_->comm), "MPI_Bcast");
+    check(MPI_Bcast(bytes.data() + done, part, MPI_BYTE, root, state_->comm()), "MPI_Bcast");
   }
   return bytes;
 }
 
-Gathered Communicator::allGather(std::span<const std::byte> bytes) const {
-  std::vector<std::uint64_t> sizes(static_cast<std::size_t>(size()));
+Gathered Communicator::allGather(std::span<const std::byte> bytes, std::size_t elementBytes) const {
+  assert(elementBytes > 0 && bytes.size() % elementBytes == 0);
   if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
-  const std::uint64_t mine = bytes.size();
-  check(MPI_Allgather(&mine, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, state_->comm), "MPI_Allgather");
-  const Layout layout(sizes);
-  state_->demandFits(layout.fits());
-  Gathered result = emptyGathered(layout, 1);
-  check(MPI_Allgatherv(bytes.data(), static_cast<int>(mine), MPI_BYTE, result.bytes.data(),
-                       layout.counts.data(), layout.starts.data(), MPI_BYTE, state_->comm),
+  const std::uint64_t mine = bytes.size() / elementBytes;
+  const Layout layout(state_->allGatherSize(mine));
+  std::optional<ElementType> type;
+  Gathered result;
+  together([&] {
+    layout.demandFits();
+    type.emplace(elementBytes);
+    result = emptyGathered(layout, elementBytes);
+  });
+  check(MPI_Allgatherv(bytes.data(), static_cast<int>(mine), type->handle(), result.bytes.data(),
+                       layout.counts.data(), layout.starts.data(), type->handle(), state_->comm()),
         "MPI_Allgatherv");
   return result;
 }
 
 Gathered Communicator::gather(std::span<const std::byte> bytes, std::size_t elementBytes, int root) const {
   assert(elementBytes > 0 && bytes.size() % elementBytes == 0);
+  assert(root >= 0 && root < size());
   if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
   const std::uint64_t mine = bytes.size() / elementBytes;
-  std::vector<std::uint64_t> sizes(static_cast<std::size_t>(size()));
-  check(MPI_Allgather(&mine, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, state_->comm), "MPI_Allgather");
-  const Layout layout(sizes);
-  state_->demandFits(layout.fits());
-  const ElementType type(elementBytes);
+  const Layout layout(state_->allGatherSize(mine));
+  std::optional<ElementType> type;
   Gathered result;
-  if (rank() == root) result = emptyGathered(layout, elementBytes);
-  check(MPI_Gatherv(bytes.data(), static_cast<int>(mine), type.handle(), result.bytes.data(),
-                    layout.counts.data(), layout.starts.data(), type.handle(), root, state_->comm),
+  together([&] {
+    layout.demandFits();
+    type.emplace(elementBytes);
+    if (rank() == root) result = emptyGathered(layout, elementBytes);
+  });
+  check(MPI_Gatherv(bytes.data(), static_cast<int>(mine), type->handle(), result.bytes.data(),
+                    layout.counts.data(), layout.starts.data(), type->handle(), root, state_->comm()),
         "MPI_Gatherv");
   return result;
 }
@@ -225,37 +263,38 @@ Gathered Communicator::allToAll(std::span<const std::byte> bytes, std::span<cons
   assert(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}) * elementBytes == bytes.size());
   if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
   std::vector<std::uint64_t> incoming(counts.size());
-  check(MPI_Alltoall(counts.data(), 1, MPI_UINT64_T, incoming.data(), 1, MPI_UINT64_T, state_->comm),
+  check(MPI_Alltoall(counts.data(), 1, MPI_UINT64_T, incoming.data(), 1, MPI_UINT64_T, state_->comm()),
         "MPI_Alltoall");
   const Layout out(counts);
   const Layout in(incoming);
-  state_->demandFits(out.fits() && in.fits());
-  const ElementType type(elementBytes);
-  Gathered result = emptyGathered(in, elementBytes);
-  check(MPI_Alltoallv(bytes.data(), out.counts.data(), out.starts.data(), type.handle(), result.bytes.data(),
-                      in.counts.data(), in.starts.data(), type.handle(), state_->comm),
+  std::optional<ElementType> type;
+  Gathered result;
+  together([&] {
+    out.demandFits();
+    in.demandFits();
+    type.emplace(elementBytes);
+    result = emptyGathered(in, elementBytes);
+  });
+  check(MPI_Alltoallv(bytes.data(), out.counts.data(), out.starts.data(), type->handle(), result.bytes.data(),
+                      in.counts.data(), in.starts.data(), type->handle(), state_->comm()),
         "MPI_Alltoallv");
   return result;
 }
 
-void Communicator::agree(std::exception_ptr mine) const {
+void Communicator::agree(const std::exception_ptr& mine) const {
   if (state_->serial()) {
     if (mine) std::rethrow_exception(mine);
     return;
   }
   int firstFailing = mine ? rank() : size();
-  check(MPI_Allreduce(MPI_IN_PLACE, &firstFailing, 1, MPI_INT, MPI_MIN, state_->comm), "MPI_Allreduce");
+  check(MPI_Allreduce(MPI_IN_PLACE, &firstFailing, 1, MPI_INT, MPI_MIN, state_->comm()), "MPI_Allreduce");
   if (firstFailing == size()) return;
-  std::vector<std::byte> text;
-  if (rank() == firstFailing) {
-    const std::string message = describe(mine);
-    const auto* begin = reinterpret_cast<const std::byte*>(message.data());
-    text.assign(begin, begin + message.size());
-  }
-  text = broadcast(std::move(text), firstFailing);
+  Text text{};
+  if (rank() == firstFailing) text = describe(mine);
+  check(MPI_Bcast(text.data(), static_cast<int>(text.size()), MPI_CHAR, firstFailing, state_->comm()),
+        "MPI_Bcast");
   if (mine) std::rethrow_exception(mine);
-  const std::string message(reinterpret_cast<const char*>(text.data()), text.size());
-  throw Error(ErrorCode::RemoteRank, fmt::format("rank {} failed: {}", firstFailing, message));
+  throw Error(ErrorCode::RemoteRank, fmt::format("rank {} failed: {}", firstFailing, text.data()));
 }
 
 void Communicator::together(const std::function<void()>& work) const {

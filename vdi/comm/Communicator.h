@@ -12,8 +12,7 @@
 
 namespace vdi::comm {
 
-/// Byte blocks of every rank, concatenated in rank order: rank r's part is bytes[offsets[r] .. offsets[r +
-/// 1]).
+/// Byte blocks of every rank, concatenated in rank order: rank r's part is bytes[offsets[r] .. offsets[r+1]).
 struct Gathered {
   std::vector<std::byte> bytes;
   std::vector<std::uint64_t> offsets;  // size() + 1
@@ -30,7 +29,8 @@ class Communicator {
  public:
   /// One rank, never touches MPI.
   static Communicator serial();
-  /// Duplicates the communicator (collective). `fortranHandle` = MPI_Comm_c2f(comm). MPI must be initialised.
+  /// Duplicates the communicator (collective). `fortranHandle` = MPI_Comm_c2f(comm). Throws
+  /// Error{Communication} when MPI isn't initialised, Error{InvalidArgument} for MPI_COMM_NULL.
   static Communicator fromMpi(int fortranHandle);
   /// MPI_COMM_WORLD if MPI is initialised and not finalised, else serial(). For programs of ours; never for a
   /// plugin.
@@ -55,20 +55,26 @@ class Communicator {
   void allReduceSum(std::span<std::uint64_t> values) const;
   void allReduceMax(std::span<std::uint64_t> values) const;
 
-  std::vector<std::byte> broadcast(std::vector<std::byte> bytes,
-                                   int root) const;            // collective; size is root's
-  Gathered allGather(std::span<const std::byte> bytes) const;  // collective
-  /// Collective. Elements of `elementBytes` each; counts may differ by rank; only the root's result isn't
-  /// empty. More than 2 GiB in all is fine (datatypes), as long as each rank has fewer than 2^31 elements.
+  // Exchanges of bytes, all collective. Elements of `elementBytes` each travel as one MPI datatype, so more
+  // than 2 GiB is fine, as long as no rank sends or receives 2^31 elements or more in one call. Where that
+  // fails, or a rank lacks the memory, nothing is sent and every rank throws: the one in trouble its own
+  // error, the others Error{RemoteRank}.
+
+  /// Every rank gets the root's bytes; what the others pass in is dropped.
+  std::vector<std::byte> broadcast(std::vector<std::byte> bytes, int root) const;
+  /// Every rank's bytes, on every rank. Sizes may differ by rank.
+  Gathered allGather(std::span<const std::byte> bytes, std::size_t elementBytes) const;
+  /// Every rank's bytes, on the root; elsewhere the result is empty, `offsets` too. Sizes may differ by rank.
   Gathered gather(std::span<const std::byte> bytes, std::size_t elementBytes, int root) const;
-  /// Collective. `counts[r]` elements go to rank r, taken from `bytes` in rank order. Sizes as for gather.
+  /// `counts[r]` elements go to rank r, taken from `bytes` in rank order; the result has what every rank sent
+  /// here.
   Gathered allToAll(std::span<const std::byte> bytes, std::span<const std::uint64_t> counts,
                     std::size_t elementBytes) const;
 
   /// Collective: nobody leaves alone. With no error on any rank it returns. Otherwise every rank throws: a
   /// rank with an error rethrows its own, the others throw Error{RemoteRank} with the lowest failing rank's
   /// number and text.
-  void agree(std::exception_ptr mine) const;
+  void agree(const std::exception_ptr& mine) const;
   /// Runs `work`, then agree() with what it threw. Collective; `work` itself must not communicate.
   void together(const std::function<void()>& work) const;
   /// Collective: throws Error{InvalidArgument} on every rank if `fingerprint` differs between ranks; `what`

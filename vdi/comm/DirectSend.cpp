@@ -1,5 +1,7 @@
 #include "vdi/comm/DirectSend.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -20,8 +22,12 @@ std::vector<T> copyAs(std::span<const std::byte> bytes) {
   return values;
 }
 
-/// Lists from their counts and supersegments. Throws Error{Communication} when they don't match.
+/// Lists from their counts and supersegments. Throws Error{Communication} when they don't match,
+/// Error{OutOfMemory} when the 32-bit offsets can't count them.
 SupersegmentLists assemble(std::span<const std::uint32_t> counts, std::vector<Supersegment> segments) {
+  if (segments.size() > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error(ErrorCode::OutOfMemory, "more than 2^32 - 1 supersegments in one VDI");
+  }
   SupersegmentLists lists;
   lists.offsets.reserve(counts.size() + 1);
   std::uint64_t total = 0;
@@ -42,6 +48,20 @@ std::vector<std::uint32_t> countsOf(const SupersegmentLists& lists) {
   return counts;
 }
 
+/// Throws Error{Communication} unless every rank sent counts for just the lists that it owns.
+void demandOwnedLists(const Gathered& counts) {
+  const auto size = static_cast<int>(counts.offsets.size()) - 1;
+  const std::uint64_t total = counts.bytes.size() / sizeof(std::uint32_t);
+  for (int r = 0; r < size; ++r) {
+    const std::uint64_t sent = counts.of(r).size() / sizeof(std::uint32_t);
+    const std::uint64_t owned = ownedLists(total, r, size).count();
+    if (sent != owned) {
+      throw Error(ErrorCode::Communication,
+                  fmt::format("rank {} sent {} of {} lists, its part is {}", r, sent, total, owned));
+    }
+  }
+}
+
 }  // namespace
 
 ListRange ownedLists(std::uint64_t listCount, int rank, int size) {
@@ -55,16 +75,20 @@ ListRange ownedLists(std::uint64_t listCount, int rank, int size) {
 }
 
 Received distribute(const Communicator& comm, const SupersegmentLists& sub) {
+  assert(sub.offsets.back() == sub.segments.size());
   const auto ranks = static_cast<std::size_t>(comm.size());
   const auto me = static_cast<std::size_t>(comm.rank());
   std::vector<std::uint64_t> listsTo(ranks);
   std::vector<std::uint64_t> segmentsTo(ranks);
-  for (std::size_t r = 0; r < ranks; ++r) {
-    const ListRange range = ownedLists(sub.listCount(), static_cast<int>(r), comm.size());
-    listsTo[r] = range.count();
-    segmentsTo[r] = sub.offsets[range.last] - sub.offsets[range.first];
-  }
-  const std::vector<std::uint32_t> counts = countsOf(sub);
+  std::vector<std::uint32_t> counts;
+  comm.together([&] {
+    counts = countsOf(sub);
+    for (std::size_t r = 0; r < ranks; ++r) {
+      const ListRange range = ownedLists(sub.listCount(), static_cast<int>(r), comm.size());
+      listsTo[r] = range.count();
+      segmentsTo[r] = sub.offsets[range.last] - sub.offsets[range.first];
+    }
+  });
   const Gathered receivedCounts =
       comm.allToAll(std::as_bytes(std::span(counts)), listsTo, sizeof(std::uint32_t));
   const Gathered receivedSegments =
@@ -89,13 +113,16 @@ Received distribute(const Communicator& comm, const SupersegmentLists& sub) {
 }
 
 SupersegmentLists gatherLists(const Communicator& comm, const SupersegmentLists& owned, int root) {
-  const std::vector<std::uint32_t> counts = countsOf(owned);
+  assert(owned.offsets.back() == owned.segments.size());
+  std::vector<std::uint32_t> counts;
+  comm.together([&] { counts = countsOf(owned); });
   const Gathered allCounts = comm.gather(std::as_bytes(std::span(counts)), sizeof(std::uint32_t), root);
   const Gathered allSegments =
       comm.gather(std::as_bytes(std::span(owned.segments)), sizeof(Supersegment), root);
   SupersegmentLists lists;
   comm.together([&] {
     if (comm.rank() == root) {
+      demandOwnedLists(allCounts);
       lists = assemble(copyAs<std::uint32_t>(allCounts.bytes), copyAs<Supersegment>(allSegments.bytes));
     }
   });

@@ -21,17 +21,20 @@ struct ListRange {
 /// Contiguous, in rank order, sizes differ by at most one; empty for surplus ranks when ranks > lists.
 ListRange ownedLists(std::uint64_t listCount, int rank, int size);
 
-/// What the owner received: subLists[r] is rank r's part of the owner's lists (owner's range count lists
-/// each).
+/// What the owner received: subLists[r] is rank r's part of the owner's lists, ownedLists().count() lists
+/// each.
 struct Received {
   std::vector<SupersegmentLists> subLists;
   std::uint64_t bytesSent = 0;      // by this rank to other ranks: supersegments and counts
   std::uint64_t bytesReceived = 0;  // from other ranks
 };
-/// Collective. `sub` holds all lists of the image on every rank.
+/// Collective. `sub` holds all lists of the image on every rank. Every rank throws (Error{Communication} or
+/// Error{RemoteRank}) when the ranks' images differ in size, or when what one receives isn't what the counts
+/// announced.
 Received distribute(const Communicator& comm, const SupersegmentLists& sub);
 
 /// Collective. `owned` holds this rank's ownedLists; the root's result holds all lists, the others' none.
+/// Every rank throws when a rank hands in another number of lists than it owns.
 SupersegmentLists gatherLists(const Communicator& comm, const SupersegmentLists& owned, int root);
 
 /// Collective: the union of every rank's localScene.

@@ -180,7 +180,7 @@ class Exchange {
       own.push_back({b.origin, b.spacing, b.owned, b.dims, static_cast<std::uint32_t>(b.type), comm_.rank(),
                      static_cast<std::int32_t>(i)});
     }
-    const Gathered gathered = comm_.allGather(std::as_bytes(std::span(own)));
+    const Gathered gathered = comm_.allGather(std::as_bytes(std::span(own)), sizeof(Description));
     all_.resize(gathered.bytes.size() / sizeof(Description));
     if (!all_.empty()) std::memcpy(all_.data(), gathered.bytes.data(), gathered.bytes.size());
     plans_.resize(all_.size());
