@@ -58,6 +58,7 @@ Layout layoutFromString(const std::string& name) {
 
 std::vector<std::string> layoutNames() {
   std::vector<std::string> names;
+  names.reserve(layouts.size());
   for (const auto& entry : layouts) names.emplace_back(entry.first);
   return names;
 }

@@ -18,14 +18,12 @@ vec4 accumulated;
 float firstDepth;
 
 // What a sample is for: an interval of a list, or light of a pixel.
-void useSample(uint k, vec3 color, float opticalDepth) {
-  float front = push.params.value.first + float(k) * push.params.value.step;
+void useSample(float front, float back, vec3 color, float opticalDepth) {
   if (volumeOnly) {
     float opacity = opacityOf(opticalDepth);
     if (opacity > 0.0 && accumulated.a == 0.0) firstDepth = front;
     accumulated += (1.0 - accumulated.a) * opacity * vec4(color, 1.0);
   } else {
-    float back = push.params.value.first + float(k + 1u) * push.params.value.step;
     searchAdd(front, back, color * opacityOf(opticalDepth), opticalDepth);
   }
 }
@@ -40,6 +38,7 @@ void main() {
   if (x >= push.params.value.width || y >= push.lastRow) return;
   listIndex = y * push.params.value.width + x;
   setUpRay(x, y);
+  setUpScene();
 
   if (volumeOnly) {
     accumulated = vec4(0.0);

@@ -1,12 +1,15 @@
 // One ray through the kd-tree of bricks, front to back, sample by sample.
 //
-// Needs: shared/cast.h, push.params, pages, pageCount; void useSample(uint k, vec3 color, float opticalDepth), colour
-// straight.
+// Needs: shared/cast.h, push.params, pages, pageCount; void useSample(float front, float back, vec3 color, float
+// opticalDepth), colour straight.
 
 vec3 rayStart;
 vec3 rayDirection;
-float raySampleUnits;  // world length of a sample / unit distance
-float rayOpticalDepth;  // so far
+float rayUnitsPerDepth;  // world length of a unit of depth / unit distance
+float rayOpticalDepth;   // so far
+uvec2 rayScene;          // samples [x, y) lie in the scene's bounds
+float rayEnter;          // depth where the ray enters these, and leaves them
+float rayLeave;
 
 void setUpRay(uint x, uint y) {
   float u = float(x) + 0.5 - 0.5 * float(push.params.value.width);
@@ -16,7 +19,7 @@ void setUpRay(uint x, uint y) {
       push.params.value.directionBase + u * push.params.value.directionRight + v * push.params.value.directionUp;
   rayStart = start;
   rayDirection = direction;
-  raySampleUnits = length(direction) * push.params.value.perUnitDistance;
+  rayUnitsPerDepth = length(direction) * push.params.value.perUnitDistance / push.params.value.step;
 }
 
 // `precise`: every rank and every pass must find the same position for sample k, since ownership depends on it.
@@ -48,6 +51,27 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
   while (first < last && !contains(lo, hi, samplePosition(first))) ++first;
   while (last > first && !contains(lo, hi, samplePosition(last - 1u))) --last;
   return uvec2(first, last);
+}
+
+// The scene's bounds seldom lie half-way between two samples. The outermost samples stand for what's really there: the first
+// one's interval starts where the ray enters, the last one's ends where it leaves. That follows from the ray and the scene
+// alone, so it's the same on every rank; without it the faces of a filled box show the sample lattice as stripes.
+void setUpScene() {
+  rayScene = samplesIn(push.params.value.sceneLo, push.params.value.sceneHi);
+  float enter = 0.0;
+  float leave = float(push.params.value.sampleCount) * push.params.value.step;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (rayDirection[axis] == 0.0) continue;
+    float a = (push.params.value.sceneLo[axis] - rayStart[axis]) / rayDirection[axis];
+    float b = (push.params.value.sceneHi[axis] - rayStart[axis]) / rayDirection[axis];
+    enter = max(enter, min(a, b));
+    leave = min(leave, max(a, b));
+  }
+  float first = (float(rayScene.x) + 0.5) * push.params.value.step;
+  float last = (float(rayScene.y) - 0.5) * push.params.value.step;
+  rayEnter = push.params.value.first + clamp(enter, first - push.params.value.step, first);
+  rayLeave = push.params.value.first + clamp(leave, last, last + push.params.value.step);
+  rayLeave = max(rayLeave, rayEnter + 0.001 * push.params.value.step);
 }
 
 // Pages beyond pageCount cost nothing: the comparison with a specialisation constant removes them.
@@ -84,8 +108,10 @@ bool castBrick(uint index) {
     vec3 coordinate =
         clamp(samplePosition(k) * brick.texelScale + brick.texelOffset, brick.texelLo, brick.texelHi);
     vec4 entry = classify((texel(brick.page, coordinate) - brick.tableOrigin) * brick.tableScale);
-    float opticalDepth = min(entry.a * raySampleUnits, maxOpticalDepth);
-    useSample(k, entry.rgb, opticalDepth);
+    float front = k == rayScene.x ? rayEnter : push.params.value.first + float(k) * push.params.value.step;
+    float back = k + 1u == rayScene.y ? rayLeave : push.params.value.first + float(k + 1u) * push.params.value.step;
+    float opticalDepth = min(entry.a * rayUnitsPerDepth * (back - front), maxOpticalDepth);
+    useSample(front, back, entry.rgb, opticalDepth);
     rayOpticalDepth += opticalDepth;
     if (rayOpticalDepth >= push.params.value.enough) return false;
   }
@@ -96,7 +122,7 @@ const int kdStackSize = 40;  // VolumeStore builds no deeper tree
 
 void castRay() {
   rayOpticalDepth = 0.0;
-  if (push.params.value.nodeCount == 0u) return;
+  if (push.params.value.nodeCount == 0u || rayScene.x == rayScene.y) return;
   // Parts of the ray, in units of depth from the lattice's front. They overlap by the rounding error: a brick decides by
   // itself, exactly, which samples are its own; the order of visits comes from the signs of the direction alone.
   uint stackNode[kdStackSize];

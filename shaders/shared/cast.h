@@ -53,10 +53,12 @@ struct CastParams {
   float coordinateError;  // bound on the rounding error of a position
   vec3 directionUp;
   uint sampleCount;
+  vec3 sceneLo;  // bounds of all ranks' blocks, snapped as the bricks are
+  uint tableSize;
+  vec3 sceneHi;
+  uint budget;
   uint width;
   uint height;
-  uint budget;
-  uint tableSize;
   uint cutAtGaps;
   uint runsOnly;
   uint nodeCount;  // 0: no bricks

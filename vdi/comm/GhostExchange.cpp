@@ -50,7 +50,9 @@ struct LatticeKey {
   std::uint32_t type;
   std::array<double, 3> spacing;
   std::array<std::int64_t, 3> phase;  // origin modulo spacing, in steps of the tolerance
-  auto operator<=>(const LatticeKey&) const = default;
+  bool operator<(const LatticeKey& other) const {
+    return std::tie(type, spacing, phase) < std::tie(other.type, other.spacing, other.phase);
+  }
 };
 
 glm::i64vec3 round64(const glm::dvec3& v) {

@@ -25,6 +25,10 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
   params.step = static_cast<float>(lattice.step);
   params.first = static_cast<float>(lattice.first);
   params.sampleCount = lattice.count;
+  for (int axis = 0; axis < 3; ++axis) {
+    params.sceneLo[axis] = snapToScene(scene, scene.bounds.lo[axis], axis);
+    params.sceneHi[axis] = snapToScene(scene, scene.bounds.hi[axis], axis);
+  }
   params.width = static_cast<std::uint32_t>(view.width());
   params.height = static_cast<std::uint32_t>(view.height());
   // A position is the sum of a start and a depth times a direction, each rounded to 24 bits.

@@ -203,6 +203,7 @@ class Instance {
     std::vector<VkPhysicalDevice> devices(count);
     vkEnumeratePhysicalDevices(handle_, &count, devices.data());
     std::vector<Candidate> result;
+    result.reserve(devices.size());
     for (VkPhysicalDevice device : devices) result.push_back(inspect(device));
     return result;
   }

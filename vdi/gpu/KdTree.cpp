@@ -10,7 +10,6 @@ namespace vdi::gpu {
 namespace {
 
 using shared::Brick;
-using shared::KdNode;
 
 struct Plane {
   int axis = -1;

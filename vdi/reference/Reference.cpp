@@ -111,6 +111,40 @@ SampleRange samplesIn(const OwnedBox& box, const SceneRay& ray, std::uint32_t co
   return range;
 }
 
+/// The scene's bounds seldom lie half-way between two samples: the first sample's interval starts where the ray enters them,
+/// the last one's ends where it leaves. Depends on ray and scene alone, so it's the same on every rank.
+struct SceneStretch {
+  SampleRange samples;
+  float enter = 0.0F;  // depth
+  float leave = 0.0F;
+};
+
+SceneStretch sceneStretch(const Frame& frame, const SceneRay& ray) {
+  OwnedBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.lo[axis] = snapToScene(frame.scene, frame.scene.bounds.lo[axis], axis);
+    box.hi[axis] = snapToScene(frame.scene, frame.scene.bounds.hi[axis], axis);
+  }
+  float enter = 0.0F;
+  float leave = static_cast<float>(frame.lattice.count) * ray.step;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (ray.direction[axis] == 0.0F) continue;
+    const float a = (box.lo[axis] - ray.start[axis]) / ray.direction[axis];
+    const float b = (box.hi[axis] - ray.start[axis]) / ray.direction[axis];
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  SceneStretch stretch;
+  stretch.samples = samplesIn(box, ray, frame.lattice.count);
+  const float first = (static_cast<float>(stretch.samples.first) + 0.5F) * ray.step;
+  const float last = (static_cast<float>(stretch.samples.last) - 0.5F) * ray.step;
+  const auto front = static_cast<float>(frame.lattice.first);
+  stretch.enter = front + std::clamp(enter, first - ray.step, first);
+  stretch.leave = front + std::clamp(leave, last, last + ray.step);
+  stretch.leave = std::max(stretch.leave, stretch.enter + 0.001F * ray.step);
+  return stretch;
+}
+
 // ---- walking a ray through a VDI
 // -----------------------------------------------------------------------------------------
 
@@ -252,8 +286,8 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
   std::sort(pieces.begin(), pieces.end(),
             [](const Piece& a, const Piece& b) { return a.range.first < b.range.first; });
 
-  const float sampleLength = glm::length(ray.direction) * ray.step;
-  const float lengthInUnits = sampleLength / static_cast<float>(frame.table.unitDistance);
+  const SceneStretch scene = sceneStretch(frame, ray);
+  const float unitsPerDepth = glm::length(ray.direction) / static_cast<float>(frame.table.unitDistance);
   const float enough = opticalDepthOf(static_cast<float>(frame.settings.terminationOpacity));
   std::vector<Interval> samples;
   float total = 0.0F;
@@ -261,11 +295,11 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
     for (std::uint32_t k = piece.range.first; k < piece.range.last; ++k) {
       const glm::dvec3 world = glm::dvec3(ray.sample(k)) + frame.scene.bounds.center();
       const TransferTableEntry entry = frame.table.lookup(interpolate(*piece.block, world));
-      const float opticalDepth = std::min(entry.extinction * lengthInUnits, maxExtinction);
+      const float front = k == scene.samples.first ? scene.enter : static_cast<float>(frame.lattice.frontOf(k));
+      const float back = k + 1 == scene.samples.last ? scene.leave : static_cast<float>(frame.lattice.frontOf(k + 1));
+      const float opticalDepth = std::min(entry.extinction * unitsPerDepth * (back - front), maxExtinction);
       const float opacity = opacityOf(opticalDepth);
-      samples.push_back({static_cast<float>(frame.lattice.frontOf(k)),
-                         static_cast<float>(frame.lattice.frontOf(k + 1)), entry.red * opacity,
-                         entry.green * opacity, entry.blue * opacity, opticalDepth});
+      samples.push_back({front, back, entry.red * opacity, entry.green * opacity, entry.blue * opacity, opticalDepth});
       total += opticalDepth;
       if (total >= enough) return samples;
     }

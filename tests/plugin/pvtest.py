@@ -1,0 +1,177 @@
+"""What the pvbatch tests share: the plugin, sources that deal blocks to ranks, pictures and their comparison.
+
+Run by ctest through xvfb-run; VDI_PLUGIN names the plugin, VDI_TEST_OUTPUT a folder for pictures. With several ranks only
+rank 0 runs the test script; sources run on all ranks, inside Programmable Source."""
+
+import os
+import sys
+
+import numpy as np
+from paraview import simple
+from skimage.metrics import structural_similarity
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkIOImage import vtkPNGReader, vtkPNGWriter
+
+simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=False, ns=simple.__dict__)
+
+OUTPUT = os.environ.get("VDI_TEST_OUTPUT", ".")
+
+# Runs on every rank. A layered field on the unit cube in BLOCKS^3 blocks, dealt out by DEAL ("random", "slabs",
+# "interleaved"), as point data with shared points or cell data, of a numpy type; `self` is the Programmable Source.
+BLOCKS_SCRIPT = """
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPartitionedDataSet
+from vtkmodules.vtkParallelCore import vtkMultiProcessController
+controller = vtkMultiProcessController.GetGlobalController()
+rank, ranks = controller.GetLocalProcessId(), controller.GetNumberOfProcesses()
+count, cells, deal, kind, as_cells = {count}, {cells}, "{deal}", "{kind}", {as_cells}
+n = count * cells
+owners = np.random.RandomState(11).randint(0, ranks, count ** 3)
+if deal == "interleaved":
+    owners = np.arange(count ** 3) % ranks
+elif deal == "slabs":
+    owners = np.arange(count ** 3) * ranks // count ** 3
+output = self.GetPartitionedDataSetOutput() if hasattr(self, "GetPartitionedDataSetOutput") else self.GetOutputDataObject(0)
+mine = np.flatnonzero(owners == rank)
+blocks = []
+for index in mine:
+    at = np.array([index % count, index // count % count, index // count ** 2]) * cells
+    image = vtkImageData()
+    image.SetOrigin(*(at / n))
+    image.SetSpacing(1 / n, 1 / n, 1 / n)
+    image.SetDimensions(cells + 1, cells + 1, cells + 1)
+    values = np.arange(cells) + 0.5 if as_cells else np.arange(cells + 1)
+    z, y, x = np.meshgrid(*[(values + at[axis]) / n for axis in (2, 1, 0)], indexing="ij")
+    field = 0.5 + 0.5 * np.sin(9 * x + 2 * np.sin(5 * y)) * np.cos(7 * z + 3 * x) * np.cos(4 * y)
+    scale = 1.0 if kind == "float32" else 200.0 if kind == "uint8" else 60000.0
+    array = numpy_to_vtk((field * scale).astype(kind).ravel(), deep=True)
+    array.SetName("scalars")
+    (image.GetCellData() if as_cells else image.GetPointData()).SetScalars(array)
+    blocks.append(image)
+for number, image in enumerate(blocks):
+    output.SetBlock(number, image)
+"""
+
+
+def blocks_source(deal, count=4, cells=8, kind="float32", as_cells=False):
+    """A multiblock data set whose blocks each rank makes by itself."""
+    source = simple.ProgrammableSource()
+    source.OutputDataSetType = "vtkMultiblockDataSet"
+    source.Script = BLOCKS_SCRIPT.format(count=count, cells=cells, deal=deal, kind=kind, as_cells=as_cells)
+    source.UpdatePipeline()
+    return source
+
+
+def set_colors(name, low, high, peak=0.8):
+    """A three-hue colour map with a ramp of opacity, for both ParaView's volume rendering and ours."""
+    at = lambda share: low + share * (high - low)
+    colors = simple.GetColorTransferFunction(name)
+    colors.ColorSpace = "RGB"
+    colors.RGBPoints = [at(0), 0.1, 0.2, 0.9, at(0.5), 0.9, 0.9, 0.2, at(1), 0.9, 0.1, 0.1]
+    opacity = simple.GetOpacityTransferFunction(name)
+    opacity.Points = [at(0), 0, 0.5, 0, at(0.35), 0, 0.5, 0, at(0.7), 0.2, 0.5, 0, at(1), peak, 0.5, 0]
+    return colors, opacity
+
+
+def make_view(size, position, focal_point, parallel_scale=None):
+    view = simple.CreateView("RenderView")
+    view.ViewSize = size
+    view.OrientationAxesVisibility = 0
+    view.UseColorPaletteForBackground = 0
+    view.Background = [0, 0, 0]
+    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = position, focal_point, [0, 1, 0]
+    view.CameraViewAngle = 30
+    view.CameraParallelProjection = 0 if parallel_scale is None else 1
+    if parallel_scale is not None:
+        view.CameraParallelScale = parallel_scale
+    return view
+
+
+def paraview_volume(source, view, association, name, unit_distance):
+    """ParaView's own volume rendering, unshaded, as an array of [rows][columns][3] bytes from the top."""
+    representation = simple.Show(source, view)
+    representation.SetRepresentationType("Volume")
+    simple.ColorBy(representation, (association, name))
+    representation.ScalarOpacityUnitDistance = unit_distance
+    representation.Shade = 0
+    simple.HideScalarBarIfNotNeeded(simple.GetColorTransferFunction(name), view)
+    path = os.path.join(OUTPUT, "paraview_volume.png")
+    simple.Render(view)
+    simple.SaveScreenshot(path, view, ImageResolution=view.ViewSize)
+    return read_png(path)
+
+
+def vdi_filter(source, view, association, name, unit_distance, **properties):
+    """VolumetricDepthImage with the view's camera and size."""
+    image = simple.VolumetricDepthImage(Input=source)
+    image.SelectInputScalars = [association, name]
+    image.ScalarOpacityUnitDistance = unit_distance
+    image.Resolution = view.ViewSize
+    image.CameraPosition, image.CameraFocalPoint = view.CameraPosition, view.CameraFocalPoint
+    image.CameraViewUp, image.CameraViewAngle = view.CameraViewUp, view.CameraViewAngle
+    image.CameraParallelProjection = view.CameraParallelProjection
+    image.CameraParallelScale = view.CameraParallelScale
+    for key, value in properties.items():
+        setattr(image, key, value)
+    return image
+
+
+def picture(proxy):
+    """The RGBA of a proxy's output over black, [rows][columns][3] bytes from the top."""
+    proxy.UpdatePipeline()
+    data = proxy.GetClientSideObject().GetOutputDataObject(0)
+    if data.GetNumberOfPoints() == 0:
+        return None
+    width, height, _ = data.GetDimensions()
+    rgba = vtk_to_numpy(data.GetPointData().GetArray("RGBA")).reshape(height, width, 4).astype(float)
+    return np.flipud(np.rint(rgba[..., :3] * rgba[..., 3:] / 255)).astype(np.uint8)
+
+
+def read_png(path):
+    reader = vtkPNGReader()
+    reader.SetFileName(path)
+    reader.Update()
+    data = reader.GetOutput()
+    width, height, _ = data.GetDimensions()
+    scalars = vtk_to_numpy(data.GetPointData().GetScalars())
+    return np.flipud(scalars.reshape(height, width, -1)[..., :3])
+
+
+def write_png(name, rgb):
+    data = vtkImageData()
+    data.SetDimensions(rgb.shape[1], rgb.shape[0], 1)
+    data.GetPointData().SetScalars(numpy_to_vtk(np.flipud(rgb).reshape(-1, 3).copy(), deep=True))
+    writer = vtkPNGWriter()
+    writer.SetFileName(os.path.join(OUTPUT, name))
+    writer.SetInputData(data)
+    writer.Write()
+
+
+def ssim(a, b):
+    return structural_similarity(a, b, channel_axis=2, gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
+                                 data_range=255)
+
+
+def wrong_share(a, b, object_only=None):
+    """Share of the object's pixels (those that aren't black in `object_only`) with a channel off by more than 16."""
+    off = np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 16
+    inside = (object_only if object_only is not None else b).max(axis=2) > 8
+    return off[inside].mean()
+
+
+failures = []
+
+
+def check(good, what):
+    print(("ok      " if good else "FAILED  ") + what, flush=True)
+    if not good:
+        failures.append(what)
+
+
+def finish():
+    sys.stdout.flush()
+    if failures:
+        # Satellites wait in their event loop; leaving by os._exit makes mpirun end them.
+        os._exit(1)
