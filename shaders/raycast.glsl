@@ -33,18 +33,17 @@ bool contains(vec3 lo, vec3 hi, vec3 p) { return all(greaterThanEqual(p, lo)) &&
 
 // Samples [first, last) of the ray that the box owns: one range, because each coordinate is monotone along the ray.
 uvec2 samplesIn(vec3 lo, vec3 hi) {
-  // Where the ray is in the box, in units of samples, with room for rounding; then exactly, sample by sample.
-  float enter = 0.0;
-  float leave = float(push.params.value.sampleCount);
-  for (int axis = 0; axis < 3; ++axis) {
-    if (rayDirection[axis] == 0.0) continue;
-    float perSample = 1.0 / (rayDirection[axis] * push.params.value.step);
-    float a = (lo[axis] - rayStart[axis]) * perSample;
-    float b = (hi[axis] - rayStart[axis]) * perSample;
-    float spare = 2.0 + 1e-6 * max(abs(a), abs(b)) + abs(push.params.value.coordinateError * perSample);
-    enter = max(enter, min(a, b) - spare);
-    leave = min(leave, max(a, b) + spare);
-  }
+  // Where the ray is in the box, in units of samples, with room for rounding; then exactly, sample by sample. Vectors are
+  // never indexed by a variable here: lavapipe (Mesa 22.3) mixes up the components when lanes diverge.
+  bvec3 across = equal(rayDirection, vec3(0.0));
+  vec3 perSample = 1.0 / (rayDirection * push.params.value.step);
+  vec3 a = (lo - rayStart) * perSample;
+  vec3 b = (hi - rayStart) * perSample;
+  vec3 spare = 2.0 + 1e-6 * max(abs(a), abs(b)) + abs(push.params.value.coordinateError * perSample);
+  vec3 enters = mix(min(a, b) - spare, vec3(0.0), across);
+  vec3 leaves = mix(max(a, b) + spare, vec3(push.params.value.sampleCount), across);
+  float enter = max(max(enters.x, enters.y), max(enters.z, 0.0));
+  float leave = min(min(leaves.x, leaves.y), min(leaves.z, float(push.params.value.sampleCount)));
   if (!(enter < leave)) return uvec2(0u);
   uint first = uint(enter);
   uint last = min(push.params.value.sampleCount, uint(ceil(leave)));
@@ -58,15 +57,14 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
 // alone, so it's the same on every rank; without it the faces of a filled box show the sample lattice as stripes.
 void setUpScene() {
   rayScene = samplesIn(push.params.value.sceneLo, push.params.value.sceneHi);
-  float enter = 0.0;
-  float leave = float(push.params.value.sampleCount) * push.params.value.step;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (rayDirection[axis] == 0.0) continue;
-    float a = (push.params.value.sceneLo[axis] - rayStart[axis]) / rayDirection[axis];
-    float b = (push.params.value.sceneHi[axis] - rayStart[axis]) / rayDirection[axis];
-    enter = max(enter, min(a, b));
-    leave = min(leave, max(a, b));
-  }
+  bvec3 across = equal(rayDirection, vec3(0.0));
+  float far = float(push.params.value.sampleCount) * push.params.value.step;
+  vec3 a = (push.params.value.sceneLo - rayStart) / rayDirection;
+  vec3 b = (push.params.value.sceneHi - rayStart) / rayDirection;
+  vec3 enters = mix(min(a, b), vec3(0.0), across);
+  vec3 leaves = mix(max(a, b), vec3(far), across);
+  float enter = max(max(enters.x, enters.y), max(enters.z, 0.0));
+  float leave = min(min(leaves.x, leaves.y), min(leaves.z, far));
   float first = (float(rayScene.x) + 0.5) * push.params.value.step;
   float last = (float(rayScene.y) - 0.5) * push.params.value.step;
   rayEnter = push.params.value.first + clamp(enter, first - push.params.value.step, first);
@@ -118,6 +116,8 @@ bool castBrick(uint index) {
   return true;
 }
 
+float component(vec3 v, uint axis) { return axis == 0u ? v.x : axis == 1u ? v.y : v.z; }
+
 const int kdStackSize = 40;  // VolumeStore builds no deeper tree
 
 void castRay() {
@@ -140,8 +140,8 @@ void castRay() {
       part = stackPart[top];
       continue;
     }
-    float start = rayStart[here.axis];
-    float direction = rayDirection[here.axis];
+    float start = component(rayStart, here.axis);
+    float direction = component(rayDirection, here.axis);
     if (direction == 0.0) {
       node = here.first + (start < here.split ? 0u : 1u);
       continue;

@@ -32,12 +32,13 @@ vec2 insideFrustum() {
   vec2 stretch = vec2(0.0, uintBitsToFloat(0x7f7fffffu));
   bool parallel = push.params.value.parallel != 0u;
   vec2 halfSize = 0.5 * vec2(push.params.value.lists) * push.params.value.pixelSize;
-  for (int axis = 0; axis < 2; ++axis) {
-    float value = halfSize[axis] * (parallel ? 1.0 : rayOrigin.z);
-    float slope = halfSize[axis] * (parallel ? 0.0 : rayDirection.z);
-    clip(stretch, value - rayOrigin[axis], slope - rayDirection[axis]);
-    clip(stretch, value + rayOrigin[axis], slope + rayDirection[axis]);
-  }
+  // Not as a loop over the axes: lavapipe (Mesa 22.3) mixes up components of vectors that are indexed by a variable.
+  vec2 value = halfSize * (parallel ? 1.0 : rayOrigin.z);
+  vec2 slope = halfSize * (parallel ? 0.0 : rayDirection.z);
+  clip(stretch, value.x - rayOrigin.x, slope.x - rayDirection.x);
+  clip(stretch, value.x + rayOrigin.x, slope.x + rayDirection.x);
+  clip(stretch, value.y - rayOrigin.y, slope.y - rayDirection.y);
+  clip(stretch, value.y + rayOrigin.y, slope.y + rayDirection.y);
   clip(stretch, rayOrigin.z - push.params.value.nearest, rayDirection.z);
   clip(stretch, push.params.value.farthest - rayOrigin.z, -rayDirection.z);
   return stretch;

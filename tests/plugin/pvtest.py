@@ -91,6 +91,7 @@ def make_view(size, position, focal_point, parallel_scale=None):
 
 def paraview_volume(source, view, association, name, unit_distance):
     """ParaView's own volume rendering, unshaded, as an array of [rows][columns][3] bytes from the top."""
+    position, focal_point, scale = list(view.CameraPosition), list(view.CameraFocalPoint), view.CameraParallelScale
     representation = simple.Show(source, view)
     representation.SetRepresentationType("Volume")
     simple.ColorBy(representation, (association, name))
@@ -98,6 +99,8 @@ def paraview_volume(source, view, association, name, unit_distance):
     representation.Shade = 0
     simple.HideScalarBarIfNotNeeded(simple.GetColorTransferFunction(name), view)
     path = os.path.join(OUTPUT, "paraview_volume.png")
+    simple.Render(view)  # the first picture of a view moves its camera
+    view.CameraPosition, view.CameraFocalPoint, view.CameraParallelScale = position, focal_point, scale
     simple.Render(view)
     simple.SaveScreenshot(path, view, ImageResolution=view.ViewSize)
     return read_png(path)

@@ -97,7 +97,8 @@ double windowedSsim(const Channel& channel, int width, int height) {
     for (int x = radius; x < width - radius; ++x) {
       Moments m;
       for (int i = -radius; i <= radius; ++i)
-        m.add(kernel[i + radius], columns[static_cast<std::size_t>(x + i)]);
+        m.add(kernel[i + radius],
+              columns[static_cast<std::size_t>(x) + static_cast<std::size_t>(i + radius) - radius]);
       sum += m.ssim();
     }
   }

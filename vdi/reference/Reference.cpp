@@ -111,8 +111,9 @@ SampleRange samplesIn(const OwnedBox& box, const SceneRay& ray, std::uint32_t co
   return range;
 }
 
-/// The scene's bounds seldom lie half-way between two samples: the first sample's interval starts where the ray enters them,
-/// the last one's ends where it leaves. Depends on ray and scene alone, so it's the same on every rank.
+/// The scene's bounds seldom lie half-way between two samples: the first sample's interval starts where the
+/// ray enters them, the last one's ends where it leaves. Depends on ray and scene alone, so it's the same on
+/// every rank.
 struct SceneStretch {
   SampleRange samples;
   float enter = 0.0F;  // depth
@@ -295,11 +296,14 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
     for (std::uint32_t k = piece.range.first; k < piece.range.last; ++k) {
       const glm::dvec3 world = glm::dvec3(ray.sample(k)) + frame.scene.bounds.center();
       const TransferTableEntry entry = frame.table.lookup(interpolate(*piece.block, world));
-      const float front = k == scene.samples.first ? scene.enter : static_cast<float>(frame.lattice.frontOf(k));
-      const float back = k + 1 == scene.samples.last ? scene.leave : static_cast<float>(frame.lattice.frontOf(k + 1));
+      const float front =
+          k == scene.samples.first ? scene.enter : static_cast<float>(frame.lattice.frontOf(k));
+      const float back =
+          k + 1 == scene.samples.last ? scene.leave : static_cast<float>(frame.lattice.frontOf(k + 1));
       const float opticalDepth = std::min(entry.extinction * unitsPerDepth * (back - front), maxExtinction);
       const float opacity = opacityOf(opticalDepth);
-      samples.push_back({front, back, entry.red * opacity, entry.green * opacity, entry.blue * opacity, opticalDepth});
+      samples.push_back(
+          {front, back, entry.red * opacity, entry.green * opacity, entry.blue * opacity, opticalDepth});
       total += opticalDepth;
       if (total >= enough) return samples;
     }
