@@ -1,6 +1,7 @@
 #include "vdi/core/ImageMetrics.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -79,26 +80,35 @@ double smallSsim(const Channel& channel, int width, int height) {
   return all.ssim();
 }
 
+using Kernel = std::array<double, 2 * radius + 1>;
+
+Kernel gaussian() {
+  Kernel kernel{};
+  double total = 0.0;
+  for (std::size_t i = 0; i < kernel.size(); ++i) {
+    const double distance = static_cast<double>(i) - radius;
+    kernel[i] = std::exp(-0.5 * distance * distance / (sigma * sigma));
+    total += kernel[i];
+  }
+  for (double& weight : kernel) weight /= total;
+  return kernel;
+}
+
 /// The Gaussian is separable: columns first, a row of results at a time.
 double windowedSsim(const Channel& channel, int width, int height) {
-  double kernel[2 * radius + 1];
-  double total = 0.0;
-  for (int i = -radius; i <= radius; ++i)
-    total += kernel[i + radius] = std::exp(-0.5 * i * i / (sigma * sigma));
-  for (double& weight : kernel) weight /= total;
+  const Kernel kernel = gaussian();
   std::vector<Moments> columns(static_cast<std::size_t>(width));
   double sum = 0.0;
   for (int y = radius; y < height - radius; ++y) {
     for (int x = 0; x < width; ++x) {
       Moments m;
-      for (int i = -radius; i <= radius; ++i) m.add(kernel[i + radius], channel.at(x, y + i));
+      for (int i = -radius; i <= radius; ++i)
+        m.add(kernel[static_cast<std::size_t>(radius + i)], channel.at(x, y + i));
       columns[static_cast<std::size_t>(x)] = m;
     }
-    for (int x = radius; x < width - radius; ++x) {
+    for (std::size_t first = 0; first + kernel.size() <= columns.size(); ++first) {
       Moments m;
-      for (int i = -radius; i <= radius; ++i)
-        m.add(kernel[i + radius],
-              columns[static_cast<std::size_t>(x) + static_cast<std::size_t>(i + radius) - radius]);
+      for (std::size_t i = 0; i < kernel.size(); ++i) m.add(kernel[i], columns[first + i]);
       sum += m.ssim();
     }
   }
