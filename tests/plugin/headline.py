@@ -14,9 +14,7 @@ from pvtest import *  # noqa: E402,F403
 VARIANTS = {  # name: (deal, kind, cell data, parallel scale)
     "random": ("random", "float32", False, None),
     "cells": ("random", "float32", True, None),
-    "uint8": ("interleaved", "uint8", False, None),
     "uint16_parallel": ("random", "uint16", False, 0.75),
-    "slabs": ("slabs", "float32", False, None),
 }
 mode = sys.argv[1]
 for name, (deal, kind, as_cells, scale) in VARIANTS.items():
@@ -24,13 +22,15 @@ for name, (deal, kind, as_cells, scale) in VARIANTS.items():
     high = {"float32": 1.0, "uint8": 200.0, "uint16": 60000.0}[kind]
     source = blocks_source(deal, kind=kind, as_cells=as_cells)
     set_colors("scalars", 0, high)
-    view = make_view([320, 240], [1.9, 1.4, 2.1], [0.5, 0.5, 0.5], scale)
+    view = make_view([240, 180], [1.9, 1.4, 2.1], [0.5, 0.5, 0.5], scale)
     image = vdi_filter(source, view, association, "scalars", 0.05)
     ours = picture(image)
     rendered = simple.RenderVDI(Input=image)
     rendered.UseOriginalCamera = 1
     from_vdi = picture(rendered)
-    theirs = paraview_volume(source, view, association, "scalars", 0.05)
+    theirs = None
+    if mode == "write" or name == "random":
+        theirs = paraview_volume(source, view, association, "scalars", 0.05)
     path = "one_rank_%s.png" % name
     if mode == "write":
         check(ours.max() > 100 and (ours.max(axis=2) > 8).mean() > 0.1, name + ": there is something to see")
@@ -44,9 +44,9 @@ for name, (deal, kind, as_cells, scale) in VARIANTS.items():
         check(worst <= 1, "%s: the flat picture equals one rank's, worst channel off by %d" % (name, worst))
         worst = np.abs(from_vdi.astype(int) - truth).max()
         check(worst <= 1, "%s: so does the VDI rendered from its own viewpoint, off by %d" % (name, worst))
-        print("%s: wrong by more than 16/255 of the object's pixels: ours %.2f %%, ParaView's own %.2f %%"
-              % (name, 100 * wrong_share(ours, truth), 100 * wrong_share(theirs, truth)), flush=True)
-        if name == "random":
+        if theirs is not None:
+            print("%s: wrong by more than 16/255 of the object's pixels: ours %.2f %%, ParaView's own %.2f %%"
+                  % (name, 100 * wrong_share(ours, truth), 100 * wrong_share(theirs, truth)), flush=True)
             check(wrong_share(theirs, truth) > 0.02, "ParaView's own rendering shows the fault that this test is about")
             write_png("headline.png", np.hstack([truth, ours, theirs]))
     simple.Delete(view)

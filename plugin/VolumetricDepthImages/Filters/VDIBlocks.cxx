@@ -9,9 +9,11 @@
 #include <vtkDoubleArray.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
+#include <vtkOverlappingAMR.h>
 #include <vtkPiecewiseFunction.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
+#include <vtkUniformGridAMRDataIterator.h>
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
@@ -107,27 +109,51 @@ TypedArray typed(vtkDataArray* array, int component) {
   return result;
 }
 
+/// Where an image's cells lie.
+struct Lattice {
+  glm::dvec3 origin;  // lower corner of the first cell
+  glm::dvec3 spacing;
+  glm::ivec3 points;
+  glm::ivec3 cells;
+};
+
 /// Cells of the image that are its own, as disjoint boxes [lo, hi) of cell indices: all of them in one box
-/// unless ghost or blanked cells say otherwise. Boxes grow along x, then y, then z, so that whole ghost
-/// layers leave one box.
+/// unless ghost or blanked cells say otherwise, or `finer` blocks of an AMR data set cover some. Boxes grow
+/// along x, then y, then z, so that whole ghost layers leave one box.
 struct CellBox {
   glm::ivec3 lo;
   glm::ivec3 hi;
 };
 
-std::vector<CellBox> ownCells(vtkImageData* image, const glm::ivec3& cells) {
+std::vector<CellBox> ownCells(vtkImageData* image, const Lattice& lattice,
+                              const std::vector<vdi::Box>& finer) {
   constexpr unsigned char notOurs = vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::REFINEDCELL |
                                     vtkDataSetAttributes::HIDDENCELL;
+  const glm::ivec3& cells = lattice.cells;
   vtkUnsignedCharArray* ghosts = image->GetCellGhostArray();
-  if (ghosts == nullptr) return {{glm::ivec3(0), cells}};
-  const unsigned char* flags = ghosts->GetPointer(0);
+  if (ghosts == nullptr && finer.empty()) return {{glm::ivec3(0), cells}};
   const auto index = [&](int x, int y, int z) {
     return (static_cast<std::size_t>(z) * static_cast<std::size_t>(cells.y) + static_cast<std::size_t>(y)) *
                static_cast<std::size_t>(cells.x) +
            static_cast<std::size_t>(x);
   };
-  std::vector<bool> open(static_cast<std::size_t>(ghosts->GetNumberOfTuples()));
-  for (std::size_t i = 0; i < open.size(); ++i) open[i] = (flags[i] & notOurs) == 0;
+  std::vector<bool> open(index(cells.x - 1, cells.y - 1, cells.z - 1) + 1, true);
+  if (ghosts != nullptr) {
+    const unsigned char* flags = ghosts->GetPointer(0);
+    for (std::size_t i = 0; i < open.size(); ++i) open[i] = (flags[i] & notOurs) == 0;
+  }
+  for (const vdi::Box& box : finer) {
+    // Finer boxes begin and end with coarse cells; a cell is covered if its middle is.
+    const glm::dvec3 lo = glm::ceil((box.lo - lattice.origin) / lattice.spacing - 0.5);
+    const glm::dvec3 hi = glm::ceil((box.hi - lattice.origin) / lattice.spacing - 0.5);
+    const glm::ivec3 first(glm::clamp(lo, glm::dvec3(0.0), glm::dvec3(cells)));
+    const glm::ivec3 last(glm::clamp(hi, glm::dvec3(0.0), glm::dvec3(cells)));
+    for (int z = first.z; z < last.z; ++z) {
+      for (int y = first.y; y < last.y; ++y) {
+        for (int x = first.x; x < last.x; ++x) open[index(x, y, z)] = false;
+      }
+    }
+  }
   const auto allOpen = [&](const CellBox& box) {
     for (int z = box.lo.z; z < box.hi.z; ++z) {
       for (int y = box.lo.y; y < box.hi.y; ++y) {
@@ -165,7 +191,8 @@ std::vector<CellBox> ownCells(vtkImageData* image, const glm::ivec3& cells) {
   return boxes;
 }
 
-void addImage(vtkImageData* image, const ArrayChoice& choice, std::vector<vdi::Block>& blocks) {
+void addImage(vtkImageData* image, const ArrayChoice& choice, const std::vector<vdi::Box>& finer,
+              std::vector<vdi::Block>& blocks) {
   if (image->GetNumberOfPoints() == 0) return;
   if (!image->GetDirectionMatrix()->IsIdentity()) {
     throw Error(ErrorCode::InvalidArgument,
@@ -182,19 +209,18 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, std::vector<vdi::B
   const TypedArray scalars = typed(array, choice.component);
   int extent[6];
   image->GetExtent(extent);
-  glm::dvec3 origin;
-  glm::dvec3 spacing;
-  glm::ivec3 points;
+  Lattice lattice;
   for (int axis = 0; axis < 3; ++axis) {
-    spacing[axis] = image->GetSpacing()[axis];
-    origin[axis] = image->GetOrigin()[axis] + extent[2 * axis] * spacing[axis];
-    points[axis] = extent[2 * axis + 1] - extent[2 * axis] + 1;
+    lattice.spacing[axis] = image->GetSpacing()[axis];
+    lattice.origin[axis] = image->GetOrigin()[axis] + extent[2 * axis] * lattice.spacing[axis];
+    lattice.points[axis] = extent[2 * axis + 1] - extent[2 * axis] + 1;
   }
-  const glm::ivec3 cells = glm::max(points - 1, glm::ivec3(1));
+  lattice.cells = glm::max(lattice.points - 1, glm::ivec3(1));
+  const auto& [origin, spacing, points, cells] = lattice;
   // The deleter's copy of the smart pointer is what keeps the array alive.
   const std::shared_ptr<const void> keepAlive(
       scalars.array->GetVoidPointer(0), [array = scalars.array](const void*) mutable { array = nullptr; });
-  for (const CellBox& box : ownCells(image, cells)) {
+  for (const CellBox& box : ownCells(image, lattice, finer)) {
     vdi::Block block = choice.cells
                            ? vdi::Block::fromCells(cells, origin, spacing, scalars.type, keepAlive.get())
                            : vdi::Block::fromPoints(points, origin, spacing, scalars.type, keepAlive.get());
@@ -209,7 +235,8 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, std::vector<vdi::B
   }
 }
 
-void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, std::vector<vdi::Block>& blocks) {
+void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, const std::vector<vdi::Box>& finer,
+             std::vector<vdi::Block>& blocks) {
   if (leaf == nullptr) return;
   auto* image = vtkImageData::SafeDownCast(leaf);
   if (image == nullptr) {
@@ -220,7 +247,30 @@ void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, std::vector<vdi::Bl
             "or AMR data sets (Resample To Image makes it of anything)",
             leaf->GetClassName()));
   }
-  addImage(image, choice, blocks);
+  addImage(image, choice, finer, blocks);
+}
+
+/// Blocks of a level with what the levels above it leave of them. Where every level's blocks lie is known on
+/// all ranks.
+void addOverlapping(vtkOverlappingAMR* amr, const ArrayChoice& choice, std::vector<vdi::Block>& blocks) {
+  const auto iterator = vtkSmartPointer<vtkUniformGridAMRDataIterator>::Take(
+      vtkUniformGridAMRDataIterator::SafeDownCast(amr->NewIterator()));
+  unsigned int level = amr->GetNumberOfLevels();
+  std::vector<vdi::Box> finer;
+  for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
+    if (iterator->GetCurrentLevel() != level) {
+      level = iterator->GetCurrentLevel();
+      finer.clear();
+      for (unsigned int above = level + 1; above < amr->GetNumberOfLevels(); ++above) {
+        for (unsigned int i = 0; i < amr->GetNumberOfDataSets(above); ++i) {
+          double b[6];
+          amr->GetBounds(above, i, b);
+          finer.push_back({{b[0], b[2], b[4]}, {b[1], b[3], b[5]}});
+        }
+      }
+    }
+    addLeaf(iterator->GetCurrentDataObject(), choice, finer, blocks);
+  }
 }
 
 constexpr int colorSamples = 1024;
@@ -231,12 +281,16 @@ std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice)
   std::vector<vdi::Block> blocks;
   auto* composite = vtkCompositeDataSet::SafeDownCast(data);
   if (composite == nullptr) {
-    addLeaf(data, choice, blocks);
+    addLeaf(data, choice, {}, blocks);
+    return blocks;
+  }
+  if (auto* amr = vtkOverlappingAMR::SafeDownCast(data)) {
+    addOverlapping(amr, choice, blocks);
     return blocks;
   }
   const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
   for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
-    addLeaf(iterator->GetCurrentDataObject(), choice, blocks);
+    addLeaf(iterator->GetCurrentDataObject(), choice, {}, blocks);
   }
   return blocks;
 }

@@ -1,0 +1,93 @@
+"""The filters, reader, writer and extractor as a script's author uses them, and what bad input gets."""
+
+import os
+import sys
+
+import numpy as np
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from pvtest import *  # noqa: E402,F403
+from vtkmodules.vtkCommonCore import vtkCommand, vtkOutputWindow  # noqa: E402
+
+POSITION, FOCAL_POINT = [60, 45, 75], [0, 0, 0]
+
+
+def with_camera(proxy):
+    proxy.CameraPosition, proxy.CameraFocalPoint = POSITION, FOCAL_POINT
+    return proxy
+
+
+def vdi_of(source, array=("POINTS", "RTData"), **properties):
+    image = with_camera(simple.VolumetricDepthImage(Input=source))
+    image.SelectInputScalars = list(array)
+    image.Resolution = [120, 90]
+    for key, value in properties.items():
+        setattr(image, key, value)
+    return image
+
+
+def errors_of(action):
+    """What VTK reports as errors while `action` runs."""
+    texts = []
+    window = vtkOutputWindow.GetInstance()
+    window_messages = window.AddObserver("ErrorEvent", lambda *args: texts.append("error"))
+    try:
+        action()
+    except RuntimeError as error:
+        texts.append(str(error))
+    window.RemoveObserver(window_messages)
+    return texts
+
+
+wavelet = simple.Wavelet(WholeExtent=[-12, 12, -12, 12, -12, 12])
+image = vdi_of(wavelet)
+flat = picture(image)
+check(flat.max() > 60, "an image in, a picture out")
+check(image.LookupTable is not None, "the colour map is the array's own when none is given")
+names = [image.GetPointDataInformation().GetArray(i).Name for i in range(2)]
+check(names == ["RGBA", "SupersegmentCount"], "point data: RGBA and SupersegmentCount")
+image.SMProxy.UpdatePropertyInformation()
+check("generate" in image.SMProxy.GetProperty("Report").GetElement(0), "the report tells what each stage took")
+
+# Saved, read again, rendered: the same.
+path = os.path.join(OUTPUT, "wavelet.vdi")
+simple.SaveData(path, proxy=image)
+read = simple.OpenDataFile(path)
+check(np.array_equal(picture(read), flat), "a saved VDI reads back as it was")
+for source in (image, read):
+    rendered = with_camera(simple.RenderVDI(Input=source))
+    worst = np.abs(picture(rendered).astype(int) - flat).max()
+    check(worst <= 1, "RenderVDI from V_O gives the flat picture, off by %d" % worst)
+rendered.Resolution = [64, 64]
+check(picture(rendered).shape == (64, 64, 3), "RenderVDI renders at any resolution")
+check(np.array_equal(picture(vdi_of(wavelet, PictureOnly=1)), flat), "PictureOnly gives the same picture")
+
+# A series is time steps.
+second = os.path.join(OUTPUT, "series_1.vdi")
+simple.SaveData(os.path.join(OUTPUT, "series_0.vdi"), proxy=image)
+simple.SaveData(second, proxy=vdi_of(wavelet, Supersegments=3))
+series = simple.VDIReader(FileNames=[os.path.join(OUTPUT, "series_0.vdi"), second])
+series.UpdatePipelineInformation()
+check(len(series.TimestepValues) == 2, "a series of files is a series of time steps")
+
+# Composite and cell data.
+cells = simple.PointDatatoCellData(Input=wavelet)
+check(picture(vdi_of(cells, ("CELLS", "RTData"))).max() > 60, "cell data")
+group = simple.GroupDatasets(Input=[wavelet])
+check(np.array_equal(picture(vdi_of(group)), flat), "a multiblock of one image gives the image's picture")
+amr = simple.HierarchicalFractal(Dimensions=8, TwoDimensional=0, Asymetric=0)
+fractal = vdi_of(amr, ("CELLS", "Fractal Volume Fraction"), CameraPosition=[8, 6, 9], CameraFocalPoint=[0, 0, 0])
+check(picture(fractal).max() > 60, "an AMR data set of " + amr.GetClientSideObject().GetOutputDataObject(0).GetClassName())
+
+# Bad input: an error, not a crash, and the next thing works.
+check(errors_of(lambda: vdi_of(simple.Tetrahedralize(Input=wavelet)).UpdatePipeline()), "an unstructured grid is refused")
+check(errors_of(lambda: vdi_of(wavelet, CameraPosition=[0, 0, 0]).UpdatePipeline()), "a camera on its focal point is refused")
+check(errors_of(lambda: vdi_of(wavelet, ("POINTS", "nothing")).UpdatePipeline()), "an array that isn't there is refused")
+check(errors_of(lambda: simple.RenderVDI(Input=wavelet).UpdatePipeline()), "RenderVDI refuses an image that is no VDI")
+broken = os.path.join(OUTPUT, "broken.vdi")
+content = bytearray(open(path, "rb").read())
+content[len(content) // 2] ^= 0x10
+open(broken, "wb").write(content)
+check(errors_of(lambda: simple.VDIReader(FileNames=[broken]).UpdatePipeline()), "a file with a flipped bit is refused")
+check(np.array_equal(picture(vdi_of(wavelet)), flat), "after all that, a VDI is made as before")
+finish()
