@@ -16,6 +16,7 @@ def use():
     view = simple.GetActiveViewOrCreate("RenderView")
     view.OrientationAxesVisibility = 0
     wavelet = simple.Wavelet()
+    wavelet.UpdatePipeline()
     pvtest.set_colors("RTData", 37, 277)
     image = simple.VolumetricDepthImage(Input=wavelet)
     image.Resolution = [480, 320]
