@@ -1,17 +1,23 @@
-// The subcommands of `vdi`. Each adds its options to the program and returns what runs when it's chosen.
+// The subcommands of `vdi`. Each adds its options to the program; choosing it on the command line fills in
+// the job, which runs once the whole command line has been understood.
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <memory>
+#include <functional>
 
 #include "vdi/comm/Communicator.h"
 
 namespace vdi::apps {
 
-void addGenerate(CLI::App& app, const comm::Communicator& world);
-void addRender(CLI::App& app);
-void addCompare(CLI::App& app);
-void addInfo(CLI::App& app);
-void addBench(CLI::App& app);
+struct Job {
+  std::function<void(const comm::Communicator& world)> run;
+  bool collective = false;  // may run on several ranks, all of which call it
+};
+
+void addGenerate(CLI::App& app, Job& job);
+void addRender(CLI::App& app, Job& job);
+void addCompare(CLI::App& app, Job& job);
+void addInfo(CLI::App& app, Job& job);
+void addBench(CLI::App& app, Job& job);
 
 }  // namespace vdi::apps

@@ -12,16 +12,24 @@ namespace vdi::apps {
 namespace {
 
 struct Options {
-  SourceOptions source;
+  std::string raw;  // sidecar; empty: a procedural field
+  std::string field = "turbulence";
+  DealOptions deal;
   ViewOptions view;
   QualityOptions quality;
-  std::string transferFunction;
   std::string output;
   std::string flat;
   std::string volume;
   double time = 0.0;
   std::uint64_t step = 0;
+
+  bool wantsVdi() const { return volume.empty() || !output.empty() || !flat.empty(); }
 };
+
+std::vector<Block> blocksOf(const Options& options, const comm::Communicator& world) {
+  return options.raw.empty() ? fieldBlocks(options.field, options.deal, world.rank(), world.size())
+                             : rawBlocks(options.raw, options.deal, world.rank(), world.size());
+}
 
 void printReport(const std::vector<RankReport>& reports) {
   fmt::print(
@@ -34,6 +42,17 @@ void printReport(const std::vector<RankReport>& reports) {
   }
 }
 
+void writeVdiFiles(const Options& options, Vdi& vdi, const VdiGenerator& generator) {
+  vdi.time = options.time;
+  vdi.timeStep = options.step;
+  if (!options.output.empty()) io::writeVdi(options.output, vdi);
+  if (!options.flat.empty()) io::writePng(options.flat, io::toPicture(flatten(vdi)));
+  fmt::print("{} x {} lists, {} supersegments, on {}\n", vdi.width, vdi.height, vdi.lists.segments.size(),
+             generator.device().name());
+  printReport(generator.reports());
+}
+
+/// What the root writes, the others wait for: all ranks fail when it can't.
 void generate(const Options& options, const comm::Communicator& world) {
   std::shared_ptr<gpu::Device> device;
   std::vector<Block> blocks;
@@ -41,7 +60,7 @@ void generate(const Options& options, const comm::Communicator& world) {
   world.together([&] {
     settings = makeSettings(options.quality);
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
-    blocks = makeBlocks(options.source, world.rank(), world.size());
+    blocks = blocksOf(options, world);
   });
   VdiGenerator generator(device, comm::Communicator::world());
   generator.setBlocks(std::move(blocks));
@@ -49,19 +68,14 @@ void generate(const Options& options, const comm::Communicator& world) {
   TransferFunction function;
   world.together([&] {
     camera = makeCamera(options.view, generator.scene());
-    function = makeTransferFunction(options.transferFunction, generator.scene(), generator.scalarRange());
+    function = makeTransferFunction(options.quality, generator.scene(), generator.scalarRange());
   });
-  std::optional<Vdi> vdi = generator.generate(camera, function, settings);
-  world.together([&] {
-    if (!vdi) return;
-    vdi->time = options.time;
-    vdi->timeStep = options.step;
-    if (!options.output.empty()) io::writeVdi(options.output, *vdi);
-    if (!options.flat.empty()) io::writePng(options.flat, io::toPicture(flatten(*vdi)));
-    fmt::print("{} x {} lists, {} supersegments, on {}\n", vdi->width, vdi->height,
-               vdi->lists.segments.size(), generator.device().name());
-    printReport(generator.reports());
-  });
+  if (options.wantsVdi()) {
+    std::optional<Vdi> vdi = generator.generate(camera, function, settings);
+    world.together([&] {
+      if (vdi) writeVdiFiles(options, *vdi, generator);
+    });
+  }
   if (options.volume.empty()) return;
   const std::optional<Image> image = generator.renderVolume(camera, function, settings);
   world.together([&] {
@@ -71,21 +85,42 @@ void generate(const Options& options, const comm::Communicator& world) {
 
 }  // namespace
 
-void addGenerate(CLI::App& app, const comm::Communicator& world) {
-  CLI::App* command =
-      app.add_subcommand("generate", "Make a VDI of a raw volume or a procedural field; also under mpirun");
+void addGenerate(CLI::App& app, Job& job) {
+  CLI::App* command = app.add_subcommand(
+      "generate", "Make a VDI of a raw volume or a procedural field; on several ranks under mpirun");
+  command->footer(
+      "Examples:\n"
+      "  vdi generate --field coil -o coil.vdi --flat coil.png\n"
+      "  mpirun -np 4 vdi generate --raw brain.json --blocks 4x4x4 --layout random -o brain.vdi");
   const auto options = std::make_shared<Options>();
-  addSourceOptions(*command, options->source);
+  CLI::Option* raw =
+      command->add_option("--raw", options->raw, "JSON sidecar of a raw volume (docs/raw-volumes.md)")
+          ->type_name("FILE")
+          ->group("Volume and ranks");
+  command->add_option("--field", options->field, "procedural field:" + fieldsHelp())
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->excludes(raw)
+      ->group("Volume and ranks");
+  addDealOptions(*command, options->deal);
+  raw->excludes("--size")->excludes("--type");
   addViewOptions(*command, options->view);
   addQualityOptions(*command, options->quality);
-  command->add_option("--transfer-function", options->transferFunction,
-                      "JSON file (docs/raw-volumes.md); default: three hues");
-  command->add_option("-o,--output", options->output, "the .vdi file to write");
-  command->add_option("--flat", options->flat, "PNG of the VDI seen from its own viewpoint");
-  command->add_option("--dvr", options->volume, "PNG of plain volume rendering from there");
-  command->add_option("--time", options->time, "simulation time, kept in the file")->capture_default_str();
-  command->add_option("--step", options->step, "time step, kept in the file")->capture_default_str();
-  command->callback([options, &world] { generate(*options, world); });
+  const auto addFile = [&](const char* name, std::string& file, const char* description) {
+    command->add_option(name, file, description)->type_name("FILE")->group("Output");
+  };
+  addFile("-o,--output", options->output, "the .vdi file to write");
+  addFile("--flat", options->flat, "PNG of the VDI seen from its own viewpoint");
+  addFile("--dvr", options->volume, "PNG of plain volume rendering from there");
+  command->add_option("--time", options->time, "simulation time, kept in the file")
+      ->capture_default_str()
+      ->group("Output");
+  command->add_option("--step", options->step, "time step, kept in the file")
+      ->capture_default_str()
+      ->group("Output");
+  command->callback([options, &job] {
+    job = {[options](const comm::Communicator& world) { generate(*options, world); }, true};
+  });
 }
 
 }  // namespace vdi::apps

@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "apps/Cameras.h"
 #include "apps/Commands.h"
-#include "apps/RawVolume.h"
 #include "apps/Source.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
@@ -21,8 +21,9 @@ namespace {
 struct RenderOptions {
   std::string input;
   std::string output;
-  std::string camera;
+  CameraOptions camera;
   std::vector<double> azimuths{0.0};
+  double elevation = 0.0;
   std::string resolution;
 };
 
@@ -41,8 +42,7 @@ void render(const RenderOptions& options) {
   VdiRenderer renderer(gpu::Device::create(gpu::requestFromEnvironment(0)));
   renderer.setVdi(vdi);
   for (const double azimuth : options.azimuths) {
-    Camera camera = options.camera.empty() ? vdi.camera : readCamera(options.camera);
-    if (azimuth != 0.0) camera = camera.azimuth(azimuth);
+    const Camera camera = turned(chosenCamera(options.camera, vdi.camera), azimuth, options.elevation);
     const std::filesystem::path path = nameFor(options.output, azimuth, options.azimuths.size() > 1);
     io::writePng(path, io::toPicture(renderer.render(camera, size[0], size[1])));
     fmt::print("{}: {:.2f} ms on the device\n", path.string(), renderer.renderMilliseconds());
@@ -111,41 +111,53 @@ void printInfo(const InfoOptions& options) {
 
 }  // namespace
 
-void addRender(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("render", "Show a VDI from a viewpoint, as PNG");
+void addRender(CLI::App& app, Job& job) {
+  CLI::App* command = app.add_subcommand("render", "Show a VDI from new viewpoints, as PNG");
+  command->footer(
+      "Example:\n"
+      "  vdi render coil.vdi -o coil.png --azimuth 0 5 20 50\n"
+      "writes coil_0deg.png, coil_5deg.png, coil_20deg.png and coil_50deg.png.");
   const auto options = std::make_shared<RenderOptions>();
-  command->add_option("input", options->input, "the .vdi file")->required();
+  command->add_option("input", options->input, "the .vdi file")->type_name("")->required();
   command
       ->add_option("-o,--output", options->output,
-                   "PNG; with several angles their degrees are added to its name")
+                   "PNG; with several azimuths their degrees are added to its name")
+      ->type_name("FILE")
       ->required();
+  command->add_option("--resolution", options->resolution, "pixels; default: the VDI's")->type_name("WxH");
+  addCameraOptions(*command, options->camera, "the one that the VDI was made for");
   command
       ->add_option("--azimuth", options->azimuths,
                    "degrees to turn the camera about its focal point; several make several pictures")
-      ->capture_default_str();
-  command->add_option("--camera", options->camera,
-                      "JSON file; default: the camera that the VDI was made for");
-  command->add_option("--resolution", options->resolution, "WIDTHxHEIGHT; default: the VDI's");
-  command->callback([options] { render(*options); });
+      ->type_name("DEG")
+      ->capture_default_str()
+      ->group("Viewpoint");
+  command->add_option("--elevation", options->elevation, "degrees to raise it after that")
+      ->capture_default_str()
+      ->group("Viewpoint");
+  command->callback([options, &job] { job = {[options](const comm::Communicator&) { render(*options); }}; });
 }
 
-void addCompare(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("compare", "Tell how alike two PNGs are");
+void addCompare(CLI::App& app, Job& job) {
+  CLI::App* command =
+      app.add_subcommand("compare", "Tell how alike two PNGs are: SSIM, PSNR, mean and largest error");
+  command->footer("JSON has null for the infinite PSNR of equal pictures.");
   const auto options = std::make_shared<CompareOptions>();
-  command->add_option("a", options->a, "PNG")->required();
-  command->add_option("b", options->b, "PNG")->required();
+  command->add_option("a", options->a, "PNG")->type_name("")->required();
+  command->add_option("b", options->b, "PNG")->type_name("")->required();
   command->add_flag("--json", options->json, "print JSON");
-  command->callback([options] { comparePictures(*options); });
+  command->callback(
+      [options, &job] { job = {[options](const comm::Communicator&) { comparePictures(*options); }}; });
 }
 
-void addInfo(CLI::App& app) {
+void addInfo(CLI::App& app, Job& job) {
   CLI::App* command = app.add_subcommand("info", "Describe .vdi files or this machine's devices");
   const auto options = std::make_shared<InfoOptions>();
-  command->add_option("files", options->files, ".vdi files");
+  command->add_option("files", options->files, ".vdi files")->type_name("");
   command->add_flag("--devices", options->devices, "list the Vulkan devices and whether each can be used");
-  command->callback([options] {
-    if (options->files.empty() && !options->devices) throw CLI::RequiredError("a .vdi file or --devices");
-    printInfo(*options);
+  command->callback([options, &job] {
+    if (options->files.empty() && !options->devices) throw CLI::RequiredError("A .vdi file or --devices");
+    job = {[options](const comm::Communicator&) { printInfo(*options); }};
   });
 }
 

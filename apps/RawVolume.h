@@ -1,12 +1,10 @@
 // Raw volumes with a JSON sidecar; docs/raw-volumes.md describes the sidecar.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
-#include <vector>
 
 #include "apps/Decomposition.h"
-#include "vdi/core/Camera.h"
-#include "vdi/core/TransferFunction.h"
 
 namespace vdi::apps {
 
@@ -18,20 +16,10 @@ struct RawVolume {
 };
 
 /// Throws Error: Io if a file is missing; Format if the sidecar isn't JSON, lacks a field, has an unknown or
-/// impossible one, or if the raw file's size doesn't match.
+/// impossible one, or if the raw file's size isn't the one that it asks for.
 RawVolume readSidecar(const std::filesystem::path& path);
 
-/// The values of one part, read from the file; the block owns them.
+/// The values of one part, read from the file; the block owns them. Throws Error{Io}.
 Block readPart(const RawVolume& volume, const Part& part);
-
-/// {"colors": [[x, r, g, b], ...], "opacities": [[x, a], ...], "unit_distance": d}. Throws as readSidecar.
-TransferFunction readTransferFunction(const std::filesystem::path& path);
-
-/// Three hues over [min, max]: transparent below a third, nearly opaque at the top.
-TransferFunction defaultTransferFunction(double min, double max, double unitDistance);
-
-/// {"position": [x, y, z], "focal_point": [...], "view_up": [...], "view_angle": degrees} or, instead of
-/// view_angle, "parallel_scale": s. Throws as readSidecar.
-Camera readCamera(const std::filesystem::path& path);
 
 }  // namespace vdi::apps

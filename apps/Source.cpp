@@ -1,12 +1,13 @@
 #include "apps/Source.h"
 
 #include <charconv>
-#include <cmath>
-#include <numbers>
-#include <sstream>
+#include <string_view>
 
+#include "apps/Cameras.h"
 #include "apps/Fields.h"
+#include "apps/Help.h"
 #include "apps/RawVolume.h"
+#include "apps/TransferFunctions.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::apps {
@@ -20,7 +21,8 @@ Joint jointOf(const std::string& name) {
   throw Error(ErrorCode::InvalidArgument, "no joint '" + name + "'; there are shared, gap and cells");
 }
 
-glm::ivec3 vectorOf(const std::vector<int>& v) {
+template <typename T>
+glm::vec<3, T> vectorOf(const std::vector<T>& v) {
   return {v[0], v[1], v[2]};
 }
 
@@ -51,68 +53,102 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
+const char* const dealGroup = "Volume and ranks";
+const char* const viewGroup = "Viewpoint";
+const char* const qualityGroup = "VDI";
+
 }  // namespace
 
 std::vector<int> parseSizes(const std::string& text, std::size_t count) {
   std::vector<int> sizes;
-  std::stringstream stream(text);
-  for (std::string part; std::getline(stream, part, 'x');) {
+  const char* at = text.data();
+  const char* const end = text.data() + text.size();
+  while (sizes.size() < count) {
     int value = 0;
-    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
-    if (error != std::errc() || end != part.data() + part.size() || value < 1) break;
+    const auto [after, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || value < 1) break;
     sizes.push_back(value);
+    at = after;
+    if (sizes.size() == count || at == end || *at != 'x') break;
+    ++at;
   }
-  if (sizes.size() != count || !stream.eof()) {
+  if (sizes.size() != count || at != end) {
     throw Error(ErrorCode::InvalidArgument,
-                "'" + text + "' isn't " + std::to_string(count) + " positive numbers joined by x");
+                "'" + text + "' isn't " + std::to_string(count) + " positive whole numbers joined by x");
   }
   return sizes;
 }
 
-void addSourceOptions(CLI::App& command, SourceOptions& options) {
-  std::string names;
-  for (const FieldInfo& info : fields()) names += "\n  " + info.name + ": " + info.description;
-  command.add_option("--raw", options.raw, "JSON sidecar of a raw volume (docs/raw-volumes.md)");
-  command.add_option("--field", options.field, "procedural field:" + names)
-      ->capture_default_str()
-      ->excludes("--raw");
-  command.add_option("--size", options.size, "values per axis of the field")->capture_default_str();
-  command.add_option("--type", options.type, "scalar type of the field: u8 i8 u16 i16 u32 i32 f32 f64")
-      ->capture_default_str();
-  command.add_option("--seed", options.seed, "of random fields and layouts")->capture_default_str();
-  command.add_option("--blocks", options.blocks, "blocks per axis")->capture_default_str();
-  command.add_option("--layout", options.layout, "who holds which block: " + joined(layoutNames()))
-      ->capture_default_str();
-  command
-      .add_option(
-          "--joint", options.joint,
-          "blocks share the points of common faces (shared), no point twice (gap), or cell data (cells)")
-      ->capture_default_str();
+std::string fieldsHelp() {
+  std::string text;
+  for (const FieldInfo& info : fields()) text += "\n  " + info.name + ": " + info.description;
+  return text;
 }
 
-std::vector<Block> makeBlocks(const SourceOptions& options, int rank, int ranks) {
-  const glm::ivec3 count = vectorOf(parseSizes(options.blocks, 3));
-  const Layout layout = layoutFromString(options.layout);
-  std::vector<Block> blocks;
-  if (!options.raw.empty()) {
-    const RawVolume volume = readSidecar(options.raw);
-    for (const Part& part :
-         decompose(volume.lattice.size, count, layout, volume.lattice.joint, ranks, options.seed)) {
-      if (part.owner == rank) blocks.push_back(readPart(volume, part));
+void addDealOptions(CLI::App& command, DealOptions& options) {
+  command.add_option("--size", options.size, "values per axis of a field")
+      ->type_name("XxYxZ")
+      ->capture_default_str()
+      ->group(dealGroup);
+  command.add_option("--type", options.type, "scalar type of a field: u8, i8, u16, i16, u32, i32, f32, f64")
+      ->type_name("TYPE")
+      ->capture_default_str()
+      ->group(dealGroup);
+  command.add_option("--seed", options.seed, "of random fields and layouts")
+      ->capture_default_str()
+      ->group(dealGroup);
+  command.add_option("--blocks", options.blocks, "blocks per axis")
+      ->type_name("XxYxZ")
+      ->capture_default_str()
+      ->group(dealGroup);
+  command
+      .add_option("--layout", options.layout,
+                  "which rank holds which block: " + joined(layoutNames()) +
+                      "; on fewer blocks than ranks some hold nothing")
+      ->type_name("LAYOUT")
+      ->capture_default_str()
+      ->group(dealGroup);
+  command
+      .add_option("--joint", options.joint,
+                  "neighbouring blocks both hold the points of their common face (shared), no point is held "
+                  "twice (gap), or cell data (cells); default: shared, or what the raw volume is")
+      ->type_name("JOINT")
+      ->group(dealGroup);
+}
+
+std::vector<Block> rawBlocks(const std::string& sidecar, const DealOptions& options, int rank, int ranks) {
+  RawVolume volume = readSidecar(sidecar);
+  if (!options.joint.empty()) {
+    const Joint joint = jointOf(options.joint);
+    if ((joint == Joint::Cells) != (volume.lattice.joint == Joint::Cells)) {
+      throw Error(ErrorCode::InvalidArgument,
+                  "--joint " + options.joint + " doesn't go with the association of " + sidecar);
     }
-    return blocks;
+    volume.lattice.joint = joint;
   }
+  std::vector<Block> blocks;
+  for (const Part& part :
+       decompose(volume.lattice.size, vectorOf(parseSizes(options.blocks, 3)),
+                 layoutFromString(options.layout), volume.lattice.joint, ranks, options.seed)) {
+    if (part.owner == rank) blocks.push_back(readPart(volume, part));
+  }
+  return blocks;
+}
+
+std::vector<Block> fieldBlocks(const std::string& name, const DealOptions& options, int rank, int ranks) {
   Lattice lattice;
   lattice.size = vectorOf(parseSizes(options.size, 3));
   lattice.type = scalarTypeFromString(options.type);
-  lattice.joint = jointOf(options.joint);
+  if (!options.joint.empty()) lattice.joint = jointOf(options.joint);
   const int longest = std::max({lattice.size.x, lattice.size.y, lattice.size.z});
   const bool cells = lattice.joint == Joint::Cells;
   const double spacing = 1.0 / std::max(cells ? longest : longest - 1, 1);
   lattice.spacing = glm::dvec3(spacing);
-  const Field field = makeField(options.field, options.seed);
+  const Field field = makeField(name, options.seed);
   const double top = topOf(lattice.type);
-  for (const Part& part : decompose(lattice.size, count, layout, lattice.joint, ranks, options.seed)) {
+  std::vector<Block> blocks;
+  for (const Part& part : decompose(lattice.size, vectorOf(parseSizes(options.blocks, 3)),
+                                    layoutFromString(options.layout), lattice.joint, ranks, options.seed)) {
     if (part.owner != rank) continue;
     blocks.push_back(makeBlock(lattice, part, [&](const glm::ivec3& index) {
       return top * field((glm::dvec3(index) + (cells ? 0.5 : 0.0)) * spacing);
@@ -121,35 +157,103 @@ std::vector<Block> makeBlocks(const SourceOptions& options, int rank, int ranks)
   return blocks;
 }
 
-void addViewOptions(CLI::App& command, ViewOptions& options) {
-  command.add_option("--camera", options.camera,
-                     "JSON file with position, focal_point, view_up and view_angle or parallel_scale");
-  command.add_option("--azimuth", options.azimuth, "degrees around the scene, without --camera")
-      ->capture_default_str();
-  command.add_option("--elevation", options.elevation, "degrees above it, without --camera")
-      ->capture_default_str();
-  command.add_flag("--parallel", options.parallel, "parallel projection, without --camera");
+void addCameraOptions(CLI::App& command, CameraOptions& options, const std::string& otherwise) {
+  command
+      .add_option("--camera", options.file,
+                  "JSON file of the camera (docs/raw-volumes.md); default: " + otherwise)
+      ->type_name("FILE")
+      ->group(viewGroup);
+  const auto addVector = [&](const char* name, std::vector<double>& value, const char* description) {
+    return command.add_option(name, value, description)->expected(3)->type_name("X Y Z")->group(viewGroup);
+  };
+  addVector("--position", options.position, "the camera's place, world");
+  addVector("--focal-point", options.focalPoint, "what it looks at, world");
+  addVector("--view-up", options.viewUp, "what is up in the picture");
+  CLI::Option* angle =
+      command.add_option("--view-angle", options.viewAngle, "vertical, degrees; perspective projection")
+          ->group(viewGroup);
+  command
+      .add_option("--parallel-scale", options.parallelScale,
+                  "half the picture's height in world units; parallel projection")
+      ->excludes(angle)
+      ->group(viewGroup);
 }
 
-Camera makeCamera(const ViewOptions& options, const Scene& scene) {
-  if (!options.camera.empty()) return readCamera(options.camera);
-  const double azimuth = options.azimuth * std::numbers::pi / 180.0;
-  const double elevation = options.elevation * std::numbers::pi / 180.0;
-  const glm::dvec3 towards{-std::sin(azimuth) * std::cos(elevation), -std::sin(elevation),
-                           -std::cos(azimuth) * std::cos(elevation)};
-  Camera camera = Camera::framing(scene.bounds, towards, {0.0, 1.0, 0.0});
-  camera.parallelProjection = options.parallel;
+Camera chosenCamera(const CameraOptions& options, const Camera& otherwise) {
+  Camera camera = options.file.empty() ? otherwise : readCamera(options.file);
+  if (!options.position.empty()) camera.position = vectorOf(options.position);
+  if (!options.focalPoint.empty()) camera.focalPoint = vectorOf(options.focalPoint);
+  if (!options.viewUp.empty()) camera.viewUp = vectorOf(options.viewUp);
+  if (options.viewAngle) {
+    camera.parallelProjection = false;
+    camera.viewAngle = *options.viewAngle;
+  }
+  if (options.parallelScale) {
+    camera.parallelProjection = true;
+    camera.parallelScale = *options.parallelScale;
+  }
   return camera;
 }
 
+void addViewOptions(CLI::App& command, ViewOptions& options) {
+  addCameraOptions(command, options.camera, "on an orbit from which the whole scene is seen");
+  const auto orbit = [&](CLI::Option* option) {
+    option->excludes("--camera")->excludes("--position")->group(viewGroup);
+    return option;
+  };
+  orbit(command.add_option("--azimuth", options.azimuth, "degrees around the scene's centre, about y")
+            ->capture_default_str());
+  orbit(command.add_option("--elevation", options.elevation, "degrees above it")->capture_default_str());
+  orbit(command.add_option("--zoom", options.zoom, "> 1 goes nearer")
+            ->check(demandPositive)
+            ->capture_default_str());
+  orbit(command.add_flag("--parallel", options.parallel, "parallel projection of the whole scene"))
+      ->excludes("--view-angle");
+}
+
+Camera makeCamera(const ViewOptions& options, const Scene& scene) {
+  // The angle decides how far away the whole scene is seen from; one that makes no sense is refused later.
+  const double angle = options.camera.viewAngle.value_or(30.0);
+  const bool sensible = angle > 0.0 && angle < 180.0;
+  Camera camera =
+      orbitCamera(scene.bounds, options.azimuth, options.elevation, options.zoom, sensible ? angle : 30.0);
+  camera.parallelProjection = options.parallel;
+  return chosenCamera(options.camera, camera);
+}
+
 void addQualityOptions(CLI::App& command, QualityOptions& options) {
-  command.add_option("--resolution", options.resolution, "lists, that is pixels: WIDTHxHEIGHT")
-      ->capture_default_str();
-  command.add_option("--supersegments", options.supersegments, "the most in one list (N_S)")
-      ->capture_default_str();
-  command.add_option("--sampling-rate", options.samplesPerVoxel, "samples per voxel")->capture_default_str();
+  std::string presets;
+  for (const PresetInfo& info : transferFunctionPresets())
+    presets += "\n  " + info.name + ": " + info.description;
+  command.add_option("--resolution", options.resolution, "lists, that is pixels")
+      ->type_name("WxH")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command.add_option("--supersegments", options.supersegments, "the most in one list (N_S), 1 to 1024")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command.add_option("--sampling-rate", options.samplesPerVoxel, "samples per voxel, 1/64 to 64")
+      ->capture_default_str()
+      ->group(qualityGroup);
   command.add_option("--algorithm", options.algorithm, "how samples become supersegments: bisection")
-      ->capture_default_str();
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command
+      .add_option("--transfer-function", options.transferFunction,
+                  "a JSON file whose name ends in .json (docs/raw-volumes.md), or one of these, stretched "
+                  "over the data's range:" +
+                      presets)
+      ->type_name("NAME|FILE")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command
+      .add_option(
+          "--unit-distance", options.unitDistance,
+          "world units of material that have the transfer function's opacity; default: the file's, or "
+          "a fiftieth of the scene's diagonal")
+      ->check(demandPositive)
+      ->group(qualityGroup);
 }
 
 GenerateSettings makeSettings(const QualityOptions& options) {
@@ -164,12 +268,18 @@ GenerateSettings makeSettings(const QualityOptions& options) {
   return settings;
 }
 
-TransferFunction makeTransferFunction(const std::string& file, const Scene& scene, const ScalarRange& range) {
-  if (!file.empty()) return readTransferFunction(file);
-  const double diagonal = scene.bounds.empty() ? 1.0 : glm::length(scene.bounds.size());
-  const bool spread = range.min < range.max;
-  const double min = range.min <= range.max ? range.min : 0.0;
-  return defaultTransferFunction(min, spread ? range.max : min + 1.0, diagonal / 50.0);
+TransferFunction makeTransferFunction(const QualityOptions& options, const Scene& scene,
+                                      const ScalarRange& range) {
+  TransferFunction function;
+  if (options.transferFunction.ends_with(".json")) {
+    function = readTransferFunction(options.transferFunction, range);
+  } else {
+    const double diagonal = glm::length(scene.bounds.size());
+    function =
+        presetTransferFunction(options.transferFunction, range, diagonal > 0.0 ? diagonal / 50.0 : 1.0);
+  }
+  if (options.unitDistance) function.unitDistance = *options.unitDistance;
+  return function;
 }
 
 }  // namespace vdi::apps

@@ -1,8 +1,9 @@
-// Options that say which volume, view and settings: what generate and bench have in common.
+// Options that say which volume, view and settings: what several subcommands have in common.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,25 +15,43 @@
 
 namespace vdi::apps {
 
-struct SourceOptions {
-  std::string raw;  // sidecar; empty: a procedural field
-  std::string field = "turbulence";
+/// How a volume is cut and dealt.
+struct DealOptions {
   std::string size = "96x96x96";
   std::string type = "f32";
   std::uint32_t seed = 1;
   std::string blocks = "2x2x2";
   std::string layout = "interleaved";
-  std::string joint = "shared";
+  std::string joint;  // empty: the raw volume's, or shared points
 };
-void addSourceOptions(CLI::App& command, SourceOptions& options);
+void addDealOptions(CLI::App& command, DealOptions& options);
 
-/// The blocks that `rank` of `ranks` holds. Throws Error.
-std::vector<Block> makeBlocks(const SourceOptions& options, int rank, int ranks);
+/// The blocks of a procedural field that `rank` of `ranks` holds. Throws Error.
+std::vector<Block> fieldBlocks(const std::string& field, const DealOptions& options, int rank, int ranks);
+/// The blocks of a raw volume; size and type are the sidecar's. Throws Error.
+std::vector<Block> rawBlocks(const std::string& sidecar, const DealOptions& options, int rank, int ranks);
+/// "name: description" of each field, for --help.
+std::string fieldsHelp();
 
+/// A camera given by its properties; what isn't given is taken from a file or another camera.
+struct CameraOptions {
+  std::string file;
+  std::vector<double> position;    // 3, or none
+  std::vector<double> focalPoint;  // 3, or none
+  std::vector<double> viewUp;      // 3, or none
+  std::optional<double> viewAngle;
+  std::optional<double> parallelScale;
+};
+void addCameraOptions(CLI::App& command, CameraOptions& options, const std::string& otherwise);
+/// `otherwise`, or the file's camera, with the given properties replaced.
+Camera chosenCamera(const CameraOptions& options, const Camera& otherwise);
+
+/// A viewpoint on an orbit around the scene, unless the camera is given.
 struct ViewOptions {
-  std::string camera;  // file
+  CameraOptions camera;
   double azimuth = 30.0;
   double elevation = 20.0;
+  double zoom = 1.0;
   bool parallel = false;
 };
 void addViewOptions(CLI::App& command, ViewOptions& options);
@@ -43,13 +62,15 @@ struct QualityOptions {
   std::uint32_t supersegments = 25;
   double samplesPerVoxel = 1.0;
   std::string algorithm = "bisection";
+  std::string transferFunction = "three-hues";  // a preset or a file
+  std::optional<double> unitDistance;
 };
 void addQualityOptions(CLI::App& command, QualityOptions& options);
 GenerateSettings makeSettings(const QualityOptions& options);
-
-/// The file's, or the default one over the data's range with a unit distance of a fiftieth of the scene's
+/// Presets are stretched over the data's range and have a unit distance of a fiftieth of the scene's
 /// diagonal.
-TransferFunction makeTransferFunction(const std::string& file, const Scene& scene, const ScalarRange& range);
+TransferFunction makeTransferFunction(const QualityOptions& options, const Scene& scene,
+                                      const ScalarRange& range);
 
 /// "640x360" or "96x96x96"; throws Error{InvalidArgument}.
 std::vector<int> parseSizes(const std::string& text, std::size_t count);

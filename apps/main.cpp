@@ -2,9 +2,20 @@
 #include <fmt/format.h>
 #include <mpi.h>
 
+#include <algorithm>
+#include <array>
+#include <chrono>
 #include <cstdio>
+#include <functional>
+#include <memory>
+#include <new>
+#include <string>
+#include <string_view>
+#include <thread>
 
+#include "BuildCommit.h"
 #include "apps/Commands.h"
+#include "apps/Help.h"
 #include "vdi/core/Error.h"
 
 namespace {
@@ -12,42 +23,109 @@ namespace {
 constexpr int failed = 1;
 constexpr int badUsage = 2;
 
-int runTool(int argc, char** argv) {
+/// How this rank ends.
+struct Outcome {
+  int status = 0;
+  std::string message;  // empty: nothing to say, or another rank says it
+};
+
+std::string firstLine(std::string_view text) {
+  return std::string(text.substr(0, text.find('\n')));
+}
+
+Outcome outcomeOf(const CLI::App& app, const CLI::ParseError& error, bool speaks) {
+  if (error.get_exit_code() == 0) {  // --help, --version
+    if (speaks) app.exit(error);
+    return {};
+  }
+  const auto chosen = app.get_subcommands();
+  const std::string command = chosen.empty() ? "vdi" : "vdi " + chosen.front()->get_name();
+  return {badUsage, fmt::format("{} (see '{} --help')", firstLine(error.what()), command)};
+}
+
+/// Ranks that were started with other arguments would wait for each other in different places.
+void demandEqualArguments(const vdi::comm::Communicator& world, int argc, char** argv) {
+  std::string all;
+  for (int i = 1; i < argc; ++i) all += std::string(argv[i]) + '\n';
+  world.demandEqual(std::hash<std::string>{}(all), "command line");
+}
+
+Outcome runTool(int argc, char** argv) {
   const vdi::comm::Communicator world = vdi::comm::Communicator::world();
   CLI::App app(
       "Volumetric Depth Images: small, view-dependent pictures with depth that can be seen from new "
-      "viewpoints");
+      "viewpoints",
+      "vdi");
+  app.formatter(std::make_shared<vdi::apps::HelpFormatter>());  // subcommands inherit it
   app.require_subcommand(1);
+  app.set_version_flag("--version", fmt::format("vdi {} ({})", VDI_VERSION, buildCommit));
   app.footer(
-      "VDI_DEVICE chooses the Vulkan device (index or part of its name); VDI_VALIDATION=1 turns validation "
-      "on.");
-  vdi::apps::addGenerate(app, world);
-  vdi::apps::addRender(app);
-  vdi::apps::addCompare(app);
-  vdi::apps::addInfo(app);
-  vdi::apps::addBench(app);
+      "The environment variable VDI_DEVICE chooses the Vulkan device (index or part of its name, see vdi "
+      "info "
+      "--devices);\nVDI_VALIDATION=1 turns the validation layer on. Exit status: 0, 1 for a failure, 2 for a "
+      "command line that makes no sense.");
+  vdi::apps::Job job;
+  vdi::apps::addGenerate(app, job);
+  vdi::apps::addRender(app, job);
+  vdi::apps::addCompare(app, job);
+  vdi::apps::addInfo(app, job);
+  vdi::apps::addBench(app, job);
   try {
-    app.parse(argc, argv);
-    return 0;
+    world.together([&] { app.parse(argc, argv); });
+    demandEqualArguments(world, argc, argv);
+    if (world.size() > 1 && !job.collective) {
+      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                       "this subcommand works on one rank; generate and bench work on several");
+    }
+    job.run(world);
+    return {};
   } catch (const CLI::ParseError& error) {
-    const bool help = error.get_exit_code() == 0;
-    if (world.rank() == 0) app.exit(error);
-    return help ? 0 : badUsage;
+    return outcomeOf(app, error, world.rank() == 0);
   } catch (const vdi::Error& error) {
-    // All ranks fail together; the one with the cause speaks.
-    if (error.code() != vdi::ErrorCode::RemoteRank) fmt::print(stderr, "vdi: {}\n", error.what());
-    return error.code() == vdi::ErrorCode::InvalidArgument ? badUsage : failed;
+    if (error.code() == vdi::ErrorCode::RemoteRank) return {failed, {}};
+    return {error.code() == vdi::ErrorCode::InvalidArgument ? badUsage : failed, error.what()};
+  } catch (const std::bad_alloc&) {
+    return {failed, "out of memory"};
   } catch (const std::exception& error) {
-    fmt::print(stderr, "vdi: {}\n", error.what());
-    return failed;
+    return {failed, error.what()};
   }
+}
+
+void say(const std::string& message) {
+  fmt::print(stderr, "vdi: {}\n", message);
+}
+
+/// All ranks end with the worst status, and the lowest one that has a message says it. A rank that failed
+/// while others still work ends them after a while: they may wait for it in a call that it never makes.
+int leaveTogether(const Outcome& mine) {
+  constexpr auto patience = std::chrono::seconds(20);
+  int rank = 0;
+  int size = 1;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  MPI_Comm_size(MPI_COMM_WORLD, &size);
+  std::array<int, 2> least{mine.message.empty() ? size : rank, -mine.status};
+  MPI_Request request = MPI_REQUEST_NULL;
+  MPI_Iallreduce(MPI_IN_PLACE, least.data(), 2, MPI_INT, MPI_MIN, MPI_COMM_WORLD, &request);
+  const auto start = std::chrono::steady_clock::now();
+  int done = 0;
+  MPI_Test(&request, &done, MPI_STATUS_IGNORE);
+  while (done == 0) {
+    if (mine.status != 0 && std::chrono::steady_clock::now() - start > patience) {
+      say(mine.message);
+      MPI_Abort(MPI_COMM_WORLD, mine.status);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    MPI_Test(&request, &done, MPI_STATUS_IGNORE);
+  }
+  if (least[0] == rank) say(mine.message);
+  return -least[1];
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
-  const int result = runTool(argc, argv);
+  const int result = leaveTogether(runTool(argc, argv));
   MPI_Finalize();
   return result;
 }

@@ -1,0 +1,62 @@
+#include "apps/Help.h"
+
+#include <sstream>
+
+namespace vdi::apps {
+
+namespace {
+
+constexpr std::size_t nameColumn = 30;
+constexpr std::size_t textWidth = 74;
+
+/// Breaks at blanks; what follows a break is indented as the line itself.
+std::string wrapped(const std::string& line) {
+  const std::size_t first = line.find_first_not_of(' ');
+  const std::string indent(first == std::string::npos ? 0 : first, ' ');
+  std::stringstream words(line);
+  std::string text = indent;
+  std::size_t used = indent.size();
+  bool atStart = true;
+  for (std::string word; words >> word; atStart = false) {
+    if (!atStart && used + 1 + word.size() > textWidth) {
+      text += "\n" + indent;
+      used = indent.size();
+    } else if (!atStart) {
+      text += ' ';
+      ++used;
+    }
+    text += word;
+    used += word.size();
+  }
+  return text;
+}
+
+}  // namespace
+
+HelpFormatter::HelpFormatter() {
+  column_width(nameColumn);
+}
+
+std::string HelpFormatter::make_option_opts(const CLI::Option* option) const {
+  std::string text;
+  const std::string type = option->get_type_name();
+  if (!type.empty()) text += " " + type;
+  if (!option->get_default_str().empty()) text += " = " + option->get_default_str();
+  if (option->get_expected_max() == CLI::detail::expected_max_vector_size) text += " ...";
+  if (option->get_required()) text += " (required)";
+  return text;
+}
+
+std::string HelpFormatter::make_option_desc(const CLI::Option* option) const {
+  std::stringstream lines(option->get_description());
+  std::string text;
+  for (std::string line; std::getline(lines, line);) text += (text.empty() ? "" : "\n") + wrapped(line);
+  return text;
+}
+
+std::string demandPositive(const std::string& text) {
+  double value = 0.0;
+  return CLI::detail::lexical_cast(text, value) && value > 0.0 ? "" : "must be > 0, it is " + text;
+}
+
+}  // namespace vdi::apps

@@ -1,0 +1,21 @@
+// How --help looks.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace vdi::apps {
+
+/// CLI11's, with wrapped lines, and without the lists of options that exclude each other: whoever mixes them
+/// is told.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  HelpFormatter();
+  std::string make_option_opts(const CLI::Option* option) const override;
+  std::string make_option_desc(const CLI::Option* option) const override;
+};
+
+/// A check for options: "must be > 0".
+std::string demandPositive(const std::string& text);
+
+}  // namespace vdi::apps

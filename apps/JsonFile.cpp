@@ -1,0 +1,124 @@
+#include "apps/JsonFile.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <limits>
+#include <utility>
+
+#include "vdi/core/Error.h"
+
+namespace vdi::apps {
+
+using nlohmann::json;
+
+namespace {
+
+bool isNumbers(const json& value, std::size_t count) {
+  if (!value.is_array() || value.size() != count) return false;
+  for (const json& item : value) {
+    if (!item.is_number()) return false;
+  }
+  return true;
+}
+
+std::string joined(const std::set<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+JsonFile::JsonFile(std::filesystem::path path, const std::set<std::string>& known) : path_(std::move(path)) {
+  std::ifstream file(path_);
+  if (!file || !std::filesystem::is_regular_file(path_)) {
+    throw Error(ErrorCode::Io, "can't open the file", path_.string());
+  }
+  try {
+    object_ = json::parse(file);
+  } catch (const json::exception& error) {
+    fail(fmt::format("not valid JSON: {}", error.what()));
+  }
+  if (!object_.is_object()) fail("not a JSON object");
+  for (const auto& [key, value] : object_.items()) {
+    if (!known.contains(key)) fail(fmt::format("unknown field '{}'; there are {}", key, joined(known)));
+  }
+}
+
+double JsonFile::number(const char* name) const {
+  const json& value = at(name);
+  if (!value.is_number()) fail(fmt::format("'{}' must be a number", name));
+  return value.get<double>();
+}
+
+bool JsonFile::flag(const char* name) const {
+  const json& value = at(name);
+  if (!value.is_boolean()) fail(fmt::format("'{}' must be true or false", name));
+  return value.get<bool>();
+}
+
+std::string JsonFile::text(const char* name) const {
+  const json& value = at(name);
+  if (!value.is_string()) fail(fmt::format("'{}' must be a text", name));
+  return value.get<std::string>();
+}
+
+std::uint64_t JsonFile::count(const char* name) const {
+  const json& value = at(name);
+  if (!value.is_number_unsigned()) fail(fmt::format("'{}' must be a whole number >= 0", name));
+  return value.get<std::uint64_t>();
+}
+
+glm::dvec3 JsonFile::vector(const char* name) const {
+  const json& value = at(name);
+  if (!isNumbers(value, 3)) fail(fmt::format("'{}' must be three numbers", name));
+  return {value[0].get<double>(), value[1].get<double>(), value[2].get<double>()};
+}
+
+glm::ivec3 JsonFile::positives(const char* name) const {
+  const json& value = at(name);
+  glm::ivec3 result(0);
+  bool good = isNumbers(value, 3);
+  for (int axis = 0; good && axis < 3; ++axis) {
+    const json& item = value[static_cast<std::size_t>(axis)];
+    good = item.is_number_unsigned() && item.get<std::uint64_t>() >= 1 &&
+           item.get<std::uint64_t>() <= static_cast<std::uint64_t>(std::numeric_limits<int>::max());
+    if (good) result[axis] = item.get<int>();
+  }
+  if (!good) fail(fmt::format("'{}' must be three whole numbers >= 1", name));
+  return result;
+}
+
+std::string JsonFile::choice(const char* name, const std::set<std::string>& choices) const {
+  std::string value = text(name);
+  if (!choices.contains(value)) {
+    fail(fmt::format("'{}' must be one of {}, it is '{}'", name, joined(choices), value));
+  }
+  return value;
+}
+
+std::vector<std::vector<double>> JsonFile::rows(const char* name, std::size_t width) const {
+  const json& value = at(name);
+  const auto demand = [&](bool good) {
+    if (!good) fail(fmt::format("'{}' must be a list of lists of {} numbers", name, width));
+  };
+  demand(value.is_array());
+  std::vector<std::vector<double>> rows;
+  for (const json& row : value) {
+    demand(isNumbers(row, width));
+    rows.push_back(row.get<std::vector<double>>());
+  }
+  return rows;
+}
+
+void JsonFile::fail(const std::string& what) const {
+  throw Error(ErrorCode::Format, what, path_.string());
+}
+
+const json& JsonFile::at(const char* name) const {
+  if (!has(name)) fail(fmt::format("the field '{}' is missing", name));
+  return object_.at(name);
+}
+
+}  // namespace vdi::apps

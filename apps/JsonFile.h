@@ -1,0 +1,46 @@
+// A JSON object in a file, read strictly: what isn't understood is an error, never a default.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace vdi::apps {
+
+class JsonFile {
+ public:
+  /// Throws Error: Io if the file can't be read; Format if it isn't one JSON object or has a field that isn't
+  /// among `known`.
+  JsonFile(std::filesystem::path path, const std::set<std::string>& known);
+
+  const std::filesystem::path& path() const { return path_; }
+  bool has(const char* name) const { return object_.contains(name); }
+
+  // The value of a field. Each throws Error{Format} with the field's name when it's missing or of another
+  // kind.
+  double number(const char* name) const;
+  bool flag(const char* name) const;
+  std::string text(const char* name) const;
+  std::uint64_t count(const char* name) const;   // whole, >= 0
+  glm::dvec3 vector(const char* name) const;     // three numbers
+  glm::ivec3 positives(const char* name) const;  // three whole numbers >= 1
+  /// One of `choices`.
+  std::string choice(const char* name, const std::set<std::string>& choices) const;
+  /// An array of rows of `width` numbers each.
+  std::vector<std::vector<double>> rows(const char* name, std::size_t width) const;
+
+  /// Throws Error{Format} with the path as context.
+  [[noreturn]] void fail(const std::string& what) const;
+
+ private:
+  const nlohmann::json& at(const char* name) const;
+
+  std::filesystem::path path_;
+  nlohmann::json object_;
+};
+
+}  // namespace vdi::apps
