@@ -3,16 +3,23 @@
 find_program(GLSLANG_VALIDATOR glslangValidator REQUIRED)
 find_program(SPIRV_VAL spirv-val REQUIRED)
 
-# vdi_embed_shaders(<target> <folder> name ...): compiles <folder>/<name>.comp for Vulkan 1.3, runs spirv-val on the
-# result, and adds to the target a source that defines vdi::gpu::shaderCode for those names. What a shader includes is
-# tracked: a changed header recompiles just the shaders that use it.
+# vdi_embed_shaders(<target> <folder> [NAMESPACE <namespace>] SHADERS name ...): compiles <folder>/<name>.comp for
+# Vulkan 1.3, runs spirv-val on the result, and adds to the target a source that defines
+#   std::span<const std::uint32_t> <namespace>::shaderCode(std::string_view name)
+# for those names; the namespace is vdi::gpu unless given. What a shader includes is tracked: a changed header
+# recompiles just the shaders that use it.
 function(vdi_embed_shaders target folder)
-  set(outputDir "${CMAKE_CURRENT_BINARY_DIR}/shaders")
+  cmake_parse_arguments(PARSE_ARGV 2 arg "" "NAMESPACE" "SHADERS")
+  set(namespace "${arg_NAMESPACE}")
+  if(NOT namespace)
+    set(namespace vdi::gpu)
+  endif()
+  set(outputDir "${CMAKE_CURRENT_BINARY_DIR}/shaders/${target}")
   file(MAKE_DIRECTORY "${outputDir}")
   set(table "")
   set(includes "")
   set(headers "")
-  foreach(name IN LISTS ARGN)
+  foreach(name IN LISTS arg_SHADERS)
     set(source "${folder}/${name}.comp")
     set(header "${outputDir}/${name}.spv.h")
     set(spirv "${outputDir}/${name}.spv")

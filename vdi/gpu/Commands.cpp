@@ -51,8 +51,7 @@ void changeLayout(VkCommandBuffer commands, const Image3D& image, VkImageLayout 
 
 Commands::Commands(std::shared_ptr<Device> device) : device_(std::move(device)) {
   try {
-    const VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr,
-                                           VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT,
+    const VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr, 0,
                                            device_->queueFamily()};
     check(vkCreateCommandPool(device_->handle(), &poolInfo, nullptr, &pool_), "vkCreateCommandPool");
     const VkCommandBufferAllocateInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr,
@@ -70,7 +69,7 @@ Commands::Commands(std::shared_ptr<Device> device) : device_(std::move(device)) 
 }
 
 Commands::~Commands() {
-  if (submitted_) vkWaitForFences(device_->handle(), 1, &fence_, VK_TRUE, UINT64_MAX);
+  if (state_ == State::Submitted) vkWaitForFences(device_->handle(), 1, &fence_, VK_TRUE, UINT64_MAX);
   release();
 }
 
@@ -85,12 +84,16 @@ void Commands::begin() {
   wait();
   marks_.clear();
   vkResetQueryPool(device_->handle(), queries_, 0, maxMarks + 1);
+  check(vkResetCommandPool(device_->handle(), pool_, 0), "vkResetCommandPool");
   const VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr,
                                       VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT, nullptr};
   check(vkBeginCommandBuffer(buffer_, &info), "vkBeginCommandBuffer");
+  state_ = State::Recording;
 }
 
 void Commands::submit() {
+  assert(state_ == State::Recording);
+  state_ = State::Idle;
   if (!marks_.empty()) writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
   // Makes what was written visible to the host after wait().
   memoryBarrier(buffer_);
@@ -100,26 +103,33 @@ void Commands::submit() {
   const VkSubmitInfo2 info{
       VK_STRUCTURE_TYPE_SUBMIT_INFO_2, nullptr, 0, 0, nullptr, 1, &bufferInfo, 0, nullptr};
   device_->submit(info, fence_);
-  submitted_ = true;
+  state_ = State::Submitted;
 }
 
+/// After a lost device the submission counts as not done: each further begin or wait throws again.
 void Commands::wait() {
-  if (!submitted_) return;
-  submitted_ = false;
+  if (state_ != State::Submitted) return;
   check(vkWaitForFences(device_->handle(), 1, &fence_, VK_TRUE, UINT64_MAX), "vkWaitForFences");
+  state_ = State::Idle;
   check(vkResetFences(device_->handle(), 1, &fence_), "vkResetFences");
+  readTimes();
 }
 
 void Commands::dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants,
                              std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  assert(state_ == State::Recording);
+  assert(x <= device_->limits().maxGroups[0] && y <= device_->limits().maxGroups[1] &&
+         z <= device_->limits().maxGroups[2]);
   vkCmdBindPipeline(buffer_, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.handle());
   VkDescriptorSet set = pipeline.descriptorSet();
   if (set != VK_NULL_HANDLE) {
     vkCmdBindDescriptorSets(buffer_, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.layout(), 0, 1, &set, 0,
                             nullptr);
   }
-  vkCmdPushConstants(buffer_, pipeline.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                     static_cast<std::uint32_t>(constants.size()), constants.data());
+  if (!constants.empty()) {
+    vkCmdPushConstants(buffer_, pipeline.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                       static_cast<std::uint32_t>(constants.size()), constants.data());
+  }
   vkCmdDispatch(buffer_, x, y, z);
 }
 
@@ -154,6 +164,11 @@ void Commands::endUpload(const Image3D& image) {
 
 void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to,
                            const glm::uvec3& texelOffset, const glm::uvec3& texelExtent) {
+  assert(glm::all(glm::lessThanEqual(texelOffset + texelExtent, to.extent())));
+  if (texelExtent.x == 0 || texelExtent.y == 0 || texelExtent.z == 0) return;
+  assert(fromOffset +
+             std::uint64_t{texelExtent.x} * texelExtent.y * texelExtent.z * texelBytes(to.format()) <=
+         from.size());
   const glm::ivec3 offset(texelOffset);
   const VkBufferImageCopy region{fromOffset,
                                  0,
@@ -166,7 +181,7 @@ void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const I
 }
 
 void Commands::mark(std::string name) {
-  if (marks_.size() >= maxMarks) return;
+  assert(state_ == State::Recording && marks_.size() < maxMarks);
   writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
   marks_.push_back(std::move(name));
 }
@@ -175,19 +190,20 @@ void Commands::writeTimestamp(std::uint32_t query) {
   vkCmdWriteTimestamp2(buffer_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, queries_, query);
 }
 
-std::vector<StageTime> Commands::stageTimes() const {
-  std::vector<StageTime> times;
-  if (marks_.empty()) return times;
+void Commands::readTimes() {
+  times_.clear();
+  if (marks_.empty()) return;
   std::vector<std::uint64_t> ticks(marks_.size() + 1);
   check(vkGetQueryPoolResults(device_->handle(), queries_, 0, static_cast<std::uint32_t>(ticks.size()),
                               ticks.size() * sizeof(std::uint64_t), ticks.data(), sizeof(std::uint64_t),
                               VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
         "vkGetQueryPoolResults");
+  const DeviceLimits& limits = device_->limits();
+  const std::uint64_t validBits = ~std::uint64_t{0} >> (64U - limits.timestampBits);
   for (std::size_t i = 0; i < marks_.size(); ++i) {
-    const auto elapsed = static_cast<double>(ticks[i + 1] - ticks[i]);
-    times.push_back({marks_[i], elapsed * static_cast<double>(device_->limits().timestampPeriodNs) * 1e-6});
+    const auto elapsed = static_cast<double>((ticks[i + 1] - ticks[i]) & validBits);
+    times_.push_back({marks_[i], elapsed * static_cast<double>(limits.timestampPeriodNs) * 1e-6});
   }
-  return times;
 }
 
 }  // namespace vdi::gpu

@@ -31,9 +31,12 @@ class Commands {
   Commands(Commands&&) = delete;
   Commands& operator=(Commands&&) = delete;
 
-  void begin();  // waits for the previous submission, then resets
+  /// Waits for the previous submission, then starts anew. What was recorded and not submitted is dropped, so
+  /// an exception between begin and submit does no harm.
+  void begin();
   void submit();
-  /// Returns when the submission is done. Throws Error{DeviceFailure} on device loss.
+  /// Returns when the submission is done, at once when there's none. Throws Error{DeviceFailure} on device
+  /// loss.
   void wait();
   void submitAndWait() {
     submit();
@@ -54,7 +57,7 @@ class Commands {
 
   void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
             std::uint64_t bytes);
-  void fill(const Buffer& buffer, std::uint32_t word);  // whole buffer
+  void fill(const Buffer& buffer, std::uint32_t word);  // the whole buffer
   /// Makes the image ready for copyToImage and fills it with zeros: texels that nothing is copied to would
   /// otherwise hold anything, NaN included, and a NaN spoils its neighbours even with weight 0.
   void beginUpload(const Image3D& image);
@@ -67,12 +70,15 @@ class Commands {
   /// Marks the start of a named stage on the device's clock; it ends at the next mark, or at submit. Up to 64
   /// a submission.
   void mark(std::string name);
-  /// Device time of each stage of the last finished submission, in order. Valid after wait().
-  std::vector<StageTime> stageTimes() const;
+  /// Device time of each stage of the last submission that was waited for, in order.
+  const std::vector<StageTime>& stageTimes() const { return times_; }
 
  private:
   void release() noexcept;
   void writeTimestamp(std::uint32_t query);
+  void readTimes();
+
+  enum class State { Idle, Recording, Submitted };
 
   std::shared_ptr<Device> device_;
   VkCommandPool pool_ = VK_NULL_HANDLE;
@@ -80,7 +86,8 @@ class Commands {
   VkFence fence_ = VK_NULL_HANDLE;
   VkQueryPool queries_ = VK_NULL_HANDLE;
   std::vector<std::string> marks_;
-  bool submitted_ = false;
+  std::vector<StageTime> times_;
+  State state_ = State::Idle;
 };
 
 }  // namespace vdi::gpu

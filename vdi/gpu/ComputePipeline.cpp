@@ -77,7 +77,7 @@ void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
   const VkSpecializationInfo specialization{static_cast<std::uint32_t>(entries.size()), entries.data(),
                                             info.specialization.size() * sizeof(std::uint32_t),
                                             info.specialization.data()};
-  const ShaderModule module(*device_, shaderCode(info.shader));
+  const ShaderModule module(*device_, info.code.empty() ? shaderCode(info.shader) : info.code);
   const VkComputePipelineCreateInfo pipelineInfo{
       VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
       nullptr,

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cctype>
 #include <cstdlib>
 #include <cstring>
 #include <mutex>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "vdi/core/Error.h"
+#include "vdi/gpu/DeviceChoice.h"
 
 namespace vdi::gpu {
 
@@ -20,50 +20,18 @@ namespace {
 
 constexpr const char* validationLayer = "VK_LAYER_KHRONOS_validation";
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
-const char* typeName(VkPhysicalDeviceType type) {
-  switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
-      return "discrete";
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
-      return "integrated";
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
-      return "virtual";
-    case VK_PHYSICAL_DEVICE_TYPE_CPU:
-      return "CPU";
-    default:
-      return "other";
-  }
-}
-
-int preference(VkPhysicalDeviceType type) {
-  switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
-      return 4;
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
-      return 3;
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
-      return 2;
-    case VK_PHYSICAL_DEVICE_TYPE_CPU:
-      return 1;
-    default:
-      return 0;
-  }
-}
-
 /// The chain of feature structs, as one object that can be queried or passed to vkCreateDevice.
 struct Features {
   VkPhysicalDeviceFeatures2 core{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, nullptr, {}};
+  VkPhysicalDeviceVulkan11Features v11{};
   VkPhysicalDeviceVulkan12Features v12{};
   VkPhysicalDeviceVulkan13Features v13{};
   Features() {
+    v11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES;
     v12.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES;
     v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES;
-    core.pNext = &v12;
+    core.pNext = &v11;
+    v11.pNext = &v12;
     v12.pNext = &v13;
   }
   Features(const Features&) = delete;
@@ -72,11 +40,9 @@ struct Features {
 
 struct Candidate {
   VkPhysicalDevice handle = VK_NULL_HANDLE;
-  VkPhysicalDeviceProperties properties{};
   std::uint32_t queueFamily = 0;
-  std::uint64_t memoryBytes = 0;
-  std::uint64_t maxAllocationBytes = 0;
-  std::vector<std::string> refusals;
+  DeviceLimits limits;
+  DeviceSummary summary;
 };
 
 std::uint64_t largestDeviceHeap(VkPhysicalDevice device) {
@@ -91,15 +57,17 @@ std::uint64_t largestDeviceHeap(VkPhysicalDevice device) {
   return largest;
 }
 
-/// Prefers the family with graphics, which on common hardware is the one with the most compute queues.
-bool findComputeFamily(VkPhysicalDevice device, std::uint32_t& family) {
+/// The first family that computes and has timestamps: the one with graphics on common hardware, which has the
+/// whole device, while compute-only families may share it.
+bool findComputeFamily(VkPhysicalDevice device, Candidate& candidate) {
   std::uint32_t count = 0;
   vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
   std::vector<VkQueueFamilyProperties> families(count);
   vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
   for (std::uint32_t i = 0; i < count; ++i) {
     if ((families[i].queueFlags & VK_QUEUE_COMPUTE_BIT) != 0 && families[i].timestampValidBits > 0) {
-      family = i;
+      candidate.queueFamily = i;
+      candidate.limits.timestampBits = families[i].timestampValidBits;
       return true;
     }
   }
@@ -114,29 +82,29 @@ bool filtersLinearly(VkPhysicalDevice device, VkFormat format) {
   return (properties.optimalTilingFeatures & wanted) == wanted;
 }
 
-Candidate inspect(VkPhysicalDevice device) {
-  Candidate candidate;
-  candidate.handle = device;
-  vkGetPhysicalDeviceProperties(device, &candidate.properties);
-  candidate.memoryBytes = largestDeviceHeap(device);
-  auto& refusals = candidate.refusals;
-  if (candidate.properties.apiVersion < VK_API_VERSION_1_3) {
-    refusals.push_back(fmt::format("Vulkan {}.{}, 1.3 is needed",
-                                   VK_API_VERSION_MAJOR(candidate.properties.apiVersion),
-                                   VK_API_VERSION_MINOR(candidate.properties.apiVersion)));
-    return candidate;
-  }
+/// What needs Vulkan 1.3 to be asked for: limits, driver, and what's missing.
+void inspectFeatures(VkPhysicalDevice device, Candidate& candidate) {
+  VkPhysicalDeviceDriverProperties driver{};
+  driver.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES;
   VkPhysicalDeviceMaintenance3Properties m3{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES,
-                                            nullptr, 0, 0};
+                                            &driver, 0, 0};
   VkPhysicalDeviceMaintenance4Properties m4{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES, &m3,
                                             0};
   VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &m4, {}};
   vkGetPhysicalDeviceProperties2(device, &properties);
-  // Several drivers report 4 GiB here and allocate more; what's really there decides. The Vulkan limits of
-  // buffers stay.
-  candidate.maxAllocationBytes = std::max<std::uint64_t>(m3.maxMemoryAllocationSize, m4.maxBufferSize);
+  candidate.summary.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
+  DeviceLimits& limits = candidate.limits;
+  limits.maxBufferBytes = m4.maxBufferSize;
+  // Some drivers report 4 GiB as the largest allocation and make larger ones: there the largest buffer, which
+  // they'd have to allocate, tells more.
+  limits.maxAllocationBytes =
+      std::min(limits.memoryBytes, std::max<std::uint64_t>(m3.maxMemoryAllocationSize, m4.maxBufferSize));
+
   Features features;
   vkGetPhysicalDeviceFeatures2(device, &features.core);
+  limits.shaderFloat16 = features.v12.shaderFloat16 == VK_TRUE;
+  limits.storage16Bit = features.v11.storageBuffer16BitAccess == VK_TRUE;
+  limits.storage8Bit = features.v12.storageBuffer8BitAccess == VK_TRUE;
   const std::array<std::pair<VkBool32, const char*>, 7> demands{{
       {features.core.features.shaderInt64, "shaderInt64"},
       {features.v12.bufferDeviceAddress, "bufferDeviceAddress"},
@@ -147,28 +115,81 @@ Candidate inspect(VkPhysicalDevice device) {
       {features.v13.maintenance4, "maintenance4"},
   }};
   for (const auto& [present, name] : demands) {
-    if (present == VK_FALSE) refusals.push_back(fmt::format("no {}", name));
+    if (present == VK_FALSE) candidate.summary.refusals.push_back(fmt::format("no {}", name));
   }
-  if (!findComputeFamily(device, candidate.queueFamily))
-    refusals.emplace_back("no compute queue with timestamps");
+}
+
+Candidate inspect(VkPhysicalDevice device) {
+  Candidate candidate;
+  candidate.handle = device;
+  VkPhysicalDeviceProperties properties;
+  vkGetPhysicalDeviceProperties(device, &properties);
+  DeviceLimits& limits = candidate.limits;
+  limits.memoryBytes = largestDeviceHeap(device);
+  limits.maxImageDimension3D = properties.limits.maxImageDimension3D;
+  limits.timestampPeriodNs = properties.limits.timestampPeriod;
+  std::copy_n(properties.limits.maxComputeWorkGroupCount, 3, limits.maxGroups.begin());
+
+  DeviceSummary& summary = candidate.summary;
+  summary.name = properties.deviceName;
+  summary.type = properties.deviceType;
+  summary.memoryBytes = limits.memoryBytes;
+  summary.driver = fmt::format("driver {:#x}", properties.driverVersion);
+  if (properties.apiVersion >= VK_API_VERSION_1_3) {
+    inspectFeatures(device, candidate);
+  } else {
+    summary.refusals.push_back(fmt::format("Vulkan {}.{}, 1.3 is needed",
+                                           VK_API_VERSION_MAJOR(properties.apiVersion),
+                                           VK_API_VERSION_MINOR(properties.apiVersion)));
+  }
+  if (!findComputeFamily(device, candidate))
+    summary.refusals.emplace_back("no compute queue with timestamps");
   for (const auto& [format, name] :
        {std::pair(VK_FORMAT_R8_UNORM, "R8_UNORM"), std::pair(VK_FORMAT_R16_UNORM, "R16_UNORM"),
         std::pair(VK_FORMAT_R32_SFLOAT, "R32_SFLOAT")}) {
-    if (!filtersLinearly(device, format)) refusals.push_back(fmt::format("no linear filtering of {}", name));
+    if (!filtersLinearly(device, format))
+      summary.refusals.push_back(fmt::format("no linear filtering of {}", name));
   }
   return candidate;
 }
 
-std::string describe(const std::vector<Candidate>& candidates) {
-  if (candidates.empty()) return "there is no Vulkan device: no driver (ICD) is installed or visible\n";
-  std::string text;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const Candidate& c = candidates[i];
-    text += fmt::format("{}: {} ({}, {} MiB): {}\n", i, c.properties.deviceName,
-                        typeName(c.properties.deviceType), c.memoryBytes >> 20,
-                        c.refusals.empty() ? "usable" : fmt::format("{}", fmt::join(c.refusals, ", ")));
+std::vector<DeviceSummary> summaries(const std::vector<Candidate>& candidates) {
+  std::vector<DeviceSummary> result;
+  for (const Candidate& candidate : candidates) result.push_back(candidate.summary);
+  return result;
+}
+
+/// The validation layer's messages.
+class MessageLog {
+ public:
+  void add(const char* text) {
+    const std::lock_guard lock(mutex_);
+    ++count_;
+    text_ += text;
+    text_ += '\n';
+    if (text_.size() > kept) text_.erase(0, text_.size() - kept);
   }
-  return text;
+  std::uint32_t count() const {
+    const std::lock_guard lock(mutex_);
+    return count_;
+  }
+  std::string text() const {
+    const std::lock_guard lock(mutex_);
+    return text_;
+  }
+
+ private:
+  static constexpr std::size_t kept = 65536;
+  mutable std::mutex mutex_;
+  std::uint32_t count_ = 0;
+  std::string text_;
+};
+
+VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT,
+                                         VkDebugUtilsMessageTypeFlagsEXT,
+                                         const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
+  static_cast<MessageLog*>(user)->add(data->pMessage);
+  return VK_FALSE;
 }
 
 /// VkInstance with RAII, so that construction can fail half-way.
@@ -197,7 +218,9 @@ class Instance {
   VkInstance handle() const { return handle_; }
   VkInstance release() { return std::exchange(handle_, VK_NULL_HANDLE); }
 
+  /// Empty without an instance, which is what the loader gives when there's no driver at all.
   std::vector<Candidate> candidates() const {
+    if (handle_ == VK_NULL_HANDLE) return {};
     std::uint32_t count = 0;
     if (vkEnumeratePhysicalDevices(handle_, &count, nullptr) != VK_SUCCESS) return {};
     std::vector<VkPhysicalDevice> devices(count);
@@ -212,33 +235,6 @@ class Instance {
   VkInstance handle_ = VK_NULL_HANDLE;
   VkResult result_ = VK_SUCCESS;
 };
-
-bool selected(const Candidate& candidate, std::size_t index, const std::string& selector) {
-  if (selector.empty()) return true;
-  if (std::all_of(selector.begin(), selector.end(), [](unsigned char c) { return std::isdigit(c) != 0; })) {
-    return std::to_string(index) == selector;
-  }
-  return lower(candidate.properties.deviceName).find(lower(selector)) != std::string::npos;
-}
-
-const Candidate& choose(const std::vector<Candidate>& candidates, const DeviceRequest& request) {
-  std::vector<const Candidate*> best;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const Candidate& c = candidates[i];
-    if (!c.refusals.empty() || !selected(c, i, request.selector)) continue;
-    const int rank = preference(c.properties.deviceType);
-    if (!best.empty() && rank < preference(best.front()->properties.deviceType)) continue;
-    if (!best.empty() && rank > preference(best.front()->properties.deviceType)) best.clear();
-    best.push_back(&c);
-  }
-  if (best.empty()) {
-    const std::string wanted =
-        request.selector.empty() ? "" : fmt::format(" that matches VDI_DEVICE='{}'", request.selector);
-    throw Error(ErrorCode::DeviceUnavailable,
-                fmt::format("no usable Vulkan device{}; the devices are:\n{}", wanted, describe(candidates)));
-  }
-  return *best[static_cast<std::size_t>(std::max(request.localRank, 0)) % best.size()];
-}
 
 }  // namespace
 
@@ -256,9 +252,9 @@ struct Device::State {
   VkPhysicalDeviceMemoryProperties memory{};
   std::atomic<std::int64_t> allocated{0};
   std::mutex queueMutex;
-  mutable std::mutex messageMutex;
-  std::uint32_t messageCount = 0;
-  std::string messages;
+  MessageLog log;
+
+  void listen();  // to the validation layer
 
   ~State() {
     if (cache != VK_NULL_HANDLE) vkDestroyPipelineCache(device, cache, nullptr);
@@ -272,14 +268,88 @@ struct Device::State {
   }
 };
 
+void Device::State::listen() {
+  const VkDebugUtilsMessengerCreateInfoEXT info{
+      VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT,
+      nullptr,
+      0,
+      VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
+      VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT,
+      onMessage,
+      &log};
+  const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
+      vkGetInstanceProcAddr(instance, "vkCreateDebugUtilsMessengerEXT"));
+  check(create == nullptr ? VK_ERROR_EXTENSION_NOT_PRESENT : create(instance, &info, nullptr, &messenger),
+        "vkCreateDebugUtilsMessengerEXT");
+}
+
 namespace {
 
-VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT,
-                                         VkDebugUtilsMessageTypeFlagsEXT,
-                                         const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
-  auto* sink = static_cast<std::function<void(const char*)>*>(user);
-  (*sink)(data->pMessage);
-  return VK_FALSE;
+std::string resultName(VkResult result) {
+  switch (result) {
+    case VK_NOT_READY:
+      return "VK_NOT_READY";
+    case VK_TIMEOUT:
+      return "VK_TIMEOUT";
+    case VK_INCOMPLETE:
+      return "VK_INCOMPLETE";
+    case VK_ERROR_OUT_OF_HOST_MEMORY:
+      return "VK_ERROR_OUT_OF_HOST_MEMORY";
+    case VK_ERROR_OUT_OF_DEVICE_MEMORY:
+      return "VK_ERROR_OUT_OF_DEVICE_MEMORY";
+    case VK_ERROR_INITIALIZATION_FAILED:
+      return "VK_ERROR_INITIALIZATION_FAILED";
+    case VK_ERROR_DEVICE_LOST:
+      return "VK_ERROR_DEVICE_LOST";
+    case VK_ERROR_MEMORY_MAP_FAILED:
+      return "VK_ERROR_MEMORY_MAP_FAILED";
+    case VK_ERROR_LAYER_NOT_PRESENT:
+      return "VK_ERROR_LAYER_NOT_PRESENT";
+    case VK_ERROR_EXTENSION_NOT_PRESENT:
+      return "VK_ERROR_EXTENSION_NOT_PRESENT";
+    case VK_ERROR_FEATURE_NOT_PRESENT:
+      return "VK_ERROR_FEATURE_NOT_PRESENT";
+    case VK_ERROR_INCOMPATIBLE_DRIVER:
+      return "VK_ERROR_INCOMPATIBLE_DRIVER";
+    case VK_ERROR_TOO_MANY_OBJECTS:
+      return "VK_ERROR_TOO_MANY_OBJECTS";
+    case VK_ERROR_FORMAT_NOT_SUPPORTED:
+      return "VK_ERROR_FORMAT_NOT_SUPPORTED";
+    default:
+      return fmt::format("VkResult {}", static_cast<int>(result));
+  }
+}
+
+/// A device of its own for the process, with every feature that `limits` and Device::create promise.
+VkDevice makeDevice(const Candidate& chosen) {
+  const float priority = 1.0F;
+  const VkDeviceQueueCreateInfo queueInfo{
+      VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO, nullptr, 0, chosen.queueFamily, 1, &priority};
+  Features features;
+  features.core.features.shaderInt64 = VK_TRUE;
+  features.v11.storageBuffer16BitAccess = chosen.limits.storage16Bit ? VK_TRUE : VK_FALSE;
+  features.v12.storageBuffer8BitAccess = chosen.limits.storage8Bit ? VK_TRUE : VK_FALSE;
+  features.v12.shaderFloat16 = chosen.limits.shaderFloat16 ? VK_TRUE : VK_FALSE;
+  features.v12.bufferDeviceAddress = VK_TRUE;
+  features.v12.scalarBlockLayout = VK_TRUE;
+  features.v12.timelineSemaphore = VK_TRUE;
+  features.v12.hostQueryReset = VK_TRUE;
+  features.v13.synchronization2 = VK_TRUE;
+  features.v13.maintenance4 = VK_TRUE;
+  VkDeviceCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
+  info.pNext = &features.core;
+  info.queueCreateInfoCount = 1;
+  info.pQueueCreateInfos = &queueInfo;
+  VkDevice device = VK_NULL_HANDLE;
+  const VkResult result = vkCreateDevice(chosen.handle, &info, nullptr, &device);
+  if (result != VK_SUCCESS) {  // in use exclusively, reset, unplugged, ...
+    throw Error(
+        ErrorCode::DeviceUnavailable,
+        fmt::format("the Vulkan device can't be opened: vkCreateDevice failed with {}", resultName(result)),
+        chosen.summary.name);
+  }
+  return device;
 }
 
 }  // namespace
@@ -288,7 +358,7 @@ void check(VkResult result, const char* call) {
   if (result == VK_SUCCESS) return;
   const bool memory = result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY;
   throw Error(memory ? ErrorCode::OutOfMemory : ErrorCode::DeviceFailure,
-              fmt::format("{} failed with VkResult {}", call, static_cast<int>(result)));
+              fmt::format("{} failed with {}", call, resultName(result)));
 }
 
 DeviceRequest requestFromEnvironment(int localRank) {
@@ -302,86 +372,47 @@ DeviceRequest requestFromEnvironment(int localRank) {
 
 std::string Device::describeAll() {
   const Instance instance(false);
-  if (instance.result() != VK_SUCCESS) return describe({});
-  return describe(instance.candidates());
+  return describeDevices(summaries(instance.candidates()));
 }
 
 std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
   Instance instance(request.validation);
-  if (instance.result() == VK_ERROR_LAYER_NOT_PRESENT) {
-    throw Error(ErrorCode::DeviceUnavailable, "validation was asked for, but its layer isn't installed",
-                validationLayer);
+  if (request.validation && (instance.result() == VK_ERROR_LAYER_NOT_PRESENT ||
+                             instance.result() == VK_ERROR_EXTENSION_NOT_PRESENT)) {
+    throw Error(
+        ErrorCode::DeviceUnavailable,
+        fmt::format("validation was asked for, but isn't installed: {}", resultName(instance.result())),
+        validationLayer);
   }
-  const std::vector<Candidate> candidates =
-      instance.result() == VK_SUCCESS ? instance.candidates() : std::vector<Candidate>();
-  const Candidate& chosen = choose(candidates, request);
+  // The loader's answer to a machine without a driver is VK_ERROR_INCOMPATIBLE_DRIVER.
+  if (instance.result() != VK_SUCCESS && instance.result() != VK_ERROR_INCOMPATIBLE_DRIVER) {
+    throw Error(ErrorCode::DeviceUnavailable,
+                fmt::format("vkCreateInstance failed with {}", resultName(instance.result())));
+  }
+  const std::vector<Candidate> candidates = instance.candidates();
+  const Candidate& chosen = candidates[chooseDevice(summaries(candidates), request)];
 
   auto state = std::make_unique<State>();
   state->instance = instance.release();
+  if (request.validation) state->listen();
   state->physical = chosen.handle;
   state->queueFamily = chosen.queueFamily;
-  state->name = chosen.properties.deviceName;
-  state->cpu = chosen.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  state->limits = {chosen.memoryBytes, std::min(chosen.maxAllocationBytes, chosen.memoryBytes),
-                   chosen.properties.limits.maxImageDimension3D, chosen.properties.limits.timestampPeriod};
+  state->name = chosen.summary.name;
+  state->cpu = chosen.summary.type == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  state->limits = chosen.limits;
   vkGetPhysicalDeviceMemoryProperties(chosen.handle, &state->memory);
-
-  const float priority = 1.0F;
-  const VkDeviceQueueCreateInfo queueInfo{
-      VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO, nullptr, 0, chosen.queueFamily, 1, &priority};
-  Features features;
-  features.core.features.shaderInt64 = VK_TRUE;
-  features.v12.bufferDeviceAddress = VK_TRUE;
-  features.v12.scalarBlockLayout = VK_TRUE;
-  features.v12.timelineSemaphore = VK_TRUE;
-  features.v12.hostQueryReset = VK_TRUE;
-  features.v13.synchronization2 = VK_TRUE;
-  features.v13.maintenance4 = VK_TRUE;
-  VkDeviceCreateInfo info{VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                          &features.core,
-                          0,
-                          1,
-                          &queueInfo,
-                          0,
-                          nullptr,
-                          0,
-                          nullptr,
-                          nullptr};
-  check(vkCreateDevice(chosen.handle, &info, nullptr, &state->device), "vkCreateDevice");
+  state->device = makeDevice(chosen);
   vkGetDeviceQueue(state->device, chosen.queueFamily, 0, &state->queue);
   const VkPipelineCacheCreateInfo cacheInfo{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO, nullptr, 0, 0,
                                             nullptr};
   check(vkCreatePipelineCache(state->device, &cacheInfo, nullptr, &state->cache), "vkCreatePipelineCache");
-  std::shared_ptr<Device> device(new Device(std::move(state)));
-  if (request.validation) device->listen();
-  return device;
+  return std::shared_ptr<Device>(new Device(std::move(state)));
 }
 
 Device::Device(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 Device::~Device() {
   if (state_->device != VK_NULL_HANDLE) vkDeviceWaitIdle(state_->device);
-}
-
-void Device::listen() {
-  messageSink_ = [state = state_.get()](const char* text) {
-    const std::lock_guard lock(state->messageMutex);
-    ++state->messageCount;
-    if (state->messages.size() < 65536) state->messages += std::string(text) + "\n";
-  };
-  const VkDebugUtilsMessengerCreateInfoEXT info{
-      VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT,
-      nullptr,
-      0,
-      VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT,
-      VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT,
-      onMessage,
-      &messageSink_};
-  const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
-      vkGetInstanceProcAddr(state_->instance, "vkCreateDebugUtilsMessengerEXT"));
-  check(create == nullptr ? VK_ERROR_EXTENSION_NOT_PRESENT
-                          : create(state_->instance, &info, nullptr, &state_->messenger),
-        "vkCreateDebugUtilsMessengerEXT");
 }
 
 const std::string& Device::name() const {
@@ -412,12 +443,20 @@ VkPipelineCache Device::pipelineCache() const {
   return state_->cache;
 }
 
-std::uint32_t Device::memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const {
+std::optional<std::uint32_t> Device::findMemoryType(std::uint32_t typeBits,
+                                                    VkMemoryPropertyFlags wanted) const {
   for (std::uint32_t i = 0; i < state_->memory.memoryTypeCount; ++i) {
     const bool allowed = (typeBits & (1U << i)) != 0;
     if (allowed && (state_->memory.memoryTypes[i].propertyFlags & wanted) == wanted) return i;
   }
-  throw Error(ErrorCode::OutOfMemory, fmt::format("no memory type with properties {:#x}", wanted), name());
+  return std::nullopt;
+}
+
+std::uint32_t Device::memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const {
+  const auto type = findMemoryType(typeBits, wanted);
+  if (!type)
+    throw Error(ErrorCode::OutOfMemory, fmt::format("no memory type with properties {:#x}", wanted), name());
+  return *type;
 }
 
 std::uint64_t Device::allocatedBytes() const {
@@ -428,13 +467,10 @@ void Device::accountAllocation(std::int64_t bytes) {
 }
 
 std::uint32_t Device::validationMessageCount() const {
-  const std::lock_guard lock(state_->messageMutex);
-  return state_->messageCount;
+  return state_->log.count();
 }
-
 std::string Device::validationMessages() const {
-  const std::lock_guard lock(state_->messageMutex);
-  return state_->messages;
+  return state_->log.text();
 }
 
 void Device::submit(const VkSubmitInfo2& info, VkFence fence) {

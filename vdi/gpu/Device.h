@@ -3,16 +3,17 @@
 
 #include <vulkan/vulkan.h>
 
+#include <array>
 #include <cstdint>
-#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace vdi::gpu {
 
 struct DeviceRequest {
-  /// Index (as `vdi info --devices` lists them) or part of the name, case-insensitive. Empty: the best
-  /// device; equal ones are dealt out by localRank.
+  /// Index (as `vdi info --devices` lists them) or part of the name, case-insensitive; digits alone are
+  /// always an index. Empty: all devices. The best of those is used; equal ones are dealt out by localRank.
   std::string selector;
   int localRank = 0;        // rank among the ranks of this node
   bool validation = false;  // VK_LAYER_KHRONOS_validation; every message of severity warning or error is kept
@@ -23,19 +24,29 @@ struct DeviceRequest {
 DeviceRequest requestFromEnvironment(int localRank);
 
 struct DeviceLimits {
-  std::uint64_t memoryBytes = 0;         // of the largest device-local heap
-  std::uint64_t maxAllocationBytes = 0;  // VkPhysicalDeviceMaintenance3Properties / 4
+  std::uint64_t memoryBytes = 0;  // of the largest device-local heap
+  /// The most that's worth asking for in one allocation: the larger of maxMemoryAllocationSize and
+  /// maxBufferSize, at most memoryBytes. The driver may still refuse it.
+  std::uint64_t maxAllocationBytes = 0;
+  std::uint64_t maxBufferBytes = 0;
   std::uint32_t maxImageDimension3D = 0;
+  std::array<std::uint32_t, 3> maxGroups{};  // of one dispatch, per axis
   float timestampPeriodNs = 0.0F;
+  std::uint32_t timestampBits = 0;  // the low ones that count; the clock wraps around
+  // Features that are turned on where the device has them.
+  bool shaderFloat16 = false;
+  bool storage16Bit = false;  // storageBuffer16BitAccess
+  bool storage8Bit = false;   // storageBuffer8BitAccess
 };
 
 class Device {
  public:
   /// Throws Error{DeviceUnavailable}; the text lists every device of the machine and why it was refused, or
-  /// that there's no Vulkan driver at all. What's demanded: Vulkan 1.3, a compute queue with timestamps,
-  /// hostQueryReset, bufferDeviceAddress, scalarBlockLayout, shaderInt64, timelineSemaphore,
-  /// synchronization2, maintenance4, linear filtering of 3-D R32_SFLOAT, R16_UNORM and R8_UNORM images.
-  /// Preference: discrete, integrated, virtual, CPU.
+  /// says that there's no Vulkan driver at all, that the validation layer is missing, or that the device
+  /// can't be opened. What's demanded: Vulkan 1.3, a compute queue with timestamps, hostQueryReset,
+  /// bufferDeviceAddress, scalarBlockLayout, shaderInt64, timelineSemaphore, synchronization2, maintenance4,
+  /// linear filtering of 3-D R32_SFLOAT, R16_UNORM and R8_UNORM images. Preference: discrete, integrated,
+  /// virtual, CPU.
   static std::shared_ptr<Device> create(const DeviceRequest& request);
   /// A line per device: index, name, type, driver, memory, "usable" or why not. Never throws.
   static std::string describeAll();
@@ -57,14 +68,17 @@ class Device {
   std::uint32_t queueFamily() const;
   VkPipelineCache pipelineCache() const;
 
-  /// Index of a memory type that `typeBits` allows and that has `wanted`; throws Error{OutOfMemory} if
-  /// there's none.
+  /// Index of the first memory type that `typeBits` allows and that has `wanted`, if there's one; by Vulkan's
+  /// order that's the one with the fewest other properties.
+  std::optional<std::uint32_t> findMemoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
+  /// The same; throws Error{OutOfMemory} if there's none.
   std::uint32_t memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
   /// Bytes of device memory that Buffers and Images of this device hold now.
   std::uint64_t allocatedBytes() const;
   void accountAllocation(std::int64_t bytes);
 
-  /// Number of validation messages so far, and the text of the latest ones. 0 and empty without validation.
+  /// Number of validation messages so far, and the text of the latest ones (64 KiB). 0 and empty without
+  /// validation.
   std::uint32_t validationMessageCount() const;
   std::string validationMessages() const;
 
@@ -74,8 +88,6 @@ class Device {
  private:
   struct State;
   explicit Device(std::unique_ptr<State> state);
-  void listen();  // to the validation layer
-  std::function<void(const char*)> messageSink_;
   std::unique_ptr<State> state_;
 };
 

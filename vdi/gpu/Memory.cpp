@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <utility>
 
 #include "vdi/core/Error.h"
@@ -14,31 +15,36 @@ namespace {
 
 constexpr std::uint64_t smallestBuffer = 16;
 
-/// Memory for a resource; throws with the figures that a user needs.
-VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::uint32_t type,
-                        const void* chain) {
-  const VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, chain, needs.size, type};
-  VkDeviceMemory memory = VK_NULL_HANDLE;
-  const VkResult result = vkAllocateMemory(device.handle(), &info, nullptr, &memory);
-  if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY) {
-    throw Error(
-        ErrorCode::OutOfMemory,
-        fmt::format("{} MiB of device memory were refused; {} MiB of {} MiB are in use by this process",
-                    needs.size >> 20, device.allocatedBytes() >> 20, device.limits().memoryBytes >> 20),
-        device.name());
-  }
-  check(result, "vkAllocateMemory");
-  device.accountAllocation(static_cast<std::int64_t>(needs.size));
-  return memory;
+double mebibytes(std::uint64_t bytes) {
+  return static_cast<double>(bytes) / (1 << 20);
 }
 
-void demandFits(const Device& device, std::uint64_t bytes) {
-  if (bytes > device.limits().maxAllocationBytes) {
-    throw Error(ErrorCode::OutOfMemory,
-                fmt::format("one allocation of {} MiB is more than the device's limit of {} MiB", bytes >> 20,
-                            device.limits().maxAllocationBytes >> 20),
-                device.name());
-  }
+/// With the figures that a user needs to make the problem fit.
+[[noreturn]] void throwOutOfMemory(const Device& device, std::uint64_t bytes, const char* what) {
+  throw Error(
+      ErrorCode::OutOfMemory,
+      fmt::format("no room for a {} of {:.1f} MiB: {:.1f} MiB of the device's {:.0f} MiB are held here, "
+                  "and one allocation may have up to {:.0f} MiB",
+                  what, mebibytes(bytes), mebibytes(device.allocatedBytes()),
+                  mebibytes(device.limits().memoryBytes), mebibytes(device.limits().maxAllocationBytes)),
+      device.name());
+}
+
+void demandRoom(VkResult result, const char* call, const Device& device, std::uint64_t bytes,
+                const char* what) {
+  if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY)
+    throwOutOfMemory(device, bytes, what);
+  check(result, call);
+}
+
+VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::uint32_t type,
+                        const void* chain, const char* what) {
+  const VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, chain, needs.size, type};
+  VkDeviceMemory memory = VK_NULL_HANDLE;
+  demandRoom(vkAllocateMemory(device.handle(), &info, nullptr, &memory), "vkAllocateMemory", device,
+             needs.size, what);
+  device.accountAllocation(static_cast<std::int64_t>(needs.size));
+  return memory;
 }
 
 std::uint32_t memoryTypeFor(const Device& device, std::uint32_t typeBits, MemoryKind kind) {
@@ -46,38 +52,58 @@ std::uint32_t memoryTypeFor(const Device& device, std::uint32_t typeBits, Memory
       VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
   if (kind == MemoryKind::DeviceLocal)
     return device.memoryType(typeBits, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
-  if (kind == MemoryKind::Upload) return device.memoryType(typeBits, host);
-  try {
-    return device.memoryType(typeBits, host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
-  } catch (const Error&) {
-    return device.memoryType(typeBits, host);
+  if (kind == MemoryKind::Readback) {
+    const auto cached = device.findMemoryType(typeBits, host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
+    if (cached) return *cached;
   }
+  return device.memoryType(typeBits, host);
 }
 
 }  // namespace
 
+std::uint64_t texelBytes(VkFormat format) {
+  switch (format) {
+    case VK_FORMAT_R8_UNORM:
+      return 1;
+    case VK_FORMAT_R16_UNORM:
+      return 2;
+    case VK_FORMAT_R32_SFLOAT:
+      return 4;
+    default:
+      assert(false && "not a format of volumes");
+      return 4;
+  }
+}
+
 Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind kind)
     : device_(std::move(device)), size_(std::max(bytes, smallestBuffer)) {
-  demandFits(*device_, size_);
+  // vkCmdFillBuffer reaches whole words only.
+  const std::uint64_t words = (size_ + 3) / 4 * 4;
+  const DeviceLimits& limits = device_->limits();
+  if (words > limits.maxAllocationBytes || words > limits.maxBufferBytes)
+    throwOutOfMemory(*device_, words, "buffer");
   try {
     const VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
                                   nullptr,
                                   0,
-                                  size_,
+                                  words,
                                   VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
                                       VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                                       VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT,
                                   VK_SHARING_MODE_EXCLUSIVE,
                                   0,
                                   nullptr};
-    check(vkCreateBuffer(device_->handle(), &info, nullptr, &buffer_), "vkCreateBuffer");
+    demandRoom(vkCreateBuffer(device_->handle(), &info, nullptr, &buffer_), "vkCreateBuffer", *device_, words,
+               "buffer");
     VkMemoryRequirements needs;
     vkGetBufferMemoryRequirements(device_->handle(), buffer_, &needs);
     const VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO, nullptr,
                                           VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT, 0};
-    memory_ = allocate(*device_, needs, memoryTypeFor(*device_, needs.memoryTypeBits, kind), &flags);
+    memory_ =
+        allocate(*device_, needs, memoryTypeFor(*device_, needs.memoryTypeBits, kind), &flags, "buffer");
     allocated_ = needs.size;
-    check(vkBindBufferMemory(device_->handle(), buffer_, memory_, 0), "vkBindBufferMemory");
+    demandRoom(vkBindBufferMemory(device_->handle(), buffer_, memory_, 0), "vkBindBufferMemory", *device_,
+               words, "buffer");
     const VkBufferDeviceAddressInfo addressInfo{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, nullptr,
                                                 buffer_};
     address_ = vkGetBufferDeviceAddress(device_->handle(), &addressInfo);
@@ -114,11 +140,20 @@ Buffer& Buffer::operator=(Buffer&& other) noexcept {
 }
 
 bool Buffer::reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes, MemoryKind kind) {
+  assert(buffer_ == VK_NULL_HANDLE || (kind == MemoryKind::DeviceLocal) == mapped_.empty());
   if (buffer_ != VK_NULL_HANDLE && size_ >= bytes) return false;
   const bool grows = buffer_ != VK_NULL_HANDLE;
-  release();
-  const std::uint64_t roomy = std::min(bytes + bytes / 2, device->limits().maxAllocationBytes);
-  *this = Buffer(device, grows ? std::max(bytes, roomy) : bytes, kind);
+  const std::uint64_t most = std::min(device->limits().maxAllocationBytes, device->limits().maxBufferBytes);
+  release();  // first, so that both needn't fit at once
+  if (grows && bytes < most) {
+    try {
+      *this = Buffer(device, std::min(bytes + bytes / 2, most), kind);
+      return true;
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::OutOfMemory) throw;
+    }
+  }
+  *this = Buffer(device, bytes, kind);
   return true;
 }
 
@@ -138,6 +173,7 @@ void Buffer::release() noexcept {
 
 Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format)
     : device_(std::move(device)), extent_(extent), format_(format) {
+  assert(glm::all(glm::greaterThan(extent, glm::uvec3(0))));
   const std::uint32_t longest = device_->limits().maxImageDimension3D;
   if (glm::any(glm::greaterThan(extent, glm::uvec3(longest)))) {
     throw Error(ErrorCode::InvalidArgument,
@@ -145,6 +181,9 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
                             extent.y, extent.z, longest),
                 device_->name());
   }
+  // Drivers compute with sizes that overflow beyond what they can hold: ours decides first.
+  const std::uint64_t bytes = std::uint64_t{extent.x} * extent.y * extent.z * texelBytes(format);
+  if (bytes > device_->limits().maxAllocationBytes) throwOutOfMemory(*device_, bytes, "texture");
   try {
     const VkImageCreateInfo info{VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
                                  nullptr,
@@ -161,13 +200,16 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
                                  0,
                                  nullptr,
                                  VK_IMAGE_LAYOUT_UNDEFINED};
-    check(vkCreateImage(device_->handle(), &info, nullptr, &image_), "vkCreateImage");
+    demandRoom(vkCreateImage(device_->handle(), &info, nullptr, &image_), "vkCreateImage", *device_, bytes,
+               "texture");
     VkMemoryRequirements needs;
     vkGetImageMemoryRequirements(device_->handle(), image_, &needs);
-    memory_ = allocate(*device_, needs,
-                       memoryTypeFor(*device_, needs.memoryTypeBits, MemoryKind::DeviceLocal), nullptr);
+    memory_ =
+        allocate(*device_, needs, memoryTypeFor(*device_, needs.memoryTypeBits, MemoryKind::DeviceLocal),
+                 nullptr, "texture");
     allocated_ = needs.size;
-    check(vkBindImageMemory(device_->handle(), image_, memory_, 0), "vkBindImageMemory");
+    demandRoom(vkBindImageMemory(device_->handle(), image_, memory_, 0), "vkBindImageMemory", *device_, bytes,
+               "texture");
     const VkImageViewCreateInfo viewInfo{
         VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO, nullptr, 0, image_, VK_IMAGE_VIEW_TYPE_3D, format, {},
         {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
@@ -194,8 +236,8 @@ Image3D& Image3D::operator=(Image3D&& other) noexcept {
   view_ = std::exchange(other.view_, VK_NULL_HANDLE);
   memory_ = std::exchange(other.memory_, VK_NULL_HANDLE);
   allocated_ = std::exchange(other.allocated_, 0);
-  extent_ = other.extent_;
-  format_ = other.format_;
+  extent_ = std::exchange(other.extent_, glm::uvec3(0));
+  format_ = std::exchange(other.format_, VK_FORMAT_UNDEFINED);
   return *this;
 }
 

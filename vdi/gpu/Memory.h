@@ -19,12 +19,16 @@ enum class MemoryKind {
   Readback,     // host-visible, cached where there's such a type; coherent
 };
 
+/// Bytes of a texel of the formats that Image3D is made with: R8_UNORM, R16_UNORM, R32_SFLOAT; asserts one of
+/// them.
+std::uint64_t texelBytes(VkFormat format);
+
 /// A storage buffer with a device address. Usage: storage, transfer source and destination.
 class Buffer {
  public:
   Buffer() = default;
-  /// Size 0 is rounded up to 16 bytes. Throws Error{OutOfMemory} with the figure asked for and the device's
-  /// size.
+  /// Size 0 is rounded up to 16 bytes. Throws Error{OutOfMemory} with the MiB asked for, those that this
+  /// Device's Buffers and Images hold, and the device's size.
   Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind kind);
   ~Buffer();
   Buffer(Buffer&& other) noexcept;
@@ -44,8 +48,9 @@ class Buffer {
   }
 
   /// Makes the buffer hold at least `bytes`: keeps it when it's large enough, else replaces it (contents
-  /// lost, a half more than asked so that slow growth doesn't reallocate every frame). Returns true if it was
-  /// replaced.
+  /// lost). The first time it gets just `bytes`; when it grows, a half more where the device has that, so
+  /// that slow growth doesn't reallocate every frame. Returns true if it was replaced. If that throws, the
+  /// buffer is empty. `kind` must not change.
   bool reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes, MemoryKind kind);
 
  private:
@@ -64,8 +69,8 @@ class Buffer {
 class Image3D {
  public:
   Image3D() = default;
-  /// Throws Error{OutOfMemory} with the figure, Error{InvalidArgument} for an extent beyond
-  /// maxImageDimension3D.
+  /// Throws Error{OutOfMemory} as Buffer does, Error{InvalidArgument} for an extent beyond
+  /// maxImageDimension3D. No extent may be 0.
   Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format);
   ~Image3D();
   Image3D(Image3D&& other) noexcept;

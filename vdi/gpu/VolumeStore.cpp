@@ -25,11 +25,6 @@ constexpr std::uint64_t stagingBytes = 64ULL << 20;
 /// times 0 is NaN.
 constexpr double filterGuard = 2.0 / 256.0;
 
-std::uint64_t texelBytes(VkFormat format) {
-  if (format == VK_FORMAT_R8_UNORM) return 1;
-  return format == VK_FORMAT_R16_UNORM ? 2 : 4;
-}
-
 std::uint64_t volumeOf(const glm::uvec3& extent) {
   return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z;
 }

@@ -26,7 +26,8 @@ namespace {
 /// The other name, and its file until it's renamed.
 class TemporaryFile {
  public:
-  /// Process numbers repeat between the nodes of a cluster that share a file system, so the name has a random part.
+  /// Process numbers repeat between the nodes of a cluster that share a file system, so the name has a random
+  /// part.
   explicit TemporaryFile(const std::filesystem::path& target) : target_(target) {
     std::random_device random;
     do {

@@ -9,8 +9,8 @@
 
 namespace vdi::io {
 
-/// A regular file open for reading. Throws Error{Io} with the path as context: no such file, not a regular file, no
-/// permission, a read that fails or ends early.
+/// A regular file open for reading. Throws Error{Io} with the path as context: no such file, not a regular
+/// file, no permission, a read that fails or ends early.
 class InputFile {
  public:
   explicit InputFile(std::filesystem::path path);
@@ -29,9 +29,9 @@ class InputFile {
   std::uint64_t size_ = 0;
 };
 
-/// Writes a file of a name that nobody else uses beside `path` and renames it. Until then `path` keeps its old
-/// content, and after an error too; the other file is removed. The bytes aren't forced to the disk: a power cut may
-/// still lose them. Throws Error{Io} with the path as context and the system's reason.
+/// Writes a file of a name that nobody else uses beside `path` and renames it. Until then `path` keeps its
+/// old content, and after an error too; the other file is removed. The bytes aren't forced to the disk: a
+/// power cut may still lose them. Throws Error{Io} with the path as context and the system's reason.
 void writeAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
 }  // namespace vdi::io

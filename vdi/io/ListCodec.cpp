@@ -13,8 +13,8 @@ namespace vdi::io::detail {
 
 namespace {
 
-/// The bit patterns of a supersegment's floats. Prediction is integer arithmetic on them: floating point would make
-/// the file depend on the rounding mode that the host program runs in.
+/// The bit patterns of a supersegment's floats. Prediction is integer arithmetic on them: floating point
+/// would make the file depend on the rounding mode that the host program runs in.
 struct Words {
   std::uint32_t front = 0;
   std::uint32_t back = 0;
@@ -42,8 +42,8 @@ struct Context {
   std::uint32_t previous;  // where this one begins if it follows the last one without a gap
 };
 
-/// Premultiplied colours grow with opacity; the bit pattern of a float is close to its logarithm, so a factor is a
-/// difference.
+/// Premultiplied colours grow with opacity; the bit pattern of a float is close to its logarithm, so a factor
+/// is a difference.
 std::uint32_t predictColor(const Context& context, std::uint32_t opacity, std::size_t channel) {
   const std::uint32_t color = context.reference.color[channel];
   return color == 0 ? 0 : color + (opacity - context.reference.opacity);
@@ -122,8 +122,8 @@ Context contextOf(const Walk::Step& step, std::span<const Supersegment> segments
   return context;
 }
 
-/// Columns of 32-bit words, byte b of word i of a column of n at planes[b * n + i]: bytes of one significance lie
-/// together, and the upper ones are mostly zero.
+/// Columns of 32-bit words, byte b of word i of a column of n at planes[b * n + i]: bytes of one significance
+/// lie together, and the upper ones are mostly zero.
 void putWord(std::byte* planes, std::size_t count, std::size_t i, std::uint32_t word) {
   for (std::size_t b = 0; b < 4; ++b) planes[b * count + i] = static_cast<std::byte>(word >> (8 * b));
 }
@@ -167,14 +167,15 @@ std::vector<std::byte> packLists(const SupersegmentLists& lists, std::size_t fir
     for (std::uint32_t j = 0; j < length; ++j, ++index) {
       const Residuals residuals =
           residualsOf(wordsOf(segments[index]), contextOf(walk.step(), segments, index));
-      for (std::size_t c = 0; c < columns; ++c) putWord(columnData + c * count * 4, count, index, residuals[c]);
+      for (std::size_t c = 0; c < columns; ++c)
+        putWord(columnData + c * count * 4, count, index, residuals[c]);
     }
   }
 
   std::vector<std::byte> packed(static_cast<std::size_t>(LZ4_compressBound(static_cast<int>(size))));
-  const int packedSize =
-      LZ4_compress_default(reinterpret_cast<const char*>(plain.data()), reinterpret_cast<char*>(packed.data()),
-                           static_cast<int>(size), static_cast<int>(packed.size()));
+  const int packedSize = LZ4_compress_default(reinterpret_cast<const char*>(plain.data()),
+                                              reinterpret_cast<char*>(packed.data()), static_cast<int>(size),
+                                              static_cast<int>(packed.size()));
   assert(packedSize > 0);  // the buffer holds any result
   packed.resize(static_cast<std::size_t>(packedSize));
   return packed;

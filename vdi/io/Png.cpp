@@ -2,72 +2,86 @@
 
 #include <fmt/format.h>
 #include <png.h>
-#include <unistd.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
-#include <system_error>
 
 #include "vdi/core/Error.h"
+#include "vdi/io/Files.h"
 
 namespace vdi::io {
+
+namespace {
+
+/// 0 for what isn't a number.
+std::uint8_t toByte(float value) {
+  return value > 0.0F ? static_cast<std::uint8_t>(std::lround(std::min(value, 1.0F) * 255.0F)) : 0;
+}
+
+/// libpng's simplified interface: it reports errors in the struct, not by a longjmp over our destructors.
+class PngImage {
+ public:
+  PngImage() { image_.version = PNG_IMAGE_VERSION; }
+  ~PngImage() { png_image_free(&image_); }
+  PngImage(const PngImage&) = delete;
+  PngImage& operator=(const PngImage&) = delete;
+  png_image* operator->() { return &image_; }
+  png_image* get() { return &image_; }
+
+ private:
+  png_image image_{};
+};
+
+}  // namespace
 
 Picture toPicture(const Image& image, const glm::vec3& background) {
   Picture picture{image.width, image.height, {}};
   picture.rgb.resize(image.pixelCount() * 3);
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width; ++x) {
-      const auto row = static_cast<std::size_t>(image.height - 1 - y);
-      const auto column = static_cast<std::size_t>(x);
-      const auto width = static_cast<std::size_t>(image.width);
-      const glm::vec4& rgba = image.rgba[row * width + column];
-      std::uint8_t* out = &picture.rgb[(static_cast<std::size_t>(y) * width + column) * 3];
-      for (int c = 0; c < 3; ++c) {
-        const float value = rgba[c] + (1.0F - rgba.a) * background[c];
-        out[c] = static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * 255.0F));
-      }
+  const auto width = static_cast<std::size_t>(image.width);
+  const auto height = static_cast<std::size_t>(image.height);
+  std::uint8_t* out = picture.rgb.data();
+  for (std::size_t y = 0; y < height; ++y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      const glm::vec4& rgba = image.rgba[(height - 1 - y) * width + x];
+      for (int c = 0; c < 3; ++c) *out++ = toByte(rgba[c] + (1.0F - rgba.a) * background[c]);
     }
   }
   return picture;
 }
 
-// libpng's simplified interface: it reports errors in the struct instead of by longjmp.
-
 void writePng(const std::filesystem::path& path, const Picture& picture) {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(picture.width);
-  image.height = static_cast<png_uint_32>(picture.height);
-  image.format = PNG_FORMAT_RGB;
-  const std::filesystem::path temporary = path.string() + fmt::format(".{}.tmp", ::getpid());
-  const int written = png_image_write_to_file(&image, temporary.c_str(), 0, picture.rgb.data(), 0, nullptr);
-  std::error_code error;
-  if (written != 0) std::filesystem::rename(temporary, path, error);
-  if (written == 0 || error) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
-    throw Error(ErrorCode::Io,
-                fmt::format("can't write the PNG: {}", written == 0 ? image.message : error.message()),
-                path.string());
+  assert(picture.rgb.size() ==
+         std::size_t{3} * static_cast<unsigned>(picture.width) * static_cast<unsigned>(picture.height));
+  PngImage image;
+  image->width = static_cast<png_uint_32>(picture.width);
+  image->height = static_cast<png_uint_32>(picture.height);
+  image->format = PNG_FORMAT_RGB;
+  // An upper bound of the size: one compression, not one for the size and one for the bytes.
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(*image.get());
+  std::vector<std::byte> bytes(size);
+  if (png_image_write_to_memory(image.get(), bytes.data(), &size, 0, picture.rgb.data(), 0, nullptr) == 0) {
+    throw Error(ErrorCode::Io, fmt::format("can't make a PNG: {}", image->message), path.string());
   }
+  writeAtomically(path, std::span(bytes).first(size));
 }
 
 Picture readPng(const std::filesystem::path& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error))
-    throw Error(ErrorCode::Io, "can't open the file", path.string());
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  if (png_image_begin_read_from_file(&image, path.c_str()) == 0) {
-    throw Error(ErrorCode::Format, fmt::format("not a PNG: {}", image.message), path.string());
-  }
-  image.format = PNG_FORMAT_RGB;
-  Picture picture{static_cast<int>(image.width), static_cast<int>(image.height), {}};
-  picture.rgb.resize(PNG_IMAGE_SIZE(image));
+  const std::vector<std::byte> bytes = InputFile(path).readAll();
+  PngImage image;
+  const auto demand = [&](bool good, const char* why) {
+    if (!good) throw Error(ErrorCode::Format, fmt::format("not a sound PNG: {}", why), path.string());
+  };
+  demand(png_image_begin_read_from_memory(image.get(), bytes.data(), bytes.size()) != 0, image->message);
+  // A byte of a PNG holds at most 1032 bytes of rows (deflate), each of at most 8 pixels.
+  constexpr std::uint64_t mostPixelsPerByte = 1032 * 8;
+  demand(std::uint64_t{image->width} * image->height <= bytes.size() * mostPixelsPerByte,
+         "its header says that it's larger than its bytes can hold");
+  image->format = PNG_FORMAT_RGB;
+  Picture picture{static_cast<int>(image->width), static_cast<int>(image->height), {}};
+  picture.rgb.resize(std::size_t{3} * image->width * image->height);
   const png_color black{0, 0, 0};
-  if (png_image_finish_read(&image, &black, picture.rgb.data(), 0, nullptr) == 0) {
-    throw Error(ErrorCode::Format, fmt::format("not a PNG: {}", image.message), path.string());
-  }
+  demand(png_image_finish_read(image.get(), &black, picture.rgb.data(), 0, nullptr) != 0, image->message);
   return picture;
 }
 

@@ -1,0 +1,195 @@
+// Damaged .vdi files, the same ones in every run: each must be refused with Error{Format}; what passes the
+// checksums because they were made anew must give a VDI that validate() takes. Meant to run under sanitizers
+// too.
+#include <xxhash.h>
+
+#include <catch2/catch.hpp>
+#include <cstring>
+
+#include "tests/io/Samples.h"
+#include "vdi/io/ListCodec.h"
+#include "vdi/io/VdiFile.h"
+
+using namespace vdi;
+
+namespace {
+
+constexpr std::size_t headerBytes = 240;
+
+enum class Outcome { Refused, Sound, Other };
+
+/// Other: another exception, or a VDI that isn't sound.
+Outcome outcomeOf(std::span<const std::byte> bytes) {
+  // A copy of just this size, so that a sanitizer sees every byte read beyond.
+  const std::vector<std::byte> copy(bytes.begin(), bytes.end());
+  try {
+    const Vdi vdi = io::decode(copy);
+    validate(vdi);
+    return Outcome::Sound;
+  } catch (const Error& error) {
+    return error.code() == ErrorCode::Format ? Outcome::Refused : Outcome::Other;
+  } catch (...) {
+    return Outcome::Other;
+  }
+}
+
+void put64(std::vector<std::byte>& bytes, std::size_t offset, std::uint64_t value) {
+  std::memcpy(bytes.data() + offset, &value, sizeof(value));
+}
+
+std::uint32_t get32(const std::vector<std::byte>& bytes, std::size_t offset) {
+  std::uint32_t value = 0;
+  std::memcpy(&value, bytes.data() + offset, sizeof(value));
+  return value;
+}
+
+/// Makes every checksum of a damaged file right that its header and table still let be found.
+void reseal(std::vector<std::byte>& bytes) {
+  const std::size_t chunks = get32(bytes, 40);
+  const std::size_t room = (bytes.size() - headerBytes) / 16;
+  std::size_t at = headerBytes + chunks * 16;
+  for (std::size_t i = 0; i < chunks && chunks <= room; ++i) {
+    const std::size_t packed = get32(bytes, headerBytes + i * 16 + 4);
+    if (at + packed > bytes.size()) break;
+    put64(bytes, headerBytes + i * 16 + 8, XXH64(bytes.data() + at, packed, 0));
+    at += packed;
+  }
+  put64(bytes, 224, XXH64(bytes.data() + headerBytes, std::min(chunks, room) * 16, 0));
+  put64(bytes, 232, XXH64(bytes.data(), 232, 0));
+}
+
+void flip(std::vector<std::byte>& bytes, std::size_t bit) {
+  bytes[bit / 8] ^= static_cast<std::byte>(1U << (bit % 8));
+}
+
+}  // namespace
+
+TEST_CASE("a small file with any one bit flipped is refused") {
+  const std::vector<std::byte> sound = io::encode(test::noisyVdi(6, 5, 4));
+  REQUIRE(outcomeOf(sound) == Outcome::Sound);
+  std::size_t passed = 0;
+  for (std::size_t bit = 0; bit < sound.size() * 8; ++bit) {
+    std::vector<std::byte> damaged = sound;
+    flip(damaged, bit);
+    if (outcomeOf(damaged) != Outcome::Refused) ++passed;
+  }
+  CHECK(passed == 0);
+}
+
+TEST_CASE("a small file cut at any length, or with bytes behind it, is refused") {
+  const std::vector<std::byte> sound = io::encode(test::noisyVdi(6, 5, 4));
+  std::size_t passed = 0;
+  for (std::size_t length = 0; length < sound.size(); ++length) {
+    if (outcomeOf(std::span(sound).first(length)) != Outcome::Refused) ++passed;
+  }
+  std::vector<std::byte> longer = sound;
+  for (int i = 0; i < 300; ++i) {
+    longer.push_back(static_cast<std::byte>(i));
+    if (outcomeOf(longer) != Outcome::Refused) ++passed;
+  }
+  CHECK(passed == 0);
+}
+
+TEST_CASE("a file of several chunks, damaged in many ways, is refused") {
+  const std::vector<std::byte> sound = io::encode(test::plausibleVdi(130, 100, 8));
+  REQUIRE(outcomeOf(sound) == Outcome::Sound);
+  test::Noise noise(11);
+  const auto size = static_cast<std::uint32_t>(sound.size());
+  std::size_t passed = 0;
+  for (int i = 0; i < 600; ++i) {
+    std::vector<std::byte> damaged = sound;
+    const std::uint32_t from = noise.below(size);
+    const std::uint32_t length = std::min(1 + noise.below(64), size - from);
+    switch (i % 4) {
+      case 0:
+        flip(damaged, noise.below(size * 8));
+        break;
+      case 1:  // another value of a byte, then noise over what follows
+        damaged[from] ^= static_cast<std::byte>(1 + noise.below(255));
+        for (std::uint32_t j = 1; j < length; ++j)
+          damaged[from + j] = static_cast<std::byte>(noise.below(256));
+        break;
+      case 2:
+        damaged.erase(damaged.begin() + from, damaged.begin() + from + length);
+        break;
+      default:
+        damaged.resize(from);
+        break;
+    }
+    if (outcomeOf(damaged) != Outcome::Refused) ++passed;
+  }
+  CHECK(passed == 0);
+}
+
+TEST_CASE("flipped bits below right checksums: refused, or a sound VDI") {
+  const std::vector<std::byte> sound = io::encode(test::plausibleVdi(12, 9, 4));
+  std::size_t other = 0;
+  std::size_t accepted = 0;
+  for (std::size_t bit = 0; bit < sound.size() * 8; ++bit) {
+    std::vector<std::byte> damaged = sound;
+    flip(damaged, bit);
+    reseal(damaged);
+    const Outcome outcome = outcomeOf(damaged);
+    if (outcome == Outcome::Other) ++other;
+    if (outcome == Outcome::Sound) ++accepted;
+  }
+  CHECK(other == 0);
+  CHECK(accepted > 0);  // the checksums were right: the decoder below them was reached
+}
+
+TEST_CASE("noise below right checksums: refused, or a sound VDI") {
+  const std::vector<std::byte> sound = io::encode(test::plausibleVdi(100, 90, 6));
+  test::Noise noise(17);
+  const auto dataStart = static_cast<std::uint32_t>(headerBytes + std::size_t{get32(sound, 40)} * 16);
+  const auto size = static_cast<std::uint32_t>(sound.size());
+  std::size_t other = 0;
+  for (int i = 0; i < 1500; ++i) {
+    std::vector<std::byte> damaged = sound;
+    const std::uint32_t first = i % 3 == 0 ? 0 : dataStart;
+    for (std::uint32_t n = 1 + noise.below(8); n > 0; --n) {
+      damaged[first + noise.below(size - first)] = static_cast<std::byte>(noise.below(256));
+    }
+    reseal(damaged);
+    if (outcomeOf(damaged) == Outcome::Other) ++other;
+  }
+  CHECK(other == 0);
+}
+
+TEST_CASE("bytes of no meaning are refused") {
+  test::Noise noise(23);
+  const std::vector<std::byte> sound = io::encode(test::noisyVdi(6, 5, 4));
+  std::size_t passed = 0;
+  for (std::uint32_t i = 0; i < 2000; ++i) {
+    std::vector<std::byte> bytes(noise.below(1000));
+    for (std::byte& byte : bytes) byte = static_cast<std::byte>(noise.below(256));
+    const std::size_t kept = std::min<std::size_t>(i % headerBytes, bytes.size());
+    std::copy_n(sound.begin(), kept, bytes.begin());
+    if (outcomeOf(bytes) != Outcome::Refused) ++passed;
+  }
+  CHECK(passed == 0);
+}
+
+TEST_CASE("noise in place of packed lists is refused or fills just what was asked for") {
+  test::Noise noise(31);
+  const Vdi vdi = test::plausibleVdi(20, 15, 5);
+  const std::vector<std::byte> sound = io::detail::packLists(vdi.lists, 0, 300);
+  std::size_t refused = 0;
+  for (int i = 0; i < 3000; ++i) {
+    std::vector<std::byte> packed = sound;
+    for (std::uint32_t n = 1 + noise.below(4); n > 0; --n) {
+      packed[noise.below(static_cast<std::uint32_t>(packed.size()))] =
+          static_cast<std::byte>(noise.below(256));
+    }
+    std::vector<std::uint32_t> ends(300);
+    std::vector<Supersegment> segments(vdi.lists.segments.size());
+    try {
+      io::detail::unpackLists(packed, 0, ends, segments);
+      CHECK(ends.back() == segments.size());
+      CHECK(std::is_sorted(ends.begin(), ends.end()));
+    } catch (const Error& error) {
+      CHECK(error.code() == ErrorCode::Format);
+      ++refused;
+    }
+  }
+  CHECK(refused > 0);
+}

@@ -1,0 +1,316 @@
+// The .vdi file: what goes in comes out, the byte map of docs/format.md, and clear refusals.
+#include <xxhash.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "tests/io/Samples.h"
+#include "vdi/io/Files.h"
+#include "vdi/io/ListCodec.h"
+#include "vdi/io/VdiFile.h"
+
+using namespace vdi;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Equal to the bit: operator== takes 0 and -0 for equal.
+bool sameBits(const Vdi& a, const Vdi& b) {
+  return a == b && std::memcmp(a.lists.segments.data(), b.lists.segments.data(),
+                               a.lists.segments.size() * sizeof(Supersegment)) == 0;
+}
+
+/// A value at a place of the byte map.
+template <typename T>
+T at(std::span<const std::byte> bytes, std::size_t offset) {
+  T value;
+  std::memcpy(&value, bytes.data() + offset, sizeof(T));
+  return value;
+}
+template <typename T>
+void put(std::vector<std::byte>& bytes, std::size_t offset, T value) {
+  std::memcpy(bytes.data() + offset, &value, sizeof(T));
+}
+
+constexpr std::size_t headerBytes = 240;
+
+/// Makes both outer checksums right again.
+void seal(std::vector<std::byte>& bytes) {
+  const auto chunks = at<std::uint32_t>(bytes, 40);
+  const std::size_t table = std::min<std::size_t>(chunks * 16ULL, bytes.size() - headerBytes);
+  put<std::uint64_t>(bytes, 224, XXH64(bytes.data() + headerBytes, table, 0));
+  put<std::uint64_t>(bytes, 232, XXH64(bytes.data(), 232, 0));
+}
+
+/// What decode says about a file changed in one place, checksums of header and table in order.
+template <typename T>
+std::string refusal(std::vector<std::byte> bytes, std::size_t offset, T value) {
+  put(bytes, offset, value);
+  seal(bytes);
+  const Error error = test::errorOf([&] { io::decode(bytes); });
+  CHECK(error.code() == ErrorCode::Format);
+  return error.what();
+}
+
+std::vector<std::byte> fromHex(const std::string& hex) {
+  std::vector<std::byte> bytes;
+  for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
+    bytes.push_back(static_cast<std::byte>(std::stoi(hex.substr(i, 2), nullptr, 16)));
+  }
+  return bytes;
+}
+
+using Catch::Matchers::Contains;
+
+}  // namespace
+
+TEST_CASE("a VDI comes back as it was, to the bit") {
+  SECTION("sizes around a chunk of lists") {
+    const auto [width, height] =
+        GENERATE(table<int, int>({{1, 1}, {1, 7}, {64, 64}, {4095, 1}, {1, 4097}, {97, 101}, {128, 64}}));
+    const auto budget = GENERATE(1U, 2U, 25U);
+    const Vdi vdi = test::noisyVdi(width, height, budget, static_cast<std::uint64_t>(width) + budget);
+    CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
+  }
+  SECTION("long lists") {
+    const Vdi vdi = test::noisyVdi(5, 5, 1024);
+    CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
+  }
+  SECTION("what a generator makes") {
+    const Vdi vdi = test::plausibleVdi(160, 90, 25);
+    CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
+  }
+  SECTION("nothing in it, of nothing") {
+    Vdi vdi = test::emptyVdi(33, 22, 5);
+    vdi.bounds = Box();
+    vdi.sampleStep = 0.0;
+    CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
+  }
+  SECTION("parallel projection") {
+    Vdi vdi = test::noisyVdi(3, 2, 4);
+    vdi.camera.parallelProjection = true;
+    CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
+  }
+  SECTION("the ends of the floats") {
+    using Limits = std::numeric_limits<float>;
+    Vdi vdi = test::emptyVdi(2, 2, 3);
+    vdi.lists.segments = {{0.0F, Limits::denorm_min(), -0.0F, Limits::max(), Limits::lowest(), 1.0F},
+                          {Limits::denorm_min(), Limits::min(), Limits::min(), -Limits::denorm_min(), 0.0F,
+                           Limits::denorm_min()},
+                          {0.0F, Limits::max(), 0.0F, -1.0F, 1e-30F, 0.5F},
+                          {-0.0F, 1e-20F, 0.0F, 0.0F, 0.0F, 1e-20F}};
+    vdi.lists.offsets = {0, 2, 2, 3, 4};
+    CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
+  }
+}
+
+TEST_CASE("equal VDIs give equal bytes") {
+  CHECK(io::encode(test::noisyVdi(70, 60, 9)) == io::encode(test::noisyVdi(70, 60, 9)));
+}
+
+TEST_CASE("header and chunk table lie as docs/format.md says") {
+  Vdi vdi = test::noisyVdi(100, 90, 6);
+  vdi.camera.parallelProjection = true;
+  const std::vector<std::byte> bytes = io::encode(vdi);
+  CHECK(std::memcmp(bytes.data(), "VDI-FILE", 8) == 0);
+  CHECK(at<std::uint32_t>(bytes, 8) == 1);
+  CHECK(at<std::uint32_t>(bytes, 12) == headerBytes);
+  CHECK(at<std::uint32_t>(bytes, 16) == 0);
+  CHECK(at<std::uint32_t>(bytes, 20) == 1);
+  CHECK(at<std::uint32_t>(bytes, 24) == 100);
+  CHECK(at<std::uint32_t>(bytes, 28) == 90);
+  CHECK(at<std::uint32_t>(bytes, 32) == 6);
+  CHECK(at<std::uint32_t>(bytes, 36) == 4096);
+  CHECK(at<std::uint32_t>(bytes, 40) == 3);
+  CHECK(at<std::uint32_t>(bytes, 44) == 0);
+  CHECK(at<std::uint64_t>(bytes, 48) == vdi.lists.segments.size());
+  CHECK(at<std::uint64_t>(bytes, 56) == bytes.size() - headerBytes - 48);
+  CHECK(at<std::uint64_t>(bytes, 64) == vdi.timeStep);
+  CHECK(at<double>(bytes, 72) == vdi.time);
+  CHECK(at<double>(bytes, 80) == vdi.sampleStep);
+  CHECK(at<glm::dvec3>(bytes, 88) == vdi.bounds.lo);
+  CHECK(at<glm::dvec3>(bytes, 112) == vdi.bounds.hi);
+  CHECK(at<glm::dvec3>(bytes, 136) == vdi.camera.position);
+  CHECK(at<glm::dvec3>(bytes, 160) == vdi.camera.focalPoint);
+  CHECK(at<glm::dvec3>(bytes, 184) == vdi.camera.viewUp);
+  CHECK(at<double>(bytes, 208) == vdi.camera.viewAngle);
+  CHECK(at<double>(bytes, 216) == vdi.camera.parallelScale);
+  CHECK(at<std::uint64_t>(bytes, 224) == XXH64(bytes.data() + headerBytes, 48, 0));
+  CHECK(at<std::uint64_t>(bytes, 232) == XXH64(bytes.data(), 232, 0));
+  std::size_t offset = headerBytes + 48;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t last = std::min<std::size_t>((i + 1) * 4096, 9000);
+    CHECK(at<std::uint32_t>(bytes, headerBytes + 16 * i) ==
+          vdi.lists.offsets[last] - vdi.lists.offsets[i * 4096]);
+    const auto packed = at<std::uint32_t>(bytes, headerBytes + 16 * i + 4);
+    CHECK(at<std::uint64_t>(bytes, headerBytes + 16 * i + 8) == XXH64(bytes.data() + offset, packed, 0));
+    offset += packed;
+  }
+  CHECK(offset == bytes.size());
+}
+
+TEST_CASE("a file written by the first version 1 can be read") {
+  const std::vector<std::byte> bytes = fromHex(
+      "5644492d46494c4501000000f00000000000000000000000030000000200000003000000001000000100000000000000"
+      "0800000000000000c700000000000000070000000001000000000000004a9340000000000000803f000000000000f0bf"
+      "0000000000000000000000000000f03f0000000000000040000000000000084000000000000010400000000000000040"
+      "000000000000f83f0000000000000a40000000000000e03f000000000000e03f000000000000e03f0000000000000000"
+      "000000000000f03f000000000000c03f0000000000803a40000000000000e83f5bb7ef88486a4c6fe75569a21d8e7581"
+      "08000000c70000007cffd7f62513ad907d000201010103000100f429a41c2c5f6ff6fc00b2f72b0df81d060073402011"
+      "bcaaa4007e00000005050000d33bde11002f8b08a87c8d7d2c26fe6563515341f4a104134900f12cc0806ac6277fe80c"
+      "159e7817dcfaf419f0ee25609f0c2f6b790204000001000030e1f3716284630ed845f480b4389b2ddf7fb390261da914"
+      "7d01022000f0319ca515be0caa1f63e010b90862a3003036f0784e1c58d7bc7e010400000201044c346abaa496030804"
+      "8b50ca3eeb7644cfb6e5d9b213ae407ef5f8fe040106fe");
+  CHECK(sameBits(io::decode(bytes), test::noisyVdi(3, 2, 3)));
+}
+
+TEST_CASE("later versions, encodings and flags are named in the refusal") {
+  const std::vector<std::byte> sound = io::encode(test::noisyVdi(4, 4, 3));
+  CHECK_THAT(refusal(sound, 8, 2U), Contains("version 2"));
+  CHECK_THAT(refusal(sound, 12, 256U), Contains("header"));
+  CHECK_THAT(refusal(sound, 16, 7U), Contains("encoding 7"));
+  CHECK_THAT(refusal(sound, 20, 2U), Contains("flags"));
+  CHECK_THAT(refusal(sound, 44, 1U), Contains("flags"));
+  CHECK_THAT(refusal(sound, 0, 'v'), Contains("VDI-FILE"));
+}
+
+TEST_CASE("a header or table that can't be true is refused, its checksums being right") {
+  const std::vector<std::byte> sound = io::encode(test::noisyVdi(4, 4, 3));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refusal(sound, 24, 0U);
+  refusal(sound, 24, 5U);  // another number of lists: the counts run out
+  refusal(sound, 28, 32769U);
+  refusal(sound, 32, 0U);
+  refusal(sound, 32, 1U);  // a smaller budget than the lists need
+  refusal(sound, 36, 0U);
+  refusal(sound, 40, 2U);
+  refusal(sound, 48, at<std::uint64_t>(sound, 48) + 1);
+  refusal(sound, 56, at<std::uint64_t>(sound, 56) + 1);
+  refusal(sound, 72, nan);
+  refusal(sound, 80, -1.0);
+  refusal(sound, 88, nan);
+  refusal(sound, 208, 180.0);  // a view angle of 180 degrees
+  refusal(sound, 240, at<std::uint32_t>(sound, 240) + 1);
+  refusal(sound, 244, at<std::uint32_t>(sound, 244) - 1);
+}
+
+TEST_CASE("headers that ask for more memory than the file can justify are refused") {
+  std::vector<std::byte> bytes = io::encode(test::emptyVdi(4, 4, 3));
+  const auto claim = [&](std::uint32_t side, std::uint32_t listsPerChunk, std::uint32_t supersegments) {
+    std::vector<std::byte> forged = bytes;
+    put(forged, 24, side);
+    put(forged, 28, side);
+    put(forged, 36, listsPerChunk);
+    put<std::uint64_t>(forged, 48, supersegments);
+    put(forged, 240, supersegments);
+    seal(forged);
+    return std::string(test::errorOf([&] { io::decode(forged); }).what());
+  };
+  CHECK_THAT(claim(32768, 1U << 30, 0), Contains("can't hold"));
+  CHECK_THAT(claim(16384, 1U << 28, 0), Contains("can't hold"));
+  CHECK_THAT(claim(64, 4096, 3 * 4096), Contains("can't hold"));
+  CHECK_THAT(claim(4, 4096, ~0U), Contains("can't hold"));
+  CHECK_THAT(claim(32768, 1, 0), Contains("chunks"));
+}
+
+TEST_CASE("info is known without the lists") {
+  const test::TemporaryFolder folder;
+  const fs::path path = folder.path() / "v.vdi";
+  const Vdi vdi = test::noisyVdi(70, 60, 9);
+  io::writeVdi(path, vdi);
+  Vdi expected = vdi;
+  expected.lists = SupersegmentLists();
+  std::vector<std::byte> bytes = io::InputFile(path).readAll();
+  const auto demandGood = [&](const io::VdiFileInfo& info) {
+    CHECK(info.version == 1);
+    CHECK(info.header == expected);
+    CHECK(info.supersegmentCount == vdi.lists.segments.size());
+    CHECK(info.storedBytes == bytes.size());
+    CHECK(info.expandedBytes == vdi.lists.segments.size() * 24 + vdi.lists.offsets.size() * 4);
+  };
+  demandGood(io::readVdiInfo(path));
+  demandGood(io::decodeInfo(bytes));
+  bytes.back() ^= std::byte{1};  // in a list
+  io::writeAtomically(path, bytes);
+  demandGood(io::readVdiInfo(path));
+  CHECK(test::errorOf([&] { io::readVdi(path); }).code() == ErrorCode::Format);
+  bytes.pop_back();
+  io::writeAtomically(path, bytes);
+  CHECK(test::errorOf([&] { io::readVdiInfo(path); }).code() == ErrorCode::Format);
+}
+
+TEST_CASE("what decode would refuse isn't written") {
+  const test::TemporaryFolder folder;
+  const fs::path path = folder.path() / "v.vdi";
+  const Vdi sound = test::noisyVdi(8, 8, 4);
+  io::writeVdi(path, sound);
+  const auto refused = [&](const std::function<void(Vdi&)>& spoil) {
+    Vdi vdi = sound;
+    spoil(vdi);
+    const Error error = test::errorOf([&] { io::writeVdi(path, vdi); });
+    CHECK(error.code() == ErrorCode::Format);
+    CHECK(error.context() == path.string());
+  };
+  refused([](Vdi& vdi) { vdi.width = 7; });
+  refused([](Vdi& vdi) { vdi.lists.offsets.back() += 1; });
+  refused([](Vdi& vdi) { vdi.budget = 1; });
+  refused([](Vdi& vdi) { vdi.lists.segments[3].opacity = 0.0F; });
+  refused([](Vdi& vdi) { vdi.lists.segments[3].red = std::numeric_limits<float>::infinity(); });
+  refused([](Vdi& vdi) { vdi.camera.position = vdi.camera.focalPoint; });
+  refused([](Vdi& vdi) { vdi.time = std::numeric_limits<double>::infinity(); });
+  CHECK(io::readVdi(path) == sound);
+  CHECK(folder.fileCount() == 1);
+}
+
+TEST_CASE("files: written, read, and refused with their path") {
+  const test::TemporaryFolder folder;
+  const fs::path path = folder.path() / "v.vdi";
+  const Vdi vdi = test::plausibleVdi(80, 45, 12);
+  io::writeVdi(path, vdi);
+  CHECK(io::readVdi(path) == vdi);
+  const Error missing = test::errorOf([&] { io::readVdi(folder.path() / "none.vdi"); });
+  CHECK(missing.code() == ErrorCode::Io);
+  CHECK_THAT(missing.what(), Contains("none.vdi"));
+  io::writeAtomically(path, {});
+  const Error empty = test::errorOf([&] { io::readVdi(path); });
+  CHECK(empty.code() == ErrorCode::Format);
+  CHECK(empty.context() == path.string());
+  CHECK(test::errorOf([&] { io::readVdiInfo(path); }).code() == ErrorCode::Format);
+}
+
+TEST_CASE("unpackLists refuses what isn't just the lists and supersegments asked for") {
+  const Vdi vdi = test::noisyVdi(10, 10, 5);
+  const std::vector<std::byte> packed = io::detail::packLists(vdi.lists, 20, 60);
+  const std::size_t count = vdi.lists.offsets[60] - vdi.lists.offsets[20];
+  const auto unpack = [&](std::size_t lists, std::size_t segments) {
+    SupersegmentLists back;
+    back.offsets.resize(lists + 1);
+    back.segments.resize(segments);
+    io::detail::unpackLists(packed, 0, std::span(back.offsets).subspan(1), back.segments);
+    return back;
+  };
+  const SupersegmentLists back = unpack(40, count);
+  for (std::size_t i = 0; i < 40; ++i) {
+    const auto expected = vdi.lists.list(20 + i);
+    const auto got = back.list(i);
+    CHECK(std::equal(expected.begin(), expected.end(), got.begin(), got.end()));
+  }
+  CHECK(test::errorOf([&] { unpack(41, count); }).code() == ErrorCode::Format);
+  CHECK(test::errorOf([&] { unpack(40, count + 1); }).code() == ErrorCode::Format);
+  // As many bytes, dealt out otherwise: six counts in place of a supersegment, and the reverse.
+  CHECK(test::errorOf([&] { unpack(46, count - 1); }).code() == ErrorCode::Format);
+  CHECK(test::errorOf([&] { unpack(34, count + 1); }).code() == ErrorCode::Format);
+}
+
+TEST_CASE("a VDI such as a generator makes is stored in less than 5/8 of its memory") {
+  const Vdi vdi = test::plausibleVdi(480, 270, 25);
+  const std::vector<std::byte> bytes = io::encode(vdi);
+  const io::VdiFileInfo info = io::decodeInfo(bytes);
+  const double ratio = static_cast<double>(info.expandedBytes) / static_cast<double>(info.storedBytes);
+  CAPTURE(info.expandedBytes, info.storedBytes);
+  CHECK(ratio > 1.6);
+  const Vdi nothing = test::emptyVdi(480, 270, 25);
+  CHECK(io::encode(nothing).size() < 20000);
+}
