@@ -3,10 +3,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
-
-#include <vtkSmartPointer.h>
 
 class vtkDataObject;
 
@@ -21,9 +20,13 @@ class Engine {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  /// Runs every script on `grid`. Returns what went wrong on this rank, "" if nothing did. A script that
-  /// fails is called again at the next step.
-  std::string execute(vtkDataObject* grid, std::int64_t step, double time);
+  /// Runs every script on `grid`, also those that failed before. nullopt if all went well on this rank, else
+  /// what went wrong here; "" where a script was stopped because of another rank.
+  std::optional<std::string> execute(vtkDataObject* grid, std::int64_t step, double time);
+
+  /// Runs the scripts' catalyst_finalize, after which only the destructor may follow. Returns as execute
+  /// does.
+  std::optional<std::string> finish();
 
  private:
   struct State;

@@ -11,9 +11,9 @@
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
  * All functions are collective over the communicator. None ends the process: they return VDI_CATALYST_OK or a
- * code below, the same one on all ranks, and rank 0 prints one line to standard error; after an error the
- * next step works again. Nothing is copied on the host: pointers must stay valid, and their data unchanged,
- * until vdi_catalyst_execute returns.
+ * code below, the same one on all ranks, and rank 0 prints one message to standard error, not again while it
+ * repeats; after an error the next step works again. Nothing is copied on the host: pointers must stay valid,
+ * and their data unchanged, until vdi_catalyst_execute returns.
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData a block, under the name "grid":
@@ -39,7 +39,7 @@ enum {
   VDI_CATALYST_OK = 0,
   VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer, a size below 1, an unknown type, arrays before blocks */
   VDI_CATALYST_ENGINE = 2, /* ParaView's engine can't be started, or was started before in this process */
-  VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed in this step */
+  VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
 };
 
 /* Scalar types. */
@@ -71,9 +71,9 @@ typedef struct vdi_catalyst_block {
 
 typedef struct vdi_catalyst vdi_catalyst;
 
-/* Starts the engine on a duplicate of the communicator (its Fortran handle) and adds the scripts. Once a
- * process. On failure *catalyst is null, and the other functions, given null, do nothing but return
- * VDI_CATALYST_BAD_ARGUMENT. */
+/* Starts the engine on a duplicate of the communicator (its Fortran handle) and adds the scripts, the same on
+ * all ranks; they are loaded at the first step. Once a process. On failure *catalyst is null, and the other
+ * functions, given null, do nothing but return VDI_CATALYST_BAD_ARGUMENT. */
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 
