@@ -36,15 +36,18 @@ Camera readCamera(const std::filesystem::path& path) {
   return camera;
 }
 
-Camera orbitCamera(const Box& bounds, double azimuthDegrees, double elevationDegrees, double zoom,
-                   double viewAngle) {
-  const double azimuth = radians(azimuthDegrees);
-  const double elevation = radians(elevationDegrees);
-  const glm::dvec3 towards{-std::sin(azimuth) * std::cos(elevation), -std::sin(elevation),
-                           -std::cos(azimuth) * std::cos(elevation)};
-  Camera camera = Camera::framing(bounds, towards, {0.0, 1.0, 0.0}, viewAngle);
-  camera.position = camera.focalPoint + (camera.position - camera.focalPoint) / zoom;
-  camera.parallelScale /= zoom;
+Camera orbitCamera(const Box& bounds, const Orbit& orbit, double viewAngle) {
+  const glm::dvec3 up = glm::normalize(orbit.up);
+  const glm::dvec3 aside = std::abs(up.x) < 0.99 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 0.0, 1.0);
+  const glm::dvec3 right = glm::normalize(aside - glm::dot(aside, up) * up);
+  const glm::dvec3 back = glm::cross(right, up);
+  const double azimuth = radians(orbit.azimuth);
+  const double elevation = radians(orbit.elevation);
+  const glm::dvec3 around = std::cos(azimuth) * back + std::sin(azimuth) * right;
+  const glm::dvec3 from = std::cos(elevation) * around + std::sin(elevation) * up;
+  Camera camera = Camera::framing(bounds, -from, orbit.up, viewAngle);
+  camera.position = camera.focalPoint + (camera.position - camera.focalPoint) / orbit.zoom;
+  camera.parallelScale /= orbit.zoom;
   return camera;
 }
 

@@ -12,10 +12,15 @@ namespace vdi::apps {
 /// isn't a camera.
 Camera readCamera(const std::filesystem::path& path);
 
-/// Sees the whole of `bounds` from azimuth (about y, 0 looks along -z) and elevation, in degrees; up is y.
-/// `zoom` > 1 shows things larger: from nearer in perspective.
-Camera orbitCamera(const Box& bounds, double azimuthDegrees, double elevationDegrees, double zoom = 1.0,
-                   double viewAngle = 30.0);
+/// Where a camera orbits. At azimuth 0 it looks along -z where up is y, along +y where up is z.
+struct Orbit {
+  double azimuth = 0.0;          // degrees, about `up`
+  double elevation = 0.0;        // degrees above the plane through the centre that `up` is orthogonal to
+  glm::dvec3 up{0.0, 1.0, 0.0};  // not zero
+  double zoom = 1.0;             // > 1 shows things larger: from nearer in perspective
+};
+/// Sees the whole of `bounds` if zoom is 1. Its view-up is the orbit's up.
+Camera orbitCamera(const Box& bounds, const Orbit& orbit, double viewAngle = 30.0);
 
 /// Turned about the focal point as vtkCamera::Azimuth, then vtkCamera::Elevation do. The view-up stays as it
 /// is, unless that would make it parallel to the view direction or turn the picture over: then it turns too.

@@ -3,7 +3,6 @@
 #include <charconv>
 #include <string_view>
 
-#include "apps/Cameras.h"
 #include "apps/Fields.h"
 #include "apps/Help.h"
 #include "apps/RawVolume.h"
@@ -201,10 +200,13 @@ void addViewOptions(CLI::App& command, ViewOptions& options) {
     option->excludes("--camera")->excludes("--position")->group(viewGroup);
     return option;
   };
-  orbit(command.add_option("--azimuth", options.azimuth, "degrees around the scene's centre, about y")
+  orbit(command
+            .add_option("--azimuth", options.orbit.azimuth,
+                        "degrees around the scene's centre, about --view-up")
             ->capture_default_str());
-  orbit(command.add_option("--elevation", options.elevation, "degrees above it")->capture_default_str());
-  orbit(command.add_option("--zoom", options.zoom, "> 1 goes nearer")
+  orbit(
+      command.add_option("--elevation", options.orbit.elevation, "degrees above it")->capture_default_str());
+  orbit(command.add_option("--zoom", options.orbit.zoom, "> 1 goes nearer")
             ->check(demandPositive)
             ->capture_default_str());
   orbit(command.add_flag("--parallel", options.parallel, "parallel projection of the whole scene"))
@@ -212,11 +214,15 @@ void addViewOptions(CLI::App& command, ViewOptions& options) {
 }
 
 Camera makeCamera(const ViewOptions& options, const Scene& scene) {
-  // The angle decides how far away the whole scene is seen from; one that makes no sense is refused later.
+  // How far away the whole scene is seen from depends on these; what makes no sense is refused later.
   const double angle = options.camera.viewAngle.value_or(30.0);
   const bool sensible = angle > 0.0 && angle < 180.0;
-  Camera camera =
-      orbitCamera(scene.bounds, options.azimuth, options.elevation, options.zoom, sensible ? angle : 30.0);
+  Orbit orbit = options.orbit;
+  if (!options.camera.viewUp.empty()) {
+    orbit.up = vectorOf(options.camera.viewUp);
+    if (!(glm::length(orbit.up) > 0.0)) throw Error(ErrorCode::InvalidArgument, "--view-up is zero");
+  }
+  Camera camera = orbitCamera(scene.bounds, orbit, sensible ? angle : 30.0);
   camera.parallelProjection = options.parallel;
   return chosenCamera(options.camera, camera);
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/Cameras.h"
 #include "apps/Decomposition.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
@@ -49,9 +50,7 @@ Camera chosenCamera(const CameraOptions& options, const Camera& otherwise);
 /// A viewpoint on an orbit around the scene, unless the camera is given.
 struct ViewOptions {
   CameraOptions camera;
-  double azimuth = 30.0;
-  double elevation = 20.0;
-  double zoom = 1.0;
+  Orbit orbit{.azimuth = 30.0, .elevation = 20.0};
   bool parallel = false;
 };
 void addViewOptions(CLI::App& command, ViewOptions& options);
