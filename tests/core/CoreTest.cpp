@@ -1,0 +1,158 @@
+// Camera, sample lattice, transfer tables, blocks and the checks of a VDI.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+
+#include "vdi/core/Block.h"
+#include "vdi/core/Camera.h"
+#include "vdi/core/Error.h"
+#include "vdi/core/GenerateSettings.h"
+#include "vdi/core/Scene.h"
+#include "vdi/core/TransferFunction.h"
+#include "vdi/core/Vdi.h"
+
+using namespace vdi;
+
+TEST_CASE("rays go through the points that they're named after") {
+  for (const bool parallel : {false, true}) {
+    Camera camera;
+    camera.position = {3.0, -2.0, 5.0};
+    camera.focalPoint = {0.5, 0.2, -1.0};
+    camera.parallelProjection = parallel;
+    camera.parallelScale = 2.0;
+    const View view(camera, 200, 100);
+    const Ray middle = view.rayThrough(100.0, 50.0);
+    CHECK(glm::length(middle.direction - view.forward()) < 1e-12);
+    const Ray corner = view.rayThrough(0.0, 0.0);
+    CHECK(glm::dot(corner.direction, view.forward()) == Approx(1.0));  // unit depth
+    const glm::dvec3 seen = view.toView(corner.origin + 4.0 * corner.direction);
+    CHECK(seen.z == Approx(4.0));
+    CHECK(seen.x == Approx(-view.halfWidth() * (parallel ? 1.0 : 4.0)));
+    CHECK(seen.y == Approx(-view.halfHeight() * (parallel ? 1.0 : 4.0)));  // row 0 is the bottom
+  }
+}
+
+TEST_CASE("azimuth turns as vtkCamera does, and back") {
+  Camera camera;
+  camera.position = {0.0, 0.0, 2.0};
+  const Camera right = camera.azimuth(90.0);
+  CHECK(glm::length(right.position - glm::dvec3(2.0, 0.0, 0.0)) < 1e-12);
+  CHECK(glm::length(right.azimuth(-90.0).position - camera.position) < 1e-12);
+}
+
+TEST_CASE("a camera that can't see is refused, a careless view-up is mended") {
+  Camera camera;
+  camera.viewUp = camera.focalPoint - camera.position;
+  CHECK(std::abs(glm::dot(View(camera, 4, 4).up(), View(camera, 4, 4).forward())) < 1e-12);
+  CHECK_THROWS_AS(View(camera, 0, 4), Error);
+  camera.viewAngle = 180.0;
+  CHECK_THROWS_AS(View(camera, 4, 4), Error);
+  camera = {};
+  camera.position = camera.focalPoint;
+  CHECK_THROWS_AS(View(camera, 4, 4), Error);
+  camera = {};
+  camera.position.x = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_AS(View(camera, 4, 4), Error);
+}
+
+TEST_CASE("the sample lattice covers the scene in front of the camera and nothing behind it") {
+  const Scene scene{{glm::dvec3(0.0), glm::dvec3(1.0)}, 0.1};
+  Camera camera;
+  camera.position = {0.5, 0.5, 3.0};
+  camera.focalPoint = glm::dvec3(0.5);
+  const DepthLattice lattice = depthLattice(scene, View(camera, 8, 8), 1.0);
+  CHECK(lattice.first == Approx(2.0));
+  CHECK(lattice.step == Approx(0.1));
+  CHECK(lattice.frontOf(lattice.count) >= 3.0 - 1e-9);
+  CHECK(lattice.count <= 11);
+  camera.position = {0.5, 0.5, 0.5};
+  camera.focalPoint = {0.5, 0.5, 0.0};
+  CHECK(depthLattice(scene, View(camera, 8, 8), 1.0).first == 0.0);
+  camera.position = {0.5, 0.5, -1.0};
+  camera.focalPoint = {0.5, 0.5, -2.0};
+  CHECK(depthLattice(scene, View(camera, 8, 8), 1.0).count == 0);
+  CHECK_THROWS_AS(depthLattice(scene, View(camera, 8, 8), 0.0), Error);
+}
+
+TEST_CASE("a face computed in two ways snaps to one float") {
+  const Scene scene{{glm::dvec3(-0.3, 1.0, 7.0), glm::dvec3(11.7, 9.0, 8.0)}, 0.1};
+  for (int i = 0; i <= 120; ++i) {
+    const double upper = -0.3 + i * 0.1;          // origin + count * spacing
+    const double lower = 11.7 - (120 - i) * 0.1;  // from the other end
+    CHECK(snapToScene(scene, upper, 0) == snapToScene(scene, lower, 0));
+  }
+}
+
+TEST_CASE("transfer functions are piecewise linear, with steps, constant outside") {
+  TransferFunction function;
+  function.colors = {{0.0, {1.0, 0.0, 0.0}}, {2.0, {0.0, 0.0, 1.0}}};
+  function.opacities = {{0.0, 0.0}, {1.0, 0.2}, {1.0, 0.8}, {2.0, 1.0}};
+  CHECK(function.opacityAt(-5.0) == 0.0);
+  CHECK(function.opacityAt(0.5) == Approx(0.1));
+  CHECK(function.opacityAt(1.0) == Approx(0.8));
+  CHECK(function.opacityAt(9.0) == 1.0);
+  CHECK(function.colorAt(0.5).r == Approx(0.75));
+  const TransferTable table = bake(function);
+  for (const double x : {-1.0, 0.25, 0.75, 1.5, 3.0}) {
+    INFO(x);
+    const TransferTableEntry entry = table.lookup(x);
+    CHECK(entry.red == Approx(function.colorAt(x).r).margin(2e-3));
+    CHECK(1.0 - std::exp2(-entry.extinction) == Approx(function.opacityAt(x)).margin(2e-3));
+  }
+  CHECK(table.lookup(std::numeric_limits<double>::quiet_NaN()).extinction == 0.0F);
+  CHECK(table.lookup(std::numeric_limits<double>::infinity()).extinction == 0.0F);
+  CHECK(table.visible(0.5, 0.6));
+  function.opacities = {{0.0, 0.0}, {1.0, 0.0}, {1.0001, 1.0}, {1.0002, 0.0}, {2.0, 0.0}};
+  const TransferTable narrow = bake(function);
+  CHECK(narrow.entries.size() == 16384);
+  CHECK(narrow.visible(0.9, 1.1));
+  CHECK_FALSE(narrow.visible(0.1, 0.9));
+  function.opacities = {{1.0, 0.0}, {0.0, 1.0}};
+  CHECK_THROWS_AS(bake(function), Error);
+  function.opacities = {{0.0, 1.5}};
+  CHECK_THROWS_AS(bake(function), Error);
+}
+
+TEST_CASE("who owns what: points to the last point, cells whole, ghosts never") {
+  const int value = 0;
+  const Block points = Block::fromPoints({5, 5, 5}, glm::dvec3(1.0), glm::dvec3(0.5), ScalarType::I32, &value,
+                                         {{1, 0, 0}, {1, 0, 0}});
+  CHECK(points.owned.lo == glm::dvec3(1.5, 1.0, 1.0));
+  CHECK(points.owned.hi == glm::dvec3(2.5, 3.0, 3.0));
+  const Block cells = Block::fromCells({4, 4, 4}, glm::dvec3(0.0), glm::dvec3(0.5), ScalarType::I32, &value,
+                                       {{0, 1, 0}, {0, 0, 2}});
+  CHECK(cells.origin == glm::dvec3(0.25));
+  CHECK(cells.owned.lo == glm::dvec3(0.0, 0.5, 0.0));
+  CHECK(cells.owned.hi == glm::dvec3(2.0, 2.0, 1.0));
+}
+
+TEST_CASE("settings and names out of range are refused by name") {
+  GenerateSettings settings;
+  settings.supersegments = 1025;
+  CHECK_THROWS_WITH(validate(settings), Catch::Contains("supersegments") && Catch::Contains("1025"));
+  CHECK_THROWS_WITH(algorithmFromString("magic"), Catch::Contains("bisection"));
+  CHECK_THROWS_WITH(scalarTypeFromString("f16"), Catch::Contains("f32"));
+}
+
+TEST_CASE("a VDI that isn't sound is refused") {
+  Vdi vdi;
+  vdi.width = 2;
+  vdi.height = 1;
+  vdi.budget = 2;
+  vdi.lists.offsets = {0, 2, 2};
+  vdi.lists.segments = {{1.0F, 2.0F, 0.1F, 0.1F, 0.1F, 0.5F}, {2.0F, 3.0F, 0.1F, 0.1F, 0.1F, 1.0F}};
+  CHECK_NOTHROW(validate(vdi));
+  const auto broken = [&](auto change) {
+    Vdi copy = vdi;
+    change(copy);
+    CHECK_THROWS_AS(validate(copy), Error);
+  };
+  broken([](Vdi& v) { v.budget = 1; });
+  broken([](Vdi& v) { v.width = 3; });
+  broken([](Vdi& v) { v.lists.offsets.back() = 3; });
+  broken([](Vdi& v) { v.lists.offsets = {0, 3, 2}; });
+  broken([](Vdi& v) { v.lists.segments[1].front = 1.5F; });
+  broken([](Vdi& v) { v.lists.segments[0].back = 1.0F; });
+  broken([](Vdi& v) { v.lists.segments[0].opacity = 0.0F; });
+  broken([](Vdi& v) { v.lists.segments[0].red = std::numeric_limits<float>::quiet_NaN(); });
+}
