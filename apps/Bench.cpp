@@ -46,8 +46,8 @@ double median(std::vector<double> values) {
 template <typename Measure>
 double medianOf(int repeats, Measure measure) {
   measure();
-  std::vector<double> times;
-  for (int i = 0; i < repeats; ++i) times.push_back(measure());
+  std::vector<double> times(static_cast<std::size_t>(repeats));
+  for (double& time : times) time = measure();
   return median(times);
 }
 

@@ -17,7 +17,9 @@
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData a block, under the name "grid":
- * TrivialProducer(registrationName="grid").
+ * TrivialProducer(registrationName="grid"). A script runs on all ranks, and what updates a pipeline is
+ * collective: where a rank leaves it before an update that the others enter, they wait, as in any MPI
+ * program. An exception on one rank after the last update of a step stops the step on all.
  */
 #ifndef VDI_CATALYST_H
 #define VDI_CATALYST_H

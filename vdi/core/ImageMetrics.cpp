@@ -102,8 +102,8 @@ double windowedSsim(const Channel& channel, int width, int height) {
   for (int y = radius; y < height - radius; ++y) {
     for (int x = 0; x < width; ++x) {
       Moments m;
-      for (int i = -radius; i <= radius; ++i)
-        m.add(kernel[static_cast<std::size_t>(radius + i)], channel.at(x, y + i));
+      for (std::size_t i = 0; i < kernel.size(); ++i)
+        m.add(kernel[i], channel.at(x, y - radius + static_cast<int>(i)));
       columns[static_cast<std::size_t>(x)] = m;
     }
     for (std::size_t first = 0; first + kernel.size() <= columns.size(); ++first) {

@@ -155,6 +155,7 @@ Candidate inspect(VkPhysicalDevice device) {
 
 std::vector<DeviceSummary> summaries(const std::vector<Candidate>& candidates) {
   std::vector<DeviceSummary> result;
+  result.reserve(candidates.size());
   for (const Candidate& candidate : candidates) result.push_back(candidate.summary);
   return result;
 }

@@ -74,7 +74,7 @@ Picture readPng(const std::filesystem::path& path) {
   };
   demand(png_image_begin_read_from_memory(image.get(), bytes.data(), bytes.size()) != 0, image->message);
   // A byte of a PNG holds at most 1032 bytes of rows (deflate), each of at most 8 pixels.
-  constexpr std::uint64_t mostPixelsPerByte = 1032 * 8;
+  constexpr std::uint64_t mostPixelsPerByte = std::uint64_t{1032} * 8;
   demand(std::uint64_t{image->width} * image->height <= bytes.size() * mostPixelsPerByte,
          "its header says that it's larger than its bytes can hold");
   image->format = PNG_FORMAT_RGB;

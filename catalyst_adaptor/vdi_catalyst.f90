@@ -1,0 +1,76 @@
+! vdi_catalyst.h for Fortran: compile this file with the simulation and `use vdi_catalyst`. The header has the
+! documentation; the handle is a type(c_ptr), strings end with c_null_char, arrays of pointers are arrays of c_loc(...).
+module vdi_catalyst
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int32_t, c_int64_t, c_ptr
+  implicit none
+  private :: c_char, c_double, c_int, c_int32_t, c_int64_t, c_ptr
+
+  enum, bind(c)
+    enumerator :: vdi_catalyst_ok = 0
+    enumerator :: vdi_catalyst_bad_argument = 1
+    enumerator :: vdi_catalyst_engine = 2
+    enumerator :: vdi_catalyst_script = 3
+  end enum
+
+  integer(c_int32_t), parameter :: vdi_catalyst_u8 = 0
+  integer(c_int32_t), parameter :: vdi_catalyst_i8 = 1
+  integer(c_int32_t), parameter :: vdi_catalyst_u16 = 2
+  integer(c_int32_t), parameter :: vdi_catalyst_i16 = 3
+  integer(c_int32_t), parameter :: vdi_catalyst_u32 = 4
+  integer(c_int32_t), parameter :: vdi_catalyst_i32 = 5
+  integer(c_int32_t), parameter :: vdi_catalyst_f32 = 6
+  integer(c_int32_t), parameter :: vdi_catalyst_f64 = 7
+
+  integer(c_int32_t), parameter :: vdi_catalyst_points = 0
+  integer(c_int32_t), parameter :: vdi_catalyst_cells = 1
+
+  type, bind(c) :: vdi_catalyst_block
+    integer(c_int32_t) :: cells(3)
+    integer(c_int32_t) :: ghost_lo(3) = 0
+    integer(c_int32_t) :: ghost_hi(3) = 0
+    real(c_double) :: origin(3) = 0
+    real(c_double) :: spacing(3) = 1
+  end type
+
+  interface
+    ! communicator: an `integer` handle of mpif.h or `use mpi`, or comm%mpi_val of `use mpi_f08`.
+    function vdi_catalyst_initialize(communicator, script_count, scripts, catalyst) bind(c) result(code)
+      import :: c_int, c_int32_t, c_ptr
+      integer(c_int32_t), value :: communicator, script_count
+      type(c_ptr), intent(in) :: scripts(*)
+      type(c_ptr), intent(out) :: catalyst
+      integer(c_int) :: code
+    end function
+
+    function vdi_catalyst_set_blocks(catalyst, count, blocks) bind(c) result(code)
+      import :: c_int, c_int32_t, c_ptr, vdi_catalyst_block
+      type(c_ptr), value :: catalyst
+      integer(c_int32_t), value :: count
+      type(vdi_catalyst_block), intent(in) :: blocks(*)
+      integer(c_int) :: code
+    end function
+
+    function vdi_catalyst_set_array(catalyst, name, type, association, values) bind(c) result(code)
+      import :: c_char, c_int, c_int32_t, c_ptr
+      type(c_ptr), value :: catalyst
+      character(kind=c_char), intent(in) :: name(*)
+      integer(c_int32_t), value :: type, association
+      type(c_ptr), intent(in) :: values(*)
+      integer(c_int) :: code
+    end function
+
+    function vdi_catalyst_execute(catalyst, step, time) bind(c) result(code)
+      import :: c_double, c_int, c_int64_t, c_ptr
+      type(c_ptr), value :: catalyst
+      integer(c_int64_t), value :: step
+      real(c_double), value :: time
+      integer(c_int) :: code
+    end function
+
+    function vdi_catalyst_finalize(catalyst) bind(c) result(code)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: catalyst
+      integer(c_int) :: code
+    end function
+  end interface
+end module
