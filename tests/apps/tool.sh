@@ -1,0 +1,87 @@
+#!/usr/bin/env bash
+# The tool as a user runs it: what works, and what bad input gets. $1: vdi, $2: mpirun and its options, as one word list.
+set -uo pipefail
+vdi=$1
+read -r -a mpirun <<<"$2"
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+cd "$folder" || exit 1
+failures=0
+
+fail() {
+  echo "FAILED  $*"
+  failures=$((failures + 1))
+}
+# works <what> command...: exit status 0.
+works() {
+  local what=$1
+  shift
+  "$@" >out.txt 2>err.txt || { fail "$what: status $?"; cat out.txt err.txt; }
+}
+# refused <status> <pattern> command...: that exit status, one line that matches.
+refused() {
+  local status=$1 pattern=$2
+  shift 2
+  "$@" >out.txt 2>err.txt
+  local got=$?
+  [ $got -eq "$status" ] || fail "status $got, not $status: $*"
+  grep -qiE "$pattern" err.txt || { fail "no '$pattern' in what is said of: $*"; cat err.txt; }
+}
+small=(--size 24x20x16 --resolution 80x60 --supersegments 8)
+
+# One rank and three give the same picture; the picture of the VDI from its own viewpoint is that picture.
+for joint in shared gap cells; do
+  works "generate" "$vdi" generate --field turbulence "${small[@]}" --joint "$joint" -o one.vdi --flat one.png
+  works "generate on 3 ranks" "${mpirun[@]}" 3 "$vdi" generate --field turbulence "${small[@]}" --joint "$joint" \
+    --blocks 3x2x2 --layout random -o three.vdi --flat three.png
+  works "compare" "$vdi" compare --json one.png three.png
+  python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "$joint: ranks differ"
+  works "render" "$vdi" render three.vdi -o turned.png --azimuth 0 20
+  works "compare" "$vdi" compare --json one.png turned_0deg.png
+  python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] > 0.995, r" || fail "$joint: not the picture"
+  works "compare" "$vdi" compare --json one.png turned_20deg.png
+  python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] < 0.99, r" || fail "$joint: nothing turned"
+done
+works "info" "$vdi" info one.vdi
+grep -q "80 x 60" out.txt || fail "info doesn't tell the resolution"
+works "bench" "$vdi" bench --fields sphere "${small[@]}" --repeats 1 --angles 0 20 -o bench.json
+python3 - <<'P' || fail "bench.json isn't what it should be"
+import json
+bench = json.load(open("bench.json"))
+assert bench["device"] and len(bench["rows"]) >= 2
+assert all(row["dvr_ms"] is None or row["dvr_ms"] > 0 for row in bench["rows"])
+P
+
+# A raw volume of 16-bit big-endian cells behind a header.
+python3 - <<'P'
+import json
+import struct
+values = [(x * 200 + y * 90) % 4000 for z in range(6) for y in range(8) for x in range(10)]
+open("v.raw", "wb").write(b"header" + struct.pack(">480H", *values))
+json.dump({"file": "v.raw", "dims": [10, 8, 6], "type": "u16", "endianness": "big", "skip": 6, "association": "cell"},
+          open("v.json", "w"))
+json.dump({"file": "v.raw", "dims": [10, 8, 7], "type": "u16"}, open("long.json", "w"))
+json.dump({"file": "v.raw", "dims": [10, 8, 6], "type": "u12"}, open("type.json", "w"))
+json.dump({"file": "v.raw", "dims": [10, 8, 6], "type": "u16", "spacin": [1, 1, 1]}, open("field.json", "w"))
+P
+works "raw" "$vdi" generate --raw v.json --resolution 40x30 --flat raw.png
+works "raw on 2 ranks" "${mpirun[@]}" 2 "$vdi" generate --raw v.json --resolution 40x30 --blocks 2x2x1 --flat raw2.png
+works "compare" "$vdi" compare --json raw.png raw2.png
+python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "raw: ranks differ"
+refused 1 "long.json|v.raw" "$vdi" generate --raw long.json -o x.vdi
+refused 1 "u12" "$vdi" generate --raw type.json -o x.vdi
+refused 1 "spacin" "$vdi" generate --raw field.json -o x.vdi
+refused 1 "none.json" "$vdi" generate --raw none.json -o x.vdi
+
+# Bad input.
+head -c 200 one.vdi >short.vdi
+refused 1 "short.vdi" "$vdi" render short.vdi -o x.png
+refused 1 "v.json" "$vdi" info v.json
+refused 2 "nonsense" "$vdi" generate --field nonsense -o x.vdi
+refused 2 "supersegments" "$vdi" generate --field sphere --supersegments 0 -o x.vdi
+refused 2 "0x5" "$vdi" generate --field sphere --resolution 0x5 -o x.vdi
+refused 2 "" "$vdi" frobnicate
+refused 1 "nothing-like-this" env VDI_DEVICE=nothing-like-this "$vdi" generate --field sphere "${small[@]}" -o x.vdi
+refused 1 "no-such-folder" "$vdi" generate --field sphere "${small[@]}" -o no-such-folder/x.vdi
+[ ! -e x.vdi ] && [ ! -e x.png ] || fail "a refused command left a file"
+exit $((failures > 0))
