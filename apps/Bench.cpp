@@ -163,7 +163,7 @@ class Bench {
     detail::Compositor compositor(device_);
     return medianOf(options_.repeats, [&] {
       const auto start = std::chrono::steady_clock::now();
-      compositor.composite(parts, settings_.supersegments, vdi->sampleStep);
+      compositor.composite(parts, settings_.supersegments, vdi->sampleStep, settings_.algorithm);
       return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     });
   }

@@ -241,7 +241,9 @@ void addQualityOptions(CLI::App& command, QualityOptions& options) {
   command.add_option("--sampling-rate", options.samplesPerVoxel, "samples per voxel, 1/64 to 64")
       ->capture_default_str()
       ->group(qualityGroup);
-  command.add_option("--algorithm", options.algorithm, "how samples become supersegments: bisection")
+  command
+      .add_option("--algorithm", options.algorithm,
+                  "how samples become supersegments: merge, without search; bisection, the paper's search")
       ->type_name("NAME")
       ->capture_default_str()
       ->group(qualityGroup);

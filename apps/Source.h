@@ -60,7 +60,7 @@ struct QualityOptions {
   std::string resolution = "640x360";
   std::uint32_t supersegments = 25;
   double samplesPerVoxel = 1.0;
-  std::string algorithm = "bisection";
+  std::string algorithm = "merge";
   std::string transferFunction = "three-hues";  // a preset or a file
   std::optional<double> unitDistance;
 };

@@ -1,18 +1,24 @@
-// Casts one ray per pixel through a rank's blocks: DVR, or the search for each list's sensitivity, or the writing of its
-// supersegments. Twin of castRay, renderVolume and generate in vdi/reference/Reference.cpp.
+// Casts one ray per pixel through a rank's blocks: DVR; or the search for each list's sensitivity, and the writing of its
+// supersegments; or the counting of its grains, and the writing of them. Twin of castRay, renderVolume and generate in vdi/reference/Reference.cpp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/cast.h"
 
 layout(local_size_x = castGroupX, local_size_y = castGroupY) in;
-layout(constant_id = 0) const bool volumeOnly = false;  // DVR alone: leaves the search out of the program
+// What the program is for; the others' code is left out.
+layout(constant_id = 0) const uint castProgram = castProgramSearch;
 layout(constant_id = 1) const uint pageCount = 1;
 
 layout(set = 0, binding = 0) uniform sampler3D pages[castMaxPages];
 
 layout(push_constant, scalar) uniform Push { CastConstants push; };
 
+const bool volumeOnly = castProgram == castProgramVolume;
+const bool countsGrains = castProgram == castProgramCountGrains;
+const bool writesGrains = castProgram == castProgramWriteGrains;
+
 #include "lists.glsl"
+#include "grains.glsl"
 
 vec4 accumulated;
 float firstDepth;
@@ -23,6 +29,11 @@ void useSample(float front, float back, vec3 color, float opticalDepth) {
     float opacity = opacityOf(opticalDepth);
     if (opacity > 0.0 && accumulated.a == 0.0) firstDepth = front;
     accumulated += (1.0 - accumulated.a) * opacity * vec4(color, 1.0);
+  } else if (countsGrains || writesGrains) {
+    float opacity = opacityOf(opticalDepth);
+    // Nearly all intervals are one sample long.
+    float part = back - front == push.params.value.step ? opacity : opacityOf(opticalDepth * push.params.value.step / (back - front));
+    grainsAdd(front, back, color * opacity, opticalDepth, vec4(color, 1.0) * part);
   } else {
     searchAdd(front, back, color * opacityOf(opticalDepth), opticalDepth);
   }
@@ -49,5 +60,11 @@ void main() {
     return;
   }
 
-  searchOrWriteList(push.mode == castModeWrite);
+  if (countsGrains) {
+    countGrains();
+  } else if (writesGrains) {
+    writeGrains();
+  } else {
+    searchOrWriteList(push.mode == castModeWrite);
+  }
 }

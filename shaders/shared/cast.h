@@ -16,26 +16,34 @@ VDI_SHARED_BEGIN
 inline constexpr uint castGroupX = 8;
 inline constexpr uint castGroupY = 8;
 inline constexpr uint castMaxPages = 8;
-inline constexpr uint castModeVolume = 0;
-inline constexpr uint castModeSearch = 1;
-inline constexpr uint castModeWrite = 2;
+inline constexpr uint castProgramVolume = 0;
+inline constexpr uint castProgramSearch = 1;
+inline constexpr uint castProgramCountGrains = 2;
+inline constexpr uint castProgramWriteGrains = 3;
+inline constexpr uint castModeSearch = 0;
+inline constexpr uint castModeWrite = 1;
 #else
 const uint castGroupX = 8;
 const uint castGroupY = 8;
 const uint castMaxPages = 8;
-const uint castModeVolume = 0;  // DVR: colours and depths
-const uint castModeSearch = 1;  // sensitivities and counts
-const uint castModeWrite = 2;   // supersegments
+const uint castProgramVolume = 0;       // DVR: colours and depths
+const uint castProgramSearch = 1;       // by bisection: one program that does both of the modes
+const uint castProgramCountGrains = 2;  // by merging: tolerances and counts
+const uint castProgramWriteGrains = 3;
+const uint castModeSearch = 0;  // sensitivities and counts
+const uint castModeWrite = 1;   // supersegments
 #endif
 
 struct CastParams {
   VDI_ADDRESS(BrickArray) bricks;
   VDI_ADDRESS(KdNodeArray) nodes;  // node 0 is the root
   VDI_ADDRESS(TableArray) table;
-  VDI_ADDRESS(FloatArray) sensitivities;  // [h][w]
-  VDI_ADDRESS(UintArray) counts;          // [h][w]
+  VDI_ADDRESS(FloatArray) sensitivities;  // [h][w]; by merging: tolerances
+  VDI_ADDRESS(UintArray) counts;          // [h][w]; by merging: of grains
   VDI_ADDRESS(UintArray) offsets;         // [h][w], exclusive prefix sum of counts
-  VDI_ADDRESS(SegmentArray) segments;     // compact
+  VDI_ADDRESS(SegmentArray) segments;     // compact; by bisection
+  VDI_ADDRESS(GrainArray) grains;         // compact; by merging
+  VDI_ADDRESS(UvecArray) reductions;      // [h][w]: grains written, and how many are to be left of them
   VDI_ADDRESS(Vec4Array) colors;          // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;         // [h][w]
   VDI_ADDRESS(UintArray) status;          // [1]: lists whose written count differs from the stored one

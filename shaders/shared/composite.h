@@ -9,12 +9,18 @@ VDI_SHARED_BEGIN
 inline constexpr uint compositeGroup = 64;
 inline constexpr uint mergeModeCount = 0;
 inline constexpr uint mergeModeMerge = 1;
+inline constexpr uint compositeProgramSearch = 0;
+inline constexpr uint compositeProgramCountGrains = 1;
+inline constexpr uint compositeProgramWriteGrains = 2;
 inline constexpr uint compositeModeSearch = 0;
 inline constexpr uint compositeModeWrite = 1;
 #else
 const uint compositeGroup = 64;
 const uint mergeModeCount = 0;  // counts[list] = sum over ranks
 const uint mergeModeMerge = 1;  // writes merged
+const uint compositeProgramSearch = 0;  // as castProgramSearch and so on
+const uint compositeProgramCountGrains = 1;
+const uint compositeProgramWriteGrains = 2;
 const uint compositeModeSearch = 0;
 const uint compositeModeWrite = 1;
 #endif
@@ -43,6 +49,8 @@ struct CompositeParams {
   VDI_ADDRESS(UintArray) counts;
   VDI_ADDRESS(UintArray) offsets;
   VDI_ADDRESS(SegmentArray) segments;
+  VDI_ADDRESS(GrainArray) grains;
+  VDI_ADDRESS(UvecArray) reductions;
   VDI_ADDRESS(UintArray) status;
   float step;  // of the sample lattice
   uint budget;

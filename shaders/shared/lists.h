@@ -1,9 +1,16 @@
-// Supersegments and the constants of the sensitivity search.
+// Supersegments, and the grains that they're merged from.
 #ifndef VDI_SHARED_LISTS_H
 #define VDI_SHARED_LISTS_H
 #include "interop.h"
 
 VDI_SHARED_BEGIN
+
+// Room for grains, in multiples of a list's budget; as in vdi/reference/Segmenter.h.
+#ifdef __cplusplus
+inline constexpr uint grainsPerBudget = 3;
+#else
+const uint grainsPerBudget = 3;
+#endif
 
 // Supersegment of core/Vdi.h.
 struct Segment {
@@ -15,11 +22,25 @@ struct Segment {
   float opacity;
 };
 
+// Grain of vdi/reference/SegmentByMerging.cpp.
+struct Grain {
+  float front;
+  float back;
+  float red;  // premultiplied
+  float green;
+  float blue;
+  float opticalDepth;
+  float before;  // optical depth in front of it; -1 - that, if it must not be merged with the grain before it
+  float cost;    // of merging it with the next one: scratch of reduce.comp
+};
+
 VDI_SHARED_END
 
 #ifndef __cplusplus
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray { Grain at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer UvecArray { uvec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray { float at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4Array { vec4 at[]; };
 #endif

@@ -30,14 +30,16 @@ TEST_CASE("opacity and optical depth are inverse to each other, small values inc
   CHECK(opacityOf(opticalDepthOf(1.0F)) == 1.0F);
 }
 
-TEST_CASE("equal samples make one supersegment, whatever their number") {
+TEST_CASE("both algorithms: equal samples make one supersegment, whatever their number") {
   std::vector<Interval> samples;
   for (int k = 0; k < 40; ++k) samples.push_back(sample(k, 0.5F, 0.1F));
-  const auto list = segmentByBisection(samples, {4, 1.0F, false});
-  REQUIRE(list.size() == 1);
-  CHECK(list[0].front == 0.0F);
-  CHECK(list[0].back == 40.0F);
-  CHECK(list[0].opacity == Approx(1.0 - std::pow(0.9, 40)).epsilon(1e-4));
+  for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
+    const auto list = segment(samples, {4, 1.0F, false}, algorithm);
+    REQUIRE(list.size() == 1);
+    CHECK(list[0].front == 0.0F);
+    CHECK(list[0].back == 40.0F);
+    CHECK(list[0].opacity == Approx(1.0 - std::pow(0.9, 40)).epsilon(1e-4));
+  }
 }
 
 TEST_CASE("transparent samples open nothing, may be absorbed, and are trimmed at the end") {
@@ -58,15 +60,21 @@ TEST_CASE("gaps end a supersegment where another rank may have material, and onl
   const std::vector<Interval> samples{sample(0, 1.0F, 0.5F), sample(5, 1.0F, 0.5F)};
   CHECK(segmentWithSensitivity(samples, 2.0F, {9, 1.0F, true}).size() == 2);
   CHECK(segmentWithSensitivity(samples, 2.0F, {9, 1.0F, false}).size() == 1);
-  CHECK(segmentByBisection(samples, {1, 1.0F, true}).size() == 2);  // runs come before the budget
+  for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
+    CHECK(segment(samples, {1, 1.0F, true}, algorithm).size() == 2);  // runs come before the budget
+    CHECK(segment(samples, {1, 1.0F, false}, algorithm).size() == 1);
+  }
 }
 
 TEST_CASE("no more intervals than the budget: nothing is merged") {
   const std::vector<Interval> samples{sample(0, 0.5F, 0.3F), sample(1, 0.5F, 0.3F), sample(2, 0.5F, 0.3F)};
-  CHECK(segmentByBisection(samples, {3, 1.0F, false}).size() == 3);
+  for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection})
+    CHECK(segment(samples, {3, 1.0F, false}, algorithm).size() == 3);
 }
 
 TEST_CASE("a list never exceeds its budget, fills most of it, and composites to the same picture") {
+  const Algorithm algorithm = GENERATE(Algorithm::Merge, Algorithm::Bisection);
+  INFO(toString(algorithm));
   std::mt19937 generator(5);
   std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
   constexpr int rounds = 40;
@@ -80,7 +88,7 @@ TEST_CASE("a list never exceeds its budget, fills most of it, and composites to 
         samples.push_back(sample(k, uniform(generator), opacity));
         expected *= 1.0F - opacity;
       }
-      const auto list = segmentByBisection(samples, {budget, 1.0F, false});
+      const auto list = segment(samples, {budget, 1.0F, false}, algorithm);
       CHECK(list.size() <= budget);
       CHECK_FALSE(list.empty());
       stored += list.size();
@@ -99,6 +107,44 @@ TEST_CASE("the criterion does not depend on the length of a sample") {
     scaled.back().front *= 1e6F;
     scaled.back().back *= 1e6F;
   }
-  CHECK(segmentByBisection(once, {8, 1.0F, false}).size() ==
-        segmentByBisection(scaled, {8, 1e6F, false}).size());
+  for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
+    CHECK(segment(once, {8, 1.0F, false}, algorithm).size() ==
+          segment(scaled, {8, 1e6F, false}, algorithm).size());
+  }
+}
+
+TEST_CASE("merging fills the list where bisection collapses: bands of one value each") {
+  // Thin bands, all alike: at any sensitivity either all stay apart or all go together.
+  std::vector<Interval> samples;
+  for (int k = 0; k < 300; ++k) samples.push_back(sample(k, 1.0F, k % 3 == 0 ? 0.02F : 0.0F));
+  CHECK(segmentByMerging(samples, {25, 1.0F, false}).size() == 25);
+  CHECK(segmentByBisection(samples, {25, 1.0F, false}).size() == 1);
+}
+
+TEST_CASE("merging keeps what stands out and gives up what's alike") {
+  std::vector<Interval> samples;
+  for (int k = 0; k < 60; ++k)
+    samples.push_back(
+        sample(k, k == 30 ? 1.0F : 0.2F + 0.001F * static_cast<float>(k % 2), k == 30 ? 0.8F : 0.02F));
+  const auto list = segmentByMerging(samples, {3, 1.0F, false});
+  REQUIRE(list.size() == 3);
+  CHECK(list[1].front == 30.0F);
+  CHECK(list[1].back == 31.0F);
+}
+
+TEST_CASE("merging never joins what gaps keep apart") {
+  std::vector<Interval> samples;
+  for (int k = 0; k < 40; ++k)
+    samples.push_back(sample(k + k / 10, 0.5F, 0.01F * static_cast<float>(1 + k % 4)));
+  const auto list = segmentByMerging(samples, {5, 1.0F, true});
+  REQUIRE(list.size() == 5);
+  std::size_t ends = 0;
+  for (const Supersegment& s : list) {
+    for (const float gap : {10.0F, 21.0F, 32.0F}) {
+      CHECK_FALSE((s.front < gap && s.back > gap + 1.0F));
+      ends += s.back == gap ? 1 : 0;
+    }
+  }
+  CHECK(ends == 3);
+  CHECK(segmentByMerging(samples, {2, 1.0F, true}).size() == 4);  // as many as there are runs
 }

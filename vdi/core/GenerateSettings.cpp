@@ -10,13 +10,17 @@ const char* toString(Algorithm algorithm) {
   switch (algorithm) {
     case Algorithm::Bisection:
       return "bisection";
+    case Algorithm::Merge:
+      return "merge";
   }
   return "unknown";
 }
 
 Algorithm algorithmFromString(const std::string& name) {
-  if (name == "bisection") return Algorithm::Bisection;
-  throw Error(ErrorCode::InvalidArgument, "no algorithm '" + name + "'; there is bisection");
+  for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
+    if (name == toString(algorithm)) return algorithm;
+  }
+  throw Error(ErrorCode::InvalidArgument, "no algorithm '" + name + "'; there are merge and bisection");
 }
 
 void validate(const GenerateSettings& settings) {

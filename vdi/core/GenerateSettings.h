@@ -9,9 +9,10 @@ namespace vdi {
 /// How samples become supersegments.
 enum class Algorithm : std::uint32_t {
   Bisection = 0,  // the paper's: a search for the sensitivity per list (section 2.4)
+  Merge = 1,      // no search: fine pieces first, then the cheapest neighbours are merged until they fit
 };
 
-const char* toString(Algorithm algorithm);  // "bisection"
+const char* toString(Algorithm algorithm);  // "bisection", "merge"
 /// Throws Error{InvalidArgument} that lists the names there are.
 Algorithm algorithmFromString(const std::string& name);
 
@@ -20,7 +21,7 @@ struct GenerateSettings {
   int height = 720;
   std::uint32_t supersegments = 25;  // N_S, 1 .. 1024
   double samplesPerVoxel = 1.0;      // [1/64, 64]
-  Algorithm algorithm = Algorithm::Bisection;
+  Algorithm algorithm = Algorithm::Merge;
   /// A ray ends once it has accumulated this opacity: (0, 1]; 1 never ends early. What's hidden behind it at
   /// V_O is missing when seen from V_N.
   double terminationOpacity = 0.9999;

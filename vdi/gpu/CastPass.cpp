@@ -47,32 +47,35 @@ void CastPass::bind(const VolumeStore& volume) {
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
   if (bound_ != nullptr && boundVersion_ == volume.pagesVersion()) return;
   Pipelines& pipelines = pipelines_[pageCount];
-  if (!pipelines.volume) {
-    const auto make = [&](bool volumeOnly) {
+  std::array<const Image3D*, shared::castMaxPages> images{};
+  for (std::size_t i = 0; i < images.size(); ++i) images[i] = &volume.pages()[std::min(i, pageCount - 1)];
+  for (std::uint32_t program = 0; program < pipelines.size(); ++program) {
+    std::unique_ptr<ComputePipeline>& pipeline = pipelines[program];
+    if (!pipeline) {
       ComputePipelineInfo info;
       info.shader = "cast";
       info.pushConstantBytes = sizeof(shared::CastConstants);
       info.imageCount = shared::castMaxPages;
-      info.specialization = {volumeOnly ? 1U : 0U, static_cast<std::uint32_t>(pageCount)};
-      return std::make_unique<ComputePipeline>(device_, info);
-    };
-    pipelines.volume = make(true);
-    pipelines.lists = make(false);
+      info.specialization = {program, static_cast<std::uint32_t>(pageCount)};
+      pipeline = std::make_unique<ComputePipeline>(device_, info);
+    }
+    pipeline->bindImages(images, sampler_);
   }
-  std::array<const Image3D*, shared::castMaxPages> images{};
-  for (std::size_t i = 0; i < images.size(); ++i) images[i] = &volume.pages()[std::min(i, pageCount - 1)];
-  pipelines.volume->bindImages(images, sampler_);
-  pipelines.lists->bindImages(images, sampler_);
   bound_ = &pipelines;
   boundVersion_ = volume.pagesVersion();
 }
 
-void CastPass::record(Commands& commands, VkDeviceAddress params, std::uint32_t mode, std::uint32_t width,
-                      std::uint32_t firstRow, std::uint32_t lastRow) const {
+void CastPass::record(Commands& commands, VkDeviceAddress params, Work work, Algorithm algorithm,
+                      std::uint32_t width, std::uint32_t firstRow, std::uint32_t lastRow) const {
   assert(bound_ != nullptr && firstRow < lastRow);
-  const shared::CastConstants constants{params, mode, firstRow, lastRow, 0};
-  const ComputePipeline& pipeline = mode == shared::castModeVolume ? *bound_->volume : *bound_->lists;
-  commands.dispatch(pipeline, constants, (width + shared::castGroupX - 1) / shared::castGroupX,
+  const bool writes = work == Work::Write;
+  const std::uint32_t program = work == Work::Volume                ? shared::castProgramVolume
+                                : algorithm == Algorithm::Bisection ? shared::castProgramSearch
+                                : writes                            ? shared::castProgramWriteGrains
+                                                                    : shared::castProgramCountGrains;
+  const shared::CastConstants constants{params, writes ? shared::castModeWrite : shared::castModeSearch,
+                                        firstRow, lastRow, 0};
+  commands.dispatch(*(*bound_)[program], constants, (width + shared::castGroupX - 1) / shared::castGroupX,
                     (lastRow - firstRow + shared::castGroupY - 1) / shared::castGroupY);
 }
 

@@ -1,11 +1,13 @@
-// Dispatches cast.comp: DVR, or search and writing of supersegments, over the bricks of a VolumeStore.
+// Dispatches cast.comp: DVR, or the two steps that make lists, over the bricks of a VolumeStore.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
 
 #include "shaders/shared/cast.h"
+#include "vdi/core/GenerateSettings.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/ComputePipeline.h"
 #include "vdi/gpu/Memory.h"
@@ -32,15 +34,16 @@ class CastPass {
   /// be in flight.
   void bind(const VolumeStore& volume);
 
-  /// Rows [firstRow, lastRow) in one of the castMode's. `params` is the address of a CastParams.
-  void record(Commands& commands, VkDeviceAddress params, std::uint32_t mode, std::uint32_t width,
+  /// What a dispatch does: the picture; or the first step of an algorithm (sensitivities or tolerances, and
+  /// counts), or its second one (supersegments or grains).
+  enum class Work { Volume, Search, Write };
+  /// Rows [firstRow, lastRow). `params` is the address of a CastParams.
+  void record(Commands& commands, VkDeviceAddress params, Work work, Algorithm algorithm, std::uint32_t width,
               std::uint32_t firstRow, std::uint32_t lastRow) const;
 
  private:
-  struct Pipelines {
-    std::unique_ptr<ComputePipeline> volume;
-    std::unique_ptr<ComputePipeline> lists;
-  };
+  /// By shared::castProgram...
+  using Pipelines = std::array<std::unique_ptr<ComputePipeline>, 4>;
   std::shared_ptr<Device> device_;
   Sampler sampler_;
   std::map<std::size_t, Pipelines> pipelines_;  // by page count

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "shaders/shared/composite.h"
+#include "vdi/core/GenerateSettings.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/ComputePipeline.h"
 
@@ -12,13 +13,16 @@ namespace vdi::gpu {
 
 class CompositePass {
  public:
-  explicit CompositePass(std::shared_ptr<Device> device);
-  /// `params` is the address of a CompositeParams; mode compositeModeSearch, then (after a scan)
-  /// compositeModeWrite.
-  void record(Commands& commands, VkDeviceAddress params, std::uint32_t mode, std::uint32_t listCount) const;
+  explicit CompositePass(const std::shared_ptr<Device>& device);
+  /// `params` is the address of a CompositeParams. The first step of the algorithm, then (`write`, after a
+  /// scan) the second one.
+  void record(Commands& commands, VkDeviceAddress params, Algorithm algorithm, bool write,
+              std::uint32_t listCount) const;
 
  private:
-  ComputePipeline pipeline_;
+  ComputePipeline search_;
+  ComputePipeline countGrains_;
+  ComputePipeline writeGrains_;
 };
 
 }  // namespace vdi::gpu

@@ -18,9 +18,11 @@ Compositor::Compositor(std::shared_ptr<gpu::Device> device)
       params_(device_, sizeof(shared::CompositeParams), MemoryKind::Upload) {}
 
 SupersegmentLists Compositor::composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
-                                        double sampleStep) {
+                                        double sampleStep, Algorithm algorithm) {
   settings_.step = static_cast<float>(sampleStep);
   settings_.budget = budget;
+  algorithm_ = algorithm;
+  sampleStep_ = sampleStep;
   const std::size_t listCount = subLists.front().listCount();
   SupersegmentLists result;
   result.offsets.reserve(listCount + 1);
@@ -103,12 +105,13 @@ void Compositor::compositeBand(std::span<const SupersegmentLists> subLists, std:
     settings_.counts = targets.counts;
     settings_.offsets = targets.offsets;
     settings_.segments = targets.segments;
+    settings_.grains = targets.grains;
+    settings_.reductions = targets.reductions;
     settings_.status = targets.status;
     std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
-    compositePass_.record(commands, params_.address(),
-                          write ? shared::compositeModeWrite : shared::compositeModeSearch, listCount);
+    compositePass_.record(commands, params_.address(), algorithm_, write, listCount);
   };
-  builder_.build(listCount, record, result);
+  builder_.build({listCount, algorithm_, sampleStep_}, record, result);
 }
 
 void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::vec4> rgba,

@@ -20,7 +20,7 @@ class Compositor {
 
   /// subLists[r] are rank r's supersegments of the owner's lists. The result has at most `budget` a list.
   SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
-                              double sampleStep);
+                              double sampleStep, Algorithm algorithm);
 
  private:
   void compositeBand(std::span<const SupersegmentLists> subLists, std::size_t first, std::size_t last,
@@ -43,6 +43,8 @@ class Compositor {
   gpu::Buffer mergedOffsets_;
   gpu::Buffer merged_;
   gpu::shared::CompositeParams settings_{};
+  Algorithm algorithm_ = Algorithm::Merge;
+  double sampleStep_ = 1.0;
 };
 
 /// The flat picture of the owner's lists: all ranks' supersegments of each list composited in order of depth.

@@ -201,7 +201,8 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
     s.mine.bytesSent = received.bytesSent;
     s.mine.distributeSeconds = watch.lap();
     s.cancellable(progress, 0.95, [&](const detail::RayCaster::Progress& report) {
-      lists = s.compositor->composite(received.subLists, settings.supersegments, prepared->lattice.step);
+      lists = s.compositor->composite(received.subLists, settings.supersegments, prepared->lattice.step,
+                                      settings.algorithm);
       report(1.0);
     });
     received = {};

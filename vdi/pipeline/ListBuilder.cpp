@@ -9,57 +9,147 @@
 namespace vdi::detail {
 
 using gpu::MemoryKind;
+namespace shared = gpu::shared;
 
 ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
       commands_(device_),
       scan_(device_),
+      reduce_(device_),
       status_(device_, sizeof(std::uint32_t), MemoryKind::Readback) {}
 
-void ListBuilder::build(std::uint32_t listCount, const Record& record, SupersegmentLists& result) {
-  const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
+std::uint64_t ListBuilder::bytesPerList(std::uint32_t budget, Algorithm algorithm) {
+  const std::uint64_t segments = std::uint64_t{budget} * sizeof(Supersegment);
+  if (algorithm == Algorithm::Bisection) return segments;
+  return segments + std::uint64_t{shared::grainsPerBudget} * budget * sizeof(shared::Grain);
+}
+
+void ListBuilder::build(const Request& request, const Record& record, SupersegmentLists& result) {
+  const std::uint64_t words = (std::uint64_t{request.listCount} + 1) * sizeof(std::uint32_t);
   sensitivities_.reserve(device_, words, MemoryKind::DeviceLocal);
   counts_.reserve(device_, words, MemoryKind::DeviceLocal);
   offsets_.reserve(device_, words, MemoryKind::DeviceLocal);
   readback_.reserve(device_, words, MemoryKind::Readback);
   status_.mappedAs<std::uint32_t>()[0] = 0;
-  BandTargets targets{sensitivities_.address(), counts_.address(), offsets_.address(), 0, status_.address()};
-
-  commands_.begin();
-  record(commands_, targets, false);
-  commands_.barrier();
-  scan_.record(commands_, counts_, offsets_, listCount);
-  commands_.copy(offsets_, 0, readback_, 0, words);
-  commands_.submitAndWait();
-  scan_.demandNoOverflow();
-
-  const auto offsets = readback_.mappedAs<std::uint32_t>();
-  const std::uint64_t total = offsets[listCount];
-  const std::uint64_t before = result.segments.size();
-  if (before + total > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI", device_->name());
+  deviceMilliseconds_ = 0.0;
+  if (request.algorithm == Algorithm::Bisection) {
+    buildByBisection(request, record, result);
+  } else {
+    buildByMerging(request, record, result);
   }
-  for (std::uint32_t i = 1; i <= listCount; ++i) {
-    result.offsets.push_back(static_cast<std::uint32_t>(before + offsets[i]));
-  }
-  if (total == 0) return;
-
-  const std::uint64_t bytes = total * sizeof(Supersegment);
-  segments_.reserve(device_, bytes, MemoryKind::DeviceLocal);
-  targets.segments = segments_.address();
-  readback_.reserve(device_, bytes, MemoryKind::Readback);
-  commands_.begin();
-  record(commands_, targets, true);
-  commands_.barrier();
-  commands_.copy(segments_, 0, readback_, 0, bytes);
-  commands_.submitAndWait();
   if (const std::uint32_t wrong = status_.mappedAs<std::uint32_t>()[0]; wrong != 0) {
     throw Error(ErrorCode::DeviceFailure,
                 fmt::format("{} lists were written with another count than was stored", wrong),
                 device_->name());
   }
+}
+
+void ListBuilder::submit() {
+  commands_.submitAndWait();
+  for (const gpu::StageTime& stage : commands_.stageTimes()) {
+    if (stage.name != "download") deviceMilliseconds_ += stage.milliseconds;
+  }
+}
+
+/// Ends the recording with the prefix sum of counts_, submits, and returns the sum of all; the offsets are in
+/// readback_.
+std::uint64_t ListBuilder::scanAndTotal(std::uint32_t listCount, gpu::Buffer& offsets) {
+  const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
+  commands_.barrier();
+  scan_.record(commands_, counts_, offsets, listCount);
+  commands_.mark("download");
+  commands_.copy(offsets, 0, readback_, 0, words);
+  submit();
+  scan_.demandNoOverflow();
+  return readback_.mappedAs<std::uint32_t>()[listCount];
+}
+
+void ListBuilder::appendOffsets(std::uint32_t listCount, SupersegmentLists& result) const {
+  const auto offsets = readback_.mappedAs<std::uint32_t>();
+  const std::uint64_t before = result.segments.size();
+  if (before + offsets[listCount] > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI", device_->name());
+  }
+  for (std::uint32_t i = 1; i <= listCount; ++i) {
+    result.offsets.push_back(static_cast<std::uint32_t>(before + offsets[i]));
+  }
+}
+
+/// Ends the recording with the copy of the supersegments, submits and appends them.
+void ListBuilder::download(std::uint64_t total, SupersegmentLists& result) {
+  const std::uint64_t bytes = total * sizeof(Supersegment);
+  readback_.reserve(device_, bytes, MemoryKind::Readback);
+  commands_.barrier();
+  commands_.mark("download");
+  commands_.copy(segments_, 0, readback_, 0, bytes);
+  submit();
   const auto written = readback_.mappedAs<Supersegment>().first(total);
   result.segments.insert(result.segments.end(), written.begin(), written.end());
+}
+
+void ListBuilder::buildByBisection(const Request& request, const Record& record, SupersegmentLists& result) {
+  BandTargets targets;
+  targets.sensitivities = sensitivities_.address();
+  targets.counts = counts_.address();
+  targets.offsets = offsets_.address();
+  targets.status = status_.address();
+  commands_.begin();
+  commands_.mark("search");
+  record(commands_, targets, false);
+  const std::uint64_t total = scanAndTotal(request.listCount, offsets_);
+  appendOffsets(request.listCount, result);
+  if (total == 0) return;
+
+  segments_.reserve(device_, total * sizeof(Supersegment), MemoryKind::DeviceLocal);
+  targets.segments = segments_.address();
+  commands_.begin();
+  commands_.mark("write");
+  record(commands_, targets, true);
+  download(total, result);
+}
+
+void ListBuilder::buildByMerging(const Request& request, const Record& record, SupersegmentLists& result) {
+  const std::uint64_t lists = request.listCount;
+  grainOffsets_.reserve(device_, (lists + 1) * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+  reductions_.reserve(device_, lists * 2 * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+  BandTargets targets;
+  targets.sensitivities = sensitivities_.address();
+  targets.counts = counts_.address();
+  targets.offsets = grainOffsets_.address();
+  targets.reductions = reductions_.address();
+  targets.status = status_.address();
+  commands_.begin();
+  commands_.mark("count");
+  record(commands_, targets, false);
+  const std::uint64_t grainTotal = scanAndTotal(request.listCount, grainOffsets_);
+
+  grains_.reserve(device_, grainTotal * sizeof(shared::Grain), MemoryKind::DeviceLocal);
+  targets.grains = grains_.address();
+  shared::ReduceConstants reduce{};
+  reduce.grains = grains_.address();
+  reduce.grainOffsets = grainOffsets_.address();
+  reduce.reductions = reductions_.address();
+  reduce.counts = counts_.address();
+  reduce.offsets = offsets_.address();
+  reduce.step = static_cast<float>(request.sampleStep);
+  reduce.listCount = request.listCount;
+  reduce.mode = shared::reduceModeCount;
+  commands_.begin();
+  commands_.mark("write");
+  record(commands_, targets, true);
+  commands_.barrier();
+  reduce_.record(commands_, reduce);
+  const std::uint64_t total = scanAndTotal(request.listCount, offsets_);
+  appendOffsets(request.listCount, result);
+  if (total == 0) return;
+
+  segments_.reserve(device_, total * sizeof(Supersegment), MemoryKind::DeviceLocal);
+  reduce.segments = segments_.address();
+  reduce.mode = shared::reduceModeWrite;
+  commands_.begin();
+  commands_.mark("reduce");
+  reduce_.record(commands_, reduce);
+  download(total, result);
 }
 
 }  // namespace vdi::detail

@@ -1,25 +1,32 @@
-// From intervals to compact lists on the device, band by band: search, prefix sum, write, download (paper,
-// section 4). What casts rays and what composites share it; not part of the library's interface.
+// From intervals to compact lists on the device, band by band, and download (paper, section 4). What casts
+// rays and what composites share it; not part of the library's interface. vdi/reference/Segmenter.h describes
+// the algorithms.
+//   bisection: search of sensitivities, prefix sum of the counts, write.
+//   merge: count of grains, prefix sum, write of grains; count of what's to be left, prefix sum, reduce.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <memory>
 
+#include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/ReducePass.h"
 #include "vdi/gpu/ScanPass.h"
 
 namespace vdi::detail {
 
-/// Device addresses of one band of lists, counted from the band's first list.
+/// Device addresses of one band of lists, counted from the band's first list. See shaders/shared/cast.h.
 struct BandTargets {
   std::uint64_t sensitivities = 0;
   std::uint64_t counts = 0;
   std::uint64_t offsets = 0;
   std::uint64_t segments = 0;
+  std::uint64_t grains = 0;
+  std::uint64_t reductions = 0;
   std::uint64_t status = 0;
 };
 
@@ -27,24 +34,47 @@ class ListBuilder {
  public:
   explicit ListBuilder(std::shared_ptr<gpu::Device> device);
 
-  /// Records the dispatch that fills sensitivities and counts, or (write) segments.
+  /// Device bytes that a list of `budget` supersegments may take.
+  static std::uint64_t bytesPerList(std::uint32_t budget, Algorithm algorithm);
+
+  /// Records the dispatch of the algorithm's first step, or (write) its second one.
   using Record = std::function<void(gpu::Commands&, const BandTargets&, bool write)>;
 
-  /// Runs both steps for `listCount` lists and appends what was written to `result`. Throws
-  /// Error{OutOfMemory} when the supersegments don't fit, Error{DeviceFailure} if a list's written count
-  /// isn't its stored count.
-  void build(std::uint32_t listCount, const Record& record, SupersegmentLists& result);
+  struct Request {
+    std::uint32_t listCount = 0;
+    Algorithm algorithm = Algorithm::Merge;
+    double sampleStep = 1.0;
+  };
+
+  /// Runs all steps and appends what was written to `result`. Throws Error{OutOfMemory} when the
+  /// supersegments don't fit, Error{DeviceFailure} if a list's written count isn't its stored count.
+  void build(const Request& request, const Record& record, SupersegmentLists& result);
+
+  /// Device milliseconds of the last build: all steps without downloads.
+  double deviceMilliseconds() const { return deviceMilliseconds_; }
 
  private:
+  void buildByBisection(const Request& request, const Record& record, SupersegmentLists& result);
+  void buildByMerging(const Request& request, const Record& record, SupersegmentLists& result);
+  std::uint64_t scanAndTotal(std::uint32_t listCount, gpu::Buffer& offsets);
+  void appendOffsets(std::uint32_t listCount, SupersegmentLists& result) const;
+  void download(std::uint64_t total, SupersegmentLists& result);
+  void submit();
+
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
   gpu::ScanPass scan_;
+  gpu::ReducePass reduce_;
   gpu::Buffer sensitivities_;
   gpu::Buffer counts_;
   gpu::Buffer offsets_;
+  gpu::Buffer grainOffsets_;
+  gpu::Buffer grains_;
+  gpu::Buffer reductions_;
   gpu::Buffer segments_;
   gpu::Buffer status_;
   gpu::Buffer readback_;
+  double deviceMilliseconds_ = 0.0;
 };
 
 }  // namespace vdi::detail

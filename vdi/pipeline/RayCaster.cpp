@@ -69,8 +69,11 @@ SupersegmentLists RayCaster::lists(const Request& request, const Progress& progr
   }
   result.offsets.reserve(static_cast<std::size_t>(width) * height + 1);
   shared::CastParams params = prepare(request);
+  // What has no budget needs no merging: one try with the coarsest sensitivity does.
+  const Algorithm algorithm = request.runsOnly ? Algorithm::Bisection : request.settings.algorithm;
   const std::uint32_t band =
-      rowsPerBand(request, std::uint64_t{request.settings.supersegments} * sizeof(Supersegment));
+      rowsPerBand(request, ListBuilder::bytesPerList(request.settings.supersegments, algorithm));
+  deviceMilliseconds_ = 0.0;
   for (std::uint32_t row = 0; row < height; row += band) {
     const std::uint32_t end = std::min(height, row + band);
     const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
@@ -80,12 +83,16 @@ SupersegmentLists RayCaster::lists(const Request& request, const Progress& progr
       params.counts = targets.counts - skipped;
       params.offsets = targets.offsets - skipped;
       params.segments = targets.segments;
+      params.grains = targets.grains;
+      params.reductions = targets.reductions - 2 * skipped;
       params.status = targets.status;
       std::memcpy(params_.mapped().data(), &params, sizeof(params));
-      pass_.record(commands, params_.address(), write ? shared::castModeWrite : shared::castModeSearch, width,
-                   row, end);
+      pass_.record(commands, params_.address(),
+                   write ? gpu::CastPass::Work::Write : gpu::CastPass::Work::Search, algorithm, width, row,
+                   end);
     };
-    builder_.build((end - row) * width, record, result);
+    builder_.build({(end - row) * width, algorithm, request.lattice.step}, record, result);
+    deviceMilliseconds_ += builder_.deviceMilliseconds();
     if (!progress(static_cast<double>(end) / height)) break;
   }
   return result;
@@ -100,6 +107,7 @@ Image RayCaster::image(const Request& request, const Progress& progress) {
   if (volume_.empty() || request.lattice.count == 0) return image;
   shared::CastParams params = prepare(request);
   const std::uint32_t band = rowsPerBand(request, sizeof(glm::vec4) + sizeof(float));
+  deviceMilliseconds_ = 0.0;
   colors_.reserve(device_, std::uint64_t{band} * width * sizeof(glm::vec4), MemoryKind::Readback);
   depths_.reserve(device_, std::uint64_t{band} * width * sizeof(float), MemoryKind::Readback);
   for (std::uint32_t row = 0; row < height; row += band) {
@@ -109,8 +117,11 @@ Image RayCaster::image(const Request& request, const Progress& progress) {
     params.depths = depths_.address() - first * sizeof(float);
     std::memcpy(params_.mapped().data(), &params, sizeof(params));
     commands_.begin();
-    pass_.record(commands_, params_.address(), shared::castModeVolume, width, row, end);
+    commands_.mark("cast");
+    pass_.record(commands_, params_.address(), gpu::CastPass::Work::Volume, Algorithm::Merge, width, row,
+                 end);
     commands_.submitAndWait();
+    deviceMilliseconds_ += commands_.stageTimes().front().milliseconds;
     const std::size_t count = std::size_t{end - row} * width;
     std::memcpy(image.rgba.data() + first, colors_.mapped().data(), count * sizeof(glm::vec4));
     std::memcpy(image.depth.data() + first, depths_.mapped().data(), count * sizeof(float));

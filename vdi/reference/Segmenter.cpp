@@ -63,6 +63,8 @@ class OpenSegment {
   float opticalDepth_;
 };
 
+}  // namespace
+
 std::size_t countRuns(std::span<const Interval> intervals) {
   std::size_t runs = 0;
   float reach = -1.0F;
@@ -77,8 +79,6 @@ std::size_t countRuns(std::span<const Interval> intervals) {
   }
   return runs;
 }
-
-}  // namespace
 
 float opacityOf(float opticalDepth) {
   constexpr float ln2 = 0.69314718F;
@@ -153,9 +153,11 @@ std::vector<Supersegment> segment(std::span<const Interval> intervals, const Seg
                                   Algorithm algorithm) {
   switch (algorithm) {
     case Algorithm::Bisection:
+      return segmentByBisection(intervals, rules);
+    case Algorithm::Merge:
       break;
   }
-  return segmentByBisection(intervals, rules);
+  return segmentByMerging(intervals, rules);
 }
 
 }  // namespace vdi::reference

@@ -46,6 +46,9 @@ struct SegmentRules {
 std::vector<Supersegment> segmentWithSensitivity(std::span<const Interval> intervals, float sensitivity,
                                                  const SegmentRules& rules);
 
+/// The pieces of visible material that gaps force apart.
+std::size_t countRuns(std::span<const Interval> intervals);
+
 /// The sensitivity search, per list:
 ///   * the list may hold max(budget, runs) supersegments, runs being the pieces that gaps force (1 without
 ///   cutAtGaps);
@@ -62,6 +65,28 @@ inline constexpr int mostTries = 22;
 inline constexpr float goodFill = 0.85F;
 inline constexpr float closeBounds = 1.001F;
 std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals, const SegmentRules& rules);
+
+/// The default: no search for a sensitivity, and nothing that depends on one threshold for the whole list.
+///   1. If no more intervals than the list may hold (see above) aren't transparent, each becomes a
+///   supersegment.
+///   2. Grains: neighbouring intervals go together as long as their deviation from the grain's first one,
+///   summed over their length and weighted by how much of it V_O sees, stays within a tolerance: sum of w *
+///   |x - x_first| * length / sampleStep, x being colour and opacity over one sample, w = hiddenWeight + (1 -
+///   hiddenWeight) * transmittance in front. The tolerance is the smallest of finestTolerance *
+///   toleranceRatio^j, j = 0 .. toleranceLevels - 1, that gives at most grainsPerBudget * budget grains (or
+///   the number of runs, if that's larger); if none does, it's infinite. As in segmentWithSensitivity, a
+///   transparent interval opens none, and a transparent tail is trimmed.
+///   3. While there are more grains than the list may hold, the two neighbours whose merging changes least
+///   are merged: the sum over both (and the empty space between them) of w * |x - x_merged| * length.
+/// The tolerances are counted side by side in one walk along the ray, so that a device needs two walks in
+/// all. A list that isn't full after step 2 deviates by less than finestTolerance of a sample per
+/// supersegment.
+inline constexpr int toleranceLevels = 8;
+inline constexpr float finestTolerance = 0.002F;
+inline constexpr float toleranceRatio = 4.0F;
+inline constexpr std::uint32_t grainsPerBudget = 3;
+inline constexpr float hiddenWeight = 0.3F;
+std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules);
 
 /// The algorithm of that name.
 std::vector<Supersegment> segment(std::span<const Interval> intervals, const SegmentRules& rules,

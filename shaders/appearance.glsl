@@ -1,0 +1,15 @@
+// Material over one sample; twin of Appearance in vdi/reference/SegmentByMerging.cpp.
+//
+// Needs: optical.glsl.
+
+const float hiddenWeight = 0.3;
+const float unlimited = 3.4e38;
+
+// Premultiplied colour and opacity of `opticalDepth` over `length`, brought to one sample.
+vec4 appearanceOf(vec3 color, float opticalDepth, float length, float sampleStep) {
+  float whole = opacityOf(opticalDepth);
+  float part = opacityOf(opticalDepth * sampleStep / length);
+  return vec4(whole > 0.0 ? color * (part / whole) : vec3(0.0), part);
+}
+
+float weightBehind(float opticalDepth) { return hiddenWeight + (1.0 - hiddenWeight) * exp2(-opticalDepth); }

@@ -1,0 +1,166 @@
+// The shaders' twin is shaders/grains.glsl (step 2) and shaders/reduce.comp (step 3).
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "vdi/core/TransferFunction.h"
+#include "vdi/reference/Segmenter.h"
+
+namespace vdi::reference {
+
+namespace {
+
+constexpr float unlimited = std::numeric_limits<float>::infinity();
+
+/// Colour and opacity of material over one sample.
+struct Appearance {
+  float red;
+  float green;
+  float blue;
+  float opacity;
+};
+
+Appearance overOneSample(float red, float green, float blue, float opticalDepth, float length,
+                         float sampleStep) {
+  const float whole = opacityOf(opticalDepth);
+  const float part = opacityOf(opticalDepth * sampleStep / length);
+  const float scale = whole > 0.0F ? part / whole : 0.0F;
+  return {red * scale, green * scale, blue * scale, part};
+}
+
+float distance(const Appearance& a, const Appearance& b) {
+  const float red = a.red - b.red;
+  const float green = a.green - b.green;
+  const float blue = a.blue - b.blue;
+  const float opacity = a.opacity - b.opacity;
+  return std::sqrt(red * red + green * green + blue * blue + opacity * opacity);
+}
+
+float weightBehind(float opticalDepth) {
+  return hiddenWeight + (1.0F - hiddenWeight) * std::exp2(-opticalDepth);
+}
+
+struct Grain {
+  float front;
+  float back;
+  float red;  // premultiplied
+  float green;
+  float blue;
+  float opticalDepth;
+  float before;  // optical depth in front of it
+  bool cut;      // must not be merged with the grain before it
+
+  Appearance appearance(float sampleStep) const {
+    return overOneSample(red, green, blue, opticalDepth, back - front, sampleStep);
+  }
+  void absorb(float theBack, float theRed, float theGreen, float theBlue, float theOpticalDepth) {
+    const float transmittance = 1.0F - opacityOf(opticalDepth);
+    red += transmittance * theRed;
+    green += transmittance * theGreen;
+    blue += transmittance * theBlue;
+    opticalDepth = std::min(opticalDepth + theOpticalDepth, maxExtinction);
+    back = theBack;
+  }
+};
+
+/// A negative tolerance makes each interval a grain.
+std::vector<Grain> grainsOf(std::span<const Interval> intervals, float tolerance, const SegmentRules& rules) {
+  std::vector<Grain> grains;
+  bool open = false;
+  bool cut = true;
+  Appearance first{};
+  float deviation = 0.0F;
+  float before = 0.0F;
+  float reach = 0.0F;
+  const auto deviate = [&](const Appearance& x, float length) {
+    deviation += weightBehind(before) * (length / rules.sampleStep) * distance(x, first);
+    if (deviation > tolerance) open = false;
+  };
+  for (const Interval& i : intervals) {
+    if (i.front > reach) {
+      if (rules.cutAtGaps) {
+        open = false;
+        cut = true;
+      } else if (open) {
+        deviate({}, i.front - reach);
+      }
+    }
+    const Appearance x =
+        overOneSample(i.red, i.green, i.blue, i.opticalDepth, i.back - i.front, rules.sampleStep);
+    if (open) deviate(x, i.back - i.front);
+    if (tolerance < 0.0F) open = false;
+    if (i.opticalDepth > 0.0F) {
+      if (open) {
+        grains.back().absorb(i.back, i.red, i.green, i.blue, i.opticalDepth);
+      } else {
+        grains.push_back(
+            {i.front, i.back, i.red, i.green, i.blue, i.opticalDepth, before, rules.cutAtGaps && cut});
+        first = x;
+        deviation = 0.0F;
+        open = true;
+        cut = false;
+      }
+    }
+    before += i.opticalDepth;
+    reach = i.back;
+  }
+  return grains;
+}
+
+Grain merged(const Grain& a, const Grain& b) {
+  Grain result = a;
+  result.absorb(b.back, b.red, b.green, b.blue, b.opticalDepth);
+  return result;
+}
+
+/// What merging two neighbours changes.
+float costOf(const Grain& a, const Grain& b, float sampleStep) {
+  if (b.cut) return unlimited;
+  const Appearance both = merged(a, b).appearance(sampleStep);
+  return weightBehind(a.before) * ((a.back - a.front) * distance(a.appearance(sampleStep), both) +
+                                   (b.back - b.front) * distance(b.appearance(sampleStep), both) +
+                                   std::max(b.front - a.back, 0.0F) * distance({}, both));
+}
+
+void mergeCheapest(std::vector<Grain>& grains, std::size_t most, float sampleStep) {
+  std::vector<float> costs;  // of merging i and i + 1
+  for (std::size_t i = 0; i + 1 < grains.size(); ++i)
+    costs.push_back(costOf(grains[i], grains[i + 1], sampleStep));
+  while (grains.size() > most) {
+    const auto i = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+    grains[i] = merged(grains[i], grains[i + 1]);
+    grains.erase(grains.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+    costs.erase(costs.begin() + static_cast<std::ptrdiff_t>(i));
+    if (i < costs.size()) costs[i] = costOf(grains[i], grains[i + 1], sampleStep);
+    if (i > 0) costs[i - 1] = costOf(grains[i - 1], grains[i], sampleStep);
+  }
+}
+
+}  // namespace
+
+std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules) {
+  const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
+  const std::size_t most = std::max<std::size_t>(rules.budget, runs);
+  const auto visible = std::count_if(intervals.begin(), intervals.end(),
+                                     [](const Interval& interval) { return interval.opticalDepth > 0.0F; });
+  std::vector<Grain> grains;
+  if (static_cast<std::size_t>(visible) <= most) {
+    grains = grainsOf(intervals, -1.0F, rules);
+  } else {
+    const std::size_t room = std::max<std::size_t>(std::size_t{grainsPerBudget} * rules.budget, runs);
+    float tolerance = finestTolerance;
+    grains = grainsOf(intervals, tolerance, rules);
+    for (int level = 1; grains.size() > room; ++level) {
+      tolerance = level < toleranceLevels ? tolerance * toleranceRatio : unlimited;
+      grains = grainsOf(intervals, tolerance, rules);
+    }
+    mergeCheapest(grains, most, rules.sampleStep);
+  }
+  std::vector<Supersegment> list;
+  list.reserve(grains.size());
+  for (const Grain& g : grains)
+    list.push_back({g.front, g.back, g.red, g.green, g.blue, opacityOf(g.opticalDepth)});
+  return list;
+}
+
+}  // namespace vdi::reference
