@@ -1,4 +1,6 @@
 // vdi bench: how long each stage takes and how true the result is.
+#include "apps/Bench.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -32,23 +34,87 @@ struct Options {
   ViewOptions view;
   QualityOptions quality;
   std::vector<double> angles{0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0};
+  std::vector<std::string> algorithms{"merge"};
+  std::vector<std::uint32_t> supersegments{25};
+  int views = 1;
   int repeats = 5;
+  std::string suite;
   std::string output;
+  std::vector<std::string> comparison;
 };
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+struct DataSet {
+  std::string name;
+  std::string field;  // or, if empty:
+  std::string raw;    // sidecar
+  std::string size;
+  std::string type;
+};
+
+/// The paper's configurations (its section 6), with fields of the same size, type and character instead of
+/// its data. Names: what they stand in for.
+std::vector<DataSet> suiteSets(const std::string& suite) {
+  if (suite == "paper") {
+    return {{"kingsnake-like", "coil", "", "1024x1024x795", "u8"},
+            {"rayleigh-taylor-like", "mixing", "", "1024x1024x1024", "u16"},
+            {"richtmyer-meshkov-like", "interface", "", "2048x2048x1920", "u8"}};
+  }
+  return {{"kingsnake-like", "coil", "", "64x64x50", "u8"},
+          {"rayleigh-taylor-like", "mixing", "", "64x64x64", "u16"},
+          {"richtmyer-meshkov-like", "interface", "", "96x96x90", "u8"}};
 }
 
-/// Median of the milliseconds that `measure` returns, after one run that doesn't count.
+/// What a suite fixes; sizes can still be given.
+void applySuite(Options& options) {
+  if (options.suite.empty()) return;
+  const bool paper = options.suite == "paper";
+  options.algorithms = {"merge", "bisection"};
+  options.views = paper ? 4 : 1;
+  options.quality.resolution = paper ? "1920x1080" : "240x136";
+  options.supersegments = paper ? std::vector<std::uint32_t>{20, 25, 30} : std::vector<std::uint32_t>{10};
+  if (!paper) options.repeats = 3;
+}
+
+std::vector<DataSet> dataSets(const Options& options) {
+  if (!options.suite.empty()) {
+    std::vector<DataSet> sets = suiteSets(options.suite);
+    if (!options.fields.empty()) {
+      std::erase_if(sets, [&](const DataSet& set) {
+        return std::find(options.fields.begin(), options.fields.end(), set.field) == options.fields.end();
+      });
+    }
+    return sets;
+  }
+  std::vector<DataSet> sets;
+  for (const std::string& sidecar : options.raws)
+    sets.push_back({std::filesystem::path(sidecar).stem().string(), "", sidecar, "", ""});
+  std::vector<std::string> fields = options.fields;
+  if (fields.empty() && options.raws.empty()) fields = {"turbulence", "mixing", "coil"};
+  for (const std::string& field : fields)
+    sets.push_back({field, field, "", options.deal.size, options.deal.type});
+  return sets;
+}
+
+struct Spread {
+  double median = 0.0;
+  double least = 0.0;
+  double most = 0.0;
+};
+
+Spread spreadOf(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  const double middle = values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+  return {middle, values.front(), values.back()};
+}
+
+/// Of the milliseconds that `measure` returns, after one run that doesn't count.
 template <typename Measure>
-double medianOf(int repeats, Measure measure) {
+Spread repeated(int repeats, Measure measure) {
   measure();
   std::vector<double> times(static_cast<std::size_t>(repeats));
   for (double& time : times) time = measure();
-  return median(times);
+  return spreadOf(times);
 }
 
 /// Milliseconds of the slowest rank; 0 where there are no reports, that is, not on the root.
@@ -59,12 +125,25 @@ double slowest(const std::vector<RankReport>& reports, Seconds seconds) {
   return worst;
 }
 
+double frameSeconds(const RankReport& r) {
+  return r.generateSeconds + r.distributeSeconds + r.compositeSeconds + r.gatherSeconds;
+}
+
 /// One VDI of a data set and what making it took. Only the root has it.
 struct Made {
   std::optional<Vdi> vdi;
-  double generateMs = 0.0;
+  Spread generate;
+  Spread frame;
   double compositeMs = 0.0;
   std::size_t storedBytes = 0;
+};
+
+struct Truth {
+  Camera camera;
+  double angle = 0.0;
+  std::optional<Image> image;
+  Spread cast;
+  Spread frame;
 };
 
 /// Collective, as the generator is: every rank runs the same stages, the root collects the figures.
@@ -80,121 +159,127 @@ class Bench {
   /// Table lines go to `table`. Empty on all ranks but the root.
   json rows(std::FILE* table) {
     table_ = table;
-    json rows = json::array();
-    for (const std::string& sidecar : options_.raws) {
-      measure(std::filesystem::path(sidecar).stem().string(), rows,
-              [&] { return rawBlocks(sidecar, options_.deal, world_.rank(), world_.size()); });
+    if (root()) {
+      fmt::print(table_, "{:<22} {:<9} {:>3} {:>4} {:>5} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>8}\n",
+                 "data set", "algorithm", "N_S", "view", "angle", "DVR", "generate", "composite", "render",
+                 "SSIM", "PSNR", "stored");
     }
-    std::vector<std::string> fields = options_.fields;
-    if (fields.empty() && options_.raws.empty()) fields = {"turbulence", "mixing", "coil"};
-    for (const std::string& field : fields) {
-      measure(field, rows, [&] { return fieldBlocks(field, options_.deal, world_.rank(), world_.size()); });
-    }
-    return rows;
+    for (const DataSet& set : dataSets(options_)) measure(set);
+    return rows_;
   }
 
  private:
   bool root() const { return world_.rank() == 0; }
 
-  template <typename MakeBlocks>
-  void measure(const std::string& name, json& rows, MakeBlocks makeBlocks) {
+  void measure(const DataSet& set) {
     std::vector<Block> blocks;
-    world_.together([&] { blocks = makeBlocks(); });
+    world_.together([&] {
+      DealOptions deal = options_.deal;
+      if (!set.size.empty()) deal.size = set.size;
+      if (!set.type.empty()) deal.type = set.type;
+      blocks = set.field.empty() ? rawBlocks(set.raw, deal, world_.rank(), world_.size())
+                                 : fieldBlocks(set.field, deal, world_.rank(), world_.size());
+    });
     generator_.setBlocks(std::move(blocks));
+    for (int view = 0; view < options_.views; ++view) measureView(set, 360.0 * view / options_.views);
+  }
+
+  void measureView(const DataSet& set, double turned) {
     Camera camera;
     TransferFunction function;
     world_.together([&] {
-      camera = makeCamera(options_.view, generator_.scene());
+      camera = makeCamera(options_.view, generator_.scene()).azimuth(turned);
       function = makeTransferFunction(options_.quality, generator_.scene(), generator_.scalarRange());
     });
-    const Made made = make(camera, function);
-    std::optional<VdiRenderer> renderer;
-    world_.together([&] {
-      if (!root()) return;
-      renderer.emplace(device_);
-      renderer->setVdi(*made.vdi);
-    });
-    for (const double angle : options_.angles) {
-      const Camera other = angle == 0.0 ? camera : camera.azimuth(angle);
-      std::optional<Image> truth;
-      const double volumeMs = medianOf(options_.repeats, [&] {
-        truth = generator_.renderVolume(other, function, settings_);
-        return slowest(generator_.reports(), [](const RankReport& r) {
-          return r.generateSeconds + r.distributeSeconds + r.compositeSeconds + r.gatherSeconds;
+    std::vector<Truth> truths;
+    for (const double angle : options_.angles)
+      truths.push_back(volumeRendering(camera.azimuth(angle), angle, function));
+    for (const std::string& algorithm : options_.algorithms) {
+      for (const std::uint32_t supersegments : options_.supersegments) {
+        settings_.algorithm = algorithmFromString(algorithm);
+        settings_.supersegments = supersegments;
+        const Made made = make(camera, function);
+        world_.together([&] {
+          if (!root()) return;
+          VdiRenderer renderer(device_);
+          renderer.setVdi(*made.vdi);
+          for (const Truth& truth : truths) addRow(set.name, turned, made, renderer, truth);
         });
-      });
-      world_.together([&] {
-        if (root()) rows.push_back(row(name, angle, made, volumeMs, *renderer, other, *truth));
-      });
+      }
     }
+  }
+
+  Truth volumeRendering(const Camera& camera, double angle, const TransferFunction& function) {
+    Truth truth{camera, angle, {}, {}, {}};
+    std::vector<double> frames;
+    truth.cast = repeated(options_.repeats, [&] {
+      truth.image = generator_.renderVolume(camera, function, settings_);
+      frames.push_back(slowest(generator_.reports(), frameSeconds));
+      return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
+    });
+    frames.erase(frames.begin());  // the warm-up's
+    truth.frame = spreadOf(frames);
+    return truth;
   }
 
   Made make(const Camera& camera, const TransferFunction& function) {
     Made made;
-    std::vector<double> compositeTimes;
-    made.generateMs = medianOf(options_.repeats, [&] {
+    std::vector<double> composites;
+    std::vector<double> frames;
+    made.generate = repeated(options_.repeats, [&] {
       made.vdi = generator_.generate(camera, function, settings_);
-      compositeTimes.push_back(
+      composites.push_back(
           slowest(generator_.reports(), [](const RankReport& r) { return r.compositeSeconds; }));
-      return slowest(generator_.reports(), [](const RankReport& r) { return r.generateSeconds; });
+      frames.push_back(slowest(generator_.reports(), frameSeconds));
+      return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
     });
-    compositeTimes.erase(compositeTimes.begin());  // the warm-up's
-    made.compositeMs = world_.size() > 1 ? median(compositeTimes) : ownerTime(camera, function);
+    composites.erase(composites.begin());
+    frames.erase(frames.begin());
+    made.frame = spreadOf(frames);
+    made.compositeMs = spreadOf(composites).median;
     world_.together([&] {
       if (root()) made.storedBytes = io::encode(*made.vdi).size();
     });
     return made;
   }
 
-  /// On one rank nothing is composited. What an owner of the whole picture would do for four ranks: merge
-  /// four times as many supersegments, dealt to the ranks in turn, into the budget.
-  double ownerTime(const Camera& camera, const TransferFunction& function) {
-    constexpr std::uint32_t ranks = 4;
-    GenerateSettings finer = settings_;
-    finer.supersegments = std::min(settings_.supersegments * ranks, 1024U);
-    const std::optional<Vdi> vdi = generator_.generate(camera, function, finer);
-    std::vector<SupersegmentLists> parts(ranks);
-    for (std::size_t list = 0; list < vdi->lists.listCount(); ++list) {
-      const auto segments = vdi->lists.list(list);
-      for (std::size_t i = 0; i < segments.size(); ++i) parts[i % ranks].segments.push_back(segments[i]);
-      for (SupersegmentLists& part : parts)
-        part.offsets.push_back(static_cast<std::uint32_t>(part.segments.size()));
-    }
-    detail::Compositor compositor(device_);
-    return medianOf(options_.repeats, [&] {
-      const auto start = std::chrono::steady_clock::now();
-      compositor.composite(parts, settings_.supersegments, vdi->sampleStep, settings_.algorithm);
-      return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    });
-  }
-
-  json row(const std::string& name, double angle, const Made& made, double volumeMs, VdiRenderer& renderer,
-           const Camera& camera, const Image& truth) {
+  void addRow(const std::string& name, double turned, const Made& made, VdiRenderer& renderer,
+              const Truth& truth) {
     Image seen;
-    const double renderMs = medianOf(options_.repeats, [&] {
-      seen = renderer.render(camera, settings_.width, settings_.height);
+    const Spread render = repeated(options_.repeats, [&] {
+      seen = renderer.render(truth.camera, settings_.width, settings_.height);
       return renderer.renderMilliseconds();
     });
     const ImageDifference d =
-        compare(io::toPicture(seen).rgb, io::toPicture(truth).rgb, seen.width, seen.height, 3);
-    fmt::print(table_,
-               "{:<14} {:>5g} deg  DVR {:9.2f} ms  generate {:9.2f} ms  composite {:8.2f} ms  "
-               "render {:8.2f} ms  SSIM {:.4f}  PSNR {:6.2f} dB\n",
-               name, angle, volumeMs, made.generateMs, made.compositeMs, renderMs, d.ssim, d.psnrDb);
+        compare(io::toPicture(seen).rgb, io::toPicture(*truth.image).rgb, seen.width, seen.height, 3);
+    const auto spread = [](const Spread& s) { return s.most - s.least; };
+    fmt::print(
+        table_,
+        "{:<22} {:<9} {:>3} {:>4g} {:>5g} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>7.4f} {:>7.2f} {:>8.2f}\n",
+        name, toString(settings_.algorithm), settings_.supersegments, turned, truth.angle, truth.cast.median,
+        made.generate.median, made.compositeMs, render.median, d.ssim, d.psnrDb,
+        static_cast<double>(made.storedBytes) / (1 << 20));
     std::fflush(table_);
-    return {{"dataset", name},
-            {"algorithm", toString(settings_.algorithm)},
-            {"supersegments", settings_.supersegments},
-            {"width", settings_.width},
-            {"height", settings_.height},
-            {"angle_deg", angle},
-            {"dvr_ms", volumeMs},
-            {"generate_ms", made.generateMs},
-            {"composite_ms", made.compositeMs},
-            {"render_ms", renderMs},
-            {"ssim", d.ssim},
-            {"psnr_db", std::isfinite(d.psnrDb) ? json(d.psnrDb) : json(nullptr)},
-            {"stored_bytes", made.storedBytes}};
+    rows_.push_back({{"dataset", name},
+                     {"algorithm", toString(settings_.algorithm)},
+                     {"supersegments", settings_.supersegments},
+                     {"width", settings_.width},
+                     {"height", settings_.height},
+                     {"view_deg", turned},
+                     {"angle_deg", truth.angle},
+                     {"dvr_ms", truth.cast.median},
+                     {"dvr_spread_ms", spread(truth.cast)},
+                     {"dvr_frame_ms", truth.frame.median},
+                     {"generate_ms", made.generate.median},
+                     {"generate_spread_ms", spread(made.generate)},
+                     {"generate_frame_ms", made.frame.median},
+                     {"composite_ms", world_.size() > 1 ? json(made.compositeMs) : json(nullptr)},
+                     {"render_ms", render.median},
+                     {"render_spread_ms", spread(render)},
+                     {"ssim", d.ssim},
+                     {"psnr_db", std::isfinite(d.psnrDb) ? json(d.psnrDb) : json(nullptr)},
+                     {"supersegment_count", made.vdi->lists.segments.size()},
+                     {"stored_bytes", made.storedBytes}});
   }
 
   const Options& options_;
@@ -203,6 +288,7 @@ class Bench {
   std::shared_ptr<gpu::Device> device_;
   VdiGenerator generator_;
   std::FILE* table_ = nullptr;
+  json rows_ = json::array();
 };
 
 std::string today() {
@@ -223,24 +309,45 @@ void write(const json& document, const std::string& path) {
   if (!file) throw Error(ErrorCode::Io, "can't write the file", path);
 }
 
-void run(const Options& options, const comm::Communicator& world) {
+void measureAll(const Options& options, const comm::Communicator& world) {
   std::shared_ptr<gpu::Device> device;
   world.together([&] {
     if (options.repeats < 1) throw Error(ErrorCode::InvalidArgument, "--repeats must be at least 1");
+    for (const std::string& algorithm : options.algorithms) (void)algorithmFromString(algorithm);
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
     (void)makeSettings(options.quality);  // before anything takes time
   });
   // The table must not get between the lines of the JSON.
   std::FILE* table = options.output.empty() ? stderr : stdout;
   if (world.rank() == 0) {
-    fmt::print(table, "device: {}, ranks: {}, commit: {}\n", device->name(), world.size(), buildCommit);
+    fmt::print(table, "device: {}, ranks: {}, commit: {}; milliseconds, dB, MiB\n", device->name(),
+               world.size(), buildCommit);
   }
   const json rows = Bench(options, world, device).rows(table);
   world.together([&] {
     if (world.rank() != 0) return;
-    write({{"device", device->name()}, {"commit", buildCommit}, {"date", today()}, {"rows", rows}},
+    write({{"device", device->name()},
+           {"commit", buildCommit},
+           {"date", today()},
+           {"ranks", world.size()},
+           {"rows", rows}},
           options.output);
   });
+}
+
+void run(Options options, const comm::Communicator& world) {
+  if (!options.comparison.empty()) {
+    int regressions = 0;
+    world.together([&] {
+      if (world.rank() == 0)
+        regressions = compareBenches(options.comparison[0], options.comparison[1], stdout);
+      if (regressions > 0)
+        throw Error(ErrorCode::InvalidArgument, fmt::format("{} regressions", regressions));
+    });
+    return;
+  }
+  applySuite(options);
+  measureAll(options, world);
 }
 
 }  // namespace
@@ -249,11 +356,15 @@ void addBench(CLI::App& app, Job& job) {
   CLI::App* command = app.add_subcommand(
       "bench", "Time every stage on this device and compare a VDI's views with volume rendering");
   command->footer(
-      "Each time is the median over the repeats, of the slowest rank. DVR is a whole frame of volume\n"
-      "rendering, its picture on the host; generate is the sub-VDI of a rank, on the host; composite is the\n"
-      "merging of what the ranks generated: under mpirun as it happens, on one rank for four that hold a\n"
-      "quarter each; render is the device's time for one view of the VDI. SSIM and PSNR compare that view\n"
-      "with DVR; JSON has null for the infinite PSNR of equal pictures.");
+      "Each time is the median over the repeats, of the slowest rank. DVR and generate are device times of "
+      "the\n"
+      "rank's own volume rendering and of its (sub-)VDI, compact, without transfers; JSON has the whole "
+      "frames too\n"
+      "(dvr_frame_ms, generate_frame_ms), with transfers and compositing. composite is what merging took "
+      "under\n"
+      "mpirun; render is the device's time for one view of the VDI. SSIM and PSNR compare that view with "
+      "DVR; JSON\n"
+      "has null for what wasn't measured and for the infinite PSNR of equal pictures.");
   const auto options = std::make_shared<Options>();
   command
       ->add_option("--fields", options->fields,
@@ -267,12 +378,32 @@ void addBench(CLI::App& app, Job& job) {
       ->group("Volume and ranks");
   addDealOptions(*command, options->deal);
   addViewOptions(*command, options->view);
-  addQualityOptions(*command, options->quality);
+  addQualityOptions(*command, options->quality, QualityUse::Several);
+  command->add_option("--algorithms", options->algorithms, "merge, bisection or both")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command->add_option("--supersegments", options->supersegments, "one or several N_S")->capture_default_str();
+  command->add_option("--views", options->views, "viewpoints of VDIs, evenly around the scene")
+      ->check(CLI::Range(1, 360))
+      ->capture_default_str();
   command->add_option("--angles", options->angles, "degrees from the VDI's viewpoint")
       ->type_name("DEG")
       ->capture_default_str();
   command->add_option("--repeats", options->repeats, "runs of which the median counts, after one warm-up")
       ->capture_default_str();
+  command
+      ->add_option(
+          "--suite", options->suite,
+          "data sets, sizes, viewpoints and N_S of docs/benchmarks.md: paper (needs a GPU and 32 GiB), "
+          "small (a minute on a CPU); --fields picks some of it")
+      ->check(CLI::IsMember({"paper", "small"}));
+  command
+      ->add_option(
+          "--compare", options->comparison,
+          "two JSON files, before and after: tells what got slower by more than 10 % and the spread, "
+          "larger by more than 5 %, or less true; exit status 1 if anything did")
+      ->expected(2)
+      ->type_name("FILE FILE");
   command
       ->add_option("-o,--output", options->output,
                    "JSON file; default: standard output, and the table goes to standard error")

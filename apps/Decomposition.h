@@ -1,9 +1,11 @@
 // Cuts a lattice into blocks and deals them to ranks, in ways that simulations do and in ways that hurt.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "vdi/core/Block.h"
@@ -45,7 +47,7 @@ struct Lattice {
 };
 
 /// A block for a part, with its own copy of the values. `valueAt(index)` gives the value at a lattice index;
-/// integers are rounded.
+/// integers are rounded. It may be called from several threads at once.
 template <typename ValueAt>
 Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt);
 
@@ -59,14 +61,24 @@ Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt) {
   const auto count = static_cast<std::size_t>(part.dims.x) * static_cast<std::size_t>(part.dims.y) *
                      static_cast<std::size_t>(part.dims.z);
   const std::shared_ptr<std::byte[]> data(new std::byte[count * sizeOf(lattice.type)]);
-  std::size_t index = 0;
-  for (int z = 0; z < part.dims.z; ++z) {
-    for (int y = 0; y < part.dims.y; ++y) {
-      for (int x = 0; x < part.dims.x; ++x) {
-        storeValue(lattice.type, data.get(), index++, valueAt(part.first + glm::ivec3(x, y, z)));
+  const auto fillLayers = [&](int first, int step) {
+    const auto layer = static_cast<std::size_t>(part.dims.x) * static_cast<std::size_t>(part.dims.y);
+    for (int z = first; z < part.dims.z; z += step) {
+      std::size_t index = layer * static_cast<std::size_t>(z);
+      for (int y = 0; y < part.dims.y; ++y) {
+        for (int x = 0; x < part.dims.x; ++x) {
+          storeValue(lattice.type, data.get(), index++, valueAt(part.first + glm::ivec3(x, y, z)));
+        }
       }
     }
-  }
+  };
+  // Large blocks on all cores; threads aren't worth it for small ones.
+  constexpr std::size_t large = std::size_t{1} << 22;
+  const int threads = count < large ? 1 : static_cast<int>(std::max(std::thread::hardware_concurrency(), 1U));
+  std::vector<std::jthread> others;
+  for (int i = 1; i < threads; ++i) others.emplace_back(fillLayers, i, threads);
+  fillLayers(0, threads);
+  others.clear();
   Block block = emptyBlock(lattice, part, data.get());
   block.keepAlive = std::shared_ptr<const void>(data, data.get());
   return block;

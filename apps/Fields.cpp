@@ -76,6 +76,12 @@ double mixing(const glm::dvec3& p, std::uint32_t seed) {
                     0.0, 1.0);
 }
 
+/// Two fluids torn into each other everywhere: mostly one or the other, with an intricate interface.
+double interface(const glm::dvec3& p, std::uint32_t seed) {
+  const double mixed = octaves(p * 9.0, 6, seed) - 0.5;
+  return std::clamp(0.5 + 0.5 * std::tanh(18.0 * mixed), 0.0, 1.0);
+}
+
 /// A coiled tube of ribs in emptiness: thin, opaque, sparse.
 double coil(const glm::dvec3& p) {
   const glm::dvec3 q = p - 0.5;
@@ -103,6 +109,7 @@ const std::vector<FieldInfo>& fields() {
       {"marschner-lobb", "the test signal of Marschner and Lobb, 1994"},
       {"turbulence", "five octaves of smooth noise; takes a seed"},
       {"mixing", "two fluids with a turbulent layer between; takes a seed"},
+      {"interface", "two fluids torn into each other, with an intricate interface everywhere; takes a seed"},
       {"coil", "a thin, ribbed, opaque coil in emptiness"},
       {"ramp", "x + y + z, linear: what interpolation must reproduce"},
   };
@@ -115,6 +122,7 @@ Field makeField(const std::string& name, std::uint32_t seed) {
   if (name == "marschner-lobb") return marschnerLobb;
   if (name == "turbulence") return [seed](const glm::dvec3& p) { return octaves(p * 6.0, 5, seed); };
   if (name == "mixing") return [seed](const glm::dvec3& p) { return mixing(p, seed); };
+  if (name == "interface") return [seed](const glm::dvec3& p) { return interface(p, seed); };
   if (name == "coil") return coil;
   if (name == "ramp") return [](const glm::dvec3& p) { return (p.x + p.y + p.z) / 3.0; };
   std::string names;

@@ -227,7 +227,7 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene) {
   return chosenCamera(options.camera, camera);
 }
 
-void addQualityOptions(CLI::App& command, QualityOptions& options) {
+void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse use) {
   std::string presets;
   for (const PresetInfo& info : transferFunctionPresets())
     presets += "\n  " + info.name + ": " + info.description;
@@ -235,16 +235,18 @@ void addQualityOptions(CLI::App& command, QualityOptions& options) {
       ->type_name("WxH")
       ->capture_default_str()
       ->group(qualityGroup);
-  command.add_option("--supersegments", options.supersegments, "the most in one list (N_S), 1 to 1024")
-      ->capture_default_str()
-      ->group(qualityGroup);
+  if (use == QualityUse::One) {
+    command.add_option("--supersegments", options.supersegments, "the most in one list (N_S), 1 to 1024")
+        ->capture_default_str()
+        ->group(qualityGroup);
+    command
+        .add_option("--algorithm", options.algorithm,
+                    "how samples become supersegments: merge, without search; bisection, the paper's search")
+        ->type_name("NAME")
+        ->capture_default_str()
+        ->group(qualityGroup);
+  }
   command.add_option("--sampling-rate", options.samplesPerVoxel, "samples per voxel, 1/64 to 64")
-      ->capture_default_str()
-      ->group(qualityGroup);
-  command
-      .add_option("--algorithm", options.algorithm,
-                  "how samples become supersegments: merge, without search; bisection, the paper's search")
-      ->type_name("NAME")
       ->capture_default_str()
       ->group(qualityGroup);
   command

@@ -64,7 +64,9 @@ struct QualityOptions {
   std::string transferFunction = "three-hues";  // a preset or a file
   std::optional<double> unitDistance;
 };
-void addQualityOptions(CLI::App& command, QualityOptions& options);
+/// Several: what the command runs over, supersegments and algorithms, is its own affair.
+enum class QualityUse { One, Several };
+void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse use = QualityUse::One);
 GenerateSettings makeSettings(const QualityOptions& options);
 /// Presets are stretched over the data's range and have a unit distance of a fiftieth of the scene's
 /// diagonal.

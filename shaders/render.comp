@@ -4,6 +4,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/render.h"
+#include "masks.glsl"
 #include "optical.glsl"
 
 layout(local_size_x = renderGroupX, local_size_y = renderGroupY) in;
@@ -64,25 +65,36 @@ float pixelLength(ivec2 pixel) {
   return sqrt(1.0 + dot(offset, offset));
 }
 
-void addSegment(Segment s, vec2 stretch, float segmentScale) {
-  clip(stretch, rayOrigin.z - s.front, rayDirection.z);
-  clip(stretch, s.back - rayOrigin.z, -rayDirection.z);
+void addSegment(uvec4 packed, vec2 stretch, float segmentScale) {
+  float front = uintBitsToFloat(packed.x);
+  float back = uintBitsToFloat(packed.y);
+  clip(stretch, rayOrigin.z - front, rayDirection.z);
+  clip(stretch, back - rayOrigin.z, -rayDirection.z);
   if (!(stretch.x < stretch.y)) return;
-  float share = (stretch.y - stretch.x) * segmentScale / (s.back - s.front);
-  float opacity = opacityOf(opticalDepthOf(s.opacity) * share);
+  vec2 blueOpticalDepth = unpackHalf2x16(packed.w);
+  float opacity = opacityOf(blueOpticalDepth.y * ((stretch.y - stretch.x) * segmentScale / (back - front)));
   if (!(opacity > 0.0)) return;
   if (accumulated.a == 0.0) firstDepth = stretch.x;
-  accumulated += (1.0 - accumulated.a) * (opacity / s.opacity) * vec4(s.red, s.green, s.blue, s.opacity);
+  accumulated += (1.0 - accumulated.a) * opacity * vec4(unpackHalf2x16(packed.z), blueOpticalDepth.x, 1.0);
+}
+
+float depthAt(float t) { return rayOrigin.z + t * rayDirection.z; }
+
+// The parts of the depth range that the ray is in, along a part of it.
+uint maskAlong(vec2 stretch) {
+  float a = depthAt(stretch.x);
+  float b = depthAt(stretch.y);
+  return maskOf(min(a, b), max(a, b), push.params.value.nearest, push.params.value.binScale);
 }
 
 // What the ray meets of one list.
 void addList(ivec2 pixel, vec2 stretch) {
   uint list = uint(pixel.y) * uint(push.params.value.lists.x) + uint(pixel.x);
+  if ((push.params.value.masks.at[list] & maskAlong(stretch)) == 0u) return;
   uint begin = push.params.value.offsets.at[list];
   uint end = push.params.value.offsets.at[list + 1u];
-  if (begin == end) return;
-  float enterDepth = rayOrigin.z + stretch.x * rayDirection.z;
-  float leaveDepth = rayOrigin.z + stretch.y * rayDirection.z;
+  float enterDepth = depthAt(stretch.x);
+  float leaveDepth = depthAt(stretch.y);
   float nearDepth = min(enterDepth, leaveDepth);
   float farDepth = max(enterDepth, leaveDepth);
   float segmentScale = rayWorldPerT / pixelLength(pixel);
@@ -91,7 +103,7 @@ void addList(ivec2 pixel, vec2 stretch) {
   uint high = end;
   while (low < high) {
     uint middle = (low + high) / 2u;
-    if (push.params.value.segments.at[middle].back > nearDepth) {
+    if (uintBitsToFloat(push.params.value.segments.at[middle].y) > nearDepth) {
       high = middle;
     } else {
       low = middle + 1u;
@@ -99,13 +111,13 @@ void addList(ivec2 pixel, vec2 stretch) {
   }
   if (rayDirection.z >= 0.0) {
     for (uint i = low; i < end; ++i) {
-      Segment s = push.params.value.segments.at[i];
-      if (s.front >= farDepth && i > low) break;
-      addSegment(s, stretch, segmentScale);
+      uvec4 packed = push.params.value.segments.at[i];
+      if (uintBitsToFloat(packed.x) >= farDepth && i > low) break;
+      addSegment(packed, stretch, segmentScale);
     }
   } else {
     uint stop = low;
-    while (stop < end && push.params.value.segments.at[stop].front < farDepth) ++stop;
+    while (stop < end && uintBitsToFloat(push.params.value.segments.at[stop].x) < farDepth) ++stop;
     for (uint i = stop; i > low; --i) addSegment(push.params.value.segments.at[i - 1u], stretch, segmentScale);
   }
 }
@@ -115,11 +127,37 @@ void walkLists(vec2 stretch) {
   ivec2 pixel = clamp(ivec2(floor(pixelAt(stretch.x))), ivec2(0), lastList);
   ivec2 last = clamp(ivec2(floor(pixelAt(stretch.y))), ivec2(0), lastList);
   ivec2 direction = sign(last - pixel);
+  ivec2 ahead = max(direction, ivec2(0));
+  int tilesAcross = (push.params.value.lists.x + renderTile - 1) / renderTile;
   float enter = stretch.x;
+  vec2 t = crossings(pixel + ahead);
+  ivec2 knownTile = ivec2(-1);
   // At most one step per column and row.
   int most = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
   for (int i = 0; i < most; ++i) {
-    vec2 t = crossings(pixel + max(direction, ivec2(0)));
+    ivec2 tile = pixel / renderTile;
+    if (tile != knownTile) {
+      // A tile without material along the ray is left in one step.
+      knownTile = tile;
+      ivec2 edge = (tile + ahead) * renderTile;
+      bool leavesX = last.x / renderTile != tile.x;
+      bool leavesY = last.y / renderTile != tile.y;
+      vec2 tileT = mix(vec2(stretch.y), crossings(edge), bvec2(leavesX, leavesY));
+      float leave = clamp(min(tileT.x, tileT.y), enter, stretch.y);
+      uint mask = push.params.value.tileMasks.at[tile.y * tilesAcross + tile.x];
+      if ((mask & maskAlong(vec2(enter, leave))) == 0u) {
+        if (!leavesX && !leavesY) return;
+        bool stepX = leavesX && (!leavesY || tileT.x <= tileT.y);
+        ivec2 lowest = max(tile * renderTile, min(pixel, last));
+        ivec2 highest = min(tile * renderTile + renderTile - 1, max(pixel, last));
+        ivec2 there = clamp(ivec2(floor(pixelAt(leave))), lowest, highest);
+        int beyond = stepX ? edge.x + ahead.x - 1 : edge.y + ahead.y - 1;
+        pixel = stepX ? ivec2(beyond, there.y) : ivec2(there.x, beyond);
+        t = crossings(pixel + ahead);
+        enter = leave;
+        continue;
+      }
+    }
     bool movesX = pixel.x != last.x;
     bool movesY = pixel.y != last.y;
     bool stepX = movesX && (!movesY || t.x <= t.y);
@@ -127,7 +165,9 @@ void walkLists(vec2 stretch) {
     float leave = clamp(stepX ? t.x : stepY ? t.y : stretch.y, enter, stretch.y);
     if (leave > enter) addList(pixel, vec2(enter, leave));
     if (!(stepX || stepY) || accumulated.a >= opaque) return;
+    // As whole vectors, here and in crossings: lavapipe (Mesa 22.3) mixes up components that are worked on apart.
     pixel += ivec2(stepX ? direction.x : 0, stepY ? direction.y : 0);
+    t = crossings(pixel + ahead);
     enter = leave;
   }
 }

@@ -8,14 +8,59 @@ VDI_SHARED_BEGIN
 #ifdef __cplusplus
 inline constexpr uint renderGroupX = 8;
 inline constexpr uint renderGroupY = 8;
+inline constexpr uint expandGroup = 64;
+inline constexpr uint expandModeSegments = 0;
+inline constexpr uint expandModeMasks = 1;
+inline constexpr uint expandModeTiles = 2;
+inline constexpr int renderTile = 8;
 #else
 const uint renderGroupX = 8;
 const uint renderGroupY = 8;
+const uint expandGroup = 64;
+const uint expandModeSegments = 0;  // one invocation a supersegment
+const uint expandModeMasks = 1;     // one a list
+const uint expandModeTiles = 2;     // one a tile
+const int renderTile = 8;           // lists per side of a tile
 #endif
 
+// A supersegment as rendering wants it, in 16 bytes: depths, straight colour and optical depth over the whole interval, the
+// latter two as half floats (largest error of an opacity: 0.0004).
+struct RenderSegment {
+  float front;
+  float back;
+  uint redGreen;
+  uint blueOpticalDepth;
+};
+
+VDI_SHARED_END
+
+#ifndef __cplusplus
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer RenderSegmentArray { uvec4 at[]; };
+#endif
+
+VDI_SHARED_BEGIN
+
+// What's where, for skipping empty space: bit b of a mask tells whether there is material in the b-th of 32 equal parts of
+// the VDI's depth range; a mask a list, and one a tile of 8 x 8 lists.
+struct ExpandConstants {
+  VDI_ADDRESS(UintArray) offsets;                // [lists + 1]
+  VDI_ADDRESS(SegmentArray) from;                // compact, as generated: a part of the supersegments
+  VDI_ADDRESS(RenderSegmentArray) segments;      // all
+  VDI_ADDRESS(UintArray) masks;                  // [lists.y][lists.x]
+  VDI_ADDRESS(UintArray) tileMasks;              // [tiles.y][tiles.x]
+  uint mode;
+  uint first;  // supersegment that `from` starts with
+  uint count;  // supersegments of `from`
+  float nearest;
+  float binScale;  // bins per unit of depth
+  ivec2 lists;
+};
+
 struct RenderParams {
-  VDI_ADDRESS(UintArray) offsets;      // [lists + 1]
-  VDI_ADDRESS(SegmentArray) segments;  // compact
+  VDI_ADDRESS(UintArray) offsets;            // [lists + 1]
+  VDI_ADDRESS(RenderSegmentArray) segments;  // compact
+  VDI_ADDRESS(UintArray) masks;
+  VDI_ADDRESS(UintArray) tileMasks;
   VDI_ADDRESS(Vec4Array) colors;       // [height][width]
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
   // Ray of the new view's pixel in V_O's view space, as in CastParams: base + u * right + v * up, t = the new view's depth.
@@ -32,6 +77,7 @@ struct RenderParams {
   vec3 directionUp;
   uint height;
   ivec2 lists;  // of the VDI: width, height
+  float binScale;
 };
 
 #ifndef __cplusplus

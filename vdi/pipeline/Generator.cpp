@@ -127,7 +127,8 @@ struct VdiGenerator::State {
     comm.demandEqual(fingerprintOf(camera), "camera");
     comm.demandEqual(fingerprintOf(function), "transfer function");
     comm.demandEqual(fingerprintOf(settings), "resolution, supersegments, sampling rate or algorithm");
-    mine.generateSeconds = mine.distributeSeconds = mine.compositeSeconds = mine.gatherSeconds = 0.0;
+    mine.generateSeconds = mine.distributeSeconds = mine.compositeSeconds = mine.gatherSeconds =
+        mine.generateDeviceSeconds = 0.0;
     mine.subSupersegments = mine.bytesSent = 0;
     return prepared;
   }
@@ -196,6 +197,7 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
   });
   s.mine.subSupersegments = lists.segments.size();
   s.mine.generateSeconds = watch.lap();
+  s.mine.generateDeviceSeconds = 1e-3 * s.caster->deviceMilliseconds();
   if (!alone) {
     comm::Received received = comm::distribute(s.comm, lists);
     s.mine.bytesSent = received.bytesSent;
@@ -244,6 +246,7 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   });
   s.mine.subSupersegments = lists.segments.size();
   s.mine.generateSeconds = watch.lap();
+  s.mine.generateDeviceSeconds = 1e-3 * s.caster->deviceMilliseconds();
   if (!alone) {
     // The limit case of the paper's section 5.3: one supersegment a run, composited in order of depth.
     const comm::Received received = comm::distribute(s.comm, lists);

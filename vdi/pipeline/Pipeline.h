@@ -24,7 +24,8 @@ namespace vdi {
 /// Wall-clock seconds and bytes of one rank in the last frame.
 struct RankReport {
   double uploadSeconds = 0.0;
-  double generateSeconds = 0.0;
+  double generateSeconds = 0.0;        // casting and segmenting, transfers included
+  double generateDeviceSeconds = 0.0;  // of these, the device's work without transfers
   double distributeSeconds = 0.0;
   double compositeSeconds = 0.0;
   double gatherSeconds = 0.0;

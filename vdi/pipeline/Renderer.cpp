@@ -4,6 +4,7 @@
 
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Commands.h"
+#include "vdi/gpu/ExpandPass.h"
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/RenderPass.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -18,36 +19,71 @@ struct VdiRenderer::State {
       : device(std::move(theDevice)),
         commands(device),
         pass(device),
+        expand(device),
         params(device, sizeof(shared::RenderParams), MemoryKind::Upload) {}
 
   std::shared_ptr<gpu::Device> device;
   gpu::Commands commands;
   gpu::RenderPass pass;
+  gpu::ExpandPass expand;
   gpu::Buffer params;
   gpu::Buffer staging;
   gpu::Buffer offsets;
   gpu::Buffer segments;
+  gpu::Buffer masks;
+  gpu::Buffer tileMasks;
   gpu::Buffer colors;
   gpu::Buffer depths;
   std::unique_ptr<View> original;  // none until there's a VDI
   float nearest = 0.0F;
   float farthest = 0.0F;
+  float binScale = 0.0F;
   double milliseconds = 0.0;
 
-  template <typename T>
-  void upload(const std::vector<T>& values, gpu::Buffer& to) {
-    constexpr std::uint64_t chunk = 64ULL << 20;
-    const std::uint64_t bytes = values.size() * sizeof(T);
-    to.reserve(device, bytes, MemoryKind::DeviceLocal);
-    staging.reserve(device, std::min(bytes, chunk), MemoryKind::Upload);
-    const auto* data = reinterpret_cast<const std::byte*>(values.data());
-    for (std::uint64_t done = 0; done < bytes; done += chunk) {
-      const std::uint64_t part = std::min(chunk, bytes - done);
-      std::memcpy(staging.mapped().data(), data + done, part);
+  /// Calls use(first, count) for parts of `values` that lie in staging, one after the other.
+  template <typename T, typename Use>
+  void inParts(const std::vector<T>& values, Use use) {
+    constexpr std::size_t most = (std::size_t{64} << 20) / sizeof(T);
+    staging.reserve(device, std::min(values.size(), most) * sizeof(T), MemoryKind::Upload);
+    for (std::size_t first = 0; first < values.size(); first += most) {
+      const std::size_t count = std::min(most, values.size() - first);
+      std::memcpy(staging.mapped().data(), values.data() + first, count * sizeof(T));
       commands.begin();
-      commands.copy(staging, 0, to, done, part);
+      use(first, count);
       commands.submitAndWait();
     }
+  }
+
+  void upload(const SupersegmentLists& lists, const glm::ivec2& size) {
+    offsets.reserve(device, lists.offsets.size() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+    segments.reserve(device, lists.segments.size() * sizeof(shared::RenderSegment), MemoryKind::DeviceLocal);
+    masks.reserve(device, lists.listCount() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+    tileMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+    inParts(lists.offsets, [&](std::size_t first, std::size_t count) {
+      commands.copy(staging, 0, offsets, first * sizeof(std::uint32_t), count * sizeof(std::uint32_t));
+    });
+    shared::ExpandConstants constants{};
+    constants.offsets = offsets.address();
+    constants.segments = segments.address();
+    constants.masks = masks.address();
+    constants.tileMasks = tileMasks.address();
+    constants.nearest = nearest;
+    constants.binScale = binScale;
+    constants.lists = size;
+    constants.mode = shared::expandModeSegments;
+    inParts(lists.segments, [&](std::size_t first, std::size_t count) {
+      constants.from = staging.address();
+      constants.first = static_cast<std::uint32_t>(first);
+      constants.count = static_cast<std::uint32_t>(count);
+      expand.record(commands, constants);
+    });
+    commands.begin();
+    constants.mode = shared::expandModeMasks;
+    expand.record(commands, constants);
+    commands.barrier();
+    constants.mode = shared::expandModeTiles;
+    expand.record(commands, constants);
+    commands.submitAndWait();
   }
 };
 
@@ -59,8 +95,6 @@ VdiRenderer::~VdiRenderer() = default;
 void VdiRenderer::setVdi(const Vdi& vdi) {
   State& s = *state_;
   s.original.reset();
-  s.upload(vdi.lists.offsets, s.offsets);
-  s.upload(vdi.lists.segments, s.segments);
   s.nearest = Image::noDepth;
   s.farthest = 0.0F;
   for (const Supersegment& segment : vdi.lists.segments) {
@@ -69,6 +103,8 @@ void VdiRenderer::setVdi(const Vdi& vdi) {
   }
   // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
   if (!vdi.camera.parallelProjection) s.nearest = std::max(s.nearest, s.farthest * 1e-6F);
+  s.binScale = s.farthest > s.nearest ? 32.0F / (s.farthest - s.nearest) : 0.0F;
+  s.upload(vdi.lists, {vdi.width, vdi.height});
   s.original = std::make_unique<View>(vdi.view());
 }
 
@@ -83,6 +119,9 @@ Image VdiRenderer::render(const Camera& camera, int width, int height) {
   shared::RenderParams params = gpu::renderGeometry(*s.original, view);
   params.offsets = s.offsets.address();
   params.segments = s.segments.address();
+  params.masks = s.masks.address();
+  params.tileMasks = s.tileMasks.address();
+  params.binScale = s.binScale;
   params.colors = s.colors.address();
   params.depths = s.depths.address();
   params.nearest = s.nearest;

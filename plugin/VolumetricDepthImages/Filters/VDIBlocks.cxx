@@ -212,8 +212,9 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::vector<
   Lattice lattice;
   for (int axis = 0; axis < 3; ++axis) {
     lattice.spacing[axis] = image->GetSpacing()[axis];
-    lattice.origin[axis] = image->GetOrigin()[axis] + extent[2 * axis] * lattice.spacing[axis];
-    lattice.points[axis] = extent[2 * axis + 1] - extent[2 * axis] + 1;
+    const std::ptrdiff_t side = std::ptrdiff_t{2} * axis;
+    lattice.origin[axis] = image->GetOrigin()[axis] + extent[side] * lattice.spacing[axis];
+    lattice.points[axis] = extent[side + 1] - extent[side] + 1;
   }
   lattice.cells = glm::max(lattice.points - 1, glm::ivec3(1));
   const auto& [origin, spacing, points, cells] = lattice;
@@ -314,6 +315,7 @@ vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewis
   }
   const double* mapRange = map->GetRange();
   std::vector<double> places;
+  places.reserve(colorSamples);
   for (int i = 0; i < colorSamples; ++i) {
     places.push_back(mapRange[0] + (mapRange[1] - mapRange[0]) * i / (colorSamples - 1));
   }

@@ -92,8 +92,9 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
     camera[axis] = vdi.camera.position[axis];
     camera[3 + axis] = vdi.camera.focalPoint[axis];
     camera[6 + axis] = vdi.camera.viewUp[axis];
-    bounds[2 * axis] = vdi.bounds.lo[axis];
-    bounds[2 * axis + 1] = vdi.bounds.hi[axis];
+    const std::ptrdiff_t side = std::ptrdiff_t{2} * axis;
+    bounds[side] = vdi.bounds.lo[axis];
+    bounds[side + 1] = vdi.bounds.hi[axis];
   }
   camera[9] = vdi.camera.viewAngle;
   camera[10] = vdi.camera.parallelProjection ? 1.0 : 0.0;
@@ -122,8 +123,9 @@ bool getVdi(vtkDataObject* data, vdi::Vdi& vdi) {
     vdi.camera.position[axis] = camera[axis];
     vdi.camera.focalPoint[axis] = camera[3 + axis];
     vdi.camera.viewUp[axis] = camera[6 + axis];
-    vdi.bounds.lo[axis] = bounds[2 * axis];
-    vdi.bounds.hi[axis] = bounds[2 * axis + 1];
+    const std::ptrdiff_t side = std::ptrdiff_t{2} * axis;
+    vdi.bounds.lo[axis] = bounds[side];
+    vdi.bounds.hi[axis] = bounds[side + 1];
   }
   vdi.camera.viewAngle = camera[9];
   vdi.camera.parallelProjection = camera[10] != 0.0;

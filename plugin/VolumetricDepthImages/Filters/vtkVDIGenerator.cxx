@@ -46,8 +46,9 @@ void vtkVDIGenerator::SetReport(const char* text) {
   delete[] this->Report;
   this->Report = nullptr;
   if (text == nullptr) return;
-  this->Report = new char[std::strlen(text) + 1];
-  std::strcpy(this->Report, text);
+  const std::size_t bytes = std::strlen(text) + 1;
+  this->Report = new char[bytes];
+  std::memcpy(this->Report, text, bytes);
 }
 
 void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {

@@ -27,7 +27,7 @@ vtkVDIReader::vtkVDIReader() {
 }
 
 vtkVDIReader::~vtkVDIReader() {
-  this->SetFileName(nullptr);
+  this->vtkVDIReader::SetFileName(nullptr);
 }
 
 void vtkVDIReader::PrintSelf(ostream& os, vtkIndent indent) {

@@ -14,7 +14,7 @@ vtkStandardNewMacro(vtkVDIWriter);
 vtkVDIWriter::vtkVDIWriter() = default;
 
 vtkVDIWriter::~vtkVDIWriter() {
-  this->SetFileName(nullptr);
+  this->vtkVDIWriter::SetFileName(nullptr);
 }
 
 void vtkVDIWriter::PrintSelf(ostream& os, vtkIndent indent) {

@@ -1,0 +1,88 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "apps/Bench.h"
+#include "vdi/core/Error.h"
+
+namespace vdi::apps {
+
+namespace {
+
+using nlohmann::json;
+
+json readBench(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  if (!file) throw Error(ErrorCode::Io, "can't read the file", path.string());
+  json document = json::parse(file, nullptr, false);
+  if (!document.is_object() || !document.contains("rows") || !document["rows"].is_array())
+    throw Error(ErrorCode::Format, "not a result of vdi bench", path.string());
+  return document;
+}
+
+std::string keyOf(const json& row) {
+  std::string key;
+  for (const char* field :
+       {"dataset", "algorithm", "supersegments", "width", "height", "view_deg", "angle_deg"}) {
+    if (row.contains(field)) key.append(key.empty() ? 0 : 1, ' ').append(row[field].dump());
+  }
+  return key;
+}
+
+/// null and missing: nothing to compare.
+double figure(const json& row, const char* field) {
+  return row.contains(field) && row[field].is_number() ? row[field].get<double>() : -1.0;
+}
+
+}  // namespace
+
+int compareBenches(const std::filesystem::path& before, const std::filesystem::path& after, std::FILE* out) {
+  const json a = readBench(before);
+  const json b = readBench(after);
+  const bool sameDevice = a.value("device", "") == b.value("device", "");
+  std::map<std::string, json> old;
+  for (const json& row : a["rows"]) old[keyOf(row)] = row;
+  int worse = 0;
+  std::size_t compared = 0;
+  const auto tell = [&](const std::string& key, const char* what, double was, double is) {
+    fmt::print(out, "{}: {} was {:.4g}, is {:.4g}\n", key, what, was, is);
+    ++worse;
+  };
+  for (const json& row : b["rows"]) {
+    const std::string key = keyOf(row);
+    const auto found = old.find(key);
+    if (found == old.end()) continue;
+    ++compared;
+    for (const char* name : {"dvr", "generate", "render"}) {
+      const std::string field = std::string(name) + "_ms";
+      double was = figure(found->second, field.c_str());
+      double is = figure(row, field.c_str());
+      double noise = std::max(figure(found->second, (std::string(name) + "_spread_ms").c_str()),
+                              figure(row, (std::string(name) + "_spread_ms").c_str()));
+      if (was < 0.0 || is < 0.0) continue;
+      if (!sameDevice) {
+        was /= std::max(figure(found->second, "dvr_ms"), 1e-9);
+        is /= std::max(figure(row, "dvr_ms"), 1e-9);
+        noise = 0.0;
+      }
+      if (is > 1.1 * was && is - was > noise) tell(key, field.c_str(), was, is);
+    }
+    const double wasBytes = figure(found->second, "stored_bytes");
+    const double isBytes = figure(row, "stored_bytes");
+    if (wasBytes >= 0.0 && isBytes > 1.05 * wasBytes) tell(key, "stored_bytes", wasBytes, isBytes);
+    const double wasSsim = figure(found->second, "ssim");
+    const double isSsim = figure(row, "ssim");
+    if (wasSsim >= 0.0 && isSsim >= 0.0 && isSsim < wasSsim - 0.002) tell(key, "ssim", wasSsim, isSsim);
+  }
+  fmt::print(out, "{} rows compared, {} figures got worse{}\n", compared, worse,
+             sameDevice ? "" : "; the devices differ, so times are compared as multiples of DVR");
+  if (compared == 0)
+    throw Error(ErrorCode::InvalidArgument, "the files have no rows in common", after.string());
+  return worse;
+}
+
+}  // namespace vdi::apps

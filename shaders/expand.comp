@@ -1,0 +1,51 @@
+// Supersegments as they're generated and stored -> as render.comp wants them, with masks of where there's material.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared/render.h"
+
+layout(local_size_x = expandGroup) in;
+layout(push_constant, scalar) uniform Push { ExpandConstants push; };
+
+#include "masks.glsl"
+#include "optical.glsl"
+
+const float largestHalf = 65504.0;
+
+void expandSegment(uint i) {
+  Segment s = push.from.at[i];
+  float opticalDepth = min(opticalDepthOf(s.opacity), largestHalf);
+  vec3 straight = vec3(s.red, s.green, s.blue) / s.opacity;
+  push.segments.at[push.first + i] = uvec4(floatBitsToUint(s.front), floatBitsToUint(s.back), packHalf2x16(straight.rg),
+                                           packHalf2x16(vec2(straight.b, opticalDepth)));
+}
+
+void maskList(uint list) {
+  uint mask = 0u;
+  uint end = push.offsets.at[list + 1u];
+  for (uint i = push.offsets.at[list]; i < end; ++i) {
+    vec2 depths = uintBitsToFloat(push.segments.at[i].xy);
+    mask |= maskOf(depths.x, depths.y, push.nearest, push.binScale);
+  }
+  push.masks.at[list] = mask;
+}
+
+void maskTile(ivec2 tile, uint index) {
+  uint mask = 0u;
+  ivec2 end = min((tile + 1) * renderTile, push.lists);
+  for (int y = tile.y * renderTile; y < end.y; ++y) {
+    for (int x = tile.x * renderTile; x < end.x; ++x) mask |= push.masks.at[uint(y) * uint(push.lists.x) + uint(x)];
+  }
+  push.tileMasks.at[index] = mask;
+}
+
+void main() {
+  uint i = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * expandGroup;
+  if (push.mode == expandModeSegments) {
+    if (i < push.count) expandSegment(i);
+  } else if (push.mode == expandModeMasks) {
+    if (i < uint(push.lists.x) * uint(push.lists.y)) maskList(i);
+  } else {
+    ivec2 tiles = (push.lists + renderTile - 1) / renderTile;
+    if (i < uint(tiles.x * tiles.y)) maskTile(ivec2(int(i) % tiles.x, int(i) / tiles.x), i);
+  }
+}

@@ -1,0 +1,40 @@
+#include "vdi/gpu/ExpandPass.h"
+
+#include <algorithm>
+
+namespace vdi::gpu {
+
+namespace {
+
+ComputePipelineInfo pipelineInfo() {
+  ComputePipelineInfo info;
+  info.shader = "expand";
+  info.pushConstantBytes = sizeof(shared::ExpandConstants);
+  return info;
+}
+
+std::uint64_t invocations(const shared::ExpandConstants& constants) {
+  if (constants.mode == shared::expandModeSegments) return constants.count;
+  if (constants.mode == shared::expandModeTiles) return tileCount(constants.lists);
+  return static_cast<std::uint64_t>(constants.lists.x) * static_cast<std::uint64_t>(constants.lists.y);
+}
+
+}  // namespace
+
+std::uint64_t tileCount(const glm::ivec2& lists) {
+  const glm::ivec2 tiles = (lists + shared::renderTile - 1) / shared::renderTile;
+  return static_cast<std::uint64_t>(tiles.x) * static_cast<std::uint64_t>(tiles.y);
+}
+
+ExpandPass::ExpandPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
+
+void ExpandPass::record(Commands& commands, const shared::ExpandConstants& constants) const {
+  constexpr std::uint64_t widest = 32768;  // groups; every device allows 65535 per axis
+  const std::uint64_t groups = (invocations(constants) + shared::expandGroup - 1) / shared::expandGroup;
+  if (groups == 0) return;
+  const std::uint64_t across = std::min(groups, widest);
+  commands.dispatch(pipeline_, constants, static_cast<std::uint32_t>(across),
+                    static_cast<std::uint32_t>((groups + across - 1) / across));
+}
+
+}  // namespace vdi::gpu
