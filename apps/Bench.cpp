@@ -134,6 +134,8 @@ struct Made {
   std::optional<Vdi> vdi;
   Spread generate;
   Spread frame;
+  double searchMs = 0.0;
+  double writeMs = 0.0;
   double compositeMs = 0.0;
   std::size_t storedBytes = 0;
 };
@@ -237,6 +239,8 @@ class Bench {
     frames.erase(frames.begin());
     made.frame = spreadOf(frames);
     made.compositeMs = spreadOf(composites).median;
+    made.searchMs = slowest(generator_.reports(), [](const RankReport& r) { return r.searchSeconds; });
+    made.writeMs = slowest(generator_.reports(), [](const RankReport& r) { return r.writeSeconds; });
     world_.together([&] {
       if (root()) made.storedBytes = io::encode(*made.vdi).size();
     });
@@ -273,6 +277,8 @@ class Bench {
                      {"generate_ms", made.generate.median},
                      {"generate_spread_ms", spread(made.generate)},
                      {"generate_frame_ms", made.frame.median},
+                     {"generate_search_ms", made.searchMs},
+                     {"generate_write_ms", made.writeMs},
                      {"composite_ms", world_.size() > 1 ? json(made.compositeMs) : json(nullptr)},
                      {"render_ms", render.median},
                      {"render_spread_ms", spread(render)},

@@ -12,4 +12,10 @@ vec4 appearanceOf(vec3 color, float opticalDepth, float length, float sampleStep
   return vec4(whole > 0.0 ? color * (part / whole) : vec3(0.0), part);
 }
 
-float weightBehind(float opticalDepth) { return hiddenWeight + (1.0 - hiddenWeight) * exp2(-opticalDepth); }
+// Of what lies behind material of that transmittance.
+float weightBehind(float transmittance) { return hiddenWeight + (1.0 - hiddenWeight) * transmittance; }
+
+float differenceOf(vec4 a, vec4 b) {
+  vec4 d = abs(a - b);
+  return (d.r + d.g) + (d.b + d.a);
+}

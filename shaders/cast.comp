@@ -33,7 +33,7 @@ void useSample(float front, float back, vec3 color, float opticalDepth) {
     float opacity = opacityOf(opticalDepth);
     // Nearly all intervals are one sample long.
     float part = back - front == push.params.value.step ? opacity : opacityOf(opticalDepth * push.params.value.step / (back - front));
-    grainsAdd(front, back, color * opacity, opticalDepth, vec4(color, 1.0) * part);
+    grainsAdd(front, back, color * opacity, opacity, opticalDepth, vec4(color, 1.0) * part);
   } else {
     searchAdd(front, back, color * opacityOf(opticalDepth), opticalDepth);
   }

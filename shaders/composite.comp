@@ -21,7 +21,7 @@ void walk() {
     float opticalDepth = opticalDepthOf(s.opacity);
     if (countsGrains || writesGrains) {
       vec4 x = appearanceOf(color, opticalDepth, s.back - s.front, push.params.value.step);
-      grainsAdd(s.front, s.back, color, opticalDepth, x);
+      grainsAdd(s.front, s.back, color, s.opacity, opticalDepth, x);
     } else {
       searchAdd(s.front, s.back, color, opticalDepth);
     }

@@ -6,6 +6,7 @@
 // a constant; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 #include "appearance.glsl"
+#include "grain.glsl"
 
 const int toleranceLevels = 8;
 const float finestTolerance = 0.002;
@@ -13,104 +14,107 @@ const float toleranceRatio = 4.0;
 
 void walk();
 
-float grainsBefore;  // optical depth so far
+float grainsBefore;  // transmittance so far
 float grainsReach;
 uint grainsVisible;
 uint grainsRuns;
 bool grainsRunVisible;
 bool grainsCutAtGaps;
 
-// One per tolerance while counting, the first alone while writing. A negative deviation: none is open.
+// One per tolerance while counting, the first alone while writing.
 vec4 grainFirst[toleranceLevels];
 float grainDeviation[toleranceLevels];
 uint grainCount[toleranceLevels];
+uint grainsOpen;  // bit j: a grain of tolerance j is open
 
 float grainTolerance;  // while writing
 Grain grain;
+float grainTransmittance;
 bool grainCut;
 
 void writeGrain() {
   uint slot = grainCount[0] - 1u;
   if (slot < push.params.value.counts.at[listIndex]) {
-    push.params.value.grains.at[push.params.value.offsets.at[listIndex] + slot] = grain;
+    uint at = 2u * (push.params.value.offsets.at[listIndex] + slot);
+    push.params.value.grains.at[at] = firstHalf(grain);
+    push.params.value.grains.at[at + 1u] = secondHalf(grain);
   }
 }
 
-void closeGrain(int level) {
-  if (writesGrains && grainDeviation[level] >= 0.0) writeGrain();
-  grainDeviation[level] = -1.0;
+void closeGrains(uint levels) {
+  if (writesGrains && (grainsOpen & levels) != 0u) writeGrain();
+  grainsOpen &= ~levels;
 }
 
 void deviate(vec4 x, float weightedLength) {
   float tolerance = writesGrains ? grainTolerance : finestTolerance;
+  uint beyond = 0u;
   [[unroll]] for (int level = 0; level < (writesGrains ? 1 : toleranceLevels); ++level) {
-    if (grainDeviation[level] >= 0.0) {
-      float deviation = grainDeviation[level] + weightedLength * length(x - grainFirst[level]);
-      if (deviation > tolerance) {
-        closeGrain(level);
-      } else {
-        grainDeviation[level] = deviation;
-      }
-    }
+    grainDeviation[level] += weightedLength * differenceOf(x, grainFirst[level]);
+    if (grainDeviation[level] > tolerance) beyond |= 1u << level;
     tolerance *= toleranceRatio;
   }
+  closeGrains(beyond);
 }
 
 // `color` is premultiplied; `x` is the interval's appearance.
-void grainsAdd(float front, float back, vec3 color, float opticalDepth, vec4 x) {
-  float weight = weightBehind(grainsBefore) / push.params.value.step;
-  if (front > grainsReach) {
-    grainsRunVisible = false;
-    if (grainsCutAtGaps) {
-      [[unroll]] for (int level = 0; level < (writesGrains ? 1 : toleranceLevels); ++level) closeGrain(level);
-      grainCut = true;
-    } else {
-      deviate(vec4(0.0), weight * (front - grainsReach));
-    }
-  }
-  deviate(x, weight * (back - front));
-  if (opticalDepth > 0.0) {
-    ++grainsVisible;
-    if (!grainsRunVisible) ++grainsRuns;
-    grainsRunVisible = true;
-    // Nothing but a run's start may open a grain once the room for them is used up. It isn't, unless the program that
-    // counted rounded otherwise.
-    bool full = writesGrains && !grainCut && grainCount[0] >= push.params.value.counts.at[listIndex];
-    [[unroll]] for (int level = 0; level < (writesGrains ? 1 : toleranceLevels); ++level) {
-      if (grainDeviation[level] >= 0.0 || full) {
-        if (!writesGrains) continue;
-        grain.red += (1.0 - opacityOf(grain.opticalDepth)) * color.r;
-        grain.green += (1.0 - opacityOf(grain.opticalDepth)) * color.g;
-        grain.blue += (1.0 - opacityOf(grain.opticalDepth)) * color.b;
-        grain.opticalDepth = min(grain.opticalDepth + opticalDepth, maxOpticalDepth);
-        grain.back = back;
-        grainDeviation[level] = max(grainDeviation[level], 0.0);
-      } else {
-        ++grainCount[level];
-        grainFirst[level] = x;
-        grainDeviation[level] = 0.0;
-        if (writesGrains) {
-          float before = grainsCutAtGaps && grainCut ? -1.0 - grainsBefore : grainsBefore;
-          grain = Grain(front, back, color.r, color.g, color.b, opticalDepth, before, 0.0);
-          grainCut = false;
-        }
-      }
-    }
-  }
-  grainsBefore += opticalDepth;
+void grainsAdd(float front, float back, vec3 color, float opacity, float opticalDepth, vec4 x) {
+  bool gap = front > grainsReach;
+  float reach = grainsReach;
   grainsReach = back;
+  if (gap) grainsRunVisible = false;
+  if (gap && grainsCutAtGaps) {
+    closeGrains(~0u);
+    grainCut = true;
+  }
+  if (grainsOpen == 0u && !(opticalDepth > 0.0)) return;
+  float weight = weightBehind(grainsBefore) / push.params.value.step;
+  if (gap && !grainsCutAtGaps) deviate(vec4(0.0), weight * (front - reach));
+  deviate(x, weight * (back - front));
+  if (!(opticalDepth > 0.0)) return;
+
+  ++grainsVisible;
+  if (!grainsRunVisible) ++grainsRuns;
+  grainsRunVisible = true;
+  // Nothing but a run's start may open a grain once the room for them is used up. It isn't, unless the program that
+  // counted rounded otherwise.
+  bool full = writesGrains && !grainCut && grainCount[0] >= push.params.value.counts.at[listIndex];
+  [[unroll]] for (int level = 0; level < (writesGrains ? 1 : toleranceLevels); ++level) {
+    if ((grainsOpen & (1u << level)) == 0u && !full) {
+      ++grainCount[level];
+      grainFirst[level] = x;
+      grainDeviation[level] = 0.0;
+      if (writesGrains) {
+        float before = grainsCutAtGaps && grainCut ? -1.0 - grainsBefore : grainsBefore;
+        grain = Grain(front, back, color.r, color.g, color.b, opticalDepth, before, 0.0);
+        grainTransmittance = 1.0 - opacity;
+        grainCut = false;
+      }
+    } else if (writesGrains) {
+      grain.red += grainTransmittance * color.r;
+      grain.green += grainTransmittance * color.g;
+      grain.blue += grainTransmittance * color.b;
+      grain.opticalDepth = min(grain.opticalDepth + opticalDepth, maxOpticalDepth);
+      grain.back = back;
+      grainTransmittance *= 1.0 - opacity;
+    }
+  }
+  grainsOpen = ~0u;
+  grainsBefore *= 1.0 - opacity;
 }
 
 void walkForGrains() {
   grainsCutAtGaps = push.params.value.cutAtGaps != 0u;
-  grainsBefore = 0.0;
+  grainsBefore = 1.0;
+  grainsOpen = 0u;
   grainsReach = 0.0;
   grainsVisible = 0u;
   grainsRuns = 0u;
   grainsRunVisible = false;
   grainCut = true;
   [[unroll]] for (int level = 0; level < toleranceLevels; ++level) {
-    grainDeviation[level] = -1.0;
+    grainFirst[level] = vec4(0.0);
+    grainDeviation[level] = 0.0;
     grainCount[level] = 0u;
   }
   walk();
@@ -146,7 +150,7 @@ void writeGrains() {
   }
   grainTolerance = push.params.value.sensitivities.at[listIndex];
   walkForGrains();
-  closeGrain(0);
+  closeGrains(1u);
   uint written = min(grainCount[0], push.params.value.counts.at[listIndex]);
   if (written != grainCount[0]) atomicAdd(push.params.value.status.at[0], 1u);
   uint most = max(push.params.value.budget, grainsCutAtGaps ? grainsRuns : 1u);

@@ -9,26 +9,39 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
 #include "optical.glsl"
 #include "appearance.glsl"
+#include "grain.glsl"
 
-const float dead = -1.0;  // back of a grain that was merged into another
+const float merged = 3.2e38;  // cost of a grain that was merged into another; below unlimited, above all else
 
 // Costs of lists of up to that many grains; longer lists keep theirs in the grains.
-const uint quickGrains = 96u;
+const uint quickGrains = 80u;
 shared float quickCosts[quickGrains * reduceGroup];
 
 uint base;
 uint count;
 
 float costAt(uint i) {
-  return count <= quickGrains ? quickCosts[i * reduceGroup + gl_LocalInvocationID.x] : push.grains.at[base + i].cost;
+  return count <= quickGrains ? quickCosts[i * reduceGroup + gl_LocalInvocationID.x]
+                              : push.grains.at[2u * (base + i) + 1u].w;
 }
 
 void setCost(uint i, float cost) {
   if (count <= quickGrains) {
     quickCosts[i * reduceGroup + gl_LocalInvocationID.x] = cost;
   } else {
-    push.grains.at[base + i].cost = cost;
+    push.grains.at[2u * (base + i) + 1u].w = cost;
   }
+}
+
+Grain grainAt(uint i) {
+  uint at = 2u * (base + i);
+  return grainOf(push.grains.at[at], push.grains.at[at + 1u]);
+}
+
+void setGrain(uint i, Grain g) {
+  uint at = 2u * (base + i);
+  push.grains.at[at] = firstHalf(g);
+  push.grains.at[at + 1u] = secondHalf(g);
 }
 
 vec4 appearance(Grain g) {
@@ -50,28 +63,28 @@ float costOf(Grain a, Grain b) {
   vec4 both = appearance(mergedOf(a, b));
   float before = a.before < 0.0 ? -1.0 - a.before : a.before;
   return weightBehind(before) *
-         ((a.back - a.front) * length(appearance(a) - both) + (b.back - b.front) * length(appearance(b) - both) +
-          max(b.front - a.back, 0.0) * length(both));
+         ((a.back - a.front) * differenceOf(appearance(a), both) + (b.back - b.front) * differenceOf(appearance(b), both) +
+          max(b.front - a.back, 0.0) * differenceOf(vec4(0.0), both));
 }
 
 // The next or previous grain that's left; count if there's none.
 uint nextOf(uint i) {
-  for (++i; i < count && push.grains.at[base + i].back == dead; ++i) {
+  for (++i; i < count && costAt(i) == merged; ++i) {
   }
   return i;
 }
 uint previousOf(uint i) {
   while (i > 0u) {
     --i;
-    if (push.grains.at[base + i].back != dead) return i;
+    if (costAt(i) != merged) return i;
   }
   return count;
 }
 
 void mergeCheapest(uint excess) {
-  Grain a = push.grains.at[base];
+  Grain a = grainAt(0u);
   for (uint i = 0u; i + 1u < count; ++i) {
-    Grain b = push.grains.at[base + i + 1u];
+    Grain b = grainAt(i + 1u);
     setCost(i, costOf(a, b));
     a = b;
   }
@@ -86,23 +99,23 @@ void mergeCheapest(uint excess) {
         cheapest = i;
       }
     }
+    if (least >= merged) return;  // just cuts are left; there are no more of them than may be
     uint other = nextOf(cheapest);
-    if (other == count) return;  // just cuts are left; there are no more of them than may be
-    Grain merged = mergedOf(push.grains.at[base + cheapest], push.grains.at[base + other]);
-    push.grains.at[base + cheapest] = merged;
-    push.grains.at[base + other].back = dead;
-    setCost(other, unlimited);
     uint next = nextOf(other);
-    setCost(cheapest, next == count ? unlimited : costOf(merged, push.grains.at[base + next]));
     uint previous = previousOf(cheapest);
-    if (previous != count) setCost(previous, costOf(push.grains.at[base + previous], merged));
+    Grain both = mergedOf(grainAt(cheapest), grainAt(other));
+    both.cost = next == count ? unlimited : costOf(both, grainAt(next));
+    setGrain(cheapest, both);
+    setCost(cheapest, both.cost);
+    setCost(other, merged);
+    if (previous != count) setCost(previous, costOf(grainAt(previous), both));
   }
 }
 
-void writeSegments(uint slot) {
+void writeSegments(uint slot, bool reduced) {
   for (uint i = 0u; i < count; ++i) {
-    Grain g = push.grains.at[base + i];
-    if (g.back == dead) continue;
+    if (reduced && costAt(i) == merged) continue;
+    Grain g = grainAt(i);
     push.segments.at[slot++] = Segment(g.front, g.back, g.red, g.green, g.blue, opacityOf(g.opticalDepth));
   }
 }
@@ -118,6 +131,7 @@ void main() {
   base = push.grainOffsets.at[list];
   count = reduction.x;
   if (count == 0u) return;
-  if (reduction.x > reduction.y) mergeCheapest(reduction.x - reduction.y);
-  writeSegments(push.offsets.at[list]);
+  bool reduces = reduction.x > reduction.y;
+  if (reduces) mergeCheapest(reduction.x - reduction.y);
+  writeSegments(push.offsets.at[list], reduces);
 }

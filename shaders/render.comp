@@ -51,13 +51,6 @@ vec2 pixelAt(float t) {
   return p.xy * scale + 0.5 * vec2(push.params.value.lists);
 }
 
-// Where the ray crosses the planes between columns and between rows at image coordinates `pixel`.
-vec2 crossings(ivec2 pixel) {
-  vec2 slope = (vec2(pixel) - 0.5 * vec2(push.params.value.lists)) * push.params.value.pixelSize;
-  if (push.params.value.parallel != 0u) return (slope - rayOrigin.xy) / rayDirection.xy;
-  return (slope * rayOrigin.z - rayOrigin.xy) / (rayDirection.xy - slope * rayDirection.z);
-}
-
 // World length of a unit of depth in the list's pixel.
 float pixelLength(ivec2 pixel) {
   if (push.params.value.parallel != 0u) return 1.0;
@@ -122,15 +115,36 @@ void addList(ivec2 pixel, vec2 stretch) {
   }
 }
 
+// The ray in V_O's picture is a straight line from s = 0 to s = 1. Where it's at s: t, perspective taken into account.
+struct PictureLine {
+  vec2 start;
+  vec2 inverseDelta;
+  vec2 t;      // at both ends
+  vec2 depth;  // likewise; 1 where V_O's projection is parallel
+};
+
+float tAt(PictureLine line, float s) {
+  return line.t.x + (line.t.y - line.t.x) * (s * line.depth.x) / mix(line.depth.y, line.depth.x, s);
+}
+
+// Where the line crosses the edges between columns and between rows. Vectors are worked on as wholes here: lavapipe
+// (Mesa 22.3) mixes up components that are worked on apart.
+vec2 crossings(PictureLine line, ivec2 edges) { return (vec2(edges) - line.start) * line.inverseDelta; }
+
 void walkLists(vec2 stretch) {
+  vec2 end = pixelAt(stretch.y);
+  PictureLine line;
+  line.start = pixelAt(stretch.x);
+  line.inverseDelta = 1.0 / (end - line.start);
+  line.t = stretch;
+  line.depth = push.params.value.parallel != 0u ? vec2(1.0) : vec2(depthAt(stretch.x), depthAt(stretch.y));
   ivec2 lastList = push.params.value.lists - 1;
-  ivec2 pixel = clamp(ivec2(floor(pixelAt(stretch.x))), ivec2(0), lastList);
-  ivec2 last = clamp(ivec2(floor(pixelAt(stretch.y))), ivec2(0), lastList);
+  ivec2 pixel = clamp(ivec2(floor(line.start)), ivec2(0), lastList);
+  ivec2 last = clamp(ivec2(floor(end)), ivec2(0), lastList);
   ivec2 direction = sign(last - pixel);
   ivec2 ahead = max(direction, ivec2(0));
   int tilesAcross = (push.params.value.lists.x + renderTile - 1) / renderTile;
   float enter = stretch.x;
-  vec2 t = crossings(pixel + ahead);
   ivec2 knownTile = ivec2(-1);
   // At most one step per column and row.
   int most = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
@@ -140,34 +154,30 @@ void walkLists(vec2 stretch) {
       // A tile without material along the ray is left in one step.
       knownTile = tile;
       ivec2 edge = (tile + ahead) * renderTile;
-      bool leavesX = last.x / renderTile != tile.x;
-      bool leavesY = last.y / renderTile != tile.y;
-      vec2 tileT = mix(vec2(stretch.y), crossings(edge), bvec2(leavesX, leavesY));
-      float leave = clamp(min(tileT.x, tileT.y), enter, stretch.y);
+      bvec2 leaves = notEqual(last / renderTile, tile);
+      vec2 s = mix(vec2(1.0), crossings(line, edge), leaves);
+      float leaveS = min(s.x, s.y);
+      float leave = leaves.x || leaves.y ? clamp(tAt(line, leaveS), enter, stretch.y) : stretch.y;
       uint mask = push.params.value.tileMasks.at[tile.y * tilesAcross + tile.x];
       if ((mask & maskAlong(vec2(enter, leave))) == 0u) {
-        if (!leavesX && !leavesY) return;
-        bool stepX = leavesX && (!leavesY || tileT.x <= tileT.y);
+        if (!leaves.x && !leaves.y) return;
+        bool stepX = leaves.x && (!leaves.y || s.x <= s.y);
         ivec2 lowest = max(tile * renderTile, min(pixel, last));
         ivec2 highest = min(tile * renderTile + renderTile - 1, max(pixel, last));
-        ivec2 there = clamp(ivec2(floor(pixelAt(leave))), lowest, highest);
-        int beyond = stepX ? edge.x + ahead.x - 1 : edge.y + ahead.y - 1;
-        pixel = stepX ? ivec2(beyond, there.y) : ivec2(there.x, beyond);
-        t = crossings(pixel + ahead);
+        ivec2 there = clamp(ivec2(floor(mix(line.start, end, leaveS))), lowest, highest);
+        pixel = mix(there, edge + ahead - 1, bvec2(stepX, !stepX));
         enter = leave;
         continue;
       }
     }
-    bool movesX = pixel.x != last.x;
-    bool movesY = pixel.y != last.y;
-    bool stepX = movesX && (!movesY || t.x <= t.y);
-    bool stepY = movesY && !stepX;
-    float leave = clamp(stepX ? t.x : stepY ? t.y : stretch.y, enter, stretch.y);
+    bvec2 moves = notEqual(pixel, last);
+    vec2 s = crossings(line, pixel + ahead);
+    bool stepX = moves.x && (!moves.y || s.x <= s.y);
+    bool stepY = moves.y && !stepX;
+    float leave = stepX || stepY ? clamp(tAt(line, stepX ? s.x : s.y), enter, stretch.y) : stretch.y;
     if (leave > enter) addList(pixel, vec2(enter, leave));
     if (!(stepX || stepY) || accumulated.a >= opaque) return;
-    // As whole vectors, here and in crossings: lavapipe (Mesa 22.3) mixes up components that are worked on apart.
-    pixel += ivec2(stepX ? direction.x : 0, stepY ? direction.y : 0);
-    t = crossings(pixel + ahead);
+    pixel += mix(ivec2(0), direction, bvec2(stepX, stepY));
     enter = leave;
   }
 }

@@ -30,14 +30,15 @@ struct Grain {
   float green;
   float blue;
   float opticalDepth;
-  float before;  // optical depth in front of it; -1 - that, if it must not be merged with the grain before it
+  float before;  // transmittance of what's in front of it; -1 - that, if it must not be merged with the grain before it
   float cost;    // of merging it with the next one: scratch of reduce.comp
 };
 
 VDI_SHARED_END
 
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray { Grain at[]; };
+// Two vec4 a grain: one access each, where a struct's members would take eight.
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray { vec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer UvecArray { uvec2 at[]; };

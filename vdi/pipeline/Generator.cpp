@@ -148,6 +148,12 @@ struct VdiGenerator::State {
     if (any[0] != 0) throw Error(ErrorCode::Cancelled, "stopped on request");
   }
 
+  void noteTimes() {
+    mine.generateDeviceSeconds = 1e-3 * caster->times().all;
+    mine.searchSeconds = 1e-3 * caster->times().search;
+    mine.writeSeconds = 1e-3 * caster->times().write;
+  }
+
   void shareReports() {
     static_assert(std::is_trivially_copyable_v<RankReport>);
     mine.deviceBytes = device->allocatedBytes();
@@ -197,7 +203,7 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
   });
   s.mine.subSupersegments = lists.segments.size();
   s.mine.generateSeconds = watch.lap();
-  s.mine.generateDeviceSeconds = 1e-3 * s.caster->deviceMilliseconds();
+  s.noteTimes();
   if (!alone) {
     comm::Received received = comm::distribute(s.comm, lists);
     s.mine.bytesSent = received.bytesSent;
@@ -246,7 +252,7 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   });
   s.mine.subSupersegments = lists.segments.size();
   s.mine.generateSeconds = watch.lap();
-  s.mine.generateDeviceSeconds = 1e-3 * s.caster->deviceMilliseconds();
+  s.noteTimes();
   if (!alone) {
     // The limit case of the paper's section 5.3: one supersegment a run, composited in order of depth.
     const comm::Received received = comm::distribute(s.comm, lists);

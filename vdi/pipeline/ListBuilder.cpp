@@ -31,7 +31,7 @@ void ListBuilder::build(const Request& request, const Record& record, Supersegme
   offsets_.reserve(device_, words, MemoryKind::DeviceLocal);
   readback_.reserve(device_, words, MemoryKind::Readback);
   status_.mappedAs<std::uint32_t>()[0] = 0;
-  deviceMilliseconds_ = 0.0;
+  times_ = {};
   if (request.algorithm == Algorithm::Bisection) {
     buildByBisection(request, record, result);
   } else {
@@ -47,7 +47,10 @@ void ListBuilder::build(const Request& request, const Record& record, Supersegme
 void ListBuilder::submit() {
   commands_.submitAndWait();
   for (const gpu::StageTime& stage : commands_.stageTimes()) {
-    if (stage.name != "download") deviceMilliseconds_ += stage.milliseconds;
+    if (stage.name == "download") continue;
+    times_.all += stage.milliseconds;
+    if (stage.name == "search") times_.search += stage.milliseconds;
+    if (stage.name == "write") times_.write += stage.milliseconds;
   }
 }
 
@@ -119,7 +122,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, S
   targets.reductions = reductions_.address();
   targets.status = status_.address();
   commands_.begin();
-  commands_.mark("count");
+  commands_.mark("search");
   record(commands_, targets, false);
   const std::uint64_t grainTotal = scanAndTotal(request.listCount, grainOffsets_);
 

@@ -30,6 +30,20 @@ struct BandTargets {
   std::uint64_t status = 0;
 };
 
+/// Device milliseconds: of all steps, of the algorithm's first one, and of its second one; each with its
+/// prefix sum.
+struct ListTimes {
+  double all = 0.0;
+  double search = 0.0;
+  double write = 0.0;
+  ListTimes& operator+=(const ListTimes& other) {
+    all += other.all;
+    search += other.search;
+    write += other.write;
+    return *this;
+  }
+};
+
 class ListBuilder {
  public:
   explicit ListBuilder(std::shared_ptr<gpu::Device> device);
@@ -50,8 +64,8 @@ class ListBuilder {
   /// supersegments don't fit, Error{DeviceFailure} if a list's written count isn't its stored count.
   void build(const Request& request, const Record& record, SupersegmentLists& result);
 
-  /// Device milliseconds of the last build: all steps without downloads.
-  double deviceMilliseconds() const { return deviceMilliseconds_; }
+  /// Of the last build, without downloads.
+  const ListTimes& times() const { return times_; }
 
  private:
   void buildByBisection(const Request& request, const Record& record, SupersegmentLists& result);
@@ -74,7 +88,7 @@ class ListBuilder {
   gpu::Buffer segments_;
   gpu::Buffer status_;
   gpu::Buffer readback_;
-  double deviceMilliseconds_ = 0.0;
+  ListTimes times_;
 };
 
 }  // namespace vdi::detail

@@ -73,7 +73,7 @@ SupersegmentLists RayCaster::lists(const Request& request, const Progress& progr
   const Algorithm algorithm = request.runsOnly ? Algorithm::Bisection : request.settings.algorithm;
   const std::uint32_t band =
       rowsPerBand(request, ListBuilder::bytesPerList(request.settings.supersegments, algorithm));
-  deviceMilliseconds_ = 0.0;
+  times_ = {};
   for (std::uint32_t row = 0; row < height; row += band) {
     const std::uint32_t end = std::min(height, row + band);
     const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
@@ -92,7 +92,7 @@ SupersegmentLists RayCaster::lists(const Request& request, const Progress& progr
                    end);
     };
     builder_.build({(end - row) * width, algorithm, request.lattice.step}, record, result);
-    deviceMilliseconds_ += builder_.deviceMilliseconds();
+    times_ += builder_.times();
     if (!progress(static_cast<double>(end) / height)) break;
   }
   return result;
@@ -107,7 +107,7 @@ Image RayCaster::image(const Request& request, const Progress& progress) {
   if (volume_.empty() || request.lattice.count == 0) return image;
   shared::CastParams params = prepare(request);
   const std::uint32_t band = rowsPerBand(request, sizeof(glm::vec4) + sizeof(float));
-  deviceMilliseconds_ = 0.0;
+  times_ = {};
   colors_.reserve(device_, std::uint64_t{band} * width * sizeof(glm::vec4), MemoryKind::Readback);
   depths_.reserve(device_, std::uint64_t{band} * width * sizeof(float), MemoryKind::Readback);
   for (std::uint32_t row = 0; row < height; row += band) {
@@ -121,7 +121,7 @@ Image RayCaster::image(const Request& request, const Progress& progress) {
     pass_.record(commands_, params_.address(), gpu::CastPass::Work::Volume, Algorithm::Merge, width, row,
                  end);
     commands_.submitAndWait();
-    deviceMilliseconds_ += commands_.stageTimes().front().milliseconds;
+    times_.all += commands_.stageTimes().front().milliseconds;
     const std::size_t count = std::size_t{end - row} * width;
     std::memcpy(image.rgba.data() + first, colors_.mapped().data(), count * sizeof(glm::vec4));
     std::memcpy(image.depth.data() + first, depths_.mapped().data(), count * sizeof(float));

@@ -42,8 +42,8 @@ class RayCaster {
   SupersegmentLists lists(const Request& request, const Progress& progress);
   /// DVR.
   Image image(const Request& request, const Progress& progress);
-  /// Device milliseconds of the last of them, without transfers.
-  double deviceMilliseconds() const { return deviceMilliseconds_; }
+  /// Of the last of them, without transfers. Of a picture: `all`.
+  const ListTimes& times() const { return times_; }
 
  private:
   gpu::shared::CastParams prepare(const Request& request);
@@ -57,7 +57,7 @@ class RayCaster {
   gpu::Buffer params_;
   gpu::Buffer colors_;
   gpu::Buffer depths_;
-  double deviceMilliseconds_ = 0.0;
+  ListTimes times_;
 };
 
 }  // namespace vdi::detail

@@ -28,16 +28,15 @@ Appearance overOneSample(float red, float green, float blue, float opticalDepth,
   return {red * scale, green * scale, blue * scale, part};
 }
 
+/// Sum of absolute differences: as good as the root of squares here (measured), and a device has it for less.
 float distance(const Appearance& a, const Appearance& b) {
-  const float red = a.red - b.red;
-  const float green = a.green - b.green;
-  const float blue = a.blue - b.blue;
-  const float opacity = a.opacity - b.opacity;
-  return std::sqrt(red * red + green * green + blue * blue + opacity * opacity);
+  return std::abs(a.red - b.red) + std::abs(a.green - b.green) + std::abs(a.blue - b.blue) +
+         std::abs(a.opacity - b.opacity);
 }
 
-float weightBehind(float opticalDepth) {
-  return hiddenWeight + (1.0F - hiddenWeight) * std::exp2(-opticalDepth);
+/// Of what lies behind material of that transmittance.
+float weightBehind(float transmittance) {
+  return hiddenWeight + (1.0F - hiddenWeight) * transmittance;
 }
 
 struct Grain {
@@ -47,7 +46,7 @@ struct Grain {
   float green;
   float blue;
   float opticalDepth;
-  float before;  // optical depth in front of it
+  float before;  // transmittance of what's in front of it
   bool cut;      // must not be merged with the grain before it
 
   Appearance appearance(float sampleStep) const {
@@ -70,7 +69,7 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float tolerance
   bool cut = true;
   Appearance first{};
   float deviation = 0.0F;
-  float before = 0.0F;
+  float before = 1.0F;
   float reach = 0.0F;
   const auto deviate = [&](const Appearance& x, float length) {
     deviation += weightBehind(before) * (length / rules.sampleStep) * distance(x, first);
@@ -101,7 +100,7 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float tolerance
         cut = false;
       }
     }
-    before += i.opticalDepth;
+    before *= 1.0F - opacityOf(i.opticalDepth);
     reach = i.back;
   }
   return grains;
