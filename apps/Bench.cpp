@@ -108,10 +108,13 @@ Spread spreadOf(std::vector<double> values) {
   return {middle, values.front(), values.back()};
 }
 
-/// Of the milliseconds that `measure` returns, after one run that doesn't count.
+/// Of the milliseconds that `measure` returns, after runs that don't count: a device that was idle needs a
+/// while to raise its clock. On several ranks their number must not depend on a clock (`fixed`).
 template <typename Measure>
-Spread repeated(int repeats, Measure measure) {
-  measure();
+Spread repeated(int repeats, bool fixed, Measure measure) {
+  using Clock = std::chrono::steady_clock;
+  const auto enough = Clock::now() + std::chrono::milliseconds(300);
+  for (int i = 0; fixed ? i < 3 : i == 0 || Clock::now() < enough; ++i) measure();
   std::vector<double> times(static_cast<std::size_t>(repeats));
   for (double& time : times) time = measure();
   return spreadOf(times);
@@ -211,16 +214,20 @@ class Bench {
     }
   }
 
+  /// Without the warm-up's.
+  std::vector<double> lastOf(const std::vector<double>& values) const {
+    return {values.end() - options_.repeats, values.end()};
+  }
+
   Truth volumeRendering(const Camera& camera, double angle, const TransferFunction& function) {
     Truth truth{camera, angle, {}, {}, {}};
     std::vector<double> frames;
-    truth.cast = repeated(options_.repeats, [&] {
+    truth.cast = repeated(options_.repeats, world_.size() > 1, [&] {
       truth.image = generator_.renderVolume(camera, function, settings_);
       frames.push_back(slowest(generator_.reports(), frameSeconds));
       return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
     });
-    frames.erase(frames.begin());  // the warm-up's
-    truth.frame = spreadOf(frames);
+    truth.frame = spreadOf(lastOf(frames));
     return truth;
   }
 
@@ -228,17 +235,15 @@ class Bench {
     Made made;
     std::vector<double> composites;
     std::vector<double> frames;
-    made.generate = repeated(options_.repeats, [&] {
+    made.generate = repeated(options_.repeats, world_.size() > 1, [&] {
       made.vdi = generator_.generate(camera, function, settings_);
       composites.push_back(
           slowest(generator_.reports(), [](const RankReport& r) { return r.compositeSeconds; }));
       frames.push_back(slowest(generator_.reports(), frameSeconds));
       return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
     });
-    composites.erase(composites.begin());
-    frames.erase(frames.begin());
-    made.frame = spreadOf(frames);
-    made.compositeMs = spreadOf(composites).median;
+    made.frame = spreadOf(lastOf(frames));
+    made.compositeMs = spreadOf(lastOf(composites)).median;
     made.searchMs = slowest(generator_.reports(), [](const RankReport& r) { return r.searchSeconds; });
     made.writeMs = slowest(generator_.reports(), [](const RankReport& r) { return r.writeSeconds; });
     world_.together([&] {
@@ -250,7 +255,7 @@ class Bench {
   void addRow(const std::string& name, double turned, const Made& made, VdiRenderer& renderer,
               const Truth& truth) {
     Image seen;
-    const Spread render = repeated(options_.repeats, [&] {
+    const Spread render = repeated(options_.repeats, false, [&] {
       seen = renderer.render(truth.camera, settings_.width, settings_.height);
       return renderer.renderMilliseconds();
     });

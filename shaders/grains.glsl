@@ -6,7 +6,6 @@
 // a constant; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 #include "appearance.glsl"
-#include "grain.glsl"
 
 const int toleranceLevels = 8;
 const float finestTolerance = 0.002;
@@ -29,15 +28,18 @@ uint grainsOpen;  // bit j: a grain of tolerance j is open
 
 float grainTolerance;  // while writing
 Grain grain;
+vec4 grainLight;
 float grainTransmittance;
 bool grainCut;
 
 void writeGrain() {
   uint slot = grainCount[0] - 1u;
   if (slot < push.params.value.counts.at[listIndex]) {
-    uint at = 2u * (push.params.value.offsets.at[listIndex] + slot);
-    push.params.value.grains.at[at] = firstHalf(grain);
-    push.params.value.grains.at[at + 1u] = secondHalf(grain);
+    uint at = push.params.value.offsets.at[listIndex] + slot;
+    push.params.value.grains.at[2u * at] = vec4(grain.front, grain.back, grain.before, uintBitsToFloat(slot));
+    push.params.value.grains.at[2u * at + 1u] =
+        appearanceOf(grainLight.rgb, grainLight.a, grain.back - grain.front, push.params.value.step);
+    push.params.value.lights.at[at] = grainLight;
   }
 }
 
@@ -86,15 +88,13 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
       grainDeviation[level] = 0.0;
       if (writesGrains) {
         float before = grainsCutAtGaps && grainCut ? -1.0 - grainsBefore : grainsBefore;
-        grain = Grain(front, back, color.r, color.g, color.b, opticalDepth, before, 0.0);
+        grain = Grain(front, back, before, 0u, vec4(0.0));
+        grainLight = vec4(color, opticalDepth);
         grainTransmittance = 1.0 - opacity;
         grainCut = false;
       }
     } else if (writesGrains) {
-      grain.red += grainTransmittance * color.r;
-      grain.green += grainTransmittance * color.g;
-      grain.blue += grainTransmittance * color.b;
-      grain.opticalDepth = min(grain.opticalDepth + opticalDepth, maxOpticalDepth);
+      grainLight = vec4(grainLight.rgb + grainTransmittance * color, min(grainLight.a + opticalDepth, maxOpticalDepth));
       grain.back = back;
       grainTransmittance *= 1.0 - opacity;
     }

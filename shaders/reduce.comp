@@ -1,5 +1,6 @@
-// Merges the grains of each list, cheapest neighbours first, until as few are left as the list may hold. Twin of mergeCheapest
-// in vdi/reference/SegmentByMerging.cpp. One invocation a list.
+// Merges the grains of each list, in rounds, until as few are left as the list may hold. Twin of mergeCheapest in
+// vdi/reference/SegmentByMerging.cpp. One invocation a list, which goes through its grains front to back, several times:
+// little state, so that many lists are in flight and hide the latency of memory.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/reduce.h"
@@ -9,114 +10,102 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
 #include "optical.glsl"
 #include "appearance.glsl"
-#include "grain.glsl"
-
-const float merged = 3.2e38;  // cost of a grain that was merged into another; below unlimited, above all else
-
-// Costs of lists of up to that many grains; longer lists keep theirs in the grains.
-const uint quickGrains = 80u;
-shared float quickCosts[quickGrains * reduceGroup];
 
 uint base;
-uint count;
-
-float costAt(uint i) {
-  return count <= quickGrains ? quickCosts[i * reduceGroup + gl_LocalInvocationID.x]
-                              : push.grains.at[2u * (base + i) + 1u].w;
-}
-
-void setCost(uint i, float cost) {
-  if (count <= quickGrains) {
-    quickCosts[i * reduceGroup + gl_LocalInvocationID.x] = cost;
-  } else {
-    push.grains.at[2u * (base + i) + 1u].w = cost;
-  }
-}
 
 Grain grainAt(uint i) {
-  uint at = 2u * (base + i);
-  return grainOf(push.grains.at[at], push.grains.at[at + 1u]);
+  vec4 depths = push.grains.at[2u * (base + i)];
+  return Grain(depths.x, depths.y, depths.z, floatBitsToUint(depths.w), push.grains.at[2u * (base + i) + 1u]);
 }
 
 void setGrain(uint i, Grain g) {
-  uint at = 2u * (base + i);
-  push.grains.at[at] = firstHalf(g);
-  push.grains.at[at + 1u] = secondHalf(g);
+  push.grains.at[2u * (base + i)] = vec4(g.front, g.back, g.before, uintBitsToFloat(g.first));
+  push.grains.at[2u * (base + i) + 1u] = g.mean;
 }
 
-vec4 appearance(Grain g) {
-  return appearanceOf(vec3(g.red, g.green, g.blue), g.opticalDepth, g.back - g.front, push.step);
-}
-
-Grain mergedOf(Grain a, Grain b) {
-  float transmittance = 1.0 - opacityOf(a.opticalDepth);
-  a.red += transmittance * b.red;
-  a.green += transmittance * b.green;
-  a.blue += transmittance * b.blue;
-  a.opticalDepth = min(a.opticalDepth + b.opticalDepth, maxOpticalDepth);
-  a.back = b.back;
-  return a;
+vec4 meanOf(Grain a, Grain b) {
+  float whole = b.back - a.front;
+  return (a.back - a.front) / whole * a.mean + (b.back - b.front) / whole * b.mean;
 }
 
 float costOf(Grain a, Grain b) {
   if (b.before < 0.0) return unlimited;
-  vec4 both = appearance(mergedOf(a, b));
+  vec4 both = meanOf(a, b);
   float before = a.before < 0.0 ? -1.0 - a.before : a.before;
-  return weightBehind(before) *
-         ((a.back - a.front) * differenceOf(appearance(a), both) + (b.back - b.front) * differenceOf(appearance(b), both) +
-          max(b.front - a.back, 0.0) * differenceOf(vec4(0.0), both));
+  return weightBehind(before) * ((a.back - a.front) * differenceOf(a.mean, both) +
+                                 (b.back - b.front) * differenceOf(b.mean, both) +
+                                 max(b.front - a.back, 0.0) * differenceOf(vec4(0.0), both));
 }
 
-// The next or previous grain that's left; count if there's none.
-uint nextOf(uint i) {
-  for (++i; i < count && costAt(i) == merged; ++i) {
-  }
-  return i;
-}
-uint previousOf(uint i) {
-  while (i > 0u) {
-    --i;
-    if (costAt(i) != merged) return i;
-  }
-  return count;
-}
-
-void mergeCheapest(uint excess) {
+// What merging may cost in this round; negative if nothing can be merged.
+float limitOf(uint count) {
+  float sum = 0.0;
+  float finite = 0.0;
   Grain a = grainAt(0u);
-  for (uint i = 0u; i + 1u < count; ++i) {
-    Grain b = grainAt(i + 1u);
-    setCost(i, costOf(a, b));
+  for (uint i = 1u; i < count; ++i) {
+    Grain b = grainAt(i);
+    float cost = costOf(a, b);
+    if (cost < unlimited) {
+      sum += cost;
+      finite += 1.0;
+    }
     a = b;
   }
-  setCost(count - 1u, unlimited);
-  for (; excess > 0u; --excess) {
-    uint cheapest = 0u;
-    float least = costAt(0u);
-    for (uint i = 1u; i < count; ++i) {
-      float cost = costAt(i);
-      if (cost < least) {
-        least = cost;
-        cheapest = i;
-      }
-    }
-    if (least >= merged) return;  // just cuts are left; there are no more of them than may be
-    uint other = nextOf(cheapest);
-    uint next = nextOf(other);
-    uint previous = previousOf(cheapest);
-    Grain both = mergedOf(grainAt(cheapest), grainAt(other));
-    both.cost = next == count ? unlimited : costOf(both, grainAt(next));
-    setGrain(cheapest, both);
-    setCost(cheapest, both.cost);
-    setCost(other, merged);
-    if (previous != count) setCost(previous, costOf(grainAt(previous), both));
-  }
+  return finite > 0.0 ? sum / finite * 1.0001 : -1.0;
 }
 
-void writeSegments(uint slot, bool reduced) {
+// One round, in place; returns how many grains are left.
+uint mergeOnce(uint count, uint excess, float limit) {
+  uint left = 0u;
+  float previous = unlimited;
+  Grain a = grainAt(0u);
+  Grain b = grainAt(1u);
+  float cost = costOf(a, b);
+  for (uint i = 0u; i < count;) {
+    Grain c = b;
+    float next = unlimited;
+    if (i + 2u < count) {
+      c = grainAt(i + 2u);
+      next = costOf(b, c);
+    }
+    bool merges = excess > 0u && cost < unlimited && cost <= limit && cost <= previous && cost <= next;
+    if (merges) {
+      a.mean = meanOf(a, b);
+      a.back = b.back;
+      --excess;
+    }
+    setGrain(left++, a);
+    previous = merges ? next : cost;
+    i += merges ? 2u : 1u;
+    if (i >= count) break;
+    if (merges) {
+      a = c;
+      b = c;
+      cost = unlimited;
+      if (i + 1u < count) {
+        b = grainAt(i + 1u);
+        cost = costOf(a, b);
+      }
+    } else {
+      a = b;
+      b = c;
+      cost = next;
+    }
+  }
+  return left;
+}
+
+// Light of the grains that were merged is put together here, front to back.
+void writeSegments(uint count, uint grains, uint slot) {
   for (uint i = 0u; i < count; ++i) {
-    if (reduced && costAt(i) == merged) continue;
     Grain g = grainAt(i);
-    push.segments.at[slot++] = Segment(g.front, g.back, g.red, g.green, g.blue, opacityOf(g.opticalDepth));
+    uint end = i + 1u < count ? floatBitsToUint(push.grains.at[2u * (base + i) + 2u].w) : grains;
+    vec4 light = push.lights.at[base + g.first];
+    for (uint j = g.first + 1u; j < end; ++j) {
+      vec4 more = push.lights.at[base + j];
+      light = vec4(light.rgb + (1.0 - opacityOf(light.a)) * more.rgb, min(light.a + more.a, maxOpticalDepth));
+    }
+    push.segments.at[slot + i] = Segment(g.front, g.back, light.r, light.g, light.b, opacityOf(light.a));
   }
 }
 
@@ -129,9 +118,11 @@ void main() {
     return;
   }
   base = push.grainOffsets.at[list];
-  count = reduction.x;
-  if (count == 0u) return;
-  bool reduces = reduction.x > reduction.y;
-  if (reduces) mergeCheapest(reduction.x - reduction.y);
-  writeSegments(push.offsets.at[list], reduces);
+  uint count = reduction.x;
+  while (count > reduction.y) {
+    float limit = limitOf(count);
+    if (limit < 0.0) break;  // just cuts are left; there are no more of them than may be
+    count = mergeOnce(count, count - reduction.y, limit);
+  }
+  writeSegments(min(count, reduction.y), reduction.x, push.offsets.at[list]);
 }

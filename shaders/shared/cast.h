@@ -43,6 +43,7 @@ struct CastParams {
   VDI_ADDRESS(UintArray) offsets;         // [h][w], exclusive prefix sum of counts
   VDI_ADDRESS(SegmentArray) segments;     // compact; by bisection
   VDI_ADDRESS(GrainArray) grains;         // compact; by merging
+  VDI_ADDRESS(Vec4Array) lights;    // of the grains
   VDI_ADDRESS(UvecArray) reductions;      // [h][w]: grains written, and how many are to be left of them
   VDI_ADDRESS(Vec4Array) colors;          // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;         // [h][w]

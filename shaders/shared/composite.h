@@ -50,6 +50,7 @@ struct CompositeParams {
   VDI_ADDRESS(UintArray) offsets;
   VDI_ADDRESS(SegmentArray) segments;
   VDI_ADDRESS(GrainArray) grains;
+  VDI_ADDRESS(Vec4Array) lights;    // of the grains
   VDI_ADDRESS(UvecArray) reductions;
   VDI_ADDRESS(UintArray) status;
   float step;  // of the sample lattice

@@ -7,9 +7,9 @@ VDI_SHARED_BEGIN
 
 // Room for grains, in multiples of a list's budget; as in vdi/reference/Segmenter.h.
 #ifdef __cplusplus
-inline constexpr uint grainsPerBudget = 3;
+inline constexpr uint grainsPerBudget = 2;
 #else
-const uint grainsPerBudget = 3;
+const uint grainsPerBudget = 2;
 #endif
 
 // Supersegment of core/Vdi.h.
@@ -22,16 +22,14 @@ struct Segment {
   float opacity;
 };
 
-// Grain of vdi/reference/SegmentByMerging.cpp.
+// Grain of vdi/reference/SegmentByMerging.cpp in memory. Its light, premultiplied colour over all of it and optical depth, is
+// kept apart: it isn't needed to decide what's merged.
 struct Grain {
   float front;
   float back;
-  float red;  // premultiplied
-  float green;
-  float blue;
-  float opticalDepth;
   float before;  // transmittance of what's in front of it; -1 - that, if it must not be merged with the grain before it
-  float cost;    // of merging it with the next one: scratch of reduce.comp
+  uint first;    // the first of the grains that it was merged from
+  vec4 mean;     // premultiplied colour and opacity over one sample
 };
 
 VDI_SHARED_END

@@ -6,17 +6,18 @@
 VDI_SHARED_BEGIN
 
 #ifdef __cplusplus
-inline constexpr uint reduceGroup = 32;
+inline constexpr uint reduceGroup = 64;
 inline constexpr uint reduceModeCount = 0;
 inline constexpr uint reduceModeWrite = 1;
 #else
-const uint reduceGroup = 32;
+const uint reduceGroup = 64;
 const uint reduceModeCount = 0;  // counts[list] = supersegments that are left
 const uint reduceModeWrite = 1;  // merges and writes
 #endif
 
 struct ReduceConstants {
   VDI_ADDRESS(GrainArray) grains;
+  VDI_ADDRESS(Vec4Array) lights;    // of the grains
   VDI_ADDRESS(UintArray) grainOffsets;  // [lists + 1]
   VDI_ADDRESS(UvecArray) reductions;    // [lists]: grains written, and how many are to be left of them
   VDI_ADDRESS(UintArray) counts;        // [lists]

@@ -106,6 +106,7 @@ void Compositor::compositeBand(std::span<const SupersegmentLists> subLists, std:
     settings_.offsets = targets.offsets;
     settings_.segments = targets.segments;
     settings_.grains = targets.grains;
+    settings_.lights = targets.lights;
     settings_.reductions = targets.reductions;
     settings_.status = targets.status;
     std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));

@@ -21,7 +21,8 @@ ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
 std::uint64_t ListBuilder::bytesPerList(std::uint32_t budget, Algorithm algorithm) {
   const std::uint64_t segments = std::uint64_t{budget} * sizeof(Supersegment);
   if (algorithm == Algorithm::Bisection) return segments;
-  return segments + std::uint64_t{shared::grainsPerBudget} * budget * sizeof(shared::Grain);
+  return segments +
+         std::uint64_t{shared::grainsPerBudget} * budget * (sizeof(shared::Grain) + sizeof(glm::vec4));
 }
 
 void ListBuilder::build(const Request& request, const Record& record, SupersegmentLists& result) {
@@ -127,9 +128,12 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, S
   const std::uint64_t grainTotal = scanAndTotal(request.listCount, grainOffsets_);
 
   grains_.reserve(device_, grainTotal * sizeof(shared::Grain), MemoryKind::DeviceLocal);
+  lights_.reserve(device_, grainTotal * sizeof(glm::vec4), MemoryKind::DeviceLocal);
   targets.grains = grains_.address();
+  targets.lights = lights_.address();
   shared::ReduceConstants reduce{};
   reduce.grains = grains_.address();
+  reduce.lights = lights_.address();
   reduce.grainOffsets = grainOffsets_.address();
   reduce.reductions = reductions_.address();
   reduce.counts = counts_.address();

@@ -26,6 +26,7 @@ struct BandTargets {
   std::uint64_t offsets = 0;
   std::uint64_t segments = 0;
   std::uint64_t grains = 0;
+  std::uint64_t lights = 0;
   std::uint64_t reductions = 0;
   std::uint64_t status = 0;
 };
@@ -84,6 +85,7 @@ class ListBuilder {
   gpu::Buffer offsets_;
   gpu::Buffer grainOffsets_;
   gpu::Buffer grains_;
+  gpu::Buffer lights_;
   gpu::Buffer reductions_;
   gpu::Buffer segments_;
   gpu::Buffer status_;

@@ -84,6 +84,7 @@ SupersegmentLists RayCaster::lists(const Request& request, const Progress& progr
       params.offsets = targets.offsets - skipped;
       params.segments = targets.segments;
       params.grains = targets.grains;
+      params.lights = targets.lights;
       params.reductions = targets.reductions - 2 * skipped;
       params.status = targets.status;
       std::memcpy(params_.mapped().data(), &params, sizeof(params));

@@ -1,7 +1,7 @@
 // The shaders' twin is shaders/grains.glsl (step 2) and shaders/reduce.comp (step 3).
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 
 #include "vdi/core/TransferFunction.h"
 #include "vdi/reference/Segmenter.h"
@@ -10,7 +10,7 @@ namespace vdi::reference {
 
 namespace {
 
-constexpr float unlimited = std::numeric_limits<float>::infinity();
+constexpr float unlimited = 3.4e38F;
 
 /// Colour and opacity of material over one sample.
 struct Appearance {
@@ -46,12 +46,9 @@ struct Grain {
   float green;
   float blue;
   float opticalDepth;
-  float before;  // transmittance of what's in front of it
-  bool cut;      // must not be merged with the grain before it
-
-  Appearance appearance(float sampleStep) const {
-    return overOneSample(red, green, blue, opticalDepth, back - front, sampleStep);
-  }
+  float before;       // transmittance of what's in front of it
+  bool cut;           // must not be merged with the grain before it
+  Appearance mean{};  // over its length
   void absorb(float theBack, float theRed, float theGreen, float theBlue, float theOpticalDepth) {
     const float transmittance = 1.0F - opacityOf(opticalDepth);
     red += transmittance * theRed;
@@ -106,32 +103,74 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float tolerance
   return grains;
 }
 
+/// The mean over two neighbours and the empty space between them.
+Appearance meanOf(const Grain& a, const Grain& b) {
+  const float whole = b.back - a.front;
+  const float first = (a.back - a.front) / whole;
+  const float second = (b.back - b.front) / whole;
+  return {first * a.mean.red + second * b.mean.red, first * a.mean.green + second * b.mean.green,
+          first * a.mean.blue + second * b.mean.blue, first * a.mean.opacity + second * b.mean.opacity};
+}
+
 Grain merged(const Grain& a, const Grain& b) {
   Grain result = a;
+  result.mean = meanOf(a, b);
   result.absorb(b.back, b.red, b.green, b.blue, b.opticalDepth);
   return result;
 }
 
 /// What merging two neighbours changes.
-float costOf(const Grain& a, const Grain& b, float sampleStep) {
+float costOf(const Grain& a, const Grain& b) {
   if (b.cut) return unlimited;
-  const Appearance both = merged(a, b).appearance(sampleStep);
-  return weightBehind(a.before) * ((a.back - a.front) * distance(a.appearance(sampleStep), both) +
-                                   (b.back - b.front) * distance(b.appearance(sampleStep), both) +
-                                   std::max(b.front - a.back, 0.0F) * distance({}, both));
+  const Appearance both = meanOf(a, b);
+  return weightBehind(a.before) *
+         ((a.back - a.front) * distance(a.mean, both) + (b.back - b.front) * distance(b.mean, both) +
+          std::max(b.front - a.back, 0.0F) * distance({}, both));
+}
+
+/// Costs of merging each grain with the next one; unlimited for the last.
+std::vector<float> costsOf(const std::vector<Grain>& grains) {
+  std::vector<float> costs(grains.size(), unlimited);
+  for (std::size_t i = 0; i + 1 < grains.size(); ++i) costs[i] = costOf(grains[i], grains[i + 1]);
+  return costs;
+}
+
+/// One round; `excess` grains at most are to go. False if none can.
+bool mergeOnce(std::vector<Grain>& grains, std::size_t excess) {
+  const std::vector<float> costs = costsOf(grains);
+  float sum = 0.0F;
+  float finite = 0.0F;
+  for (const float cost : costs) {
+    if (cost >= unlimited) continue;
+    sum += cost;
+    finite += 1.0F;
+  }
+  if (finite == 0.0F) return false;
+  // Rounded up, so that the mean of equal costs isn't below them.
+  const float limit = sum / finite * 1.0001F;
+  std::vector<Grain> left;
+  float previous = unlimited;
+  for (std::size_t i = 0; i < grains.size(); ++i) {
+    const float next = i + 1 < grains.size() ? costs[i + 1] : unlimited;
+    if (excess > 0 && costs[i] < unlimited && costs[i] <= limit && costs[i] <= previous && costs[i] <= next) {
+      left.push_back(merged(grains[i], grains[i + 1]));
+      previous = next;
+      --excess;
+      ++i;
+    } else {
+      left.push_back(grains[i]);
+      previous = costs[i];
+    }
+  }
+  grains = std::move(left);
+  return true;
 }
 
 void mergeCheapest(std::vector<Grain>& grains, std::size_t most, float sampleStep) {
-  std::vector<float> costs;  // of merging i and i + 1
-  for (std::size_t i = 0; i + 1 < grains.size(); ++i)
-    costs.push_back(costOf(grains[i], grains[i + 1], sampleStep));
-  while (grains.size() > most) {
-    const auto i = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
-    grains[i] = merged(grains[i], grains[i + 1]);
-    grains.erase(grains.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-    costs.erase(costs.begin() + static_cast<std::ptrdiff_t>(i));
-    if (i < costs.size()) costs[i] = costOf(grains[i], grains[i + 1], sampleStep);
-    if (i > 0) costs[i - 1] = costOf(grains[i - 1], grains[i], sampleStep);
+  for (Grain& g : grains) {
+    g.mean = overOneSample(g.red, g.green, g.blue, g.opticalDepth, g.back - g.front, sampleStep);
+  }
+  while (grains.size() > most && mergeOnce(grains, grains.size() - most)) {
   }
 }
 

@@ -76,15 +76,18 @@ std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals
 ///   toleranceRatio^j, j = 0 .. toleranceLevels - 1, that gives at most grainsPerBudget * budget grains (or
 ///   the number of runs, if that's larger); if none does, it's infinite. As in segmentWithSensitivity, a
 ///   transparent interval opens none, and a transparent tail is trimmed.
-///   3. While there are more grains than the list may hold, the two neighbours whose merging changes least
-///   are merged: the sum over both (and the empty space between them) of w * |x - x_merged| * length.
+///   3. While there are more grains than the list may hold: a round of merging neighbours. The cost of
+///   merging two is the sum over both, and over the empty space between them, of w * |x - x_mean| * length.
+///   Front to back, two are merged if that costs no more than the mean of all costs, and no more than merging
+///   either of them with its other neighbour, until no more have to go. (As good as always merging the
+///   cheapest two, measured, and it has no list that's searched again for each.)
 /// The tolerances are counted side by side in one walk along the ray, so that a device needs two walks in
 /// all. A list that isn't full after step 2 deviates by less than finestTolerance of a sample per
 /// supersegment.
 inline constexpr int toleranceLevels = 8;
 inline constexpr float finestTolerance = 0.002F;
 inline constexpr float toleranceRatio = 4.0F;
-inline constexpr std::uint32_t grainsPerBudget = 3;
+inline constexpr std::uint32_t grainsPerBudget = 2;
 inline constexpr float hiddenWeight = 0.3F;
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules);
 
