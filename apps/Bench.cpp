@@ -34,8 +34,8 @@ struct Options {
   ViewOptions view;
   QualityOptions quality;
   std::vector<double> angles{0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0};
-  std::vector<std::string> algorithms{"merge"};
-  std::vector<std::uint32_t> supersegments{25};
+  std::vector<std::string> algorithms;       // empty: merge, or the suite's
+  std::vector<std::uint32_t> supersegments;  // empty: 25, or the suite's
   int views = 1;
   int repeats = 5;
   std::string suite;
@@ -64,15 +64,23 @@ std::vector<DataSet> suiteSets(const std::string& suite) {
           {"richtmyer-meshkov-like", "interface", "", "96x96x90", "u8"}};
 }
 
-/// What a suite fixes; sizes can still be given.
 void applySuite(Options& options) {
-  if (options.suite.empty()) return;
   const bool paper = options.suite == "paper";
-  options.algorithms = {"merge", "bisection"};
-  options.views = paper ? 4 : 1;
-  options.quality.resolution = paper ? "1920x1080" : "240x136";
-  options.supersegments = paper ? std::vector<std::uint32_t>{20, 25, 30} : std::vector<std::uint32_t>{10};
-  if (!paper) options.repeats = 3;
+  const bool small = options.suite == "small";
+  if (paper || small) {
+    options.views = paper ? 4 : 1;
+    options.quality.resolution = paper ? "1920x1080" : "240x136";
+  }
+  if (options.algorithms.empty()) {
+    options.algorithms = {"merge"};
+    if (paper || small) options.algorithms.emplace_back("bisection");
+  }
+  if (options.supersegments.empty()) {
+    options.supersegments = paper   ? std::vector<std::uint32_t>{20, 25, 30}
+                            : small ? std::vector<std::uint32_t>{10}
+                                    : std::vector<std::uint32_t>{25};
+  }
+  if (small) options.repeats = std::min(options.repeats, 3);
 }
 
 std::vector<DataSet> dataSets(const Options& options) {
@@ -136,6 +144,7 @@ double frameSeconds(const RankReport& r) {
 struct Made {
   std::optional<Vdi> vdi;
   Spread generate;
+  Spread overVolume;  // device time of generation / that of volume rendering right before it
   Spread frame;
   double searchMs = 0.0;
   double writeMs = 0.0;
@@ -208,7 +217,7 @@ class Bench {
           if (!root()) return;
           VdiRenderer renderer(device_);
           renderer.setVdi(*made.vdi);
-          for (const Truth& truth : truths) addRow(set.name, turned, made, renderer, truth);
+          for (const Truth& truth : truths) addRow(set.name, turned, function, made, renderer, truth);
         });
       }
     }
@@ -235,13 +244,21 @@ class Bench {
     Made made;
     std::vector<double> composites;
     std::vector<double> frames;
+    std::vector<double> ratios;
+    const auto deviceMs = [&] {
+      return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
+    };
     made.generate = repeated(options_.repeats, world_.size() > 1, [&] {
+      generator_.renderVolume(camera, function, settings_);
+      const double volumeMs = deviceMs();
       made.vdi = generator_.generate(camera, function, settings_);
       composites.push_back(
           slowest(generator_.reports(), [](const RankReport& r) { return r.compositeSeconds; }));
       frames.push_back(slowest(generator_.reports(), frameSeconds));
-      return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
+      ratios.push_back(volumeMs > 0.0 ? deviceMs() / volumeMs : 0.0);
+      return deviceMs();
     });
+    made.overVolume = spreadOf(lastOf(ratios));
     made.frame = spreadOf(lastOf(frames));
     made.compositeMs = spreadOf(lastOf(composites)).median;
     made.searchMs = slowest(generator_.reports(), [](const RankReport& r) { return r.searchSeconds; });
@@ -252,22 +269,30 @@ class Bench {
     return made;
   }
 
-  void addRow(const std::string& name, double turned, const Made& made, VdiRenderer& renderer,
-              const Truth& truth) {
+  void addRow(const std::string& name, double turned, const TransferFunction& function, const Made& made,
+              VdiRenderer& renderer, const Truth& truth) {
     Image seen;
+    std::vector<double> ratios;
     const Spread render = repeated(options_.repeats, false, [&] {
+      double volumeMs = 0.0;
+      if (world_.size() == 1) {
+        generator_.renderVolume(truth.camera, function, settings_);
+        volumeMs = 1e3 * generator_.reports().front().generateDeviceSeconds;
+      }
       seen = renderer.render(truth.camera, settings_.width, settings_.height);
+      ratios.push_back(volumeMs / renderer.renderMilliseconds());
       return renderer.renderMilliseconds();
     });
+    const double speedup = spreadOf(lastOf(ratios)).median;
     const ImageDifference d =
         compare(io::toPicture(seen).rgb, io::toPicture(*truth.image).rgb, seen.width, seen.height, 3);
     const auto spread = [](const Spread& s) { return s.most - s.least; };
-    fmt::print(
-        table_,
-        "{:<22} {:<9} {:>3} {:>4g} {:>5g} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>7.4f} {:>7.2f} {:>8.2f}\n",
-        name, toString(settings_.algorithm), settings_.supersegments, turned, truth.angle, truth.cast.median,
-        made.generate.median, made.compositeMs, render.median, d.ssim, d.psnrDb,
-        static_cast<double>(made.storedBytes) / (1 << 20));
+    fmt::print(table_,
+               "{:<22} {:<9} {:>3} {:>4g} {:>5g} {:>9.3f} {:>9.3f} {:>6.2f} {:>9.3f} {:>6.2f} {:>9.3f} "
+               "{:>7.4f} {:>7.2f} {:>8.2f}\n",
+               name, toString(settings_.algorithm), settings_.supersegments, turned, truth.angle,
+               truth.cast.median, made.generate.median, made.compositeMs, render.median, d.ssim, d.psnrDb,
+               static_cast<double>(made.storedBytes) / (1 << 20));
     std::fflush(table_);
     rows_.push_back({{"dataset", name},
                      {"algorithm", toString(settings_.algorithm)},
@@ -281,6 +306,8 @@ class Bench {
                      {"dvr_frame_ms", truth.frame.median},
                      {"generate_ms", made.generate.median},
                      {"generate_spread_ms", spread(made.generate)},
+                     {"generate_over_dvr", made.overVolume.median},
+                     {"dvr_over_render", world_.size() == 1 ? json(speedup) : json(nullptr)},
                      {"generate_frame_ms", made.frame.median},
                      {"generate_search_ms", made.searchMs},
                      {"generate_write_ms", made.writeMs},
@@ -390,10 +417,9 @@ void addBench(CLI::App& app, Job& job) {
   addDealOptions(*command, options->deal);
   addViewOptions(*command, options->view);
   addQualityOptions(*command, options->quality, QualityUse::Several);
-  command->add_option("--algorithms", options->algorithms, "merge, bisection or both")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command->add_option("--supersegments", options->supersegments, "one or several N_S")->capture_default_str();
+  command->add_option("--algorithms", options->algorithms, "merge (the default), bisection or both")
+      ->type_name("NAME");
+  command->add_option("--supersegments", options->supersegments, "one or several N_S; default: 25");
   command->add_option("--views", options->views, "viewpoints of VDIs, evenly around the scene")
       ->check(CLI::Range(1, 360))
       ->capture_default_str();

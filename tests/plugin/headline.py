@@ -42,8 +42,10 @@ for name, (deal, kind, as_cells, scale) in VARIANTS.items():
         truth = read_png(os.path.join(OUTPUT, path))
         worst = np.abs(ours.astype(int) - truth).max()
         check(worst <= 1, "%s: the flat picture equals one rank's, worst channel off by %d" % (name, worst))
-        worst = np.abs(from_vdi.astype(int) - truth).max()
-        check(worst <= 1, "%s: so does the VDI rendered from its own viewpoint, off by %d" % (name, worst))
+        # Colour and alpha are rounded apart, so that a twentieth of a step can become two.
+        off = np.abs(from_vdi.astype(int) - truth)
+        check(off.max() <= 2 and off.mean() < 0.05, "%s: so does the VDI rendered from its own viewpoint, off by %d at most, "
+              "%.4f on average" % (name, off.max(), off.mean()))
         if theirs is not None:
             print("%s: wrong by more than 16/255 of the object's pixels: ours %.2f %%, ParaView's own %.2f %%"
                   % (name, 100 * wrong_share(ours, truth), 100 * wrong_share(theirs, truth)), flush=True)
