@@ -36,7 +36,7 @@ struct Options {
   std::vector<double> angles{0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0};
   std::vector<std::string> algorithms;       // empty: merge, or the suite's
   std::vector<std::uint32_t> supersegments;  // empty: 25, or the suite's
-  int views = 1;
+  int views = 0;                             // 0: 1, or the suite's
   int repeats = 5;
   std::string suite;
   std::string output;
@@ -68,13 +68,14 @@ void applySuite(Options& options) {
   const bool paper = options.suite == "paper";
   const bool small = options.suite == "small";
   if (paper || small) {
-    options.views = paper ? 4 : 1;
+    if (options.views == 0) options.views = paper ? 4 : 1;
     options.quality.resolution = paper ? "1920x1080" : "240x136";
   }
   if (options.algorithms.empty()) {
     options.algorithms = {"merge"};
     if (paper || small) options.algorithms.emplace_back("bisection");
   }
+  if (options.views == 0) options.views = 1;
   if (options.supersegments.empty()) {
     options.supersegments = paper   ? std::vector<std::uint32_t>{20, 25, 30}
                             : small ? std::vector<std::uint32_t>{10}
@@ -424,9 +425,8 @@ void addBench(CLI::App& app, Job& job) {
   command->add_option("--algorithms", options->algorithms, "merge (the default), bisection or both")
       ->type_name("NAME");
   command->add_option("--supersegments", options->supersegments, "one or several N_S; default: 25");
-  command->add_option("--views", options->views, "viewpoints of VDIs, evenly around the scene")
-      ->check(CLI::Range(1, 360))
-      ->capture_default_str();
+  command->add_option("--views", options->views, "viewpoints of VDIs, evenly around the scene; default: 1")
+      ->check(CLI::Range(1, 360));
   command->add_option("--angles", options->angles, "degrees from the VDI's viewpoint")
       ->type_name("DEG")
       ->capture_default_str();

@@ -57,10 +57,12 @@ check(np.array_equal(picture(read), flat), "a saved VDI reads back as it was")
 for source in (image, read):
     rendered = with_camera(simple.RenderVDI(Input=source))
     worst = np.abs(picture(rendered).astype(int) - flat).max()
-    check(worst <= 1, "RenderVDI from V_O gives the flat picture, off by %d" % worst)
+    check(worst <= 2, "RenderVDI from V_O gives the flat picture, off by %d" % worst)
 rendered.Resolution = [64, 64]
 check(picture(rendered).shape == (64, 64, 3), "RenderVDI renders at any resolution")
 check(np.array_equal(picture(vdi_of(wavelet, PictureOnly=1)), flat), "PictureOnly gives the same picture")
+searched = picture(vdi_of(wavelet, Algorithm="Bisection", Supersegments=2))
+check(np.abs(searched.astype(int) - flat).max() <= 1, "both algorithms give the same picture from V_O")
 
 # A series is time steps.
 second = os.path.join(OUTPUT, "series_1.vdi")

@@ -56,6 +56,7 @@ void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
   os << indent << "Resolution: " << this->Resolution[0] << " x " << this->Resolution[1] << "\n"
      << indent << "Supersegments: " << this->Supersegments << "\n"
      << indent << "SamplingRate: " << this->SamplingRate << "\n"
+     << indent << "Algorithm: " << this->Algorithm << "\n"
      << indent << "ScalarOpacityUnitDistance: " << this->ScalarOpacityUnitDistance << "\n";
 }
 
@@ -229,6 +230,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
   settings.height = this->Resolution[1];
   settings.supersegments = static_cast<std::uint32_t>(std::max(this->Supersegments, 0));
   settings.samplesPerVoxel = this->SamplingRate;
+  settings.algorithm = static_cast<vdi::Algorithm>(this->Algorithm);
   const auto progress = [this](double done) {
     this->UpdateProgress(0.1 + 0.9 * done);
     return !this->CheckAbort();

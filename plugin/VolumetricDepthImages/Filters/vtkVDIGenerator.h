@@ -54,6 +54,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkSetMacro(Supersegments, int);
   /// Samples per voxel.
   vtkSetMacro(SamplingRate, double);
+  /// How samples become supersegments, an enumerator of vdi::Algorithm: 1 merge, 0 bisection.
+  vtkSetClampMacro(Algorithm, int, 0, 1);
   /// Exchange ghost layers where blocks lack them.
   vtkSetMacro(FillGhosts, bool);
 
@@ -108,6 +110,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   int Resolution[2] = {1280, 720};
   int Supersegments = 25;
   double SamplingRate = 1.0;
+  int Algorithm = 1;
   bool FillGhosts = true;
   bool PictureOnly = false;
   int TimeStep = 0;
