@@ -4,7 +4,6 @@
 #include <vtkCompositeDataSet.h>
 #include <vtkDataObject.h>
 #include <vtkDataSetAttributes.h>
-#include <vtkExtentTranslator.h>
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
@@ -125,13 +124,11 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
   info->Set(Pipeline::UPDATE_PIECE_NUMBER(), rank);
   info->Set(Pipeline::UPDATE_NUMBER_OF_PIECES(), ranks);
   info->Set(Pipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), ghosts);
+  // The whole extent, of which the source makes this rank's piece: it splits the extent that it's asked for.
   if (info->Has(Pipeline::WHOLE_EXTENT())) {
     int whole[6];
-    int mine[6];
     info->Get(Pipeline::WHOLE_EXTENT(), whole);
-    vtkNew<vtkExtentTranslator> translator;
-    translator->PieceToExtentThreadSafe(rank, ranks, ghosts, whole, mine, vtkExtentTranslator::BLOCK_MODE, 0);
-    info->Set(Pipeline::UPDATE_EXTENT(), mine, 6);
+    info->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
   }
   return 1;
 }
