@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <new>
@@ -121,9 +122,23 @@ int leaveTogether(const Outcome& mine) {
   return -least[1];
 }
 
+/// Launchers tell their processes so. Alone, there's no need for MPI, whose start takes seconds on some
+/// machines.
+bool startedByMpi() {
+  constexpr std::array signs{"OMPI_COMM_WORLD_SIZE", "PMIX_RANK",    "PMI_RANK",    "PMI_SIZE",
+                             "MPI_LOCALNRANKS",      "SLURM_PROCID", "PALS_RANKID", "ALPS_APP_PE"};
+  return std::any_of(signs.begin(), signs.end(),
+                     [](const char* sign) { return std::getenv(sign) != nullptr; });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (!startedByMpi()) {
+    const Outcome outcome = runTool(argc, argv);
+    if (!outcome.message.empty()) say(outcome.message);
+    return outcome.status;
+  }
   MPI_Init(&argc, &argv);
   const int result = leaveTogether(runTool(argc, argv));
   MPI_Finalize();
