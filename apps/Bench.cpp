@@ -18,7 +18,6 @@
 #include "vdi/core/ImageMetrics.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
-#include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Pipeline.h"
 
 namespace vdi::apps {
@@ -225,6 +224,11 @@ class Bench {
     }
   }
 
+  /// Of the last generation or volume rendering.
+  double deviceMs() const {
+    return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
+  }
+
   /// Without the warm-up's.
   std::vector<double> lastOf(const std::vector<double>& values) const {
     return {values.end() - options_.repeats, values.end()};
@@ -236,7 +240,7 @@ class Bench {
     truth.cast = repeated(options_.repeats, world_.size() > 1, [&] {
       truth.image = generator_.renderVolume(camera, function, settings_);
       frames.push_back(slowest(generator_.reports(), frameSeconds));
-      return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
+      return deviceMs();
     });
     truth.frame = spreadOf(lastOf(frames));
     return truth;
@@ -247,9 +251,6 @@ class Bench {
     std::vector<double> composites;
     std::vector<double> frames;
     std::vector<double> ratios;
-    const auto deviceMs = [&] {
-      return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
-    };
     made.generate = repeated(options_.repeats, world_.size() > 1, [&] {
       generator_.renderVolume(camera, function, settings_);
       const double volumeMs = deviceMs();
@@ -279,7 +280,7 @@ class Bench {
       double volumeMs = 0.0;
       if (world_.size() == 1) {
         generator_.renderVolume(truth.camera, function, settings_);
-        volumeMs = 1e3 * generator_.reports().front().generateDeviceSeconds;
+        volumeMs = deviceMs();
       }
       seen = renderer.render(truth.camera, settings_.width, settings_.height);
       ratios.push_back(volumeMs / renderer.renderMilliseconds());

@@ -2,10 +2,9 @@
 // vdi/reference/SegmentByMerging.cpp; reduce.comp merges grains into supersegments. Counting does all tolerances side by
 // side in one walk; writing does one.
 //
-// Needs: optical.glsl; push.params.value with sensitivities, counts, offsets, grains, reductions, status; bool writesGrains,
+// Needs: optical.glsl, appearance.glsl; push.params.value with sensitivities, counts, offsets, grains, reductions, status; bool writesGrains,
 // a constant; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
-#include "appearance.glsl"
 
 const int toleranceLevels = 8;
 const float finestTolerance = 0.002;

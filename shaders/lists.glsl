@@ -6,6 +6,7 @@ uint listIndex;
 
 void emitSegment(float front, float back, vec3 color, float opacity);
 #include "optical.glsl"
+#include "appearance.glsl"
 #include "segmenter.glsl"
 #include "search.glsl"
 

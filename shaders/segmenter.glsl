@@ -1,7 +1,7 @@
 // How intervals become supersegments, for one sensitivity: the exchangeable piece. The algorithm is
 // segmentWithSensitivity of vdi/reference/Segmenter.cpp, as a state machine that's fed interval by interval.
 //
-// Needs: optical.glsl; void emitSegment(float front, float back, vec3 color, float opacity).
+// Needs: optical.glsl, appearance.glsl; void emitSegment(float front, float back, vec3 color, float opacity).
 
 struct SegmenterState {
   float sensitivity;
@@ -29,13 +29,6 @@ void segmenterClose() {
   segmenter.open = false;
 }
 
-// (colour, opacity) of `opticalDepth` over `length`, brought to one sample.
-vec4 overOneSample(vec3 color, float opticalDepth, float length) {
-  float whole = opacityOf(opticalDepth);
-  float part = opacityOf(opticalDepth * segmenterStep / length);
-  return vec4(whole > 0.0 ? color * (part / whole) : vec3(0.0), part);
-}
-
 void segmenterAbsorb(float back, vec3 color, float opticalDepth) {
   segmenter.reach = back;
   if (!(opticalDepth > 0.0)) return;
@@ -46,18 +39,18 @@ void segmenterAbsorb(float back, vec3 color, float opticalDepth) {
 
 void segmenterAdd(float front, float back, vec3 color, float opticalDepth) {
   if (segmenter.open) {
-    vec4 mine = overOneSample(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front);
+    vec4 mine = appearanceOf(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front, segmenterStep);
     if (front > segmenter.reach) {
       // The gap is a transparent sample.
       if (segmenterCutAtGaps || length(mine) > segmenter.sensitivity) {
         segmenterClose();
       } else {
         segmenter.reach = front;
-        mine = overOneSample(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front);
+        mine = appearanceOf(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front, segmenterStep);
       }
     }
     if (segmenter.open) {
-      vec4 other = overOneSample(color, opticalDepth, back - front);
+      vec4 other = appearanceOf(color, opticalDepth, back - front, segmenterStep);
       if (length(mine - other) > segmenter.sensitivity) segmenterClose();
     }
   }
