@@ -300,6 +300,7 @@ class Bench {
     std::fflush(table_);
     rows_.push_back({{"dataset", name},
                      {"algorithm", toString(settings_.algorithm)},
+                     {"precision", toString(made.vdi->precision())},
                      {"supersegments", settings_.supersegments},
                      {"width", settings_.width},
                      {"height", settings_.height},
@@ -320,7 +321,7 @@ class Bench {
                      {"render_spread_ms", spread(render)},
                      {"ssim", d.ssim},
                      {"psnr_db", std::isfinite(d.psnrDb) ? json(d.psnrDb) : json(nullptr)},
-                     {"supersegment_count", made.vdi->lists.segments.size()},
+                     {"supersegment_count", made.vdi->supersegmentCount()},
                      {"stored_bytes", made.storedBytes}});
   }
 

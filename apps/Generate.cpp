@@ -47,7 +47,7 @@ void writeVdiFiles(const Options& options, Vdi& vdi, const VdiGenerator& generat
   vdi.timeStep = options.step;
   if (!options.output.empty()) io::writeVdi(options.output, vdi);
   if (!options.flat.empty()) io::writePng(options.flat, io::toPicture(flatten(vdi)));
-  fmt::print("{} x {} lists, {} supersegments, on {}\n", vdi.width, vdi.height, vdi.lists.segments.size(),
+  fmt::print("{} x {} lists, {} supersegments, on {}\n", vdi.width, vdi.height, vdi.supersegmentCount(),
              generator.device().name());
   printReport(generator.reports());
 }

@@ -91,8 +91,9 @@ void printInfo(const InfoOptions& options) {
     const Vdi& v = info.header;
     fmt::print("{}\n  version          {}\n  lists            {} x {}, at most {} supersegments each\n", file,
                info.version, v.width, v.height, v.budget);
-    fmt::print("  supersegments    {} ({:.2f} a list)\n", info.supersegmentCount,
-               static_cast<double>(info.supersegmentCount) / (static_cast<double>(v.width) * v.height));
+    fmt::print("  supersegments    {} ({:.2f} a list), {} precision\n", info.supersegmentCount,
+               static_cast<double>(info.supersegmentCount) / (static_cast<double>(v.width) * v.height),
+               toString(v.precision()));
     fmt::print("  stored           {:.2f} MiB of {:.2f} MiB\n",
                static_cast<double>(info.storedBytes) / 1048576.0,
                static_cast<double>(info.expandedBytes) / 1048576.0);

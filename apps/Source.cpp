@@ -246,6 +246,21 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
         ->capture_default_str()
         ->group(qualityGroup);
   }
+  command
+      .add_option(
+          "--precision", options.precision,
+          "what a supersegment takes: compact, 8 bytes, seen from the VDI's viewpoint within 1/255; full, "
+          "24 bytes of floats")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command
+      .add_option(
+          "--termination-opacity", options.terminationOpacity,
+          "a ray ends once it has accumulated this opacity, (0, 1]; what's hidden behind is missing from "
+          "other viewpoints; 1: never")
+      ->capture_default_str()
+      ->group(qualityGroup);
   command.add_option("--sampling-rate", options.samplesPerVoxel, "samples per voxel, 1/64 to 64")
       ->capture_default_str()
       ->group(qualityGroup);
@@ -274,6 +289,8 @@ GenerateSettings makeSettings(const QualityOptions& options) {
   settings.supersegments = options.supersegments;
   settings.samplesPerVoxel = options.samplesPerVoxel;
   settings.algorithm = algorithmFromString(options.algorithm);
+  settings.precision = precisionFromString(options.precision);
+  settings.terminationOpacity = options.terminationOpacity;
   validate(settings);
   return settings;
 }

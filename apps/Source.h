@@ -61,6 +61,8 @@ struct QualityOptions {
   std::uint32_t supersegments = 25;
   double samplesPerVoxel = 1.0;
   std::string algorithm = "merge";
+  std::string precision = "compact";
+  double terminationOpacity = GenerateSettings().terminationOpacity;
   std::string transferFunction = "three-hues";  // a preset or a file
   std::optional<double> unitDistance;
 };

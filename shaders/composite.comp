@@ -14,16 +14,16 @@ const bool writesGrains = compositeProgram == compositeProgramWriteGrains;
 #include "grains.glsl"
 
 void walk() {
+  SegmentArray merged = push.params.value.merged;
+  StoredForm form = push.params.value.form;
   uint end = push.params.value.mergedOffsets.at[listIndex + 1u];
   for (uint i = push.params.value.mergedOffsets.at[listIndex]; i < end; ++i) {
-    Segment s = push.params.value.merged.at[i];
-    vec3 color = vec3(s.red, s.green, s.blue);
-    float opticalDepth = opticalDepthOf(s.opacity);
+    Material s = loadSegment(merged, i, form);
     if (countsGrains || writesGrains) {
-      vec4 x = appearanceOf(color, opticalDepth, s.back - s.front, push.params.value.step);
-      grainsAdd(s.front, s.back, color, s.opacity, opticalDepth, x);
+      vec4 x = appearanceOf(s.color, s.opticalDepth, s.back - s.front, push.params.value.step);
+      grainsAdd(s.front, s.back, s.color, opacityOf(s.opticalDepth), s.opticalDepth, x);
     } else {
-      searchAdd(s.front, s.back, color, opticalDepth);
+      searchAdd(s.front, s.back, s.color, s.opticalDepth);
     }
   }
 }

@@ -8,14 +8,26 @@ layout(push_constant, scalar) uniform Push { ExpandConstants push; };
 
 #include "masks.glsl"
 #include "optical.glsl"
+#include "store.glsl"
 
 const float largestHalf = 65504.0;
 
 void expandSegment(uint i) {
-  Segment s = push.from.at[i];
-  float opticalDepth = min(opticalDepthOf(s.opacity), largestHalf);
-  vec3 straight = vec3(s.red, s.green, s.blue) / s.opacity;
-  push.segments.at[push.first + i] = uvec4(floatBitsToUint(s.front), floatBitsToUint(s.back), packHalf2x16(straight.rg),
+  vec2 depths;
+  vec3 straight;
+  float opticalDepth;
+  if (isCompact(push.form)) {
+    uvec2 packed = CompactArray(push.from).at[i];
+    depths = codedDepths(packed, push.form);
+    straight = codedColor(packed);
+    opticalDepth = codedOpticalDepth(packed);
+  } else {
+    Segment s = push.from.at[i];
+    depths = vec2(s.front, s.back);
+    straight = vec3(s.red, s.green, s.blue) / s.opacity;
+    opticalDepth = min(opticalDepthOf(s.opacity), largestHalf);
+  }
+  push.segments.at[push.first + i] = uvec4(floatBitsToUint(depths), packHalf2x16(straight.rg),
                                            packHalf2x16(vec2(straight.b, opticalDepth)));
 }
 

@@ -1,19 +1,22 @@
 // One list from intervals to stored supersegments: search in one dispatch, write in a later one.
 //
-// Needs: push.params.value with sensitivities, counts, offsets, segments, status; void walk().
+// Needs: push.params.value with sensitivities, counts, offsets, segments, form, status; void walk().
 
 uint listIndex;
 
-void emitSegment(float front, float back, vec3 color, float opacity);
 #include "optical.glsl"
 #include "appearance.glsl"
+#include "store.glsl"
+void emitSegment(Material m);
 #include "segmenter.glsl"
 #include "search.glsl"
 
-void emitSegment(float front, float back, vec3 color, float opacity) {
+void emitSegment(Material m) {
   if (search.writing && search.emitted < push.params.value.counts.at[listIndex]) {
     uint slot = push.params.value.offsets.at[listIndex] + search.emitted;
-    push.params.value.segments.at[slot] = Segment(front, back, color.r, color.g, color.b, opacity);
+    SegmentArray segments = push.params.value.segments;
+    StoredForm form = push.params.value.form;
+    storeSegment(segments, slot, m, form);
   }
   ++search.emitted;
 }
@@ -22,6 +25,7 @@ void searchOrWriteList(bool write) {
   segmenterStep = push.params.value.step;
   segmenterCutAtGaps = push.params.value.cutAtGaps != 0u;
   if (write && push.params.value.counts.at[listIndex] == 0u) return;
+  beginStoring();
   float known = write ? push.params.value.sensitivities.at[listIndex] : 0.0;
   SearchResult result = searchList(write, known, push.params.value.budget, push.params.value.runsOnly != 0u);
   if (write) {

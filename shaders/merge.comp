@@ -7,12 +7,29 @@
 layout(local_size_x = compositeGroup) in;
 layout(push_constant, scalar) uniform Push { MergeConstants push; };
 
+#include "optical.glsl"
+#include "store.glsl"
+
 uint subOffset(uint rank, uint list) { return push.subOffsets.at[rank * (push.listCount + 1u) + list]; }
 
 void countList(uint list) {
   uint total = 0u;
   for (uint rank = 0u; rank < push.rankCount; ++rank) total += subOffset(rank, list + 1u) - subOffset(rank, list);
   push.counts.at[list] = total;
+}
+
+// Comparable within a list.
+float frontOf(SegmentArray segments, uint i) {
+  if (isCompact(push.form)) return float(depthCodes(CompactArray(segments).at[i]).x);
+  return segments.at[i].front;
+}
+
+void copySegment(SegmentArray from, uint i, uint slot) {
+  if (isCompact(push.form)) {
+    CompactArray(push.merged).at[slot] = CompactArray(from).at[i];
+  } else {
+    push.merged.at[slot] = from.at[i];
+  }
 }
 
 void mergeList(uint list) {
@@ -26,14 +43,16 @@ void mergeList(uint list) {
     for (uint rank = 0u; rank < push.rankCount; ++rank) {
       uint head = push.heads.at[rank * push.listCount + list];
       if (head == subOffset(rank, list + 1u)) continue;
-      float front = push.received.at[rank].at[head].front;
+      SegmentArray segments = push.received.at[rank];
+      float front = frontOf(segments, head);
       if (front < nearestFront) {
         nearestFront = front;
         nearest = rank;
       }
     }
     uint head = push.heads.at[nearest * push.listCount + list]++;
-    push.merged.at[slot] = push.received.at[nearest].at[head];
+    SegmentArray from = push.received.at[nearest];
+    copySegment(from, head, slot);
   }
 }
 

@@ -10,6 +10,7 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
 #include "optical.glsl"
 #include "appearance.glsl"
+#include "store.glsl"
 
 uint base;
 
@@ -97,6 +98,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
 
 // Light of the grains that were merged is put together here, front to back.
 void writeSegments(uint count, uint grains, uint slot) {
+  beginStoring();
   for (uint i = 0u; i < count; ++i) {
     Grain g = grainAt(i);
     uint end = i + 1u < count ? floatBitsToUint(push.grains.at[2u * (base + i) + 2u].w) : grains;
@@ -105,7 +107,7 @@ void writeSegments(uint count, uint grains, uint slot) {
       vec4 more = push.lights.at[base + j];
       light = vec4(light.rgb + (1.0 - opacityOf(light.a)) * more.rgb, min(light.a + more.a, maxOpticalDepth));
     }
-    push.segments.at[slot + i] = Segment(g.front, g.back, light.r, light.g, light.b, opacityOf(light.a));
+    storeSegment(push.segments, slot + i, Material(g.front, g.back, light.rgb, light.a), push.form);
   }
 }
 

@@ -1,7 +1,7 @@
 // How intervals become supersegments, for one sensitivity: the exchangeable piece. The algorithm is
 // segmentWithSensitivity of vdi/reference/Segmenter.cpp, as a state machine that's fed interval by interval.
 //
-// Needs: optical.glsl, appearance.glsl; void emitSegment(float front, float back, vec3 color, float opacity).
+// Needs: optical.glsl, appearance.glsl, store.glsl; void emitSegment(Material m).
 
 struct SegmenterState {
   float sensitivity;
@@ -25,7 +25,7 @@ void segmenterBegin(float sensitivity) {
 }
 
 void segmenterClose() {
-  emitSegment(segmenter.front, segmenter.back, segmenter.color, opacityOf(segmenter.opticalDepth));
+  emitSegment(Material(segmenter.front, segmenter.back, segmenter.color, segmenter.opticalDepth));
   segmenter.open = false;
 }
 

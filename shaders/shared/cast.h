@@ -71,6 +71,7 @@ struct CastParams {
   uint cutAtGaps;
   uint runsOnly;
   uint nodeCount;  // 0: no bricks
+  StoredForm form;  // of segments
 };
 
 #ifndef __cplusplus

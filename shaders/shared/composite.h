@@ -40,6 +40,7 @@ struct MergeConstants {
   uint rankCount;
   uint mode;
   uint pad;
+  StoredForm form;  // of received and merged
 };
 
 struct CompositeParams {
@@ -59,6 +60,7 @@ struct CompositeParams {
   uint runsOnly;   // 0
   uint listCount;
   uint pad;
+  StoredForm form;  // of merged and segments
 };
 
 #ifndef __cplusplus

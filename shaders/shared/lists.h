@@ -22,6 +22,13 @@ struct Segment {
   float opacity;
 };
 
+// How supersegments lie in memory: as CompactSupersegment with this DepthCode of core/Supersegment.h, or, if the step is 0,
+// as Segment.
+struct StoredForm {
+  float depthFirst;
+  float depthStep;
+};
+
 // Grain of vdi/reference/SegmentByMerging.cpp in memory. Its light, premultiplied colour over all of it and optical depth, is
 // kept apart: it isn't needed to decide what's merged.
 struct Grain {
@@ -38,6 +45,7 @@ VDI_SHARED_END
 // Two vec4 a grain: one access each, where a struct's members would take eight.
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray { vec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CompactArray { uvec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer UvecArray { uvec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray { float at[]; };

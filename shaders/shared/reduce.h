@@ -27,6 +27,7 @@ struct ReduceConstants {
   uint listCount;
   uint mode;
   uint pad;
+  StoredForm form;  // of segments
 };
 
 VDI_SHARED_END

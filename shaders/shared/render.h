@@ -54,6 +54,7 @@ struct ExpandConstants {
   float nearest;
   float binScale;  // bins per unit of depth
   ivec2 lists;
+  StoredForm form;  // of `from`
 };
 
 struct RenderParams {

@@ -50,7 +50,7 @@ TEST_CASE("every rank receives its lists from every rank") {
   const Communicator world = Communicator::world();
   const std::size_t listCount =
       GENERATE(std::size_t{1}, std::size_t{2}, std::size_t{4}, std::size_t{13}, std::size_t{64} * 48);
-  const comm::Received received = comm::distribute(world, listsOf(world.rank(), 0, listCount));
+  const comm::Received<Supersegment> received = comm::distribute(world, listsOf(world.rank(), 0, listCount));
   const comm::ListRange mine = comm::ownedLists(listCount, world.rank(), world.size());
   REQUIRE(received.subLists.size() == static_cast<std::size_t>(world.size()));
   std::uint64_t bytes = 0;

@@ -139,8 +139,8 @@ TEST_CASE("a VDI that isn't sound is refused") {
   vdi.width = 2;
   vdi.height = 1;
   vdi.budget = 2;
-  vdi.lists.offsets = {0, 2, 2};
-  vdi.lists.segments = {{1.0F, 2.0F, 0.1F, 0.1F, 0.1F, 0.5F}, {2.0F, 3.0F, 0.1F, 0.1F, 0.1F, 1.0F}};
+  vdi.lists = SupersegmentLists{{0, 2, 2},
+                                {{1.0F, 2.0F, 0.1F, 0.1F, 0.1F, 0.5F}, {2.0F, 3.0F, 0.1F, 0.1F, 0.1F, 1.0F}}};
   CHECK_NOTHROW(validate(vdi));
   const auto broken = [&](auto change) {
     Vdi copy = vdi;
@@ -149,10 +149,12 @@ TEST_CASE("a VDI that isn't sound is refused") {
   };
   broken([](Vdi& v) { v.budget = 1; });
   broken([](Vdi& v) { v.width = 3; });
-  broken([](Vdi& v) { v.lists.offsets.back() = 3; });
-  broken([](Vdi& v) { v.lists.offsets = {0, 3, 2}; });
-  broken([](Vdi& v) { v.lists.segments[1].front = 1.5F; });
-  broken([](Vdi& v) { v.lists.segments[0].back = 1.0F; });
-  broken([](Vdi& v) { v.lists.segments[0].opacity = 0.0F; });
-  broken([](Vdi& v) { v.lists.segments[0].red = std::numeric_limits<float>::quiet_NaN(); });
+  broken([](Vdi& v) { std::get<SupersegmentLists>(v.lists).offsets.back() = 3; });
+  broken([](Vdi& v) { std::get<SupersegmentLists>(v.lists).offsets = {0, 3, 2}; });
+  broken([](Vdi& v) { std::get<SupersegmentLists>(v.lists).segments[1].front = 1.5F; });
+  broken([](Vdi& v) { std::get<SupersegmentLists>(v.lists).segments[0].back = 1.0F; });
+  broken([](Vdi& v) { std::get<SupersegmentLists>(v.lists).segments[0].opacity = 0.0F; });
+  broken([](Vdi& v) {
+    std::get<SupersegmentLists>(v.lists).segments[0].red = std::numeric_limits<float>::quiet_NaN();
+  });
 }

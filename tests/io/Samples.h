@@ -13,6 +13,7 @@
 
 #include "vdi/core/Error.h"
 #include "vdi/core/Vdi.h"
+#include "vdi/reference/Compaction.h"
 
 namespace vdi::test {
 
@@ -31,6 +32,14 @@ class Noise {
   std::uint64_t state_;
 };
 
+/// The lists of a VDI of full precision.
+inline SupersegmentLists& full(Vdi& vdi) {
+  return std::get<SupersegmentLists>(vdi.lists);
+}
+inline const SupersegmentLists& full(const Vdi& vdi) {
+  return std::get<SupersegmentLists>(vdi.lists);
+}
+
 inline Vdi emptyVdi(int width, int height, std::uint32_t budget) {
   Vdi vdi;
   vdi.camera.position = {2.0, 1.5, 3.25};
@@ -45,7 +54,7 @@ inline Vdi emptyVdi(int width, int height, std::uint32_t budget) {
   vdi.sampleStep = 1.0 / 128.0;
   vdi.time = 1234.5;
   vdi.timeStep = (std::uint64_t{1} << 40) + 7;
-  vdi.lists.offsets.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) + 1, 0);
+  full(vdi).offsets.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) + 1, 0);
   return vdi;
 }
 
@@ -54,16 +63,16 @@ inline Vdi emptyVdi(int width, int height, std::uint32_t budget) {
 inline Vdi noisyVdi(int width, int height, std::uint32_t budget, std::uint64_t seed = 1) {
   Vdi vdi = emptyVdi(width, height, budget);
   Noise noise(seed);
-  for (std::size_t i = 0; i + 1 < vdi.lists.offsets.size(); ++i) {
+  for (std::size_t i = 0; i + 1 < full(vdi).offsets.size(); ++i) {
     const std::uint32_t count = noise.below(budget + 1);
     float depth = noise.unit();
     for (std::uint32_t j = 0; j < count; ++j) {
       const float front = depth + (noise.below(2) == 0 ? 0.0F : noise.unit());
       depth = front + 0x1p-10F + noise.unit();
       const auto color = [&noise] { return noise.unit() * 2.0F - 0.5F; };
-      vdi.lists.segments.push_back({front, depth, color(), color(), color(), 1.0F - noise.unit() * 0.999F});
+      full(vdi).segments.push_back({front, depth, color(), color(), color(), 1.0F - noise.unit() * 0.999F});
     }
-    vdi.lists.offsets[i + 1] = static_cast<std::uint32_t>(vdi.lists.segments.size());
+    full(vdi).offsets[i + 1] = static_cast<std::uint32_t>(full(vdi).segments.size());
   }
   return vdi;
 }
@@ -89,16 +98,24 @@ inline Vdi plausibleVdi(int width, int height, std::uint32_t budget) {
         const float density = 0.02F + 0.015F * std::sin(2.0F * n + 4.0F * u - 3.0F * v);
         const float opacity = 1.0F - std::exp(-length * density) * (1.0F - 1e-4F * noise.unit());
         const float hue = 0.5F + 0.5F * std::sin(0.7F * n + 2.0F * u);
-        vdi.lists.segments.push_back(
+        full(vdi).segments.push_back(
             {front, back, opacity * hue, opacity * (1.0F - hue), opacity * 0.25F, opacity});
         front = j % 5 == 4 ? back + 3.0F * step : back;
       }
-      vdi.lists.offsets[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+      full(vdi).offsets[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
                         static_cast<std::size_t>(x) + 1] =
-          static_cast<std::uint32_t>(vdi.lists.segments.size());
+          static_cast<std::uint32_t>(full(vdi).segments.size());
     }
   }
   return vdi;
+}
+
+/// The same in codes.
+inline Vdi compact(const Vdi& vdi) {
+  Vdi result = vdi;
+  result.depthCode = {0.5F, 0x1p-10F};
+  result.lists = reference::compacted(full(vdi), result.depthCode);
+  return result;
 }
 
 /// A folder that goes with everything in it.

@@ -18,8 +18,9 @@ namespace {
 
 /// Equal to the bit: operator== takes 0 and -0 for equal.
 bool sameBits(const Vdi& a, const Vdi& b) {
-  return a == b && std::memcmp(a.lists.segments.data(), b.lists.segments.data(),
-                               a.lists.segments.size() * sizeof(Supersegment)) == 0;
+  if (a.precision() == Precision::Compact) return a == b;
+  return a == b && std::memcmp(test::full(a).segments.data(), test::full(b).segments.data(),
+                               test::full(a).segments.size() * sizeof(Supersegment)) == 0;
 }
 
 /// A value at a place of the byte map.
@@ -74,6 +75,14 @@ TEST_CASE("a VDI comes back as it was, to the bit") {
     const Vdi vdi = test::noisyVdi(width, height, budget, static_cast<std::uint64_t>(width) + budget);
     CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
   }
+  SECTION("compact") {
+    const auto [width, height] = GENERATE(table<int, int>({{1, 1}, {1, 7}, {64, 64}, {97, 101}}));
+    const Vdi vdi = test::compact(test::noisyVdi(width, height, 25));
+    CHECK_NOTHROW(validate(vdi));
+    CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
+    CHECK(sameBits(io::decode(io::encode(test::compact(test::plausibleVdi(160, 90, 25)))),
+                   test::compact(test::plausibleVdi(160, 90, 25))));
+  }
   SECTION("long lists") {
     const Vdi vdi = test::noisyVdi(5, 5, 1024);
     CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
@@ -96,12 +105,12 @@ TEST_CASE("a VDI comes back as it was, to the bit") {
   SECTION("the ends of the floats") {
     using Limits = std::numeric_limits<float>;
     Vdi vdi = test::emptyVdi(2, 2, 3);
-    vdi.lists.segments = {{0.0F, Limits::denorm_min(), -0.0F, Limits::max(), Limits::lowest(), 1.0F},
-                          {Limits::denorm_min(), Limits::min(), Limits::min(), -Limits::denorm_min(), 0.0F,
-                           Limits::denorm_min()},
-                          {0.0F, Limits::max(), 0.0F, -1.0F, 1e-30F, 0.5F},
-                          {-0.0F, 1e-20F, 0.0F, 0.0F, 0.0F, 1e-20F}};
-    vdi.lists.offsets = {0, 2, 2, 3, 4};
+    test::full(vdi).segments = {{0.0F, Limits::denorm_min(), -0.0F, Limits::max(), Limits::lowest(), 1.0F},
+                                {Limits::denorm_min(), Limits::min(), Limits::min(), -Limits::denorm_min(),
+                                 0.0F, Limits::denorm_min()},
+                                {0.0F, Limits::max(), 0.0F, -1.0F, 1e-30F, 0.5F},
+                                {-0.0F, 1e-20F, 0.0F, 0.0F, 0.0F, 1e-20F}};
+    test::full(vdi).offsets = {0, 2, 2, 3, 4};
     CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
   }
 }
@@ -125,7 +134,7 @@ TEST_CASE("header and chunk table lie as docs/format.md says") {
   CHECK(at<std::uint32_t>(bytes, 36) == 4096);
   CHECK(at<std::uint32_t>(bytes, 40) == 3);
   CHECK(at<std::uint32_t>(bytes, 44) == 0);
-  CHECK(at<std::uint64_t>(bytes, 48) == vdi.lists.segments.size());
+  CHECK(at<std::uint64_t>(bytes, 48) == test::full(vdi).segments.size());
   CHECK(at<std::uint64_t>(bytes, 56) == bytes.size() - headerBytes - 48);
   CHECK(at<std::uint64_t>(bytes, 64) == vdi.timeStep);
   CHECK(at<double>(bytes, 72) == vdi.time);
@@ -143,7 +152,7 @@ TEST_CASE("header and chunk table lie as docs/format.md says") {
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t last = std::min<std::size_t>((i + 1) * 4096, 9000);
     CHECK(at<std::uint32_t>(bytes, headerBytes + 16 * i) ==
-          vdi.lists.offsets[last] - vdi.lists.offsets[i * 4096]);
+          test::full(vdi).offsets[last] - test::full(vdi).offsets[i * 4096]);
     const auto packed = at<std::uint32_t>(bytes, headerBytes + 16 * i + 4);
     CHECK(at<std::uint64_t>(bytes, headerBytes + 16 * i + 8) == XXH64(bytes.data() + offset, packed, 0));
     offset += packed;
@@ -226,9 +235,9 @@ TEST_CASE("info is known without the lists") {
   const auto demandGood = [&](const io::VdiFileInfo& info) {
     CHECK(info.version == 1);
     CHECK(info.header == expected);
-    CHECK(info.supersegmentCount == vdi.lists.segments.size());
+    CHECK(info.supersegmentCount == test::full(vdi).segments.size());
     CHECK(info.storedBytes == bytes.size());
-    CHECK(info.expandedBytes == vdi.lists.segments.size() * 24 + vdi.lists.offsets.size() * 4);
+    CHECK(info.expandedBytes == test::full(vdi).segments.size() * 24 + test::full(vdi).offsets.size() * 4);
   };
   demandGood(io::readVdiInfo(path));
   demandGood(io::decodeInfo(bytes));
@@ -254,10 +263,10 @@ TEST_CASE("what decode would refuse isn't written") {
     CHECK(error.context() == path.string());
   };
   refused([](Vdi& vdi) { vdi.width = 7; });
-  refused([](Vdi& vdi) { vdi.lists.offsets.back() += 1; });
+  refused([](Vdi& vdi) { test::full(vdi).offsets.back() += 1; });
   refused([](Vdi& vdi) { vdi.budget = 1; });
-  refused([](Vdi& vdi) { vdi.lists.segments[3].opacity = 0.0F; });
-  refused([](Vdi& vdi) { vdi.lists.segments[3].red = std::numeric_limits<float>::infinity(); });
+  refused([](Vdi& vdi) { test::full(vdi).segments[3].opacity = 0.0F; });
+  refused([](Vdi& vdi) { test::full(vdi).segments[3].red = std::numeric_limits<float>::infinity(); });
   refused([](Vdi& vdi) { vdi.camera.position = vdi.camera.focalPoint; });
   refused([](Vdi& vdi) { vdi.time = std::numeric_limits<double>::infinity(); });
   CHECK(io::readVdi(path) == sound);
@@ -282,18 +291,18 @@ TEST_CASE("files: written, read, and refused with their path") {
 
 TEST_CASE("unpackLists refuses what isn't just the lists and supersegments asked for") {
   const Vdi vdi = test::noisyVdi(10, 10, 5);
-  const std::vector<std::byte> packed = io::detail::packLists(vdi.lists, 20, 60);
-  const std::size_t count = vdi.lists.offsets[60] - vdi.lists.offsets[20];
+  const std::vector<std::byte> packed = io::detail::packLists(test::full(vdi), {}, 20, 60);
+  const std::size_t count = test::full(vdi).offsets[60] - test::full(vdi).offsets[20];
   const auto unpack = [&](std::size_t lists, std::size_t segments) {
     SupersegmentLists back;
     back.offsets.resize(lists + 1);
     back.segments.resize(segments);
-    io::detail::unpackLists(packed, 0, std::span(back.offsets).subspan(1), back.segments);
+    io::detail::unpackLists(packed, 0, std::span(back.offsets).subspan(1), std::span(back.segments));
     return back;
   };
   const SupersegmentLists back = unpack(40, count);
   for (std::size_t i = 0; i < 40; ++i) {
-    const auto expected = vdi.lists.list(20 + i);
+    const auto expected = test::full(vdi).list(20 + i);
     const auto got = back.list(i);
     CHECK(std::equal(expected.begin(), expected.end(), got.begin(), got.end()));
   }
@@ -302,6 +311,26 @@ TEST_CASE("unpackLists refuses what isn't just the lists and supersegments asked
   // As many bytes, dealt out otherwise: six counts in place of a supersegment, and the reverse.
   CHECK(test::errorOf([&] { unpack(46, count - 1); }).code() == ErrorCode::Format);
   CHECK(test::errorOf([&] { unpack(34, count + 1); }).code() == ErrorCode::Format);
+}
+
+TEST_CASE("compact lists are stored in 2/5 of what full ones take, and refused when they aren't sound") {
+  const Vdi vdi = test::plausibleVdi(480, 270, 25);
+  const Vdi compact = test::compact(vdi);
+  const std::vector<std::byte> bytes = io::encode(compact);
+  CHECK(bytes.size() * 5 < io::encode(vdi).size() * 2);
+  const io::VdiFileInfo info = io::decodeInfo(bytes);
+  CHECK(info.header.precision() == Precision::Compact);
+  CHECK(info.expandedBytes == compact.supersegmentCount() * 8 + compact.offsets().size() * 4);
+  const auto refused = [&](auto change) {
+    Vdi broken = compact;
+    change(broken);
+    CHECK(test::errorOf([&] { io::encode(broken); }).code() == ErrorCode::Format);
+  };
+  refused([](Vdi& v) { v.depthCode.step = 0.0F; });
+  refused([](Vdi& v) { v.depthCode.first = std::numeric_limits<float>::quiet_NaN(); });
+  refused([](Vdi& v) {
+    std::get<CompactLists>(v.lists).segments[5].depths = 7;
+  });  // ends where it begins, or before
 }
 
 TEST_CASE("a VDI such as a generator makes is stored in less than 5/8 of its memory") {

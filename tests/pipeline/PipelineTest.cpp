@@ -12,6 +12,7 @@
 #include "vdi/io/Png.h"
 #include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Pipeline.h"
+#include "vdi/reference/Compaction.h"
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
@@ -42,20 +43,25 @@ ImageDifference differenceOf(const Image& a, const Image& b) {
   return compare(io::toPicture(a).rgb, io::toPicture(b).rgb, a.width, a.height, 3);
 }
 
-bool alike(const Supersegment& a, const Supersegment& b) {
-  const auto close = [](float x, float y) { return std::abs(x - y) < 2e-3F; };
+constexpr float rounding = 2e-3F;
+constexpr float oneCode = 1.5F / 255.0F;
+
+bool alike(const Supersegment& a, const Supersegment& b, float tolerance) {
+  const auto close = [&](float x, float y) { return std::abs(x - y) < tolerance; };
   return close(a.front, b.front) && close(a.back, b.back) && close(a.red, b.red) && close(a.green, b.green) &&
          close(a.blue, b.blue) && close(a.opacity, b.opacity);
 }
 
 /// Rounding may tip a decision, so a few are to be expected.
-std::size_t listsThatDiffer(const SupersegmentLists& a, const SupersegmentLists& b) {
+std::size_t listsThatDiffer(const SupersegmentLists& a, const SupersegmentLists& b,
+                            float tolerance = rounding) {
   REQUIRE(a.listCount() == b.listCount());
   std::size_t count = 0;
   for (std::size_t i = 0; i < a.listCount(); ++i) {
     const auto x = a.list(i);
     const auto y = b.list(i);
-    count += std::equal(x.begin(), x.end(), y.begin(), y.end(), alike) ? 0 : 1;
+    const auto same = [&](const Supersegment& s, const Supersegment& t) { return alike(s, t, tolerance); };
+    count += std::equal(x.begin(), x.end(), y.begin(), y.end(), same) ? 0 : 1;
   }
   return count;
 }
@@ -95,13 +101,23 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
         INFO(toString(algorithm));
         GenerateSettings own = settings;
         own.algorithm = algorithm;
-        vdi = generator.generate(camera, function, own);
-        CHECK_NOTHROW(validate(*vdi));
         const reference::Frame ownFrame(generator.scene(), camera, function, own);
         const SupersegmentLists lists = reference::generate(ownFrame, dealt.mine, false);
         CHECK(lists.segments.size() > lists.listCount());
-        CHECK(listsThatDiffer(vdi->lists, lists) <= lists.listCount() / 50);
-        CHECK(largestDifference(flatten(*vdi), expected) < 0.5F);
+        own.precision = Precision::Full;
+        const auto full = generator.generate(camera, function, own);
+        CHECK_NOTHROW(validate(*full));
+        own.precision = Precision::Compact;
+        vdi = generator.generate(camera, function, own);
+        CHECK_NOTHROW(validate(*vdi));
+        CHECK(vdi->precision() == Precision::Compact);
+        CHECK(listsThatDiffer(full->expandedLists(), lists) <= lists.listCount() / 50);
+        CHECK(largestDifference(flatten(*full), expected) < 0.5F);
+        // The codes, from the very floats that the device made: rounding may tip a few of them.
+        const SupersegmentLists codes =
+            expanded(reference::compacted(full->expandedLists(), vdi->depthCode), vdi->depthCode);
+        CHECK(listsThatDiffer(vdi->expandedLists(), codes, oneCode) <= lists.listCount() / 50);
+        CHECK(largestDifference(flatten(*vdi), expected) < 1.0F);
       }
 
       VdiRenderer renderer(device());
@@ -136,7 +152,7 @@ TEST_CASE("merging and compositing on the device equal the reference") {
   }
   const SupersegmentLists expected = reference::composite(subLists, 6, frame.lattice.step, algorithm);
   detail::Compositor compositor(device());
-  const SupersegmentLists result = compositor.composite(subLists, 6, frame.lattice.step, algorithm);
+  const SupersegmentLists result = compositor.composite(subLists, {6, frame.lattice.step, algorithm, {}});
   CHECK(listsThatDiffer(result, expected) <= expected.listCount() / 50);
   std::vector<glm::vec4> rgba(result.listCount());
   std::vector<float> depth(result.listCount());
@@ -148,6 +164,18 @@ TEST_CASE("merging and compositing on the device equal the reference") {
       sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
     for (int c = 0; c < 4; ++c) CHECK(std::abs(sum[c] - rgba[i][c]) < 0.5F / 255.0F);
   }
+  // Codes in, codes out: what the reference makes of the codes' values.
+  const DepthCode code = depthCodeFor(frame.lattice);
+  std::vector<CompactLists> subCodes;
+  std::vector<SupersegmentLists> subValues;
+  for (const SupersegmentLists& sub : subLists) {
+    subCodes.push_back(reference::compacted(sub, code));
+    subValues.push_back(expanded(subCodes.back(), code));
+  }
+  const SupersegmentLists ofCodes = reference::composite(subValues, 6, frame.lattice.step, algorithm);
+  const CompactLists codes = compositor.composite(subCodes, {6, frame.lattice.step, algorithm, code});
+  CHECK(listsThatDiffer(expanded(codes, code), expanded(reference::compacted(ofCodes, code), code),
+                        oneCode) <= expected.listCount() / 25);
   CHECK(device()->validationMessages() == "");
 }
 

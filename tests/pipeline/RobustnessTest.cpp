@@ -91,7 +91,7 @@ TEST_CASE("cameras inside, behind and looking away") {
   away.position = {0.5, 0.5, -3.0};
   away.focalPoint = {0.5, 0.5, -4.0};
   const auto nothing = generator.generate(away, test::threeHues(1.0), settings);
-  CHECK(nothing->lists.segments.empty());
+  CHECK(nothing->supersegmentCount() == 0);
   CHECK(highestOpacity(*generator.renderVolume(away, test::threeHues(1.0), settings)) == 0.0F);
   renderer.setVdi(*nothing);
   CHECK(highestOpacity(renderer.render(away, 8, 8)) == 0.0F);
@@ -101,17 +101,17 @@ TEST_CASE("no blocks, empty blocks, a transparent function, one supersegment, co
   VdiGenerator generator(device(), comm::Communicator::serial());
   const GenerateSettings settings = test::smallSettings();
   generator.setBlocks({});
-  CHECK(generator.generate(test::oblique(), test::threeHues(1.0), settings)->lists.segments.empty());
+  CHECK(generator.generate(test::oblique(), test::threeHues(1.0), settings)->supersegmentCount() == 0);
 
   Block flat = cube(8, 1.0 / 7.0, [](const glm::ivec3&) { return 0.7F; });
   flat.owned.hi.x = flat.owned.lo.x;
   generator.setBlocks({flat});
-  CHECK(generator.generate(test::oblique(), test::threeHues(1.0), settings)->lists.segments.empty());
+  CHECK(generator.generate(test::oblique(), test::threeHues(1.0), settings)->supersegmentCount() == 0);
 
   generator.setBlocks({cube(8, 1.0 / 7.0, [](const glm::ivec3&) { return 0.7F; })});
   TransferFunction transparent = test::threeHues(1.0);
   for (OpacityNode& node : transparent.opacities) node.opacity = 0.0;
-  CHECK(generator.generate(test::oblique(), transparent, settings)->lists.segments.empty());
+  CHECK(generator.generate(test::oblique(), transparent, settings)->supersegmentCount() == 0);
 
   const auto single =
       generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(64, 48, 1));
@@ -137,11 +137,11 @@ TEST_CASE("scales of 1e-9 and 1e9 give the picture of scale 1") {
     const Image image = flatten(*vdi);
     if (scale == 1.0) {
       unit = image;
-      segments = vdi->lists.segments.size();
+      segments = vdi->supersegmentCount();
       CHECK(highestOpacity(image) > 0.5F);
       continue;
     }
-    CHECK(std::abs(static_cast<double>(vdi->lists.segments.size()) / static_cast<double>(segments) - 1.0) <
+    CHECK(std::abs(static_cast<double>(vdi->supersegmentCount()) / static_cast<double>(segments) - 1.0) <
           0.01);
     for (std::size_t i = 0; i < image.rgba.size(); ++i) {
       CHECK(glm::length(image.rgba[i] - unit.rgba[i]) < 2.0F / 255.0F);
@@ -180,6 +180,7 @@ TEST_CASE("wrong arguments are refused with their names") {
   CHECK(codeOf([&] { generator.generate(test::oblique(), empty, test::smallSettings()); }) ==
         ErrorCode::InvalidArgument);
   // After all that it still works.
-  CHECK(!generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings())
-             ->lists.segments.empty());
+  CHECK(
+      generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings())->supersegmentCount() >
+      0);
 }

@@ -24,11 +24,12 @@ std::vector<T> copyAs(std::span<const std::byte> bytes) {
 
 /// Lists from their counts and supersegments. Throws Error{Communication} when they don't match,
 /// Error{OutOfMemory} when the 32-bit offsets can't count them.
-SupersegmentLists assemble(std::span<const std::uint32_t> counts, std::vector<Supersegment> segments) {
+template <typename Segment>
+ListsOf<Segment> assemble(std::span<const std::uint32_t> counts, std::vector<Segment> segments) {
   if (segments.size() > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::OutOfMemory, "more than 2^32 - 1 supersegments in one VDI");
   }
-  SupersegmentLists lists;
+  ListsOf<Segment> lists;
   lists.offsets.reserve(counts.size() + 1);
   std::uint64_t total = 0;
   for (const std::uint32_t count : counts) {
@@ -42,7 +43,8 @@ SupersegmentLists assemble(std::span<const std::uint32_t> counts, std::vector<Su
   return lists;
 }
 
-std::vector<std::uint32_t> countsOf(const SupersegmentLists& lists) {
+template <typename Segment>
+std::vector<std::uint32_t> countsOf(const ListsOf<Segment>& lists) {
   std::vector<std::uint32_t> counts(lists.listCount());
   for (std::size_t i = 0; i < counts.size(); ++i) counts[i] = lists.countOf(i);
   return counts;
@@ -74,7 +76,8 @@ ListRange ownedLists(std::uint64_t listCount, int rank, int size) {
   return {first, first + share + (mine < rest ? 1 : 0)};
 }
 
-Received distribute(const Communicator& comm, const SupersegmentLists& sub) {
+template <typename Segment>
+Received<Segment> distribute(const Communicator& comm, const ListsOf<Segment>& sub) {
   assert(sub.offsets.back() == sub.segments.size());
   const auto ranks = static_cast<std::size_t>(comm.size());
   const auto me = static_cast<std::size_t>(comm.rank());
@@ -92,19 +95,18 @@ Received distribute(const Communicator& comm, const SupersegmentLists& sub) {
   const Gathered receivedCounts =
       comm.allToAll(std::as_bytes(std::span(counts)), listsTo, sizeof(std::uint32_t));
   const Gathered receivedSegments =
-      comm.allToAll(std::as_bytes(std::span(sub.segments)), segmentsTo, sizeof(Supersegment));
+      comm.allToAll(std::as_bytes(std::span(sub.segments)), segmentsTo, sizeof(Segment));
 
-  Received received;
+  Received<Segment> received;
   comm.together([&] {
     for (std::size_t r = 0; r < ranks; ++r) {
       const auto part = copyAs<std::uint32_t>(receivedCounts.of(static_cast<int>(r)));
       if (part.size() != listsTo[me]) {
         throw Error(ErrorCode::Communication, "the ranks' sub-VDIs have different numbers of lists");
       }
-      received.subLists.push_back(
-          assemble(part, copyAs<Supersegment>(receivedSegments.of(static_cast<int>(r)))));
+      received.subLists.push_back(assemble(part, copyAs<Segment>(receivedSegments.of(static_cast<int>(r)))));
       if (r == me) continue;
-      received.bytesSent += listsTo[r] * sizeof(std::uint32_t) + segmentsTo[r] * sizeof(Supersegment);
+      received.bytesSent += listsTo[r] * sizeof(std::uint32_t) + segmentsTo[r] * sizeof(Segment);
       received.bytesReceived +=
           receivedCounts.of(static_cast<int>(r)).size() + receivedSegments.of(static_cast<int>(r)).size();
     }
@@ -112,22 +114,27 @@ Received distribute(const Communicator& comm, const SupersegmentLists& sub) {
   return received;
 }
 
-SupersegmentLists gatherLists(const Communicator& comm, const SupersegmentLists& owned, int root) {
+template <typename Segment>
+ListsOf<Segment> gatherLists(const Communicator& comm, const ListsOf<Segment>& owned, int root) {
   assert(owned.offsets.back() == owned.segments.size());
   std::vector<std::uint32_t> counts;
   comm.together([&] { counts = countsOf(owned); });
   const Gathered allCounts = comm.gather(std::as_bytes(std::span(counts)), sizeof(std::uint32_t), root);
-  const Gathered allSegments =
-      comm.gather(std::as_bytes(std::span(owned.segments)), sizeof(Supersegment), root);
-  SupersegmentLists lists;
+  const Gathered allSegments = comm.gather(std::as_bytes(std::span(owned.segments)), sizeof(Segment), root);
+  ListsOf<Segment> lists;
   comm.together([&] {
     if (comm.rank() == root) {
       demandOwnedLists(allCounts);
-      lists = assemble(copyAs<std::uint32_t>(allCounts.bytes), copyAs<Supersegment>(allSegments.bytes));
+      lists = assemble(copyAs<std::uint32_t>(allCounts.bytes), copyAs<Segment>(allSegments.bytes));
     }
   });
   return lists;
 }
+
+template Received<Supersegment> distribute(const Communicator&, const SupersegmentLists&);
+template Received<CompactSupersegment> distribute(const Communicator&, const CompactLists&);
+template SupersegmentLists gatherLists(const Communicator&, const SupersegmentLists&, int);
+template CompactLists gatherLists(const Communicator&, const CompactLists&, int);
 
 Scene globalScene(const Communicator& comm, const Scene& local) {
   std::array<double, 7> least{

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "vdi/core/Supersegment.h"
+
 namespace vdi {
 
 /// How samples become supersegments.
@@ -22,6 +24,8 @@ struct GenerateSettings {
   std::uint32_t supersegments = 25;  // N_S, 1 .. 1024
   double samplesPerVoxel = 1.0;      // [1/64, 64]
   Algorithm algorithm = Algorithm::Merge;
+  /// Rays of more samples than depthCodeFor can number give a VDI of full precision all the same.
+  Precision precision = Precision::Compact;
   /// A ray ends once it has accumulated this opacity: (0, 1]; 1 never ends early. What's hidden behind it at
   /// V_O is missing when seen from V_N.
   double terminationOpacity = 0.9999;

@@ -1,41 +1,16 @@
-// Supersegments, lists and the VDI itself (paper, sections 2.4 and 4).
+// The VDI itself (paper, sections 2.4 and 4).
 #pragma once
 
 #include <cstdint>
 #include <span>
+#include <variant>
 #include <vector>
 
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
+#include "vdi/core/Supersegment.h"
 
 namespace vdi {
-
-/// One depth interval of a list. The colour is premultiplied and accumulated over the whole interval, and so
-/// is the opacity. A part of length l' of an interval of length l has opacity a' = 1 - (1 - a)^(l'/l), colour
-/// scaled by a'/a.
-struct Supersegment {
-  float front = 0.0F;  // view-space depth of V_O, world units
-  float back = 0.0F;   // > front
-  float red = 0.0F;
-  float green = 0.0F;
-  float blue = 0.0F;
-  float opacity = 0.0F;  // in (0, 1]
-  bool operator==(const Supersegment&) const = default;
-};
-static_assert(sizeof(Supersegment) == 24);
-
-/// Compact lists: list i is segments[offsets[i] .. offsets[i + 1]), front to back, disjoint.
-struct SupersegmentLists {
-  std::vector<std::uint32_t> offsets{0};  // exclusive prefix sum, listCount() + 1 entries
-  std::vector<Supersegment> segments;
-
-  std::size_t listCount() const { return offsets.size() - 1; }
-  std::uint32_t countOf(std::size_t list) const { return offsets[list + 1] - offsets[list]; }
-  std::span<const Supersegment> list(std::size_t i) const {
-    return std::span(segments).subspan(offsets[i], countOf(i));
-  }
-  bool operator==(const SupersegmentLists&) const = default;
-};
 
 /// A whole VDI with everything that is needed to render it. List (x, y) has the index y * width + x, row 0 at
 /// the bottom.
@@ -48,15 +23,30 @@ struct Vdi {
   double sampleStep = 0.0;   // depth interval of one sample (DepthLattice::step)
   double time = 0.0;         // simulation time, 0 when unknown
   std::uint64_t timeStep = 0;
-  SupersegmentLists lists;  // width * height lists
+  DepthCode depthCode;                                  // of compact lists; all 0 otherwise
+  std::variant<SupersegmentLists, CompactLists> lists;  // width * height lists
 
   View view() const { return {camera, width, height}; }
+  Precision precision() const {
+    return std::holds_alternative<CompactLists>(lists) ? Precision::Compact : Precision::Full;
+  }
+  const std::vector<std::uint32_t>& offsets() const {  // exclusive prefix sum, a list more than there are
+    return std::visit([](const auto& l) -> const std::vector<std::uint32_t>& { return l.offsets; }, lists);
+  }
+  std::size_t listCount() const { return offsets().size() - 1; }
+  std::size_t supersegmentCount() const {
+    return std::visit([](const auto& l) { return l.segments.size(); }, lists);
+  }
+  /// Of all lists, as floats whatever the precision is: index in [0, supersegmentCount()).
+  Supersegment supersegment(std::size_t index) const;
+  /// All lists as floats; a copy.
+  SupersegmentLists expandedLists() const;
   bool operator==(const Vdi&) const = default;
 };
 
-/// Throws Error{Format} unless: the offsets ascend from 0 to segments.size(), there are width * height lists,
-/// each list holds at most `budget` supersegments with finite values, 0 <= front < back, ascending and
-/// disjoint, opacity in (0, 1].
+/// Throws Error{Format} unless: the offsets ascend from 0 to the number of supersegments, there are
+/// width * height lists, each list holds at most `budget` supersegments with finite values, 0 <= front <
+/// back, ascending and disjoint, opacity in (0, 1]; and compact lists have a depth code with positive step.
 void validate(const Vdi& vdi);
 
 }  // namespace vdi

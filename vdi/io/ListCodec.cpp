@@ -6,6 +6,8 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <cstring>
+#include <type_traits>
 
 #include "vdi/core/Error.h"
 
@@ -13,41 +15,9 @@ namespace vdi::io::detail {
 
 namespace {
 
-/// The bit patterns of a supersegment's floats. Prediction is integer arithmetic on them: floating point
-/// would make the file depend on the rounding mode that the host program runs in.
-struct Words {
-  std::uint32_t front = 0;
-  std::uint32_t back = 0;
-  std::uint32_t opacity = 0;
-  std::array<std::uint32_t, 3> color{};
-};
-
-Words wordsOf(const Supersegment& s) {
-  return {std::bit_cast<std::uint32_t>(s.front),
-          std::bit_cast<std::uint32_t>(s.back),
-          std::bit_cast<std::uint32_t>(s.opacity),
-          {std::bit_cast<std::uint32_t>(s.red), std::bit_cast<std::uint32_t>(s.green),
-           std::bit_cast<std::uint32_t>(s.blue)}};
-}
-
-Supersegment segmentOf(const Words& w) {
-  return {std::bit_cast<float>(w.front),    std::bit_cast<float>(w.back),
-          std::bit_cast<float>(w.color[0]), std::bit_cast<float>(w.color[1]),
-          std::bit_cast<float>(w.color[2]), std::bit_cast<float>(w.opacity)};
-}
-
-/// What a supersegment is predicted from.
-struct Context {
-  Words reference;         // the one at the same place of the list before
-  std::uint32_t previous;  // where this one begins if it follows the last one without a gap
-};
-
-/// Premultiplied colours grow with opacity; the bit pattern of a float is close to its logarithm, so a factor
-/// is a difference.
-std::uint32_t predictColor(const Context& context, std::uint32_t opacity, std::size_t channel) {
-  const std::uint32_t color = context.reference.color[channel];
-  return color == 0 ? 0 : color + (opacity - context.reference.opacity);
-}
+/// The columns of a chunk, one number of each for a supersegment.
+constexpr std::size_t columns = 6;
+using Words = std::array<std::uint32_t, columns>;
 
 /// Small differences of either sign become small numbers.
 std::uint32_t fold(std::uint32_t difference) {
@@ -57,29 +27,122 @@ std::uint32_t unfold(std::uint32_t folded) {
   return (folded >> 1) ^ (0U - (folded & 1U));
 }
 
-/// The order of the columns in the file.
-constexpr std::size_t columns = 6;
-using Residuals = std::array<std::uint32_t, columns>;
+/// What a supersegment is predicted from: the one at the same place of the list before, and where this one
+/// begins if it follows the last one without a gap.
+template <typename Coding>
+struct Context {
+  typename Coding::Fields reference{};
+  std::uint32_t previous = 0;
+};
 
-Residuals residualsOf(const Words& w, const Context& context) {
-  return {fold(w.front - context.previous),
-          w.back - w.front,  // never negative
-          fold(w.opacity - context.reference.opacity),
-          fold(w.color[0] - predictColor(context, w.opacity, 0)),
-          fold(w.color[1] - predictColor(context, w.opacity, 1)),
-          fold(w.color[2] - predictColor(context, w.opacity, 2))};
-}
+/// Encoding 0. Fields are the bit patterns of floats. Prediction is integer arithmetic on them: floating
+/// point would make the file depend on the rounding mode that the host program runs in.
+struct FullCoding {
+  using Segment = Supersegment;
+  static constexpr Precision precision = Precision::Full;
+  static constexpr std::size_t codeBytes = 0;
+  static constexpr std::array<std::size_t, columns> bytes{4, 4, 4, 4, 4, 4};
 
-Words restore(const Residuals& residuals, const Context& context) {
-  Words w;
-  w.front = context.previous + unfold(residuals[0]);
-  w.back = w.front + residuals[1];
-  w.opacity = context.reference.opacity + unfold(residuals[2]);
-  for (std::size_t c = 0; c < 3; ++c) {
-    w.color[c] = predictColor(context, w.opacity, c) + unfold(residuals[3 + c]);
+  struct Fields {
+    std::uint32_t front = 0;
+    std::uint32_t back = 0;
+    std::uint32_t opacity = 0;
+    std::array<std::uint32_t, 3> color{};
+  };
+
+  static Fields fieldsOf(const Segment& s) {
+    return {std::bit_cast<std::uint32_t>(s.front),
+            std::bit_cast<std::uint32_t>(s.back),
+            std::bit_cast<std::uint32_t>(s.opacity),
+            {std::bit_cast<std::uint32_t>(s.red), std::bit_cast<std::uint32_t>(s.green),
+             std::bit_cast<std::uint32_t>(s.blue)}};
   }
-  return w;
-}
+
+  static Segment segmentOf(const Fields& f) {
+    return {std::bit_cast<float>(f.front),    std::bit_cast<float>(f.back),
+            std::bit_cast<float>(f.color[0]), std::bit_cast<float>(f.color[1]),
+            std::bit_cast<float>(f.color[2]), std::bit_cast<float>(f.opacity)};
+  }
+
+  /// Premultiplied colours grow with opacity; the bit pattern of a float is close to its logarithm, so a
+  /// factor is a difference.
+  static std::uint32_t predictColor(const Context<FullCoding>& context, std::uint32_t opacity,
+                                    std::size_t channel) {
+    const std::uint32_t color = context.reference.color[channel];
+    return color == 0 ? 0 : color + (opacity - context.reference.opacity);
+  }
+
+  static Words residualsOf(const Fields& f, const Context<FullCoding>& context) {
+    return {fold(f.front - context.previous),
+            f.back - f.front,  // never negative
+            fold(f.opacity - context.reference.opacity),
+            fold(f.color[0] - predictColor(context, f.opacity, 0)),
+            fold(f.color[1] - predictColor(context, f.opacity, 1)),
+            fold(f.color[2] - predictColor(context, f.opacity, 2))};
+  }
+
+  static Fields restore(const Words& residuals, const Context<FullCoding>& context) {
+    Fields f;
+    f.front = context.previous + unfold(residuals[0]);
+    f.back = f.front + residuals[1];
+    f.opacity = context.reference.opacity + unfold(residuals[2]);
+    for (std::size_t c = 0; c < 3; ++c)
+      f.color[c] = predictColor(context, f.opacity, c) + unfold(residuals[3 + c]);
+    return f;
+  }
+};
+
+/// Encoding 1. Fields are the codes of a CompactSupersegment. Colours are straight, so they don't depend on
+/// opacity; their residuals are differences modulo 256.
+struct CompactCoding {
+  using Segment = CompactSupersegment;
+  static constexpr Precision precision = Precision::Compact;
+  static constexpr std::size_t codeBytes = sizeof(DepthCode);  // in front of the chunk
+  static constexpr std::array<std::size_t, columns> bytes{2, 2, 2, 1, 1, 1};
+
+  struct Fields {
+    std::uint32_t front = 0;
+    std::uint32_t back = 0;
+    std::uint32_t opticalDepth = 0;
+    std::array<std::uint32_t, 3> color{};
+  };
+
+  static Fields fieldsOf(const Segment& s) {
+    return {s.front(), s.back(), s.opticalDepth(), {s.color(0), s.color(1), s.color(2)}};
+  }
+
+  static Segment segmentOf(const Fields& f) {
+    return Segment::pack(f.front & 0x7fffU, f.back & 0x7fffU, f.color[0] & 0xffU, f.color[1] & 0xffU,
+                         f.color[2] & 0xffU, f.opticalDepth & 0x3ffU);
+  }
+
+  /// A difference as a signed byte, folded.
+  static std::uint32_t foldByte(std::uint32_t difference) {
+    return fold((difference & 0xffU) < 128 ? difference & 0xffU : difference | ~0xffU) & 0xffU;
+  }
+
+  static Words residualsOf(const Fields& f, const Context<CompactCoding>& context) {
+    return {fold(f.front - context.previous),
+            f.back - f.front,
+            fold(f.opticalDepth - context.reference.opticalDepth),
+            foldByte(f.color[0] - context.reference.color[0]),
+            foldByte(f.color[1] - context.reference.color[1]),
+            foldByte(f.color[2] - context.reference.color[2])};
+  }
+
+  static Fields restore(const Words& residuals, const Context<CompactCoding>& context) {
+    Fields f;
+    f.front = (context.previous + unfold(residuals[0])) & 0x7fffU;
+    f.back = (f.front + residuals[1]) & 0x7fffU;
+    f.opticalDepth = (context.reference.opticalDepth + unfold(residuals[2])) & 0x3ffU;
+    for (std::size_t c = 0; c < 3; ++c)
+      f.color[c] = (context.reference.color[c] + unfold(residuals[3 + c])) & 0xffU;
+    return f;
+  }
+};
+
+template <typename Segment>
+using CodingOf = std::conditional_t<std::is_same_v<Segment, Supersegment>, FullCoding, CompactCoding>;
 
 /// Walks the supersegments of a chunk in order: which one each is predicted from, by index in the chunk.
 class Walk {
@@ -114,24 +177,24 @@ class Walk {
   std::size_t next_ = 0;
 };
 
-Context contextOf(const Walk::Step& step, std::span<const Supersegment> segments, std::size_t index) {
-  Context context{};
-  if (step.reference != Walk::none) context.reference = wordsOf(segments[step.reference]);
-  context.previous =
-      step.firstOfList ? context.reference.front : std::bit_cast<std::uint32_t>(segments[index - 1].back);
+template <typename Coding>
+Context<Coding> contextOf(const Walk::Step& step, std::span<const typename Coding::Segment> segments,
+                          std::size_t index) {
+  Context<Coding> context;
+  if (step.reference != Walk::none) context.reference = Coding::fieldsOf(segments[step.reference]);
+  context.previous = step.firstOfList ? context.reference.front : Coding::fieldsOf(segments[index - 1]).back;
   return context;
 }
 
-/// Columns of 32-bit words, byte b of word i of a column of n at planes[b * n + i]: bytes of one significance
-/// lie together, and the upper ones are mostly zero.
-void putWord(std::byte* planes, std::size_t count, std::size_t i, std::uint32_t word) {
-  for (std::size_t b = 0; b < 4; ++b) planes[b * count + i] = static_cast<std::byte>(word >> (8 * b));
+/// Columns of numbers of `bytes` bytes, byte b of number i of a column of n at planes[b * n + i]: bytes of
+/// one significance lie together, and the upper ones are mostly zero.
+void putWord(std::byte* planes, std::size_t count, std::size_t i, std::uint32_t word, std::size_t bytes) {
+  for (std::size_t b = 0; b < bytes; ++b) planes[b * count + i] = static_cast<std::byte>(word >> (8 * b));
 }
-std::uint32_t getWord(const std::byte* planes, std::size_t count, std::size_t i) {
+std::uint32_t getWord(const std::byte* planes, std::size_t count, std::size_t i, std::size_t bytes) {
   std::uint32_t word = 0;
-  for (std::size_t b = 0; b < 4; ++b) {
+  for (std::size_t b = 0; b < bytes; ++b)
     word |= static_cast<std::uint32_t>(planes[b * count + i]) << (8 * b);
-  }
   return word;
 }
 
@@ -148,27 +211,35 @@ bool canExpandTo(std::uint64_t packedBytes, std::uint64_t bytes) {
   return bytes <= packedBytes * 255 && packedBytes <= bound;
 }
 
-std::vector<std::byte> packLists(const SupersegmentLists& lists, std::size_t first, std::size_t last) {
+template <typename Segment>
+std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode& code, std::size_t first,
+                                 std::size_t last) {
+  using Coding = CodingOf<Segment>;
   const std::size_t listCount = last - first;
   const std::size_t begin = lists.offsets[first];
   const std::size_t count = lists.offsets[last] - begin;
-  const std::span<const Supersegment> segments = std::span(lists.segments).subspan(begin, count);
-  const std::uint64_t size = expandedBytes(listCount, count);
+  const std::span<const Segment> segments = std::span(lists.segments).subspan(begin, count);
+  const std::uint64_t size = expandedBytes(listCount, count, Coding::precision);
   if (size > LZ4_MAX_INPUT_SIZE) throw Error(ErrorCode::Io, "too many supersegments in one chunk of lists");
 
   std::vector<std::byte> plain(size);
-  std::byte* const columnData = plain.data() + listCount * sizeof(std::uint32_t);
+  std::byte* const lengths = plain.data() + Coding::codeBytes;
+  std::byte* const columnData = lengths + listCount * sizeof(std::uint32_t);
+  if constexpr (Coding::codeBytes > 0) std::memcpy(plain.data(), &code, Coding::codeBytes);
   Walk walk;
   std::size_t index = 0;
   for (std::size_t i = 0; i < listCount; ++i) {
     const std::uint32_t length = lists.countOf(first + i);
-    putWord(plain.data(), listCount, i, length);
+    putWord(lengths, listCount, i, length, sizeof(length));
     walk.beginList(length);
     for (std::uint32_t j = 0; j < length; ++j, ++index) {
-      const Residuals residuals =
-          residualsOf(wordsOf(segments[index]), contextOf(walk.step(), segments, index));
-      for (std::size_t c = 0; c < columns; ++c)
-        putWord(columnData + c * count * 4, count, index, residuals[c]);
+      const Words residuals = Coding::residualsOf(Coding::fieldsOf(segments[index]),
+                                                  contextOf<Coding>(walk.step(), segments, index));
+      std::byte* column = columnData;
+      for (std::size_t c = 0; c < columns; ++c) {
+        putWord(column, count, index, residuals[c], Coding::bytes[c]);
+        column += count * Coding::bytes[c];
+      }
     }
   }
 
@@ -181,10 +252,12 @@ std::vector<std::byte> packLists(const SupersegmentLists& lists, std::size_t fir
   return packed;
 }
 
-void unpackLists(std::span<const std::byte> packed, std::uint32_t before, std::span<std::uint32_t> ends,
-                 std::span<Supersegment> segments) {
+template <typename Segment>
+DepthCode unpackLists(std::span<const std::byte> packed, std::uint32_t before, std::span<std::uint32_t> ends,
+                      std::span<Segment> segments) {
+  using Coding = CodingOf<Segment>;
   const std::size_t count = segments.size();
-  const std::uint64_t size = expandedBytes(ends.size(), count);
+  const std::uint64_t size = expandedBytes(ends.size(), count, Coding::precision);
   assert(canExpandTo(packed.size(), size));
   std::vector<std::byte> plain(size);
   const int got =
@@ -192,23 +265,38 @@ void unpackLists(std::span<const std::byte> packed, std::uint32_t before, std::s
                           static_cast<int>(packed.size()), static_cast<int>(size));
   if (got < 0 || static_cast<std::uint64_t>(got) != size) fail("it doesn't decompress to its size");
 
-  const std::byte* const columnData = plain.data() + ends.size() * sizeof(std::uint32_t);
+  const std::byte* const lengths = plain.data() + Coding::codeBytes;
+  const std::byte* const columnData = lengths + ends.size() * sizeof(std::uint32_t);
+  DepthCode code;
+  if constexpr (Coding::codeBytes > 0) std::memcpy(&code, plain.data(), Coding::codeBytes);
   Walk walk;
   std::size_t index = 0;
   for (std::size_t i = 0; i < ends.size(); ++i) {
-    const std::uint32_t length = getWord(plain.data(), ends.size(), i);
+    const std::uint32_t length = getWord(lengths, ends.size(), i, sizeof(length));
     if (length > count - index) fail("it has more supersegments than announced");
     walk.beginList(length);
     for (std::uint32_t j = 0; j < length; ++j, ++index) {
-      Residuals residuals;
+      Words residuals;
+      const std::byte* column = columnData;
       for (std::size_t c = 0; c < columns; ++c) {
-        residuals[c] = getWord(columnData + c * count * 4, count, index);
+        residuals[c] = getWord(column, count, index, Coding::bytes[c]);
+        column += count * Coding::bytes[c];
       }
-      segments[index] = segmentOf(restore(residuals, contextOf(walk.step(), segments, index)));
+      segments[index] =
+          Coding::segmentOf(Coding::restore(residuals, contextOf<Coding>(walk.step(), segments, index)));
     }
     ends[i] = before + static_cast<std::uint32_t>(index);
   }
   if (index != count) fail("it has fewer supersegments than announced");
+  return code;
 }
+
+template std::vector<std::byte> packLists(const SupersegmentLists&, const DepthCode&, std::size_t,
+                                          std::size_t);
+template std::vector<std::byte> packLists(const CompactLists&, const DepthCode&, std::size_t, std::size_t);
+template DepthCode unpackLists(std::span<const std::byte>, std::uint32_t, std::span<std::uint32_t>,
+                               std::span<Supersegment>);
+template DepthCode unpackLists(std::span<const std::byte>, std::uint32_t, std::span<std::uint32_t>,
+                               std::span<CompactSupersegment>);
 
 }  // namespace vdi::io::detail

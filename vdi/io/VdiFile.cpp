@@ -21,7 +21,8 @@ static_assert(std::endian::native == std::endian::little, "the .vdi file is read
 
 constexpr std::array<char, 8> magicText{'V', 'D', 'I', '-', 'F', 'I', 'L', 'E'};
 constexpr std::uint32_t currentVersion = 1;
-constexpr std::uint32_t encodingFull = 0;  // 32-bit floats, lossless: ListCodec.h
+// Encodings are the numbers of Precision.
+static_assert(static_cast<int>(Precision::Full) == 0 && static_cast<int>(Precision::Compact) == 1);
 constexpr std::uint32_t flagParallel = 1;
 constexpr std::uint32_t knownFlags = flagParallel;
 constexpr std::uint32_t chunkLists = 4096;
@@ -104,6 +105,10 @@ std::uint64_t checksumOf(const Header& header) {
   return XXH64(&header, offsetof(Header, headerChecksum), 0);
 }
 
+Precision precisionOf(const Header& header) {
+  return static_cast<Precision>(header.encoding);
+}
+
 std::uint64_t chunksOf(std::uint64_t lists, std::uint32_t listsPerChunk) {
   return (lists + listsPerChunk - 1) / listsPerChunk;
 }
@@ -128,14 +133,14 @@ Header headerOf(const Vdi& vdi) {
   header.magic = magicText;
   header.version = currentVersion;
   header.headerBytes = sizeof(Header);
-  header.encoding = encodingFull;
+  header.encoding = static_cast<std::uint32_t>(vdi.precision());
   header.flags = vdi.camera.parallelProjection ? flagParallel : 0;
   header.width = static_cast<std::uint32_t>(vdi.width);
   header.height = static_cast<std::uint32_t>(vdi.height);
   header.budget = vdi.budget;
   header.listsPerChunk = chunkLists;
-  header.chunkCount = static_cast<std::uint32_t>(chunksOf(vdi.lists.listCount(), chunkLists));
-  header.supersegmentCount = vdi.lists.segments.size();
+  header.chunkCount = static_cast<std::uint32_t>(chunksOf(vdi.listCount(), chunkLists));
+  header.supersegmentCount = vdi.supersegmentCount();
   header.timeStep = vdi.timeStep;
   header.time = vdi.time;
   header.sampleStep = vdi.sampleStep;
@@ -169,6 +174,7 @@ Vdi vdiOf(const Header& header) {
   vdi.camera.viewAngle = header.viewAngle;
   vdi.camera.parallelScale = header.parallelScale;
   vdi.camera.parallelProjection = (header.flags & flagParallel) != 0;
+  if (precisionOf(header) == Precision::Compact) vdi.lists = CompactLists();
   demandSoundHeader(vdi);
   return vdi;
 }
@@ -185,9 +191,9 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   }
   if (header.headerBytes != sizeof(Header)) fail(fmt::format("its header has {} bytes", header.headerBytes));
   if (header.headerChecksum != checksumOf(header)) fail("the header's checksum is wrong");
-  if (header.encoding != encodingFull) {
-    fail(fmt::format("its supersegments have encoding {}, this program reads encoding {}", header.encoding,
-                     encodingFull));
+  if (header.encoding > static_cast<std::uint32_t>(Precision::Compact)) {
+    fail(fmt::format("its supersegments have encoding {}, this program reads encodings 0 and 1",
+                     header.encoding));
   }
   if ((header.flags & ~knownFlags) != 0 || header.reserved != 0)
     fail("it uses flags that this program doesn't know");
@@ -235,7 +241,8 @@ std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> b
     next.checksum = entry.checksum;
     next.listCount = std::min<std::uint64_t>(header.listsPerChunk, lists - next.firstList);
     next.supersegmentCount = entry.supersegmentCount;
-    const std::uint64_t expanded = detail::expandedBytes(next.listCount, next.supersegmentCount);
+    const std::uint64_t expanded =
+        detail::expandedBytes(next.listCount, next.supersegmentCount, precisionOf(header));
     if (!detail::canExpandTo(next.packedBytes, expanded) ||
         next.supersegmentCount > next.listCount * header.budget) {
       fail(fmt::format("chunk {} can't hold {} supersegments in {} bytes", chunks.size(),
@@ -253,15 +260,18 @@ std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> b
   return chunks;
 }
 
-void decodeChunk(const Chunk& chunk, std::span<const std::byte> data, SupersegmentLists& lists) {
+/// Returns the depth code that the chunk's supersegments have.
+template <typename Segment>
+DepthCode decodeChunk(const Chunk& chunk, std::span<const std::byte> data, ListsOf<Segment>& lists) {
   const auto packed = data.subspan(chunk.dataOffset, chunk.packedBytes);
   if (chunk.checksum != checksumOf(packed)) {
     fail(fmt::format("the checksum of the chunk from list {} on is wrong", chunk.firstList));
   }
   try {
-    detail::unpackLists(packed, static_cast<std::uint32_t>(chunk.firstSupersegment),
-                        std::span(lists.offsets).subspan(chunk.firstList + 1, chunk.listCount),
-                        std::span(lists.segments).subspan(chunk.firstSupersegment, chunk.supersegmentCount));
+    return detail::unpackLists(
+        packed, static_cast<std::uint32_t>(chunk.firstSupersegment),
+        std::span(lists.offsets).subspan(chunk.firstList + 1, chunk.listCount),
+        std::span(lists.segments).subspan(chunk.firstSupersegment, chunk.supersegmentCount));
   } catch (const Error& error) {
     fail(fmt::format("the chunk from list {} on: {}", chunk.firstList, error.what()));
   }
@@ -274,7 +284,9 @@ VdiFileInfo infoOf(const Header& header, std::uint64_t fileBytes) {
   info.supersegmentCount = header.supersegmentCount;
   info.storedBytes = fileBytes;
   info.expandedBytes =
-      detail::expandedBytes(std::uint64_t{header.width} * header.height + 1, header.supersegmentCount);
+      (std::uint64_t{header.width} * header.height + 1) * sizeof(std::uint32_t) +
+      header.supersegmentCount *
+          (precisionOf(header) == Precision::Compact ? sizeof(CompactSupersegment) : sizeof(Supersegment));
   return info;
 }
 
@@ -300,9 +312,10 @@ std::vector<std::byte> encode(const Vdi& vdi) {
   std::vector<std::byte> bytes(dataStart);
   for (std::size_t i = 0; i < table.size(); ++i) {
     const std::size_t first = i * chunkLists;
-    const std::size_t last = std::min<std::size_t>(first + chunkLists, vdi.lists.listCount());
-    const std::vector<std::byte> packed = detail::packLists(vdi.lists, first, last);
-    table[i] = {vdi.lists.offsets[last] - vdi.lists.offsets[first], static_cast<std::uint32_t>(packed.size()),
+    const std::size_t last = std::min<std::size_t>(first + chunkLists, vdi.listCount());
+    const std::vector<std::byte> packed = std::visit(
+        [&](const auto& lists) { return detail::packLists(lists, vdi.depthCode, first, last); }, vdi.lists);
+    table[i] = {vdi.offsets()[last] - vdi.offsets()[first], static_cast<std::uint32_t>(packed.size()),
                 checksumOf(packed)};
     bytes.insert(bytes.end(), packed.begin(), packed.end());
   }
@@ -318,10 +331,18 @@ Vdi decode(std::span<const std::byte> bytes) {
   const Header header = parseHeader(bytes, bytes.size());
   const std::vector<Chunk> chunks = parseTable(header, bytes.subspan(sizeof(Header)));
   Vdi vdi = vdiOf(header);
-  vdi.lists.offsets.resize(std::size_t{header.width} * header.height + 1);
-  vdi.lists.segments.resize(header.supersegmentCount);
   const auto data = bytes.subspan(sizeof(Header) + tableBytesOf(header));
-  for (const Chunk& chunk : chunks) decodeChunk(chunk, data, vdi.lists);
+  std::visit(
+      [&](auto& lists) {
+        lists.offsets.resize(std::size_t{header.width} * header.height + 1);
+        lists.segments.resize(header.supersegmentCount);
+        for (const Chunk& chunk : chunks) {
+          const DepthCode code = decodeChunk(chunk, data, lists);
+          if (chunk.firstList == 0) vdi.depthCode = code;
+          if (code != vdi.depthCode) fail("its chunks have different depth codes");
+        }
+      },
+      vdi.lists);
   validate(vdi);
   return vdi;
 }

@@ -13,14 +13,14 @@ namespace vdi::io {
 /// What a reader can know without decompressing the lists.
 struct VdiFileInfo {
   std::uint32_t version = 0;
-  Vdi header;  // everything but the lists
+  Vdi header;  // everything but the lists and their depth code; its precision() is right
   std::uint64_t supersegmentCount = 0;
   std::uint64_t storedBytes = 0;    // whole file
   std::uint64_t expandedBytes = 0;  // offsets and supersegments in memory
 };
 
-/// Lossless, LZ4, checksummed. Deterministic: equal VDIs give equal bytes on every machine (little-endian).
-/// Throws Error{Format} for a VDI that decode would refuse.
+/// Lossless in the VDI's precision, LZ4, checksummed. Deterministic: equal VDIs give equal bytes on every
+/// machine (little-endian). Throws Error{Format} for a VDI that decode would refuse.
 std::vector<std::byte> encode(const Vdi& vdi);
 /// Throws Error{Format} for bytes that are truncated, altered, of another version or encoding, or whose
 /// header asks for more memory than their number can justify (before that is allocated; a sound file expands

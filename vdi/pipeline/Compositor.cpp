@@ -17,24 +17,24 @@ Compositor::Compositor(std::shared_ptr<gpu::Device> device)
       builder_(device_),
       params_(device_, sizeof(shared::CompositeParams), MemoryKind::Upload) {}
 
-SupersegmentLists Compositor::composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
-                                        double sampleStep, Algorithm algorithm) {
-  settings_.step = static_cast<float>(sampleStep);
-  settings_.budget = budget;
-  algorithm_ = algorithm;
-  sampleStep_ = sampleStep;
+template <typename Segment>
+ListsOf<Segment> Compositor::composite(const std::vector<ListsOf<Segment>>& subLists,
+                                       const Request& request) {
+  request_ = request;
+  settings_.step = static_cast<float>(request.sampleStep);
+  settings_.budget = request.budget;
+  settings_.form = storedForm(request.code);
   const std::size_t listCount = subLists.front().listCount();
-  SupersegmentLists result;
+  ListsOf<Segment> result;
   result.offsets.reserve(listCount + 1);
   // Bands of lists whose supersegments, received, merged and composited, take at most an eighth of the device
   // each.
-  const std::uint64_t most =
-      std::max<std::uint64_t>(device_->limits().memoryBytes / 8 / sizeof(Supersegment), 1);
+  const std::uint64_t most = std::max<std::uint64_t>(device_->limits().memoryBytes / 8 / sizeof(Segment), 1);
   for (std::size_t first = 0; first < listCount;) {
     std::size_t last = first;
     for (std::uint64_t total = 0; last < listCount; ++last) {
       std::uint64_t next = 0;
-      for (const SupersegmentLists& sub : subLists) next += sub.countOf(last);
+      for (const ListsOf<Segment>& sub : subLists) next += sub.countOf(last);
       if (last > first && total + next > most) break;
       total += next;
     }
@@ -45,19 +45,20 @@ SupersegmentLists Compositor::composite(std::span<const SupersegmentLists> subLi
 }
 
 /// Lists [first, last) of all ranks: supersegments to received_, offsets from 0 to subOffsets_.
-void Compositor::upload(std::span<const SupersegmentLists> subLists, std::size_t first, std::size_t last) {
+template <typename Segment>
+void Compositor::upload(const std::vector<ListsOf<Segment>>& subLists, std::size_t first, std::size_t last) {
   const std::size_t listCount = last - first;
   std::uint64_t total = 0;
-  for (const SupersegmentLists& sub : subLists) total += sub.offsets[last] - sub.offsets[first];
-  staging_.reserve(device_, total * sizeof(Supersegment), MemoryKind::Upload);
-  received_.reserve(device_, total * sizeof(Supersegment), MemoryKind::DeviceLocal);
+  for (const ListsOf<Segment>& sub : subLists) total += sub.offsets[last] - sub.offsets[first];
+  staging_.reserve(device_, total * sizeof(Segment), MemoryKind::Upload);
+  received_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
   rankAddresses_.reserve(device_, subLists.size() * sizeof(std::uint64_t), MemoryKind::Upload);
   subOffsets_.reserve(device_, subLists.size() * (listCount + 1) * sizeof(std::uint32_t), MemoryKind::Upload);
   std::uint64_t at = 0;
   for (std::size_t rank = 0; rank < subLists.size(); ++rank) {
-    const SupersegmentLists& sub = subLists[rank];
+    const ListsOf<Segment>& sub = subLists[rank];
     const std::uint32_t begin = sub.offsets[first];
-    const std::uint64_t bytes = (sub.offsets[last] - begin) * sizeof(Supersegment);
+    const std::uint64_t bytes = (sub.offsets[last] - begin) * sizeof(Segment);
     if (bytes > 0) std::memcpy(staging_.mapped().data() + at, sub.segments.data() + begin, bytes);
     rankAddresses_.mappedAs<std::uint64_t>()[rank] = received_.address() + at;
     const auto offsets = subOffsets_.mappedAs<std::uint32_t>().subspan(rank * (listCount + 1), listCount + 1);
@@ -66,17 +67,18 @@ void Compositor::upload(std::span<const SupersegmentLists> subLists, std::size_t
   }
 }
 
-void Compositor::compositeBand(std::span<const SupersegmentLists> subLists, std::size_t first,
-                               std::size_t last, SupersegmentLists& result) {
+template <typename Segment>
+void Compositor::compositeBand(const std::vector<ListsOf<Segment>>& subLists, std::size_t first,
+                               std::size_t last, ListsOf<Segment>& result) {
   const auto listCount = static_cast<std::uint32_t>(last - first);
   upload(subLists, first, last);
   std::uint64_t total = 0;
-  for (const SupersegmentLists& sub : subLists) total += sub.offsets[last] - sub.offsets[first];
+  for (const ListsOf<Segment>& sub : subLists) total += sub.offsets[last] - sub.offsets[first];
   const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
   heads_.reserve(device_, subLists.size() * words, MemoryKind::DeviceLocal);
   mergedCounts_.reserve(device_, words, MemoryKind::DeviceLocal);
   mergedOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
-  merged_.reserve(device_, total * sizeof(Supersegment), MemoryKind::DeviceLocal);
+  merged_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
 
   shared::MergeConstants merge{};
   merge.received = rankAddresses_.address();
@@ -86,9 +88,10 @@ void Compositor::compositeBand(std::span<const SupersegmentLists> subLists, std:
   merge.offsets = mergedOffsets_.address();
   merge.merged = merged_.address();
   merge.listCount = listCount;
+  merge.form = settings_.form;
   merge.rankCount = static_cast<std::uint32_t>(subLists.size());
   commands_.begin();
-  commands_.copy(staging_, 0, received_, 0, total * sizeof(Supersegment));
+  commands_.copy(staging_, 0, received_, 0, total * sizeof(Segment));
   merge.mode = shared::mergeModeCount;
   mergePass_.record(commands_, merge);
   commands_.barrier();
@@ -110,10 +113,13 @@ void Compositor::compositeBand(std::span<const SupersegmentLists> subLists, std:
     settings_.reductions = targets.reductions;
     settings_.status = targets.status;
     std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
-    compositePass_.record(commands, params_.address(), algorithm_, write, listCount);
+    compositePass_.record(commands, params_.address(), request_.algorithm, write, listCount);
   };
-  builder_.build({listCount, algorithm_, sampleStep_}, record, result);
+  builder_.build({listCount, request_.algorithm, request_.sampleStep, request_.code}, record, result);
 }
+
+template SupersegmentLists Compositor::composite(const std::vector<SupersegmentLists>&, const Request&);
+template CompactLists Compositor::composite(const std::vector<CompactLists>&, const Request&);
 
 void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::vec4> rgba,
                    std::span<float> depth) {

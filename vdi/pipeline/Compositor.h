@@ -18,14 +18,23 @@ class Compositor {
  public:
   explicit Compositor(std::shared_ptr<gpu::Device> device);
 
+  struct Request {
+    std::uint32_t budget = 1;
+    double sampleStep = 1.0;
+    Algorithm algorithm = Algorithm::Merge;
+    DepthCode code;  // of compact lists
+  };
+
   /// subLists[r] are rank r's supersegments of the owner's lists. The result has at most `budget` a list.
-  SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
-                              double sampleStep, Algorithm algorithm);
+  template <typename Segment>
+  ListsOf<Segment> composite(const std::vector<ListsOf<Segment>>& subLists, const Request& request);
 
  private:
-  void compositeBand(std::span<const SupersegmentLists> subLists, std::size_t first, std::size_t last,
-                     SupersegmentLists& result);
-  void upload(std::span<const SupersegmentLists> subLists, std::size_t first, std::size_t last);
+  template <typename Segment>
+  void compositeBand(const std::vector<ListsOf<Segment>>& subLists, std::size_t first, std::size_t last,
+                     ListsOf<Segment>& result);
+  template <typename Segment>
+  void upload(const std::vector<ListsOf<Segment>>& subLists, std::size_t first, std::size_t last);
 
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
@@ -43,8 +52,7 @@ class Compositor {
   gpu::Buffer mergedOffsets_;
   gpu::Buffer merged_;
   gpu::shared::CompositeParams settings_{};
-  Algorithm algorithm_ = Algorithm::Merge;
-  double sampleStep_ = 1.0;
+  Request request_;
 };
 
 /// The flat picture of the owner's lists: all ranks' supersegments of each list composited in order of depth.

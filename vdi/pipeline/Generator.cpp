@@ -84,6 +84,7 @@ std::uint64_t fingerprintOf(const GenerateSettings& settings) {
   print.add(settings.supersegments);
   print.add(settings.samplesPerVoxel);
   print.add(settings.algorithm);
+  print.add(settings.precision);
   print.add(settings.terminationOpacity);
   return print.value();
 }
@@ -126,7 +127,8 @@ struct VdiGenerator::State {
     });
     comm.demandEqual(fingerprintOf(camera), "camera");
     comm.demandEqual(fingerprintOf(function), "transfer function");
-    comm.demandEqual(fingerprintOf(settings), "resolution, supersegments, sampling rate or algorithm");
+    comm.demandEqual(fingerprintOf(settings),
+                     "resolution, supersegments, sampling rate, algorithm or precision");
     mine.generateSeconds = mine.distributeSeconds = mine.compositeSeconds = mine.gatherSeconds =
         mine.generateDeviceSeconds = 0.0;
     mine.subSupersegments = mine.bytesSent = 0;
@@ -146,6 +148,36 @@ struct VdiGenerator::State {
     std::array<std::uint64_t, 1> any{cancelled ? 1U : 0U};
     comm.allReduceMax(any);
     if (any[0] != 0) throw Error(ErrorCode::Cancelled, "stopped on request");
+  }
+
+  /// The VDI's lists, on the root; what it is that's sent and stored, Segment says.
+  template <typename Segment>
+  ListsOf<Segment> makeLists(const Prepared& prepared, const GenerateSettings& settings,
+                             const DepthCode& code, const Progress& progress) {
+    const bool alone = comm.size() == 1;
+    Stopwatch watch;
+    ListsOf<Segment> lists;
+    cancellable(progress, 0.8, [&](const detail::RayCaster::Progress& report) {
+      lists = caster->lists<Segment>(
+          {scene, prepared.view, prepared.lattice, prepared.table, settings, !alone, false, code}, report);
+    });
+    mine.subSupersegments = lists.segments.size();
+    mine.generateSeconds = watch.lap();
+    noteTimes();
+    if (alone) return lists;
+    comm::Received<Segment> received = comm::distribute(comm, lists);
+    mine.bytesSent = received.bytesSent;
+    mine.distributeSeconds = watch.lap();
+    cancellable(progress, 0.95, [&](const detail::RayCaster::Progress& report) {
+      lists = compositor->composite(
+          received.subLists, {settings.supersegments, prepared.lattice.step, settings.algorithm, code});
+      report(1.0);
+    });
+    received = {};
+    mine.compositeSeconds = watch.lap();
+    lists = comm::gatherLists(comm, lists, root);
+    mine.gatherSeconds = watch.lap();
+    return lists;
   }
 
   void noteTimes() {
@@ -194,41 +226,22 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
                                           const GenerateSettings& settings, const Progress& progress) {
   State& s = *state_;
   const auto prepared = s.prepare(camera, transferFunction, settings);
-  const bool alone = s.comm.size() == 1;
-  Stopwatch watch;
-  SupersegmentLists lists;
-  s.cancellable(progress, 0.8, [&](const detail::RayCaster::Progress& report) {
-    lists = s.caster->lists(
-        {s.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, false}, report);
-  });
-  s.mine.subSupersegments = lists.segments.size();
-  s.mine.generateSeconds = watch.lap();
-  s.noteTimes();
-  if (!alone) {
-    comm::Received received = comm::distribute(s.comm, lists);
-    s.mine.bytesSent = received.bytesSent;
-    s.mine.distributeSeconds = watch.lap();
-    s.cancellable(progress, 0.95, [&](const detail::RayCaster::Progress& report) {
-      lists = s.compositor->composite(received.subLists, settings.supersegments, prepared->lattice.step,
-                                      settings.algorithm);
-      report(1.0);
-    });
-    received = {};
-    s.mine.compositeSeconds = watch.lap();
-    lists = comm::gatherLists(s.comm, lists, root);
-    s.mine.gatherSeconds = watch.lap();
+  Vdi vdi;
+  if (settings.precision == Precision::Compact) vdi.depthCode = depthCodeFor(prepared->lattice);
+  if (vdi.depthCode.step > 0.0F) {
+    vdi.lists = s.makeLists<CompactSupersegment>(*prepared, settings, vdi.depthCode, progress);
+  } else {
+    vdi.lists = s.makeLists<Supersegment>(*prepared, settings, {}, progress);
   }
   s.shareReports();
   if (progress) progress(1.0);
   if (s.comm.rank() != root) return std::nullopt;
-  Vdi vdi;
   vdi.camera = camera;
   vdi.width = settings.width;
   vdi.height = settings.height;
   vdi.budget = settings.supersegments;
   vdi.bounds = s.scene.bounds;
   vdi.sampleStep = prepared->lattice.step;
-  vdi.lists = std::move(lists);
   return vdi;
 }
 
@@ -240,14 +253,14 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   const bool alone = s.comm.size() == 1;
   Stopwatch watch;
   const detail::RayCaster::Request request{
-      s.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, !alone};
+      s.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, !alone, {}};
   Image image;
   SupersegmentLists lists;
   s.cancellable(progress, 0.9, [&](const detail::RayCaster::Progress& report) {
     if (alone) {
       image = s.caster->image(request, report);
     } else {
-      lists = s.caster->lists(request, report);
+      lists = s.caster->lists<Supersegment>(request, report);
     }
   });
   s.mine.subSupersegments = lists.segments.size();
@@ -255,7 +268,7 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   s.noteTimes();
   if (!alone) {
     // The limit case of the paper's section 5.3: one supersegment a run, composited in order of depth.
-    const comm::Received received = comm::distribute(s.comm, lists);
+    const comm::Received<Supersegment> received = comm::distribute(s.comm, lists);
     s.mine.bytesSent = received.bytesSent;
     s.mine.distributeSeconds = watch.lap();
     const std::size_t owned = received.subLists.front().listCount();

@@ -18,6 +18,10 @@ ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
       reduce_(device_),
       status_(device_, sizeof(std::uint32_t), MemoryKind::Readback) {}
 
+shared::StoredForm storedForm(const DepthCode& code) {
+  return {code.first, code.step};
+}
+
 std::uint64_t ListBuilder::bytesPerList(std::uint32_t budget, Algorithm algorithm) {
   const std::uint64_t segments = std::uint64_t{budget} * sizeof(Supersegment);
   if (algorithm == Algorithm::Bisection) return segments;
@@ -25,7 +29,8 @@ std::uint64_t ListBuilder::bytesPerList(std::uint32_t budget, Algorithm algorith
          std::uint64_t{shared::grainsPerBudget} * budget * (sizeof(shared::Grain) + sizeof(glm::vec4));
 }
 
-void ListBuilder::build(const Request& request, const Record& record, SupersegmentLists& result) {
+template <typename Segment>
+void ListBuilder::build(const Request& request, const Record& record, ListsOf<Segment>& result) {
   const std::uint64_t words = (std::uint64_t{request.listCount} + 1) * sizeof(std::uint32_t);
   sensitivities_.reserve(device_, words, MemoryKind::DeviceLocal);
   counts_.reserve(device_, words, MemoryKind::DeviceLocal);
@@ -68,7 +73,8 @@ std::uint64_t ListBuilder::scanAndTotal(std::uint32_t listCount, gpu::Buffer& of
   return readback_.mappedAs<std::uint32_t>()[listCount];
 }
 
-void ListBuilder::appendOffsets(std::uint32_t listCount, SupersegmentLists& result) const {
+template <typename Segment>
+void ListBuilder::appendOffsets(std::uint32_t listCount, ListsOf<Segment>& result) const {
   const auto offsets = readback_.mappedAs<std::uint32_t>();
   const std::uint64_t before = result.segments.size();
   if (before + offsets[listCount] > std::numeric_limits<std::uint32_t>::max()) {
@@ -80,18 +86,20 @@ void ListBuilder::appendOffsets(std::uint32_t listCount, SupersegmentLists& resu
 }
 
 /// Ends the recording with the copy of the supersegments, submits and appends them.
-void ListBuilder::download(std::uint64_t total, SupersegmentLists& result) {
-  const std::uint64_t bytes = total * sizeof(Supersegment);
+template <typename Segment>
+void ListBuilder::download(std::uint64_t total, ListsOf<Segment>& result) {
+  const std::uint64_t bytes = total * sizeof(Segment);
   readback_.reserve(device_, bytes, MemoryKind::Readback);
   commands_.barrier();
   commands_.mark("download");
   commands_.copy(segments_, 0, readback_, 0, bytes);
   submit();
-  const auto written = readback_.mappedAs<Supersegment>().first(total);
+  const auto written = readback_.mappedAs<Segment>().first(total);
   result.segments.insert(result.segments.end(), written.begin(), written.end());
 }
 
-void ListBuilder::buildByBisection(const Request& request, const Record& record, SupersegmentLists& result) {
+template <typename Segment>
+void ListBuilder::buildByBisection(const Request& request, const Record& record, ListsOf<Segment>& result) {
   BandTargets targets;
   targets.sensitivities = sensitivities_.address();
   targets.counts = counts_.address();
@@ -104,7 +112,7 @@ void ListBuilder::buildByBisection(const Request& request, const Record& record,
   appendOffsets(request.listCount, result);
   if (total == 0) return;
 
-  segments_.reserve(device_, total * sizeof(Supersegment), MemoryKind::DeviceLocal);
+  segments_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
   targets.segments = segments_.address();
   commands_.begin();
   commands_.mark("write");
@@ -112,7 +120,8 @@ void ListBuilder::buildByBisection(const Request& request, const Record& record,
   download(total, result);
 }
 
-void ListBuilder::buildByMerging(const Request& request, const Record& record, SupersegmentLists& result) {
+template <typename Segment>
+void ListBuilder::buildByMerging(const Request& request, const Record& record, ListsOf<Segment>& result) {
   const std::uint64_t lists = request.listCount;
   grainOffsets_.reserve(device_, (lists + 1) * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
   reductions_.reserve(device_, lists * 2 * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
@@ -140,6 +149,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, S
   reduce.offsets = offsets_.address();
   reduce.step = static_cast<float>(request.sampleStep);
   reduce.listCount = request.listCount;
+  reduce.form = storedForm(request.code);
   reduce.mode = shared::reduceModeCount;
   commands_.begin();
   commands_.mark("write");
@@ -150,7 +160,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, S
   appendOffsets(request.listCount, result);
   if (total == 0) return;
 
-  segments_.reserve(device_, total * sizeof(Supersegment), MemoryKind::DeviceLocal);
+  segments_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
   reduce.segments = segments_.address();
   reduce.mode = shared::reduceModeWrite;
   commands_.begin();
@@ -158,5 +168,8 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, S
   reduce_.record(commands_, reduce);
   download(total, result);
 }
+
+template void ListBuilder::build(const Request&, const Record&, SupersegmentLists&);
+template void ListBuilder::build(const Request&, const Record&, CompactLists&);
 
 }  // namespace vdi::detail

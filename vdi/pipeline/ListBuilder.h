@@ -31,6 +31,9 @@ struct BandTargets {
   std::uint64_t status = 0;
 };
 
+/// What the shaders call the form that lists of that type have in memory.
+gpu::shared::StoredForm storedForm(const DepthCode& code);
+
 /// Device milliseconds: of all steps, of the algorithm's first one, and of its second one; each with its
 /// prefix sum.
 struct ListTimes {
@@ -59,21 +62,28 @@ class ListBuilder {
     std::uint32_t listCount = 0;
     Algorithm algorithm = Algorithm::Merge;
     double sampleStep = 1.0;
+    DepthCode code;  // of compact lists
   };
 
-  /// Runs all steps and appends what was written to `result`. Throws Error{OutOfMemory} when the
-  /// supersegments don't fit, Error{DeviceFailure} if a list's written count isn't its stored count.
-  void build(const Request& request, const Record& record, SupersegmentLists& result);
+  /// Runs all steps and appends what was written to `result`, compact or full as its type says. Throws
+  /// Error{OutOfMemory} when the supersegments don't fit, Error{DeviceFailure} if a list's written count
+  /// isn't its stored count.
+  template <typename Segment>
+  void build(const Request& request, const Record& record, ListsOf<Segment>& result);
 
   /// Of the last build, without downloads.
   const ListTimes& times() const { return times_; }
 
  private:
-  void buildByBisection(const Request& request, const Record& record, SupersegmentLists& result);
-  void buildByMerging(const Request& request, const Record& record, SupersegmentLists& result);
+  template <typename Segment>
+  void buildByBisection(const Request& request, const Record& record, ListsOf<Segment>& result);
+  template <typename Segment>
+  void buildByMerging(const Request& request, const Record& record, ListsOf<Segment>& result);
   std::uint64_t scanAndTotal(std::uint32_t listCount, gpu::Buffer& offsets);
-  void appendOffsets(std::uint32_t listCount, SupersegmentLists& result) const;
-  void download(std::uint64_t total, SupersegmentLists& result);
+  template <typename Segment>
+  void appendOffsets(std::uint32_t listCount, ListsOf<Segment>& result) const;
+  template <typename Segment>
+  void download(std::uint64_t total, ListsOf<Segment>& result);
   void submit();
 
   std::shared_ptr<gpu::Device> device_;

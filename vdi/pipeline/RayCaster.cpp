@@ -43,6 +43,7 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.budget = request.settings.supersegments;
   params.cutAtGaps = request.cutAtGaps ? 1U : 0U;
   params.runsOnly = request.runsOnly ? 1U : 0U;
+  params.form = storedForm(request.code);
   if (!volume_.empty()) pass_.bind(volume_);
   return params;
 }
@@ -58,10 +59,11 @@ std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytes
   return static_cast<std::uint32_t>(rows);
 }
 
-SupersegmentLists RayCaster::lists(const Request& request, const Progress& progress) {
+template <typename Segment>
+ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progress) {
   const auto width = static_cast<std::uint32_t>(request.view.width());
   const auto height = static_cast<std::uint32_t>(request.view.height());
-  SupersegmentLists result;
+  ListsOf<Segment> result;
   const bool nothingThere = volume_.empty() || request.lattice.count == 0;
   if (nothingThere) {
     result.offsets.assign(static_cast<std::size_t>(width) * height + 1, 0);
@@ -92,12 +94,15 @@ SupersegmentLists RayCaster::lists(const Request& request, const Progress& progr
                    write ? gpu::CastPass::Work::Write : gpu::CastPass::Work::Search, algorithm, width, row,
                    end);
     };
-    builder_.build({(end - row) * width, algorithm, request.lattice.step}, record, result);
+    builder_.build({(end - row) * width, algorithm, request.lattice.step, request.code}, record, result);
     times_ += builder_.times();
     if (!progress(static_cast<double>(end) / height)) break;
   }
   return result;
 }
+
+template SupersegmentLists RayCaster::lists(const Request&, const Progress&);
+template CompactLists RayCaster::lists(const Request&, const Progress&);
 
 Image RayCaster::image(const Request& request, const Progress& progress) {
   const auto width = static_cast<std::uint32_t>(request.view.width());

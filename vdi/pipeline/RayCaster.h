@@ -33,13 +33,15 @@ class RayCaster {
     const TransferTable& table;
     const GenerateSettings& settings;
     bool cutAtGaps;
-    bool runsOnly;  // one supersegment a run, no search
+    bool runsOnly;   // one supersegment a run, no search
+    DepthCode code;  // of compact lists
   };
   /// Called with the share done; returning false ends the work early with what's there.
   using Progress = std::function<bool(double)>;
 
   /// One list per pixel.
-  SupersegmentLists lists(const Request& request, const Progress& progress);
+  template <typename Segment>
+  ListsOf<Segment> lists(const Request& request, const Progress& progress);
   /// DVR.
   Image image(const Request& request, const Progress& progress);
   /// Of the last of them, without transfers. Of a picture: `all`.

@@ -7,6 +7,7 @@
 #include "vdi/gpu/ExpandPass.h"
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/RenderPass.h"
+#include "vdi/pipeline/ListBuilder.h"
 #include "vdi/pipeline/Pipeline.h"
 
 namespace vdi {
@@ -54,7 +55,8 @@ struct VdiRenderer::State {
     }
   }
 
-  void upload(const SupersegmentLists& lists, const glm::ivec2& size) {
+  template <typename Segment>
+  void upload(const ListsOf<Segment>& lists, const DepthCode& code, const glm::ivec2& size) {
     offsets.reserve(device, lists.offsets.size() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
     segments.reserve(device, lists.segments.size() * sizeof(shared::RenderSegment), MemoryKind::DeviceLocal);
     masks.reserve(device, lists.listCount() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
@@ -70,6 +72,7 @@ struct VdiRenderer::State {
     constants.nearest = nearest;
     constants.binScale = binScale;
     constants.lists = size;
+    constants.form = detail::storedForm(code);
     constants.mode = shared::expandModeSegments;
     inParts(lists.segments, [&](std::size_t first, std::size_t count) {
       constants.from = staging.address();
@@ -97,14 +100,16 @@ void VdiRenderer::setVdi(const Vdi& vdi) {
   s.original.reset();
   s.nearest = Image::noDepth;
   s.farthest = 0.0F;
-  for (const Supersegment& segment : vdi.lists.segments) {
-    s.nearest = std::min(s.nearest, segment.front);
-    s.farthest = std::max(s.farthest, segment.back);
+  const std::vector<std::uint32_t>& offsets = vdi.offsets();
+  for (std::size_t i = 0; i + 1 < offsets.size(); ++i) {
+    if (offsets[i] == offsets[i + 1]) continue;
+    s.nearest = std::min(s.nearest, vdi.supersegment(offsets[i]).front);
+    s.farthest = std::max(s.farthest, vdi.supersegment(offsets[i + 1] - 1).back);
   }
   // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
   if (!vdi.camera.parallelProjection) s.nearest = std::max(s.nearest, s.farthest * 1e-6F);
   s.binScale = s.farthest > s.nearest ? 32.0F / (s.farthest - s.nearest) : 0.0F;
-  s.upload(vdi.lists, {vdi.width, vdi.height});
+  std::visit([&](const auto& lists) { s.upload(lists, vdi.depthCode, {vdi.width, vdi.height}); }, vdi.lists);
   s.original = std::make_unique<View>(vdi.view());
 }
 
@@ -147,12 +152,15 @@ Image flatten(const Vdi& vdi) {
   Image image{vdi.width, vdi.height, {}, {}};
   image.rgba.resize(image.pixelCount());
   image.depth.resize(image.pixelCount());
+  const std::vector<std::uint32_t>& offsets = vdi.offsets();
   for (std::size_t i = 0; i < image.pixelCount(); ++i) {
-    const auto list = vdi.lists.list(i);
     glm::vec4 sum(0.0F);
-    for (const Supersegment& s : list) sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
+    for (std::size_t j = offsets[i]; j < offsets[i + 1]; ++j) {
+      const Supersegment s = vdi.supersegment(j);
+      sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
+    }
     image.rgba[i] = sum;
-    image.depth[i] = list.empty() ? Image::noDepth : list.front().front;
+    image.depth[i] = offsets[i] == offsets[i + 1] ? Image::noDepth : vdi.supersegment(offsets[i]).front;
   }
   return image;
 }

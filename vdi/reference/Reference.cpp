@@ -229,11 +229,12 @@ void addList(Accumulator& sum, std::span<const Supersegment> list, const ViewRay
   }
 }
 
-Accumulator walkLists(const Vdi& vdi, const View& original, const ViewRay& ray, const Stretch& stretch) {
+Accumulator walkLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+                      const Stretch& stretch) {
   Accumulator sum;
   const glm::dvec2 start = pixelAt(ray, original, stretch.enter);
   const glm::dvec2 end = pixelAt(ray, original, stretch.leave);
-  const glm::ivec2 size{vdi.width, vdi.height};
+  const glm::ivec2 size{original.width(), original.height()};
   glm::ivec2 pixel = glm::clamp(glm::ivec2(glm::floor(start)), glm::ivec2(0), size - 1);
   const glm::ivec2 last = glm::clamp(glm::ivec2(glm::floor(end)), glm::ivec2(0), size - 1);
   const glm::ivec2 step = glm::sign(last - pixel);  // image coordinates are monotone along a ray
@@ -251,8 +252,8 @@ Accumulator walkLists(const Vdi& vdi, const View& original, const ViewRay& ray, 
     }
     leave = std::max(leave, enter);
     const Ray pixelRay = original.rayThrough(pixel.x + 0.5, pixel.y + 0.5);
-    const auto list = vdi.lists.list(static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(vdi.width) +
-                                     static_cast<std::size_t>(pixel.x));
+    const auto list = lists.list(static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(size.x) +
+                                 static_cast<std::size_t>(pixel.x));
     addList(sum, list, ray, glm::length(pixelRay.direction), {enter, leave});
     if (axis < 0) return sum;
     pixel[axis] += step[axis];
@@ -365,11 +366,12 @@ SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::ui
 
 Image render(const Vdi& vdi, const View& view) {
   Image image = blankImage(view.width(), view.height());
-  if (vdi.lists.segments.empty()) return image;
+  const SupersegmentLists lists = vdi.expandedLists();
+  if (lists.segments.empty()) return image;
   const View original = vdi.view();
   float nearest = std::numeric_limits<float>::infinity();
   float farthest = 0.0F;
-  for (const Supersegment& segment : vdi.lists.segments) {
+  for (const Supersegment& segment : lists.segments) {
     nearest = std::min(nearest, segment.front);
     farthest = std::max(farthest, segment.back);
   }
@@ -384,7 +386,7 @@ Image render(const Vdi& vdi, const View& view) {
       const ViewRay ray{original.toView(world.origin), direction, glm::length(world.direction)};
       const Stretch stretch = insideFrustum(ray, original, smallest, farthest);
       if (stretch.empty()) continue;
-      const Accumulator sum = walkLists(vdi, original, ray, stretch);
+      const Accumulator sum = walkLists(lists, original, ray, stretch);
       const auto pixel =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
       image.rgba[pixel] = sum.rgba();

@@ -80,20 +80,6 @@ std::size_t countRuns(std::span<const Interval> intervals) {
   return runs;
 }
 
-float opacityOf(float opticalDepth) {
-  constexpr float ln2 = 0.69314718F;
-  const float x = opticalDepth * ln2;
-  return x < 1e-3F ? x * (1.0F - 0.5F * x) : 1.0F - std::exp2(-opticalDepth);
-}
-
-float opticalDepthOf(float opacity) {
-  if (opacity >= 1.0F) return maxExtinction;
-  constexpr float perLn2 = 1.44269504F;
-  const float depth =
-      opacity < 1e-3F ? opacity * (1.0F + 0.5F * opacity) * perLn2 : -std::log2(1.0F - opacity);
-  return std::min(depth, maxExtinction);
-}
-
 std::vector<Supersegment> segmentWithSensitivity(std::span<const Interval> intervals, float sensitivity,
                                                  const SegmentRules& rules) {
   std::vector<Supersegment> list;

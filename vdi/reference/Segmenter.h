@@ -23,11 +23,6 @@ struct Interval {
   float opticalDepth = 0.0F;  // >= 0; 0: transparent
 };
 
-/// 1 - 2^-opticalDepth, exact for small arguments too.
-float opacityOf(float opticalDepth);
-/// Its inverse, at most maxExtinction.
-float opticalDepthOf(float opacity);
-
 struct SegmentRules {
   std::uint32_t budget = 1;  // N_S
   float sampleStep = 1.0F;   // DepthLattice::step: the length that Eq. 1 is normalised to

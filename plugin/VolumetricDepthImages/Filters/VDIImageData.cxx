@@ -42,6 +42,23 @@ Array* field(vtkFieldData* fields, const char* name, int components, vtkIdType t
   return array;
 }
 
+template <typename Segment, typename T>
+void copySegments(const std::vector<Segment>& segments, T* to) {
+  if (!segments.empty())
+    std::memcpy(static_cast<void*>(to), segments.data(), segments.size() * sizeof(Segment));
+}
+
+template <typename Segment, typename Array>
+vdi::ListsOf<Segment> listsFrom(vtkUnsignedIntArray* offsets, Array* segments) {
+  vdi::ListsOf<Segment> lists;
+  const unsigned int* first = offsets->GetPointer(0);
+  lists.offsets.assign(first, first + offsets->GetNumberOfTuples());
+  lists.segments.resize(static_cast<std::size_t>(segments->GetNumberOfTuples()));
+  const std::size_t bytes = lists.segments.size() * sizeof(Segment);
+  if (bytes > 0) std::memcpy(static_cast<void*>(lists.segments.data()), segments->GetPointer(0), bytes);
+  return lists;
+}
+
 unsigned char toByte(float share) {
   return static_cast<unsigned char>(std::lround(std::clamp(share, 0.0F, 1.0F) * 255.0F));
 }
@@ -73,19 +90,25 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
   setPicture(image, vdi::flatten(vdi), false);
   vtkNew<vtkUnsignedIntArray> counts;
   counts->SetName("SupersegmentCount");
-  counts->SetNumberOfTuples(static_cast<vtkIdType>(vdi.lists.listCount()));
-  for (std::size_t i = 0; i < vdi.lists.listCount(); ++i)
-    counts->SetValue(static_cast<vtkIdType>(i), vdi.lists.countOf(i));
+  const std::vector<std::uint32_t>& offsets = vdi.offsets();
+  counts->SetNumberOfTuples(static_cast<vtkIdType>(vdi.listCount()));
+  for (std::size_t i = 0; i < vdi.listCount(); ++i)
+    counts->SetValue(static_cast<vtkIdType>(i), offsets[i + 1] - offsets[i]);
   image->GetPointData()->AddArray(counts);
 
   vtkFieldData* fields = image->GetFieldData();
-  std::copy(vdi.lists.offsets.begin(), vdi.lists.offsets.end(),
-            addField<vtkUnsignedIntArray>(fields, "VDI.offsets", 1,
-                                          static_cast<vtkIdType>(vdi.lists.offsets.size())));
-  float* segments = addField<vtkFloatArray>(fields, "VDI.supersegments", 6,
-                                            static_cast<vtkIdType>(vdi.lists.segments.size()));
-  const std::size_t bytes = vdi.lists.segments.size() * sizeof(vdi::Supersegment);
-  if (bytes > 0) std::memcpy(segments, vdi.lists.segments.data(), bytes);
+  std::copy(offsets.begin(), offsets.end(),
+            addField<vtkUnsignedIntArray>(fields, "VDI.offsets", 1, static_cast<vtkIdType>(offsets.size())));
+  const auto count = static_cast<vtkIdType>(vdi.supersegmentCount());
+  if (const auto* compact = std::get_if<vdi::CompactLists>(&vdi.lists)) {
+    copySegments(compact->segments, addField<vtkUnsignedIntArray>(fields, "VDI.codes", 2, count));
+    float* code = addField<vtkFloatArray>(fields, "VDI.depthCode", 1, 2);
+    code[0] = vdi.depthCode.first;
+    code[1] = vdi.depthCode.step;
+  } else {
+    copySegments(std::get<vdi::SupersegmentLists>(vdi.lists).segments,
+                 addField<vtkFloatArray>(fields, "VDI.supersegments", 6, count));
+  }
   double* camera = addField<vtkDoubleArray>(fields, "VDI.camera", 1, 12);
   double* bounds = addField<vtkDoubleArray>(fields, "VDI.bounds", 1, 6);
   for (int axis = 0; axis < 3; ++axis) {
@@ -111,7 +134,6 @@ bool getVdi(vtkDataObject* data, vdi::Vdi& vdi) {
   if (image == nullptr || image->GetFieldData()->GetAbstractArray("VDI.offsets") == nullptr) return false;
   vtkFieldData* fields = image->GetFieldData();
   auto* offsets = field<vtkUnsignedIntArray>(fields, "VDI.offsets", 1, -1);
-  auto* segments = field<vtkFloatArray>(fields, "VDI.supersegments", 6, -1);
   const double* camera = field<vtkDoubleArray>(fields, "VDI.camera", 1, 12)->GetPointer(0);
   const double* bounds = field<vtkDoubleArray>(fields, "VDI.bounds", 1, 6)->GetPointer(0);
   const double* parameters = field<vtkDoubleArray>(fields, "VDI.parameters", 1, 4)->GetPointer(0);
@@ -134,11 +156,16 @@ bool getVdi(vtkDataObject* data, vdi::Vdi& vdi) {
   vdi.sampleStep = parameters[1];
   vdi.time = parameters[2];
   vdi.timeStep = static_cast<std::uint64_t>(parameters[3]);
-  const unsigned int* first = offsets->GetPointer(0);
-  vdi.lists.offsets.assign(first, first + offsets->GetNumberOfTuples());
-  vdi.lists.segments.resize(static_cast<std::size_t>(segments->GetNumberOfTuples()));
-  const std::size_t bytes = vdi.lists.segments.size() * sizeof(vdi::Supersegment);
-  if (bytes > 0) std::memcpy(static_cast<void*>(vdi.lists.segments.data()), segments->GetPointer(0), bytes);
+  vdi.depthCode = {};
+  if (fields->GetAbstractArray("VDI.codes") != nullptr) {
+    vdi.lists =
+        listsFrom<vdi::CompactSupersegment>(offsets, field<vtkUnsignedIntArray>(fields, "VDI.codes", 2, -1));
+    const float* code = field<vtkFloatArray>(fields, "VDI.depthCode", 1, 2)->GetPointer(0);
+    vdi.depthCode = {code[0], code[1]};
+  } else {
+    vdi.lists =
+        listsFrom<vdi::Supersegment>(offsets, field<vtkFloatArray>(fields, "VDI.supersegments", 6, -1));
+  }
   validate(vdi);
   return true;
 }

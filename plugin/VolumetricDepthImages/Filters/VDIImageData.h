@@ -5,7 +5,9 @@
 //               SupersegmentCount  unsigned int [h][w]
 //               Depth              float [h][w], of RenderVDI only
 //   field data  VDI.offsets        unsigned int [w*h + 1]
-//               VDI.supersegments  float [n][6]: front, back, red, green, blue, opacity
+//               VDI.supersegments  full precision: float [n][6]: front, back, red, green, blue, opacity
+//               VDI.codes          compact: unsigned int [n][2], vdi::CompactSupersegment
+//               VDI.depthCode      compact: float [2], vdi::DepthCode
 //               VDI.camera         double [12]: position, focal point, view-up, view angle, parallel
 //               projection, scale VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ... VDI.parameters
 //               double [4]: N_S, sample step, time, time step

@@ -56,6 +56,8 @@ void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
      << indent << "Supersegments: " << this->Supersegments << "\n"
      << indent << "SamplingRate: " << this->SamplingRate << "\n"
      << indent << "Algorithm: " << this->Algorithm << "\n"
+     << indent << "Precision: " << this->Precision << "\n"
+     << indent << "TerminationOpacity: " << this->TerminationOpacity << "\n"
      << indent << "ScalarOpacityUnitDistance: " << this->ScalarOpacityUnitDistance << "\n";
 }
 
@@ -228,6 +230,8 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
   settings.supersegments = static_cast<std::uint32_t>(std::max(this->Supersegments, 0));
   settings.samplesPerVoxel = this->SamplingRate;
   settings.algorithm = static_cast<vdi::Algorithm>(this->Algorithm);
+  settings.precision = static_cast<vdi::Precision>(this->Precision);
+  settings.terminationOpacity = this->TerminationOpacity;
   const auto progress = [this](double done) {
     this->UpdateProgress(0.1 + 0.9 * done);
     return !this->CheckAbort();

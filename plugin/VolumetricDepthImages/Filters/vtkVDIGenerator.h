@@ -54,6 +54,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkSetMacro(Supersegments, int);
   /// Samples per voxel.
   vtkSetMacro(SamplingRate, double);
+  /// What a supersegment takes, an enumerator of vdi::Precision: 1 compact (8 bytes), 0 full (24).
+  vtkSetClampMacro(Precision, int, 0, 1);
+  vtkGetMacro(Precision, int);
+  /// A ray ends once it has accumulated this opacity; 1: never.
+  vtkSetClampMacro(TerminationOpacity, double, 0.01, 1.0);
+  vtkGetMacro(TerminationOpacity, double);
   /// How samples become supersegments, an enumerator of vdi::Algorithm: 1 merge, 0 bisection.
   vtkSetClampMacro(Algorithm, int, 0, 1);
   /// Exchange ghost layers where blocks lack them.
@@ -111,6 +117,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   int Supersegments = 25;
   double SamplingRate = 1.0;
   int Algorithm = 1;
+  int Precision = 1;
+  double TerminationOpacity = 0.9999;
   bool FillGhosts = true;
   bool PictureOnly = false;
   int TimeStep = 0;

@@ -1,0 +1,105 @@
+// Supersegments in memory: 24 bytes of floats, or 8 of codes. Storing codes is the twin of vdi/reference/Compaction.h;
+// loading them, of expanded in vdi/core/Supersegment.cpp.
+//
+// Needs: shared/lists.h, optical.glsl.
+
+const float mostDepthCode = 32767.0;
+const float mostCarriedDepth = 1.0 / 16.0;
+const float mostDepthChange = 0.25;
+const float thinnestStep = 0.0007;
+const float mostColorChange = 3.0 / 255.0;
+const float unseen = 1e-6;
+
+// A supersegment whose optical depth doesn't get lost when its opacity rounds to 1.
+struct Material {
+  float front;
+  float back;
+  vec3 color;  // premultiplied
+  float opticalDepth;
+};
+
+bool isCompact(StoredForm form) { return form.depthStep > 0.0; }
+
+float opticalDepthOfCode(uint code) {
+  return code == 0u ? 9.5367431640625e-7 : (exp2(float(code) * (16.0 / 1023.0)) - 1.0) / 16.0;
+}
+
+uint codeOfOpticalDepth(float opticalDepth) {
+  return uint(clamp(round(log2(1.0 + 16.0 * max(opticalDepth, 0.0)) * (1023.0 / 16.0)), 0.0, 1023.0));
+}
+
+uvec2 depthCodes(uvec2 packed) { return uvec2(packed.x & 0x7fffu, (packed.x >> 15) & 0x7fffu); }
+
+float codedOpticalDepth(uvec2 packed) { return opticalDepthOfCode(packed.x >> 30 | (packed.y >> 24) << 2); }
+
+// Straight.
+vec3 codedColor(uvec2 packed) {
+  return vec3(float(packed.y & 0xffu), float((packed.y >> 8) & 0xffu), float((packed.y >> 16) & 0xffu)) / 255.0;
+}
+
+vec2 codedDepths(uvec2 packed, StoredForm form) {
+  return form.depthFirst + vec2(depthCodes(packed)) * form.depthStep;
+}
+
+Material loadSegment(SegmentArray segments, uint i, StoredForm form) {
+  if (isCompact(form)) {
+    uvec2 packed = CompactArray(segments).at[i];
+    vec2 depths = codedDepths(packed, form);
+    float opticalDepth = codedOpticalDepth(packed);
+    return Material(depths.x, depths.y, codedColor(packed) * opacityOf(opticalDepth), opticalDepth);
+  }
+  Segment s = segments.at[i];
+  return Material(s.front, s.back, vec3(s.red, s.green, s.blue), opticalDepthOf(s.opacity));
+}
+
+// What rounding the list's supersegments so far has left over.
+uint storeReach;
+float storeDepth;        // optical depth so far
+float storeStoredDepth;  // of what was stored
+float storeCarriedDepth;
+vec3 storeCarriedLight;
+
+void beginStoring() {
+  storeReach = 0u;
+  storeDepth = 0.0;
+  storeStoredDepth = 0.0;
+  storeCarriedDepth = 0.0;
+  storeCarriedLight = vec3(0.0);
+}
+
+uvec2 compacted(Material m, StoredForm form) {
+  vec2 places = round((vec2(m.front, m.back) - form.depthFirst) / form.depthStep);
+  uvec2 codes = uvec2(clamp(places, vec2(0.0), vec2(mostDepthCode)));
+  uint front = min(max(codes.x, storeReach), uint(mostDepthCode) - 1u);
+  uint back = max(codes.y, front + 1u);
+  storeReach = back;
+
+  float slack = mostDepthChange * m.opticalDepth + thinnestStep;
+  uint depth = codeOfOpticalDepth(m.opticalDepth + clamp(storeCarriedDepth, -slack, slack));
+  float stored = opticalDepthOfCode(depth);
+
+  vec3 light = exp2(-storeDepth) * m.color;
+  float seen = exp2(-storeStoredDepth) * opacityOf(stored);
+  vec3 straight = m.color / opacityOf(m.opticalDepth);
+  vec3 color = straight;
+  if (seen > unseen) {
+    color = clamp((storeCarriedLight + light) / seen, straight - mostColorChange, straight + mostColorChange);
+  }
+  vec3 colorCodes = round(clamp(color, vec3(0.0), vec3(1.0)) * 255.0);
+
+  storeCarriedLight += light - seen / 255.0 * colorCodes;
+  storeCarriedDepth = clamp(storeCarriedDepth + m.opticalDepth - stored, -mostCarriedDepth, mostCarriedDepth);
+  storeDepth += m.opticalDepth;
+  storeStoredDepth += stored;
+  uvec3 c = uvec3(colorCodes);
+  return uvec2(front | back << 15 | (depth & 3u) << 30, c.r | c.g << 8 | c.b << 16 | (depth >> 2) << 24);
+}
+
+// The supersegments of a list one after the other, front to back, after beginStoring.
+void storeSegment(SegmentArray segments, uint slot, Material m, StoredForm form) {
+  if (isCompact(form)) {
+    CompactArray(segments).at[slot] = compacted(m, form);
+  } else {
+    segments.at[slot] = Segment(m.front, m.back, m.color.r, m.color.g, m.color.b, opacityOf(m.opticalDepth));
+  }
+}
