@@ -251,6 +251,8 @@ class Bench {
     std::vector<double> composites;
     std::vector<double> frames;
     std::vector<double> ratios;
+    std::vector<double> searches;
+    std::vector<double> writes;
     made.generate = repeated(options_.repeats, world_.size() > 1, [&] {
       generator_.renderVolume(camera, function, settings_);
       const double volumeMs = deviceMs();
@@ -259,13 +261,15 @@ class Bench {
           slowest(generator_.reports(), [](const RankReport& r) { return r.compositeSeconds; }));
       frames.push_back(slowest(generator_.reports(), frameSeconds));
       ratios.push_back(volumeMs > 0.0 ? deviceMs() / volumeMs : 0.0);
+      searches.push_back(slowest(generator_.reports(), [](const RankReport& r) { return r.searchSeconds; }));
+      writes.push_back(slowest(generator_.reports(), [](const RankReport& r) { return r.writeSeconds; }));
       return deviceMs();
     });
     made.overVolume = spreadOf(lastOf(ratios));
     made.frame = spreadOf(lastOf(frames));
     made.compositeMs = spreadOf(lastOf(composites)).median;
-    made.searchMs = slowest(generator_.reports(), [](const RankReport& r) { return r.searchSeconds; });
-    made.writeMs = slowest(generator_.reports(), [](const RankReport& r) { return r.writeSeconds; });
+    made.searchMs = spreadOf(lastOf(searches)).median;
+    made.writeMs = spreadOf(lastOf(writes)).median;
     world_.together([&] {
       if (root()) made.storedBytes = io::encode(*made.vdi).size();
     });

@@ -46,8 +46,16 @@ void walk() { castRay(); }
 void main() {
   uint x = gl_GlobalInvocationID.x;
   uint y = gl_GlobalInvocationID.y + push.firstRow;
-  if (x >= push.params.value.width || y >= push.lastRow) return;
+  uint endRow = push.lastRow;
   listIndex = y * push.params.value.width + x;
+  if (countsGrains) {
+    uint stride = push.params.value.countedStride;
+    x = gl_GlobalInvocationID.x * stride;
+    y = gl_GlobalInvocationID.y * stride + push.firstRow;
+    endRow = min(push.lastRow + stride - 1u, push.params.value.height);
+    listIndex = gl_GlobalInvocationID.y * push.params.value.countedWidth + gl_GlobalInvocationID.x;
+  }
+  if (x >= push.params.value.width || y >= endRow) return;
   setUpRay(x, y);
   setUpScene();
 

@@ -16,7 +16,7 @@ void expandSegment(uint i) {
   vec2 depths;
   vec3 straight;
   float opticalDepth;
-  if (isCompact(push.form)) {
+  if (compactForm) {
     uvec2 packed = CompactArray(push.from).at[i];
     depths = codedDepths(packed, push.form);
     straight = codedColor(packed);

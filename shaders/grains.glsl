@@ -2,13 +2,11 @@
 // vdi/reference/SegmentByMerging.cpp; reduce.comp merges grains into supersegments. Counting does all tolerances side by
 // side in one walk; writing does one.
 //
-// Needs: optical.glsl, appearance.glsl; push.params.value with sensitivities, counts, offsets, grains, reductions, status; bool writesGrains,
-// a constant; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
+// Needs: optical.glsl, appearance.glsl; push.params.value with sensitivities, counts, offsets, spans, lights, written, left, status;
+// bool writesGrains, a constant; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 
-const int toleranceLevels = 8;
-const float finestTolerance = 0.002;
-const float toleranceRatio = 4.0;
+#include "tolerance.glsl"
 
 void walk();
 
@@ -25,21 +23,30 @@ float grainDeviation[toleranceLevels];
 uint grainCount[toleranceLevels];
 uint grainsOpen;  // bit j: a grain of tolerance j is open
 
-float grainTolerance;  // while writing
-Grain grain;
+// While writing; see Allotment in vdi/reference/Segmenter.h.
+float grainTolerance;
+float grainAllotted;
+uint grainRoom;
+vec2 grainSpan;  // front, back
 vec4 grainLight;
 float grainTransmittance;
-bool grainCut;
+bool grainStartsRun;
+bool grainCut;  // the next grain starts a run
 
 void writeGrain() {
   uint slot = grainCount[0] - 1u;
-  if (slot < push.params.value.counts.at[listIndex]) {
+  if (slot < grainRoom) {
     uint at = push.params.value.offsets.at[listIndex] + slot;
-    push.params.value.grains.at[2u * at] = vec4(grain.front, grain.back, grain.before, uintBitsToFloat(slot));
-    push.params.value.grains.at[2u * at + 1u] =
-        appearanceOf(grainLight.rgb, grainLight.a, grain.back - grain.front, push.params.value.step);
-    push.params.value.lights.at[at] = grainLight;
+    push.params.value.spans.at[at] = grainSpan;
+    push.params.value.lights.at[at] = vec4(grainLight.rgb, grainStartsRun ? -grainLight.a : grainLight.a);
   }
+}
+
+void adaptTolerance() {
+  uint left = grainRoom - min(grainRoom, grainCount[0]);
+  if (left >= spareGrains) return;
+  float base = grainAllotted < 0.0 ? finestTolerance / toleranceRatio : grainAllotted;
+  grainTolerance = left == 0u ? unlimited : base * pow(toleranceRatio, float(spareGrains - left));
 }
 
 void closeGrains(uint levels) {
@@ -77,24 +84,25 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
   ++grainsVisible;
   if (!grainsRunVisible) ++grainsRuns;
   grainsRunVisible = true;
-  // Nothing but a run's start may open a grain once the room for them is used up. It isn't, unless the program that
-  // counted rounded otherwise.
-  bool full = writesGrains && !grainCut && grainCount[0] >= push.params.value.counts.at[listIndex];
+  // Nothing but a run's start may open a grain once the room for them is used up. With cuts at gaps it isn't, unless
+  // the program that counted rounded otherwise.
+  bool full = writesGrains && !grainCut && grainCount[0] >= grainRoom;
   [[unroll]] for (int level = 0; level < (writesGrains ? 1 : toleranceLevels); ++level) {
     if ((grainsOpen & (1u << level)) == 0u && !full) {
       ++grainCount[level];
       grainFirst[level] = x;
       grainDeviation[level] = 0.0;
       if (writesGrains) {
-        float before = grainsCutAtGaps && grainCut ? -1.0 - grainsBefore : grainsBefore;
-        grain = Grain(front, back, before, 0u, vec4(0.0));
+        grainStartsRun = grainsCutAtGaps && grainCut;
+        grainSpan = vec2(front, back);
         grainLight = vec4(color, opticalDepth);
         grainTransmittance = 1.0 - opacity;
         grainCut = false;
+        adaptTolerance();
       }
     } else if (writesGrains) {
       grainLight = vec4(grainLight.rgb + grainTransmittance * color, min(grainLight.a + opticalDepth, maxOpticalDepth));
-      grain.back = back;
+      grainSpan.y = back;
       grainTransmittance *= 1.0 - opacity;
     }
   }
@@ -143,15 +151,19 @@ void countGrains() {
 }
 
 void writeGrains() {
-  if (push.params.value.counts.at[listIndex] == 0u) {
-    push.params.value.reductions.at[listIndex] = uvec2(0u);
+  grainRoom = push.params.value.counts.at[listIndex];
+  if (grainRoom == 0u) {
+    push.params.value.written.at[listIndex] = 0u;
+    push.params.value.left.at[listIndex] = 0u;
     return;
   }
-  grainTolerance = push.params.value.sensitivities.at[listIndex];
+  grainAllotted = push.params.value.sensitivities.at[listIndex];
+  grainTolerance = grainAllotted;
   walkForGrains();
   closeGrains(1u);
-  uint written = min(grainCount[0], push.params.value.counts.at[listIndex]);
+  uint written = min(grainCount[0], grainRoom);
   if (written != grainCount[0]) atomicAdd(push.params.value.status.at[0], 1u);
   uint most = max(push.params.value.budget, grainsCutAtGaps ? grainsRuns : 1u);
-  push.params.value.reductions.at[listIndex] = uvec2(written, min(written, most));
+  push.params.value.written.at[listIndex] = written;
+  push.params.value.left.at[listIndex] = min(written, most);
 }

@@ -20,12 +20,12 @@ void countList(uint list) {
 
 // Comparable within a list.
 float frontOf(SegmentArray segments, uint i) {
-  if (isCompact(push.form)) return float(depthCodes(CompactArray(segments).at[i]).x);
+  if (compactForm) return float(depthCodes(CompactArray(segments).at[i]).x);
   return segments.at[i].front;
 }
 
 void copySegment(SegmentArray from, uint i, uint slot) {
-  if (isCompact(push.form)) {
+  if (compactForm) {
     CompactArray(push.merged).at[slot] = CompactArray(from).at[i];
   } else {
     push.merged.at[slot] = from.at[i];

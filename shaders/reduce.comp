@@ -38,21 +38,24 @@ float costOf(Grain a, Grain b) {
                                  max(b.front - a.back, 0.0) * differenceOf(vec4(0.0), both));
 }
 
-// What merging may cost in this round; negative if nothing can be merged.
-float limitOf(uint count) {
-  float sum = 0.0;
-  float finite = 0.0;
-  Grain a = grainAt(0u);
-  for (uint i = 1u; i < count; ++i) {
-    Grain b = grainAt(i);
-    float cost = costOf(a, b);
-    if (cost < unlimited) {
-      sum += cost;
-      finite += 1.0;
-    }
-    a = b;
-  }
-  return finite > 0.0 ? sum / finite * 1.0001 : -1.0;
+// Costs of merging each grain with the one before it, of a list that's being written front to back: what the next round
+// may cost follows from their sum.
+Grain costPrevious;
+float costSum;
+float costsFinite;
+
+void beginCosts() {
+  costSum = 0.0;
+  costsFinite = 0.0;
+}
+
+void setGrainAndCost(uint i, Grain g) {
+  setGrain(i, g);
+  float cost = i > 0u ? costOf(costPrevious, g) : unlimited;
+  bool finite = cost < unlimited;
+  costSum += finite ? cost : 0.0;
+  costsFinite += finite ? 1.0 : 0.0;
+  costPrevious = g;
 }
 
 // One round, in place; returns how many grains are left.
@@ -62,6 +65,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
   Grain a = grainAt(0u);
   Grain b = grainAt(1u);
   float cost = costOf(a, b);
+  beginCosts();
   for (uint i = 0u; i < count;) {
     Grain c = b;
     float next = unlimited;
@@ -75,7 +79,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
       a.back = b.back;
       --excess;
     }
-    setGrain(left++, a);
+    setGrainAndCost(left++, a);
     previous = merges ? next : cost;
     i += merges ? 2u : 1u;
     if (i >= count) break;
@@ -96,15 +100,41 @@ uint mergeOnce(uint count, uint excess, float limit) {
   return left;
 }
 
+vec4 lightAt(uint i) {
+  vec4 light = push.lights.at[base + i];
+  return vec4(light.rgb, abs(light.a));
+}
+
+void setUpGrains(uint count) {
+  float before = 1.0;
+  beginCosts();
+  for (uint i = 0u; i < count; ++i) {
+    vec2 span = push.spans.at[base + i];
+    vec4 light = push.lights.at[base + i];
+    bool cut = light.a < 0.0;
+    light.a = abs(light.a);
+    setGrainAndCost(i, Grain(span.x, span.y, cut ? -1.0 - before : before, i,
+                             appearanceOf(light.rgb, light.a, span.y - span.x, push.step)));
+    before *= 1.0 - opacityOf(light.a);
+  }
+}
+
+void writeGrainsAsSegments(uint count, uint slot) {
+  for (uint i = 0u; i < count; ++i) {
+    vec2 span = push.spans.at[base + i];
+    vec4 light = lightAt(i);
+    storeSegment(push.segments, slot + i, Material(span.x, span.y, light.rgb, light.a), push.form);
+  }
+}
+
 // Light of the grains that were merged is put together here, front to back.
 void writeSegments(uint count, uint grains, uint slot) {
-  beginStoring();
   for (uint i = 0u; i < count; ++i) {
     Grain g = grainAt(i);
     uint end = i + 1u < count ? floatBitsToUint(push.grains.at[2u * (base + i) + 2u].w) : grains;
-    vec4 light = push.lights.at[base + g.first];
+    vec4 light = lightAt(g.first);
     for (uint j = g.first + 1u; j < end; ++j) {
-      vec4 more = push.lights.at[base + j];
+      vec4 more = lightAt(j);
       light = vec4(light.rgb + (1.0 - opacityOf(light.a)) * more.rgb, min(light.a + more.a, maxOpticalDepth));
     }
     storeSegment(push.segments, slot + i, Material(g.front, g.back, light.rgb, light.a), push.form);
@@ -114,17 +144,20 @@ void writeSegments(uint count, uint grains, uint slot) {
 void main() {
   uint list = gl_GlobalInvocationID.x;
   if (list >= push.listCount) return;
-  uvec2 reduction = push.reductions.at[list];
-  if (push.mode == reduceModeCount) {
-    push.counts.at[list] = reduction.y;
+  uint written = push.written.at[list];
+  uint slot = push.offsets.at[list];
+  uint most = push.offsets.at[list + 1u] - slot;
+  base = push.grainOffsets.at[list];
+  beginStoring();
+  if (written <= most) {
+    writeGrainsAsSegments(written, slot);
     return;
   }
-  base = push.grainOffsets.at[list];
-  uint count = reduction.x;
-  while (count > reduction.y) {
-    float limit = limitOf(count);
-    if (limit < 0.0) break;  // just cuts are left; there are no more of them than may be
-    count = mergeOnce(count, count - reduction.y, limit);
+  setUpGrains(written);
+  uint count = written;
+  while (count > most) {
+    if (costsFinite == 0.0) break;  // just cuts are left; there are no more of them than may be
+    count = mergeOnce(count, count - most, costSum / costsFinite * 1.0001);
   }
-  writeSegments(min(count, reduction.y), reduction.x, push.offsets.at[list]);
+  writeSegments(min(count, most), written, slot);
 }

@@ -18,7 +18,8 @@ struct Material {
   float opticalDepth;
 };
 
-bool isCompact(StoredForm form) { return form.depthStep > 0.0; }
+// Which of the two forms; the other one's code is left out.
+layout(constant_id = 2) const bool compactForm = false;
 
 float opticalDepthOfCode(uint code) {
   return code == 0u ? 9.5367431640625e-7 : (exp2(float(code) * (16.0 / 1023.0)) - 1.0) / 16.0;
@@ -42,7 +43,7 @@ vec2 codedDepths(uvec2 packed, StoredForm form) {
 }
 
 Material loadSegment(SegmentArray segments, uint i, StoredForm form) {
-  if (isCompact(form)) {
+  if (compactForm) {
     uvec2 packed = CompactArray(segments).at[i];
     vec2 depths = codedDepths(packed, form);
     float opticalDepth = codedOpticalDepth(packed);
@@ -97,7 +98,7 @@ uvec2 compacted(Material m, StoredForm form) {
 
 // The supersegments of a list one after the other, front to back, after beginStoring.
 void storeSegment(SegmentArray segments, uint slot, Material m, StoredForm form) {
-  if (isCompact(form)) {
+  if (compactForm) {
     CompactArray(segments).at[slot] = compacted(m, form);
   } else {
     segments.at[slot] = Segment(m.front, m.back, m.color.r, m.color.g, m.color.b, opacityOf(m.opticalDepth));

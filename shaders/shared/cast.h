@@ -38,13 +38,14 @@ struct CastParams {
   VDI_ADDRESS(BrickArray) bricks;
   VDI_ADDRESS(KdNodeArray) nodes;  // node 0 is the root
   VDI_ADDRESS(TableArray) table;
-  VDI_ADDRESS(FloatArray) sensitivities;  // [h][w]; by merging: tolerances
-  VDI_ADDRESS(UintArray) counts;          // [h][w]; by merging: of grains
+  VDI_ADDRESS(FloatArray) sensitivities;  // [h][w]; by merging: tolerances, while counting those of the counted lists
+  VDI_ADDRESS(UintArray) counts;          // [h][w]; by merging: room for grains, while counting the grains of these
   VDI_ADDRESS(UintArray) offsets;         // [h][w], exclusive prefix sum of counts
   VDI_ADDRESS(SegmentArray) segments;     // compact; by bisection
-  VDI_ADDRESS(GrainArray) grains;         // compact; by merging
-  VDI_ADDRESS(Vec4Array) lights;    // of the grains
-  VDI_ADDRESS(UvecArray) reductions;      // [h][w]: grains written, and how many are to be left of them
+  VDI_ADDRESS(Vec2Array) spans;           // of the grains, compact; by merging
+  VDI_ADDRESS(Vec4Array) lights;          // likewise
+  VDI_ADDRESS(UintArray) written;         // [h][w]: grains
+  VDI_ADDRESS(UintArray) left;            // [h][w]: how many are to be left of them
   VDI_ADDRESS(Vec4Array) colors;          // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;         // [h][w]
   VDI_ADDRESS(UintArray) status;          // [1]: lists whose written count differs from the stored one
@@ -72,6 +73,10 @@ struct CastParams {
   uint runsOnly;
   uint nodeCount;  // 0: no bricks
   StoredForm form;  // of segments
+  // While counting grains: every countedStride-th list of every countedStride-th row, from the band's first row on, up to
+  // and including the row behind the band, as [rows][countedWidth].
+  uint countedStride;
+  uint countedWidth;
 };
 
 #ifndef __cplusplus

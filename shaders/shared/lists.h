@@ -5,11 +5,17 @@
 
 VDI_SHARED_BEGIN
 
-// Room for grains, in multiples of a list's budget; as in vdi/reference/Segmenter.h.
+// Room for grains, in multiples of a list's budget, and what's added to it; as in vdi/reference/Segmenter.h.
 #ifdef __cplusplus
 inline constexpr uint grainsPerBudget = 2;
+inline constexpr uint spareGrains = 4;
+inline constexpr uint uncountedSpareGrains = 8;
+inline constexpr uint countedStride = 2;
 #else
 const uint grainsPerBudget = 2;
+const uint spareGrains = 4;
+const uint uncountedSpareGrains = 8;
+const uint countedStride = 2;
 #endif
 
 // Supersegment of core/Vdi.h.
@@ -23,14 +29,19 @@ struct Segment {
 };
 
 // How supersegments lie in memory: as CompactSupersegment with this DepthCode of core/Supersegment.h, or, if the step is 0,
-// as Segment.
+// as Segment. Shaders are specialised to one of the two (store.glsl).
 struct StoredForm {
   float depthFirst;
   float depthStep;
 };
 
-// Grain of vdi/reference/SegmentByMerging.cpp in memory. Its light, premultiplied colour over all of it and optical depth, is
-// kept apart: it isn't needed to decide what's merged.
+#ifdef __cplusplus
+inline uint isCompact(const StoredForm& form) { return form.depthStep > 0.0F ? 1 : 0; }
+#endif
+
+// Grain of vdi/reference/SegmentByMerging.cpp while it's decided what's merged. What the grains are made of lies apart, and
+// stays as it was written: their spans (front, back) and lights, premultiplied colour over all of a grain and its optical
+// depth, which is negative if the grain must not be merged with the one before it.
 struct Grain {
   float front;
   float back;
@@ -47,8 +58,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray 
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CompactArray { uvec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer UvecArray { uvec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray { float at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer Vec2Array { vec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4Array { vec4 at[]; };
 #endif
 

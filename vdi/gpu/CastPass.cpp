@@ -10,6 +10,18 @@
 
 namespace vdi::gpu {
 
+namespace {
+
+ComputePipelineInfo pipelineInfo() {
+  ComputePipelineInfo info;
+  info.shader = "cast";
+  info.pushConstantBytes = sizeof(shared::CastConstants);
+  info.imageCount = shared::castMaxPages;
+  return info;
+}
+
+}  // namespace
+
 shared::CastParams castGeometry(const Scene& scene, const View& view, const DepthLattice& lattice) {
   shared::CastParams params{};
   const Ray middle = view.rayThrough(0.5 * view.width(), 0.5 * view.height());
@@ -40,43 +52,41 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
   return params;
 }
 
-CastPass::CastPass(std::shared_ptr<Device> device) : device_(std::move(device)), sampler_(device_) {}
+CastPass::CastPass(std::shared_ptr<Device> device) : sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
 
-void CastPass::bind(const VolumeStore& volume) {
-  const std::size_t pageCount = volume.pages().size();
+ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t compact) {
+  const std::size_t pageCount = volume_->pages().size();
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
-  if (bound_ != nullptr && boundVersion_ == volume.pagesVersion()) return;
-  Pipelines& pipelines = pipelines_[pageCount];
-  std::array<const Image3D*, shared::castMaxPages> images{};
-  for (std::size_t i = 0; i < images.size(); ++i) images[i] = &volume.pages()[std::min(i, pageCount - 1)];
-  for (std::uint32_t program = 0; program < pipelines.size(); ++program) {
-    std::unique_ptr<ComputePipeline>& pipeline = pipelines[program];
-    if (!pipeline) {
-      ComputePipelineInfo info;
-      info.shader = "cast";
-      info.pushConstantBytes = sizeof(shared::CastConstants);
-      info.imageCount = shared::castMaxPages;
-      info.specialization = {program, static_cast<std::uint32_t>(pageCount)};
-      pipeline = std::make_unique<ComputePipeline>(device_, info);
-    }
-    pipeline->bindImages(images, sampler_);
+  ComputePipeline& pipeline = pipelines_.with({program, static_cast<std::uint32_t>(pageCount), compact});
+  std::uint64_t& bound = boundVersions_[&pipeline];
+  if (bound != volume_->pagesVersion()) {
+    std::array<const Image3D*, shared::castMaxPages> images{};
+    for (std::size_t i = 0; i < images.size(); ++i) images[i] = &volume_->pages()[std::min(i, pageCount - 1)];
+    pipeline.bindImages(images, sampler_);
+    bound = volume_->pagesVersion();
   }
-  bound_ = &pipelines;
-  boundVersion_ = volume.pagesVersion();
+  return pipeline;
 }
 
 void CastPass::record(Commands& commands, VkDeviceAddress params, Work work, Algorithm algorithm,
-                      std::uint32_t width, std::uint32_t firstRow, std::uint32_t lastRow) const {
-  assert(bound_ != nullptr && firstRow < lastRow);
+                      const Band& band) {
+  assert(volume_ != nullptr && band.firstRow < band.lastRow);
   const bool writes = work == Work::Write;
   const std::uint32_t program = work == Work::Volume                ? shared::castProgramVolume
                                 : algorithm == Algorithm::Bisection ? shared::castProgramSearch
                                 : writes                            ? shared::castProgramWriteGrains
                                                                     : shared::castProgramCountGrains;
+  // Just the search stores supersegments itself.
+  const std::uint32_t compact = program == shared::castProgramSearch ? isCompact(band.form) : 0;
   const shared::CastConstants constants{params, writes ? shared::castModeWrite : shared::castModeSearch,
-                                        firstRow, lastRow, 0};
-  commands.dispatch(*(*bound_)[program], constants, (width + shared::castGroupX - 1) / shared::castGroupX,
-                    (lastRow - firstRow + shared::castGroupY - 1) / shared::castGroupY);
+                                        band.firstRow, band.lastRow, 0};
+  const bool counts = program == shared::castProgramCountGrains;
+  const std::uint32_t stride = counts ? band.countedStride : 1;
+  // The row behind the band is counted too.
+  const std::uint32_t rows = (band.lastRow - band.firstRow + stride - 1) / stride + (stride > 1 ? 1 : 0);
+  const std::uint32_t width = (band.width + stride - 1) / stride;
+  commands.dispatch(pipelineFor(program, compact), constants, (width + shared::castGroupX - 1) / shared::castGroupX,
+                    (rows + shared::castGroupY - 1) / shared::castGroupY);
 }
 
 }  // namespace vdi::gpu

@@ -1,7 +1,6 @@
 // Dispatches cast.comp: DVR, or the two steps that make lists, over the bricks of a VolumeStore.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -30,25 +29,30 @@ class CastPass {
  public:
   explicit CastPass(std::shared_ptr<Device> device);
 
-  /// Chooses the pipelines for the store's pages and binds these. Cheap when nothing changed. No dispatch may
-  /// be in flight.
-  void bind(const VolumeStore& volume);
+  /// What later dispatches read; kept by reference, it must have pages. Pipelines are made when they're first
+  /// recorded.
+  void bind(const VolumeStore& volume) { volume_ = &volume; }
 
   /// What a dispatch does: the picture; or the first step of an algorithm (sensitivities or tolerances, and
   /// counts), or its second one (supersegments or grains).
   enum class Work { Volume, Search, Write };
-  /// Rows [firstRow, lastRow). `params` is the address of a CastParams.
-  void record(Commands& commands, VkDeviceAddress params, Work work, Algorithm algorithm, std::uint32_t width,
-              std::uint32_t firstRow, std::uint32_t lastRow) const;
+  struct Band {
+    std::uint32_t width = 0;
+    std::uint32_t firstRow = 0;
+    std::uint32_t lastRow = 0;        // exclusive
+    std::uint32_t countedStride = 1;  // these two as in CastParams
+    shared::StoredForm form{};
+  };
+  /// `params` is the address of a CastParams. No dispatch of this pass may be in flight.
+  void record(Commands& commands, VkDeviceAddress params, Work work, Algorithm algorithm, const Band& band);
 
  private:
-  /// By shared::castProgram...
-  using Pipelines = std::array<std::unique_ptr<ComputePipeline>, 4>;
-  std::shared_ptr<Device> device_;
+  ComputePipeline& pipelineFor(std::uint32_t program, std::uint32_t compact);
+
   Sampler sampler_;
-  std::map<std::size_t, Pipelines> pipelines_;  // by page count
-  const Pipelines* bound_ = nullptr;
-  std::uint64_t boundVersion_ = 0;
+  PipelineSet pipelines_;  // by shared::castProgram..., page count and precision
+  std::map<const ComputePipeline*, std::uint64_t> boundVersions_;  // of the pages that they're bound to
+  const VolumeStore* volume_ = nullptr;
 };
 
 }  // namespace vdi::gpu

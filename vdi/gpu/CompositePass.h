@@ -13,16 +13,14 @@ namespace vdi::gpu {
 
 class CompositePass {
  public:
-  explicit CompositePass(const std::shared_ptr<Device>& device);
-  /// `params` is the address of a CompositeParams. The first step of the algorithm, then (`write`, after a
+  explicit CompositePass(std::shared_ptr<Device> device);
+  /// `params` is the address of a CompositeParams of that form. The first step of the algorithm, then (`write`, after a
   /// scan) the second one.
-  void record(Commands& commands, VkDeviceAddress params, Algorithm algorithm, bool write,
-              std::uint32_t listCount) const;
+  void record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form, Algorithm algorithm,
+              bool write, std::uint32_t listCount);
 
  private:
-  ComputePipeline search_;
-  ComputePipeline countGrains_;
-  ComputePipeline writeGrains_;
+  PipelineSet pipelines_;  // by shared::compositeProgram... and precision
 };
 
 }  // namespace vdi::gpu

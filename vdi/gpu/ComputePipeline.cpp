@@ -103,6 +103,16 @@ void ComputePipeline::bindImages(std::span<const Image3D* const> images, const S
   vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
 }
 
+ComputePipeline& PipelineSet::with(const std::vector<std::uint32_t>& specialization) {
+  std::unique_ptr<ComputePipeline>& pipeline = pipelines_[specialization];
+  if (!pipeline) {
+    ComputePipelineInfo info = common_;
+    info.specialization = specialization;
+    pipeline = std::make_unique<ComputePipeline>(device_, info);
+  }
+  return *pipeline;
+}
+
 void ComputePipeline::release() noexcept {
   VkDevice device = device_->handle();
   if (pipeline_ != VK_NULL_HANDLE) vkDestroyPipeline(device, pipeline_, nullptr);

@@ -5,9 +5,11 @@
 #include <vulkan/vulkan.h>
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace vdi::gpu {
@@ -58,6 +60,20 @@ class ComputePipeline {
   VkDescriptorSet set_ = VK_NULL_HANDLE;
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkPipeline pipeline_ = VK_NULL_HANDLE;
+};
+
+/// Pipelines of one shader that differ in specialisation, each made when it's first asked for.
+class PipelineSet {
+ public:
+  /// `common`: but for the specialisation.
+  PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common)
+      : device_(std::move(device)), common_(std::move(common)) {}
+  ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
+
+ private:
+  std::shared_ptr<Device> device_;
+  ComputePipelineInfo common_;
+  std::map<std::vector<std::uint32_t>, std::unique_ptr<ComputePipeline>> pipelines_;
 };
 
 }  // namespace vdi::gpu

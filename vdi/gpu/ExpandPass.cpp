@@ -26,14 +26,14 @@ std::uint64_t tileCount(const glm::ivec2& lists) {
   return static_cast<std::uint64_t>(tiles.x) * static_cast<std::uint64_t>(tiles.y);
 }
 
-ExpandPass::ExpandPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
+ExpandPass::ExpandPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
 
-void ExpandPass::record(Commands& commands, const shared::ExpandConstants& constants) const {
+void ExpandPass::record(Commands& commands, const shared::ExpandConstants& constants) {
   constexpr std::uint64_t widest = 32768;  // groups; every device allows 65535 per axis
   const std::uint64_t groups = (invocations(constants) + shared::expandGroup - 1) / shared::expandGroup;
   if (groups == 0) return;
   const std::uint64_t across = std::min(groups, widest);
-  commands.dispatch(pipeline_, constants, static_cast<std::uint32_t>(across),
+  commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants, static_cast<std::uint32_t>(across),
                     static_cast<std::uint32_t>((groups + across - 1) / across));
 }
 

@@ -13,10 +13,10 @@ class ExpandPass {
  public:
   explicit ExpandPass(std::shared_ptr<Device> device);
   /// One of the expandMode's: all segments first, in any number of parts; then the masks; then the tiles.
-  void record(Commands& commands, const shared::ExpandConstants& constants) const;
+  void record(Commands& commands, const shared::ExpandConstants& constants);
 
  private:
-  ComputePipeline pipeline_;
+  PipelineSet pipelines_;  // by precision
 };
 
 /// Tiles of renderTile x renderTile lists.

@@ -13,10 +13,10 @@ ComputePipelineInfo pipelineInfo() {
 
 }  // namespace
 
-MergePass::MergePass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
+MergePass::MergePass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
 
-void MergePass::record(Commands& commands, const shared::MergeConstants& constants) const {
-  commands.dispatch(pipeline_, constants,
+void MergePass::record(Commands& commands, const shared::MergeConstants& constants) {
+  commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants,
                     (constants.listCount + shared::compositeGroup - 1) / shared::compositeGroup);
 }
 

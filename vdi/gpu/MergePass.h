@@ -13,10 +13,10 @@ class MergePass {
  public:
   explicit MergePass(std::shared_ptr<Device> device);
   /// constants.mode: mergeModeCount, then (after a scan) mergeModeMerge.
-  void record(Commands& commands, const shared::MergeConstants& constants) const;
+  void record(Commands& commands, const shared::MergeConstants& constants);
 
  private:
-  ComputePipeline pipeline_;
+  PipelineSet pipelines_;  // by precision
 };
 
 }  // namespace vdi::gpu

@@ -13,10 +13,10 @@ ComputePipelineInfo pipelineInfo() {
 
 }  // namespace
 
-ReducePass::ReducePass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
+ReducePass::ReducePass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
 
-void ReducePass::record(Commands& commands, const shared::ReduceConstants& constants) const {
-  commands.dispatch(pipeline_, constants,
+void ReducePass::record(Commands& commands, const shared::ReduceConstants& constants) {
+  commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants,
                     (constants.listCount + shared::reduceGroup - 1) / shared::reduceGroup);
 }
 

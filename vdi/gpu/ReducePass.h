@@ -12,11 +12,10 @@ namespace vdi::gpu {
 class ReducePass {
  public:
   explicit ReducePass(std::shared_ptr<Device> device);
-  /// reduceModeCount, then (after a scan of the counts) reduceModeWrite.
-  void record(Commands& commands, const shared::ReduceConstants& constants) const;
+  void record(Commands& commands, const shared::ReduceConstants& constants);
 
  private:
-  ComputePipeline pipeline_;
+  PipelineSet pipelines_;  // by precision
 };
 
 }  // namespace vdi::gpu

@@ -108,14 +108,21 @@ void Compositor::compositeBand(const std::vector<ListsOf<Segment>>& subLists, st
     settings_.counts = targets.counts;
     settings_.offsets = targets.offsets;
     settings_.segments = targets.segments;
-    settings_.grains = targets.grains;
+    settings_.spans = targets.spans;
     settings_.lights = targets.lights;
-    settings_.reductions = targets.reductions;
+    settings_.written = targets.written;
+    settings_.left = targets.left;
     settings_.status = targets.status;
     std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
-    compositePass_.record(commands, params_.address(), request_.algorithm, write, listCount);
+    compositePass_.record(commands, params_.address(), settings_.form, request_.algorithm, write, listCount);
   };
-  builder_.build({listCount, request_.algorithm, request_.sampleStep, request_.code}, record, result);
+  ListBuilder::Request build;
+  build.width = listCount;
+  build.rows = 1;
+  build.algorithm = request_.algorithm;
+  build.sampleStep = request_.sampleStep;
+  build.code = request_.code;
+  builder_.build(build, record, result);
 }
 
 template SupersegmentLists Compositor::composite(const std::vector<SupersegmentLists>&, const Request&);

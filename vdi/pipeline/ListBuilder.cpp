@@ -15,6 +15,7 @@ ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
       commands_(device_),
       scan_(device_),
+      allot_(device_),
       reduce_(device_),
       status_(device_, sizeof(std::uint32_t), MemoryKind::Readback) {}
 
@@ -25,13 +26,14 @@ shared::StoredForm storedForm(const DepthCode& code) {
 std::uint64_t ListBuilder::bytesPerList(std::uint32_t budget, Algorithm algorithm) {
   const std::uint64_t segments = std::uint64_t{budget} * sizeof(Supersegment);
   if (algorithm == Algorithm::Bisection) return segments;
-  return segments +
-         std::uint64_t{shared::grainsPerBudget} * budget * (sizeof(shared::Grain) + sizeof(glm::vec4));
+  const std::uint64_t grains = std::uint64_t{shared::grainsPerBudget} * budget;
+  const std::uint64_t room = grains + grains / 4 + shared::uncountedSpareGrains;
+  return segments + room * (sizeof(shared::Grain) + sizeof(glm::vec2) + sizeof(glm::vec4));
 }
 
 template <typename Segment>
 void ListBuilder::build(const Request& request, const Record& record, ListsOf<Segment>& result) {
-  const std::uint64_t words = (std::uint64_t{request.listCount} + 1) * sizeof(std::uint32_t);
+  const std::uint64_t words = (std::uint64_t{request.listCount()} + 1) * sizeof(std::uint32_t);
   sensitivities_.reserve(device_, words, MemoryKind::DeviceLocal);
   counts_.reserve(device_, words, MemoryKind::DeviceLocal);
   offsets_.reserve(device_, words, MemoryKind::DeviceLocal);
@@ -60,12 +62,13 @@ void ListBuilder::submit() {
   }
 }
 
-/// Ends the recording with the prefix sum of counts_, submits, and returns the sum of all; the offsets are in
+/// Ends the recording with the prefix sum of counts, submits, and returns the sum of all; the offsets are in
 /// readback_.
-std::uint64_t ListBuilder::scanAndTotal(std::uint32_t listCount, gpu::Buffer& offsets) {
+std::uint64_t ListBuilder::scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts,
+                                        gpu::Buffer& offsets) {
   const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
   commands_.barrier();
-  scan_.record(commands_, counts_, offsets, listCount);
+  scan_.record(commands_, counts, offsets, listCount);
   commands_.mark("download");
   commands_.copy(offsets, 0, readback_, 0, words);
   submit();
@@ -108,8 +111,8 @@ void ListBuilder::buildByBisection(const Request& request, const Record& record,
   commands_.begin();
   commands_.mark("search");
   record(commands_, targets, false);
-  const std::uint64_t total = scanAndTotal(request.listCount, offsets_);
-  appendOffsets(request.listCount, result);
+  const std::uint64_t total = scanAndTotal(request.listCount(), counts_, offsets_);
+  appendOffsets(request.listCount(), result);
   if (total == 0) return;
 
   segments_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
@@ -122,47 +125,57 @@ void ListBuilder::buildByBisection(const Request& request, const Record& record,
 
 template <typename Segment>
 void ListBuilder::buildByMerging(const Request& request, const Record& record, ListsOf<Segment>& result) {
-  const std::uint64_t lists = request.listCount;
-  grainOffsets_.reserve(device_, (lists + 1) * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
-  reductions_.reserve(device_, lists * 2 * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+  const std::uint32_t lists = request.listCount();
+  const std::uint64_t words = (std::uint64_t{lists} + 1) * sizeof(std::uint32_t);
+  const std::uint64_t countedWords =
+      std::uint64_t{request.countedWidth()} * request.countedRows() * sizeof(std::uint32_t);
+  grainOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
+  written_.reserve(device_, words, MemoryKind::DeviceLocal);
+  countedTolerances_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
+  countedGrains_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
+  left_.reserve(device_, words, MemoryKind::DeviceLocal);
   BandTargets targets;
-  targets.sensitivities = sensitivities_.address();
-  targets.counts = counts_.address();
-  targets.offsets = grainOffsets_.address();
-  targets.reductions = reductions_.address();
+  targets.sensitivities = countedTolerances_.address();
+  targets.counts = countedGrains_.address();
   targets.status = status_.address();
   commands_.begin();
   commands_.mark("search");
   record(commands_, targets, false);
-  const std::uint64_t grainTotal = scanAndTotal(request.listCount, grainOffsets_);
+  commands_.barrier();
+  allot_.record(commands_, {countedTolerances_.address(), countedGrains_.address(), sensitivities_.address(),
+                            counts_.address(), request.width, request.rows, request.countedWidth(),
+                            request.countedRows(), request.countedStride});
+  const std::uint64_t grainTotal = scanAndTotal(lists, counts_, grainOffsets_);
 
   grains_.reserve(device_, grainTotal * sizeof(shared::Grain), MemoryKind::DeviceLocal);
+  spans_.reserve(device_, grainTotal * sizeof(glm::vec2), MemoryKind::DeviceLocal);
   lights_.reserve(device_, grainTotal * sizeof(glm::vec4), MemoryKind::DeviceLocal);
-  targets.grains = grains_.address();
+  targets.sensitivities = sensitivities_.address();
+  targets.counts = counts_.address();
+  targets.offsets = grainOffsets_.address();
+  targets.spans = spans_.address();
   targets.lights = lights_.address();
-  shared::ReduceConstants reduce{};
-  reduce.grains = grains_.address();
-  reduce.lights = lights_.address();
-  reduce.grainOffsets = grainOffsets_.address();
-  reduce.reductions = reductions_.address();
-  reduce.counts = counts_.address();
-  reduce.offsets = offsets_.address();
-  reduce.step = static_cast<float>(request.sampleStep);
-  reduce.listCount = request.listCount;
-  reduce.form = storedForm(request.code);
-  reduce.mode = shared::reduceModeCount;
+  targets.written = written_.address();
+  targets.left = left_.address();
   commands_.begin();
   commands_.mark("write");
   record(commands_, targets, true);
-  commands_.barrier();
-  reduce_.record(commands_, reduce);
-  const std::uint64_t total = scanAndTotal(request.listCount, offsets_);
-  appendOffsets(request.listCount, result);
+  const std::uint64_t total = scanAndTotal(lists, left_, offsets_);
+  appendOffsets(lists, result);
   if (total == 0) return;
 
   segments_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
+  shared::ReduceConstants reduce{};
+  reduce.spans = spans_.address();
+  reduce.grains = grains_.address();
+  reduce.lights = lights_.address();
+  reduce.grainOffsets = grainOffsets_.address();
+  reduce.written = written_.address();
+  reduce.offsets = offsets_.address();
   reduce.segments = segments_.address();
-  reduce.mode = shared::reduceModeWrite;
+  reduce.step = static_cast<float>(request.sampleStep);
+  reduce.listCount = lists;
+  reduce.form = storedForm(request.code);
   commands_.begin();
   commands_.mark("reduce");
   reduce_.record(commands_, reduce);

@@ -2,7 +2,8 @@
 // rays and what composites share it; not part of the library's interface. vdi/reference/Segmenter.h describes
 // the algorithms.
 //   bisection: search of sensitivities, prefix sum of the counts, write.
-//   merge: count of grains, prefix sum, write of grains; count of what's to be left, prefix sum, reduce.
+//   merge: count of grains, of all lists or one in countedStride x countedStride; allotment to all lists, prefix sum,
+//   write of grains; prefix sum of what's to be left of them, reduce.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Vdi.h"
+#include "vdi/gpu/AllotPass.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/gpu/Memory.h"
@@ -25,9 +27,10 @@ struct BandTargets {
   std::uint64_t counts = 0;
   std::uint64_t offsets = 0;
   std::uint64_t segments = 0;
-  std::uint64_t grains = 0;
+  std::uint64_t spans = 0;
   std::uint64_t lights = 0;
-  std::uint64_t reductions = 0;
+  std::uint64_t written = 0;
+  std::uint64_t left = 0;
   std::uint64_t status = 0;
 };
 
@@ -59,10 +62,20 @@ class ListBuilder {
   using Record = std::function<void(gpu::Commands&, const BandTargets&, bool write)>;
 
   struct Request {
-    std::uint32_t listCount = 0;
+    std::uint32_t width = 0;  // lists in a row
+    std::uint32_t rows = 0;
+    bool rowBehind = false;           // another row follows the band's last one
+    std::uint32_t countedStride = 1;  // merge: `rows` is a multiple of it, or nothing follows
     Algorithm algorithm = Algorithm::Merge;
     double sampleStep = 1.0;
     DepthCode code;  // of compact lists
+
+    std::uint32_t listCount() const { return width * rows; }
+    /// Of the lists that are counted: every countedStride-th, the row behind the band's last one included.
+    std::uint32_t countedWidth() const { return (width + countedStride - 1) / countedStride; }
+    std::uint32_t countedRows() const {
+      return (rows + countedStride - 1) / countedStride + (rowBehind && countedStride > 1 ? 1 : 0);
+    }
   };
 
   /// Runs all steps and appends what was written to `result`, compact or full as its type says. Throws
@@ -79,7 +92,7 @@ class ListBuilder {
   void buildByBisection(const Request& request, const Record& record, ListsOf<Segment>& result);
   template <typename Segment>
   void buildByMerging(const Request& request, const Record& record, ListsOf<Segment>& result);
-  std::uint64_t scanAndTotal(std::uint32_t listCount, gpu::Buffer& offsets);
+  std::uint64_t scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts, gpu::Buffer& offsets);
   template <typename Segment>
   void appendOffsets(std::uint32_t listCount, ListsOf<Segment>& result) const;
   template <typename Segment>
@@ -89,14 +102,19 @@ class ListBuilder {
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
   gpu::ScanPass scan_;
+  gpu::AllotPass allot_;
   gpu::ReducePass reduce_;
   gpu::Buffer sensitivities_;
   gpu::Buffer counts_;
   gpu::Buffer offsets_;
   gpu::Buffer grainOffsets_;
   gpu::Buffer grains_;
+  gpu::Buffer spans_;
   gpu::Buffer lights_;
-  gpu::Buffer reductions_;
+  gpu::Buffer written_;
+  gpu::Buffer left_;
+  gpu::Buffer countedTolerances_;
+  gpu::Buffer countedGrains_;
   gpu::Buffer segments_;
   gpu::Buffer status_;
   gpu::Buffer readback_;

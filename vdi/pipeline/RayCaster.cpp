@@ -49,14 +49,15 @@ shared::CastParams RayCaster::prepare(const Request& request) {
 }
 
 /// The whole picture at once where memory allows; on a CPU device in eighths, so that progress shows and an
-/// abort is heard.
+/// abort is heard. A multiple of shared::countedStride, or all.
 std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytesPerPixel) const {
   const auto height = static_cast<std::uint64_t>(request.view.height());
   const std::uint64_t rowBytes = static_cast<std::uint64_t>(request.view.width()) * bytesPerPixel;
   const std::uint64_t room = std::max<std::uint64_t>(device_->limits().memoryBytes / 8, rowBytes);
   std::uint64_t rows = std::min(height, room / rowBytes);
   if (device_->isCpu()) rows = std::min(rows, std::max<std::uint64_t>((height + 7) / 8, 1));
-  return static_cast<std::uint32_t>(rows);
+  rows = (rows + shared::countedStride - 1) / shared::countedStride * shared::countedStride;
+  return static_cast<std::uint32_t>(std::min(height, rows));
 }
 
 template <typename Segment>
@@ -75,9 +76,21 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
   const Algorithm algorithm = request.runsOnly ? Algorithm::Bisection : request.settings.algorithm;
   const std::uint32_t band =
       rowsPerBand(request, ListBuilder::bytesPerList(request.settings.supersegments, algorithm));
+  // With cuts at gaps each list's runs must be counted.
+  const std::uint32_t stride = request.cutAtGaps ? 1 : shared::countedStride;
   times_ = {};
   for (std::uint32_t row = 0; row < height; row += band) {
     const std::uint32_t end = std::min(height, row + band);
+    ListBuilder::Request build;
+    build.width = width;
+    build.rows = end - row;
+    build.rowBehind = end < height;
+    build.countedStride = stride;
+    build.algorithm = algorithm;
+    build.sampleStep = request.lattice.step;
+    build.code = request.code;
+    params.countedStride = stride;
+    params.countedWidth = build.countedWidth();
     const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
       // The shader counts lists from the picture's first; the targets hold just this band's.
       const std::uint64_t skipped = std::uint64_t{row} * width * sizeof(std::uint32_t);
@@ -85,16 +98,21 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
       params.counts = targets.counts - skipped;
       params.offsets = targets.offsets - skipped;
       params.segments = targets.segments;
-      params.grains = targets.grains;
+      params.spans = targets.spans;
       params.lights = targets.lights;
-      params.reductions = targets.reductions - 2 * skipped;
+      params.written = targets.written - skipped;
+      params.left = targets.left - skipped;
       params.status = targets.status;
+      if (!write && algorithm == Algorithm::Merge) {
+        params.sensitivities = targets.sensitivities;
+        params.counts = targets.counts;
+      }
       std::memcpy(params_.mapped().data(), &params, sizeof(params));
       pass_.record(commands, params_.address(),
-                   write ? gpu::CastPass::Work::Write : gpu::CastPass::Work::Search, algorithm, width, row,
-                   end);
+                   write ? gpu::CastPass::Work::Write : gpu::CastPass::Work::Search, algorithm,
+                   {width, row, end, stride, params.form});
     };
-    builder_.build({(end - row) * width, algorithm, request.lattice.step, request.code}, record, result);
+    builder_.build(build, record, result);
     times_ += builder_.times();
     if (!progress(static_cast<double>(end) / height)) break;
   }
@@ -124,8 +142,7 @@ Image RayCaster::image(const Request& request, const Progress& progress) {
     std::memcpy(params_.mapped().data(), &params, sizeof(params));
     commands_.begin();
     commands_.mark("cast");
-    pass_.record(commands_, params_.address(), gpu::CastPass::Work::Volume, Algorithm::Merge, width, row,
-                 end);
+    pass_.record(commands_, params_.address(), gpu::CastPass::Work::Volume, Algorithm::Merge, {width, row, end});
     commands_.submitAndWait();
     times_.all += commands_.stageTimes().front().milliseconds;
     const std::size_t count = std::size_t{end - row} * width;

@@ -331,10 +331,32 @@ Image renderVolume(const Frame& frame, std::span<const Block> blocks) {
 
 SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bool cutAtGaps) {
   const SegmentRules rules{frame.settings.supersegments, static_cast<float>(frame.lattice.step), cutAtGaps};
+  const int width = frame.view.width();
+  const int height = frame.view.height();
   SupersegmentLists lists;
-  for (int y = 0; y < frame.view.height(); ++y) {
-    for (int x = 0; x < frame.view.width(); ++x) {
-      const auto list = segment(castRay(frame, blocks, x, y), rules, frame.settings.algorithm);
+  const auto allotmentAt = [&](int x, int y) { return allotmentOf(castRay(frame, blocks, x, y), rules); };
+  const auto listAt = [&](int x, int y) {
+    const std::vector<Interval> samples = castRay(frame, blocks, x, y);
+    if (frame.settings.algorithm == Algorithm::Bisection) return segmentByBisection(samples, rules);
+    if (cutAtGaps) return segmentByMerging(samples, rules);
+    // The counted lists left and right, below and above; the last ones where there's none beyond.
+    const auto before = [](int i) { return i - i % countedStride; };
+    const auto after = [&](int i, int size) {
+      const int next = before(i + countedStride - 1);
+      return next < size ? next : before(i);
+    };
+    const int left = before(x);
+    const int right = after(x, width);
+    const int below = before(y);
+    const int above = after(y, height);
+    if (left == x && below == y) return segmentByMerging(samples, rules, allotmentAt(x, y));
+    const Allotment counted[] = {allotmentAt(left, below), allotmentAt(right, below), allotmentAt(left, above),
+                                 allotmentAt(right, above)};
+    return segmentByMerging(samples, rules, allotmentBetween(counted));
+  };
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto list = listAt(x, y);
       lists.segments.insert(lists.segments.end(), list.begin(), list.end());
       lists.offsets.push_back(static_cast<std::uint32_t>(lists.segments.size()));
     }

@@ -1,6 +1,7 @@
 // The shaders' twin is shaders/grains.glsl (step 2) and shaders/reduce.comp (step 3).
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "vdi/core/TransferFunction.h"
@@ -59,9 +60,17 @@ struct Grain {
   }
 };
 
-/// A negative tolerance makes each interval a grain.
-std::vector<Grain> grainsOf(std::span<const Interval> intervals, float tolerance, const SegmentRules& rules) {
+/// A negative tolerance makes each interval a grain. See Allotment for `room`.
+std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted, const SegmentRules& rules,
+                            std::size_t room = std::numeric_limits<std::size_t>::max()) {
   std::vector<Grain> grains;
+  float tolerance = allotted;
+  const auto adaptTolerance = [&] {
+    const std::size_t left = room - std::min(room, grains.size());
+    if (left >= spareGrains) return;
+    const float base = allotted < 0.0F ? finestTolerance / toleranceRatio : allotted;
+    tolerance = left == 0 ? unlimited : base * std::pow(toleranceRatio, static_cast<float>(spareGrains - left));
+  };
   bool open = false;
   bool cut = true;
   Appearance first{};
@@ -95,6 +104,7 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float tolerance
         deviation = 0.0F;
         open = true;
         cut = false;
+        adaptTolerance();
       }
     }
     before *= 1.0F - opacityOf(i.opticalDepth);
@@ -176,29 +186,60 @@ void mergeCheapest(std::vector<Grain>& grains, std::size_t most, float sampleSte
 
 }  // namespace
 
-std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules) {
+Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules) {
   const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
   const std::size_t most = std::max<std::size_t>(rules.budget, runs);
-  const auto visible = std::count_if(intervals.begin(), intervals.end(),
-                                     [](const Interval& interval) { return interval.opticalDepth > 0.0F; });
-  std::vector<Grain> grains;
-  if (static_cast<std::size_t>(visible) <= most) {
-    grains = grainsOf(intervals, -1.0F, rules);
-  } else {
+  const auto visible = static_cast<std::size_t>(
+      std::count_if(intervals.begin(), intervals.end(),
+                    [](const Interval& interval) { return interval.opticalDepth > 0.0F; }));
+  if (visible == 0) return {};
+  float tolerance = -1.0F;
+  std::size_t count = visible;
+  if (visible > most) {
     const std::size_t room = std::max<std::size_t>(std::size_t{grainsPerBudget} * rules.budget, runs);
-    float tolerance = finestTolerance;
-    grains = grainsOf(intervals, tolerance, rules);
-    for (int level = 1; grains.size() > room; ++level) {
+    tolerance = finestTolerance;
+    count = grainsOf(intervals, tolerance, rules).size();
+    for (int level = 1; count > room; ++level) {
       tolerance = level < toleranceLevels ? tolerance * toleranceRatio : unlimited;
-      grains = grainsOf(intervals, tolerance, rules);
+      count = grainsOf(intervals, tolerance, rules).size();
     }
-    mergeCheapest(grains, most, rules.sampleStep);
   }
+  const auto grains = static_cast<std::uint32_t>(count);
+  return {tolerance, grains, grains + spareGrains};
+}
+
+Allotment allotmentBetween(std::span<const Allotment> counted) {
+  Allotment result;
+  float exponents = 0.0F;
+  float count = 0.0F;
+  bool exact = true;
+  for (const Allotment& a : counted) {
+    result.grains = std::max(result.grains, a.grains);
+    if (a.grains == 0) continue;
+    exact = exact && a.tolerance < 0.0F;
+    exponents += std::log2(a.tolerance < 0.0F ? finestTolerance / toleranceRatio : a.tolerance);
+    count += 1.0F;
+  }
+  if (!exact) result.tolerance = std::exp2(exponents / count);
+  result.room = result.grains + uncountedSpareGrains + result.grains / 4;
+  return result;
+}
+
+std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules,
+                                           const Allotment& allotment) {
+  const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
+  std::vector<Grain> grains;
+  if (allotment.room > 0) grains = grainsOf(intervals, allotment.tolerance, rules, allotment.room);
+  mergeCheapest(grains, std::max<std::size_t>(rules.budget, runs), rules.sampleStep);
   std::vector<Supersegment> list;
   list.reserve(grains.size());
   for (const Grain& g : grains)
     list.push_back({g.front, g.back, g.red, g.green, g.blue, opacityOf(g.opticalDepth)});
   return list;
+}
+
+std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules) {
+  return segmentByMerging(intervals, rules, allotmentOf(intervals, rules));
 }
 
 }  // namespace vdi::reference

@@ -1,0 +1,29 @@
+// Parameters of allot.comp.
+#ifndef VDI_SHARED_ALLOT_H
+#define VDI_SHARED_ALLOT_H
+#include "lists.h"
+
+VDI_SHARED_BEGIN
+
+#ifdef __cplusplus
+inline constexpr uint allotGroup = 64;
+#else
+const uint allotGroup = 64;
+#endif
+
+// A band of lists, of which every stride-th in a row of every stride-th row is counted.
+struct AllotConstants {
+  VDI_ADDRESS(FloatArray) countedTolerances;  // [countedRows][countedWidth]
+  VDI_ADDRESS(UintArray) countedGrains;       // likewise
+  VDI_ADDRESS(FloatArray) tolerances;         // [rows][width]
+  VDI_ADDRESS(UintArray) rooms;               // likewise
+  uint width;
+  uint rows;
+  uint countedWidth;
+  uint countedRows;
+  uint stride;
+};
+
+VDI_SHARED_END
+
+#endif
