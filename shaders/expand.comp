@@ -31,21 +31,25 @@ void expandSegment(uint i) {
                                            packHalf2x16(vec2(straight.b, opticalDepth)));
 }
 
-void maskList(uint list) {
+void maskList(uint list, uint listCount) {
   uint mask = 0u;
+  if (list == listCount) {
+    push.heads.at[list] = uvec2(push.offsets.at[list], 0u);
+    return;
+  }
   uint end = push.offsets.at[list + 1u];
   for (uint i = push.offsets.at[list]; i < end; ++i) {
     vec2 depths = uintBitsToFloat(push.segments.at[i].xy);
     mask |= maskOf(depths.x, depths.y, push.nearest, push.binScale);
   }
-  push.masks.at[list] = mask;
+  push.heads.at[list] = uvec2(push.offsets.at[list], mask);
 }
 
 void maskTile(ivec2 tile, uint index) {
   uint mask = 0u;
   ivec2 end = min((tile + 1) * renderTile, push.lists);
   for (int y = tile.y * renderTile; y < end.y; ++y) {
-    for (int x = tile.x * renderTile; x < end.x; ++x) mask |= push.masks.at[uint(y) * uint(push.lists.x) + uint(x)];
+    for (int x = tile.x * renderTile; x < end.x; ++x) mask |= push.heads.at[uint(y) * uint(push.lists.x) + uint(x)].y;
   }
   push.tileMasks.at[index] = mask;
 }
@@ -55,7 +59,8 @@ void main() {
   if (push.mode == expandModeSegments) {
     if (i < push.count) expandSegment(i);
   } else if (push.mode == expandModeMasks) {
-    if (i < uint(push.lists.x) * uint(push.lists.y)) maskList(i);
+    uint listCount = uint(push.lists.x) * uint(push.lists.y);
+    if (i <= listCount) maskList(i, listCount);
   } else {
     ivec2 tiles = (push.lists + renderTile - 1) / renderTile;
     if (i < uint(tiles.x * tiles.y)) maskTile(ivec2(int(i) % tiles.x, int(i) / tiles.x), i);

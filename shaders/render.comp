@@ -80,28 +80,21 @@ uint maskAlong(vec2 stretch) {
   return maskOf(min(a, b), max(a, b), push.params.value.nearest, push.params.value.binScale);
 }
 
-// What the ray meets of one list.
-void addList(ivec2 pixel, vec2 stretch) {
-  uint list = uint(pixel.y) * uint(push.params.value.lists.x) + uint(pixel.x);
-  if ((push.params.value.masks.at[list] & maskAlong(stretch)) == 0u) return;
-  uint begin = push.params.value.offsets.at[list];
-  uint end = push.params.value.offsets.at[list + 1u];
+// Where in its list the last search ended: neighbouring lists are alike, so the next search starts there.
+uint searchHint = 0u;
+
+// What the ray meets of one list, which has supersegments [begin, end).
+void addList(ivec2 pixel, uint begin, uint end, vec2 stretch) {
   float enterDepth = depthAt(stretch.x);
   float leaveDepth = depthAt(stretch.y);
   float nearDepth = min(enterDepth, leaveDepth);
   float farDepth = max(enterDepth, leaveDepth);
   float segmentScale = rayWorldPerT / pixelLength(pixel);
   // The first supersegment that ends behind nearDepth.
-  uint low = begin;
-  uint high = end;
-  while (low < high) {
-    uint middle = (low + high) / 2u;
-    if (uintBitsToFloat(push.params.value.segments.at[middle].y) > nearDepth) {
-      high = middle;
-    } else {
-      low = middle + 1u;
-    }
-  }
+  uint low = min(begin + searchHint, end);
+  while (low > begin && uintBitsToFloat(push.params.value.segments.at[low - 1u].y) > nearDepth) --low;
+  while (low < end && !(uintBitsToFloat(push.params.value.segments.at[low].y) > nearDepth)) ++low;
+  searchHint = low - begin;
   if (rayDirection.z >= 0.0) {
     for (uint i = low; i < end; ++i) {
       uvec4 packed = push.params.value.segments.at[i];
@@ -144,8 +137,9 @@ void walkLists(vec2 stretch) {
   ivec2 direction = sign(last - pixel);
   ivec2 ahead = max(direction, ivec2(0));
   int tilesAcross = (push.params.value.lists.x + renderTile - 1) / renderTile;
-  float enter = stretch.x;
+  float enterS = 0.0;
   ivec2 knownTile = ivec2(-1);
+  uint tileRay = 0u;  // depths that the ray is in, in the tile
   // At most one step per column and row.
   int most = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
   for (int i = 0; i < most; ++i) {
@@ -156,29 +150,37 @@ void walkLists(vec2 stretch) {
       ivec2 edge = (tile + ahead) * renderTile;
       bvec2 leaves = notEqual(last / renderTile, tile);
       vec2 s = mix(vec2(1.0), crossings(line, edge), leaves);
-      float leaveS = min(s.x, s.y);
-      float leave = leaves.x || leaves.y ? clamp(tAt(line, leaveS), enter, stretch.y) : stretch.y;
+      float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
+      tileRay = maskAlong(vec2(tAt(line, enterS), tAt(line, leaveS)));
       uint mask = push.params.value.tileMasks.at[tile.y * tilesAcross + tile.x];
-      if ((mask & maskAlong(vec2(enter, leave))) == 0u) {
+      if ((mask & tileRay) == 0u) {
         if (!leaves.x && !leaves.y) return;
         bool stepX = leaves.x && (!leaves.y || s.x <= s.y);
         ivec2 lowest = max(tile * renderTile, min(pixel, last));
         ivec2 highest = min(tile * renderTile + renderTile - 1, max(pixel, last));
         ivec2 there = clamp(ivec2(floor(mix(line.start, end, leaveS))), lowest, highest);
         pixel = mix(there, edge + ahead - 1, bvec2(stepX, !stepX));
-        enter = leave;
+        enterS = leaveS;
         continue;
       }
     }
     bvec2 moves = notEqual(pixel, last);
-    vec2 s = crossings(line, pixel + ahead);
-    bool stepX = moves.x && (!moves.y || s.x <= s.y);
+    vec2 s = mix(vec2(2.0), crossings(line, pixel + ahead), moves);
+    bool stepX = moves.x && s.x <= s.y;
     bool stepY = moves.y && !stepX;
-    float leave = stepX || stepY ? clamp(tAt(line, stepX ? s.x : s.y), enter, stretch.y) : stretch.y;
-    if (leave > enter) addList(pixel, vec2(enter, leave));
-    if (!(stepX || stepY) || accumulated.a >= opaque) return;
+    float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
+    uint list = uint(pixel.y) * uint(push.params.value.lists.x) + uint(pixel.x);
+    uvec2 head = push.params.value.heads.at[list];
+    if ((head.y & tileRay) != 0u) {
+      vec2 part = vec2(tAt(line, enterS), tAt(line, leaveS));
+      if (part.y > part.x && (head.y & maskAlong(part)) != 0u) {
+        addList(pixel, head.x, push.params.value.heads.at[list + 1u].x, part);
+        if (accumulated.a >= opaque) return;
+      }
+    }
+    if (!(stepX || stepY)) return;
     pixel += mix(ivec2(0), direction, bvec2(stepX, stepY));
-    enter = leave;
+    enterS = leaveS;
   }
 }
 

@@ -18,7 +18,7 @@ const uint renderGroupX = 8;
 const uint renderGroupY = 8;
 const uint expandGroup = 64;
 const uint expandModeSegments = 0;  // one invocation a supersegment
-const uint expandModeMasks = 1;     // one a list
+const uint expandModeMasks = 1;     // one a list, and one behind the last
 const uint expandModeTiles = 2;     // one a tile
 const int renderTile = 8;           // lists per side of a tile
 #endif
@@ -36,6 +36,8 @@ VDI_SHARED_END
 
 #ifndef __cplusplus
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer RenderSegmentArray { uvec4 at[]; };
+// What a ray asks of each list that it crosses, in one access: where the list starts in the compact array, and its mask.
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer ListHeads { uvec2 at[]; };
 #endif
 
 VDI_SHARED_BEGIN
@@ -46,7 +48,7 @@ struct ExpandConstants {
   VDI_ADDRESS(UintArray) offsets;                // [lists + 1]
   VDI_ADDRESS(SegmentArray) from;                // compact, as generated: a part of the supersegments
   VDI_ADDRESS(RenderSegmentArray) segments;      // all
-  VDI_ADDRESS(UintArray) masks;                  // [lists.y][lists.x]
+  VDI_ADDRESS(ListHeads) heads;                  // [lists + 1]
   VDI_ADDRESS(UintArray) tileMasks;              // [tiles.y][tiles.x]
   uint mode;
   uint first;  // supersegment that `from` starts with
@@ -58,9 +60,8 @@ struct ExpandConstants {
 };
 
 struct RenderParams {
-  VDI_ADDRESS(UintArray) offsets;            // [lists + 1]
+  VDI_ADDRESS(ListHeads) heads;
   VDI_ADDRESS(RenderSegmentArray) segments;  // compact
-  VDI_ADDRESS(UintArray) masks;
   VDI_ADDRESS(UintArray) tileMasks;
   VDI_ADDRESS(Vec4Array) colors;       // [height][width]
   VDI_ADDRESS(FloatArray) depths;      // [height][width]

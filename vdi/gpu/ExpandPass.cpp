@@ -16,7 +16,7 @@ ComputePipelineInfo pipelineInfo() {
 std::uint64_t invocations(const shared::ExpandConstants& constants) {
   if (constants.mode == shared::expandModeSegments) return constants.count;
   if (constants.mode == shared::expandModeTiles) return tileCount(constants.lists);
-  return static_cast<std::uint64_t>(constants.lists.x) * static_cast<std::uint64_t>(constants.lists.y);
+  return static_cast<std::uint64_t>(constants.lists.x) * static_cast<std::uint64_t>(constants.lists.y) + 1;
 }
 
 }  // namespace
@@ -33,7 +33,8 @@ void ExpandPass::record(Commands& commands, const shared::ExpandConstants& const
   const std::uint64_t groups = (invocations(constants) + shared::expandGroup - 1) / shared::expandGroup;
   if (groups == 0) return;
   const std::uint64_t across = std::min(groups, widest);
-  commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants, static_cast<std::uint32_t>(across),
+  commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants,
+                    static_cast<std::uint32_t>(across),
                     static_cast<std::uint32_t>((groups + across - 1) / across));
 }
 

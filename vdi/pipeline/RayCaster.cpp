@@ -126,30 +126,35 @@ Image RayCaster::image(const Request& request, const Progress& progress) {
   const auto width = static_cast<std::uint32_t>(request.view.width());
   const auto height = static_cast<std::uint32_t>(request.view.height());
   Image image{request.view.width(), request.view.height(), {}, {}};
-  image.rgba.assign(image.pixelCount(), glm::vec4(0.0F));
-  image.depth.assign(image.pixelCount(), Image::noDepth);
-  if (volume_.empty() || request.lattice.count == 0) return image;
+  if (volume_.empty() || request.lattice.count == 0) {
+    image.rgba.assign(image.pixelCount(), glm::vec4(0.0F));
+    image.depth.assign(image.pixelCount(), Image::noDepth);
+    return image;
+  }
+  image.rgba.reserve(image.pixelCount());
+  image.depth.reserve(image.pixelCount());
   shared::CastParams params = prepare(request);
   const std::uint32_t band = rowsPerBand(request, sizeof(glm::vec4) + sizeof(float));
   times_ = {};
-  colors_.reserve(device_, std::uint64_t{band} * width * sizeof(glm::vec4), MemoryKind::Readback);
-  depths_.reserve(device_, std::uint64_t{band} * width * sizeof(float), MemoryKind::Readback);
   for (std::uint32_t row = 0; row < height; row += band) {
     const std::uint32_t end = std::min(height, row + band);
     const std::uint64_t first = std::uint64_t{row} * width;
-    params.colors = colors_.address() - first * sizeof(glm::vec4);
-    params.depths = depths_.address() - first * sizeof(float);
+    picture_.reserve(device_, std::uint64_t{end - row} * width);
+    params.colors = picture_.colors() - first * sizeof(glm::vec4);
+    params.depths = picture_.depths() - first * sizeof(float);
     std::memcpy(params_.mapped().data(), &params, sizeof(params));
     commands_.begin();
     commands_.mark("cast");
-    pass_.record(commands_, params_.address(), gpu::CastPass::Work::Volume, Algorithm::Merge, {width, row, end});
+    pass_.record(commands_, params_.address(), gpu::CastPass::Work::Volume, Algorithm::Merge,
+                 {width, row, end});
+    picture_.recordDownload(commands_);
     commands_.submitAndWait();
     times_.all += commands_.stageTimes().front().milliseconds;
-    const std::size_t count = std::size_t{end - row} * width;
-    std::memcpy(image.rgba.data() + first, colors_.mapped().data(), count * sizeof(glm::vec4));
-    std::memcpy(image.depth.data() + first, depths_.mapped().data(), count * sizeof(float));
+    picture_.appendTo(image);
     if (!progress(static_cast<double>(end) / height)) break;
   }
+  image.rgba.resize(image.pixelCount(), glm::vec4(0.0F));
+  image.depth.resize(image.pixelCount(), Image::noDepth);
   return image;
 }
 

@@ -17,6 +17,7 @@
 #include "vdi/gpu/CastPass.h"
 #include "vdi/gpu/VolumeStore.h"
 #include "vdi/pipeline/ListBuilder.h"
+#include "vdi/pipeline/PictureBuffers.h"
 
 namespace vdi::detail {
 
@@ -57,8 +58,7 @@ class RayCaster {
   ListBuilder builder_;
   gpu::Commands commands_;
   gpu::Buffer params_;
-  gpu::Buffer colors_;
-  gpu::Buffer depths_;
+  PictureBuffers picture_;
   ListTimes times_;
 };
 

@@ -8,6 +8,7 @@
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/RenderPass.h"
 #include "vdi/pipeline/ListBuilder.h"
+#include "vdi/pipeline/PictureBuffers.h"
 #include "vdi/pipeline/Pipeline.h"
 
 namespace vdi {
@@ -31,10 +32,9 @@ struct VdiRenderer::State {
   gpu::Buffer staging;
   gpu::Buffer offsets;
   gpu::Buffer segments;
-  gpu::Buffer masks;
+  gpu::Buffer heads;
   gpu::Buffer tileMasks;
-  gpu::Buffer colors;
-  gpu::Buffer depths;
+  detail::PictureBuffers picture;
   std::unique_ptr<View> original;  // none until there's a VDI
   float nearest = 0.0F;
   float farthest = 0.0F;
@@ -59,7 +59,7 @@ struct VdiRenderer::State {
   void upload(const ListsOf<Segment>& lists, const DepthCode& code, const glm::ivec2& size) {
     offsets.reserve(device, lists.offsets.size() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
     segments.reserve(device, lists.segments.size() * sizeof(shared::RenderSegment), MemoryKind::DeviceLocal);
-    masks.reserve(device, lists.listCount() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+    heads.reserve(device, (lists.listCount() + 1) * 2 * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
     tileMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
     inParts(lists.offsets, [&](std::size_t first, std::size_t count) {
       commands.copy(staging, 0, offsets, first * sizeof(std::uint32_t), count * sizeof(std::uint32_t));
@@ -67,7 +67,7 @@ struct VdiRenderer::State {
     shared::ExpandConstants constants{};
     constants.offsets = offsets.address();
     constants.segments = segments.address();
-    constants.masks = masks.address();
+    constants.heads = heads.address();
     constants.tileMasks = tileMasks.address();
     constants.nearest = nearest;
     constants.binScale = binScale;
@@ -117,30 +117,25 @@ Image VdiRenderer::render(const Camera& camera, int width, int height) {
   State& s = *state_;
   if (!s.original) throw Error(ErrorCode::InvalidArgument, "there is no VDI to render yet");
   const View view(camera, width, height);
-  Image image{width, height, {}, {}};
-  const std::uint64_t pixels = image.pixelCount();
-  s.colors.reserve(s.device, pixels * sizeof(glm::vec4), MemoryKind::Readback);
-  s.depths.reserve(s.device, pixels * sizeof(float), MemoryKind::Readback);
+  s.picture.reserve(s.device, static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height));
   shared::RenderParams params = gpu::renderGeometry(*s.original, view);
-  params.offsets = s.offsets.address();
+  params.heads = s.heads.address();
   params.segments = s.segments.address();
-  params.masks = s.masks.address();
   params.tileMasks = s.tileMasks.address();
   params.binScale = s.binScale;
-  params.colors = s.colors.address();
-  params.depths = s.depths.address();
+  params.colors = s.picture.colors();
+  params.depths = s.picture.depths();
   params.nearest = s.nearest;
   params.farthest = s.farthest;
   std::memcpy(s.params.mapped().data(), &params, sizeof(params));
   s.commands.begin();
   s.commands.mark("render");
   s.pass.record(s.commands, s.params.address(), params.width, params.height);
+  s.picture.recordDownload(s.commands);
   s.commands.submitAndWait();
   s.milliseconds = s.commands.stageTimes().front().milliseconds;
-  image.rgba.resize(pixels);
-  image.depth.resize(pixels);
-  std::memcpy(image.rgba.data(), s.colors.mapped().data(), pixels * sizeof(glm::vec4));
-  std::memcpy(image.depth.data(), s.depths.mapped().data(), pixels * sizeof(float));
+  Image image{width, height, {}, {}};
+  s.picture.appendTo(image);
   return image;
 }
 

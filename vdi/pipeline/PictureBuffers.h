@@ -1,0 +1,32 @@
+// Colours and depths of pixels on the device, and their way to the host. Not part of the library's interface.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "vdi/core/Image.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/Memory.h"
+
+namespace vdi::detail {
+
+class PictureBuffers {
+ public:
+  void reserve(const std::shared_ptr<gpu::Device>& device, std::uint64_t pixels);
+
+  std::uint64_t colors() const { return colors_.address(); }  // glm::vec4 each
+  std::uint64_t depths() const { return depths_.address(); }  // float each
+
+  /// Behind what writes them; a stage named "download".
+  void recordDownload(gpu::Commands& commands) const;
+  /// After that has run: all pixels behind those that the image has.
+  void appendTo(Image& image) const;
+
+ private:
+  std::uint64_t pixels_ = 0;
+  gpu::Buffer colors_;
+  gpu::Buffer depths_;
+  gpu::Buffer readback_;  // colours, then depths
+};
+
+}  // namespace vdi::detail
