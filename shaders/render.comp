@@ -15,6 +15,7 @@ const float opaque = 0.9999;
 vec3 rayOrigin;  // V_O's view space
 vec3 rayDirection;
 float rayWorldPerT;
+float rayPerDepth;  // t per unit of V_O's depth
 vec4 accumulated;
 float firstDepth;
 
@@ -59,36 +60,30 @@ float pixelLength(ivec2 pixel) {
 }
 
 void addSegment(uvec4 packed, vec2 stretch, float segmentScale) {
-  float front = uintBitsToFloat(packed.x);
-  float back = uintBitsToFloat(packed.y);
-  clip(stretch, rayOrigin.z - front, rayDirection.z);
-  clip(stretch, back - rayOrigin.z, -rayDirection.z);
-  if (!(stretch.x < stretch.y)) return;
+  vec2 depths = uintBitsToFloat(packed.xy);
+  vec2 t = (depths - rayOrigin.z) * rayPerDepth;
+  float enter = max(stretch.x, min(t.x, t.y));
+  float leave = min(stretch.y, max(t.x, t.y));
+  if (!(enter < leave)) return;
   vec2 blueOpticalDepth = unpackHalf2x16(packed.w);
-  float opacity = opacityOf(blueOpticalDepth.y * ((stretch.y - stretch.x) * segmentScale / (back - front)));
+  float opacity = opacityOf(blueOpticalDepth.y * ((leave - enter) * segmentScale / (depths.y - depths.x)));
   if (!(opacity > 0.0)) return;
-  if (accumulated.a == 0.0) firstDepth = stretch.x;
+  if (accumulated.a == 0.0) firstDepth = enter;
   accumulated += (1.0 - accumulated.a) * opacity * vec4(unpackHalf2x16(packed.z), blueOpticalDepth.x, 1.0);
 }
 
 float depthAt(float t) { return rayOrigin.z + t * rayDirection.z; }
 
-// The parts of the depth range that the ray is in, along a part of it.
-uint maskAlong(vec2 stretch) {
-  float a = depthAt(stretch.x);
-  float b = depthAt(stretch.y);
+// The parts of the depth range that the ray is in between two depths, in any order.
+uint maskBetween(float a, float b) {
   return maskOf(min(a, b), max(a, b), push.params.value.nearest, push.params.value.binScale);
 }
 
 // Where in its list the last search ended: neighbouring lists are alike, so the next search starts there.
 uint searchHint = 0u;
 
-// What the ray meets of one list, which has supersegments [begin, end).
-void addList(ivec2 pixel, uint begin, uint end, vec2 stretch) {
-  float enterDepth = depthAt(stretch.x);
-  float leaveDepth = depthAt(stretch.y);
-  float nearDepth = min(enterDepth, leaveDepth);
-  float farDepth = max(enterDepth, leaveDepth);
+// What the ray meets of one list, which has supersegments [begin, end), between two depths.
+void addList(ivec2 pixel, uint begin, uint end, vec2 stretch, float nearDepth, float farDepth) {
   float segmentScale = rayWorldPerT / pixelLength(pixel);
   // The first supersegment that ends behind nearDepth.
   uint low = min(begin + searchHint, end);
@@ -138,6 +133,8 @@ void walkLists(vec2 stretch) {
   ivec2 ahead = max(direction, ivec2(0));
   int tilesAcross = (push.params.value.lists.x + renderTile - 1) / renderTile;
   float enterS = 0.0;
+  float enterT = stretch.x;  // where s is knownS
+  float knownS = 0.0;
   ivec2 knownTile = ivec2(-1);
   uint tileRay = 0u;  // depths that the ray is in, in the tile
   // At most one step per column and row.
@@ -151,7 +148,7 @@ void walkLists(vec2 stretch) {
       bvec2 leaves = notEqual(last / renderTile, tile);
       vec2 s = mix(vec2(1.0), crossings(line, edge), leaves);
       float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
-      tileRay = maskAlong(vec2(tAt(line, enterS), tAt(line, leaveS)));
+      tileRay = maskBetween(depthAt(tAt(line, enterS)), depthAt(tAt(line, leaveS)));
       uint mask = push.params.value.tileMasks.at[tile.y * tilesAcross + tile.x];
       if ((mask & tileRay) == 0u) {
         if (!leaves.x && !leaves.y) return;
@@ -172,11 +169,16 @@ void walkLists(vec2 stretch) {
     uint list = uint(pixel.y) * uint(push.params.value.lists.x) + uint(pixel.x);
     uvec2 head = push.params.value.heads.at[list];
     if ((head.y & tileRay) != 0u) {
-      vec2 part = vec2(tAt(line, enterS), tAt(line, leaveS));
-      if (part.y > part.x && (head.y & maskAlong(part)) != 0u) {
-        addList(pixel, head.x, push.params.value.heads.at[list + 1u].x, part);
+      if (knownS != enterS) enterT = tAt(line, enterS);
+      vec2 part = vec2(enterT, tAt(line, leaveS));
+      float a = depthAt(part.x);
+      float b = depthAt(part.y);
+      if (part.y > part.x && (head.y & maskBetween(a, b)) != 0u) {
+        addList(pixel, head.x, push.params.value.heads.at[list + 1u].x, part, min(a, b), max(a, b));
         if (accumulated.a >= opaque) return;
       }
+      enterT = part.y;
+      knownS = leaveS;
     }
     if (!(stepX || stepY)) return;
     pixel += mix(ivec2(0), direction, bvec2(stepX, stepY));
@@ -192,6 +194,8 @@ void main() {
   rayOrigin = push.params.value.originBase + u * push.params.value.originRight + v * push.params.value.originUp;
   rayDirection = push.params.value.directionBase + u * push.params.value.directionRight + v * push.params.value.directionUp;
   rayWorldPerT = length(rayDirection);
+  // Across V_O's depths: all of a supersegment's are met at once, or none.
+  rayPerDepth = 1.0 / (abs(rayDirection.z) < 1e-20 ? 1e-20 : rayDirection.z);
   accumulated = vec4(0.0);
   firstDepth = uintBitsToFloat(0x7f800000u);
   vec2 stretch = insideFrustum();

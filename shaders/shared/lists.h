@@ -10,12 +10,12 @@ VDI_SHARED_BEGIN
 inline constexpr uint grainsPerBudget = 2;
 inline constexpr uint spareGrains = 4;
 inline constexpr uint uncountedSpareGrains = 8;
-inline constexpr uint countedStride = 2;
+inline constexpr uint countedStride = 4;
 #else
 const uint grainsPerBudget = 2;
 const uint spareGrains = 4;
 const uint uncountedSpareGrains = 8;
-const uint countedStride = 2;
+const uint countedStride = 4;
 #endif
 
 // Supersegment of core/Vdi.h.

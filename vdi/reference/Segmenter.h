@@ -85,24 +85,25 @@ inline constexpr float toleranceRatio = 4.0F;
 inline constexpr std::uint32_t grainsPerBudget = 2;
 inline constexpr float hiddenWeight = 0.3F;
 
-/// What step 2 may do for a list: its tolerance, and the grains that counting found. There's room for a few more;
-/// when fewer than spareGrains of that are left, the tolerance grows by toleranceRatio with each further grain, and
-/// the last one takes all that's left. So a list that wasn't counted can't overflow, however wrong its allotment is.
-/// With cutAtGaps each list must be counted, for there's no saying how many runs it has otherwise.
+/// What step 2 may do for a list: its tolerance, and the grains that counting found. There's room for a few
+/// more; when fewer than spareGrains of that are left, the tolerance grows by toleranceRatio with each
+/// further grain, and the last one takes all that's left. So a list that wasn't counted can't overflow,
+/// however wrong its allotment is. With cutAtGaps each list must be counted, for there's no saying how many
+/// runs it has otherwise.
 struct Allotment {
-  float tolerance = -1.0F;   // negative: each interval is a grain
+  float tolerance = -1.0F;  // negative: each interval is a grain
   std::uint32_t grains = 0;
-  std::uint32_t room = 0;    // >= grains + spareGrains, or 0 for a list that's known to be empty
+  std::uint32_t room = 0;  // >= grains + spareGrains, or 0 for a list that's known to be empty
   bool operator==(const Allotment&) const = default;
 };
 inline constexpr std::uint32_t spareGrains = 4;
 inline constexpr std::uint32_t uncountedSpareGrains = 8;  // and a quarter of `grains`
-inline constexpr int countedStride = 2;
+inline constexpr int countedStride = 4;
 
 /// Counts.
 Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules);
-/// Of a list that isn't counted, from the counted ones next to it: the geometric mean of their tolerances, room for
-/// the most grains. Those that hold nothing have no say.
+/// Of a list that isn't counted, from the counted ones next to it: the geometric mean of their tolerances,
+/// room for the most grains. Those that hold nothing have no say.
 Allotment allotmentBetween(std::span<const Allotment> counted);
 
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules,
