@@ -98,14 +98,24 @@ vec4 classify(float position) {
              position - float(below));
 }
 
+// Where in the table sample k of the brick lies; beyond the brick, the nearest value.
+float tablePosition(Brick brick, uint k) {
+  vec3 coordinate = clamp(samplePosition(k) * brick.texelScale + brick.texelOffset, brick.texelLo, brick.texelHi);
+  return (texel(brick.page, coordinate) - brick.tableOrigin) * brick.tableScale;
+}
+
 // Returns false once the ray is opaque enough.
 bool castBrick(uint index) {
   Brick brick = push.params.value.bricks.at[index];
   uvec2 range = samplesIn(brick.lo, brick.hi);
+  if (range.x >= range.y) return true;
+  // Texels are asked for two samples ahead, the table one: their latency is most of what a sample takes.
+  vec4 ahead = classify(tablePosition(brick, range.x));
+  float further = tablePosition(brick, range.x + 1u);
   for (uint k = range.x; k < range.y; ++k) {
-    vec3 coordinate =
-        clamp(samplePosition(k) * brick.texelScale + brick.texelOffset, brick.texelLo, brick.texelHi);
-    vec4 entry = classify((texel(brick.page, coordinate) - brick.tableOrigin) * brick.tableScale);
+    vec4 entry = ahead;
+    ahead = classify(further);
+    further = tablePosition(brick, k + 2u);
     float front = k == rayScene.x ? rayEnter : push.params.value.first + float(k) * push.params.value.step;
     float back = k + 1u == rayScene.y ? rayLeave : push.params.value.first + float(k + 1u) * push.params.value.step;
     float opticalDepth = min(entry.a * rayUnitsPerDepth * (back - front), maxOpticalDepth);

@@ -130,7 +130,8 @@ void walkLists(vec2 stretch) {
   ivec2 pixel = clamp(ivec2(floor(line.start)), ivec2(0), lastList);
   ivec2 last = clamp(ivec2(floor(end)), ivec2(0), lastList);
   ivec2 direction = sign(last - pixel);
-  ivec2 ahead = max(direction, ivec2(0));
+  ivec2 beyond = max(direction, ivec2(0));
+  uint across = uint(push.params.value.lists.x);
   int tilesAcross = (push.params.value.lists.x + renderTile - 1) / renderTile;
   float enterS = 0.0;
   float enterT = stretch.x;  // where s is knownS
@@ -138,51 +139,63 @@ void walkLists(vec2 stretch) {
   ivec2 knownTile = ivec2(-1);
   uint tileRay = 0u;  // depths that the ray is in, in the tile
   // At most one step per column and row.
-  int most = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
-  for (int i = 0; i < most; ++i) {
-    ivec2 tile = pixel / renderTile;
-    if (tile != knownTile) {
-      // A tile without material along the ray is left in one step.
-      knownTile = tile;
-      ivec2 edge = (tile + ahead) * renderTile;
-      bvec2 leaves = notEqual(last / renderTile, tile);
-      vec2 s = mix(vec2(1.0), crossings(line, edge), leaves);
+  int steps = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
+  bool walking = true;
+  while (walking && accumulated.a < opaque) {
+    // On to the next list with material along the ray; rays of a workgroup then look at theirs together.
+    bool found = false;
+    ivec2 here = pixel;
+    vec2 part = stretch;
+    vec2 depths = vec2(0.0);
+    uint begin = 0u;
+    for (; walking && !found; --steps) {
+      walking = steps > 1;
+      ivec2 tile = pixel / renderTile;
+      if (tile != knownTile) {
+        // A tile without material along the ray is left in one step.
+        knownTile = tile;
+        ivec2 edge = (tile + beyond) * renderTile;
+        bvec2 leaves = notEqual(last / renderTile, tile);
+        vec2 s = mix(vec2(1.0), crossings(line, edge), leaves);
+        float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
+        tileRay = maskBetween(depthAt(tAt(line, enterS)), depthAt(tAt(line, leaveS)));
+        uint mask = push.params.value.tileMasks.at[tile.y * tilesAcross + tile.x];
+        if ((mask & tileRay) == 0u) {
+          if (!leaves.x && !leaves.y) walking = false;
+          bool stepX = leaves.x && (!leaves.y || s.x <= s.y);
+          ivec2 lowest = max(tile * renderTile, min(pixel, last));
+          ivec2 highest = min(tile * renderTile + renderTile - 1, max(pixel, last));
+          ivec2 there = clamp(ivec2(floor(mix(line.start, end, leaveS))), lowest, highest);
+          pixel = mix(there, edge + beyond - 1, bvec2(stepX, !stepX));
+          enterS = leaveS;
+          continue;
+        }
+      }
+      bvec2 moves = notEqual(pixel, last);
+      vec2 s = mix(vec2(2.0), crossings(line, pixel + beyond), moves);
+      bool stepX = moves.x && s.x <= s.y;
+      bool stepY = moves.y && !stepX;
       float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
-      tileRay = maskBetween(depthAt(tAt(line, enterS)), depthAt(tAt(line, leaveS)));
-      uint mask = push.params.value.tileMasks.at[tile.y * tilesAcross + tile.x];
-      if ((mask & tileRay) == 0u) {
-        if (!leaves.x && !leaves.y) return;
-        bool stepX = leaves.x && (!leaves.y || s.x <= s.y);
-        ivec2 lowest = max(tile * renderTile, min(pixel, last));
-        ivec2 highest = min(tile * renderTile + renderTile - 1, max(pixel, last));
-        ivec2 there = clamp(ivec2(floor(mix(line.start, end, leaveS))), lowest, highest);
-        pixel = mix(there, edge + ahead - 1, bvec2(stepX, !stepX));
-        enterS = leaveS;
-        continue;
+      uvec2 head = push.params.value.heads.at[uint(pixel.y) * across + uint(pixel.x)];
+      if ((head.y & tileRay) != 0u) {
+        if (knownS != enterS) enterT = tAt(line, enterS);
+        part = vec2(enterT, tAt(line, leaveS));
+        vec2 ends = vec2(depthAt(part.x), depthAt(part.y));
+        depths = vec2(min(ends.x, ends.y), max(ends.x, ends.y));
+        found = part.y > part.x && (head.y & maskBetween(ends.x, ends.y)) != 0u;
+        enterT = part.y;
+        knownS = leaveS;
       }
+      here = pixel;
+      begin = head.x;
+      pixel += mix(ivec2(0), direction, bvec2(stepX, stepY));
+      enterS = leaveS;
+      if (!stepX && !stepY) walking = false;
     }
-    bvec2 moves = notEqual(pixel, last);
-    vec2 s = mix(vec2(2.0), crossings(line, pixel + ahead), moves);
-    bool stepX = moves.x && s.x <= s.y;
-    bool stepY = moves.y && !stepX;
-    float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
-    uint list = uint(pixel.y) * uint(push.params.value.lists.x) + uint(pixel.x);
-    uvec2 head = push.params.value.heads.at[list];
-    if ((head.y & tileRay) != 0u) {
-      if (knownS != enterS) enterT = tAt(line, enterS);
-      vec2 part = vec2(enterT, tAt(line, leaveS));
-      float a = depthAt(part.x);
-      float b = depthAt(part.y);
-      if (part.y > part.x && (head.y & maskBetween(a, b)) != 0u) {
-        addList(pixel, head.x, push.params.value.heads.at[list + 1u].x, part, min(a, b), max(a, b));
-        if (accumulated.a >= opaque) return;
-      }
-      enterT = part.y;
-      knownS = leaveS;
+    if (found) {
+      uint end = push.params.value.heads.at[uint(here.y) * across + uint(here.x) + 1u].x;
+      addList(here, begin, end, part, depths.x, depths.y);
     }
-    if (!(stepX || stepY)) return;
-    pixel += mix(ivec2(0), direction, bvec2(stepX, stepY));
-    enterS = leaveS;
   }
 }
 
