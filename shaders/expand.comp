@@ -1,4 +1,5 @@
-// Supersegments as they're generated and stored -> as render.comp wants them, with masks of where there's material.
+// What render.comp wants beside the supersegments: masks of where there's material. And, of a VDI of full precision,
+// supersegments in 16 bytes instead of 24.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/render.h"
@@ -9,25 +10,15 @@ layout(push_constant, scalar) uniform Push { ExpandConstants push; };
 #include "masks.glsl"
 #include "optical.glsl"
 #include "store.glsl"
+#include "pieces.glsl"
 
 const float largestHalf = 65504.0;
 
 void expandSegment(uint i) {
-  vec2 depths;
-  vec3 straight;
-  float opticalDepth;
-  if (compactForm) {
-    uvec2 packed = CompactArray(push.from).at[i];
-    depths = codedDepths(packed, push.form);
-    straight = codedColor(packed);
-    opticalDepth = codedOpticalDepth(packed);
-  } else {
-    Segment s = push.from.at[i];
-    depths = vec2(s.front, s.back);
-    straight = vec3(s.red, s.green, s.blue) / s.opacity;
-    opticalDepth = min(opticalDepthOf(s.opacity), largestHalf);
-  }
-  push.segments.at[push.first + i] = uvec4(floatBitsToUint(depths), packHalf2x16(straight.rg),
+  Segment s = push.from.at[i];
+  vec3 straight = vec3(s.red, s.green, s.blue) / s.opacity;
+  float opticalDepth = min(opticalDepthOf(s.opacity), largestHalf);
+  push.segments.at[push.first + i] = uvec4(floatBitsToUint(s.front), floatBitsToUint(s.back), packHalf2x16(straight.rg),
                                            packHalf2x16(vec2(straight.b, opticalDepth)));
 }
 
@@ -39,7 +30,7 @@ void maskList(uint list, uint listCount) {
   }
   uint end = push.offsets.at[list + 1u];
   for (uint i = push.offsets.at[list]; i < end; ++i) {
-    vec2 depths = uintBitsToFloat(push.segments.at[i].xy);
+    vec2 depths = pieceDepths(push.segments, i, push.form);
     mask |= maskOf(depths.x, depths.y, push.nearest, push.binScale);
   }
   push.heads.at[list] = uvec2(push.offsets.at[list], mask);

@@ -6,6 +6,8 @@
 #include "shared/render.h"
 #include "masks.glsl"
 #include "optical.glsl"
+#include "store.glsl"
+#include "pieces.glsl"
 
 layout(local_size_x = renderGroupX, local_size_y = renderGroupY) in;
 layout(push_constant, scalar) uniform Push { RenderConstants push; };
@@ -59,17 +61,16 @@ float pixelLength(ivec2 pixel) {
   return sqrt(1.0 + dot(offset, offset));
 }
 
-void addSegment(uvec4 packed, vec2 stretch, float segmentScale) {
-  vec2 depths = uintBitsToFloat(packed.xy);
-  vec2 t = (depths - rayOrigin.z) * rayPerDepth;
+void addPiece(Piece piece, vec2 stretch, float segmentScale) {
+  vec2 t = (piece.depths - rayOrigin.z) * rayPerDepth;
   float enter = max(stretch.x, min(t.x, t.y));
   float leave = min(stretch.y, max(t.x, t.y));
   if (!(enter < leave)) return;
-  vec2 blueOpticalDepth = unpackHalf2x16(packed.w);
-  float opacity = opacityOf(blueOpticalDepth.y * ((leave - enter) * segmentScale / (depths.y - depths.x)));
+  float share = (leave - enter) * segmentScale / (piece.depths.y - piece.depths.x);
+  float opacity = opacityOf(piece.opticalDepth * share);
   if (!(opacity > 0.0)) return;
   if (accumulated.a == 0.0) firstDepth = enter;
-  accumulated += (1.0 - accumulated.a) * opacity * vec4(unpackHalf2x16(packed.z), blueOpticalDepth.x, 1.0);
+  accumulated += (1.0 - accumulated.a) * opacity * vec4(piece.color, 1.0);
 }
 
 float depthAt(float t) { return rayOrigin.z + t * rayDirection.z; }
@@ -85,21 +86,23 @@ uint searchHint = 0u;
 // What the ray meets of one list, which has supersegments [begin, end), between two depths.
 void addList(ivec2 pixel, uint begin, uint end, vec2 stretch, float nearDepth, float farDepth) {
   float segmentScale = rayWorldPerT / pixelLength(pixel);
+  RenderSegmentArray segments = push.params.value.segments;
+  StoredForm form = push.params.value.form;
   // The first supersegment that ends behind nearDepth.
   uint low = min(begin + searchHint, end);
-  while (low > begin && uintBitsToFloat(push.params.value.segments.at[low - 1u].y) > nearDepth) --low;
-  while (low < end && !(uintBitsToFloat(push.params.value.segments.at[low].y) > nearDepth)) ++low;
+  while (low > begin && pieceDepths(segments, low - 1u, form).y > nearDepth) --low;
+  while (low < end && !(pieceDepths(segments, low, form).y > nearDepth)) ++low;
   searchHint = low - begin;
   if (rayDirection.z >= 0.0) {
     for (uint i = low; i < end; ++i) {
-      uvec4 packed = push.params.value.segments.at[i];
-      if (uintBitsToFloat(packed.x) >= farDepth && i > low) break;
-      addSegment(packed, stretch, segmentScale);
+      Piece piece = pieceAt(segments, i, form);
+      if (piece.depths.x >= farDepth && i > low) break;
+      addPiece(piece, stretch, segmentScale);
     }
   } else {
     uint stop = low;
-    while (stop < end && uintBitsToFloat(push.params.value.segments.at[stop].x) < farDepth) ++stop;
-    for (uint i = stop; i > low; --i) addSegment(push.params.value.segments.at[i - 1u], stretch, segmentScale);
+    while (stop < end && pieceDepths(segments, stop, form).x < farDepth) ++stop;
+    for (uint i = stop; i > low; --i) addPiece(pieceAt(segments, i - 1u, form), stretch, segmentScale);
   }
 }
 
@@ -130,8 +133,7 @@ void walkLists(vec2 stretch) {
   ivec2 pixel = clamp(ivec2(floor(line.start)), ivec2(0), lastList);
   ivec2 last = clamp(ivec2(floor(end)), ivec2(0), lastList);
   ivec2 direction = sign(last - pixel);
-  ivec2 beyond = max(direction, ivec2(0));
-  uint across = uint(push.params.value.lists.x);
+  ivec2 ahead = max(direction, ivec2(0));
   int tilesAcross = (push.params.value.lists.x + renderTile - 1) / renderTile;
   float enterS = 0.0;
   float enterT = stretch.x;  // where s is knownS
@@ -139,63 +141,51 @@ void walkLists(vec2 stretch) {
   ivec2 knownTile = ivec2(-1);
   uint tileRay = 0u;  // depths that the ray is in, in the tile
   // At most one step per column and row.
-  int steps = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
-  bool walking = true;
-  while (walking && accumulated.a < opaque) {
-    // On to the next list with material along the ray; rays of a workgroup then look at theirs together.
-    bool found = false;
-    ivec2 here = pixel;
-    vec2 part = stretch;
-    vec2 depths = vec2(0.0);
-    uint begin = 0u;
-    for (; walking && !found; --steps) {
-      walking = steps > 1;
-      ivec2 tile = pixel / renderTile;
-      if (tile != knownTile) {
-        // A tile without material along the ray is left in one step.
-        knownTile = tile;
-        ivec2 edge = (tile + beyond) * renderTile;
-        bvec2 leaves = notEqual(last / renderTile, tile);
-        vec2 s = mix(vec2(1.0), crossings(line, edge), leaves);
-        float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
-        tileRay = maskBetween(depthAt(tAt(line, enterS)), depthAt(tAt(line, leaveS)));
-        uint mask = push.params.value.tileMasks.at[tile.y * tilesAcross + tile.x];
-        if ((mask & tileRay) == 0u) {
-          if (!leaves.x && !leaves.y) walking = false;
-          bool stepX = leaves.x && (!leaves.y || s.x <= s.y);
-          ivec2 lowest = max(tile * renderTile, min(pixel, last));
-          ivec2 highest = min(tile * renderTile + renderTile - 1, max(pixel, last));
-          ivec2 there = clamp(ivec2(floor(mix(line.start, end, leaveS))), lowest, highest);
-          pixel = mix(there, edge + beyond - 1, bvec2(stepX, !stepX));
-          enterS = leaveS;
-          continue;
-        }
-      }
-      bvec2 moves = notEqual(pixel, last);
-      vec2 s = mix(vec2(2.0), crossings(line, pixel + beyond), moves);
-      bool stepX = moves.x && s.x <= s.y;
-      bool stepY = moves.y && !stepX;
+  int most = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
+  for (int i = 0; i < most; ++i) {
+    ivec2 tile = pixel / renderTile;
+    if (tile != knownTile) {
+      // A tile without material along the ray is left in one step.
+      knownTile = tile;
+      ivec2 edge = (tile + ahead) * renderTile;
+      bvec2 leaves = notEqual(last / renderTile, tile);
+      vec2 s = mix(vec2(1.0), crossings(line, edge), leaves);
       float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
-      uvec2 head = push.params.value.heads.at[uint(pixel.y) * across + uint(pixel.x)];
-      if ((head.y & tileRay) != 0u) {
-        if (knownS != enterS) enterT = tAt(line, enterS);
-        part = vec2(enterT, tAt(line, leaveS));
-        vec2 ends = vec2(depthAt(part.x), depthAt(part.y));
-        depths = vec2(min(ends.x, ends.y), max(ends.x, ends.y));
-        found = part.y > part.x && (head.y & maskBetween(ends.x, ends.y)) != 0u;
-        enterT = part.y;
-        knownS = leaveS;
+      tileRay = maskBetween(depthAt(tAt(line, enterS)), depthAt(tAt(line, leaveS)));
+      uint mask = push.params.value.tileMasks.at[tile.y * tilesAcross + tile.x];
+      if ((mask & tileRay) == 0u) {
+        if (!leaves.x && !leaves.y) return;
+        bool stepX = leaves.x && (!leaves.y || s.x <= s.y);
+        ivec2 lowest = max(tile * renderTile, min(pixel, last));
+        ivec2 highest = min(tile * renderTile + renderTile - 1, max(pixel, last));
+        ivec2 there = clamp(ivec2(floor(mix(line.start, end, leaveS))), lowest, highest);
+        pixel = mix(there, edge + ahead - 1, bvec2(stepX, !stepX));
+        enterS = leaveS;
+        continue;
       }
-      here = pixel;
-      begin = head.x;
-      pixel += mix(ivec2(0), direction, bvec2(stepX, stepY));
-      enterS = leaveS;
-      if (!stepX && !stepY) walking = false;
     }
-    if (found) {
-      uint end = push.params.value.heads.at[uint(here.y) * across + uint(here.x) + 1u].x;
-      addList(here, begin, end, part, depths.x, depths.y);
+    bvec2 moves = notEqual(pixel, last);
+    vec2 s = mix(vec2(2.0), crossings(line, pixel + ahead), moves);
+    bool stepX = moves.x && s.x <= s.y;
+    bool stepY = moves.y && !stepX;
+    float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
+    uint list = uint(pixel.y) * uint(push.params.value.lists.x) + uint(pixel.x);
+    uvec2 head = push.params.value.heads.at[list];
+    if ((head.y & tileRay) != 0u) {
+      if (knownS != enterS) enterT = tAt(line, enterS);
+      vec2 part = vec2(enterT, tAt(line, leaveS));
+      float a = depthAt(part.x);
+      float b = depthAt(part.y);
+      if (part.y > part.x && (head.y & maskBetween(a, b)) != 0u) {
+        addList(pixel, head.x, push.params.value.heads.at[list + 1u].x, part, min(a, b), max(a, b));
+        if (accumulated.a >= opaque) return;
+      }
+      enterT = part.y;
+      knownS = leaveS;
     }
+    if (!(stepX || stepY)) return;
+    pixel += mix(ivec2(0), direction, bvec2(stepX, stepY));
+    enterS = leaveS;
   }
 }
 

@@ -17,13 +17,13 @@ inline constexpr int renderTile = 8;
 const uint renderGroupX = 8;
 const uint renderGroupY = 8;
 const uint expandGroup = 64;
-const uint expandModeSegments = 0;  // one invocation a supersegment
+const uint expandModeSegments = 0;  // one invocation a supersegment; of a VDI of full precision
 const uint expandModeMasks = 1;     // one a list, and one behind the last
 const uint expandModeTiles = 2;     // one a tile
 const int renderTile = 8;           // lists per side of a tile
 #endif
 
-// A supersegment as rendering wants it, in 16 bytes: depths, straight colour and optical depth over the whole interval, the
+// A supersegment of a VDI of full precision as rendering wants it, in 16 bytes: depths, straight colour and optical depth over the whole interval, the
 // latter two as half floats (largest error of an opacity: 0.0004).
 struct RenderSegment {
   float front;
@@ -47,7 +47,7 @@ VDI_SHARED_BEGIN
 struct ExpandConstants {
   VDI_ADDRESS(UintArray) offsets;                // [lists + 1]
   VDI_ADDRESS(SegmentArray) from;                // compact, as generated: a part of the supersegments
-  VDI_ADDRESS(RenderSegmentArray) segments;      // all
+  VDI_ADDRESS(RenderSegmentArray) segments;      // all; CompactArray of a compact VDI
   VDI_ADDRESS(ListHeads) heads;                  // [lists + 1]
   VDI_ADDRESS(UintArray) tileMasks;              // [tiles.y][tiles.x]
   uint mode;
@@ -56,12 +56,12 @@ struct ExpandConstants {
   float nearest;
   float binScale;  // bins per unit of depth
   ivec2 lists;
-  StoredForm form;  // of `from`
+  StoredForm form;
 };
 
 struct RenderParams {
   VDI_ADDRESS(ListHeads) heads;
-  VDI_ADDRESS(RenderSegmentArray) segments;  // compact
+  VDI_ADDRESS(RenderSegmentArray) segments;  // compact array; CompactArray of a compact VDI
   VDI_ADDRESS(UintArray) tileMasks;
   VDI_ADDRESS(Vec4Array) colors;       // [height][width]
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
@@ -80,6 +80,7 @@ struct RenderParams {
   uint height;
   ivec2 lists;  // of the VDI: width, height
   float binScale;
+  StoredForm form;
 };
 
 #ifndef __cplusplus

@@ -38,13 +38,12 @@ shared::RenderParams renderGeometry(const View& original, const View& view) {
   return params;
 }
 
-RenderPass::RenderPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
+RenderPass::RenderPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
 
-void RenderPass::record(Commands& commands, VkDeviceAddress params, std::uint32_t width,
-                        std::uint32_t height) const {
-  commands.dispatch(pipeline_, shared::RenderConstants{params},
-                    (width + shared::renderGroupX - 1) / shared::renderGroupX,
-                    (height + shared::renderGroupY - 1) / shared::renderGroupY);
+void RenderPass::record(Commands& commands, VkDeviceAddress address, const shared::RenderParams& params) {
+  commands.dispatch(pipelines_.with({0, 0, isCompact(params.form)}), shared::RenderConstants{address},
+                    (params.width + shared::renderGroupX - 1) / shared::renderGroupX,
+                    (params.height + shared::renderGroupY - 1) / shared::renderGroupY);
 }
 
 }  // namespace vdi::gpu

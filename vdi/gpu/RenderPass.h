@@ -20,11 +20,11 @@ shared::RenderParams renderGeometry(const View& original, const View& view);
 class RenderPass {
  public:
   explicit RenderPass(std::shared_ptr<Device> device);
-  /// `params` is the address of a RenderParams; width and height are the picture's.
-  void record(Commands& commands, VkDeviceAddress params, std::uint32_t width, std::uint32_t height) const;
+  /// `address`: where the device finds `params`.
+  void record(Commands& commands, VkDeviceAddress address, const shared::RenderParams& params);
 
  private:
-  ComputePipeline pipeline_;
+  PipelineSet pipelines_;  // by precision
 };
 
 }  // namespace vdi::gpu

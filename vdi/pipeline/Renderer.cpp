@@ -1,6 +1,7 @@
 // VdiRenderer and flatten: what a viewer does with a VDI.
 #include <algorithm>
 #include <cstring>
+#include <type_traits>
 
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Commands.h"
@@ -36,6 +37,7 @@ struct VdiRenderer::State {
   gpu::Buffer tileMasks;
   detail::PictureBuffers picture;
   std::unique_ptr<View> original;  // none until there's a VDI
+  shared::StoredForm form{};
   float nearest = 0.0F;
   float farthest = 0.0F;
   float binScale = 0.0F;
@@ -58,7 +60,9 @@ struct VdiRenderer::State {
   template <typename Segment>
   void upload(const ListsOf<Segment>& lists, const DepthCode& code, const glm::ivec2& size) {
     offsets.reserve(device, lists.offsets.size() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
-    segments.reserve(device, lists.segments.size() * sizeof(shared::RenderSegment), MemoryKind::DeviceLocal);
+    constexpr bool compact = std::is_same_v<Segment, CompactSupersegment>;
+    constexpr std::size_t segmentBytes = compact ? sizeof(Segment) : sizeof(shared::RenderSegment);
+    segments.reserve(device, lists.segments.size() * segmentBytes, MemoryKind::DeviceLocal);
     heads.reserve(device, (lists.listCount() + 1) * 2 * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
     tileMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
     inParts(lists.offsets, [&](std::size_t first, std::size_t count) {
@@ -72,13 +76,18 @@ struct VdiRenderer::State {
     constants.nearest = nearest;
     constants.binScale = binScale;
     constants.lists = size;
-    constants.form = detail::storedForm(code);
+    form = detail::storedForm(code);
+    constants.form = form;
     constants.mode = shared::expandModeSegments;
     inParts(lists.segments, [&](std::size_t first, std::size_t count) {
-      constants.from = staging.address();
-      constants.first = static_cast<std::uint32_t>(first);
-      constants.count = static_cast<std::uint32_t>(count);
-      expand.record(commands, constants);
+      if constexpr (compact) {
+        commands.copy(staging, 0, segments, first * sizeof(Segment), count * sizeof(Segment));
+      } else {
+        constants.from = staging.address();
+        constants.first = static_cast<std::uint32_t>(first);
+        constants.count = static_cast<std::uint32_t>(count);
+        expand.record(commands, constants);
+      }
     });
     commands.begin();
     constants.mode = shared::expandModeMasks;
@@ -120,6 +129,7 @@ Image VdiRenderer::render(const Camera& camera, int width, int height) {
   s.picture.reserve(s.device, static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height));
   shared::RenderParams params = gpu::renderGeometry(*s.original, view);
   params.heads = s.heads.address();
+  params.form = s.form;
   params.segments = s.segments.address();
   params.tileMasks = s.tileMasks.address();
   params.binScale = s.binScale;
@@ -130,7 +140,7 @@ Image VdiRenderer::render(const Camera& camera, int width, int height) {
   std::memcpy(s.params.mapped().data(), &params, sizeof(params));
   s.commands.begin();
   s.commands.mark("render");
-  s.pass.record(s.commands, s.params.address(), params.width, params.height);
+  s.pass.record(s.commands, s.params.address(), params);
   s.picture.recordDownload(s.commands);
   s.commands.submitAndWait();
   s.milliseconds = s.commands.stageTimes().front().milliseconds;
