@@ -3,10 +3,10 @@
 //
 // Needs: shared/lists.h, optical.glsl.
 
-const float mostDepthCode = 32767.0;
+const float mostDepthCode = 16383.0;
 const float mostCarriedDepth = 1.0 / 16.0;
 const float mostDepthChange = 0.25;
-const float thinnestStep = 0.0007;
+const float thinnestStep = 0.0002;
 const float mostColorChange = 3.0 / 255.0;
 const float unseen = 1e-6;
 
@@ -22,16 +22,16 @@ struct Material {
 layout(constant_id = 2) const bool compactForm = false;
 
 float opticalDepthOfCode(uint code) {
-  return code == 0u ? 9.5367431640625e-7 : (exp2(float(code) * (16.0 / 1023.0)) - 1.0) / 16.0;
+  return code == 0u ? 9.5367431640625e-7 : (exp2(float(code) * (16.0 / 4095.0)) - 1.0) / 16.0;
 }
 
 uint codeOfOpticalDepth(float opticalDepth) {
-  return uint(clamp(round(log2(1.0 + 16.0 * max(opticalDepth, 0.0)) * (1023.0 / 16.0)), 0.0, 1023.0));
+  return uint(clamp(round(log2(1.0 + 16.0 * max(opticalDepth, 0.0)) * (4095.0 / 16.0)), 0.0, 4095.0));
 }
 
-uvec2 depthCodes(uvec2 packed) { return uvec2(packed.x & 0x7fffu, (packed.x >> 15) & 0x7fffu); }
+uvec2 depthCodes(uvec2 packed) { return uvec2(packed.x & 0x3fffu, (packed.x >> 14) & 0x3fffu); }
 
-float codedOpticalDepth(uvec2 packed) { return opticalDepthOfCode(packed.x >> 30 | (packed.y >> 24) << 2); }
+float codedOpticalDepth(uvec2 packed) { return opticalDepthOfCode(packed.x >> 28 | (packed.y >> 24) << 4); }
 
 // Straight.
 vec3 codedColor(uvec2 packed) {
@@ -93,7 +93,7 @@ uvec2 compacted(Material m, StoredForm form) {
   storeDepth += m.opticalDepth;
   storeStoredDepth += stored;
   uvec3 c = uvec3(colorCodes);
-  return uvec2(front | back << 15 | (depth & 3u) << 30, c.r | c.g << 8 | c.b << 16 | (depth >> 2) << 24);
+  return uvec2(front | back << 14 | (depth & 0xfu) << 28, c.r | c.g << 8 | c.b << 16 | (depth >> 4) << 24);
 }
 
 // The supersegments of a list one after the other, front to back, after beginStoring.

@@ -113,7 +113,7 @@ inline Vdi plausibleVdi(int width, int height, std::uint32_t budget) {
 /// The same in codes.
 inline Vdi compact(const Vdi& vdi) {
   Vdi result = vdi;
-  result.depthCode = {0.5F, 0x1p-10F};
+  result.depthCode = {0.5F, 0x1p-8F};
   result.lists = reference::compacted(full(vdi), result.depthCode);
   return result;
 }

@@ -60,9 +60,15 @@ for source in (image, read):
     check(worst <= 2, "RenderVDI from V_O gives the flat picture, off by %d" % worst)
 rendered.Resolution = [64, 64]
 check(picture(rendered).shape == (64, 64, 3), "RenderVDI renders at any resolution")
-check(np.array_equal(picture(vdi_of(wavelet, PictureOnly=1)), flat), "PictureOnly gives the same picture")
-searched = picture(vdi_of(wavelet, Algorithm="Bisection", Supersegments=2))
-check(np.abs(searched.astype(int) - flat).max() <= 1, "both algorithms give the same picture from V_O")
+volume = picture(vdi_of(wavelet, PictureOnly=1)).astype(int)
+check(np.abs(volume - flat).max() <= 1, "from V_O a VDI is the volume's own picture")
+for precision in ("Full", "Compact"):
+    searched = picture(vdi_of(wavelet, Algorithm="Bisection", Supersegments=2, Precision=precision))
+    worst = np.abs(searched - volume).max()
+    check(worst <= 1, "so it is by bisection, in %s precision, off by %d" % (precision.lower(), worst))
+full = vdi_of(wavelet, Precision="Full")
+check(np.array_equal(picture(full), volume), "full precision gives the same picture to the bit")
+check(picture(with_camera(simple.RenderVDI(Input=full))).max() > 60, "a VDI of full precision is rendered")
 
 # A series is time steps.
 second = os.path.join(OUTPUT, "series_1.vdi")

@@ -38,10 +38,10 @@ DepthCode depthCodeFor(const DepthLattice& lattice) {
 }
 
 float opticalDepthOfCode(std::uint32_t code) {
-  static const std::array<float, 1024> table = [] {
-    std::array<float, 1024> depths{};
+  static const std::array<float, 4096> table = [] {
+    std::array<float, 4096> depths{};
     for (std::size_t i = 0; i < depths.size(); ++i) {
-      depths[i] = static_cast<float>((std::exp2(static_cast<double>(i) * 16.0 / 1023.0) - 1.0) / 16.0);
+      depths[i] = static_cast<float>((std::exp2(static_cast<double>(i) * 16.0 / 4095.0) - 1.0) / 16.0);
     }
     depths[0] = 0x1p-20F;
     return depths;

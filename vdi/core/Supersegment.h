@@ -35,30 +35,29 @@ struct Supersegment {
 static_assert(sizeof(Supersegment) == 24);
 
 /// The same in 8 bytes. Depths are codes of a DepthCode; the colour is straight, 8 bits a channel; the
-/// optical depth has 10 bits, see opticalDepthOfCode. Whoever encodes a list carries what rounding a
+/// optical depth has 12 bits, see opticalDepthOfCode. Whoever encodes a list carries what rounding a
 /// supersegment changed over to the next one (reference/Compaction.h), so that errors don't add up along the
 /// list.
 struct CompactSupersegment {
-  std::uint32_t depths = 0;  // bits 0 - 14 front, 15 - 29 back, 30 - 31 the optical depth's low bits
-  std::uint32_t material =
-      0;  // bits 0 - 7 red, 8 - 15 green, 16 - 23 blue, 24 - 31 the optical depth's high bits
+  std::uint32_t depths = 0;    // bits 0 - 13 front, 14 - 27 back, 28 - 31 the optical depth's low bits
+  std::uint32_t material = 0;  // bits 0 - 7 red, 8 - 15 green, 16 - 23 blue, 24 - 31 its high bits
 
   static CompactSupersegment pack(std::uint32_t front, std::uint32_t back, std::uint32_t red,
                                   std::uint32_t green, std::uint32_t blue, std::uint32_t opticalDepth) {
-    return {front | back << 15 | (opticalDepth & 3U) << 30,
-            red | green << 8 | blue << 16 | (opticalDepth >> 2) << 24};
+    return {front | back << 14 | (opticalDepth & 0xfU) << 28,
+            red | green << 8 | blue << 16 | (opticalDepth >> 4) << 24};
   }
-  std::uint32_t front() const { return depths & 0x7fffU; }
-  std::uint32_t back() const { return (depths >> 15) & 0x7fffU; }
+  std::uint32_t front() const { return depths & 0x3fffU; }
+  std::uint32_t back() const { return (depths >> 14) & 0x3fffU; }
   std::uint32_t color(int channel) const { return (material >> (8 * channel)) & 0xffU; }  // red, green, blue
-  std::uint32_t opticalDepth() const { return depths >> 30 | (material >> 24) << 2; }
+  std::uint32_t opticalDepth() const { return depths >> 28 | (material >> 24) << 4; }
   bool operator==(const CompactSupersegment&) const = default;
 };
 static_assert(sizeof(CompactSupersegment) == 8);
 
 /// Code c stands for the depth first + c * step, computed in single precision.
 struct DepthCode {
-  static constexpr std::uint32_t largest = 32767;
+  static constexpr std::uint32_t largest = 16383;
   float first = 0.0F;
   float step = 0.0F;  // > 0; 0: there is none, as in a VDI of full precision
   float depthOf(std::uint32_t code) const { return first + static_cast<float>(code) * step; }
@@ -66,11 +65,11 @@ struct DepthCode {
 };
 
 /// The code for what lies on the lattice: step is a part of a sample, so that the lattice's depths have codes
-/// of their own. None (step 0) for a lattice of more samples than fit, 16382.
+/// of their own. None (step 0) for a lattice of more samples than fit, 8190.
 DepthCode depthCodeFor(const DepthLattice& lattice);
 
-/// Optical depth of codes 0 .. 1023: 2^-20, and from there on (2^(code * 16 / 1023) - 1) / 16, that is, in
-/// steps of 0.0007 where material is thin and of 1.1 % where it's dense, up to 4096.
+/// Optical depth of codes 0 .. 4095: 2^-20, and from there on (2^(code * 16 / 4095) - 1) / 16, that is, in
+/// steps of 0.00017 where material is thin and of 0.3 % where it's dense, up to 4096.
 float opticalDepthOfCode(std::uint32_t code);
 
 /// 1 - 2^-opticalDepth, exact for small arguments too.

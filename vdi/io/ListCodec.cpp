@@ -112,8 +112,8 @@ struct CompactCoding {
   }
 
   static Segment segmentOf(const Fields& f) {
-    return Segment::pack(f.front & 0x7fffU, f.back & 0x7fffU, f.color[0] & 0xffU, f.color[1] & 0xffU,
-                         f.color[2] & 0xffU, f.opticalDepth & 0x3ffU);
+    return Segment::pack(f.front & 0x3fffU, f.back & 0x3fffU, f.color[0] & 0xffU, f.color[1] & 0xffU,
+                         f.color[2] & 0xffU, f.opticalDepth & 0xfffU);
   }
 
   /// A difference as a signed byte, folded.
@@ -132,9 +132,9 @@ struct CompactCoding {
 
   static Fields restore(const Words& residuals, const Context<CompactCoding>& context) {
     Fields f;
-    f.front = (context.previous + unfold(residuals[0])) & 0x7fffU;
-    f.back = (f.front + residuals[1]) & 0x7fffU;
-    f.opticalDepth = (context.reference.opticalDepth + unfold(residuals[2])) & 0x3ffU;
+    f.front = (context.previous + unfold(residuals[0])) & 0x3fffU;
+    f.back = (f.front + residuals[1]) & 0x3fffU;
+    f.opticalDepth = (context.reference.opticalDepth + unfold(residuals[2])) & 0xfffU;
     for (std::size_t c = 0; c < 3; ++c)
       f.color[c] = (context.reference.color[c] + unfold(residuals[3 + c])) & 0xffU;
     return f;

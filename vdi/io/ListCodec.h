@@ -11,7 +11,7 @@
 
 namespace vdi::io::detail {
 
-/// Bytes of a chunk before LZ4. Codes of 15 or 10 bits take two bytes there, of which LZ4 leaves little.
+/// Bytes of a chunk before LZ4. Codes of 14 or 12 bits take two bytes there, of which LZ4 leaves little.
 constexpr std::uint64_t expandedBytes(std::uint64_t lists, std::uint64_t supersegments, Precision precision) {
   const bool compact = precision == Precision::Compact;
   return (compact ? sizeof(DepthCode) : 0) + lists * sizeof(std::uint32_t) +

@@ -10,13 +10,13 @@ namespace {
 
 constexpr float mostCarriedDepth = 1.0F / 16.0F;
 constexpr float mostDepthChange = 0.25F;  // of the supersegment's own
-constexpr float thinnestStep = 0.0007F;   // of opticalDepthOfCode
+constexpr float thinnestStep = 0.0002F;   // of opticalDepthOfCode
 constexpr float mostColorChange = 3.0F / 255.0F;
 constexpr float unseen = 1e-6F;
 
 std::uint32_t codeOfOpticalDepth(float opticalDepth) {
-  const float code = std::log2(1.0F + 16.0F * std::max(opticalDepth, 0.0F)) * (1023.0F / 16.0F);
-  return static_cast<std::uint32_t>(std::clamp(std::round(code), 0.0F, 1023.0F));
+  const float code = std::log2(1.0F + 16.0F * std::max(opticalDepth, 0.0F)) * (4095.0F / 16.0F);
+  return static_cast<std::uint32_t>(std::clamp(std::round(code), 0.0F, 4095.0F));
 }
 
 std::uint32_t codeOfDepth(float depth, const DepthCode& code) {
