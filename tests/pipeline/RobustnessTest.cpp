@@ -149,6 +149,132 @@ TEST_CASE("scales of 1e-9 and 1e9 give the picture of scale 1") {
   }
 }
 
+namespace {
+
+/// All algorithms and precisions: at most the budget, and from V_O the volume's own picture. From the side:
+/// as much light as the volume's picture has, to a few per cent.
+void demandFaithful(VdiGenerator& generator, const Camera& camera, const TransferFunction& function,
+                    GenerateSettings settings) {
+  const auto volume = generator.renderVolume(camera, function, settings);
+  const auto side = generator.renderVolume(camera.azimuth(20.0), function, settings);
+  CHECK(highestOpacity(*volume) > 0.2F);
+  for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
+    for (const Precision precision : {Precision::Compact, Precision::Full}) {
+      INFO(toString(algorithm) << ", " << toString(precision));
+      settings.algorithm = algorithm;
+      settings.precision = precision;
+      const auto vdi = generator.generate(camera, function, settings);
+      CHECK_NOTHROW(validate(*vdi));
+      const Image flat = flatten(*vdi);
+      float worst = 0.0F;
+      for (std::size_t i = 0; i < flat.rgba.size(); ++i) {
+        for (int c = 0; c < 4; ++c) worst = std::max(worst, std::abs(flat.rgba[i][c] - volume->rgba[i][c]));
+      }
+      CHECK(worst < 1.0F / 255.0F);
+      VdiRenderer renderer(device());
+      renderer.setVdi(*vdi);
+      const Image seen = renderer.render(camera.azimuth(20.0), settings.width, settings.height);
+      glm::vec4 light(0.0F);
+      glm::vec4 expected(0.0F);
+      for (std::size_t i = 0; i < seen.rgba.size(); ++i) {
+        light += seen.rgba[i];
+        expected += side->rgba[i];
+      }
+      CHECK(light.a == Approx(expected.a).epsilon(0.15));
+    }
+  }
+}
+
+/// Opaque in one narrow band of scalars.
+TransferFunction band(double center, double halfWidth) {
+  TransferFunction function;
+  function.colors = {{0.0, {0.9, 0.6, 0.1}}};
+  function.opacities = {{center - halfWidth, 0.0},
+                        {center - 0.9 * halfWidth, 0.9},
+                        {center + 0.9 * halfWidth, 0.9},
+                        {center + halfWidth, 0.0}};
+  function.unitDistance = 0.05;
+  return function;
+}
+
+}  // namespace
+
+TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's picture is the volume's") {
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  const GenerateSettings settings = test::smallSettings(64, 48, 6);
+  generator.setBlocks({cube(
+      24, 1.0 / 23.0, [](const glm::ivec3& i) { return static_cast<float>(i.x + i.y + i.z) / 69.0F; })});
+  TransferFunction bands;
+  bands.colors = {{0.0, {0.9, 0.1, 0.1}}, {1.0, {0.1, 0.1, 0.9}}};
+  for (int i = 0; i < 20; ++i) {
+    bands.opacities.push_back({i / 20.0, 0.0});
+    bands.opacities.push_back({(i + 0.5) / 20.0, 0.3});
+  }
+  bands.unitDistance = 0.05;
+  demandFaithful(generator, test::oblique(), bands, settings);
+  // As wide as a voxel's step.
+  demandFaithful(generator, test::oblique(), band(0.5, 0.5 / 69.0), settings);
+
+  generator.setBlocks({cube(16, 1.0 / 15.0, [](const glm::ivec3&) { return 0.7F; })});
+  demandFaithful(generator, test::oblique(), test::threeHues(1.0), settings);
+
+  generator.setBlocks(
+      {cube(17, 1.0 / 16.0, [](const glm::ivec3& i) { return i == glm::ivec3(8) ? 1.0F : 0.0F; })});
+  // At one sample a voxel it's chance whether volume rendering itself meets it from the side.
+  GenerateSettings fine = test::smallSettings(160, 120, 6);
+  fine.samplesPerVoxel = 4.0;
+  demandFaithful(generator, test::oblique(), band(1.0, 0.8), fine);
+}
+
+TEST_CASE("voxels 50 times as long as wide") {
+  const apps::Lattice lattice{
+      {40, 40, 5}, glm::dvec3(0.0), {0.01, 0.01, 0.5}, ScalarType::F32, Joint::SharedPoints};
+  const Block block = apps::makeBlock(lattice, {{0, 0, 0}, {40, 40, 5}, 0}, [](const glm::ivec3& i) {
+    return 0.5F + 0.5F * std::sin(0.3F * static_cast<float>(i.x)) * std::cos(static_cast<float>(i.z));
+  });
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks({block});
+  const Camera camera =
+      Camera::framing({glm::dvec3(0.0), glm::dvec3(0.39, 0.39, 2.0)}, {-1.0, -0.4, -0.5}, {0.0, 1.0, 0.0});
+  demandFaithful(generator, camera, test::threeHues(1.0), test::smallSettings(64, 48, 10));
+}
+
+TEST_CASE("one supersegment a list and 255, pictures of one pixel and of one row") {
+  const auto dealt = test::deal("turbulence", {30, 30, 30}, {2, 2, 2}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::U8, 0, 1);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  const TransferFunction function = test::threeHues(80.0);
+  for (const std::uint32_t budget : {1U, 255U}) {
+    INFO(budget);
+    demandFaithful(generator, test::oblique(), function, test::smallSettings(48, 36, budget));
+  }
+  for (const auto& [width, height] : {std::pair(1, 1), std::pair(5, 1), std::pair(1, 7)}) {
+    INFO(width << " x " << height);
+    const auto vdi = generator.generate(test::oblique(), function, test::smallSettings(width, height));
+    CHECK_NOTHROW(validate(*vdi));
+    CHECK(highestOpacity(flatten(*vdi)) > 0.2F);
+  }
+}
+
+TEST_CASE("rays of more samples than depth codes can tell apart give a VDI of full precision") {
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks({cube(8, 1.0 / 7.0, [](const glm::ivec3&) { return 0.7F; })});
+  GenerateSettings settings = test::smallSettings(8, 6, 4);
+  settings.samplesPerVoxel = 1.0;
+  CHECK(generator.generate(test::oblique(), test::threeHues(1.0), settings)->precision() ==
+        Precision::Compact);
+  const apps::Lattice lattice{
+      {2, 2, 200}, glm::dvec3(0.0), {0.0005, 0.0005, 0.05}, ScalarType::F32, Joint::SharedPoints};
+  generator.setBlocks(
+      {apps::makeBlock(lattice, {{0, 0, 0}, {2, 2, 200}, 0}, [](const glm::ivec3&) { return 0.7F; })});
+  const Camera along =
+      Camera::framing({glm::dvec3(0.0), glm::dvec3(0.0005, 0.0005, 10.0)}, {0.1, 0.2, -1.0}, {0.0, 1.0, 0.0});
+  const auto vdi = generator.generate(along, test::threeHues(1.0), settings);
+  CHECK(vdi->precision() == Precision::Full);
+  CHECK_NOTHROW(validate(*vdi));
+}
+
 TEST_CASE("wrong arguments are refused with their names") {
   VdiGenerator generator(device(), comm::Communicator::serial());
   const Block good = cube(8, 1.0 / 7.0, [](const glm::ivec3&) { return 0.7F; });
