@@ -98,30 +98,85 @@ vec4 classify(float position) {
              position - float(below));
 }
 
-// Where in the table sample k of the brick lies; beyond the brick, the nearest value.
-float tablePosition(Brick brick, uint k) {
-  vec3 coordinate = clamp(samplePosition(k) * brick.texelScale + brick.texelOffset, brick.texelLo, brick.texelHi);
-  return (texel(brick.page, coordinate) - brick.tableOrigin) * brick.tableScale;
+// Texture coordinate of sample k; beyond the brick, the nearest one in it.
+vec3 coordinateOf(Brick brick, uint k) {
+  return clamp(samplePosition(k) * brick.texelScale + brick.texelOffset, brick.texelLo, brick.texelHi);
 }
 
-// Returns false once the ray is opaque enough.
-bool castBrick(uint index) {
-  Brick brick = push.params.value.bricks.at[index];
-  uvec2 range = samplesIn(brick.lo, brick.hi);
-  if (range.x >= range.y) return true;
+// Where in the table it lies.
+float tablePosition(Brick brick, uint k) {
+  return (texel(brick.page, coordinateOf(brick, k)) - brick.tableOrigin) * brick.tableScale;
+}
+
+// The macrocell that sample k lies in: whether anything in it is visible, and the first sample behind it.
+struct CellStretch {
+  bool visible;
+  uint end;
+};
+
+CellStretch cellAt(Brick brick, uint k, vec3 cellsPerSample) {
+  vec3 place = max(coordinateOf(brick, k) * brick.cellScale + brick.cellOffset, vec3(0.0));
+  uvec3 cell = min(uvec3(place), brick.cellDims - 1u);
+  vec3 corner = vec3(cell) + vec3(greaterThan(cellsPerSample, vec3(0.0)));
+  vec3 samples = mix(abs((corner - place) / cellsPerSample), vec3(1.0e6), equal(cellsPerSample, vec3(0.0)));
+  // Rounding may take a sample for one of the cell before; cells know a texel more than they hold.
+  float ahead = min(min(samples.x, samples.y), min(samples.z, 1.0e6));
+  uint index = brick.firstCell + (cell.z * brick.cellDims.y + cell.y) * brick.cellDims.x + cell.x;
+  return CellStretch(push.params.value.cells.at[index] != 0u, k + max(1u, uint(ahead + 0.95)));
+}
+
+float frontOf(uint k) { return k == rayScene.x ? rayEnter : push.params.value.first + float(k) * push.params.value.step; }
+float backOf(uint k) {
+  return k + 1u == rayScene.y ? rayLeave : push.params.value.first + float(k + 1u) * push.params.value.step;
+}
+
+// Samples [emptyBegin, begin) as one transparent one, if there are any, which is the same to whoever uses them; then
+// [begin, end). Returns false once the ray is opaque enough.
+bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
   // Texels are asked for two samples ahead, the table one: their latency is most of what a sample takes.
-  vec4 ahead = classify(tablePosition(brick, range.x));
-  float further = tablePosition(brick, range.x + 1u);
-  for (uint k = range.x; k < range.y; ++k) {
-    vec4 entry = ahead;
-    ahead = classify(further);
-    further = tablePosition(brick, k + 2u);
-    float front = k == rayScene.x ? rayEnter : push.params.value.first + float(k) * push.params.value.step;
-    float back = k + 1u == rayScene.y ? rayLeave : push.params.value.first + float(k + 1u) * push.params.value.step;
+  vec4 ahead = classify(tablePosition(brick, begin));
+  float further = tablePosition(brick, begin + 1u);
+  for (uint k = emptyBegin < begin ? begin - 1u : begin; k < end; ++k) {
+    bool empty = k < begin;
+    vec4 entry = empty ? vec4(0.0) : ahead;
+    if (!empty) {
+      ahead = classify(further);
+      further = tablePosition(brick, k + 2u);
+    }
+    float front = frontOf(empty ? emptyBegin : k);
+    float back = backOf(k);
     float opticalDepth = min(entry.a * rayUnitsPerDepth * (back - front), maxOpticalDepth);
     useSample(front, back, entry.rgb, opticalDepth);
     rayOpticalDepth += opticalDepth;
     if (rayOpticalDepth >= push.params.value.enough) return false;
+  }
+  return true;
+}
+
+const uint shortGap = 32u;  // samples
+
+bool castBrick(uint index) {
+  Brick brick = push.params.value.bricks.at[index];
+  uvec2 range = samplesIn(brick.lo, brick.hi);
+  vec3 cellsPerSample = rayDirection * push.params.value.step * brick.texelScale * brick.cellScale;
+  uint k = range.x;
+  while (k < range.y) {
+    uint emptyBegin = k;
+    CellStretch stretch = CellStretch(false, k);
+    while (k < range.y) {
+      stretch = cellAt(brick, k, cellsPerSample);
+      if (stretch.visible) break;
+      k = min(stretch.end, range.y);
+    }
+    // As far as there are visible cells. Short gaps are no reason to stop: rays that stop at different places wait for
+    // each other.
+    uint end = min(stretch.end, range.y);
+    for (uint next = end; next < range.y && next < end + shortGap; next = min(stretch.end, range.y)) {
+      stretch = cellAt(brick, next, cellsPerSample);
+      if (stretch.visible) end = min(stretch.end, range.y);
+    }
+    if (!castSamples(brick, emptyBegin, k, end)) return false;
+    k = end;
   }
   return true;
 }

@@ -2,6 +2,7 @@
 #ifndef VDI_SHARED_CAST_H
 #define VDI_SHARED_CAST_H
 #include "lists.h"
+#include "cells.h"
 #include "volume.h"
 
 #ifndef __cplusplus
@@ -38,6 +39,7 @@ struct CastParams {
   VDI_ADDRESS(BrickArray) bricks;
   VDI_ADDRESS(KdNodeArray) nodes;  // node 0 is the root
   VDI_ADDRESS(TableArray) table;
+  VDI_ADDRESS(CellArray) cells;  // macrocells: 1 where something is visible
   VDI_ADDRESS(FloatArray) sensitivities;  // [h][w]; by merging: tolerances, while counting those of the counted lists
   VDI_ADDRESS(UintArray) counts;          // [h][w]; by merging: room for grains, while counting the grains of these
   VDI_ADDRESS(UintArray) offsets;         // [h][w], exclusive prefix sum of counts

@@ -12,6 +12,7 @@ using uint64_t = std::uint64_t;
 using vec2 = glm::vec2;
 using vec3 = glm::vec3;
 using vec4 = glm::vec4;
+using uvec3 = glm::uvec3;
 using uvec4 = glm::uvec4;
 using ivec2 = glm::ivec2;
 #define VDI_SHARED_BEGIN namespace vdi::gpu::shared {

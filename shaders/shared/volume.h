@@ -5,6 +5,13 @@
 
 VDI_SHARED_BEGIN
 
+// Texels per side of a macrocell (cells.comp).
+#ifdef __cplusplus
+inline constexpr uint cellSide = 16;
+#else
+const uint cellSide = 16;
+#endif
+
 // A box of samples that one piece of one texture page serves. Positions are relative to the scene's centre, snapped to
 // the scene's lattice (core/Scene.h).
 struct Brick {
@@ -17,9 +24,15 @@ struct Brick {
   vec3 texelOffset;
   uint piece;  // of vdi/gpu/VolumeStore; the shaders don't read it
   vec3 texelLo;  // centre of the outermost texels: coordinates are clamped to these
-  uint pad0;
+  uint firstCell;  // of its piece's macrocells
   vec3 texelHi;
+  uint pad0;
+  vec3 cellScale;  // place among the piece's macrocells = texture coordinate * cellScale + cellOffset
   uint pad1;
+  vec3 cellOffset;
+  uint pad2;
+  uvec3 cellDims;
+  uint pad3;
 };
 
 // Node of a kd-tree over bricks. Inner: samples with p[axis] < split lie in child `first`, the others in `first + 1`.

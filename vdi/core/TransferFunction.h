@@ -44,6 +44,7 @@ struct TransferTableEntry {
   float green = 0.0F;
   float blue = 0.0F;
   float extinction = 0.0F;
+  bool operator==(const TransferTableEntry&) const = default;
 };
 
 inline constexpr float maxExtinction = 65536.0F;
@@ -58,6 +59,7 @@ struct TransferTable {
 
   /// NaN and infinite scalars are transparent black.
   TransferTableEntry lookup(double scalar) const;
+  bool operator==(const TransferTable&) const = default;
   /// True if some scalar in [lo, hi] has opacity > 0: what empty-space skipping asks.
   bool visible(double lo, double hi) const;
 };

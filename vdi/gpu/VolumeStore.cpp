@@ -147,7 +147,8 @@ class Packer {
 
 }  // namespace
 
-VolumeStore::VolumeStore(std::shared_ptr<Device> device) : device_(std::move(device)), commands_(device_) {}
+VolumeStore::VolumeStore(std::shared_ptr<Device> device)
+    : device_(std::move(device)), commands_(device_), cellsPass_(device_) {}
 
 VkFormat VolumeStore::formatOf(ScalarType type) const {
   switch (sizeOf(type)) {
@@ -322,7 +323,11 @@ void VolumeStore::layBricks(std::span<const Block> blocks, std::span<const Piece
         brick.texelLo[axis] = static_cast<float>((piece.place[axis] + edge) / extent[axis]);
         brick.texelHi[axis] =
             static_cast<float>((piece.place[axis] + piece.dims[axis] - edge) / extent[axis]);
+        brick.cellScale[axis] = static_cast<float>(extent[axis] / shared::cellSide);
+        brick.cellOffset[axis] = static_cast<float>(-(piece.place[axis] + 0.5) / shared::cellSide);
       }
+      brick.firstCell = cellPieces_[index].firstCell;
+      brick.cellDims = cellPieces_[index].cellDims;
       if (glm::all(glm::lessThan(brick.lo, brick.hi))) bricks.push_back(brick);
     }
   }
@@ -362,6 +367,7 @@ void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
     pack(pieces);
     pieces_ = std::move(pieces);
     if (!pieces_.empty()) upload(pieces_);
+    layCells();
     layBricks(blocks, piecesOf, scene);
     if (!table_.entries.empty()) placeTable();
   } catch (...) {
@@ -369,14 +375,69 @@ void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
     pieces_.clear();
     tree_.clear();
     bricks_.clear();
+    cellPieces_.clear();
+    cellCount_ = 0;
     ++pagesVersion_;
     throw;
   }
   for (Piece& piece : pieces_) piece.block = nullptr;  // not ours beyond this call
 }
 
+/// Macrocells of all pieces, and the ranges of values in them.
+void VolumeStore::layCells() {
+  cellPieces_.clear();
+  std::uint64_t cells = 0;
+  for (const Piece& piece : pieces_) {
+    shared::CellPiece cellPiece{};
+    cellPiece.place = piece.place;
+    cellPiece.page = piece.page;
+    cellPiece.dims = piece.dims;
+    cellPiece.firstCell = static_cast<std::uint32_t>(cells);
+    // A cell lies between texel centres.
+    const glm::uvec3 gaps = glm::max(piece.dims, glm::uvec3(2)) - 1U;
+    cellPiece.cellDims = (gaps + shared::cellSide - 1U) / shared::cellSide;
+    cells += volumeOf(cellPiece.cellDims);
+    cellPieces_.push_back(cellPiece);
+  }
+  if (cells > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error(ErrorCode::OutOfMemory, fmt::format("{} macrocells in one rank's blocks", cells),
+                device_->name());
+  }
+  cellCount_ = static_cast<std::uint32_t>(cells);
+  if (cellCount_ == 0) return;
+  rangeBuffer_.reserve(device_, cells * sizeof(glm::vec2), MemoryKind::DeviceLocal);
+  visibleBuffer_.reserve(device_, cells * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+  runCells(shared::cellsModeMeasure);
+}
+
+void VolumeStore::runCells(std::uint32_t mode) {
+  const auto bytes = std::span(cellPieces_).size_bytes();
+  cellPieceBuffer_.reserve(device_, bytes, MemoryKind::Upload);
+  std::memcpy(cellPieceBuffer_.mapped().data(), cellPieces_.data(), bytes);
+  shared::CellsConstants constants{};
+  constants.pieces = cellPieceBuffer_.address();
+  constants.ranges = rangeBuffer_.address();
+  constants.visible = visibleBuffer_.address();
+  constants.visibleBefore = visibleBeforeBuffer_.address();
+  constants.pieceCount = static_cast<std::uint32_t>(cellPieces_.size());
+  constants.cellCount = cellCount_;
+  constants.tableSize = tableSize();
+  constants.mode = mode;
+  commands_.begin();
+  cellsPass_.record(commands_, constants, pages_, pagesVersion_);
+  commands_.submitAndWait();
+}
+
 void VolumeStore::setTable(const TransferTable& table) {
+  if (table_ == table) return;
   table_ = table;
+  visibleBeforeBuffer_.reserve(device_, (table_.entries.size() + 1) * sizeof(std::uint32_t),
+                               MemoryKind::Upload);
+  const auto visibleBefore = visibleBeforeBuffer_.mappedAs<std::uint32_t>();
+  visibleBefore[0] = 0;
+  for (std::size_t i = 0; i < table_.entries.size(); ++i) {
+    visibleBefore[i + 1] = visibleBefore[i] + (table_.entries[i].extinction > 0.0F ? 1 : 0);
+  }
   const auto bytes = std::span(table_.entries).size_bytes();
   tableBuffer_.reserve(device_, bytes, MemoryKind::Upload);
   std::memcpy(tableBuffer_.mapped().data(), table_.entries.data(), bytes);
@@ -390,6 +451,12 @@ void VolumeStore::placeTable() {
     bricks_[i].tableOrigin = static_cast<float>((table_.min - piece.valueOffset) / piece.valueScale);
     bricks_[i].tableScale = static_cast<float>(piece.valueScale * perScalar);
   }
+  for (std::size_t i = 0; i < cellPieces_.size(); ++i) {
+    cellPieces_[i].tableOrigin =
+        static_cast<float>((table_.min - pieces_[i].valueOffset) / pieces_[i].valueScale);
+    cellPieces_[i].tableScale = static_cast<float>(pieces_[i].valueScale * perScalar);
+  }
+  if (cellCount_ > 0) runCells(shared::cellsModeClassify);
   brickBuffer_.reserve(device_, std::span(bricks_).size_bytes(), MemoryKind::Upload);
   if (!bricks_.empty())
     std::memcpy(brickBuffer_.mapped().data(), bricks_.data(), std::span(bricks_).size_bytes());

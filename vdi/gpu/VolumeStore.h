@@ -11,6 +11,7 @@
 #include "vdi/core/Block.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
+#include "vdi/gpu/CellsPass.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Memory.h"
 
@@ -38,6 +39,8 @@ class VolumeStore {
   VkDeviceAddress bricks() const { return brickBuffer_.address(); }
   VkDeviceAddress nodes() const { return nodeBuffer_.address(); }
   VkDeviceAddress table() const { return tableBuffer_.address(); }
+  /// Macrocells, for the bricks' firstCell: 1 where the table makes anything visible.
+  VkDeviceAddress cells() const { return visibleBuffer_.address(); }
   std::span<const Image3D> pages() const { return pages_; }
   /// Changes whenever pages were made anew: descriptor sets that name them must be written again.
   std::uint64_t pagesVersion() const { return pagesVersion_; }
@@ -68,7 +71,9 @@ class VolumeStore {
   void upload(std::span<const Piece> pieces);
   static void writeBox(const Piece& piece, const glm::uvec3& at, const glm::uvec3& box, std::byte* to);
   void layBricks(std::span<const Block> blocks, std::span<const PieceRange> piecesOf, const Scene& scene);
+  void layCells();
   void placeTable();
+  void runCells(std::uint32_t mode);
 
   std::shared_ptr<Device> device_;
   Commands commands_;
@@ -79,7 +84,14 @@ class VolumeStore {
   std::vector<shared::Brick> bricks_;  // leaves; table fields are filled by placeTable
   std::vector<std::uint32_t> pieceOfBrick_;
   std::vector<shared::KdNode> tree_;
+  std::vector<shared::CellPiece> cellPieces_;  // of pieces_; table fields are filled by placeTable
+  std::uint32_t cellCount_ = 0;
   TransferTable table_;
+  CellsPass cellsPass_;
+  Buffer cellPieceBuffer_;
+  Buffer rangeBuffer_;
+  Buffer visibleBuffer_;
+  Buffer visibleBeforeBuffer_;
   Buffer brickBuffer_;
   Buffer nodeBuffer_;
   Buffer tableBuffer_;

@@ -36,6 +36,7 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.bricks = volume_.bricks();
   params.nodes = volume_.nodes();
   params.table = volume_.table();
+  params.cells = volume_.cells();
   params.tableSize = volume_.tableSize();
   params.nodeCount = volume_.nodeCount();
   params.perUnitDistance = static_cast<float>(request.lattice.step / request.table.unitDistance);

@@ -1,0 +1,82 @@
+// Macrocells: the range of values in each, once when blocks arrive; and whether any of these is visible, when blocks or the
+// transfer table change. The rays of cast.comp pass those where nothing is.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared/cast.h"
+#include "shared/cells.h"
+
+layout(local_size_x = cellsGroup) in;
+layout(constant_id = 0) const uint pageCount = 1;
+layout(set = 0, binding = 0) uniform sampler3D pages[castMaxPages];
+layout(push_constant, scalar) uniform Push { CellsConstants push; };
+
+float texelAt(uint page, ivec3 at) {
+  float value = 0.0;
+  if (pageCount == 1u || page == 0u) value = texelFetch(pages[0], at, 0).r;
+  if (pageCount > 1u && page == 1u) value = texelFetch(pages[1], at, 0).r;
+  if (pageCount > 2u && page == 2u) value = texelFetch(pages[2], at, 0).r;
+  if (pageCount > 3u && page == 3u) value = texelFetch(pages[3], at, 0).r;
+  if (pageCount > 4u && page == 4u) value = texelFetch(pages[4], at, 0).r;
+  if (pageCount > 5u && page == 5u) value = texelFetch(pages[5], at, 0).r;
+  if (pageCount > 6u && page == 6u) value = texelFetch(pages[6], at, 0).r;
+  if (pageCount > 7u && page == 7u) value = texelFetch(pages[7], at, 0).r;
+  return value;
+}
+
+uint pieceOf(uint cell) {
+  uint low = 0u;
+  uint high = push.pieceCount;
+  while (high - low > 1u) {
+    uint middle = (low + high) / 2u;
+    if (push.pieces.at[middle].firstCell <= cell) {
+      low = middle;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
+}
+
+void measure(CellPiece piece, uint cell) {
+  uint index = cell - piece.firstCell;
+  uvec3 cellAt = uvec3(index % piece.cellDims.x, (index / piece.cellDims.x) % piece.cellDims.y,
+                       index / (piece.cellDims.x * piece.cellDims.y));
+  ivec3 first = max(ivec3(cellAt * cellSide) - 1, ivec3(0));
+  ivec3 last = min(ivec3((cellAt + 1u) * cellSide) + 1, ivec3(piece.dims) - 1);
+  vec2 range = vec2(3.4e38, -3.4e38);
+  for (int z = first.z; z <= last.z; ++z) {
+    for (int y = first.y; y <= last.y; ++y) {
+      for (int x = first.x; x <= last.x; ++x) {
+        float value = texelAt(piece.page, ivec3(piece.place) + ivec3(x, y, z));
+        // What isn't finite is transparent, and so is what's interpolated with it.
+        if (abs(value) <= 3.0e38) range = vec2(min(range.x, value), max(range.y, value));
+      }
+    }
+  }
+  push.ranges.at[cell] = range;
+}
+
+void classify(CellPiece piece, uint cell) {
+  vec2 range = push.ranges.at[cell];
+  bool visible = false;
+  if (range.x <= range.y) {
+    // The table is linear between entries: those at both sides count.
+    float last = float(push.tableSize - 1u);
+    vec2 places = clamp((range - piece.tableOrigin) * piece.tableScale + vec2(-0.01, 0.01), vec2(0.0), vec2(last));
+    uint begin = uint(places.x);
+    uint end = min(uint(ceil(places.y)) + 1u, push.tableSize);
+    visible = push.visibleBefore.at[end] > push.visibleBefore.at[begin];
+  }
+  push.visible.at[cell] = visible ? 1u : 0u;
+}
+
+void main() {
+  uint cell = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * cellsGroup;
+  if (cell >= push.cellCount) return;
+  CellPiece piece = push.pieces.at[pieceOf(cell)];
+  if (push.mode == cellsModeMeasure) {
+    measure(piece, cell);
+  } else {
+    classify(piece, cell);
+  }
+}

@@ -1,0 +1,40 @@
+#include "vdi/gpu/CellsPass.h"
+
+#include <algorithm>
+#include <array>
+
+#include "shaders/shared/cast.h"
+
+namespace vdi::gpu {
+
+namespace {
+
+ComputePipelineInfo pipelineInfo() {
+  ComputePipelineInfo info;
+  info.shader = "cells";
+  info.pushConstantBytes = sizeof(shared::CellsConstants);
+  info.imageCount = shared::castMaxPages;
+  return info;
+}
+
+}  // namespace
+
+CellsPass::CellsPass(std::shared_ptr<Device> device)
+    : sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
+
+void CellsPass::record(Commands& commands, const shared::CellsConstants& constants,
+                       std::span<const Image3D> pages, std::uint64_t pagesVersion) {
+  ComputePipeline& pipeline = pipelines_.with({static_cast<std::uint32_t>(pages.size())});
+  if (boundVersion_ != pagesVersion) {
+    std::array<const Image3D*, shared::castMaxPages> images{};
+    for (std::size_t i = 0; i < images.size(); ++i) images[i] = &pages[std::min(i, pages.size() - 1)];
+    pipeline.bindImages(images, sampler_);
+    boundVersion_ = pagesVersion;
+  }
+  constexpr std::uint32_t widest = 32768;  // groups; every device allows 65535 per axis
+  const std::uint32_t groups = (constants.cellCount + shared::cellsGroup - 1) / shared::cellsGroup;
+  const std::uint32_t across = std::min(groups, widest);
+  commands.dispatch(pipeline, constants, across, (groups + across - 1) / across);
+}
+
+}  // namespace vdi::gpu

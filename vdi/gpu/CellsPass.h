@@ -1,0 +1,29 @@
+// Dispatches cells.comp: macrocells of the pages' pieces.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "shaders/shared/cells.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/ComputePipeline.h"
+#include "vdi/gpu/Memory.h"
+
+namespace vdi::gpu {
+
+class CellsPass {
+ public:
+  explicit CellsPass(std::shared_ptr<Device> device);
+  /// One of the cellsMode's. `pages`: at least one, which the pieces lie in; `pagesVersion` changes when they
+  /// do.
+  void record(Commands& commands, const shared::CellsConstants& constants, std::span<const Image3D> pages,
+              std::uint64_t pagesVersion);
+
+ private:
+  Sampler sampler_;
+  PipelineSet pipelines_;  // by page count
+  std::uint64_t boundVersion_ = 0;
+};
+
+}  // namespace vdi::gpu
