@@ -135,6 +135,32 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
   CHECK(device()->validationMessages() == "");
 }
 
+TEST_CASE("what macrocells let rays pass changes nothing, whatever the transfer function becomes") {
+  // Several macrocells along each axis, most of them empty.
+  const auto dealt = test::deal("coil", {70, 75, 66}, {1, 2, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::U8, 0, 1);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  GenerateSettings settings = test::smallSettings(41, 33, 6);
+  settings.precision = Precision::Full;
+  for (const double top : {80.0, 30.0, 200.0}) {  // the last one: next to nothing is visible
+    INFO(top);
+    const TransferFunction function = test::threeHues(top);
+    const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
+    const Image expected = reference::renderVolume(frame, dealt.mine);
+    CHECK(largestDifference(*generator.renderVolume(test::oblique(), function, settings), expected) < 0.5F);
+    for (const Algorithm algorithm : algorithms) {
+      INFO(toString(algorithm));
+      GenerateSettings own = settings;
+      own.algorithm = algorithm;
+      const reference::Frame ownFrame(generator.scene(), test::oblique(), function, own);
+      const SupersegmentLists lists = reference::generate(ownFrame, dealt.mine, false);
+      const auto vdi = generator.generate(test::oblique(), function, own);
+      CHECK(listsThatDiffer(vdi->expandedLists(), lists) <= lists.listCount() / 50);
+    }
+  }
+}
+
 TEST_CASE("merging and compositing on the device equal the reference") {
   const auto dealt = test::deal("turbulence", {26, 22, 24}, {3, 3, 3}, Layout::Random, Joint::SharedPoints,
                                 ScalarType::F32, 0, 1);
