@@ -44,6 +44,14 @@ for joint in shared gap cells; do
 done
 works "info" "$vdi" info one.vdi
 grep -q "80 x 60" out.txt || fail "info doesn't tell the resolution"
+grep -q "compact precision" out.txt || fail "info doesn't tell the precision"
+works "full precision" "$vdi" generate --field turbulence "${small[@]}" --joint cells --precision full -o full.vdi --flat full.png
+works "compare" "$vdi" compare --json one.png full.png
+python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "compact isn't full's picture"
+[ $((2 * $(stat -c %s one.vdi))) -lt "$(stat -c %s full.vdi)" ] || fail "compact is no smaller"
+works "render" "$vdi" render full.vdi -o turned.png --azimuth 20
+refused 2 "precision" "$vdi" generate --field sphere "${small[@]}" --precision double -o x.vdi
+refused 2 "termination" "$vdi" generate --field sphere "${small[@]}" --termination-opacity 0 -o x.vdi
 works "bench" "$vdi" bench --fields sphere "${small[@]}" --repeats 1 --angles 0 20 -o bench.json
 python3 - <<'P' || fail "bench.json isn't what it should be"
 import json
