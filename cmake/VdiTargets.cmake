@@ -50,6 +50,17 @@ function(vdi_add_catch_test name)
 endfunction()
 
 # The environment that every test needs: mpirun as root in a container, no interference between ranks on few cores.
+# vdi_virtual_screen(<variable>): a command prefix that gives what follows an X server. Each has a number of its own to start
+# from: a server that is still ending takes the next one's socket away if that has the same number.
+function(vdi_virtual_screen variable)
+  find_program(XVFB_RUN xvfb-run REQUIRED)
+  get_property(screens GLOBAL PROPERTY VDI_VIRTUAL_SCREENS)
+  math(EXPR screens "${screens} + 1")
+  set_property(GLOBAL PROPERTY VDI_VIRTUAL_SCREENS ${screens})
+  math(EXPR number "200 + 10 * ${screens}")
+  set(${variable} "${XVFB_RUN}" -a -n ${number} PARENT_SCOPE)
+endfunction()
+
 function(vdi_test_properties test)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "LABELS;ENVIRONMENT")
   set_tests_properties(

@@ -32,10 +32,9 @@ void main() {
   uint y = list / push.width;
   uint left = x / push.stride;
   uint below = y / push.stride;
-  if (left * push.stride == x && below * push.stride == y) {
-    uint at = below * push.countedWidth + left;
-    uint grains = push.countedGrains.at[at];
-    push.tolerances.at[list] = push.countedTolerances.at[at];
+  if (push.stride == 1u) {
+    uint grains = push.countedGrains.at[list];
+    push.tolerances.at[list] = push.countedTolerances.at[list];
     push.rooms.at[list] = grains == 0u ? 0u : grains + spareGrains;
     return;
   }

@@ -56,6 +56,8 @@ void main() {
     listIndex = gl_GlobalInvocationID.y * push.params.value.countedWidth + gl_GlobalInvocationID.x;
   }
   if (x >= push.params.value.width || y >= endRow) return;
+  samplesAtOnce = countsGrains ? push.params.value.countedSamples : 1u;
+  grainsAtOnce = samplesAtOnce;
   setUpRay(x, y);
   setUpScene();
 

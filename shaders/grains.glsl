@@ -13,6 +13,7 @@ void walk();
 float grainsBefore;  // transmittance so far
 float grainsReach;
 uint grainsVisible;
+uint grainsAtOnce = 1u;  // samples that an interval stands for
 uint grainsRuns;
 bool grainsRunVisible;
 bool grainsCutAtGaps;
@@ -81,7 +82,7 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
   deviate(x, weight * (back - front));
   if (!(opticalDepth > 0.0)) return;
 
-  ++grainsVisible;
+  grainsVisible += grainsAtOnce;
   if (!grainsRunVisible) ++grainsRuns;
   grainsRunVisible = true;
   // Nothing but a run's start may open a grain once the room for them is used up. With cuts at gaps it isn't, unless

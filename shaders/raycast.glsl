@@ -130,21 +130,27 @@ float backOf(uint k) {
   return k + 1u == rayScene.y ? rayLeave : push.params.value.first + float(k + 1u) * push.params.value.step;
 }
 
+// How many samples are used as one: more while grains are counted (CastParams::countedSamples).
+uint samplesAtOnce;
+
 // Samples [emptyBegin, begin) as one transparent one, if there are any, which is the same to whoever uses them; then
-// [begin, end). Returns false once the ray is opaque enough.
+// [begin, end), where samplesAtOnce isn't 1 those that are multiples of it. Returns false once the ray is opaque enough.
 bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
   // Texels are asked for two samples ahead, the table one: their latency is most of what a sample takes.
-  vec4 ahead = classify(tablePosition(brick, begin));
-  float further = tablePosition(brick, begin + 1u);
-  for (uint k = emptyBegin < begin ? begin - 1u : begin; k < end; ++k) {
-    bool empty = k < begin;
+  uint emptyFirst = (emptyBegin + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce;
+  uint first = (begin + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce;
+  vec4 ahead = classify(tablePosition(brick, first));
+  float further = tablePosition(brick, first + samplesAtOnce);
+  bool empty = emptyFirst < first;
+  for (uint k = empty ? first - samplesAtOnce : first; k < end; k += samplesAtOnce) {
     vec4 entry = empty ? vec4(0.0) : ahead;
     if (!empty) {
       ahead = classify(further);
-      further = tablePosition(brick, k + 2u);
+      further = tablePosition(brick, k + 2u * samplesAtOnce);
     }
-    float front = frontOf(empty ? emptyBegin : k);
-    float back = backOf(k);
+    float front = frontOf(empty ? emptyFirst : k);
+    float back = backOf(min(k + samplesAtOnce, rayScene.y) - 1u);
+    empty = false;
     float opticalDepth = min(entry.a * rayUnitsPerDepth * (back - front), maxOpticalDepth);
     useSample(front, back, entry.rgb, opticalDepth);
     rayOpticalDepth += opticalDepth;

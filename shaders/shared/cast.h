@@ -79,6 +79,7 @@ struct CastParams {
   // and including the row behind the band, as [rows][countedWidth].
   uint countedStride;
   uint countedWidth;
+  uint countedSamples;  // one sample stands for that many, those of a multiple of it
 };
 
 #ifndef __cplusplus

@@ -11,6 +11,10 @@ inline constexpr uint grainsPerBudget = 2;
 inline constexpr uint spareGrains = 4;
 inline constexpr uint uncountedSpareGrains = 8;
 inline constexpr uint countedStride = 4;
+inline uint countedSamplesFor(uint lattice, uint budget) {
+  const uint share = lattice / (16 * budget);
+  return share < 1 ? 1 : share > 4 ? 4 : share;
+}
 #else
 const uint grainsPerBudget = 2;
 const uint spareGrains = 4;

@@ -91,6 +91,8 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
     build.sampleStep = request.lattice.step;
     build.code = request.code;
     params.countedStride = stride;
+    params.countedSamples =
+        stride > 1 ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments) : 1;
     params.countedWidth = build.countedWidth();
     const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
       // The shader counts lists from the picture's first; the targets hold just this band's.

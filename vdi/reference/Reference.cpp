@@ -273,7 +273,8 @@ Frame::Frame(const Scene& theScene, const Camera& camera, const TransferFunction
   validate(theSettings);
 }
 
-std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y) {
+std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y,
+                              std::uint32_t atOnce) {
   struct Piece {
     SampleRange range;
     const Block* block;
@@ -294,13 +295,15 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
   std::vector<Interval> samples;
   float total = 0.0F;
   for (const Piece& piece : pieces) {
-    for (std::uint32_t k = piece.range.first; k < piece.range.last; ++k) {
+    const std::uint32_t first = (piece.range.first + atOnce - 1) / atOnce * atOnce;
+    for (std::uint32_t k = first; k < piece.range.last; k += atOnce) {
+      const std::uint32_t end = std::min(k + atOnce, scene.samples.last);
       const glm::dvec3 world = glm::dvec3(ray.sample(k)) + frame.scene.bounds.center();
       const TransferTableEntry entry = frame.table.lookup(interpolate(*piece.block, world));
       const float front =
           k == scene.samples.first ? scene.enter : static_cast<float>(frame.lattice.frontOf(k));
       const float back =
-          k + 1 == scene.samples.last ? scene.leave : static_cast<float>(frame.lattice.frontOf(k + 1));
+          end == scene.samples.last ? scene.leave : static_cast<float>(frame.lattice.frontOf(end));
       const float opticalDepth = std::min(entry.extinction * unitsPerDepth * (back - front), maxExtinction);
       const float opacity = opacityOf(opticalDepth);
       samples.push_back(
@@ -334,7 +337,10 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
   const int width = frame.view.width();
   const int height = frame.view.height();
   SupersegmentLists lists;
-  const auto allotmentAt = [&](int x, int y) { return allotmentOf(castRay(frame, blocks, x, y), rules); };
+  const std::uint32_t atOnce = countedSamplesFor(frame.lattice.count, rules.budget);
+  const auto allotmentAt = [&](int x, int y) {
+    return allotmentOf(castRay(frame, blocks, x, y, atOnce), rules, atOnce);
+  };
   const auto listAt = [&](int x, int y) {
     const std::vector<Interval> samples = castRay(frame, blocks, x, y);
     if (frame.settings.algorithm == Algorithm::Bisection) return segmentByBisection(samples, rules);
@@ -349,9 +355,8 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
     const int right = after(x, width);
     const int below = before(y);
     const int above = after(y, height);
-    if (left == x && below == y) return segmentByMerging(samples, rules, allotmentAt(x, y));
-    const Allotment counted[] = {allotmentAt(left, below), allotmentAt(right, below), allotmentAt(left, above),
-                                 allotmentAt(right, above)};
+    const Allotment counted[] = {allotmentAt(left, below), allotmentAt(right, below),
+                                 allotmentAt(left, above), allotmentAt(right, above)};
     return segmentByMerging(samples, rules, allotmentBetween(counted));
   };
   for (int y = 0; y < height; ++y) {

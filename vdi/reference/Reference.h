@@ -32,7 +32,9 @@ struct Frame {
 
 /// The samples of the ray through the centre of pixel (x, y) that `blocks` own, front to back, transparent
 /// ones included, up to the one with which the ray's opacity reaches the termination opacity.
-std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y);
+/// With `atOnce`, just the samples of the lattice's multiples of it, each in place of that many.
+std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y,
+                              std::uint32_t atOnce = 1);
 
 /// DVR: the ground truth. Depth as Image says.
 Image renderVolume(const Frame& frame, std::span<const Block> blocks);

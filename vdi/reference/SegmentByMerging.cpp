@@ -69,7 +69,8 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
     const std::size_t left = room - std::min(room, grains.size());
     if (left >= spareGrains) return;
     const float base = allotted < 0.0F ? finestTolerance / toleranceRatio : allotted;
-    tolerance = left == 0 ? unlimited : base * std::pow(toleranceRatio, static_cast<float>(spareGrains - left));
+    tolerance =
+        left == 0 ? unlimited : base * std::pow(toleranceRatio, static_cast<float>(spareGrains - left));
   };
   bool open = false;
   bool cut = true;
@@ -186,12 +187,13 @@ void mergeCheapest(std::vector<Grain>& grains, std::size_t most, float sampleSte
 
 }  // namespace
 
-Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules) {
+Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce) {
   const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
   const std::size_t most = std::max<std::size_t>(rules.budget, runs);
-  const auto visible = static_cast<std::size_t>(
-      std::count_if(intervals.begin(), intervals.end(),
-                    [](const Interval& interval) { return interval.opticalDepth > 0.0F; }));
+  const std::size_t visible = atOnce * static_cast<std::size_t>(std::count_if(
+                                           intervals.begin(), intervals.end(), [](const Interval& interval) {
+                                             return interval.opticalDepth > 0.0F;
+                                           }));
   if (visible == 0) return {};
   float tolerance = -1.0F;
   std::size_t count = visible;

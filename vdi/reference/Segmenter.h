@@ -99,11 +99,17 @@ struct Allotment {
 inline constexpr std::uint32_t spareGrains = 4;
 inline constexpr std::uint32_t uncountedSpareGrains = 8;  // and a quarter of `grains`
 inline constexpr int countedStride = 4;
+/// A ray that's counted for others takes one sample for this many: the more, the longer rays are for their
+/// lists' budget, for a device waits for the longest ray.
+constexpr std::uint32_t countedSamplesFor(std::uint32_t latticeCount, std::uint32_t budget) {
+  const std::uint32_t share = latticeCount / (16 * budget);
+  return share < 1 ? 1 : share > 4 ? 4 : share;
+}
 
-/// Counts.
-Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules);
-/// Of a list that isn't counted, from the counted ones next to it: the geometric mean of their tolerances,
-/// room for the most grains. Those that hold nothing have no say.
+/// Counts. `atOnce`: samples that an interval stands for.
+Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce = 1);
+/// Of a list among counted ones: the geometric mean of their tolerances, room for the most grains. Those that
+/// hold nothing have no say.
 Allotment allotmentBetween(std::span<const Allotment> counted);
 
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules,
