@@ -52,7 +52,8 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
   return params;
 }
 
-CastPass::CastPass(std::shared_ptr<Device> device) : sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
+CastPass::CastPass(std::shared_ptr<Device> device)
+    : sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
 
 ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t compact) {
   const std::size_t pageCount = volume_->pages().size();
@@ -85,7 +86,8 @@ void CastPass::record(Commands& commands, VkDeviceAddress params, Work work, Alg
   // The row behind the band is counted too.
   const std::uint32_t rows = (band.lastRow - band.firstRow + stride - 1) / stride + (stride > 1 ? 1 : 0);
   const std::uint32_t width = (band.width + stride - 1) / stride;
-  commands.dispatch(pipelineFor(program, compact), constants, (width + shared::castGroupX - 1) / shared::castGroupX,
+  commands.dispatch(pipelineFor(program, compact), constants,
+                    (width + shared::castGroupX - 1) / shared::castGroupX,
                     (rows + shared::castGroupY - 1) / shared::castGroupY);
 }
 

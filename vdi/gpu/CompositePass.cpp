@@ -13,7 +13,8 @@ ComputePipelineInfo pipelineInfo() {
 
 }  // namespace
 
-CompositePass::CompositePass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
+CompositePass::CompositePass(std::shared_ptr<Device> device)
+    : pipelines_(std::move(device), pipelineInfo()) {}
 
 void CompositePass::record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form,
                            Algorithm algorithm, bool write, std::uint32_t listCount) {

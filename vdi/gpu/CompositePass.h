@@ -14,8 +14,8 @@ namespace vdi::gpu {
 class CompositePass {
  public:
   explicit CompositePass(std::shared_ptr<Device> device);
-  /// `params` is the address of a CompositeParams of that form. The first step of the algorithm, then (`write`, after a
-  /// scan) the second one.
+  /// `params` is the address of a CompositeParams of that form. The first step of the algorithm, then
+  /// (`write`, after a scan) the second one.
   void record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form, Algorithm algorithm,
               bool write, std::uint32_t listCount);
 

@@ -2,8 +2,8 @@
 // rays and what composites share it; not part of the library's interface. vdi/reference/Segmenter.h describes
 // the algorithms.
 //   bisection: search of sensitivities, prefix sum of the counts, write.
-//   merge: count of grains, of all lists or one in countedStride x countedStride; allotment to all lists, prefix sum,
-//   write of grains; prefix sum of what's to be left of them, reduce.
+//   merge: count of grains, of all lists or one in countedStride x countedStride; allotment to all lists,
+//   prefix sum, write of grains; prefix sum of what's to be left of them, reduce.
 #pragma once
 
 #include <cstdint>
