@@ -37,6 +37,7 @@ struct Options {
   std::vector<std::uint32_t> supersegments;  // empty: 25, or the suite's
   int views = 0;                             // 0: 1, or the suite's
   int repeats = 5;
+  std::string reconstruction = "smooth";
   std::string suite;
   std::string output;
   std::vector<std::string> comparison;
@@ -167,6 +168,7 @@ class Bench {
       : options_(options),
         world_(world),
         settings_(makeSettings(options.quality)),
+        reconstruction_(reconstructionFromString(options.reconstruction)),
         device_(device),
         generator_(std::move(device), comm::Communicator::world()) {}
 
@@ -286,7 +288,7 @@ class Bench {
         generator_.renderVolume(truth.camera, function, settings_);
         volumeMs = deviceMs();
       }
-      seen = renderer.render(truth.camera, settings_.width, settings_.height);
+      seen = renderer.render(truth.camera, settings_.width, settings_.height, reconstruction_);
       ratios.push_back(volumeMs / renderer.renderMilliseconds());
       return renderer.renderMilliseconds();
     });
@@ -305,6 +307,7 @@ class Bench {
     rows_.push_back({{"dataset", name},
                      {"algorithm", toString(settings_.algorithm)},
                      {"precision", toString(made.vdi->precision())},
+                     {"reconstruction", toString(reconstruction_)},
                      {"supersegments", settings_.supersegments},
                      {"width", settings_.width},
                      {"height", settings_.height},
@@ -332,6 +335,7 @@ class Bench {
   const Options& options_;
   const comm::Communicator& world_;
   GenerateSettings settings_;
+  Reconstruction reconstruction_;
   std::shared_ptr<gpu::Device> device_;
   VdiGenerator generator_;
   std::FILE* table_ = nullptr;
@@ -362,6 +366,7 @@ void measureAll(const Options& options, const comm::Communicator& world) {
     if (options.repeats < 1) throw Error(ErrorCode::InvalidArgument, "--repeats must be at least 1");
     for (const std::string& algorithm : options.algorithms) (void)algorithmFromString(algorithm);
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
+    (void)reconstructionFromString(options.reconstruction);
     (void)makeSettings(options.quality);  // before anything takes time
   });
   // The table must not get between the lines of the JSON.
@@ -436,6 +441,7 @@ void addBench(CLI::App& app, Job& job) {
   command->add_option("--angles", options->angles, "degrees from the VDI's viewpoint")
       ->type_name("DEG")
       ->capture_default_str();
+  addReconstructionOption(*command, options->reconstruction);
   command->add_option("--repeats", options->repeats, "runs of which the median counts, after one warm-up")
       ->capture_default_str();
   command

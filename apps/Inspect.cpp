@@ -25,6 +25,7 @@ struct RenderOptions {
   std::vector<double> azimuths{0.0};
   double elevation = 0.0;
   std::string resolution;
+  std::string reconstruction = "smooth";
 };
 
 /// picture.png at 20 degrees: picture_20deg.png, when there are several.
@@ -39,12 +40,13 @@ void render(const RenderOptions& options) {
   const Vdi vdi = io::readVdi(options.input);
   const std::vector<int> size = options.resolution.empty() ? std::vector<int>{vdi.width, vdi.height}
                                                            : parseSizes(options.resolution, 2);
+  const Reconstruction reconstruction = reconstructionFromString(options.reconstruction);
   VdiRenderer renderer(gpu::Device::create(gpu::requestFromEnvironment(0)));
   renderer.setVdi(vdi);
   for (const double azimuth : options.azimuths) {
     const Camera camera = turned(chosenCamera(options.camera, vdi.camera), azimuth, options.elevation);
     const std::filesystem::path path = nameFor(options.output, azimuth, options.azimuths.size() > 1);
-    io::writePng(path, io::toPicture(renderer.render(camera, size[0], size[1])));
+    io::writePng(path, io::toPicture(renderer.render(camera, size[0], size[1], reconstruction)));
     fmt::print("{}: {:.2f} ms on the device\n", path.string(), renderer.renderMilliseconds());
   }
 }
@@ -136,6 +138,7 @@ void addRender(CLI::App& app, Job& job) {
   command->add_option("--elevation", options->elevation, "degrees to raise it after that")
       ->capture_default_str()
       ->group("Viewpoint");
+  addReconstructionOption(*command, options->reconstruction);
   command->callback([options, &job] { job = {[options](const comm::Communicator&) { render(*options); }}; });
 }
 

@@ -281,6 +281,14 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
       ->group(qualityGroup);
 }
 
+void addReconstructionOption(CLI::App& command, std::string& name) {
+  command
+      .add_option("--reconstruction", name,
+                  "between lists: smooth, which blends two of them, or constant, as in the paper; faster")
+      ->type_name("NAME")
+      ->capture_default_str();
+}
+
 GenerateSettings makeSettings(const QualityOptions& options) {
   GenerateSettings settings;
   const std::vector<int> sizes = parseSizes(options.resolution, 2);

@@ -75,6 +75,9 @@ GenerateSettings makeSettings(const QualityOptions& options);
 TransferFunction makeTransferFunction(const QualityOptions& options, const Scene& scene,
                                       const ScalarRange& range);
 
+/// Of views of a VDI: a name that reconstructionFromString knows.
+void addReconstructionOption(CLI::App& command, std::string& name);
+
 /// "640x360" or "96x96x96"; throws Error{InvalidArgument}.
 std::vector<int> parseSizes(const std::string& text, std::size_t count);
 

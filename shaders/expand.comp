@@ -36,11 +36,13 @@ void maskList(uint list, uint listCount) {
   push.heads.at[list] = uvec2(push.offsets.at[list], mask);
 }
 
+// With the lists around it, which smooth reconstruction sees from within the tile.
 void maskTile(ivec2 tile, uint index) {
   uint mask = 0u;
-  ivec2 end = min((tile + 1) * renderTile, push.lists);
-  for (int y = tile.y * renderTile; y < end.y; ++y) {
-    for (int x = tile.x * renderTile; x < end.x; ++x) mask |= push.heads.at[uint(y) * uint(push.lists.x) + uint(x)].y;
+  ivec2 begin = max(tile * renderTile - 1, ivec2(0));
+  ivec2 end = min((tile + 1) * renderTile + 1, push.lists);
+  for (int y = begin.y; y < end.y; ++y) {
+    for (int x = begin.x; x < end.x; ++x) mask |= push.heads.at[uint(y) * uint(push.lists.x) + uint(x)].y;
   }
   push.tileMasks.at[index] = mask;
 }

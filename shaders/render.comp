@@ -1,4 +1,4 @@
-// Renders a VDI from a new viewpoint; twin of render in vdi/reference/Reference.cpp. A ray is straight in V_O's view
+// Renders a VDI from a new viewpoint; twin of vdi/reference/Render.cpp. A ray is straight in V_O's view
 // space, where each list fills the frustum of its pixel, so the ray crosses lists one after the other as a line crosses
 // the cells of a picture.
 #version 460
@@ -12,6 +12,9 @@
 layout(local_size_x = renderGroupX, local_size_y = renderGroupY) in;
 layout(push_constant, scalar) uniform Push { RenderConstants push; };
 
+// Reconstruction::Smooth or Constant.
+layout(constant_id = 3) const bool smoothReconstruction = true;
+
 const float opaque = 0.9999;
 
 vec3 rayOrigin;  // V_O's view space
@@ -20,6 +23,12 @@ float rayWorldPerT;
 float rayPerDepth;  // t per unit of V_O's depth
 vec4 accumulated;
 float firstDepth;
+
+void accumulate(vec4 light, float depth) {
+  if (!(light.a > 0.0)) return;
+  if (accumulated.a == 0.0) firstDepth = depth;
+  accumulated += (1.0 - accumulated.a) * light;
+}
 
 // Keeps the part of `stretch` where value + t * slope >= 0.
 void clip(inout vec2 stretch, float value, float slope) {
@@ -61,6 +70,10 @@ float pixelLength(ivec2 pixel) {
   return sqrt(1.0 + dot(offset, offset));
 }
 
+// Of one list.
+vec4 listLight;
+float listDepth;
+
 void addPiece(Piece piece, vec2 stretch, float segmentScale) {
   vec2 t = (piece.depths - rayOrigin.z) * rayPerDepth;
   float enter = max(stretch.x, min(t.x, t.y));
@@ -69,8 +82,8 @@ void addPiece(Piece piece, vec2 stretch, float segmentScale) {
   float share = (leave - enter) * segmentScale / (piece.depths.y - piece.depths.x);
   float opacity = opacityOf(piece.opticalDepth * share);
   if (!(opacity > 0.0)) return;
-  if (accumulated.a == 0.0) firstDepth = enter;
-  accumulated += (1.0 - accumulated.a) * opacity * vec4(piece.color, 1.0);
+  if (listLight.a == 0.0) listDepth = enter;
+  listLight += (1.0 - listLight.a) * opacity * vec4(piece.color, 1.0);
 }
 
 float depthAt(float t) { return rayOrigin.z + t * rayDirection.z; }
@@ -80,19 +93,19 @@ uint maskBetween(float a, float b) {
   return maskOf(min(a, b), max(a, b), push.params.value.nearest, push.params.value.binScale);
 }
 
-// Where in its list the last search ended: neighbouring lists are alike, so the next search starts there.
-uint searchHint = 0u;
-
-// What the ray meets of one list, which has supersegments [begin, end), between two depths.
-void addList(ivec2 pixel, uint begin, uint end, vec2 stretch, float nearDepth, float farDepth) {
+// listLight and listDepth of what the ray meets of one list, which has supersegments [begin, end), between two depths.
+// `hint`: where in its list the last search ended; neighbouring lists are alike, so the next search starts there.
+void lookAtList(ivec2 pixel, uint begin, uint end, vec2 stretch, float nearDepth, float farDepth, inout uint hint) {
+  listLight = vec4(0.0);
+  listDepth = uintBitsToFloat(0x7f800000u);
   float segmentScale = rayWorldPerT / pixelLength(pixel);
   RenderSegmentArray segments = push.params.value.segments;
   StoredForm form = push.params.value.form;
   // The first supersegment that ends behind nearDepth.
-  uint low = min(begin + searchHint, end);
+  uint low = min(begin + hint, end);
   while (low > begin && pieceDepths(segments, low - 1u, form).y > nearDepth) --low;
   while (low < end && !(pieceDepths(segments, low, form).y > nearDepth)) ++low;
-  searchHint = low - begin;
+  hint = low - begin;
   if (rayDirection.z >= 0.0) {
     for (uint i = low; i < end; ++i) {
       Piece piece = pieceAt(segments, i, form);
@@ -109,85 +122,25 @@ void addList(ivec2 pixel, uint begin, uint end, vec2 stretch, float nearDepth, f
 // The ray in V_O's picture is a straight line from s = 0 to s = 1. Where it's at s: t, perspective taken into account.
 struct PictureLine {
   vec2 start;
+  vec2 end;
   vec2 inverseDelta;
   vec2 t;      // at both ends
   vec2 depth;  // likewise; 1 where V_O's projection is parallel
 };
 
+PictureLine pictureLine(vec2 stretch) {
+  vec2 depth = push.params.value.parallel != 0u ? vec2(1.0) : vec2(depthAt(stretch.x), depthAt(stretch.y));
+  vec2 start = pixelAt(stretch.x);
+  vec2 end = pixelAt(stretch.y);
+  return PictureLine(start, end, 1.0 / (end - start), stretch, depth);
+}
+
 float tAt(PictureLine line, float s) {
   return line.t.x + (line.t.y - line.t.x) * (s * line.depth.x) / mix(line.depth.y, line.depth.x, s);
 }
 
-// Where the line crosses the edges between columns and between rows. Vectors are worked on as wholes here: lavapipe
-// (Mesa 22.3) mixes up components that are worked on apart.
-vec2 crossings(PictureLine line, ivec2 edges) { return (vec2(edges) - line.start) * line.inverseDelta; }
-
-void walkLists(vec2 stretch) {
-  vec2 end = pixelAt(stretch.y);
-  PictureLine line;
-  line.start = pixelAt(stretch.x);
-  line.inverseDelta = 1.0 / (end - line.start);
-  line.t = stretch;
-  line.depth = push.params.value.parallel != 0u ? vec2(1.0) : vec2(depthAt(stretch.x), depthAt(stretch.y));
-  ivec2 lastList = push.params.value.lists - 1;
-  ivec2 pixel = clamp(ivec2(floor(line.start)), ivec2(0), lastList);
-  ivec2 last = clamp(ivec2(floor(end)), ivec2(0), lastList);
-  ivec2 direction = sign(last - pixel);
-  ivec2 ahead = max(direction, ivec2(0));
-  int tilesAcross = (push.params.value.lists.x + renderTile - 1) / renderTile;
-  float enterS = 0.0;
-  float enterT = stretch.x;  // where s is knownS
-  float knownS = 0.0;
-  ivec2 knownTile = ivec2(-1);
-  uint tileRay = 0u;  // depths that the ray is in, in the tile
-  // At most one step per column and row.
-  int most = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
-  for (int i = 0; i < most; ++i) {
-    ivec2 tile = pixel / renderTile;
-    if (tile != knownTile) {
-      // A tile without material along the ray is left in one step.
-      knownTile = tile;
-      ivec2 edge = (tile + ahead) * renderTile;
-      bvec2 leaves = notEqual(last / renderTile, tile);
-      vec2 s = mix(vec2(1.0), crossings(line, edge), leaves);
-      float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
-      tileRay = maskBetween(depthAt(tAt(line, enterS)), depthAt(tAt(line, leaveS)));
-      uint mask = push.params.value.tileMasks.at[tile.y * tilesAcross + tile.x];
-      if ((mask & tileRay) == 0u) {
-        if (!leaves.x && !leaves.y) return;
-        bool stepX = leaves.x && (!leaves.y || s.x <= s.y);
-        ivec2 lowest = max(tile * renderTile, min(pixel, last));
-        ivec2 highest = min(tile * renderTile + renderTile - 1, max(pixel, last));
-        ivec2 there = clamp(ivec2(floor(mix(line.start, end, leaveS))), lowest, highest);
-        pixel = mix(there, edge + ahead - 1, bvec2(stepX, !stepX));
-        enterS = leaveS;
-        continue;
-      }
-    }
-    bvec2 moves = notEqual(pixel, last);
-    vec2 s = mix(vec2(2.0), crossings(line, pixel + ahead), moves);
-    bool stepX = moves.x && s.x <= s.y;
-    bool stepY = moves.y && !stepX;
-    float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
-    uint list = uint(pixel.y) * uint(push.params.value.lists.x) + uint(pixel.x);
-    uvec2 head = push.params.value.heads.at[list];
-    if ((head.y & tileRay) != 0u) {
-      if (knownS != enterS) enterT = tAt(line, enterS);
-      vec2 part = vec2(enterT, tAt(line, leaveS));
-      float a = depthAt(part.x);
-      float b = depthAt(part.y);
-      if (part.y > part.x && (head.y & maskBetween(a, b)) != 0u) {
-        addList(pixel, head.x, push.params.value.heads.at[list + 1u].x, part, min(a, b), max(a, b));
-        if (accumulated.a >= opaque) return;
-      }
-      enterT = part.y;
-      knownS = leaveS;
-    }
-    if (!(stepX || stepY)) return;
-    pixel += mix(ivec2(0), direction, bvec2(stepX, stepY));
-    enterS = leaveS;
-  }
-}
+#include "walk_lists.glsl"
+#include "walk_smoothly.glsl"
 
 void main() {
   uvec2 at = gl_GlobalInvocationID.xy;
@@ -202,7 +155,14 @@ void main() {
   accumulated = vec4(0.0);
   firstDepth = uintBitsToFloat(0x7f800000u);
   vec2 stretch = insideFrustum();
-  if (stretch.x < stretch.y) walkLists(stretch);
+  if (stretch.x < stretch.y) {
+    PictureLine line = pictureLine(stretch);
+    if (smoothReconstruction) {
+      walkSmoothly(line);
+    } else {
+      walkLists(line);
+    }
+  }
   uint index = at.y * push.params.value.width + at.x;
   push.params.value.colors.at[index] = accumulated;
   push.params.value.depths.at[index] = firstDepth;

@@ -50,6 +50,10 @@ works "compare" "$vdi" compare --json one.png full.png
 python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "compact isn't full's picture"
 [ $((2 * $(stat -c %s one.vdi))) -lt "$(stat -c %s full.vdi)" ] || fail "compact is no smaller"
 works "render" "$vdi" render full.vdi -o turned.png --azimuth 20
+works "render" "$vdi" render full.vdi -o constant.png --azimuth 20 --reconstruction constant
+works "compare" "$vdi" compare --json turned.png constant.png
+python3 -c "import json; r = json.load(open('out.txt')); assert 0.9 < r['ssim'] < 1, r" || fail "constant isn't like smooth"
+refused 2 "reconstruction" "$vdi" render full.vdi -o x.png --reconstruction cubic
 refused 2 "precision" "$vdi" generate --field sphere "${small[@]}" --precision double -o x.vdi
 refused 2 "termination" "$vdi" generate --field sphere "${small[@]}" --termination-opacity 0 -o x.vdi
 works "bench" "$vdi" bench --fields sphere "${small[@]}" --repeats 1 --angles 0 20 -o bench.json

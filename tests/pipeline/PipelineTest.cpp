@@ -126,9 +126,13 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
       for (const double angle : {0.0, 7.0, 35.0, 100.0, 180.0}) {
         INFO("from " << angle << " degrees");
         const Camera other = camera.azimuth(angle);
-        // A size whose rays never run exactly between two lists: those may take either.
-        const Image seen = renderer.render(other, 40, 32);
-        CHECK(largestDifference(seen, reference::render(*vdi, View(other, 40, 32))) < 2.0F);
+        for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
+          INFO(toString(reconstruction));
+          // A size whose rays never run exactly between two lists: those may take either.
+          const Image seen = renderer.render(other, 40, 32, reconstruction);
+          const Image expectedThere = reference::render(*vdi, View(other, 40, 32), reconstruction);
+          CHECK(largestDifference(seen, expectedThere) < 2.0F);
+        }
       }
     }
   }
@@ -159,6 +163,30 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
       const SupersegmentLists lists = reference::generate(ownFrame, dealt.mine, false);
       const auto vdi = generator.generate(test::oblique(), function, own);
       CHECK(listsThatDiffer(vdi->expandedLists(), lists) <= lists.listCount() / 50);
+    }
+  }
+}
+
+TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the reference") {
+  const auto dealt = test::deal("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::U8, 0, 1);
+  const bool parallel = GENERATE(false, true);
+  const Camera camera = test::oblique(parallel);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  const auto vdi = generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
+  VdiRenderer renderer(device());
+  renderer.setVdi(*vdi);
+  for (const double angle : {2.0, 20.0, 70.0, 160.0, 290.0}) {
+    for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
+      INFO(angle << " degrees, " << toString(reconstruction) << ", parallel " << parallel);
+      Camera other = camera.azimuth(angle);
+      other.viewUp += 0.2 * glm::dvec3(1.0, 0.0, 0.5);
+      const Image seen = renderer.render(other, 65, 47, reconstruction);
+      const Image expected = reference::render(*vdi, View(other, 65, 47), reconstruction);
+      CHECK(std::any_of(expected.rgba.begin(), expected.rgba.end(),
+                        [](const glm::vec4& c) { return c.a > 0.1F; }));
+      CHECK(largestDifference(seen, expected) < 2.0F);
     }
   }
 }

@@ -69,6 +69,12 @@ for precision in ("Full", "Compact"):
 full = vdi_of(wavelet, Precision="Full")
 check(np.array_equal(picture(full), volume), "full precision gives the same picture to the bit")
 check(picture(with_camera(simple.RenderVDI(Input=full))).max() > 60, "a VDI of full precision is rendered")
+rendered = {
+    name: picture(simple.RenderVDI(Input=full, UseOriginalCamera=1, Azimuth=10, Reconstruction=name))
+    for name in ("Smooth", "Constant")
+}
+apart = np.abs(rendered["Smooth"].astype(int) - rendered["Constant"]).max()
+check(0 < apart < 80, "reconstructions are alike but not equal, off by %d" % apart)
 
 # A series is time steps.
 second = os.path.join(OUTPUT, "series_1.vdi")

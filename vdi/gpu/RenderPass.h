@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "shaders/shared/render.h"
+#include "vdi/core/Reconstruction.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/ComputePipeline.h"
 
@@ -21,10 +22,11 @@ class RenderPass {
  public:
   explicit RenderPass(std::shared_ptr<Device> device);
   /// `address`: where the device finds `params`.
-  void record(Commands& commands, VkDeviceAddress address, const shared::RenderParams& params);
+  void record(Commands& commands, VkDeviceAddress address, const shared::RenderParams& params,
+              Reconstruction reconstruction);
 
  private:
-  PipelineSet pipelines_;  // by precision
+  PipelineSet pipelines_;  // by precision and reconstruction
 };
 
 }  // namespace vdi::gpu

@@ -14,6 +14,7 @@
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Image.h"
+#include "vdi/core/Reconstruction.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
@@ -95,7 +96,8 @@ class VdiRenderer {
 
   /// Uploads; the host copy isn't needed afterwards.
   void setVdi(const Vdi& vdi);
-  Image render(const Camera& camera, int width, int height);
+  Image render(const Camera& camera, int width, int height,
+               Reconstruction reconstruction = Reconstruction::Smooth);
   double renderMilliseconds() const;  // device time of the last render
 
  private:

@@ -122,7 +122,7 @@ void VdiRenderer::setVdi(const Vdi& vdi) {
   s.original = std::make_unique<View>(vdi.view());
 }
 
-Image VdiRenderer::render(const Camera& camera, int width, int height) {
+Image VdiRenderer::render(const Camera& camera, int width, int height, Reconstruction reconstruction) {
   State& s = *state_;
   if (!s.original) throw Error(ErrorCode::InvalidArgument, "there is no VDI to render yet");
   const View view(camera, width, height);
@@ -140,7 +140,7 @@ Image VdiRenderer::render(const Camera& camera, int width, int height) {
   std::memcpy(s.params.mapped().data(), &params, sizeof(params));
   s.commands.begin();
   s.commands.mark("render");
-  s.pass.record(s.commands, s.params.address(), params);
+  s.pass.record(s.commands, s.params.address(), params, reconstruction);
   s.picture.recordDownload(s.commands);
   s.commands.submitAndWait();
   s.milliseconds = s.commands.stageTimes().front().milliseconds;

@@ -4,35 +4,11 @@
 #include <cassert>
 #include <cmath>
 
+#include "vdi/reference/Accumulator.h"
+
 namespace vdi::reference {
 
 namespace {
-
-/// Colour and opacity accumulated front to back, and the depth of what came first.
-class Accumulator {
- public:
-  void add(const glm::vec3& color, float opacity, float depth) {
-    if (!(opacity > 0.0F)) return;
-    if (rgba_.a == 0.0F) depth_ = depth;
-    rgba_ += (1.0F - rgba_.a) * glm::vec4(color, opacity);
-  }
-  const glm::vec4& rgba() const { return rgba_; }
-  float depth() const { return depth_; }
-
- private:
-  glm::vec4 rgba_{0.0F};
-  float depth_ = Image::noDepth;
-};
-
-Image blankImage(int width, int height) {
-  Image image{width, height, {}, {}};
-  image.rgba.resize(image.pixelCount(), glm::vec4(0.0F));
-  image.depth.resize(image.pixelCount(), Image::noDepth);
-  return image;
-}
-
-// ---- sampling a block
-// ------------------------------------------------------------------------------------------------
 
 struct SceneRay {
   glm::vec3 start;  // relative to the scene's centre, at the front of the sample lattice
@@ -144,121 +120,6 @@ SceneStretch sceneStretch(const Frame& frame, const SceneRay& ray) {
   stretch.leave = front + std::clamp(leave, last, last + ray.step);
   stretch.leave = std::max(stretch.leave, stretch.enter + 0.001F * ray.step);
   return stretch;
-}
-
-// ---- walking a ray through a VDI
-// -----------------------------------------------------------------------------------------
-
-/// A ray p(t) = origin + t * direction in the view space of V_O, t being the new view's depth.
-struct ViewRay {
-  glm::dvec3 origin;
-  glm::dvec3 direction;
-  double worldPerT = 1.0;  // world length per unit of t
-};
-
-/// Where the ray crosses the plane between pixel columns (or rows) at image coordinate `pixel`. In V_O's view
-/// space that plane is  p[axis] = slope * p.z (perspective) or p[axis] = slope (parallel).
-double crossing(const ViewRay& ray, const View& view, int axis, int pixel) {
-  const double extent = axis == 0 ? view.width() : view.height();
-  const double slope = (pixel - 0.5 * extent) * 2.0 * view.halfHeight() / view.height();
-  if (view.parallel()) return (slope - ray.origin[axis]) / ray.direction[axis];
-  return (slope * ray.origin.z - ray.origin[axis]) / (ray.direction[axis] - slope * ray.direction.z);
-}
-
-/// Image coordinates of the point at t; its depth must be > 0.
-glm::dvec2 pixelAt(const ViewRay& ray, const View& view, double t) {
-  const glm::dvec3 p = ray.origin + t * ray.direction;
-  const double scale = 0.5 * view.height() / view.halfHeight() / (view.parallel() ? 1.0 : p.z);
-  return {p.x * scale + 0.5 * view.width(), p.y * scale + 0.5 * view.height()};
-}
-
-/// The part of the ray inside V_O's frustum between two depths, or an empty interval.
-struct Stretch {
-  double enter;
-  double leave;
-  bool empty() const { return !(enter < leave); }
-};
-
-/// Keeps what satisfies value + t * slope >= 0.
-void clip(Stretch& stretch, double value, double slope) {
-  if (slope > 0.0) {
-    stretch.enter = std::max(stretch.enter, -value / slope);
-  } else if (slope < 0.0) {
-    stretch.leave = std::min(stretch.leave, -value / slope);
-  } else if (value < 0.0) {
-    stretch.leave = stretch.enter;
-  }
-}
-
-Stretch insideFrustum(const ViewRay& ray, const View& view, double nearest, double farthest) {
-  Stretch stretch{0.0, std::numeric_limits<double>::infinity()};  // nothing behind the new eye
-  const glm::dvec2 half{view.halfWidth(), view.halfHeight()};
-  for (int axis = 0; axis < 2; ++axis) {
-    for (const double side : {-1.0, 1.0}) {
-      // side * p[axis] <= half * (p.z or 1)
-      const double value = half[axis] * (view.parallel() ? 1.0 : ray.origin.z) - side * ray.origin[axis];
-      const double slope =
-          half[axis] * (view.parallel() ? 0.0 : ray.direction.z) - side * ray.direction[axis];
-      clip(stretch, value, slope);
-    }
-  }
-  clip(stretch, ray.origin.z - nearest, ray.direction.z);
-  clip(stretch, farthest - ray.origin.z, -ray.direction.z);
-  return stretch;
-}
-
-/// Adds what the ray meets of one list between enter and leave.
-void addList(Accumulator& sum, std::span<const Supersegment> list, const ViewRay& ray, double pixelLength,
-             const Stretch& stretch) {
-  const auto depthAt = [&](double t) { return ray.origin.z + t * ray.direction.z; };
-  const double nearDepth = std::min(depthAt(stretch.enter), depthAt(stretch.leave));
-  const double farDepth = std::max(depthAt(stretch.enter), depthAt(stretch.leave));
-  const bool forward = ray.direction.z >= 0.0;
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const Supersegment& segment = forward ? list[i] : list[list.size() - 1 - i];
-    Stretch part = stretch;
-    clip(part, ray.origin.z - segment.front, ray.direction.z);
-    clip(part, segment.back - ray.origin.z, -ray.direction.z);
-    if (segment.back <= nearDepth || segment.front >= farDepth || part.empty()) continue;
-    const double met = (part.leave - part.enter) * ray.worldPerT;
-    const double whole = (segment.back - segment.front) * pixelLength;
-    const float opacity = opacityOf(opticalDepthOf(segment.opacity) * static_cast<float>(met / whole));
-    const float scale = opacity / segment.opacity;
-    sum.add(scale * glm::vec3(segment.red, segment.green, segment.blue), opacity,
-            static_cast<float>(part.enter));
-  }
-}
-
-Accumulator walkLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
-                      const Stretch& stretch) {
-  Accumulator sum;
-  const glm::dvec2 start = pixelAt(ray, original, stretch.enter);
-  const glm::dvec2 end = pixelAt(ray, original, stretch.leave);
-  const glm::ivec2 size{original.width(), original.height()};
-  glm::ivec2 pixel = glm::clamp(glm::ivec2(glm::floor(start)), glm::ivec2(0), size - 1);
-  const glm::ivec2 last = glm::clamp(glm::ivec2(glm::floor(end)), glm::ivec2(0), size - 1);
-  const glm::ivec2 step = glm::sign(last - pixel);  // image coordinates are monotone along a ray
-  double enter = stretch.enter;
-  for (;;) {
-    int axis = -1;
-    double leave = stretch.leave;
-    for (int a = 0; a < 2; ++a) {
-      if (pixel[a] == last[a]) continue;
-      const double t = crossing(ray, original, a, step[a] > 0 ? pixel[a] + 1 : pixel[a]);
-      if (t < leave) {
-        leave = t;
-        axis = a;
-      }
-    }
-    leave = std::max(leave, enter);
-    const Ray pixelRay = original.rayThrough(pixel.x + 0.5, pixel.y + 0.5);
-    const auto list = lists.list(static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(size.x) +
-                                 static_cast<std::size_t>(pixel.x));
-    addList(sum, list, ray, glm::length(pixelRay.direction), {enter, leave});
-    if (axis < 0) return sum;
-    pixel[axis] += step[axis];
-    enter = leave;
-  }
 }
 
 }  // namespace
@@ -389,38 +250,6 @@ SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::ui
     result.offsets.push_back(static_cast<std::uint32_t>(result.segments.size()));
   }
   return result;
-}
-
-Image render(const Vdi& vdi, const View& view) {
-  Image image = blankImage(view.width(), view.height());
-  const SupersegmentLists lists = vdi.expandedLists();
-  if (lists.segments.empty()) return image;
-  const View original = vdi.view();
-  float nearest = std::numeric_limits<float>::infinity();
-  float farthest = 0.0F;
-  for (const Supersegment& segment : lists.segments) {
-    nearest = std::min(nearest, segment.front);
-    farthest = std::max(farthest, segment.back);
-  }
-  // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
-  const double smallest = original.parallel() ? nearest : std::max(nearest, farthest * 1e-6F);
-  for (int y = 0; y < view.height(); ++y) {
-    for (int x = 0; x < view.width(); ++x) {
-      const Ray world = view.rayThrough(x + 0.5, y + 0.5);
-      const glm::dvec3 direction{glm::dot(world.direction, original.right()),
-                                 glm::dot(world.direction, original.up()),
-                                 glm::dot(world.direction, original.forward())};
-      const ViewRay ray{original.toView(world.origin), direction, glm::length(world.direction)};
-      const Stretch stretch = insideFrustum(ray, original, smallest, farthest);
-      if (stretch.empty()) continue;
-      const Accumulator sum = walkLists(lists, original, ray, stretch);
-      const auto pixel =
-          static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
-      image.rgba[pixel] = sum.rgba();
-      image.depth[pixel] = sum.depth();
-    }
-  }
-  return image;
 }
 
 }  // namespace vdi::reference

@@ -10,6 +10,7 @@
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Image.h"
+#include "vdi/core/Reconstruction.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
@@ -50,6 +51,6 @@ SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::ui
 
 /// The VDI seen by `view`. Each supersegment fills the part of its pixel's frustum between its two depths;
 /// rays walk through the frusta of V_O's pixels in order, whatever their direction.
-Image render(const Vdi& vdi, const View& view);
+Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction);
 
 }  // namespace vdi::reference

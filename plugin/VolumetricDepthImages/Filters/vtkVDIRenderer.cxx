@@ -30,6 +30,7 @@ void vtkVDIRenderer::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Resolution: " << this->Resolution[0] << " x " << this->Resolution[1] << "\n"
      << indent << "UseOriginalCamera: " << this->UseOriginalCamera << "\n"
+     << indent << "Reconstruction: " << this->Reconstruction << "\n"
      << indent << "Azimuth: " << this->Azimuth << "\n";
 }
 
@@ -114,7 +115,8 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
     camera = internal.Original;
   }
   const bool own = this->Resolution[0] <= 0 || this->Resolution[1] <= 0;
-  const vdi::Image picture = internal.Renderer->render(camera, own ? internal.Width : this->Resolution[0],
-                                                       own ? internal.Height : this->Resolution[1]);
+  const vdi::Image picture = internal.Renderer->render(
+      camera, own ? internal.Width : this->Resolution[0], own ? internal.Height : this->Resolution[1],
+      static_cast<vdi::Reconstruction>(this->Reconstruction));
   pv::setPicture(output, picture, true);
 }

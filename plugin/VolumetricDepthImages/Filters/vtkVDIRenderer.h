@@ -39,6 +39,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   /// Of the picture; 0 0: the VDI's.
   vtkSetVector2Macro(Resolution, int);
 
+  /// vdi::Reconstruction: 1 (default) blends neighbouring lists, 0 shows each as it is.
+  vtkSetClampMacro(Reconstruction, int, 0, 1);
+
  protected:
   vtkVDIRenderer();
   ~vtkVDIRenderer() override;
@@ -65,6 +68,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   bool UseOriginalCamera = false;
   double Azimuth = 0.0;
   int Resolution[2] = {0, 0};
+  int Reconstruction = 1;
 };
 
 #endif

@@ -1,0 +1,259 @@
+// A VDI from a new viewpoint: a ray walks through the frusta of V_O's pixels. The shaders' twin is
+// shaders/render.comp.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "vdi/reference/Accumulator.h"
+#include "vdi/reference/Reference.h"
+
+namespace vdi::reference {
+
+namespace {
+
+/// A ray p(t) = origin + t * direction in the view space of V_O, t being the new view's depth.
+struct ViewRay {
+  glm::dvec3 origin;
+  glm::dvec3 direction;
+  double worldPerT = 1.0;  // world length per unit of t
+};
+
+/// Where the ray crosses the plane between pixel columns (or rows) at image coordinate `pixel`. In V_O's view
+/// space that plane is  p[axis] = slope * p.z (perspective) or p[axis] = slope (parallel).
+double crossing(const ViewRay& ray, const View& view, int axis, int pixel) {
+  const double extent = axis == 0 ? view.width() : view.height();
+  const double slope = (pixel - 0.5 * extent) * 2.0 * view.halfHeight() / view.height();
+  if (view.parallel()) return (slope - ray.origin[axis]) / ray.direction[axis];
+  return (slope * ray.origin.z - ray.origin[axis]) / (ray.direction[axis] - slope * ray.direction.z);
+}
+
+/// Image coordinates of the point at t; its depth must be > 0.
+glm::dvec2 pixelAt(const ViewRay& ray, const View& view, double t) {
+  const glm::dvec3 p = ray.origin + t * ray.direction;
+  const double scale = 0.5 * view.height() / view.halfHeight() / (view.parallel() ? 1.0 : p.z);
+  return {p.x * scale + 0.5 * view.width(), p.y * scale + 0.5 * view.height()};
+}
+
+/// The part of the ray inside V_O's frustum between two depths, or an empty interval.
+struct Stretch {
+  double enter;
+  double leave;
+  bool empty() const { return !(enter < leave); }
+};
+
+/// Keeps what satisfies value + t * slope >= 0.
+void clip(Stretch& stretch, double value, double slope) {
+  if (slope > 0.0) {
+    stretch.enter = std::max(stretch.enter, -value / slope);
+  } else if (slope < 0.0) {
+    stretch.leave = std::min(stretch.leave, -value / slope);
+  } else if (value < 0.0) {
+    stretch.leave = stretch.enter;
+  }
+}
+
+Stretch insideFrustum(const ViewRay& ray, const View& view, double nearest, double farthest) {
+  Stretch stretch{0.0, std::numeric_limits<double>::infinity()};  // nothing behind the new eye
+  const glm::dvec2 half{view.halfWidth(), view.halfHeight()};
+  for (int axis = 0; axis < 2; ++axis) {
+    for (const double side : {-1.0, 1.0}) {
+      // side * p[axis] <= half * (p.z or 1)
+      const double value = half[axis] * (view.parallel() ? 1.0 : ray.origin.z) - side * ray.origin[axis];
+      const double slope =
+          half[axis] * (view.parallel() ? 0.0 : ray.direction.z) - side * ray.direction[axis];
+      clip(stretch, value, slope);
+    }
+  }
+  clip(stretch, ray.origin.z - nearest, ray.direction.z);
+  clip(stretch, farthest - ray.origin.z, -ray.direction.z);
+  return stretch;
+}
+
+/// Adds what the ray meets of one list between enter and leave.
+void addList(Accumulator& sum, std::span<const Supersegment> list, const ViewRay& ray, double pixelLength,
+             const Stretch& stretch) {
+  const auto depthAt = [&](double t) { return ray.origin.z + t * ray.direction.z; };
+  const double nearDepth = std::min(depthAt(stretch.enter), depthAt(stretch.leave));
+  const double farDepth = std::max(depthAt(stretch.enter), depthAt(stretch.leave));
+  const bool forward = ray.direction.z >= 0.0;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const Supersegment& segment = forward ? list[i] : list[list.size() - 1 - i];
+    Stretch part = stretch;
+    clip(part, ray.origin.z - segment.front, ray.direction.z);
+    clip(part, segment.back - ray.origin.z, -ray.direction.z);
+    if (segment.back <= nearDepth || segment.front >= farDepth || part.empty()) continue;
+    const double met = (part.leave - part.enter) * ray.worldPerT;
+    const double whole = (segment.back - segment.front) * pixelLength;
+    const float opacity = opacityOf(opticalDepthOf(segment.opacity) * static_cast<float>(met / whole));
+    const float scale = opacity / segment.opacity;
+    sum.add(scale * glm::vec3(segment.red, segment.green, segment.blue), opacity,
+            static_cast<float>(part.enter));
+  }
+}
+
+/// What the ray meets of the list of a pixel.
+void addListOf(Accumulator& sum, const SupersegmentLists& lists, const View& original,
+               const glm::ivec2& pixel, const ViewRay& ray, const Stretch& stretch) {
+  const double pixelLength = glm::length(original.rayThrough(pixel.x + 0.5, pixel.y + 0.5).direction);
+  const auto index = static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(original.width()) +
+                     static_cast<std::size_t>(pixel.x);
+  addList(sum, lists.list(index), ray, pixelLength, stretch);
+}
+
+Accumulator walkLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+                      const Stretch& stretch) {
+  Accumulator sum;
+  const glm::dvec2 start = pixelAt(ray, original, stretch.enter);
+  const glm::dvec2 end = pixelAt(ray, original, stretch.leave);
+  const glm::ivec2 size{original.width(), original.height()};
+  glm::ivec2 pixel = glm::clamp(glm::ivec2(glm::floor(start)), glm::ivec2(0), size - 1);
+  const glm::ivec2 last = glm::clamp(glm::ivec2(glm::floor(end)), glm::ivec2(0), size - 1);
+  const glm::ivec2 step = glm::sign(last - pixel);  // image coordinates are monotone along a ray
+  double enter = stretch.enter;
+  for (;;) {
+    int axis = -1;
+    double leave = stretch.leave;
+    for (int a = 0; a < 2; ++a) {
+      if (pixel[a] == last[a]) continue;
+      const double t = crossing(ray, original, a, step[a] > 0 ? pixel[a] + 1 : pixel[a]);
+      if (t < leave) {
+        leave = t;
+        axis = a;
+      }
+    }
+    leave = std::max(leave, enter);
+    addListOf(sum, lists, original, pixel, ray, {enter, leave});
+    if (axis < 0) return sum;
+    pixel[axis] += step[axis];
+    enter = leave;
+  }
+}
+
+/// Several lists seen as one.
+class Blend {
+ public:
+  void add(const Accumulator& list, double weight) {
+    rgba_ += static_cast<float>(weight) * list.rgba();
+    depth_ = std::min(depth_, list.depth());
+  }
+  void addTo(Accumulator& sum) const { sum.add(glm::vec3(rgba_), rgba_.a, depth_); }
+
+ private:
+  glm::vec4 rgba_{0.0F};
+  float depth_ = Image::noDepth;
+};
+
+/// Of a point between the centres of two neighbouring lists: the first one, and the other one's share, which
+/// is exactly 0 on the first one's centre even where rounding isn't.
+struct BetweenCentres {
+  int first;
+  double shareOfNext;
+  explicit BetweenCentres(double place) : first(static_cast<int>(std::floor(place - 0.5))) {
+    constexpr double onCentre = 1.0 / 256.0;
+    const double share = place - 0.5 - first;
+    shareOfNext = std::clamp((share - onCentre) / (1.0 - 2.0 * onCentre), 0.0, 1.0);
+  }
+  double weight(int side) const { return side == 0 ? 1.0 - shareOfNext : shareOfNext; }
+};
+
+/// A ray that stays in about one place of V_O's picture: the four lists around that.
+Accumulator lookAlongLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+                           const Stretch& stretch, const glm::dvec2& place) {
+  const BetweenCentres x(place.x);
+  const BetweenCentres y(place.y);
+  const glm::ivec2 size{original.width(), original.height()};
+  Blend blend;
+  for (const glm::ivec2& side : {glm::ivec2(0, 0), glm::ivec2(1, 0), glm::ivec2(0, 1), glm::ivec2(1, 1)}) {
+    const double weight = x.weight(side.x) * y.weight(side.y);
+    if (weight == 0.0) continue;
+    Accumulator part;
+    const glm::ivec2 pixel = glm::clamp(glm::ivec2(x.first, y.first) + side, glm::ivec2(0), size - 1);
+    addListOf(part, lists, original, pixel, ray, stretch);
+    blend.add(part, weight);
+  }
+  Accumulator sum;
+  blend.addTo(sum);
+  return sum;
+}
+
+/// Reconstruction::Smooth. Column by column, or row by row, whichever the ray crosses more of: then it stays
+/// near the same two lists of each column, and those are blended. Blending across columns as well is worth
+/// nothing (measured) but where the ray crosses hardly any.
+Accumulator walkSmoothly(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+                         const Stretch& stretch) {
+  const glm::dvec2 start = pixelAt(ray, original, stretch.enter);
+  const glm::dvec2 end = pixelAt(ray, original, stretch.leave);
+  const glm::dvec2 extent = glm::abs(end - start);
+  const int along = 1.001 * extent.x >= extent.y ? 0 : 1;  // diagonals: by columns, whatever rounding does
+  const int across = 1 - along;
+  if (extent[along] < 1.0) return lookAlongLists(lists, original, ray, stretch, 0.5 * (start + end));
+  Accumulator sum;
+  const glm::ivec2 size{original.width(), original.height()};
+  int column = std::clamp(static_cast<int>(std::floor(start[along])), 0, size[along] - 1);
+  const int last = std::clamp(static_cast<int>(std::floor(end[along])), 0, size[along] - 1);
+  const int step = last > column ? 1 : -1;
+  double enter = stretch.enter;
+  double place = start[across];
+  for (;;) {
+    double leave = stretch.leave;
+    if (column != last) {
+      const double t = crossing(ray, original, along, step > 0 ? column + 1 : column);
+      leave = std::clamp(t, enter, stretch.leave);
+    }
+    const double nextPlace = pixelAt(ray, original, leave)[across];
+    const BetweenCentres between(0.5 * (place + nextPlace));
+    Blend blend;
+    for (const int side : {0, 1}) {
+      if (between.weight(side) == 0.0) continue;
+      glm::ivec2 pixel;
+      pixel[along] = column;
+      pixel[across] = std::clamp(between.first + side, 0, size[across] - 1);
+      Accumulator part;
+      addListOf(part, lists, original, pixel, ray, {enter, leave});
+      blend.add(part, between.weight(side));
+    }
+    blend.addTo(sum);
+    if (column == last) return sum;
+    column += step;
+    enter = leave;
+    place = nextPlace;
+  }
+}
+
+}  // namespace
+
+Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction) {
+  Image image = blankImage(view.width(), view.height());
+  const SupersegmentLists lists = vdi.expandedLists();
+  if (lists.segments.empty()) return image;
+  const View original = vdi.view();
+  float nearest = std::numeric_limits<float>::infinity();
+  float farthest = 0.0F;
+  for (const Supersegment& segment : lists.segments) {
+    nearest = std::min(nearest, segment.front);
+    farthest = std::max(farthest, segment.back);
+  }
+  // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
+  const double smallest = original.parallel() ? nearest : std::max(nearest, farthest * 1e-6F);
+  for (int y = 0; y < view.height(); ++y) {
+    for (int x = 0; x < view.width(); ++x) {
+      const Ray world = view.rayThrough(x + 0.5, y + 0.5);
+      const glm::dvec3 direction{glm::dot(world.direction, original.right()),
+                                 glm::dot(world.direction, original.up()),
+                                 glm::dot(world.direction, original.forward())};
+      const ViewRay ray{original.toView(world.origin), direction, glm::length(world.direction)};
+      const Stretch stretch = insideFrustum(ray, original, smallest, farthest);
+      if (stretch.empty()) continue;
+      const Accumulator sum = reconstruction == Reconstruction::Smooth
+                                  ? walkSmoothly(lists, original, ray, stretch)
+                                  : walkLists(lists, original, ray, stretch);
+      const auto pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
+      image.rgba[pixel] = sum.rgba();
+      image.depth[pixel] = sum.depth();
+    }
+  }
+  return image;
+}
+
+}  // namespace vdi::reference
