@@ -213,7 +213,12 @@ class Bench {
       truths.push_back(volumeRendering(camera.azimuth(angle), angle, function));
     for (const std::string& algorithm : options_.algorithms) {
       for (const std::uint32_t supersegments : options_.supersegments) {
+        settings_ = makeSettings(options_.quality);
         settings_.algorithm = algorithmFromString(algorithm);
+        if (settings_.algorithm == Algorithm::Bisection) {  // which knows no other
+          settings_.budget = Budget::List;
+          settings_.fill = 1.0;
+        }
         settings_.supersegments = supersegments;
         const Made made = make(camera, function);
         world_.together([&] {
@@ -309,6 +314,8 @@ class Bench {
                      {"precision", toString(made.vdi->precision())},
                      {"reconstruction", toString(reconstruction_)},
                      {"supersegments", settings_.supersegments},
+                     {"budget", toString(settings_.budget)},
+                     {"fill", settings_.fill},
                      {"width", settings_.width},
                      {"height", settings_.height},
                      {"view_deg", turned},

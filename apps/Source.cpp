@@ -247,6 +247,19 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
         ->group(qualityGroup);
   }
   command
+      .add_option("--budget", options.budget,
+                  "who gets supersegments: list, up to N_S each; total, as many in all, but up to twice N_S "
+                  "where a list needs them and fewer elsewhere")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command
+      .add_option("--fill", options.fill,
+                  "with --budget total: share of these supersegments that is made, (0, 1]; half of them look "
+                  "nearly the same")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command
       .add_option(
           "--precision", options.precision,
           "what a supersegment takes: compact, 8 bytes, seen from the VDI's viewpoint within 1/255; full, "
@@ -295,6 +308,8 @@ GenerateSettings makeSettings(const QualityOptions& options) {
   settings.width = sizes[0];
   settings.height = sizes[1];
   settings.supersegments = options.supersegments;
+  settings.budget = budgetFromString(options.budget);
+  settings.fill = options.fill;
   settings.samplesPerVoxel = options.samplesPerVoxel;
   settings.algorithm = algorithmFromString(options.algorithm);
   settings.precision = precisionFromString(options.precision);

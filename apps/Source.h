@@ -59,6 +59,8 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene);
 struct QualityOptions {
   std::string resolution = "640x360";
   std::uint32_t supersegments = 25;
+  std::string budget = "list";
+  double fill = 1.0;
   double samplesPerVoxel = 1.0;
   std::string algorithm = "merge";
   std::string precision = "compact";

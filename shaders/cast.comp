@@ -14,7 +14,8 @@ layout(set = 0, binding = 0) uniform sampler3D pages[castMaxPages];
 layout(push_constant, scalar) uniform Push { CastConstants push; };
 
 const bool volumeOnly = castProgram == castProgramVolume;
-const bool countsGrains = castProgram == castProgramCountGrains;
+const bool surveysGrains = castProgram == castProgramSurvey;
+const bool countsGrains = castProgram == castProgramCountGrains || surveysGrains;
 const bool writesGrains = castProgram == castProgramWriteGrains;
 
 #include "lists.glsl"
@@ -55,11 +56,17 @@ void main() {
     endRow = min(push.lastRow + stride - 1u, push.params.value.height);
     listIndex = gl_GlobalInvocationID.y * push.params.value.countedWidth + gl_GlobalInvocationID.x;
   }
-  if (x >= push.params.value.width || y >= endRow) return;
+  bool hasRay = x < push.params.value.width && y < endRow;
+  if (!hasRay && !surveysGrains) return;
   samplesAtOnce = countsGrains ? push.params.value.countedSamples : 1u;
   grainsAtOnce = samplesAtOnce;
   setUpRay(x, y);
   setUpScene();
+
+  if (surveysGrains) {
+    surveyGrains(hasRay);
+    return;
+  }
 
   if (volumeOnly) {
     accumulated = vec4(0.0);

@@ -7,7 +7,8 @@ layout(local_size_x = compositeGroup) in;
 layout(push_constant, scalar) uniform Push { CompositeConstants push; };
 
 layout(constant_id = 0) const uint compositeProgram = compositeProgramSearch;
-const bool countsGrains = compositeProgram == compositeProgramCountGrains;
+const bool surveysGrains = compositeProgram == compositeProgramSurvey;
+const bool countsGrains = compositeProgram == compositeProgramCountGrains || surveysGrains;
 const bool writesGrains = compositeProgram == compositeProgramWriteGrains;
 
 #include "lists.glsl"
@@ -30,7 +31,12 @@ void walk() {
 
 void main() {
   listIndex = gl_GlobalInvocationID.x;
-  if (listIndex >= push.params.value.listCount) return;
+  bool hasList = listIndex < push.params.value.listCount;
+  if (surveysGrains) {
+    surveyGrains(hasList);
+    return;
+  }
+  if (!hasList) return;
   if (countsGrains) {
     countGrains();
   } else if (writesGrains) {

@@ -2,7 +2,8 @@
 // vdi/reference/SegmentByMerging.cpp; reduce.comp merges grains into supersegments. Counting does all tolerances side by
 // side in one walk; writing does one.
 //
-// Needs: optical.glsl, appearance.glsl; push.params.value with sensitivities, counts, offsets, spans, lights, written, left, status;
+// Needs: optical.glsl, appearance.glsl; push.params.value with sensitivities, counts, offsets, spans, lights, written, left, status,
+// survey;
 // bool writesGrains, a constant; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 
@@ -128,9 +129,25 @@ void walkForGrains() {
   walk();
 }
 
+// What the list would hold at a level of the survey, if anything. Twin of supersegmentsAtLevel.
+uint supersegmentsAtLevel(uint level) {
+  uint count = level == 0u ? grainsVisible : 1u;
+  [[unroll]] for (int i = 0; i < toleranceLevels; ++i) count = level == uint(i) + 1u ? grainCount[i] : count;
+  return min(count, push.params.value.mostPerList);
+}
+
+uint budgetOfList() {
+  float level = push.params.value.level;
+  if (level < 0.0) return push.params.value.budget;
+  uint below = min(uint(level), surveyLevels - 2u);
+  float a = float(supersegmentsAtLevel(below));
+  float b = float(supersegmentsAtLevel(below + 1u));
+  return max(uint(a + (level - float(below)) * (b - a) + 0.5), 1u);
+}
+
 void countGrains() {
   walkForGrains();
-  uint budget = push.params.value.budget;
+  uint budget = budgetOfList();
   uint runs = grainsCutAtGaps ? grainsRuns : min(grainsRuns, 1u);
   uint count = grainsVisible;
   float tolerance = -1.0;
@@ -149,6 +166,7 @@ void countGrains() {
   }
   push.params.value.sensitivities.at[listIndex] = tolerance;
   push.params.value.counts.at[listIndex] = count;
+  push.params.value.left.at[listIndex] = max(budget, runs);
 }
 
 void writeGrains() {
@@ -164,7 +182,28 @@ void writeGrains() {
   closeGrains(1u);
   uint written = min(grainCount[0], grainRoom);
   if (written != grainCount[0]) atomicAdd(push.params.value.status.at[0], 1u);
-  uint most = max(push.params.value.budget, grainsCutAtGaps ? grainsRuns : 1u);
   push.params.value.written.at[listIndex] = written;
-  push.params.value.left.at[listIndex] = min(written, most);
+  push.params.value.left.at[listIndex] = min(written, push.params.value.left.at[listIndex]);
+}
+
+// What a workgroup's lists add to the survey.
+shared uint surveyed[surveyLevels + 1u];
+
+// For all invocations of a workgroup, those without a list included.
+void surveyGrains(bool hasList) {
+  uint own = gl_LocalInvocationIndex;
+  if (own <= surveyLevels) surveyed[own] = 0u;
+  barrier();
+  if (hasList) {
+    walkForGrains();
+    if (grainsVisible > 0u) {
+      for (uint level = 0u; level < surveyLevels; ++level) atomicAdd(surveyed[level], supersegmentsAtLevel(level));
+      atomicAdd(surveyed[surveyLevels], min(grainsVisible, push.params.value.budget));
+    }
+  }
+  barrier();
+  if (own <= surveyLevels && surveyed[own] > 0u) {
+    uint before = atomicAdd(push.params.value.survey.at[2u * own], surveyed[own]);
+    if (before + surveyed[own] < before) atomicAdd(push.params.value.survey.at[2u * own + 1u], 1u);
+  }
 }

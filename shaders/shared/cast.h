@@ -21,6 +21,7 @@ inline constexpr uint castProgramVolume = 0;
 inline constexpr uint castProgramSearch = 1;
 inline constexpr uint castProgramCountGrains = 2;
 inline constexpr uint castProgramWriteGrains = 3;
+inline constexpr uint castProgramSurvey = 4;
 inline constexpr uint castModeSearch = 0;
 inline constexpr uint castModeWrite = 1;
 #else
@@ -31,6 +32,7 @@ const uint castProgramVolume = 0;       // DVR: colours and depths
 const uint castProgramSearch = 1;       // by bisection: one program that does both of the modes
 const uint castProgramCountGrains = 2;  // by merging: tolerances and counts
 const uint castProgramWriteGrains = 3;
+const uint castProgramSurvey = 4;  // by merging, for the total budget: what lists need
 const uint castModeSearch = 0;  // sensitivities and counts
 const uint castModeWrite = 1;   // supersegments
 #endif
@@ -47,10 +49,11 @@ struct CastParams {
   VDI_ADDRESS(Vec2Array) spans;           // of the grains, compact; by merging
   VDI_ADDRESS(Vec4Array) lights;          // likewise
   VDI_ADDRESS(UintArray) written;         // [h][w]: grains
-  VDI_ADDRESS(UintArray) left;            // [h][w]: how many are to be left of them
+  VDI_ADDRESS(UintArray) left;            // [h][w]: how many are to be left of them; until that's known, at most
   VDI_ADDRESS(Vec4Array) colors;          // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;         // [h][w]
   VDI_ADDRESS(UintArray) status;          // [1]: lists whose written count differs from the stored one
+  VDI_ADDRESS(UintArray) survey;          // [surveyLevels + 1][2]
   // Ray of pixel (x, y): start = startBase + u * startRight + v * startUp, direction likewise, with u = x + 0.5 - w/2 and
   // v = y + 0.5 - h/2. Start: at the front of the sample lattice, relative to the scene's centre.
   vec3 startBase;
@@ -80,6 +83,8 @@ struct CastParams {
   uint countedStride;
   uint countedWidth;
   uint countedSamples;  // one sample stands for that many, those of a multiple of it
+  uint mostPerList;
+  float level;  // of the survey; negative: equal budgets
 };
 
 #ifndef __cplusplus

@@ -12,6 +12,7 @@ inline constexpr uint mergeModeMerge = 1;
 inline constexpr uint compositeProgramSearch = 0;
 inline constexpr uint compositeProgramCountGrains = 1;
 inline constexpr uint compositeProgramWriteGrains = 2;
+inline constexpr uint compositeProgramSurvey = 3;
 inline constexpr uint compositeModeSearch = 0;
 inline constexpr uint compositeModeWrite = 1;
 #else
@@ -21,6 +22,7 @@ const uint mergeModeMerge = 1;  // writes merged
 const uint compositeProgramSearch = 0;  // as castProgramSearch and so on
 const uint compositeProgramCountGrains = 1;
 const uint compositeProgramWriteGrains = 2;
+const uint compositeProgramSurvey = 3;
 const uint compositeModeSearch = 0;
 const uint compositeModeWrite = 1;
 #endif
@@ -55,13 +57,16 @@ struct CompositeParams {
   VDI_ADDRESS(UintArray) written;
   VDI_ADDRESS(UintArray) left;
   VDI_ADDRESS(UintArray) status;
+  VDI_ADDRESS(UintArray) survey;
   float step;  // of the sample lattice
   uint budget;
   uint cutAtGaps;  // 0: a gap is a transparent sample
   uint runsOnly;   // 0
   uint listCount;
-  uint pad;
+  uint mostPerList;
+  float level;  // as in CastParams
   StoredForm form;  // of merged and segments
+  uint pad;
 };
 
 #ifndef __cplusplus

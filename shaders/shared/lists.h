@@ -22,6 +22,14 @@ const uint uncountedSpareGrains = 8;
 const uint countedStride = 4;
 #endif
 
+// A survey: what all lists would hold at each level, then what they would equally; a pair of words each, the low one first.
+// Survey of core/Budget.h.
+#ifdef __cplusplus
+inline constexpr uint surveyLevels = 10;
+#else
+const uint surveyLevels = 10;
+#endif
+
 // Supersegment of core/Vdi.h.
 struct Segment {
   float front;

@@ -54,6 +54,14 @@ works "render" "$vdi" render full.vdi -o constant.png --azimuth 20 --reconstruct
 works "compare" "$vdi" compare --json turned.png constant.png
 python3 -c "import json; r = json.load(open('out.txt')); assert 0.9 < r['ssim'] < 1, r" || fail "constant isn't like smooth"
 refused 2 "reconstruction" "$vdi" render full.vdi -o x.png --reconstruction cubic
+works "total budget" "$vdi" generate --field mixing "${small[@]}" --budget total --fill 0.5 -o need.vdi --flat need.png --dvr need_dvr.png
+works "equal budget" "$vdi" generate --field mixing "${small[@]}" -o equal.vdi
+[ $((10 * $(stat -c %s need.vdi))) -lt $((8 * $(stat -c %s equal.vdi))) ] || fail "half of the supersegments are no smaller"
+works "compare" "$vdi" compare --json need.png need_dvr.png
+python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "a total budget isn't true at V_O"
+refused 2 "merge" "$vdi" generate --field sphere "${small[@]}" --budget total --algorithm bisection -o x.vdi
+refused 2 "fill" "$vdi" generate --field sphere "${small[@]}" --fill 0.5 -o x.vdi
+refused 2 "budget" "$vdi" generate --field sphere "${small[@]}" --budget each -o x.vdi
 refused 2 "precision" "$vdi" generate --field sphere "${small[@]}" --precision double -o x.vdi
 refused 2 "termination" "$vdi" generate --field sphere "${small[@]}" --termination-opacity 0 -o x.vdi
 works "bench" "$vdi" bench --fields sphere "${small[@]}" --repeats 1 --angles 0 20 -o bench.json

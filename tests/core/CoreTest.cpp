@@ -1,4 +1,5 @@
 // Camera, sample lattice, transfer tables, blocks and the checks of a VDI.
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
@@ -157,4 +158,44 @@ TEST_CASE("a VDI that isn't sound is refused") {
   broken([](Vdi& v) {
     std::get<SupersegmentLists>(v.lists).segments[0].red = std::numeric_limits<float>::quiet_NaN();
   });
+}
+
+TEST_CASE("the level of a survey: where lists hold the wanted total") {
+  Survey survey;
+  survey.supersegments = {1000, 800, 600, 300, 200, 100, 50, 20, 10, 10};
+  survey.equally = 600;
+  CHECK(survey.levelFor(1.0) == 2.0F);
+  CHECK(survey.levelFor(0.75) == Approx(2.5F));  // 450
+  CHECK(survey.levelFor(0.001) == 9.0F);         // less than one each can't be
+  survey.equally = 2000;
+  CHECK(survey.levelFor(1.0) == 0.0F);  // all samples are fewer than wanted
+  survey.equally = 900;
+  CHECK(survey.levelFor(1.0) == Approx(0.5F));
+  Survey twice = survey;
+  twice += survey;
+  CHECK(twice.levelFor(0.3) == survey.levelFor(0.3));
+  CHECK(Survey().levelFor(1.0) == 0.0F);
+  const auto countAt = [](std::size_t level) { return std::array{40, 30, 20, 15, 12, 9, 6, 3, 2, 1}[level]; };
+  CHECK(supersegmentsAt(0.0F, countAt) == 40);
+  CHECK(supersegmentsAt(1.5F, countAt) == 25);
+  CHECK(supersegmentsAt(9.0F, countAt) == 1);
+  CHECK(supersegmentsAt(8.9F, countAt) == 1);
+}
+
+TEST_CASE("budgets and fills that can't be are refused") {
+  GenerateSettings settings;
+  settings.budget = Budget::Total;
+  settings.fill = 0.5;
+  CHECK_NOTHROW(validate(settings));
+  settings.algorithm = Algorithm::Bisection;
+  CHECK_THROWS_AS(validate(settings), Error);
+  settings.algorithm = Algorithm::Merge;
+  settings.fill = 0.0;
+  CHECK_THROWS_AS(validate(settings), Error);
+  settings.fill = 0.5;
+  settings.budget = Budget::List;
+  CHECK_THROWS_AS(validate(settings), Error);
+  CHECK(mostPerList(25, Budget::List) == 25);
+  CHECK(mostPerList(25, Budget::Total) == 50);
+  CHECK(mostPerList(1000, Budget::Total) == mostSupersegments);
 }

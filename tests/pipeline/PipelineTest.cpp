@@ -207,9 +207,9 @@ TEST_CASE("merging and compositing on the device equal the reference") {
     for (std::size_t i = rank; i < dealt.all.size(); i += 3) mine.push_back(dealt.all[i]);
     subLists.push_back(reference::generate(frame, mine, true));
   }
-  const SupersegmentLists expected = reference::composite(subLists, 6, frame.lattice.step, algorithm);
+  const SupersegmentLists expected = reference::composite(subLists, settings, frame.lattice.step);
   detail::Compositor compositor(device());
-  const SupersegmentLists result = compositor.composite(subLists, {6, frame.lattice.step, algorithm, {}});
+  const SupersegmentLists result = compositor.composite(subLists, {6, 6, frame.lattice.step, algorithm, {}});
   CHECK(listsThatDiffer(result, expected) <= expected.listCount() / 50);
   std::vector<glm::vec4> rgba(result.listCount());
   std::vector<float> depth(result.listCount());
@@ -229,11 +229,59 @@ TEST_CASE("merging and compositing on the device equal the reference") {
     subCodes.push_back(reference::compacted(sub, code));
     subValues.push_back(expanded(subCodes.back(), code));
   }
-  const SupersegmentLists ofCodes = reference::composite(subValues, 6, frame.lattice.step, algorithm);
-  const CompactLists codes = compositor.composite(subCodes, {6, frame.lattice.step, algorithm, code});
+  const SupersegmentLists ofCodes = reference::composite(subValues, settings, frame.lattice.step);
+  const CompactLists codes = compositor.composite(subCodes, {6, 6, frame.lattice.step, algorithm, code});
   CHECK(listsThatDiffer(expanded(codes, code), expanded(reference::compacted(ofCodes, code), code),
                         oneCode) <= expected.listCount() / 25);
   CHECK(device()->validationMessages() == "");
+}
+
+TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists") {
+  const double fill = GENERATE(1.0, 0.5);
+  INFO("fill " << fill);
+  const auto dealt = test::deal("turbulence", {40, 40, 40}, {2, 2, 2}, Layout::Random, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  const TransferFunction function = test::threeHues(0.8);
+  GenerateSettings settings = test::smallSettings(61, 43, 12);
+  settings.precision = Precision::Full;
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  const auto equal = generator.generate(test::oblique(), function, settings);
+  settings.budget = Budget::Total;
+  settings.fill = fill;
+  const auto vdi = generator.generate(test::oblique(), function, settings);
+  CHECK_NOTHROW(validate(*vdi));
+  const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
+  const SupersegmentLists expected = reference::generate(frame, dealt.mine, false);
+  CHECK(listsThatDiffer(vdi->expandedLists(), expected) <= expected.listCount() / 50);
+  CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, dealt.mine)) < 1.0F);
+  const double share =
+      static_cast<double>(vdi->supersegmentCount()) / static_cast<double>(equal->supersegmentCount());
+  CHECK(share == Approx(fill).epsilon(0.05));
+  std::size_t longest = 0;
+  for (std::size_t i = 0; i < expected.listCount(); ++i) longest = std::max(longest, expected.list(i).size());
+  CHECK(static_cast<double>(longest) > 12 * fill);
+  CHECK(longest <= 24);
+
+  // Composited from three ranks' lists.
+  settings.budget = Budget::List;
+  settings.fill = 1.0;
+  const reference::Frame equalFrame(generator.scene(), test::oblique(), function, settings);
+  std::vector<SupersegmentLists> subLists;
+  for (std::size_t rank = 0; rank < 3; ++rank) {
+    std::vector<Block> mine;
+    for (std::size_t i = rank; i < dealt.all.size(); i += 3) mine.push_back(dealt.all[i]);
+    subLists.push_back(reference::generate(equalFrame, mine, true));
+  }
+  settings.budget = Budget::Total;
+  settings.fill = fill;
+  const SupersegmentLists composited = reference::composite(subLists, settings, frame.lattice.step);
+  detail::Compositor compositor(device());
+  detail::Compositor::Request request{
+      12, mostPerList(12, Budget::Total), frame.lattice.step, Algorithm::Merge, {}};
+  request.level = compositor.survey(subLists, request).levelFor(fill);
+  CHECK(listsThatDiffer(compositor.composite(subLists, request), composited) <= composited.listCount() / 50);
+  CHECK(listsThatDiffer(compositor.composite(subLists, request), composited) <= composited.listCount() / 50);
 }
 
 TEST_CASE("a VDI equals DVR at V_O and stays close around it") {

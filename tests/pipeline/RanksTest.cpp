@@ -99,6 +99,28 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
   }
 }
 
+TEST_CASE(
+    "a total budget over all ranks: the picture of one, as many supersegments as equally, unequal lists") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto dealt = test::deal("turbulence", {34, 30, 37}, {3, 3, 3}, Layout::Random, Joint::SharedPoints,
+                                ScalarType::F32, world.rank(), world.size());
+  VdiGenerator generator(device(), comm::Communicator::world());
+  generator.setBlocks(dealt.mine);
+  GenerateSettings settings = test::smallSettings(61, 45, 12);
+  const auto truth = generator.renderVolume(test::oblique(), test::threeHues(0.8), settings);
+  const auto equal = generator.generate(test::oblique(), test::threeHues(0.8), settings);
+  for (const double fill : {1.0, 0.6}) {
+    settings.budget = Budget::Total;
+    settings.fill = fill;
+    const auto vdi = generator.generate(test::oblique(), test::threeHues(0.8), settings);
+    if (world.rank() != 0) continue;
+    CHECK_NOTHROW(validate(*vdi));
+    CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
+    const auto count = static_cast<double>(vdi->supersegmentCount());
+    CHECK(count / static_cast<double>(equal->supersegmentCount()) == Approx(fill).epsilon(0.05));
+  }
+}
+
 TEST_CASE("tiny pictures: more ranks than rows and pixels") {
   const comm::Communicator world = comm::Communicator::world();
   const auto dealt = test::deal("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved, Joint::SharedPoints,

@@ -66,6 +66,20 @@ for precision in ("Full", "Compact"):
     searched = picture(vdi_of(wavelet, Algorithm="Bisection", Supersegments=2, Precision=precision))
     worst = np.abs(searched - volume).max()
     check(worst <= 1, "so it is by bisection, in %s precision, off by %d" % (precision.lower(), worst))
+by_need = vdi_of(wavelet, Supersegments=6, Budget="Total", Fill=0.5)
+check(np.abs(picture(by_need) - volume).max() <= 1, "so it is with a total budget")
+equal_share = vdi_of(wavelet, Supersegments=6)
+
+
+def supersegments(vdi):
+    vdi.UpdatePipeline()
+    data = vdi.GetClientSideObject().GetOutput().GetPointData()
+    return vtk_to_numpy(data.GetArray("SupersegmentCount")).astype(int)
+
+
+share = supersegments(by_need).sum() / supersegments(equal_share).sum()
+check(0.4 < share < 0.6, "which makes half of the supersegments, %.2f" % share)
+check(len(np.unique(supersegments(by_need))) > 3, "lists hold as many as they need")
 full = vdi_of(wavelet, Precision="Full")
 check(np.array_equal(picture(full), volume), "full precision gives the same picture to the bit")
 check(picture(with_camera(simple.RenderVDI(Input=full))).max() > 60, "a VDI of full precision is rendered")
@@ -73,8 +87,8 @@ rendered = {
     name: picture(simple.RenderVDI(Input=full, UseOriginalCamera=1, Azimuth=10, Reconstruction=name))
     for name in ("Smooth", "Constant")
 }
-apart = np.abs(rendered["Smooth"].astype(int) - rendered["Constant"]).max()
-check(0 < apart < 80, "reconstructions are alike but not equal, off by %d" % apart)
+apart = np.abs(rendered["Smooth"].astype(int) - rendered["Constant"]).mean()
+check(0 < apart < 4, "reconstructions are alike but not equal, off by %.2f on average" % apart)
 
 # A series is time steps.
 second = os.path.join(OUTPUT, "series_1.vdi")
@@ -87,8 +101,9 @@ check(len(series.TimestepValues) == 2, "a series of files is a series of time st
 # Composite and cell data.
 cells = simple.PointDatatoCellData(Input=wavelet)
 check(picture(vdi_of(cells, ("CELLS", "RTData"))).max() > 60, "cell data")
-group = simple.GroupDatasets(Input=[wavelet])
-check(np.array_equal(picture(vdi_of(group)), flat), "a multiblock of one image gives the image's picture")
+group = vdi_of(simple.GroupDatasets(Input=[wavelet]))
+check(not errors_of(group.UpdatePipeline), "a multiblock makes no errors")
+check(np.array_equal(picture(group), flat), "a multiblock of one image gives the image's picture")
 amr = simple.HierarchicalFractal(Dimensions=8, TwoDimensional=0, Asymetric=0)
 fractal = vdi_of(amr, ("CELLS", "Fractal Volume Fraction"), CameraPosition=[8, 6, 9], CameraFocalPoint=[0, 0, 0])
 check(picture(fractal).max() > 60, "an AMR data set of " + amr.GetClientSideObject().GetOutputDataObject(0).GetClassName())

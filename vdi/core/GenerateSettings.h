@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "vdi/core/Budget.h"
 #include "vdi/core/Supersegment.h"
 
 namespace vdi {
@@ -21,8 +22,11 @@ Algorithm algorithmFromString(const std::string& name);
 struct GenerateSettings {
   int width = 1280;
   int height = 720;
-  std::uint32_t supersegments = 25;  // N_S, 1 .. 1024
-  double samplesPerVoxel = 1.0;      // [1/64, 64]
+  std::uint32_t supersegments = 25;  // N_S, 1 .. mostSupersegments
+  /// Total: N_S is what lists have on average, where they have that many samples; needs Algorithm::Merge.
+  Budget budget = Budget::List;
+  double fill = 1.0;             // (0, 1]; with Budget::Total, share of what N_S each would give that's made
+  double samplesPerVoxel = 1.0;  // [1/64, 64]
   Algorithm algorithm = Algorithm::Merge;
   /// Rays of more samples than depthCodeFor can number give a VDI of full precision all the same.
   Precision precision = Precision::Compact;

@@ -74,6 +74,7 @@ void CastPass::record(Commands& commands, VkDeviceAddress params, Work work, Alg
   assert(volume_ != nullptr && band.firstRow < band.lastRow);
   const bool writes = work == Work::Write;
   const std::uint32_t program = work == Work::Volume                ? shared::castProgramVolume
+                                : work == Work::Survey              ? shared::castProgramSurvey
                                 : algorithm == Algorithm::Bisection ? shared::castProgramSearch
                                 : writes                            ? shared::castProgramWriteGrains
                                                                     : shared::castProgramCountGrains;
@@ -81,7 +82,7 @@ void CastPass::record(Commands& commands, VkDeviceAddress params, Work work, Alg
   const std::uint32_t compact = program == shared::castProgramSearch ? isCompact(band.form) : 0;
   const shared::CastConstants constants{params, writes ? shared::castModeWrite : shared::castModeSearch,
                                         band.firstRow, band.lastRow, 0};
-  const bool counts = program == shared::castProgramCountGrains;
+  const bool counts = program == shared::castProgramCountGrains || program == shared::castProgramSurvey;
   const std::uint32_t stride = counts ? band.countedStride : 1;
   // The row behind the band is counted too.
   const std::uint32_t rows = (band.lastRow - band.firstRow + stride - 1) / stride + (stride > 1 ? 1 : 0);

@@ -17,10 +17,12 @@ CompositePass::CompositePass(std::shared_ptr<Device> device)
     : pipelines_(std::move(device), pipelineInfo()) {}
 
 void CompositePass::record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form,
-                           Algorithm algorithm, bool write, std::uint32_t listCount) {
-  const std::uint32_t program = algorithm == Algorithm::Bisection ? shared::compositeProgramSearch
-                                : write                           ? shared::compositeProgramWriteGrains
-                                                                  : shared::compositeProgramCountGrains;
+                           Work work, Algorithm algorithm, std::uint32_t listCount) {
+  const bool write = work == Work::Write;
+  const std::uint32_t program = work == Work::Survey                ? shared::compositeProgramSurvey
+                                : algorithm == Algorithm::Bisection ? shared::compositeProgramSearch
+                                : write                             ? shared::compositeProgramWriteGrains
+                                                                    : shared::compositeProgramCountGrains;
   const std::uint32_t mode = write ? shared::compositeModeWrite : shared::compositeModeSearch;
   commands.dispatch(pipelines_.with({program, 0, isCompact(form)}),
                     shared::CompositeConstants{params, mode, 0},

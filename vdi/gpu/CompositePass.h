@@ -14,10 +14,12 @@ namespace vdi::gpu {
 class CompositePass {
  public:
   explicit CompositePass(std::shared_ptr<Device> device);
-  /// `params` is the address of a CompositeParams of that form. The first step of the algorithm, then
-  /// (`write`, after a scan) the second one.
-  void record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form, Algorithm algorithm,
-              bool write, std::uint32_t listCount);
+  /// What a dispatch does: what lists need (merging); or the first step of the algorithm, or, after a scan,
+  /// its second one.
+  enum class Work { Survey, Search, Write };
+  /// `params` is the address of a CompositeParams of that form.
+  void record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form, Work work,
+              Algorithm algorithm, std::uint32_t listCount);
 
  private:
   PipelineSet pipelines_;  // by shared::compositeProgram... and precision

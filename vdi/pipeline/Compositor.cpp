@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace vdi::detail {
 
@@ -15,41 +16,73 @@ Compositor::Compositor(std::shared_ptr<gpu::Device> device)
       mergePass_(device_),
       compositePass_(device_),
       builder_(device_),
-      params_(device_, sizeof(shared::CompositeParams), MemoryKind::Upload) {}
+      params_(device_, sizeof(shared::CompositeParams), MemoryKind::Upload),
+      survey_(device_) {}
+
+/// Bands of lists whose supersegments, received, merged and composited, take at most an eighth of the device
+/// each.
+template <typename Segment>
+std::vector<Compositor::Band> Compositor::begin(const std::vector<ListsOf<Segment>>& subLists,
+                                                const Request& request) {
+  request_ = request;
+  settings_.step = static_cast<float>(request.sampleStep);
+  settings_.budget = request.budget;
+  settings_.mostPerList = request.mostPerList;
+  settings_.level = request.level;
+  settings_.form = storedForm(request.code);
+  const std::size_t listCount = subLists.front().listCount();
+  const std::uint64_t most = std::max<std::uint64_t>(device_->limits().memoryBytes / 8 / sizeof(Segment), 1);
+  std::vector<Band> bands;
+  for (Band band; band.first < listCount; band.first = band.last) {
+    for (std::uint64_t total = 0; band.last < listCount; ++band.last) {
+      std::uint64_t next = 0;
+      for (const ListsOf<Segment>& sub : subLists) next += sub.countOf(band.last);
+      if (band.last > band.first && total + next > most) break;
+      total += next;
+    }
+    bands.push_back(band);
+  }
+  return bands;
+}
+
+template <typename Segment>
+Survey Compositor::survey(const std::vector<ListsOf<Segment>>& subLists, const Request& request) {
+  surveyed_.reset();
+  const std::vector<Band> bands = begin(subLists, request);
+  Survey sum;
+  for (const Band& band : bands) {
+    merge(subLists, band);
+    sum += survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
+      settings_.survey = address;
+      std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
+      compositePass_.record(commands, params_.address(), settings_.form, gpu::CompositePass::Work::Survey,
+                            request_.algorithm, band.listCount());
+    });
+  }
+  if (bands.size() == 1) surveyed_ = bands.front();
+  return sum;
+}
 
 template <typename Segment>
 ListsOf<Segment> Compositor::composite(const std::vector<ListsOf<Segment>>& subLists,
                                        const Request& request) {
-  request_ = request;
-  settings_.step = static_cast<float>(request.sampleStep);
-  settings_.budget = request.budget;
-  settings_.form = storedForm(request.code);
-  const std::size_t listCount = subLists.front().listCount();
+  const std::vector<Band> bands = begin(subLists, request);
   ListsOf<Segment> result;
-  result.offsets.reserve(listCount + 1);
-  // Bands of lists whose supersegments, received, merged and composited, take at most an eighth of the device
-  // each.
-  const std::uint64_t most = std::max<std::uint64_t>(device_->limits().memoryBytes / 8 / sizeof(Segment), 1);
-  for (std::size_t first = 0; first < listCount;) {
-    std::size_t last = first;
-    for (std::uint64_t total = 0; last < listCount; ++last) {
-      std::uint64_t next = 0;
-      for (const ListsOf<Segment>& sub : subLists) next += sub.countOf(last);
-      if (last > first && total + next > most) break;
-      total += next;
-    }
-    compositeBand(subLists, first, last, result);
-    first = last;
+  result.offsets.reserve(subLists.front().listCount() + 1);
+  const std::optional<Band> merged = std::exchange(surveyed_, std::nullopt);
+  for (const Band& band : bands) {
+    if (merged != band) merge(subLists, band);
+    compositeBand(band, result);
   }
   return result;
 }
 
-/// Lists [first, last) of all ranks: supersegments to received_, offsets from 0 to subOffsets_.
+/// Of all ranks: supersegments to received_, offsets from 0 to subOffsets_.
 template <typename Segment>
-void Compositor::upload(const std::vector<ListsOf<Segment>>& subLists, std::size_t first, std::size_t last) {
-  const std::size_t listCount = last - first;
+void Compositor::upload(const std::vector<ListsOf<Segment>>& subLists, const Band& band) {
+  const std::size_t listCount = band.listCount();
   std::uint64_t total = 0;
-  for (const ListsOf<Segment>& sub : subLists) total += sub.offsets[last] - sub.offsets[first];
+  for (const ListsOf<Segment>& sub : subLists) total += sub.offsets[band.last] - sub.offsets[band.first];
   staging_.reserve(device_, total * sizeof(Segment), MemoryKind::Upload);
   received_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
   rankAddresses_.reserve(device_, subLists.size() * sizeof(std::uint64_t), MemoryKind::Upload);
@@ -57,23 +90,23 @@ void Compositor::upload(const std::vector<ListsOf<Segment>>& subLists, std::size
   std::uint64_t at = 0;
   for (std::size_t rank = 0; rank < subLists.size(); ++rank) {
     const ListsOf<Segment>& sub = subLists[rank];
-    const std::uint32_t begin = sub.offsets[first];
-    const std::uint64_t bytes = (sub.offsets[last] - begin) * sizeof(Segment);
+    const std::uint32_t begin = sub.offsets[band.first];
+    const std::uint64_t bytes = (sub.offsets[band.last] - begin) * sizeof(Segment);
     if (bytes > 0) std::memcpy(staging_.mapped().data() + at, sub.segments.data() + begin, bytes);
     rankAddresses_.mappedAs<std::uint64_t>()[rank] = received_.address() + at;
     const auto offsets = subOffsets_.mappedAs<std::uint32_t>().subspan(rank * (listCount + 1), listCount + 1);
-    for (std::size_t i = 0; i <= listCount; ++i) offsets[i] = sub.offsets[first + i] - begin;
+    for (std::size_t i = 0; i <= listCount; ++i) offsets[i] = sub.offsets[band.first + i] - begin;
     at += bytes;
   }
 }
 
+/// All ranks' supersegments of each list, by depth, to merged_ and mergedOffsets_.
 template <typename Segment>
-void Compositor::compositeBand(const std::vector<ListsOf<Segment>>& subLists, std::size_t first,
-                               std::size_t last, ListsOf<Segment>& result) {
-  const auto listCount = static_cast<std::uint32_t>(last - first);
-  upload(subLists, first, last);
+void Compositor::merge(const std::vector<ListsOf<Segment>>& subLists, const Band& band) {
+  const std::uint32_t listCount = band.listCount();
+  upload(subLists, band);
   std::uint64_t total = 0;
-  for (const ListsOf<Segment>& sub : subLists) total += sub.offsets[last] - sub.offsets[first];
+  for (const ListsOf<Segment>& sub : subLists) total += sub.offsets[band.last] - sub.offsets[band.first];
   const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
   heads_.reserve(device_, subLists.size() * words, MemoryKind::DeviceLocal);
   mergedCounts_.reserve(device_, words, MemoryKind::DeviceLocal);
@@ -99,10 +132,13 @@ void Compositor::compositeBand(const std::vector<ListsOf<Segment>>& subLists, st
   merge.mode = shared::mergeModeMerge;
   mergePass_.record(commands_, merge);
   commands_.submitAndWait();
-
   settings_.merged = merged_.address();
   settings_.mergedOffsets = mergedOffsets_.address();
   settings_.listCount = listCount;
+}
+
+template <typename Segment>
+void Compositor::compositeBand(const Band& band, ListsOf<Segment>& result) {
   const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
     settings_.sensitivities = targets.sensitivities;
     settings_.counts = targets.counts;
@@ -114,17 +150,22 @@ void Compositor::compositeBand(const std::vector<ListsOf<Segment>>& subLists, st
     settings_.left = targets.left;
     settings_.status = targets.status;
     std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
-    compositePass_.record(commands, params_.address(), settings_.form, request_.algorithm, write, listCount);
+    using Work = gpu::CompositePass::Work;
+    compositePass_.record(commands, params_.address(), settings_.form, write ? Work::Write : Work::Search,
+                          request_.algorithm, band.listCount());
   };
   ListBuilder::Request build;
-  build.width = listCount;
+  build.width = band.listCount();
   build.rows = 1;
   build.algorithm = request_.algorithm;
+  build.budget = request_.budget;
   build.sampleStep = request_.sampleStep;
   build.code = request_.code;
   builder_.build(build, record, result);
 }
 
+template Survey Compositor::survey(const std::vector<SupersegmentLists>&, const Request&);
+template Survey Compositor::survey(const std::vector<CompactLists>&, const Request&);
 template SupersegmentLists Compositor::composite(const std::vector<SupersegmentLists>&, const Request&);
 template CompactLists Compositor::composite(const std::vector<CompactLists>&, const Request&);
 

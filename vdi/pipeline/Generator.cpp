@@ -82,6 +82,8 @@ std::uint64_t fingerprintOf(const GenerateSettings& settings) {
   print.add(settings.width);
   print.add(settings.height);
   print.add(settings.supersegments);
+  print.add(settings.budget);
+  print.add(settings.fill);
   print.add(settings.samplesPerVoxel);
   print.add(settings.algorithm);
   print.add(settings.precision);
@@ -128,7 +130,7 @@ struct VdiGenerator::State {
     comm.demandEqual(fingerprintOf(camera), "camera");
     comm.demandEqual(fingerprintOf(function), "transfer function");
     comm.demandEqual(fingerprintOf(settings),
-                     "resolution, supersegments, sampling rate, algorithm or precision");
+                     "resolution, supersegments, budget, sampling rate, algorithm or precision");
     mine.generateSeconds = mine.distributeSeconds = mine.compositeSeconds = mine.gatherSeconds =
         mine.generateDeviceSeconds = 0.0;
     mine.subSupersegments = mine.bytesSent = 0;
@@ -168,9 +170,21 @@ struct VdiGenerator::State {
     comm::Received<Segment> received = comm::distribute(comm, lists);
     mine.bytesSent = received.bytesSent;
     mine.distributeSeconds = watch.lap();
+    detail::Compositor::Request request{settings.supersegments,
+                                        mostPerList(settings.supersegments, settings.budget),
+                                        prepared.lattice.step,
+                                        settings.algorithm,
+                                        code,
+                                        -1.0F};
+    if (settings.budget == Budget::Total) {
+      Survey survey;
+      comm.together([&] { survey = compositor->survey(received.subLists, request); });
+      comm.allReduceSum(survey.supersegments);
+      comm.allReduceSum(std::span(&survey.equally, 1));
+      request.level = survey.levelFor(settings.fill);
+    }
     cancellable(progress, 0.95, [&](const detail::RayCaster::Progress& report) {
-      lists = compositor->composite(
-          received.subLists, {settings.supersegments, prepared.lattice.step, settings.algorithm, code});
+      lists = compositor->composite(received.subLists, request);
       report(1.0);
     });
     received = {};
@@ -239,7 +253,7 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
   vdi.camera = camera;
   vdi.width = settings.width;
   vdi.height = settings.height;
-  vdi.budget = settings.supersegments;
+  vdi.budget = mostPerList(settings.supersegments, settings.budget);
   vdi.bounds = s.scene.bounds;
   vdi.sampleStep = prepared->lattice.step;
   return vdi;

@@ -23,10 +23,10 @@ shared::StoredForm storedForm(const DepthCode& code) {
   return {code.first, code.step};
 }
 
-std::uint64_t ListBuilder::bytesPerList(std::uint32_t budget, Algorithm algorithm) {
-  const std::uint64_t segments = std::uint64_t{budget} * sizeof(Supersegment);
+std::uint64_t ListBuilder::bytesPerList(std::uint32_t most, Algorithm algorithm) {
+  const std::uint64_t segments = std::uint64_t{most} * sizeof(Supersegment);
   if (algorithm == Algorithm::Bisection) return segments;
-  const std::uint64_t grains = std::uint64_t{shared::grainsPerBudget} * budget;
+  const std::uint64_t grains = std::uint64_t{shared::grainsPerBudget} * most;
   const std::uint64_t room = grains + grains / 4 + shared::uncountedSpareGrains;
   return segments + room * (sizeof(shared::Grain) + sizeof(glm::vec2) + sizeof(glm::vec4));
 }
@@ -133,18 +133,21 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
   written_.reserve(device_, words, MemoryKind::DeviceLocal);
   countedTolerances_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
   countedGrains_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
+  countedMosts_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
   left_.reserve(device_, words, MemoryKind::DeviceLocal);
   BandTargets targets;
   targets.sensitivities = countedTolerances_.address();
   targets.counts = countedGrains_.address();
+  targets.left = countedMosts_.address();
   targets.status = status_.address();
   commands_.begin();
   commands_.mark("search");
   record(commands_, targets, false);
   commands_.barrier();
-  allot_.record(commands_, {countedTolerances_.address(), countedGrains_.address(), sensitivities_.address(),
-                            counts_.address(), request.width, request.rows, request.countedWidth(),
-                            request.countedRows(), request.countedStride});
+  allot_.record(commands_,
+                {countedTolerances_.address(), countedGrains_.address(), countedMosts_.address(),
+                 sensitivities_.address(), counts_.address(), left_.address(), request.width, request.rows,
+                 request.countedWidth(), request.countedRows(), request.countedStride, request.budget});
   const std::uint64_t grainTotal = scanAndTotal(lists, counts_, grainOffsets_);
 
   grains_.reserve(device_, grainTotal * sizeof(shared::Grain), MemoryKind::DeviceLocal);

@@ -55,8 +55,8 @@ class ListBuilder {
  public:
   explicit ListBuilder(std::shared_ptr<gpu::Device> device);
 
-  /// Device bytes that a list of `budget` supersegments may take.
-  static std::uint64_t bytesPerList(std::uint32_t budget, Algorithm algorithm);
+  /// Device bytes that a list of `most` supersegments may take.
+  static std::uint64_t bytesPerList(std::uint32_t most, Algorithm algorithm);
 
   /// Records the dispatch of the algorithm's first step, or (write) its second one.
   using Record = std::function<void(gpu::Commands&, const BandTargets&, bool write)>;
@@ -67,6 +67,7 @@ class ListBuilder {
     bool rowBehind = false;           // another row follows the band's last one
     std::uint32_t countedStride = 1;  // merge: `rows` is a multiple of it, or nothing follows
     Algorithm algorithm = Algorithm::Merge;
+    std::uint32_t budget = 1;  // N_S
     double sampleStep = 1.0;
     DepthCode code;  // of compact lists
 
@@ -115,6 +116,7 @@ class ListBuilder {
   gpu::Buffer left_;
   gpu::Buffer countedTolerances_;
   gpu::Buffer countedGrains_;
+  gpu::Buffer countedMosts_;
   gpu::Buffer segments_;
   gpu::Buffer status_;
   gpu::Buffer readback_;

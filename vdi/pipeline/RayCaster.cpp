@@ -24,7 +24,8 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
       pass_(device_),
       builder_(device_),
       commands_(device_),
-      params_(device_, sizeof(shared::CastParams), MemoryKind::Upload) {}
+      params_(device_, sizeof(shared::CastParams), MemoryKind::Upload),
+      survey_(device_) {}
 
 void RayCaster::setBlocks(std::span<const Block> blocks, const Scene& scene) {
   volume_.setBlocks(blocks, scene);
@@ -42,6 +43,8 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.perUnitDistance = static_cast<float>(request.lattice.step / request.table.unitDistance);
   params.enough = opticalDepthOf(request.settings.terminationOpacity);
   params.budget = request.settings.supersegments;
+  params.mostPerList = mostPerList(request.settings.supersegments, request.settings.budget);
+  params.level = -1.0F;
   params.cutAtGaps = request.cutAtGaps ? 1U : 0U;
   params.runsOnly = request.runsOnly ? 1U : 0U;
   params.form = storedForm(request.code);
@@ -61,6 +64,21 @@ std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytes
   return static_cast<std::uint32_t>(std::min(height, rows));
 }
 
+/// Of the lists that are counted, in the whole picture: bands of it must agree.
+float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) {
+  const auto width = static_cast<std::uint32_t>(request.view.width());
+  const auto height = static_cast<std::uint32_t>(request.view.height());
+  const Survey survey = survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
+    params.survey = address;
+    std::memcpy(params_.mapped().data(), &params, sizeof(params));
+    pass_.record(commands, params_.address(), gpu::CastPass::Work::Survey, Algorithm::Merge,
+                 {width, 0, height, params.countedStride, params.form});
+  });
+  const double milliseconds = commands_.stageTimes().front().milliseconds;
+  times_ += {milliseconds, milliseconds, 0.0};
+  return survey.levelFor(request.settings.fill);
+}
+
 template <typename Segment>
 ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progress) {
   const auto width = static_cast<std::uint32_t>(request.view.width());
@@ -75,11 +93,17 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
   shared::CastParams params = prepare(request);
   // What has no budget needs no merging: one try with the coarsest sensitivity does.
   const Algorithm algorithm = request.runsOnly ? Algorithm::Bisection : request.settings.algorithm;
-  const std::uint32_t band =
-      rowsPerBand(request, ListBuilder::bytesPerList(request.settings.supersegments, algorithm));
+  const std::uint32_t band = rowsPerBand(request, ListBuilder::bytesPerList(params.mostPerList, algorithm));
   // With cuts at gaps each list's runs must be counted.
   const std::uint32_t stride = request.cutAtGaps ? 1 : shared::countedStride;
+  params.countedStride = stride;
+  params.countedSamples =
+      stride > 1 ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments) : 1;
   times_ = {};
+  // What a list needs is known when all ranks' parts of it are together: parts have N_S each.
+  if (request.settings.budget == Budget::Total && !request.cutAtGaps) {
+    params.level = levelOfNeed(params, request);
+  }
   for (std::uint32_t row = 0; row < height; row += band) {
     const std::uint32_t end = std::min(height, row + band);
     ListBuilder::Request build;
@@ -88,11 +112,9 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
     build.rowBehind = end < height;
     build.countedStride = stride;
     build.algorithm = algorithm;
+    build.budget = request.settings.supersegments;
     build.sampleStep = request.lattice.step;
     build.code = request.code;
-    params.countedStride = stride;
-    params.countedSamples =
-        stride > 1 ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments) : 1;
     params.countedWidth = build.countedWidth();
     const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
       // The shader counts lists from the picture's first; the targets hold just this band's.
@@ -109,6 +131,7 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
       if (!write && algorithm == Algorithm::Merge) {
         params.sensitivities = targets.sensitivities;
         params.counts = targets.counts;
+        params.left = targets.left;
       }
       std::memcpy(params_.mapped().data(), &params, sizeof(params));
       pass_.record(commands, params_.address(),

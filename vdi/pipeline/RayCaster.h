@@ -18,6 +18,7 @@
 #include "vdi/gpu/VolumeStore.h"
 #include "vdi/pipeline/ListBuilder.h"
 #include "vdi/pipeline/PictureBuffers.h"
+#include "vdi/pipeline/SurveyBuffer.h"
 
 namespace vdi::detail {
 
@@ -50,6 +51,7 @@ class RayCaster {
 
  private:
   gpu::shared::CastParams prepare(const Request& request);
+  float levelOfNeed(gpu::shared::CastParams params, const Request& request);
   std::uint32_t rowsPerBand(const Request& request, std::uint64_t bytesPerPixel) const;
 
   std::shared_ptr<gpu::Device> device_;
@@ -59,6 +61,7 @@ class RayCaster {
   gpu::Commands commands_;
   gpu::Buffer params_;
   PictureBuffers picture_;
+  SurveyBuffer survey_;
   ListTimes times_;
 };
 

@@ -194,11 +194,20 @@ Image renderVolume(const Frame& frame, std::span<const Block> blocks) {
 }
 
 SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bool cutAtGaps) {
-  const SegmentRules rules{frame.settings.supersegments, static_cast<float>(frame.lattice.step), cutAtGaps};
+  SegmentRules rules{frame.settings.supersegments, static_cast<float>(frame.lattice.step), cutAtGaps};
   const int width = frame.view.width();
   const int height = frame.view.height();
   SupersegmentLists lists;
   const std::uint32_t atOnce = countedSamplesFor(frame.lattice.count, rules.budget);
+  // A rank's own lists get N_S each: what a list needs is known when all ranks' are together.
+  if (frame.settings.budget == Budget::Total && !cutAtGaps) {
+    Survey survey;
+    for (int y = 0; y < height; y += countedStride) {
+      for (int x = 0; x < width; x += countedStride)
+        addTo(survey, castRay(frame, blocks, x, y, atOnce), rules, atOnce);
+    }
+    rules.level = survey.levelFor(frame.settings.fill);
+  }
   const auto allotmentAt = [&](int x, int y) {
     return allotmentOf(castRay(frame, blocks, x, y, atOnce), rules, atOnce);
   };
@@ -218,7 +227,7 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
     const int above = after(y, height);
     const Allotment counted[] = {allotmentAt(left, below), allotmentAt(right, below),
                                  allotmentAt(left, above), allotmentAt(right, above)};
-    return segmentByMerging(samples, rules, allotmentBetween(counted));
+    return segmentByMerging(samples, rules, allotmentBetween(counted, rules));
   };
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -230,22 +239,34 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
   return lists;
 }
 
-SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
-                            double sampleStep, Algorithm algorithm) {
-  const SegmentRules rules{budget, static_cast<float>(sampleStep), false};
-  SupersegmentLists result;
+namespace {
+
+/// All ranks' supersegments of a list, by depth.
+std::vector<Interval> mergedList(std::span<const SupersegmentLists> subLists, std::size_t list) {
+  std::vector<Interval> merged;
+  for (const SupersegmentLists& sub : subLists) {
+    for (const Supersegment& s : sub.list(list))
+      merged.push_back({s.front, s.back, s.red, s.green, s.blue, opticalDepthOf(s.opacity)});
+  }
+  std::stable_sort(merged.begin(), merged.end(),
+                   [](const Interval& a, const Interval& b) { return a.front < b.front; });
+  return merged;
+}
+
+}  // namespace
+
+SupersegmentLists composite(std::span<const SupersegmentLists> subLists, const GenerateSettings& settings,
+                            double sampleStep) {
+  SegmentRules rules{settings.supersegments, static_cast<float>(sampleStep), false};
   const std::size_t listCount = subLists.empty() ? 0 : subLists.front().listCount();
+  if (settings.budget == Budget::Total) {
+    Survey survey;
+    for (std::size_t i = 0; i < listCount; ++i) addTo(survey, mergedList(subLists, i), rules);
+    rules.level = survey.levelFor(settings.fill);
+  }
+  SupersegmentLists result;
   for (std::size_t i = 0; i < listCount; ++i) {
-    std::vector<Interval> merged;
-    for (const SupersegmentLists& sub : subLists) {
-      assert(sub.listCount() == listCount);
-      for (const Supersegment& s : sub.list(i)) {
-        merged.push_back({s.front, s.back, s.red, s.green, s.blue, opticalDepthOf(s.opacity)});
-      }
-    }
-    std::stable_sort(merged.begin(), merged.end(),
-                     [](const Interval& a, const Interval& b) { return a.front < b.front; });
-    const auto list = segment(merged, rules, algorithm);
+    const auto list = segment(mergedList(subLists, i), rules, settings.algorithm);
     result.segments.insert(result.segments.end(), list.begin(), list.end());
     result.offsets.push_back(static_cast<std::uint32_t>(result.segments.size()));
   }

@@ -44,10 +44,11 @@ Image renderVolume(const Frame& frame, std::span<const Block> blocks);
 /// blocks there are.
 SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bool cutAtGaps);
 
-/// The ranks' lists of each pixel merged by depth and segmented again to at most `budget` (paper,
-/// section 5.2). All inputs have the same number of lists.
-SupersegmentLists composite(std::span<const SupersegmentLists> subLists, std::uint32_t budget,
-                            double sampleStep, Algorithm algorithm);
+/// The ranks' lists of each pixel merged by depth and segmented again to the budget (paper,
+/// section 5.2). All inputs have the same number of lists. Of the settings: supersegments, budget, fill and
+/// algorithm.
+SupersegmentLists composite(std::span<const SupersegmentLists> subLists, const GenerateSettings& settings,
+                            double sampleStep);
 
 /// The VDI seen by `view`. Each supersegment fills the part of its pixel's frustum between its two depths;
 /// rays walk through the frusta of V_O's pixels in order, whatever their direction.

@@ -187,18 +187,54 @@ void mergeCheapest(std::vector<Grain>& grains, std::size_t most, float sampleSte
 
 }  // namespace
 
+namespace {
+
+static_assert(Survey::levels == toleranceLevels + 2);
+
+std::size_t visibleSamples(std::span<const Interval> intervals, std::size_t atOnce) {
+  return atOnce * static_cast<std::size_t>(
+                      std::count_if(intervals.begin(), intervals.end(),
+                                    [](const Interval& interval) { return interval.opticalDepth > 0.0F; }));
+}
+
+/// What a list that isn't empty would hold at a level of a Survey.
+std::size_t supersegmentsAtLevel(std::span<const Interval> intervals, const SegmentRules& rules,
+                                 std::size_t atOnce, std::size_t level) {
+  std::size_t count = 1;
+  if (level == 0) count = visibleSamples(intervals, atOnce);
+  if (level > 0 && level + 1 < Survey::levels) {
+    const float tolerance = finestTolerance * std::pow(toleranceRatio, static_cast<float>(level - 1));
+    count = grainsOf(intervals, tolerance, rules).size();
+  }
+  return std::min<std::size_t>(count, mostPerList(rules.budget, Budget::Total));
+}
+
+}  // namespace
+
+void addTo(Survey& survey, std::span<const Interval> intervals, const SegmentRules& rules,
+           std::size_t atOnce) {
+  const std::size_t visible = visibleSamples(intervals, atOnce);
+  if (visible == 0) return;
+  for (std::size_t level = 0; level < Survey::levels; ++level)
+    survey.supersegments[level] += supersegmentsAtLevel(intervals, rules, atOnce, level);
+  survey.equally += std::min<std::size_t>(visible, rules.budget);
+}
+
 Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce) {
   const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
-  const std::size_t most = std::max<std::size_t>(rules.budget, runs);
-  const std::size_t visible = atOnce * static_cast<std::size_t>(std::count_if(
-                                           intervals.begin(), intervals.end(), [](const Interval& interval) {
-                                             return interval.opticalDepth > 0.0F;
-                                           }));
+  const std::size_t visible = visibleSamples(intervals, atOnce);
   if (visible == 0) return {};
+  std::size_t budget = rules.budget;
+  if (rules.level >= 0.0F) {
+    budget = supersegmentsAt(rules.level, [&](std::size_t level) {
+      return supersegmentsAtLevel(intervals, rules, atOnce, level);
+    });
+  }
+  const std::size_t most = std::max(budget, runs);
   float tolerance = -1.0F;
   std::size_t count = visible;
   if (visible > most) {
-    const std::size_t room = std::max<std::size_t>(std::size_t{grainsPerBudget} * rules.budget, runs);
+    const std::size_t room = std::max(grainsPerBudget * budget, runs);
     tolerance = finestTolerance;
     count = grainsOf(intervals, tolerance, rules).size();
     for (int level = 1; count > room; ++level) {
@@ -207,21 +243,24 @@ Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& r
     }
   }
   const auto grains = static_cast<std::uint32_t>(count);
-  return {tolerance, grains, grains + spareGrains};
+  return {tolerance, grains, grains + spareGrains, static_cast<std::uint32_t>(most)};
 }
 
-Allotment allotmentBetween(std::span<const Allotment> counted) {
+Allotment allotmentBetween(std::span<const Allotment> counted, const SegmentRules& rules) {
   Allotment result;
   float exponents = 0.0F;
   float count = 0.0F;
+  float most = 0.0F;
   bool exact = true;
   for (const Allotment& a : counted) {
     result.grains = std::max(result.grains, a.grains);
     if (a.grains == 0) continue;
     exact = exact && a.tolerance < 0.0F;
     exponents += std::log2(a.tolerance < 0.0F ? finestTolerance / toleranceRatio : a.tolerance);
+    most += static_cast<float>(a.most);
     count += 1.0F;
   }
+  result.most = count > 0.0F ? static_cast<std::uint32_t>(most / count + 0.5F) : rules.budget;
   if (!exact) result.tolerance = std::exp2(exponents / count);
   result.room = result.grains + uncountedSpareGrains + result.grains / 4;
   return result;
@@ -229,10 +268,9 @@ Allotment allotmentBetween(std::span<const Allotment> counted) {
 
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules,
                                            const Allotment& allotment) {
-  const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
   std::vector<Grain> grains;
   if (allotment.room > 0) grains = grainsOf(intervals, allotment.tolerance, rules, allotment.room);
-  mergeCheapest(grains, std::max<std::size_t>(rules.budget, runs), rules.sampleStep);
+  mergeCheapest(grains, allotment.most, rules.sampleStep);
   std::vector<Supersegment> list;
   list.reserve(grains.size());
   for (const Grain& g : grains)

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "vdi/core/Budget.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Vdi.h"
 
@@ -29,6 +30,9 @@ struct SegmentRules {
   /// True for a sub-VDI that other ranks' supersegments will be merged with: a supersegment then never spans
   /// a gap, for another rank's material may lie there. False: a gap is a transparent sample, as in the paper.
   bool cutAtGaps = false;
+  /// Of a Survey: each list holds what it needs at that level, up to twice the budget (Budget::Total), by
+  /// merging. Negative: each may hold `budget`. Not with cutAtGaps.
+  float level = -1.0F;
 };
 
 /// Segments for one sensitivity (Eq. 1). Two sides are compared by their premultiplied colour *and* opacity,
@@ -77,8 +81,8 @@ std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals
 ///   either of them with its other neighbour, until no more have to go. (As good as always merging the
 ///   cheapest two, measured, and it has no list that's searched again for each.)
 /// The tolerances are counted side by side in one walk along the ray, so that a device needs two walks in
-/// all; and where no gaps must be kept, only one ray of countedStride x countedStride is counted, see
-/// Allotment.
+/// all (Budget::Total takes one more, for its Survey); and where no gaps must be kept, only one ray of
+/// countedStride x countedStride is counted, see Allotment.
 inline constexpr int toleranceLevels = 8;
 inline constexpr float finestTolerance = 0.002F;
 inline constexpr float toleranceRatio = 4.0F;
@@ -94,6 +98,7 @@ struct Allotment {
   float tolerance = -1.0F;  // negative: each interval is a grain
   std::uint32_t grains = 0;
   std::uint32_t room = 0;  // >= grains + spareGrains, or 0 for a list that's known to be empty
+  std::uint32_t most = 0;  // supersegments that are to be left
   bool operator==(const Allotment&) const = default;
 };
 inline constexpr std::uint32_t spareGrains = 4;
@@ -108,9 +113,13 @@ constexpr std::uint32_t countedSamplesFor(std::uint32_t latticeCount, std::uint3
 
 /// Counts. `atOnce`: samples that an interval stands for.
 Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce = 1);
-/// Of a list among counted ones: the geometric mean of their tolerances, room for the most grains. Those that
-/// hold nothing have no say.
-Allotment allotmentBetween(std::span<const Allotment> counted);
+/// Of a list among counted ones: the geometric mean of their tolerances, room for the most grains, the mean
+/// of what's to be left. Those that hold nothing have no say.
+Allotment allotmentBetween(std::span<const Allotment> counted, const SegmentRules& rules);
+
+/// Adds a counted list.
+void addTo(Survey& survey, std::span<const Interval> intervals, const SegmentRules& rules,
+           std::size_t atOnce = 1);
 
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules,
                                            const Allotment& allotment);

@@ -56,6 +56,8 @@ void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
      << indent << "Supersegments: " << this->Supersegments << "\n"
      << indent << "SamplingRate: " << this->SamplingRate << "\n"
      << indent << "Algorithm: " << this->Algorithm << "\n"
+     << indent << "Budget: " << this->Budget << "\n"
+     << indent << "Fill: " << this->Fill << "\n"
      << indent << "Precision: " << this->Precision << "\n"
      << indent << "TerminationOpacity: " << this->TerminationOpacity << "\n"
      << indent << "ScalarOpacityUnitDistance: " << this->ScalarOpacityUnitDistance << "\n";
@@ -131,6 +133,8 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
     int whole[6];
     info->Get(Pipeline::WHOLE_EXTENT(), whole);
     info->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
+  } else {
+    info->Remove(Pipeline::UPDATE_EXTENT());  // the picture's, of which a composite's sources would be asked for
   }
   return 1;
 }
@@ -230,6 +234,8 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
   settings.supersegments = static_cast<std::uint32_t>(std::max(this->Supersegments, 0));
   settings.samplesPerVoxel = this->SamplingRate;
   settings.algorithm = static_cast<vdi::Algorithm>(this->Algorithm);
+  settings.budget = static_cast<vdi::Budget>(this->Budget);
+  settings.fill = this->Fill;
   settings.precision = static_cast<vdi::Precision>(this->Precision);
   settings.terminationOpacity = this->TerminationOpacity;
   const auto progress = [this](double done) {

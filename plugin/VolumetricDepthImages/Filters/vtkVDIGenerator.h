@@ -54,6 +54,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkSetMacro(Supersegments, int);
   /// Samples per voxel.
   vtkSetMacro(SamplingRate, double);
+  /// Who gets supersegments, an enumerator of vdi::Budget: 0 (default) each list up to Supersegments, 1 as
+  /// many in all, but lists what they need. Fill, in (0, 1]: with the latter, share of them that's made.
+  vtkSetClampMacro(Budget, int, 0, 1);
+  vtkGetMacro(Budget, int);
+  vtkSetClampMacro(Fill, double, 0.01, 1.0);
+  vtkGetMacro(Fill, double);
   /// What a supersegment takes, an enumerator of vdi::Precision: 1 compact (8 bytes), 0 full (24).
   vtkSetClampMacro(Precision, int, 0, 1);
   vtkGetMacro(Precision, int);
@@ -117,6 +123,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   int Supersegments = 25;
   double SamplingRate = 1.0;
   int Algorithm = 1;
+  int Budget = 0;
+  double Fill = 1.0;
   int Precision = 1;
   double TerminationOpacity = 0.9999;
   bool FillGhosts = true;

@@ -1,0 +1,28 @@
+// Where shaders add up what lists need. Not part of the library's interface.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "vdi/core/Budget.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/Memory.h"
+
+namespace vdi::detail {
+
+class SurveyBuffer {
+ public:
+  explicit SurveyBuffer(std::shared_ptr<gpu::Device> device);
+
+  /// Records a dispatch that adds to the survey at this device address ([surveyLevels + 1][2] words).
+  using Record = std::function<void(gpu::Commands&, std::uint64_t address)>;
+  /// What the dispatch counted.
+  Survey take(gpu::Commands& commands, const Record& record);
+
+ private:
+  gpu::Buffer sums_;
+  gpu::Buffer readback_;
+};
+
+}  // namespace vdi::detail
