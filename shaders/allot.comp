@@ -10,7 +10,6 @@ layout(push_constant, scalar) uniform Push { AllotConstants push; };
 #include "tolerance.glsl"
 
 uint mostGrains;
-float mosts;
 bool allExact;
 float exponents;
 float countedLists;
@@ -21,7 +20,6 @@ void consider(uint x, uint y) {
   float tolerance = push.countedTolerances.at[at];
   if (grains == 0u) return;
   mostGrains = max(mostGrains, grains);
-  mosts += float(push.countedMosts.at[at]);
   if (tolerance >= 0.0) allExact = false;
   exponents += log2(tolerance < 0.0 ? finestTolerance / toleranceRatio : tolerance);
   countedLists += 1.0;
@@ -38,13 +36,11 @@ void main() {
     uint grains = push.countedGrains.at[list];
     push.tolerances.at[list] = push.countedTolerances.at[list];
     push.rooms.at[list] = grains == 0u ? 0u : grains + spareGrains;
-    push.mosts.at[list] = push.countedMosts.at[list];
     return;
   }
   uint right = min((x + push.stride - 1u) / push.stride, push.countedWidth - 1u);
   uint above = min((y + push.stride - 1u) / push.stride, push.countedRows - 1u);
   mostGrains = 0u;
-  mosts = 0.0;
   allExact = true;
   exponents = 0.0;
   countedLists = 0.0;
@@ -53,6 +49,5 @@ void main() {
   consider(left, above);
   consider(right, above);
   push.tolerances.at[list] = allExact ? -1.0 : exp2(exponents / countedLists);
-  push.mosts.at[list] = countedLists > 0.0 ? uint(mosts / countedLists + 0.5) : push.budget;
   push.rooms.at[list] = mostGrains + uncountedSpareGrains + mostGrains / 4u;
 }

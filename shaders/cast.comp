@@ -16,7 +16,8 @@ layout(push_constant, scalar) uniform Push { CastConstants push; };
 const bool volumeOnly = castProgram == castProgramVolume;
 const bool surveysGrains = castProgram == castProgramSurvey;
 const bool countsGrains = castProgram == castProgramCountGrains || surveysGrains;
-const bool writesGrains = castProgram == castProgramWriteGrains;
+const bool writesByNeed = castProgram == castProgramWriteByNeed;
+const bool writesGrains = castProgram == castProgramWriteGrains || writesByNeed;
 
 #include "lists.glsl"
 #include "grains.glsl"

@@ -9,7 +9,8 @@ layout(push_constant, scalar) uniform Push { CompositeConstants push; };
 layout(constant_id = 0) const uint compositeProgram = compositeProgramSearch;
 const bool surveysGrains = compositeProgram == compositeProgramSurvey;
 const bool countsGrains = compositeProgram == compositeProgramCountGrains || surveysGrains;
-const bool writesGrains = compositeProgram == compositeProgramWriteGrains;
+const bool writesByNeed = compositeProgram == compositeProgramWriteByNeed;
+const bool writesGrains = compositeProgram == compositeProgramWriteGrains || writesByNeed;
 
 #include "lists.glsl"
 #include "grains.glsl"

@@ -4,7 +4,7 @@
 //
 // Needs: optical.glsl, appearance.glsl; push.params.value with sensitivities, counts, offsets, spans, lights, written, left, status,
 // survey;
-// bool writesGrains, a constant; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
+// bool writesGrains, writesByNeed, constants; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 
 #include "tolerance.glsl"
@@ -19,7 +19,9 @@ uint grainsRuns;
 bool grainsRunVisible;
 bool grainsCutAtGaps;
 
-// One per tolerance while counting, the first alone while writing.
+// One per tolerance while counting. While writing the first is what's written; by need, two more count what the list would
+// hold at the levels of the survey that its number of supersegments is interpolated from.
+const int levelsWalked = writesByNeed ? 3 : writesGrains ? 1 : toleranceLevels;
 vec4 grainFirst[toleranceLevels];
 float grainDeviation[toleranceLevels];
 uint grainCount[toleranceLevels];
@@ -27,6 +29,7 @@ uint grainsOpen;  // bit j: a grain of tolerance j is open
 
 // While writing; see Allotment in vdi/reference/Segmenter.h.
 float grainTolerance;
+vec2 needTolerances;
 float grainAllotted;
 uint grainRoom;
 vec2 grainSpan;  // front, back
@@ -52,14 +55,15 @@ void adaptTolerance() {
 }
 
 void closeGrains(uint levels) {
-  if (writesGrains && (grainsOpen & levels) != 0u) writeGrain();
+  if (writesGrains && (grainsOpen & levels & 1u) != 0u) writeGrain();
   grainsOpen &= ~levels;
 }
 
 void deviate(vec4 x, float weightedLength) {
-  float tolerance = writesGrains ? grainTolerance : finestTolerance;
+  float tolerance = finestTolerance;
   uint beyond = 0u;
-  [[unroll]] for (int level = 0; level < (writesGrains ? 1 : toleranceLevels); ++level) {
+  [[unroll]] for (int level = 0; level < levelsWalked; ++level) {
+    if (writesGrains) tolerance = level == 0 ? grainTolerance : level == 1 ? needTolerances.x : needTolerances.y;
     grainDeviation[level] += weightedLength * differenceOf(x, grainFirst[level]);
     if (grainDeviation[level] > tolerance) beyond |= 1u << level;
     tolerance *= toleranceRatio;
@@ -89,12 +93,13 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
   // Nothing but a run's start may open a grain once the room for them is used up. With cuts at gaps it isn't, unless
   // the program that counted rounded otherwise.
   bool full = writesGrains && !grainCut && grainCount[0] >= grainRoom;
-  [[unroll]] for (int level = 0; level < (writesGrains ? 1 : toleranceLevels); ++level) {
-    if ((grainsOpen & (1u << level)) == 0u && !full) {
+  [[unroll]] for (int level = 0; level < levelsWalked; ++level) {
+    bool written = writesGrains && level == 0;
+    if ((grainsOpen & (1u << level)) == 0u && !(written && full)) {
       ++grainCount[level];
       grainFirst[level] = x;
       grainDeviation[level] = 0.0;
-      if (writesGrains) {
+      if (written) {
         grainStartsRun = grainsCutAtGaps && grainCut;
         grainSpan = vec2(front, back);
         grainLight = vec4(color, opticalDepth);
@@ -102,7 +107,7 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
         grainCut = false;
         adaptTolerance();
       }
-    } else if (writesGrains) {
+    } else if (written) {
       grainLight = vec4(grainLight.rgb + grainTransmittance * color, min(grainLight.a + opticalDepth, maxOpticalDepth));
       grainSpan.y = back;
       grainTransmittance *= 1.0 - opacity;
@@ -129,6 +134,12 @@ void walkForGrains() {
   walk();
 }
 
+// Twin of supersegmentsAt in vdi/core/Budget.h.
+uint interpolatedCount(float level, uint countBelow, uint countAbove) {
+  float share = level - float(min(uint(level), surveyLevels - 2u));
+  return max(uint(float(countBelow) + share * (float(countAbove) - float(countBelow)) + 0.5), 1u);
+}
+
 // What the list would hold at a level of the survey, if anything. Twin of supersegmentsAtLevel.
 uint supersegmentsAtLevel(uint level) {
   uint count = level == 0u ? grainsVisible : 1u;
@@ -140,14 +151,15 @@ uint budgetOfList() {
   float level = push.params.value.level;
   if (level < 0.0) return push.params.value.budget;
   uint below = min(uint(level), surveyLevels - 2u);
-  float a = float(supersegmentsAtLevel(below));
-  float b = float(supersegmentsAtLevel(below + 1u));
-  return max(uint(a + (level - float(below)) * (b - a) + 0.5), 1u);
+  return interpolatedCount(level, supersegmentsAtLevel(below), supersegmentsAtLevel(below + 1u));
 }
 
-void countGrains() {
-  walkForGrains();
-  uint budget = budgetOfList();
+struct CountedGrains {
+  float tolerance;
+  uint count;
+};
+
+CountedGrains grainsFor(uint budget) {
   uint runs = grainsCutAtGaps ? grainsRuns : min(grainsRuns, 1u);
   uint count = grainsVisible;
   float tolerance = -1.0;
@@ -164,9 +176,20 @@ void countGrains() {
       coarser /= toleranceRatio;
     }
   }
-  push.params.value.sensitivities.at[listIndex] = tolerance;
-  push.params.value.counts.at[listIndex] = count;
-  push.params.value.left.at[listIndex] = max(budget, runs);
+  return CountedGrains(tolerance, count);
+}
+
+void countGrains() {
+  walkForGrains();
+  CountedGrains counted = grainsFor(budgetOfList());
+  push.params.value.sensitivities.at[listIndex] = counted.tolerance;
+  push.params.value.counts.at[listIndex] = counted.count;
+}
+
+// Of a level of the survey.
+float toleranceOfLevel(uint level) {
+  if (level == 0u) return -1.0;
+  return level + 1u == surveyLevels ? unlimited : finestTolerance * pow(toleranceRatio, float(level - 1u));
 }
 
 void writeGrains() {
@@ -178,12 +201,21 @@ void writeGrains() {
   }
   grainAllotted = push.params.value.sensitivities.at[listIndex];
   grainTolerance = grainAllotted;
+  if (writesByNeed) {
+    uint below = min(uint(push.params.value.level), surveyLevels - 2u);
+    needTolerances = vec2(toleranceOfLevel(below), toleranceOfLevel(below + 1u));
+  }
   walkForGrains();
   closeGrains(1u);
   uint written = min(grainCount[0], grainRoom);
   if (written != grainCount[0]) atomicAdd(push.params.value.status.at[0], 1u);
+  uint most = max(push.params.value.budget, grainsCutAtGaps ? grainsRuns : 1u);
+  if (writesByNeed) {
+    most = interpolatedCount(push.params.value.level, min(grainCount[1], push.params.value.mostPerList),
+                             min(grainCount[2], push.params.value.mostPerList));
+  }
   push.params.value.written.at[listIndex] = written;
-  push.params.value.left.at[listIndex] = min(written, push.params.value.left.at[listIndex]);
+  push.params.value.left.at[listIndex] = min(written, most);
 }
 
 // What a workgroup's lists add to the survey.
@@ -198,7 +230,7 @@ void surveyGrains(bool hasList) {
     walkForGrains();
     if (grainsVisible > 0u) {
       for (uint level = 0u; level < surveyLevels; ++level) atomicAdd(surveyed[level], supersegmentsAtLevel(level));
-      atomicAdd(surveyed[surveyLevels], min(grainsVisible, push.params.value.budget));
+      atomicAdd(surveyed[surveyLevels], min(grainsFor(push.params.value.budget).count, push.params.value.budget));
     }
   }
   barrier();

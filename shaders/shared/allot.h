@@ -15,16 +15,13 @@ const uint allotGroup = 64;
 struct AllotConstants {
   VDI_ADDRESS(FloatArray) countedTolerances;  // [countedRows][countedWidth]
   VDI_ADDRESS(UintArray) countedGrains;       // likewise
-  VDI_ADDRESS(UintArray) countedMosts;        // likewise: supersegments that a list may have
   VDI_ADDRESS(FloatArray) tolerances;         // [rows][width]
   VDI_ADDRESS(UintArray) rooms;               // likewise
-  VDI_ADDRESS(UintArray) mosts;               // likewise
   uint width;
   uint rows;
   uint countedWidth;
   uint countedRows;
   uint stride;
-  uint budget;  // N_S
 };
 
 VDI_SHARED_END

@@ -22,6 +22,7 @@ inline constexpr uint castProgramSearch = 1;
 inline constexpr uint castProgramCountGrains = 2;
 inline constexpr uint castProgramWriteGrains = 3;
 inline constexpr uint castProgramSurvey = 4;
+inline constexpr uint castProgramWriteByNeed = 5;
 inline constexpr uint castModeSearch = 0;
 inline constexpr uint castModeWrite = 1;
 #else
@@ -32,7 +33,8 @@ const uint castProgramVolume = 0;       // DVR: colours and depths
 const uint castProgramSearch = 1;       // by bisection: one program that does both of the modes
 const uint castProgramCountGrains = 2;  // by merging: tolerances and counts
 const uint castProgramWriteGrains = 3;
-const uint castProgramSurvey = 4;  // by merging, for the total budget: what lists need
+const uint castProgramSurvey = 4;       // for the total budget: what lists need
+const uint castProgramWriteByNeed = 5;  // and the writing of their grains
 const uint castModeSearch = 0;  // sensitivities and counts
 const uint castModeWrite = 1;   // supersegments
 #endif
@@ -49,7 +51,7 @@ struct CastParams {
   VDI_ADDRESS(Vec2Array) spans;           // of the grains, compact; by merging
   VDI_ADDRESS(Vec4Array) lights;          // likewise
   VDI_ADDRESS(UintArray) written;         // [h][w]: grains
-  VDI_ADDRESS(UintArray) left;            // [h][w]: how many are to be left of them; until that's known, at most
+  VDI_ADDRESS(UintArray) left;            // [h][w]: how many are to be left of them
   VDI_ADDRESS(Vec4Array) colors;          // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;         // [h][w]
   VDI_ADDRESS(UintArray) status;          // [1]: lists whose written count differs from the stored one

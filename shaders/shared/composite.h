@@ -13,6 +13,7 @@ inline constexpr uint compositeProgramSearch = 0;
 inline constexpr uint compositeProgramCountGrains = 1;
 inline constexpr uint compositeProgramWriteGrains = 2;
 inline constexpr uint compositeProgramSurvey = 3;
+inline constexpr uint compositeProgramWriteByNeed = 4;
 inline constexpr uint compositeModeSearch = 0;
 inline constexpr uint compositeModeWrite = 1;
 #else
@@ -23,6 +24,7 @@ const uint compositeProgramSearch = 0;  // as castProgramSearch and so on
 const uint compositeProgramCountGrains = 1;
 const uint compositeProgramWriteGrains = 2;
 const uint compositeProgramSurvey = 3;
+const uint compositeProgramWriteByNeed = 4;
 const uint compositeModeSearch = 0;
 const uint compositeModeWrite = 1;
 #endif

@@ -161,8 +161,8 @@ TEST_CASE("a list that wasn't counted fits however wrong its allotment is, and l
   }
   const SegmentRules rules{100, 1.0F, false};
   for (const std::uint32_t grains : {0U, 3U, 40U}) {
-    const Allotment neighbours[] = {{-1.0F, grains, grains + spareGrains, 100}, {}};
-    const Allotment guessed = allotmentBetween(neighbours, rules);
+    const Allotment neighbours[] = {{-1.0F, grains, grains + spareGrains}, {}};
+    const Allotment guessed = allotmentBetween(neighbours);
     CHECK(guessed.room >= grains + uncountedSpareGrains);
     const auto list = segmentByMerging(samples, rules, guessed);
     CHECK(list.size() <= guessed.room);
@@ -171,17 +171,14 @@ TEST_CASE("a list that wasn't counted fits however wrong its allotment is, and l
   }
   // Between lists that hold nothing there's room for something small all the same.
   const Allotment nothing[] = {{}, {}};
-  CHECK(segmentByMerging({samples.data(), 3}, rules, allotmentBetween(nothing, rules)).size() >= 2);
+  CHECK(segmentByMerging({samples.data(), 3}, rules, allotmentBetween(nothing)).size() >= 2);
   CHECK(segmentByMerging(samples, rules, Allotment()).empty());  // known to be empty
 }
 
 TEST_CASE("an allotment between counted lists: the mean of their tolerances, room for the most grains") {
-  const Allotment counted[] = {{0.01F, 20, 24, 10}, {0.04F, 30, 34, 15}, {}, {0.02F, 10, 14, 8}};
-  const Allotment between = allotmentBetween(counted, {12, 1.0F, false});
+  const Allotment counted[] = {{0.01F, 20, 24}, {0.04F, 30, 34}, {}, {0.02F, 10, 14}};
+  const Allotment between = allotmentBetween(counted);
   CHECK(between.tolerance == Approx(0.02F));
   CHECK(between.grains == 30);
   CHECK(between.room == 30 + uncountedSpareGrains + 7);
-  CHECK(between.most == 11);
-  const Allotment nothing[] = {{}, {}};
-  CHECK(allotmentBetween(nothing, {12, 1.0F, false}).most == 12);
 }

@@ -72,9 +72,10 @@ ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t comp
 void CastPass::record(Commands& commands, VkDeviceAddress params, Work work, Algorithm algorithm,
                       const Band& band) {
   assert(volume_ != nullptr && band.firstRow < band.lastRow);
-  const bool writes = work == Work::Write;
+  const bool writes = work == Work::Write || work == Work::WriteByNeed;
   const std::uint32_t program = work == Work::Volume                ? shared::castProgramVolume
                                 : work == Work::Survey              ? shared::castProgramSurvey
+                                : work == Work::WriteByNeed         ? shared::castProgramWriteByNeed
                                 : algorithm == Algorithm::Bisection ? shared::castProgramSearch
                                 : writes                            ? shared::castProgramWriteGrains
                                                                     : shared::castProgramCountGrains;

@@ -34,8 +34,9 @@ class CastPass {
   void bind(const VolumeStore& volume) { volume_ = &volume; }
 
   /// What a dispatch does: the picture; or what lists need (merging); or the first step of an algorithm
-  /// (sensitivities or tolerances, and counts), or its second one (supersegments or grains).
-  enum class Work { Volume, Survey, Search, Write };
+  /// (sensitivities or tolerances, and counts), or its second one (supersegments or grains; by
+  /// need, with Budget::Total).
+  enum class Work { Volume, Survey, Search, Write, WriteByNeed };
   struct Band {
     std::uint32_t width = 0;
     std::uint32_t firstRow = 0;

@@ -18,8 +18,9 @@ CompositePass::CompositePass(std::shared_ptr<Device> device)
 
 void CompositePass::record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form,
                            Work work, Algorithm algorithm, std::uint32_t listCount) {
-  const bool write = work == Work::Write;
+  const bool write = work == Work::Write || work == Work::WriteByNeed;
   const std::uint32_t program = work == Work::Survey                ? shared::compositeProgramSurvey
+                                : work == Work::WriteByNeed         ? shared::compositeProgramWriteByNeed
                                 : algorithm == Algorithm::Bisection ? shared::compositeProgramSearch
                                 : write                             ? shared::compositeProgramWriteGrains
                                                                     : shared::compositeProgramCountGrains;

@@ -15,8 +15,8 @@ class CompositePass {
  public:
   explicit CompositePass(std::shared_ptr<Device> device);
   /// What a dispatch does: what lists need (merging); or the first step of the algorithm, or, after a scan,
-  /// its second one.
-  enum class Work { Survey, Search, Write };
+  /// its second one (by need, with Budget::Total).
+  enum class Work { Survey, Search, Write, WriteByNeed };
   /// `params` is the address of a CompositeParams of that form.
   void record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form, Work work,
               Algorithm algorithm, std::uint32_t listCount);

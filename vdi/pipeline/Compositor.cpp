@@ -151,14 +151,16 @@ void Compositor::compositeBand(const Band& band, ListsOf<Segment>& result) {
     settings_.status = targets.status;
     std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
     using Work = gpu::CompositePass::Work;
-    compositePass_.record(commands, params_.address(), settings_.form, write ? Work::Write : Work::Search,
+    compositePass_.record(commands, params_.address(), settings_.form,
+                          !write                   ? Work::Search
+                          : settings_.level < 0.0F ? Work::Write
+                                                   : Work::WriteByNeed,
                           request_.algorithm, band.listCount());
   };
   ListBuilder::Request build;
   build.width = band.listCount();
   build.rows = 1;
   build.algorithm = request_.algorithm;
-  build.budget = request_.budget;
   build.sampleStep = request_.sampleStep;
   build.code = request_.code;
   builder_.build(build, record, result);

@@ -133,21 +133,18 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
   written_.reserve(device_, words, MemoryKind::DeviceLocal);
   countedTolerances_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
   countedGrains_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
-  countedMosts_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
   left_.reserve(device_, words, MemoryKind::DeviceLocal);
   BandTargets targets;
   targets.sensitivities = countedTolerances_.address();
   targets.counts = countedGrains_.address();
-  targets.left = countedMosts_.address();
   targets.status = status_.address();
   commands_.begin();
   commands_.mark("search");
   record(commands_, targets, false);
   commands_.barrier();
-  allot_.record(commands_,
-                {countedTolerances_.address(), countedGrains_.address(), countedMosts_.address(),
-                 sensitivities_.address(), counts_.address(), left_.address(), request.width, request.rows,
-                 request.countedWidth(), request.countedRows(), request.countedStride, request.budget});
+  allot_.record(commands_, {countedTolerances_.address(), countedGrains_.address(), sensitivities_.address(),
+                            counts_.address(), request.width, request.rows, request.countedWidth(),
+                            request.countedRows(), request.countedStride});
   const std::uint64_t grainTotal = scanAndTotal(lists, counts_, grainOffsets_);
 
   grains_.reserve(device_, grainTotal * sizeof(shared::Grain), MemoryKind::DeviceLocal);

@@ -67,7 +67,6 @@ class ListBuilder {
     bool rowBehind = false;           // another row follows the band's last one
     std::uint32_t countedStride = 1;  // merge: `rows` is a multiple of it, or nothing follows
     Algorithm algorithm = Algorithm::Merge;
-    std::uint32_t budget = 1;  // N_S
     double sampleStep = 1.0;
     DepthCode code;  // of compact lists
 
@@ -116,7 +115,6 @@ class ListBuilder {
   gpu::Buffer left_;
   gpu::Buffer countedTolerances_;
   gpu::Buffer countedGrains_;
-  gpu::Buffer countedMosts_;
   gpu::Buffer segments_;
   gpu::Buffer status_;
   gpu::Buffer readback_;

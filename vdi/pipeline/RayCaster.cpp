@@ -112,7 +112,6 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
     build.rowBehind = end < height;
     build.countedStride = stride;
     build.algorithm = algorithm;
-    build.budget = request.settings.supersegments;
     build.sampleStep = request.lattice.step;
     build.code = request.code;
     params.countedWidth = build.countedWidth();
@@ -131,12 +130,14 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
       if (!write && algorithm == Algorithm::Merge) {
         params.sensitivities = targets.sensitivities;
         params.counts = targets.counts;
-        params.left = targets.left;
       }
       std::memcpy(params_.mapped().data(), &params, sizeof(params));
+      using Work = gpu::CastPass::Work;
       pass_.record(commands, params_.address(),
-                   write ? gpu::CastPass::Work::Write : gpu::CastPass::Work::Search, algorithm,
-                   {width, row, end, stride, params.form});
+                   !write                ? Work::Search
+                   : params.level < 0.0F ? Work::Write
+                                         : Work::WriteByNeed,
+                   algorithm, {width, row, end, stride, params.form});
     };
     builder_.build(build, record, result);
     times_ += builder_.times();

@@ -227,7 +227,7 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
     const int above = after(y, height);
     const Allotment counted[] = {allotmentAt(left, below), allotmentAt(right, below),
                                  allotmentAt(left, above), allotmentAt(right, above)};
-    return segmentByMerging(samples, rules, allotmentBetween(counted, rules));
+    return segmentByMerging(samples, rules, allotmentBetween(counted));
   };
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {

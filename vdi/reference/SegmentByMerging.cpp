@@ -209,27 +209,28 @@ std::size_t supersegmentsAtLevel(std::span<const Interval> intervals, const Segm
   return std::min<std::size_t>(count, mostPerList(rules.budget, Budget::Total));
 }
 
+/// What a list that isn't empty may hold, but for runs.
+std::size_t budgetOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce) {
+  if (rules.level < 0.0F) return rules.budget;
+  return supersegmentsAt(
+      rules.level, [&](std::size_t level) { return supersegmentsAtLevel(intervals, rules, atOnce, level); });
+}
+
 }  // namespace
 
 void addTo(Survey& survey, std::span<const Interval> intervals, const SegmentRules& rules,
            std::size_t atOnce) {
-  const std::size_t visible = visibleSamples(intervals, atOnce);
-  if (visible == 0) return;
+  if (visibleSamples(intervals, atOnce) == 0) return;
   for (std::size_t level = 0; level < Survey::levels; ++level)
     survey.supersegments[level] += supersegmentsAtLevel(intervals, rules, atOnce, level);
-  survey.equally += std::min<std::size_t>(visible, rules.budget);
+  survey.equally += std::min(allotmentOf(intervals, rules, atOnce).grains, rules.budget);
 }
 
 Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce) {
-  const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
   const std::size_t visible = visibleSamples(intervals, atOnce);
   if (visible == 0) return {};
-  std::size_t budget = rules.budget;
-  if (rules.level >= 0.0F) {
-    budget = supersegmentsAt(rules.level, [&](std::size_t level) {
-      return supersegmentsAtLevel(intervals, rules, atOnce, level);
-    });
-  }
+  const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
+  const std::size_t budget = budgetOf(intervals, rules, atOnce);
   const std::size_t most = std::max(budget, runs);
   float tolerance = -1.0F;
   std::size_t count = visible;
@@ -243,24 +244,21 @@ Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& r
     }
   }
   const auto grains = static_cast<std::uint32_t>(count);
-  return {tolerance, grains, grains + spareGrains, static_cast<std::uint32_t>(most)};
+  return {tolerance, grains, grains + spareGrains};
 }
 
-Allotment allotmentBetween(std::span<const Allotment> counted, const SegmentRules& rules) {
+Allotment allotmentBetween(std::span<const Allotment> counted) {
   Allotment result;
   float exponents = 0.0F;
   float count = 0.0F;
-  float most = 0.0F;
   bool exact = true;
   for (const Allotment& a : counted) {
     result.grains = std::max(result.grains, a.grains);
     if (a.grains == 0) continue;
     exact = exact && a.tolerance < 0.0F;
     exponents += std::log2(a.tolerance < 0.0F ? finestTolerance / toleranceRatio : a.tolerance);
-    most += static_cast<float>(a.most);
     count += 1.0F;
   }
-  result.most = count > 0.0F ? static_cast<std::uint32_t>(most / count + 0.5F) : rules.budget;
   if (!exact) result.tolerance = std::exp2(exponents / count);
   result.room = result.grains + uncountedSpareGrains + result.grains / 4;
   return result;
@@ -270,7 +268,8 @@ std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, 
                                            const Allotment& allotment) {
   std::vector<Grain> grains;
   if (allotment.room > 0) grains = grainsOf(intervals, allotment.tolerance, rules, allotment.room);
-  mergeCheapest(grains, allotment.most, rules.sampleStep);
+  const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
+  mergeCheapest(grains, std::max(budgetOf(intervals, rules, 1), runs), rules.sampleStep);
   std::vector<Supersegment> list;
   list.reserve(grains.size());
   for (const Grain& g : grains)

@@ -98,7 +98,6 @@ struct Allotment {
   float tolerance = -1.0F;  // negative: each interval is a grain
   std::uint32_t grains = 0;
   std::uint32_t room = 0;  // >= grains + spareGrains, or 0 for a list that's known to be empty
-  std::uint32_t most = 0;  // supersegments that are to be left
   bool operator==(const Allotment&) const = default;
 };
 inline constexpr std::uint32_t spareGrains = 4;
@@ -113,9 +112,9 @@ constexpr std::uint32_t countedSamplesFor(std::uint32_t latticeCount, std::uint3
 
 /// Counts. `atOnce`: samples that an interval stands for.
 Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce = 1);
-/// Of a list among counted ones: the geometric mean of their tolerances, room for the most grains, the mean
-/// of what's to be left. Those that hold nothing have no say.
-Allotment allotmentBetween(std::span<const Allotment> counted, const SegmentRules& rules);
+/// Of a list among counted ones: the geometric mean of their tolerances, room for the most grains. Those that
+/// hold nothing have no say.
+Allotment allotmentBetween(std::span<const Allotment> counted);
 
 /// Adds a counted list.
 void addTo(Survey& survey, std::span<const Interval> intervals, const SegmentRules& rules,
