@@ -1,7 +1,9 @@
 // Device choice, prefix sums and the kd-tree, each against something plain.
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <numeric>
 #include <random>
+#include <vector>
 
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Commands.h"
@@ -147,4 +149,27 @@ TEST_CASE("boxes that no plane separates uncut are cut; boxes that overlap are r
     CHECK(find(tree, 0.5F * (pinwheel[i].lo + pinwheel[i].hi)) == static_cast<int>(i));
   }
   CHECK_THROWS_AS(buildKdTree({brick({0, 0, 0}, {2, 2, 2}), brick({1, 1, 1}, {3, 3, 3})}), Error);
+}
+
+TEST_CASE("host memory that starts and ends anywhere is imported without a copy, where the device can") {
+  if (device()->limits().hostPointerAlignment == 0) {
+    WARN("this device can't import host memory");
+    return;
+  }
+  std::vector<std::uint32_t> values(100000);
+  std::iota(values.begin(), values.end(), 7U);
+  for (const auto& [first, count] : {std::pair<std::size_t, std::size_t>(0, 100000), {3, 5}, {1025, 50000}}) {
+    const auto imported = importHostMemory(device(), values.data() + first, count * sizeof(std::uint32_t));
+    REQUIRE(imported);
+    CHECK(imported->offset < device()->limits().hostPointerAlignment);
+    const Buffer back(device(), count * sizeof(std::uint32_t), MemoryKind::Readback);
+    Commands commands(device());
+    commands.begin();
+    commands.copy(imported->buffer, imported->offset, back, 0, back.size());
+    commands.submitAndWait();
+    CHECK(std::equal(values.begin() + static_cast<std::ptrdiff_t>(first),
+                     values.begin() + static_cast<std::ptrdiff_t>(first + count),
+                     back.mappedAs<std::uint32_t>().begin()));
+  }
+  CHECK(device()->validationMessages() == "");
 }

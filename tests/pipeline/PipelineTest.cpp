@@ -167,6 +167,44 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
   }
 }
 
+TEST_CASE(
+    "values that are copied as they are and values that are staged, several buffers full, give one picture") {
+  // Equal texels from both: those of i16 are shifted up.
+  const glm::ivec3 size{262, 261, 260};
+  std::vector<std::uint16_t> values;
+  values.reserve(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
+                 static_cast<std::size_t>(size.z));
+  for (int z = 0; z < size.z; ++z) {
+    for (int y = 0; y < size.y; ++y) {
+      for (int x = 0; x < size.x; ++x)
+        values.push_back(static_cast<std::uint16_t>(200 * ((x / 16 + y / 16 + z / 16) % 7) + z));
+    }
+  }
+  std::vector<std::int16_t> shifted;
+  shifted.reserve(values.size());
+  for (const std::uint16_t value : values) shifted.push_back(static_cast<std::int16_t>(value - 32768));
+  const auto pictureOf = [&](ScalarType type, const void* data, double offset) {
+    Block block;
+    block.dims = size;
+    block.origin = glm::dvec3(0.0);
+    block.spacing = glm::dvec3(1.0 / 261);
+    block.type = type;
+    block.data = data;
+    block.owned = {glm::dvec3(0.0), glm::dvec3(size - 1) / 261.0};
+    TransferFunction function = test::threeHues(1400.0);
+    for (auto& node : function.colors) node.x += offset;
+    for (auto& node : function.opacities) node.x += offset;
+    VdiGenerator generator(device(), comm::Communicator::serial());
+    generator.setBlocks({block});
+    return *generator.renderVolume(test::oblique(), function, test::smallSettings(48, 36));
+  };
+  const Image direct = pictureOf(ScalarType::U16, values.data(), 0.0);
+  const Image staged = pictureOf(ScalarType::I16, shifted.data(), -32768.0);
+  CHECK(std::any_of(direct.rgba.begin(), direct.rgba.end(), [](const glm::vec4& c) { return c.a > 0.5F; }));
+  CHECK(largestDifference(direct, staged) < 0.01F);
+  CHECK(device()->validationMessages() == "");
+}
+
 TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the reference") {
   const auto dealt = test::deal("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
                                 ScalarType::U8, 0, 1);

@@ -163,16 +163,19 @@ void Commands::endUpload(const Image3D& image) {
 }
 
 void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to,
-                           const glm::uvec3& texelOffset, const glm::uvec3& texelExtent) {
+                           const glm::uvec3& texelOffset, const glm::uvec3& texelExtent,
+                           const glm::uvec2& pitch) {
   assert(glm::all(glm::lessThanEqual(texelOffset + texelExtent, to.extent())));
   if (texelExtent.x == 0 || texelExtent.y == 0 || texelExtent.z == 0) return;
-  assert(fromOffset +
-             std::uint64_t{texelExtent.x} * texelExtent.y * texelExtent.z * texelBytes(to.format()) <=
+  [[maybe_unused]] const glm::u64vec2 steps(pitch.x > 0 ? pitch.x : texelExtent.x,
+                                            pitch.y > 0 ? pitch.y : texelExtent.y);
+  assert(fromOffset + (((texelExtent.z - 1) * steps.y + texelExtent.y - 1) * steps.x + texelExtent.x) *
+                          texelBytes(to.format()) <=
          from.size());
   const glm::ivec3 offset(texelOffset);
   const VkBufferImageCopy region{fromOffset,
-                                 0,
-                                 0,
+                                 pitch.x,
+                                 pitch.y,
                                  {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
                                  {offset.x, offset.y, offset.z},
                                  {texelExtent.x, texelExtent.y, texelExtent.z}};

@@ -63,9 +63,11 @@ class Commands {
   void beginUpload(const Image3D& image);
   /// Makes the image ready to be sampled by what's recorded later.
   void endUpload(const Image3D& image);
-  /// Tightly packed texels, x fastest, from the buffer into a box of the image.
+  /// Texels, x fastest, from the buffer into a box of the image. `pitch`: texels from row to row and rows
+  /// from slice to slice; 0: tightly packed.
   void copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to,
-                   const glm::uvec3& texelOffset, const glm::uvec3& texelExtent);
+                   const glm::uvec3& texelOffset, const glm::uvec3& texelExtent,
+                   const glm::uvec2& pitch = glm::uvec2(0));
 
   /// Marks the start of a named stage on the device's clock; it ends at the next mark, or at submit. Up to 64
   /// a submission.

@@ -82,6 +82,23 @@ bool filtersLinearly(VkPhysicalDevice device, VkFormat format) {
   return (properties.optimalTilingFeatures & wanted) == wanted;
 }
 
+/// 0 without VK_EXT_external_memory_host.
+std::uint64_t hostPointerAlignment(VkPhysicalDevice device) {
+  std::uint32_t count = 0;
+  vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr);
+  std::vector<VkExtensionProperties> extensions(count);
+  vkEnumerateDeviceExtensionProperties(device, nullptr, &count, extensions.data());
+  const bool there = std::any_of(extensions.begin(), extensions.end(), [](const VkExtensionProperties& e) {
+    return std::strcmp(e.extensionName, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME) == 0;
+  });
+  if (!there) return 0;
+  VkPhysicalDeviceExternalMemoryHostPropertiesEXT host{
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_MEMORY_HOST_PROPERTIES_EXT, nullptr, 0};
+  VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &host, {}};
+  vkGetPhysicalDeviceProperties2(device, &properties);
+  return host.minImportedHostPointerAlignment;
+}
+
 /// What needs Vulkan 1.3 to be asked for: limits, driver, and what's missing.
 void inspectFeatures(VkPhysicalDevice device, Candidate& candidate) {
   VkPhysicalDeviceDriverProperties driver{};
@@ -99,6 +116,8 @@ void inspectFeatures(VkPhysicalDevice device, Candidate& candidate) {
   // they'd have to allocate, tells more.
   limits.maxAllocationBytes =
       std::min(limits.memoryBytes, std::max<std::uint64_t>(m3.maxMemoryAllocationSize, m4.maxBufferSize));
+
+  limits.hostPointerAlignment = hostPointerAlignment(device);
 
   Features features;
   vkGetPhysicalDeviceFeatures2(device, &features.core);
@@ -254,6 +273,7 @@ struct Device::State {
   std::atomic<std::int64_t> allocated{0};
   std::mutex queueMutex;
   MessageLog log;
+  PFN_vkGetMemoryHostPointerPropertiesEXT hostPointerProperties = nullptr;
 
   void listen();  // to the validation layer
 
@@ -342,6 +362,11 @@ VkDevice makeDevice(const Candidate& chosen) {
   info.pNext = &features.core;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queueInfo;
+  const char* hostMemory = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
+  if (chosen.limits.hostPointerAlignment > 0) {
+    info.enabledExtensionCount = 1;
+    info.ppEnabledExtensionNames = &hostMemory;
+  }
   VkDevice device = VK_NULL_HANDLE;
   const VkResult result = vkCreateDevice(chosen.handle, &info, nullptr, &device);
   if (result != VK_SUCCESS) {  // in use exclusively, reset, unplugged, ...
@@ -404,6 +429,10 @@ std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
   vkGetPhysicalDeviceMemoryProperties(chosen.handle, &state->memory);
   state->device = makeDevice(chosen);
   vkGetDeviceQueue(state->device, chosen.queueFamily, 0, &state->queue);
+  if (state->limits.hostPointerAlignment > 0) {
+    state->hostPointerProperties = reinterpret_cast<PFN_vkGetMemoryHostPointerPropertiesEXT>(
+        vkGetDeviceProcAddr(state->device, "vkGetMemoryHostPointerPropertiesEXT"));
+  }
   const VkPipelineCacheCreateInfo cacheInfo{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO, nullptr, 0, 0,
                                             nullptr};
   check(vkCreatePipelineCache(state->device, &cacheInfo, nullptr, &state->cache), "vkCreatePipelineCache");
@@ -458,6 +487,15 @@ std::uint32_t Device::memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags w
   if (!type)
     throw Error(ErrorCode::OutOfMemory, fmt::format("no memory type with properties {:#x}", wanted), name());
   return *type;
+}
+
+std::uint32_t Device::memoryTypesOfHostPointer(const void* pages) const {
+  if (state_->hostPointerProperties == nullptr) return 0;
+  VkMemoryHostPointerPropertiesEXT properties{VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT, nullptr,
+                                              0};
+  const VkResult result = state_->hostPointerProperties(
+      state_->device, VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT, pages, &properties);
+  return result == VK_SUCCESS ? properties.memoryTypeBits : 0;
 }
 
 std::uint64_t Device::allocatedBytes() const {

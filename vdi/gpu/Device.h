@@ -33,6 +33,8 @@ struct DeviceLimits {
   std::array<std::uint32_t, 3> maxGroups{};  // of one dispatch, per axis
   float timestampPeriodNs = 0.0F;
   std::uint32_t timestampBits = 0;  // the low ones that count; the clock wraps around
+  /// What the start and the size of host memory that's imported must be multiples of; 0: the device can't.
+  std::uint64_t hostPointerAlignment = 0;
   // Features that are turned on where the device has them.
   bool shaderFloat16 = false;
   bool storage16Bit = false;  // storageBuffer16BitAccess
@@ -73,6 +75,9 @@ class Device {
   std::optional<std::uint32_t> findMemoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
   /// The same; throws Error{OutOfMemory} if there's none.
   std::uint32_t memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
+  /// Memory types as which memory of the process at `pages`, aligned to hostPointerAlignment, can be
+  /// imported; 0: none.
+  std::uint32_t memoryTypesOfHostPointer(const void* pages) const;
   /// Bytes of device memory that Buffers and Images of this device hold now.
   std::uint64_t allocatedBytes() const;
   void accountAllocation(std::int64_t bytes);

@@ -118,6 +118,53 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
   }
 }
 
+std::optional<ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& device, const void* data,
+                                               std::uint64_t bytes) {
+  const std::uint64_t alignment = device->limits().hostPointerAlignment;
+  if (alignment == 0) return std::nullopt;
+  const auto address = reinterpret_cast<std::uintptr_t>(data);
+  const std::uintptr_t base = address / alignment * alignment;
+  const std::uint64_t size = (address + bytes - base + alignment - 1) / alignment * alignment;
+  if (size > device->limits().maxBufferBytes) return std::nullopt;
+  void* pages = reinterpret_cast<void*>(base);  // NOLINT(performance-no-int-to-ptr): aligning a pointer
+  constexpr auto handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT;
+
+  ImportedBuffer result;
+  result.offset = address - base;
+  Buffer& buffer = result.buffer;
+  buffer.device_ = device;
+  buffer.size_ = size;
+  const VkExternalMemoryBufferCreateInfo external{VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO,
+                                                  nullptr, handleType};
+  const VkBufferCreateInfo bufferInfo{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+                                      &external,
+                                      0,
+                                      size,
+                                      VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                      VK_SHARING_MODE_EXCLUSIVE,
+                                      0,
+                                      nullptr};
+  if (vkCreateBuffer(device->handle(), &bufferInfo, nullptr, &buffer.buffer_) != VK_SUCCESS) {
+    buffer.buffer_ = VK_NULL_HANDLE;
+    return std::nullopt;
+  }
+  VkMemoryRequirements needs;
+  vkGetBufferMemoryRequirements(device->handle(), buffer.buffer_, &needs);
+  const std::optional<std::uint32_t> type =
+      device->findMemoryType(needs.memoryTypeBits & device->memoryTypesOfHostPointer(pages), 0);
+  if (!type || needs.size > size) return std::nullopt;
+  const VkImportMemoryHostPointerInfoEXT import{VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT,
+                                                nullptr, handleType, pages};
+  const VkMemoryAllocateInfo memoryInfo{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, &import, size, *type};
+  if (vkAllocateMemory(device->handle(), &memoryInfo, nullptr, &buffer.memory_) != VK_SUCCESS) {
+    buffer.memory_ = VK_NULL_HANDLE;
+    return std::nullopt;
+  }
+  if (vkBindBufferMemory(device->handle(), buffer.buffer_, buffer.memory_, 0) != VK_SUCCESS)
+    return std::nullopt;
+  return result;
+}
+
 Buffer::~Buffer() {
   release();
 }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 
 namespace vdi::gpu {
@@ -54,6 +55,8 @@ class Buffer {
   bool reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes, MemoryKind kind);
 
  private:
+  friend std::optional<struct ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& device,
+                                                               const void* data, std::uint64_t bytes);
   void release() noexcept;
   std::shared_ptr<Device> device_;
   VkBuffer buffer_ = VK_NULL_HANDLE;
@@ -63,6 +66,17 @@ class Buffer {
   VkDeviceAddress address_ = 0;
   std::span<std::byte> mapped_;
 };
+
+/// Memory of the process as the device sees it: `data` starts `offset` bytes into the buffer, which is for
+/// transfers from it alone, and takes whole pages.
+struct ImportedBuffer {
+  Buffer buffer;
+  std::uint64_t offset = 0;
+};
+/// Without a copy (VK_EXT_external_memory_host); nothing if the device can't, whatever the reason. The memory
+/// must stay as long as the buffer does.
+std::optional<ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& device, const void* data,
+                                               std::uint64_t bytes);
 
 /// A sampled 3-D image with one mip level, optimal tiling, and its view. Filled between
 /// Commands::beginUpload and endUpload. Usage: sampled, transfer destination.

@@ -18,8 +18,6 @@ namespace vdi::gpu {
 
 namespace {
 
-constexpr std::uint64_t stagingBytes = 64ULL << 20;
-
 /// Coordinates stay this many texels inside the outermost texel centres, two steps of a filter with 8-bit
 /// weights: nearer, the filter would read texels of the neighbour in the page, if only with weight 0, and NaN
 /// times 0 is NaN.
@@ -27,84 +25,6 @@ constexpr double filterGuard = 2.0 / 256.0;
 
 std::uint64_t volumeOf(const glm::uvec3& extent) {
   return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z;
-}
-
-/// `count` values as texels: the unsigned integer formats shift signed values up, the float format is
-/// relative to the block's range (valueOffset, valueScale) except for f32, which is stored as it is.
-template <typename From, typename To, typename Convert>
-void convertRow(const void* from, std::size_t first, std::size_t count, std::byte* to, Convert convert) {
-  const auto* values = static_cast<const From*>(from) + first;
-  auto* texels = reinterpret_cast<To*>(to);
-  for (std::size_t i = 0; i < count; ++i) texels[i] = convert(values[i]);
-}
-
-void writeRow(const Block& block, VkFormat format, double offset, double scale, std::size_t first,
-              std::size_t count, std::byte* to) {
-  const auto relative = [offset, scale](auto value) {
-    return static_cast<float>((static_cast<double>(value) - offset) / scale);
-  };
-  const bool wide = format == VK_FORMAT_R16_UNORM;
-  using U8 = std::uint8_t;
-  using U16 = std::uint16_t;
-  switch (block.type) {
-    case ScalarType::U8:
-      if (wide) {
-        return convertRow<U8, U16>(block.data, first, count, to,
-                                   [](U8 v) { return static_cast<U16>(v * 257); });
-      }
-      std::memcpy(to, static_cast<const U8*>(block.data) + first, count);
-      return;
-    case ScalarType::I8:
-      if (wide) {
-        return convertRow<std::int8_t, U16>(block.data, first, count, to,
-                                            [](std::int8_t v) { return static_cast<U16>((v + 128) * 257); });
-      }
-      return convertRow<std::int8_t, U8>(block.data, first, count, to,
-                                         [](std::int8_t v) { return static_cast<U8>(v + 128); });
-    case ScalarType::U16:
-      std::memcpy(to, static_cast<const U16*>(block.data) + first, count * 2);
-      return;
-    case ScalarType::I16:
-      return convertRow<std::int16_t, U16>(block.data, first, count, to,
-                                           [](std::int16_t v) { return static_cast<U16>(v + 32768); });
-    case ScalarType::F32:
-      std::memcpy(to, static_cast<const float*>(block.data) + first, count * 4);
-      return;
-    case ScalarType::U32:
-      return convertRow<std::uint32_t, float>(block.data, first, count, to, relative);
-    case ScalarType::I32:
-      return convertRow<std::int32_t, float>(block.data, first, count, to, relative);
-    case ScalarType::F64:
-      return convertRow<double, float>(block.data, first, count, to, relative);
-  }
-}
-
-/// value = texel * scale + offset for the normalised formats and for f32.
-struct ValueMap {
-  double scale = 1.0;
-  double offset = 0.0;
-};
-
-ValueMap valueMapOf(const Block& block) {
-  switch (block.type) {
-    case ScalarType::U8:
-      return {255.0, 0.0};
-    case ScalarType::I8:
-      return {255.0, -128.0};
-    case ScalarType::U16:
-      return {65535.0, 0.0};
-    case ScalarType::I16:
-      return {65535.0, -32768.0};
-    case ScalarType::F32:
-      return {};
-    case ScalarType::U32:
-    case ScalarType::I32:
-    case ScalarType::F64:
-      break;
-  }
-  const ScalarRange range = finiteRange(block);
-  if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0};
-  return {range.max - range.min, range.min};
 }
 
 /// Places boxes of one format into pages: rows of boxes along x, rows beside each other along y, layers on
@@ -148,7 +68,7 @@ class Packer {
 }  // namespace
 
 VolumeStore::VolumeStore(std::shared_ptr<Device> device)
-    : device_(std::move(device)), commands_(device_), cellsPass_(device_) {}
+    : device_(std::move(device)), commands_(device_), upload_(device_), cellsPass_(device_) {}
 
 VkFormat VolumeStore::formatOf(ScalarType type) const {
   switch (sizeOf(type)) {
@@ -162,7 +82,7 @@ VkFormat VolumeStore::formatOf(ScalarType type) const {
 }
 
 /// Pieces overlap by one value, so that each interpolates by itself.
-std::vector<VolumeStore::Piece> VolumeStore::cut(const Block& block) const {
+std::vector<VolumePiece> VolumeStore::cut(const Block& block) const {
   const VkFormat format = formatOf(block.type);
   const std::uint64_t maxTexels = device_->limits().maxAllocationBytes / texelBytes(format) / 2;
   glm::uvec3 largest = glm::min(glm::uvec3(block.dims), glm::uvec3(device_->limits().maxImageDimension3D));
@@ -171,7 +91,7 @@ std::vector<VolumeStore::Piece> VolumeStore::cut(const Block& block) const {
     largest[axis] = (largest[axis] + 1) / 2;
   }
   const ValueMap map = valueMapOf(block);
-  std::vector<Piece> pieces;
+  std::vector<VolumePiece> pieces;
   const glm::ivec3 stride = glm::max(glm::ivec3(largest) - 1, glm::ivec3(1));
   for (int z = 0; z == 0 || z < block.dims.z - 1; z += stride.z) {
     for (int y = 0; y == 0 || y < block.dims.y - 1; y += stride.y) {
@@ -185,10 +105,11 @@ std::vector<VolumeStore::Piece> VolumeStore::cut(const Block& block) const {
   return pieces;
 }
 
-void VolumeStore::pack(std::vector<Piece>& pieces) {
-  const bool sameShapes = pieces.size() == pieces_.size() &&
-                          std::equal(pieces.begin(), pieces.end(), pieces_.begin(),
-                                     [](const Piece& a, const Piece& b) { return a.samePlaceAs(b); });
+void VolumeStore::pack(std::vector<VolumePiece>& pieces) {
+  const bool sameShapes =
+      pieces.size() == pieces_.size() &&
+      std::equal(pieces.begin(), pieces.end(), pieces_.begin(),
+                 [](const VolumePiece& a, const VolumePiece& b) { return a.samePlaceAs(b); });
   if (sameShapes) {
     for (std::size_t i = 0; i < pieces.size(); ++i) {
       pieces[i].page = pieces_[i].page;
@@ -238,60 +159,6 @@ void VolumeStore::pack(std::vector<Piece>& pieces) {
   }
 }
 
-/// Texels of a box of the piece, tightly packed.
-void VolumeStore::writeBox(const Piece& piece, const glm::uvec3& at, const glm::uvec3& box, std::byte* to) {
-  const Block& block = *piece.block;
-  const std::uint64_t rowBytes = box.x * texelBytes(piece.format);
-  const auto blockDims = glm::u64vec3(block.dims);
-  const glm::u64vec3 start = glm::u64vec3(piece.first) + glm::u64vec3(at);
-  for (std::uint32_t z = 0; z < box.z; ++z) {
-    for (std::uint32_t y = 0; y < box.y; ++y) {
-      const std::uint64_t first = ((start.z + z) * blockDims.y + start.y + y) * blockDims.x + start.x;
-      writeRow(block, piece.format, piece.valueOffset, piece.valueScale, first, box.x, to);
-      to += rowBytes;
-    }
-  }
-}
-
-void VolumeStore::upload(std::span<const Piece> pieces) {
-  staging_.reserve(device_, stagingBytes, MemoryKind::Upload);
-  commands_.begin();
-  for (const Image3D& page : pages_) commands_.beginUpload(page);
-  std::uint64_t filled = 0;
-  const auto flush = [&] {
-    commands_.submitAndWait();
-    commands_.begin();
-    filled = 0;
-  };
-  for (const Piece& piece : pieces) {
-    const std::uint64_t bytes = texelBytes(piece.format);
-    const std::uint64_t rowBytes = piece.dims.x * bytes;
-    const std::uint64_t sliceBytes = rowBytes * piece.dims.y;
-    // As many whole slices at a time as the staging buffer has room for, or as many whole rows of one slice.
-    // Vulkan wants offsets in multiples of 4.
-    glm::uvec3 at{0};
-    while (at.z < piece.dims.z) {
-      filled = (filled + 3) / 4 * 4;
-      const bool slices = at.y == 0 && sliceBytes <= staging_.size();
-      if (filled + (slices ? sliceBytes : rowBytes) > staging_.size()) flush();
-      const std::uint64_t room = staging_.size() - filled;
-      glm::uvec3 box{piece.dims.x, piece.dims.y, 1};
-      if (slices) {
-        box.z = static_cast<std::uint32_t>(std::min<std::uint64_t>(piece.dims.z - at.z, room / sliceBytes));
-      } else {
-        box.y = static_cast<std::uint32_t>(std::min<std::uint64_t>(piece.dims.y - at.y, room / rowBytes));
-      }
-      writeBox(piece, at, box, staging_.mapped().data() + filled);
-      commands_.copyToImage(staging_, filled, pages_[piece.page], piece.place + at, box);
-      filled += rowBytes * box.y * box.z;
-      at.y += box.y;
-      if (at.y == piece.dims.y) at = {0, 0, at.z + box.z};
-    }
-  }
-  for (const Image3D& page : pages_) commands_.endUpload(page);
-  commands_.submitAndWait();
-}
-
 void VolumeStore::layBricks(std::span<const Block> blocks, std::span<const PieceRange> piecesOf,
                             const Scene& scene) {
   const glm::dvec3 center = scene.bounds.center();
@@ -299,7 +166,7 @@ void VolumeStore::layBricks(std::span<const Block> blocks, std::span<const Piece
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const Block& block = blocks[i];
     for (std::uint32_t index = piecesOf[i].first; index < piecesOf[i].last; ++index) {
-      const Piece& piece = pieces_[index];
+      const VolumePiece& piece = pieces_[index];
       shared::Brick brick{};
       brick.page = piece.page;
       brick.piece = index;
@@ -345,7 +212,7 @@ void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
   tree_.clear();
   bricks_.clear();
   try {
-    std::vector<Piece> pieces;
+    std::vector<VolumePiece> pieces;
     std::vector<PieceRange> piecesOf;  // of each block
     // Blocks that share their values (the parts of a box with holes) share their pieces.
     std::map<std::tuple<const void*, double, double, double>, PieceRange> known;
@@ -355,7 +222,7 @@ void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
         const std::tuple key(block.data, block.origin.x, block.origin.y, block.origin.z);
         const auto [place, isNew] = known.try_emplace(key);
         if (isNew) {
-          const std::vector<Piece> parts = cut(block);
+          const std::vector<VolumePiece> parts = cut(block);
           place->second.first = static_cast<std::uint32_t>(pieces.size());
           pieces.insert(pieces.end(), parts.begin(), parts.end());
           place->second.last = static_cast<std::uint32_t>(pieces.size());
@@ -366,7 +233,7 @@ void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
     }
     pack(pieces);
     pieces_ = std::move(pieces);
-    if (!pieces_.empty()) upload(pieces_);
+    if (!pieces_.empty()) upload_.run(pieces_, pages_);
     layCells();
     layBricks(blocks, piecesOf, scene);
     if (!table_.entries.empty()) placeTable();
@@ -380,14 +247,14 @@ void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
     ++pagesVersion_;
     throw;
   }
-  for (Piece& piece : pieces_) piece.block = nullptr;  // not ours beyond this call
+  for (VolumePiece& piece : pieces_) piece.block = nullptr;  // not ours beyond this call
 }
 
 /// Macrocells of all pieces, and the ranges of values in them.
 void VolumeStore::layCells() {
   cellPieces_.clear();
   std::uint64_t cells = 0;
-  for (const Piece& piece : pieces_) {
+  for (const VolumePiece& piece : pieces_) {
     shared::CellPiece cellPiece{};
     cellPiece.place = piece.place;
     cellPiece.page = piece.page;
@@ -447,7 +314,7 @@ void VolumeStore::setTable(const TransferTable& table) {
 void VolumeStore::placeTable() {
   const double perScalar = static_cast<double>(table_.entries.size() - 1) / (table_.max - table_.min);
   for (std::size_t i = 0; i < bricks_.size(); ++i) {
-    const Piece& piece = pieces_[pieceOfBrick_[i]];
+    const VolumePiece& piece = pieces_[pieceOfBrick_[i]];
     bricks_[i].tableOrigin = static_cast<float>((table_.min - piece.valueOffset) / piece.valueScale);
     bricks_[i].tableScale = static_cast<float>(piece.valueScale * perScalar);
   }

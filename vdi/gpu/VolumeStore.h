@@ -14,6 +14,7 @@
 #include "vdi/gpu/CellsPass.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/VolumeUpload.h"
 
 namespace vdi::gpu {
 
@@ -46,19 +47,6 @@ class VolumeStore {
   std::uint64_t pagesVersion() const { return pagesVersion_; }
 
  private:
-  /// A box of a block's values that fits one page.
-  struct Piece {
-    const Block* block = nullptr;
-    glm::ivec3 first{0};  // index of its first value in the block
-    glm::uvec3 dims{0};
-    VkFormat format = VK_FORMAT_UNDEFINED;
-    std::uint32_t page = 0;
-    glm::uvec3 place{0};      // in the page, texels
-    double valueScale = 1.0;  // value = texel * valueScale + valueOffset
-    double valueOffset = 0.0;
-    bool samePlaceAs(const Piece& other) const { return dims == other.dims && format == other.format; }
-  };
-
   /// Pieces [first, last) are a block's.
   struct PieceRange {
     std::uint32_t first = 0;
@@ -66,10 +54,8 @@ class VolumeStore {
   };
 
   VkFormat formatOf(ScalarType type) const;
-  std::vector<Piece> cut(const Block& block) const;
-  void pack(std::vector<Piece>& pieces);
-  void upload(std::span<const Piece> pieces);
-  static void writeBox(const Piece& piece, const glm::uvec3& at, const glm::uvec3& box, std::byte* to);
+  std::vector<VolumePiece> cut(const Block& block) const;
+  void pack(std::vector<VolumePiece>& pieces);
   void layBricks(std::span<const Block> blocks, std::span<const PieceRange> piecesOf, const Scene& scene);
   void layCells();
   void placeTable();
@@ -77,10 +63,10 @@ class VolumeStore {
 
   std::shared_ptr<Device> device_;
   Commands commands_;
-  Buffer staging_;
+  VolumeUpload upload_;
   std::vector<Image3D> pages_;
   std::uint64_t pagesVersion_ = 0;
-  std::vector<Piece> pieces_;
+  std::vector<VolumePiece> pieces_;
   std::vector<shared::Brick> bricks_;  // leaves; table fields are filled by placeTable
   std::vector<std::uint32_t> pieceOfBrick_;
   std::vector<shared::KdNode> tree_;
