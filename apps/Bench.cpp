@@ -263,6 +263,7 @@ class Bench {
     made.generate = repeated(options_.repeats, world_.size() > 1, [&] {
       generator_.renderVolume(camera, function, settings_);
       const double volumeMs = deviceMs();
+      if (made.vdi) generator_.recycle(std::move(*made.vdi));
       made.vdi = generator_.generate(camera, function, settings_);
       composites.push_back(
           slowest(generator_.reports(), [](const RankReport& r) { return r.compositeSeconds; }));

@@ -205,6 +205,23 @@ TEST_CASE(
   CHECK(device()->validationMessages() == "");
 }
 
+TEST_CASE("a VDI in the memory of another one, whatever its precision and size were, is the same") {
+  const auto dealt = test::deal("mixing", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  GenerateSettings settings = test::smallSettings(40, 30, 5);
+  const auto vdiOf = [&] { return *generator.generate(test::oblique(), test::threeHues(1.0), settings); };
+  const Vdi first = vdiOf();
+  for (const Precision precision : {Precision::Compact, Precision::Full, Precision::Compact}) {
+    settings = test::smallSettings(60, 50, 9);
+    settings.precision = precision;
+    generator.recycle(vdiOf());
+    settings = test::smallSettings(40, 30, 5);
+    CHECK(vdiOf() == first);
+  }
+}
+
 TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the reference") {
   const auto dealt = test::deal("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
                                 ScalarType::U8, 0, 1);

@@ -49,6 +49,15 @@ float opticalDepthOfCode(std::uint32_t code) {
   return table[code];
 }
 
+float opacityOfCode(std::uint32_t code) {
+  static const std::array<float, 4096> table = [] {
+    std::array<float, 4096> opacities{};
+    for (std::uint32_t i = 0; i < opacities.size(); ++i) opacities[i] = opacityOf(opticalDepthOfCode(i));
+    return opacities;
+  }();
+  return table[code];
+}
+
 float opacityOf(float opticalDepth) {
   constexpr float ln2 = 0.69314718F;
   const float x = opticalDepth * ln2;
@@ -64,7 +73,7 @@ float opticalDepthOf(float opacity) {
 }
 
 Supersegment expanded(const CompactSupersegment& segment, const DepthCode& code) {
-  const float opacity = opacityOf(opticalDepthOfCode(segment.opticalDepth()));
+  const float opacity = opacityOfCode(segment.opticalDepth());
   const auto color = [&](int channel) {
     return static_cast<float>(segment.color(channel)) / 255.0F * opacity;
   };

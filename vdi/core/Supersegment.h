@@ -71,6 +71,8 @@ DepthCode depthCodeFor(const DepthLattice& lattice);
 /// Optical depth of codes 0 .. 4095: 2^-20, and from there on (2^(code * 16 / 4095) - 1) / 16, that is, in
 /// steps of 0.00017 where material is thin and of 0.3 % where it's dense, up to 4096.
 float opticalDepthOfCode(std::uint32_t code);
+/// Of what has that optical depth.
+float opacityOfCode(std::uint32_t code);
 
 /// 1 - 2^-opticalDepth, exact for small arguments too.
 float opacityOf(float opticalDepth);

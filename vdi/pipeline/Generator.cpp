@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cstring>
 #include <type_traits>
+#include <utility>
+#include <variant>
 
 #include "vdi/comm/DirectSend.h"
 #include "vdi/comm/GhostExchange.h"
@@ -108,6 +110,7 @@ struct VdiGenerator::State {
   std::unique_ptr<detail::Compositor> compositor;
   Scene scene;
   ScalarRange range;
+  std::variant<SupersegmentLists, CompactLists> spare;  // for their memory
   RankReport mine;
   std::vector<RankReport> reports;
 
@@ -152,6 +155,12 @@ struct VdiGenerator::State {
     if (any[0] != 0) throw Error(ErrorCode::Cancelled, "stopped on request");
   }
 
+  template <typename Segment>
+  ListsOf<Segment> takeSpare() {
+    auto* lists = std::get_if<ListsOf<Segment>>(&spare);
+    return lists != nullptr ? std::exchange(*lists, {}) : ListsOf<Segment>();
+  }
+
   /// The VDI's lists, on the root; what it is that's sent and stored, Segment says.
   template <typename Segment>
   ListsOf<Segment> makeLists(const Prepared& prepared, const GenerateSettings& settings,
@@ -161,13 +170,15 @@ struct VdiGenerator::State {
     ListsOf<Segment> lists;
     cancellable(progress, 0.8, [&](const detail::RayCaster::Progress& report) {
       lists = caster->lists<Segment>(
-          {scene, prepared.view, prepared.lattice, prepared.table, settings, !alone, false, code}, report);
+          {scene, prepared.view, prepared.lattice, prepared.table, settings, !alone, false, code}, report,
+          takeSpare<Segment>());
     });
     mine.subSupersegments = lists.segments.size();
     mine.generateSeconds = watch.lap();
     noteTimes();
     if (alone) return lists;
     comm::Received<Segment> received = comm::distribute(comm, lists);
+    spare = std::move(lists);
     mine.bytesSent = received.bytesSent;
     mine.distributeSeconds = watch.lap();
     detail::Compositor::Request request{settings.supersegments,
@@ -257,6 +268,10 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
   vdi.bounds = s.scene.bounds;
   vdi.sampleStep = prepared->lattice.step;
   return vdi;
+}
+
+void VdiGenerator::recycle(Vdi&& vdi) {
+  state_->spare = std::move(vdi.lists);
 }
 
 std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,

@@ -69,6 +69,10 @@ class VdiGenerator {
   std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
                               const GenerateSettings& settings, const Progress& progress = {});
 
+  /// Takes a VDI that nobody needs any more, so that the next one of its precision is made in its memory:
+  /// fresh memory costs more than copying to it. Not collective.
+  void recycle(Vdi&& vdi);
+
   /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0.
   /// supersegments and algorithm of the settings are ignored.
   std::optional<Image> renderVolume(const Camera& camera, const TransferFunction& transferFunction,

@@ -80,10 +80,11 @@ float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) 
 }
 
 template <typename Segment>
-ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progress) {
+ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progress, ListsOf<Segment> result) {
   const auto width = static_cast<std::uint32_t>(request.view.width());
   const auto height = static_cast<std::uint32_t>(request.view.height());
-  ListsOf<Segment> result;
+  result.offsets.assign(1, 0);
+  result.segments.clear();
   const bool nothingThere = volume_.empty() || request.lattice.count == 0;
   if (nothingThere) {
     result.offsets.assign(static_cast<std::size_t>(width) * height + 1, 0);
@@ -146,8 +147,8 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
   return result;
 }
 
-template SupersegmentLists RayCaster::lists(const Request&, const Progress&);
-template CompactLists RayCaster::lists(const Request&, const Progress&);
+template SupersegmentLists RayCaster::lists(const Request&, const Progress&, SupersegmentLists);
+template CompactLists RayCaster::lists(const Request&, const Progress&, CompactLists);
 
 Image RayCaster::image(const Request& request, const Progress& progress) {
   const auto width = static_cast<std::uint32_t>(request.view.width());

@@ -41,9 +41,9 @@ class RayCaster {
   /// Called with the share done; returning false ends the work early with what's there.
   using Progress = std::function<bool(double)>;
 
-  /// One list per pixel.
+  /// One list per pixel, in the memory of `result`.
   template <typename Segment>
-  ListsOf<Segment> lists(const Request& request, const Progress& progress);
+  ListsOf<Segment> lists(const Request& request, const Progress& progress, ListsOf<Segment> result = {});
   /// DVR.
   Image image(const Request& request, const Progress& progress);
   /// Of the last of them, without transfers. Of a picture: `all`.

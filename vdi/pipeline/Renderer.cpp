@@ -153,19 +153,37 @@ double VdiRenderer::renderMilliseconds() const {
   return state_->milliseconds;
 }
 
+namespace {
+
+/// `value`: a supersegment as floats.
+template <typename Segment, typename Value>
+void flattenLists(const ListsOf<Segment>& lists, Value value, Image& image) {
+  constexpr float opaque = 0.999999F;
+  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
+    const std::span<const Segment> list = lists.list(i);
+    glm::vec4 sum(0.0F);
+    for (auto segment = list.begin(); segment != list.end() && sum.a < opaque; ++segment) {
+      const Supersegment& s = value(*segment);
+      sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
+    }
+    image.rgba[i] = sum;
+    image.depth[i] = list.empty() ? Image::noDepth : value(list.front()).front;
+  }
+}
+
+}  // namespace
+
 Image flatten(const Vdi& vdi) {
   Image image{vdi.width, vdi.height, {}, {}};
   image.rgba.resize(image.pixelCount());
   image.depth.resize(image.pixelCount());
-  const std::vector<std::uint32_t>& offsets = vdi.offsets();
-  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
-    glm::vec4 sum(0.0F);
-    for (std::size_t j = offsets[i]; j < offsets[i + 1]; ++j) {
-      const Supersegment s = vdi.supersegment(j);
-      sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
-    }
-    image.rgba[i] = sum;
-    image.depth[i] = offsets[i] == offsets[i + 1] ? Image::noDepth : vdi.supersegment(offsets[i]).front;
+  if (const auto* compact = std::get_if<CompactLists>(&vdi.lists)) {
+    flattenLists(
+        *compact, [&](const CompactSupersegment& s) { return expanded(s, vdi.depthCode); }, image);
+  } else {
+    flattenLists(
+        std::get<SupersegmentLists>(vdi.lists),
+        [](const Supersegment& s) -> const Supersegment& { return s; }, image);
   }
   return image;
 }

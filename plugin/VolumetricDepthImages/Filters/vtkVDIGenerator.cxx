@@ -134,7 +134,8 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
     info->Get(Pipeline::WHOLE_EXTENT(), whole);
     info->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
   } else {
-    info->Remove(Pipeline::UPDATE_EXTENT());  // the picture's, of which a composite's sources would be asked for
+    info->Remove(
+        Pipeline::UPDATE_EXTENT());  // the picture's, of which a composite's sources would be asked for
   }
   return 1;
 }
@@ -257,6 +258,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
     vdi->time = time;
     vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));
     pv::setVdi(output, *vdi);
+    generator.recycle(std::move(*vdi));
   }
   output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
 }
