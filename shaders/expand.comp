@@ -47,6 +47,15 @@ void maskTile(ivec2 tile, uint index) {
   push.tileMasks.at[index] = mask;
 }
 
+void maskLargeTile(ivec2 largeTile, ivec2 tiles, uint index) {
+  uint mask = 0u;
+  ivec2 end = min((largeTile + 1) * (renderLargeTile / renderTile), tiles);
+  for (int y = largeTile.y * (renderLargeTile / renderTile); y < end.y; ++y) {
+    for (int x = largeTile.x * (renderLargeTile / renderTile); x < end.x; ++x) mask |= push.tileMasks.at[uint(y * tiles.x + x)];
+  }
+  push.tileMasks.at[index] = mask;
+}
+
 void main() {
   uint i = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * expandGroup;
   if (push.mode == expandModeSegments) {
@@ -56,6 +65,12 @@ void main() {
     if (i <= listCount) maskList(i, listCount);
   } else {
     ivec2 tiles = (push.lists + renderTile - 1) / renderTile;
-    if (i < uint(tiles.x * tiles.y)) maskTile(ivec2(int(i) % tiles.x, int(i) / tiles.x), i);
+    ivec2 largeTiles = (push.lists + renderLargeTile - 1) / renderLargeTile;
+    uint count = uint(tiles.x * tiles.y);
+    if (push.mode == expandModeTiles) {
+      if (i < count) maskTile(ivec2(int(i) % tiles.x, int(i) / tiles.x), i);
+    } else if (i < uint(largeTiles.x * largeTiles.y)) {
+      maskLargeTile(ivec2(int(i) % largeTiles.x, int(i) / largeTiles.x), tiles, count + i);
+    }
   }
 }

@@ -139,6 +139,21 @@ float tAt(PictureLine line, float s) {
   return line.t.x + (line.t.y - line.t.x) * (s * line.depth.x) / mix(line.depth.y, line.depth.x, s);
 }
 
+// Likewise, where the line is between two s.
+uint rayBetween(PictureLine line, float enterS, float leaveS) {
+  return maskBetween(depthAt(tAt(line, enterS)), depthAt(tAt(line, leaveS)));
+}
+
+// Tiles of both sizes are in one array, the large ones behind.
+int tileIndex(int size, ivec2 pixel) {
+  ivec2 lists = push.params.value.lists;
+  ivec2 tile = pixel / size;
+  int tilesAcross = (lists.x + size - 1) / size;
+  int first = 0;
+  if (size == renderLargeTile) first = ((lists.x + renderTile - 1) / renderTile) * ((lists.y + renderTile - 1) / renderTile);
+  return first + tile.y * tilesAcross + tile.x;
+}
+
 #include "walk_lists.glsl"
 #include "walk_smoothly.glsl"
 

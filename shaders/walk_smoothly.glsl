@@ -57,83 +57,119 @@ void lookAlongLists(PictureLine line) {
   accumulate(blendLight, blendDepth);
 }
 
-void walkSmoothly(PictureLine line) {
+// The line as the walk sees it: along the axis that it crosses more of, "columns", and across it, "rows".
+struct ColumnLine {
+  bool byColumns;  // of lists; else columns are rows of these
+  float start;
+  float extent;
+  float inverse;
+  float startAcross;
+  float extentAcross;
+  float inverseAcross;
+  int lastColumn;  // of the line
+  int ahead;       // 1 if columns ascend
+};
+
+// Where the line leaves the tile of `size` columns and rows that it's in from `enterS` on, in `column` and `row`: s, at most
+// 1, and the column.
+struct TileExit {
+  float s;
+  int column;
+};
+
+TileExit tileExit(ColumnLine line, int size, int column, int row, float enterS) {
+  int tile = column / size;
+  bool ends = line.lastColumn / size == tile;
+  int edge = (tile + line.ahead) * size;
+  float sAlong = ends ? 1.0 : (float(edge) - line.start) * line.inverse;
+  int edgeAcross = (row / size + (line.extentAcross > 0.0 ? 1 : 0)) * size;
+  float sAcross = line.extentAcross == 0.0 ? 1.0 : (float(edgeAcross) - line.startAcross) * line.inverseAcross;
+  float s = clamp(min(sAlong, sAcross), enterS, 1.0);
+  int there = edge + line.ahead - 1;
+  if (ends || sAcross < sAlong) {
+    there = clamp(int(floor(line.start + s * line.extent)), max(tile * size, min(column, line.lastColumn)),
+                  min(tile * size + size - 1, max(column, line.lastColumn)));
+  }
+  return TileExit(s, there);
+}
+
+int tileIndex(ColumnLine line, int size, int column, int row) {
+  return tileIndex(size, line.byColumns ? ivec2(column, row) : ivec2(row, column));
+}
+
+void walkSmoothly(PictureLine picture) {
   ivec2 lists = push.params.value.lists;
-  vec2 whole = line.end - line.start;
+  vec2 whole = picture.end - picture.start;
   if (max(abs(whole.x), abs(whole.y)) < 1.0) {
-    lookAlongLists(line);
+    lookAlongLists(picture);
     return;
   }
-  bool byColumns = 1.001 * abs(whole.x) >= abs(whole.y);
-  float start = byColumns ? line.start.x : line.start.y;
-  float extent = byColumns ? whole.x : whole.y;
-  float inverse = byColumns ? line.inverseDelta.x : line.inverseDelta.y;
-  float startAcross = byColumns ? line.start.y : line.start.x;
-  float inverseAcross = byColumns ? line.inverseDelta.y : line.inverseDelta.x;
-  float extentAcross = byColumns ? whole.y : whole.x;
-  int lastColumn = (byColumns ? lists.x : lists.y) - 1;
-  int lastAcross = (byColumns ? lists.y : lists.x) - 1;
-  int stride = byColumns ? 1 : lists.x;
-  int strideAcross = byColumns ? lists.x : 1;
-  int tilesAcross = (lists.x + renderTile - 1) / renderTile;
-  int column = clamp(int(floor(start)), 0, lastColumn);
-  int last = clamp(int(floor(start + extent)), 0, lastColumn);
-  int direction = last > column ? 1 : -1;
-  int ahead = max(direction, 0);
-  int aheadAcross = extentAcross > 0.0 ? 1 : 0;
+  ColumnLine line;
+  line.byColumns = 1.001 * abs(whole.x) >= abs(whole.y);
+  line.start = line.byColumns ? picture.start.x : picture.start.y;
+  line.extent = line.byColumns ? whole.x : whole.y;
+  line.inverse = line.byColumns ? picture.inverseDelta.x : picture.inverseDelta.y;
+  line.startAcross = line.byColumns ? picture.start.y : picture.start.x;
+  line.extentAcross = line.byColumns ? whole.y : whole.x;
+  line.inverseAcross = line.byColumns ? picture.inverseDelta.y : picture.inverseDelta.x;
+  int mostColumn = (line.byColumns ? lists.x : lists.y) - 1;
+  int mostAcross = (line.byColumns ? lists.y : lists.x) - 1;
+  int stride = line.byColumns ? 1 : lists.x;
+  int strideAcross = line.byColumns ? lists.x : 1;
+  int column = clamp(int(floor(line.start)), 0, mostColumn);
+  line.lastColumn = clamp(int(floor(line.start + line.extent)), 0, mostColumn);
+  int direction = line.lastColumn > column ? 1 : -1;
+  line.ahead = max(direction, 0);
   float enterS = 0.0;
-  float enterT = line.t.x;  // where s is knownS
+  float enterT = picture.t.x;  // where s is knownS
   float knownS = 0.0;
   int knownTile = -1;
+  int knownLargeTile = -1;
   uint tileRay = 0u;  // depths that the ray is in, in columns that start in the tile
   uint nearHint = 0u;
   uint nextHint = 0u;
-  int most = abs(last - column) + 1;
+  // Every turn passes a column.
+  int most = abs(line.lastColumn - column) + 1;
   for (int i = 0; i < most; ++i) {
-    int row = clamp(int(floor(startAcross + enterS * extentAcross)), 0, lastAcross);
-    int tileAlong = column / renderTile;
-    int tileRow = row / renderTile;
-    int tile = byColumns ? tileRow * tilesAcross + tileAlong : tileAlong * tilesAcross + tileRow;
+    // Columns that lie in a tile without material along the ray are left out, those of a large tile at once. A tile's mask
+    // has its neighbours' outermost lists in it.
+    int row = clamp(int(floor(line.startAcross + enterS * line.extentAcross)), 0, mostAcross);
+    int tile = tileIndex(line, renderTile, column, row);
     if (tile != knownTile) {
-      // Columns that lie in a tile without material along the ray are left out. A tile's mask has its neighbours' outermost
-      // lists in it.
       knownTile = tile;
-      bool ends = last / renderTile == tileAlong;
-      int edge = (tileAlong + ahead) * renderTile;
-      float sAlong = ends ? 1.0 : (float(edge) - start) * inverse;
-      float edgeAcross = float((tileRow + aheadAcross) * renderTile);
-      float sAcross = extentAcross == 0.0 ? 1.0 : (edgeAcross - startAcross) * inverseAcross;
-      float leaveS = clamp(min(sAlong, sAcross), enterS, 1.0);
-      tileRay = maskBetween(depthAt(tAt(line, enterS)), depthAt(tAt(line, min(leaveS + abs(inverse), 1.0))));
-      if ((push.params.value.tileMasks.at[tile] & tileRay) == 0u) {
-        if (leaveS >= 1.0) return;
-        int there = edge + ahead - 1;
-        if (ends || sAcross < sAlong) {
-          there = clamp(int(floor(start + leaveS * extent)), max(tileAlong * renderTile, min(column, last)),
-                        min(tileAlong * renderTile + renderTile - 1, max(column, last)));
-        }
-        if (there != column) {
-          column = there;
-          enterS = clamp((float(column + 1 - ahead) - start) * inverse, enterS, 1.0);
-          continue;
-        }
+      TileExit leave = tileExit(line, renderTile, column, row, enterS);
+      tileRay = rayBetween(picture, enterS, min(leave.s + abs(line.inverse), 1.0));
+      bool passes = (push.params.value.tileMasks.at[tile] & tileRay) == 0u;
+      int largeTile = tileIndex(line, renderLargeTile, column, row);
+      if (passes && largeTile != knownLargeTile) {
+        knownLargeTile = largeTile;
+        TileExit leaveLarge = tileExit(line, renderLargeTile, column, row, enterS);
+        if ((push.params.value.tileMasks.at[largeTile] & rayBetween(picture, enterS, leaveLarge.s)) == 0u) leave = leaveLarge;
+      }
+      if (passes && leave.s >= 1.0) return;
+      if (passes && leave.column != column) {
+        column = leave.column;
+        enterS = clamp((float(column + 1 - line.ahead) - line.start) * line.inverse, enterS, 1.0);
+        continue;
       }
     }
-    float leaveS = column == last ? 1.0 : clamp((float(column + ahead) - start) * inverse, enterS, 1.0);
-    float centre = startAcross + 0.5 * (enterS + leaveS) * extentAcross - 0.5;
+    float leaveS = column == line.lastColumn
+                       ? 1.0
+                       : clamp((float(column + line.ahead) - line.start) * line.inverse, enterS, 1.0);
+    float centre = line.startAcross + 0.5 * (enterS + leaveS) * line.extentAcross - 0.5;
     float share = shareOfNext(centre);
-    int near = clamp(int(floor(centre)), 0, lastAcross);
-    int next = clamp(int(floor(centre)) + 1, 0, lastAcross);
+    int near = clamp(int(floor(centre)), 0, mostAcross);
+    int next = clamp(int(floor(centre)) + 1, 0, mostAcross);
     uint nearList = uint(column * stride + near * strideAcross);
     uint nextList = uint(column * stride + next * strideAcross);
     uvec2 nearHead = push.params.value.heads.at[nearList];
     uvec2 nextHead = push.params.value.heads.at[nextList];
     if (((nearHead.y | nextHead.y) & tileRay) != 0u) {
-      if (knownS != enterS) enterT = tAt(line, enterS);
-      BlendPart part = blendPart(vec2(enterT, tAt(line, leaveS)));
+      if (knownS != enterS) enterT = tAt(picture, enterS);
+      BlendPart part = blendPart(vec2(enterT, tAt(picture, leaveS)));
       if (part.t.y > part.t.x) {
-        ivec2 nearPixel = byColumns ? ivec2(column, near) : ivec2(near, column);
-        ivec2 nextPixel = byColumns ? ivec2(column, next) : ivec2(next, column);
+        ivec2 nearPixel = line.byColumns ? ivec2(column, near) : ivec2(near, column);
+        ivec2 nextPixel = line.byColumns ? ivec2(column, next) : ivec2(next, column);
         beginBlend();
         blendList(nearPixel, nearList, nearHead, 1.0 - share, part, nearHint);
         blendList(nextPixel, nextList, nextHead, share, part, nextHint);
@@ -143,7 +179,7 @@ void walkSmoothly(PictureLine line) {
       enterT = part.t.y;
       knownS = leaveS;
     }
-    if (column == last) return;
+    if (column == line.lastColumn) return;
     column += direction;
     enterS = leaveS;
   }

@@ -12,7 +12,9 @@ inline constexpr uint expandGroup = 64;
 inline constexpr uint expandModeSegments = 0;
 inline constexpr uint expandModeMasks = 1;
 inline constexpr uint expandModeTiles = 2;
+inline constexpr uint expandModeLargeTiles = 3;
 inline constexpr int renderTile = 8;
+inline constexpr int renderLargeTile = 64;
 #else
 const uint renderGroupX = 8;
 const uint renderGroupY = 8;
@@ -20,7 +22,9 @@ const uint expandGroup = 64;
 const uint expandModeSegments = 0;  // one invocation a supersegment; of a VDI of full precision
 const uint expandModeMasks = 1;     // one a list, and one behind the last
 const uint expandModeTiles = 2;     // one a tile
-const int renderTile = 8;           // lists per side of a tile
+const uint expandModeLargeTiles = 3;  // one a large tile
+const int renderTile = 8;             // lists per side of a tile
+const int renderLargeTile = 64;       // a multiple of that
 #endif
 
 // A supersegment of a VDI of full precision as rendering wants it, in 16 bytes: depths, straight colour and optical depth over the whole interval, the
@@ -43,13 +47,14 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) buffer ListHeads { 
 VDI_SHARED_BEGIN
 
 // What's where, for skipping empty space: bit b of a mask tells whether there is material in the b-th of 32 equal parts of
-// the VDI's depth range; a mask a list, and one a tile of 8 x 8 lists.
+// the VDI's depth range; a mask a list, one a tile of 8 x 8 lists, and one a large
+// tile of 64 x 64.
 struct ExpandConstants {
   VDI_ADDRESS(UintArray) offsets;                // [lists + 1]
   VDI_ADDRESS(SegmentArray) from;                // compact, as generated: a part of the supersegments
   VDI_ADDRESS(RenderSegmentArray) segments;      // all; CompactArray of a compact VDI
   VDI_ADDRESS(ListHeads) heads;                  // [lists + 1]
-  VDI_ADDRESS(UintArray) tileMasks;              // [tiles.y][tiles.x]
+  VDI_ADDRESS(UintArray) tileMasks;              // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
   uint mode;
   uint first;  // supersegment that `from` starts with
   uint count;  // supersegments of `from`

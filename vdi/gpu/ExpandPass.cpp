@@ -13,17 +13,23 @@ ComputePipelineInfo pipelineInfo() {
   return info;
 }
 
+std::uint64_t tilesOf(const glm::ivec2& lists, int size) {
+  const glm::ivec2 tiles = (lists + size - 1) / size;
+  return static_cast<std::uint64_t>(tiles.x) * static_cast<std::uint64_t>(tiles.y);
+}
+
 std::uint64_t invocations(const shared::ExpandConstants& constants) {
   if (constants.mode == shared::expandModeSegments) return constants.count;
-  if (constants.mode == shared::expandModeTiles) return tileCount(constants.lists);
+  if (constants.mode == shared::expandModeTiles) return tilesOf(constants.lists, shared::renderTile);
+  if (constants.mode == shared::expandModeLargeTiles)
+    return tilesOf(constants.lists, shared::renderLargeTile);
   return static_cast<std::uint64_t>(constants.lists.x) * static_cast<std::uint64_t>(constants.lists.y) + 1;
 }
 
 }  // namespace
 
 std::uint64_t tileCount(const glm::ivec2& lists) {
-  const glm::ivec2 tiles = (lists + shared::renderTile - 1) / shared::renderTile;
-  return static_cast<std::uint64_t>(tiles.x) * static_cast<std::uint64_t>(tiles.y);
+  return tilesOf(lists, shared::renderTile) + tilesOf(lists, shared::renderLargeTile);
 }
 
 ExpandPass::ExpandPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}

@@ -19,7 +19,7 @@ class ExpandPass {
   PipelineSet pipelines_;  // by precision
 };
 
-/// Tiles of renderTile x renderTile lists.
+/// Small and large tiles.
 std::uint64_t tileCount(const glm::ivec2& lists);
 
 }  // namespace vdi::gpu

@@ -17,6 +17,9 @@ constexpr std::uint64_t stagingBytes = 32ULL << 20;  // each of the two
 /// Below that, importing memory takes longer than copying it.
 constexpr std::uint64_t leastImport = 1ULL << 20;
 
+/// Each takes one of the allocations that a device may have at a time, 4096 or more.
+constexpr std::size_t mostImports = 256;
+
 /// `count` values as texels: the unsigned integer formats shift signed values up, the float format is
 /// relative to the block's range (valueOffset, valueScale) except for f32, which is stored as it is.
 template <typename From, typename To, typename Convert>
@@ -141,7 +144,7 @@ bool VolumeUpload::copyDirectly(const VolumePiece& piece, const Image3D& page,
   const std::uint64_t first = ((at.z * dims.y + at.y) * dims.x + at.x) * bytes;
   const glm::u64vec3 last = at + glm::u64vec3(piece.dims) - std::uint64_t{1};
   const std::uint64_t end = ((last.z * dims.y + last.y) * dims.x + last.x + 1) * bytes;
-  if (!isTexels(piece) || end - first < leastImport) return false;
+  if (!isTexels(piece) || end - first < leastImport || imported.size() == mostImports) return false;
   std::optional<ImportedBuffer> source =
       importHostMemory(device_, static_cast<const std::byte*>(block.data) + first, end - first);
   if (!source || source->offset % bytes != 0) return false;

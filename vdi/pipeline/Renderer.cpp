@@ -95,6 +95,9 @@ struct VdiRenderer::State {
     commands.barrier();
     constants.mode = shared::expandModeTiles;
     expand.record(commands, constants);
+    commands.barrier();
+    constants.mode = shared::expandModeLargeTiles;
+    expand.record(commands, constants);
     commands.submitAndWait();
   }
 };
