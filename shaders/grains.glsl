@@ -134,10 +134,12 @@ void walkForGrains() {
   walk();
 }
 
-// Twin of supersegmentsAt in vdi/core/Budget.h.
-uint interpolatedCount(float level, uint countBelow, uint countAbove) {
+// Twins of roundingOf and supersegmentsAt in vdi/core/Budget.h.
+float roundingOf(uint index) { return float((index * 0x9E3779B1u) >> 8) * 5.9604644775390625e-8; }
+
+uint interpolatedCount(float level, uint countBelow, uint countAbove, float rounding) {
   float share = level - float(min(uint(level), surveyLevels - 2u));
-  return max(uint(float(countBelow) + share * (float(countAbove) - float(countBelow)) + 0.5), 1u);
+  return max(uint(float(countBelow) + share * (float(countAbove) - float(countBelow)) + rounding), 1u);
 }
 
 // What the list would hold at a level of the survey, if anything. Twin of supersegmentsAtLevel.
@@ -151,7 +153,7 @@ uint budgetOfList() {
   float level = push.params.value.level;
   if (level < 0.0) return push.params.value.budget;
   uint below = min(uint(level), surveyLevels - 2u);
-  return interpolatedCount(level, supersegmentsAtLevel(below), supersegmentsAtLevel(below + 1u));
+  return interpolatedCount(level, supersegmentsAtLevel(below), supersegmentsAtLevel(below + 1u), 0.5);
 }
 
 struct CountedGrains {
@@ -212,7 +214,7 @@ void writeGrains() {
   uint most = max(push.params.value.budget, grainsCutAtGaps ? grainsRuns : 1u);
   if (writesByNeed) {
     most = interpolatedCount(push.params.value.level, min(grainCount[1], push.params.value.mostPerList),
-                             min(grainCount[2], push.params.value.mostPerList));
+                             min(grainCount[2], push.params.value.mostPerList), roundingOf(listIndex));
   }
   push.params.value.written.at[listIndex] = written;
   push.params.value.left.at[listIndex] = min(written, most);

@@ -176,10 +176,13 @@ TEST_CASE("the level of a survey: where lists hold the wanted total") {
   CHECK(twice.levelFor(0.3) == survey.levelFor(0.3));
   CHECK(Survey().levelFor(1.0) == 0.0F);
   const auto countAt = [](std::size_t level) { return std::array{40, 30, 20, 15, 12, 9, 6, 3, 2, 1}[level]; };
-  CHECK(supersegmentsAt(0.0F, countAt) == 40);
-  CHECK(supersegmentsAt(1.5F, countAt) == 25);
-  CHECK(supersegmentsAt(9.0F, countAt) == 1);
-  CHECK(supersegmentsAt(8.9F, countAt) == 1);
+  CHECK(supersegmentsAt(0.0F, 0.5F, countAt) == 40);
+  CHECK(supersegmentsAt(1.5F, 0.5F, countAt) == 25);
+  CHECK(supersegmentsAt(9.0F, 0.5F, countAt) == 1);
+  CHECK(supersegmentsAt(8.9F, 0.5F, countAt) == 1);
+  double sum = 0.0;
+  for (std::uint32_t i = 0; i < 1000; ++i) sum += supersegmentsAt(5.25F, roundingOf(i), countAt);
+  CHECK(sum / 1000.0 == Approx(8.25).epsilon(0.01));
 }
 
 TEST_CASE("budgets and fills that can't be are refused") {

@@ -106,7 +106,7 @@ TEST_CASE(
                                 ScalarType::F32, world.rank(), world.size());
   VdiGenerator generator(device(), comm::Communicator::world());
   generator.setBlocks(dealt.mine);
-  GenerateSettings settings = test::smallSettings(61, 45, 12);
+  GenerateSettings settings = test::smallSettings(61, 45, 5);
   const auto truth = generator.renderVolume(test::oblique(), test::threeHues(0.8), settings);
   const auto equal = generator.generate(test::oblique(), test::threeHues(0.8), settings);
   for (const double fill : {1.0, 0.6}) {

@@ -10,9 +10,9 @@
 namespace vdi {
 
 enum class Budget : std::uint32_t {
-  List = 0,   // N_S each, as in the paper
-  Total = 1,  // in all as many as with N_S each; lists where much changes get more, up to mostPerList, others
-              // less
+  List = 0,  // up to N_S each, as in the paper
+  /// In all as many as with N_S each: lists where much changes get more, up to mostPerList, others less.
+  Total = 1,
 };
 
 const char* toString(Budget budget);  // "list", "total"
@@ -46,14 +46,20 @@ struct Survey {
   float levelFor(double fill) const;
 };
 
+/// What's added before a list's number is rounded down, in [0, 1): alike lists would otherwise all be rounded
+/// the same way, and their sum would be off. `index`: of the list.
+constexpr float roundingOf(std::uint32_t index) {
+  return static_cast<float>((index * 0x9E3779B1U) >> 8U) * 0x1p-24F;
+}
+
 /// What a list gets at a level in [0, Survey::levels - 1]; `countAt(k)` says what it would hold at level k.
 template <typename CountAt>
-std::uint32_t supersegmentsAt(float level, CountAt countAt) {
+std::uint32_t supersegmentsAt(float level, float rounding, CountAt countAt) {
   const auto below = std::min(static_cast<std::size_t>(level), Survey::levels - 2);
   const float share = level - static_cast<float>(below);
   const auto a = static_cast<float>(countAt(below));
   const auto b = static_cast<float>(countAt(below + 1));
-  return std::max(static_cast<std::uint32_t>(a + share * (b - a) + 0.5F), 1U);
+  return std::max(static_cast<std::uint32_t>(a + share * (b - a) + rounding), 1U);
 }
 
 }  // namespace vdi

@@ -225,9 +225,11 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
     const int right = after(x, width);
     const int below = before(y);
     const int above = after(y, height);
+    SegmentRules own = rules;
+    own.rounding = roundingOf(static_cast<std::uint32_t>(y * width + x));
     const Allotment counted[] = {allotmentAt(left, below), allotmentAt(right, below),
                                  allotmentAt(left, above), allotmentAt(right, above)};
-    return segmentByMerging(samples, rules, allotmentBetween(counted));
+    return segmentByMerging(samples, own, allotmentBetween(counted));
   };
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -266,6 +268,7 @@ SupersegmentLists composite(std::span<const SupersegmentLists> subLists, const G
   }
   SupersegmentLists result;
   for (std::size_t i = 0; i < listCount; ++i) {
+    rules.rounding = roundingOf(static_cast<std::uint32_t>(i));
     const auto list = segment(mergedList(subLists, i), rules, settings.algorithm);
     result.segments.insert(result.segments.end(), list.begin(), list.end());
     result.offsets.push_back(static_cast<std::uint32_t>(result.segments.size()));

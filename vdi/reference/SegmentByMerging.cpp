@@ -210,10 +210,12 @@ std::size_t supersegmentsAtLevel(std::span<const Interval> intervals, const Segm
 }
 
 /// What a list that isn't empty may hold, but for runs.
-std::size_t budgetOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce) {
+std::size_t budgetOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce,
+                     float rounding) {
   if (rules.level < 0.0F) return rules.budget;
-  return supersegmentsAt(
-      rules.level, [&](std::size_t level) { return supersegmentsAtLevel(intervals, rules, atOnce, level); });
+  return supersegmentsAt(rules.level, rounding, [&](std::size_t level) {
+    return supersegmentsAtLevel(intervals, rules, atOnce, level);
+  });
 }
 
 }  // namespace
@@ -230,7 +232,7 @@ Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& r
   const std::size_t visible = visibleSamples(intervals, atOnce);
   if (visible == 0) return {};
   const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
-  const std::size_t budget = budgetOf(intervals, rules, atOnce);
+  const std::size_t budget = budgetOf(intervals, rules, atOnce, 0.5F);
   const std::size_t most = std::max(budget, runs);
   float tolerance = -1.0F;
   std::size_t count = visible;
@@ -269,7 +271,7 @@ std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, 
   std::vector<Grain> grains;
   if (allotment.room > 0) grains = grainsOf(intervals, allotment.tolerance, rules, allotment.room);
   const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
-  mergeCheapest(grains, std::max(budgetOf(intervals, rules, 1), runs), rules.sampleStep);
+  mergeCheapest(grains, std::max(budgetOf(intervals, rules, 1, rules.rounding), runs), rules.sampleStep);
   std::vector<Supersegment> list;
   list.reserve(grains.size());
   for (const Grain& g : grains)

@@ -33,6 +33,7 @@ struct SegmentRules {
   /// Of a Survey: each list holds what it needs at that level, up to twice the budget (Budget::Total), by
   /// merging. Negative: each may hold `budget`. Not with cutAtGaps.
   float level = -1.0F;
+  float rounding = 0.5F;  // with a level: roundingOf the list
 };
 
 /// Segments for one sensitivity (Eq. 1). Two sides are compared by their premultiplied colour *and* opacity,
