@@ -232,18 +232,34 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the refe
   const auto vdi = generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
   VdiRenderer renderer(device());
   renderer.setVdi(*vdi);
+  std::vector<Camera> cameras;
   for (const double angle : {2.0, 20.0, 70.0, 160.0, 290.0}) {
+    cameras.push_back(camera.azimuth(angle));
+    cameras.back().viewUp += 0.2 * glm::dvec3(1.0, 0.0, 0.5);
+  }
+  // From within the scene, outwards and back to V_O; and by the other projection.
+  Camera inside = camera;
+  inside.position = camera.focalPoint + glm::dvec3(0.1, 0.05, -0.1);
+  inside.focalPoint = camera.focalPoint + glm::dvec3(0.6, -0.1, 0.3);
+  inside.parallelProjection = false;
+  cameras.push_back(inside);
+  inside.focalPoint = camera.position;
+  cameras.push_back(inside);
+  cameras.push_back(test::oblique(!parallel).azimuth(15.0));
+  std::size_t seenFrom = 0;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
     for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
-      INFO(angle << " degrees, " << toString(reconstruction) << ", parallel " << parallel);
-      Camera other = camera.azimuth(angle);
-      other.viewUp += 0.2 * glm::dvec3(1.0, 0.0, 0.5);
-      const Image seen = renderer.render(other, 65, 47, reconstruction);
-      const Image expected = reference::render(*vdi, View(other, 65, 47), reconstruction);
-      CHECK(std::any_of(expected.rgba.begin(), expected.rgba.end(),
-                        [](const glm::vec4& c) { return c.a > 0.1F; }));
+      INFO("camera " << i << ", " << toString(reconstruction) << ", parallel " << parallel);
+      const Image seen = renderer.render(cameras[i], 65, 47, reconstruction);
+      const Image expected = reference::render(*vdi, View(cameras[i], 65, 47), reconstruction);
+      seenFrom += std::any_of(expected.rgba.begin(), expected.rgba.end(),
+                              [](const glm::vec4& c) { return c.a > 0.1F; })
+                      ? 1
+                      : 0;
       CHECK(largestDifference(seen, expected) < 2.0F);
     }
   }
+  CHECK(seenFrom >= 2 * (cameras.size() - 1));
 }
 
 TEST_CASE("merging and compositing on the device equal the reference") {
