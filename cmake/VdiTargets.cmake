@@ -51,14 +51,15 @@ endfunction()
 
 # The environment that every test needs: mpirun as root in a container, no interference between ranks on few cores.
 # vdi_virtual_screen(<variable>): a command prefix that gives what follows an X server. Each has a number of its own to start
-# from: a server that is still ending takes the next one's socket away if that has the same number.
+# from: a server that is still ending takes the next one's socket away if that has the same number. And none starts anew when
+# its last client has left (-noreset): another rank that comes just then would find no server.
 function(vdi_virtual_screen variable)
   find_program(XVFB_RUN xvfb-run REQUIRED)
   get_property(screens GLOBAL PROPERTY VDI_VIRTUAL_SCREENS)
   math(EXPR screens "${screens} + 1")
   set_property(GLOBAL PROPERTY VDI_VIRTUAL_SCREENS ${screens})
   math(EXPR number "200 + 10 * ${screens}")
-  set(${variable} "${XVFB_RUN}" -a -n ${number} PARENT_SCOPE)
+  set(${variable} "${XVFB_RUN}" -a -n ${number} -s "-screen 0 1280x1024x24 -noreset" PARENT_SCOPE)
 endfunction()
 
 function(vdi_test_properties test)
