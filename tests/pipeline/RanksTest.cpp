@@ -128,10 +128,13 @@ TEST_CASE("tiny pictures: more ranks than rows and pixels") {
   VdiGenerator generator(device(), comm::Communicator::world());
   generator.setBlocks(dealt.mine);
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(3, 1), std::pair(1, 2)}) {
-    for (const std::uint32_t budget : {1U, 7U}) {
-      const auto vdi = generator.generate(test::oblique(), test::threeHues(1.0),
-                                          test::smallSettings(width, height, budget));
-      if (world.rank() == 0) CHECK_NOTHROW(validate(*vdi));
+    for (const std::uint32_t supersegments : {1U, 7U}) {
+      for (const Budget budget : {Budget::List, Budget::Total}) {
+        GenerateSettings settings = test::smallSettings(width, height, supersegments);
+        settings.budget = budget;
+        const auto vdi = generator.generate(test::oblique(), test::threeHues(1.0), settings);
+        if (world.rank() == 0) CHECK_NOTHROW(validate(*vdi));
+      }
     }
   }
 }

@@ -151,17 +151,21 @@ TEST_CASE("scales of 1e-9 and 1e9 give the picture of scale 1") {
 
 namespace {
 
-/// All algorithms and precisions: at most the budget, and from V_O the volume's own picture. From the side:
-/// as much light as the volume's picture has, to a few per cent.
+/// All algorithms, budgets and precisions: at most the budget, and from V_O the volume's own picture. From
+/// the side: as much light as the volume's picture has, to a few per cent.
 void demandFaithful(VdiGenerator& generator, const Camera& camera, const TransferFunction& function,
                     GenerateSettings settings) {
   const auto volume = generator.renderVolume(camera, function, settings);
   const auto side = generator.renderVolume(camera.azimuth(20.0), function, settings);
   CHECK(highestOpacity(*volume) > 0.2F);
-  for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
+  const std::pair<Algorithm, Budget> kinds[] = {{Algorithm::Merge, Budget::List},
+                                                {Algorithm::Merge, Budget::Total},
+                                                {Algorithm::Bisection, Budget::List}};
+  for (const auto& [algorithm, budget] : kinds) {
     for (const Precision precision : {Precision::Compact, Precision::Full}) {
-      INFO(toString(algorithm) << ", " << toString(precision));
+      INFO(toString(algorithm) << ", " << toString(budget) << ", " << toString(precision));
       settings.algorithm = algorithm;
+      settings.budget = budget;
       settings.precision = precision;
       const auto vdi = generator.generate(camera, function, settings);
       CHECK_NOTHROW(validate(*vdi));
