@@ -178,7 +178,7 @@ struct VdiGenerator::State {
     noteTimes();
     if (alone) return lists;
     comm::Received<Segment> received = comm::distribute(comm, lists);
-    spare = std::move(lists);
+    spare = std::exchange(lists, {});
     mine.bytesSent = received.bytesSent;
     mine.distributeSeconds = watch.lap();
     detail::Compositor::Request request{settings.supersegments,
