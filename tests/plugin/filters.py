@@ -80,7 +80,7 @@ def supersegments(vdi):
 share = supersegments(by_need).sum() / supersegments(equal_share).sum()
 check(0.4 < share < 0.6, "which makes half of the supersegments, %.2f" % share)
 check(len(np.unique(supersegments(by_need))) > 3, "lists hold as many as they need")
-full = vdi_of(wavelet, Precision="Full")
+full = vdi_of(wavelet, Precision="Full", TerminationOpacity=0.9999)  # as PictureOnly ends its rays
 check(np.array_equal(picture(full), volume), "full precision gives the same picture to the bit")
 check(picture(with_camera(simple.RenderVDI(Input=full))).max() > 60, "a VDI of full precision is rendered")
 rendered = {

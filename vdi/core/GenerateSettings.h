@@ -19,6 +19,9 @@ const char* toString(Algorithm algorithm);  // "bisection", "merge"
 /// Throws Error{InvalidArgument} that lists the names there are.
 Algorithm algorithmFromString(const std::string& name);
 
+/// What is behind material of that opacity changes no pixel by 1/255.
+constexpr double pictureTermination = 0.9999;
+
 struct GenerateSettings {
   int width = 1280;
   int height = 720;
@@ -31,8 +34,9 @@ struct GenerateSettings {
   /// Rays of more samples than depthCodeFor can number give a VDI of full precision all the same.
   Precision precision = Precision::Compact;
   /// A ray ends once it has accumulated this opacity: (0, 1]; 1 never ends early. What's hidden behind it at
-  /// V_O is missing when seen from V_N.
-  double terminationOpacity = 0.9999;
+  /// V_O is missing when seen from V_N, hence the default (docs/adr). Pictures need no more than
+  /// pictureTermination.
+  double terminationOpacity = 1.0;
   bool operator==(const GenerateSettings&) const = default;
 };
 

@@ -238,7 +238,9 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
   settings.budget = static_cast<vdi::Budget>(this->Budget);
   settings.fill = this->Fill;
   settings.precision = static_cast<vdi::Precision>(this->Precision);
-  settings.terminationOpacity = this->TerminationOpacity;
+  settings.terminationOpacity = this->PictureOnly
+                                    ? std::min(this->TerminationOpacity, vdi::pictureTermination)
+                                    : this->TerminationOpacity;
   const auto progress = [this](double done) {
     this->UpdateProgress(0.1 + 0.9 * done);
     return !this->CheckAbort();

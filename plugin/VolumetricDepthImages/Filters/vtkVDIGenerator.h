@@ -126,7 +126,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   int Budget = 0;
   double Fill = 1.0;
   int Precision = 1;
-  double TerminationOpacity = 0.9999;
+  double TerminationOpacity = 1.0;
   bool FillGhosts = true;
   bool PictureOnly = false;
   int TimeStep = 0;
