@@ -205,6 +205,29 @@ TEST_CASE(
   CHECK(device()->validationMessages() == "");
 }
 
+TEST_CASE("rays go on behind material of opacity 1, unless they're to end") {
+  const auto dealt = test::deal("shells", {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  TransferFunction function = test::threeHues(1.0);
+  function.opacities = {{0.0, 0.0}, {0.5, 0.0}, {0.6, 1.0}, {1.0, 1.0}};
+  GenerateSettings settings = test::smallSettings(40, 30, 12);
+  settings.precision = Precision::Full;
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  std::vector<std::size_t> counts;
+  for (const double termination : {0.9999, 1.0}) {
+    INFO(termination);
+    settings.terminationOpacity = termination;
+    const auto vdi = generator.generate(test::oblique(), function, settings);
+    const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
+    const SupersegmentLists expected = reference::generate(frame, dealt.mine, false);
+    CHECK(listsThatDiffer(vdi->expandedLists(), expected) <= expected.listCount() / 50);
+    CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, dealt.mine)) < 1.0F);
+    counts.push_back(vdi->supersegmentCount());
+  }
+  CHECK(counts[1] > 2 * counts[0]);
+}
+
 TEST_CASE("a VDI in the memory of another one, whatever its precision and size were, is the same") {
   const auto dealt = test::deal("mixing", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
                                 ScalarType::F32, 0, 1);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace vdi::detail {
 
@@ -11,9 +12,10 @@ namespace shared = gpu::shared;
 
 namespace {
 
-/// Twin of reference::opticalDepthOf.
-float opticalDepthOf(double opacity) {
-  return opacity >= 1.0 ? maxExtinction * 2.0F : static_cast<float>(-std::log2(1.0 - opacity));
+/// At which a ray ends; never for an opacity of 1, though there is material with that.
+float enoughFor(double terminationOpacity) {
+  return terminationOpacity >= 1.0 ? std::numeric_limits<float>::infinity()
+                                   : static_cast<float>(-std::log2(1.0 - terminationOpacity));
 }
 
 }  // namespace
@@ -41,7 +43,7 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.tableSize = volume_.tableSize();
   params.nodeCount = volume_.nodeCount();
   params.perUnitDistance = static_cast<float>(request.lattice.step / request.table.unitDistance);
-  params.enough = opticalDepthOf(request.settings.terminationOpacity);
+  params.enough = enoughFor(request.settings.terminationOpacity);
   params.budget = request.settings.supersegments;
   params.mostPerList = mostPerList(request.settings.supersegments, request.settings.budget);
   params.level = -1.0F;

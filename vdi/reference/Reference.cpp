@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 #include "vdi/reference/Accumulator.h"
 
@@ -152,7 +153,9 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
 
   const SceneStretch scene = sceneStretch(frame, ray);
   const float unitsPerDepth = glm::length(ray.direction) / static_cast<float>(frame.table.unitDistance);
-  const float enough = opticalDepthOf(static_cast<float>(frame.settings.terminationOpacity));
+  const double termination = frame.settings.terminationOpacity;
+  const float enough = termination >= 1.0 ? std::numeric_limits<float>::infinity()
+                                          : static_cast<float>(-std::log2(1.0 - termination));
   std::vector<Interval> samples;
   float total = 0.0F;
   for (const Piece& piece : pieces) {
