@@ -3,8 +3,7 @@
 // side in one walk; writing does one.
 //
 // Needs: optical.glsl, appearance.glsl; push.params.value with sensitivities, counts, offsets, spans, lights, written, left, status,
-// survey;
-// bool writesGrains, writesByNeed, constants; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
+// survey; bool writesGrains, writesByNeed, constants; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 
 #include "tolerance.glsl"
@@ -137,8 +136,10 @@ void walkForGrains() {
 // Twins of roundingOf and supersegmentsAt in vdi/core/Budget.h.
 float roundingOf(uint index) { return float((index * 0x9E3779B1u) >> 8) * 5.9604644775390625e-8; }
 
-uint interpolatedCount(float level, uint countBelow, uint countAbove, float rounding) {
-  float share = level - float(min(uint(level), surveyLevels - 2u));
+uint levelBelow() { return min(uint(push.params.value.level), surveyLevels - 2u); }
+
+uint interpolatedCount(uint countBelow, uint countAbove, float rounding) {
+  float share = push.params.value.level - float(levelBelow());
   return max(uint(float(countBelow) + share * (float(countAbove) - float(countBelow)) + rounding), 1u);
 }
 
@@ -150,10 +151,8 @@ uint supersegmentsAtLevel(uint level) {
 }
 
 uint budgetOfList() {
-  float level = push.params.value.level;
-  if (level < 0.0) return push.params.value.budget;
-  uint below = min(uint(level), surveyLevels - 2u);
-  return interpolatedCount(level, supersegmentsAtLevel(below), supersegmentsAtLevel(below + 1u), 0.5);
+  if (push.params.value.level < 0.0) return push.params.value.budget;
+  return interpolatedCount(supersegmentsAtLevel(levelBelow()), supersegmentsAtLevel(levelBelow() + 1u), 0.5);
 }
 
 struct CountedGrains {
@@ -203,17 +202,14 @@ void writeGrains() {
   }
   grainAllotted = push.params.value.sensitivities.at[listIndex];
   grainTolerance = grainAllotted;
-  if (writesByNeed) {
-    uint below = min(uint(push.params.value.level), surveyLevels - 2u);
-    needTolerances = vec2(toleranceOfLevel(below), toleranceOfLevel(below + 1u));
-  }
+  if (writesByNeed) needTolerances = vec2(toleranceOfLevel(levelBelow()), toleranceOfLevel(levelBelow() + 1u));
   walkForGrains();
   closeGrains(1u);
   uint written = min(grainCount[0], grainRoom);
   if (written != grainCount[0]) atomicAdd(push.params.value.status.at[0], 1u);
   uint most = max(push.params.value.budget, grainsCutAtGaps ? grainsRuns : 1u);
   if (writesByNeed) {
-    most = interpolatedCount(push.params.value.level, min(grainCount[1], push.params.value.mostPerList),
+    most = interpolatedCount(min(grainCount[1], push.params.value.mostPerList),
                              min(grainCount[2], push.params.value.mostPerList), roundingOf(listIndex));
   }
   push.params.value.written.at[listIndex] = written;

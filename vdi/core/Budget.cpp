@@ -1,24 +1,21 @@
 #include "vdi/core/Budget.h"
 
-#include "vdi/core/Error.h"
+#include "vdi/core/EnumNames.h"
 
 namespace vdi {
 
+namespace {
+
+constexpr EnumNames<Budget> budgetNames{{{Budget::List, "list"}, {Budget::Total, "total"}}};
+
+}  // namespace
+
 const char* toString(Budget budget) {
-  switch (budget) {
-    case Budget::List:
-      return "list";
-    case Budget::Total:
-      return "total";
-  }
-  return "unknown";
+  return nameOf(budget, budgetNames);
 }
 
 Budget budgetFromString(const std::string& name) {
-  for (const Budget known : {Budget::List, Budget::Total}) {
-    if (name == toString(known)) return known;
-  }
-  throw Error(ErrorCode::InvalidArgument, "no budget '" + name + "'; there are list and total");
+  return namedValue(name, "budget", budgetNames);
 }
 
 float Survey::levelFor(double fill) const {

@@ -2,25 +2,24 @@
 
 #include <fmt/format.h>
 
+#include "vdi/core/EnumNames.h"
 #include "vdi/core/Error.h"
 
 namespace vdi {
 
+namespace {
+
+constexpr EnumNames<Algorithm> algorithmNames{
+    {{Algorithm::Merge, "merge"}, {Algorithm::Bisection, "bisection"}}};
+
+}  // namespace
+
 const char* toString(Algorithm algorithm) {
-  switch (algorithm) {
-    case Algorithm::Bisection:
-      return "bisection";
-    case Algorithm::Merge:
-      return "merge";
-  }
-  return "unknown";
+  return nameOf(algorithm, algorithmNames);
 }
 
 Algorithm algorithmFromString(const std::string& name) {
-  for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
-    if (name == toString(algorithm)) return algorithm;
-  }
-  throw Error(ErrorCode::InvalidArgument, "no algorithm '" + name + "'; there are merge and bisection");
+  return namedValue(name, "algorithm", algorithmNames);
 }
 
 void validate(const GenerateSettings& settings) {

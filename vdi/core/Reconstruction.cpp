@@ -1,24 +1,22 @@
 #include "vdi/core/Reconstruction.h"
 
-#include "vdi/core/Error.h"
+#include "vdi/core/EnumNames.h"
 
 namespace vdi {
 
+namespace {
+
+constexpr EnumNames<Reconstruction> reconstructionNames{
+    {{Reconstruction::Smooth, "smooth"}, {Reconstruction::Constant, "constant"}}};
+
+}  // namespace
+
 const char* toString(Reconstruction reconstruction) {
-  switch (reconstruction) {
-    case Reconstruction::Constant:
-      return "constant";
-    case Reconstruction::Smooth:
-      return "smooth";
-  }
-  return "unknown";
+  return nameOf(reconstruction, reconstructionNames);
 }
 
 Reconstruction reconstructionFromString(const std::string& name) {
-  for (const Reconstruction known : {Reconstruction::Smooth, Reconstruction::Constant}) {
-    if (name == toString(known)) return known;
-  }
-  throw Error(ErrorCode::InvalidArgument, "no reconstruction '" + name + "'; there are smooth and constant");
+  return namedValue(name, "reconstruction", reconstructionNames);
 }
 
 }  // namespace vdi

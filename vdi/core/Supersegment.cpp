@@ -4,26 +4,23 @@
 #include <array>
 #include <cmath>
 
-#include "vdi/core/Error.h"
+#include "vdi/core/EnumNames.h"
 #include "vdi/core/TransferFunction.h"
 
 namespace vdi {
 
+namespace {
+
+constexpr EnumNames<Precision> precisionNames{{{Precision::Compact, "compact"}, {Precision::Full, "full"}}};
+
+}  // namespace
+
 const char* toString(Precision precision) {
-  switch (precision) {
-    case Precision::Full:
-      return "full";
-    case Precision::Compact:
-      return "compact";
-  }
-  return "unknown";
+  return nameOf(precision, precisionNames);
 }
 
 Precision precisionFromString(const std::string& name) {
-  for (const Precision precision : {Precision::Compact, Precision::Full}) {
-    if (name == toString(precision)) return precision;
-  }
-  throw Error(ErrorCode::InvalidArgument, "no precision '" + name + "'; there are compact and full");
+  return namedValue(name, "precision", precisionNames);
 }
 
 DepthCode depthCodeFor(const DepthLattice& lattice) {

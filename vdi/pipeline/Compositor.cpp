@@ -77,9 +77,9 @@ ListsOf<Segment> Compositor::composite(const std::vector<ListsOf<Segment>>& subL
   return result;
 }
 
-/// Of all ranks: supersegments to received_, offsets from 0 to subOffsets_.
+/// Of all ranks: supersegments to received_, offsets from 0 to subOffsets_. Returns how many supersegments.
 template <typename Segment>
-void Compositor::upload(const std::vector<ListsOf<Segment>>& subLists, const Band& band) {
+std::uint64_t Compositor::upload(const std::vector<ListsOf<Segment>>& subLists, const Band& band) {
   const std::size_t listCount = band.listCount();
   std::uint64_t total = 0;
   for (const ListsOf<Segment>& sub : subLists) total += sub.offsets[band.last] - sub.offsets[band.first];
@@ -98,15 +98,14 @@ void Compositor::upload(const std::vector<ListsOf<Segment>>& subLists, const Ban
     for (std::size_t i = 0; i <= listCount; ++i) offsets[i] = sub.offsets[band.first + i] - begin;
     at += bytes;
   }
+  return total;
 }
 
 /// All ranks' supersegments of each list, by depth, to merged_ and mergedOffsets_.
 template <typename Segment>
 void Compositor::merge(const std::vector<ListsOf<Segment>>& subLists, const Band& band) {
   const std::uint32_t listCount = band.listCount();
-  upload(subLists, band);
-  std::uint64_t total = 0;
-  for (const ListsOf<Segment>& sub : subLists) total += sub.offsets[band.last] - sub.offsets[band.first];
+  const std::uint64_t total = upload(subLists, band);
   const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
   heads_.reserve(device_, subLists.size() * words, MemoryKind::DeviceLocal);
   mergedCounts_.reserve(device_, words, MemoryKind::DeviceLocal);

@@ -53,7 +53,7 @@ class Compositor {
   template <typename Segment>
   void compositeBand(const Band& band, ListsOf<Segment>& result);
   template <typename Segment>
-  void upload(const std::vector<ListsOf<Segment>>& subLists, const Band& band);
+  std::uint64_t upload(const std::vector<ListsOf<Segment>>& subLists, const Band& band);
 
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
