@@ -12,6 +12,7 @@ layout(constant_id = 1) const uint pageCount = 1;
 layout(set = 0, binding = 0) uniform sampler3D pages[castMaxPages];
 
 layout(push_constant, scalar) uniform Push { CastConstants push; };
+layout(set = 0, binding = 1, scalar) uniform Params { CastParams params; };
 
 const bool volumeOnly = castProgram == castProgramVolume;
 const bool surveysGrains = castProgram == castProgramSurvey;
@@ -34,7 +35,7 @@ void useSample(float front, float back, vec3 color, float opticalDepth) {
   } else if (countsGrains || writesGrains) {
     float opacity = opacityOf(opticalDepth);
     // Nearly all intervals are one sample long.
-    float part = back - front == push.params.value.step ? opacity : opacityOf(opticalDepth * push.params.value.step / (back - front));
+    float part = back - front == params.step ? opacity : opacityOf(opticalDepth * params.step / (back - front));
     grainsAdd(front, back, color * opacity, opacity, opticalDepth, vec4(color, 1.0) * part);
   } else {
     searchAdd(front, back, color * opacityOf(opticalDepth), opticalDepth);
@@ -49,17 +50,17 @@ void main() {
   uint x = gl_GlobalInvocationID.x;
   uint y = gl_GlobalInvocationID.y + push.firstRow;
   uint endRow = push.lastRow;
-  listIndex = y * push.params.value.width + x;
+  listIndex = y * params.width + x;
   if (countsGrains) {
-    uint stride = push.params.value.countedStride;
+    uint stride = params.countedStride;
     x = gl_GlobalInvocationID.x * stride;
     y = gl_GlobalInvocationID.y * stride + push.firstRow;
-    endRow = min(push.lastRow + stride - 1u, push.params.value.height);
-    listIndex = gl_GlobalInvocationID.y * push.params.value.countedWidth + gl_GlobalInvocationID.x;
+    endRow = min(push.lastRow + stride - 1u, params.height);
+    listIndex = gl_GlobalInvocationID.y * params.countedWidth + gl_GlobalInvocationID.x;
   }
-  bool hasRay = x < push.params.value.width && y < endRow;
+  bool hasRay = x < params.width && y < endRow;
   if (!hasRay && !surveysGrains) return;
-  samplesAtOnce = countsGrains ? push.params.value.countedSamples : 1u;
+  samplesAtOnce = countsGrains ? params.countedSamples : 1u;
   grainsAtOnce = samplesAtOnce;
   setUpRay(x, y);
   setUpScene();
@@ -73,8 +74,8 @@ void main() {
     accumulated = vec4(0.0);
     firstDepth = uintBitsToFloat(0x7f800000u);
     castRay();
-    push.params.value.colors.at[listIndex] = accumulated;
-    push.params.value.depths.at[listIndex] = firstDepth;
+    params.colors.at[listIndex] = accumulated;
+    params.depths.at[listIndex] = firstDepth;
     return;
   }
 

@@ -5,6 +5,7 @@
 
 layout(local_size_x = compositeGroup) in;
 layout(push_constant, scalar) uniform Push { CompositeConstants push; };
+layout(set = 0, binding = 1, scalar) uniform Params { CompositeParams params; };
 
 layout(constant_id = 0) const uint compositeProgram = compositeProgramSearch;
 const bool surveysGrains = compositeProgram == compositeProgramSurvey;
@@ -16,13 +17,13 @@ const bool writesGrains = compositeProgram == compositeProgramWriteGrains || wri
 #include "grains.glsl"
 
 void walk() {
-  SegmentArray merged = push.params.value.merged;
-  StoredForm form = push.params.value.form;
-  uint end = push.params.value.mergedOffsets.at[listIndex + 1u];
-  for (uint i = push.params.value.mergedOffsets.at[listIndex]; i < end; ++i) {
+  SegmentArray merged = params.merged;
+  StoredForm form = params.form;
+  uint end = params.mergedOffsets.at[listIndex + 1u];
+  for (uint i = params.mergedOffsets.at[listIndex]; i < end; ++i) {
     Material s = loadSegment(merged, i, form);
     if (countsGrains || writesGrains) {
-      vec4 x = appearanceOf(s.color, s.opticalDepth, s.back - s.front, push.params.value.step);
+      vec4 x = appearanceOf(s.color, s.opticalDepth, s.back - s.front, params.step);
       grainsAdd(s.front, s.back, s.color, opacityOf(s.opticalDepth), s.opticalDepth, x);
     } else {
       searchAdd(s.front, s.back, s.color, s.opticalDepth);
@@ -32,7 +33,7 @@ void walk() {
 
 void main() {
   listIndex = gl_GlobalInvocationID.x;
-  bool hasList = listIndex < push.params.value.listCount;
+  bool hasList = listIndex < params.listCount;
   if (surveysGrains) {
     surveyGrains(hasList);
     return;

@@ -2,7 +2,7 @@
 // vdi/reference/SegmentByMerging.cpp; reduce.comp merges grains into supersegments. Counting does all tolerances side by
 // side in one walk; writing does one.
 //
-// Needs: optical.glsl, appearance.glsl; push.params.value with sensitivities, counts, offsets, spans, lights, written, left, status,
+// Needs: optical.glsl, appearance.glsl; params with sensitivities, counts, offsets, spans, lights, written, left, status,
 // survey; bool writesGrains, writesByNeed, constants; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 
@@ -40,9 +40,9 @@ bool grainCut;  // the next grain starts a run
 void writeGrain() {
   uint slot = grainCount[0] - 1u;
   if (slot < grainRoom) {
-    uint at = push.params.value.offsets.at[listIndex] + slot;
-    push.params.value.spans.at[at] = grainSpan;
-    push.params.value.lights.at[at] = vec4(grainLight.rgb, grainStartsRun ? -grainLight.a : grainLight.a);
+    uint at = params.offsets.at[listIndex] + slot;
+    params.spans.at[at] = grainSpan;
+    params.lights.at[at] = vec4(grainLight.rgb, grainStartsRun ? -grainLight.a : grainLight.a);
   }
 }
 
@@ -81,7 +81,7 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
     grainCut = true;
   }
   if (grainsOpen == 0u && !(opticalDepth > 0.0)) return;
-  float weight = weightBehind(grainsBefore) / push.params.value.step;
+  float weight = weightBehind(grainsBefore) / params.step;
   if (gap && !grainsCutAtGaps) deviate(vec4(0.0), weight * (front - reach));
   deviate(x, weight * (back - front));
   if (!(opticalDepth > 0.0)) return;
@@ -117,7 +117,7 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
 }
 
 void walkForGrains() {
-  grainsCutAtGaps = push.params.value.cutAtGaps != 0u;
+  grainsCutAtGaps = params.cutAtGaps != 0u;
   grainsBefore = 1.0;
   grainsOpen = 0u;
   grainsReach = 0.0;
@@ -136,10 +136,10 @@ void walkForGrains() {
 // Twins of roundingOf and supersegmentsAt in vdi/core/Budget.h.
 float roundingOf(uint index) { return float((index * 0x9E3779B1u) >> 8) * 5.9604644775390625e-8; }
 
-uint levelBelow() { return min(uint(push.params.value.level), surveyLevels - 2u); }
+uint levelBelow() { return min(uint(params.level), surveyLevels - 2u); }
 
 uint interpolatedCount(uint countBelow, uint countAbove, float rounding) {
-  float share = push.params.value.level - float(levelBelow());
+  float share = params.level - float(levelBelow());
   return max(uint(float(countBelow) + share * (float(countAbove) - float(countBelow)) + rounding), 1u);
 }
 
@@ -147,11 +147,11 @@ uint interpolatedCount(uint countBelow, uint countAbove, float rounding) {
 uint supersegmentsAtLevel(uint level) {
   uint count = level == 0u ? grainsVisible : 1u;
   [[unroll]] for (int i = 0; i < toleranceLevels; ++i) count = level == uint(i) + 1u ? grainCount[i] : count;
-  return min(count, push.params.value.mostPerList);
+  return min(count, params.mostPerList);
 }
 
 uint budgetOfList() {
-  if (push.params.value.level < 0.0) return push.params.value.budget;
+  if (params.level < 0.0) return params.budget;
   return interpolatedCount(supersegmentsAtLevel(levelBelow()), supersegmentsAtLevel(levelBelow() + 1u), 0.5);
 }
 
@@ -183,8 +183,8 @@ CountedGrains grainsFor(uint budget) {
 void countGrains() {
   walkForGrains();
   CountedGrains counted = grainsFor(budgetOfList());
-  push.params.value.sensitivities.at[listIndex] = counted.tolerance;
-  push.params.value.counts.at[listIndex] = counted.count;
+  params.sensitivities.at[listIndex] = counted.tolerance;
+  params.counts.at[listIndex] = counted.count;
 }
 
 // Of a level of the survey.
@@ -194,26 +194,26 @@ float toleranceOfLevel(uint level) {
 }
 
 void writeGrains() {
-  grainRoom = push.params.value.counts.at[listIndex];
+  grainRoom = params.counts.at[listIndex];
   if (grainRoom == 0u) {
-    push.params.value.written.at[listIndex] = 0u;
-    push.params.value.left.at[listIndex] = 0u;
+    params.written.at[listIndex] = 0u;
+    params.left.at[listIndex] = 0u;
     return;
   }
-  grainAllotted = push.params.value.sensitivities.at[listIndex];
+  grainAllotted = params.sensitivities.at[listIndex];
   grainTolerance = grainAllotted;
   if (writesByNeed) needTolerances = vec2(toleranceOfLevel(levelBelow()), toleranceOfLevel(levelBelow() + 1u));
   walkForGrains();
   closeGrains(1u);
   uint written = min(grainCount[0], grainRoom);
-  if (written != grainCount[0]) atomicAdd(push.params.value.status.at[0], 1u);
-  uint most = max(push.params.value.budget, grainsCutAtGaps ? grainsRuns : 1u);
+  if (written != grainCount[0]) atomicAdd(params.status.at[0], 1u);
+  uint most = max(params.budget, grainsCutAtGaps ? grainsRuns : 1u);
   if (writesByNeed) {
-    most = interpolatedCount(min(grainCount[1], push.params.value.mostPerList),
-                             min(grainCount[2], push.params.value.mostPerList), roundingOf(listIndex));
+    most = interpolatedCount(min(grainCount[1], params.mostPerList),
+                             min(grainCount[2], params.mostPerList), roundingOf(listIndex));
   }
-  push.params.value.written.at[listIndex] = written;
-  push.params.value.left.at[listIndex] = min(written, most);
+  params.written.at[listIndex] = written;
+  params.left.at[listIndex] = min(written, most);
 }
 
 // What a workgroup's lists add to the survey.
@@ -228,12 +228,12 @@ void surveyGrains(bool hasList) {
     walkForGrains();
     if (grainsVisible > 0u) {
       for (uint level = 0u; level < surveyLevels; ++level) atomicAdd(surveyed[level], supersegmentsAtLevel(level));
-      atomicAdd(surveyed[surveyLevels], min(grainsFor(push.params.value.budget).count, push.params.value.budget));
+      atomicAdd(surveyed[surveyLevels], min(grainsFor(params.budget).count, params.budget));
     }
   }
   barrier();
   if (own <= surveyLevels && surveyed[own] > 0u) {
-    uint before = atomicAdd(push.params.value.survey.at[2u * own], surveyed[own]);
-    if (before + surveyed[own] < before) atomicAdd(push.params.value.survey.at[2u * own + 1u], 1u);
+    uint before = atomicAdd(params.survey.at[2u * own], surveyed[own]);
+    if (before + surveyed[own] < before) atomicAdd(params.survey.at[2u * own + 1u], 1u);
   }
 }

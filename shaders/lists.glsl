@@ -1,6 +1,6 @@
 // One list from intervals to stored supersegments: search in one dispatch, write in a later one.
 //
-// Needs: push.params.value with sensitivities, counts, offsets, segments, form, status; void walk().
+// Needs: params with sensitivities, counts, offsets, segments, form, status; void walk().
 
 uint listIndex;
 
@@ -12,26 +12,26 @@ void emitSegment(Material m);
 #include "search.glsl"
 
 void emitSegment(Material m) {
-  if (search.writing && search.emitted < push.params.value.counts.at[listIndex]) {
-    uint slot = push.params.value.offsets.at[listIndex] + search.emitted;
-    SegmentArray segments = push.params.value.segments;
-    StoredForm form = push.params.value.form;
+  if (search.writing && search.emitted < params.counts.at[listIndex]) {
+    uint slot = params.offsets.at[listIndex] + search.emitted;
+    SegmentArray segments = params.segments;
+    StoredForm form = params.form;
     storeSegment(segments, slot, m, form);
   }
   ++search.emitted;
 }
 
 void searchOrWriteList(bool write) {
-  segmenterStep = push.params.value.step;
-  segmenterCutAtGaps = push.params.value.cutAtGaps != 0u;
-  if (write && push.params.value.counts.at[listIndex] == 0u) return;
+  segmenterStep = params.step;
+  segmenterCutAtGaps = params.cutAtGaps != 0u;
+  if (write && params.counts.at[listIndex] == 0u) return;
   beginStoring();
-  float known = write ? push.params.value.sensitivities.at[listIndex] : 0.0;
-  SearchResult result = searchList(write, known, push.params.value.budget, push.params.value.runsOnly != 0u);
+  float known = write ? params.sensitivities.at[listIndex] : 0.0;
+  SearchResult result = searchList(write, known, params.budget, params.runsOnly != 0u);
   if (write) {
-    if (result.count != push.params.value.counts.at[listIndex]) atomicAdd(push.params.value.status.at[0], 1u);
+    if (result.count != params.counts.at[listIndex]) atomicAdd(params.status.at[0], 1u);
   } else {
-    push.params.value.sensitivities.at[listIndex] = result.sensitivity;
-    push.params.value.counts.at[listIndex] = result.count;
+    params.sensitivities.at[listIndex] = result.sensitivity;
+    params.counts.at[listIndex] = result.count;
   }
 }

@@ -1,6 +1,6 @@
 // One ray through the kd-tree of bricks, front to back, sample by sample.
 //
-// Needs: shared/cast.h, push.params, pages, pageCount; void useSample(float front, float back, vec3 color, float
+// Needs: shared/cast.h, params, pages, pageCount; void useSample(float front, float back, vec3 color, float
 // opticalDepth), colour straight.
 
 vec3 rayStart;
@@ -12,19 +12,19 @@ float rayEnter;          // depth where the ray enters these, and leaves them
 float rayLeave;
 
 void setUpRay(uint x, uint y) {
-  float u = float(x) + 0.5 - 0.5 * float(push.params.value.width);
-  float v = float(y) + 0.5 - 0.5 * float(push.params.value.height);
-  precise vec3 start = push.params.value.startBase + u * push.params.value.startRight + v * push.params.value.startUp;
+  float u = float(x) + 0.5 - 0.5 * float(params.width);
+  float v = float(y) + 0.5 - 0.5 * float(params.height);
+  precise vec3 start = params.startBase + u * params.startRight + v * params.startUp;
   precise vec3 direction =
-      push.params.value.directionBase + u * push.params.value.directionRight + v * push.params.value.directionUp;
+      params.directionBase + u * params.directionRight + v * params.directionUp;
   rayStart = start;
   rayDirection = direction;
-  rayUnitsPerDepth = length(direction) * push.params.value.perUnitDistance / push.params.value.step;
+  rayUnitsPerDepth = length(direction) * params.perUnitDistance / params.step;
 }
 
 // `precise`: every rank and every pass must find the same position for sample k, since ownership depends on it.
 vec3 samplePosition(uint k) {
-  precise float depth = (float(k) + 0.5) * push.params.value.step;
+  precise float depth = (float(k) + 0.5) * params.step;
   precise vec3 position = rayStart + depth * rayDirection;
   return position;
 }
@@ -36,17 +36,17 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
   // Where the ray is in the box, in units of samples, with room for rounding; then exactly, sample by sample. Vectors are
   // never indexed by a variable here: lavapipe (Mesa 22.3) mixes up the components when lanes diverge.
   bvec3 across = equal(rayDirection, vec3(0.0));
-  vec3 perSample = 1.0 / (rayDirection * push.params.value.step);
+  vec3 perSample = 1.0 / (rayDirection * params.step);
   vec3 a = (lo - rayStart) * perSample;
   vec3 b = (hi - rayStart) * perSample;
-  vec3 spare = 2.0 + 1e-6 * max(abs(a), abs(b)) + abs(push.params.value.coordinateError * perSample);
+  vec3 spare = 2.0 + 1e-6 * max(abs(a), abs(b)) + abs(params.coordinateError * perSample);
   vec3 enters = mix(min(a, b) - spare, vec3(0.0), across);
-  vec3 leaves = mix(max(a, b) + spare, vec3(push.params.value.sampleCount), across);
+  vec3 leaves = mix(max(a, b) + spare, vec3(params.sampleCount), across);
   float enter = max(max(enters.x, enters.y), max(enters.z, 0.0));
-  float leave = min(min(leaves.x, leaves.y), min(leaves.z, float(push.params.value.sampleCount)));
+  float leave = min(min(leaves.x, leaves.y), min(leaves.z, float(params.sampleCount)));
   if (!(enter < leave)) return uvec2(0u);
   uint first = uint(enter);
-  uint last = min(push.params.value.sampleCount, uint(ceil(leave)));
+  uint last = min(params.sampleCount, uint(ceil(leave)));
   while (first < last && !contains(lo, hi, samplePosition(first))) ++first;
   while (last > first && !contains(lo, hi, samplePosition(last - 1u))) --last;
   return uvec2(first, last);
@@ -56,20 +56,20 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
 // one's interval starts where the ray enters, the last one's ends where it leaves. That follows from the ray and the scene
 // alone, so it's the same on every rank; without it the faces of a filled box show the sample lattice as stripes.
 void setUpScene() {
-  rayScene = samplesIn(push.params.value.sceneLo, push.params.value.sceneHi);
+  rayScene = samplesIn(params.sceneLo, params.sceneHi);
   bvec3 across = equal(rayDirection, vec3(0.0));
-  float far = float(push.params.value.sampleCount) * push.params.value.step;
-  vec3 a = (push.params.value.sceneLo - rayStart) / rayDirection;
-  vec3 b = (push.params.value.sceneHi - rayStart) / rayDirection;
+  float far = float(params.sampleCount) * params.step;
+  vec3 a = (params.sceneLo - rayStart) / rayDirection;
+  vec3 b = (params.sceneHi - rayStart) / rayDirection;
   vec3 enters = mix(min(a, b), vec3(0.0), across);
   vec3 leaves = mix(max(a, b), vec3(far), across);
   float enter = max(max(enters.x, enters.y), max(enters.z, 0.0));
   float leave = min(min(leaves.x, leaves.y), min(leaves.z, far));
-  float first = (float(rayScene.x) + 0.5) * push.params.value.step;
-  float last = (float(rayScene.y) - 0.5) * push.params.value.step;
-  rayEnter = push.params.value.first + clamp(enter, first - push.params.value.step, first);
-  rayLeave = push.params.value.first + clamp(leave, last, last + push.params.value.step);
-  rayLeave = max(rayLeave, rayEnter + 0.001 * push.params.value.step);
+  float first = (float(rayScene.x) + 0.5) * params.step;
+  float last = (float(rayScene.y) - 0.5) * params.step;
+  rayEnter = params.first + clamp(enter, first - params.step, first);
+  rayLeave = params.first + clamp(leave, last, last + params.step);
+  rayLeave = max(rayLeave, rayEnter + 0.001 * params.step);
 }
 
 // Pages beyond pageCount cost nothing: the comparison with a specialisation constant removes them.
@@ -88,12 +88,12 @@ float texel(uint page, vec3 coordinate) {
 
 // Straight colour and extinction at a table position; NaN and infinities are transparent.
 vec4 classify(float position) {
-  float last = float(push.params.value.tableSize - 1u);
+  float last = float(params.tableSize - 1u);
   if (!(abs(position) <= 3.0e38)) return vec4(0.0);
   position = clamp(position, 0.0, last);
-  uint below = min(uint(position), push.params.value.tableSize - 2u);
-  TableEntry a = push.params.value.table.at[below];
-  TableEntry b = push.params.value.table.at[below + 1u];
+  uint below = min(uint(position), params.tableSize - 2u);
+  TableEntry a = params.table.at[below];
+  TableEntry b = params.table.at[below + 1u];
   return mix(vec4(a.red, a.green, a.blue, a.extinction), vec4(b.red, b.green, b.blue, b.extinction),
              position - float(below));
 }
@@ -122,12 +122,12 @@ CellStretch cellAt(Brick brick, uint k, vec3 cellsPerSample) {
   // Rounding may take a sample for one of the cell before; cells know a texel more than they hold.
   float ahead = min(min(samples.x, samples.y), min(samples.z, 1.0e6));
   uint index = brick.firstCell + (cell.z * brick.cellDims.y + cell.y) * brick.cellDims.x + cell.x;
-  return CellStretch(push.params.value.cells.at[index] != 0u, k + max(1u, uint(ahead + 0.95)));
+  return CellStretch(params.cells.at[index] != 0u, k + max(1u, uint(ahead + 0.95)));
 }
 
-float frontOf(uint k) { return k == rayScene.x ? rayEnter : push.params.value.first + float(k) * push.params.value.step; }
+float frontOf(uint k) { return k == rayScene.x ? rayEnter : params.first + float(k) * params.step; }
 float backOf(uint k) {
-  return k + 1u == rayScene.y ? rayLeave : push.params.value.first + float(k + 1u) * push.params.value.step;
+  return k + 1u == rayScene.y ? rayLeave : params.first + float(k + 1u) * params.step;
 }
 
 // How many samples are used as one: more while grains are counted (CastParams::countedSamples).
@@ -154,7 +154,7 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
     float opticalDepth = min(entry.a * rayUnitsPerDepth * (back - front), maxOpticalDepth);
     useSample(front, back, entry.rgb, opticalDepth);
     rayOpticalDepth += opticalDepth;
-    if (rayOpticalDepth >= push.params.value.enough) return false;
+    if (rayOpticalDepth >= params.enough) return false;
   }
   return true;
 }
@@ -162,9 +162,9 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
 const uint shortGap = 32u;  // samples
 
 bool castBrick(uint index) {
-  Brick brick = push.params.value.bricks.at[index];
+  Brick brick = params.bricks.at[index];
   uvec2 range = samplesIn(brick.lo, brick.hi);
-  vec3 cellsPerSample = rayDirection * push.params.value.step * brick.texelScale * brick.cellScale;
+  vec3 cellsPerSample = rayDirection * params.step * brick.texelScale * brick.cellScale;
   uint k = range.x;
   while (k < range.y) {
     uint emptyBegin = k;
@@ -193,16 +193,16 @@ const int kdStackSize = 40;  // VolumeStore builds no deeper tree
 
 void castRay() {
   rayOpticalDepth = 0.0;
-  if (push.params.value.nodeCount == 0u || rayScene.x == rayScene.y) return;
+  if (params.nodeCount == 0u || rayScene.x == rayScene.y) return;
   // Parts of the ray, in units of depth from the lattice's front. They overlap by the rounding error: a brick decides by
   // itself, exactly, which samples are its own; the order of visits comes from the signs of the direction alone.
   uint stackNode[kdStackSize];
   vec2 stackPart[kdStackSize];
   int top = 0;
   uint node = 0u;
-  vec2 part = vec2(0.0, float(push.params.value.sampleCount) * push.params.value.step);
+  vec2 part = vec2(0.0, float(params.sampleCount) * params.step);
   for (;;) {
-    KdNode here = push.params.value.nodes.at[node];
+    KdNode here = params.nodes.at[node];
     if (here.axis == 3u) {
       if (here.count != 0u && !castBrick(here.first)) return;
       if (top == 0) return;
@@ -219,8 +219,8 @@ void castRay() {
     }
     float inverse = 1.0 / direction;
     float crossing = (here.split - start) * inverse;
-    float spare = 2.0 * push.params.value.step + 1e-6 * abs(crossing) +
-                  abs(push.params.value.coordinateError * inverse);
+    float spare = 2.0 * params.step + 1e-6 * abs(crossing) +
+                  abs(params.coordinateError * inverse);
     uint near = here.first + (direction > 0.0 ? 0u : 1u);
     uint far = here.first + (direction > 0.0 ? 1u : 0u);
     bool meetsNear = part.x <= crossing + spare;

@@ -10,7 +10,7 @@
 #include "pieces.glsl"
 
 layout(local_size_x = renderGroupX, local_size_y = renderGroupY) in;
-layout(push_constant, scalar) uniform Push { RenderConstants push; };
+layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 // Reconstruction::Smooth or Constant.
 layout(constant_id = 3) const bool smoothReconstruction = true;
@@ -43,8 +43,8 @@ void clip(inout vec2 stretch, float value, float slope) {
 
 vec2 insideFrustum() {
   vec2 stretch = vec2(0.0, uintBitsToFloat(0x7f7fffffu));
-  bool parallel = push.params.value.parallel != 0u;
-  vec2 halfSize = 0.5 * vec2(push.params.value.lists) * push.params.value.pixelSize;
+  bool parallel = params.parallel != 0u;
+  vec2 halfSize = 0.5 * vec2(params.lists) * params.pixelSize;
   // Not as a loop over the axes: lavapipe (Mesa 22.3) mixes up components of vectors that are indexed by a variable.
   vec2 value = halfSize * (parallel ? 1.0 : rayOrigin.z);
   vec2 slope = halfSize * (parallel ? 0.0 : rayDirection.z);
@@ -52,21 +52,21 @@ vec2 insideFrustum() {
   clip(stretch, value.x + rayOrigin.x, slope.x + rayDirection.x);
   clip(stretch, value.y - rayOrigin.y, slope.y - rayDirection.y);
   clip(stretch, value.y + rayOrigin.y, slope.y + rayDirection.y);
-  clip(stretch, rayOrigin.z - push.params.value.nearest, rayDirection.z);
-  clip(stretch, push.params.value.farthest - rayOrigin.z, -rayDirection.z);
+  clip(stretch, rayOrigin.z - params.nearest, rayDirection.z);
+  clip(stretch, params.farthest - rayOrigin.z, -rayDirection.z);
   return stretch;
 }
 
 vec2 pixelAt(float t) {
   vec3 p = rayOrigin + t * rayDirection;
-  float scale = 1.0 / (push.params.value.pixelSize * (push.params.value.parallel != 0u ? 1.0 : p.z));
-  return p.xy * scale + 0.5 * vec2(push.params.value.lists);
+  float scale = 1.0 / (params.pixelSize * (params.parallel != 0u ? 1.0 : p.z));
+  return p.xy * scale + 0.5 * vec2(params.lists);
 }
 
 // World length of a unit of depth in the list's pixel.
 float pixelLength(ivec2 pixel) {
-  if (push.params.value.parallel != 0u) return 1.0;
-  vec2 offset = (vec2(pixel) + 0.5 - 0.5 * vec2(push.params.value.lists)) * push.params.value.pixelSize;
+  if (params.parallel != 0u) return 1.0;
+  vec2 offset = (vec2(pixel) + 0.5 - 0.5 * vec2(params.lists)) * params.pixelSize;
   return sqrt(1.0 + dot(offset, offset));
 }
 
@@ -90,7 +90,7 @@ float depthAt(float t) { return rayOrigin.z + t * rayDirection.z; }
 
 // The parts of the depth range that the ray is in between two depths, in any order.
 uint maskBetween(float a, float b) {
-  return maskOf(min(a, b), max(a, b), push.params.value.nearest, push.params.value.binScale);
+  return maskOf(min(a, b), max(a, b), params.nearest, params.binScale);
 }
 
 // listLight and listDepth of what the ray meets of one list, which has supersegments [begin, end), between two depths.
@@ -99,8 +99,8 @@ void lookAtList(ivec2 pixel, uint begin, uint end, vec2 stretch, float nearDepth
   listLight = vec4(0.0);
   listDepth = uintBitsToFloat(0x7f800000u);
   float segmentScale = rayWorldPerT / pixelLength(pixel);
-  RenderSegmentArray segments = push.params.value.segments;
-  StoredForm form = push.params.value.form;
+  RenderSegmentArray segments = params.segments;
+  StoredForm form = params.form;
   // The first supersegment that ends behind nearDepth.
   uint low = min(begin + hint, end);
   while (low > begin && pieceDepths(segments, low - 1u, form).y > nearDepth) --low;
@@ -129,7 +129,7 @@ struct PictureLine {
 };
 
 PictureLine pictureLine(vec2 stretch) {
-  vec2 depth = push.params.value.parallel != 0u ? vec2(1.0) : vec2(depthAt(stretch.x), depthAt(stretch.y));
+  vec2 depth = params.parallel != 0u ? vec2(1.0) : vec2(depthAt(stretch.x), depthAt(stretch.y));
   vec2 start = pixelAt(stretch.x);
   vec2 end = pixelAt(stretch.y);
   return PictureLine(start, end, 1.0 / (end - start), stretch, depth);
@@ -146,7 +146,7 @@ uint rayBetween(PictureLine line, float enterS, float leaveS) {
 
 // Tiles of both sizes are in one array, the large ones behind.
 int tileIndex(int size, ivec2 pixel) {
-  ivec2 lists = push.params.value.lists;
+  ivec2 lists = params.lists;
   ivec2 tile = pixel / size;
   int tilesAcross = (lists.x + size - 1) / size;
   int first = 0;
@@ -159,11 +159,11 @@ int tileIndex(int size, ivec2 pixel) {
 
 void main() {
   uvec2 at = gl_GlobalInvocationID.xy;
-  if (at.x >= push.params.value.width || at.y >= push.params.value.height) return;
-  float u = float(at.x) + 0.5 - 0.5 * float(push.params.value.width);
-  float v = float(at.y) + 0.5 - 0.5 * float(push.params.value.height);
-  rayOrigin = push.params.value.originBase + u * push.params.value.originRight + v * push.params.value.originUp;
-  rayDirection = push.params.value.directionBase + u * push.params.value.directionRight + v * push.params.value.directionUp;
+  if (at.x >= params.width || at.y >= params.height) return;
+  float u = float(at.x) + 0.5 - 0.5 * float(params.width);
+  float v = float(at.y) + 0.5 - 0.5 * float(params.height);
+  rayOrigin = params.originBase + u * params.originRight + v * params.originUp;
+  rayDirection = params.directionBase + u * params.directionRight + v * params.directionUp;
   rayWorldPerT = length(rayDirection);
   // Across V_O's depths: all of a supersegment's are met at once, or none.
   rayPerDepth = 1.0 / (abs(rayDirection.z) < 1e-20 ? 1e-20 : rayDirection.z);
@@ -178,7 +178,7 @@ void main() {
       walkLists(line);
     }
   }
-  uint index = at.y * push.params.value.width + at.x;
-  push.params.value.colors.at[index] = accumulated;
-  push.params.value.depths.at[index] = firstDepth;
+  uint index = at.y * params.width + at.x;
+  params.colors.at[index] = accumulated;
+  params.depths.at[index] = firstDepth;
 }

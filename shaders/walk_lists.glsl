@@ -27,7 +27,7 @@ ListExit listExit(PictureLine line, int size, ivec2 pixel, ivec2 last, ivec2 ahe
 }
 
 void walkLists(PictureLine line) {
-  ivec2 lastList = push.params.value.lists - 1;
+  ivec2 lastList = params.lists - 1;
   ivec2 pixel = clamp(ivec2(floor(line.start)), ivec2(0), lastList);
   ivec2 last = clamp(ivec2(floor(line.end)), ivec2(0), lastList);
   ivec2 direction = sign(last - pixel);
@@ -48,12 +48,12 @@ void walkLists(PictureLine line) {
       knownTile = tile;
       ListExit leave = listExit(line, renderTile, pixel, last, ahead, enterS);
       tileRay = rayBetween(line, enterS, leave.s);
-      if ((push.params.value.tileMasks.at[tile] & tileRay) == 0u) {
+      if ((params.tileMasks.at[tile] & tileRay) == 0u) {
         int largeTile = tileIndex(renderLargeTile, pixel);
         if (largeTile != knownLargeTile) {
           knownLargeTile = largeTile;
           ListExit leaveLarge = listExit(line, renderLargeTile, pixel, last, ahead, enterS);
-          if ((push.params.value.tileMasks.at[largeTile] & rayBetween(line, enterS, leaveLarge.s)) == 0u) leave = leaveLarge;
+          if ((params.tileMasks.at[largeTile] & rayBetween(line, enterS, leaveLarge.s)) == 0u) leave = leaveLarge;
         }
         if (leave.ends) return;
         pixel = leave.pixel;
@@ -66,15 +66,15 @@ void walkLists(PictureLine line) {
     bool stepX = moves.x && s.x <= s.y;
     bool stepY = moves.y && !stepX;
     float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
-    uint list = uint(pixel.y) * uint(push.params.value.lists.x) + uint(pixel.x);
-    uvec2 head = push.params.value.heads.at[list];
+    uint list = uint(pixel.y) * uint(params.lists.x) + uint(pixel.x);
+    uvec2 head = params.heads.at[list];
     if ((head.y & tileRay) != 0u) {
       if (knownS != enterS) enterT = tAt(line, enterS);
       vec2 part = vec2(enterT, tAt(line, leaveS));
       float a = depthAt(part.x);
       float b = depthAt(part.y);
       if (part.y > part.x && (head.y & maskBetween(a, b)) != 0u) {
-        lookAtList(pixel, head.x, push.params.value.heads.at[list + 1u].x, part, min(a, b), max(a, b), hint);
+        lookAtList(pixel, head.x, params.heads.at[list + 1u].x, part, min(a, b), max(a, b), hint);
         accumulate(listLight, listDepth);
         if (accumulated.a >= opaque) return;
       }

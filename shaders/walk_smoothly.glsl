@@ -26,7 +26,7 @@ BlendPart blendPart(vec2 t) {
 // `head`: the list's, if it has a share in the blend.
 void blendList(ivec2 pixel, uint list, uvec2 head, float weight, BlendPart part, inout uint hint) {
   if ((head.y & part.mask) == 0u || !(weight > 0.0)) return;
-  lookAtList(pixel, head.x, push.params.value.heads.at[list + 1u].x, part.t, part.depths.x, part.depths.y, hint);
+  lookAtList(pixel, head.x, params.heads.at[list + 1u].x, part.t, part.depths.x, part.depths.y, hint);
   blendLight += weight * listLight;
   blendDepth = min(blendDepth, listDepth);
 }
@@ -40,7 +40,7 @@ float shareOfNext(float place) {
 
 // A ray that stays in about one place of V_O's picture: the four lists around that.
 void lookAlongLists(PictureLine line) {
-  ivec2 lastList = push.params.value.lists - 1;
+  ivec2 lastList = params.lists - 1;
   vec2 place = 0.5 * (line.start + line.end) - 0.5;
   float shareX = shareOfNext(place.x);
   float shareY = shareOfNext(place.y);
@@ -50,9 +50,9 @@ void lookAlongLists(PictureLine line) {
     ivec2 side = ivec2(i & 1, i >> 1);
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(floor(place)) + side, ivec2(0), lastList);
-    uint list = uint(pixel.y) * uint(push.params.value.lists.x) + uint(pixel.x);
+    uint list = uint(pixel.y) * uint(params.lists.x) + uint(pixel.x);
     uint hint = 0u;
-    blendList(pixel, list, push.params.value.heads.at[list], weight, part, hint);
+    blendList(pixel, list, params.heads.at[list], weight, part, hint);
   }
   accumulate(blendLight, blendDepth);
 }
@@ -98,7 +98,7 @@ int tileIndex(ColumnLine line, int size, int column, int row) {
 }
 
 void walkSmoothly(PictureLine picture) {
-  ivec2 lists = push.params.value.lists;
+  ivec2 lists = params.lists;
   vec2 whole = picture.end - picture.start;
   if (max(abs(whole.x), abs(whole.y)) < 1.0) {
     lookAlongLists(picture);
@@ -139,12 +139,12 @@ void walkSmoothly(PictureLine picture) {
       knownTile = tile;
       TileExit leave = tileExit(line, renderTile, column, row, enterS);
       tileRay = rayBetween(picture, enterS, min(leave.s + abs(line.inverse), 1.0));
-      bool passes = (push.params.value.tileMasks.at[tile] & tileRay) == 0u;
+      bool passes = (params.tileMasks.at[tile] & tileRay) == 0u;
       int largeTile = tileIndex(line, renderLargeTile, column, row);
       if (passes && largeTile != knownLargeTile) {
         knownLargeTile = largeTile;
         TileExit leaveLarge = tileExit(line, renderLargeTile, column, row, enterS);
-        if ((push.params.value.tileMasks.at[largeTile] & rayBetween(picture, enterS, leaveLarge.s)) == 0u) leave = leaveLarge;
+        if ((params.tileMasks.at[largeTile] & rayBetween(picture, enterS, leaveLarge.s)) == 0u) leave = leaveLarge;
       }
       if (passes && leave.s >= 1.0) return;
       if (passes && leave.column != column) {
@@ -162,8 +162,8 @@ void walkSmoothly(PictureLine picture) {
     int next = clamp(int(floor(centre)) + 1, 0, mostAcross);
     uint nearList = uint(column * stride + near * strideAcross);
     uint nextList = uint(column * stride + next * strideAcross);
-    uvec2 nearHead = push.params.value.heads.at[nearList];
-    uvec2 nextHead = push.params.value.heads.at[nextList];
+    uvec2 nearHead = params.heads.at[nearList];
+    uvec2 nextHead = params.heads.at[nextList];
     if (((nearHead.y | nextHead.y) & tileRay) != 0u) {
       if (knownS != enterS) enterT = tAt(picture, enterS);
       BlendPart part = blendPart(vec2(enterT, tAt(picture, leaveS)));

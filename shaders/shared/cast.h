@@ -89,16 +89,10 @@ struct CastParams {
   float level;  // of the survey; negative: equal budgets
 };
 
-#ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer CastParamsRef { CastParams value; };
-#endif
-
 struct CastConstants {
-  VDI_ADDRESS(CastParamsRef) params;
   uint mode;
   uint firstRow;  // of the band of rows that this dispatch covers
   uint lastRow;
-  uint pad;
 };
 
 VDI_SHARED_END

@@ -71,16 +71,8 @@ struct CompositeParams {
   uint pad;
 };
 
-#ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer CompositeParamsRef {
-  CompositeParams value;
-};
-#endif
-
 struct CompositeConstants {
-  VDI_ADDRESS(CompositeParamsRef) params;
   uint mode;
-  uint pad;
 };
 
 VDI_SHARED_END

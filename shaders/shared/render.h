@@ -88,14 +88,6 @@ struct RenderParams {
   StoredForm form;
 };
 
-#ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer RenderParamsRef { RenderParams value; };
-#endif
-
-struct RenderConstants {
-  VDI_ADDRESS(RenderParamsRef) params;
-};
-
 VDI_SHARED_END
 
 #endif

@@ -17,6 +17,7 @@ ComputePipelineInfo pipelineInfo() {
   info.shader = "cast";
   info.pushConstantBytes = sizeof(shared::CastConstants);
   info.imageCount = shared::castMaxPages;
+  info.uniformBytes = sizeof(shared::CastParams);
   return info;
 }
 
@@ -69,7 +70,7 @@ ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t comp
   return pipeline;
 }
 
-void CastPass::record(Commands& commands, VkDeviceAddress params, Work work, Algorithm algorithm,
+void CastPass::record(Commands& commands, const shared::CastParams& params, Work work, Algorithm algorithm,
                       const Band& band) {
   assert(volume_ != nullptr && band.firstRow < band.lastRow);
   const bool writes = work == Work::Write || work == Work::WriteByNeed;
@@ -81,13 +82,14 @@ void CastPass::record(Commands& commands, VkDeviceAddress params, Work work, Alg
                                                                     : shared::castProgramCountGrains;
   // Just the search stores supersegments itself.
   const std::uint32_t compact = program == shared::castProgramSearch ? isCompact(band.form) : 0;
-  const shared::CastConstants constants{params, writes ? shared::castModeWrite : shared::castModeSearch,
-                                        band.firstRow, band.lastRow, 0};
+  const shared::CastConstants constants{writes ? shared::castModeWrite : shared::castModeSearch,
+                                        band.firstRow, band.lastRow};
   const bool counts = program == shared::castProgramCountGrains || program == shared::castProgramSurvey;
   const std::uint32_t stride = counts ? band.countedStride : 1;
   // The row behind the band is counted too.
   const std::uint32_t rows = (band.lastRow - band.firstRow + stride - 1) / stride + (stride > 1 ? 1 : 0);
   const std::uint32_t width = (band.width + stride - 1) / stride;
+  pipelines_.update(commands, params);
   commands.dispatch(pipelineFor(program, compact), constants,
                     (width + shared::castGroupX - 1) / shared::castGroupX,
                     (rows + shared::castGroupY - 1) / shared::castGroupY);

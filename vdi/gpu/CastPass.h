@@ -44,8 +44,9 @@ class CastPass {
     std::uint32_t countedStride = 1;  // these two as in CastParams
     shared::StoredForm form{};
   };
-  /// `params` is the address of a CastParams. No dispatch of this pass may be in flight.
-  void record(Commands& commands, VkDeviceAddress params, Work work, Algorithm algorithm, const Band& band);
+  /// No dispatch of this pass may be in flight.
+  void record(Commands& commands, const shared::CastParams& params, Work work, Algorithm algorithm,
+              const Band& band);
 
  private:
   ComputePipeline& pipelineFor(std::uint32_t program, std::uint32_t compact);

@@ -149,6 +149,11 @@ void Commands::fill(const Buffer& buffer, std::uint32_t word) {
   vkCmdFillBuffer(buffer_, buffer.handle(), 0, VK_WHOLE_SIZE, word);
 }
 
+void Commands::update(const Buffer& buffer, std::span<const std::byte> bytes) {
+  assert(bytes.size() <= buffer.size() && bytes.size() <= 65536 && bytes.size() % 4 == 0);
+  vkCmdUpdateBuffer(buffer_, buffer.handle(), 0, bytes.size(), bytes.data());
+}
+
 void Commands::beginUpload(const Image3D& image) {
   changeLayout(buffer_, image, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   const VkClearColorValue zero{};

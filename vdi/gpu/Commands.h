@@ -58,6 +58,8 @@ class Commands {
   void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
             std::uint64_t bytes);
   void fill(const Buffer& buffer, std::uint32_t word);  // the whole buffer
+  /// The buffer's first bytes, by way of the command buffer: whole words, 64 KiB at most.
+  void update(const Buffer& buffer, std::span<const std::byte> bytes);
   /// Makes the image ready for copyToImage and fills it with zeros: texels that nothing is copied to would
   /// otherwise hold anything, NaN included, and a NaN spoils its neighbours even with weight 0.
   void beginUpload(const Image3D& image);

@@ -8,6 +8,7 @@ ComputePipelineInfo pipelineInfo() {
   ComputePipelineInfo info;
   info.shader = "composite";
   info.pushConstantBytes = sizeof(shared::CompositeConstants);
+  info.uniformBytes = sizeof(shared::CompositeParams);
   return info;
 }
 
@@ -16,8 +17,8 @@ ComputePipelineInfo pipelineInfo() {
 CompositePass::CompositePass(std::shared_ptr<Device> device)
     : pipelines_(std::move(device), pipelineInfo()) {}
 
-void CompositePass::record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form,
-                           Work work, Algorithm algorithm, std::uint32_t listCount) {
+void CompositePass::record(Commands& commands, const shared::CompositeParams& params, Work work,
+                           Algorithm algorithm) {
   const bool write = work == Work::Write || work == Work::WriteByNeed;
   const std::uint32_t program = work == Work::Survey                ? shared::compositeProgramSurvey
                                 : work == Work::WriteByNeed         ? shared::compositeProgramWriteByNeed
@@ -25,9 +26,9 @@ void CompositePass::record(Commands& commands, VkDeviceAddress params, const sha
                                 : write                             ? shared::compositeProgramWriteGrains
                                                                     : shared::compositeProgramCountGrains;
   const std::uint32_t mode = write ? shared::compositeModeWrite : shared::compositeModeSearch;
-  commands.dispatch(pipelines_.with({program, 0, isCompact(form)}),
-                    shared::CompositeConstants{params, mode, 0},
-                    (listCount + shared::compositeGroup - 1) / shared::compositeGroup);
+  pipelines_.update(commands, params);
+  commands.dispatch(pipelines_.with({program, 0, isCompact(params.form)}), shared::CompositeConstants{mode},
+                    (params.listCount + shared::compositeGroup - 1) / shared::compositeGroup);
 }
 
 }  // namespace vdi::gpu

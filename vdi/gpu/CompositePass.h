@@ -17,9 +17,7 @@ class CompositePass {
   /// What a dispatch does: what lists need (merging); or the first step of the algorithm, or, after a scan,
   /// its second one (by need, with Budget::Total).
   enum class Work { Survey, Search, Write, WriteByNeed };
-  /// `params` is the address of a CompositeParams of that form.
-  void record(Commands& commands, VkDeviceAddress params, const shared::StoredForm& form, Work work,
-              Algorithm algorithm, std::uint32_t listCount);
+  void record(Commands& commands, const shared::CompositeParams& params, Work work, Algorithm algorithm);
 
  private:
   PipelineSet pipelines_;  // by shared::compositeProgram... and precision

@@ -3,14 +3,16 @@
 #include <cassert>
 #include <utility>
 
+#include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
-#include "vdi/gpu/Memory.h"
 
 namespace vdi::gpu {
 
 namespace {
 
 constexpr std::uint32_t guaranteedPushConstantBytes = 128;
+constexpr std::uint32_t imageBinding = 0;
+constexpr std::uint32_t uniformBinding = 1;
 
 /// Exists just while the pipeline is made.
 class ShaderModule {
@@ -33,10 +35,10 @@ class ShaderModule {
 }  // namespace
 
 ComputePipeline::ComputePipeline(std::shared_ptr<Device> device, const ComputePipelineInfo& info)
-    : device_(std::move(device)), imageCount_(info.imageCount) {
+    : device_(std::move(device)), imageCount_(info.imageCount), uniformBytes_(info.uniformBytes) {
   assert(info.pushConstantBytes <= guaranteedPushConstantBytes);
   try {
-    if (imageCount_ > 0) makeDescriptorSet();
+    if (imageCount_ > 0 || uniformBytes_ > 0) makeDescriptorSet();
     makePipeline(info);
   } catch (...) {
     release();
@@ -49,15 +51,22 @@ ComputePipeline::~ComputePipeline() {
 }
 
 void ComputePipeline::makeDescriptorSet() {
-  const VkDescriptorSetLayoutBinding binding{0, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, imageCount_,
-                                             VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+  std::vector<VkDescriptorSetLayoutBinding> bindings;
+  std::vector<VkDescriptorPoolSize> sizes;
+  const auto add = [&](std::uint32_t binding, VkDescriptorType type, std::uint32_t count) {
+    if (count == 0) return;
+    bindings.push_back({binding, type, count, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+    sizes.push_back({type, count});
+  };
+  add(imageBinding, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, imageCount_);
+  add(uniformBinding, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, uniformBytes_ > 0 ? 1 : 0);
   const VkDescriptorSetLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
-                                                   nullptr, 0, 1, &binding};
+                                                   nullptr, 0, static_cast<std::uint32_t>(bindings.size()),
+                                                   bindings.data()};
   check(vkCreateDescriptorSetLayout(device_->handle(), &layoutInfo, nullptr, &setLayout_),
         "vkCreateDescriptorSetLayout");
-  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, imageCount_};
-  const VkDescriptorPoolCreateInfo poolInfo{
-      VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, nullptr, 0, 1, 1, &size};
+  const VkDescriptorPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, nullptr,     0, 1,
+                                            static_cast<std::uint32_t>(sizes.size()),      sizes.data()};
   check(vkCreateDescriptorPool(device_->handle(), &poolInfo, nullptr, &pool_), "vkCreateDescriptorPool");
   const VkDescriptorSetAllocateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO, nullptr, pool_, 1,
                                             &setLayout_};
@@ -66,9 +75,13 @@ void ComputePipeline::makeDescriptorSet() {
 
 void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
   const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, info.pushConstantBytes};
-  const VkPipelineLayoutCreateInfo layoutInfo{
-      VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO, nullptr, 0, imageCount_ > 0 ? 1U : 0U, &setLayout_,
-      info.pushConstantBytes > 0 ? 1U : 0U,          &range};
+  const VkPipelineLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
+                                              nullptr,
+                                              0,
+                                              set_ != VK_NULL_HANDLE ? 1U : 0U,
+                                              &setLayout_,
+                                              info.pushConstantBytes > 0 ? 1U : 0U,
+                                              &range};
   check(vkCreatePipelineLayout(device_->handle(), &layoutInfo, nullptr, &layout_), "vkCreatePipelineLayout");
   std::vector<VkSpecializationMapEntry> entries;
   for (std::uint32_t id = 0; id < info.specialization.size(); ++id) {
@@ -98,9 +111,29 @@ void ComputePipeline::bindImages(std::span<const Image3D* const> images, const S
   for (const Image3D* image : images)
     infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
   const VkWriteDescriptorSet write{
-      VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,    nullptr,      set_,    0,      0, imageCount_,
+      VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,    nullptr,      set_,    imageBinding, 0, imageCount_,
       VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, infos.data(), nullptr, nullptr};
   vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
+}
+
+void ComputePipeline::bindUniforms(const Buffer& buffer) {
+  const VkDescriptorBufferInfo info{buffer.handle(), 0, uniformBytes_};
+  const VkWriteDescriptorSet write{
+      VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set_,  uniformBinding, 0, 1,
+      VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,      nullptr, &info, nullptr};
+  vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
+}
+
+PipelineSet::PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common)
+    : device_(std::move(device)), common_(std::move(common)) {
+  if (common_.uniformBytes > 0) uniforms_ = Buffer(device_, common_.uniformBytes, MemoryKind::DeviceLocal);
+}
+
+void PipelineSet::updateBytes(Commands& commands, std::span<const std::byte> bytes) {
+  assert(bytes.size() == common_.uniformBytes);
+  commands.barrier();
+  commands.update(uniforms_, bytes);
+  commands.barrier();
 }
 
 ComputePipeline& PipelineSet::with(const std::vector<std::uint32_t>& specialization) {
@@ -109,6 +142,7 @@ ComputePipeline& PipelineSet::with(const std::vector<std::uint32_t>& specializat
     ComputePipelineInfo info = common_;
     info.specialization = specialization;
     pipeline = std::make_unique<ComputePipeline>(device_, info);
+    if (uniforms_) pipeline->bindUniforms(uniforms_);
   }
   return *pipeline;
 }

@@ -1,5 +1,6 @@
-// A compute shader ready to be dispatched. Buffers reach shaders as device addresses inside the push
-// constants, so the only descriptors are the sampled 3-D images, in one set that is written when they change.
+// A compute shader ready to be dispatched. Buffers reach shaders as device addresses, inside the push
+// constants or inside the uniforms, if it has more parameters than fit there; so the only descriptors are the
+// uniforms and the sampled 3-D images, in one set that is written when they change.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -12,11 +13,12 @@
 #include <utility>
 #include <vector>
 
+#include "vdi/gpu/Memory.h"
+
 namespace vdi::gpu {
 
+class Commands;
 class Device;
-class Image3D;
-class Sampler;
 
 /// SPIR-V of `shaders/<name>.comp`, compiled at build time and embedded in the library; asserts that the name
 /// exists.
@@ -26,8 +28,9 @@ struct ComputePipelineInfo {
   std::string_view shader;  // name without ".comp", for shaderCode
   std::span<const std::uint32_t>
       code;  // SPIR-V that's used instead when it isn't empty; just while constructing
-  std::uint32_t pushConstantBytes = 0;  // at most 128
-  std::uint32_t imageCount = 0;  // size of the sampler3D array at set 0, binding 0; 0: no descriptor set
+  std::uint32_t pushConstantBytes = 0;        // at most 128
+  std::uint32_t imageCount = 0;               // size of the sampler3D array at set 0, binding 0
+  std::uint32_t uniformBytes = 0;             // of the uniform block at set 0, binding 1; 0: none
   std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
 };
 
@@ -43,10 +46,12 @@ class ComputePipeline {
   /// Writes the descriptor set: exactly imageCount images. Must not be called while a dispatch of this
   /// pipeline is in flight.
   void bindImages(std::span<const Image3D* const> images, const Sampler& sampler);
+  /// Likewise, a buffer of uniformBytes.
+  void bindUniforms(const Buffer& buffer);
 
   VkPipeline handle() const { return pipeline_; }
   VkPipelineLayout layout() const { return layout_; }
-  VkDescriptorSet descriptorSet() const { return set_; }  // VK_NULL_HANDLE without images
+  VkDescriptorSet descriptorSet() const { return set_; }  // VK_NULL_HANDLE without any
 
  private:
   void makeDescriptorSet();
@@ -55,6 +60,7 @@ class ComputePipeline {
 
   std::shared_ptr<Device> device_;
   std::uint32_t imageCount_ = 0;
+  std::uint32_t uniformBytes_ = 0;
   VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
   VkDescriptorPool pool_ = VK_NULL_HANDLE;
   VkDescriptorSet set_ = VK_NULL_HANDLE;
@@ -66,13 +72,22 @@ class ComputePipeline {
 class PipelineSet {
  public:
   /// `common`: but for the specialisation.
-  PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common)
-      : device_(std::move(device)), common_(std::move(common)) {}
+  PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common);
   ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
+  /// What the uniforms of all pipelines are for what's recorded next. They're in the device's own memory,
+  /// where shaders read them as fast as constants: a GPU would fetch them from the host's memory again and
+  /// again.
+  template <typename Uniforms>
+  void update(Commands& commands, const Uniforms& uniforms) {
+    updateBytes(commands, std::as_bytes(std::span(&uniforms, 1)));
+  }
 
  private:
+  void updateBytes(Commands& commands, std::span<const std::byte> bytes);
+
   std::shared_ptr<Device> device_;
   ComputePipelineInfo common_;
+  Buffer uniforms_;  // of all of them
   std::map<std::vector<std::uint32_t>, std::unique_ptr<ComputePipeline>> pipelines_;
 };
 

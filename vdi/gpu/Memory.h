@@ -24,7 +24,7 @@ enum class MemoryKind {
 /// them.
 std::uint64_t texelBytes(VkFormat format);
 
-/// A storage buffer with a device address. Usage: storage, transfer source and destination.
+/// A buffer with a device address. Usage: storage, uniforms, transfer source and destination.
 class Buffer {
  public:
   Buffer() = default;

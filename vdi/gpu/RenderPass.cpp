@@ -9,7 +9,7 @@ namespace {
 ComputePipelineInfo pipelineInfo() {
   ComputePipelineInfo info;
   info.shader = "render";
-  info.pushConstantBytes = sizeof(shared::RenderConstants);
+  info.uniformBytes = sizeof(shared::RenderParams);
   return info;
 }
 
@@ -40,12 +40,13 @@ shared::RenderParams renderGeometry(const View& original, const View& view) {
 
 RenderPass::RenderPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
 
-void RenderPass::record(Commands& commands, VkDeviceAddress address, const shared::RenderParams& params,
+void RenderPass::record(Commands& commands, const shared::RenderParams& params,
                         Reconstruction reconstruction) {
   const std::uint32_t smooth = reconstruction == Reconstruction::Smooth ? 1 : 0;
-  commands.dispatch(pipelines_.with({0, 0, isCompact(params.form), smooth}), shared::RenderConstants{address},
-                    (params.width + shared::renderGroupX - 1) / shared::renderGroupX,
-                    (params.height + shared::renderGroupY - 1) / shared::renderGroupY);
+  pipelines_.update(commands, params);
+  commands.dispatchBytes(pipelines_.with({0, 0, isCompact(params.form), smooth}), {},
+                         (params.width + shared::renderGroupX - 1) / shared::renderGroupX,
+                         (params.height + shared::renderGroupY - 1) / shared::renderGroupY, 1);
 }
 
 }  // namespace vdi::gpu

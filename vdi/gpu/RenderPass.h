@@ -21,9 +21,7 @@ shared::RenderParams renderGeometry(const View& original, const View& view);
 class RenderPass {
  public:
   explicit RenderPass(std::shared_ptr<Device> device);
-  /// `address`: where the device finds `params`.
-  void record(Commands& commands, VkDeviceAddress address, const shared::RenderParams& params,
-              Reconstruction reconstruction);
+  void record(Commands& commands, const shared::RenderParams& params, Reconstruction reconstruction);
 
  private:
   PipelineSet pipelines_;  // by precision and reconstruction

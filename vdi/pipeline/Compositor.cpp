@@ -16,7 +16,6 @@ Compositor::Compositor(std::shared_ptr<gpu::Device> device)
       mergePass_(device_),
       compositePass_(device_),
       builder_(device_),
-      params_(device_, sizeof(shared::CompositeParams), MemoryKind::Upload),
       survey_(device_) {}
 
 /// Bands of lists whose supersegments, received, merged and composited, take at most an eighth of the device
@@ -54,9 +53,7 @@ Survey Compositor::survey(const std::vector<ListsOf<Segment>>& subLists, const R
     merge(subLists, band);
     sum += survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
       settings_.survey = address;
-      std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
-      compositePass_.record(commands, params_.address(), settings_.form, gpu::CompositePass::Work::Survey,
-                            request_.algorithm, band.listCount());
+      compositePass_.record(commands, settings_, gpu::CompositePass::Work::Survey, request_.algorithm);
     });
   }
   if (bands.size() == 1) surveyed_ = bands.front();
@@ -148,13 +145,12 @@ void Compositor::compositeBand(const Band& band, ListsOf<Segment>& result) {
     settings_.written = targets.written;
     settings_.left = targets.left;
     settings_.status = targets.status;
-    std::memcpy(params_.mapped().data(), &settings_, sizeof(settings_));
     using Work = gpu::CompositePass::Work;
-    compositePass_.record(commands, params_.address(), settings_.form,
+    compositePass_.record(commands, settings_,
                           !write                   ? Work::Search
                           : settings_.level < 0.0F ? Work::Write
                                                    : Work::WriteByNeed,
-                          request_.algorithm, band.listCount());
+                          request_.algorithm);
   };
   ListBuilder::Request build;
   build.width = band.listCount();

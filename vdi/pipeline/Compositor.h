@@ -61,7 +61,6 @@ class Compositor {
   gpu::MergePass mergePass_;
   gpu::CompositePass compositePass_;
   ListBuilder builder_;
-  gpu::Buffer params_;
   gpu::Buffer staging_;
   gpu::Buffer received_;
   gpu::Buffer rankAddresses_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 namespace vdi::detail {
@@ -26,7 +25,6 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
       pass_(device_),
       builder_(device_),
       commands_(device_),
-      params_(device_, sizeof(shared::CastParams), MemoryKind::Upload),
       survey_(device_) {}
 
 void RayCaster::setBlocks(std::span<const Block> blocks, const Scene& scene) {
@@ -72,8 +70,7 @@ float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) 
   const auto height = static_cast<std::uint32_t>(request.view.height());
   const Survey survey = survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
     params.survey = address;
-    std::memcpy(params_.mapped().data(), &params, sizeof(params));
-    pass_.record(commands, params_.address(), gpu::CastPass::Work::Survey, Algorithm::Merge,
+    pass_.record(commands, params, gpu::CastPass::Work::Survey, Algorithm::Merge,
                  {width, 0, height, params.countedStride, params.form});
   });
   const double milliseconds = commands_.stageTimes().front().milliseconds;
@@ -134,9 +131,8 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
         params.sensitivities = targets.sensitivities;
         params.counts = targets.counts;
       }
-      std::memcpy(params_.mapped().data(), &params, sizeof(params));
       using Work = gpu::CastPass::Work;
-      pass_.record(commands, params_.address(),
+      pass_.record(commands, params,
                    !write                ? Work::Search
                    : params.level < 0.0F ? Work::Write
                                          : Work::WriteByNeed,
@@ -172,11 +168,9 @@ Image RayCaster::image(const Request& request, const Progress& progress) {
     picture_.reserve(device_, std::uint64_t{end - row} * width);
     params.colors = picture_.colors() - first * sizeof(glm::vec4);
     params.depths = picture_.depths() - first * sizeof(float);
-    std::memcpy(params_.mapped().data(), &params, sizeof(params));
     commands_.begin();
     commands_.mark("cast");
-    pass_.record(commands_, params_.address(), gpu::CastPass::Work::Volume, Algorithm::Merge,
-                 {width, row, end});
+    pass_.record(commands_, params, gpu::CastPass::Work::Volume, Algorithm::Merge, {width, row, end});
     picture_.recordDownload(commands_);
     commands_.submitAndWait();
     times_.all += commands_.stageTimes().front().milliseconds;

@@ -59,7 +59,6 @@ class RayCaster {
   gpu::CastPass pass_;
   ListBuilder builder_;
   gpu::Commands commands_;
-  gpu::Buffer params_;
   PictureBuffers picture_;
   SurveyBuffer survey_;
   ListTimes times_;

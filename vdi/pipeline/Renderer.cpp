@@ -19,17 +19,12 @@ namespace shared = gpu::shared;
 
 struct VdiRenderer::State {
   explicit State(std::shared_ptr<gpu::Device> theDevice)
-      : device(std::move(theDevice)),
-        commands(device),
-        pass(device),
-        expand(device),
-        params(device, sizeof(shared::RenderParams), MemoryKind::Upload) {}
+      : device(std::move(theDevice)), commands(device), pass(device), expand(device) {}
 
   std::shared_ptr<gpu::Device> device;
   gpu::Commands commands;
   gpu::RenderPass pass;
   gpu::ExpandPass expand;
-  gpu::Buffer params;
   gpu::Buffer staging;
   gpu::Buffer offsets;
   gpu::Buffer segments;
@@ -140,10 +135,9 @@ Image VdiRenderer::render(const Camera& camera, int width, int height, Reconstru
   params.depths = s.picture.depths();
   params.nearest = s.nearest;
   params.farthest = s.farthest;
-  std::memcpy(s.params.mapped().data(), &params, sizeof(params));
   s.commands.begin();
   s.commands.mark("render");
-  s.pass.record(s.commands, s.params.address(), params, reconstruction);
+  s.pass.record(s.commands, params, reconstruction);
   s.picture.recordDownload(s.commands);
   s.commands.submitAndWait();
   s.milliseconds = s.commands.stageTimes().front().milliseconds;
