@@ -2,10 +2,11 @@
 // vdi/reference/SegmentByMerging.cpp; reduce.comp merges grains into supersegments. Counting does all tolerances side by
 // side in one walk; writing does one.
 //
-// Needs: optical.glsl, appearance.glsl; params with sensitivities, counts, offsets, spans, lights, written, left, status,
+// Needs: optical.glsl, appearance.glsl; params with sensitivities, counts, offsets, grains, written, left, status,
 // survey; bool writesGrains, writesByNeed, constants; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 
+#include "grain.glsl"
 #include "tolerance.glsl"
 
 void walk();
@@ -31,6 +32,7 @@ float grainTolerance;
 vec2 needTolerances;
 float grainAllotted;
 uint grainRoom;
+uint grainBase;  // where the list's grains are
 vec2 grainSpan;  // front, back
 vec4 grainLight;
 float grainTransmittance;
@@ -40,9 +42,7 @@ bool grainCut;  // the next grain starts a run
 void writeGrain() {
   uint slot = grainCount[0] - 1u;
   if (slot < grainRoom) {
-    uint at = params.offsets.at[listIndex] + slot;
-    params.spans.at[at] = grainSpan;
-    params.lights.at[at] = vec4(grainLight.rgb, grainStartsRun ? -grainLight.a : grainLight.a);
+    params.grains.at[grainBase + slot] = packedGrain(grainSpan, grainLight, grainStartsRun);
   }
 }
 
@@ -200,6 +200,7 @@ void writeGrains() {
     params.left.at[listIndex] = 0u;
     return;
   }
+  grainBase = params.offsets.at[listIndex];
   grainAllotted = params.sensitivities.at[listIndex];
   grainTolerance = grainAllotted;
   if (writesByNeed) needTolerances = vec2(toleranceOfLevel(levelBelow()), toleranceOfLevel(levelBelow() + 1u));

@@ -11,153 +11,157 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 #include "optical.glsl"
 #include "appearance.glsl"
 #include "store.glsl"
+#include "grain.glsl"
 
+struct Grain {
+  vec2 span;  // front, back
+  vec4 light;
+  bool cut;
+  float opacity;
+  vec4 appearance;
+};
+
+Grain grainOf(uvec4 packed) {
+  vec2 span = spanOf(packed);
+  vec4 light = lightOf(packed);
+  return Grain(span, light, isCut(packed), opacityOf(light.a), appearanceOf(light.rgb, light.a, span.y - span.x, push.step));
+}
+
+// The list's grains, one after the other; the next one is on its way while one is used.
 uint base;
+uint grainCount;
+uint nextRead;
+uvec4 grainAhead;
 
-Grain grainAt(uint i) {
-  vec4 depths = push.grains.at[2u * (base + i)];
-  return Grain(depths.x, depths.y, depths.z, floatBitsToUint(depths.w), push.grains.at[2u * (base + i) + 1u]);
+void beginReading(uint count) {
+  grainCount = count;
+  nextRead = 1u;
+  grainAhead = push.grains.at[base];
 }
 
-void setGrain(uint i, Grain g) {
-  push.grains.at[2u * (base + i)] = vec4(g.front, g.back, g.before, uintBitsToFloat(g.first));
-  push.grains.at[2u * (base + i) + 1u] = g.mean;
+uvec4 readPacked() {
+  uvec4 grain = grainAhead;
+  if (nextRead < grainCount) grainAhead = push.grains.at[base + nextRead];
+  ++nextRead;
+  return grain;
 }
 
-vec4 meanOf(Grain a, Grain b) {
-  float whole = b.back - a.front;
-  return (a.back - a.front) / whole * a.mean + (b.back - b.front) / whole * b.mean;
+Grain readGrain() { return grainOf(readPacked()); }
+
+// `before`: transmittance of what's in front of a.
+float costOf(Grain a, Grain b, float before) {
+  if (b.cut) return unlimited;
+  float first = a.span.y - a.span.x;
+  float second = b.span.y - b.span.x;
+  vec4 both = (first * a.appearance + second * b.appearance) / (b.span.y - a.span.x);
+  return weightBehind(before) * (first * differenceOf(a.appearance, both) + second * differenceOf(b.appearance, both) +
+                                 max(b.span.x - a.span.y, 0.0) * differenceOf(vec4(0.0), both));
 }
 
-float costOf(Grain a, Grain b) {
-  if (b.before < 0.0) return unlimited;
-  vec4 both = meanOf(a, b);
-  float before = a.before < 0.0 ? -1.0 - a.before : a.before;
-  return weightBehind(before) * ((a.back - a.front) * differenceOf(a.mean, both) +
-                                 (b.back - b.front) * differenceOf(b.mean, both) +
-                                 max(b.front - a.back, 0.0) * differenceOf(vec4(0.0), both));
-}
-
-// Costs of merging each grain with the one before it, of a list that's being written front to back: what the next round
-// may cost follows from their sum.
-Grain costPrevious;
+// Costs of merging each grain with the one before it, of a list that's gone through front to back: what the next round may
+// cost follows from their sum.
+Grain previousGrain;
+float previousBefore;
 float costSum;
 float costsFinite;
 
 void beginCosts() {
+  previousBefore = -1.0;
   costSum = 0.0;
   costsFinite = 0.0;
 }
 
-void setGrainAndCost(uint i, Grain g) {
-  setGrain(i, g);
-  float cost = i > 0u ? costOf(costPrevious, g) : unlimited;
-  bool finite = cost < unlimited;
-  costSum += finite ? cost : 0.0;
-  costsFinite += finite ? 1.0 : 0.0;
-  costPrevious = g;
+void addCost(Grain g, float before) {
+  if (previousBefore >= 0.0 && !g.cut) {
+    costSum += costOf(previousGrain, g, previousBefore);
+    costsFinite += 1.0;
+  }
+  previousGrain = g;
+  previousBefore = before;
 }
 
-// One round, in place; returns how many grains are left.
+void sumCosts(uint count) {
+  beginReading(count);
+  beginCosts();
+  float before = 1.0;
+  for (uint i = 0u; i < count; ++i) {
+    Grain g = readGrain();
+    addCost(g, before);
+    before *= 1.0 - g.opacity;
+  }
+}
+
+uvec4 packedAgain(Grain g) { return packedGrain(g.span, g.light, g.cut); }
+
+Grain merged(Grain a, Grain b) {
+  vec4 light = vec4(a.light.rgb + (1.0 - a.opacity) * b.light.rgb, a.light.a + b.light.a);
+  return grainOf(packedGrain(vec2(a.span.x, b.span.y), light, a.cut));
+}
+
+// One round, in place, of at least two grains; returns how many are left.
 uint mergeOnce(uint count, uint excess, float limit) {
   uint left = 0u;
   float previous = unlimited;
-  Grain a = grainAt(0u);
-  Grain b = grainAt(1u);
-  float cost = costOf(a, b);
+  float before = 1.0;
+  beginReading(count);
+  Grain a = readGrain();
+  Grain b = readGrain();
+  float cost = costOf(a, b, before);
   beginCosts();
   for (uint i = 0u; i < count;) {
     Grain c = b;
     float next = unlimited;
     if (i + 2u < count) {
-      c = grainAt(i + 2u);
-      next = costOf(b, c);
+      c = readGrain();
+      next = costOf(b, c, before * (1.0 - a.opacity));
     }
     bool merges = excess > 0u && cost < unlimited && cost <= limit && cost <= previous && cost <= next;
     if (merges) {
-      a.mean = meanOf(a, b);
-      a.back = b.back;
+      a = merged(a, b);
       --excess;
     }
-    setGrainAndCost(left++, a);
+    push.grains.at[base + left++] = packedAgain(a);
+    addCost(a, before);
+    before *= 1.0 - a.opacity;
     previous = merges ? next : cost;
     i += merges ? 2u : 1u;
-    if (i >= count) break;
+    a = merges ? c : b;
+    b = c;
+    cost = next;
     if (merges) {
-      a = c;
-      b = c;
       cost = unlimited;
       if (i + 1u < count) {
-        b = grainAt(i + 1u);
-        cost = costOf(a, b);
+        b = readGrain();
+        cost = costOf(a, b, before);
       }
-    } else {
-      a = b;
-      b = c;
-      cost = next;
     }
   }
   return left;
 }
 
-vec4 lightAt(uint i) {
-  vec4 light = push.lights.at[base + i];
-  return vec4(light.rgb, abs(light.a));
-}
-
-void setUpGrains(uint count) {
-  float before = 1.0;
-  beginCosts();
+void writeSegments(uint count, uint slot) {
+  beginReading(count);
+  beginStoring();
   for (uint i = 0u; i < count; ++i) {
-    vec2 span = push.spans.at[base + i];
-    vec4 light = push.lights.at[base + i];
-    bool cut = light.a < 0.0;
-    light.a = abs(light.a);
-    setGrainAndCost(i, Grain(span.x, span.y, cut ? -1.0 - before : before, i,
-                             appearanceOf(light.rgb, light.a, span.y - span.x, push.step)));
-    before *= 1.0 - opacityOf(light.a);
-  }
-}
-
-void writeGrainsAsSegments(uint count, uint slot) {
-  for (uint i = 0u; i < count; ++i) {
-    vec2 span = push.spans.at[base + i];
-    vec4 light = lightAt(i);
+    uvec4 packed = readPacked();
+    vec2 span = spanOf(packed);
+    vec4 light = lightOf(packed);
     storeSegment(push.segments, slot + i, Material(span.x, span.y, light.rgb, light.a), push.form);
-  }
-}
-
-// Light of the grains that were merged is put together here, front to back.
-void writeSegments(uint count, uint grains, uint slot) {
-  for (uint i = 0u; i < count; ++i) {
-    Grain g = grainAt(i);
-    uint end = i + 1u < count ? floatBitsToUint(push.grains.at[2u * (base + i) + 2u].w) : grains;
-    vec4 light = lightAt(g.first);
-    for (uint j = g.first + 1u; j < end; ++j) {
-      vec4 more = lightAt(j);
-      light = vec4(light.rgb + (1.0 - opacityOf(light.a)) * more.rgb, min(light.a + more.a, maxOpticalDepth));
-    }
-    storeSegment(push.segments, slot + i, Material(g.front, g.back, light.rgb, light.a), push.form);
   }
 }
 
 void main() {
   uint list = gl_GlobalInvocationID.x;
   if (list >= push.listCount) return;
-  uint written = push.written.at[list];
+  uint count = push.written.at[list];
   uint slot = push.offsets.at[list];
   uint most = push.offsets.at[list + 1u] - slot;
   base = push.grainOffsets.at[list];
-  beginStoring();
-  if (written <= most) {
-    writeGrainsAsSegments(written, slot);
-    return;
-  }
-  setUpGrains(written);
-  uint count = written;
+  if (count == 0u) return;
+  if (count > most) sumCosts(count);
   while (count > most) {
     if (costsFinite == 0.0) break;  // just cuts are left; there are no more of them than may be
     count = mergeOnce(count, count - most, costSum / costsFinite * 1.0001);
   }
-  writeSegments(min(count, most), written, slot);
+  writeSegments(min(count, most), slot);
 }

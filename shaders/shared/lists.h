@@ -7,6 +7,7 @@ VDI_SHARED_BEGIN
 
 // Room for grains, in multiples of a list's budget, and what's added to it; as in vdi/reference/Segmenter.h.
 #ifdef __cplusplus
+inline constexpr uint grainBytes = 16;
 inline constexpr uint grainsPerBudget = 2;
 inline constexpr uint spareGrains = 4;
 inline constexpr uint uncountedSpareGrains = 8;
@@ -51,27 +52,14 @@ struct StoredForm {
 inline uint isCompact(const StoredForm& form) { return form.depthStep > 0.0F ? 1 : 0; }
 #endif
 
-// Grain of vdi/reference/SegmentByMerging.cpp while it's decided what's merged. What the grains are made of lies apart, and
-// stays as it was written: their spans (front, back) and lights, premultiplied colour over all of a grain and its optical
-// depth, which is negative if the grain must not be merged with the one before it.
-struct Grain {
-  float front;
-  float back;
-  float before;  // transmittance of what's in front of it; -1 - that, if it must not be merged with the grain before it
-  uint first;    // the first of the grains that it was merged from
-  vec4 mean;     // premultiplied colour and opacity over one sample
-};
-
 VDI_SHARED_END
 
 #ifndef __cplusplus
-// Two vec4 a grain: one access each, where a struct's members would take eight.
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray { vec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray { uvec4 at[]; };  // grain.glsl
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CompactArray { uvec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray { float at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer Vec2Array { vec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4Array { vec4 at[]; };
 #endif
 

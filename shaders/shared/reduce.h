@@ -12,9 +12,7 @@ const uint reduceGroup = 64;
 #endif
 
 struct ReduceConstants {
-  VDI_ADDRESS(Vec2Array) spans;         // of the grains
-  VDI_ADDRESS(Vec4Array) lights;
-  VDI_ADDRESS(GrainArray) grains;       // scratch, as many
+  VDI_ADDRESS(GrainArray) grains;       // merged in place
   VDI_ADDRESS(UintArray) grainOffsets;  // [lists + 1]
   VDI_ADDRESS(UintArray) written;       // [lists]: grains
   VDI_ADDRESS(UintArray) offsets;       // [lists + 1], of what's to be left of them

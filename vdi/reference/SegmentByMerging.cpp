@@ -1,6 +1,7 @@
 // The shaders' twin is shaders/grains.glsl (step 2) and shaders/reduce.comp (step 3).
 #include <algorithm>
 #include <cmath>
+#include <glm/gtc/packing.hpp>
 #include <limits>
 #include <utility>
 
@@ -47,9 +48,9 @@ struct Grain {
   float green;
   float blue;
   float opticalDepth;
-  float before;       // transmittance of what's in front of it
-  bool cut;           // must not be merged with the grain before it
-  Appearance mean{};  // over its length
+  bool cut;                 // must not be merged with the grain before it
+  float before = 1.0F;      // transmittance of what's in front of it; see setUpCosts
+  Appearance appearance{};  // likewise
   void absorb(float theBack, float theRed, float theGreen, float theBlue, float theOpticalDepth) {
     const float transmittance = 1.0F - opacityOf(opticalDepth);
     red += transmittance * theRed;
@@ -57,6 +58,17 @@ struct Grain {
     blue += transmittance * theBlue;
     opticalDepth = std::min(opticalDepth + theOpticalDepth, maxExtinction);
     back = theBack;
+  }
+  /// To what it has in memory: half floats. The scale keeps thin material's optical depth a normal number.
+  void round() {
+    constexpr float scale = 64.0F;
+    constexpr float thinnest = 0x1p-20F;
+    constexpr float thickest = 1023.0F;
+    const auto half = [](float value) { return glm::unpackHalf1x16(glm::packHalf1x16(value)); };
+    red = half(red);
+    green = half(green);
+    blue = half(blue);
+    opticalDepth = half(std::clamp(opticalDepth, thinnest, thickest) * scale) / scale;
   }
 };
 
@@ -100,7 +112,7 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
         grains.back().absorb(i.back, i.red, i.green, i.blue, i.opticalDepth);
       } else {
         grains.push_back(
-            {i.front, i.back, i.red, i.green, i.blue, i.opticalDepth, before, rules.cutAtGaps && cut});
+            {i.front, i.back, i.red, i.green, i.blue, i.opticalDepth, rules.cutAtGaps && cut});
         first = x;
         deviation = 0.0F;
         open = true;
@@ -111,6 +123,7 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
     before *= 1.0F - opacityOf(i.opticalDepth);
     reach = i.back;
   }
+  for (Grain& g : grains) g.round();
   return grains;
 }
 
@@ -119,14 +132,14 @@ Appearance meanOf(const Grain& a, const Grain& b) {
   const float whole = b.back - a.front;
   const float first = (a.back - a.front) / whole;
   const float second = (b.back - b.front) / whole;
-  return {first * a.mean.red + second * b.mean.red, first * a.mean.green + second * b.mean.green,
-          first * a.mean.blue + second * b.mean.blue, first * a.mean.opacity + second * b.mean.opacity};
+  return {first * a.appearance.red + second * b.appearance.red, first * a.appearance.green + second * b.appearance.green,
+          first * a.appearance.blue + second * b.appearance.blue, first * a.appearance.opacity + second * b.appearance.opacity};
 }
 
 Grain merged(const Grain& a, const Grain& b) {
   Grain result = a;
-  result.mean = meanOf(a, b);
   result.absorb(b.back, b.red, b.green, b.blue, b.opticalDepth);
+  result.round();
   return result;
 }
 
@@ -135,8 +148,18 @@ float costOf(const Grain& a, const Grain& b) {
   if (b.cut) return unlimited;
   const Appearance both = meanOf(a, b);
   return weightBehind(a.before) *
-         ((a.back - a.front) * distance(a.mean, both) + (b.back - b.front) * distance(b.mean, both) +
+         ((a.back - a.front) * distance(a.appearance, both) + (b.back - b.front) * distance(b.appearance, both) +
           std::max(b.front - a.back, 0.0F) * distance({}, both));
+}
+
+/// What costs are computed from.
+void setUpCosts(std::vector<Grain>& grains, float sampleStep) {
+  float before = 1.0F;
+  for (Grain& g : grains) {
+    g.before = before;
+    g.appearance = overOneSample(g.red, g.green, g.blue, g.opticalDepth, g.back - g.front, sampleStep);
+    before *= 1.0F - opacityOf(g.opticalDepth);
+  }
 }
 
 /// Costs of merging each grain with the next one; unlimited for the last.
@@ -147,7 +170,8 @@ std::vector<float> costsOf(const std::vector<Grain>& grains) {
 }
 
 /// One round; `excess` grains at most are to go. False if none can.
-bool mergeOnce(std::vector<Grain>& grains, std::size_t excess) {
+bool mergeOnce(std::vector<Grain>& grains, std::size_t excess, float sampleStep) {
+  setUpCosts(grains, sampleStep);
   const std::vector<float> costs = costsOf(grains);
   float sum = 0.0F;
   float finite = 0.0F;
@@ -178,10 +202,7 @@ bool mergeOnce(std::vector<Grain>& grains, std::size_t excess) {
 }
 
 void mergeCheapest(std::vector<Grain>& grains, std::size_t most, float sampleStep) {
-  for (Grain& g : grains) {
-    g.mean = overOneSample(g.red, g.green, g.blue, g.opticalDepth, g.back - g.front, sampleStep);
-  }
-  while (grains.size() > most && mergeOnce(grains, grains.size() - most)) {
+  while (grains.size() > most && mergeOnce(grains, grains.size() - most, sampleStep)) {
   }
 }
 
