@@ -2,7 +2,6 @@
 // floats, whose sign tells that it must not be merged with the grain before it. Twin of Grain::round in
 // vdi/reference/SegmentByMerging.cpp.
 
-
 const float grainDepthScale = 64.0;             // optical depths from
 const float thinnestGrain = 9.5367431640625e-7;  // 2^-20, to
 const float thickestGrain = 1023.0;             // are normal half floats then
