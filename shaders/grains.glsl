@@ -18,6 +18,7 @@ uint grainsAtOnce = 1u;  // samples that an interval stands for
 uint grainsRuns;
 bool grainsRunVisible;
 bool grainsCutAtGaps;
+float grainsPerStep;  // 1 / length of a sample
 
 // One per tolerance while counting. While writing the first is what's written; by need, two more count what the list would
 // hold at the levels of the survey that its number of supersegments is interpolated from.
@@ -81,7 +82,7 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
     grainCut = true;
   }
   if (grainsOpen == 0u && !(opticalDepth > 0.0)) return;
-  float weight = weightBehind(grainsBefore) / params.step;
+  float weight = weightBehind(grainsBefore) * grainsPerStep;
   if (gap && !grainsCutAtGaps) deviate(vec4(0.0), weight * (front - reach));
   deviate(x, weight * (back - front));
   if (!(opticalDepth > 0.0)) return;
@@ -119,6 +120,7 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
 void walkForGrains() {
   grainsCutAtGaps = params.cutAtGaps != 0u;
   grainsBefore = 1.0;
+  grainsPerStep = 1.0 / params.step;
   grainsOpen = 0u;
   grainsReach = 0.0;
   grainsVisible = 0u;

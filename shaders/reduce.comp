@@ -53,41 +53,42 @@ float costOf(Grain a, Grain b, float before) {
   if (b.cut) return unlimited;
   float first = a.span.y - a.span.x;
   float second = b.span.y - b.span.x;
-  vec4 both = (first * a.appearance + second * b.appearance) / (b.span.y - a.span.x);
-  return weightBehind(before) * (first * differenceOf(a.appearance, both) + second * differenceOf(b.appearance, both) +
-                                 max(b.span.x - a.span.y, 0.0) * differenceOf(vec4(0.0), both));
+  float whole = b.span.y - a.span.x;
+  float gap = b.span.x - a.span.y;
+  float weight = weightBehind(before) / whole;
+  // What's below, where there's no gap.
+  if (!(gap > 0.0)) return 2.0 * weight * first * second * differenceOf(a.appearance, b.appearance);
+  vec4 both = first * a.appearance + second * b.appearance;
+  return weight * (first * differenceOf(whole * a.appearance, both) + second * differenceOf(whole * b.appearance, both) +
+                   gap * differenceOf(vec4(0.0), both));
 }
 
-// Costs of merging each grain with the one before it, of a list that's gone through front to back: what the next round may
-// cost follows from their sum.
-Grain previousGrain;
-float previousBefore;
+// Of the mergers that are possible: what the next round may cost follows from it.
 float costSum;
 float costsFinite;
 
 void beginCosts() {
-  previousBefore = -1.0;
   costSum = 0.0;
   costsFinite = 0.0;
 }
 
-void addCost(Grain g, float before) {
-  if (previousBefore >= 0.0 && !g.cut) {
-    costSum += costOf(previousGrain, g, previousBefore);
-    costsFinite += 1.0;
-  }
-  previousGrain = g;
-  previousBefore = before;
+void addCost(float cost) {
+  bool finite = cost < unlimited;
+  costSum += finite ? cost : 0.0;
+  costsFinite += finite ? 1.0 : 0.0;
 }
 
+// Of at least two grains.
 void sumCosts(uint count) {
   beginReading(count);
   beginCosts();
   float before = 1.0;
-  for (uint i = 0u; i < count; ++i) {
-    Grain g = readGrain();
-    addCost(g, before);
-    before *= 1.0 - g.opacity;
+  Grain a = readGrain();
+  for (uint i = 1u; i < count; ++i) {
+    Grain b = readGrain();
+    addCost(costOf(a, b, before));
+    before *= 1.0 - a.opacity;
+    a = b;
   }
 }
 
@@ -121,7 +122,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
       --excess;
     }
     push.grains.at[base + left++] = packedAgain(a);
-    addCost(a, before);
+    addCost(merges ? next : cost);
     before *= 1.0 - a.opacity;
     previous = merges ? next : cost;
     i += merges ? 2u : 1u;

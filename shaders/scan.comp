@@ -27,7 +27,7 @@ void sumPart() {
   uint64_t groupTotal = threadTotals[scanGroup - 1u];
   uint running = uint(threadTotals[gl_LocalInvocationIndex] - total);
   for (uint i = 0u; i < scanPerThread; ++i) {
-    if (first + i < push.count) push.prefix.at[first + i] = running;
+    if (first + i <= push.count) push.prefix.at[first + i] = running;
     running += values[i];
   }
   if (gl_LocalInvocationIndex == 0u) {
@@ -36,11 +36,23 @@ void sumPart() {
   }
 }
 
+// Each workgroup sums up those before it by itself: that takes less time than another level of dispatches.
 void addSums() {
+  uint64_t total = 0ul;
+  for (uint i = gl_LocalInvocationIndex; i < gl_WorkGroupID.x; i += scanGroup) total += push.sums.at[i];
+  threadTotals[gl_LocalInvocationIndex] = total;
+  barrier();
+  for (uint offset = scanGroup / 2u; offset > 0u; offset /= 2u) {
+    if (gl_LocalInvocationIndex < offset) {
+      threadTotals[gl_LocalInvocationIndex] += threadTotals[gl_LocalInvocationIndex + offset];
+    }
+    barrier();
+  }
+  uint64_t before = threadTotals[0];
+  if (gl_LocalInvocationIndex == 0u && before + push.sums.at[gl_WorkGroupID.x] > 0xfffffffful) push.overflow.at[0] = 1u;
   uint first = (gl_WorkGroupID.x * scanGroup + gl_LocalInvocationIndex) * scanPerThread;
-  uint before = push.sums.at[gl_WorkGroupID.x];
   for (uint i = 0u; i < scanPerThread; ++i) {
-    if (first + i < push.count) push.prefix.at[first + i] += before;
+    if (first + i <= push.count) push.prefix.at[first + i] += uint(before);
   }
 }
 

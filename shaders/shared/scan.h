@@ -1,4 +1,4 @@
-// Parameters of scan.comp: exclusive prefix sums, level by level.
+// Parameters of scan.comp: exclusive prefix sums.
 #ifndef VDI_SHARED_SCAN_H
 #define VDI_SHARED_SCAN_H
 #include "lists.h"
@@ -14,12 +14,12 @@ inline constexpr uint scanModeAdd = 1;
 const uint scanGroup = 256;
 const uint scanPerThread = 8;
 const uint scanModeSum = 0;  // values -> prefix within each workgroup's part, sums[group] = total of the part
-const uint scanModeAdd = 1;  // prefix += sums[group], sums being scanned by then
+const uint scanModeAdd = 1;  // prefix += sums of the groups before
 #endif
 
 struct ScanConstants {
   VDI_ADDRESS(UintArray) values;
-  VDI_ADDRESS(UintArray) prefix;  // count + 1 entries at the lowest level
+  VDI_ADDRESS(UintArray) prefix;  // count + 1 entries
   VDI_ADDRESS(UintArray) sums;
   VDI_ADDRESS(UintArray) overflow;  // [1], set to 1 when a total doesn't fit 32 bits
   uint count;

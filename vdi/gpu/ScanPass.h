@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <vector>
 
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/ComputePipeline.h"
@@ -16,9 +15,9 @@ class ScanPass {
  public:
   explicit ScanPass(std::shared_ptr<Device> device);
 
-  /// prefix[0 .. count] = exclusive prefix sum of values[0 .. count - 1], prefix[count] being the total;
-  /// `values` has room for count + 1 entries too. Records its barriers, also one at the end. Values are below
-  /// 2^21.
+  /// prefix[0 .. count] = exclusive prefix sum of values[0 .. count - 1], prefix[count] being the total.
+  /// Records its barriers, also one at the start and one at the end. Nothing that was recorded before may be
+  /// running.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count);
 
   /// Throws Error{OutOfMemory} if the total of the last finished scan didn't fit 32 bits.
@@ -27,8 +26,7 @@ class ScanPass {
  private:
   std::shared_ptr<Device> device_;
   ComputePipeline pipeline_;
-  std::vector<Buffer> sums_;  // by level
-  Buffer zero_;
+  Buffer sums_;  // of workgroups
   Buffer overflow_;
 };
 

@@ -67,7 +67,6 @@ void ListBuilder::submit() {
 std::uint64_t ListBuilder::scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts,
                                         gpu::Buffer& offsets) {
   const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
-  commands_.barrier();
   scan_.record(commands_, counts, offsets, listCount);
   commands_.mark("download");
   commands_.copy(offsets, 0, readback_, 0, words);

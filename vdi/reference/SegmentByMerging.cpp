@@ -111,8 +111,7 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
       if (open) {
         grains.back().absorb(i.back, i.red, i.green, i.blue, i.opticalDepth);
       } else {
-        grains.push_back(
-            {i.front, i.back, i.red, i.green, i.blue, i.opticalDepth, rules.cutAtGaps && cut});
+        grains.push_back({i.front, i.back, i.red, i.green, i.blue, i.opticalDepth, rules.cutAtGaps && cut});
         first = x;
         deviation = 0.0F;
         open = true;
@@ -127,15 +126,6 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
   return grains;
 }
 
-/// The mean over two neighbours and the empty space between them.
-Appearance meanOf(const Grain& a, const Grain& b) {
-  const float whole = b.back - a.front;
-  const float first = (a.back - a.front) / whole;
-  const float second = (b.back - b.front) / whole;
-  return {first * a.appearance.red + second * b.appearance.red, first * a.appearance.green + second * b.appearance.green,
-          first * a.appearance.blue + second * b.appearance.blue, first * a.appearance.opacity + second * b.appearance.opacity};
-}
-
 Grain merged(const Grain& a, const Grain& b) {
   Grain result = a;
   result.absorb(b.back, b.red, b.green, b.blue, b.opticalDepth);
@@ -143,13 +133,21 @@ Grain merged(const Grain& a, const Grain& b) {
   return result;
 }
 
-/// What merging two neighbours changes.
+/// What merging two neighbours changes: the sum over both, and over the gap between them, of the distance to
+/// their mean times the length.
 float costOf(const Grain& a, const Grain& b) {
   if (b.cut) return unlimited;
-  const Appearance both = meanOf(a, b);
+  const float first = a.back - a.front;
+  const float second = b.back - b.front;
+  const float whole = b.back - a.front;
+  const float gap = std::max(b.front - a.back, 0.0F);
+  const auto mean = [&](float x, float y) { return (first * x + second * y) / whole; };
+  const Appearance& x = a.appearance;
+  const Appearance& y = b.appearance;
+  const Appearance both = {mean(x.red, y.red), mean(x.green, y.green), mean(x.blue, y.blue),
+                           mean(x.opacity, y.opacity)};
   return weightBehind(a.before) *
-         ((a.back - a.front) * distance(a.appearance, both) + (b.back - b.front) * distance(b.appearance, both) +
-          std::max(b.front - a.back, 0.0F) * distance({}, both));
+         (first * distance(x, both) + second * distance(y, both) + gap * distance({}, both));
 }
 
 /// What costs are computed from.
@@ -169,20 +167,25 @@ std::vector<float> costsOf(const std::vector<Grain>& grains) {
   return costs;
 }
 
-/// One round; `excess` grains at most are to go. False if none can.
-bool mergeOnce(std::vector<Grain>& grains, std::size_t excess, float sampleStep) {
-  setUpCosts(grains, sampleStep);
-  const std::vector<float> costs = costsOf(grains);
+/// Of the mergers that are possible.
+struct Costs {
   float sum = 0.0F;
   float finite = 0.0F;
-  for (const float cost : costs) {
-    if (cost >= unlimited) continue;
+  void add(float cost) {
+    if (cost >= unlimited) return;
     sum += cost;
     finite += 1.0F;
   }
-  if (finite == 0.0F) return false;
-  // Rounded up, so that the mean of equal costs isn't below them.
-  const float limit = sum / finite * 1.0001F;
+  /// Rounded up, so that the mean of equal costs isn't below them.
+  float limit() const { return sum / finite * 1.0001F; }
+};
+
+/// One round; `excess` grains at most are to go. Returns the costs of the mergers that weren't made, as they
+/// were before those that were.
+Costs mergeOnce(std::vector<Grain>& grains, std::size_t excess, float limit, float sampleStep) {
+  setUpCosts(grains, sampleStep);
+  const std::vector<float> costs = costsOf(grains);
+  Costs others;
   std::vector<Grain> left;
   float previous = unlimited;
   for (std::size_t i = 0; i < grains.size(); ++i) {
@@ -196,14 +199,19 @@ bool mergeOnce(std::vector<Grain>& grains, std::size_t excess, float sampleStep)
       left.push_back(grains[i]);
       previous = costs[i];
     }
+    others.add(previous);
   }
   grains = std::move(left);
-  return true;
+  return others;
 }
 
 void mergeCheapest(std::vector<Grain>& grains, std::size_t most, float sampleStep) {
-  while (grains.size() > most && mergeOnce(grains, grains.size() - most, sampleStep)) {
-  }
+  if (grains.size() <= most) return;
+  setUpCosts(grains, sampleStep);
+  Costs costs;
+  for (const float cost : costsOf(grains)) costs.add(cost);
+  while (grains.size() > most && costs.finite > 0.0F)
+    costs = mergeOnce(grains, grains.size() - most, costs.limit(), sampleStep);
 }
 
 }  // namespace
