@@ -20,55 +20,78 @@ bool grainsRunVisible;
 bool grainsCutAtGaps;
 float grainsPerStep;  // 1 / length of a sample
 
-// One per tolerance while counting. While writing the first is what's written; by need, two more count what the list would
-// hold at the levels of the survey that its number of supersegments is interpolated from.
-const int levelsWalked = writesByNeed ? 3 : writesGrains ? 1 : toleranceLevels;
-vec4 grainFirst[toleranceLevels];
-float grainDeviation[toleranceLevels];
-uint grainCount[toleranceLevels];
-uint grainsOpen;  // bit j: a grain of tolerance j is open
-
-// While writing; see Allotment in vdi/reference/Segmenter.h.
-float grainTolerance;
+// What's counted, side by side: one set of grains per tolerance, or, while writing by need, at the two levels of the survey
+// that the list's number of supersegments is interpolated from.
+const int countedLevels = writesByNeed ? 2 : writesGrains ? 0 : toleranceLevels;
+vec4 countedFirst[toleranceLevels];
+float countedDeviation[toleranceLevels];
+uint countedGrains[toleranceLevels];
+uint countedOpen;  // bit j: a grain of tolerance j is open
 vec2 needTolerances;
+
+// What's written; see Allotment in vdi/reference/Segmenter.h.
+float grainTolerance;
 float grainAllotted;
 uint grainRoom;
 uint grainBase;  // where the list's grains are
+uint grainsBegun;
+bool grainOpen;
+vec4 grainFirst;
+float grainDeviation;
 vec2 grainSpan;  // front, back
 vec4 grainLight;
 float grainTransmittance;
 bool grainStartsRun;
 bool grainCut;  // the next grain starts a run
 
-void writeGrain() {
-  uint slot = grainCount[0] - 1u;
-  if (slot < grainRoom) {
-    params.grains.at[grainBase + slot] = packedGrain(grainSpan, grainLight, grainStartsRun);
-  }
+void closeGrain() {
+  uint slot = grainsBegun - 1u;
+  if (grainOpen && slot < grainRoom) params.grains.at[grainBase + slot] = packedGrain(grainSpan, grainLight, grainStartsRun);
+  grainOpen = false;
 }
 
 void adaptTolerance() {
-  uint left = grainRoom - min(grainRoom, grainCount[0]);
+  uint left = grainRoom - min(grainRoom, grainsBegun);
   if (left >= spareGrains) return;
   float base = grainAllotted < 0.0 ? finestTolerance / toleranceRatio : grainAllotted;
   grainTolerance = left == 0u ? unlimited : base * pow(toleranceRatio, float(spareGrains - left));
 }
 
-void closeGrains(uint levels) {
-  if (writesGrains && (grainsOpen & levels & 1u) != 0u) writeGrain();
-  grainsOpen &= ~levels;
+// Nothing but a run's start may open a grain once the room for them is used up. With cuts at gaps it isn't, unless
+// the program that counted rounded otherwise.
+bool roomForGrain() { return grainCut || grainsBegun < grainRoom; }
+
+void beginGrain(float front, vec4 x) {
+  closeGrain();
+  ++grainsBegun;
+  grainFirst = x;
+  grainDeviation = 0.0;
+  grainStartsRun = grainsCutAtGaps && grainCut;
+  grainSpan.x = front;
+  grainLight = vec4(0.0);
+  grainTransmittance = 1.0;
+  grainCut = false;
+  adaptTolerance();
+}
+
+void absorb(float back, vec3 color, float opacity, float opticalDepth) {
+  grainLight = vec4(grainLight.rgb + grainTransmittance * color, min(grainLight.a + opticalDepth, maxOpticalDepth));
+  grainSpan.y = back;
+  grainTransmittance *= 1.0 - opacity;
+  grainOpen = true;
 }
 
 void deviate(vec4 x, float weightedLength) {
+  if (writesGrains) grainDeviation += weightedLength * differenceOf(x, grainFirst);
   float tolerance = finestTolerance;
   uint beyond = 0u;
-  [[unroll]] for (int level = 0; level < levelsWalked; ++level) {
-    if (writesGrains) tolerance = level == 0 ? grainTolerance : level == 1 ? needTolerances.x : needTolerances.y;
-    grainDeviation[level] += weightedLength * differenceOf(x, grainFirst[level]);
-    if (grainDeviation[level] > tolerance) beyond |= 1u << level;
+  [[unroll]] for (int level = 0; level < countedLevels; ++level) {
+    if (writesByNeed) tolerance = level == 0 ? needTolerances.x : needTolerances.y;
+    countedDeviation[level] += weightedLength * differenceOf(x, countedFirst[level]);
+    if (countedDeviation[level] > tolerance) beyond |= 1u << level;
     tolerance *= toleranceRatio;
   }
-  closeGrains(beyond);
+  countedOpen &= ~beyond;
 }
 
 // `color` is premultiplied; `x` is the interval's appearance.
@@ -78,42 +101,35 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
   grainsReach = back;
   if (gap) grainsRunVisible = false;
   if (gap && grainsCutAtGaps) {
-    closeGrains(~0u);
+    if (writesGrains) closeGrain();
+    countedOpen = 0u;
     grainCut = true;
   }
-  if (grainsOpen == 0u && !(opticalDepth > 0.0)) return;
+  bool visible = opticalDepth > 0.0;
+  if (!visible && !grainOpen && countedOpen == 0u) return;
   float weight = weightBehind(grainsBefore) * grainsPerStep;
   if (gap && !grainsCutAtGaps) deviate(vec4(0.0), weight * (front - reach));
   deviate(x, weight * (back - front));
-  if (!(opticalDepth > 0.0)) return;
-
+  bool deviates = grainDeviation > grainTolerance;
+  if (!visible) {
+    if (writesGrains && deviates) closeGrain();
+    return;
+  }
   grainsVisible += grainsAtOnce;
   if (!grainsRunVisible) ++grainsRuns;
   grainsRunVisible = true;
-  // Nothing but a run's start may open a grain once the room for them is used up. With cuts at gaps it isn't, unless
-  // the program that counted rounded otherwise.
-  bool full = writesGrains && !grainCut && grainCount[0] >= grainRoom;
-  [[unroll]] for (int level = 0; level < levelsWalked; ++level) {
-    bool written = writesGrains && level == 0;
-    if ((grainsOpen & (1u << level)) == 0u && !(written && full)) {
-      ++grainCount[level];
-      grainFirst[level] = x;
-      grainDeviation[level] = 0.0;
-      if (written) {
-        grainStartsRun = grainsCutAtGaps && grainCut;
-        grainSpan = vec2(front, back);
-        grainLight = vec4(color, opticalDepth);
-        grainTransmittance = 1.0 - opacity;
-        grainCut = false;
-        adaptTolerance();
-      }
-    } else if (written) {
-      grainLight = vec4(grainLight.rgb + grainTransmittance * color, min(grainLight.a + opticalDepth, maxOpticalDepth));
-      grainSpan.y = back;
-      grainTransmittance *= 1.0 - opacity;
+  if (writesGrains) {
+    if ((!grainOpen || deviates) && roomForGrain()) beginGrain(front, x);
+    absorb(back, color, opacity, opticalDepth);
+  }
+  [[unroll]] for (int level = 0; level < countedLevels; ++level) {
+    if ((countedOpen & (1u << level)) == 0u) {
+      ++countedGrains[level];
+      countedFirst[level] = x;
+      countedDeviation[level] = 0.0;
     }
   }
-  grainsOpen = ~0u;
+  if (countedLevels > 0) countedOpen = ~0u;
   grainsBefore *= 1.0 - opacity;
 }
 
@@ -121,17 +137,21 @@ void walkForGrains() {
   grainsCutAtGaps = params.cutAtGaps != 0u;
   grainsBefore = 1.0;
   grainsPerStep = 1.0 / params.step;
-  grainsOpen = 0u;
   grainsReach = 0.0;
   grainsVisible = 0u;
   grainsRuns = 0u;
   grainsRunVisible = false;
-  grainCut = true;
+  countedOpen = 0u;
   [[unroll]] for (int level = 0; level < toleranceLevels; ++level) {
-    grainFirst[level] = vec4(0.0);
-    grainDeviation[level] = 0.0;
-    grainCount[level] = 0u;
+    countedFirst[level] = vec4(0.0);
+    countedDeviation[level] = 0.0;
+    countedGrains[level] = 0u;
   }
+  grainsBegun = 0u;
+  grainOpen = false;
+  grainFirst = vec4(0.0);
+  grainDeviation = 0.0;
+  grainCut = true;
   walk();
 }
 
@@ -148,7 +168,7 @@ uint interpolatedCount(uint countBelow, uint countAbove, float rounding) {
 // What the list would hold at a level of the survey, if anything. Twin of supersegmentsAtLevel.
 uint supersegmentsAtLevel(uint level) {
   uint count = level == 0u ? grainsVisible : 1u;
-  [[unroll]] for (int i = 0; i < toleranceLevels; ++i) count = level == uint(i) + 1u ? grainCount[i] : count;
+  [[unroll]] for (int i = 0; i < toleranceLevels; ++i) count = level == uint(i) + 1u ? countedGrains[i] : count;
   return min(count, params.mostPerList);
 }
 
@@ -172,8 +192,8 @@ CountedGrains grainsFor(uint budget) {
     tolerance = unlimited;
     float coarser = finestTolerance * pow(toleranceRatio, float(toleranceLevels - 1));
     [[unroll]] for (int level = toleranceLevels - 1; level >= 0; --level) {
-      if (grainCount[level] <= room) {
-        count = grainCount[level];
+      if (countedGrains[level] <= room) {
+        count = countedGrains[level];
         tolerance = coarser;
       }
       coarser /= toleranceRatio;
@@ -207,13 +227,13 @@ void writeGrains() {
   grainTolerance = grainAllotted;
   if (writesByNeed) needTolerances = vec2(toleranceOfLevel(levelBelow()), toleranceOfLevel(levelBelow() + 1u));
   walkForGrains();
-  closeGrains(1u);
-  uint written = min(grainCount[0], grainRoom);
-  if (written != grainCount[0]) atomicAdd(params.status.at[0], 1u);
+  closeGrain();
+  uint written = min(grainsBegun, grainRoom);
+  if (written != grainsBegun) atomicAdd(params.status.at[0], 1u);
   uint most = max(params.budget, grainsCutAtGaps ? grainsRuns : 1u);
   if (writesByNeed) {
-    most = interpolatedCount(min(grainCount[1], params.mostPerList),
-                             min(grainCount[2], params.mostPerList), roundingOf(listIndex));
+    most = interpolatedCount(min(countedGrains[0], params.mostPerList),
+                             min(countedGrains[1], params.mostPerList), roundingOf(listIndex));
   }
   params.written.at[listIndex] = written;
   params.left.at[listIndex] = min(written, most);
