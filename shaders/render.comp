@@ -144,6 +144,8 @@ uint rayBetween(PictureLine line, float enterS, float leaveS) {
   return maskBetween(depthAt(tAt(line, enterS)), depthAt(tAt(line, leaveS)));
 }
 
+uint listOf(ivec2 pixel) { return uint(pixel.y) * uint(params.lists.x) + uint(pixel.x); }
+
 // Tiles of both sizes are in one array, the large ones behind.
 int tileIndex(int size, ivec2 pixel) {
   ivec2 lists = params.lists;

@@ -26,63 +26,90 @@ ListExit listExit(PictureLine line, int size, ivec2 pixel, ivec2 last, ivec2 ahe
   return ListExit(leaveS, mix(there, edge + ahead - 1, bvec2(stepX, !stepX)), !leaves.x && !leaves.y);
 }
 
+// Where a walk along the line is.
+struct ListWalk {
+  ivec2 pixel;
+  float enterS;  // where the line enters it
+  int tile;
+  int largeTile;
+  uint tileRay;  // depths that the ray is in, in the tile
+};
+
+// Goes on to a tile with material along the ray, if it isn't in one; false if there's none. A tile without is left in one step,
+// and so is a large one.
+bool findTile(PictureLine line, ivec2 last, ivec2 ahead, inout ListWalk walk) {
+  for (;;) {
+    int tile = tileIndex(renderTile, walk.pixel);
+    if (tile == walk.tile) return true;
+    walk.tile = tile;
+    ListExit leave = listExit(line, renderTile, walk.pixel, last, ahead, walk.enterS);
+    walk.tileRay = rayBetween(line, walk.enterS, leave.s);
+    if ((params.tileMasks.at[tile] & walk.tileRay) != 0u) return true;
+    int largeTile = tileIndex(renderLargeTile, walk.pixel);
+    if (largeTile != walk.largeTile) {
+      walk.largeTile = largeTile;
+      ListExit leaveLarge = listExit(line, renderLargeTile, walk.pixel, last, ahead, walk.enterS);
+      if ((params.tileMasks.at[largeTile] & rayBetween(line, walk.enterS, leaveLarge.s)) == 0u) leave = leaveLarge;
+    }
+    if (leave.ends) return false;
+    walk.pixel = leave.pixel;
+    walk.enterS = leave.s;
+  }
+}
+
+// A list that the ray crosses.
+struct ListMeeting {
+  float leaveS;
+  ivec2 next;  // the list behind it; itself, if the line ends in it
+  uvec2 head;
+  vec2 part;  // of the ray, t
+  vec2 depths;
+  bool found;
+};
+
 void walkLists(PictureLine line) {
   ivec2 lastList = params.lists - 1;
-  ivec2 pixel = clamp(ivec2(floor(line.start)), ivec2(0), lastList);
   ivec2 last = clamp(ivec2(floor(line.end)), ivec2(0), lastList);
-  ivec2 direction = sign(last - pixel);
+  ListWalk walk = ListWalk(clamp(ivec2(floor(line.start)), ivec2(0), lastList), 0.0, -1, -1, 0u);
+  ivec2 direction = sign(last - walk.pixel);
   ivec2 ahead = max(direction, ivec2(0));
-  float enterS = 0.0;
   float enterT = line.t.x;  // where s is knownS
   float knownS = 0.0;
-  int knownTile = -1;
-  int knownLargeTile = -1;
   uint hint = 0u;
-  uint tileRay = 0u;  // depths that the ray is in, in the tile
-  // At most one step per column and row.
-  int most = abs(last.x - pixel.x) + abs(last.y - pixel.y) + 1;
-  for (int i = 0; i < most; ++i) {
-    int tile = tileIndex(renderTile, pixel);
-    if (tile != knownTile) {
-      // A tile without material along the ray is left in one step, and so is a large one.
-      knownTile = tile;
-      ListExit leave = listExit(line, renderTile, pixel, last, ahead, enterS);
-      tileRay = rayBetween(line, enterS, leave.s);
-      if ((params.tileMasks.at[tile] & tileRay) == 0u) {
-        int largeTile = tileIndex(renderLargeTile, pixel);
-        if (largeTile != knownLargeTile) {
-          knownLargeTile = largeTile;
-          ListExit leaveLarge = listExit(line, renderLargeTile, pixel, last, ahead, enterS);
-          if ((params.tileMasks.at[largeTile] & rayBetween(line, enterS, leaveLarge.s)) == 0u) leave = leaveLarge;
+  // As in walkSmoothly: tiles, then lists, then supersegments. Every turn passes a list.
+  while (findTile(line, last, ahead, walk)) {
+    ListMeeting meeting = ListMeeting(0.0, ivec2(0), uvec2(0u), vec2(0.0), vec2(0.0), false);
+    for (;;) {
+      bvec2 moves = notEqual(walk.pixel, last);
+      vec2 s = mix(vec2(2.0), crossings(line, walk.pixel + ahead), moves);
+      bool stepX = moves.x && s.x <= s.y;
+      bool stepY = moves.y && !stepX;
+      ivec2 pixel = walk.pixel + mix(ivec2(0), direction, bvec2(stepX, stepY));
+      float leaveS = clamp(min(s.x, s.y), walk.enterS, 1.0);
+      uvec2 head = params.heads.at[listOf(walk.pixel)];
+      if ((head.y & walk.tileRay) != 0u) {
+        if (knownS != walk.enterS) enterT = tAt(line, walk.enterS);
+        vec2 part = vec2(enterT, tAt(line, leaveS));
+        vec2 depths = vec2(depthAt(part.x), depthAt(part.y));
+        enterT = part.y;
+        knownS = leaveS;
+        if (part.y > part.x && (head.y & maskBetween(depths.x, depths.y)) != 0u) {
+          meeting = ListMeeting(leaveS, pixel, head, part, depths, true);
+          break;
         }
-        if (leave.ends) return;
-        pixel = leave.pixel;
-        enterS = leave.s;
-        continue;
       }
+      if (!(stepX || stepY)) return;
+      walk.pixel = pixel;
+      walk.enterS = leaveS;
+      if (tileIndex(renderTile, walk.pixel) != walk.tile) break;
     }
-    bvec2 moves = notEqual(pixel, last);
-    vec2 s = mix(vec2(2.0), crossings(line, pixel + ahead), moves);
-    bool stepX = moves.x && s.x <= s.y;
-    bool stepY = moves.y && !stepX;
-    float leaveS = clamp(min(s.x, s.y), enterS, 1.0);
-    uint list = uint(pixel.y) * uint(params.lists.x) + uint(pixel.x);
-    uvec2 head = params.heads.at[list];
-    if ((head.y & tileRay) != 0u) {
-      if (knownS != enterS) enterT = tAt(line, enterS);
-      vec2 part = vec2(enterT, tAt(line, leaveS));
-      float a = depthAt(part.x);
-      float b = depthAt(part.y);
-      if (part.y > part.x && (head.y & maskBetween(a, b)) != 0u) {
-        lookAtList(pixel, head.x, params.heads.at[list + 1u].x, part, min(a, b), max(a, b), hint);
-        accumulate(listLight, listDepth);
-        if (accumulated.a >= opaque) return;
-      }
-      enterT = part.y;
-      knownS = leaveS;
-    }
-    if (!(stepX || stepY)) return;
-    pixel += mix(ivec2(0), direction, bvec2(stepX, stepY));
-    enterS = leaveS;
+    if (!meeting.found) continue;
+    uint end = params.heads.at[listOf(walk.pixel) + 1u].x;
+    lookAtList(walk.pixel, meeting.head.x, end, meeting.part, min(meeting.depths.x, meeting.depths.y),
+               max(meeting.depths.x, meeting.depths.y), hint);
+    accumulate(listLight, listDepth);
+    if (accumulated.a >= opaque || meeting.next == walk.pixel) return;
+    walk.pixel = meeting.next;
+    walk.enterS = meeting.leaveS;
   }
 }

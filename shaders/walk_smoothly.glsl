@@ -24,9 +24,9 @@ BlendPart blendPart(vec2 t) {
 }
 
 // `head`: the list's, if it has a share in the blend.
-void blendList(ivec2 pixel, uint list, uvec2 head, float weight, BlendPart part, inout uint hint) {
+void blendList(ivec2 pixel, uvec2 head, float weight, BlendPart part, inout uint hint) {
   if ((head.y & part.mask) == 0u || !(weight > 0.0)) return;
-  lookAtList(pixel, head.x, params.heads.at[list + 1u].x, part.t, part.depths.x, part.depths.y, hint);
+  lookAtList(pixel, head.x, params.heads.at[listOf(pixel) + 1u].x, part.t, part.depths.x, part.depths.y, hint);
   blendLight += weight * listLight;
   blendDepth = min(blendDepth, listDepth);
 }
@@ -50,9 +50,8 @@ void lookAlongLists(PictureLine line) {
     ivec2 side = ivec2(i & 1, i >> 1);
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(floor(place)) + side, ivec2(0), lastList);
-    uint list = uint(pixel.y) * uint(params.lists.x) + uint(pixel.x);
     uint hint = 0u;
-    blendList(pixel, list, params.heads.at[list], weight, part, hint);
+    blendList(pixel, params.heads.at[listOf(pixel)], weight, part, hint);
   }
   accumulate(blendLight, blendDepth);
 }
@@ -67,7 +66,9 @@ struct ColumnLine {
   float extentAcross;
   float inverseAcross;
   int lastColumn;  // of the line
+  int direction;   // 1 or -1, from column to column
   int ahead;       // 1 if columns ascend
+  int mostAcross;  // the last row there is
 };
 
 // Where the line leaves the tile of `size` columns and rows that it's in from `enterS` on, in `column` and `row`: s, at most
@@ -93,8 +94,74 @@ TileExit tileExit(ColumnLine line, int size, int column, int row, float enterS) 
   return TileExit(s, there);
 }
 
-int tileIndex(ColumnLine line, int size, int column, int row) {
-  return tileIndex(size, line.byColumns ? ivec2(column, row) : ivec2(row, column));
+// Where a walk along the line is.
+struct ColumnWalk {
+  int column;
+  float enterS;  // where the line enters it
+  int tile;
+  int largeTile;
+  uint tileRay;  // depths that the ray is in, in columns that start in the tile
+};
+
+int tileOf(ColumnLine line, int size, ColumnWalk walk) {
+  int row = clamp(int(floor(line.startAcross + walk.enterS * line.extentAcross)), 0, line.mostAcross);
+  return tileIndex(size, line.byColumns ? ivec2(walk.column, row) : ivec2(row, walk.column));
+}
+
+float enterColumn(ColumnLine line, int column, float atLeast) {
+  return clamp((float(column + 1 - line.ahead) - line.start) * line.inverse, atLeast, 1.0);
+}
+
+// Goes on to a tile with material along the ray, if it isn't in one; false if there's none. Columns that lie in a tile without
+// are left out, those of a large tile at once. A tile's mask has its neighbours' outermost lists in it.
+bool findTile(PictureLine picture, ColumnLine line, inout ColumnWalk walk) {
+  for (;;) {
+    int tile = tileOf(line, renderTile, walk);
+    if (tile == walk.tile) return true;
+    walk.tile = tile;
+    int row = clamp(int(floor(line.startAcross + walk.enterS * line.extentAcross)), 0, line.mostAcross);
+    TileExit leave = tileExit(line, renderTile, walk.column, row, walk.enterS);
+    walk.tileRay = rayBetween(picture, walk.enterS, min(leave.s + abs(line.inverse), 1.0));
+    if ((params.tileMasks.at[tile] & walk.tileRay) != 0u) return true;
+    int largeTile = tileOf(line, renderLargeTile, walk);
+    if (largeTile != walk.largeTile) {
+      walk.largeTile = largeTile;
+      TileExit leaveLarge = tileExit(line, renderLargeTile, walk.column, row, walk.enterS);
+      if ((params.tileMasks.at[largeTile] & rayBetween(picture, walk.enterS, leaveLarge.s)) == 0u) leave = leaveLarge;
+    }
+    if (leave.s >= 1.0) return false;
+    if (leave.column == walk.column) return true;
+    walk.column = leave.column;
+    walk.enterS = enterColumn(line, walk.column, walk.enterS);
+  }
+}
+
+// A column that the ray crosses: the two lists beside it, as pixels.
+struct ColumnMeeting {
+  float leaveS;
+  float share;  // of next
+  ivec2 near;
+  ivec2 next;
+  uvec2 nearHead;
+  uvec2 nextHead;
+  BlendPart part;  // of the ray; its mask is 0 where the column wasn't looked at
+};
+const ColumnMeeting noMeeting =
+    ColumnMeeting(0.0, 0.0, ivec2(0), ivec2(0), uvec2(0u), uvec2(0u), BlendPart(vec2(0.0), vec2(0.0), 0u));
+
+ColumnMeeting meetColumn(PictureLine picture, ColumnLine line, ColumnWalk walk) {
+  ColumnMeeting meeting = noMeeting;
+  meeting.leaveS =
+      walk.column == line.lastColumn ? 1.0 : enterColumn(line, walk.column + line.direction, walk.enterS);
+  float centre = line.startAcross + 0.5 * (walk.enterS + meeting.leaveS) * line.extentAcross - 0.5;
+  meeting.share = shareOfNext(centre);
+  int near = clamp(int(floor(centre)), 0, line.mostAcross);
+  int next = clamp(int(floor(centre)) + 1, 0, line.mostAcross);
+  meeting.near = line.byColumns ? ivec2(walk.column, near) : ivec2(near, walk.column);
+  meeting.next = line.byColumns ? ivec2(walk.column, next) : ivec2(next, walk.column);
+  meeting.nearHead = params.heads.at[listOf(meeting.near)];
+  meeting.nextHead = params.heads.at[listOf(meeting.next)];
+  return meeting;
 }
 
 void walkSmoothly(PictureLine picture) {
@@ -112,75 +179,47 @@ void walkSmoothly(PictureLine picture) {
   line.startAcross = line.byColumns ? picture.start.y : picture.start.x;
   line.extentAcross = line.byColumns ? whole.y : whole.x;
   line.inverseAcross = line.byColumns ? picture.inverseDelta.y : picture.inverseDelta.x;
+  line.mostAcross = (line.byColumns ? lists.y : lists.x) - 1;
   int mostColumn = (line.byColumns ? lists.x : lists.y) - 1;
-  int mostAcross = (line.byColumns ? lists.y : lists.x) - 1;
-  int stride = line.byColumns ? 1 : lists.x;
-  int strideAcross = line.byColumns ? lists.x : 1;
   int column = clamp(int(floor(line.start)), 0, mostColumn);
   line.lastColumn = clamp(int(floor(line.start + line.extent)), 0, mostColumn);
-  int direction = line.lastColumn > column ? 1 : -1;
-  line.ahead = max(direction, 0);
-  float enterS = 0.0;
+  line.direction = line.lastColumn > column ? 1 : -1;
+  line.ahead = max(line.direction, 0);
+  ColumnWalk walk = ColumnWalk(column, 0.0, -1, -1, 0u);
   float enterT = picture.t.x;  // where s is knownS
   float knownS = 0.0;
-  int knownTile = -1;
-  int knownLargeTile = -1;
-  uint tileRay = 0u;  // depths that the ray is in, in columns that start in the tile
   uint nearHint = 0u;
   uint nextHint = 0u;
-  // Every turn passes a column.
-  int most = abs(line.lastColumn - column) + 1;
-  for (int i = 0; i < most; ++i) {
-    // Columns that lie in a tile without material along the ray are left out, those of a large tile at once. A tile's mask
-    // has its neighbours' outermost lists in it.
-    int row = clamp(int(floor(line.startAcross + enterS * line.extentAcross)), 0, mostAcross);
-    int tile = tileIndex(line, renderTile, column, row);
-    if (tile != knownTile) {
-      knownTile = tile;
-      TileExit leave = tileExit(line, renderTile, column, row, enterS);
-      tileRay = rayBetween(picture, enterS, min(leave.s + abs(line.inverse), 1.0));
-      bool passes = (params.tileMasks.at[tile] & tileRay) == 0u;
-      int largeTile = tileIndex(line, renderLargeTile, column, row);
-      if (passes && largeTile != knownLargeTile) {
-        knownLargeTile = largeTile;
-        TileExit leaveLarge = tileExit(line, renderLargeTile, column, row, enterS);
-        if ((params.tileMasks.at[largeTile] & rayBetween(picture, enterS, leaveLarge.s)) == 0u) leave = leaveLarge;
+  // Rays look for tiles, then for columns, and then at lists: each in a loop of its own, so that those next to each other do
+  // the same at a time. Every turn passes a column.
+  while (findTile(picture, line, walk)) {
+    ColumnMeeting meeting = noMeeting;
+    for (;;) {
+      ColumnMeeting here = meetColumn(picture, line, walk);
+      if (((here.nearHead.y | here.nextHead.y) & walk.tileRay) != 0u) {
+        if (knownS != walk.enterS) enterT = tAt(picture, walk.enterS);
+        here.part = blendPart(vec2(enterT, tAt(picture, here.leaveS)));
+        enterT = here.part.t.y;
+        knownS = here.leaveS;
+        if (here.part.t.y > here.part.t.x && ((here.nearHead.y | here.nextHead.y) & here.part.mask) != 0u) {
+          // Just what's assigned here may be used behind the loop: lavapipe (Mesa 22.3) gives a ray that has left a loop what
+          // others compute in it later, but for values that differ from exit to exit.
+          meeting = here;
+          break;
+        }
       }
-      if (passes && leave.s >= 1.0) return;
-      if (passes && leave.column != column) {
-        column = leave.column;
-        enterS = clamp((float(column + 1 - line.ahead) - line.start) * line.inverse, enterS, 1.0);
-        continue;
-      }
+      if (walk.column == line.lastColumn) return;
+      walk.column += line.direction;
+      walk.enterS = here.leaveS;
+      if (tileOf(line, renderTile, walk) != walk.tile) break;
     }
-    float leaveS = column == line.lastColumn
-                       ? 1.0
-                       : clamp((float(column + line.ahead) - line.start) * line.inverse, enterS, 1.0);
-    float centre = line.startAcross + 0.5 * (enterS + leaveS) * line.extentAcross - 0.5;
-    float share = shareOfNext(centre);
-    int near = clamp(int(floor(centre)), 0, mostAcross);
-    int next = clamp(int(floor(centre)) + 1, 0, mostAcross);
-    uint nearList = uint(column * stride + near * strideAcross);
-    uint nextList = uint(column * stride + next * strideAcross);
-    uvec2 nearHead = params.heads.at[nearList];
-    uvec2 nextHead = params.heads.at[nextList];
-    if (((nearHead.y | nextHead.y) & tileRay) != 0u) {
-      if (knownS != enterS) enterT = tAt(picture, enterS);
-      BlendPart part = blendPart(vec2(enterT, tAt(picture, leaveS)));
-      if (part.t.y > part.t.x) {
-        ivec2 nearPixel = line.byColumns ? ivec2(column, near) : ivec2(near, column);
-        ivec2 nextPixel = line.byColumns ? ivec2(column, next) : ivec2(next, column);
-        beginBlend();
-        blendList(nearPixel, nearList, nearHead, 1.0 - share, part, nearHint);
-        blendList(nextPixel, nextList, nextHead, share, part, nextHint);
-        accumulate(blendLight, blendDepth);
-        if (accumulated.a >= opaque) return;
-      }
-      enterT = part.t.y;
-      knownS = leaveS;
-    }
-    if (column == line.lastColumn) return;
-    column += direction;
-    enterS = leaveS;
+    if (meeting.part.mask == 0u) continue;
+    beginBlend();
+    blendList(meeting.near, meeting.nearHead, 1.0 - meeting.share, meeting.part, nearHint);
+    blendList(meeting.next, meeting.nextHead, meeting.share, meeting.part, nextHint);
+    accumulate(blendLight, blendDepth);
+    if (accumulated.a >= opaque || walk.column == line.lastColumn) return;
+    walk.column += line.direction;
+    walk.enterS = meeting.leaveS;
   }
 }
