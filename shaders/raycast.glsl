@@ -159,7 +159,7 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
   return true;
 }
 
-const uint shortGap = 32u;  // samples that are used
+const uint shortGap = 32u;  // samples
 
 bool castBrick(uint index) {
   Brick brick = params.bricks.at[index];
@@ -177,7 +177,7 @@ bool castBrick(uint index) {
     // As far as there are visible cells. Short gaps are no reason to stop: rays that stop at different places wait for
     // each other.
     uint end = min(stretch.end, range.y);
-    for (uint next = end; next < range.y && next < end + shortGap * samplesAtOnce; next = min(stretch.end, range.y)) {
+    for (uint next = end; next < range.y && next < end + shortGap; next = min(stretch.end, range.y)) {
       stretch = cellAt(brick, next, cellsPerSample);
       if (stretch.visible) end = min(stretch.end, range.y);
     }
