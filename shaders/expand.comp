@@ -30,7 +30,7 @@ void maskList(uint list, uint listCount) {
   }
   uint end = push.offsets.at[list + 1u];
   for (uint i = push.offsets.at[list]; i < end; ++i) {
-    vec2 depths = pieceDepths(push.segments, i, push.form);
+    vec2 depths = pieceDepths(packedPiece(push.segments, i), push.form);
     mask |= maskOf(depths.x, depths.y, push.nearest, push.binScale);
   }
   push.heads.at[list] = uvec2(push.offsets.at[list], mask);

@@ -2,23 +2,22 @@
 //
 // Needs: shared/render.h, store.glsl.
 
-vec2 pieceDepths(RenderSegmentArray segments, uint i, StoredForm form) {
-  if (compactForm) return codedDepths(uvec2(CompactArray(segments).at[i].x, 0u), form);
-  return uintBitsToFloat(segments.at[i].xy);
+uvec4 packedPiece(RenderSegmentArray segments, uint i) {
+  if (compactForm) return uvec4(CompactArray(segments).at[i], 0u, 0u);
+  return segments.at[i];
 }
 
-struct Piece {
-  vec2 depths;  // front, back
-  vec3 color;   // straight
-  float opticalDepth;
-};
+// Front and back.
+vec2 pieceDepths(uvec4 packed, StoredForm form) {
+  return compactForm ? codedDepths(packed.xy, form) : uintBitsToFloat(packed.xy);
+}
 
-Piece pieceAt(RenderSegmentArray segments, uint i, StoredForm form) {
-  if (compactForm) {
-    uvec2 packed = CompactArray(segments).at[i];
-    return Piece(codedDepths(packed, form), codedColor(packed), codedOpticalDepth(packed));
-  }
-  uvec4 packed = segments.at[i];
-  vec2 blueOpticalDepth = unpackHalf2x16(packed.w);
-  return Piece(uintBitsToFloat(packed.xy), vec3(unpackHalf2x16(packed.z), blueOpticalDepth.x), blueOpticalDepth.y);
+// Over the whole interval.
+float pieceOpticalDepth(uvec4 packed) {
+  return compactForm ? codedOpticalDepth(packed.xy) : unpackHalf2x16(packed.w).y;
+}
+
+// Straight.
+vec3 pieceColor(uvec4 packed) {
+  return compactForm ? codedColor(packed.xy) : vec3(unpackHalf2x16(packed.z), unpackHalf2x16(packed.w).x);
 }

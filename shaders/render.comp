@@ -21,6 +21,7 @@ vec3 rayOrigin;  // V_O's view space
 vec3 rayDirection;
 float rayWorldPerT;
 float rayPerDepth;  // t per unit of V_O's depth
+int rayStep;  // from one supersegment of a list to the next that the ray meets: 1 or -1
 vec4 accumulated;
 float firstDepth;
 
@@ -74,18 +75,6 @@ float pixelLength(ivec2 pixel) {
 vec4 listLight;
 float listDepth;
 
-void addPiece(Piece piece, vec2 stretch, float segmentScale) {
-  vec2 t = (piece.depths - rayOrigin.z) * rayPerDepth;
-  float enter = max(stretch.x, min(t.x, t.y));
-  float leave = min(stretch.y, max(t.x, t.y));
-  if (!(enter < leave)) return;
-  float share = (leave - enter) * segmentScale / (piece.depths.y - piece.depths.x);
-  float opacity = opacityOf(piece.opticalDepth * share);
-  if (!(opacity > 0.0)) return;
-  if (listLight.a == 0.0) listDepth = enter;
-  listLight += (1.0 - listLight.a) * opacity * vec4(piece.color, 1.0);
-}
-
 float depthAt(float t) { return rayOrigin.z + t * rayDirection.z; }
 
 // The parts of the depth range that the ray is in between two depths, in any order.
@@ -93,29 +82,51 @@ uint maskBetween(float a, float b) {
   return maskOf(min(a, b), max(a, b), params.nearest, params.binScale);
 }
 
-// listLight and listDepth of what the ray meets of one list, which has supersegments [begin, end), between two depths.
+// Where the ray enters and leaves a supersegment's depths: t.
+vec2 pieceStretch(uvec4 packed) {
+  vec2 t = (pieceDepths(packed, params.form) - rayOrigin.z) * rayPerDepth;
+  return rayStep > 0 ? t : t.yx;
+}
+
+// listLight and listDepth of what a stretch of the ray meets of one list, which has supersegments [begin, end), at least one.
 // `hint`: where in its list the last search ended; neighbouring lists are alike, so the next search starts there.
-void lookAtList(ivec2 pixel, uint begin, uint end, vec2 stretch, float nearDepth, float farDepth, inout uint hint) {
+void lookAtList(ivec2 pixel, uint begin, uint end, vec2 stretch, inout int hint) {
   listLight = vec4(0.0);
   listDepth = uintBitsToFloat(0x7f800000u);
   float segmentScale = rayWorldPerT / pixelLength(pixel);
   RenderSegmentArray segments = params.segments;
-  StoredForm form = params.form;
-  // The first supersegment that ends behind nearDepth.
-  uint low = min(begin + hint, end);
-  while (low > begin && pieceDepths(segments, low - 1u, form).y > nearDepth) --low;
-  while (low < end && !(pieceDepths(segments, low, form).y > nearDepth)) ++low;
-  hint = low - begin;
-  if (rayDirection.z >= 0.0) {
-    for (uint i = low; i < end; ++i) {
-      Piece piece = pieceAt(segments, i, form);
-      if (piece.depths.x >= farDepth && i > low) break;
-      addPiece(piece, stretch, segmentScale);
-    }
-  } else {
-    uint stop = low;
-    while (stop < end && pieceDepths(segments, stop, form).x < farDepth) ++stop;
-    for (uint i = stop; i > low; --i) addPiece(pieceAt(segments, i - 1u, form), stretch, segmentScale);
+  int first = int(begin);
+  int last = int(end) - 1;
+  // The first supersegment, as the ray sees them, that it leaves behind the stretch's start.
+  int i = clamp(first + hint, first, last);
+  uvec4 packed = packedPiece(segments, uint(i));
+  for (int before = i - rayStep; before >= first && before <= last; before -= rayStep) {
+    uvec4 packedBefore = packedPiece(segments, uint(before));
+    if (!(pieceStretch(packedBefore).y > stretch.x)) break;
+    i = before;
+    packed = packedBefore;
+  }
+  vec2 t = pieceStretch(packed);
+  while (!(t.y > stretch.x)) {
+    hint = i - first;
+    i += rayStep;
+    if (i < first || i > last) return;
+    packed = packedPiece(segments, uint(i));
+    t = pieceStretch(packed);
+  }
+  hint = i - first;
+  while (t.x < stretch.y) {
+    float enter = max(stretch.x, t.x);
+    float leave = min(stretch.y, t.y);
+    vec2 depths = pieceDepths(packed, params.form);
+    float share = (leave - enter) * segmentScale / (depths.y - depths.x);
+    float opacity = enter < leave ? opacityOf(pieceOpticalDepth(packed) * share) : 0.0;
+    if (opacity > 0.0 && listLight.a == 0.0) listDepth = enter;
+    listLight += (1.0 - listLight.a) * opacity * vec4(pieceColor(packed), 1.0);
+    i += rayStep;
+    if (i < first || i > last) return;
+    packed = packedPiece(segments, uint(i));
+    t = pieceStretch(packed);
   }
 }
 
@@ -169,6 +180,7 @@ void main() {
   rayWorldPerT = length(rayDirection);
   // Across V_O's depths: all of a supersegment's are met at once, or none.
   rayPerDepth = 1.0 / (abs(rayDirection.z) < 1e-20 ? 1e-20 : rayDirection.z);
+  rayStep = rayPerDepth > 0.0 ? 1 : -1;
   accumulated = vec4(0.0);
   firstDepth = uintBitsToFloat(0x7f800000u);
   vec2 stretch = insideFrustum();

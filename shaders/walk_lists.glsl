@@ -63,7 +63,6 @@ struct ListMeeting {
   ivec2 next;  // the list behind it; itself, if the line ends in it
   uvec2 head;
   vec2 part;  // of the ray, t
-  vec2 depths;
   bool found;
 };
 
@@ -75,10 +74,10 @@ void walkLists(PictureLine line) {
   ivec2 ahead = max(direction, ivec2(0));
   float enterT = line.t.x;  // where s is knownS
   float knownS = 0.0;
-  uint hint = 0u;
+  int hint = 0;
   // As in walkSmoothly: tiles, then lists, then supersegments. Every turn passes a list.
   while (findTile(line, last, ahead, walk)) {
-    ListMeeting meeting = ListMeeting(0.0, ivec2(0), uvec2(0u), vec2(0.0), vec2(0.0), false);
+    ListMeeting meeting = ListMeeting(0.0, ivec2(0), uvec2(0u), vec2(0.0), false);
     for (;;) {
       bvec2 moves = notEqual(walk.pixel, last);
       vec2 s = mix(vec2(2.0), crossings(line, walk.pixel + ahead), moves);
@@ -94,7 +93,7 @@ void walkLists(PictureLine line) {
         enterT = part.y;
         knownS = leaveS;
         if (part.y > part.x && (head.y & maskBetween(depths.x, depths.y)) != 0u) {
-          meeting = ListMeeting(leaveS, pixel, head, part, depths, true);
+          meeting = ListMeeting(leaveS, pixel, head, part, true);
           break;
         }
       }
@@ -105,8 +104,7 @@ void walkLists(PictureLine line) {
     }
     if (!meeting.found) continue;
     uint end = params.heads.at[listOf(walk.pixel) + 1u].x;
-    lookAtList(walk.pixel, meeting.head.x, end, meeting.part, min(meeting.depths.x, meeting.depths.y),
-               max(meeting.depths.x, meeting.depths.y), hint);
+    lookAtList(walk.pixel, meeting.head.x, end, meeting.part, hint);
     accumulate(listLight, listDepth);
     if (accumulated.a >= opaque || meeting.next == walk.pixel) return;
     walk.pixel = meeting.next;

@@ -13,20 +13,15 @@ void beginBlend() {
 // The stretch of the ray that a blend is of.
 struct BlendPart {
   vec2 t;
-  vec2 depths;  // V_O's, in order
   uint mask;
 };
 
-BlendPart blendPart(vec2 t) {
-  float a = depthAt(t.x);
-  float b = depthAt(t.y);
-  return BlendPart(t, vec2(min(a, b), max(a, b)), maskBetween(a, b));
-}
+BlendPart blendPart(vec2 t) { return BlendPart(t, maskBetween(depthAt(t.x), depthAt(t.y))); }
 
 // `head`: the list's, if it has a share in the blend.
-void blendList(ivec2 pixel, uvec2 head, float weight, BlendPart part, inout uint hint) {
+void blendList(ivec2 pixel, uvec2 head, float weight, BlendPart part, inout int hint) {
   if ((head.y & part.mask) == 0u || !(weight > 0.0)) return;
-  lookAtList(pixel, head.x, params.heads.at[listOf(pixel) + 1u].x, part.t, part.depths.x, part.depths.y, hint);
+  lookAtList(pixel, head.x, params.heads.at[listOf(pixel) + 1u].x, part.t, hint);
   blendLight += weight * listLight;
   blendDepth = min(blendDepth, listDepth);
 }
@@ -50,7 +45,7 @@ void lookAlongLists(PictureLine line) {
     ivec2 side = ivec2(i & 1, i >> 1);
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(floor(place)) + side, ivec2(0), lastList);
-    uint hint = 0u;
+    int hint = 0;
     blendList(pixel, params.heads.at[listOf(pixel)], weight, part, hint);
   }
   accumulate(blendLight, blendDepth);
@@ -147,7 +142,7 @@ struct ColumnMeeting {
   BlendPart part;  // of the ray; its mask is 0 where the column wasn't looked at
 };
 const ColumnMeeting noMeeting =
-    ColumnMeeting(0.0, 0.0, ivec2(0), ivec2(0), uvec2(0u), uvec2(0u), BlendPart(vec2(0.0), vec2(0.0), 0u));
+    ColumnMeeting(0.0, 0.0, ivec2(0), ivec2(0), uvec2(0u), uvec2(0u), BlendPart(vec2(0.0), 0u));
 
 ColumnMeeting meetColumn(PictureLine picture, ColumnLine line, ColumnWalk walk) {
   ColumnMeeting meeting = noMeeting;
@@ -188,8 +183,8 @@ void walkSmoothly(PictureLine picture) {
   ColumnWalk walk = ColumnWalk(column, 0.0, -1, -1, 0u);
   float enterT = picture.t.x;  // where s is knownS
   float knownS = 0.0;
-  uint nearHint = 0u;
-  uint nextHint = 0u;
+  int nearHint = 0;
+  int nextHint = 0;
   // Rays look for tiles, then for columns, and then at lists: each in a loop of its own, so that those next to each other do
   // the same at a time. Every turn passes a column.
   while (findTile(picture, line, walk)) {
