@@ -17,7 +17,6 @@ layout(set = 0, binding = 1, scalar) uniform Params { CastParams params; };
 const bool volumeOnly = castProgram == castProgramVolume;
 const bool surveysGrains = castProgram == castProgramSurvey;
 const bool countsGrains = castProgram == castProgramCountGrains || surveysGrains;
-const bool fewRays = countsGrains;  // one in sixteen
 const bool writesByNeed = castProgram == castProgramWriteByNeed;
 const bool writesGrains = castProgram == castProgramWriteGrains || writesByNeed;
 

@@ -1,6 +1,6 @@
 // One ray through the kd-tree of bricks, front to back, sample by sample.
 //
-// Needs: shared/cast.h, params, pages, pageCount; const bool fewRays; void useSample(float front, float back, vec3 color, float
+// Needs: shared/cast.h, params, pages, pageCount; void useSample(float front, float back, vec3 color, float
 // opticalDepth), colour straight.
 
 vec3 rayStart;
@@ -136,20 +136,17 @@ uint samplesAtOnce;
 // Samples [emptyBegin, begin) as one transparent one, if there are any, which is the same to whoever uses them; then
 // [begin, end), where samplesAtOnce isn't 1 those that are multiples of it. Returns false once the ray is opaque enough.
 bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
-  // Texels are asked for two samples ahead, the table one: their latency is most of what a sample takes. Three where
-  // there are few rays to wait with.
+  // Texels are asked for two samples ahead, the table one: their latency is most of what a sample takes.
   uint emptyFirst = (emptyBegin + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce;
   uint first = (begin + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce;
   vec4 ahead = classify(tablePosition(brick, first));
   float further = tablePosition(brick, first + samplesAtOnce);
-  float furthest = fewRays ? tablePosition(brick, first + 2u * samplesAtOnce) : 0.0;
   bool empty = emptyFirst < first;
   for (uint k = empty ? first - samplesAtOnce : first; k < end; k += samplesAtOnce) {
     vec4 entry = empty ? vec4(0.0) : ahead;
     if (!empty) {
       ahead = classify(further);
-      further = fewRays ? furthest : tablePosition(brick, k + 2u * samplesAtOnce);
-      if (fewRays) furthest = tablePosition(brick, k + 3u * samplesAtOnce);
+      further = tablePosition(brick, k + 2u * samplesAtOnce);
     }
     float front = frontOf(empty ? emptyFirst : k);
     float back = backOf(min(k + samplesAtOnce, rayScene.y) - 1u);
