@@ -1,21 +1,24 @@
-// A grain in memory: 16 bytes, one access. Front and back; premultiplied colour over all of it and optical depth as half
-// floats, whose sign tells that it must not be merged with the grain before it. Twin of Grain::round in
-// vdi/reference/SegmentByMerging.cpp.
+// A grain in memory: 24 bytes, two accesses. Front and back; premultiplied colour over all of it and optical depth, which is
+// negative if the grain must not be merged with the one before it.
+//
+// Needs: shared/lists.h.
 
-const float grainDepthScale = 64.0;             // optical depths from
-const float thinnestGrain = 9.5367431640625e-7;  // 2^-20, to
-const float thickestGrain = 1023.0;             // are normal half floats then
+struct StoredGrain {
+  vec2 span;
+  vec4 light;
+};
 
-uvec4 packedGrain(vec2 span, vec4 light, bool cut) {
-  float depth = clamp(light.a, thinnestGrain, thickestGrain) * grainDepthScale;
-  return uvec4(floatBitsToUint(span), packHalf2x16(light.rg), packHalf2x16(vec2(light.b, depth)) | (cut ? 0x80000000u : 0u));
+StoredGrain storedGrain(vec2 span, vec4 light, bool cut) {
+  return StoredGrain(span, vec4(light.rgb, cut ? -light.a : light.a));
 }
 
-vec2 spanOf(uvec4 grain) { return uintBitsToFloat(grain.xy); }
+vec4 lightOf(StoredGrain grain) { return vec4(grain.light.rgb, abs(grain.light.a)); }
 
-vec4 lightOf(uvec4 grain) {
-  vec2 blueDepth = unpackHalf2x16(grain.w & 0x7fffffffu);
-  return vec4(unpackHalf2x16(grain.z), blueDepth.x, blueDepth.y * (1.0 / grainDepthScale));
+bool isCut(StoredGrain grain) { return grain.light.a < 0.0; }
+
+void storeGrain(GrainSpans spans, GrainLights lights, uint i, StoredGrain grain) {
+  spans.at[i] = grain.span;
+  lights.at[i] = grain.light;
 }
 
-bool isCut(uvec4 grain) { return (grain.w & 0x80000000u) != 0u; }
+StoredGrain loadGrain(GrainSpans spans, GrainLights lights, uint i) { return StoredGrain(spans.at[i], lights.at[i]); }

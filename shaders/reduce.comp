@@ -21,32 +21,33 @@ struct Grain {
   vec4 appearance;
 };
 
-Grain grainOf(uvec4 packed) {
-  vec2 span = spanOf(packed);
-  vec4 light = lightOf(packed);
-  return Grain(span, light, isCut(packed), opacityOf(light.a), appearanceOf(light.rgb, light.a, span.y - span.x, push.step));
+Grain grainOf(vec2 span, vec4 light, bool cut) {
+  return Grain(span, light, cut, opacityOf(light.a), appearanceOf(light.rgb, light.a, span.y - span.x, push.step));
 }
 
 // The list's grains, one after the other; the next one is on its way while one is used.
 uint base;
 uint grainCount;
 uint nextRead;
-uvec4 grainAhead;
+StoredGrain grainAhead;
 
 void beginReading(uint count) {
   grainCount = count;
   nextRead = 1u;
-  grainAhead = push.grains.at[base];
+  grainAhead = loadGrain(push.spans, push.lights, base);
 }
 
-uvec4 readPacked() {
-  uvec4 grain = grainAhead;
-  if (nextRead < grainCount) grainAhead = push.grains.at[base + nextRead];
+StoredGrain readStored() {
+  StoredGrain grain = grainAhead;
+  if (nextRead < grainCount) grainAhead = loadGrain(push.spans, push.lights, base + nextRead);
   ++nextRead;
   return grain;
 }
 
-Grain readGrain() { return grainOf(readPacked()); }
+Grain readGrain() {
+  StoredGrain stored = readStored();
+  return grainOf(stored.span, lightOf(stored), isCut(stored));
+}
 
 // `before`: transmittance of what's in front of a.
 float costOf(Grain a, Grain b, float before) {
@@ -92,11 +93,9 @@ void sumCosts(uint count) {
   }
 }
 
-uvec4 packedAgain(Grain g) { return packedGrain(g.span, g.light, g.cut); }
-
 Grain merged(Grain a, Grain b) {
-  vec4 light = vec4(a.light.rgb + (1.0 - a.opacity) * b.light.rgb, a.light.a + b.light.a);
-  return grainOf(packedGrain(vec2(a.span.x, b.span.y), light, a.cut));
+  vec4 light = vec4(a.light.rgb + (1.0 - a.opacity) * b.light.rgb, min(a.light.a + b.light.a, maxOpticalDepth));
+  return grainOf(vec2(a.span.x, b.span.y), light, a.cut);
 }
 
 // One round, in place, of at least two grains; returns how many are left.
@@ -121,7 +120,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
       a = merged(a, b);
       --excess;
     }
-    push.grains.at[base + left++] = packedAgain(a);
+    storeGrain(push.spans, push.lights, base + left++, storedGrain(a.span, a.light, a.cut));
     addCost(merges ? next : cost);
     before *= 1.0 - a.opacity;
     previous = merges ? next : cost;
@@ -144,10 +143,9 @@ void writeSegments(uint count, uint slot) {
   beginReading(count);
   beginStoring();
   for (uint i = 0u; i < count; ++i) {
-    uvec4 packed = readPacked();
-    vec2 span = spanOf(packed);
-    vec4 light = lightOf(packed);
-    storeSegment(push.segments, slot + i, Material(span.x, span.y, light.rgb, light.a), push.form);
+    StoredGrain grain = readStored();
+    vec4 light = lightOf(grain);
+    storeSegment(push.segments, slot + i, Material(grain.span.x, grain.span.y, light.rgb, light.a), push.form);
   }
 }
 

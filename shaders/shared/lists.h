@@ -7,14 +7,13 @@ VDI_SHARED_BEGIN
 
 // Room for grains, in multiples of a list's budget, and what's added to it; as in vdi/reference/Segmenter.h.
 #ifdef __cplusplus
-inline constexpr uint grainBytes = 16;
 inline constexpr uint grainsPerBudget = 2;
 inline constexpr uint spareGrains = 4;
 inline constexpr uint uncountedSpareGrains = 8;
 inline constexpr uint countedStride = 4;
 inline uint countedSamplesFor(uint lattice, uint budget) {
   const uint share = lattice / (16 * budget);
-  return share < 1 ? 1 : share > 4 ? 4 : share;
+  return share < 1 ? 1 : share > 2 ? 2 : share;
 }
 #else
 const uint grainsPerBudget = 2;
@@ -55,7 +54,8 @@ inline uint isCompact(const StoredForm& form) { return form.depthStep > 0.0F ? 1
 VDI_SHARED_END
 
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray { uvec4 at[]; };  // grain.glsl
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer GrainSpans { vec2 at[]; };  // these two: grain.glsl
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainLights { vec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CompactArray { uvec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };

@@ -28,7 +28,7 @@ std::uint64_t ListBuilder::bytesPerList(std::uint32_t most, Algorithm algorithm)
   if (algorithm == Algorithm::Bisection) return segments;
   const std::uint64_t grains = std::uint64_t{shared::grainsPerBudget} * most;
   const std::uint64_t room = grains + grains / 4 + shared::uncountedSpareGrains;
-  return segments + room * shared::grainBytes;
+  return segments + room * (sizeof(glm::vec2) + sizeof(glm::vec4));
 }
 
 template <typename Segment>
@@ -146,11 +146,13 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
                             request.countedRows(), request.countedStride});
   const std::uint64_t grainTotal = scanAndTotal(lists, counts_, grainOffsets_);
 
-  grains_.reserve(device_, grainTotal * shared::grainBytes, MemoryKind::DeviceLocal);
+  spans_.reserve(device_, grainTotal * sizeof(glm::vec2), MemoryKind::DeviceLocal);
+  lights_.reserve(device_, grainTotal * sizeof(glm::vec4), MemoryKind::DeviceLocal);
   targets.sensitivities = sensitivities_.address();
   targets.counts = counts_.address();
   targets.offsets = grainOffsets_.address();
-  targets.grains = grains_.address();
+  targets.spans = spans_.address();
+  targets.lights = lights_.address();
   targets.written = written_.address();
   targets.left = left_.address();
   commands_.begin();
@@ -162,7 +164,8 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
 
   segments_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
   shared::ReduceConstants reduce{};
-  reduce.grains = grains_.address();
+  reduce.spans = spans_.address();
+  reduce.lights = lights_.address();
   reduce.grainOffsets = grainOffsets_.address();
   reduce.written = written_.address();
   reduce.offsets = offsets_.address();

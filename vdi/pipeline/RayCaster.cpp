@@ -122,7 +122,8 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
       params.counts = targets.counts - skipped;
       params.offsets = targets.offsets - skipped;
       params.segments = targets.segments;
-      params.grains = targets.grains;
+      params.spans = targets.spans;
+      params.lights = targets.lights;
       params.written = targets.written - skipped;
       params.left = targets.left - skipped;
       params.status = targets.status;

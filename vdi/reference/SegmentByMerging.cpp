@@ -1,7 +1,6 @@
 // The shaders' twin is shaders/grains.glsl (step 2) and shaders/reduce.comp (step 3).
 #include <algorithm>
 #include <cmath>
-#include <glm/gtc/packing.hpp>
 #include <limits>
 #include <utility>
 
@@ -59,17 +58,6 @@ struct Grain {
     opticalDepth = std::min(opticalDepth + theOpticalDepth, maxExtinction);
     back = theBack;
   }
-  /// To what it has in memory: half floats. The scale keeps thin material's optical depth a normal number.
-  void round() {
-    constexpr float scale = 64.0F;
-    constexpr float thinnest = 0x1p-20F;
-    constexpr float thickest = 1023.0F;
-    const auto half = [](float value) { return glm::unpackHalf1x16(glm::packHalf1x16(value)); };
-    red = half(red);
-    green = half(green);
-    blue = half(blue);
-    opticalDepth = half(std::clamp(opticalDepth, thinnest, thickest) * scale) / scale;
-  }
 };
 
 /// A negative tolerance makes each interval a grain. See Allotment for `room`.
@@ -122,14 +110,12 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
     before *= 1.0F - opacityOf(i.opticalDepth);
     reach = i.back;
   }
-  for (Grain& g : grains) g.round();
   return grains;
 }
 
 Grain merged(const Grain& a, const Grain& b) {
   Grain result = a;
   result.absorb(b.back, b.red, b.green, b.blue, b.opticalDepth);
-  result.round();
   return result;
 }
 

@@ -108,7 +108,7 @@ inline constexpr int countedStride = 4;
 /// lists' budget, for a device waits for the longest ray.
 constexpr std::uint32_t countedSamplesFor(std::uint32_t latticeCount, std::uint32_t budget) {
   const std::uint32_t share = latticeCount / (16 * budget);
-  return share < 1 ? 1 : share > 4 ? 4 : share;
+  return share < 1 ? 1 : share > 2 ? 2 : share;
 }
 
 /// Counts. `atOnce`: samples that an interval stands for.
