@@ -2,7 +2,7 @@
 //
 // Needs: optical.glsl.
 
-const float hiddenWeight = 0.3;
+const float hiddenWeight = 0.15;
 const float unlimited = 3.4e38;
 
 // Premultiplied colour and opacity of `opticalDepth` over `length`, brought to one sample.

@@ -98,8 +98,12 @@ struct ColumnWalk {
   uint tileRay;  // depths that the ray is in, in columns that start in the tile
 };
 
+int rowOf(ColumnLine line, ColumnWalk walk) {
+  return clamp(int(floor(line.startAcross + walk.enterS * line.extentAcross)), 0, line.mostAcross);
+}
+
 int tileOf(ColumnLine line, int size, ColumnWalk walk) {
-  int row = clamp(int(floor(line.startAcross + walk.enterS * line.extentAcross)), 0, line.mostAcross);
+  int row = rowOf(line, walk);
   return tileIndex(size, line.byColumns ? ivec2(walk.column, row) : ivec2(row, walk.column));
 }
 
@@ -114,7 +118,7 @@ bool findTile(PictureLine picture, ColumnLine line, inout ColumnWalk walk) {
     int tile = tileOf(line, renderTile, walk);
     if (tile == walk.tile) return true;
     walk.tile = tile;
-    int row = clamp(int(floor(line.startAcross + walk.enterS * line.extentAcross)), 0, line.mostAcross);
+    int row = rowOf(line, walk);
     TileExit leave = tileExit(line, renderTile, walk.column, row, walk.enterS);
     walk.tileRay = rayBetween(picture, walk.enterS, min(leave.s + abs(line.inverse), 1.0));
     if ((params.tileMasks.at[tile] & walk.tileRay) != 0u) return true;

@@ -88,7 +88,7 @@ inline constexpr int toleranceLevels = 8;
 inline constexpr float finestTolerance = 0.002F;
 inline constexpr float toleranceRatio = 4.0F;
 inline constexpr std::uint32_t grainsPerBudget = 2;
-inline constexpr float hiddenWeight = 0.3F;
+inline constexpr float hiddenWeight = 0.15F;
 
 /// What step 2 may do for a list: its tolerance, and the grains that counting found. There's room for a few
 /// more; when fewer than spareGrains of that are left, the tolerance grows by toleranceRatio with each
