@@ -6,7 +6,6 @@
 
 namespace vdi::detail {
 
-using gpu::MemoryKind;
 namespace shared = gpu::shared;
 
 namespace {
