@@ -8,17 +8,13 @@ struct StoredGrain {
   vec4 light;
 };
 
-StoredGrain storedGrain(vec2 span, vec4 light, bool cut) {
-  return StoredGrain(span, vec4(light.rgb, cut ? -light.a : light.a));
-}
-
 vec4 lightOf(StoredGrain grain) { return vec4(grain.light.rgb, abs(grain.light.a)); }
 
 bool isCut(StoredGrain grain) { return grain.light.a < 0.0; }
 
-void storeGrain(GrainSpans spans, GrainLights lights, uint i, StoredGrain grain) {
-  spans.at[i] = grain.span;
-  lights.at[i] = grain.light;
+void storeGrain(GrainSpans spans, GrainLights lights, uint i, vec2 span, vec4 light, bool cut) {
+  spans.at[i] = span;
+  lights.at[i] = vec4(light.rgb, cut ? -light.a : light.a);
 }
 
 StoredGrain loadGrain(GrainSpans spans, GrainLights lights, uint i) { return StoredGrain(spans.at[i], lights.at[i]); }

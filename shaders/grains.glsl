@@ -47,7 +47,7 @@ bool grainCut;  // the next grain starts a run
 void closeGrain() {
   uint slot = grainsBegun - 1u;
   if (grainOpen && slot < grainRoom) {
-    storeGrain(params.spans, params.lights, grainBase + slot, storedGrain(grainSpan, grainLight, grainStartsRun));
+    storeGrain(params.spans, params.lights, grainBase + slot, grainSpan, grainLight, grainStartsRun);
   }
   grainOpen = false;
 }

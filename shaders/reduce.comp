@@ -120,10 +120,10 @@ uint mergeOnce(uint count, uint excess, float limit) {
       a = merged(a, b);
       --excess;
     }
-    storeGrain(push.spans, push.lights, base + left++, storedGrain(a.span, a.light, a.cut));
-    addCost(merges ? next : cost);
+    storeGrain(push.spans, push.lights, base + left++, a.span, a.light, a.cut);
     before *= 1.0 - a.opacity;
     previous = merges ? next : cost;
+    addCost(previous);
     i += merges ? 2u : 1u;
     a = merges ? c : b;
     b = c;

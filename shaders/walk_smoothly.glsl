@@ -148,7 +148,7 @@ struct ColumnMeeting {
 const ColumnMeeting noMeeting =
     ColumnMeeting(0.0, 0.0, ivec2(0), ivec2(0), uvec2(0u), uvec2(0u), BlendPart(vec2(0.0), 0u));
 
-ColumnMeeting meetColumn(PictureLine picture, ColumnLine line, ColumnWalk walk) {
+ColumnMeeting meetColumn(ColumnLine line, ColumnWalk walk) {
   ColumnMeeting meeting = noMeeting;
   meeting.leaveS =
       walk.column == line.lastColumn ? 1.0 : enterColumn(line, walk.column + line.direction, walk.enterS);
@@ -194,7 +194,7 @@ void walkSmoothly(PictureLine picture) {
   while (findTile(picture, line, walk)) {
     ColumnMeeting meeting = noMeeting;
     for (;;) {
-      ColumnMeeting here = meetColumn(picture, line, walk);
+      ColumnMeeting here = meetColumn(line, walk);
       if (((here.nearHead.y | here.nextHead.y) & walk.tileRay) != 0u) {
         if (knownS != walk.enterS) enterT = tAt(picture, walk.enterS);
         here.part = blendPart(vec2(enterT, tAt(picture, here.leaveS)));

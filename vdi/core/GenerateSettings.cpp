@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <limits>
+
 #include "vdi/core/EnumNames.h"
 #include "vdi/core/Error.h"
 
@@ -44,6 +47,12 @@ void validate(const GenerateSettings& settings) {
   }
   demand(settings.terminationOpacity > 0.0 && settings.terminationOpacity <= 1.0, "termination opacity",
          settings.terminationOpacity, "(0, 1]");
+}
+
+float terminationOpticalDepth(const GenerateSettings& settings) {
+  const double opacity = settings.terminationOpacity;
+  return opacity >= 1.0 ? std::numeric_limits<float>::infinity()
+                        : static_cast<float>(-std::log2(1.0 - opacity));
 }
 
 }  // namespace vdi

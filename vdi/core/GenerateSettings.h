@@ -43,4 +43,8 @@ struct GenerateSettings {
 /// Throws Error{InvalidArgument} naming the field, its value and its range.
 void validate(const GenerateSettings& settings);
 
+/// At which a ray ends (-log2 of transmittance): infinite for terminationOpacity 1, though there is material
+/// of that opacity.
+float terminationOpticalDepth(const GenerateSettings& settings);
+
 }  // namespace vdi

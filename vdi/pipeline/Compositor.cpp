@@ -123,7 +123,6 @@ void Compositor::merge(const std::vector<ListsOf<Segment>>& subLists, const Band
   commands_.copy(staging_, 0, received_, 0, total * sizeof(Segment));
   merge.mode = shared::mergeModeCount;
   mergePass_.record(commands_, merge);
-  commands_.barrier();
   scan_.record(commands_, mergedCounts_, mergedOffsets_, listCount);
   merge.mode = shared::mergeModeMerge;
   mergePass_.record(commands_, merge);

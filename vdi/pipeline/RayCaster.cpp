@@ -1,22 +1,10 @@
 #include "vdi/pipeline/RayCaster.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 namespace vdi::detail {
 
 namespace shared = gpu::shared;
-
-namespace {
-
-/// At which a ray ends; never for an opacity of 1, though there is material with that.
-float enoughFor(double terminationOpacity) {
-  return terminationOpacity >= 1.0 ? std::numeric_limits<float>::infinity()
-                                   : static_cast<float>(-std::log2(1.0 - terminationOpacity));
-}
-
-}  // namespace
 
 RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
@@ -40,7 +28,7 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.tableSize = volume_.tableSize();
   params.nodeCount = volume_.nodeCount();
   params.perUnitDistance = static_cast<float>(request.lattice.step / request.table.unitDistance);
-  params.enough = enoughFor(request.settings.terminationOpacity);
+  params.enough = terminationOpticalDepth(request.settings);
   params.budget = request.settings.supersegments;
   params.mostPerList = mostPerList(request.settings.supersegments, request.settings.budget);
   params.level = -1.0F;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <limits>
 
 #include "vdi/reference/Accumulator.h"
 
@@ -153,9 +152,7 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
 
   const SceneStretch scene = sceneStretch(frame, ray);
   const float unitsPerDepth = glm::length(ray.direction) / static_cast<float>(frame.table.unitDistance);
-  const double termination = frame.settings.terminationOpacity;
-  const float enough = termination >= 1.0 ? std::numeric_limits<float>::infinity()
-                                          : static_cast<float>(-std::log2(1.0 - termination));
+  const float enough = terminationOpticalDepth(frame.settings);
   std::vector<Interval> samples;
   float total = 0.0F;
   for (const Piece& piece : pieces) {
