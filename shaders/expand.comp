@@ -22,33 +22,31 @@ void expandSegment(uint i) {
                                            packHalf2x16(vec2(straight.b, opticalDepth)));
 }
 
-void maskList(uint list, uint listCount) {
-  uint mask = 0u;
-  if (list == listCount) {
-    push.heads.at[list] = uvec2(push.offsets.at[list], 0u);
-    return;
-  }
+void maskList(uint list) {
+  uint64_t mask = 0ul;
+  uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];
-  for (uint i = push.offsets.at[list]; i < end; ++i) {
-    vec2 depths = pieceDepths(packedPiece(push.segments, i), push.form);
+  for (uint i = first; i < end; ++i) {
+    vec2 places = piecePlaces(packedPiece(push.segments, i));
+    vec2 depths = placeOrigin(push.form) + placeUnit(push.form) * places;
     mask |= maskOf(depths.x, depths.y, push.nearest, push.binScale);
   }
-  push.heads.at[list] = uvec2(push.offsets.at[list], mask);
+  push.heads.at[list] = ListHead(first, end - first, mask);
 }
 
 // With the lists around it, which smooth reconstruction sees from within the tile.
 void maskTile(ivec2 tile, uint index) {
-  uint mask = 0u;
+  uint64_t mask = 0ul;
   ivec2 begin = max(tile * renderTile - 1, ivec2(0));
   ivec2 end = min((tile + 1) * renderTile + 1, push.lists);
   for (int y = begin.y; y < end.y; ++y) {
-    for (int x = begin.x; x < end.x; ++x) mask |= push.heads.at[uint(y) * uint(push.lists.x) + uint(x)].y;
+    for (int x = begin.x; x < end.x; ++x) mask |= push.heads.at[uint(y) * uint(push.lists.x) + uint(x)].mask;
   }
   push.tileMasks.at[index] = mask;
 }
 
 void maskLargeTile(ivec2 largeTile, ivec2 tiles, uint index) {
-  uint mask = 0u;
+  uint64_t mask = 0ul;
   ivec2 end = min((largeTile + 1) * (renderLargeTile / renderTile), tiles);
   for (int y = largeTile.y * (renderLargeTile / renderTile); y < end.y; ++y) {
     for (int x = largeTile.x * (renderLargeTile / renderTile); x < end.x; ++x) mask |= push.tileMasks.at[uint(y * tiles.x + x)];
@@ -62,7 +60,7 @@ void main() {
     if (i < push.count) expandSegment(i);
   } else if (push.mode == expandModeMasks) {
     uint listCount = uint(push.lists.x) * uint(push.lists.y);
-    if (i <= listCount) maskList(i, listCount);
+    if (i < listCount) maskList(i);
   } else {
     ivec2 tiles = (push.lists + renderTile - 1) / renderTile;
     ivec2 largeTiles = (push.lists + renderLargeTile - 1) / renderLargeTile;

@@ -1,8 +1,8 @@
 // Masks of the parts of the VDI's depth range; see shared/render.h.
 
 // Monotone in depth, so that intervals that overlap share a bit.
-int binOf(float depth, float nearest, float binScale) { return clamp(int((depth - nearest) * binScale), 0, 31); }
+int binOf(float depth, float nearest, float binScale) { return int(clamp((depth - nearest) * binScale, 0.0, float(renderBins - 1))); }
 
-uint maskOf(float front, float back, float nearest, float binScale) {
-  return ((2u << binOf(back, nearest, binScale)) - 1u) & ~((1u << binOf(front, nearest, binScale)) - 1u);
+uint64_t maskOf(float front, float back, float nearest, float binScale) {
+  return ((2ul << binOf(back, nearest, binScale)) - 1ul) & ~((1ul << binOf(front, nearest, binScale)) - 1ul);
 }

@@ -7,10 +7,14 @@ uvec4 packedPiece(RenderSegmentArray segments, uint i) {
   return segments.at[i];
 }
 
-// Front and back.
-vec2 pieceDepths(uvec4 packed, StoredForm form) {
-  return compactForm ? codedDepths(packed.xy, form) : uintBitsToFloat(packed.xy);
+// Front and back, in units of their own: depth = placeOrigin + placeUnit * place.
+vec2 piecePlaces(uvec4 packed) {
+  uvec2 codes = depthCodes(packed.xy);
+  return compactForm ? vec2(exactFloat(codes.x), exactFloat(codes.y)) : uintBitsToFloat(packed.xy);
 }
+
+float placeOrigin(StoredForm form) { return compactForm ? form.depthFirst : 0.0; }
+float placeUnit(StoredForm form) { return compactForm ? form.depthStep : 1.0; }
 
 // Over the whole interval.
 float pieceOpticalDepth(uvec4 packed) {

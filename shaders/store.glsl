@@ -21,8 +21,11 @@ struct Material {
 // Which of the two forms; the other one's code is left out.
 layout(constant_id = 2) const bool compactForm = false;
 
+// Of an integer below 2^23: as its mantissa, which takes a GPU less time than a conversion.
+float exactFloat(uint value) { return uintBitsToFloat(0x4b000000u | value) - 8388608.0; }
+
 float opticalDepthOfCode(uint code) {
-  return code == 0u ? 9.5367431640625e-7 : (exp2(float(code) * (16.0 / 4095.0)) - 1.0) / 16.0;
+  return code == 0u ? 9.5367431640625e-7 : (exp2(exactFloat(code) * (16.0 / 4095.0)) - 1.0) / 16.0;
 }
 
 uint codeOfOpticalDepth(float opticalDepth) {
@@ -35,7 +38,8 @@ float codedOpticalDepth(uvec2 packed) { return opticalDepthOfCode(packed.x >> 28
 
 // Straight.
 vec3 codedColor(uvec2 packed) {
-  return vec3(float(packed.y & 0xffu), float((packed.y >> 8) & 0xffu), float((packed.y >> 16) & 0xffu)) / 255.0;
+  return vec3(exactFloat(packed.y & 0xffu), exactFloat((packed.y >> 8) & 0xffu), exactFloat((packed.y >> 16) & 0xffu)) *
+         (1.0 / 255.0);
 }
 
 vec2 codedDepths(uvec2 packed, StoredForm form) {

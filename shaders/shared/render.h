@@ -14,17 +14,23 @@ inline constexpr uint expandModeMasks = 1;
 inline constexpr uint expandModeTiles = 2;
 inline constexpr uint expandModeLargeTiles = 3;
 inline constexpr int renderTile = 8;
+inline constexpr int renderTileShift = 3;
 inline constexpr int renderLargeTile = 64;
+inline constexpr int renderMostMarks = 4096;
+inline constexpr int renderBins = 64;
 #else
 const uint renderGroupX = 8;
 const uint renderGroupY = 8;
 const uint expandGroup = 64;
 const uint expandModeSegments = 0;  // one invocation a supersegment; of a VDI of full precision
-const uint expandModeMasks = 1;     // one a list, and one behind the last
+const uint expandModeMasks = 1;     // one a list
 const uint expandModeTiles = 2;     // one a tile
 const uint expandModeLargeTiles = 3;  // one a large tile
 const int renderTile = 8;             // lists per side of a tile
+const int renderTileShift = 3;        // 1 << renderTileShift == renderTile
 const int renderLargeTile = 64;       // a multiple of that
+const int renderMostMarks = 4096;     // tiles of an axis (beam.glsl)
+const int renderBins = 64;            // parts of the depth range: bits of a mask
 #endif
 
 // A supersegment of a VDI of full precision as rendering wants it, in 16 bytes: depths, straight colour and optical depth over the whole interval, the
@@ -36,25 +42,32 @@ struct RenderSegment {
   uint blueOpticalDepth;
 };
 
+// What a ray asks of each list that it crosses: its supersegments in the compact array, and its mask.
+struct ListHead {
+  uint first;
+  uint count;
+  uint64_t mask;
+};
+
 VDI_SHARED_END
 
 #ifndef __cplusplus
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer RenderSegmentArray { uvec4 at[]; };
-// What a ray asks of each list that it crosses, in one access: where the list starts in the compact array, and its mask.
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer ListHeads { uvec2 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ListHeads { ListHead at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer MaskArray { uint64_t at[]; };
 #endif
 
 VDI_SHARED_BEGIN
 
-// What's where, for skipping empty space: bit b of a mask tells whether there is material in the b-th of 32 equal parts of
+// What's where, for skipping empty space: bit b of a mask tells whether there is material in the b-th of renderBins equal parts of
 // the VDI's depth range; a mask a list, one a tile of 8 x 8 lists, and one a large
 // tile of 64 x 64.
 struct ExpandConstants {
   VDI_ADDRESS(UintArray) offsets;                // [lists + 1]
   VDI_ADDRESS(SegmentArray) from;                // compact, as generated: a part of the supersegments
   VDI_ADDRESS(RenderSegmentArray) segments;      // all; CompactArray of a compact VDI
-  VDI_ADDRESS(ListHeads) heads;                  // [lists + 1]
-  VDI_ADDRESS(UintArray) tileMasks;              // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
+  VDI_ADDRESS(ListHeads) heads;                  // [lists]
+  VDI_ADDRESS(MaskArray) tileMasks;              // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
   uint mode;
   uint first;  // supersegment that `from` starts with
   uint count;  // supersegments of `from`
@@ -67,7 +80,7 @@ struct ExpandConstants {
 struct RenderParams {
   VDI_ADDRESS(ListHeads) heads;
   VDI_ADDRESS(RenderSegmentArray) segments;  // compact array; CompactArray of a compact VDI
-  VDI_ADDRESS(UintArray) tileMasks;
+  VDI_ADDRESS(MaskArray) tileMasks;
   VDI_ADDRESS(Vec4Array) colors;       // [height][width]
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
   // Ray of the new view's pixel in V_O's view space, as in CastParams: base + u * right + v * up, t = the new view's depth.

@@ -23,7 +23,7 @@ std::uint64_t invocations(const shared::ExpandConstants& constants) {
   if (constants.mode == shared::expandModeTiles) return tilesOf(constants.lists, shared::renderTile);
   if (constants.mode == shared::expandModeLargeTiles)
     return tilesOf(constants.lists, shared::renderLargeTile);
-  return static_cast<std::uint64_t>(constants.lists.x) * static_cast<std::uint64_t>(constants.lists.y) + 1;
+  return static_cast<std::uint64_t>(constants.lists.x) * static_cast<std::uint64_t>(constants.lists.y);
 }
 
 }  // namespace

@@ -58,8 +58,8 @@ struct VdiRenderer::State {
     constexpr bool compact = std::is_same_v<Segment, CompactSupersegment>;
     constexpr std::size_t segmentBytes = compact ? sizeof(Segment) : sizeof(shared::RenderSegment);
     segments.reserve(device, lists.segments.size() * segmentBytes, MemoryKind::DeviceLocal);
-    heads.reserve(device, (lists.listCount() + 1) * 2 * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
-    tileMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+    heads.reserve(device, lists.listCount() * sizeof(shared::ListHead), MemoryKind::DeviceLocal);
+    tileMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint64_t), MemoryKind::DeviceLocal);
     inParts(lists.offsets, [&](std::size_t first, std::size_t count) {
       commands.copy(staging, 0, offsets, first * sizeof(std::uint32_t), count * sizeof(std::uint32_t));
     });
@@ -115,7 +115,7 @@ void VdiRenderer::setVdi(const Vdi& vdi) {
   }
   // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
   if (!vdi.camera.parallelProjection) s.nearest = std::max(s.nearest, s.farthest * 1e-6F);
-  s.binScale = s.farthest > s.nearest ? 32.0F / (s.farthest - s.nearest) : 0.0F;
+  s.binScale = s.farthest > s.nearest ? shared::renderBins / (s.farthest - s.nearest) : 0.0F;
   std::visit([&](const auto& lists) { s.upload(lists, vdi.depthCode, {vdi.width, vdi.height}); }, vdi.lists);
   s.original = std::make_unique<View>(vdi.view());
 }
