@@ -2,6 +2,7 @@
 // supersegments; or the counting of its grains, and the writing of them. Twin of castRay, renderVolume and generate in vdi/reference/Reference.cpp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #include "shared/cast.h"
 
 layout(local_size_x = castGroupX, local_size_y = castGroupY) in;

@@ -130,31 +130,37 @@ float backOf(uint k) {
   return k + 1u == rayScene.y ? rayLeave : params.first + float(k + 1u) * params.step;
 }
 
+// Texels that are asked for at a time, and then entries of the table: waiting for one takes a GPU as long as waiting for all.
+layout(constant_id = 3) const uint samplesAhead = 1;
+
 // How many samples are used as one: more while grains are counted (CastParams::countedSamples).
 uint samplesAtOnce;
 
 // Samples [emptyBegin, begin) as one transparent one, if there are any, which is the same to whoever uses them; then
 // [begin, end), where samplesAtOnce isn't 1 those that are multiples of it. Returns false once the ray is opaque enough.
 bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
-  // Texels are asked for two samples ahead, the table one: their latency is most of what a sample takes.
   uint emptyFirst = (emptyBegin + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce;
   uint first = (begin + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce;
-  vec4 ahead = classify(tablePosition(brick, first));
-  float further = tablePosition(brick, first + samplesAtOnce);
   bool empty = emptyFirst < first;
-  for (uint k = empty ? first - samplesAtOnce : first; k < end; k += samplesAtOnce) {
-    vec4 entry = empty ? vec4(0.0) : ahead;
-    if (!empty) {
-      ahead = classify(further);
-      further = tablePosition(brick, k + 2u * samplesAtOnce);
+  for (uint batch = empty ? first - samplesAtOnce : first; batch < end; batch += samplesAhead * samplesAtOnce) {
+    float positions[samplesAhead];
+    vec4 entries[samplesAhead];
+    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) positions[i] = tablePosition(brick, batch + i * samplesAtOnce);
+    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) entries[i] = classify(positions[i]);
+    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) {
+      uint k = batch + i * samplesAtOnce;
+      if (samplesAhead == 1u || k < end) {
+        bool here = i == 0u && empty;
+        vec4 entry = here ? vec4(0.0) : entries[i];
+        float front = frontOf(here ? emptyFirst : k);
+        float back = backOf(min(k + samplesAtOnce, rayScene.y) - 1u);
+        float opticalDepth = min(entry.a * rayUnitsPerDepth * (back - front), maxOpticalDepth);
+        useSample(front, back, entry.rgb, opticalDepth);
+        rayOpticalDepth += opticalDepth;
+        if (rayOpticalDepth >= params.enough) return false;
+      }
     }
-    float front = frontOf(empty ? emptyFirst : k);
-    float back = backOf(min(k + samplesAtOnce, rayScene.y) - 1u);
     empty = false;
-    float opticalDepth = min(entry.a * rayUnitsPerDepth * (back - front), maxOpticalDepth);
-    useSample(front, back, entry.rgb, opticalDepth);
-    rayOpticalDepth += opticalDepth;
-    if (rayOpticalDepth >= params.enough) return false;
   }
   return true;
 }

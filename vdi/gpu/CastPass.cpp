@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "vdi/core/Scene.h"
+#include "vdi/gpu/Device.h"
 #include "vdi/gpu/VolumeStore.h"
 
 namespace vdi::gpu {
@@ -54,12 +55,14 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
 }
 
 CastPass::CastPass(std::shared_ptr<Device> device)
-    : sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
+    : isCpu_(device->isCpu()), sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
 
 ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t compact) {
   const std::size_t pageCount = volume_->pages().size();
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
-  ComputePipeline& pipeline = pipelines_.with({program, static_cast<std::uint32_t>(pageCount), compact});
+  const std::uint32_t samplesAhead = isCpu_ ? 1 : 4;  // measured: docs/benchmarks.md
+  ComputePipeline& pipeline =
+      pipelines_.with({program, static_cast<std::uint32_t>(pageCount), compact, samplesAhead});
   std::uint64_t& bound = boundVersions_[&pipeline];
   if (bound != volume_->pagesVersion()) {
     std::array<const Image3D*, shared::castMaxPages> images{};

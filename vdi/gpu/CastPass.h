@@ -51,6 +51,7 @@ class CastPass {
  private:
   ComputePipeline& pipelineFor(std::uint32_t program, std::uint32_t compact);
 
+  bool isCpu_;
   Sampler sampler_;
   PipelineSet pipelines_;  // by shared::castProgram..., page count and precision
   std::map<const ComputePipeline*, std::uint64_t> boundVersions_;  // of the pages that they're bound to
