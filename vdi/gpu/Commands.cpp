@@ -13,16 +13,18 @@ namespace {
 
 constexpr std::uint32_t maxMarks = 64;
 
-void memoryBarrier(VkCommandBuffer commands) {
-  constexpr VkPipelineStageFlags2 stages = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT |
-                                           VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT |
-                                           VK_PIPELINE_STAGE_2_HOST_BIT;
-  constexpr VkAccessFlags2 writes =
-      VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_TRANSFER_WRITE_BIT | VK_ACCESS_2_HOST_WRITE_BIT;
-  constexpr VkAccessFlags2 reads =
-      VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_TRANSFER_READ_BIT | VK_ACCESS_2_HOST_READ_BIT;
-  const VkMemoryBarrier2 barrier{
-      VK_STRUCTURE_TYPE_MEMORY_BARRIER_2, nullptr, stages, writes, stages, reads | writes};
+/// `host`: what's written is visible to the host as well, which flushes more caches than the device alone needs.
+void memoryBarrier(VkCommandBuffer commands, bool host) {
+  constexpr VkPipelineStageFlags2 stages =
+      VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
+  constexpr VkAccessFlags2 writes = VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_TRANSFER_WRITE_BIT;
+  constexpr VkAccessFlags2 reads = VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_TRANSFER_READ_BIT;
+  const VkMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
+                                 nullptr,
+                                 stages,
+                                 writes,
+                                 host ? VK_PIPELINE_STAGE_2_HOST_BIT : stages,
+                                 host ? VK_ACCESS_2_HOST_READ_BIT : reads | writes};
   const VkDependencyInfo info{
       VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 1, &barrier, 0, nullptr, 0, nullptr};
   vkCmdPipelineBarrier2(commands, &info);
@@ -96,7 +98,7 @@ void Commands::submit() {
   state_ = State::Idle;
   if (!marks_.empty()) writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
   // Makes what was written visible to the host after wait().
-  memoryBarrier(buffer_);
+  memoryBarrier(buffer_, true);
   check(vkEndCommandBuffer(buffer_), "vkEndCommandBuffer");
   const VkCommandBufferSubmitInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO, nullptr, buffer_,
                                              0};
@@ -134,7 +136,7 @@ void Commands::dispatchBytes(const ComputePipeline& pipeline, std::span<const st
 }
 
 void Commands::barrier() {
-  memoryBarrier(buffer_);
+  memoryBarrier(buffer_, false);
 }
 
 void Commands::copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
@@ -159,7 +161,7 @@ void Commands::beginUpload(const Image3D& image) {
   const VkClearColorValue zero{};
   const VkImageSubresourceRange all{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
   vkCmdClearColorImage(buffer_, image.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &zero, 1, &all);
-  memoryBarrier(buffer_);
+  memoryBarrier(buffer_, false);
 }
 
 void Commands::endUpload(const Image3D& image) {
