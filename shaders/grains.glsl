@@ -2,7 +2,7 @@
 // vdi/reference/SegmentByMerging.cpp; reduce.comp merges grains into supersegments. Counting does all tolerances side by
 // side in one walk; writing does one.
 //
-// Needs: optical.glsl, appearance.glsl; params with sensitivities, counts, offsets, spans, lights, written, left, status,
+// Needs: optical.glsl, appearance.glsl; params with sensitivities, counts, offsets, grains, written, left, status,
 // survey; bool writesGrains, writesByNeed, constants; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 
@@ -47,7 +47,7 @@ bool grainCut;  // the next grain starts a run
 void closeGrain() {
   uint slot = grainsBegun - 1u;
   if (grainOpen && slot < grainRoom) {
-    storeGrain(params.spans, params.lights, grainBase + slot, grainSpan, grainLight, grainStartsRun);
+    params.grains.at[grainBase + slot] = storedGrain(grainSpan, grainLight, grainStartsRun);
   }
   grainOpen = false;
 }

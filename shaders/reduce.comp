@@ -34,12 +34,12 @@ StoredGrain grainAhead;
 void beginReading(uint count) {
   grainCount = count;
   nextRead = 1u;
-  grainAhead = loadGrain(push.spans, push.lights, base);
+  grainAhead = push.grains.at[base];
 }
 
 StoredGrain readStored() {
   StoredGrain grain = grainAhead;
-  if (nextRead < grainCount) grainAhead = loadGrain(push.spans, push.lights, base + nextRead);
+  if (nextRead < grainCount) grainAhead = push.grains.at[base + nextRead];
   ++nextRead;
   return grain;
 }
@@ -120,7 +120,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
       a = merged(a, b);
       --excess;
     }
-    storeGrain(push.spans, push.lights, base + left++, a.span, a.light, a.cut);
+    push.grains.at[base + left++] = storedGrain(a.span, a.light, a.cut);
     before *= 1.0 - a.opacity;
     previous = merges ? next : cost;
     addCost(previous);

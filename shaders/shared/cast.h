@@ -48,8 +48,7 @@ struct CastParams {
   VDI_ADDRESS(UintArray) counts;          // [h][w]; by merging: room for grains, while counting the grains of these
   VDI_ADDRESS(UintArray) offsets;         // [h][w], exclusive prefix sum of counts
   VDI_ADDRESS(SegmentArray) segments;     // compact; by bisection
-  VDI_ADDRESS(GrainSpans) spans;          // of the grains, compact; by merging
-  VDI_ADDRESS(GrainLights) lights;        // likewise
+  VDI_ADDRESS(GrainArray) grains;          // compact; by merging
   VDI_ADDRESS(UintArray) written;         // [h][w]: grains
   VDI_ADDRESS(UintArray) left;            // [h][w]: how many are to be left of them
   VDI_ADDRESS(Vec4Array) colors;          // [h][w], premultiplied

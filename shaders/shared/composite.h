@@ -54,8 +54,7 @@ struct CompositeParams {
   VDI_ADDRESS(UintArray) counts;
   VDI_ADDRESS(UintArray) offsets;
   VDI_ADDRESS(SegmentArray) segments;
-  VDI_ADDRESS(GrainSpans) spans;  // of the grains
-  VDI_ADDRESS(GrainLights) lights;
+  VDI_ADDRESS(GrainArray) grains;
   VDI_ADDRESS(UintArray) written;
   VDI_ADDRESS(UintArray) left;
   VDI_ADDRESS(UintArray) status;

@@ -12,8 +12,7 @@ const uint reduceGroup = 64;
 #endif
 
 struct ReduceConstants {
-  VDI_ADDRESS(GrainSpans) spans;        // of the grains, which are merged in place
-  VDI_ADDRESS(GrainLights) lights;
+  VDI_ADDRESS(GrainArray) grains;
   VDI_ADDRESS(UintArray) grainOffsets;  // [lists + 1]
   VDI_ADDRESS(UintArray) written;       // [lists]: grains
   VDI_ADDRESS(UintArray) offsets;       // [lists + 1], of what's to be left of them

@@ -139,8 +139,7 @@ void Compositor::compositeBand(const Band& band, ListsOf<Segment>& result) {
     settings_.counts = targets.counts;
     settings_.offsets = targets.offsets;
     settings_.segments = targets.segments;
-    settings_.spans = targets.spans;
-    settings_.lights = targets.lights;
+    settings_.grains = targets.grains;
     settings_.written = targets.written;
     settings_.left = targets.left;
     settings_.status = targets.status;

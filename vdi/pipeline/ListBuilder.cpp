@@ -28,7 +28,7 @@ std::uint64_t ListBuilder::bytesPerList(std::uint32_t most, Algorithm algorithm)
   if (algorithm == Algorithm::Bisection) return segments;
   const std::uint64_t grains = std::uint64_t{shared::grainsPerBudget} * most;
   const std::uint64_t room = grains + grains / 4 + shared::uncountedSpareGrains;
-  return segments + room * (sizeof(glm::vec2) + sizeof(glm::vec4));
+  return segments + room * sizeof(shared::StoredGrain);
 }
 
 template <typename Segment>
@@ -146,13 +146,11 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
                             request.countedRows(), request.countedStride});
   const std::uint64_t grainTotal = scanAndTotal(lists, counts_, grainOffsets_);
 
-  spans_.reserve(device_, grainTotal * sizeof(glm::vec2), MemoryKind::DeviceLocal);
-  lights_.reserve(device_, grainTotal * sizeof(glm::vec4), MemoryKind::DeviceLocal);
+  grains_.reserve(device_, grainTotal * sizeof(shared::StoredGrain), MemoryKind::DeviceLocal);
   targets.sensitivities = sensitivities_.address();
   targets.counts = counts_.address();
   targets.offsets = grainOffsets_.address();
-  targets.spans = spans_.address();
-  targets.lights = lights_.address();
+  targets.grains = grains_.address();
   targets.written = written_.address();
   targets.left = left_.address();
   commands_.begin();
@@ -164,8 +162,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
 
   segments_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
   shared::ReduceConstants reduce{};
-  reduce.spans = spans_.address();
-  reduce.lights = lights_.address();
+  reduce.grains = grains_.address();
   reduce.grainOffsets = grainOffsets_.address();
   reduce.written = written_.address();
   reduce.offsets = offsets_.address();

@@ -27,8 +27,7 @@ struct BandTargets {
   std::uint64_t counts = 0;
   std::uint64_t offsets = 0;
   std::uint64_t segments = 0;
-  std::uint64_t spans = 0;
-  std::uint64_t lights = 0;
+  std::uint64_t grains = 0;
   std::uint64_t written = 0;
   std::uint64_t left = 0;
   std::uint64_t status = 0;
@@ -108,8 +107,7 @@ class ListBuilder {
   gpu::Buffer counts_;
   gpu::Buffer offsets_;
   gpu::Buffer grainOffsets_;
-  gpu::Buffer spans_;
-  gpu::Buffer lights_;
+  gpu::Buffer grains_;
   gpu::Buffer written_;
   gpu::Buffer left_;
   gpu::Buffer countedTolerances_;

@@ -109,8 +109,7 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
       params.counts = targets.counts - skipped;
       params.offsets = targets.offsets - skipped;
       params.segments = targets.segments;
-      params.spans = targets.spans;
-      params.lights = targets.lights;
+      params.grains = targets.grains;
       params.written = targets.written - skipped;
       params.left = targets.left - skipped;
       params.status = targets.status;
