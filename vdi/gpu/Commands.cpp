@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::uint32_t maxMarks = 64;
 
-/// `host`: what's written is visible to the host as well, which flushes more caches than the device alone needs.
+/// `host`: what's written is visible to the host as well, which flushes more caches than the device alone
+/// needs.
 void memoryBarrier(VkCommandBuffer commands, bool host) {
   constexpr VkPipelineStageFlags2 stages =
       VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;

@@ -51,8 +51,8 @@ class Commands {
   void dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
                      std::uint32_t y, std::uint32_t z);
 
-  /// Everything recorded so far is finished and visible to everything recorded later. What the host wrote before
-  /// submit() is anyway, and so is everything to the host after wait().
+  /// Everything recorded so far is finished and visible to everything recorded later. What the host wrote
+  /// before submit() is anyway, and so is everything to the host after wait().
   void barrier();
 
   void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
