@@ -116,14 +116,11 @@ bool beamMeets(bool byColumns, int tile, int first, int last) {
   return false;
 }
 
-// Of pictures that large, all tiles are walked.
-bool hasMarks(bool byColumns) { return columnCount(byColumns) <= renderMostMarks * renderTile; }
-
 void markAlong(int axis) {
   bool byColumns = axis == 0;
   int first = beamFirst[axis];
   int last = beamLast[axis];
-  int lastTile = hasMarks(byColumns) ? last >> renderTileShift : -1;
+  int lastTile = last >> renderTileShift;  // none: -1 stays -1
   for (int tile = (first >> renderTileShift) + int(gl_LocalInvocationIndex); tile <= lastTile;
        tile += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
     if (beamMeets(byColumns, tile, first, last)) atomicOr(marks[axis * markWords + (tile >> 5)], 1u << (tile & 31));
@@ -152,7 +149,6 @@ void markBeam(PictureLine line, bool walks) {
 
 // The first tile to walk from `tile` to `last`, in the line's direction; -1 if there's none.
 int nextTile(PictureLine line, int tile, int last) {
-  if (!hasMarks(line.byColumns)) return tile;
   int base = line.byColumns ? 0 : markWords;
   int word = tile >> 5;
   int lastWord = last >> 5;

@@ -1,5 +1,8 @@
 #include "vdi/gpu/RenderPass.h"
 
+#include <algorithm>
+#include <cassert>
+
 #include "vdi/core/Camera.h"
 
 namespace vdi::gpu {
@@ -35,6 +38,8 @@ shared::RenderParams renderGeometry(const View& original, const View& view) {
   params.width = static_cast<std::uint32_t>(view.width());
   params.height = static_cast<std::uint32_t>(view.height());
   params.lists = {original.width(), original.height()};
+  // View allows no more.
+  assert(std::max(original.width(), original.height()) <= shared::renderMostMarks * shared::renderTile);
   return params;
 }
 
