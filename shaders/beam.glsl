@@ -12,9 +12,9 @@ struct PictureLine {
   float perColumn;  // of the line; 0 if it stays at one place
   vec2 t;           // at both ends
   vec2 divisors;    // likewise
-  int first;     // column
+  int first;        // column
   int last;
-  int direction;  // 1 or -1, from column to column
+  int direction;    // 1 or -1, from column to column
 };
 
 int columnCount(bool byColumns) { return byColumns ? params.lists.x : params.lists.y; }
@@ -55,6 +55,7 @@ EdgeCrossing edgeCrossing(Ray of, bool byColumns, float edge) {
 }
 
 // Bit t of an axis' marks: rays that go along that axis may meet material in columns of tile t.
+const int invocations = int(gl_WorkGroupSize.x * gl_WorkGroupSize.y);
 const int markWords = renderMostMarks / 32;
 shared uint marks[2 * markWords];
 shared int beamFirst[2];  // column, of all rays along that axis
@@ -67,8 +68,8 @@ uint64_t maskBetween(float a, float b) {
 
 // Tiles of both sizes are in one array, the large ones behind.
 uint64_t tileMask(int size, ivec2 tile) {
-  ivec2 tiles = (params.lists + size - 1) / size;
-  ivec2 smallTiles = (params.lists + renderTile - 1) / renderTile;
+  ivec2 tiles = tilesOf(params.lists, size);
+  ivec2 smallTiles = tilesOf(params.lists, renderTile);
   int first = size == renderTile ? 0 : smallTiles.x * smallTiles.y;
   return params.tileMasks.at[first + tile.y * tiles.x + tile.x];
 }
@@ -122,7 +123,7 @@ void markAlong(int axis) {
   int last = beamLast[axis];
   int lastTile = last >> renderTileShift;  // none: -1 stays -1
   for (int tile = (first >> renderTileShift) + int(gl_LocalInvocationIndex); tile <= lastTile;
-       tile += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
+       tile += invocations) {
     if (beamMeets(byColumns, tile, first, last)) atomicOr(marks[axis * markWords + (tile >> 5)], 1u << (tile & 31));
   }
 }
@@ -130,7 +131,7 @@ void markAlong(int axis) {
 // For all invocations of a workgroup, those whose ray doesn't walk included.
 void markBeam(PictureLine line, bool walks) {
   int own = int(gl_LocalInvocationIndex);
-  for (int i = own; i < 2 * markWords; i += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) marks[i] = 0u;
+  for (int i = own; i < 2 * markWords; i += invocations) marks[i] = 0u;
   if (own < 2) {
     beamFirst[own] = 0x7fffffff;
     beamLast[own] = -1;

@@ -62,8 +62,8 @@ void main() {
     uint listCount = uint(push.lists.x) * uint(push.lists.y);
     if (i < listCount) maskList(i);
   } else {
-    ivec2 tiles = (push.lists + renderTile - 1) / renderTile;
-    ivec2 largeTiles = (push.lists + renderLargeTile - 1) / renderLargeTile;
+    ivec2 tiles = tilesOf(push.lists, renderTile);
+    ivec2 largeTiles = tilesOf(push.lists, renderLargeTile);
     uint count = uint(tiles.x * tiles.y);
     if (push.mode == expandModeTiles) {
       if (i < count) maskTile(ivec2(int(i) % tiles.x, int(i) / tiles.x), i);

@@ -6,3 +6,6 @@ int binOf(float depth, float nearest, float binScale) { return int(clamp((depth 
 uint64_t maskOf(float front, float back, float nearest, float binScale) {
   return ((2ul << binOf(back, nearest, binScale)) - 1ul) & ~((1ul << binOf(front, nearest, binScale)) - 1ul);
 }
+
+// How many tiles of `size` x `size` lists there are.
+ivec2 tilesOf(ivec2 lists, int size) { return (lists + size - 1) / size; }

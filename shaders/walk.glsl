@@ -150,7 +150,8 @@ void lookAtColumn(PictureLine line, int column, bvec2 looks, inout ivec2 hints) 
   accumulate(light, depth);
 }
 
-// Tile by tile: what there's to look at is found for all columns of one at once, since memory takes as long for all as for one.
+// Tile by tile: first all that there's to look at is found, then looked at, so that rays next to each other do the same at a
+// time.
 void walk(PictureLine line) {
   int lastTile = line.last >> renderTileShift;
   ivec2 hints = ivec2(0);
