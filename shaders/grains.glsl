@@ -39,6 +39,7 @@ bool grainOpen;
 vec4 grainFirst;
 float grainDeviation;
 vec2 grainSpan;  // front, back
+float beforeGrain;  // transmittance of what's in front of it
 vec4 grainLight;
 float grainTransmittance;
 bool grainStartsRun;
@@ -47,7 +48,7 @@ bool grainCut;  // the next grain starts a run
 void closeGrain() {
   uint slot = grainsBegun - 1u;
   if (grainOpen && slot < grainRoom) {
-    params.grains.at[grainBase + slot] = storedGrain(grainSpan, grainLight, grainStartsRun);
+    params.grains.at[grainBase + slot] = storedGrain(grainSpan, beforeGrain, grainLight, grainStartsRun);
   }
   grainOpen = false;
 }
@@ -70,6 +71,7 @@ void beginGrain(float front, vec4 x) {
   grainDeviation = 0.0;
   grainStartsRun = grainsCutAtGaps && grainCut;
   grainSpan.x = front;
+  beforeGrain = grainsBefore;
   grainLight = vec4(0.0);
   grainTransmittance = 1.0;
   grainCut = false;

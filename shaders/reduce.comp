@@ -1,6 +1,6 @@
-// Merges the grains of each list, in rounds, until as few are left as the list may hold. Twin of mergeCheapest in
-// vdi/reference/SegmentByMerging.cpp. One invocation a list, which goes through its grains front to back, several times:
-// little state, so that many lists are in flight and hide the latency of memory.
+// Merges the grains of lists that have too many, in rounds, until as few are left as the list may hold. Twin of
+// mergeCheapest in vdi/reference/SegmentByMerging.cpp. One invocation a list, which streams through its grains; for devices
+// and lists that reduce_team.comp isn't for.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/reduce.h"
@@ -10,20 +10,13 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
 #include "optical.glsl"
 #include "appearance.glsl"
-#include "store.glsl"
 #include "grain.glsl"
+#include "merging.glsl"
 
 struct Grain {
-  vec2 span;  // front, back
-  vec4 light;
-  bool cut;
-  float opacity;
+  StoredGrain stored;
   vec4 appearance;
 };
-
-Grain grainOf(vec2 span, vec4 light, bool cut) {
-  return Grain(span, light, cut, opacityOf(light.a), appearanceOf(light.rgb, light.a, span.y - span.x, push.step));
-}
 
 // The list's grains, one after the other; the next one is on its way while one is used.
 uint base;
@@ -37,34 +30,16 @@ void beginReading(uint count) {
   grainAhead = push.grains.at[base];
 }
 
-StoredGrain readStored() {
+Grain readGrain() {
   StoredGrain grain = grainAhead;
   if (nextRead < grainCount) grainAhead = push.grains.at[base + nextRead];
   ++nextRead;
-  return grain;
+  return Grain(grain, appearanceOf(grain, push.step));
 }
 
-Grain readGrain() {
-  StoredGrain stored = readStored();
-  return grainOf(stored.span, lightOf(stored), isCut(stored));
-}
+float costOf(Grain a, Grain b) { return costOf(a.stored, a.appearance, b.stored, b.appearance); }
 
-// `before`: transmittance of what's in front of a.
-float costOf(Grain a, Grain b, float before) {
-  if (b.cut) return unlimited;
-  float first = a.span.y - a.span.x;
-  float second = b.span.y - b.span.x;
-  float whole = b.span.y - a.span.x;
-  float gap = b.span.x - a.span.y;
-  float weight = weightBehind(before) / whole;
-  // What's below, where there's no gap.
-  if (!(gap > 0.0)) return 2.0 * weight * first * second * differenceOf(a.appearance, b.appearance);
-  vec4 both = first * a.appearance + second * b.appearance;
-  return weight * (first * differenceOf(whole * a.appearance, both) + second * differenceOf(whole * b.appearance, both) +
-                   gap * differenceOf(vec4(0.0), both));
-}
-
-// Of the mergers that are possible: what the next round may cost follows from it.
+// Of the mergers that are possible.
 float costSum;
 float costsFinite;
 
@@ -83,45 +58,36 @@ void addCost(float cost) {
 void sumCosts(uint count) {
   beginReading(count);
   beginCosts();
-  float before = 1.0;
   Grain a = readGrain();
   for (uint i = 1u; i < count; ++i) {
     Grain b = readGrain();
-    addCost(costOf(a, b, before));
-    before *= 1.0 - a.opacity;
+    addCost(costOf(a, b));
     a = b;
   }
 }
 
-Grain merged(Grain a, Grain b) {
-  vec4 light = vec4(a.light.rgb + (1.0 - a.opacity) * b.light.rgb, min(a.light.a + b.light.a, maxOpticalDepth));
-  return grainOf(vec2(a.span.x, b.span.y), light, a.cut);
-}
-
-// One round, in place, of at least two grains; returns how many are left.
+// One round, in place, of at least two grains; `excess` of them at most go. Returns how many are left.
 uint mergeOnce(uint count, uint excess, float limit) {
   uint left = 0u;
   float previous = unlimited;
-  float before = 1.0;
   beginReading(count);
   Grain a = readGrain();
   Grain b = readGrain();
-  float cost = costOf(a, b, before);
+  float cost = costOf(a, b);
   beginCosts();
   for (uint i = 0u; i < count;) {
     Grain c = b;
     float next = unlimited;
     if (i + 2u < count) {
       c = readGrain();
-      next = costOf(b, c, before * (1.0 - a.opacity));
+      next = costOf(b, c);
     }
-    bool merges = excess > 0u && cost < unlimited && cost <= limit && cost <= previous && cost <= next;
+    bool merges = excess > 0u && isCheapest(i, previous, cost, next, limit);
     if (merges) {
-      a = merged(a, b);
+      a.stored = merged(a.stored, b.stored);
       --excess;
     }
-    push.grains.at[base + left++] = storedGrain(a.span, a.light, a.cut);
-    before *= 1.0 - a.opacity;
+    push.grains.at[base + left++] = a.stored;
     previous = merges ? next : cost;
     addCost(previous);
     i += merges ? 2u : 1u;
@@ -132,35 +98,23 @@ uint mergeOnce(uint count, uint excess, float limit) {
       cost = unlimited;
       if (i + 1u < count) {
         b = readGrain();
-        cost = costOf(a, b, before);
+        cost = costOf(a, b);
       }
     }
   }
   return left;
 }
 
-void writeSegments(uint count, uint slot) {
-  beginReading(count);
-  beginStoring();
-  for (uint i = 0u; i < count; ++i) {
-    StoredGrain grain = readStored();
-    vec4 light = lightOf(grain);
-    storeSegment(push.segments, slot + i, Material(grain.span.x, grain.span.y, light.rgb, light.a), push.form);
-  }
-}
-
 void main() {
   uint list = gl_GlobalInvocationID.x;
   if (list >= push.listCount) return;
   uint count = push.written.at[list];
-  uint slot = push.offsets.at[list];
-  uint most = push.offsets.at[list + 1u] - slot;
+  uint most = push.left.at[list];
+  if (count <= most || count <= push.teamCapacity) return;
   base = push.grainOffsets.at[list];
-  if (count == 0u) return;
-  if (count > most) sumCosts(count);
+  sumCosts(count);
   while (count > most) {
     if (costsFinite == 0.0) break;  // just cuts are left; there are no more of them than may be
-    count = mergeOnce(count, count - most, costSum / costsFinite * 1.0001);
+    count = mergeOnce(count, count - most, limitOf(costSum, costsFinite));
   }
-  writeSegments(min(count, most), slot);
 }

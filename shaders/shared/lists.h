@@ -11,6 +11,11 @@ inline constexpr uint grainsPerBudget = 2;
 inline constexpr uint spareGrains = 4;
 inline constexpr uint uncountedSpareGrains = 8;
 inline constexpr uint countedStride = 4;
+// Of a list that may hold `most` supersegments, where gaps don't demand more.
+inline uint64_t mostGrains(uint64_t most) {
+  const uint64_t grains = grainsPerBudget * most;
+  return grains + grains / 4 + uncountedSpareGrains;
+}
 inline uint countedSamplesFor(uint lattice, uint budget) {
   const uint share = lattice / (16 * budget);
   return share < 1 ? 1 : share > 2 ? 2 : share;
@@ -40,13 +45,12 @@ struct Segment {
   float opacity;
 };
 
-// A grain in memory: front and back; premultiplied colour over all of it and optical depth, which is negative if the grain must
-// not be merged with the one before it. In 32 bytes, though 24 would do: neighbouring invocations read different lists, and a
-// grain is a whole piece of a cache line then (merging takes 0.75 of the time on an H200).
+// A grain in memory.
 struct StoredGrain {
-  vec2 span;
-  vec2 unused;
-  vec4 light;
+  vec2 span;     // front, back
+  float before;  // transmittance of what's in front of it
+  float unused;
+  vec4 light;    // premultiplied colour over all of it, and optical depth: negative if it must not be merged with the one before it
 };
 
 // How supersegments lie in memory: as CompactSupersegment with this DepthCode of core/Supersegment.h, or, if the step is 0,
@@ -66,6 +70,11 @@ VDI_SHARED_END
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray { StoredGrain at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CompactArray { uvec2 at[]; };
+struct FourCompact {
+  uvec4 first;
+  uvec4 second;
+};
+layout(buffer_reference, scalar, buffer_reference_align = 32) buffer FourCompactArray { FourCompact at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray { float at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4Array { vec4 at[]; };

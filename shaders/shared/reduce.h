@@ -1,4 +1,4 @@
-// Parameters of reduce.comp.
+// Parameters of queue.comp, reduce.comp, reduce_team.comp and store.comp: what becomes of grains.
 #ifndef VDI_SHARED_REDUCE_H
 #define VDI_SHARED_REDUCE_H
 #include "lists.h"
@@ -6,19 +6,30 @@
 VDI_SHARED_BEGIN
 
 #ifdef __cplusplus
+inline constexpr uint queueGroup = 256;
+inline constexpr uint reduceTeam = 32;
 inline constexpr uint reduceGroup = 64;
+inline constexpr uint storeGroup = 64;
 #else
+const uint queueGroup = 256;
 const uint reduceGroup = 64;
+const uint reduceTeam = 32;  // at most 32
+const uint storeGroup = 64;
 #endif
 
 struct ReduceConstants {
   VDI_ADDRESS(GrainArray) grains;
   VDI_ADDRESS(UintArray) grainOffsets;  // [lists + 1]
   VDI_ADDRESS(UintArray) written;       // [lists]: grains
-  VDI_ADDRESS(UintArray) offsets;       // [lists + 1], of what's to be left of them
+  VDI_ADDRESS(UintArray) left;          // [lists]: how many are to be left of them
+  VDI_ADDRESS(UintArray) offsets;       // [lists + 1], exclusive prefix sum of left
+  VDI_ADDRESS(UintArray) queue;         // [lists]: those that teams reduce, in any order
+  VDI_ADDRESS(UintArray) queued;        // [1]: how many
   VDI_ADDRESS(SegmentArray) segments;
   float step;  // of the sample lattice
   uint listCount;
+  uint teamCapacity;  // grains of a list that a team has room for; 0: there are no teams
+  uint pad;
   StoredForm form;  // of segments
 };
 

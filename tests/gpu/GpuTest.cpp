@@ -1,5 +1,6 @@
-// Device choice, prefix sums and the kd-tree, each against something plain.
+// Device choice, prefix sums, merging and the kd-tree, each against something plain.
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstring>
 #include <numeric>
 #include <random>
@@ -10,6 +11,7 @@
 #include "vdi/gpu/Device.h"
 #include "vdi/gpu/KdTree.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/ReducePass.h"
 #include "vdi/gpu/ScanPass.h"
 
 using namespace vdi;
@@ -111,6 +113,118 @@ TEST_CASE("a prefix sum beyond 32 bits is noticed") {
   scan.record(commands, values, prefix, count);
   commands.submitAndWait();
   CHECK_THROWS_AS(scan.demandNoOverflow(), Error);
+}
+
+namespace {
+
+/// Grains of many lists, as writing leaves them: none, few, many, more than a team has room for; some all
+/// alike, some with gaps, some with cuts at these.
+struct Grains {
+  static constexpr std::uint32_t most = 12;  // N_S
+  std::vector<shared::StoredGrain> grains;
+  std::vector<std::uint32_t> offsets{0};
+  std::vector<std::uint32_t> written;
+  std::vector<std::uint32_t> left;
+  std::vector<std::uint32_t> leftOffsets{0};
+
+  explicit Grains(std::uint32_t lists) {
+    std::mt19937 generator(11);
+    const auto random = [&] { return static_cast<float>(generator() % 1000 + 1) / 1024.0F; };
+    for (std::uint32_t list = 0; list < lists; ++list) {
+      const std::uint32_t count = list % 5 == 0    ? 0
+                                  : list % 97 == 1 ? 400 + generator() % 300
+                                                   : generator() % 38;
+      const bool alike = list % 7 == 2;
+      const bool gaps = list % 3 == 1;
+      const bool cuts = gaps && list % 2 == 0;
+      float at = 1.0F;
+      float before = 1.0F;
+      std::uint32_t runs = 1;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        const bool gap = gaps && i > 0 && generator() % 4 == 0;
+        if (gap) at += random();
+        runs += gap && cuts ? 1 : 0;
+        const float back = at + (alike ? 0.5F : random());
+        const float depth = alike ? 0.25F : 0.5F * random();
+        const glm::vec3 color = alike ? glm::vec3(0.125F) : 0.3F * glm::vec3(random(), random(), random());
+        grains.push_back({{at, back}, before, 0.0F, {color, gap && cuts ? -depth : depth}});
+        before *= std::exp2(-depth);
+        at = back;
+      }
+      written.push_back(count);
+      left.push_back(std::min(count, std::max(most, runs)));
+      offsets.push_back(offsets.back() + count);
+      leftOffsets.push_back(leftOffsets.back() + left.back());
+    }
+  }
+};
+
+template <typename T>
+Buffer uploaded(const std::vector<T>& values) {
+  Buffer buffer(device(), std::span(values).size_bytes(), MemoryKind::Upload);
+  std::memcpy(buffer.mapped().data(), values.data(), std::span(values).size_bytes());
+  return buffer;
+}
+
+std::vector<shared::Segment> reduced(const Grains& lists, ReducePass::Teams teams) {
+  const Buffer grains = uploaded(lists.grains);
+  const Buffer offsets = uploaded(lists.offsets);
+  const Buffer written = uploaded(lists.written);
+  const Buffer left = uploaded(lists.left);
+  const Buffer leftOffsets = uploaded(lists.leftOffsets);
+  const Buffer segments(device(), lists.leftOffsets.back() * sizeof(shared::Segment), MemoryKind::Readback);
+  shared::ReduceConstants constants{};
+  constants.grains = grains.address();
+  constants.grainOffsets = offsets.address();
+  constants.written = written.address();
+  constants.left = left.address();
+  constants.offsets = leftOffsets.address();
+  constants.segments = segments.address();
+  constants.step = 0.125F;
+  constants.listCount = static_cast<std::uint32_t>(lists.written.size());
+  ReducePass pass(device(), teams);
+  Commands commands(device());
+  commands.begin();
+  pass.record(commands, constants, {Grains::most, false});
+  commands.submitAndWait();
+  const auto result = segments.mappedAs<shared::Segment>();
+  return {result.begin(), result.end()};
+}
+
+}  // namespace
+
+TEST_CASE("teams merge grains as single invocations do") {
+  const Grains lists(3000);
+  const std::vector<shared::Segment> alone = reduced(lists, ReducePass::Teams::No);
+  const std::vector<shared::Segment> teams = reduced(lists, ReducePass::Teams::Yes);
+  REQUIRE(alone.size() == teams.size());
+  std::uint32_t wrong = 0;
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    const auto near = [](float a, float b) { return std::abs(a - b) <= 1e-5F * std::abs(b); };
+    wrong += near(alone[i].front, teams[i].front) && near(alone[i].back, teams[i].back) &&
+                     near(alone[i].red, teams[i].red) && near(alone[i].opacity, teams[i].opacity)
+                 ? 0
+                 : 1;
+  }
+  CHECK(wrong == 0);
+  // Each list's outermost depths, and what shines through all of it, stay what they were.
+  std::uint32_t off = 0;
+  for (std::size_t list = 0; list < lists.written.size(); ++list) {
+    if (lists.written[list] == 0) continue;
+    float depth = 0.0F;
+    float depthLeft = 0.0F;
+    for (std::uint32_t i = lists.offsets[list]; i < lists.offsets[list + 1]; ++i)
+      depth += std::abs(lists.grains[i].light.a);
+    for (std::uint32_t i = lists.leftOffsets[list]; i < lists.leftOffsets[list + 1]; ++i)
+      depthLeft -= std::log2(1.0F - teams[i].opacity);
+    const bool sound =
+        teams[lists.leftOffsets[list]].front == lists.grains[lists.offsets[list]].span.x &&
+        teams[lists.leftOffsets[list + 1] - 1].back == lists.grains[lists.offsets[list + 1] - 1].span.y &&
+        std::abs(depth - depthLeft) < 0.02F * depth + 1e-3F;
+    off += sound || depth > 15.0F ? 0 : 1;
+  }
+  CHECK(off == 0);
+  CHECK(device()->validationMessages() == "");
 }
 
 TEST_CASE("the kd-tree finds the brick of every point") {

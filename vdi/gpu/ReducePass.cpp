@@ -1,23 +1,74 @@
 #include "vdi/gpu/ReducePass.h"
 
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "vdi/gpu/Device.h"
+
 namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo pipelineInfo(std::string_view shader) {
   ComputePipelineInfo info;
-  info.shader = "reduce";
+  info.shader = shader;
   info.pushConstantBytes = sizeof(shared::ReduceConstants);
   return info;
 }
 
+/// What a list takes, as far as the 16 KiB of shared memory that every device has hold it.
+std::uint32_t teamCapacity(std::uint64_t grains) {
+  constexpr std::uint64_t largest = 320;
+  constexpr std::uint64_t unit = 16;
+  return static_cast<std::uint32_t>(std::min((grains + unit - 1) / unit * unit, largest));
+}
+
+constexpr std::uint32_t groupsFor(std::uint32_t lists, std::uint32_t group) {
+  return (lists + group - 1) / group;
+}
+
 }  // namespace
 
-ReducePass::ReducePass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
+ReducePass::ReducePass(std::shared_ptr<Device> device)
+    : ReducePass(device, device->isCpu() ? Teams::No : Teams::Yes) {}
 
-void ReducePass::record(Commands& commands, const shared::ReduceConstants& constants) {
-  commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants,
-                    (constants.listCount + shared::reduceGroup - 1) / shared::reduceGroup);
+ReducePass::ReducePass(std::shared_ptr<Device> device, Teams teams)
+    : device_(std::move(device)),
+      teams_(teams),
+      find_(device_, pipelineInfo("queue")),
+      team_(device_, pipelineInfo("reduce_team")),
+      alone_(device_, pipelineInfo("reduce")),
+      store_(device_, pipelineInfo("store")),
+      queued_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal) {}
+
+void ReducePass::record(Commands& commands, shared::ReduceConstants constants, const MostPerList& most) {
+  bool alone = true;
+  if (teams_ == Teams::Yes) {
+    const std::uint64_t grains = shared::mostGrains(most.supersegments);
+    constants.teamCapacity = teamCapacity(grains);
+    alone = !most.always || grains > constants.teamCapacity;
+    recordTeams(commands, constants);
+  }
+  if (alone) commands.dispatch(alone_, constants, groupsFor(constants.listCount, shared::reduceGroup));
+  commands.barrier();
+  commands.dispatch(store_.with({0, 0, isCompact(constants.form)}), constants,
+                    groupsFor(constants.listCount, shared::storeGroup));
+}
+
+void ReducePass::recordTeams(Commands& commands, shared::ReduceConstants& constants) {
+  queue_.reserve(device_, std::uint64_t{constants.listCount} * sizeof(std::uint32_t),
+                 MemoryKind::DeviceLocal);
+  constants.queue = queue_.address();
+  constants.queued = queued_.address();
+  const std::array<std::uint32_t, 1> none{};
+  commands.update(queued_, std::as_bytes(std::span(none)));
+  commands.barrier();
+  commands.dispatch(find_, constants, groupsFor(constants.listCount, shared::queueGroup));
+  commands.barrier();
+  constexpr std::uint32_t mostTeams = 16384;  // enough for any device; each takes list after list
+  commands.dispatch(team_.with({constants.teamCapacity}), constants,
+                    std::min(constants.listCount, mostTeams));
 }
 
 }  // namespace vdi::gpu

@@ -1,4 +1,5 @@
-// Dispatches reduce.comp: grains merged into supersegments.
+// Dispatches queue.comp, reduce_team.comp, reduce.comp and store.comp: grains merged, and stored as
+// supersegments.
 #pragma once
 
 #include <memory>
@@ -6,16 +7,38 @@
 #include "shaders/shared/reduce.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/ComputePipeline.h"
+#include "vdi/gpu/Memory.h"
 
 namespace vdi::gpu {
 
 class ReducePass {
  public:
+  /// Whether a workgroup merges a list, where it has room for that, or a single invocation.
+  enum class Teams { Yes, No };
+
+  /// Teams: on all devices but CPUs, where barriers cost more than they win.
   explicit ReducePass(std::shared_ptr<Device> device);
-  void record(Commands& commands, const shared::ReduceConstants& constants);
+  ReducePass(std::shared_ptr<Device> device, Teams teams);
+
+  struct MostPerList {
+    std::uint32_t supersegments = 1;
+    bool always = true;  // or more, where gaps demand that
+  };
+
+  /// `constants` without queue, queued and teamCapacity.
+  void record(Commands& commands, shared::ReduceConstants constants, const MostPerList& most);
 
  private:
-  PipelineSet pipelines_;  // by precision
+  void recordTeams(Commands& commands, shared::ReduceConstants& constants);
+
+  std::shared_ptr<Device> device_;
+  Teams teams_;
+  ComputePipeline find_;
+  PipelineSet team_;  // by capacity
+  ComputePipeline alone_;
+  PipelineSet store_;  // by precision
+  Buffer queue_;
+  Buffer queued_;
 };
 
 }  // namespace vdi::gpu

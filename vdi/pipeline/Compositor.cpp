@@ -154,6 +154,7 @@ void Compositor::compositeBand(const Band& band, ListsOf<Segment>& result) {
   build.width = band.listCount();
   build.rows = 1;
   build.algorithm = request_.algorithm;
+  build.most = {request_.mostPerList, true};
   build.sampleStep = request_.sampleStep;
   build.code = request_.code;
   builder_.build(build, record, result);

@@ -26,9 +26,7 @@ shared::StoredForm storedForm(const DepthCode& code) {
 std::uint64_t ListBuilder::bytesPerList(std::uint32_t most, Algorithm algorithm) {
   const std::uint64_t segments = std::uint64_t{most} * sizeof(Supersegment);
   if (algorithm == Algorithm::Bisection) return segments;
-  const std::uint64_t grains = std::uint64_t{shared::grainsPerBudget} * most;
-  const std::uint64_t room = grains + grains / 4 + shared::uncountedSpareGrains;
-  return segments + room * sizeof(shared::StoredGrain);
+  return segments + shared::mostGrains(most) * sizeof(shared::StoredGrain);
 }
 
 template <typename Segment>
@@ -165,6 +163,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
   reduce.grains = grains_.address();
   reduce.grainOffsets = grainOffsets_.address();
   reduce.written = written_.address();
+  reduce.left = left_.address();
   reduce.offsets = offsets_.address();
   reduce.segments = segments_.address();
   reduce.step = static_cast<float>(request.sampleStep);
@@ -172,7 +171,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
   reduce.form = storedForm(request.code);
   commands_.begin();
   commands_.mark("reduce");
-  reduce_.record(commands_, reduce);
+  reduce_.record(commands_, reduce, request.most);
   download(total, result);
 }
 

@@ -66,6 +66,7 @@ class ListBuilder {
     bool rowBehind = false;           // another row follows the band's last one
     std::uint32_t countedStride = 1;  // merge: `rows` is a multiple of it, or nothing follows
     Algorithm algorithm = Algorithm::Merge;
+    gpu::ReducePass::MostPerList most;
     double sampleStep = 1.0;
     DepthCode code;  // of compact lists
 

@@ -99,6 +99,7 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
     build.rowBehind = end < height;
     build.countedStride = stride;
     build.algorithm = algorithm;
+    build.most = {params.mostPerList, !request.cutAtGaps};
     build.sampleStep = request.lattice.step;
     build.code = request.code;
     params.countedWidth = build.countedWidth();

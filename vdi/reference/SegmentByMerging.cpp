@@ -48,8 +48,8 @@ struct Grain {
   float blue;
   float opticalDepth;
   bool cut;                 // must not be merged with the grain before it
-  float before = 1.0F;      // transmittance of what's in front of it; see setUpCosts
-  Appearance appearance{};  // likewise
+  float before;             // transmittance of what's in front of it
+  Appearance appearance{};  // see setUpCosts
   void absorb(float theBack, float theRed, float theGreen, float theBlue, float theOpticalDepth) {
     const float transmittance = 1.0F - opacityOf(opticalDepth);
     red += transmittance * theRed;
@@ -99,7 +99,8 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
       if (open) {
         grains.back().absorb(i.back, i.red, i.green, i.blue, i.opticalDepth);
       } else {
-        grains.push_back({i.front, i.back, i.red, i.green, i.blue, i.opticalDepth, rules.cutAtGaps && cut});
+        grains.push_back(
+            {i.front, i.back, i.red, i.green, i.blue, i.opticalDepth, rules.cutAtGaps && cut, before});
         first = x;
         deviation = 0.0F;
         open = true;
@@ -138,12 +139,8 @@ float costOf(const Grain& a, const Grain& b) {
 
 /// What costs are computed from.
 void setUpCosts(std::vector<Grain>& grains, float sampleStep) {
-  float before = 1.0F;
-  for (Grain& g : grains) {
-    g.before = before;
+  for (Grain& g : grains)
     g.appearance = overOneSample(g.red, g.green, g.blue, g.opticalDepth, g.back - g.front, sampleStep);
-    before *= 1.0F - opacityOf(g.opticalDepth);
-  }
 }
 
 /// Costs of merging each grain with the next one; unlimited for the last.
@@ -166,6 +163,13 @@ struct Costs {
   float limit() const { return sum / finite * 1.0001F; }
 };
 
+/// Of equal costs those at even places are the cheaper ones, so that of a long run of them every other goes
+/// in one round.
+bool isCheapest(const std::vector<float>& costs, std::size_t i) {
+  const auto cheaperThan = [&](float other) { return i % 2 == 0 ? costs[i] <= other : costs[i] < other; };
+  return (i == 0 || cheaperThan(costs[i - 1])) && (i + 1 == costs.size() || cheaperThan(costs[i + 1]));
+}
+
 /// One round; `excess` grains at most are to go. Returns the costs of the mergers that weren't made, as they
 /// were before those that were.
 Costs mergeOnce(std::vector<Grain>& grains, std::size_t excess, float limit, float sampleStep) {
@@ -173,19 +177,15 @@ Costs mergeOnce(std::vector<Grain>& grains, std::size_t excess, float limit, flo
   const std::vector<float> costs = costsOf(grains);
   Costs others;
   std::vector<Grain> left;
-  float previous = unlimited;
   for (std::size_t i = 0; i < grains.size(); ++i) {
-    const float next = i + 1 < grains.size() ? costs[i + 1] : unlimited;
-    if (excess > 0 && costs[i] < unlimited && costs[i] <= limit && costs[i] <= previous && costs[i] <= next) {
+    if (excess > 0 && costs[i] < unlimited && costs[i] <= limit && isCheapest(costs, i)) {
       left.push_back(merged(grains[i], grains[i + 1]));
-      previous = next;
       --excess;
-      ++i;
+      ++i;  // whose cost isn't the least, or it would have gone instead
     } else {
       left.push_back(grains[i]);
-      previous = costs[i];
     }
-    others.add(previous);
+    others.add(costs[i]);
   }
   grains = std::move(left);
   return others;
