@@ -226,7 +226,7 @@ class Bench {
       if (!set.size.empty()) deal.size = set.size;
       if (!set.type.empty()) deal.type = set.type;
       blocks = set.field.empty() ? rawBlocks(set.raw, deal, world_.rank(), world_.size())
-                                 : fieldBlocks(set.field, deal, world_.rank(), world_.size());
+                                 : fieldBlocks(set.field, deal, device_, world_.rank(), world_.size());
     });
     generator_.setBlocks(std::move(blocks));
     for (int view = 0; view < options_.views; ++view) measureView(set, 360.0 * view / options_.views);

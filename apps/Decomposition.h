@@ -56,29 +56,33 @@ Block emptyBlock(const Lattice& lattice, const Part& part, const void* data);
 /// Writes one value of the given type.
 void storeValue(ScalarType type, void* data, std::size_t index, double value);
 
+/// Calls use(0) .. use(layers - 1), from several threads at once if there are many values in them.
+template <typename Use>
+void onAllCores(int layers, std::size_t values, Use use) {
+  constexpr std::size_t many = std::size_t{1} << 22;
+  const int threads = values < many ? 1 : static_cast<int>(std::max(std::thread::hardware_concurrency(), 1U));
+  const auto part = [&](int first) {
+    for (int layer = first; layer < layers; layer += threads) use(layer);
+  };
+  std::vector<std::jthread> others;
+  for (int i = 1; i < threads; ++i) others.emplace_back(part, i);
+  part(0);
+}
+
 template <typename ValueAt>
 Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt) {
   const auto count = static_cast<std::size_t>(part.dims.x) * static_cast<std::size_t>(part.dims.y) *
                      static_cast<std::size_t>(part.dims.z);
   const std::shared_ptr<std::byte[]> data(new std::byte[count * sizeOf(lattice.type)]);
-  const auto fillLayers = [&](int first, int step) {
-    const auto layer = static_cast<std::size_t>(part.dims.x) * static_cast<std::size_t>(part.dims.y);
-    for (int z = first; z < part.dims.z; z += step) {
-      std::size_t index = layer * static_cast<std::size_t>(z);
-      for (int y = 0; y < part.dims.y; ++y) {
-        for (int x = 0; x < part.dims.x; ++x) {
-          storeValue(lattice.type, data.get(), index++, valueAt(part.first + glm::ivec3(x, y, z)));
-        }
+  onAllCores(part.dims.z, count, [&](int z) {
+    std::size_t index = static_cast<std::size_t>(z) * static_cast<std::size_t>(part.dims.x) *
+                        static_cast<std::size_t>(part.dims.y);
+    for (int y = 0; y < part.dims.y; ++y) {
+      for (int x = 0; x < part.dims.x; ++x) {
+        storeValue(lattice.type, data.get(), index++, valueAt(part.first + glm::ivec3(x, y, z)));
       }
     }
-  };
-  // Large blocks on all cores; threads aren't worth it for small ones.
-  constexpr std::size_t large = std::size_t{1} << 22;
-  const int threads = count < large ? 1 : static_cast<int>(std::max(std::thread::hardware_concurrency(), 1U));
-  std::vector<std::jthread> others;
-  for (int i = 1; i < threads; ++i) others.emplace_back(fillLayers, i, threads);
-  fillLayers(0, threads);
-  others.clear();
+  });
   Block block = emptyBlock(lattice, part, data.get());
   block.keepAlive = std::shared_ptr<const void>(data, data.get());
   return block;

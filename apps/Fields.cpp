@@ -116,6 +116,15 @@ const std::vector<FieldInfo>& fields() {
   return infos;
 }
 
+std::size_t fieldIndex(const std::string& name) {
+  std::string names;
+  for (const FieldInfo& info : fields()) {
+    if (info.name == name) return static_cast<std::size_t>(&info - fields().data());
+    names += (names.empty() ? "" : ", ") + info.name;
+  }
+  throw Error(ErrorCode::InvalidArgument, "no field '" + name + "'; there are " + names);
+}
+
 Field makeField(const std::string& name, std::uint32_t seed) {
   if (name == "sphere") return sphere;
   if (name == "shells") return shells;
@@ -124,10 +133,8 @@ Field makeField(const std::string& name, std::uint32_t seed) {
   if (name == "mixing") return [seed](const glm::dvec3& p) { return mixing(p, seed); };
   if (name == "interface") return [seed](const glm::dvec3& p) { return interface(p, seed); };
   if (name == "coil") return coil;
-  if (name == "ramp") return [](const glm::dvec3& p) { return (p.x + p.y + p.z) / 3.0; };
-  std::string names;
-  for (const FieldInfo& info : fields()) names += (names.empty() ? "" : ", ") + info.name;
-  throw Error(ErrorCode::InvalidArgument, "no field '" + name + "'; there are " + names);
+  (void)fieldIndex(name);
+  return [](const glm::dvec3& p) { return (p.x + p.y + p.z) / 3.0; };  // ramp
 }
 
 }  // namespace vdi::apps

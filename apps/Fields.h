@@ -19,6 +19,9 @@ struct FieldInfo {
 };
 const std::vector<FieldInfo>& fields();
 
+/// Of a name among these. Throws Error{InvalidArgument} that lists the names there are.
+std::size_t fieldIndex(const std::string& name);
+
 /// Throws Error{InvalidArgument} that lists the names there are. `seed` changes the ones with random parts.
 Field makeField(const std::string& name, std::uint32_t seed);
 

@@ -26,8 +26,9 @@ struct Options {
   bool wantsVdi() const { return volume.empty() || !output.empty() || !flat.empty(); }
 };
 
-std::vector<Block> blocksOf(const Options& options, const comm::Communicator& world) {
-  return options.raw.empty() ? fieldBlocks(options.field, options.deal, world.rank(), world.size())
+std::vector<Block> blocksOf(const Options& options, const std::shared_ptr<gpu::Device>& device,
+                            const comm::Communicator& world) {
+  return options.raw.empty() ? fieldBlocks(options.field, options.deal, device, world.rank(), world.size())
                              : rawBlocks(options.raw, options.deal, world.rank(), world.size());
 }
 
@@ -60,7 +61,7 @@ void generate(const Options& options, const comm::Communicator& world) {
   world.together([&] {
     settings = makeSettings(options.quality);
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
-    blocks = blocksOf(options, world);
+    blocks = blocksOf(options, device, world);
   });
   VdiGenerator generator(device, comm::Communicator::world());
   generator.setBlocks(std::move(blocks));

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <string_view>
 
+#include "apps/DeviceField.h"
 #include "apps/Fields.h"
 #include "apps/Help.h"
 #include "apps/RawVolume.h"
@@ -134,7 +135,8 @@ std::vector<Block> rawBlocks(const std::string& sidecar, const DealOptions& opti
   return blocks;
 }
 
-std::vector<Block> fieldBlocks(const std::string& name, const DealOptions& options, int rank, int ranks) {
+std::vector<Block> fieldBlocks(const std::string& name, const DealOptions& options,
+                               const std::shared_ptr<gpu::Device>& device, int rank, int ranks) {
   Lattice lattice;
   lattice.size = vectorOf(parseSizes(options.size, 3));
   lattice.type = scalarTypeFromString(options.type);
@@ -143,15 +145,12 @@ std::vector<Block> fieldBlocks(const std::string& name, const DealOptions& optio
   const bool cells = lattice.joint == Joint::Cells;
   const double spacing = 1.0 / std::max(cells ? longest : longest - 1, 1);
   lattice.spacing = glm::dvec3(spacing);
-  const Field field = makeField(name, options.seed);
+  DeviceField field(device, name, options.seed);
   const double top = topOf(lattice.type);
   std::vector<Block> blocks;
   for (const Part& part : decompose(lattice.size, vectorOf(parseSizes(options.blocks, 3)),
                                     layoutFromString(options.layout), lattice.joint, ranks, options.seed)) {
-    if (part.owner != rank) continue;
-    blocks.push_back(makeBlock(lattice, part, [&](const glm::ivec3& index) {
-      return top * field((glm::dvec3(index) + (cells ? 0.5 : 0.0)) * spacing);
-    }));
+    if (part.owner == rank) blocks.push_back(field.makeBlock(lattice, part, top));
   }
   return blocks;
 }

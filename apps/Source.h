@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
+#include "vdi/gpu/Device.h"
 
 namespace vdi::apps {
 
@@ -27,8 +29,9 @@ struct DealOptions {
 };
 void addDealOptions(CLI::App& command, DealOptions& options);
 
-/// The blocks of a procedural field that `rank` of `ranks` holds. Throws Error.
-std::vector<Block> fieldBlocks(const std::string& field, const DealOptions& options, int rank, int ranks);
+/// The blocks of a procedural field that `rank` of `ranks` holds, made by its device. Throws Error.
+std::vector<Block> fieldBlocks(const std::string& field, const DealOptions& options,
+                               const std::shared_ptr<gpu::Device>& device, int rank, int ranks);
 /// The blocks of a raw volume; size and type are the sidecar's. Throws Error.
 std::vector<Block> rawBlocks(const std::string& sidecar, const DealOptions& options, int rank, int ranks);
 /// "name: description" of each field, for --help.

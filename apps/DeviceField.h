@@ -1,0 +1,37 @@
+// The fields of Fields.h, made by a device: in seconds where cores take minutes.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/Decomposition.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/ComputePipeline.h"
+#include "vdi/gpu/Device.h"
+#include "vdi/gpu/Memory.h"
+
+namespace vdi::apps {
+
+class DeviceField {
+ public:
+  /// Throws Error{InvalidArgument} that lists the names there are.
+  DeviceField(std::shared_ptr<gpu::Device> device, const std::string& name, std::uint32_t seed);
+
+  /// A block for a part, with its own copy of the values, which are `top` times the field's. They're
+  /// deterministic on a device; another one, and makeField, which works in double precision, may give others
+  /// in the sixth digit. The lattice's spacing must be the same on all axes, its origin 0.
+  Block makeBlock(const Lattice& lattice, const Part& part, double top);
+
+ private:
+  std::shared_ptr<gpu::Device> device_;
+  gpu::ComputePipeline pipeline_;
+  gpu::Commands commands_;
+  gpu::Buffer values_;
+  gpu::Buffer readback_;
+  std::uint32_t field_;
+  std::uint32_t seed_;
+};
+
+}  // namespace vdi::apps

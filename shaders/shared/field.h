@@ -1,0 +1,26 @@
+// Parameters of field.comp.
+#ifndef VDI_SHARED_FIELD_H
+#define VDI_SHARED_FIELD_H
+#include "lists.h"
+
+VDI_SHARED_BEGIN
+
+#ifdef __cplusplus
+inline constexpr uint fieldGroup = 64;
+#else
+const uint fieldGroup = 64;
+#endif
+
+struct FieldConstants {
+  VDI_ADDRESS(FloatArray) values;  // [size.z][size.y][size.x], in [0, 1]
+  uvec3 size;
+  uint field;  // place in fields() of apps/Fields.h
+  vec3 first;  // lattice index of the first value, and half a one for cells
+  float spacing;
+  uint seed;
+  uint pad;
+};
+
+VDI_SHARED_END
+
+#endif
