@@ -14,40 +14,58 @@ bool allExact;
 float exponents;
 float countedLists;
 
-void consider(uint x, uint y) {
-  uint at = y * push.countedWidth + x;
-  uint grains = push.countedGrains.at[at];
-  float tolerance = push.countedTolerances.at[at];
-  if (grains == 0u) return;
-  mostGrains = max(mostGrains, grains);
-  if (tolerance >= 0.0) allExact = false;
-  exponents += log2(tolerance < 0.0 ? finestTolerance / toleranceRatio : tolerance);
+struct Counted {
+  float tolerance;
+  uint grains;
+};
+
+Counted countedAt(uint x, uint y) {
+  uint at = (y * push.countedWidth + x) * push.shares;
+  Counted counted = Counted(push.countedTolerances.at[at], push.countedGrains.at[at]);
+  for (uint share = 1u; share < push.shares; ++share) {
+    Counted coarser = Counted(push.countedTolerances.at[at + share], push.countedGrains.at[at + share]);
+    if (coarser.tolerance < counted.tolerance) counted = coarser;  // none of the finer ones gives few enough
+  }
+  return counted;
+}
+
+void consider(Counted counted) {
+  if (counted.grains == 0u) return;
+  mostGrains = max(mostGrains, counted.grains);
+  if (counted.tolerance >= 0.0) allExact = false;
+  exponents += log2(counted.tolerance < 0.0 ? finestTolerance / toleranceRatio : counted.tolerance);
   countedLists += 1.0;
 }
 
 void main() {
-  uint list = gl_GlobalInvocationID.x;
-  if (list >= push.width * push.rows) return;
-  uint x = list % push.width;
-  uint y = list / push.width;
-  uint left = x / push.stride;
-  uint below = y / push.stride;
-  if (push.stride == 1u) {
+  uint x = gl_GlobalInvocationID.x;
+  uint y = gl_GlobalInvocationID.y;
+  if (x >= push.width) return;
+  uint list = y * push.width + x;
+  if (push.strideShift == 0u) {
     uint grains = push.countedGrains.at[list];
     push.tolerances.at[list] = push.countedTolerances.at[list];
     push.rooms.at[list] = grains == 0u ? 0u : grains + spareGrains;
     return;
   }
-  uint right = min((x + push.stride - 1u) / push.stride, push.countedWidth - 1u);
-  uint above = min((y + push.stride - 1u) / push.stride, push.countedRows - 1u);
+  uint left = x >> push.strideShift;
+  uint below = y >> push.strideShift;
+  uint beyond = (1u << push.strideShift) - 1u;
+  uint right = min((x + beyond) >> push.strideShift, push.countedWidth - 1u);
+  uint above = min((y + beyond) >> push.strideShift, push.countedRows - 1u);
   mostGrains = 0u;
   allExact = true;
   exponents = 0.0;
   countedLists = 0.0;
-  consider(left, below);
-  consider(right, below);
-  consider(left, above);
-  consider(right, above);
+  // All are asked for before any is used.
+  Counted leftBelow = countedAt(left, below);
+  Counted rightBelow = countedAt(right, below);
+  Counted leftAbove = countedAt(left, above);
+  Counted rightAbove = countedAt(right, above);
+  consider(leftBelow);
+  consider(rightBelow);
+  consider(leftAbove);
+  consider(rightAbove);
   push.tolerances.at[list] = allExact ? -1.0 : exp2(exponents / countedLists);
   push.rooms.at[list] = mostGrains + uncountedSpareGrains + mostGrains / 4u;
 }

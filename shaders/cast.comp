@@ -9,6 +9,9 @@ layout(local_size_x = castGroupX, local_size_y = castGroupY) in;
 // What the program is for; the others' code is left out.
 layout(constant_id = 0) const uint castProgram = castProgramSearch;
 layout(constant_id = 1) const uint pageCount = 1;
+// Invocations side by side that count the grains of one ray, each for its share of the tolerances: a GPU waits for the longest
+// of few rays.
+layout(constant_id = 4) const uint countShares = 1;
 
 layout(set = 0, binding = 0) uniform sampler3D pages[castMaxPages];
 
@@ -54,10 +57,12 @@ void main() {
   listIndex = y * params.width + x;
   if (countsGrains) {
     uint stride = params.countedStride;
-    x = gl_GlobalInvocationID.x * stride;
+    uint column = gl_GlobalInvocationID.x / countShares;
+    countShare = gl_GlobalInvocationID.x % countShares;
+    x = column * stride;
     y = gl_GlobalInvocationID.y * stride + push.firstRow;
     endRow = min(push.lastRow + stride - 1u, params.height);
-    listIndex = gl_GlobalInvocationID.y * params.countedWidth + gl_GlobalInvocationID.x;
+    listIndex = gl_GlobalInvocationID.y * params.countedWidth + column;
   }
   bool hasRay = x < params.width && y < endRow;
   if (!hasRay && !surveysGrains) return;

@@ -13,6 +13,8 @@ const bool countsGrains = compositeProgram == compositeProgramCountGrains || sur
 const bool writesByNeed = compositeProgram == compositeProgramWriteByNeed;
 const bool writesGrains = compositeProgram == compositeProgramWriteGrains || writesByNeed;
 
+const uint countShares = 1u;
+
 #include "lists.glsl"
 #include "grains.glsl"
 

@@ -3,7 +3,7 @@
 // side in one walk; writing does one.
 //
 // Needs: optical.glsl, appearance.glsl; params with sensitivities, counts, offsets, grains, written, left, status,
-// survey; bool writesGrains, writesByNeed, constants; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
+// survey; bool writesGrains, writesByNeed, uint countShares, constants; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 
 #include "grain.glsl"
@@ -22,11 +22,13 @@ float grainsPerStep;  // 1 / length of a sample
 
 // What's counted, side by side: one set of grains per tolerance, or, while writing by need, at the two levels of the survey
 // that the list's number of supersegments is interpolated from.
-const int countedLevels = writesByNeed ? 2 : writesGrains ? 0 : toleranceLevels;
+const int countedLevels = writesByNeed ? 2 : writesGrains ? 0 : toleranceLevels / int(countShares);
+uint countShare = 0u;  // 0 .. countShares - 1: which of the tolerances
 vec4 countedFirst[toleranceLevels];
 float countedDeviation[toleranceLevels];
 uint countedGrains[toleranceLevels];
 uint countedOpen;  // bit j: a grain of tolerance j is open
+float finestCounted;
 vec2 needTolerances;
 
 // What's written; see Allotment in vdi/reference/Segmenter.h.
@@ -87,7 +89,7 @@ void absorb(float back, vec3 color, float opacity, float opticalDepth) {
 
 void deviate(vec4 x, float weightedLength) {
   if (writesGrains) grainDeviation += weightedLength * differenceOf(x, grainFirst);
-  float tolerance = finestTolerance;
+  float tolerance = finestCounted;
   uint beyond = 0u;
   [[unroll]] for (int level = 0; level < countedLevels; ++level) {
     if (writesByNeed) tolerance = level == 0 ? needTolerances.x : needTolerances.y;
@@ -146,6 +148,8 @@ void walkForGrains() {
   grainsRuns = 0u;
   grainsRunVisible = false;
   countedOpen = 0u;
+  finestCounted = finestTolerance;
+  for (uint level = 0u; level < countShare * uint(countedLevels); ++level) finestCounted *= toleranceRatio;
   [[unroll]] for (int level = 0; level < toleranceLevels; ++level) {
     countedFirst[level] = vec4(0.0);
     countedDeviation[level] = 0.0;
@@ -194,8 +198,8 @@ CountedGrains grainsFor(uint budget) {
     uint room = max(grainsPerBudget * budget, runs);
     count = runs;
     tolerance = unlimited;
-    float coarser = finestTolerance * pow(toleranceRatio, float(toleranceLevels - 1));
-    [[unroll]] for (int level = toleranceLevels - 1; level >= 0; --level) {
+    float coarser = finestCounted * pow(toleranceRatio, float(countedLevels - 1));
+    [[unroll]] for (int level = countedLevels - 1; level >= 0; --level) {
       if (countedGrains[level] <= room) {
         count = countedGrains[level];
         tolerance = coarser;
@@ -209,8 +213,9 @@ CountedGrains grainsFor(uint budget) {
 void countGrains() {
   walkForGrains();
   CountedGrains counted = grainsFor(budgetOfList());
-  params.sensitivities.at[listIndex] = counted.tolerance;
-  params.counts.at[listIndex] = counted.count;
+  uint place = listIndex * countShares + countShare;
+  params.sensitivities.at[place] = counted.tolerance;
+  params.counts.at[place] = counted.count;
 }
 
 // Of a level of the survey.

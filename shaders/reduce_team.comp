@@ -1,12 +1,15 @@
-// As reduce.comp, with a workgroup for a list: its invocations go through the grains side by side, in shared memory. A GPU is
-// busy with few lists then, and reads and writes them once. Workgroups take one list after the other from the queue.
+// As reduce.comp, with a team for each list: a workgroup of one subgroup, whose invocations go through the grains side by side, in
+// shared memory. A GPU is busy with few lists then, and reads and writes them once. Teams take one list after the other from the
+// queue.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_basic : require
 #include "shared/reduce.h"
 
-layout(local_size_x = reduceTeam) in;
-layout(constant_id = 0) const uint capacity = 16u;  // grains of a list
+layout(local_size_x_id = 0) in;  // gl_SubgroupSize, at most 32
+layout(constant_id = 1) const uint capacity = 16u;  // grains of a list
 layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
 #include "optical.glsl"
@@ -21,11 +24,7 @@ shared vec2 spans[capacity];
 shared float befores[capacity];
 shared float costs[capacity];  // of merging each with the next one; unlimited for the last
 
-shared float sums[reduceTeam];
-shared uint cutCount;
-shared uint choices[3];  // bit i: the i-th of the grains that are looked at merges with the next one; by turns
-
-const uint team = reduceTeam;
+const uint team = gl_WorkGroupSize.x;
 uint own;  // which of the team
 
 StoredGrain load(uint i) { return StoredGrain(spans[i], befores[i], 0.0, lights[i]); }
@@ -37,30 +36,22 @@ void store(uint i, StoredGrain grain, vec4 appearance) {
   appearances[i] = appearance;
 }
 
-// From the device's memory; returns how many of them must not be merged with the one before.
-uint loadList(uint base, uint count) {
-  if (own == 0u) cutCount = 0u;
-  barrier();
+// From the device's memory; returns how many of them must not be merged with the one before. `ahead`: the invocation's first one.
+uint loadList(uint base, uint count, StoredGrain ahead) {
+  uint cuts = 0u;
   for (uint i = own; i < count; i += team) {
-    StoredGrain grain = push.grains.at[base + i];
+    StoredGrain grain = ahead;
+    if (i >= team) grain = push.grains.at[base + i];
     store(i, grain, appearanceOf(grain, push.step));
-    if (i > 0u && isCut(grain)) atomicAdd(cutCount, 1u);
+    if (i > 0u && isCut(grain)) ++cuts;
   }
-  barrier();
-  return cutCount;
+  subgroupBarrier();
+  return subgroupAdd(cuts);
 }
 
 void storeList(uint base, uint count) {
   for (uint i = own; i < count; i += team) push.grains.at[base + i] = load(i);
-  barrier();
-}
-
-float sumOf(float value) {
-  sums[own] = value;
-  barrier();
-  float sum = 0.0;
-  [[unroll]] for (uint i = 0u; i < team; ++i) sum += sums[i];
-  return sum;
+  subgroupBarrier();
 }
 
 // Returns the sum of the invocation's own ones that aren't unlimited.
@@ -72,7 +63,7 @@ float findCosts(uint count) {
     costs[i] = cost;
     mine += cost < unlimited ? cost : 0.0;
   }
-  barrier();
+  subgroupBarrier();
   return mine;
 }
 
@@ -81,7 +72,6 @@ float findCosts(uint count) {
 uint mergeOnce(uint count, uint excess, float limit, out float others) {
   uint left = 0u;
   uint absorbed = 0u;  // 1: the first grain of this turn, by the last one of the turn before
-  uint turn = 0u;
   others = 0.0;
   for (uint first = 0u; first < count; first += team) {
     uint i = first + own;
@@ -100,12 +90,9 @@ uint mergeOnce(uint count, uint excess, float limit, out float others) {
         next = load(i + 1u);
       }
     }
-    uint turnAfter = turn == 2u ? 0u : turn + 1u;
-    if (chosen) atomicOr(choices[turn], 1u << own);
-    if (own == 0u) choices[turnAfter] = 0u;
-    barrier();
+    subgroupBarrier();  // all have read what's written below
     // Of the chosen ones, the first `excess` merge.
-    uint mask = choices[turn];
+    uint mask = subgroupBallot(chosen).x;
     uint before = bitCount(mask & ((1u << own) - 1u));
     if (chosen && before < excess) {
       grain = merged(grain, next);
@@ -123,9 +110,8 @@ uint mergeOnce(uint count, uint excess, float limit, out float others) {
     left += min(count - first, team) - absorbed - min(mergers - chosenLast, excess);
     absorbed = mergers <= excess ? chosenLast : 0u;
     excess -= min(mergers, excess);
-    turn = turnAfter;
   }
-  barrier();
+  subgroupBarrier();
   return left;
 }
 
@@ -134,8 +120,7 @@ void mergeCheapest(uint count, uint most, uint cuts) {
   while (count > most) {
     uint finite = count - 1u - cuts;
     if (finite == 0u) break;  // just cuts are left; there are no more of them than may be
-    if (own == 0u) choices[0] = 0u;
-    float limit = limitOf(sumOf(mine), float(finite));
+    float limit = limitOf(subgroupAdd(mine), float(finite));
     count = mergeOnce(count, count - most, limit, mine);
     if (count > most) findCosts(count);
   }
@@ -153,15 +138,19 @@ ListOfGrains listAt(uint place) {
 }
 
 void main() {
-  own = gl_LocalInvocationIndex;
+  own = gl_SubgroupInvocationID;
   uint queued = push.queued.at[0];
   uint place = gl_WorkGroupID.x;
   if (place >= queued) return;
+  uint step = gl_NumWorkGroups.x;
   ListOfGrains ahead = listAt(place);
-  for (; place < queued; place += gl_NumWorkGroups.x) {
+  StoredGrain grainAhead;
+  if (own < ahead.count) grainAhead = push.grains.at[ahead.first + own];
+  for (; place < queued; place += step) {
     ListOfGrains list = ahead;
-    if (place + gl_NumWorkGroups.x < queued) ahead = listAt(place + gl_NumWorkGroups.x);
-    uint cuts = loadList(list.first, list.count);
+    if (place + step < queued) ahead = listAt(place + step);
+    uint cuts = loadList(list.first, list.count, grainAhead);
+    if (own < ahead.count) grainAhead = push.grains.at[ahead.first + own];
     mergeCheapest(list.count, list.most, cuts);
     storeList(list.first, list.most);
   }

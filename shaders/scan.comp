@@ -50,9 +50,16 @@ void addSums() {
   }
   uint64_t before = threadTotals[0];
   if (gl_LocalInvocationIndex == 0u && before + push.sums.at[gl_WorkGroupID.x] > 0xfffffffful) push.overflow.at[0] = 1u;
-  uint first = (gl_WorkGroupID.x * scanGroup + gl_LocalInvocationIndex) * scanPerThread;
+  uint first = gl_WorkGroupID.x * scanGroup * scanPerThread + gl_LocalInvocationIndex;
+  // All are asked for before any is written: a GPU would wait for each of them otherwise.
+  uint values[scanPerThread];
   for (uint i = 0u; i < scanPerThread; ++i) {
-    if (first + i <= push.count) push.prefix.at[first + i] += uint(before);
+    uint at = first + i * scanGroup;
+    values[i] = at <= push.count ? push.prefix.at[at] : 0u;
+  }
+  for (uint i = 0u; i < scanPerThread; ++i) {
+    uint at = first + i * scanGroup;
+    if (at <= push.count) push.prefix.at[at] = values[i] + uint(before);
   }
 }
 

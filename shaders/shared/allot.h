@@ -13,15 +13,16 @@ const uint allotGroup = 64;
 
 // A band of lists, of which every stride-th in a row of every stride-th row is counted.
 struct AllotConstants {
-  VDI_ADDRESS(FloatArray) countedTolerances;  // [countedRows][countedWidth]
-  VDI_ADDRESS(UintArray) countedGrains;       // likewise
+  VDI_ADDRESS(FloatArray) countedTolerances;  // [countedRows][countedWidth][shares]: the finest that gives few enough grains
+  VDI_ADDRESS(UintArray) countedGrains;       // likewise: these
   VDI_ADDRESS(FloatArray) tolerances;         // [rows][width]
   VDI_ADDRESS(UintArray) rooms;               // likewise
   uint width;
   uint rows;
   uint countedWidth;
   uint countedRows;
-  uint stride;
+  uint strideShift;  // log2 of the stride
+  uint shares;  // of the tolerances, counted by themselves, from fine to coarse; 1 if the stride is
 };
 
 VDI_SHARED_END

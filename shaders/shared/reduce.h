@@ -7,13 +7,11 @@ VDI_SHARED_BEGIN
 
 #ifdef __cplusplus
 inline constexpr uint queueGroup = 256;
-inline constexpr uint reduceTeam = 32;
 inline constexpr uint reduceGroup = 64;
 inline constexpr uint storeGroup = 64;
 #else
 const uint queueGroup = 256;
 const uint reduceGroup = 64;
-const uint reduceTeam = 32;  // at most 32
 const uint storeGroup = 64;
 #endif
 

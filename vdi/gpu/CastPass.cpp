@@ -57,12 +57,13 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
 CastPass::CastPass(std::shared_ptr<Device> device)
     : isCpu_(device->isCpu()), sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
 
-ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t compact) {
+ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t compact,
+                                       std::uint32_t countShares) {
   const std::size_t pageCount = volume_->pages().size();
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
   const std::uint32_t samplesAhead = isCpu_ ? 1 : 4;  // measured: docs/benchmarks.md
   ComputePipeline& pipeline =
-      pipelines_.with({program, static_cast<std::uint32_t>(pageCount), compact, samplesAhead});
+      pipelines_.with({program, static_cast<std::uint32_t>(pageCount), compact, samplesAhead, countShares});
   std::uint64_t& bound = boundVersions_[&pipeline];
   if (bound != volume_->pagesVersion()) {
     std::array<const Image3D*, shared::castMaxPages> images{};
@@ -91,9 +92,10 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   const std::uint32_t stride = counts ? band.countedStride : 1;
   // The row behind the band is counted too.
   const std::uint32_t rows = (band.lastRow - band.firstRow + stride - 1) / stride + (stride > 1 ? 1 : 0);
-  const std::uint32_t width = (band.width + stride - 1) / stride;
+  const std::uint32_t shares = program == shared::castProgramCountGrains ? band.countShares : 1;
+  const std::uint32_t width = (band.width + stride - 1) / stride * shares;
   pipelines_.update(commands, params);
-  commands.dispatch(pipelineFor(program, compact), constants,
+  commands.dispatch(pipelineFor(program, compact, shares), constants,
                     (width + shared::castGroupX - 1) / shared::castGroupX,
                     (rows + shared::castGroupY - 1) / shared::castGroupY);
 }

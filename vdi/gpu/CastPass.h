@@ -41,19 +41,20 @@ class CastPass {
     std::uint32_t width = 0;
     std::uint32_t firstRow = 0;
     std::uint32_t lastRow = 0;        // exclusive
-    std::uint32_t countedStride = 1;  // these two as in CastParams
-    shared::StoredForm form{};
+    std::uint32_t countedStride = 1;  // as in CastParams
+    std::uint32_t countShares = 1;    // of the tolerances that Search counts, see AllotConstants
+    shared::StoredForm form{};        // as in CastParams
   };
   /// No dispatch of this pass may be in flight.
   void record(Commands& commands, const shared::CastParams& params, Work work, Algorithm algorithm,
               const Band& band);
 
  private:
-  ComputePipeline& pipelineFor(std::uint32_t program, std::uint32_t compact);
+  ComputePipeline& pipelineFor(std::uint32_t program, std::uint32_t compact, std::uint32_t countShares);
 
   bool isCpu_;
   Sampler sampler_;
-  PipelineSet pipelines_;  // by shared::castProgram..., page count and precision
+  PipelineSet pipelines_;  // by shared::castProgram..., page count, precision and shares
   std::map<const ComputePipeline*, std::uint64_t> boundVersions_;  // of the pages that they're bound to
   const VolumeStore* volume_ = nullptr;
 };

@@ -91,12 +91,17 @@ void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
                                             info.specialization.size() * sizeof(std::uint32_t),
                                             info.specialization.data()};
   const ShaderModule module(*device_, info.code.empty() ? shaderCode(info.shader) : info.code);
+  const VkPipelineShaderStageRequiredSubgroupSizeCreateInfo subgroups{
+      VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_REQUIRED_SUBGROUP_SIZE_CREATE_INFO, nullptr,
+      device_->limits().subgroupSize};
+  const VkPipelineShaderStageCreateFlags whole = VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT;
   const VkComputePipelineCreateInfo pipelineInfo{
       VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
       nullptr,
       0,
-      {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO, nullptr, 0, VK_SHADER_STAGE_COMPUTE_BIT,
-       module.handle(), "main", &specialization},
+      {VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO, info.wholeSubgroups ? &subgroups : nullptr,
+       info.wholeSubgroups ? whole : 0, VK_SHADER_STAGE_COMPUTE_BIT, module.handle(), "main",
+       &specialization},
       layout_,
       VK_NULL_HANDLE,
       -1};

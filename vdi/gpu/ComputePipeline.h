@@ -28,9 +28,10 @@ struct ComputePipelineInfo {
   std::string_view shader;  // name without ".comp", for shaderCode
   std::span<const std::uint32_t>
       code;  // SPIR-V that's used instead when it isn't empty; just while constructing
-  std::uint32_t pushConstantBytes = 0;        // at most 128
-  std::uint32_t imageCount = 0;               // size of the sampler3D array at set 0, binding 0
-  std::uint32_t uniformBytes = 0;             // of the uniform block at set 0, binding 1; 0: none
+  std::uint32_t pushConstantBytes = 0;  // at most 128
+  std::uint32_t imageCount = 0;         // size of the sampler3D array at set 0, binding 0
+  std::uint32_t uniformBytes = 0;       // of the uniform block at set 0, binding 1; 0: none
+  bool wholeSubgroups = false;          // of DeviceLimits::subgroupSize, of which the workgroup is a multiple
   std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
 };
 

@@ -99,6 +99,25 @@ std::uint64_t hostPointerAlignment(VkPhysicalDevice device) {
   return host.minImportedHostPointerAlignment;
 }
 
+/// DeviceLimits::subgroupSize.
+std::uint32_t usefulSubgroupSize(VkPhysicalDevice device, const Features& features) {
+  VkPhysicalDeviceVulkan13Properties v13{};
+  v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_PROPERTIES;
+  VkPhysicalDeviceVulkan11Properties v11{};
+  v11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES;
+  v11.pNext = &v13;
+  VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &v11, {}};
+  vkGetPhysicalDeviceProperties2(device, &properties);
+  constexpr VkSubgroupFeatureFlags needed =
+      VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT | VK_SUBGROUP_FEATURE_ARITHMETIC_BIT;
+  constexpr std::uint32_t largest = 32;  // bits of a word
+  const bool there = features.v13.subgroupSizeControl == VK_TRUE &&
+                     features.v13.computeFullSubgroups == VK_TRUE &&
+                     (v13.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT) != 0 &&
+                     (v11.subgroupSupportedOperations & needed) == needed && v13.minSubgroupSize <= largest;
+  return there ? std::min(largest, v13.maxSubgroupSize) : 0;
+}
+
 /// What needs Vulkan 1.3 to be asked for: limits, driver, and what's missing.
 void inspectFeatures(VkPhysicalDevice device, Candidate& candidate) {
   VkPhysicalDeviceDriverProperties driver{};
@@ -124,6 +143,7 @@ void inspectFeatures(VkPhysicalDevice device, Candidate& candidate) {
   limits.shaderFloat16 = features.v12.shaderFloat16 == VK_TRUE;
   limits.storage16Bit = features.v11.storageBuffer16BitAccess == VK_TRUE;
   limits.storage8Bit = features.v12.storageBuffer8BitAccess == VK_TRUE;
+  limits.subgroupSize = usefulSubgroupSize(device, features);
   const std::array<std::pair<VkBool32, const char*>, 7> demands{{
       {features.core.features.shaderInt64, "shaderInt64"},
       {features.v12.bufferDeviceAddress, "bufferDeviceAddress"},
@@ -357,6 +377,8 @@ VkDevice makeDevice(const Candidate& chosen) {
   features.v12.hostQueryReset = VK_TRUE;
   features.v13.synchronization2 = VK_TRUE;
   features.v13.maintenance4 = VK_TRUE;
+  features.v13.subgroupSizeControl = chosen.limits.subgroupSize > 0 ? VK_TRUE : VK_FALSE;
+  features.v13.computeFullSubgroups = chosen.limits.subgroupSize > 0 ? VK_TRUE : VK_FALSE;
   VkDeviceCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
   info.pNext = &features.core;

@@ -35,6 +35,9 @@ struct DeviceLimits {
   std::uint32_t timestampBits = 0;  // the low ones that count; the clock wraps around
   /// What the start and the size of host memory that's imported must be multiples of; 0: the device can't.
   std::uint64_t hostPointerAlignment = 0;
+  /// Invocations of a subgroup, for compute shaders whose subgroups vote and add up: they can be told to have
+  /// just that many (ComputePipelineInfo::wholeSubgroups), 32 at most. 0 if they can't.
+  std::uint32_t subgroupSize = 0;
   // Features that are turned on where the device has them.
   bool shaderFloat16 = false;
   bool storage16Bit = false;  // storageBuffer16BitAccess

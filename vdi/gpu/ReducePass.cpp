@@ -17,10 +17,21 @@ ComputePipelineInfo pipelineInfo(std::string_view shader) {
   return info;
 }
 
-/// What a list takes, as far as the 16 KiB of shared memory that every device has hold it.
+ComputePipelineInfo teamInfo() {
+  ComputePipelineInfo info = pipelineInfo("reduce_team");
+  info.wholeSubgroups = true;
+  return info;
+}
+
+/// Of shared memory, which every device has.
+constexpr std::uint32_t sharedBytes = 16384;
+/// What a grain takes of it in reduce_team.comp.
+constexpr std::uint32_t grainBytes = 48;
+
+/// What a list takes, as far as there's room for that.
 std::uint32_t teamCapacity(std::uint64_t grains) {
-  constexpr std::uint64_t largest = 320;
   constexpr std::uint64_t unit = 16;
+  constexpr std::uint64_t largest = sharedBytes / grainBytes / unit * unit;
   return static_cast<std::uint32_t>(std::min((grains + unit - 1) / unit * unit, largest));
 }
 
@@ -31,13 +42,13 @@ constexpr std::uint32_t groupsFor(std::uint32_t lists, std::uint32_t group) {
 }  // namespace
 
 ReducePass::ReducePass(std::shared_ptr<Device> device)
-    : ReducePass(device, device->isCpu() ? Teams::No : Teams::Yes) {}
+    : ReducePass(device, device->isCpu() || device->limits().subgroupSize == 0 ? Teams::No : Teams::Yes) {}
 
 ReducePass::ReducePass(std::shared_ptr<Device> device, Teams teams)
     : device_(std::move(device)),
       teams_(teams),
       find_(device_, pipelineInfo("queue")),
-      team_(device_, pipelineInfo("reduce_team")),
+      team_(device_, teamInfo()),
       alone_(device_, pipelineInfo("reduce")),
       store_(device_, pipelineInfo("store")),
       queued_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal) {}
@@ -67,7 +78,7 @@ void ReducePass::recordTeams(Commands& commands, shared::ReduceConstants& consta
   commands.dispatch(find_, constants, groupsFor(constants.listCount, shared::queueGroup));
   commands.barrier();
   constexpr std::uint32_t mostTeams = 16384;  // enough for any device; each takes list after list
-  commands.dispatch(team_.with({constants.teamCapacity}), constants,
+  commands.dispatch(team_.with({device_->limits().subgroupSize, constants.teamCapacity}), constants,
                     std::min(constants.listCount, mostTeams));
 }
 

@@ -13,10 +13,10 @@ namespace vdi::gpu {
 
 class ReducePass {
  public:
-  /// Whether a workgroup merges a list, where it has room for that, or a single invocation.
+  /// Whether a team merges a list, where it has room for that, or a single invocation.
   enum class Teams { Yes, No };
 
-  /// Teams: on all devices but CPUs, where barriers cost more than they win.
+  /// Teams: where the device has DeviceLimits::subgroupSize, but not on CPUs, which they keep no busier.
   explicit ReducePass(std::shared_ptr<Device> device);
   ReducePass(std::shared_ptr<Device> device, Teams teams);
 

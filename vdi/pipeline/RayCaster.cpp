@@ -58,7 +58,7 @@ float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) 
   const Survey survey = survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
     params.survey = address;
     pass_.record(commands, params, gpu::CastPass::Work::Survey, Algorithm::Merge,
-                 {width, 0, height, params.countedStride, params.form});
+                 {width, 0, height, params.countedStride, 1, params.form});
   });
   const double milliseconds = commands_.stageTimes().front().milliseconds;
   times_ += {milliseconds, milliseconds, 0.0};
@@ -83,6 +83,8 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
   const std::uint32_t band = rowsPerBand(request, ListBuilder::bytesPerList(params.mostPerList, algorithm));
   // With cuts at gaps each list's runs must be counted.
   const std::uint32_t stride = request.cutAtGaps ? 1 : shared::countedStride;
+  // The few that are counted otherwise don't keep a GPU busy.
+  const std::uint32_t countShares = stride > 1 && !device_->isCpu() ? 2 : 1;
   params.countedStride = stride;
   params.countedSamples =
       stride > 1 ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments) : 1;
@@ -98,6 +100,7 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
     build.rows = end - row;
     build.rowBehind = end < height;
     build.countedStride = stride;
+    build.countShares = countShares;
     build.algorithm = algorithm;
     build.most = {params.mostPerList, !request.cutAtGaps};
     build.sampleStep = request.lattice.step;
@@ -123,7 +126,7 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
                    !write                ? Work::Search
                    : params.level < 0.0F ? Work::Write
                                          : Work::WriteByNeed,
-                   algorithm, {width, row, end, stride, params.form});
+                   algorithm, {width, row, end, stride, countShares, params.form});
     };
     builder_.build(build, record, result);
     times_ += builder_.times();
