@@ -22,7 +22,7 @@ struct AllotConstants {
   uint countedWidth;
   uint countedRows;
   uint strideShift;  // log2 of the stride
-  uint shares;  // of the tolerances, counted by themselves, from fine to coarse; 1 if the stride is
+  uint shares;  // of the tolerances, counted by themselves, from fine to coarse; 1 if the stride is, or budgets aren't equal
 };
 
 VDI_SHARED_END

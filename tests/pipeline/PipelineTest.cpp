@@ -21,6 +21,17 @@ using apps::Layout;
 
 namespace {
 
+/// Another one, which does as a GPU does.
+std::shared_ptr<gpu::Device> deviceAsGpu() {
+  static const std::shared_ptr<gpu::Device> instance = [] {
+    gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
+    request.validation = true;
+    request.gpuPrograms = true;
+    return gpu::Device::create(request);
+  }();
+  return instance;
+}
+
 std::shared_ptr<gpu::Device> device() {
   static const std::shared_ptr<gpu::Device> instance = [] {
     gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
@@ -376,6 +387,30 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   request.level = compositor.survey(subLists, request).levelFor(fill);
   CHECK(listsThatDiffer(compositor.composite(subLists, request), composited) <= composited.listCount() / 50);
   CHECK(listsThatDiffer(compositor.composite(subLists, request), composited) <= composited.listCount() / 50);
+}
+
+TEST_CASE("programs for GPUs give the same lists as those for CPUs") {
+  const Budget budget = GENERATE(Budget::List, Budget::Total);
+  const std::uint32_t supersegments = GENERATE(1U, 6U, 255U);
+  INFO(supersegments << " supersegments, budget " << toString(budget));
+  const auto dealt = test::deal("turbulence", {64, 64, 64}, {2, 2, 2}, Layout::Random, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  const TransferFunction function = test::threeHues(0.8);
+  GenerateSettings settings = test::smallSettings(117, 91, supersegments);
+  settings.precision = Precision::Full;
+  settings.samplesPerVoxel = supersegments == 255 ? 16.0 : 2.0;
+  settings.budget = budget;
+  const auto made = [&](const std::shared_ptr<gpu::Device>& on) {
+    VdiGenerator generator(on, comm::Communicator::serial());
+    generator.setBlocks(dealt.mine);
+    return *generator.generate(test::oblique(), function, settings);
+  };
+  const Vdi expected = made(device());
+  const Vdi vdi = made(deviceAsGpu());
+  const auto& lists = std::get<SupersegmentLists>(expected.lists);
+  CHECK(lists.segments.size() > lists.listCount() / 4);
+  CHECK(listsThatDiffer(std::get<SupersegmentLists>(vdi.lists), lists) <= lists.listCount() / 1000);
+  CHECK(deviceAsGpu()->validationMessages() == "");
 }
 
 TEST_CASE("a VDI equals DVR at V_O and stays close around it") {

@@ -55,15 +55,16 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
 }
 
 CastPass::CastPass(std::shared_ptr<Device> device)
-    : isCpu_(device->isCpu()), sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
+    : samplesAhead_(device->runsGpuPrograms() ? 4 : 1),
+      sampler_(device),
+      pipelines_(std::move(device), pipelineInfo()) {}
 
 ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t compact,
                                        std::uint32_t countShares) {
   const std::size_t pageCount = volume_->pages().size();
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
-  const std::uint32_t samplesAhead = isCpu_ ? 1 : 4;  // measured: docs/benchmarks.md
   ComputePipeline& pipeline =
-      pipelines_.with({program, static_cast<std::uint32_t>(pageCount), compact, samplesAhead, countShares});
+      pipelines_.with({program, static_cast<std::uint32_t>(pageCount), compact, samplesAhead_, countShares});
   std::uint64_t& bound = boundVersions_[&pipeline];
   if (bound != volume_->pagesVersion()) {
     std::array<const Image3D*, shared::castMaxPages> images{};

@@ -52,7 +52,7 @@ class CastPass {
  private:
   ComputePipeline& pipelineFor(std::uint32_t program, std::uint32_t compact, std::uint32_t countShares);
 
-  bool isCpu_;
+  std::uint32_t samplesAhead_;
   Sampler sampler_;
   PipelineSet pipelines_;  // by shared::castProgram..., page count, precision and shares
   std::map<const ComputePipeline*, std::uint64_t> boundVersions_;  // of the pages that they're bound to

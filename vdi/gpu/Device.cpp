@@ -288,6 +288,7 @@ struct Device::State {
   std::uint32_t queueFamily = 0;
   std::string name;
   bool cpu = false;
+  bool gpuPrograms = true;
   DeviceLimits limits;
   VkPhysicalDeviceMemoryProperties memory{};
   std::atomic<std::int64_t> allocated{0};
@@ -447,6 +448,7 @@ std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
   state->queueFamily = chosen.queueFamily;
   state->name = chosen.summary.name;
   state->cpu = chosen.summary.type == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  state->gpuPrograms = !state->cpu || request.gpuPrograms;
   state->limits = chosen.limits;
   vkGetPhysicalDeviceMemoryProperties(chosen.handle, &state->memory);
   state->device = makeDevice(chosen);
@@ -472,6 +474,9 @@ const std::string& Device::name() const {
 }
 bool Device::isCpu() const {
   return state_->cpu;
+}
+bool Device::runsGpuPrograms() const {
+  return state_->gpuPrograms;
 }
 const DeviceLimits& Device::limits() const {
   return state_->limits;

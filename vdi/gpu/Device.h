@@ -17,6 +17,9 @@ struct DeviceRequest {
   std::string selector;
   int localRank = 0;        // rank among the ranks of this node
   bool validation = false;  // VK_LAYER_KHRONOS_validation; every message of severity warning or error is kept
+  /// Runs what's the fastest on GPUs on a CPU too, so that it can be tested there; see
+  /// Device::runsGpuPrograms.
+  bool gpuPrograms = false;
 };
 
 /// The request that the environment asks for: VDI_DEVICE is the selector, VDI_VALIDATION=1 turns validation
@@ -64,6 +67,8 @@ class Device {
 
   const std::string& name() const;  // as the driver gives it
   bool isCpu() const;               // VK_PHYSICAL_DEVICE_TYPE_CPU, lavapipe for example
+  /// Whether programs are chosen that do more work to wait less: true for GPUs. The results are the same.
+  bool runsGpuPrograms() const;
   const DeviceLimits& limits() const;
 
   VkInstance instance() const;

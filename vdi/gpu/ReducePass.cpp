@@ -42,7 +42,8 @@ constexpr std::uint32_t groupsFor(std::uint32_t lists, std::uint32_t group) {
 }  // namespace
 
 ReducePass::ReducePass(std::shared_ptr<Device> device)
-    : ReducePass(device, device->isCpu() || device->limits().subgroupSize == 0 ? Teams::No : Teams::Yes) {}
+    : ReducePass(device,
+                 device->runsGpuPrograms() && device->limits().subgroupSize > 0 ? Teams::Yes : Teams::No) {}
 
 ReducePass::ReducePass(std::shared_ptr<Device> device, Teams teams)
     : device_(std::move(device)),

@@ -16,7 +16,7 @@ class ReducePass {
   /// Whether a team merges a list, where it has room for that, or a single invocation.
   enum class Teams { Yes, No };
 
-  /// Teams: where the device has DeviceLimits::subgroupSize, but not on CPUs, which they keep no busier.
+  /// Teams: where the device has DeviceLimits::subgroupSize and runs programs for GPUs.
   explicit ReducePass(std::shared_ptr<Device> device);
   ReducePass(std::shared_ptr<Device> device, Teams teams);
 

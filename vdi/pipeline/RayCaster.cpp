@@ -83,8 +83,10 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
   const std::uint32_t band = rowsPerBand(request, ListBuilder::bytesPerList(params.mostPerList, algorithm));
   // With cuts at gaps each list's runs must be counted.
   const std::uint32_t stride = request.cutAtGaps ? 1 : shared::countedStride;
-  // The few that are counted otherwise don't keep a GPU busy.
-  const std::uint32_t countShares = stride > 1 && !device_->isCpu() ? 2 : 1;
+  // The few that are counted otherwise don't keep a GPU busy. What a list needs of a total budget depends on
+  // all tolerances, so they stay together there.
+  const bool split = stride > 1 && request.settings.budget == Budget::List && device_->runsGpuPrograms();
+  const std::uint32_t countShares = split ? 2 : 1;
   params.countedStride = stride;
   params.countedSamples =
       stride > 1 ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments) : 1;
