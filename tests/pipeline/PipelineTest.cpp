@@ -435,6 +435,32 @@ TEST_CASE("a VDI equals DVR at V_O and stays close around it") {
   }
 }
 
+TEST_CASE("VDIs that are set before the last one's upload has ended are seen whole") {
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  const Camera camera = test::oblique();
+  std::vector<Vdi> vdis;
+  for (const char* field : {"mixing", "sphere", "turbulence"}) {
+    const auto dealt = test::deal(field, {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                  ScalarType::F32, 0, 1);
+    generator.setBlocks(dealt.mine);
+    GenerateSettings settings = test::smallSettings(96 + 32 * static_cast<int>(vdis.size()), 80, 10);
+    settings.precision = vdis.size() == 1 ? Precision::Full : Precision::Compact;
+    vdis.push_back(*generator.generate(camera, test::threeHues(1.0), settings));
+  }
+  VdiRenderer busy(device());
+  for (const Vdi& last : vdis) {
+    VdiRenderer fresh(device());
+    fresh.setVdi(last);
+    for (const Vdi& vdi : vdis) busy.setVdi(vdi);
+    busy.setVdi(last);
+    CHECK(largestDifference(busy.render(camera.azimuth(15.0), 96, 80),
+                            fresh.render(camera.azimuth(15.0), 96, 80)) == 0.0F);
+  }
+  VdiRenderer ended(device());
+  ended.setVdi(vdis.front());  // and no render: its end waits
+  CHECK(device()->validationMessages() == "");
+}
+
 TEST_CASE("nothing is made anew between frames of the same size") {
   const auto dealt = test::deal("shells", {20, 20, 20}, {2, 2, 2}, Layout::OnOneRank, Joint::SharedPoints,
                                 ScalarType::F32, 0, 1);

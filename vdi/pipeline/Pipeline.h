@@ -98,7 +98,8 @@ class VdiRenderer {
   VdiRenderer(VdiRenderer&&) = delete;
   VdiRenderer& operator=(VdiRenderer&&) = delete;
 
-  /// Uploads; the host copy isn't needed afterwards.
+  /// Copies; `vdi` isn't needed afterwards. Upload and set-up go on on the device while this returns, the
+  /// next render waits for them there (VDIs of up to 128 MiB; larger ones wait for all but their last part).
   void setVdi(const Vdi& vdi);
   Image render(const Camera& camera, int width, int height,
                Reconstruction reconstruction = Reconstruction::Smooth);

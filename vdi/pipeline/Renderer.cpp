@@ -19,7 +19,7 @@ namespace shared = gpu::shared;
 
 struct VdiRenderer::State {
   explicit State(std::shared_ptr<gpu::Device> theDevice)
-      : device(std::move(theDevice)), commands(device), pass(device), expand(device) {}
+      : device(std::move(theDevice)), commands(device), pass(device), expand(device), uploads(device) {}
 
   std::shared_ptr<gpu::Device> device;
   gpu::Commands commands;
@@ -38,30 +38,48 @@ struct VdiRenderer::State {
   float binScale = 0.0F;
   double milliseconds = 0.0;
 
-  /// Calls use(first, count) for parts of `values` that lie in staging, one after the other.
+  /// What fits staging is on its way while the caller goes on; more waits for the part before.
+  static constexpr std::uint64_t stagingBytes = std::uint64_t{128} << 20;
+  std::uint64_t stagingUsed = 0;
+  /// Of setVdi, which doesn't wait for the last of them. Behind the buffers, for its end waits for what uses
+  /// them.
+  gpu::Commands uploads;
+
+  /// Calls use(at, first, count) for parts of `values` that lie in staging, `at` bytes into it.
   template <typename T, typename Use>
   void inParts(const std::vector<T>& values, Use use) {
-    constexpr std::size_t most = (std::size_t{64} << 20) / sizeof(T);
-    staging.reserve(device, std::min(values.size(), most) * sizeof(T), MemoryKind::Upload);
-    for (std::size_t first = 0; first < values.size(); first += most) {
-      const std::size_t count = std::min(most, values.size() - first);
-      std::memcpy(staging.mapped().data(), values.data() + first, count * sizeof(T));
-      commands.begin();
-      use(first, count);
-      commands.submitAndWait();
+    for (std::size_t first = 0; first < values.size();) {
+      if (stagingUsed + sizeof(T) > staging.size()) {
+        uploads.submitAndWait();
+        uploads.begin();
+        stagingUsed = 0;
+      }
+      const std::size_t count =
+          std::min<std::size_t>((staging.size() - stagingUsed) / sizeof(T), values.size() - first);
+      std::memcpy(staging.mapped().data() + stagingUsed, values.data() + first, count * sizeof(T));
+      use(stagingUsed, first, count);
+      constexpr std::uint64_t alignment = 16;
+      stagingUsed += (count * sizeof(T) + alignment - 1) / alignment * alignment;
+      first += count;
     }
   }
 
   template <typename Segment>
   void upload(const ListsOf<Segment>& lists, const DepthCode& code, const glm::ivec2& size) {
+    uploads.wait();  // for the last one, which may still use the buffers
     offsets.reserve(device, lists.offsets.size() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
     constexpr bool compact = std::is_same_v<Segment, CompactSupersegment>;
     constexpr std::size_t segmentBytes = compact ? sizeof(Segment) : sizeof(shared::RenderSegment);
     segments.reserve(device, lists.segments.size() * segmentBytes, MemoryKind::DeviceLocal);
     heads.reserve(device, lists.listCount() * sizeof(shared::ListHead), MemoryKind::DeviceLocal);
     tileMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint64_t), MemoryKind::DeviceLocal);
-    inParts(lists.offsets, [&](std::size_t first, std::size_t count) {
-      commands.copy(staging, 0, offsets, first * sizeof(std::uint32_t), count * sizeof(std::uint32_t));
+    const std::uint64_t bytes =
+        (lists.offsets.size() + 4) * sizeof(std::uint32_t) + lists.segments.size() * sizeof(Segment);
+    staging.reserve(device, std::min(bytes, stagingBytes), MemoryKind::Upload);
+    stagingUsed = 0;
+    uploads.begin();
+    inParts(lists.offsets, [&](std::uint64_t at, std::size_t first, std::size_t count) {
+      uploads.copy(staging, at, offsets, first * sizeof(std::uint32_t), count * sizeof(std::uint32_t));
     });
     shared::ExpandConstants constants{};
     constants.offsets = offsets.address();
@@ -74,26 +92,23 @@ struct VdiRenderer::State {
     form = detail::storedForm(code);
     constants.form = form;
     constants.mode = shared::expandModeSegments;
-    inParts(lists.segments, [&](std::size_t first, std::size_t count) {
+    inParts(lists.segments, [&](std::uint64_t at, std::size_t first, std::size_t count) {
       if constexpr (compact) {
-        commands.copy(staging, 0, segments, first * sizeof(Segment), count * sizeof(Segment));
+        uploads.copy(staging, at, segments, first * sizeof(Segment), count * sizeof(Segment));
       } else {
-        constants.from = staging.address();
+        constants.from = staging.address() + at;
         constants.first = static_cast<std::uint32_t>(first);
         constants.count = static_cast<std::uint32_t>(count);
-        expand.record(commands, constants);
+        expand.record(uploads, constants);
       }
     });
-    commands.begin();
-    constants.mode = shared::expandModeMasks;
-    expand.record(commands, constants);
-    commands.barrier();
-    constants.mode = shared::expandModeTiles;
-    expand.record(commands, constants);
-    commands.barrier();
-    constants.mode = shared::expandModeLargeTiles;
-    expand.record(commands, constants);
-    commands.submitAndWait();
+    for (const std::uint32_t mode :
+         {shared::expandModeMasks, shared::expandModeTiles, shared::expandModeLargeTiles}) {
+      uploads.barrier();
+      constants.mode = mode;
+      expand.record(uploads, constants);
+    }
+    uploads.submit();
   }
 };
 
@@ -136,6 +151,7 @@ Image VdiRenderer::render(const Camera& camera, int width, int height, Reconstru
   params.nearest = s.nearest;
   params.farthest = s.farthest;
   s.commands.begin();
+  s.commands.barrier();  // behind setVdi's uploads
   s.commands.mark("render");
   s.pass.record(s.commands, params, reconstruction);
   s.picture.recordDownload(s.commands);
