@@ -1,8 +1,11 @@
 // Camera, sample lattice, transfer tables, blocks and the checks of a VDI.
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <random>
+#include <vector>
 
 #include "vdi/core/Block.h"
 #include "vdi/core/Camera.h"
@@ -13,6 +16,36 @@
 #include "vdi/core/Vdi.h"
 
 using namespace vdi;
+
+TEST_CASE("the range of a block's finite values, wherever they stand") {
+  std::mt19937 generator(5);
+  for (const int count : {1, 3, 16, 17, 63, 64, 65, 200}) {
+    std::vector<float> floats(static_cast<std::size_t>(count));
+    for (float& value : floats) value = static_cast<float>(generator() % 1000) - 500.0F;
+    for (int i = 0; i < count; i += 5)
+      floats[static_cast<std::size_t>(i)] = std::numeric_limits<float>::quiet_NaN();
+    for (int i = 1; i < count; i += 7)
+      floats[static_cast<std::size_t>(i)] = -std::numeric_limits<float>::infinity();
+    ScalarRange expected;
+    for (const float value : floats) {
+      if (!std::isfinite(value)) continue;
+      expected.min = std::min(expected.min, static_cast<double>(value));
+      expected.max = std::max(expected.max, static_cast<double>(value));
+    }
+    const glm::dvec3 one(1.0);
+    CHECK(finiteRange(Block::fromPoints({count, 1, 1}, {}, one, ScalarType::F32, floats.data())) == expected);
+
+    std::vector<std::int8_t> bytes(static_cast<std::size_t>(count));
+    for (std::int8_t& value : bytes) value = static_cast<std::int8_t>(generator() % 100 - 50);
+    const auto [least, most] = std::minmax_element(bytes.begin(), bytes.end());
+    CHECK(finiteRange(Block::fromPoints({count, 1, 1}, {}, one, ScalarType::I8, bytes.data())) ==
+          ScalarRange{static_cast<double>(*least), static_cast<double>(*most)});
+  }
+  const double nothing[] = {std::numeric_limits<double>::infinity(),
+                            std::numeric_limits<double>::quiet_NaN()};
+  CHECK(finiteRange(Block::fromPoints({2, 1, 1}, {}, glm::dvec3(1.0), ScalarType::F64, nothing)) ==
+        ScalarRange());
+}
 
 TEST_CASE("rays go through the points that they're named after") {
   for (const bool parallel : {false, true}) {

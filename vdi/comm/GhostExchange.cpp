@@ -328,12 +328,16 @@ class Exchange {
     const std::shared_ptr<std::byte[]> storage(new std::byte[plan.grown.count() * size]);
     const auto* data = static_cast<const std::byte*>(block.data);
     forEachRow(plan.grown, [&](std::int64_t y, std::int64_t z) {
-      for (std::int64_t x = plan.grown.lo.x; x < plan.grown.hi.x; ++x) {
-        const glm::i64vec3 nearest =
-            glm::clamp(glm::i64vec3(x, y, z), stored.lo, stored.hi - std::int64_t{1});
-        std::memcpy(storage.get() + position(plan.grown, x, y, z) * size,
-                    data + position(stored, nearest.x, nearest.y, nearest.z) * size, size);
-      }
+      const std::int64_t nearestY = std::clamp(y, stored.lo.y, stored.hi.y - 1);
+      const std::int64_t nearestZ = std::clamp(z, stored.lo.z, stored.hi.z - 1);
+      const std::byte* const from = data + position(stored, stored.lo.x, nearestY, nearestZ) * size;
+      const std::size_t row = static_cast<std::size_t>(stored.hi.x - stored.lo.x) * size;
+      std::byte* const to = storage.get() + position(plan.grown, stored.lo.x, y, z) * size;
+      std::memcpy(to, from, row);
+      for (std::int64_t x = plan.grown.lo.x; x < stored.lo.x; ++x)
+        std::memcpy(to - static_cast<std::size_t>(stored.lo.x - x) * size, from, size);
+      for (std::int64_t x = stored.hi.x; x < plan.grown.hi.x; ++x)
+        std::memcpy(to + static_cast<std::size_t>(x - stored.lo.x) * size, from + row - size, size);
     });
     block.origin -= glm::dvec3(plan.added.lo) * block.spacing;
     block.dims += plan.added.lo + plan.added.hi;
