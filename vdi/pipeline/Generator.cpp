@@ -4,6 +4,8 @@
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <future>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -91,6 +93,16 @@ std::uint64_t fingerprintOf(const GenerateSettings& settings) {
   print.add(settings.precision);
   print.add(settings.terminationOpacity);
   return print.value();
+}
+
+ScalarRange rangeOf(std::span<const Block> blocks) {
+  ScalarRange range;
+  for (const Block& block : blocks) {
+    const ScalarRange part = finiteRange(block);
+    range.min = std::min(range.min, part.min);
+    range.max = std::max(range.max, part.max);
+  }
+  return range;
 }
 
 }  // namespace
@@ -231,18 +243,16 @@ void VdiGenerator::setBlocks(std::vector<Block> blocks, bool fillGhosts) {
   s.comm.together([&] { validate(blocks); });
   if (fillGhosts) blocks = comm::exchangeGhosts(s.comm, std::move(blocks));
   s.scene = comm::globalScene(s.comm, localScene(blocks));
-  ScalarRange range;
   s.mine = {};
-  for (const Block& block : blocks) {
-    const ScalarRange part = finiteRange(block);
-    range.min = std::min(range.min, part.min);
-    range.max = std::max(range.max, part.max);
-    s.mine.volumeBytes += block.byteCount();
-  }
-  std::array<double, 2> least{range.min, -range.max};
+  // While the values are on their way to the device, if there's a thread for it.
+  std::future<ScalarRange> range =
+      std::async(std::launch::async | std::launch::deferred, [&blocks] { return rangeOf(blocks); });
+  s.comm.together([&] { s.caster->setBlocks(blocks, s.scene); });
+  const ScalarRange mine = range.get();
+  std::array<double, 2> least{mine.min, -mine.max};
   s.comm.allReduceMin(least);
   s.range = {least[0], -least[1]};
-  s.comm.together([&] { s.caster->setBlocks(blocks, s.scene); });
+  for (const Block& block : blocks) s.mine.volumeBytes += block.byteCount();
   s.mine.blocks = blocks.size();
   s.mine.uploadSeconds = watch.lap();
 }
