@@ -79,7 +79,8 @@ std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals
 ///   3. While there are more grains than the list may hold: a round of merging neighbours. The cost of
 ///   merging two is the sum over both, and over the empty space between them, of w * |x - x_mean| * length.
 ///   Front to back, two are merged if that costs no more than the limit, and no more than merging either of
-///   them with its other neighbour, until no more have to go. The limit is the mean of all costs; after the
+///   them with its other neighbour (of equal costs those at even places count as less), until no more have to
+///   go. The limit is the mean of all costs; after the
 ///   first round, of those of the mergers that the round before left out, as they were in it. (As good as
 ///   always merging the cheapest two, measured, and it has no list that's searched again for each.)
 /// The tolerances are counted side by side in one walk along the ray, so that a device needs two walks in
