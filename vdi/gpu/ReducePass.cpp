@@ -41,7 +41,7 @@ constexpr std::uint32_t groupsFor(std::uint32_t lists, std::uint32_t group) {
 
 }  // namespace
 
-ReducePass::ReducePass(std::shared_ptr<Device> device)
+ReducePass::ReducePass(const std::shared_ptr<Device>& device)
     : ReducePass(device,
                  device->runsGpuPrograms() && device->limits().subgroupSize > 0 ? Teams::Yes : Teams::No) {}
 

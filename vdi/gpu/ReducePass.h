@@ -17,7 +17,7 @@ class ReducePass {
   enum class Teams { Yes, No };
 
   /// Teams: where the device has DeviceLimits::subgroupSize and runs programs for GPUs.
-  explicit ReducePass(std::shared_ptr<Device> device);
+  explicit ReducePass(const std::shared_ptr<Device>& device);
   ReducePass(std::shared_ptr<Device> device, Teams teams);
 
   struct MostPerList {
