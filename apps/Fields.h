@@ -1,4 +1,5 @@
 // Procedural scalar fields: deterministic, defined everywhere, so that every rank fills its blocks by itself.
+// What the tool runs on is made by a device (DeviceField.h, shaders/field.comp); these are their definition.
 #pragma once
 
 #include <cstdint>
