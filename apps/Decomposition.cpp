@@ -90,11 +90,13 @@ std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, La
   return parts;
 }
 
-Block emptyBlock(const Lattice& lattice, const Part& part, const void* data) {
+Block blockOf(const Lattice& lattice, const Part& part, const std::shared_ptr<std::byte[]>& data) {
   const glm::dvec3 origin = lattice.origin + glm::dvec3(part.first) * lattice.spacing;
-  return lattice.joint == Joint::Cells
-             ? Block::fromCells(part.dims, origin, lattice.spacing, lattice.type, data)
-             : Block::fromPoints(part.dims, origin, lattice.spacing, lattice.type, data);
+  Block block = lattice.joint == Joint::Cells
+                    ? Block::fromCells(part.dims, origin, lattice.spacing, lattice.type, data.get())
+                    : Block::fromPoints(part.dims, origin, lattice.spacing, lattice.type, data.get());
+  block.keepAlive = std::shared_ptr<const void>(data, data.get());
+  return block;
 }
 
 void storeValue(ScalarType type, void* data, std::size_t index, double value) {

@@ -51,8 +51,8 @@ struct Lattice {
 template <typename ValueAt>
 Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt);
 
-/// The block without data: geometry and ownership only.
-Block emptyBlock(const Lattice& lattice, const Part& part, const void* data);
+/// The block that has these values and keeps them.
+Block blockOf(const Lattice& lattice, const Part& part, const std::shared_ptr<std::byte[]>& data);
 /// Writes one value of the given type.
 void storeValue(ScalarType type, void* data, std::size_t index, double value);
 
@@ -83,9 +83,7 @@ Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt) {
       }
     }
   });
-  Block block = emptyBlock(lattice, part, data.get());
-  block.keepAlive = std::shared_ptr<const void>(data, data.get());
-  return block;
+  return blockOf(lattice, part, data);
 }
 
 }  // namespace vdi::apps

@@ -47,10 +47,8 @@ Block DeviceField::makeBlock(const Lattice& lattice, const Part& part, double to
     constants.size = glm::uvec3(part.dims.x, part.dims.y, layers);
     constants.first =
         glm::vec3(part.first + glm::ivec3(0, 0, z)) + (lattice.joint == Joint::Cells ? 0.5F : 0.0F);
-    const std::uint64_t groups = (count + shared::fieldGroup - 1) / shared::fieldGroup;
-    const std::uint32_t x = static_cast<std::uint32_t>(std::min<std::uint64_t>(groups, 32768));
     commands_.begin();
-    commands_.dispatch(pipeline_, constants, x, static_cast<std::uint32_t>((groups + x - 1) / x));
+    commands_.dispatchMany(pipeline_, constants, count, shared::fieldGroup);
     commands_.barrier();
     commands_.copy(values_, 0, readback_, 0, count * sizeof(float));
     commands_.submitAndWait();
@@ -62,9 +60,7 @@ Block DeviceField::makeBlock(const Lattice& lattice, const Part& part, double to
         storeValue(lattice.type, data.get(), place + j, top * static_cast<double>(values[first + j]));
     });
   }
-  Block block = emptyBlock(lattice, part, data.get());
-  block.keepAlive = std::shared_ptr<const void>(data, data.get());
-  return block;
+  return blockOf(lattice, part, data);
 }
 
 }  // namespace vdi::apps

@@ -116,13 +116,21 @@ const std::vector<FieldInfo>& fields() {
   return infos;
 }
 
-std::size_t fieldIndex(const std::string& name) {
+namespace {
+
+Error noField(const std::string& name) {
   std::string names;
-  for (const FieldInfo& info : fields()) {
-    if (info.name == name) return static_cast<std::size_t>(&info - fields().data());
-    names += (names.empty() ? "" : ", ") + info.name;
-  }
-  throw Error(ErrorCode::InvalidArgument, "no field '" + name + "'; there are " + names);
+  for (const FieldInfo& info : fields()) names += (names.empty() ? "" : ", ") + info.name;
+  return {ErrorCode::InvalidArgument, "no field '" + name + "'; there are " + names};
+}
+
+}  // namespace
+
+std::size_t fieldIndex(const std::string& name) {
+  const auto known = std::find_if(fields().begin(), fields().end(),
+                                  [&](const FieldInfo& info) { return info.name == name; });
+  if (known == fields().end()) throw noField(name);
+  return static_cast<std::size_t>(known - fields().begin());
 }
 
 Field makeField(const std::string& name, std::uint32_t seed) {
@@ -133,8 +141,8 @@ Field makeField(const std::string& name, std::uint32_t seed) {
   if (name == "mixing") return [seed](const glm::dvec3& p) { return mixing(p, seed); };
   if (name == "interface") return [seed](const glm::dvec3& p) { return interface(p, seed); };
   if (name == "coil") return coil;
-  (void)fieldIndex(name);
-  return [](const glm::dvec3& p) { return (p.x + p.y + p.z) / 3.0; };  // ramp
+  if (name == "ramp") return [](const glm::dvec3& p) { return (p.x + p.y + p.z) / 3.0; };
+  throw noField(name);
 }
 
 }  // namespace vdi::apps

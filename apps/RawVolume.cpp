@@ -88,9 +88,7 @@ Block readPart(const RawVolume& volume, const Part& part) {
   if (volume.bigEndian != (std::endian::native == std::endian::big)) {
     for (std::size_t i = 0; i < total; i += size) std::reverse(data.get() + i, data.get() + i + size);
   }
-  Block block = emptyBlock(volume.lattice, part, data.get());
-  block.keepAlive = std::shared_ptr<const void>(data, data.get());
-  return block;
+  return blockOf(volume.lattice, part, data);
 }
 
 }  // namespace vdi::apps

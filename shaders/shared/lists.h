@@ -45,7 +45,7 @@ struct Segment {
   float opacity;
 };
 
-// A grain in memory.
+// A grain in memory: 32 bytes, so that it's a whole piece of a cache line where neighbouring invocations read different lists.
 struct StoredGrain {
   vec2 span;     // front, back
   float before;  // transmittance of what's in front of it

@@ -21,23 +21,21 @@ using apps::Layout;
 
 namespace {
 
-/// Another one, which does as a GPU does.
-std::shared_ptr<gpu::Device> deviceAsGpu() {
-  static const std::shared_ptr<gpu::Device> instance = [] {
-    gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
-    request.validation = true;
-    request.gpuPrograms = true;
-    return gpu::Device::create(request);
-  }();
-  return instance;
+std::shared_ptr<gpu::Device> makeDevice(bool gpuPrograms) {
+  gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
+  request.validation = true;
+  request.gpuPrograms = gpuPrograms;
+  return gpu::Device::create(request);
 }
 
 std::shared_ptr<gpu::Device> device() {
-  static const std::shared_ptr<gpu::Device> instance = [] {
-    gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
-    request.validation = true;
-    return gpu::Device::create(request);
-  }();
+  static const std::shared_ptr<gpu::Device> instance = makeDevice(false);
+  return instance;
+}
+
+/// Another one, which does as a GPU does.
+std::shared_ptr<gpu::Device> deviceAsGpu() {
+  static const std::shared_ptr<gpu::Device> instance = makeDevice(true);
   return instance;
 }
 

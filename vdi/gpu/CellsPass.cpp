@@ -31,10 +31,7 @@ void CellsPass::record(Commands& commands, const shared::CellsConstants& constan
     pipeline.bindImages(images, sampler_);
     boundVersion_ = pagesVersion;
   }
-  constexpr std::uint32_t widest = 32768;  // groups; every device allows 65535 per axis
-  const std::uint32_t groups = (constants.cellCount + shared::cellsGroup - 1) / shared::cellsGroup;
-  const std::uint32_t across = std::min(groups, widest);
-  commands.dispatch(pipeline, constants, across, (groups + across - 1) / across);
+  commands.dispatchMany(pipeline, constants, constants.cellCount, shared::cellsGroup);
 }
 
 }  // namespace vdi::gpu

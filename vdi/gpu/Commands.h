@@ -48,6 +48,18 @@ class Commands {
                 std::uint32_t y = 1, std::uint32_t z = 1) {
     dispatchBytes(pipeline, std::as_bytes(std::span(&constants, 1)), x, y, z);
   }
+  /// Workgroups of `group` invocations for `count` of them, over two axes: every device allows 65535 per
+  /// axis. An invocation's index is gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x *
+  /// group.
+  template <typename PushConstants>
+  void dispatchMany(const ComputePipeline& pipeline, const PushConstants& constants, std::uint64_t count,
+                    std::uint32_t group) {
+    constexpr std::uint64_t widest = 32768;
+    const std::uint64_t groups = (count + group - 1) / group;
+    const std::uint64_t across = groups < widest ? groups : widest;
+    dispatch(pipeline, constants, static_cast<std::uint32_t>(across),
+             static_cast<std::uint32_t>((groups + across - 1) / across));
+  }
   void dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
                      std::uint32_t y, std::uint32_t z);
 
