@@ -1,5 +1,4 @@
-// What render.comp wants beside the supersegments: masks of where there's material. And, of a VDI of full precision,
-// supersegments in 16 bytes instead of 24.
+// What render.comp wants of a VDI: supersegments that need no decoding, and masks of where there's material.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/render.h"
@@ -12,14 +11,11 @@ layout(push_constant, scalar) uniform Push { ExpandConstants push; };
 #include "store.glsl"
 #include "pieces.glsl"
 
-const float largestHalf = 65504.0;
-
 void expandSegment(uint i) {
-  Segment s = push.from.at[i];
-  vec3 straight = vec3(s.red, s.green, s.blue) / s.opacity;
-  float opticalDepth = min(opticalDepthOf(s.opacity), largestHalf);
-  push.segments.at[push.first + i] = uvec4(floatBitsToUint(s.front), floatBitsToUint(s.back), packHalf2x16(straight.rg),
-                                           packHalf2x16(vec2(straight.b, opticalDepth)));
+  Material m = loadSegment(push.from, i, push.form);
+  float density = m.opticalDepth / (m.back - m.front);
+  push.segments.at[push.first + i] =
+      RenderSegment(m.front, m.back, density, packedPieceColor(m.color / opacityOf(m.opticalDepth)));
 }
 
 void maskList(uint list) {
@@ -27,9 +23,8 @@ void maskList(uint list) {
   uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];
   for (uint i = first; i < end; ++i) {
-    vec2 places = piecePlaces(packedPiece(push.segments, i));
-    vec2 depths = placeOrigin(push.form) + placeUnit(push.form) * places;
-    mask |= maskOf(depths.x, depths.y, push.nearest, push.binScale);
+    RenderSegment piece = push.segments.at[i];
+    mask |= maskOf(piece.front, piece.back, push.nearest, push.binScale);
   }
   push.heads.at[list] = ListHead(first, end - first, mask);
 }

@@ -4,38 +4,26 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_shuffle : require
 #include "shared/render.h"
 #include "masks.glsl"
-#include "optical.glsl"
-#include "store.glsl"
 #include "pieces.glsl"
 
-layout(local_size_x = renderGroupX, local_size_y = renderGroupY) in;
+// Renders the tiles of the picture that beams.comp has found.
+layout(local_size_x_id = 5) in;
 layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 // Reconstruction::Smooth or Constant.
 layout(constant_id = 3) const bool smoothReconstruction = true;
+// Invocations side by side that share a ray: 1 or an even number of them, up to renderTile. Few rays meet anything, and a GPU
+// waits for the longest of them.
+layout(constant_id = 4) const uint rayShares = 1;
+uint rayShare;
 
 const float opaque = 0.9999;
-const float infinity = 1.0 / 0.0;
 
-// V_O's view space, t = the new view's depth.
-struct Ray {
-  vec3 origin;
-  vec3 direction;
-};
-
-// Of a place in the new picture, in pixels from its lower left corner.
-Ray rayAt(vec2 place) {
-  vec2 uv = place - 0.5 * vec2(params.width, params.height);
-  return Ray(params.originBase + uv.x * params.originRight + uv.y * params.originUp,
-             params.directionBase + uv.x * params.directionRight + uv.y * params.directionUp);
-}
-
-float depthAt(Ray ray, float t) { return ray.origin.z + t * ray.direction.z; }
-
-// What a view-space place across the picture is divided by to be in the picture: V_O's projection.
-float divisorOf(float depth) { return params.parallel != 0u ? 1.0 : depth; }
+#include "view.glsl"
 
 Ray ray;
 vec4 accumulated;
@@ -75,17 +63,21 @@ vec2 insideFrustum() {
   return stretch;
 }
 
-vec2 pixelAt(float t) {
-  vec3 p = ray.origin + t * ray.direction;
-  return p.xy / (params.pixelSize * divisorOf(p.z)) + 0.5 * vec2(params.lists);
-}
-
 #include "beam.glsl"
+#include "line.glsl"
+#include "marks.glsl"
 #include "look.glsl"
 #include "walk.glsl"
 
-void main() {
-  uvec2 at = gl_GlobalInvocationID.xy;
+// Along a Z: the rays of a subgroup are close to each other in both directions.
+uvec2 placeOf(uint pixel) {
+  return uvec2((pixel & 1u) | (pixel >> 1 & 2u) | (pixel >> 2 & 4u), (pixel >> 1 & 1u) | (pixel >> 2 & 2u) | (pixel >> 3 & 4u));
+}
+
+void renderPixels(uint tile) {
+  uint across = (params.width + renderPictureTile - 1u) / renderPictureTile;
+  uvec2 corner = uvec2(tile % across, tile / across) * renderPictureTile;
+  uvec2 at = corner + placeOf(gl_LocalInvocationIndex / rayShares);
   bool hasPixel = at.x < params.width && at.y < params.height;
   ray = rayAt(vec2(at) + 0.5);
   accumulated = vec4(0.0);
@@ -93,14 +85,25 @@ void main() {
   vec2 stretch = insideFrustum();
   bool meets = hasPixel && stretch.x < stretch.y;
   PictureLine line = pictureLine(stretch);
-  bool along = smoothReconstruction && meets && abs(line.along.y - line.along.x) < 1.0;
+  bool along = smoothReconstruction && meets && line.columns < 1.0;
   bool walks = meets && !along;
-  beginLooking();
-  markBeam(line, walks);
-  if (along) lookAlongLists(stretch);
+  beginLooking(line);
+  markBeam(beamOf(corner, renderPictureTile), line, walks);
+  if (along) {
+    Look look = lookAlongLists(line, stretch);
+    accumulate(look.light, look.depth);
+  }
   if (walks) walk(line);
-  if (!hasPixel) return;
+  if (!hasPixel || rayShare != 0u) return;
   uint index = at.y * params.width + at.x;
   params.colors.at[index] = accumulated;
   params.depths.at[index] = firstDepth;
+}
+
+void main() {
+  rayShare = gl_LocalInvocationIndex % rayShares;
+  for (uint i = gl_WorkGroupID.x; i < params.queue.at.count; i += gl_NumWorkGroups.x) {
+    renderPixels(params.waiting.at[i]);
+    barrier();  // before the marks are used again
+  }
 }

@@ -2,7 +2,7 @@
 // Reconstruction::Constant looks at those that it crosses, one or two of each. Twin of walkSmoothly and walkLists in
 // vdi/reference/Render.cpp.
 //
-// Needs: beam.glsl, look.glsl; params, smoothReconstruction, accumulate.
+// Needs: marks.glsl, line.glsl, look.glsl; params, smoothReconstruction, rayShares, rayShare, accumulate.
 
 uint listOf(bool byColumns, int column, int row) {
   return byColumns ? uint(row) * uint(params.lists.x) + uint(column) : uint(column) * uint(params.lists.x) + uint(row);
@@ -15,64 +15,63 @@ float shareOfNext(float beyond) {
   return clamp((beyond - onCentre) / (1.0 - 2.0 * onCentre), 0.0, 1.0);
 }
 
+// Whether a list may have material where the ray is between two bins, in any order.
+bool mayMeet(uint64_t mask, vec2 bins) {
+  const float spare = 0.01;  // for rounding
+  int low = int(clamp(min(bins.x, bins.y) - spare, 0.0, float(renderBins - 1)));
+  int high = int(clamp(max(bins.x, bins.y) + spare, 0.0, float(renderBins - 1)));
+  uvec2 from = unpackUint2x32(mask >> low);
+  int more = high - low;
+  return ((more < 32 ? from.x : from.x | from.y) & (~0u >> (31 - min(more, 31)))) != 0u;
+}
+
 // A ray that stays in about one place of V_O's picture: the four lists around that.
-void lookAlongLists(vec2 stretch) {
-  vec2 place = 0.5 * (pixelAt(stretch.x) + pixelAt(stretch.y)) - 0.5;
+Look lookAlongLists(PictureLine line, vec2 stretch) {
+  vec2 place = 0.5 * (pictureAt(ray, stretch.x) + pictureAt(ray, stretch.y)) - 0.5;
   vec2 first = floor(place);
   float shareX = shareOfNext(place.x - first.x);
   float shareY = shareOfNext(place.y - first.y);
-  uint64_t mask = maskBetween(depthAt(ray, stretch.x), depthAt(ray, stretch.y));
-  vec4 light = vec4(0.0);
-  float depth = infinity;
-  for (int i = 0; i < 4; ++i) {
-    ivec2 side = ivec2(i & 1, i >> 1);
+  Look sum = nothing;
+  for (uint i = rayShare; i < 4u; i += rayShares) {
+    ivec2 side = ivec2(i & 1u, i >> 1);
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(first) + side, ivec2(0), params.lists - 1);
     uint list = listOf(true, pixel.x, pixel.y);
-    if ((params.heads.at[list].mask & mask) == 0ul || !(weight > 0.0)) continue;
+    if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, vec2(line.bins.x, at(line.bins, 1.0)))) continue;
     int hint = 0;
-    lookAtList(pieceOf(list, hint), placesPerT(vec2(pixel) + 0.5), stretch, hint);
-    light += weight * listLight;
-    depth = min(depth, listDepth);
+    Look look = lookAtList(line, list, vec2(pixel) + 0.5, vec2(0.0, 1.0), hint);
+    sum.light += weight * look.light;
+    sum.depth = min(sum.depth, look.depth);
   }
-  accumulate(light, depth);
+  [[unroll]] for (uint other = 1u; other < uint(renderTile); other <<= 1u) {
+    if (other >= rayShares) break;
+    sum.light += subgroupShuffleXor(sum.light, other);
+    sum.depth = min(sum.depth, subgroupShuffleXor(sum.depth, other));
+  }
+  return sum;
 }
-
-// Where a share of the line is passed: t, perspective taken into account.
-float tAfter(PictureLine line, float share) {
-  return line.t.x + (line.t.y - line.t.x) * (share * line.divisors.x) / mix(line.divisors.y, line.divisors.x, share);
-}
-
-float shareAt(PictureLine line, float along) { return clamp((along - line.along.x) * line.perColumn, 0.0, 1.0); }
-
-float tAtEdge(PictureLine line, int column) { return tAfter(line, shareAt(line, float(column))); }
-
-float rowAt(PictureLine line, float along) { return mix(line.across.x, line.across.y, shareAt(line, along)); }
 
 // A column that the ray crosses, and two lists of it: those beside the ray, or those that it enters and leaves the column in.
 struct Column {
-  vec2 t;
+  vec2 fractions;
   ivec2 rows;
   float share;  // of the second one
   uvec2 lists;
 };
 
-// `edges`: t where the ray enters and leaves the column.
-Column columnAt(PictureLine line, int column, vec2 edges) {
-  int ahead = max(line.direction, 0);
-  bool begins = column == line.first;
-  bool ends = column == line.last;
-  vec2 along = vec2(begins ? line.along.x : float(column + 1 - ahead), ends ? line.along.y : float(column + ahead));
+// `edges`: how many columns after its start the line is at either one.
+Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
   Column here;
-  here.t = vec2(begins ? line.t.x : edges.x, ends ? line.t.y : edges.y);
+  here.fractions = vec2(min(fractions.x, fractions.y), max(fractions.x, fractions.y));
   ivec2 mostRow = ivec2(columnCount(!line.byColumns) - 1);
   if (smoothReconstruction) {
-    float centre = rowAt(line, 0.5 * (along.x + along.y)) - 0.5;
+    float centre = line.row + 0.5 * (edges.x + edges.y) * line.rows - 0.5;
     float below = floor(centre);
     here.share = shareOfNext(centre - below);
     here.rows = clamp(int(below) + ivec2(0, 1), ivec2(0), mostRow);
   } else {
-    here.rows = clamp(ivec2(floor(vec2(rowAt(line, along.x), rowAt(line, along.y)))), ivec2(0), mostRow);
+    vec2 inOut = vec2(min(edges.x, edges.y), max(edges.x, edges.y));
+    here.rows = clamp(ivec2(floor(line.row + inOut * line.rows)), ivec2(0), mostRow);
     // A diagonal through corners may touch a third one: not enough to look at.
     here.rows.x = clamp(here.rows.x, here.rows.y - 1, here.rows.y + 1);
     here.share = here.rows.x == here.rows.y ? 0.0 : 0.5;
@@ -81,90 +80,133 @@ Column columnAt(PictureLine line, int column, vec2 edges) {
   return here;
 }
 
-uint64_t rayMask(vec2 t) { return maskBetween(depthAt(ray, t.x), depthAt(ray, t.y)); }
-
 // Memory takes about as long for several as for one.
 const int columnsAtOnce = 4;
+// Bits of what columnsToLookAt returns: a column's first and second list.
+const uint firstLook = 1u;
+const uint secondLook = 1u << renderTile;
 
-// Of the columns of a tile: bit c of each word tells whether the ray may meet something in column c's first or second list.
-uvec2 columnsToLookAt(PictureLine line, int tile) {
-  int first = tile << renderTileShift;
-  int lowest = min(line.first, line.last);
-  int highest = max(line.first, line.last);
-  uvec2 columns = uvec2(0u);
-  float lowT = tAtEdge(line, first);
-  for (int begin = 0; begin < renderTile; begin += columnsAtOnce) {
-    uint64_t firstMasks[columnsAtOnce];  // where both the ray is and the list has material
-    uint64_t secondMasks[columnsAtOnce];
+// Of the columns of a tile: bits firstLook and secondLook, shifted by c, tell whether the ray may meet something in column c's
+// lists. Each of a ray's invocations finds its part.
+uint columnsToLookAt(PictureLine line, int tile) {
+  const int part = renderTile / int(rayShares);
+  const int atOnce = min(part, columnsAtOnce);
+  int most = columnCount(line.byColumns) - 1;
+  int first = (tile << renderTileShift) + part * int(rayShare);
+  uint looks = 0u;
+  float edge = columnsTo(line, float(first));
+  float fraction = fractionAfter(line, edge);
+  for (int begin = 0; begin < part; begin += atOnce) {
+    bool looksAt[2 * columnsAtOnce];
     [[unroll]] for (int i = 0; i < columnsAtOnce; ++i) {
+      if (i >= atOnce) break;
       int column = first + begin + i;
-      float highT = tAtEdge(line, column + 1);
+      float nextEdge = columnsTo(line, float(column + 1));
+      float nextFraction = fractionAfter(line, nextEdge);
       // Columns beyond the line's ends: memory is read where there's a list, and what's read isn't used.
-      vec2 edges = line.direction > 0 ? vec2(lowT, highT) : vec2(highT, lowT);
-      Column here = columnAt(line, clamp(column, lowest, highest), edges);
-      uint64_t mask = column >= lowest && column <= highest && here.t.x < here.t.y ? rayMask(here.t) : 0ul;
-      firstMasks[i] = params.heads.at[here.lists.x].mask & (here.share < 1.0 ? mask : 0ul);
-      secondMasks[i] = params.heads.at[here.lists.y].mask & (here.share > 0.0 ? mask : 0ul);
-      lowT = highT;
+      Column here = columnAt(line, min(column, most), vec2(edge, nextEdge), vec2(fraction, nextFraction));
+      bool passes = nextEdge != edge;
+      vec2 bins = vec2(at(line.bins, fraction), at(line.bins, nextFraction));
+      looksAt[2 * i] = passes && here.share < 1.0 && mayMeet(params.heads.at[here.lists.x].mask, bins);
+      looksAt[2 * i + 1] = passes && here.share > 0.0 && mayMeet(params.heads.at[here.lists.y].mask, bins);
+      edge = nextEdge;
+      fraction = nextFraction;
     }
     [[unroll]] for (int i = 0; i < columnsAtOnce; ++i) {
-      columns |= uvec2(firstMasks[i] != 0ul ? 1u : 0u, secondMasks[i] != 0ul ? 1u : 0u) << uint(begin + i);
+      if (i >= atOnce) break;
+      looks |= ((looksAt[2 * i] ? firstLook : 0u) | (looksAt[2 * i + 1] ? secondLook : 0u)) << (begin + i);
     }
   }
-  return columns;
+  looks <<= part * int(rayShare);
+  [[unroll]] for (uint other = 1u; other < uint(renderTile); other <<= 1u) {
+    if (other >= rayShares) break;
+    looks |= subgroupShuffleXor(looks, other);
+  }
+  return looks;
 }
 
-// What the ray meets of the lists of a column; `looks`: at which ones.
-void lookAtColumn(PictureLine line, int column, bvec2 looks, inout ivec2 hints) {
-  int ahead = max(line.direction, 0);
-  Column here = columnAt(line, column, vec2(tAtEdge(line, column + 1 - ahead), tAtEdge(line, column + ahead)));
-  Piece firstPiece;
-  Piece secondPiece;
-  if (looks.x) firstPiece = pieceOf(here.lists.x, hints.x);
-  if (looks.y) secondPiece = pieceOf(here.lists.y, hints.y);
-  vec2 firstStretch = here.t;
-  vec2 secondStretch = here.t;
+Look lookAtSide(PictureLine line, int column, Column here, bool second, inout int hint) {
+  vec2 fractions = here.fractions;
   if (!smoothReconstruction && here.rows.x != here.rows.y) {
     float edge = float(max(here.rows.x, here.rows.y));
-    float share = (edge - line.across.x) / (line.across.y - line.across.x);
-    float split = clamp(tAfter(line, clamp(share, 0.0, 1.0)), here.t.x, here.t.y);
-    firstStretch.y = split;
-    secondStretch.x = split;
+    float split = fractionAfter(line, clamp((edge - line.row) / line.rows, 0.0, line.columns));
+    split = clamp(split, fractions.x, fractions.y);
+    fractions = second ? vec2(split, fractions.y) : vec2(fractions.x, split);
   }
-  vec4 light = vec4(0.0);
-  float depth = infinity;
-  if (looks.x) {
-    vec2 centre = vec2(column, here.rows.x) + 0.5;
-    lookAtList(firstPiece, placesPerT(line.byColumns ? centre : centre.yx), firstStretch, hints.x);
-    light = listLight;
-    depth = listDepth;
+  vec2 centre = vec2(column, second ? here.rows.y : here.rows.x) + 0.5;
+  return lookAtList(line, second ? here.lists.y : here.lists.x, line.byColumns ? centre : centre.yx, fractions,
+                    hint);
+}
+
+// What the ray meets of a column. `looks`: firstLook, secondLook.
+Look lookAtColumn(PictureLine line, int column, uint looks, inout ivec2 hints) {
+  vec2 edges = vec2(columnsTo(line, float(column)), columnsTo(line, float(column + 1)));
+  Column here = columnAt(line, column, edges, vec2(fractionAfter(line, edges.x), fractionAfter(line, edges.y)));
+  Look first = nothing;
+  Look second = nothing;
+  if (rayShares == 1u) {
+    if ((looks & firstLook) != 0u) first = lookAtSide(line, column, here, false, hints.x);
+    if ((looks & secondLook) != 0u) second = lookAtSide(line, column, here, true, hints.y);
+  } else {
+    bool ownSide = (rayShare & 1u) != 0u;
+    Look own = nothing;
+    if ((looks & (ownSide ? secondLook : firstLook)) != 0u) own = lookAtSide(line, column, here, ownSide, hints.x);
+    Look other = Look(subgroupShuffleXor(own.light, 1u), subgroupShuffleXor(own.depth, 1u));
+    if (ownSide) {
+      first = other;
+      second = own;
+    } else {
+      first = own;
+      second = other;
+    }
   }
-  if (!smoothReconstruction) accumulate(light, depth);
-  light = smoothReconstruction ? (1.0 - here.share) * light : vec4(0.0);
-  if (looks.y) {
-    vec2 centre = vec2(column, here.rows.y) + 0.5;
-    lookAtList(secondPiece, placesPerT(line.byColumns ? centre : centre.yx), secondStretch, hints.y);
-    light += (smoothReconstruction ? here.share : 1.0) * listLight;
-    depth = smoothReconstruction ? min(depth, listDepth) : listDepth;
+  if (smoothReconstruction) {
+    return Look(mix(first.light, second.light, here.share), min(first.depth, second.depth));
   }
-  accumulate(light, depth);
+  return Look(first.light + (1.0 - first.light.a) * second.light, first.light.a > 0.0 ? first.depth : second.depth);
+}
+
+// The next of the columns, as its bit; 0: none.
+uint nextColumn(PictureLine line, uint columns) {
+  return columns == 0u ? 0u : 1u << (line.direction > 0.0 ? findLSB(columns) : findMSB(columns));
 }
 
 // Tile by tile: first all that there's to look at is found, then looked at, so that rays next to each other do the same at a
-// time.
+// time. Of a ray's invocations, each looks at one list of a column, and pairs at different columns.
 void walk(PictureLine line) {
-  int lastTile = line.last >> renderTileShift;
+  const uint columnsAtATime = max(rayShares / 2u, 1u);
+  const uint mostAtATime = uint(renderTile) / 2u;
   ivec2 hints = ivec2(0);
-  for (int tile = line.first >> renderTileShift;; tile += line.direction) {
+  int lastTile = line.last >> renderTileShift;
+  int step = line.direction > 0.0 ? 1 : -1;
+  for (int tile = line.first >> renderTileShift;; tile += step) {
     tile = nextTile(line, tile, lastTile);
     if (tile < 0) return;
-    uvec2 columns = columnsToLookAt(line, tile);
-    while ((columns.x | columns.y) != 0u) {
-      int i = line.direction > 0 ? findLSB(columns.x | columns.y) : findMSB(columns.x | columns.y);
-      uint bit = 1u << i;
-      lookAtColumn(line, (tile << renderTileShift) + i, bvec2((columns.x & bit) != 0u, (columns.y & bit) != 0u), hints);
+    uint looks = columnsToLookAt(line, tile);
+    uint columns = (looks | looks / secondLook) & (secondLook - 1u);
+    while (columns != 0u) {
+      uint own = 0u;
+      [[unroll]] for (uint i = 0u; i < mostAtATime; ++i) {
+        if (i >= columnsAtATime) break;
+        uint next = nextColumn(line, columns);
+        if (i == rayShare / 2u) own = next;
+        columns &= ~next;
+      }
+      Look look = nothing;
+      if (own != 0u) {
+        int i = findLSB(own);
+        look = lookAtColumn(line, (tile << renderTileShift) + i, looks >> i, hints);
+      }
+      if (columnsAtATime == 1u) {
+        accumulate(look.light, look.depth);
+      } else {
+        uint base = gl_SubgroupInvocationID - rayShare;
+        [[unroll]] for (uint i = 0u; i < mostAtATime; ++i) {
+          if (i >= columnsAtATime) break;
+          accumulate(subgroupShuffle(look.light, base + 2u * i), subgroupShuffle(look.depth, base + 2u * i));
+        }
+      }
       if (accumulated.a >= opaque) return;
-      columns &= ~bit;
     }
     if (tile == lastTile) return;
   }

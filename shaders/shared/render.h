@@ -6,8 +6,10 @@
 VDI_SHARED_BEGIN
 
 #ifdef __cplusplus
-inline constexpr uint renderGroupX = 8;
-inline constexpr uint renderGroupY = 8;
+inline constexpr uint renderPictureTile = 8;
+inline constexpr uint renderRegion = 16;
+inline constexpr uint renderBeamGroup = 32;
+inline constexpr uint renderMostGroups = 65535;
 inline constexpr uint expandGroup = 64;
 inline constexpr uint expandModeSegments = 0;
 inline constexpr uint expandModeMasks = 1;
@@ -19,10 +21,12 @@ inline constexpr int renderLargeTile = 64;
 inline constexpr int renderMostMarks = 4096;
 inline constexpr int renderBins = 64;
 #else
-const uint renderGroupX = 8;
-const uint renderGroupY = 8;
+const uint renderPictureTile = 8;  // pixels per side of what a workgroup renders
+const uint renderRegion = 16;      // of the beam that says whether there's anything to render: a multiple of that
+const uint renderBeamGroup = 32;
+const uint renderMostGroups = 65535;  // every device allows them
 const uint expandGroup = 64;
-const uint expandModeSegments = 0;  // one invocation a supersegment; of a VDI of full precision
+const uint expandModeSegments = 0;  // one invocation a supersegment
 const uint expandModeMasks = 1;     // one a list
 const uint expandModeTiles = 2;     // one a tile
 const uint expandModeLargeTiles = 3;  // one a large tile
@@ -33,13 +37,12 @@ const int renderMostMarks = 4096;     // tiles of an axis (beam.glsl)
 const int renderBins = 64;            // parts of the depth range: bits of a mask
 #endif
 
-// A supersegment of a VDI of full precision as rendering wants it, in 16 bytes: depths, straight colour and optical depth over the whole interval, the
-// latter two as half floats (largest error of an opacity: 0.0004).
+// A supersegment as rendering wants it.
 struct RenderSegment {
   float front;
   float back;
-  uint redGreen;
-  uint blueOpticalDepth;
+  float density;  // optical depth per depth, along its list
+  uint color;     // straight; pieces.glsl
 };
 
 // What a ray asks of each list that it crosses: its supersegments in the compact array, and its mask.
@@ -49,11 +52,18 @@ struct ListHead {
   uint64_t mask;
 };
 
+// How many tiles of the new picture are to be rendered, and the workgroups for that: what an indirect dispatch reads.
+struct TileQueue {
+  uvec3 groups;
+  uint count;
+};
+
 VDI_SHARED_END
 
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer RenderSegmentArray { uvec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer RenderSegmentArray { RenderSegment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ListHeads { ListHead at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer TileQueueAddress { TileQueue at; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer MaskArray { uint64_t at[]; };
 #endif
 
@@ -64,8 +74,8 @@ VDI_SHARED_BEGIN
 // tile of 64 x 64.
 struct ExpandConstants {
   VDI_ADDRESS(UintArray) offsets;                // [lists + 1]
-  VDI_ADDRESS(SegmentArray) from;                // compact, as generated: a part of the supersegments
-  VDI_ADDRESS(RenderSegmentArray) segments;      // all; CompactArray of a compact VDI
+  VDI_ADDRESS(SegmentArray) from;                // compact array, as stored: a part of the supersegments
+  VDI_ADDRESS(RenderSegmentArray) segments;      // all
   VDI_ADDRESS(ListHeads) heads;                  // [lists]
   VDI_ADDRESS(MaskArray) tileMasks;              // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
   uint mode;
@@ -79,10 +89,12 @@ struct ExpandConstants {
 
 struct RenderParams {
   VDI_ADDRESS(ListHeads) heads;
-  VDI_ADDRESS(RenderSegmentArray) segments;  // compact array; CompactArray of a compact VDI
+  VDI_ADDRESS(RenderSegmentArray) segments;  // compact array
   VDI_ADDRESS(MaskArray) tileMasks;
   VDI_ADDRESS(Vec4Array) colors;       // [height][width]
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
+  VDI_ADDRESS(TileQueueAddress) queue;
+  VDI_ADDRESS(UintArray) waiting;  // the tiles of the queue: row * tiles in a row + column
   // Ray of the new view's pixel in V_O's view space, as in CastParams: base + u * right + v * up, t = the new view's depth.
   vec3 originBase;
   float nearest;  // depth range of the VDI, nearest > 0 in perspective
@@ -98,7 +110,6 @@ struct RenderParams {
   uint height;
   ivec2 lists;  // of the VDI: width, height
   float binScale;
-  StoredForm form;
 };
 
 VDI_SHARED_END

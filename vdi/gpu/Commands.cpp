@@ -18,13 +18,15 @@ constexpr std::uint32_t maxMarks = 64;
 void memoryBarrier(VkCommandBuffer commands, bool host) {
   constexpr VkPipelineStageFlags2 stages =
       VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
+  constexpr VkPipelineStageFlags2 arguments = VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT;  // of indirect dispatches
   constexpr VkAccessFlags2 writes = VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_TRANSFER_WRITE_BIT;
-  constexpr VkAccessFlags2 reads = VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_TRANSFER_READ_BIT;
+  constexpr VkAccessFlags2 reads =
+      VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_TRANSFER_READ_BIT | VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT;
   const VkMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
                                  nullptr,
-                                 stages,
+                                 stages | arguments,
                                  writes,
-                                 host ? VK_PIPELINE_STAGE_2_HOST_BIT : stages,
+                                 host ? VK_PIPELINE_STAGE_2_HOST_BIT : stages | arguments,
                                  host ? VK_ACCESS_2_HOST_READ_BIT : reads | writes};
   const VkDependencyInfo info{
       VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 1, &barrier, 0, nullptr, 0, nullptr};
@@ -120,9 +122,20 @@ void Commands::wait() {
 
 void Commands::dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants,
                              std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-  assert(state_ == State::Recording);
   assert(x <= device_->limits().maxGroups[0] && y <= device_->limits().maxGroups[1] &&
          z <= device_->limits().maxGroups[2]);
+  bind(pipeline, constants);
+  vkCmdDispatch(buffer_, x, y, z);
+}
+
+void Commands::dispatchIndirect(const ComputePipeline& pipeline, const Buffer& groups) {
+  assert(groups.size() >= sizeof(VkDispatchIndirectCommand));
+  bind(pipeline, {});
+  vkCmdDispatchIndirect(buffer_, groups.handle(), 0);
+}
+
+void Commands::bind(const ComputePipeline& pipeline, std::span<const std::byte> constants) {
+  assert(state_ == State::Recording);
   vkCmdBindPipeline(buffer_, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.handle());
   VkDescriptorSet set = pipeline.descriptorSet();
   if (set != VK_NULL_HANDLE) {
@@ -133,7 +146,6 @@ void Commands::dispatchBytes(const ComputePipeline& pipeline, std::span<const st
     vkCmdPushConstants(buffer_, pipeline.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
                        static_cast<std::uint32_t>(constants.size()), constants.data());
   }
-  vkCmdDispatch(buffer_, x, y, z);
 }
 
 void Commands::barrier() {

@@ -62,6 +62,8 @@ class Commands {
   }
   void dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
                      std::uint32_t y, std::uint32_t z);
+  /// As many workgroups as the buffer's first three words say when it comes to that; no push constants.
+  void dispatchIndirect(const ComputePipeline& pipeline, const Buffer& groups);
 
   /// Everything recorded so far is finished and visible to everything recorded later. What the host wrote
   /// before submit() is anyway, and so is everything to the host after wait().
@@ -90,6 +92,7 @@ class Commands {
   const std::vector<StageTime>& stageTimes() const { return times_; }
 
  private:
+  void bind(const ComputePipeline& pipeline, std::span<const std::byte> constants);
   void release() noexcept;
   void writeTimestamp(std::uint32_t query);
   void readTimes();

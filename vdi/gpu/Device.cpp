@@ -109,7 +109,8 @@ std::uint32_t usefulSubgroupSize(VkPhysicalDevice device, const Features& featur
   VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &v11, {}};
   vkGetPhysicalDeviceProperties2(device, &properties);
   constexpr VkSubgroupFeatureFlags needed =
-      VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT | VK_SUBGROUP_FEATURE_ARITHMETIC_BIT;
+      VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT | VK_SUBGROUP_FEATURE_ARITHMETIC_BIT |
+      VK_SUBGROUP_FEATURE_SHUFFLE_BIT;
   constexpr std::uint32_t largest = 32;  // bits of a word
   const bool there = features.v13.subgroupSizeControl == VK_TRUE &&
                      features.v13.computeFullSubgroups == VK_TRUE &&

@@ -89,6 +89,7 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
                                   words,
                                   VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT |
                                       VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
+                                      VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT |
                                       VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT,
                                   VK_SHARING_MODE_EXCLUSIVE,
                                   0,

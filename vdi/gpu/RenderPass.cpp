@@ -2,18 +2,37 @@
 
 #include <algorithm>
 #include <cassert>
+#include <span>
+#include <string_view>
 
 #include "vdi/core/Camera.h"
+#include "vdi/gpu/Device.h"
 
 namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo pipelineInfo(std::string_view shader) {
   ComputePipelineInfo info;
-  info.shader = "render";
+  info.shader = shader;
   info.uniformBytes = sizeof(shared::RenderParams);
   return info;
+}
+
+/// Invocations that share a ray (render.comp). With more, what each of them has to set up costs more than they
+/// save.
+std::uint32_t sharesFor(const Device& device) {
+  return device.runsGpuPrograms() && device.limits().subgroupSize > 0 ? 4 : 1;
+}
+
+ComputePipelineInfo renderInfo(std::uint32_t shares) {
+  ComputePipelineInfo info = pipelineInfo("render");
+  info.wholeSubgroups = shares > 1;
+  return info;
+}
+
+constexpr std::uint32_t groupsFor(std::uint32_t pixels, std::uint32_t size) {
+  return (pixels + size - 1) / size;
 }
 
 }  // namespace
@@ -43,15 +62,30 @@ shared::RenderParams renderGeometry(const View& original, const View& view) {
   return params;
 }
 
-RenderPass::RenderPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
+RenderPass::RenderPass(const std::shared_ptr<Device>& device)
+    : device_(device),
+      shares_(sharesFor(*device)),
+      beams_(device, pipelineInfo("beams")),
+      render_(device, renderInfo(shares_)),
+      queue_(device, sizeof(shared::TileQueue), MemoryKind::DeviceLocal) {}
 
-void RenderPass::record(Commands& commands, const shared::RenderParams& params,
-                        Reconstruction reconstruction) {
+void RenderPass::record(Commands& commands, shared::RenderParams params, Reconstruction reconstruction) {
+  const std::uint64_t tiles = std::uint64_t{groupsFor(params.width, shared::renderPictureTile)} *
+                              groupsFor(params.height, shared::renderPictureTile);
+  waiting_.reserve(device_, tiles * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+  params.queue = queue_.address();
+  params.waiting = waiting_.address();
+  const shared::TileQueue none{{0, 1, 1}, 0};
+  commands.barrier();
+  commands.update(queue_, std::as_bytes(std::span(&none, 1)));
+  beams_.update(commands, params);
+  render_.update(commands, params);
+  commands.dispatchBytes(beams_.with({}), {}, groupsFor(params.width, shared::renderRegion),
+                         groupsFor(params.height, shared::renderRegion), 1);
+  commands.barrier();
   const std::uint32_t smooth = reconstruction == Reconstruction::Smooth ? 1 : 0;
-  pipelines_.update(commands, params);
-  commands.dispatchBytes(pipelines_.with({0, 0, isCompact(params.form), smooth}), {},
-                         (params.width + shared::renderGroupX - 1) / shared::renderGroupX,
-                         (params.height + shared::renderGroupY - 1) / shared::renderGroupY, 1);
+  const std::uint32_t invocations = shares_ * shared::renderPictureTile * shared::renderPictureTile;
+  commands.dispatchIndirect(render_.with({0, 0, 0, smooth, shares_, invocations}), queue_);
 }
 
 }  // namespace vdi::gpu

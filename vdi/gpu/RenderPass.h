@@ -1,4 +1,4 @@
-// Dispatches render.comp: a VDI seen from a new viewpoint.
+// Dispatches beams.comp and render.comp: a VDI seen from a new viewpoint.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include "vdi/core/Reconstruction.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/ComputePipeline.h"
+#include "vdi/gpu/Memory.h"
 
 namespace vdi {
 class View;
@@ -20,11 +21,17 @@ shared::RenderParams renderGeometry(const View& original, const View& view);
 
 class RenderPass {
  public:
-  explicit RenderPass(std::shared_ptr<Device> device);
-  void record(Commands& commands, const shared::RenderParams& params, Reconstruction reconstruction);
+  explicit RenderPass(const std::shared_ptr<Device>& device);
+  /// `params`: but for the queue.
+  void record(Commands& commands, shared::RenderParams params, Reconstruction reconstruction);
 
  private:
-  PipelineSet pipelines_;  // by precision and reconstruction
+  std::shared_ptr<Device> device_;
+  std::uint32_t shares_;
+  PipelineSet beams_;
+  PipelineSet render_;  // by precision and reconstruction
+  Buffer queue_;
+  Buffer waiting_;
 };
 
 }  // namespace vdi::gpu

@@ -32,7 +32,6 @@ struct VdiRenderer::State {
   gpu::Buffer tileMasks;
   detail::PictureBuffers picture;
   std::unique_ptr<View> original;  // none until there's a VDI
-  shared::StoredForm form{};
   float nearest = 0.0F;
   float farthest = 0.0F;
   float binScale = 0.0F;
@@ -68,9 +67,7 @@ struct VdiRenderer::State {
   void upload(const ListsOf<Segment>& lists, const DepthCode& code, const glm::ivec2& size) {
     uploads.wait();  // for the last one, which may still use the buffers
     offsets.reserve(device, lists.offsets.size() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
-    constexpr bool compact = std::is_same_v<Segment, CompactSupersegment>;
-    constexpr std::size_t segmentBytes = compact ? sizeof(Segment) : sizeof(shared::RenderSegment);
-    segments.reserve(device, lists.segments.size() * segmentBytes, MemoryKind::DeviceLocal);
+    segments.reserve(device, lists.segments.size() * sizeof(shared::RenderSegment), MemoryKind::DeviceLocal);
     heads.reserve(device, lists.listCount() * sizeof(shared::ListHead), MemoryKind::DeviceLocal);
     tileMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint64_t), MemoryKind::DeviceLocal);
     const std::uint64_t bytes =
@@ -89,18 +86,13 @@ struct VdiRenderer::State {
     constants.nearest = nearest;
     constants.binScale = binScale;
     constants.lists = size;
-    form = detail::storedForm(code);
-    constants.form = form;
+    constants.form = detail::storedForm(code);
     constants.mode = shared::expandModeSegments;
     inParts(lists.segments, [&](std::uint64_t at, std::size_t first, std::size_t count) {
-      if constexpr (compact) {
-        uploads.copy(staging, at, segments, first * sizeof(Segment), count * sizeof(Segment));
-      } else {
-        constants.from = staging.address() + at;
-        constants.first = static_cast<std::uint32_t>(first);
-        constants.count = static_cast<std::uint32_t>(count);
-        expand.record(uploads, constants);
-      }
+      constants.from = staging.address() + at;
+      constants.first = static_cast<std::uint32_t>(first);
+      constants.count = static_cast<std::uint32_t>(count);
+      expand.record(uploads, constants);
     });
     for (const std::uint32_t mode :
          {shared::expandModeMasks, shared::expandModeTiles, shared::expandModeLargeTiles}) {
@@ -142,7 +134,6 @@ Image VdiRenderer::render(const Camera& camera, int width, int height, Reconstru
   s.picture.reserve(s.device, static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height));
   shared::RenderParams params = gpu::renderGeometry(*s.original, view);
   params.heads = s.heads.address();
-  params.form = s.form;
   params.segments = s.segments.address();
   params.tileMasks = s.tileMasks.address();
   params.binScale = s.binScale;

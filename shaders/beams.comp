@@ -1,0 +1,130 @@
+// Finds the tiles of the new picture whose rays may meet material, for render.comp, and leaves the others blank: most of a
+// picture is. A workgroup looks at the beam of a region.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared/render.h"
+#include "masks.glsl"
+
+layout(local_size_x = renderBeamGroup) in;
+layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
+
+#include "view.glsl"
+#include "beam.glsl"
+
+float least(vec4 values) { return min(min(values.x, values.y), min(values.z, values.w)); }
+float most(vec4 values) { return max(max(values.x, values.y), max(values.z, values.w)); }
+
+// Keeps the part of `stretch` where value + t * slope >= 0 for any ray of a beam, of whose corners the components are: between
+// them, where a plane is crossed lies between where the corners cross it, if these cross it the same way.
+void clipAny(inout vec2 stretch, vec4 value, vec4 slope) {
+  vec4 crossing = -value / slope;
+  if (all(greaterThan(slope, vec4(0.0)))) stretch.x = max(stretch.x, least(crossing));
+  if (all(lessThan(slope, vec4(0.0)))) stretch.y = min(stretch.y, most(crossing));
+}
+
+// Where a beam is in V_O's frustum: bounds of its place in the picture, and of its depths. Empty: leave <= enter.
+struct Reach {
+  float enter;
+  float leave;
+  vec2 low;
+  vec2 high;
+  vec2 depths;
+};
+
+Reach reachOf(Beam beam) {
+  Ray a = rayAt(beam.first);
+  Ray b = rayAt(beam.first + vec2(beam.extent.x, 0.0));
+  Ray c = rayAt(beam.first + vec2(0.0, beam.extent.y));
+  Ray d = rayAt(beam.first + beam.extent);
+  vec4 originX = vec4(a.origin.x, b.origin.x, c.origin.x, d.origin.x);
+  vec4 originY = vec4(a.origin.y, b.origin.y, c.origin.y, d.origin.y);
+  vec4 originZ = vec4(a.origin.z, b.origin.z, c.origin.z, d.origin.z);
+  vec4 directionX = vec4(a.direction.x, b.direction.x, c.direction.x, d.direction.x);
+  vec4 directionY = vec4(a.direction.y, b.direction.y, c.direction.y, d.direction.y);
+  vec4 directionZ = vec4(a.direction.z, b.direction.z, c.direction.z, d.direction.z);
+
+  bool parallel = params.parallel != 0u;
+  vec2 halfSize = 0.5 * vec2(params.lists) * params.pixelSize;
+  vec4 divisor = parallel ? vec4(1.0) : originZ;
+  vec4 divisorSlope = parallel ? vec4(0.0) : directionZ;
+  vec2 stretch = vec2(0.0, uintBitsToFloat(0x7f7fffffu));
+  clipAny(stretch, halfSize.x * divisor - originX, halfSize.x * divisorSlope - directionX);
+  clipAny(stretch, halfSize.x * divisor + originX, halfSize.x * divisorSlope + directionX);
+  clipAny(stretch, halfSize.y * divisor - originY, halfSize.y * divisorSlope - directionY);
+  clipAny(stretch, halfSize.y * divisor + originY, halfSize.y * divisorSlope + directionY);
+  clipAny(stretch, originZ - params.nearest, directionZ);
+  clipAny(stretch, params.farthest - originZ, -directionZ);
+
+  vec4 depthsIn = originZ + stretch.x * directionZ;
+  vec4 depthsOut = originZ + stretch.y * directionZ;
+  Reach reach = Reach(stretch.x, stretch.y, vec2(0.0), vec2(params.lists), vec2(params.nearest, params.farthest));
+  // Else anywhere: the picture of what's beside V_O's eye has no bounds.
+  if (parallel || min(least(depthsIn), least(depthsOut)) > 0.0) {
+    vec4 in_ = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsIn));
+    vec4 out_ = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsOut));
+    vec4 xIn = (originX + stretch.x * directionX) * in_;
+    vec4 xOut = (originX + stretch.y * directionX) * out_;
+    vec4 yIn = (originY + stretch.x * directionY) * in_;
+    vec4 yOut = (originY + stretch.y * directionY) * out_;
+    const float spare = 1.0;  // for rounding
+    vec2 middle = 0.5 * vec2(params.lists);
+    reach.low = clamp(vec2(min(least(xIn), least(xOut)), min(least(yIn), least(yOut))) + middle - spare, reach.low, reach.high);
+    reach.high = clamp(vec2(max(most(xIn), most(xOut)), max(most(yIn), most(yOut))) + middle + spare, reach.low, reach.high);
+    reach.depths = clamp(vec2(min(least(depthsIn), least(depthsOut)), max(most(depthsIn), most(depthsOut))), params.nearest,
+                         params.farthest);
+  }
+  return reach;
+}
+
+bool meetsMaterial(Beam beam) {
+  Reach reach = reachOf(beam);
+  if (!(reach.enter < reach.leave)) return false;
+  int own = int(gl_LocalInvocationIndex);
+  ivec2 first = min(ivec2(reach.low), params.lists - 1);
+  ivec2 last = min(ivec2(reach.high), params.lists - 1);
+  ivec2 firstTile = first >> renderTileShift;
+  ivec2 lastTile = last >> renderTileShift;
+  ivec2 tiles = lastTile - firstTile + 1;
+  const int few = 16;
+  if (tiles.x * tiles.y <= few) {
+    // Rays that stay about where they are: all tiles.
+    if (own >= tiles.x * tiles.y) return false;
+    ivec2 tile = firstTile + ivec2(own % tiles.x, own / tiles.x);
+    return (tileMask(renderTile, tile) & maskBetween(reach.depths.x, reach.depths.y)) != 0ul;
+  }
+  bool byColumns = tiles.x >= tiles.y;
+  int end = byColumns ? lastTile.x : lastTile.y;
+  for (int tile = (byColumns ? firstTile.x : firstTile.y) + own; tile <= end; tile += int(renderBeamGroup)) {
+    if (beamMeets(beam, byColumns, tile, byColumns ? first.x : first.y, byColumns ? last.x : last.y)) return true;
+  }
+  return false;
+}
+
+shared uint meets;
+
+void main() {
+  uvec2 corner = gl_WorkGroupID.xy * renderRegion;
+  uint own = gl_LocalInvocationIndex;
+  if (own == 0u) meets = 0u;
+  barrier();
+  if (meetsMaterial(beamOf(corner, renderRegion))) atomicOr(meets, 1u);
+  barrier();
+  uvec2 size = uvec2(params.width, params.height);
+  if (meets == 0u) {
+    for (uint i = own; i < renderRegion * renderRegion; i += renderBeamGroup) {
+      uvec2 at = corner + uvec2(i % renderRegion, i / renderRegion);
+      if (any(greaterThanEqual(at, size))) continue;
+      params.colors.at[at.y * params.width + at.x] = vec4(0.0);
+      params.depths.at[at.y * params.width + at.x] = infinity;
+    }
+    return;
+  }
+  const uint tilesAcross = renderRegion / renderPictureTile;
+  if (own >= tilesAcross * tilesAcross) return;
+  uvec2 tile = corner / renderPictureTile + uvec2(own % tilesAcross, own / tilesAcross);
+  uvec2 tiles = (size + renderPictureTile - 1u) / renderPictureTile;
+  if (any(greaterThanEqual(tile, tiles))) return;
+  uint place = atomicAdd(params.queue.at.count, 1u);
+  atomicMax(params.queue.at.groups.x, min(place + 1u, renderMostGroups));
+  params.waiting.at[place] = tile.y * tiles.x + tile.x;
+}

@@ -1,0 +1,58 @@
+// A ray's way through V_O's picture: straight, from column to column of lists, or from row to row if it crosses more of
+// these. What it goes from and to is called a column here, be it a row, and what lies across, a row. How far it has come is
+// counted in columns from its start, or as a fraction of its stretch.
+//
+// Needs: view.glsl, beam.glsl; params, ray.
+
+struct PictureLine {
+  bool byColumns;
+  float start;      // column
+  float columns;    // from there to its end, >= 0
+  float direction;  // 1 or -1, from column to column
+  float row;        // at the start
+  float rows;       // from one column to the next
+  // Perspective: columns and fractions, which are the same part of t and of depth, aren't proportional.
+  float gain;
+  float bend;
+  // At the start, and from there to its end.
+  vec2 t;
+  vec2 depths;
+  vec2 bins;  // masks.glsl, not clamped
+  int first;  // column
+  int last;
+};
+
+PictureLine pictureLine(vec2 stretch) {
+  PictureLine line;
+  vec2 start = pictureAt(ray, stretch.x);
+  vec2 whole = pictureAt(ray, stretch.y) - start;
+  line.byColumns = 1.001 * abs(whole.x) >= abs(whole.y);  // diagonals: by columns, whatever rounding does
+  line.start = line.byColumns ? start.x : start.y;
+  line.row = line.byColumns ? start.y : start.x;
+  float along = line.byColumns ? whole.x : whole.y;
+  line.columns = abs(along);
+  line.direction = along < 0.0 ? -1.0 : 1.0;
+  float perColumn = line.columns > 0.0 ? 1.0 / line.columns : 0.0;
+  line.rows = (line.byColumns ? whole.y : whole.x) * perColumn;
+  vec2 depths = vec2(depthAt(ray, stretch.x), depthAt(ray, stretch.y));
+  float divisors = divisorOf(depths.x) / divisorOf(depths.y);
+  line.gain = divisors * perColumn;
+  line.bend = (divisors - 1.0) * perColumn;
+  line.t = vec2(stretch.x, stretch.y - stretch.x);
+  line.depths = vec2(depths.x, depths.y - depths.x);
+  line.bins = vec2(depths.x - params.nearest, line.depths.y) * params.binScale;
+  int most = columnCount(line.byColumns) - 1;
+  line.first = clamp(int(floor(line.start)), 0, most);
+  line.last = clamp(int(floor(line.start + along)), 0, most);
+  return line;
+}
+
+// How many columns from the start to a place along the line, as far as the line goes.
+float columnsTo(PictureLine line, float along) {
+  return clamp((along - line.start) * line.direction, 0.0, line.columns);
+}
+
+float fractionAfter(PictureLine line, float columns) { return columns * line.gain / (1.0 + columns * line.bend); }
+
+// Monotone: exactly 0 and 1 aren't met at the ends, but what lies beside them both is empty.
+float at(vec2 range, float fraction) { return range.x + fraction * range.y; }

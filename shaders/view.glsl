@@ -1,0 +1,29 @@
+// The new view's rays in V_O's view space.
+//
+// Needs: shared/render.h; params.
+
+const float infinity = 1.0 / 0.0;
+
+// V_O's view space, t = the new view's depth.
+struct Ray {
+  vec3 origin;
+  vec3 direction;
+};
+
+// Of a place in the new picture, in pixels from its lower left corner.
+Ray rayAt(vec2 place) {
+  vec2 uv = place - 0.5 * vec2(params.width, params.height);
+  return Ray(params.originBase + uv.x * params.originRight + uv.y * params.originUp,
+             params.directionBase + uv.x * params.directionRight + uv.y * params.directionUp);
+}
+
+float depthAt(Ray ray, float t) { return ray.origin.z + t * ray.direction.z; }
+
+// What a view-space place across the picture is divided by to be in the picture: V_O's projection.
+float divisorOf(float depth) { return params.parallel != 0u ? 1.0 : depth; }
+
+// Of a point of a ray: place in V_O's picture, in lists from its lower left corner.
+vec2 pictureAt(Ray of, float t) {
+  vec3 p = of.origin + t * of.direction;
+  return p.xy / (params.pixelSize * divisorOf(p.z)) + 0.5 * vec2(params.lists);
+}
