@@ -14,11 +14,8 @@ struct PictureLine {
   // Perspective: columns and fractions, which are the same part of t and of depth, aren't proportional.
   float gain;
   float bend;
-  // At the start, and from there to its end.
-  vec2 t;
-  vec2 depths;
-  vec2 bins;  // masks.glsl, not clamped
-  int first;  // column
+  vec2 depths;  // at the start, and from there to its end
+  int first;    // column
   int last;
 };
 
@@ -30,20 +27,19 @@ PictureLine pictureLine(vec2 stretch) {
   line.start = line.byColumns ? start.x : start.y;
   line.row = line.byColumns ? start.y : start.x;
   float along = line.byColumns ? whole.x : whole.y;
-  line.columns = abs(along);
+  const float leastColumns = 1e-4;  // rays that stay where they are get through their column, too
+  line.columns = max(abs(along), leastColumns);
   line.direction = along < 0.0 ? -1.0 : 1.0;
-  float perColumn = line.columns > 0.0 ? 1.0 / line.columns : 0.0;
+  float perColumn = 1.0 / line.columns;
   line.rows = (line.byColumns ? whole.y : whole.x) * perColumn;
   vec2 depths = vec2(depthAt(ray, stretch.x), depthAt(ray, stretch.y));
   float divisors = divisorOf(depths.x) / divisorOf(depths.y);
   line.gain = divisors * perColumn;
   line.bend = (divisors - 1.0) * perColumn;
-  line.t = vec2(stretch.x, stretch.y - stretch.x);
   line.depths = vec2(depths.x, depths.y - depths.x);
-  line.bins = vec2(depths.x - params.nearest, line.depths.y) * params.binScale;
   int most = columnCount(line.byColumns) - 1;
   line.first = clamp(int(floor(line.start)), 0, most);
-  line.last = clamp(int(floor(line.start + along)), 0, most);
+  line.last = clamp(int(floor(line.start + line.direction * line.columns)), 0, most);
   return line;
 }
 
@@ -54,5 +50,4 @@ float columnsTo(PictureLine line, float along) {
 
 float fractionAfter(PictureLine line, float columns) { return columns * line.gain / (1.0 + columns * line.bend); }
 
-// Monotone: exactly 0 and 1 aren't met at the ends, but what lies beside them both is empty.
-float at(vec2 range, float fraction) { return range.x + fraction * range.y; }
+float lineDepth(PictureLine line, float fraction) { return line.depths.x + fraction * line.depths.y; }

@@ -5,8 +5,8 @@
 float stretchLength;  // of a ray's whole stretch, as depth of V_O's middle ray
 bool rayAscends;      // it meets a list's supersegments in their order; else backwards
 
-void beginLooking(PictureLine line) {
-  stretchLength = line.t.y * length(ray.direction);
+void beginLooking(PictureLine line, vec2 stretch) {
+  stretchLength = (stretch.y - stretch.x) * length(ray.direction);
   rayAscends = line.depths.y >= 0.0;
 }
 
@@ -19,7 +19,7 @@ float shortening(vec2 centre) {
 
 struct Look {
   vec4 light;
-  float depth;  // of what's met first, as t
+  float entered;  // where something is met first: a fraction of the line
 };
 
 const Look nothing = Look(vec4(0.0), infinity);
@@ -35,7 +35,7 @@ Look lookAtList(PictureLine line, uint list, vec2 centre, vec2 fractions, inout 
   uint slot = head.first + uint(rayAscends ? place : last - place);
   RenderSegment piece = segments.at[slot];
 
-  vec2 ends = vec2(at(line.depths, fractions.x), at(line.depths, fractions.y));
+  vec2 ends = vec2(lineDepth(line, fractions.x), lineDepth(line, fractions.y));
   float low = min(ends.x, ends.y);
   float high = max(max(ends.x, ends.y), low + 1e-6 * params.farthest);
   // How much longer the ray is between two depths than the list's own.
@@ -66,5 +66,5 @@ Look lookAtList(PictureLine line, uint list, vec2 centre, vec2 fractions, inout 
   }
   if (transmittance == 1.0) return nothing;
   float share = clamp((entered - ends.x) / (rayAscends ? high - low : low - high), 0.0, 1.0);
-  return Look(vec4(light * pieceColorUnit, 1.0 - transmittance), at(line.t, mix(fractions.x, fractions.y, share)));
+  return Look(vec4(light * pieceColorUnit, 1.0 - transmittance), mix(fractions.x, fractions.y, share));
 }

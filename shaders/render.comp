@@ -16,8 +16,8 @@ layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 // Reconstruction::Smooth or Constant.
 layout(constant_id = 3) const bool smoothReconstruction = true;
-// Invocations side by side that share a ray: 1 or an even number of them, up to renderTile. Few rays meet anything, and a GPU
-// waits for the longest of them.
+// Invocations side by side that share a ray: 1, or 2, which each look at one of the two lists of a column. Few rays meet
+// anything, and a GPU waits for the longest of them.
 layout(constant_id = 4) const uint rayShares = 1;
 uint rayShare;
 
@@ -26,15 +26,6 @@ const float opaque = 0.9999;
 #include "view.glsl"
 
 Ray ray;
-vec4 accumulated;
-float firstDepth;
-
-void accumulate(vec4 light, float depth) {
-  if (!(light.a > 0.0)) return;
-  if (accumulated.a == 0.0) firstDepth = depth;
-  accumulated += (1.0 - accumulated.a) * light;
-}
-
 // Keeps the part of `stretch` where value + t * slope >= 0.
 void clip(inout vec2 stretch, float value, float slope) {
   float crossing = -value / slope;
@@ -67,6 +58,15 @@ vec2 insideFrustum() {
 #include "line.glsl"
 #include "marks.glsl"
 #include "look.glsl"
+
+Look accumulated;
+
+void accumulate(Look behind) {
+  if (!(behind.light.a > 0.0)) return;
+  if (accumulated.light.a == 0.0) accumulated.entered = behind.entered;
+  accumulated.light += (1.0 - accumulated.light.a) * behind.light;
+}
+
 #include "walk.glsl"
 
 // Along a Z: the rays of a subgroup are close to each other in both directions.
@@ -80,24 +80,21 @@ void renderPixels(uint tile) {
   uvec2 at = corner + placeOf(gl_LocalInvocationIndex / rayShares);
   bool hasPixel = at.x < params.width && at.y < params.height;
   ray = rayAt(vec2(at) + 0.5);
-  accumulated = vec4(0.0);
-  firstDepth = infinity;
+  accumulated = nothing;
   vec2 stretch = insideFrustum();
   bool meets = hasPixel && stretch.x < stretch.y;
   PictureLine line = pictureLine(stretch);
   bool along = smoothReconstruction && meets && line.columns < 1.0;
   bool walks = meets && !along;
-  beginLooking(line);
+  beginLooking(line, stretch);
   markBeam(beamOf(corner, renderPictureTile), line, walks);
-  if (along) {
-    Look look = lookAlongLists(line, stretch);
-    accumulate(look.light, look.depth);
-  }
+  if (along) accumulate(lookAlongLists(line, stretch));
   if (walks) walk(line);
   if (!hasPixel || rayShare != 0u) return;
   uint index = at.y * params.width + at.x;
-  params.colors.at[index] = accumulated;
-  params.depths.at[index] = firstDepth;
+  params.colors.at[index] = accumulated.light;
+  bool met = accumulated.light.a > 0.0;
+  params.depths.at[index] = met ? mix(stretch.x, stretch.y, accumulated.entered) : infinity;
 }
 
 void main() {

@@ -15,15 +15,19 @@ float shareOfNext(float beyond) {
   return clamp((beyond - onCentre) / (1.0 - 2.0 * onCentre), 0.0, 1.0);
 }
 
-// Whether a list may have material where the ray is between two bins, in any order.
-bool mayMeet(uint64_t mask, vec2 bins) {
+// Whether a list may have material between two depths, in any order.
+bool mayMeet(uint64_t mask, vec2 depths) {
   const float spare = 0.01;  // for rounding
+  vec2 bins = (depths - params.nearest) * params.binScale;
   int low = int(clamp(min(bins.x, bins.y) - spare, 0.0, float(renderBins - 1)));
   int high = int(clamp(max(bins.x, bins.y) + spare, 0.0, float(renderBins - 1)));
   uvec2 from = unpackUint2x32(mask >> low);
   int more = high - low;
   return ((more < 32 ? from.x : from.x | from.y) & (~0u >> (31 - min(more, 31)))) != 0u;
 }
+
+// What the other one of a ray's two invocations has seen.
+Look fromOther(Look own) { return Look(subgroupShuffleXor(own.light, 1u), subgroupShuffleXor(own.entered, 1u)); }
 
 // A ray that stays in about one place of V_O's picture: the four lists around that.
 Look lookAlongLists(PictureLine line, vec2 stretch) {
@@ -37,18 +41,16 @@ Look lookAlongLists(PictureLine line, vec2 stretch) {
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(first) + side, ivec2(0), params.lists - 1);
     uint list = listOf(true, pixel.x, pixel.y);
-    if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, vec2(line.bins.x, at(line.bins, 1.0)))) continue;
+    vec2 depths = vec2(line.depths.x, lineDepth(line, 1.0));
+    if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, depths)) continue;
     int hint = 0;
     Look look = lookAtList(line, list, vec2(pixel) + 0.5, vec2(0.0, 1.0), hint);
     sum.light += weight * look.light;
-    sum.depth = min(sum.depth, look.depth);
+    sum.entered = min(sum.entered, look.entered);
   }
-  [[unroll]] for (uint other = 1u; other < uint(renderTile); other <<= 1u) {
-    if (other >= rayShares) break;
-    sum.light += subgroupShuffleXor(sum.light, other);
-    sum.depth = min(sum.depth, subgroupShuffleXor(sum.depth, other));
-  }
-  return sum;
+  if (rayShares == 1u) return sum;
+  Look other = fromOther(sum);
+  return Look(sum.light + other.light, min(sum.entered, other.entered));
 }
 
 // A column that the ray crosses, and two lists of it: those beside the ray, or those that it enters and leaves the column in.
@@ -106,9 +108,9 @@ uint columnsToLookAt(PictureLine line, int tile) {
       // Columns beyond the line's ends: memory is read where there's a list, and what's read isn't used.
       Column here = columnAt(line, min(column, most), vec2(edge, nextEdge), vec2(fraction, nextFraction));
       bool passes = nextEdge != edge;
-      vec2 bins = vec2(at(line.bins, fraction), at(line.bins, nextFraction));
-      looksAt[2 * i] = passes && here.share < 1.0 && mayMeet(params.heads.at[here.lists.x].mask, bins);
-      looksAt[2 * i + 1] = passes && here.share > 0.0 && mayMeet(params.heads.at[here.lists.y].mask, bins);
+      vec2 depths = vec2(lineDepth(line, fraction), lineDepth(line, nextFraction));
+      looksAt[2 * i] = passes && here.share < 1.0 && mayMeet(params.heads.at[here.lists.x].mask, depths);
+      looksAt[2 * i + 1] = passes && here.share > 0.0 && mayMeet(params.heads.at[here.lists.y].mask, depths);
       edge = nextEdge;
       fraction = nextFraction;
     }
@@ -118,11 +120,7 @@ uint columnsToLookAt(PictureLine line, int tile) {
     }
   }
   looks <<= part * int(rayShare);
-  [[unroll]] for (uint other = 1u; other < uint(renderTile); other <<= 1u) {
-    if (other >= rayShares) break;
-    looks |= subgroupShuffleXor(looks, other);
-  }
-  return looks;
+  return rayShares == 1u ? looks : looks | subgroupShuffleXor(looks, 1u);
 }
 
 Look lookAtSide(PictureLine line, int column, Column here, bool second, inout int hint) {
@@ -151,7 +149,7 @@ Look lookAtColumn(PictureLine line, int column, uint looks, inout ivec2 hints) {
     bool ownSide = (rayShare & 1u) != 0u;
     Look own = nothing;
     if ((looks & (ownSide ? secondLook : firstLook)) != 0u) own = lookAtSide(line, column, here, ownSide, hints.x);
-    Look other = Look(subgroupShuffleXor(own.light, 1u), subgroupShuffleXor(own.depth, 1u));
+    Look other = fromOther(own);
     if (ownSide) {
       first = other;
       second = own;
@@ -161,52 +159,27 @@ Look lookAtColumn(PictureLine line, int column, uint looks, inout ivec2 hints) {
     }
   }
   if (smoothReconstruction) {
-    return Look(mix(first.light, second.light, here.share), min(first.depth, second.depth));
+    return Look(mix(first.light, second.light, here.share), min(first.entered, second.entered));
   }
-  return Look(first.light + (1.0 - first.light.a) * second.light, first.light.a > 0.0 ? first.depth : second.depth);
-}
-
-// The next of the columns, as its bit; 0: none.
-uint nextColumn(PictureLine line, uint columns) {
-  return columns == 0u ? 0u : 1u << (line.direction > 0.0 ? findLSB(columns) : findMSB(columns));
+  return Look(first.light + (1.0 - first.light.a) * second.light, first.light.a > 0.0 ? first.entered : second.entered);
 }
 
 // Tile by tile: first all that there's to look at is found, then looked at, so that rays next to each other do the same at a
-// time. Of a ray's invocations, each looks at one list of a column, and pairs at different columns.
+// time.
 void walk(PictureLine line) {
-  const uint columnsAtATime = max(rayShares / 2u, 1u);
-  const uint mostAtATime = uint(renderTile) / 2u;
-  ivec2 hints = ivec2(0);
+  bool up = line.direction > 0.0;
   int lastTile = line.last >> renderTileShift;
-  int step = line.direction > 0.0 ? 1 : -1;
-  for (int tile = line.first >> renderTileShift;; tile += step) {
+  ivec2 hints = ivec2(0);
+  for (int tile = line.first >> renderTileShift;; tile += up ? 1 : -1) {
     tile = nextTile(line, tile, lastTile);
     if (tile < 0) return;
     uint looks = columnsToLookAt(line, tile);
     uint columns = (looks | looks / secondLook) & (secondLook - 1u);
     while (columns != 0u) {
-      uint own = 0u;
-      [[unroll]] for (uint i = 0u; i < mostAtATime; ++i) {
-        if (i >= columnsAtATime) break;
-        uint next = nextColumn(line, columns);
-        if (i == rayShare / 2u) own = next;
-        columns &= ~next;
-      }
-      Look look = nothing;
-      if (own != 0u) {
-        int i = findLSB(own);
-        look = lookAtColumn(line, (tile << renderTileShift) + i, looks >> i, hints);
-      }
-      if (columnsAtATime == 1u) {
-        accumulate(look.light, look.depth);
-      } else {
-        uint base = gl_SubgroupInvocationID - rayShare;
-        [[unroll]] for (uint i = 0u; i < mostAtATime; ++i) {
-          if (i >= columnsAtATime) break;
-          accumulate(subgroupShuffle(look.light, base + 2u * i), subgroupShuffle(look.depth, base + 2u * i));
-        }
-      }
-      if (accumulated.a >= opaque) return;
+      int i = up ? findLSB(columns) : findMSB(columns);
+      columns &= ~(1u << i);
+      accumulate(lookAtColumn(line, (tile << renderTileShift) + i, looks >> i, hints));
+      if (accumulated.light.a >= opaque) return;
     }
     if (tile == lastTile) return;
   }

@@ -22,7 +22,7 @@ ComputePipelineInfo pipelineInfo(std::string_view shader) {
 /// Invocations that share a ray (render.comp). With more, what each of them has to set up costs more than they
 /// save.
 std::uint32_t sharesFor(const Device& device) {
-  return device.runsGpuPrograms() && device.limits().subgroupSize > 0 ? 4 : 1;
+  return device.runsGpuPrograms() && device.limits().subgroupSize > 0 ? 2 : 1;
 }
 
 ComputePipelineInfo renderInfo(std::uint32_t shares) {
