@@ -14,8 +14,10 @@ struct PictureLine {
   // Perspective: columns and fractions, which are the same part of t and of depth, aren't proportional.
   float gain;
   float bend;
-  vec2 depths;  // at the start, and from there to its end
-  int first;    // column
+  // At the start, and from there to its end. Depths of rays that come nearer to V_O's eye are negative, so that they ascend.
+  vec2 depths;
+  vec2 bins;  // masks.glsl, not clamped
+  int first;  // column
   int last;
 };
 
@@ -36,7 +38,9 @@ PictureLine pictureLine(vec2 stretch) {
   float divisors = divisorOf(depths.x) / divisorOf(depths.y);
   line.gain = divisors * perColumn;
   line.bend = (divisors - 1.0) * perColumn;
-  line.depths = vec2(depths.x, depths.y - depths.x);
+  float change = depths.y - depths.x;
+  line.depths = change < 0.0 ? vec2(-depths.x, -change) : vec2(depths.x, change);
+  line.bins = vec2(depths.x - params.nearest, change) * params.binScale;
   int most = columnCount(line.byColumns) - 1;
   line.first = clamp(int(floor(line.start)), 0, most);
   line.last = clamp(int(floor(line.start + line.direction * line.columns)), 0, most);
@@ -50,4 +54,4 @@ float columnsTo(PictureLine line, float along) {
 
 float fractionAfter(PictureLine line, float columns) { return columns * line.gain / (1.0 + columns * line.bend); }
 
-float lineDepth(PictureLine line, float fraction) { return line.depths.x + fraction * line.depths.y; }
+float at(vec2 range, float fraction) { return range.x + fraction * range.y; }

@@ -94,7 +94,8 @@ void renderPixels(uint tile) {
   uint index = at.y * params.width + at.x;
   params.colors.at[index] = accumulated.light;
   bool met = accumulated.light.a > 0.0;
-  params.depths.at[index] = met ? mix(stretch.x, stretch.y, accumulated.entered) : infinity;
+  float fraction = clamp((accumulated.entered - line.depths.x) / max(line.depths.y, 1e-30), 0.0, 1.0);
+  params.depths.at[index] = met ? mix(stretch.x, stretch.y, fraction) : infinity;
 }
 
 void main() {

@@ -15,10 +15,9 @@ float shareOfNext(float beyond) {
   return clamp((beyond - onCentre) / (1.0 - 2.0 * onCentre), 0.0, 1.0);
 }
 
-// Whether a list may have material between two depths, in any order.
-bool mayMeet(uint64_t mask, vec2 depths) {
+// Whether a list may have material between two bins, in any order.
+bool mayMeet(uint64_t mask, vec2 bins) {
   const float spare = 0.01;  // for rounding
-  vec2 bins = (depths - params.nearest) * params.binScale;
   int low = int(clamp(min(bins.x, bins.y) - spare, 0.0, float(renderBins - 1)));
   int high = int(clamp(max(bins.x, bins.y) + spare, 0.0, float(renderBins - 1)));
   uvec2 from = unpackUint2x32(mask >> low);
@@ -26,8 +25,10 @@ bool mayMeet(uint64_t mask, vec2 depths) {
   return ((more < 32 ? from.x : from.x | from.y) & (~0u >> (31 - min(more, 31)))) != 0u;
 }
 
-// What the other one of a ray's two invocations has seen.
-Look fromOther(Look own) { return Look(subgroupShuffleXor(own.light, 1u), subgroupShuffleXor(own.entered, 1u)); }
+// What a ray's two invocations see, of which each has its own, already weighted.
+Look ofBoth(Look own) {
+  return Look(own.light + subgroupShuffleXor(own.light, 1u), min(own.entered, subgroupShuffleXor(own.entered, 1u)));
+}
 
 // A ray that stays in about one place of V_O's picture: the four lists around that.
 Look lookAlongLists(PictureLine line, vec2 stretch) {
@@ -41,16 +42,13 @@ Look lookAlongLists(PictureLine line, vec2 stretch) {
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(first) + side, ivec2(0), params.lists - 1);
     uint list = listOf(true, pixel.x, pixel.y);
-    vec2 depths = vec2(line.depths.x, lineDepth(line, 1.0));
-    if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, depths)) continue;
+    if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, vec2(line.bins.x, at(line.bins, 1.0)))) continue;
     int hint = 0;
-    Look look = lookAtList(line, list, vec2(pixel) + 0.5, vec2(0.0, 1.0), hint);
+    Look look = lookAtList(line, list, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5), hint);
     sum.light += weight * look.light;
     sum.entered = min(sum.entered, look.entered);
   }
-  if (rayShares == 1u) return sum;
-  Look other = fromOther(sum);
-  return Look(sum.light + other.light, min(sum.entered, other.entered));
+  return rayShares == 1u ? sum : ofBoth(sum);
 }
 
 // A column that the ray crosses, and two lists of it: those beside the ray, or those that it enters and leaves the column in.
@@ -108,9 +106,9 @@ uint columnsToLookAt(PictureLine line, int tile) {
       // Columns beyond the line's ends: memory is read where there's a list, and what's read isn't used.
       Column here = columnAt(line, min(column, most), vec2(edge, nextEdge), vec2(fraction, nextFraction));
       bool passes = nextEdge != edge;
-      vec2 depths = vec2(lineDepth(line, fraction), lineDepth(line, nextFraction));
-      looksAt[2 * i] = passes && here.share < 1.0 && mayMeet(params.heads.at[here.lists.x].mask, depths);
-      looksAt[2 * i + 1] = passes && here.share > 0.0 && mayMeet(params.heads.at[here.lists.y].mask, depths);
+      vec2 bins = vec2(at(line.bins, fraction), at(line.bins, nextFraction));
+      looksAt[2 * i] = passes && here.share < 1.0 && mayMeet(params.heads.at[here.lists.x].mask, bins);
+      looksAt[2 * i + 1] = passes && here.share > 0.0 && mayMeet(params.heads.at[here.lists.y].mask, bins);
       edge = nextEdge;
       fraction = nextFraction;
     }
@@ -123,7 +121,16 @@ uint columnsToLookAt(PictureLine line, int tile) {
   return rayShares == 1u ? looks : looks | subgroupShuffleXor(looks, 1u);
 }
 
-Look lookAtSide(PictureLine line, int column, Column here, bool second, inout int hint) {
+// Along the line, at the edges of a tile: between them it's nearly straight.
+vec2 shorteningsAt(PictureLine line, int tile) {
+  vec2 edges = vec2(tile, tile + 1) * float(renderTile);
+  vec2 rows = line.row + line.rows * (edges - line.start) * line.direction;
+  vec2 first = vec2(edges.x, rows.x);
+  vec2 last = vec2(edges.y, rows.y);
+  return vec2(shorteningAt(line.byColumns ? first : first.yx), shorteningAt(line.byColumns ? last : last.yx));
+}
+
+Look lookAtSide(PictureLine line, Column here, float shortening, bool second, inout int hint) {
   vec2 fractions = here.fractions;
   if (!smoothReconstruction && here.rows.x != here.rows.y) {
     float edge = float(max(here.rows.x, here.rows.y));
@@ -131,37 +138,32 @@ Look lookAtSide(PictureLine line, int column, Column here, bool second, inout in
     split = clamp(split, fractions.x, fractions.y);
     fractions = second ? vec2(split, fractions.y) : vec2(fractions.x, split);
   }
-  vec2 centre = vec2(column, second ? here.rows.y : here.rows.x) + 0.5;
-  return lookAtList(line, second ? here.lists.y : here.lists.x, line.byColumns ? centre : centre.yx, fractions,
-                    hint);
+  Look look = lookAtList(line, second ? here.lists.y : here.lists.x, fractions, shortening, hint);
+  if (smoothReconstruction) look.light *= second ? here.share : 1.0 - here.share;
+  return look;
 }
 
 // What the ray meets of a column. `looks`: firstLook, secondLook.
-Look lookAtColumn(PictureLine line, int column, uint looks, inout ivec2 hints) {
+Look lookAtColumn(PictureLine line, int column, float shortening, uint looks, inout ivec2 hints) {
   vec2 edges = vec2(columnsTo(line, float(column)), columnsTo(line, float(column + 1)));
   Column here = columnAt(line, column, edges, vec2(fractionAfter(line, edges.x), fractionAfter(line, edges.y)));
-  Look first = nothing;
-  Look second = nothing;
-  if (rayShares == 1u) {
-    if ((looks & firstLook) != 0u) first = lookAtSide(line, column, here, false, hints.x);
-    if ((looks & secondLook) != 0u) second = lookAtSide(line, column, here, true, hints.y);
-  } else {
-    bool ownSide = (rayShare & 1u) != 0u;
-    Look own = nothing;
-    if ((looks & (ownSide ? secondLook : firstLook)) != 0u) own = lookAtSide(line, column, here, ownSide, hints.x);
-    Look other = fromOther(own);
-    if (ownSide) {
-      first = other;
-      second = own;
-    } else {
-      first = own;
-      second = other;
-    }
+  Look own = nothing;
+  if (rayShares > 1u) {
+    bool second = rayShare != 0u;
+    if ((looks & (second ? secondLook : firstLook)) != 0u) own = lookAtSide(line, here, shortening, second, hints.x);
+    if (smoothReconstruction) return ofBoth(own);
+    // The first list is in front of the second one.
+    float transmittance = subgroupShuffleXor(1.0 - own.light.a, 1u);
+    if (second) own.light *= transmittance;
+    return ofBoth(own);
   }
-  if (smoothReconstruction) {
-    return Look(mix(first.light, second.light, here.share), min(first.entered, second.entered));
+  if ((looks & firstLook) != 0u) own = lookAtSide(line, here, shortening, false, hints.x);
+  if ((looks & secondLook) != 0u) {
+    Look other = lookAtSide(line, here, shortening, true, hints.y);
+    own.light += (smoothReconstruction ? 1.0 : 1.0 - own.light.a) * other.light;
+    own.entered = min(own.entered, other.entered);
   }
-  return Look(first.light + (1.0 - first.light.a) * second.light, first.light.a > 0.0 ? first.entered : second.entered);
+  return own;
 }
 
 // Tile by tile: first all that there's to look at is found, then looked at, so that rays next to each other do the same at a
@@ -175,10 +177,13 @@ void walk(PictureLine line) {
     if (tile < 0) return;
     uint looks = columnsToLookAt(line, tile);
     uint columns = (looks | looks / secondLook) & (secondLook - 1u);
+    if (columns == 0u && tile != lastTile) continue;
+    vec2 shortenings = shorteningsAt(line, tile);
     while (columns != 0u) {
       int i = up ? findLSB(columns) : findMSB(columns);
       columns &= ~(1u << i);
-      accumulate(lookAtColumn(line, (tile << renderTileShift) + i, looks >> i, hints));
+      float shortening = mix(shortenings.x, shortenings.y, (float(i) + 0.5) / float(renderTile));
+      accumulate(lookAtColumn(line, (tile << renderTileShift) + i, shortening, looks >> i, hints));
       if (accumulated.light.a >= opaque) return;
     }
     if (tile == lastTile) return;

@@ -131,13 +131,19 @@ void ComputePipeline::bindUniforms(const Buffer& buffer) {
 
 PipelineSet::PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common)
     : device_(std::move(device)), common_(std::move(common)) {
-  if (common_.uniformBytes > 0) uniforms_ = Buffer(device_, common_.uniformBytes, MemoryKind::DeviceLocal);
+  if (common_.uniformBytes == 0) return;
+  uniforms_ = std::make_shared<const Buffer>(device_, common_.uniformBytes, MemoryKind::DeviceLocal);
+}
+
+PipelineSet::PipelineSet(const PipelineSet& updated, ComputePipelineInfo common)
+    : device_(updated.device_), common_(std::move(common)), uniforms_(updated.uniforms_) {
+  assert(common_.uniformBytes == updated.common_.uniformBytes);
 }
 
 void PipelineSet::updateBytes(Commands& commands, std::span<const std::byte> bytes) {
   assert(bytes.size() == common_.uniformBytes);
   commands.barrier();
-  commands.update(uniforms_, bytes);
+  commands.update(*uniforms_, bytes);
   commands.barrier();
 }
 
@@ -147,7 +153,7 @@ ComputePipeline& PipelineSet::with(const std::vector<std::uint32_t>& specializat
     ComputePipelineInfo info = common_;
     info.specialization = specialization;
     pipeline = std::make_unique<ComputePipeline>(device_, info);
-    if (uniforms_) pipeline->bindUniforms(uniforms_);
+    if (uniforms_) pipeline->bindUniforms(*uniforms_);
   }
   return *pipeline;
 }

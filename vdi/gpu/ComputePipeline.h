@@ -74,6 +74,8 @@ class PipelineSet {
  public:
   /// `common`: but for the specialisation.
   PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common);
+  /// With the uniforms of another set, which updates them.
+  PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);
   ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
   /// What the uniforms of all pipelines are for what's recorded next. They're in the device's own memory,
   /// where shaders read them as fast as constants: a GPU would fetch them from the host's memory again and
@@ -88,7 +90,7 @@ class PipelineSet {
 
   std::shared_ptr<Device> device_;
   ComputePipelineInfo common_;
-  Buffer uniforms_;  // of all of them
+  std::shared_ptr<const Buffer> uniforms_;  // of all of them; none: they have no uniforms
   std::map<std::vector<std::uint32_t>, std::unique_ptr<ComputePipeline>> pipelines_;
 };
 

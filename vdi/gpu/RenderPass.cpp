@@ -66,7 +66,7 @@ RenderPass::RenderPass(const std::shared_ptr<Device>& device)
     : device_(device),
       shares_(sharesFor(*device)),
       beams_(device, pipelineInfo("beams")),
-      render_(device, renderInfo(shares_)),
+      render_(beams_, renderInfo(shares_)),
       queue_(device, sizeof(shared::TileQueue), MemoryKind::DeviceLocal) {}
 
 void RenderPass::record(Commands& commands, shared::RenderParams params, Reconstruction reconstruction) {
@@ -79,7 +79,6 @@ void RenderPass::record(Commands& commands, shared::RenderParams params, Reconst
   commands.barrier();
   commands.update(queue_, std::as_bytes(std::span(&none, 1)));
   beams_.update(commands, params);
-  render_.update(commands, params);
   commands.dispatchBytes(beams_.with({}), {}, groupsFor(params.width, shared::renderRegion),
                          groupsFor(params.height, shared::renderRegion), 1);
   commands.barrier();
