@@ -44,10 +44,10 @@ uint64_t tileMask(int size, ivec2 tile) {
   return params.tileMasks.at[first + tile.y * tiles.x + tile.x];
 }
 
-// Whether the beam may meet material between two edges. The picture of a quadrilateral of rays on the plane of an edge is
+// In which parts of the depth range the beam may meet material between two edges of a column of tiles. The picture of a quadrilateral of rays on the plane of an edge is
 // the convex hull of those of its corners, if all of these cross it the same way and in front of V_O's eye; and between
 // two planes rays are straight in V_O's picture.
-bool beamMeets(Beam beam, bool byColumns, int tile, int first, int last) {
+uint64_t beamMask(Beam beam, bool byColumns, int tile, int first, int last) {
   float begin = float(max(tile << renderTileShift, first));
   float end = float(min((tile + 1) << renderTileShift, last + 1));
   vec2 rows = vec2(infinity, -infinity);
@@ -68,7 +68,7 @@ bool beamMeets(Beam beam, bool byColumns, int tile, int first, int last) {
     rows = vec2(min(rows.x, row), max(rows.y, row));
     depths = vec2(min(depths.x, depth), max(depths.y, depth));
   }
-  if (!finite || !(ascends || descends) || !(params.parallel != 0u || depths.x > 0.0)) return true;
+  if (!finite || !(ascends || descends) || !(params.parallel != 0u || depths.x > 0.0)) return ~0ul;
   const float spare = 0.01;  // rows; masks of tiles know a row more than they hold
   int rowCount = columnCount(!byColumns);
   vec2 places = clamp(rows + 0.5 * float(rowCount) + vec2(-spare, spare), vec2(0.0), vec2(float(rowCount - 1)));
@@ -79,9 +79,9 @@ bool beamMeets(Beam beam, bool byColumns, int tile, int first, int last) {
   if (places.y - places.x > float(mostTiles * renderTile)) size = renderLargeTile;
   int column = (tile << renderTileShift) / size;
   int lastRow = int(places.y) / size;
+  uint64_t met = 0ul;
   for (int row = int(places.x) / size; row <= lastRow; ++row) {
-    if ((tileMask(size, byColumns ? ivec2(column, row) : ivec2(row, column)) & mask) != 0ul) return true;
+    met |= tileMask(size, byColumns ? ivec2(column, row) : ivec2(row, column));
   }
-  return false;
+  return met & mask;
 }
-

@@ -1,5 +1,5 @@
 // Finds the tiles of the new picture whose rays may meet material, for render.comp, and leaves the others blank: most of a
-// picture is. A workgroup looks at the beam of a region.
+// picture is. Those with much to look at come first, for a GPU waits for the last. A workgroup looks at the beam of a region.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/render.h"
@@ -76,9 +76,15 @@ Reach reachOf(Beam beam) {
   return reach;
 }
 
-bool meetsMaterial(Beam beam) {
+uint countOf(uint64_t mask) {
+  uvec2 words = unpackUint2x32(mask);
+  return uint(bitCount(words.x) + bitCount(words.y));
+}
+
+// In how many places the beam may meet material: parts of the depth range, tile by tile. Each invocation counts its own.
+uint placesToLookAt(Beam beam) {
   Reach reach = reachOf(beam);
-  if (!(reach.enter < reach.leave)) return false;
+  if (!(reach.enter < reach.leave)) return 0u;
   int own = int(gl_LocalInvocationIndex);
   ivec2 first = min(ivec2(reach.low), params.lists - 1);
   ivec2 last = min(ivec2(reach.high), params.lists - 1);
@@ -88,29 +94,31 @@ bool meetsMaterial(Beam beam) {
   const int few = 16;
   if (tiles.x * tiles.y <= few) {
     // Rays that stay about where they are: all tiles.
-    if (own >= tiles.x * tiles.y) return false;
+    if (own >= tiles.x * tiles.y) return 0u;
     ivec2 tile = firstTile + ivec2(own % tiles.x, own / tiles.x);
-    return (tileMask(renderTile, tile) & maskBetween(reach.depths.x, reach.depths.y)) != 0ul;
+    return countOf(tileMask(renderTile, tile) & maskBetween(reach.depths.x, reach.depths.y));
   }
   bool byColumns = tiles.x >= tiles.y;
   int end = byColumns ? lastTile.x : lastTile.y;
+  uint count = 0u;
   for (int tile = (byColumns ? firstTile.x : firstTile.y) + own; tile <= end; tile += int(renderBeamGroup)) {
-    if (beamMeets(beam, byColumns, tile, byColumns ? first.x : first.y, byColumns ? last.x : last.y)) return true;
+    count += countOf(beamMask(beam, byColumns, tile, byColumns ? first.x : first.y, byColumns ? last.x : last.y));
   }
-  return false;
+  return count;
 }
 
-shared uint meets;
+shared uint places;
 
 void main() {
   uvec2 corner = gl_WorkGroupID.xy * renderRegion;
   uint own = gl_LocalInvocationIndex;
-  if (own == 0u) meets = 0u;
+  if (own == 0u) places = 0u;
   barrier();
-  if (meetsMaterial(beamOf(corner, renderRegion))) atomicOr(meets, 1u);
+  uint count = placesToLookAt(beamOf(corner, renderRegion));
+  if (count > 0u) atomicAdd(places, count);
   barrier();
   uvec2 size = uvec2(params.width, params.height);
-  if (meets == 0u) {
+  if (places == 0u) {
     for (uint i = own; i < renderRegion * renderRegion; i += renderBeamGroup) {
       uvec2 at = corner + uvec2(i % renderRegion, i / renderRegion);
       if (any(greaterThanEqual(at, size))) continue;
@@ -122,9 +130,11 @@ void main() {
   const uint tilesAcross = renderRegion / renderPictureTile;
   if (own >= tilesAcross * tilesAcross) return;
   uvec2 tile = corner / renderPictureTile + uvec2(own % tilesAcross, own / tilesAcross);
-  uvec2 tiles = (size + renderPictureTile - 1u) / renderPictureTile;
+  uvec2 tiles = pictureTiles();
   if (any(greaterThanEqual(tile, tiles))) return;
-  uint place = atomicAdd(params.queue.at.count, 1u);
-  atomicMax(params.queue.at.groups.x, min(place + 1u, renderMostGroups));
-  params.waiting.at[place] = tile.y * tiles.x + tile.x;
+  uint kind = renderKinds - 1u - min(uint(findMSB(places)), renderKinds - 1u);
+  uint total = atomicAdd(params.queue.at.count, 1u);
+  atomicMax(params.queue.at.groups.x, min(total + 1u, renderMostGroups));
+  uint place = atomicAdd(params.queue.at.counts[kind], 1u);
+  params.waiting.at[kind * tiles.x * tiles.y + place] = tile.y * tiles.x + tile.x;
 }

@@ -16,7 +16,8 @@ void markAlong(Beam beam, int axis) {
   int lastTile = last >> renderTileShift;  // none: -1 stays -1
   for (int tile = (first >> renderTileShift) + int(gl_LocalInvocationIndex); tile <= lastTile;
        tile += invocations) {
-    if (beamMeets(beam, byColumns, tile, first, last)) atomicOr(marks[axis * markWords + (tile >> 5)], 1u << (tile & 31));
+    if (beamMask(beam, byColumns, tile, first, last) == 0ul) continue;
+    atomicOr(marks[axis * markWords + (tile >> 5)], 1u << (tile & 31));
   }
 }
 

@@ -75,7 +75,7 @@ uvec2 placeOf(uint pixel) {
 }
 
 void renderPixels(uint tile) {
-  uint across = (params.width + renderPictureTile - 1u) / renderPictureTile;
+  uint across = pictureTiles().x;
   uvec2 corner = uvec2(tile % across, tile / across) * renderPictureTile;
   uvec2 at = corner + placeOf(gl_LocalInvocationIndex / rayShares);
   bool hasPixel = at.x < params.width && at.y < params.height;
@@ -98,10 +98,18 @@ void renderPixels(uint tile) {
   params.depths.at[index] = met ? mix(stretch.x, stretch.y, fraction) : infinity;
 }
 
+// The i-th of the queue.
+uint waitingTile(uint i) {
+  uvec2 tiles = pictureTiles();
+  uint kind = 0u;
+  for (; kind + 1u < renderKinds && i >= params.queue.at.counts[kind]; ++kind) i -= params.queue.at.counts[kind];
+  return params.waiting.at[kind * tiles.x * tiles.y + i];
+}
+
 void main() {
   rayShare = gl_LocalInvocationIndex % rayShares;
   for (uint i = gl_WorkGroupID.x; i < params.queue.at.count; i += gl_NumWorkGroups.x) {
-    renderPixels(params.waiting.at[i]);
+    renderPixels(waitingTile(i));
     barrier();  // before the marks are used again
   }
 }

@@ -27,3 +27,6 @@ vec2 pictureAt(Ray of, float t) {
   vec3 p = of.origin + t * of.direction;
   return p.xy / (params.pixelSize * divisorOf(p.z)) + 0.5 * vec2(params.lists);
 }
+
+// Of renderPictureTile x renderPictureTile pixels.
+uvec2 pictureTiles() { return (uvec2(params.width, params.height) + renderPictureTile - 1u) / renderPictureTile; }

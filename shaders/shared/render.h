@@ -10,6 +10,7 @@ inline constexpr uint renderPictureTile = 8;
 inline constexpr uint renderRegion = 16;
 inline constexpr uint renderBeamGroup = 32;
 inline constexpr uint renderMostGroups = 65535;
+inline constexpr uint renderKinds = 12;
 inline constexpr uint expandGroup = 64;
 inline constexpr uint expandModeSegments = 0;
 inline constexpr uint expandModeMasks = 1;
@@ -25,6 +26,7 @@ const uint renderPictureTile = 8;  // pixels per side of what a workgroup render
 const uint renderRegion = 16;      // of the beam that says whether there's anything to render: a multiple of that
 const uint renderBeamGroup = 32;
 const uint renderMostGroups = 65535;  // every device allows them
+const uint renderKinds = 12;        // of tiles, by how much there is to look at
 const uint expandGroup = 64;
 const uint expandModeSegments = 0;  // one invocation a supersegment
 const uint expandModeMasks = 1;     // one a list
@@ -56,6 +58,7 @@ struct ListHead {
 struct TileQueue {
   uvec3 groups;
   uint count;
+  uint counts[renderKinds];  // of each kind; first those with most to look at
 };
 
 VDI_SHARED_END
@@ -94,7 +97,7 @@ struct RenderParams {
   VDI_ADDRESS(Vec4Array) colors;       // [height][width]
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
   VDI_ADDRESS(TileQueueAddress) queue;
-  VDI_ADDRESS(UintArray) waiting;  // the tiles of the queue: row * tiles in a row + column
+  VDI_ADDRESS(UintArray) waiting;  // [renderKinds][tiles]: the tiles of the queue, as row * tiles in a row + column
   // Ray of the new view's pixel in V_O's view space, as in CastParams: base + u * right + v * up, t = the new view's depth.
   vec3 originBase;
   float nearest;  // depth range of the VDI, nearest > 0 in perspective

@@ -72,10 +72,10 @@ RenderPass::RenderPass(const std::shared_ptr<Device>& device)
 void RenderPass::record(Commands& commands, shared::RenderParams params, Reconstruction reconstruction) {
   const std::uint64_t tiles = std::uint64_t{groupsFor(params.width, shared::renderPictureTile)} *
                               groupsFor(params.height, shared::renderPictureTile);
-  waiting_.reserve(device_, tiles * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+  waiting_.reserve(device_, tiles * shared::renderKinds * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
   params.queue = queue_.address();
   params.waiting = waiting_.address();
-  const shared::TileQueue none{{0, 1, 1}, 0};
+  const shared::TileQueue none{{0, 1, 1}, 0, {}};
   commands.barrier();
   commands.update(queue_, std::as_bytes(std::span(&none, 1)));
   beams_.update(commands, params);
