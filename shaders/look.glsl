@@ -29,7 +29,7 @@ const Look nothing = Look(vec4(0.0), infinity);
 vec2 pieceDepths(RenderSegment piece) { return rayAscends ? vec2(piece.front, piece.back) : vec2(-piece.back, -piece.front); }
 
 // Between two fractions of the line; `list` has at least one supersegment. `hint`: where the last look at a neighbouring list
-// started, counted as the ray meets them; lists are alike there.
+// ended, counted as the ray meets them; lists are alike there.
 Look lookAtList(PictureLine line, uint list, vec2 fractions, float shortening, inout int hint) {
   ListHead head = params.heads.at[list];
   RenderSegmentArray segments = params.segments;
@@ -50,7 +50,6 @@ Look lookAtList(PictureLine line, uint list, vec2 fractions, float shortening, i
     piece = segments.at[slot];
     depths = pieceDepths(piece);
   }
-  hint = place;
 
   vec3 light = vec3(0.0);
   float transmittance = 1.0;
@@ -68,7 +67,7 @@ Look lookAtList(PictureLine line, uint list, vec2 fractions, float shortening, i
     slot += uint(step);
     piece = segments.at[slot];
     depths = pieceDepths(piece);
-    if (depths.x <= low) hint = place;
   }
+  hint = place;
   return Look(vec4(light * pieceColorUnit, 1.0 - transmittance), entered);
 }
