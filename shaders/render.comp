@@ -29,13 +29,8 @@ Ray ray;
 // Keeps the part of `stretch` where value + t * slope >= 0.
 void clip(inout vec2 stretch, float value, float slope) {
   float crossing = -value / slope;
-  if (slope > 0.0) {
-    stretch.x = max(stretch.x, crossing);
-  } else if (slope < 0.0) {
-    stretch.y = min(stretch.y, crossing);
-  } else if (value < 0.0) {
-    stretch.y = stretch.x;
-  }
+  stretch.x = slope > 0.0 ? max(stretch.x, crossing) : stretch.x;
+  stretch.y = slope < 0.0 ? min(stretch.y, crossing) : slope == 0.0 && value < 0.0 ? stretch.x : stretch.y;
 }
 
 vec2 insideFrustum() {

@@ -97,7 +97,6 @@ uint columnsToLookAt(PictureLine line, int tile) {
   float edge = columnsTo(line, float(first));
   float fraction = fractionAfter(line, edge);
   for (int begin = 0; begin < part; begin += atOnce) {
-    bool looksAt[2 * columnsAtOnce];
     [[unroll]] for (int i = 0; i < columnsAtOnce; ++i) {
       if (i >= atOnce) break;
       int column = first + begin + i;
@@ -105,16 +104,16 @@ uint columnsToLookAt(PictureLine line, int tile) {
       float nextFraction = fractionAfter(line, nextEdge);
       // Columns beyond the line's ends: memory is read where there's a list, and what's read isn't used.
       Column here = columnAt(line, min(column, most), vec2(edge, nextEdge), vec2(fraction, nextFraction));
-      bool passes = nextEdge != edge;
+      uint64_t firstMask = params.heads.at[here.lists.x].mask;
+      uint64_t secondMask = params.heads.at[here.lists.y].mask;
       vec2 bins = vec2(at(line.bins, fraction), at(line.bins, nextFraction));
-      looksAt[2 * i] = passes && here.share < 1.0 && mayMeet(params.heads.at[here.lists.x].mask, bins);
-      looksAt[2 * i + 1] = passes && here.share > 0.0 && mayMeet(params.heads.at[here.lists.y].mask, bins);
+      // Products, for && would branch: all masks are to be asked for before the first is waited for.
+      uint passes = uint(nextEdge != edge);
+      uint meetsFirst = passes * uint(here.share < 1.0) * uint(mayMeet(firstMask, bins));
+      uint meetsSecond = passes * uint(here.share > 0.0) * uint(mayMeet(secondMask, bins));
+      looks |= (meetsFirst * firstLook + meetsSecond * secondLook) << (begin + i);
       edge = nextEdge;
       fraction = nextFraction;
-    }
-    [[unroll]] for (int i = 0; i < columnsAtOnce; ++i) {
-      if (i >= atOnce) break;
-      looks |= ((looksAt[2 * i] ? firstLook : 0u) | (looksAt[2 * i + 1] ? secondLook : 0u)) << (begin + i);
     }
   }
   looks <<= part * int(rayShare);
