@@ -76,7 +76,6 @@ void RenderPass::record(Commands& commands, shared::RenderParams params, Reconst
   params.queue = queue_.address();
   params.waiting = waiting_.address();
   const shared::TileQueue none{{0, 1, 1}, 0, {}};
-  commands.barrier();
   commands.update(queue_, std::as_bytes(std::span(&none, 1)));
   beams_.update(commands, params);
   commands.dispatchBytes(beams_.with({}), {}, groupsFor(params.width, shared::renderRegion),

@@ -22,7 +22,7 @@ shared::RenderParams renderGeometry(const View& original, const View& view);
 class RenderPass {
  public:
   explicit RenderPass(const std::shared_ptr<Device>& device);
-  /// `params`: but for the queue.
+  /// Behind a barrier. `params`: but for the queue.
   void record(Commands& commands, shared::RenderParams params, Reconstruction reconstruction);
 
  private:
