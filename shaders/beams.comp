@@ -6,6 +6,8 @@
 #include "masks.glsl"
 
 layout(local_size_x = renderBeamGroup) in;
+// Else as they come: a CPU doesn't wait, but has its caches.
+layout(constant_id = 0) const bool mostFirst = true;
 layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 #include "view.glsl"
@@ -132,7 +134,7 @@ void main() {
   uvec2 tile = corner / renderPictureTile + uvec2(own % tilesAcross, own / tilesAcross);
   uvec2 tiles = pictureTiles();
   if (any(greaterThanEqual(tile, tiles))) return;
-  uint kind = renderKinds - 1u - min(uint(findMSB(places)), renderKinds - 1u);
+  uint kind = mostFirst ? renderKinds - 1u - min(uint(findMSB(places)), renderKinds - 1u) : 0u;
   uint total = atomicAdd(params.queue.at.count, 1u);
   atomicMax(params.queue.at.groups.x, min(total + 1u, renderMostGroups));
   uint place = atomicAdd(params.queue.at.counts[kind], 1u);

@@ -7,7 +7,7 @@
 struct PictureLine {
   bool byColumns;
   float start;      // column
-  float columns;    // from there to its end, >= 0
+  float columns;    // from there to its end, > 0
   float direction;  // 1 or -1, from column to column
   float row;        // at the start
   float rows;       // from one column to the next

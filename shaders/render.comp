@@ -1,6 +1,6 @@
-// Renders a VDI from a new viewpoint; twin of vdi/reference/Render.cpp. A ray is straight in V_O's view
-// space, where each list fills the frustum of its pixel, so the ray crosses lists one after the other as a line crosses
-// the cells of a picture.
+// Renders a VDI from a new viewpoint, where beams.comp has found tiles of its picture that may show something; twin of
+// vdi/reference/Render.cpp. A ray is straight in V_O's view space, where each list fills the frustum of its pixel, so the ray
+// crosses lists one after the other as a line crosses the cells of a picture.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -10,15 +10,14 @@
 #include "masks.glsl"
 #include "pieces.glsl"
 
-// Renders the tiles of the picture that beams.comp has found.
-layout(local_size_x_id = 5) in;
+layout(local_size_x_id = 2) in;
 layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 // Reconstruction::Smooth or Constant.
-layout(constant_id = 3) const bool smoothReconstruction = true;
+layout(constant_id = 0) const bool smoothReconstruction = true;
 // Invocations side by side that share a ray: 1, or 2, which each look at one of the two lists of a column. Few rays meet
 // anything, and a GPU waits for the longest of them.
-layout(constant_id = 4) const uint rayShares = 1;
+layout(constant_id = 1) const uint rayShares = 1;
 uint rayShare;
 
 const float opaque = 0.9999;
@@ -26,6 +25,7 @@ const float opaque = 0.9999;
 #include "view.glsl"
 
 Ray ray;
+
 // Keeps the part of `stretch` where value + t * slope >= 0.
 void clip(inout vec2 stretch, float value, float slope) {
   float crossing = -value / slope;
@@ -65,8 +65,8 @@ void accumulate(Look behind) {
 #include "walk.glsl"
 
 // Along a Z: the rays of a subgroup are close to each other in both directions.
-uvec2 placeOf(uint pixel) {
-  return uvec2((pixel & 1u) | (pixel >> 1 & 2u) | (pixel >> 2 & 4u), (pixel >> 1 & 1u) | (pixel >> 2 & 2u) | (pixel >> 3 & 4u));
+uvec2 placeOf(uint i) {
+  return uvec2((i & 1u) | (i >> 1 & 2u) | (i >> 2 & 4u), (i >> 1 & 1u) | (i >> 2 & 2u) | (i >> 3 & 4u));
 }
 
 void renderPixels(uint tile) {

@@ -52,6 +52,15 @@ ImageDifference differenceOf(const Image& a, const Image& b) {
   return compare(io::toPicture(a).rgb, io::toPicture(b).rgb, a.width, a.height, 3);
 }
 
+/// Of pixels: one has a depth and the other none, or they're more than `tolerance` apart.
+std::size_t depthsThatDiffer(const Image& a, const Image& b, float tolerance) {
+  REQUIRE(a.depth.size() == b.depth.size());
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.depth.size(); ++i)
+    count += a.depth[i] == b.depth[i] || std::abs(a.depth[i] - b.depth[i]) < tolerance ? 0 : 1;
+  return count;
+}
+
 constexpr float rounding = 2e-3F;
 constexpr float oneCode = 1.5F / 255.0F;
 
@@ -98,13 +107,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
       const auto image = generator.renderVolume(camera, function, settings);
       const Image expected = reference::renderVolume(frame, dealt.mine);
       CHECK(largestDifference(*image, expected) < 0.5F);
-      std::size_t depthsOff = 0;
-      for (std::size_t i = 0; i < image->depth.size(); ++i) {
-        const float a = image->depth[i];
-        const float b = expected.depth[i];
-        depthsOff += a == b || std::abs(a - b) < 1e-3F ? 0 : 1;
-      }
-      CHECK(depthsOff <= image->depth.size() / 100);
+      CHECK(depthsThatDiffer(*image, expected, 1e-3F) <= image->depth.size() / 100);
 
       std::optional<Vdi> vdi;
       for (const Algorithm algorithm : algorithms) {
@@ -264,6 +267,8 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the refe
   const auto vdi = generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
   VdiRenderer renderer(device());
   renderer.setVdi(*vdi);
+  VdiRenderer rendererAsGpu(deviceAsGpu());
+  rendererAsGpu.setVdi(*vdi);
   std::vector<Camera> cameras;
   for (const double angle : {2.0, 20.0, 70.0, 160.0, 290.0}) {
     cameras.push_back(camera.azimuth(angle));
@@ -282,16 +287,51 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the refe
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
       INFO("camera " << i << ", " << toString(reconstruction) << ", parallel " << parallel);
-      const Image seen = renderer.render(cameras[i], 65, 47, reconstruction);
       const Image expected = reference::render(*vdi, View(cameras[i], 65, 47), reconstruction);
       seenFrom += std::any_of(expected.rgba.begin(), expected.rgba.end(),
                               [](const glm::vec4& c) { return c.a > 0.1F; })
                       ? 1
                       : 0;
-      CHECK(largestDifference(seen, expected) < 2.0F);
+      for (VdiRenderer* each : {&renderer, &rendererAsGpu}) {
+        const Image seen = each->render(cameras[i], 65, 47, reconstruction);
+        CHECK(largestDifference(seen, expected) < 2.0F);
+        CHECK(depthsThatDiffer(seen, expected, 1e-3F) <= seen.depth.size() / 100);
+      }
     }
   }
   CHECK(seenFrom >= 2 * (cameras.size() - 1));
+  CHECK(deviceAsGpu()->validationMessages() == "");
+}
+
+TEST_CASE("a picture of more tiles than a device has workgroups side by side") {
+  const auto dealt =
+      test::deal("ramp", {8, 8, 8}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints, ScalarType::F32, 0, 1);
+  Camera camera = test::oblique(true);
+  camera.parallelScale = 0.1;  // the volume is all around
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  const auto vdi = generator.generate(camera, test::threeHues(2.0), test::smallSettings(16, 16, 4));
+  VdiRenderer renderer(device());
+  renderer.setVdi(*vdi);
+  constexpr int side = 2064;  // 258 x 258 tiles; every device has 65535 workgroups
+  const Image seen = renderer.render(camera, side, side, Reconstruction::Constant);
+  const Image lists = flatten(*vdi);
+  float worst = 0.0F;
+  float clearest = 1.0F;
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const auto at = [](int column, int row, int width) {
+        return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+               static_cast<std::size_t>(column);
+      };
+      const glm::vec4 difference =
+          seen.rgba[at(x, y, side)] - lists.rgba[at(x * 16 / side, y * 16 / side, 16)];
+      for (int c = 0; c < 4; ++c) worst = std::max(worst, std::abs(difference[c]));
+      clearest = std::min(clearest, seen.rgba[at(x, y, side)].a);
+    }
+  }
+  CHECK(255.0F * worst < 2.0F);
+  CHECK(clearest > 0.01F);
 }
 
 TEST_CASE("merging and compositing on the device equal the reference") {

@@ -99,23 +99,33 @@ std::uint64_t hostPointerAlignment(VkPhysicalDevice device) {
   return host.minImportedHostPointerAlignment;
 }
 
-/// DeviceLimits::subgroupSize.
-std::uint32_t usefulSubgroupSize(VkPhysicalDevice device, const Features& features) {
+struct Subgroups {
   VkPhysicalDeviceVulkan13Properties v13{};
-  v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_PROPERTIES;
   VkPhysicalDeviceVulkan11Properties v11{};
-  v11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES;
-  v11.pNext = &v13;
-  VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &v11, {}};
-  vkGetPhysicalDeviceProperties2(device, &properties);
+  explicit Subgroups(VkPhysicalDevice device) {
+    v13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_PROPERTIES;
+    v11.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES;
+    v11.pNext = &v13;
+    VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &v11, {}};
+    vkGetPhysicalDeviceProperties2(device, &properties);
+  }
+  /// In compute shaders.
+  bool can(VkSubgroupFeatureFlags operations) const {
+    return (v11.subgroupSupportedStages & VK_SHADER_STAGE_COMPUTE_BIT) != 0 &&
+           (v11.subgroupSupportedOperations & operations) == operations;
+  }
+};
+
+/// DeviceLimits::subgroupSize.
+std::uint32_t usefulSubgroupSize(const Subgroups& subgroups, const Features& features) {
+  const auto& v13 = subgroups.v13;
   constexpr VkSubgroupFeatureFlags needed =
-      VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT | VK_SUBGROUP_FEATURE_ARITHMETIC_BIT |
-      VK_SUBGROUP_FEATURE_SHUFFLE_BIT;
+      VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT | VK_SUBGROUP_FEATURE_ARITHMETIC_BIT;
   constexpr std::uint32_t largest = 32;  // bits of a word
   const bool there = features.v13.subgroupSizeControl == VK_TRUE &&
                      features.v13.computeFullSubgroups == VK_TRUE &&
                      (v13.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT) != 0 &&
-                     (v11.subgroupSupportedOperations & needed) == needed && v13.minSubgroupSize <= largest;
+                     subgroups.can(needed) && v13.minSubgroupSize <= largest;
   return there ? std::min(largest, v13.maxSubgroupSize) : 0;
 }
 
@@ -144,8 +154,10 @@ void inspectFeatures(VkPhysicalDevice device, Candidate& candidate) {
   limits.shaderFloat16 = features.v12.shaderFloat16 == VK_TRUE;
   limits.storage16Bit = features.v11.storageBuffer16BitAccess == VK_TRUE;
   limits.storage8Bit = features.v12.storageBuffer8BitAccess == VK_TRUE;
-  limits.subgroupSize = usefulSubgroupSize(device, features);
-  const std::array<std::pair<VkBool32, const char*>, 7> demands{{
+  const Subgroups subgroups(device);
+  limits.subgroupSize = usefulSubgroupSize(subgroups, features);
+  const bool shuffles = subgroups.can(VK_SUBGROUP_FEATURE_SHUFFLE_BIT);
+  const std::array<std::pair<VkBool32, const char*>, 8> demands{{
       {features.core.features.shaderInt64, "shaderInt64"},
       {features.v12.bufferDeviceAddress, "bufferDeviceAddress"},
       {features.v12.scalarBlockLayout, "scalarBlockLayout"},
@@ -153,6 +165,7 @@ void inspectFeatures(VkPhysicalDevice device, Candidate& candidate) {
       {features.v12.hostQueryReset, "hostQueryReset"},
       {features.v13.synchronization2, "synchronization2"},
       {features.v13.maintenance4, "maintenance4"},
+      {shuffles ? VK_TRUE : VK_FALSE, "subgroup shuffles"},
   }};
   for (const auto& [present, name] : demands) {
     if (present == VK_FALSE) candidate.summary.refusals.push_back(fmt::format("no {}", name));

@@ -53,8 +53,8 @@ class Device {
   /// says that there's no Vulkan driver at all, that the validation layer is missing, or that the device
   /// can't be opened. What's demanded: Vulkan 1.3, a compute queue with timestamps, hostQueryReset,
   /// bufferDeviceAddress, scalarBlockLayout, shaderInt64, timelineSemaphore, synchronization2, maintenance4,
-  /// linear filtering of 3-D R32_SFLOAT, R16_UNORM and R8_UNORM images. Preference: discrete, integrated,
-  /// virtual, CPU.
+  /// subgroup shuffles, linear filtering of 3-D R32_SFLOAT, R16_UNORM and R8_UNORM images. Preference:
+  /// discrete, integrated, virtual, CPU.
   static std::shared_ptr<Device> create(const DeviceRequest& request);
   /// A line per device: index, name, type, driver, memory, "usable" or why not. Never throws.
   static std::string describeAll();

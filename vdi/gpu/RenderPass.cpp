@@ -19,8 +19,8 @@ ComputePipelineInfo pipelineInfo(std::string_view shader) {
   return info;
 }
 
-/// Invocations that share a ray (render.comp). With more, what each of them has to set up costs more than they
-/// save.
+/// Invocations that share a ray (render.comp). With more, what each of them has to set up costs more than
+/// they save.
 std::uint32_t sharesFor(const Device& device) {
   return device.runsGpuPrograms() && device.limits().subgroupSize > 0 ? 2 : 1;
 }
@@ -78,12 +78,13 @@ void RenderPass::record(Commands& commands, shared::RenderParams params, Reconst
   const shared::TileQueue none{{0, 1, 1}, 0, {}};
   commands.update(queue_, std::as_bytes(std::span(&none, 1)));
   beams_.update(commands, params);
-  commands.dispatchBytes(beams_.with({}), {}, groupsFor(params.width, shared::renderRegion),
+  commands.dispatchBytes(beams_.with({shares_ > 1 ? 1U : 0U}), {},
+                         groupsFor(params.width, shared::renderRegion),
                          groupsFor(params.height, shared::renderRegion), 1);
   commands.barrier();
   const std::uint32_t smooth = reconstruction == Reconstruction::Smooth ? 1 : 0;
   const std::uint32_t invocations = shares_ * shared::renderPictureTile * shared::renderPictureTile;
-  commands.dispatchIndirect(render_.with({0, 0, 0, smooth, shares_, invocations}), queue_);
+  commands.dispatchIndirect(render_.with({smooth, shares_, invocations}), queue_);
 }
 
 }  // namespace vdi::gpu

@@ -1,7 +1,6 @@
 // VdiRenderer and flatten: what a viewer does with a VDI.
 #include <algorithm>
 #include <cstring>
-#include <type_traits>
 
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Commands.h"
