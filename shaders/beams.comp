@@ -109,6 +109,12 @@ uint placesToLookAt(Beam beam) {
   return count;
 }
 
+// Twice the logarithm.
+uint magnitude(uint count) {
+  int exponent = findMSB(count);
+  return 2u * uint(exponent) + (exponent > 0 ? count >> (exponent - 1) & 1u : 0u);
+}
+
 shared uint places;
 
 void main() {
@@ -134,7 +140,7 @@ void main() {
   uvec2 tile = corner / renderPictureTile + uvec2(own % tilesAcross, own / tilesAcross);
   uvec2 tiles = pictureTiles();
   if (any(greaterThanEqual(tile, tiles))) return;
-  uint kind = mostFirst ? renderKinds - 1u - min(uint(findMSB(places)), renderKinds - 1u) : 0u;
+  uint kind = mostFirst ? renderKinds - 1u - min(magnitude(places), renderKinds - 1u) : 0u;
   uint total = atomicAdd(params.queue.at.count, 1u);
   atomicMax(params.queue.at.groups.x, min(total + 1u, renderMostGroups));
   uint place = atomicAdd(params.queue.at.counts[kind], 1u);

@@ -2,12 +2,16 @@
 //
 // Needs: shared/render.h, pieces.glsl, line.glsl; params.
 
-float stretchLength;  // of a ray's whole stretch, as depth of V_O's middle ray
-bool rayAscends;      // it meets a list's supersegments in their order; else backwards
+bool rayAscends;  // it meets a list's supersegments in their order; else backwards
+// How long the ray is for a change of depth, where that says something; else the length of its whole stretch.
+float raySlant;
+
+// Else a column's change of depth may be lost in rounding.
+bool changesDepth(PictureLine line) { return line.depths.y > 0.01 * params.farthest; }
 
 void beginLooking(PictureLine line, vec2 stretch) {
-  stretchLength = (stretch.y - stretch.x) * length(ray.direction);
   rayAscends = line.bins.y >= 0.0;
+  raySlant = (stretch.y - stretch.x) * length(ray.direction) / (changesDepth(line) ? line.depths.y : 1.0);
 }
 
 // At a place in V_O's picture: depth for a length of the ray that goes through it.
@@ -40,9 +44,12 @@ Look lookAtList(PictureLine line, uint list, vec2 fractions, float shortening, i
   RenderSegment piece = segments.at[slot];
 
   float low = at(line.depths, fractions.x);
-  float high = max(at(line.depths, fractions.y), low + 1e-6 * params.farthest);
-  // How much longer the ray is between two depths than the list's own.
-  float slant = (fractions.y - fractions.x) * stretchLength * shortening / (high - low);
+  float high = at(line.depths, fractions.y);
+  float slant = raySlant * shortening;  // how much longer the ray is between two depths than the list's own
+  if (!changesDepth(line)) {
+    high = max(high, low + 1e-6 * params.farthest);
+    slant *= (fractions.y - fractions.x) / (high - low);
+  }
   vec2 depths = pieceDepths(piece);
   while (place > 0 && depths.x > low) {
     --place;

@@ -57,9 +57,8 @@ vec2 insideFrustum() {
 Look accumulated;
 
 void accumulate(Look behind) {
-  if (!(behind.light.a > 0.0)) return;
-  if (accumulated.light.a == 0.0) accumulated.entered = behind.entered;
   accumulated.light += (1.0 - accumulated.light.a) * behind.light;
+  accumulated.entered = min(accumulated.entered, behind.entered);
 }
 
 #include "walk.glsl"

@@ -18,7 +18,8 @@ constexpr std::uint32_t maxMarks = 64;
 void memoryBarrier(VkCommandBuffer commands, bool host) {
   constexpr VkPipelineStageFlags2 stages =
       VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
-  constexpr VkPipelineStageFlags2 arguments = VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT;  // of indirect dispatches
+  constexpr VkPipelineStageFlags2 arguments =
+      VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT;  // of indirect dispatches
   constexpr VkAccessFlags2 writes = VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_TRANSFER_WRITE_BIT;
   constexpr VkAccessFlags2 reads =
       VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_TRANSFER_READ_BIT | VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT;
