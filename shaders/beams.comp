@@ -61,13 +61,14 @@ Reach reachOf(Beam beam) {
   vec4 depthsOut = originZ + stretch.y * directionZ;
   Reach reach = Reach(stretch.x, stretch.y, vec2(0.0), vec2(params.lists), vec2(params.nearest, params.farthest));
   // Else anywhere: the picture of what's beside V_O's eye has no bounds.
-  if (parallel || min(least(depthsIn), least(depthsOut)) > 0.0) {
-    vec4 in_ = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsIn));
-    vec4 out_ = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsOut));
-    vec4 xIn = (originX + stretch.x * directionX) * in_;
-    vec4 xOut = (originX + stretch.y * directionX) * out_;
-    vec4 yIn = (originY + stretch.x * directionY) * in_;
-    vec4 yOut = (originY + stretch.y * directionY) * out_;
+  const float finite = 1e30;
+  if (stretch.y < finite && (parallel || min(least(depthsIn), least(depthsOut)) > 0.0)) {
+    vec4 pixelsIn = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsIn));
+    vec4 pixelsOut = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsOut));
+    vec4 xIn = (originX + stretch.x * directionX) * pixelsIn;
+    vec4 xOut = (originX + stretch.y * directionX) * pixelsOut;
+    vec4 yIn = (originY + stretch.x * directionY) * pixelsIn;
+    vec4 yOut = (originY + stretch.y * directionY) * pixelsOut;
     const float spare = 1.0;  // for rounding
     vec2 middle = 0.5 * vec2(params.lists);
     reach.low = clamp(vec2(min(least(xIn), least(xOut)), min(least(yIn), least(yOut))) + middle - spare, reach.low, reach.high);

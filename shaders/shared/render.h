@@ -1,4 +1,4 @@
-// Parameters of render.comp: a VDI seen from anywhere.
+// Parameters of beams.comp and render.comp: a VDI seen from anywhere. And of expand.comp, which prepares it.
 #ifndef VDI_SHARED_RENDER_H
 #define VDI_SHARED_RENDER_H
 #include "lists.h"
