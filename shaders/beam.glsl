@@ -44,9 +44,9 @@ uint64_t tileMask(int size, ivec2 tile) {
   return params.tileMasks.at[first + tile.y * tiles.x + tile.x];
 }
 
-// In which parts of the depth range the beam may meet material between two edges of a column of tiles. The picture of a quadrilateral of rays on the plane of an edge is
-// the convex hull of those of its corners, if all of these cross it the same way and in front of V_O's eye; and between
-// two planes rays are straight in V_O's picture.
+// In which parts of the depth range the beam may meet material between two edges of a column of tiles. The picture of a
+// quadrilateral of rays on the plane of an edge is the convex hull of those of its corners, if all of these cross it the same
+// way and in front of V_O's eye; and between two planes rays are straight in V_O's picture.
 uint64_t beamMask(Beam beam, bool byColumns, int tile, int first, int last) {
   float begin = float(max(tile << renderTileShift, first));
   float end = float(min((tile + 1) << renderTileShift, last + 1));

@@ -8,6 +8,7 @@ layout(push_constant, scalar) uniform Push { ExpandConstants push; };
 
 #include "masks.glsl"
 #include "optical.glsl"
+#include "exact.glsl"
 #include "store.glsl"
 #include "pieces.glsl"
 

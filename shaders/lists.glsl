@@ -6,6 +6,7 @@ uint listIndex;
 
 #include "optical.glsl"
 #include "appearance.glsl"
+#include "exact.glsl"
 #include "store.glsl"
 void emitSegment(Material m);
 #include "segmenter.glsl"

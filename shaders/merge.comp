@@ -8,6 +8,7 @@ layout(local_size_x = compositeGroup) in;
 layout(push_constant, scalar) uniform Push { MergeConstants push; };
 
 #include "optical.glsl"
+#include "exact.glsl"
 #include "store.glsl"
 
 uint subOffset(uint rank, uint list) { return push.subOffsets.at[rank * (push.listCount + 1u) + list]; }

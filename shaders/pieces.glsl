@@ -1,6 +1,6 @@
 // Supersegments as render.comp reads them: RenderSegment.
 //
-// Needs: shared/render.h.
+// Needs: shared/render.h, exact.glsl.
 
 // Straight colour in 11, 11 and 10 bits; those of codes, in 8 bits, stay as they are.
 const uvec3 mostPieceColor = uvec3(2040u, 2040u, 1020u);
@@ -10,10 +10,9 @@ uint packedPieceColor(vec3 straight) {
   return codes.r | codes.g << 11 | codes.b << 22;
 }
 
-// In units of pieceColorUnit. Integers become floats as mantissas, where they are: that takes a GPU less time than a conversion.
+// In units of pieceColorUnit; green stays where it is.
 const vec3 pieceColorUnit = 1.0 / (vec3(mostPieceColor) * vec3(1.0, 2048.0, 1.0));
 
 vec3 pieceColor(RenderSegment piece) {
-  uvec3 codes = uvec3(piece.color & 0x7ffu, piece.color & 0x3ff800u, piece.color >> 22);
-  return uintBitsToFloat(codes | 0x4b000000u) - 8388608.0;
+  return vec3(exactFloat(piece.color & 0x7ffu), exactFloat(piece.color & 0x3ff800u), exactFloat(piece.color >> 22));
 }

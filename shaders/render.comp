@@ -8,6 +8,7 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 #include "shared/render.h"
 #include "masks.glsl"
+#include "exact.glsl"
 #include "pieces.glsl"
 
 layout(local_size_x_id = 2) in;

@@ -1,7 +1,7 @@
 // Supersegments in memory: 24 bytes of floats, or 8 of codes. Storing codes is the twin of vdi/reference/Compaction.h;
 // loading them, of expanded in vdi/core/Supersegment.cpp.
 //
-// Needs: shared/lists.h, optical.glsl.
+// Needs: shared/lists.h, exact.glsl, optical.glsl.
 
 const float mostDepthCode = 16383.0;
 const float mostCarriedDepth = 1.0 / 16.0;
@@ -20,9 +20,6 @@ struct Material {
 
 // Which of the two forms; the other one's code is left out.
 layout(constant_id = 2) const bool compactForm = false;
-
-// Of an integer below 2^23: as its mantissa, which takes a GPU less time than a conversion.
-float exactFloat(uint value) { return uintBitsToFloat(0x4b000000u | value) - 8388608.0; }
 
 float opticalDepthOfCode(uint code) {
   return code == 0u ? 9.5367431640625e-7 : (exp2(exactFloat(code) * (16.0 / 4095.0)) - 1.0) / 16.0;

@@ -2,7 +2,7 @@
 // Reconstruction::Constant looks at those that it crosses, one or two of each. Twin of walkSmoothly and walkLists in
 // vdi/reference/Render.cpp.
 //
-// Needs: marks.glsl, line.glsl, look.glsl; params, smoothReconstruction, rayShares, rayShare, accumulate.
+// Needs: masks.glsl, marks.glsl, line.glsl, look.glsl; params, smoothReconstruction, rayShares, rayShare, accumulate.
 
 uint listOf(bool byColumns, int column, int row) {
   return byColumns ? uint(row) * uint(params.lists.x) + uint(column) : uint(column) * uint(params.lists.x) + uint(row);
@@ -13,16 +13,6 @@ uint listOf(bool byColumns, int column, int row) {
 float shareOfNext(float beyond) {
   const float onCentre = 1.0 / 256.0;
   return clamp((beyond - onCentre) / (1.0 - 2.0 * onCentre), 0.0, 1.0);
-}
-
-// Whether a list may have material between two bins, in any order.
-bool mayMeet(uint64_t mask, vec2 bins) {
-  const float spare = 0.01;  // for rounding
-  int low = int(clamp(min(bins.x, bins.y) - spare, 0.0, float(renderBins - 1)));
-  int high = int(clamp(max(bins.x, bins.y) + spare, 0.0, float(renderBins - 1)));
-  uvec2 from = unpackUint2x32(mask >> low);
-  int more = high - low;
-  return ((more < 32 ? from.x : from.x | from.y) & (~0u >> (31 - min(more, 31)))) != 0u;
 }
 
 // What a ray's two invocations see, of which each has its own, already weighted.
@@ -80,7 +70,7 @@ Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
   return here;
 }
 
-// Memory takes about as long for several as for one.
+// Memory takes about as long for several as for one. Half of a tile: a part of it for each of a ray's invocations.
 const int columnsAtOnce = 4;
 // Bits of what columnsToLookAt returns: a column's first and second list.
 const uint firstLook = 1u;
@@ -90,15 +80,13 @@ const uint secondLook = 1u << renderTile;
 // lists. Each of a ray's invocations finds its part.
 uint columnsToLookAt(PictureLine line, int tile) {
   const int part = renderTile / int(rayShares);
-  const int atOnce = min(part, columnsAtOnce);
   int most = columnCount(line.byColumns) - 1;
   int first = (tile << renderTileShift) + part * int(rayShare);
   uint looks = 0u;
   float edge = columnsTo(line, float(first));
   float fraction = fractionAfter(line, edge);
-  for (int begin = 0; begin < part; begin += atOnce) {
+  for (int begin = 0; begin < part; begin += columnsAtOnce) {
     [[unroll]] for (int i = 0; i < columnsAtOnce; ++i) {
-      if (i >= atOnce) break;
       int column = first + begin + i;
       float nextEdge = columnsTo(line, float(column + 1));
       float nextFraction = fractionAfter(line, nextEdge);
@@ -176,7 +164,6 @@ void walk(PictureLine line) {
     if (tile < 0) return;
     uint looks = columnsToLookAt(line, tile);
     uint columns = (looks | looks / secondLook) & (secondLook - 1u);
-    if (columns == 0u && tile != lastTile) continue;
     vec2 shortenings = shorteningsAt(line, tile);
     while (columns != 0u) {
       int i = up ? findLSB(columns) : findMSB(columns);

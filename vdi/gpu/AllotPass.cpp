@@ -16,8 +16,7 @@ ComputePipelineInfo pipelineInfo() {
 AllotPass::AllotPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
 
 void AllotPass::record(Commands& commands, const shared::AllotConstants& constants) const {
-  commands.dispatch(pipeline_, constants, (constants.width + shared::allotGroup - 1) / shared::allotGroup,
-                    constants.rows);
+  commands.dispatch(pipeline_, constants, groupsFor(constants.width, shared::allotGroup), constants.rows);
 }
 
 }  // namespace vdi::gpu

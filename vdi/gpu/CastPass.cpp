@@ -96,9 +96,8 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   const std::uint32_t shares = program == shared::castProgramCountGrains ? band.countShares : 1;
   const std::uint32_t width = (band.width + stride - 1) / stride * shares;
   pipelines_.update(commands, params);
-  commands.dispatch(pipelineFor(program, compact, shares), constants,
-                    (width + shared::castGroupX - 1) / shared::castGroupX,
-                    (rows + shared::castGroupY - 1) / shared::castGroupY);
+  commands.dispatch(pipelineFor(program, compact, shares), constants, groupsFor(width, shared::castGroupX),
+                    groupsFor(rows, shared::castGroupY));
 }
 
 }  // namespace vdi::gpu

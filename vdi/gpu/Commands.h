@@ -22,6 +22,11 @@ struct StageTime {
   double milliseconds = 0.0;
 };
 
+/// Workgroups of `group` invocations along an axis that has `count` of them.
+constexpr std::uint32_t groupsFor(std::uint32_t count, std::uint32_t group) {
+  return (count + group - 1) / group;
+}
+
 class Commands {
  public:
   explicit Commands(std::shared_ptr<Device> device);

@@ -1,7 +1,5 @@
 #include "vdi/gpu/ExpandPass.h"
 
-#include <algorithm>
-
 namespace vdi::gpu {
 
 namespace {
@@ -35,13 +33,10 @@ std::uint64_t tileCount(const glm::ivec2& lists) {
 ExpandPass::ExpandPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
 
 void ExpandPass::record(Commands& commands, const shared::ExpandConstants& constants) {
-  constexpr std::uint64_t widest = 32768;  // groups; every device allows 65535 per axis
-  const std::uint64_t groups = (invocations(constants) + shared::expandGroup - 1) / shared::expandGroup;
-  if (groups == 0) return;
-  const std::uint64_t across = std::min(groups, widest);
-  commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants,
-                    static_cast<std::uint32_t>(across),
-                    static_cast<std::uint32_t>((groups + across - 1) / across));
+  const std::uint64_t count = invocations(constants);
+  if (count == 0) return;
+  commands.dispatchMany(pipelines_.with({0, 0, isCompact(constants.form)}), constants, count,
+                        shared::expandGroup);
 }
 
 }  // namespace vdi::gpu

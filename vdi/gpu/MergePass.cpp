@@ -17,7 +17,7 @@ MergePass::MergePass(std::shared_ptr<Device> device) : pipelines_(std::move(devi
 
 void MergePass::record(Commands& commands, const shared::MergeConstants& constants) {
   commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants,
-                    (constants.listCount + shared::compositeGroup - 1) / shared::compositeGroup);
+                    groupsFor(constants.listCount, shared::compositeGroup));
 }
 
 }  // namespace vdi::gpu

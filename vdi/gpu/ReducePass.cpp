@@ -35,10 +35,6 @@ std::uint32_t teamCapacity(std::uint64_t grains) {
   return static_cast<std::uint32_t>(std::min((grains + unit - 1) / unit * unit, largest));
 }
 
-constexpr std::uint32_t groupsFor(std::uint32_t lists, std::uint32_t group) {
-  return (lists + group - 1) / group;
-}
-
 }  // namespace
 
 ReducePass::ReducePass(const std::shared_ptr<Device>& device)

@@ -31,10 +31,6 @@ ComputePipelineInfo renderInfo(std::uint32_t shares) {
   return info;
 }
 
-constexpr std::uint32_t groupsFor(std::uint32_t pixels, std::uint32_t size) {
-  return (pixels + size - 1) / size;
-}
-
 }  // namespace
 
 shared::RenderParams renderGeometry(const View& original, const View& view) {
