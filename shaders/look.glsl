@@ -30,18 +30,21 @@ struct Look {
 const Look nothing = Look(vec4(0.0), infinity);
 
 // Front and back, as the ray meets them.
-vec2 pieceDepths(RenderSegment piece) { return rayAscends ? vec2(piece.front, piece.back) : vec2(-piece.back, -piece.front); }
+vec2 metDepths(uvec4 piece) {
+  vec2 depths = pieceDepths(piece);
+  return rayAscends ? depths : -depths.yx;
+}
 
 // Between two fractions of the line; `list` has at least one supersegment. `hint`: where the last look at a neighbouring list
 // ended, counted as the ray meets them; lists are alike there.
 Look lookAtList(PictureLine line, uint list, vec2 fractions, float shortening, inout int hint) {
   ListHead head = params.heads.at[list];
-  RenderSegmentArray segments = params.segments;
+  PieceArray pieces = params.segments;
   int last = int(head.count) - 1;
   int place = min(hint, last);
   int step = rayAscends ? 1 : -1;
   uint slot = head.first + uint(rayAscends ? place : last - place);
-  RenderSegment piece = segments.at[slot];
+  uvec4 piece = pieces.at[slot];
 
   float low = at(line.depths, fractions.x);
   float high = at(line.depths, fractions.y);
@@ -50,30 +53,38 @@ Look lookAtList(PictureLine line, uint list, vec2 fractions, float shortening, i
     high = max(high, low + 1e-6 * params.farthest);
     slant *= (fractions.y - fractions.x) / (high - low);
   }
-  vec2 depths = pieceDepths(piece);
+  vec2 depths = metDepths(piece);
   while (place > 0 && depths.x > low) {
     --place;
     slot -= uint(step);
-    piece = segments.at[slot];
-    depths = pieceDepths(piece);
+    piece = pieces.at[slot];
+    depths = metDepths(piece);
+  }
+  // Not below, where each takes longer.
+  while (place < last && depths.y <= low) {
+    ++place;
+    slot += uint(step);
+    piece = pieces.at[slot];
+    depths = metDepths(piece);
   }
 
   vec3 light = vec3(0.0);
   float transmittance = 1.0;
   float entered = infinity;
   for (;;) {
-    float met = min(depths.y, high) - max(depths.x, low);
+    float front = max(depths.x, low);
+    float met = min(depths.y, high) - front;
     if (met > 0.0) {
-      entered = min(entered, max(depths.x, low));
-      float behind = transmittance * exp2(-met * slant * piece.density);
+      entered = min(entered, front);
+      float behind = transmittance * exp2(-met * slant * pieceDensity(piece));
       light += (transmittance - behind) * pieceColor(piece);
       transmittance = behind;
     }
     if (depths.y >= high || place == last) break;
     ++place;
     slot += uint(step);
-    piece = segments.at[slot];
-    depths = pieceDepths(piece);
+    piece = pieces.at[slot];
+    depths = metDepths(piece);
   }
   hint = place;
   return Look(vec4(light * pieceColorUnit, 1.0 - transmittance), entered);

@@ -1,4 +1,4 @@
-// Supersegments as render.comp reads them: RenderSegment.
+// Supersegments as render.comp reads them: the words of RenderSegment.
 //
 // Needs: shared/render.h, exact.glsl.
 
@@ -13,6 +13,11 @@ uint packedPieceColor(vec3 straight) {
 // In units of pieceColorUnit; green stays where it is.
 const vec3 pieceColorUnit = 1.0 / (vec3(mostPieceColor) * vec3(1.0, 2048.0, 1.0));
 
-vec3 pieceColor(RenderSegment piece) {
-  return vec3(exactFloat(piece.color & 0x7ffu), exactFloat(piece.color & 0x3ff800u), exactFloat(piece.color >> 22));
+vec3 pieceColor(uvec4 piece) {
+  return vec3(exactFloat(piece.w & 0x7ffu), exactFloat(piece.w & 0x3ff800u), exactFloat(piece.w >> 22));
 }
+
+float pieceDensity(uvec4 piece) { return uintBitsToFloat(piece.z); }
+
+// Front and back.
+vec2 pieceDepths(uvec4 piece) { return uintBitsToFloat(piece.xy); }

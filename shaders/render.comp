@@ -21,7 +21,8 @@ layout(constant_id = 0) const bool smoothReconstruction = true;
 layout(constant_id = 1) const uint rayShares = 1;
 uint rayShare;
 
-const float opaque = 0.9999;
+// What is behind changes a pixel by less than a quarter of 1/255.
+const float opaque = 1.0 - 1.0 / 1024.0;
 
 #include "view.glsl"
 

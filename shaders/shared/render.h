@@ -65,6 +65,8 @@ VDI_SHARED_END
 
 #ifndef __cplusplus
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer RenderSegmentArray { RenderSegment at[]; };
+// RenderSegments as render.comp reads them: at once, for a driver may read the members of a struct one by one.
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer PieceArray { uvec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ListHeads { ListHead at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer TileQueueAddress { TileQueue at; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer MaskArray { uint64_t at[]; };
@@ -92,7 +94,7 @@ struct ExpandConstants {
 
 struct RenderParams {
   VDI_ADDRESS(ListHeads) heads;
-  VDI_ADDRESS(RenderSegmentArray) segments;  // compact array
+  VDI_ADDRESS(PieceArray) segments;  // compact array
   VDI_ADDRESS(MaskArray) tileMasks;
   VDI_ADDRESS(Vec4Array) colors;       // [height][width]
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
