@@ -1,6 +1,6 @@
 // What a part of a ray meets of a list.
 //
-// Needs: shared/render.h, pieces.glsl, line.glsl; params.
+// Needs: shared/render.h, pieces.glsl, line.glsl; params, opaque.
 
 bool rayAscends;  // it meets a list's supersegments in their order; else backwards
 // How long the ray is for a change of depth, where that says something; else the length of its whole stretch.
@@ -35,9 +35,48 @@ vec2 metDepths(uvec4 piece) {
   return rayAscends ? depths : -depths.yx;
 }
 
-// Between two fractions of the line; `list` has at least one supersegment. `hint`: where the last look at a neighbouring list
-// ended, counted as the ray meets them; lists are alike there.
-Look lookAtList(PictureLine line, uint list, vec2 fractions, float shortening, inout int hint) {
+// A part of a ray, as a list sees it.
+struct Part {
+  float low;  // depths
+  float high;
+  float slant;  // how much longer the ray is between two depths than the list's own
+};
+
+// Between two fractions of the line.
+Part partOf(PictureLine line, vec2 fractions, float shortening) {
+  Part part = Part(at(line.depths, fractions.x), at(line.depths, fractions.y), raySlant * shortening);
+  if (!changesDepth(line)) {
+    part.high = max(part.high, part.low + 1e-6 * params.farthest);
+    part.slant *= (fractions.y - fractions.x) / (part.high - part.low);
+  }
+  return part;
+}
+
+// What a ray has seen of a list so far.
+struct Seen {
+  vec3 light;  // in units of pieceColorUnit
+  float transmittance;
+  float entered;
+};
+
+const Seen nothingYet = Seen(vec3(0.0), 1.0, infinity);
+
+void meet(inout Seen seen, uvec4 piece, vec2 depths, Part part) {
+  float front = max(depths.x, part.low);
+  float met = min(depths.y, part.high) - front;
+  if (met > 0.0) {
+    seen.entered = min(seen.entered, front);
+    float behind = seen.transmittance * exp2(-met * part.slant * pieceDensity(piece));
+    seen.light += (seen.transmittance - behind) * pieceColor(piece);
+    seen.transmittance = behind;
+  }
+}
+
+Look lookOf(Seen seen) { return Look(vec4(seen.light * pieceColorUnit, 1.0 - seen.transmittance), seen.entered); }
+
+// `list` has at least one supersegment. `hint`: where the last look at a neighbouring list ended, counted as the ray meets
+// them; lists are alike there.
+Look lookAtList(uint list, Part part, inout int hint) {
   ListHead head = params.heads.at[list];
   PieceArray pieces = params.segments;
   int last = int(head.count) - 1;
@@ -45,47 +84,49 @@ Look lookAtList(PictureLine line, uint list, vec2 fractions, float shortening, i
   int step = rayAscends ? 1 : -1;
   uint slot = head.first + uint(rayAscends ? place : last - place);
   uvec4 piece = pieces.at[slot];
-
-  float low = at(line.depths, fractions.x);
-  float high = at(line.depths, fractions.y);
-  float slant = raySlant * shortening;  // how much longer the ray is between two depths than the list's own
-  if (!changesDepth(line)) {
-    high = max(high, low + 1e-6 * params.farthest);
-    slant *= (fractions.y - fractions.x) / (high - low);
-  }
   vec2 depths = metDepths(piece);
-  while (place > 0 && depths.x > low) {
+  while (place > 0 && depths.x > part.low) {
     --place;
     slot -= uint(step);
     piece = pieces.at[slot];
     depths = metDepths(piece);
   }
   // Not below, where each takes longer.
-  while (place < last && depths.y <= low) {
+  while (place < last && depths.y <= part.low) {
     ++place;
     slot += uint(step);
     piece = pieces.at[slot];
     depths = metDepths(piece);
   }
-
-  vec3 light = vec3(0.0);
-  float transmittance = 1.0;
-  float entered = infinity;
+  Seen seen = nothingYet;
   for (;;) {
-    float front = max(depths.x, low);
-    float met = min(depths.y, high) - front;
-    if (met > 0.0) {
-      entered = min(entered, front);
-      float behind = transmittance * exp2(-met * slant * pieceDensity(piece));
-      light += (transmittance - behind) * pieceColor(piece);
-      transmittance = behind;
-    }
-    if (depths.y >= high || place == last) break;
+    meet(seen, piece, depths, part);
+    if (depths.y >= part.high || place == last) break;
     ++place;
     slot += uint(step);
     piece = pieces.at[slot];
     depths = metDepths(piece);
   }
   hint = place;
-  return Look(vec4(light * pieceColorUnit, 1.0 - transmittance), entered);
+  return lookOf(seen);
+}
+
+// The same for a part that's most of a list: memory takes about as long for several supersegments as for one.
+Look lookThroughList(uint list, Part part) {
+  const int atOnce = 4;
+  ListHead head = params.heads.at[list];
+  PieceArray pieces = params.segments;
+  int last = int(head.count) - 1;
+  int step = rayAscends ? 1 : -1;
+  uint slot = head.first + uint(rayAscends ? 0 : last);
+  Seen seen = nothingYet;
+  for (int place = 0; place <= last && seen.transmittance > 1.0 - opaque; place += atOnce) {
+    uvec4 several[atOnce];
+    [[unroll]] for (int i = 0; i < atOnce; ++i) several[i] = pieces.at[slot + uint(min(i, last - place) * step)];
+    [[unroll]] for (int i = 0; i < atOnce; ++i) {
+      if (place + i <= last) meet(seen, several[i], metDepths(several[i]), part);
+    }
+    slot += uint(atOnce * step);
+  }
+  return lookOf(seen);
 }

@@ -27,14 +27,13 @@ Look lookAlongLists(PictureLine line, vec2 stretch) {
   float shareX = shareOfNext(place.x - first.x);
   float shareY = shareOfNext(place.y - first.y);
   Look sum = nothing;
-  for (uint i = rayShare; i < 4u; i += rayShares) {
+  [[dont_unroll]] for (uint i = rayShare; i < 4u; i += rayShares) {
     ivec2 side = ivec2(i & 1u, i >> 1);
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(first) + side, ivec2(0), params.lists - 1);
     uint list = listOf(true, pixel.x, pixel.y);
     if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, vec2(line.bins.x, at(line.bins, 1.0)))) continue;
-    int hint = 0;
-    Look look = lookAtList(line, list, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5), hint);
+    Look look = lookThroughList(list, partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5)));
     sum.light += weight * look.light;
     sum.entered = min(sum.entered, look.entered);
   }
@@ -125,7 +124,7 @@ Look lookAtSide(PictureLine line, Column here, float shortening, bool second, in
     split = clamp(split, fractions.x, fractions.y);
     fractions = second ? vec2(split, fractions.y) : vec2(fractions.x, split);
   }
-  Look look = lookAtList(line, second ? here.lists.y : here.lists.x, fractions, shortening, hint);
+  Look look = lookAtList(second ? here.lists.y : here.lists.x, partOf(line, fractions, shortening), hint);
   if (smoothReconstruction) look.light *= second ? here.share : 1.0 - here.share;
   return look;
 }
