@@ -92,10 +92,7 @@ vec4 classify(float position) {
   if (!(abs(position) <= 3.0e38)) return vec4(0.0);
   position = clamp(position, 0.0, last);
   uint below = min(uint(position), params.tableSize - 2u);
-  TableEntry a = params.table.at[below];
-  TableEntry b = params.table.at[below + 1u];
-  return mix(vec4(a.red, a.green, a.blue, a.extinction), vec4(b.red, b.green, b.blue, b.extinction),
-             position - float(below));
+  return mix(params.table.at[below], params.table.at[below + 1u], position - float(below));
 }
 
 // Texture coordinate of sample k; beyond the brick, the nearest one in it.

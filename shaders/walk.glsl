@@ -27,7 +27,7 @@ Look lookAlongLists(PictureLine line, vec2 stretch) {
   float shareX = shareOfNext(place.x - first.x);
   float shareY = shareOfNext(place.y - first.y);
   Look sum = nothing;
-  [[dont_unroll]] for (uint i = rayShare; i < 4u; i += rayShares) {
+  for (uint i = rayShare; i < 4u; i += rayShares) {
     ivec2 side = ivec2(i & 1u, i >> 1);
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(first) + side, ivec2(0), params.lists - 1);

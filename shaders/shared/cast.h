@@ -8,7 +8,9 @@
 #ifndef __cplusplus
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BrickArray { Brick at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer KdNodeArray { KdNode at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer TableArray { TableEntry at[]; };
+// TransferTableEntry of core/TransferFunction.h: straight red, green, blue, and extinction. Read at once, for a driver may read the
+// members of a struct one by one.
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer TableArray { vec4 at[]; };
 #endif
 
 VDI_SHARED_BEGIN

@@ -65,7 +65,7 @@ VDI_SHARED_END
 
 #ifndef __cplusplus
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer RenderSegmentArray { RenderSegment at[]; };
-// RenderSegments as render.comp reads them: at once, for a driver may read the members of a struct one by one.
+// RenderSegments as render.comp reads them: at once; TableArray in cast.h says why.
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer PieceArray { uvec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ListHeads { ListHead at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer TileQueueAddress { TileQueue at; };

@@ -44,14 +44,6 @@ struct KdNode {
   uint count;
 };
 
-// TransferTableEntry of core/TransferFunction.h.
-struct TableEntry {
-  float red;
-  float green;
-  float blue;
-  float extinction;
-};
-
 VDI_SHARED_END
 
 #endif
