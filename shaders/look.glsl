@@ -74,40 +74,39 @@ void meet(inout Seen seen, uvec4 piece, vec2 depths, Part part) {
 
 Look lookOf(Seen seen) { return Look(vec4(seen.light * pieceColorUnit, 1.0 - seen.transmittance), seen.entered); }
 
+// Where a look is in a list.
+struct Cursor {
+  int place;  // of a supersegment, counted as the ray meets them
+  uint slot;  // and in the compact array
+  uvec4 piece;
+  vec2 depths;  // as the ray meets it
+};
+
+Cursor cursorAt(int place, uint slot) {
+  uvec4 piece = params.segments.at[slot];
+  return Cursor(place, slot, piece, metDepths(piece));
+}
+
 // `list` has at least one supersegment. `hint`: where the last look at a neighbouring list ended, counted as the ray meets
 // them; lists are alike there.
 Look lookAtList(uint list, Part part, inout int hint) {
   ListHead head = params.heads.at[list];
-  PieceArray pieces = params.segments;
   int last = int(head.count) - 1;
   int place = min(hint, last);
   int step = rayAscends ? 1 : -1;
-  uint slot = head.first + uint(rayAscends ? place : last - place);
-  uvec4 piece = pieces.at[slot];
-  vec2 depths = metDepths(piece);
-  while (place > 0 && depths.x > part.low) {
-    --place;
-    slot -= uint(step);
-    piece = pieces.at[slot];
-    depths = metDepths(piece);
-  }
+  Cursor at = cursorAt(place, head.first + uint(rayAscends ? place : last - place));
+  while (at.place > 0 && at.depths.x > part.low) at = cursorAt(at.place - 1, at.slot - uint(step));
   // Not below, where each takes longer.
-  while (place < last && depths.y <= part.low) {
-    ++place;
-    slot += uint(step);
-    piece = pieces.at[slot];
-    depths = metDepths(piece);
-  }
+  while (at.place < last && at.depths.y <= part.low) at = cursorAt(at.place + 1, at.slot + uint(step));
   Seen seen = nothingYet;
   for (;;) {
-    meet(seen, piece, depths, part);
-    if (depths.y >= part.high || place == last) break;
-    ++place;
-    slot += uint(step);
-    piece = pieces.at[slot];
-    depths = metDepths(piece);
+    meet(seen, at.piece, at.depths, part);
+    bool isPast = at.depths.y >= part.high;
+    bool isLast = at.place == last;
+    if (isPast || isLast) break;  // of two names: || of expressions would branch twice
+    at = cursorAt(at.place + 1, at.slot + uint(step));
   }
-  hint = place;
+  hint = at.place;
   return lookOf(seen);
 }
 

@@ -28,7 +28,7 @@ void CompositePass::record(Commands& commands, const shared::CompositeParams& pa
   const std::uint32_t mode = write ? shared::compositeModeWrite : shared::compositeModeSearch;
   pipelines_.update(commands, params);
   commands.dispatch(pipelines_.with({program, 0, isCompact(params.form)}), shared::CompositeConstants{mode},
-                    (params.listCount + shared::compositeGroup - 1) / shared::compositeGroup);
+                    groupsFor(params.listCount, shared::compositeGroup));
 }
 
 }  // namespace vdi::gpu
