@@ -20,13 +20,8 @@ struct Counted {
 };
 
 Counted countedAt(uint x, uint y) {
-  uint at = (y * push.countedWidth + x) * push.shares;
-  Counted counted = Counted(push.countedTolerances.at[at], push.countedGrains.at[at]);
-  for (uint share = 1u; share < push.shares; ++share) {
-    Counted coarser = Counted(push.countedTolerances.at[at + share], push.countedGrains.at[at + share]);
-    if (coarser.tolerance < counted.tolerance) counted = coarser;  // none of the finer ones gives few enough
-  }
-  return counted;
+  uint at = y * push.countedWidth + x;
+  return Counted(push.countedTolerances.at[at], push.countedGrains.at[at]);
 }
 
 void consider(Counted counted) {

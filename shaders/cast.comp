@@ -3,15 +3,22 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_shuffle : require
 #include "shared/cast.h"
 
-layout(local_size_x = castGroupX, local_size_y = castGroupY) in;
+layout(local_size_x = castGroupX * castGroupY) in;
 // What the program is for; the others' code is left out.
 layout(constant_id = 0) const uint castProgram = castProgramSearch;
 layout(constant_id = 1) const uint pageCount = 1;
-// Invocations side by side that count the grains of one ray, each for its share of the tolerances: a GPU waits for the longest
-// of few rays.
-layout(constant_id = 4) const uint countShares = 1;
+// Invocations side by side that share a ray, where grains are counted: a GPU waits for the longest of few rays. Each takes its
+// share of the samples, and counts for its share of the tolerances.
+layout(constant_id = 4) const uint rayShares = 1;
+uint rayShare = 0u;
+// Constants, for what they take is live all along the ray: whether supersegments must end at gaps; and whether a list gets what it
+// needs (CastParams::level).
+layout(constant_id = 5) const bool cutAtGaps = false;
+layout(constant_id = 6) const bool byNeed = false;
 
 layout(set = 0, binding = 0) uniform sampler3D pages[castMaxPages];
 
@@ -21,8 +28,7 @@ layout(set = 0, binding = 1, scalar) uniform Params { CastParams params; };
 const bool volumeOnly = castProgram == castProgramVolume;
 const bool surveysGrains = castProgram == castProgramSurvey;
 const bool countsGrains = castProgram == castProgramCountGrains || surveysGrains;
-const bool writesByNeed = castProgram == castProgramWriteByNeed;
-const bool writesGrains = castProgram == castProgramWriteGrains || writesByNeed;
+const bool writesGrains = castProgram == castProgramWriteGrains;
 
 #include "lists.glsl"
 #include "grains.glsl"
@@ -30,39 +36,37 @@ const bool writesGrains = castProgram == castProgramWriteGrains || writesByNeed;
 vec4 accumulated;
 float firstDepth;
 
+#include "raycast.glsl"
+
 // What a sample is for: an interval of a list, or light of a pixel.
-void useSample(float front, float back, vec3 color, float opticalDepth) {
+void useSample(float front, float back, Sample it) {
   if (volumeOnly) {
-    float opacity = opacityOf(opticalDepth);
-    if (opacity > 0.0 && accumulated.a == 0.0) firstDepth = front;
-    accumulated += (1.0 - accumulated.a) * opacity * vec4(color, 1.0);
+    if (it.opacity > 0.0 && accumulated.a == 0.0) firstDepth = front;
+    accumulated += (1.0 - accumulated.a) * it.opacity * vec4(it.color, 1.0);
   } else if (countsGrains || writesGrains) {
-    float opacity = opacityOf(opticalDepth);
-    // Nearly all intervals are one sample long.
-    float part = back - front == params.step ? opacity : opacityOf(opticalDepth * params.step / (back - front));
-    grainsAdd(front, back, color * opacity, opacity, opticalDepth, vec4(color, 1.0) * part);
+    grainsAdd(front, back, it.color * it.opacity, it.opacity, it.opticalDepth, vec4(it.color, 1.0) * it.overStep);
   } else {
-    searchAdd(front, back, color * opacityOf(opticalDepth), opticalDepth);
+    searchAdd(front, back, it.color * it.opacity, it.opticalDepth);
   }
 }
-
-#include "raycast.glsl"
 
 void walk() { castRay(); }
 
 void main() {
-  uint x = gl_GlobalInvocationID.x;
-  uint y = gl_GlobalInvocationID.y + push.firstRow;
+  uvec2 at = gl_WorkGroupID.xy * uvec2(castGroupX, castGroupY) +
+             uvec2(gl_LocalInvocationIndex % castGroupX, gl_LocalInvocationIndex / castGroupX);
+  uint x = at.x;
+  uint y = at.y + push.firstRow;
   uint endRow = push.lastRow;
   listIndex = y * params.width + x;
   if (countsGrains) {
     uint stride = params.countedStride;
-    uint column = gl_GlobalInvocationID.x / countShares;
-    countShare = gl_GlobalInvocationID.x % countShares;
+    uint column = at.x / rayShares;
+    rayShare = at.x % rayShares;
     x = column * stride;
-    y = gl_GlobalInvocationID.y * stride + push.firstRow;
+    y = at.y * stride + push.firstRow;
     endRow = min(push.lastRow + stride - 1u, params.height);
-    listIndex = gl_GlobalInvocationID.y * params.countedWidth + column;
+    listIndex = at.y * params.countedWidth + column;
   }
   bool hasRay = x < params.width && y < endRow;
   if (!hasRay && !surveysGrains) return;

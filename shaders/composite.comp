@@ -8,12 +8,14 @@ layout(push_constant, scalar) uniform Push { CompositeConstants push; };
 layout(set = 0, binding = 1, scalar) uniform Params { CompositeParams params; };
 
 layout(constant_id = 0) const uint compositeProgram = compositeProgramSearch;
+layout(constant_id = 1) const bool byNeed = false;  // CompositeParams::level
 const bool surveysGrains = compositeProgram == compositeProgramSurvey;
 const bool countsGrains = compositeProgram == compositeProgramCountGrains || surveysGrains;
-const bool writesByNeed = compositeProgram == compositeProgramWriteByNeed;
-const bool writesGrains = compositeProgram == compositeProgramWriteGrains || writesByNeed;
+const bool writesGrains = compositeProgram == compositeProgramWriteGrains;
 
-const uint countShares = 1u;
+const uint rayShares = 1u;
+const uint rayShare = 0u;
+const bool cutAtGaps = false;  // a gap is a transparent sample
 
 #include "lists.glsl"
 #include "grains.glsl"

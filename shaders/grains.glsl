@@ -3,8 +3,11 @@
 // side in one walk; writing does one.
 //
 // Needs: optical.glsl, appearance.glsl; params with sensitivities, counts, offsets, grains, written, left, status,
-// survey; bool writesGrains, writesByNeed, uint countShares, constants; void walk(): feeds every interval of the list to grainsAdd, front to back; uint listIndex.
+// survey; bool writesGrains, cutAtGaps, byNeed, uint rayShares, constants; uint rayShare; void walk(): feeds every interval
+// of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_shuffle : require
 
 #include "grain.glsl"
 #include "tolerance.glsl"
@@ -17,13 +20,11 @@ uint grainsVisible;
 uint grainsAtOnce = 1u;  // samples that an interval stands for
 uint grainsRuns;
 bool grainsRunVisible;
-bool grainsCutAtGaps;
 float grainsPerStep;  // 1 / length of a sample
 
 // What's counted, side by side: one set of grains per tolerance, or, while writing by need, at the two levels of the survey
 // that the list's number of supersegments is interpolated from.
-const int countedLevels = writesByNeed ? 2 : writesGrains ? 0 : toleranceLevels / int(countShares);
-uint countShare = 0u;  // 0 .. countShares - 1: which of the tolerances
+const int countedLevels = !writesGrains ? toleranceLevels / int(rayShares) : byNeed ? 2 : 0;
 vec4 countedFirst[toleranceLevels];
 float countedDeviation[toleranceLevels];
 uint countedGrains[toleranceLevels];
@@ -64,14 +65,14 @@ void adaptTolerance() {
 
 // Nothing but a run's start may open a grain once the room for them is used up. With cuts at gaps it isn't, unless
 // the program that counted rounded otherwise.
-bool roomForGrain() { return grainCut || grainsBegun < grainRoom; }
+bool roomForGrain() { return (cutAtGaps && grainCut) || grainsBegun < grainRoom; }
 
 void beginGrain(float front, vec4 x) {
   closeGrain();
   ++grainsBegun;
   grainFirst = x;
   grainDeviation = 0.0;
-  grainStartsRun = grainsCutAtGaps && grainCut;
+  grainStartsRun = cutAtGaps && grainCut;
   grainSpan.x = front;
   beforeGrain = grainsBefore;
   grainLight = vec4(0.0);
@@ -92,7 +93,7 @@ void deviate(vec4 x, float weightedLength) {
   float tolerance = finestCounted;
   uint beyond = 0u;
   [[unroll]] for (int level = 0; level < countedLevels; ++level) {
-    if (writesByNeed) tolerance = level == 0 ? needTolerances.x : needTolerances.y;
+    if (writesGrains) tolerance = level == 0 ? needTolerances.x : needTolerances.y;
     countedDeviation[level] += weightedLength * differenceOf(x, countedFirst[level]);
     if (countedDeviation[level] > tolerance) beyond |= 1u << level;
     tolerance *= toleranceRatio;
@@ -106,7 +107,7 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
   float reach = grainsReach;
   grainsReach = back;
   if (gap) grainsRunVisible = false;
-  if (gap && grainsCutAtGaps) {
+  if (gap && cutAtGaps) {
     if (writesGrains) closeGrain();
     countedOpen = 0u;
     grainCut = true;
@@ -114,7 +115,7 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
   bool visible = opticalDepth > 0.0;
   if (!visible && !grainOpen && countedOpen == 0u) return;
   float weight = weightBehind(grainsBefore) * grainsPerStep;
-  if (gap && !grainsCutAtGaps) deviate(vec4(0.0), weight * (front - reach));
+  if (gap && !cutAtGaps) deviate(vec4(0.0), weight * (front - reach));
   deviate(x, weight * (back - front));
   bool deviates = grainDeviation > grainTolerance;
   if (!visible) {
@@ -140,7 +141,6 @@ void grainsAdd(float front, float back, vec3 color, float opacity, float optical
 }
 
 void walkForGrains() {
-  grainsCutAtGaps = params.cutAtGaps != 0u;
   grainsBefore = 1.0;
   grainsPerStep = 1.0 / params.step;
   grainsReach = 0.0;
@@ -149,7 +149,7 @@ void walkForGrains() {
   grainsRunVisible = false;
   countedOpen = 0u;
   finestCounted = finestTolerance;
-  for (uint level = 0u; level < countShare * uint(countedLevels); ++level) finestCounted *= toleranceRatio;
+  for (uint level = 0u; level < rayShare * uint(countedLevels); ++level) finestCounted *= toleranceRatio;
   [[unroll]] for (int level = 0; level < toleranceLevels; ++level) {
     countedFirst[level] = vec4(0.0);
     countedDeviation[level] = 0.0;
@@ -173,15 +173,22 @@ uint interpolatedCount(uint countBelow, uint countAbove, float rounding) {
   return max(uint(float(countBelow) + share * (float(countAbove) - float(countBelow)) + rounding), 1u);
 }
 
-// What the list would hold at a level of the survey, if anything. Twin of supersegmentsAtLevel.
+// What the list would hold at a level of the survey, if anything; for all invocations that share the ray. Twin of
+// supersegmentsAtLevel.
 uint supersegmentsAtLevel(uint level) {
   uint count = level == 0u ? grainsVisible : 1u;
-  [[unroll]] for (int i = 0; i < toleranceLevels; ++i) count = level == uint(i) + 1u ? countedGrains[i] : count;
+  uint tolerance = clamp(level, 1u, uint(toleranceLevels)) - 1u;
+  uint share = tolerance * rayShares / uint(toleranceLevels);
+  uint from = gl_SubgroupInvocationID - rayShare + share;
+  [[unroll]] for (int i = 0; i < countedLevels; ++i) {
+    uint counted = rayShares == 1u ? countedGrains[i] : subgroupShuffle(countedGrains[i], from);
+    if (level == 1u + share * uint(countedLevels) + uint(i)) count = counted;
+  }
   return min(count, params.mostPerList);
 }
 
 uint budgetOfList() {
-  if (params.level < 0.0) return params.budget;
+  if (!byNeed) return params.budget;
   return interpolatedCount(supersegmentsAtLevel(levelBelow()), supersegmentsAtLevel(levelBelow() + 1u), 0.5);
 }
 
@@ -191,7 +198,7 @@ struct CountedGrains {
 };
 
 CountedGrains grainsFor(uint budget) {
-  uint runs = grainsCutAtGaps ? grainsRuns : min(grainsRuns, 1u);
+  uint runs = cutAtGaps ? grainsRuns : min(grainsRuns, 1u);
   uint count = grainsVisible;
   float tolerance = -1.0;
   if (count > max(budget, runs)) {
@@ -210,12 +217,21 @@ CountedGrains grainsFor(uint budget) {
   return CountedGrains(tolerance, count);
 }
 
+// A share's own is coarser where none of its tolerances gives few enough.
+CountedGrains finestOfShares(CountedGrains own) {
+  for (uint step = 1u; step < rayShares; step *= 2u) {
+    CountedGrains other = CountedGrains(subgroupShuffleXor(own.tolerance, step), subgroupShuffleXor(own.count, step));
+    if (other.tolerance < own.tolerance) own = other;
+  }
+  return own;
+}
+
 void countGrains() {
   walkForGrains();
-  CountedGrains counted = grainsFor(budgetOfList());
-  uint place = listIndex * countShares + countShare;
-  params.sensitivities.at[place] = counted.tolerance;
-  params.counts.at[place] = counted.count;
+  CountedGrains counted = finestOfShares(grainsFor(budgetOfList()));
+  if (rayShare != 0u) return;
+  params.sensitivities.at[listIndex] = counted.tolerance;
+  params.counts.at[listIndex] = counted.count;
 }
 
 // Of a level of the survey.
@@ -234,13 +250,13 @@ void writeGrains() {
   grainBase = params.offsets.at[listIndex];
   grainAllotted = params.sensitivities.at[listIndex];
   grainTolerance = grainAllotted;
-  if (writesByNeed) needTolerances = vec2(toleranceOfLevel(levelBelow()), toleranceOfLevel(levelBelow() + 1u));
+  if (byNeed) needTolerances = vec2(toleranceOfLevel(levelBelow()), toleranceOfLevel(levelBelow() + 1u));
   walkForGrains();
   closeGrain();
   uint written = min(grainsBegun, grainRoom);
   if (written != grainsBegun) atomicAdd(params.status.at[0], 1u);
-  uint most = max(params.budget, grainsCutAtGaps ? grainsRuns : 1u);
-  if (writesByNeed) {
+  uint most = max(params.budget, cutAtGaps ? grainsRuns : 1u);
+  if (byNeed) {
     most = interpolatedCount(min(countedGrains[0], params.mostPerList),
                              min(countedGrains[1], params.mostPerList), roundingOf(listIndex));
   }
@@ -259,8 +275,12 @@ void surveyGrains(bool hasList) {
   if (hasList) {
     walkForGrains();
     if (grainsVisible > 0u) {
-      for (uint level = 0u; level < surveyLevels; ++level) atomicAdd(surveyed[level], supersegmentsAtLevel(level));
-      atomicAdd(surveyed[surveyLevels], min(grainsFor(params.budget).count, params.budget));
+      for (uint level = 0u; level < surveyLevels; ++level) {
+        uint count = supersegmentsAtLevel(level);
+        if (rayShare == 0u) atomicAdd(surveyed[level], count);
+      }
+      uint equally = min(finestOfShares(grainsFor(params.budget)).count, params.budget);
+      if (rayShare == 0u) atomicAdd(surveyed[surveyLevels], equally);
     }
   }
   barrier();

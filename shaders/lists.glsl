@@ -24,7 +24,6 @@ void emitSegment(Material m) {
 
 void searchOrWriteList(bool write) {
   segmenterStep = params.step;
-  segmenterCutAtGaps = params.cutAtGaps != 0u;
   if (write && params.counts.at[listIndex] == 0u) return;
   beginStoring();
   float known = write ? params.sensitivities.at[listIndex] : 0.0;

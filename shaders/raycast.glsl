@@ -1,7 +1,6 @@
 // One ray through the kd-tree of bricks, front to back, sample by sample.
 //
-// Needs: shared/cast.h, params, pages, pageCount; void useSample(float front, float back, vec3 color, float
-// opticalDepth), colour straight.
+// Needs: shared/cast.h, optical.glsl; params, pages, pageCount, rayShares, rayShare; useSample (below).
 
 vec3 rayStart;
 vec3 rayDirection;
@@ -105,6 +104,14 @@ float tablePosition(Brick brick, uint k) {
   return (texel(brick.page, coordinateOf(brick, k)) - brick.tableOrigin) * brick.tableScale;
 }
 
+vec3 placeAmongCells(Brick brick, uint k) { return max(coordinateOf(brick, k) * brick.cellScale + brick.cellOffset, vec3(0.0)); }
+
+uvec3 cellAround(Brick brick, vec3 place) { return min(uvec3(place), brick.cellDims - 1u); }
+
+bool showsAnything(Brick brick, uvec3 cell) {
+  return params.cells.at[brick.firstCell + (cell.z * brick.cellDims.y + cell.y) * brick.cellDims.x + cell.x] != 0u;
+}
+
 // The macrocell that sample k lies in: whether anything in it is visible, and the first sample behind it.
 struct CellStretch {
   bool visible;
@@ -112,14 +119,13 @@ struct CellStretch {
 };
 
 CellStretch cellAt(Brick brick, uint k, vec3 cellsPerSample) {
-  vec3 place = max(coordinateOf(brick, k) * brick.cellScale + brick.cellOffset, vec3(0.0));
-  uvec3 cell = min(uvec3(place), brick.cellDims - 1u);
+  vec3 place = placeAmongCells(brick, k);
+  uvec3 cell = cellAround(brick, place);
   vec3 corner = vec3(cell) + vec3(greaterThan(cellsPerSample, vec3(0.0)));
   vec3 samples = mix(abs((corner - place) / cellsPerSample), vec3(1.0e6), equal(cellsPerSample, vec3(0.0)));
   // Rounding may take a sample for one of the cell before; cells know a texel more than they hold.
   float ahead = min(min(samples.x, samples.y), min(samples.z, 1.0e6));
-  uint index = brick.firstCell + (cell.z * brick.cellDims.y + cell.y) * brick.cellDims.x + cell.x;
-  return CellStretch(params.cells.at[index] != 0u, k + max(1u, uint(ahead + 0.95)));
+  return CellStretch(showsAnything(brick, cell), k + max(1u, uint(ahead + 0.95)));
 }
 
 float frontOf(uint k) { return k == rayScene.x ? rayEnter : params.first + float(k) * params.step; }
@@ -127,17 +133,44 @@ float backOf(uint k) {
   return k + 1u == rayScene.y ? rayLeave : params.first + float(k + 1u) * params.step;
 }
 
+// What an interval of a ray comes down to.
+struct Sample {
+  vec3 color;  // straight
+  float opticalDepth;
+  float opacity;
+  float overStep;  // opacity of as much of it as is one step long
+};
+
+const Sample transparentSample = Sample(vec3(0.0), 0.0, 0.0, 0.0);
+
+Sample sampleOf(vec4 entry, float length) {
+  float opticalDepth = min(entry.a * rayUnitsPerDepth * length, maxOpticalDepth);
+  float opacity = opacityOf(opticalDepth);
+  // Nearly all intervals are one sample long.
+  float overStep = length == params.step ? opacity : opacityOf(opticalDepth * params.step / length);
+  return Sample(entry.rgb, opticalDepth, opacity, overStep);
+}
+
+// What a ray is for, interval by interval; they leave no gaps within a brick.
+void useSample(float front, float back, Sample it);
+
 // Texels that are asked for at a time, and then entries of the table: waiting for one takes a GPU as long as waiting for all.
 layout(constant_id = 3) const uint samplesAhead = 1;
 
 // How many samples are used as one: more while grains are counted (CastParams::countedSamples).
 uint samplesAtOnce;
 
+// Of what samples `first` to `last` stand for.
+vec2 spanOf(uint first, uint last) { return vec2(frontOf(first), backOf(min(last + samplesAtOnce, rayScene.y) - 1u)); }
+
+// The first of those that are used, from k on.
+uint usedFrom(uint k) { return (k + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce; }
+
 // Samples [emptyBegin, begin) as one transparent one, if there are any, which is the same to whoever uses them; then
 // [begin, end), where samplesAtOnce isn't 1 those that are multiples of it. Returns false once the ray is opaque enough.
 bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
-  uint emptyFirst = (emptyBegin + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce;
-  uint first = (begin + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce;
+  uint emptyFirst = usedFrom(emptyBegin);
+  uint first = usedFrom(begin);
   bool empty = emptyFirst < first;
   for (uint batch = empty ? first - samplesAtOnce : first; batch < end; batch += samplesAhead * samplesAtOnce) {
     float positions[samplesAhead];
@@ -149,11 +182,10 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
       if (samplesAhead == 1u || k < end) {
         bool here = i == 0u && empty;
         vec4 entry = here ? vec4(0.0) : entries[i];
-        float front = frontOf(here ? emptyFirst : k);
-        float back = backOf(min(k + samplesAtOnce, rayScene.y) - 1u);
-        float opticalDepth = min(entry.a * rayUnitsPerDepth * (back - front), maxOpticalDepth);
-        useSample(front, back, entry.rgb, opticalDepth);
-        rayOpticalDepth += opticalDepth;
+        vec2 span = spanOf(here ? emptyFirst : k, k);
+        Sample it = sampleOf(entry, span.y - span.x);
+        useSample(span.x, span.y, it);
+        rayOpticalDepth += it.opticalDepth;
         if (rayOpticalDepth >= params.enough) return false;
       }
     }
@@ -164,9 +196,13 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
 
 const uint shortGap = 32u;  // samples
 
+#include "raycast_shares.glsl"
+
+// Returns false once the ray is opaque enough.
 bool castBrick(uint index) {
   Brick brick = params.bricks.at[index];
   uvec2 range = samplesIn(brick.lo, brick.hi);
+  if (rayShares > 1u) return castShares(brick, range.x, range.y);
   vec3 cellsPerSample = rayDirection * params.step * brick.texelScale * brick.cellScale;
   uint k = range.x;
   while (k < range.y) {

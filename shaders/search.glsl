@@ -65,7 +65,7 @@ SearchResult searchList(bool write, float known, uint budget, bool runsOnly) {
     uint count = searchTry(sensitivity);
     if (write || runsOnly) return SearchResult(sensitivity, count);
     if (i == 0) {
-      most = segmenterCutAtGaps ? max(budget, search.runs) : budget;
+      most = cutAtGaps ? max(budget, search.runs) : budget;
       if (search.visible <= most) return SearchResult(-1.0, search.visible);
       if (count <= most) return SearchResult(sensitivity, count);
       sensitivity = largestSensitivity;

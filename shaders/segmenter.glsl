@@ -1,7 +1,7 @@
 // How intervals become supersegments, for one sensitivity: the exchangeable piece. The algorithm is
 // segmentWithSensitivity of vdi/reference/Segmenter.cpp, as a state machine that's fed interval by interval.
 //
-// Needs: optical.glsl, appearance.glsl, store.glsl; void emitSegment(Material m).
+// Needs: optical.glsl, appearance.glsl, store.glsl; bool cutAtGaps, constant; void emitSegment(Material m).
 
 struct SegmenterState {
   float sensitivity;
@@ -15,7 +15,6 @@ struct SegmenterState {
 
 SegmenterState segmenter;
 float segmenterStep;      // depth that both sides of Eq. 1 are normalised to
-bool segmenterCutAtGaps;
 
 void segmenterBegin(float sensitivity) {
   segmenter.sensitivity = sensitivity;
@@ -42,7 +41,7 @@ void segmenterAdd(float front, float back, vec3 color, float opticalDepth) {
     vec4 mine = appearanceOf(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front, segmenterStep);
     if (front > segmenter.reach) {
       // The gap is a transparent sample.
-      if (segmenterCutAtGaps || length(mine) > segmenter.sensitivity) {
+      if (cutAtGaps || length(mine) > segmenter.sensitivity) {
         segmenterClose();
       } else {
         segmenter.reach = front;

@@ -13,7 +13,7 @@ const uint allotGroup = 64;
 
 // A band of lists, of which every stride-th in a row of every stride-th row is counted.
 struct AllotConstants {
-  VDI_ADDRESS(FloatArray) countedTolerances;  // [countedRows][countedWidth][shares]: the finest that gives few enough grains
+  VDI_ADDRESS(FloatArray) countedTolerances;  // [countedRows][countedWidth]: the finest that gives few enough grains
   VDI_ADDRESS(UintArray) countedGrains;       // likewise: these
   VDI_ADDRESS(FloatArray) tolerances;         // [rows][width]
   VDI_ADDRESS(UintArray) rooms;               // likewise
@@ -22,7 +22,6 @@ struct AllotConstants {
   uint countedWidth;
   uint countedRows;
   uint strideShift;  // log2 of the stride
-  uint shares;  // of the tolerances, counted by themselves, from fine to coarse; 1 if the stride is, or budgets aren't equal
 };
 
 VDI_SHARED_END

@@ -24,7 +24,6 @@ inline constexpr uint castProgramSearch = 1;
 inline constexpr uint castProgramCountGrains = 2;
 inline constexpr uint castProgramWriteGrains = 3;
 inline constexpr uint castProgramSurvey = 4;
-inline constexpr uint castProgramWriteByNeed = 5;
 inline constexpr uint castModeSearch = 0;
 inline constexpr uint castModeWrite = 1;
 #else
@@ -36,7 +35,6 @@ const uint castProgramSearch = 1;       // by bisection: one program that does b
 const uint castProgramCountGrains = 2;  // by merging: tolerances and counts
 const uint castProgramWriteGrains = 3;
 const uint castProgramSurvey = 4;       // for the total budget: what lists need
-const uint castProgramWriteByNeed = 5;  // and the writing of their grains
 const uint castModeSearch = 0;  // sensitivities and counts
 const uint castModeWrite = 1;   // supersegments
 #endif
@@ -77,7 +75,6 @@ struct CastParams {
   uint budget;
   uint width;
   uint height;
-  uint cutAtGaps;
   uint runsOnly;
   uint nodeCount;  // 0: no bricks
   StoredForm form;  // of segments

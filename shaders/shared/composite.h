@@ -13,7 +13,6 @@ inline constexpr uint compositeProgramSearch = 0;
 inline constexpr uint compositeProgramCountGrains = 1;
 inline constexpr uint compositeProgramWriteGrains = 2;
 inline constexpr uint compositeProgramSurvey = 3;
-inline constexpr uint compositeProgramWriteByNeed = 4;
 inline constexpr uint compositeModeSearch = 0;
 inline constexpr uint compositeModeWrite = 1;
 #else
@@ -24,7 +23,6 @@ const uint compositeProgramSearch = 0;  // as castProgramSearch and so on
 const uint compositeProgramCountGrains = 1;
 const uint compositeProgramWriteGrains = 2;
 const uint compositeProgramSurvey = 3;
-const uint compositeProgramWriteByNeed = 4;
 const uint compositeModeSearch = 0;
 const uint compositeModeWrite = 1;
 #endif
@@ -61,13 +59,11 @@ struct CompositeParams {
   VDI_ADDRESS(UintArray) survey;
   float step;  // of the sample lattice
   uint budget;
-  uint cutAtGaps;  // 0: a gap is a transparent sample
-  uint runsOnly;   // 0
+  uint runsOnly;  // 0
   uint listCount;
   uint mostPerList;
   float level;  // as in CastParams
   StoredForm form;  // of merged and segments
-  uint pad;
 };
 
 struct CompositeConstants {

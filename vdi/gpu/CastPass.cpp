@@ -22,6 +22,16 @@ ComputePipelineInfo pipelineInfo() {
   return info;
 }
 
+ComputePipelineInfo sharingPipelineInfo() {
+  ComputePipelineInfo info = pipelineInfo();
+  info.wholeSubgroups = true;
+  return info;
+}
+
+/// One for each tolerance; a power of 2.
+constexpr std::uint32_t mostRayShares = 8;
+static_assert(shared::castGroupX % mostRayShares == 0);
+
 }  // namespace
 
 shared::CastParams castGeometry(const Scene& scene, const View& view, const DepthLattice& lattice) {
@@ -54,17 +64,21 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
   return params;
 }
 
-CastPass::CastPass(std::shared_ptr<Device> device)
+CastPass::CastPass(const std::shared_ptr<Device>& device)
     : samplesAhead_(device->runsGpuPrograms() ? 4 : 1),
+      rayShares_(device->runsGpuPrograms() ? std::clamp(device->limits().subgroupSize, 1U, mostRayShares)
+                                           : 1),
       sampler_(device),
-      pipelines_(std::move(device), pipelineInfo()) {}
+      pipelines_(device, pipelineInfo()),
+      sharingPipelines_(pipelines_, sharingPipelineInfo()) {}
 
-ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t compact,
-                                       std::uint32_t countShares) {
+ComputePipeline& CastPass::pipelineFor(const Program& program) {
   const std::size_t pageCount = volume_->pages().size();
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
+  PipelineSet& pipelines = program.rayShares > 1 ? sharingPipelines_ : pipelines_;
   ComputePipeline& pipeline =
-      pipelines_.with({program, static_cast<std::uint32_t>(pageCount), compact, samplesAhead_, countShares});
+      pipelines.with({program.program, static_cast<std::uint32_t>(pageCount), program.compact, samplesAhead_,
+                      program.rayShares, program.cutAtGaps ? 1U : 0U, program.byNeed ? 1U : 0U});
   std::uint64_t& bound = boundVersions_[&pipeline];
   if (bound != volume_->pagesVersion()) {
     std::array<const Image3D*, shared::castMaxPages> images{};
@@ -78,10 +92,9 @@ ComputePipeline& CastPass::pipelineFor(std::uint32_t program, std::uint32_t comp
 void CastPass::record(Commands& commands, const shared::CastParams& params, Work work, Algorithm algorithm,
                       const Band& band) {
   assert(volume_ != nullptr && band.firstRow < band.lastRow);
-  const bool writes = work == Work::Write || work == Work::WriteByNeed;
+  const bool writes = work == Work::Write;
   const std::uint32_t program = work == Work::Volume                ? shared::castProgramVolume
                                 : work == Work::Survey              ? shared::castProgramSurvey
-                                : work == Work::WriteByNeed         ? shared::castProgramWriteByNeed
                                 : algorithm == Algorithm::Bisection ? shared::castProgramSearch
                                 : writes                            ? shared::castProgramWriteGrains
                                                                     : shared::castProgramCountGrains;
@@ -93,11 +106,11 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   const std::uint32_t stride = counts ? band.countedStride : 1;
   // The row behind the band is counted too.
   const std::uint32_t rows = (band.lastRow - band.firstRow + stride - 1) / stride + (stride > 1 ? 1 : 0);
-  const std::uint32_t shares = program == shared::castProgramCountGrains ? band.countShares : 1;
+  const std::uint32_t shares = stride > 1 ? rayShares_ : 1;
   const std::uint32_t width = (band.width + stride - 1) / stride * shares;
   pipelines_.update(commands, params);
-  commands.dispatch(pipelineFor(program, compact, shares), constants, groupsFor(width, shared::castGroupX),
-                    groupsFor(rows, shared::castGroupY));
+  commands.dispatch(pipelineFor({program, compact, shares, band.cutAtGaps, params.level >= 0.0F}), constants,
+                    groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
 }
 
 }  // namespace vdi::gpu

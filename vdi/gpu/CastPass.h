@@ -27,22 +27,21 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
 
 class CastPass {
  public:
-  explicit CastPass(std::shared_ptr<Device> device);
+  explicit CastPass(const std::shared_ptr<Device>& device);
 
   /// What later dispatches read; kept by reference, it must have pages. Pipelines are made when they're first
   /// recorded.
   void bind(const VolumeStore& volume) { volume_ = &volume; }
 
   /// What a dispatch does: the picture; or what lists need (merging); or the first step of an algorithm
-  /// (sensitivities or tolerances, and counts), or its second one (supersegments or grains; by
-  /// need, with Budget::Total).
-  enum class Work { Volume, Survey, Search, Write, WriteByNeed };
+  /// (sensitivities or tolerances, and counts), or its second one (supersegments or grains).
+  enum class Work { Volume, Survey, Search, Write };
   struct Band {
     std::uint32_t width = 0;
     std::uint32_t firstRow = 0;
     std::uint32_t lastRow = 0;        // exclusive
     std::uint32_t countedStride = 1;  // as in CastParams
-    std::uint32_t countShares = 1;    // of the tolerances that Search counts, see AllotConstants
+    bool cutAtGaps = false;           // supersegments end there
     shared::StoredForm form{};        // as in CastParams
   };
   /// No dispatch of this pass may be in flight.
@@ -50,11 +49,21 @@ class CastPass {
               const Band& band);
 
  private:
-  ComputePipeline& pipelineFor(std::uint32_t program, std::uint32_t compact, std::uint32_t countShares);
+  /// What specialises cast.comp, besides the number of pages.
+  struct Program {
+    std::uint32_t program = 0;  // shared::castProgram...
+    std::uint32_t compact = 0;
+    std::uint32_t rayShares = 1;
+    bool cutAtGaps = false;
+    bool byNeed = false;
+  };
+  ComputePipeline& pipelineFor(const Program& program);
 
   std::uint32_t samplesAhead_;
+  std::uint32_t rayShares_;  // where few rays are cast
   Sampler sampler_;
-  PipelineSet pipelines_;  // by shared::castProgram..., page count, precision and shares
+  PipelineSet pipelines_;
+  PipelineSet sharingPipelines_;
   std::map<const ComputePipeline*, std::uint64_t> boundVersions_;  // of the pages that they're bound to
   const VolumeStore* volume_ = nullptr;
 };

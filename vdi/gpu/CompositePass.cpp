@@ -19,16 +19,15 @@ CompositePass::CompositePass(std::shared_ptr<Device> device)
 
 void CompositePass::record(Commands& commands, const shared::CompositeParams& params, Work work,
                            Algorithm algorithm) {
-  const bool write = work == Work::Write || work == Work::WriteByNeed;
+  const bool write = work == Work::Write;
   const std::uint32_t program = work == Work::Survey                ? shared::compositeProgramSurvey
-                                : work == Work::WriteByNeed         ? shared::compositeProgramWriteByNeed
                                 : algorithm == Algorithm::Bisection ? shared::compositeProgramSearch
                                 : write                             ? shared::compositeProgramWriteGrains
                                                                     : shared::compositeProgramCountGrains;
   const std::uint32_t mode = write ? shared::compositeModeWrite : shared::compositeModeSearch;
   pipelines_.update(commands, params);
-  commands.dispatch(pipelines_.with({program, 0, isCompact(params.form)}), shared::CompositeConstants{mode},
-                    groupsFor(params.listCount, shared::compositeGroup));
+  commands.dispatch(pipelines_.with({program, params.level >= 0.0F ? 1U : 0U, isCompact(params.form)}),
+                    shared::CompositeConstants{mode}, groupsFor(params.listCount, shared::compositeGroup));
 }
 
 }  // namespace vdi::gpu

@@ -15,8 +15,8 @@ class CompositePass {
  public:
   explicit CompositePass(std::shared_ptr<Device> device);
   /// What a dispatch does: what lists need (merging); or the first step of the algorithm, or, after a scan,
-  /// its second one (by need, with Budget::Total).
-  enum class Work { Survey, Search, Write, WriteByNeed };
+  /// its second one.
+  enum class Work { Survey, Search, Write };
   void record(Commands& commands, const shared::CompositeParams& params, Work work, Algorithm algorithm);
 
  private:

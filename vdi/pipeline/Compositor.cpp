@@ -144,11 +144,7 @@ void Compositor::compositeBand(const Band& band, ListsOf<Segment>& result) {
     settings_.left = targets.left;
     settings_.status = targets.status;
     using Work = gpu::CompositePass::Work;
-    compositePass_.record(commands, settings_,
-                          !write                   ? Work::Search
-                          : settings_.level < 0.0F ? Work::Write
-                                                   : Work::WriteByNeed,
-                          request_.algorithm);
+    compositePass_.record(commands, settings_, write ? Work::Write : Work::Search, request_.algorithm);
   };
   ListBuilder::Request build;
   build.width = band.listCount();

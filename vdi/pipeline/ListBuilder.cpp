@@ -125,8 +125,8 @@ template <typename Segment>
 void ListBuilder::buildByMerging(const Request& request, const Record& record, ListsOf<Segment>& result) {
   const std::uint32_t lists = request.listCount();
   const std::uint64_t words = (std::uint64_t{lists} + 1) * sizeof(std::uint32_t);
-  const std::uint64_t countedWords = std::uint64_t{request.countedWidth()} * request.countedRows() *
-                                     request.countShares * sizeof(std::uint32_t);
+  const std::uint64_t countedWords =
+      std::uint64_t{request.countedWidth()} * request.countedRows() * sizeof(std::uint32_t);
   grainOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
   written_.reserve(device_, words, MemoryKind::DeviceLocal);
   countedTolerances_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
@@ -140,11 +140,10 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
   commands_.mark("search");
   record(commands_, targets, false);
   commands_.barrier();
-  allot_.record(
-      commands_,
-      {countedTolerances_.address(), countedGrains_.address(), sensitivities_.address(), counts_.address(),
-       request.width, request.rows, request.countedWidth(), request.countedRows(),
-       static_cast<std::uint32_t>(std::countr_zero(request.countedStride)), request.countShares});
+  allot_.record(commands_,
+                {countedTolerances_.address(), countedGrains_.address(), sensitivities_.address(),
+                 counts_.address(), request.width, request.rows, request.countedWidth(),
+                 request.countedRows(), static_cast<std::uint32_t>(std::countr_zero(request.countedStride))});
   const std::uint64_t grainTotal = scanAndTotal(lists, counts_, grainOffsets_);
 
   grains_.reserve(device_, grainTotal * sizeof(shared::StoredGrain), MemoryKind::DeviceLocal);

@@ -65,7 +65,6 @@ class ListBuilder {
     std::uint32_t rows = 0;
     bool rowBehind = false;           // another row follows the band's last one
     std::uint32_t countedStride = 1;  // merge: `rows` is a multiple of it, or nothing follows
-    std::uint32_t countShares = 1;    // see AllotConstants
     Algorithm algorithm = Algorithm::Merge;
     gpu::ReducePass::MostPerList most;
     double sampleStep = 1.0;

@@ -32,7 +32,6 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.budget = request.settings.supersegments;
   params.mostPerList = mostPerList(request.settings.supersegments, request.settings.budget);
   params.level = -1.0F;
-  params.cutAtGaps = request.cutAtGaps ? 1U : 0U;
   params.runsOnly = request.runsOnly ? 1U : 0U;
   params.form = storedForm(request.code);
   if (!volume_.empty()) pass_.bind(volume_);
@@ -58,7 +57,7 @@ float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) 
   const Survey survey = survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
     params.survey = address;
     pass_.record(commands, params, gpu::CastPass::Work::Survey, Algorithm::Merge,
-                 {width, 0, height, params.countedStride, 1, params.form});
+                 {width, 0, height, params.countedStride, false, params.form});
   });
   const double milliseconds = commands_.stageTimes().front().milliseconds;
   times_ += {milliseconds, milliseconds, 0.0};
@@ -83,10 +82,6 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
   const std::uint32_t band = rowsPerBand(request, ListBuilder::bytesPerList(params.mostPerList, algorithm));
   // With cuts at gaps each list's runs must be counted.
   const std::uint32_t stride = request.cutAtGaps ? 1 : shared::countedStride;
-  // The few that are counted otherwise don't keep a GPU busy. What a list needs of a total budget depends on
-  // all tolerances, so they stay together there.
-  const bool split = stride > 1 && request.settings.budget == Budget::List && device_->runsGpuPrograms();
-  const std::uint32_t countShares = split ? 2 : 1;
   params.countedStride = stride;
   params.countedSamples =
       stride > 1 ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments) : 1;
@@ -102,7 +97,6 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
     build.rows = end - row;
     build.rowBehind = end < height;
     build.countedStride = stride;
-    build.countShares = countShares;
     build.algorithm = algorithm;
     build.most = {params.mostPerList, !request.cutAtGaps};
     build.sampleStep = request.lattice.step;
@@ -124,11 +118,8 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
         params.counts = targets.counts;
       }
       using Work = gpu::CastPass::Work;
-      pass_.record(commands, params,
-                   !write                ? Work::Search
-                   : params.level < 0.0F ? Work::Write
-                                         : Work::WriteByNeed,
-                   algorithm, {width, row, end, stride, countShares, params.form});
+      pass_.record(commands, params, write ? Work::Write : Work::Search, algorithm,
+                   {width, row, end, stride, request.cutAtGaps, params.form});
     };
     builder_.build(build, record, result);
     times_ += builder_.times();
