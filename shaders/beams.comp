@@ -8,6 +8,7 @@
 layout(local_size_x = renderBeamGroup) in;
 // Else as they come: a CPU doesn't wait, but has its caches.
 layout(constant_id = 0) const bool mostFirst = true;
+layout(push_constant, scalar) uniform Push { RenderRays rays; };
 layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 #include "view.glsl"

@@ -1,6 +1,6 @@
 // What a part of a ray meets of a list.
 //
-// Needs: shared/render.h, pieces.glsl, line.glsl; params, opaque.
+// Needs: shared/render.h, pieces.glsl, line.glsl; params, opaque, piecesAtOnce, mostPiecesAtOnce.
 
 bool rayAscends;  // it meets a list's supersegments in their order; else backwards
 // How long the ray is for a change of depth, where that says something; else the length of its whole stretch.
@@ -74,17 +74,21 @@ void meet(inout Seen seen, uvec4 piece, vec2 depths, Part part) {
 
 Look lookOf(Seen seen) { return Look(vec4(seen.light * pieceColorUnit, 1.0 - seen.transmittance), seen.entered); }
 
-// Where a look is in a list.
+// Where a look is in a list: at piecesAtOnce supersegments, the last of which stands for what's behind it.
 struct Cursor {
-  int place;  // of a supersegment, counted as the ray meets them
+  int place;  // of the first of them, counted as the ray meets them
   uint slot;  // and in the compact array
-  uvec4 piece;
-  vec2 depths;  // as the ray meets it
+  uvec4 pieces[mostPiecesAtOnce];
 };
 
-Cursor cursorAt(int place, uint slot) {
-  uvec4 piece = params.segments.at[slot];
-  return Cursor(place, slot, piece, metDepths(piece));
+Cursor cursorAt(int place, uint slot, int last, int step) {
+  Cursor at;
+  at.place = place;
+  at.slot = slot;
+  [[unroll]] for (int i = 0; i < mostPiecesAtOnce; ++i) {
+    if (i < piecesAtOnce) at.pieces[i] = params.segments.at[slot + uint(i == 0 ? 0 : min(i, last - place) * step)];
+  }
+  return at;
 }
 
 // `list` has at least one supersegment. `hint`: where the last look at a neighbouring list ended, counted as the ray meets
@@ -94,17 +98,24 @@ Look lookAtList(uint list, Part part, inout int hint) {
   int last = int(head.count) - 1;
   int place = min(hint, last);
   int step = rayAscends ? 1 : -1;
-  Cursor at = cursorAt(place, head.first + uint(rayAscends ? place : last - place));
-  while (at.place > 0 && at.depths.x > part.low) at = cursorAt(at.place - 1, at.slot - uint(step));
+  Cursor at = cursorAt(place, head.first + uint(rayAscends ? place : last - place), last, step);
+  while (at.place > 0 && metDepths(at.pieces[0]).x > part.low) {
+    int back = piecesAtOnce == 1 ? 1 : min(at.place, piecesAtOnce);
+    at = cursorAt(at.place - back, at.slot - uint(back * step), last, step);
+  }
   // Not below, where each takes longer.
-  while (at.place < last && at.depths.y <= part.low) at = cursorAt(at.place + 1, at.slot + uint(step));
+  while (at.place + piecesAtOnce <= last && metDepths(at.pieces[piecesAtOnce - 1]).y <= part.low) {
+    at = cursorAt(at.place + piecesAtOnce, at.slot + uint(piecesAtOnce * step), last, step);
+  }
   Seen seen = nothingYet;
   for (;;) {
-    meet(seen, at.piece, at.depths, part);
-    bool isPast = at.depths.y >= part.high;
-    bool isLast = at.place == last;
+    [[unroll]] for (int i = 0; i < mostPiecesAtOnce; ++i) {
+      if (i == 0 || (i < piecesAtOnce && at.place + i <= last)) meet(seen, at.pieces[i], metDepths(at.pieces[i]), part);
+    }
+    bool isPast = metDepths(at.pieces[piecesAtOnce - 1]).y >= part.high;
+    bool isLast = at.place + piecesAtOnce > last;
     if (isPast || isLast) break;  // of two names: || of expressions would branch twice
-    at = cursorAt(at.place + 1, at.slot + uint(step));
+    at = cursorAt(at.place + piecesAtOnce, at.slot + uint(piecesAtOnce * step), last, step);
   }
   hint = at.place;
   return lookOf(seen);

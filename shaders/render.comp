@@ -12,6 +12,7 @@
 #include "pieces.glsl"
 
 layout(local_size_x_id = 2) in;
+layout(push_constant, scalar) uniform Push { RenderRays rays; };
 layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 // Reconstruction::Smooth or Constant.
@@ -20,6 +21,11 @@ layout(constant_id = 0) const bool smoothReconstruction = true;
 // anything, and a GPU waits for the longest of them.
 layout(constant_id = 1) const uint rayShares = 1;
 uint rayShare;
+// Supersegments that a look reads at a time: where rays are long in their columns, a GPU rather waits for several at once.
+layout(constant_id = 3) const int piecesAtOnce = 1;
+const int mostPiecesAtOnce = 3;
+// How the pixels of a tile are dealt to invocations (shared/render.h).
+layout(constant_id = 4) const uint pixelOrder = renderOrderSquares;
 
 // What is behind changes a pixel by less than a quarter of 1/255.
 const float opaque = 1.0 - 1.0 / 1024.0;
@@ -65,9 +71,12 @@ void accumulate(Look behind) {
 
 #include "walk.glsl"
 
-// Along a Z: the rays of a subgroup are close to each other in both directions.
 uvec2 placeOf(uint i) {
-  return uvec2((i & 1u) | (i >> 1 & 2u) | (i >> 2 & 4u), (i >> 1 & 1u) | (i >> 2 & 2u) | (i >> 3 & 4u));
+  if (pixelOrder == renderOrderSquares) {
+    return uvec2((i & 1u) | (i >> 1 & 2u) | (i >> 2 & 4u), (i >> 1 & 1u) | (i >> 2 & 2u) | (i >> 3 & 4u));
+  }
+  uvec2 place = uvec2((i & 1u) | (i >> 3 & 6u), i >> 1 & 7u);
+  return pixelOrder == renderOrderColumns ? place : place.yx;
 }
 
 void renderPixels(uint tile) {
@@ -102,10 +111,20 @@ uint waitingTile(uint i) {
   return params.waiting.at[kind * tiles.x * tiles.y + i];
 }
 
+// For the next view.
+void emptyQueue() {
+  params.queue.at.groups.x = 0u;
+  params.queue.at.count = 0u;
+  params.queue.at.finished = 0u;
+  for (uint kind = 0u; kind < renderKinds; ++kind) params.queue.at.counts[kind] = 0u;
+}
+
 void main() {
   rayShare = gl_LocalInvocationIndex % rayShares;
   for (uint i = gl_WorkGroupID.x; i < params.queue.at.count; i += gl_NumWorkGroups.x) {
     renderPixels(waitingTile(i));
     barrier();  // before the marks are used again
   }
+  barrier();  // behind all invocations' last look at the queue
+  if (gl_LocalInvocationIndex == 0u && atomicAdd(params.queue.at.finished, 1u) + 1u == gl_NumWorkGroups.x) emptyQueue();
 }

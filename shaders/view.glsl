@@ -1,6 +1,6 @@
 // The new view's rays in V_O's view space.
 //
-// Needs: shared/render.h; params.
+// Needs: shared/render.h; params, rays.
 
 const float infinity = 1.0 / 0.0;
 
@@ -13,8 +13,8 @@ struct Ray {
 // Of a place in the new picture, in pixels from its lower left corner.
 Ray rayAt(vec2 place) {
   vec2 uv = place - 0.5 * vec2(params.width, params.height);
-  return Ray(params.originBase + uv.x * params.originRight + uv.y * params.originUp,
-             params.directionBase + uv.x * params.directionRight + uv.y * params.directionUp);
+  return Ray(rays.originBase + uv.x * rays.originRight + uv.y * rays.originUp,
+             rays.directionBase + uv.x * rays.directionRight + uv.y * rays.directionUp);
 }
 
 float depthAt(Ray ray, float t) { return ray.origin.z + t * ray.direction.z; }

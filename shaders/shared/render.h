@@ -11,6 +11,9 @@ inline constexpr uint renderRegion = 16;
 inline constexpr uint renderBeamGroup = 32;
 inline constexpr uint renderMostGroups = 65535;
 inline constexpr uint renderKinds = 24;
+inline constexpr uint renderOrderSquares = 0;
+inline constexpr uint renderOrderColumns = 1;
+inline constexpr uint renderOrderRows = 2;
 inline constexpr uint expandGroup = 64;
 inline constexpr uint expandModeSegments = 0;
 inline constexpr uint expandModeMasks = 1;
@@ -27,6 +30,10 @@ const uint renderRegion = 16;      // of the beam that says whether there's anyt
 const uint renderBeamGroup = 32;
 const uint renderMostGroups = 65535;  // every device allows them
 const uint renderKinds = 24;        // of tiles, by how much there is to look at
+// Of a tile's pixels: neighbouring invocations have squares of them (along a Z), or pairs of columns, or pairs of rows.
+const uint renderOrderSquares = 0;
+const uint renderOrderColumns = 1;
+const uint renderOrderRows = 2;
 const uint expandGroup = 64;
 const uint expandModeSegments = 0;  // one invocation a supersegment
 const uint expandModeMasks = 1;     // one a list
@@ -54,10 +61,12 @@ struct ListHead {
   uint64_t mask;
 };
 
-// How many tiles of the new picture are to be rendered, and the workgroups for that: what an indirect dispatch reads.
+// How many tiles of the new picture are to be rendered, and the workgroups for that: what an indirect dispatch reads. Empty between
+// views: the last workgroup leaves it so.
 struct TileQueue {
   uvec3 groups;
   uint count;
+  uint finished;             // workgroups
   uint counts[renderKinds];  // of each kind; first those with most to look at
 };
 
@@ -100,21 +109,26 @@ struct RenderParams {
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
   VDI_ADDRESS(TileQueueAddress) queue;
   VDI_ADDRESS(UintArray) waiting;  // [renderKinds][tiles]: the tiles of the queue, as row * tiles in a row + column
-  // Ray of the new view's pixel in V_O's view space, as in CastParams: base + u * right + v * up, t = the new view's depth.
-  vec3 originBase;
   float nearest;  // depth range of the VDI, nearest > 0 in perspective
-  vec3 originRight;
   float farthest;
-  vec3 originUp;
   float pixelSize;  // of V_O: view-space size of a pixel at depth 1 (perspective) or anywhere (parallel)
-  vec3 directionBase;
-  uint parallel;  // projection of V_O
-  vec3 directionRight;
-  uint width;  // of the picture
-  vec3 directionUp;
+  uint parallel;    // projection of V_O
+  uint width;       // of the picture
   uint height;
   ivec2 lists;  // of the VDI: width, height
   float binScale;
+  uint pad;
+};
+
+// Ray of the new view's pixel in V_O's view space, as in CastParams: base + u * right + v * up, t = the new view's depth. All that
+// changes while someone orbits.
+struct RenderRays {
+  vec3 originBase;
+  vec3 originRight;
+  vec3 originUp;
+  vec3 directionBase;
+  vec3 directionRight;
+  vec3 directionUp;
 };
 
 VDI_SHARED_END

@@ -274,6 +274,13 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the refe
     cameras.push_back(camera.azimuth(angle));
     cameras.back().viewUp += 0.2 * glm::dvec3(1.0, 0.0, 0.5);
   }
+  // Near V_O, across its picture's columns and across its rows.
+  cameras.push_back(camera.azimuth(5.0));
+  Camera above = camera;
+  above.viewUp = glm::cross(camera.focalPoint - camera.position, camera.viewUp);
+  above = above.azimuth(5.0);
+  above.viewUp = camera.viewUp;
+  cameras.push_back(above);
   // From within the scene, outwards and back to V_O; and by the other projection.
   Camera inside = camera;
   inside.position = camera.focalPoint + glm::dvec3(0.1, 0.05, -0.1);

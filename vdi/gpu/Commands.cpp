@@ -110,6 +110,7 @@ void Commands::submit() {
       VK_STRUCTURE_TYPE_SUBMIT_INFO_2, nullptr, 0, 0, nullptr, 1, &bufferInfo, 0, nullptr};
   device_->submit(info, fence_);
   state_ = State::Submitted;
+  ++submissions_;
 }
 
 /// After a lost device the submission counts as not done: each further begin or wait throws again.
@@ -129,9 +130,10 @@ void Commands::dispatchBytes(const ComputePipeline& pipeline, std::span<const st
   vkCmdDispatch(buffer_, x, y, z);
 }
 
-void Commands::dispatchIndirect(const ComputePipeline& pipeline, const Buffer& groups) {
+void Commands::dispatchIndirectBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants,
+                                     const Buffer& groups) {
   assert(groups.size() >= sizeof(VkDispatchIndirectCommand));
-  bind(pipeline, {});
+  bind(pipeline, constants);
   vkCmdDispatchIndirect(buffer_, groups.handle(), 0);
 }
 

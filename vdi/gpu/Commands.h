@@ -40,6 +40,8 @@ class Commands {
   /// an exception between begin and submit does no harm.
   void begin();
   void submit();
+  /// How often that was done: more than while something was recorded tells that it wasn't dropped.
+  std::uint64_t submissions() const { return submissions_; }
   /// Returns when the submission is done, at once when there's none. Throws Error{DeviceFailure} on device
   /// loss.
   void wait();
@@ -67,8 +69,14 @@ class Commands {
   }
   void dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
                      std::uint32_t y, std::uint32_t z);
-  /// As many workgroups as the buffer's first three words say when it comes to that; no push constants.
-  void dispatchIndirect(const ComputePipeline& pipeline, const Buffer& groups);
+  /// As many workgroups as the buffer's first three words say when it comes to that.
+  template <typename PushConstants>
+  void dispatchIndirect(const ComputePipeline& pipeline, const PushConstants& constants,
+                        const Buffer& groups) {
+    dispatchIndirectBytes(pipeline, std::as_bytes(std::span(&constants, 1)), groups);
+  }
+  void dispatchIndirectBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants,
+                             const Buffer& groups);
 
   /// Everything recorded so far is finished and visible to everything recorded later. What the host wrote
   /// before submit() is anyway, and so is everything to the host after wait().
@@ -112,6 +120,7 @@ class Commands {
   std::vector<std::string> marks_;
   std::vector<StageTime> times_;
   State state_ = State::Idle;
+  std::uint64_t submissions_ = 0;
 };
 
 }  // namespace vdi::gpu

@@ -1,5 +1,6 @@
 #include "vdi/gpu/ComputePipeline.h"
 
+#include <algorithm>
 #include <cassert>
 #include <utility>
 
@@ -142,9 +143,15 @@ PipelineSet::PipelineSet(const PipelineSet& updated, ComputePipelineInfo common)
 
 void PipelineSet::updateBytes(Commands& commands, std::span<const std::byte> bytes) {
   assert(bytes.size() == common_.uniformBytes);
+  // What was recorded may have been dropped.
+  const bool wasSubmitted = updatedBy_ == &commands && commands.submissions() > updatedBehind_;
+  if (wasSubmitted && std::ranges::equal(bytes, updated_)) return;
   commands.barrier();
   commands.update(*uniforms_, bytes);
   commands.barrier();
+  updated_.assign(bytes.begin(), bytes.end());
+  updatedBy_ = &commands;
+  updatedBehind_ = commands.submissions();
 }
 
 ComputePipeline& PipelineSet::with(const std::vector<std::uint32_t>& specialization) {

@@ -77,9 +77,9 @@ class PipelineSet {
   /// With the uniforms of another set, which updates them.
   PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);
   ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
-  /// What the uniforms of all pipelines are for what's recorded next. They're in the device's own memory,
-  /// where shaders read them as fast as constants: a GPU would fetch them from the host's memory again and
-  /// again.
+  /// What the uniforms of all pipelines are for what's recorded next; nothing is recorded where they are that
+  /// already. They're in the device's own memory, where shaders read them as fast as constants: a GPU would
+  /// fetch them from the host's memory again and again.
   template <typename Uniforms>
   void update(Commands& commands, const Uniforms& uniforms) {
     updateBytes(commands, std::as_bytes(std::span(&uniforms, 1)));
@@ -91,6 +91,9 @@ class PipelineSet {
   std::shared_ptr<Device> device_;
   ComputePipelineInfo common_;
   std::shared_ptr<const Buffer> uniforms_;  // of all of them; none: they have no uniforms
+  std::vector<std::byte> updated_;          // what they are
+  const Commands* updatedBy_ = nullptr;     // since this
+  std::uint64_t updatedBehind_ = 0;         // submission
   std::map<std::vector<std::uint32_t>, std::unique_ptr<ComputePipeline>> pipelines_;
 };
 

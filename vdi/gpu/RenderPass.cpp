@@ -15,6 +15,7 @@ namespace {
 ComputePipelineInfo pipelineInfo(std::string_view shader) {
   ComputePipelineInfo info;
   info.shader = shader;
+  info.pushConstantBytes = sizeof(shared::RenderRays);
   info.uniformBytes = sizeof(shared::RenderParams);
   return info;
 }
@@ -23,6 +24,26 @@ ComputePipelineInfo pipelineInfo(std::string_view shader) {
 /// they save.
 std::uint32_t sharesFor(const Device& device) {
   return device.runsGpuPrograms() && device.limits().subgroupSize > 0 ? 2 : 1;
+}
+
+/// What the view's rays have in common, by the one in the middle.
+struct Course {
+  bool isNear = false;  // nearly along V_O's: they meet many supersegments of each of a few lists
+  glm::vec2 way{0.0F};  // columns and rows of V_O's picture that are crossed within the VDI's depths
+};
+
+Course courseOf(const shared::RenderParams& params, const shared::RenderRays& rays) {
+  if (!(rays.directionBase.z > 0.0F)) return {};
+  const bool parallel = params.parallel != 0;
+  const auto placeAt = [&](float depth) {
+    const float t = (depth - rays.originBase.z) / rays.directionBase.z;
+    return glm::vec2(rays.originBase + t * rays.directionBase) / (parallel ? 1.0F : depth);
+  };
+  const glm::vec2 middle = placeAt(0.5F * (params.nearest + params.farthest));
+  const glm::vec3 along = parallel ? glm::vec3(0.0F, 0.0F, 1.0F) : glm::vec3(middle, 1.0F);
+  constexpr float cosine = 0.9914F;  // of 7.5 degrees
+  return {glm::dot(glm::normalize(rays.directionBase), glm::normalize(along)) > cosine,
+          glm::abs(placeAt(params.farthest) - placeAt(params.nearest)) / params.pixelSize};
 }
 
 ComputePipelineInfo renderInfo(std::uint32_t shares) {
@@ -35,19 +56,6 @@ ComputePipelineInfo renderInfo(std::uint32_t shares) {
 
 shared::RenderParams renderGeometry(const View& original, const View& view) {
   shared::RenderParams params{};
-  const auto toOriginal = [&](const glm::dvec3& direction) {
-    return glm::dvec3(glm::dot(direction, original.right()), glm::dot(direction, original.up()),
-                      glm::dot(direction, original.forward()));
-  };
-  const Ray middle = view.rayThrough(0.5 * view.width(), 0.5 * view.height());
-  const Ray right = view.rayThrough(0.5 * view.width() + 1.0, 0.5 * view.height());
-  const Ray up = view.rayThrough(0.5 * view.width(), 0.5 * view.height() + 1.0);
-  params.originBase = original.toView(middle.origin);
-  params.originRight = toOriginal(right.origin - middle.origin);
-  params.originUp = toOriginal(up.origin - middle.origin);
-  params.directionBase = toOriginal(middle.direction);
-  params.directionRight = toOriginal(right.direction - middle.direction);
-  params.directionUp = toOriginal(up.direction - middle.direction);
   params.pixelSize = static_cast<float>(2.0 * original.halfHeight() / original.height());
   params.parallel = original.parallel() ? 1U : 0U;
   params.width = static_cast<std::uint32_t>(view.width());
@@ -58,29 +66,63 @@ shared::RenderParams renderGeometry(const View& original, const View& view) {
   return params;
 }
 
+shared::RenderRays renderRays(const View& original, const View& view) {
+  const auto toOriginal = [&](const glm::dvec3& direction) {
+    return glm::dvec3(glm::dot(direction, original.right()), glm::dot(direction, original.up()),
+                      glm::dot(direction, original.forward()));
+  };
+  const Ray middle = view.rayThrough(0.5 * view.width(), 0.5 * view.height());
+  const Ray right = view.rayThrough(0.5 * view.width() + 1.0, 0.5 * view.height());
+  const Ray up = view.rayThrough(0.5 * view.width(), 0.5 * view.height() + 1.0);
+  return {original.toView(middle.origin),
+          toOriginal(right.origin - middle.origin),
+          toOriginal(up.origin - middle.origin),
+          toOriginal(middle.direction),
+          toOriginal(right.direction - middle.direction),
+          toOriginal(up.direction - middle.direction)};
+}
+
 RenderPass::RenderPass(const std::shared_ptr<Device>& device)
     : device_(device),
       shares_(sharesFor(*device)),
       beams_(device, pipelineInfo("beams")),
       render_(beams_, renderInfo(shares_)),
-      queue_(device, sizeof(shared::TileQueue), MemoryKind::DeviceLocal) {}
+      queue_(device, sizeof(shared::TileQueue), MemoryKind::DeviceLocal) {
+  const shared::TileQueue empty{{0, 1, 1}, 0, 0, {}};
+  Commands commands(device);
+  commands.begin();
+  commands.update(queue_, std::as_bytes(std::span(&empty, 1)));
+  commands.submitAndWait();
+}
 
-void RenderPass::record(Commands& commands, shared::RenderParams params, Reconstruction reconstruction) {
+std::vector<std::uint32_t> RenderPass::specialization(const shared::RenderParams& params,
+                                                      const shared::RenderRays& rays,
+                                                      Reconstruction reconstruction) const {
+  const std::uint32_t smooth = reconstruction == Reconstruction::Smooth ? 1 : 0;
+  const std::uint32_t invocations = shares_ * shared::renderPictureTile * shared::renderPictureTile;
+  std::uint32_t piecesAtOnce = 1;
+  std::uint32_t pixelOrder = shared::renderOrderSquares;
+  const Course course = courseOf(params, rays);
+  const float crossed = glm::max(course.way.x, course.way.y);
+  if (shares_ > 1 && course.isNear && crossed >= 1.0F) {
+    piecesAtOnce = 3;
+    pixelOrder = course.way.x == crossed ? shared::renderOrderColumns : shared::renderOrderRows;
+  }
+  return {smooth, shares_, invocations, piecesAtOnce, pixelOrder};
+}
+
+void RenderPass::record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,
+                        Reconstruction reconstruction) {
   const std::uint64_t tiles = std::uint64_t{groupsFor(params.width, shared::renderPictureTile)} *
                               groupsFor(params.height, shared::renderPictureTile);
   waiting_.reserve(device_, tiles * shared::renderKinds * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
   params.queue = queue_.address();
   params.waiting = waiting_.address();
-  const shared::TileQueue none{{0, 1, 1}, 0, {}};
-  commands.update(queue_, std::as_bytes(std::span(&none, 1)));
   beams_.update(commands, params);
-  commands.dispatchBytes(beams_.with({shares_ > 1 ? 1U : 0U}), {},
-                         groupsFor(params.width, shared::renderRegion),
-                         groupsFor(params.height, shared::renderRegion), 1);
+  commands.dispatch(beams_.with({shares_ > 1 ? 1U : 0U}), rays, groupsFor(params.width, shared::renderRegion),
+                    groupsFor(params.height, shared::renderRegion));
   commands.barrier();
-  const std::uint32_t smooth = reconstruction == Reconstruction::Smooth ? 1 : 0;
-  const std::uint32_t invocations = shares_ * shared::renderPictureTile * shared::renderPictureTile;
-  commands.dispatchIndirect(render_.with({smooth, shares_, invocations}), queue_);
+  commands.dispatchIndirect(render_.with(specialization(params, rays, reconstruction)), rays, queue_);
 }
 
 }  // namespace vdi::gpu

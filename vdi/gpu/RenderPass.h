@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "shaders/shared/render.h"
 #include "vdi/core/Reconstruction.h"
@@ -18,18 +19,24 @@ namespace vdi::gpu {
 
 /// The part of RenderParams that follows from the two views; addresses and depth range are left 0.
 shared::RenderParams renderGeometry(const View& original, const View& view);
+shared::RenderRays renderRays(const View& original, const View& view);
 
 class RenderPass {
  public:
   explicit RenderPass(const std::shared_ptr<Device>& device);
   /// Behind a barrier. `params`: but for the queue.
-  void record(Commands& commands, shared::RenderParams params, Reconstruction reconstruction);
+  void record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,
+              Reconstruction reconstruction);
 
  private:
+  std::vector<std::uint32_t> specialization(const shared::RenderParams& params,
+                                            const shared::RenderRays& rays,
+                                            Reconstruction reconstruction) const;
+
   std::shared_ptr<Device> device_;
   std::uint32_t shares_;
   PipelineSet beams_;
-  PipelineSet render_;  // by precision and reconstruction
+  PipelineSet render_;
   Buffer queue_;
   Buffer waiting_;
 };

@@ -143,7 +143,7 @@ Image VdiRenderer::render(const Camera& camera, int width, int height, Reconstru
   s.commands.begin();
   s.commands.barrier();  // behind setVdi's uploads
   s.commands.mark("render");
-  s.pass.record(s.commands, params, reconstruction);
+  s.pass.record(s.commands, params, gpu::renderRays(*s.original, view), reconstruction);
   s.picture.recordDownload(s.commands);
   s.commands.submitAndWait();
   s.milliseconds = s.commands.stageTimes().front().milliseconds;
