@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <limits>
 
 #include "vdi/core/Error.h"
+#include "vdi/pipeline/HostCopy.h"
 
 namespace vdi::detail {
 
@@ -36,7 +38,7 @@ void ListBuilder::build(const Request& request, const Record& record, ListsOf<Se
   sensitivities_.reserve(device_, words, MemoryKind::DeviceLocal);
   counts_.reserve(device_, words, MemoryKind::DeviceLocal);
   offsets_.reserve(device_, words, MemoryKind::DeviceLocal);
-  readback_.reserve(device_, words, MemoryKind::Readback);
+  offsetsReadback_.reserve(device_, words, MemoryKind::Readback);
   status_.mappedAs<std::uint32_t>()[0] = 0;
   times_ = {};
   if (request.algorithm == Algorithm::Bisection) {
@@ -51,8 +53,8 @@ void ListBuilder::build(const Request& request, const Record& record, ListsOf<Se
   }
 }
 
-void ListBuilder::submit() {
-  commands_.submitAndWait();
+void ListBuilder::wait() {
+  commands_.wait();
   for (const gpu::StageTime& stage : commands_.stageTimes()) {
     if (stage.name == "download") continue;
     times_.all += stage.milliseconds;
@@ -61,42 +63,48 @@ void ListBuilder::submit() {
   }
 }
 
-/// Ends the recording with the prefix sum of counts, submits, and returns the sum of all; the offsets are in
-/// readback_.
+/// Ends the recording with the prefix sum of counts, submits, and returns the sum of all, which is the last
+/// of the offsets; these are in offsetsReadback_, if they're wanted.
 std::uint64_t ListBuilder::scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts,
-                                        gpu::Buffer& offsets) {
-  const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
+                                        gpu::Buffer& offsets, Wanted wanted) {
+  const std::uint64_t last = std::uint64_t{listCount} * sizeof(std::uint32_t);
+  const std::uint64_t first = wanted == Wanted::Offsets ? 0 : last;
   scan_.record(commands_, counts, offsets, listCount);
   commands_.mark("download");
-  commands_.copy(offsets, 0, readback_, 0, words);
-  submit();
+  commands_.copy(offsets, first, offsetsReadback_, first, last + sizeof(std::uint32_t) - first);
+  commands_.submit();
+  wait();
   scan_.demandNoOverflow();
-  return readback_.mappedAs<std::uint32_t>()[listCount];
+  return offsetsReadback_.mappedAs<std::uint32_t>()[listCount];
 }
 
 template <typename Segment>
 void ListBuilder::appendOffsets(std::uint32_t listCount, ListsOf<Segment>& result) const {
-  const auto offsets = readback_.mappedAs<std::uint32_t>();
-  const std::uint64_t before = result.segments.size();
-  if (before + offsets[listCount] > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI", device_->name());
-  }
-  for (std::uint32_t i = 1; i <= listCount; ++i) {
-    result.offsets.push_back(static_cast<std::uint32_t>(before + offsets[i]));
-  }
+  const auto offsets = offsetsReadback_.mappedAs<std::uint32_t>().subspan(1, listCount);
+  const std::uint32_t before = result.offsets.back();
+  const std::size_t first = result.offsets.size();
+  result.offsets.resize(first + listCount);
+  std::ranges::transform(offsets, result.offsets.begin() + static_cast<std::ptrdiff_t>(first),
+                         [&](std::uint32_t offset) { return before + offset; });
 }
 
-/// Ends the recording with the copy of the supersegments, submits and appends them.
+/// Ends the recording of what makes supersegments with the copy of them, submits, and appends them. The host
+/// has something to do meanwhile: the offsets.
 template <typename Segment>
-void ListBuilder::download(std::uint64_t total, ListsOf<Segment>& result) {
+void ListBuilder::download(std::uint32_t listCount, std::uint64_t total, ListsOf<Segment>& result) {
+  const std::uint32_t before = result.offsets.back();
+  if (before + total > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI", device_->name());
+  }
   const std::uint64_t bytes = total * sizeof(Segment);
-  readback_.reserve(device_, bytes, MemoryKind::Readback);
+  segmentsReadback_.reserve(device_, bytes, MemoryKind::Readback);
   commands_.barrier();
   commands_.mark("download");
-  commands_.copy(segments_, 0, readback_, 0, bytes);
-  submit();
-  const auto written = readback_.mappedAs<Segment>().first(total);
-  result.segments.insert(result.segments.end(), written.begin(), written.end());
+  commands_.copy(segments_, 0, segmentsReadback_, 0, bytes);
+  commands_.submit();
+  appendOffsets(listCount, result);
+  wait();
+  replaceTail<Segment>(result.segments, before, segmentsReadback_.mappedAs<Segment>().first(total));
 }
 
 template <typename Segment>
@@ -109,16 +117,15 @@ void ListBuilder::buildByBisection(const Request& request, const Record& record,
   commands_.begin();
   commands_.mark("search");
   record(commands_, targets, false);
-  const std::uint64_t total = scanAndTotal(request.listCount(), counts_, offsets_);
-  appendOffsets(request.listCount(), result);
-  if (total == 0) return;
+  const std::uint64_t total = scanAndTotal(request.listCount(), counts_, offsets_, Wanted::Offsets);
+  if (total == 0) return appendOffsets(request.listCount(), result);
 
   segments_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
   targets.segments = segments_.address();
   commands_.begin();
   commands_.mark("write");
   record(commands_, targets, true);
-  download(total, result);
+  download(request.listCount(), total, result);
 }
 
 template <typename Segment>
@@ -144,7 +151,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
                 {countedTolerances_.address(), countedGrains_.address(), sensitivities_.address(),
                  counts_.address(), request.width, request.rows, request.countedWidth(),
                  request.countedRows(), static_cast<std::uint32_t>(std::countr_zero(request.countedStride))});
-  const std::uint64_t grainTotal = scanAndTotal(lists, counts_, grainOffsets_);
+  const std::uint64_t grainTotal = scanAndTotal(lists, counts_, grainOffsets_, Wanted::Total);
 
   grains_.reserve(device_, grainTotal * sizeof(shared::StoredGrain), MemoryKind::DeviceLocal);
   targets.sensitivities = sensitivities_.address();
@@ -156,9 +163,8 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
   commands_.begin();
   commands_.mark("write");
   record(commands_, targets, true);
-  const std::uint64_t total = scanAndTotal(lists, left_, offsets_);
-  appendOffsets(lists, result);
-  if (total == 0) return;
+  const std::uint64_t total = scanAndTotal(lists, left_, offsets_, Wanted::Offsets);
+  if (total == 0) return appendOffsets(lists, result);
 
   segments_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
   shared::ReduceConstants reduce{};
@@ -174,7 +180,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, L
   commands_.begin();
   commands_.mark("reduce");
   reduce_.record(commands_, reduce, request.most);
-  download(total, result);
+  download(lists, total, result);
 }
 
 template void ListBuilder::build(const Request&, const Record&, SupersegmentLists&);

@@ -78,7 +78,8 @@ class ListBuilder {
     }
   };
 
-  /// Runs all steps and appends what was written to `result`, compact or full as its type says. Throws
+  /// Runs all steps and appends what was written to `result`, compact or full as its type says: to its
+  /// offsets, and behind as many supersegments as these speak of, where it may have others still. Throws
   /// Error{OutOfMemory} when the supersegments don't fit, Error{DeviceFailure} if a list's written count
   /// isn't its stored count.
   template <typename Segment>
@@ -92,12 +93,14 @@ class ListBuilder {
   void buildByBisection(const Request& request, const Record& record, ListsOf<Segment>& result);
   template <typename Segment>
   void buildByMerging(const Request& request, const Record& record, ListsOf<Segment>& result);
-  std::uint64_t scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts, gpu::Buffer& offsets);
+  enum class Wanted { Total, Offsets };
+  std::uint64_t scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts, gpu::Buffer& offsets,
+                             Wanted wanted);
   template <typename Segment>
   void appendOffsets(std::uint32_t listCount, ListsOf<Segment>& result) const;
   template <typename Segment>
-  void download(std::uint64_t total, ListsOf<Segment>& result);
-  void submit();
+  void download(std::uint32_t listCount, std::uint64_t total, ListsOf<Segment>& result);
+  void wait();
 
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
@@ -115,7 +118,8 @@ class ListBuilder {
   gpu::Buffer countedGrains_;
   gpu::Buffer segments_;
   gpu::Buffer status_;
-  gpu::Buffer readback_;
+  gpu::Buffer offsetsReadback_;
+  gpu::Buffer segmentsReadback_;
   ListTimes times_;
 };
 

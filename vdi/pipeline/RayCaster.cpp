@@ -69,10 +69,10 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
   const auto width = static_cast<std::uint32_t>(request.view.width());
   const auto height = static_cast<std::uint32_t>(request.view.height());
   result.offsets.assign(1, 0);
-  result.segments.clear();
   const bool nothingThere = volume_.empty() || request.lattice.count == 0;
   if (nothingThere) {
     result.offsets.assign(static_cast<std::size_t>(width) * height + 1, 0);
+    result.segments.clear();
     return result;
   }
   result.offsets.reserve(static_cast<std::size_t>(width) * height + 1);
@@ -125,6 +125,7 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
     times_ += builder_.times();
     if (!progress(static_cast<double>(end) / height)) break;
   }
+  result.segments.resize(result.offsets.back());
   return result;
 }
 
