@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "vdi/core/Block.h"
+#include "vdi/core/Parallel.h"
 
 namespace vdi::apps {
 
@@ -58,15 +58,13 @@ void storeValue(ScalarType type, void* data, std::size_t index, double value);
 
 /// Calls use(0) .. use(layers - 1), from several threads at once if there are many values in them.
 template <typename Use>
-void onAllCores(int layers, std::size_t values, Use use) {
-  constexpr std::size_t many = std::size_t{1} << 22;
-  const int threads = values < many ? 1 : static_cast<int>(std::max(std::thread::hardware_concurrency(), 1U));
-  const auto part = [&](int first) {
-    for (int layer = first; layer < layers; layer += threads) use(layer);
-  };
-  std::vector<std::jthread> others;
-  for (int i = 1; i < threads; ++i) others.emplace_back(part, i);
-  part(0);
+void layerByLayer(int layers, std::size_t values, Use use) {
+  constexpr std::size_t many = std::size_t{1} << 20;
+  const auto count = static_cast<std::size_t>(layers);
+  const std::size_t perLayer = std::max<std::size_t>(values / std::max<std::size_t>(count, 1), 1);
+  inParallel(count, (many + perLayer - 1) / perLayer, [&](std::size_t first, std::size_t last) {
+    for (std::size_t layer = first; layer < last; ++layer) use(static_cast<int>(layer));
+  });
 }
 
 template <typename ValueAt>
@@ -74,7 +72,7 @@ Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt) {
   const auto count = static_cast<std::size_t>(part.dims.x) * static_cast<std::size_t>(part.dims.y) *
                      static_cast<std::size_t>(part.dims.z);
   const std::shared_ptr<std::byte[]> data(new std::byte[count * sizeOf(lattice.type)]);
-  onAllCores(part.dims.z, count, [&](int z) {
+  layerByLayer(part.dims.z, count, [&](int z) {
     std::size_t index = static_cast<std::size_t>(z) * static_cast<std::size_t>(part.dims.x) *
                         static_cast<std::size_t>(part.dims.y);
     for (int y = 0; y < part.dims.y; ++y) {

@@ -53,7 +53,7 @@ Block DeviceField::makeBlock(const Lattice& lattice, const Part& part, double to
     commands_.copy(values_, 0, readback_, 0, count * sizeof(float));
     commands_.submitAndWait();
     const std::span<const float> values = readback_.mappedAs<float>();
-    onAllCores(layers, count, [&](int i) {
+    layerByLayer(layers, count, [&](int i) {
       const std::size_t first = layer * static_cast<std::size_t>(i);
       const std::size_t place = layer * static_cast<std::size_t>(z) + first;
       for (std::size_t j = 0; j < layer; ++j)

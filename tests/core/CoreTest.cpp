@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <vector>
 
@@ -11,11 +12,43 @@
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/GenerateSettings.h"
+#include "vdi/core/Parallel.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
 
 using namespace vdi;
+
+TEST_CASE("work in parallel: each element once, exceptions come out") {
+  for (const std::size_t count : {0U, 1U, 7U, 1000U, 12345U}) {
+    std::vector<int> visits(count, 0);
+    inParallel(count, 10, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) ++visits[i];
+    });
+    CHECK(std::ranges::all_of(visits, [](int n) { return n == 1; }));
+  }
+  const auto failAtTheEnd = [](std::size_t, std::size_t last) {
+    if (last == 1000) throw Error(ErrorCode::InvalidArgument, "as asked");
+  };
+  CHECK_THROWS_AS(inParallel(1000, 10, failAtTheEnd), Error);
+}
+
+TEST_CASE("a vector's tail is replaced, in place and beyond") {
+  const std::size_t many = (std::size_t{1} << 22) + 3;  // bytes enough for several threads
+  for (const std::size_t before : {std::size_t{0}, std::size_t{5}, many, 2 * many}) {
+    for (const std::size_t first : {std::size_t{0}, std::size_t{5}}) {
+      if (first > before) continue;
+      INFO(before << " elements, from " << first);
+      std::vector<std::uint32_t> to(before, 1U);
+      std::vector<std::uint32_t> from(many);
+      std::iota(from.begin(), from.end(), 7U);
+      replaceTail<std::uint32_t>(to, first, from);
+      std::vector<std::uint32_t> expected(first, 1U);
+      expected.insert(expected.end(), from.begin(), from.end());
+      CHECK((to == expected));
+    }
+  }
+}
 
 TEST_CASE("the range of a block's finite values, wherever they stand") {
   std::mt19937 generator(5);

@@ -253,7 +253,42 @@ TEST_CASE("a VDI in the memory of another one, whatever its precision and size w
     settings.precision = precision;
     generator.recycle(vdiOf());
     settings = test::smallSettings(40, 30, 5);
+    Vdi again = vdiOf();
+    CHECK(again == first);
+    // And in the memory of one that's as large, or smaller.
+    generator.recycle(std::move(again));
+    again = vdiOf();
+    CHECK(again == first);
+    settings = test::smallSettings(12, 10, 3);
+    generator.recycle(vdiOf());
+    settings = test::smallSettings(40, 30, 5);
     CHECK(vdiOf() == first);
+  }
+}
+
+TEST_CASE("a picture in the memory of another one is the same") {
+  const auto dealt = test::deal("mixing", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  const auto volumeOf = [&](int width, int height) {
+    return *generator.renderVolume(test::oblique(), test::threeHues(1.0),
+                                   test::smallSettings(width, height, 5));
+  };
+  const auto vdi = generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(40, 30, 5));
+  VdiRenderer renderer(device());
+  renderer.setVdi(*vdi);
+  const auto same = [](const Image& a, const Image& b) {
+    return a.width == b.width && a.height == b.height && a.rgba == b.rgba && a.depth == b.depth;
+  };
+  const Image volume = volumeOf(40, 30);
+  const Image view = renderer.render(test::oblique(), 40, 30);
+  for (const auto& [width, height] : {std::pair(60, 50), std::pair(40, 30), std::pair(9, 7)}) {
+    INFO(width << " x " << height);
+    generator.recycle(volumeOf(width, height));
+    CHECK(same(volumeOf(40, 30), volume));
+    renderer.recycle(renderer.render(test::oblique().azimuth(20.0), width, height));
+    CHECK(same(renderer.render(test::oblique(), 40, 30), view));
   }
 }
 

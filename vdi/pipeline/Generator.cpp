@@ -123,6 +123,7 @@ struct VdiGenerator::State {
   Scene scene;
   ScalarRange range;
   std::variant<SupersegmentLists, CompactLists> spare;  // for their memory
+  Image spareImage;
   RankReport mine;
   std::vector<RankReport> reports;
 
@@ -284,6 +285,10 @@ void VdiGenerator::recycle(Vdi&& vdi) {
   state_->spare = std::move(vdi.lists);
 }
 
+void VdiGenerator::recycle(Image&& image) {
+  state_->spareImage = std::move(image);
+}
+
 std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
                                                 const TransferFunction& transferFunction,
                                                 const GenerateSettings& settings, const Progress& progress) {
@@ -297,7 +302,7 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   SupersegmentLists lists;
   s.cancellable(progress, 0.9, [&](const detail::RayCaster::Progress& report) {
     if (alone) {
-      image = s.caster->image(request, report);
+      image = s.caster->image(request, report, std::exchange(s.spareImage, {}));
     } else {
       lists = s.caster->lists<Supersegment>(request, report);
     }

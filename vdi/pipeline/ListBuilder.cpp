@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "vdi/core/Error.h"
-#include "vdi/pipeline/HostCopy.h"
+#include "vdi/core/Parallel.h"
 
 namespace vdi::detail {
 

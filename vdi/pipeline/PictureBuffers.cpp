@@ -1,5 +1,7 @@
 #include "vdi/pipeline/PictureBuffers.h"
 
+#include "vdi/core/Parallel.h"
+
 namespace vdi::detail {
 
 using gpu::MemoryKind;
@@ -19,11 +21,9 @@ void PictureBuffers::recordDownload(gpu::Commands& commands) const {
   commands.copy(depths_, 0, readback_, colorBytes, pixels_ * sizeof(float));
 }
 
-void PictureBuffers::appendTo(Image& image) const {
-  const auto colors = readback_.mappedAs<glm::vec4>().first(pixels_);
-  const auto depths = readback_.mappedAs<float>().subspan(pixels_ * 4, pixels_);
-  image.rgba.insert(image.rgba.end(), colors.begin(), colors.end());
-  image.depth.insert(image.depth.end(), depths.begin(), depths.end());
+void PictureBuffers::copyTo(Image& image, std::size_t first) const {
+  replaceTail<glm::vec4>(image.rgba, first, readback_.mappedAs<glm::vec4>().first(pixels_));
+  replaceTail<float>(image.depth, first, readback_.mappedAs<float>().subspan(pixels_ * 4, pixels_));
 }
 
 }  // namespace vdi::detail

@@ -19,8 +19,8 @@ class PictureBuffers {
 
   /// Behind what writes them; a stage named "download".
   void recordDownload(gpu::Commands& commands) const;
-  /// After that has run: all pixels behind those that the image has.
-  void appendTo(Image& image) const;
+  /// After that has run: makes them the image's pixels from the first-th on.
+  void copyTo(Image& image, std::size_t first) const;
 
  private:
   std::uint64_t pixels_ = 0;

@@ -132,10 +132,11 @@ ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progre
 template SupersegmentLists RayCaster::lists(const Request&, const Progress&, SupersegmentLists);
 template CompactLists RayCaster::lists(const Request&, const Progress&, CompactLists);
 
-Image RayCaster::image(const Request& request, const Progress& progress) {
+Image RayCaster::image(const Request& request, const Progress& progress, Image image) {
   const auto width = static_cast<std::uint32_t>(request.view.width());
   const auto height = static_cast<std::uint32_t>(request.view.height());
-  Image image{request.view.width(), request.view.height(), {}, {}};
+  image.width = request.view.width();
+  image.height = request.view.height();
   if (volume_.empty() || request.lattice.count == 0) {
     image.rgba.assign(image.pixelCount(), glm::vec4(0.0F));
     image.depth.assign(image.pixelCount(), Image::noDepth);
@@ -158,7 +159,7 @@ Image RayCaster::image(const Request& request, const Progress& progress) {
     picture_.recordDownload(commands_);
     commands_.submitAndWait();
     times_.all += commands_.stageTimes().front().milliseconds;
-    picture_.appendTo(image);
+    picture_.copyTo(image, first);
     if (!progress(static_cast<double>(end) / height)) break;
   }
   image.rgba.resize(image.pixelCount(), glm::vec4(0.0F));

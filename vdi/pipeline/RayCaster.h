@@ -44,8 +44,8 @@ class RayCaster {
   /// One list per pixel, in the memory of `result`.
   template <typename Segment>
   ListsOf<Segment> lists(const Request& request, const Progress& progress, ListsOf<Segment> result = {});
-  /// DVR.
-  Image image(const Request& request, const Progress& progress);
+  /// DVR, in the memory of `image`.
+  Image image(const Request& request, const Progress& progress, Image image = {});
   /// Of the last of them, without transfers. Of a picture: `all`.
   const ListTimes& times() const { return times_; }
 

@@ -1,8 +1,11 @@
 // VdiRenderer and flatten: what a viewer does with a VDI.
 #include <algorithm>
 #include <cstring>
+#include <mutex>
+#include <utility>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Parallel.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/ExpandPass.h"
 #include "vdi/gpu/Memory.h"
@@ -35,6 +38,7 @@ struct VdiRenderer::State {
   float farthest = 0.0F;
   float binScale = 0.0F;
   double milliseconds = 0.0;
+  Image spare;  // for its memory
 
   /// What fits staging is on its way while the caller goes on; more waits for the part before.
   static constexpr std::uint64_t stagingBytes = std::uint64_t{128} << 20;
@@ -103,6 +107,48 @@ struct VdiRenderer::State {
   }
 };
 
+namespace {
+
+struct DepthRange {
+  float nearest = Image::noDepth;
+  float farthest = 0.0F;
+};
+
+float frontOf(const Supersegment& segment, const DepthCode&) {
+  return segment.front;
+}
+float backOf(const Supersegment& segment, const DepthCode&) {
+  return segment.back;
+}
+float frontOf(const CompactSupersegment& segment, const DepthCode& code) {
+  return code.depthOf(segment.front());
+}
+float backOf(const CompactSupersegment& segment, const DepthCode& code) {
+  return code.depthOf(segment.back());
+}
+
+template <typename Segment>
+DepthRange depthsOf(const ListsOf<Segment>& lists, const DepthCode& code) {
+  DepthRange all;
+  std::mutex mutex;
+  constexpr std::size_t least = 1U << 16;  // lists
+  inParallel(lists.listCount(), least, [&](std::size_t first, std::size_t last) {
+    DepthRange own;
+    for (std::size_t i = first; i < last; ++i) {
+      const std::span<const Segment> list = lists.list(i);
+      if (list.empty()) continue;
+      own.nearest = std::min(own.nearest, frontOf(list.front(), code));
+      own.farthest = std::max(own.farthest, backOf(list.back(), code));
+    }
+    const std::scoped_lock lock(mutex);
+    all.nearest = std::min(all.nearest, own.nearest);
+    all.farthest = std::max(all.farthest, own.farthest);
+  });
+  return all;
+}
+
+}  // namespace
+
 VdiRenderer::VdiRenderer(std::shared_ptr<gpu::Device> device)
     : state_(std::make_unique<State>(std::move(device))) {}
 
@@ -111,14 +157,10 @@ VdiRenderer::~VdiRenderer() = default;
 void VdiRenderer::setVdi(const Vdi& vdi) {
   State& s = *state_;
   s.original.reset();
-  s.nearest = Image::noDepth;
-  s.farthest = 0.0F;
-  const std::vector<std::uint32_t>& offsets = vdi.offsets();
-  for (std::size_t i = 0; i + 1 < offsets.size(); ++i) {
-    if (offsets[i] == offsets[i + 1]) continue;
-    s.nearest = std::min(s.nearest, vdi.supersegment(offsets[i]).front);
-    s.farthest = std::max(s.farthest, vdi.supersegment(offsets[i + 1] - 1).back);
-  }
+  const DepthRange depths =
+      std::visit([&](const auto& lists) { return depthsOf(lists, vdi.depthCode); }, vdi.lists);
+  s.nearest = depths.nearest;
+  s.farthest = depths.farthest;
   // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
   if (!vdi.camera.parallelProjection) s.nearest = std::max(s.nearest, s.farthest * 1e-6F);
   s.binScale = s.farthest > s.nearest ? shared::renderBins / (s.farthest - s.nearest) : 0.0F;
@@ -147,9 +189,15 @@ Image VdiRenderer::render(const Camera& camera, int width, int height, Reconstru
   s.picture.recordDownload(s.commands);
   s.commands.submitAndWait();
   s.milliseconds = s.commands.stageTimes().front().milliseconds;
-  Image image{width, height, {}, {}};
-  s.picture.appendTo(image);
+  Image image = std::exchange(s.spare, {});
+  image.width = width;
+  image.height = height;
+  s.picture.copyTo(image, 0);
   return image;
+}
+
+void VdiRenderer::recycle(Image&& image) {
+  state_->spare = std::move(image);
 }
 
 double VdiRenderer::renderMilliseconds() const {
@@ -162,16 +210,19 @@ namespace {
 template <typename Segment, typename Value>
 void flattenLists(const ListsOf<Segment>& lists, Value value, Image& image) {
   constexpr float opaque = 0.999999F;
-  for (std::size_t i = 0; i < image.pixelCount(); ++i) {
-    const std::span<const Segment> list = lists.list(i);
-    glm::vec4 sum(0.0F);
-    for (auto segment = list.begin(); segment != list.end() && sum.a < opaque; ++segment) {
-      const Supersegment& s = value(*segment);
-      sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
+  constexpr std::size_t least = 4096;  // lists
+  inParallel(image.pixelCount(), least, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const std::span<const Segment> list = lists.list(i);
+      glm::vec4 sum(0.0F);
+      for (auto segment = list.begin(); segment != list.end() && sum.a < opaque; ++segment) {
+        const Supersegment& s = value(*segment);
+        sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
+      }
+      image.rgba[i] = sum;
+      image.depth[i] = list.empty() ? Image::noDepth : value(list.front()).front;
     }
-    image.rgba[i] = sum;
-    image.depth[i] = list.empty() ? Image::noDepth : value(list.front()).front;
-  }
+  });
 }
 
 }  // namespace

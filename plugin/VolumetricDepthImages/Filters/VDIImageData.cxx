@@ -11,11 +11,12 @@
 #include <vtkUnsignedIntArray.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
+#include <cstddef>
+#include <span>
 #include <vector>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Parallel.h"
 #include "vdi/pipeline/Pipeline.h"
 
 namespace pv {
@@ -44,8 +45,7 @@ Array* field(vtkFieldData* fields, const char* name, int components, vtkIdType t
 
 template <typename Segment, typename T>
 void copySegments(const std::vector<Segment>& segments, T* to) {
-  if (!segments.empty())
-    std::memcpy(static_cast<void*>(to), segments.data(), segments.size() * sizeof(Segment));
+  vdi::copyInParallel(std::as_bytes(std::span(segments)), to);
 }
 
 template <typename Segment, typename Array>
@@ -54,13 +54,14 @@ vdi::ListsOf<Segment> listsFrom(vtkUnsignedIntArray* offsets, Array* segments) {
   const unsigned int* first = offsets->GetPointer(0);
   lists.offsets.assign(first, first + offsets->GetNumberOfTuples());
   lists.segments.resize(static_cast<std::size_t>(segments->GetNumberOfTuples()));
-  const std::size_t bytes = lists.segments.size() * sizeof(Segment);
-  if (bytes > 0) std::memcpy(static_cast<void*>(lists.segments.data()), segments->GetPointer(0), bytes);
+  const auto* values = reinterpret_cast<const std::byte*>(segments->GetPointer(0));
+  vdi::copyInParallel({values, lists.segments.size() * sizeof(Segment)}, lists.segments.data());
   return lists;
 }
 
+/// std::lround would be a call for each.
 unsigned char toByte(float share) {
-  return static_cast<unsigned char>(std::lround(std::clamp(share, 0.0F, 1.0F) * 255.0F));
+  return static_cast<unsigned char>(std::clamp(share, 0.0F, 1.0F) * 255.0F + 0.5F);
 }
 
 }  // namespace
@@ -71,18 +72,22 @@ void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth) 
   colors->SetName("RGBA");
   colors->SetNumberOfComponents(4);
   colors->SetNumberOfTuples(static_cast<vtkIdType>(picture.pixelCount()));
-  unsigned char* out = colors->GetPointer(0);
-  for (const glm::vec4& pixel : picture.rgba) {
-    const float unmultiply = pixel.a > 0.0F ? 1.0F / pixel.a : 0.0F;
-    for (int c = 0; c < 3; ++c) *out++ = toByte(pixel[c] * unmultiply);
-    *out++ = toByte(pixel.a);
-  }
+  constexpr std::size_t least = 1U << 15;  // pixels
+  vdi::inParallel(picture.rgba.size(), least, [&](std::size_t first, std::size_t last) {
+    unsigned char* out = colors->GetPointer(0) + 4 * first;
+    for (std::size_t i = first; i < last; ++i) {
+      const glm::vec4& pixel = picture.rgba[i];
+      const float unmultiply = pixel.a > 0.0F ? 1.0F / pixel.a : 0.0F;
+      for (int c = 0; c < 3; ++c) *out++ = toByte(pixel[c] * unmultiply);
+      *out++ = toByte(pixel.a);
+    }
+  });
   image->GetPointData()->SetScalars(colors);
   if (!withDepth) return;
   vtkNew<vtkFloatArray> depth;
   depth->SetName("Depth");
   depth->SetNumberOfTuples(static_cast<vtkIdType>(picture.depth.size()));
-  std::copy(picture.depth.begin(), picture.depth.end(), depth->GetPointer(0));
+  vdi::copyInParallel(std::as_bytes(std::span(picture.depth)), depth->GetPointer(0));
   image->GetPointData()->AddArray(depth);
 }
 

@@ -250,9 +250,12 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
         generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
   };
   if (this->PictureOnly) {
-    const std::optional<vdi::Image> picture = generator.renderVolume(camera, function, settings, progress);
+    std::optional<vdi::Image> picture = generator.renderVolume(camera, function, settings, progress);
     takeReport();
-    if (picture) pv::setPicture(output, *picture, true);
+    if (picture) {
+      pv::setPicture(output, *picture, true);
+      generator.recycle(std::move(*picture));
+    }
   } else {
     std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
     takeReport();

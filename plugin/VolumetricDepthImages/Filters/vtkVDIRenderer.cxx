@@ -6,6 +6,8 @@
 #include <vtkObjectFactory.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
+#include <utility>
+
 #include "VDIImageData.h"
 #include "VDISession.h"
 #include "vdi/core/Error.h"
@@ -115,8 +117,9 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
     camera = internal.Original;
   }
   const bool own = this->Resolution[0] <= 0 || this->Resolution[1] <= 0;
-  const vdi::Image picture = internal.Renderer->render(
-      camera, own ? internal.Width : this->Resolution[0], own ? internal.Height : this->Resolution[1],
-      static_cast<vdi::Reconstruction>(this->Reconstruction));
+  vdi::Image picture = internal.Renderer->render(camera, own ? internal.Width : this->Resolution[0],
+                                                 own ? internal.Height : this->Resolution[1],
+                                                 static_cast<vdi::Reconstruction>(this->Reconstruction));
   pv::setPicture(output, picture, true);
+  internal.Renderer->recycle(std::move(picture));
 }

@@ -1,0 +1,52 @@
+// Host work on many elements, by several threads.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <future>
+#include <span>
+#include <thread>
+#include <type_traits>
+#include <vector>
+
+namespace vdi {
+
+/// Calls work(first, last) for ranges that make up [0, count), from several threads at once where each has at
+/// least `least` elements. `least` is what takes some 100 us: a thread takes half of that to start. Returns
+/// when all is done; an exception of `work` comes out here. Where no thread can be had, the calling one does
+/// its part.
+template <typename Work>
+void inParallel(std::size_t count, std::size_t least, Work work) {
+  constexpr std::size_t mostThreads = 16;
+  const std::size_t cores = std::max(std::thread::hardware_concurrency(), 1U);
+  const std::size_t threads = std::clamp<std::size_t>(count / least, 1, std::min(cores, mostThreads));
+  const std::size_t share = (count + threads - 1) / threads;
+  std::vector<std::future<void>> others;
+  for (std::size_t first = share; first < count; first += share) {
+    others.push_back(std::async(std::launch::async | std::launch::deferred,
+                                [&, first] { work(first, std::min(first + share, count)); }));
+  }
+  if (count > 0) work(std::size_t{0}, std::min(share, count));
+  for (std::future<void>& other : others) other.get();
+}
+
+/// One core copies about 10 GB/s.
+inline void copyInParallel(std::span<const std::byte> from, void* to) {
+  inParallel(from.size(), std::size_t{1} << 20, [&](std::size_t first, std::size_t last) {
+    std::memcpy(static_cast<std::byte*>(to) + first, from.data() + first, last - first);
+  });
+}
+
+/// Makes `from` what `to` holds from place `first` on (at most its size), and nothing behind. What was there
+/// is overwritten: memory that's used again isn't cleared before.
+template <typename T>
+void replaceTail(std::vector<T>& to, std::size_t first, std::span<const T> from) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  if (to.size() > first + from.size()) to.resize(first + from.size());
+  const std::size_t inPlace = to.size() - first;
+  copyInParallel(std::as_bytes(from.first(inPlace)), to.data() + first);
+  to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(inPlace), from.end());
+}
+
+}  // namespace vdi
