@@ -59,9 +59,11 @@ vdi::ListsOf<Segment> listsFrom(vtkUnsignedIntArray* offsets, Array* segments) {
   return lists;
 }
 
-/// std::lround would be a call for each.
 unsigned char toByte(float share) {
-  return static_cast<unsigned char>(std::clamp(share, 0.0F, 1.0F) * 255.0F + 0.5F);
+  // Rounded by truncation; std::lround would be a call for each.
+  constexpr float half = 0.5F;
+  const float code = std::clamp(share, 0.0F, 1.0F) * 255.0F + half;
+  return static_cast<unsigned char>(code);
 }
 
 }  // namespace
