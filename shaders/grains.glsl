@@ -179,7 +179,7 @@ uint supersegmentsAtLevel(uint level) {
   uint count = level == 0u ? grainsVisible : 1u;
   uint tolerance = clamp(level, 1u, uint(toleranceLevels)) - 1u;
   uint share = tolerance * rayShares / uint(toleranceLevels);
-  uint from = gl_SubgroupInvocationID - rayShare + share;
+  uint from = gl_SubgroupInvocationID - rayShare + share;  // who counts for it
   [[unroll]] for (int i = 0; i < countedLevels; ++i) {
     uint counted = rayShares == 1u ? countedGrains[i] : subgroupShuffle(countedGrains[i], from);
     if (level == 1u + share * uint(countedLevels) + uint(i)) count = counted;

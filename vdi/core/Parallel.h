@@ -6,11 +6,14 @@
 #include <cstring>
 #include <future>
 #include <span>
-#include <thread>
 #include <type_traits>
 #include <vector>
 
 namespace vdi {
+
+/// Cores that the calling thread may run on: mpirun may have left it one, where more threads would be in each
+/// other's way.
+std::size_t usableCores();
 
 /// Calls work(first, last) for ranges that make up [0, count), from several threads at once where each has at
 /// least `least` elements. `least` is what takes some 100 us: a thread takes half of that to start. Returns
@@ -19,8 +22,7 @@ namespace vdi {
 template <typename Work>
 void inParallel(std::size_t count, std::size_t least, Work work) {
   constexpr std::size_t mostThreads = 16;
-  const std::size_t cores = std::max(std::thread::hardware_concurrency(), 1U);
-  const std::size_t threads = std::clamp<std::size_t>(count / least, 1, std::min(cores, mostThreads));
+  const std::size_t threads = std::clamp<std::size_t>(count / least, 1, std::min(usableCores(), mostThreads));
   const std::size_t share = (count + threads - 1) / threads;
   std::vector<std::future<void>> others;
   for (std::size_t first = share; first < count; first += share) {

@@ -95,6 +95,7 @@ void Commands::begin() {
                                       VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT, nullptr};
   check(vkBeginCommandBuffer(buffer_, &info), "vkBeginCommandBuffer");
   state_ = State::Recording;
+  barrier();
 }
 
 void Commands::submit() {

@@ -36,8 +36,9 @@ class Commands {
   Commands(Commands&&) = delete;
   Commands& operator=(Commands&&) = delete;
 
-  /// Waits for the previous submission, then starts anew. What was recorded and not submitted is dropped, so
-  /// an exception between begin and submit does no harm.
+  /// Waits for the previous submission, then starts anew, behind a barrier: whatever was submitted before, by
+  /// others too, is finished and visible to what's recorded. What was recorded and not submitted is dropped,
+  /// so an exception between begin and submit does no harm.
   void begin();
   void submit();
   /// How often that was done: more than while something was recorded tells that it wasn't dropped.

@@ -182,8 +182,7 @@ Image VdiRenderer::render(const Camera& camera, int width, int height, Reconstru
   params.depths = s.picture.depths();
   params.nearest = s.nearest;
   params.farthest = s.farthest;
-  s.commands.begin();
-  s.commands.barrier();  // behind setVdi's uploads
+  s.commands.begin();  // behind setVdi's uploads
   s.commands.mark("render");
   s.pass.record(s.commands, params, gpu::renderRays(*s.original, view), reconstruction);
   s.picture.recordDownload(s.commands);
