@@ -7,6 +7,7 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 #include "shared/cast.h"
 
+// All along x, as whole subgroups must be: those that share a ray are side by side in one.
 layout(local_size_x = castGroupX * castGroupY) in;
 // What the program is for; the others' code is left out.
 layout(constant_id = 0) const uint castProgram = castProgramSearch;

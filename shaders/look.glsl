@@ -74,7 +74,12 @@ void meet(inout Seen seen, uvec4 piece, vec2 depths, Part part) {
 
 Look lookOf(Seen seen) { return Look(vec4(seen.light * pieceColorUnit, 1.0 - seen.transmittance), seen.entered); }
 
-// Where a look is in a list: at piecesAtOnce supersegments, the last of which stands for what's behind it.
+// The i-th of several supersegments from a slot on, where `more` follow in the list; the last one again beyond them.
+uvec4 pieceFrom(uint slot, int i, int more, int step) {
+  return params.segments.at[slot + uint(i == 0 ? 0 : min(i, more) * step)];
+}
+
+// Where a look is in a list: at piecesAtOnce supersegments.
 struct Cursor {
   int place;  // of the first of them, counted as the ray meets them
   uint slot;  // and in the compact array
@@ -86,7 +91,7 @@ Cursor cursorAt(int place, uint slot, int last, int step) {
   at.place = place;
   at.slot = slot;
   [[unroll]] for (int i = 0; i < mostPiecesAtOnce; ++i) {
-    if (i < piecesAtOnce) at.pieces[i] = params.segments.at[slot + uint(i == 0 ? 0 : min(i, last - place) * step)];
+    if (i < piecesAtOnce) at.pieces[i] = pieceFrom(slot, i, last - place, step);
   }
   return at;
 }
@@ -125,14 +130,13 @@ Look lookAtList(uint list, Part part, inout int hint) {
 Look lookThroughList(uint list, Part part) {
   const int atOnce = 4;
   ListHead head = params.heads.at[list];
-  PieceArray pieces = params.segments;
   int last = int(head.count) - 1;
   int step = rayAscends ? 1 : -1;
   uint slot = head.first + uint(rayAscends ? 0 : last);
   Seen seen = nothingYet;
   for (int place = 0; place <= last && seen.transmittance > 1.0 - opaque; place += atOnce) {
     uvec4 several[atOnce];
-    [[unroll]] for (int i = 0; i < atOnce; ++i) several[i] = pieces.at[slot + uint(min(i, last - place) * step)];
+    [[unroll]] for (int i = 0; i < atOnce; ++i) several[i] = pieceFrom(slot, i, last - place, step);
     [[unroll]] for (int i = 0; i < atOnce; ++i) {
       if (place + i <= last) meet(seen, several[i], metDepths(several[i]), part);
     }

@@ -194,9 +194,9 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
   return true;
 }
 
-const uint shortGap = 32u;  // samples
-
 #include "raycast_shares.glsl"
+
+const uint shortGap = 32u;  // samples
 
 // Returns false once the ray is opaque enough.
 bool castBrick(uint index) {

@@ -12,12 +12,25 @@
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/GenerateSettings.h"
+#include "vdi/core/Image.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
 
 using namespace vdi;
+
+TEST_CASE("bytes of colours are rounded to the nearest") {
+  for (int i = 0; i <= 1 << 20; ++i) {
+    const float share = std::ldexp(static_cast<float>(i), -20);
+    if (toByte(share) != std::lround(share * 255.0F)) FAIL(share);
+  }
+  CHECK(toByte(std::nextafter(1.0F, 0.0F)) == 255);
+  CHECK(toByte(-1.0F) == 0);
+  CHECK(toByte(2.0F) == 255);
+  CHECK(toByte(std::numeric_limits<float>::infinity()) == 255);
+  CHECK(toByte(std::numeric_limits<float>::quiet_NaN()) == 0);
+}
 
 TEST_CASE("work in parallel: each element once, exceptions come out") {
   for (const std::size_t count : {0U, 1U, 7U, 1000U, 12345U}) {

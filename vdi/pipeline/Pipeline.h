@@ -106,8 +106,7 @@ class VdiRenderer {
   /// most. Throws Error{InvalidArgument} before the first setVdi, and for what View rejects.
   Image render(const Camera& camera, int width, int height,
                Reconstruction reconstruction = Reconstruction::Smooth);
-  /// Takes a picture that nobody needs any more: the next one is made in its memory, which takes less than
-  /// half of the time.
+  /// Takes a picture that nobody needs any more, so that the next one is made in its memory.
   void recycle(Image&& image);
   double renderMilliseconds() const;  // device time of the last render
 

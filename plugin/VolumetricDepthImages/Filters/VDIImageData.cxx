@@ -59,13 +59,6 @@ vdi::ListsOf<Segment> listsFrom(vtkUnsignedIntArray* offsets, Array* segments) {
   return lists;
 }
 
-unsigned char toByte(float share) {
-  // Rounded by truncation; std::lround would be a call for each.
-  constexpr float half = 0.5F;
-  const float code = std::clamp(share, 0.0F, 1.0F) * 255.0F + half;
-  return static_cast<unsigned char>(code);
-}
-
 }  // namespace
 
 void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth) {
@@ -80,8 +73,8 @@ void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth) 
     for (std::size_t i = first; i < last; ++i) {
       const glm::vec4& pixel = picture.rgba[i];
       const float unmultiply = pixel.a > 0.0F ? 1.0F / pixel.a : 0.0F;
-      for (int c = 0; c < 3; ++c) *out++ = toByte(pixel[c] * unmultiply);
-      *out++ = toByte(pixel.a);
+      for (int c = 0; c < 3; ++c) *out++ = vdi::toByte(pixel[c] * unmultiply);
+      *out++ = vdi::toByte(pixel.a);
     }
   });
   image->GetPointData()->SetScalars(colors);
