@@ -37,23 +37,33 @@ uint pieceOf(uint cell) {
   return low;
 }
 
-void measure(CellPiece piece, uint cell) {
+uint ordered(float value) {
+  uint bits = floatBitsToUint(value);
+  return (bits >> 31) != 0u ? ~bits : bits | 0x80000000u;
+}
+
+void measure(CellPiece piece, uint pieceIndex, uint cell) {
   uint index = cell - piece.firstCell;
   uvec3 cellAt = uvec3(index % piece.cellDims.x, (index / piece.cellDims.x) % piece.cellDims.y,
                        index / (piece.cellDims.x * piece.cellDims.y));
   ivec3 first = max(ivec3(cellAt * cellSide) - 1, ivec3(0));
   ivec3 last = min(ivec3((cellAt + 1u) * cellSide) + 1, ivec3(piece.dims) - 1);
-  vec2 range = vec2(3.4e38, -3.4e38);
+  const float largest = 3.402823466e38;
+  vec2 range = vec2(largest, -largest);
   for (int z = first.z; z <= last.z; ++z) {
     for (int y = first.y; y <= last.y; ++y) {
       for (int x = first.x; x <= last.x; ++x) {
         float value = texelAt(piece.page, ivec3(piece.place) + ivec3(x, y, z));
         // What isn't finite is transparent, and so is what's interpolated with it.
-        if (abs(value) <= 3.0e38) range = vec2(min(range.x, value), max(range.y, value));
+        if (abs(value) <= largest) range = vec2(min(range.x, value), max(range.y, value));
       }
     }
   }
   push.ranges.at[cell] = range;
+  if (range.x <= range.y) {
+    atomicMin(push.pieceRanges.at[2u * pieceIndex], ordered(range.x));
+    atomicMin(push.pieceRanges.at[2u * pieceIndex + 1u], ~ordered(range.y));
+  }
 }
 
 void classify(CellPiece piece, uint cell) {
@@ -73,9 +83,10 @@ void classify(CellPiece piece, uint cell) {
 void main() {
   uint cell = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * cellsGroup;
   if (cell >= push.cellCount) return;
-  CellPiece piece = push.pieces.at[pieceOf(cell)];
+  uint index = pieceOf(cell);
+  CellPiece piece = push.pieces.at[index];
   if (push.mode == cellsModeMeasure) {
-    measure(piece, cell);
+    measure(piece, index, cell);
   } else {
     classify(piece, cell);
   }

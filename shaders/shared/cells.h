@@ -40,6 +40,9 @@ VDI_SHARED_BEGIN
 struct CellsConstants {
   VDI_ADDRESS(CellPieceArray) pieces;  // by firstCell
   VDI_ADDRESS(CellRangeArray) ranges;  // [cells]: smallest and largest finite texel; upside down if there's none
+  // [pieces][2]: the same of pieces, all bits set beforehand: the smallest, and the inverted bits of the largest, as bits of
+  // floats that are ordered as unsigned numbers (of negative ones all inverted, of others the sign)
+  VDI_ADDRESS(CellArray) pieceRanges;
   VDI_ADDRESS(CellArray) visible;      // [cells]: 1 or 0
   VDI_ADDRESS(CellArray) visibleBefore;  // [tableSize + 1]: how many of the table's first entries aren't transparent
   uint pieceCount;

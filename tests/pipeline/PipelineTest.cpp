@@ -102,6 +102,9 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
       const Camera camera = test::oblique(parallel);
       VdiGenerator generator(device(), comm::Communicator::serial());
       generator.setBlocks(dealt.mine);
+      ScalarRange range;
+      for (const Block& block : dealt.mine) range.include(finiteRange(block));
+      CHECK(generator.scalarRange() == range);
       const reference::Frame frame(generator.scene(), camera, function, settings);
 
       const auto image = generator.renderVolume(camera, function, settings);

@@ -160,6 +160,41 @@ TEST_CASE("a rank that fails takes nobody down, and the next frame works") {
   CHECK_NOTHROW(generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(16, 12)));
 }
 
+TEST_CASE("the next step, while this one is shown: all ranks advance, or none does") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto dealtOf = [&](const char* field) {
+    return test::deal(field, {34, 30, 37}, {3, 2, 3}, Layout::Random, Joint::Gap, ScalarType::F32,
+                      world.rank(), world.size());
+  };
+  const auto first = dealtOf("turbulence");
+  const auto second = dealtOf("shells");
+  const GenerateSettings settings = test::smallSettings();
+  const TransferFunction function = test::threeHues(0.8);
+  VdiGenerator fresh(device(), comm::Communicator::world());
+  const auto truthOf = [&](const test::Dealt& dealt) {
+    fresh.setBlocks(dealt.mine);
+    return fresh.renderVolume(test::oblique(), function, settings);
+  };
+  const auto firstTruth = truthOf(first);
+  const auto secondTruth = truthOf(second);
+  VdiGenerator generator(device(), comm::Communicator::world());
+  const auto demandShown = [&](const std::optional<Image>& truth) {
+    const auto vdi = generator.generate(test::oblique(), function, settings);
+    if (vdi) CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
+  };
+  generator.setBlocks(first.mine);
+  generator.setNextBlocks(second.mine);
+  demandShown(firstTruth);
+  auto broken = second.mine;
+  if (world.rank() == world.size() - 1) broken.emplace_back();
+  CHECK_THROWS_AS(generator.setNextBlocks(broken), Error);
+  CHECK_THROWS_AS(generator.advance(), Error);
+  demandShown(firstTruth);
+  generator.setNextBlocks(second.mine);
+  generator.advance();
+  demandShown(secondTruth);
+}
+
 TEST_CASE("parameters that differ between ranks are refused on every rank") {
   const comm::Communicator world = comm::Communicator::world();
   const auto dealt = test::deal("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved, Joint::SharedPoints,

@@ -7,11 +7,13 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <span>
 #include <type_traits>
 #include <utility>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Parallel.h"
 
 namespace vdi {
 
@@ -122,9 +124,22 @@ double valueAt(const Block& block, int i, int j, int k) {
   return withTyped(block, [index](const auto* values) { return static_cast<double>(values[index]); });
 }
 
+void ScalarRange::include(const ScalarRange& other) {
+  min = std::min(min, other.min);
+  max = std::max(max, other.max);
+}
+
 ScalarRange finiteRange(const Block& block) {
   return withTyped(block, [count = block.valueCount()](const auto* values) {
-    return finiteRangeOf(std::span(values, count));
+    constexpr std::size_t least = 1 << 19;
+    std::mutex mutex;
+    ScalarRange range;
+    inParallel(count, least, [&](std::size_t first, std::size_t last) {
+      const ScalarRange part = finiteRangeOf(std::span(values + first, last - first));
+      const std::lock_guard lock(mutex);
+      range.include(part);
+    });
+    return range;
   });
 }
 

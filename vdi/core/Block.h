@@ -75,8 +75,9 @@ struct ScalarRange {
   double min = std::numeric_limits<double>::infinity();
   double max = -std::numeric_limits<double>::infinity();
   bool operator==(const ScalarRange&) const = default;
+  void include(const ScalarRange& other);
 };
-ScalarRange finiteRange(const Block& block);
+ScalarRange finiteRange(const Block& block);  // by several threads
 
 /// Throws Error{InvalidArgument} naming the block's index for: dims < 1, spacing that isn't finite and > 0,
 /// an origin or owned box that isn't finite, null data. A block with an empty owned box is legal and owns no

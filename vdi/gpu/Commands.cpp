@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "vdi/gpu/ComputePipeline.h"
-#include "vdi/gpu/Device.h"
 #include "vdi/gpu/Memory.h"
 
 namespace vdi::gpu {
@@ -12,27 +11,6 @@ namespace vdi::gpu {
 namespace {
 
 constexpr std::uint32_t maxMarks = 64;
-
-/// `host`: what's written is visible to the host as well, which flushes more caches than the device alone
-/// needs.
-void memoryBarrier(VkCommandBuffer commands, bool host) {
-  constexpr VkPipelineStageFlags2 stages =
-      VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
-  constexpr VkPipelineStageFlags2 arguments =
-      VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT;  // of indirect dispatches
-  constexpr VkAccessFlags2 writes = VK_ACCESS_2_SHADER_WRITE_BIT | VK_ACCESS_2_TRANSFER_WRITE_BIT;
-  constexpr VkAccessFlags2 reads =
-      VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_TRANSFER_READ_BIT | VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT;
-  const VkMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
-                                 nullptr,
-                                 stages | arguments,
-                                 writes,
-                                 host ? VK_PIPELINE_STAGE_2_HOST_BIT : stages | arguments,
-                                 host ? VK_ACCESS_2_HOST_READ_BIT : reads | writes};
-  const VkDependencyInfo info{
-      VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 1, &barrier, 0, nullptr, 0, nullptr};
-  vkCmdPipelineBarrier2(commands, &info);
-}
 
 /// Waits for everything before; everything after waits for it.
 void changeLayout(VkCommandBuffer commands, const Image3D& image, VkImageLayout from, VkImageLayout to) {
@@ -55,16 +33,20 @@ void changeLayout(VkCommandBuffer commands, const Image3D& image, VkImageLayout 
 
 }  // namespace
 
-Commands::Commands(std::shared_ptr<Device> device) : device_(std::move(device)) {
+Commands::Commands(std::shared_ptr<Device> device, QueueKind kind) : device_(std::move(device)), kind_(kind) {
   try {
     const VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr, 0,
-                                           device_->queueFamily()};
+                                           device_->queueFamily(kind_)};
     check(vkCreateCommandPool(device_->handle(), &poolInfo, nullptr, &pool_), "vkCreateCommandPool");
     const VkCommandBufferAllocateInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr,
                                                  pool_, VK_COMMAND_BUFFER_LEVEL_PRIMARY, 1};
     check(vkAllocateCommandBuffers(device_->handle(), &bufferInfo, &buffer_), "vkAllocateCommandBuffers");
     const VkFenceCreateInfo fenceInfo{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, nullptr, 0};
     check(vkCreateFence(device_->handle(), &fenceInfo, nullptr, &fence_), "vkCreateFence");
+    const VkSemaphoreTypeCreateInfo timeline{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO, nullptr,
+                                             VK_SEMAPHORE_TYPE_TIMELINE, 0};
+    const VkSemaphoreCreateInfo semaphoreInfo{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &timeline, 0};
+    check(vkCreateSemaphore(device_->handle(), &semaphoreInfo, nullptr, &done_), "vkCreateSemaphore");
     const VkQueryPoolCreateInfo queryInfo{
         VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO, nullptr, 0, VK_QUERY_TYPE_TIMESTAMP, maxMarks + 1, 0};
     check(vkCreateQueryPool(device_->handle(), &queryInfo, nullptr, &queries_), "vkCreateQueryPool");
@@ -82,6 +64,7 @@ Commands::~Commands() {
 void Commands::release() noexcept {
   VkDevice device = device_->handle();
   if (queries_ != VK_NULL_HANDLE) vkDestroyQueryPool(device, queries_, nullptr);
+  if (done_ != VK_NULL_HANDLE) vkDestroySemaphore(device, done_, nullptr);
   if (fence_ != VK_NULL_HANDLE) vkDestroyFence(device, fence_, nullptr);
   if (pool_ != VK_NULL_HANDLE) vkDestroyCommandPool(device, pool_, nullptr);
 }
@@ -89,6 +72,7 @@ void Commands::release() noexcept {
 void Commands::begin() {
   wait();
   marks_.clear();
+  waits_.clear();
   vkResetQueryPool(device_->handle(), queries_, 0, maxMarks + 1);
   check(vkResetCommandPool(device_->handle(), pool_, 0), "vkResetCommandPool");
   const VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr,
@@ -98,18 +82,33 @@ void Commands::begin() {
   barrier();
 }
 
+void Commands::waitFor(const Commands& other) {
+  assert(state_ == State::Recording);
+  waits_.push_back({VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, nullptr, other.done_, other.submissions_,
+                    VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, 0});
+}
+
 void Commands::submit() {
   assert(state_ == State::Recording);
   state_ = State::Idle;
   if (!marks_.empty()) writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
   // Makes what was written visible to the host after wait().
-  memoryBarrier(buffer_, true);
+  memoryBarrier(true);
   check(vkEndCommandBuffer(buffer_), "vkEndCommandBuffer");
   const VkCommandBufferSubmitInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO, nullptr, buffer_,
                                              0};
-  const VkSubmitInfo2 info{
-      VK_STRUCTURE_TYPE_SUBMIT_INFO_2, nullptr, 0, 0, nullptr, 1, &bufferInfo, 0, nullptr};
-  device_->submit(info, fence_);
+  const VkSemaphoreSubmitInfo done{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, nullptr, done_, submissions_ + 1,
+                                   VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,    0};
+  const VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2,
+                           nullptr,
+                           0,
+                           static_cast<std::uint32_t>(waits_.size()),
+                           waits_.data(),
+                           1,
+                           &bufferInfo,
+                           1,
+                           &done};
+  device_->submit(kind_, info, fence_);
   state_ = State::Submitted;
   ++submissions_;
 }
@@ -153,7 +152,30 @@ void Commands::bind(const ComputePipeline& pipeline, std::span<const std::byte> 
 }
 
 void Commands::barrier() {
-  memoryBarrier(buffer_, false);
+  memoryBarrier(false);
+}
+
+/// `host`: what's written is visible to the host as well, which flushes more caches than the device alone
+/// needs.
+void Commands::memoryBarrier(bool host) {
+  VkPipelineStageFlags2 stages = VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
+  VkAccessFlags2 writes = VK_ACCESS_2_TRANSFER_WRITE_BIT;
+  VkAccessFlags2 reads = VK_ACCESS_2_TRANSFER_READ_BIT;
+  if (kind_ == QueueKind::Compute) {
+    stages |= VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT |
+              VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT;  // which reads the arguments of indirect dispatches
+    writes |= VK_ACCESS_2_SHADER_WRITE_BIT;
+    reads |= VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT;
+  }
+  const VkMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
+                                 nullptr,
+                                 stages,
+                                 writes,
+                                 host ? VK_PIPELINE_STAGE_2_HOST_BIT : stages,
+                                 host ? VK_ACCESS_2_HOST_READ_BIT : reads | writes};
+  const VkDependencyInfo info{
+      VK_STRUCTURE_TYPE_DEPENDENCY_INFO, nullptr, 0, 1, &barrier, 0, nullptr, 0, nullptr};
+  vkCmdPipelineBarrier2(buffer_, &info);
 }
 
 void Commands::copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
@@ -173,12 +195,17 @@ void Commands::update(const Buffer& buffer, std::span<const std::byte> bytes) {
   vkCmdUpdateBuffer(buffer_, buffer.handle(), 0, bytes.size(), bytes.data());
 }
 
-void Commands::beginUpload(const Image3D& image) {
+void Commands::clear(const Image3D& image) {
   changeLayout(buffer_, image, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   const VkClearColorValue zero{};
   const VkImageSubresourceRange all{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
   vkCmdClearColorImage(buffer_, image.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &zero, 1, &all);
-  memoryBarrier(buffer_, false);
+  endUpload(image);
+}
+
+void Commands::beginUpload(const Image3D& image) {
+  changeLayout(buffer_, image, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL,
+               VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
 }
 
 void Commands::endUpload(const Image3D& image) {

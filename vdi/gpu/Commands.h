@@ -10,11 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "vdi/gpu/Device.h"
+
 namespace vdi::gpu {
 
 class Buffer;
 class ComputePipeline;
-class Device;
 class Image3D;
 
 struct StageTime {
@@ -29,7 +30,8 @@ constexpr std::uint32_t groupsFor(std::uint32_t count, std::uint32_t group) {
 
 class Commands {
  public:
-  explicit Commands(std::shared_ptr<Device> device);
+  /// Those of a transfer queue only copy: no dispatches, clears or marks.
+  explicit Commands(std::shared_ptr<Device> device, QueueKind kind = QueueKind::Compute);
   ~Commands();  // waits for what was submitted
   Commands(const Commands&) = delete;
   Commands& operator=(const Commands&) = delete;
@@ -40,6 +42,9 @@ class Commands {
   /// others too, is finished and visible to what's recorded. What was recorded and not submitted is dropped,
   /// so an exception between begin and submit does no harm.
   void begin();
+  /// What's recorded waits, on the device, for the last submission of `other`, which must not be destroyed
+  /// before this is done. For another queue's: begin's barrier reaches its own queue only.
+  void waitFor(const Commands& other);
   void submit();
   /// How often that was done: more than while something was recorded tells that it wasn't dropped.
   std::uint64_t submissions() const { return submissions_; }
@@ -88,10 +93,12 @@ class Commands {
   void fill(const Buffer& buffer, std::uint32_t word);  // the whole buffer
   /// The buffer's first bytes, by way of the command buffer: whole words, 64 KiB at most.
   void update(const Buffer& buffer, std::span<const std::byte> bytes);
-  /// Makes the image ready for copyToImage and fills it with zeros: texels that nothing is copied to would
+  /// Fills a new image with zeros and makes it ready to be sampled: texels that nothing is copied to would
   /// otherwise hold anything, NaN included, and a NaN spoils its neighbours even with weight 0.
+  void clear(const Image3D& image);
+  /// From ready to be sampled to ready for copyToImage, with its texels as they are.
   void beginUpload(const Image3D& image);
-  /// Makes the image ready to be sampled by what's recorded later.
+  /// And back.
   void endUpload(const Image3D& image);
   /// Texels, x fastest, from the buffer into a box of the image. `pitch`: texels from row to row and rows
   /// from slice to slice; 0: tightly packed.
@@ -107,6 +114,7 @@ class Commands {
 
  private:
   void bind(const ComputePipeline& pipeline, std::span<const std::byte> constants);
+  void memoryBarrier(bool host);
   void release() noexcept;
   void writeTimestamp(std::uint32_t query);
   void readTimes();
@@ -114,9 +122,12 @@ class Commands {
   enum class State { Idle, Recording, Submitted };
 
   std::shared_ptr<Device> device_;
+  QueueKind kind_;
   VkCommandPool pool_ = VK_NULL_HANDLE;
   VkCommandBuffer buffer_ = VK_NULL_HANDLE;
   VkFence fence_ = VK_NULL_HANDLE;
+  VkSemaphore done_ = VK_NULL_HANDLE;  // timeline: counts submissions
+  std::vector<VkSemaphoreSubmitInfo> waits_;
   VkQueryPool queries_ = VK_NULL_HANDLE;
   std::vector<std::string> marks_;
   std::vector<StageTime> times_;

@@ -40,7 +40,8 @@ struct Features {
 
 struct Candidate {
   VkPhysicalDevice handle = VK_NULL_HANDLE;
-  std::uint32_t queueFamily = 0;
+  std::uint32_t computeFamily = 0;
+  std::uint32_t transferFamily = 0;
   DeviceLimits limits;
   DeviceSummary summary;
 };
@@ -58,20 +59,28 @@ std::uint64_t largestDeviceHeap(VkPhysicalDevice device) {
 }
 
 /// The first family that computes and has timestamps: the one with graphics on common hardware, which has the
-/// whole device, while compute-only families may share it.
-bool findComputeFamily(VkPhysicalDevice device, Candidate& candidate) {
+/// whole device, while compute-only families may share it. For transfers one that can do nothing else, copy
+/// engines, if it copies boxes of any texels.
+bool findFamilies(VkPhysicalDevice device, Candidate& candidate) {
   std::uint32_t count = 0;
   vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
   std::vector<VkQueueFamilyProperties> families(count);
   vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
-  for (std::uint32_t i = 0; i < count; ++i) {
-    if ((families[i].queueFlags & VK_QUEUE_COMPUTE_BIT) != 0 && families[i].timestampValidBits > 0) {
-      candidate.queueFamily = i;
-      candidate.limits.timestampBits = families[i].timestampValidBits;
-      return true;
-    }
-  }
-  return false;
+  const auto compute = std::find_if(families.begin(), families.end(), [](const auto& family) {
+    return (family.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0 && family.timestampValidBits > 0;
+  });
+  if (compute == families.end()) return false;
+  const auto transfer = std::find_if(families.begin(), families.end(), [](const auto& family) {
+    const VkExtent3D& step = family.minImageTransferGranularity;
+    return (family.queueFlags & VK_QUEUE_TRANSFER_BIT) != 0 &&
+           (family.queueFlags & (VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT)) == 0 && step.width == 1 &&
+           step.height == 1 && step.depth == 1;
+  });
+  const auto indexOf = [&](auto family) { return static_cast<std::uint32_t>(family - families.begin()); };
+  candidate.computeFamily = indexOf(compute);
+  candidate.transferFamily = indexOf(transfer != families.end() ? transfer : compute);
+  candidate.limits.timestampBits = compute->timestampValidBits;
+  return true;
 }
 
 bool filtersLinearly(VkPhysicalDevice device, VkFormat format) {
@@ -195,8 +204,7 @@ Candidate inspect(VkPhysicalDevice device) {
                                            VK_API_VERSION_MAJOR(properties.apiVersion),
                                            VK_API_VERSION_MINOR(properties.apiVersion)));
   }
-  if (!findComputeFamily(device, candidate))
-    summary.refusals.emplace_back("no compute queue with timestamps");
+  if (!findFamilies(device, candidate)) summary.refusals.emplace_back("no compute queue with timestamps");
   for (const auto& [format, name] :
        {std::pair(VK_FORMAT_R8_UNORM, "R8_UNORM"), std::pair(VK_FORMAT_R16_UNORM, "R16_UNORM"),
         std::pair(VK_FORMAT_R32_SFLOAT, "R32_SFLOAT")}) {
@@ -297,9 +305,12 @@ struct Device::State {
   VkDebugUtilsMessengerEXT messenger = VK_NULL_HANDLE;
   VkPhysicalDevice physical = VK_NULL_HANDLE;
   VkDevice device = VK_NULL_HANDLE;
-  VkQueue queue = VK_NULL_HANDLE;
+  struct Queue {
+    VkQueue handle = VK_NULL_HANDLE;
+    std::uint32_t family = 0;
+  };
+  std::array<Queue, 2> queues;  // by kind
   VkPipelineCache cache = VK_NULL_HANDLE;
-  std::uint32_t queueFamily = 0;
   std::string name;
   bool cpu = false;
   bool gpuPrograms = true;
@@ -311,6 +322,7 @@ struct Device::State {
   PFN_vkGetMemoryHostPointerPropertiesEXT hostPointerProperties = nullptr;
 
   void listen();  // to the validation layer
+  Queue& queue(QueueKind kind) { return queues[static_cast<std::size_t>(kind)]; }
 
   ~State() {
     if (cache != VK_NULL_HANDLE) vkDestroyPipelineCache(device, cache, nullptr);
@@ -379,8 +391,11 @@ std::string resultName(VkResult result) {
 /// A device of its own for the process, with every feature that `limits` and Device::create promise.
 VkDevice makeDevice(const Candidate& chosen) {
   const float priority = 1.0F;
-  const VkDeviceQueueCreateInfo queueInfo{
-      VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO, nullptr, 0, chosen.queueFamily, 1, &priority};
+  const auto queueOf = [&priority](std::uint32_t family) {
+    return VkDeviceQueueCreateInfo{
+        VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO, nullptr, 0, family, 1, &priority};
+  };
+  const std::array queues{queueOf(chosen.computeFamily), queueOf(chosen.transferFamily)};
   Features features;
   features.core.features.shaderInt64 = VK_TRUE;
   features.v11.storageBuffer16BitAccess = chosen.limits.storage16Bit ? VK_TRUE : VK_FALSE;
@@ -397,8 +412,8 @@ VkDevice makeDevice(const Candidate& chosen) {
   VkDeviceCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
   info.pNext = &features.core;
-  info.queueCreateInfoCount = 1;
-  info.pQueueCreateInfos = &queueInfo;
+  info.queueCreateInfoCount = chosen.computeFamily == chosen.transferFamily ? 1 : 2;
+  info.pQueueCreateInfos = queues.data();
   const char* hostMemory = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
   if (chosen.limits.hostPointerAlignment > 0) {
     info.enabledExtensionCount = 1;
@@ -459,14 +474,15 @@ std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
   state->instance = instance.release();
   if (request.validation) state->listen();
   state->physical = chosen.handle;
-  state->queueFamily = chosen.queueFamily;
+  state->queue(QueueKind::Compute).family = chosen.computeFamily;
+  state->queue(QueueKind::Transfer).family = chosen.transferFamily;
   state->name = chosen.summary.name;
   state->cpu = chosen.summary.type == VK_PHYSICAL_DEVICE_TYPE_CPU;
   state->gpuPrograms = !state->cpu || request.gpuPrograms;
   state->limits = chosen.limits;
   vkGetPhysicalDeviceMemoryProperties(chosen.handle, &state->memory);
   state->device = makeDevice(chosen);
-  vkGetDeviceQueue(state->device, chosen.queueFamily, 0, &state->queue);
+  for (State::Queue& queue : state->queues) vkGetDeviceQueue(state->device, queue.family, 0, &queue.handle);
   if (state->limits.hostPointerAlignment > 0) {
     state->hostPointerProperties = reinterpret_cast<PFN_vkGetMemoryHostPointerPropertiesEXT>(
         vkGetDeviceProcAddr(state->device, "vkGetMemoryHostPointerPropertiesEXT"));
@@ -504,11 +520,8 @@ VkPhysicalDevice Device::physicalDevice() const {
 VkDevice Device::handle() const {
   return state_->device;
 }
-VkQueue Device::queue() const {
-  return state_->queue;
-}
-std::uint32_t Device::queueFamily() const {
-  return state_->queueFamily;
+std::uint32_t Device::queueFamily(QueueKind kind) const {
+  return state_->queue(kind).family;
 }
 VkPipelineCache Device::pipelineCache() const {
   return state_->cache;
@@ -553,9 +566,9 @@ std::string Device::validationMessages() const {
   return state_->log.text();
 }
 
-void Device::submit(const VkSubmitInfo2& info, VkFence fence) {
+void Device::submit(QueueKind kind, const VkSubmitInfo2& info, VkFence fence) {
   const std::lock_guard lock(state_->queueMutex);
-  check(vkQueueSubmit2(state_->queue, 1, &info, fence), "vkQueueSubmit2");
+  check(vkQueueSubmit2(state_->queue(kind).handle, 1, &info, fence), "vkQueueSubmit2");
 }
 
 }  // namespace vdi::gpu

@@ -47,6 +47,10 @@ struct DeviceLimits {
   bool storage8Bit = false;   // storageBuffer8BitAccess
 };
 
+/// What a queue is for. Where the hardware has copy engines, Transfer is theirs: what's submitted there goes
+/// on beside what computes. Elsewhere both are the same queue.
+enum class QueueKind { Compute, Transfer };
+
 class Device {
  public:
   /// Throws Error{DeviceUnavailable}; the text lists every device of the machine and why it was refused, or
@@ -74,8 +78,7 @@ class Device {
   VkInstance instance() const;
   VkPhysicalDevice physicalDevice() const;
   VkDevice handle() const;
-  VkQueue queue() const;
-  std::uint32_t queueFamily() const;
+  std::uint32_t queueFamily(QueueKind kind = QueueKind::Compute) const;
   VkPipelineCache pipelineCache() const;
 
   /// Index of the first memory type that `typeBits` allows and that has `wanted`, if there's one; by Vulkan's
@@ -96,7 +99,7 @@ class Device {
   std::string validationMessages() const;
 
   /// Serialises vkQueueSubmit2 between threads.
-  void submit(const VkSubmitInfo2& info, VkFence fence);
+  void submit(QueueKind kind, const VkSubmitInfo2& info, VkFence fence);
 
  private:
   struct State;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <utility>
 
@@ -232,6 +233,9 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
   // Drivers compute with sizes that overflow beyond what they can hold: ours decides first.
   const std::uint64_t bytes = std::uint64_t{extent.x} * extent.y * extent.z * texelBytes(format);
   if (bytes > device_->limits().maxAllocationBytes) throwOutOfMemory(*device_, bytes, "texture");
+  const std::array families{device_->queueFamily(QueueKind::Compute),
+                            device_->queueFamily(QueueKind::Transfer)};
+  const bool shared = families[0] != families[1];
   try {
     const VkImageCreateInfo info{VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
                                  nullptr,
@@ -244,9 +248,9 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
                                  VK_SAMPLE_COUNT_1_BIT,
                                  VK_IMAGE_TILING_OPTIMAL,
                                  VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
-                                 VK_SHARING_MODE_EXCLUSIVE,
-                                 0,
-                                 nullptr,
+                                 shared ? VK_SHARING_MODE_CONCURRENT : VK_SHARING_MODE_EXCLUSIVE,
+                                 shared ? 2U : 0U,
+                                 families.data(),
                                  VK_IMAGE_LAYOUT_UNDEFINED};
     demandRoom(vkCreateImage(device_->handle(), &info, nullptr, &image_), "vkCreateImage", *device_, bytes,
                "texture");

@@ -78,8 +78,9 @@ struct ImportedBuffer {
 std::optional<ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& device, const void* data,
                                                std::uint64_t bytes);
 
-/// A sampled 3-D image with one mip level, optimal tiling, and its view. Filled between
-/// Commands::beginUpload and endUpload. Usage: sampled, transfer destination.
+/// A sampled 3-D image with one mip level, optimal tiling, and its view, for both kinds of queues. First
+/// Commands::clear, then filled between Commands::beginUpload and endUpload. Usage: sampled, transfer
+/// destination.
 class Image3D {
  public:
   Image3D() = default;

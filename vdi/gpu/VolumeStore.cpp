@@ -3,15 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <map>
-#include <numeric>
 #include <tuple>
+#include <utility>
 
-#include "shaders/shared/cast.h"
 #include "vdi/core/Error.h"
-#include "vdi/gpu/Device.h"
 #include "vdi/gpu/KdTree.h"
 
 namespace vdi::gpu {
@@ -23,154 +23,143 @@ namespace {
 /// times 0 is NaN.
 constexpr double filterGuard = 2.0 / 256.0;
 
+/// Smallest, and largest with its bits inverted, as cells.comp leaves them.
+using PieceRangeBits = std::array<std::uint32_t, 2>;
+
+float fromOrdered(std::uint32_t bits) {
+  return std::bit_cast<float>((bits >> 31U) != 0 ? bits & 0x7FFFFFFFU : ~bits);
+}
+
 std::uint64_t volumeOf(const glm::uvec3& extent) {
   return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z;
 }
-
-/// Places boxes of one format into pages: rows of boxes along x, rows beside each other along y, layers on
-/// top of each other along z. Boxes come in descending order of height, so blocks of one shape, the usual
-/// case, waste next to nothing.
-class Packer {
- public:
-  Packer(std::uint32_t side, std::uint32_t maxDepth, std::uint64_t maxTexels)
-      : side_(side), maxDepth_(std::min<std::uint64_t>(maxDepth, maxTexels / (std::uint64_t{side} * side))) {}
-
-  /// False when the page is full.
-  bool place(const glm::uvec3& dims, glm::uvec3& at) {
-    if (cursor_.x + dims.x > side_) {
-      cursor_ = {0, cursor_.y + rowHeight_, cursor_.z};
-      rowHeight_ = 0;
-    }
-    if (cursor_.y + dims.y > side_) {
-      cursor_ = {0, 0, cursor_.z + layerDepth_};
-      rowHeight_ = 0;
-      layerDepth_ = 0;
-    }
-    if (cursor_.z + dims.z > maxDepth_) return false;
-    at = cursor_;
-    cursor_.x += dims.x;
-    rowHeight_ = std::max(rowHeight_, dims.y);
-    layerDepth_ = std::max(layerDepth_, dims.z);
-    used_ = glm::max(used_, at + dims);
-    return true;
-  }
-  const glm::uvec3& used() const { return used_; }
-
- private:
-  std::uint32_t side_;
-  std::uint64_t maxDepth_;
-  glm::uvec3 cursor_{0};
-  std::uint32_t rowHeight_ = 0;
-  std::uint32_t layerDepth_ = 0;
-  glm::uvec3 used_{0};
-};
 
 }  // namespace
 
 VolumeStore::VolumeStore(std::shared_ptr<Device> device)
     : device_(std::move(device)), commands_(device_), upload_(device_), cellsPass_(device_) {}
 
-VkFormat VolumeStore::formatOf(ScalarType type) const {
-  switch (sizeOf(type)) {
-    case 1:
-      return device_->isCpu() ? VK_FORMAT_R16_UNORM : VK_FORMAT_R8_UNORM;
-    case 2:
-      return VK_FORMAT_R16_UNORM;
-    default:
-      return VK_FORMAT_R32_SFLOAT;
+VolumeStore::~VolumeStore() {
+  dropNext();
+}
+
+void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
+  dropNext();
+  next() = {};
+  Step& step = steps_[shown_];
+  try {
+    lay(step, blocks, scene);
+    if (!step.pieces.empty()) upload_.run(step.pieces, step.pages);
+    finish(step);
+  } catch (...) {
+    step = {};
+    throw;
   }
 }
 
-/// Pieces overlap by one value, so that each interpolates by itself.
-std::vector<VolumePiece> VolumeStore::cut(const Block& block) const {
-  const VkFormat format = formatOf(block.type);
-  const std::uint64_t maxTexels = device_->limits().maxAllocationBytes / texelBytes(format) / 2;
-  glm::uvec3 largest = glm::min(glm::uvec3(block.dims), glm::uvec3(device_->limits().maxImageDimension3D));
-  while (volumeOf(largest) > maxTexels) {
-    const int axis = largest.z >= largest.x && largest.z >= largest.y ? 2 : largest.y >= largest.x ? 1 : 0;
-    largest[axis] = (largest[axis] + 1) / 2;
+void VolumeStore::setNextBlocks(std::span<const Block> blocks, const Scene& scene) {
+  dropNext();
+  Step& step = next();
+  try {
+    lay(step, blocks, scene);
+    onItsWay_ = std::async(std::launch::async | std::launch::deferred, [this, &step] {
+      if (!step.pieces.empty()) upload_.run(step.pieces, step.pages);
+    });
+  } catch (...) {
+    step = {};
+    throw;
   }
-  const ValueMap map = valueMapOf(block);
+}
+
+void VolumeStore::awaitNext() {
+  if (!onItsWay_.valid()) throw Error(ErrorCode::InvalidArgument, "no next blocks were set");
+  try {
+    onItsWay_.get();
+    finish(next());
+  } catch (...) {
+    next() = {};
+    throw;
+  }
+}
+
+void VolumeStore::showNext() {
+  shown_ = 1 - shown_;
+}
+
+void VolumeStore::dropNext() {
+  if (!onItsWay_.valid()) return;
+  try {
+    onItsWay_.get();
+  } catch (const std::exception&) {
+    next() = {};  // nobody will ask for it
+  }
+}
+
+/// All but the values: pages, macrocells and bricks, and the upload begun.
+void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& scene) {
+  validate(blocks);
+  step.tree.clear();
+  step.blocks.assign(blocks.begin(), blocks.end());
   std::vector<VolumePiece> pieces;
-  const glm::ivec3 stride = glm::max(glm::ivec3(largest) - 1, glm::ivec3(1));
-  for (int z = 0; z == 0 || z < block.dims.z - 1; z += stride.z) {
-    for (int y = 0; y == 0 || y < block.dims.y - 1; y += stride.y) {
-      for (int x = 0; x == 0 || x < block.dims.x - 1; x += stride.x) {
-        const glm::ivec3 first{x, y, z};
-        const glm::uvec3 dims = glm::min(largest, glm::uvec3(block.dims - first));
-        pieces.push_back({&block, first, dims, format, 0, {}, map.scale, map.offset});
+  std::vector<PieceRange> piecesOf;  // of each block
+  // Blocks that share their values (the parts of a box with holes) share their pieces.
+  std::map<std::tuple<const void*, double, double, double>, PieceRange> known;
+  for (const Block& block : step.blocks) {
+    PieceRange range;
+    if (!block.owned.empty()) {
+      const std::tuple key(block.data, block.origin.x, block.origin.y, block.origin.z);
+      const auto [place, isNew] = known.try_emplace(key);
+      if (isNew) {
+        const std::vector<VolumePiece> parts = cutToPieces(*device_, block);
+        place->second.first = static_cast<std::uint32_t>(pieces.size());
+        pieces.insert(pieces.end(), parts.begin(), parts.end());
+        place->second.last = static_cast<std::uint32_t>(pieces.size());
       }
+      range = place->second;
     }
+    piecesOf.push_back(range);
   }
-  return pieces;
+  makePages(step, std::move(pieces));
+  layCells(step);
+  layBricks(step, piecesOf, scene);
+  upload_.begin(commands_);
 }
 
-void VolumeStore::pack(std::vector<VolumePiece>& pieces) {
+/// Those of the same shapes are the same.
+void VolumeStore::makePages(Step& step, std::vector<VolumePiece> pieces) {
   const bool sameShapes =
-      pieces.size() == pieces_.size() &&
-      std::equal(pieces.begin(), pieces.end(), pieces_.begin(),
+      pieces.size() == step.pieces.size() &&
+      std::equal(pieces.begin(), pieces.end(), step.pieces.begin(),
                  [](const VolumePiece& a, const VolumePiece& b) { return a.samePlaceAs(b); });
   if (sameShapes) {
     for (std::size_t i = 0; i < pieces.size(); ++i) {
-      pieces[i].page = pieces_[i].page;
-      pieces[i].place = pieces_[i].place;
+      pieces[i].page = step.pieces[i].page;
+      pieces[i].place = step.pieces[i].place;
     }
+    step.pieces = std::move(pieces);
     return;
   }
-  pages_.clear();
-  ++pagesVersion_;
-  std::vector<std::size_t> order(pieces.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    const auto key = [&](std::size_t i) {
-      return std::tuple(pieces[i].format, ~pieces[i].dims.z, ~pieces[i].dims.y, ~pieces[i].dims.x);
-    };
-    return key(a) < key(b);
-  });
-  for (std::size_t begin = 0; begin < order.size();) {
-    const VkFormat format = pieces[order[begin]].format;
-    std::size_t end = begin;
-    std::uint64_t texels = 0;
-    std::uint32_t widest = 1;
-    for (; end < order.size() && pieces[order[end]].format == format; ++end) {
-      const glm::uvec3& dims = pieces[order[end]].dims;
-      texels += volumeOf(dims);
-      widest = std::max({widest, dims.x, dims.y});
-    }
-    const auto cube = static_cast<std::uint32_t>(std::ceil(std::cbrt(static_cast<double>(texels))));
-    const std::uint32_t side = std::min((std::max(cube, widest) + widest - 1) / widest * widest,
-                                        device_->limits().maxImageDimension3D);
-    const std::uint64_t maxTexels = device_->limits().maxAllocationBytes / texelBytes(format);
-    while (begin < end) {
-      Packer packer(side, device_->limits().maxImageDimension3D, maxTexels);
-      const std::size_t pageBegin = begin;
-      while (begin < end && packer.place(pieces[order[begin]].dims, pieces[order[begin]].place)) {
-        pieces[order[begin]].page = static_cast<std::uint32_t>(pages_.size());
-        ++begin;
-      }
-      if (begin == pageBegin || pages_.size() == shared::castMaxPages) {
-        throw Error(ErrorCode::OutOfMemory,
-                    fmt::format("{} MiB of volume don't fit {} textures", texels * texelBytes(format) >> 20,
-                                shared::castMaxPages),
-                    device_->name());
-      }
-      pages_.emplace_back(device_, packer.used(), format);
-    }
-  }
+  step.pages.clear();
+  step.pieces = std::move(pieces);
+  step.pagesVersion = ++pagesVersions_;
+  for (const PageShape& shape : placeInPages(*device_, step.pieces))
+    step.pages.emplace_back(device_, shape.extent, shape.format);
+  commands_.begin();
+  for (const Image3D& page : step.pages) commands_.clear(page);
+  commands_.submitAndWait();
 }
 
-void VolumeStore::layBricks(std::span<const Block> blocks, std::span<const PieceRange> piecesOf,
-                            const Scene& scene) {
+void VolumeStore::layBricks(Step& step, std::span<const PieceRange> piecesOf, const Scene& scene) const {
   const glm::dvec3 center = scene.bounds.center();
   std::vector<shared::Brick> bricks;
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    const Block& block = blocks[i];
+  for (std::size_t i = 0; i < step.blocks.size(); ++i) {
+    const Block& block = step.blocks[i];
     for (std::uint32_t index = piecesOf[i].first; index < piecesOf[i].last; ++index) {
-      const VolumePiece& piece = pieces_[index];
+      const VolumePiece& piece = step.pieces[index];
       shared::Brick brick{};
       brick.page = piece.page;
       brick.piece = index;
-      const glm::dvec3 extent = glm::dvec3(pages_[piece.page].extent());
+      const glm::dvec3 extent = glm::dvec3(step.pages[piece.page].extent());
       const glm::dvec3 pieceOrigin = block.origin + glm::dvec3(piece.first) * block.spacing;
       for (int axis = 0; axis < 3; ++axis) {
         // An owned box may reach beyond the outermost values (cells do); only inner cuts bound a piece.
@@ -193,68 +182,26 @@ void VolumeStore::layBricks(std::span<const Block> blocks, std::span<const Piece
         brick.cellScale[axis] = static_cast<float>(extent[axis] / shared::cellSide);
         brick.cellOffset[axis] = static_cast<float>(-(piece.place[axis] + 0.5) / shared::cellSide);
       }
-      brick.firstCell = cellPieces_[index].firstCell;
-      brick.cellDims = cellPieces_[index].cellDims;
+      brick.firstCell = step.cellPieces[index].firstCell;
+      brick.cellDims = step.cellPieces[index].cellDims;
       if (glm::all(glm::lessThan(brick.lo, brick.hi))) bricks.push_back(brick);
     }
   }
   KdTree tree = buildKdTree(std::move(bricks));
-  tree_ = std::move(tree.nodes);
-  bricks_ = std::move(tree.bricks);
-  pieceOfBrick_.clear();
-  for (const shared::Brick& brick : bricks_) pieceOfBrick_.push_back(brick.piece);
-  nodeBuffer_.reserve(device_, std::span(tree_).size_bytes(), MemoryKind::Upload);
-  if (!tree_.empty()) std::memcpy(nodeBuffer_.mapped().data(), tree_.data(), std::span(tree_).size_bytes());
-}
-
-void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
-  validate(blocks);
-  tree_.clear();
-  bricks_.clear();
-  try {
-    std::vector<VolumePiece> pieces;
-    std::vector<PieceRange> piecesOf;  // of each block
-    // Blocks that share their values (the parts of a box with holes) share their pieces.
-    std::map<std::tuple<const void*, double, double, double>, PieceRange> known;
-    for (const Block& block : blocks) {
-      PieceRange range;
-      if (!block.owned.empty()) {
-        const std::tuple key(block.data, block.origin.x, block.origin.y, block.origin.z);
-        const auto [place, isNew] = known.try_emplace(key);
-        if (isNew) {
-          const std::vector<VolumePiece> parts = cut(block);
-          place->second.first = static_cast<std::uint32_t>(pieces.size());
-          pieces.insert(pieces.end(), parts.begin(), parts.end());
-          place->second.last = static_cast<std::uint32_t>(pieces.size());
-        }
-        range = place->second;
-      }
-      piecesOf.push_back(range);
-    }
-    pack(pieces);
-    pieces_ = std::move(pieces);
-    if (!pieces_.empty()) upload_.run(pieces_, pages_);
-    layCells();
-    layBricks(blocks, piecesOf, scene);
-    if (!table_.entries.empty()) placeTable();
-  } catch (...) {
-    pages_.clear();
-    pieces_.clear();
-    tree_.clear();
-    bricks_.clear();
-    cellPieces_.clear();
-    cellCount_ = 0;
-    ++pagesVersion_;
-    throw;
-  }
-  for (VolumePiece& piece : pieces_) piece.block = nullptr;  // not ours beyond this call
+  step.tree = std::move(tree.nodes);
+  step.bricks = std::move(tree.bricks);
+  step.pieceOfBrick.clear();
+  for (const shared::Brick& brick : step.bricks) step.pieceOfBrick.push_back(brick.piece);
+  step.nodeBuffer.reserve(device_, std::span(step.tree).size_bytes(), MemoryKind::Upload);
+  if (!step.tree.empty())
+    std::memcpy(step.nodeBuffer.mapped().data(), step.tree.data(), std::span(step.tree).size_bytes());
 }
 
 /// Macrocells of all pieces, and the ranges of values in them.
-void VolumeStore::layCells() {
-  cellPieces_.clear();
+void VolumeStore::layCells(Step& step) const {
+  step.cellPieces.clear();
   std::uint64_t cells = 0;
-  for (const VolumePiece& piece : pieces_) {
+  for (const VolumePiece& piece : step.pieces) {
     shared::CellPiece cellPiece{};
     cellPiece.place = piece.place;
     cellPiece.page = piece.page;
@@ -264,34 +211,81 @@ void VolumeStore::layCells() {
     const glm::uvec3 gaps = glm::max(piece.dims, glm::uvec3(2)) - 1U;
     cellPiece.cellDims = (gaps + shared::cellSide - 1U) / shared::cellSide;
     cells += volumeOf(cellPiece.cellDims);
-    cellPieces_.push_back(cellPiece);
+    step.cellPieces.push_back(cellPiece);
   }
   if (cells > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::OutOfMemory, fmt::format("{} macrocells in one rank's blocks", cells),
                 device_->name());
   }
-  cellCount_ = static_cast<std::uint32_t>(cells);
-  if (cellCount_ == 0) return;
-  rangeBuffer_.reserve(device_, cells * sizeof(glm::vec2), MemoryKind::DeviceLocal);
-  visibleBuffer_.reserve(device_, cells * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
-  runCells(shared::cellsModeMeasure);
+  step.cellCount = static_cast<std::uint32_t>(cells);
+  if (step.cellCount == 0) return;
+  step.rangeBuffer.reserve(device_, cells * sizeof(glm::vec2), MemoryKind::DeviceLocal);
+  step.visibleBuffer.reserve(device_, cells * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+  step.pieceRangeBuffer.reserve(device_, step.pieces.size() * sizeof(PieceRangeBits),
+                                MemoryKind::DeviceLocal);
 }
 
-void VolumeStore::runCells(std::uint32_t mode) {
-  const auto bytes = std::span(cellPieces_).size_bytes();
-  cellPieceBuffer_.reserve(device_, bytes, MemoryKind::Upload);
-  std::memcpy(cellPieceBuffer_.mapped().data(), cellPieces_.data(), bytes);
+/// After the upload.
+void VolumeStore::finish(Step& step) {
+  // What's here now isn't ours beyond the call that this is part of.
+  step.blocks.clear();
+  for (VolumePiece& piece : step.pieces) piece.block = nullptr;
+  if (!table_.entries.empty()) placeTable(step);
+  runCells(step, true);
+  step.range = rangeOf(step);
+}
+
+/// After cells were measured.
+ScalarRange VolumeStore::rangeOf(const Step& step) const {
+  ScalarRange range;
+  for (std::size_t i = 0; i < step.pieces.size(); ++i) {
+    const ValueMap& values = step.pieces[i].values;
+    if (values.range) {
+      range.include(*values.range);
+      continue;
+    }
+    const PieceRangeBits& bits = pieceRanges_.mappedAs<PieceRangeBits>()[i];
+    if (bits == PieceRangeBits{~0U, ~0U}) continue;  // nothing is finite
+    const auto valueOf = [&values](std::uint32_t ordered) {
+      const double value = fromOrdered(ordered) * values.scale + values.offset;
+      return values.whole ? std::round(value) : value;
+    };
+    range.include({valueOf(bits[0]), valueOf(~bits[1])});
+  }
+  return range;
+}
+
+/// Measures cells if their values are new, and classifies them if there's a table.
+void VolumeStore::runCells(Step& step, bool measure) {
+  if (step.cellCount == 0) return;
+  const auto bytes = std::span(step.cellPieces).size_bytes();
+  step.cellPieceBuffer.reserve(device_, bytes, MemoryKind::Upload);
+  std::memcpy(step.cellPieceBuffer.mapped().data(), step.cellPieces.data(), bytes);
   shared::CellsConstants constants{};
-  constants.pieces = cellPieceBuffer_.address();
-  constants.ranges = rangeBuffer_.address();
-  constants.visible = visibleBuffer_.address();
+  constants.pieces = step.cellPieceBuffer.address();
+  constants.ranges = step.rangeBuffer.address();
+  constants.pieceRanges = step.pieceRangeBuffer.address();
+  constants.visible = step.visibleBuffer.address();
   constants.visibleBefore = visibleBeforeBuffer_.address();
-  constants.pieceCount = static_cast<std::uint32_t>(cellPieces_.size());
-  constants.cellCount = cellCount_;
+  constants.pieceCount = static_cast<std::uint32_t>(step.cellPieces.size());
+  constants.cellCount = step.cellCount;
   constants.tableSize = tableSize();
-  constants.mode = mode;
   commands_.begin();
-  cellsPass_.record(commands_, constants, pages_, pagesVersion_);
+  const auto record = [&](std::uint32_t mode) {
+    constants.mode = mode;
+    cellsPass_.record(commands_, constants, step.pages, step.pagesVersion);
+  };
+  if (measure) {
+    const std::uint64_t rangeBytes = step.pieces.size() * sizeof(PieceRangeBits);
+    pieceRanges_.reserve(device_, rangeBytes, MemoryKind::Readback);
+    commands_.waitFor(upload_.last());
+    commands_.fill(step.pieceRangeBuffer, ~0U);
+    commands_.barrier();
+    record(shared::cellsModeMeasure);
+    commands_.barrier();
+    commands_.copy(step.pieceRangeBuffer, 0, pieceRanges_, 0, rangeBytes);
+  }
+  if (!table_.entries.empty()) record(shared::cellsModeClassify);
   commands_.submitAndWait();
 }
 
@@ -308,25 +302,27 @@ void VolumeStore::setTable(const TransferTable& table) {
   const auto bytes = std::span(table_.entries).size_bytes();
   tableBuffer_.reserve(device_, bytes, MemoryKind::Upload);
   std::memcpy(tableBuffer_.mapped().data(), table_.entries.data(), bytes);
-  placeTable();
+  Step& step = steps_[shown_];
+  placeTable(step);
+  runCells(step, false);
 }
 
-void VolumeStore::placeTable() {
+void VolumeStore::placeTable(Step& step) {
   const double perScalar = static_cast<double>(table_.entries.size() - 1) / (table_.max - table_.min);
-  for (std::size_t i = 0; i < bricks_.size(); ++i) {
-    const VolumePiece& piece = pieces_[pieceOfBrick_[i]];
-    bricks_[i].tableOrigin = static_cast<float>((table_.min - piece.valueOffset) / piece.valueScale);
-    bricks_[i].tableScale = static_cast<float>(piece.valueScale * perScalar);
+  for (std::size_t i = 0; i < step.bricks.size(); ++i) {
+    const VolumePiece& piece = step.pieces[step.pieceOfBrick[i]];
+    step.bricks[i].tableOrigin = static_cast<float>((table_.min - piece.values.offset) / piece.values.scale);
+    step.bricks[i].tableScale = static_cast<float>(piece.values.scale * perScalar);
   }
-  for (std::size_t i = 0; i < cellPieces_.size(); ++i) {
-    cellPieces_[i].tableOrigin =
-        static_cast<float>((table_.min - pieces_[i].valueOffset) / pieces_[i].valueScale);
-    cellPieces_[i].tableScale = static_cast<float>(pieces_[i].valueScale * perScalar);
+  for (std::size_t i = 0; i < step.cellPieces.size(); ++i) {
+    const VolumePiece& piece = step.pieces[i];
+    step.cellPieces[i].tableOrigin =
+        static_cast<float>((table_.min - piece.values.offset) / piece.values.scale);
+    step.cellPieces[i].tableScale = static_cast<float>(piece.values.scale * perScalar);
   }
-  if (cellCount_ > 0) runCells(shared::cellsModeClassify);
-  brickBuffer_.reserve(device_, std::span(bricks_).size_bytes(), MemoryKind::Upload);
-  if (!bricks_.empty())
-    std::memcpy(brickBuffer_.mapped().data(), bricks_.data(), std::span(bricks_).size_bytes());
+  const auto bytes = std::span(step.bricks).size_bytes();
+  step.brickBuffer.reserve(device_, bytes, MemoryKind::Upload);
+  if (!step.bricks.empty()) std::memcpy(step.brickBuffer.mapped().data(), step.bricks.data(), bytes);
 }
 
 }  // namespace vdi::gpu

@@ -1,8 +1,11 @@
 // A rank's blocks and the transfer table on the device. Blocks are packed into a few 3-D textures ("pages"),
-// so that any number of them costs no descriptors.
+// so that any number of them costs no descriptors. While one step's blocks are shown, the next one's can be
+// on their way.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <span>
 #include <vector>
@@ -14,37 +17,55 @@
 #include "vdi/gpu/CellsPass.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/VolumePages.h"
 #include "vdi/gpu/VolumeUpload.h"
 
 namespace vdi::gpu {
 
-class Device;
-
 class VolumeStore {
  public:
   explicit VolumeStore(std::shared_ptr<Device> device);
+  ~VolumeStore();  // waits for blocks that are on their way
+  VolumeStore(const VolumeStore&) = delete;
+  VolumeStore& operator=(const VolumeStore&) = delete;
+  VolumeStore(VolumeStore&&) = delete;
+  VolumeStore& operator=(VolumeStore&&) = delete;
 
   /// Copies the scalars to the device; host data isn't needed afterwards. Pages are kept when the blocks'
   /// shapes and types are those of the last call. 8-bit data takes 1 byte a value (2 on a CPU device, whose
   /// 8-bit filter rounds to 8 bits), 16-bit data 2, all other types 4 (u32, i32 and f64 relative to the
   /// block's own range). Throws Error: OutOfMemory with figures; InvalidArgument for overlapping blocks or
-  /// too many pages. After a throw the store is empty.
+  /// too many pages. After a throw the store is empty. Blocks on their way are dropped, with their memory.
   void setBlocks(std::span<const Block> blocks, const Scene& scene);
+
+  /// Sends the next step's blocks on their way to memory of their own, in the background; those that are
+  /// shown stay. Host data must stay as it is until awaitNext, or until another call of this or of setBlocks,
+  /// which drops them. Throws as setBlocks does; then none are on their way.
+  void setNextBlocks(std::span<const Block> blocks, const Scene& scene);
+  /// Returns once they're there. Throws what went wrong on their way, and Error{InvalidArgument} if there are
+  /// none.
+  void awaitNext();
+  /// Shows them. After awaitNext.
+  void showNext();
+  /// Waits until nothing is on its way any more, which can't be stopped, and forgets it.
+  void dropNext();
 
   /// Cheap when the table is the one of the last call.
   void setTable(const TransferTable& table);
 
-  bool empty() const { return tree_.empty(); }
-  std::uint32_t nodeCount() const { return static_cast<std::uint32_t>(tree_.size()); }
+  /// Of this rank's finite values.
+  const ScalarRange& valueRange() const { return shown().range; }
+  bool empty() const { return shown().tree.empty(); }
+  std::uint32_t nodeCount() const { return static_cast<std::uint32_t>(shown().tree.size()); }
   std::uint32_t tableSize() const { return static_cast<std::uint32_t>(table_.entries.size()); }
-  VkDeviceAddress bricks() const { return brickBuffer_.address(); }
-  VkDeviceAddress nodes() const { return nodeBuffer_.address(); }
+  VkDeviceAddress bricks() const { return shown().brickBuffer.address(); }
+  VkDeviceAddress nodes() const { return shown().nodeBuffer.address(); }
   VkDeviceAddress table() const { return tableBuffer_.address(); }
   /// Macrocells, for the bricks' firstCell: 1 where the table makes anything visible.
-  VkDeviceAddress cells() const { return visibleBuffer_.address(); }
-  std::span<const Image3D> pages() const { return pages_; }
-  /// Changes whenever pages were made anew: descriptor sets that name them must be written again.
-  std::uint64_t pagesVersion() const { return pagesVersion_; }
+  VkDeviceAddress cells() const { return shown().visibleBuffer.address(); }
+  std::span<const Image3D> pages() const { return shown().pages; }
+  /// Which pages they are: descriptor sets that name others must be written again.
+  std::uint64_t pagesVersion() const { return shown().pagesVersion; }
 
  private:
   /// Pieces [first, last) are a block's.
@@ -53,33 +74,48 @@ class VolumeStore {
     std::uint32_t last = 0;
   };
 
-  VkFormat formatOf(ScalarType type) const;
-  std::vector<VolumePiece> cut(const Block& block) const;
-  void pack(std::vector<VolumePiece>& pieces);
-  void layBricks(std::span<const Block> blocks, std::span<const PieceRange> piecesOf, const Scene& scene);
-  void layCells();
-  void placeTable();
-  void runCells(std::uint32_t mode);
+  /// The blocks of a time step.
+  struct Step {
+    std::vector<Block> blocks;  // until their values are copied
+    std::vector<VolumePiece> pieces;
+    std::vector<Image3D> pages;
+    std::uint64_t pagesVersion = 0;
+    std::vector<shared::Brick> bricks;  // leaves; table fields are filled by placeTable
+    std::vector<std::uint32_t> pieceOfBrick;
+    std::vector<shared::KdNode> tree;
+    std::vector<shared::CellPiece> cellPieces;  // of pieces; table fields are filled by placeTable
+    std::uint32_t cellCount = 0;
+    ScalarRange range;
+    Buffer cellPieceBuffer;
+    Buffer rangeBuffer;
+    Buffer pieceRangeBuffer;
+    Buffer visibleBuffer;
+    Buffer brickBuffer;
+    Buffer nodeBuffer;
+  };
+
+  const Step& shown() const { return steps_[shown_]; }
+  Step& next() { return steps_[1 - shown_]; }
+  void lay(Step& step, std::span<const Block> blocks, const Scene& scene);
+  void makePages(Step& step, std::vector<VolumePiece> pieces);
+  void layBricks(Step& step, std::span<const PieceRange> piecesOf, const Scene& scene) const;
+  void layCells(Step& step) const;
+  void finish(Step& step);
+  void placeTable(Step& step);
+  void runCells(Step& step, bool measure);
+  ScalarRange rangeOf(const Step& step) const;
 
   std::shared_ptr<Device> device_;
   Commands commands_;
   VolumeUpload upload_;
-  std::vector<Image3D> pages_;
-  std::uint64_t pagesVersion_ = 0;
-  std::vector<VolumePiece> pieces_;
-  std::vector<shared::Brick> bricks_;  // leaves; table fields are filled by placeTable
-  std::vector<std::uint32_t> pieceOfBrick_;
-  std::vector<shared::KdNode> tree_;
-  std::vector<shared::CellPiece> cellPieces_;  // of pieces_; table fields are filled by placeTable
-  std::uint32_t cellCount_ = 0;
+  std::array<Step, 2> steps_;
+  std::size_t shown_ = 0;
+  std::future<void> onItsWay_;  // the next step's upload, if there is one
+  std::uint64_t pagesVersions_ = 0;
   TransferTable table_;
   CellsPass cellsPass_;
-  Buffer cellPieceBuffer_;
-  Buffer rangeBuffer_;
-  Buffer visibleBuffer_;
+  Buffer pieceRanges_;  // read back
   Buffer visibleBeforeBuffer_;
-  Buffer brickBuffer_;
-  Buffer nodeBuffer_;
   Buffer tableBuffer_;
 };
 

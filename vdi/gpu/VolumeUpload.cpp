@@ -1,12 +1,11 @@
 #include "vdi/gpu/VolumeUpload.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <optional>
 #include <utility>
 
-#include "vdi/gpu/Device.h"
+#include "vdi/core/Parallel.h"
 
 namespace vdi::gpu {
 
@@ -20,8 +19,11 @@ constexpr std::uint64_t leastImport = 1ULL << 20;
 /// Each takes one of the allocations that a device may have at a time, 4096 or more.
 constexpr std::size_t mostImports = 256;
 
+/// Pinning pages takes one core as long as two take to copy them.
+constexpr std::size_t coresThatCopyFaster = 4;
+
 /// `count` values as texels: the unsigned integer formats shift signed values up, the float format is
-/// relative to the block's range (valueOffset, valueScale) except for f32, which is stored as it is.
+/// relative to the block's range except for f32, which is stored as it is.
 template <typename From, typename To, typename Convert>
 void convertRow(const void* from, std::size_t first, std::size_t count, std::byte* to, Convert convert) {
   const auto* values = static_cast<const From*>(from) + first;
@@ -29,10 +31,10 @@ void convertRow(const void* from, std::size_t first, std::size_t count, std::byt
   for (std::size_t i = 0; i < count; ++i) texels[i] = convert(values[i]);
 }
 
-void writeRow(const Block& block, VkFormat format, double offset, double scale, std::size_t first,
+void writeRow(const Block& block, VkFormat format, const ValueMap& values, std::size_t first,
               std::size_t count, std::byte* to) {
-  const auto relative = [offset, scale](auto value) {
-    return static_cast<float>((static_cast<double>(value) - offset) / scale);
+  const auto relative = [&values](auto value) {
+    return static_cast<float>((static_cast<double>(value) - values.offset) / values.scale);
   };
   const bool wide = format == VK_FORMAT_R16_UNORM;
   using U8 = std::uint8_t;
@@ -76,13 +78,16 @@ void writeBox(const VolumePiece& piece, const glm::uvec3& at, const glm::uvec3& 
   const std::uint64_t rowBytes = box.x * texelBytes(piece.format);
   const auto blockDims = glm::u64vec3(block.dims);
   const glm::u64vec3 start = glm::u64vec3(piece.first) + glm::u64vec3(at);
-  for (std::uint32_t z = 0; z < box.z; ++z) {
-    for (std::uint32_t y = 0; y < box.y; ++y) {
-      const std::uint64_t first = ((start.z + z) * blockDims.y + start.y + y) * blockDims.x + start.x;
-      writeRow(block, piece.format, piece.valueOffset, piece.valueScale, first, box.x, to);
-      to += rowBytes;
+  constexpr std::size_t atOnce = 1 << 20;  // bytes
+  const std::size_t rows = std::size_t{box.y} * box.z;
+  inParallel(rows, atOnce / rowBytes + 1, [&](std::size_t firstRow, std::size_t lastRow) {
+    for (std::size_t row = firstRow; row < lastRow; ++row) {
+      const std::uint64_t y = start.y + row % box.y;
+      const std::uint64_t z = start.z + row / box.y;
+      writeRow(block, piece.format, piece.values, (z * blockDims.y + y) * blockDims.x + start.x, box.x,
+               to + row * rowBytes);
     }
-  }
+  });
 }
 
 /// Whether the block's values are texels of the piece's format as they are.
@@ -100,28 +105,6 @@ bool isTexels(const VolumePiece& piece) {
 }
 
 }  // namespace
-
-ValueMap valueMapOf(const Block& block) {
-  switch (block.type) {
-    case ScalarType::U8:
-      return {255.0, 0.0};
-    case ScalarType::I8:
-      return {255.0, -128.0};
-    case ScalarType::U16:
-      return {65535.0, 0.0};
-    case ScalarType::I16:
-      return {65535.0, -32768.0};
-    case ScalarType::F32:
-      return {};
-    case ScalarType::U32:
-    case ScalarType::I32:
-    case ScalarType::F64:
-      break;
-  }
-  const ScalarRange range = finiteRange(block);
-  if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0};
-  return {range.max - range.min, range.min};
-}
 
 VolumeUpload::VolumeUpload(std::shared_ptr<Device> device)
     : device_(std::move(device)), halves_{Half(device_), Half(device_)} {}
@@ -144,7 +127,9 @@ bool VolumeUpload::copyDirectly(const VolumePiece& piece, const Image3D& page,
   const std::uint64_t first = ((at.z * dims.y + at.y) * dims.x + at.x) * bytes;
   const glm::u64vec3 last = at + glm::u64vec3(piece.dims) - std::uint64_t{1};
   const std::uint64_t end = ((last.z * dims.y + last.y) * dims.x + last.x + 1) * bytes;
-  if (!isTexels(piece) || end - first < leastImport || imported.size() == mostImports) return false;
+  if (usableCores() >= coresThatCopyFaster || !isTexels(piece) || end - first < leastImport ||
+      imported.size() == mostImports)
+    return false;
   std::optional<ImportedBuffer> source =
       importHostMemory(device_, static_cast<const std::byte*>(block.data) + first, end - first);
   if (!source || source->offset % bytes != 0) return false;
@@ -182,14 +167,19 @@ void VolumeUpload::stage(const VolumePiece& piece, const Image3D& page) {
   }
 }
 
+void VolumeUpload::begin(const Commands& before) {
+  Half& half = filling();
+  half.commands.begin();
+  half.commands.waitFor(before);
+  half.filled = 0;
+}
+
 void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Image3D> pages) {
   std::vector<Buffer> imported;
   const auto waitForAll = [&] {
     for (Half& half : halves_) half.commands.wait();
   };
   try {
-    filling().commands.begin();
-    filling().filled = 0;
     for (const Image3D& page : pages) filling().commands.beginUpload(page);
     for (const VolumePiece& piece : pieces) {
       const Image3D& page = pages[piece.page];

@@ -1,58 +1,36 @@
 // Values of blocks to texels on the device.
 #pragma once
 
-#include <vulkan/vulkan.h>
-
 #include <array>
 #include <cstdint>
-#include <glm/glm.hpp>
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "vdi/core/Block.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/VolumePages.h"
 
 namespace vdi::gpu {
 
-class Device;
-
-/// A box of a block's values that fits one page.
-struct VolumePiece {
-  const Block* block = nullptr;
-  glm::ivec3 first{0};  // index of its first value in the block
-  glm::uvec3 dims{0};
-  VkFormat format = VK_FORMAT_UNDEFINED;
-  std::uint32_t page = 0;
-  glm::uvec3 place{0};      // in the page, texels
-  double valueScale = 1.0;  // value = texel * valueScale + valueOffset
-  double valueOffset = 0.0;
-  bool samePlaceAs(const VolumePiece& other) const { return dims == other.dims && format == other.format; }
-};
-
-/// value = texel * scale + offset for the normalised formats and for f32.
-struct ValueMap {
-  double scale = 1.0;
-  double offset = 0.0;
-};
-/// Of all other types: relative to the block's own range.
-ValueMap valueMapOf(const Block& block);
-
-/// Values that are texels as they are, the device copies from the block's own memory, where the driver can
-/// import that (VK_EXT_external_memory_host). Others go through two staging buffers: one is filled while the
-/// device copies from the other.
+/// Runs on the device's transfer queue. Values that are texels as they are, the device copies from the
+/// block's own memory, where the driver can import that (VK_EXT_external_memory_host). Others go through two
+/// staging buffers: one is filled while the device copies from the other.
 class VolumeUpload {
  public:
   explicit VolumeUpload(std::shared_ptr<Device> device);
 
-  /// Fills the pages and makes them ready to be sampled; texels that no piece has are 0. Host data isn't
-  /// needed afterwards.
+  /// What run copies waits on the device for what `before` submitted last. Before each run.
+  void begin(const Commands& before);
+  /// Copies the pieces to their places in the pages, which stay ready to be sampled. Returns when all is
+  /// there and host data isn't needed any more. May be called by any thread, while others use the device.
   void run(std::span<const VolumePiece> pieces, std::span<const Image3D> pages);
+  /// What run submitted last: to be waited for by other queues.
+  const Commands& last() const { return halves_[current_].commands; }
 
  private:
   struct Half {
-    explicit Half(const std::shared_ptr<Device>& device) : commands(device) {}
+    explicit Half(const std::shared_ptr<Device>& device) : commands(device, QueueKind::Transfer) {}
     Commands commands;
     Buffer staging;
     std::uint64_t filled = 0;

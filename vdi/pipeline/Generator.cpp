@@ -4,7 +4,6 @@
 #include <array>
 #include <chrono>
 #include <cstring>
-#include <future>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -96,15 +95,13 @@ std::uint64_t fingerprintOf(const GenerateSettings& settings) {
   return print.value();
 }
 
-ScalarRange rangeOf(std::span<const Block> blocks) {
-  ScalarRange range;
-  for (const Block& block : blocks) {
-    const ScalarRange part = finiteRange(block);
-    range.min = std::min(range.min, part.min);
-    range.max = std::max(range.max, part.max);
-  }
-  return range;
-}
+/// What's known of a time step's blocks.
+struct Step {
+  Scene scene;  // global
+  std::uint64_t blocks = 0;
+  std::uint64_t bytes = 0;
+  double uploadSeconds = 0.0;
+};
 
 }  // namespace
 
@@ -121,12 +118,42 @@ struct VdiGenerator::State {
   comm::Communicator comm;
   std::unique_ptr<detail::RayCaster> caster;
   std::unique_ptr<detail::Compositor> compositor;
-  Scene scene;
-  ScalarRange range;
+  Step shown;
+  ScalarRange range;  // of what's shown, global
+  std::optional<Step> next;
   std::variant<SupersegmentLists, CompactLists> spare;  // for their memory
   Image spareImage;
   RankReport mine;
   std::vector<RankReport> reports;
+
+  /// By one of the caster's ways.
+  Step sendBlocks(std::vector<Block> blocks, bool fillGhosts,
+                  void (detail::RayCaster::*send)(std::span<const Block>, const Scene&)) {
+    Stopwatch watch;
+    Step step;
+    comm.together([&] { validate(blocks); });
+    if (fillGhosts) blocks = comm::exchangeGhosts(comm, std::move(blocks));
+    step.scene = comm::globalScene(comm, localScene(blocks));
+    comm.together([&] { ((*caster).*send)(blocks, step.scene); });
+    for (const Block& block : blocks) step.bytes += block.byteCount();
+    step.blocks = blocks.size();
+    step.uploadSeconds = watch.lap();
+    return step;
+  }
+
+  /// What's there now.
+  void show(const Step& step) {
+    shown = step;
+    const ScalarRange& mine = caster->valueRange();
+    std::array<double, 2> least{mine.min, -mine.max};
+    comm.allReduceMin(least);
+    range = {least[0], -least[1]};
+  }
+
+  void dropNext() {
+    next.reset();
+    caster->dropNext();
+  }
 
   /// What generate and renderVolume have in common: checked parameters and this rank's lists.
   struct Prepared {
@@ -142,15 +169,16 @@ struct VdiGenerator::State {
       validate(settings);
       const View view(camera, settings.width, settings.height);
       prepared = std::make_unique<Prepared>(
-          Prepared{view, depthLattice(scene, view, settings.samplesPerVoxel), bake(function)});
+          Prepared{view, depthLattice(shown.scene, view, settings.samplesPerVoxel), bake(function)});
     });
     comm.demandEqual(fingerprintOf(camera), "camera");
     comm.demandEqual(fingerprintOf(function), "transfer function");
     comm.demandEqual(fingerprintOf(settings),
                      "resolution, supersegments, budget, sampling rate, algorithm or precision");
-    mine.generateSeconds = mine.distributeSeconds = mine.compositeSeconds = mine.gatherSeconds =
-        mine.generateDeviceSeconds = 0.0;
-    mine.subSupersegments = mine.bytesSent = 0;
+    mine = {};
+    mine.uploadSeconds = shown.uploadSeconds;
+    mine.blocks = shown.blocks;
+    mine.volumeBytes = shown.bytes;
     return prepared;
   }
 
@@ -184,8 +212,8 @@ struct VdiGenerator::State {
     ListsOf<Segment> lists;
     cancellable(progress, 0.8, [&](const detail::RayCaster::Progress& report) {
       lists = caster->lists<Segment>(
-          {scene, prepared.view, prepared.lattice, prepared.table, settings, !alone, false, code}, report,
-          takeSpare<Segment>());
+          {shown.scene, prepared.view, prepared.lattice, prepared.table, settings, !alone, false, code},
+          report, takeSpare<Segment>());
     });
     mine.subSupersegments = lists.segments.size();
     mine.generateSeconds = watch.lap();
@@ -241,22 +269,32 @@ VdiGenerator::~VdiGenerator() = default;
 
 void VdiGenerator::setBlocks(std::vector<Block> blocks, bool fillGhosts) {
   State& s = *state_;
+  s.dropNext();
+  s.shown = {};  // where a rank fails, nobody shows anything
+  s.range = {};
+  s.show(s.sendBlocks(std::move(blocks), fillGhosts, &detail::RayCaster::setBlocks));
+}
+
+void VdiGenerator::setNextBlocks(std::vector<Block> blocks, bool fillGhosts) {
+  State& s = *state_;
+  s.dropNext();
+  try {
+    s.next = s.sendBlocks(std::move(blocks), fillGhosts, &detail::RayCaster::setNextBlocks);
+  } catch (...) {
+    s.dropNext();  // a rank that hasn't failed may have sent its own
+    throw;
+  }
+}
+
+void VdiGenerator::advance() {
+  State& s = *state_;
   Stopwatch watch;
-  s.comm.together([&] { validate(blocks); });
-  if (fillGhosts) blocks = comm::exchangeGhosts(s.comm, std::move(blocks));
-  s.scene = comm::globalScene(s.comm, localScene(blocks));
-  s.mine = {};
-  // While the values are on their way to the device, if there's a thread for it.
-  std::future<ScalarRange> range =
-      std::async(std::launch::async | std::launch::deferred, [&blocks] { return rangeOf(blocks); });
-  s.comm.together([&] { s.caster->setBlocks(blocks, s.scene); });
-  const ScalarRange mine = range.get();
-  std::array<double, 2> least{mine.min, -mine.max};
-  s.comm.allReduceMin(least);
-  s.range = {least[0], -least[1]};
-  for (const Block& block : blocks) s.mine.volumeBytes += block.byteCount();
-  s.mine.blocks = blocks.size();
-  s.mine.uploadSeconds = watch.lap();
+  const std::optional<Step> next = std::exchange(s.next, std::nullopt);
+  if (!next) throw Error(ErrorCode::InvalidArgument, "no next blocks were set");
+  s.comm.together([&] { s.caster->awaitNext(); });
+  s.caster->showNext();
+  s.show(*next);
+  s.shown.uploadSeconds += watch.lap();
 }
 
 std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFunction& transferFunction,
@@ -277,7 +315,7 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
   vdi.width = settings.width;
   vdi.height = settings.height;
   vdi.budget = mostPerList(settings.supersegments, settings.budget);
-  vdi.bounds = s.scene.bounds;
+  vdi.bounds = s.shown.scene.bounds;
   vdi.sampleStep = prepared->lattice.step;
   return vdi;
 }
@@ -298,7 +336,7 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   const bool alone = s.comm.size() == 1;
   Stopwatch watch;
   const detail::RayCaster::Request request{
-      s.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, !alone, {}};
+      s.shown.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, !alone, {}};
   Image image = std::exchange(s.spareImage, {});
   SupersegmentLists lists;
   s.cancellable(progress, 0.9, [&](const detail::RayCaster::Progress& report) {
@@ -340,7 +378,7 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
 }
 
 const Scene& VdiGenerator::scene() const {
-  return state_->scene;
+  return state_->shown.scene;
 }
 const ScalarRange& VdiGenerator::scalarRange() const {
   return state_->range;

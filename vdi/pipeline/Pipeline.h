@@ -24,7 +24,7 @@ namespace vdi {
 
 /// Wall-clock seconds and bytes of one rank in the last frame.
 struct RankReport {
-  double uploadSeconds = 0.0;
+  double uploadSeconds = 0.0;          // that setBlocks, or setNextBlocks and advance, took
   double generateSeconds = 0.0;        // casting and segmenting, transfers included
   double generateDeviceSeconds = 0.0;  // of these, the device's work without transfers
   double searchSeconds = 0.0;  // of these, the first step: bisection's search or the counting of grains
@@ -57,8 +57,17 @@ class VdiGenerator {
 
   /// This rank's blocks, none included; the scalars are copied to the device before it returns. With
   /// `fillGhosts`, missing layers are exchanged first (comm/GhostExchange.h). Blocks of the same shapes reuse
-  /// the device's memory.
+  /// the device's memory. After a throw there are none.
   void setBlocks(std::vector<Block> blocks, bool fillGhosts = true);
+
+  /// The next time step's blocks: sends them on their way to the device and returns, so that they get there
+  /// while the frame of those that are shown is made. The scalars must stay as they are until advance, or
+  /// until another call of this or of setBlocks, which drops them. Takes memory for a second volume, which
+  /// the next setBlocks gives back. After a throw none are on their way.
+  void setNextBlocks(std::vector<Block> blocks, bool fillGhosts = true);
+  /// Shows them, once they're there. Throws what went wrong on their way, and Error{InvalidArgument} if there
+  /// are none; then those stay that were shown.
+  void advance();
 
   const Scene& scene() const;              // global
   const ScalarRange& scalarRange() const;  // global, finite values

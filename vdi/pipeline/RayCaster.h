@@ -26,7 +26,13 @@ class RayCaster {
  public:
   explicit RayCaster(std::shared_ptr<gpu::Device> device);
 
+  /// gpu/VolumeStore's.
   void setBlocks(std::span<const Block> blocks, const Scene& scene);
+  void setNextBlocks(std::span<const Block> blocks, const Scene& scene);
+  void awaitNext();
+  void showNext();
+  void dropNext();
+  const ScalarRange& valueRange() const { return volume_.valueRange(); }
 
   struct Request {
     const Scene& scene;

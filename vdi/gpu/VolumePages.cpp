@@ -1,0 +1,161 @@
+#include "vdi/gpu/VolumePages.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+
+#include "shaders/shared/cast.h"
+#include "vdi/core/Error.h"
+#include "vdi/gpu/Memory.h"
+
+namespace vdi::gpu {
+
+namespace {
+
+std::uint64_t volumeOf(const glm::uvec3& extent) {
+  return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z;
+}
+
+/// Places boxes of one format into pages: rows of boxes along x, rows beside each other along y, layers on
+/// top of each other along z. Boxes come in descending order of height, so blocks of one shape, the usual
+/// case, waste next to nothing.
+class Packer {
+ public:
+  Packer(std::uint32_t side, std::uint32_t maxDepth, std::uint64_t maxTexels)
+      : side_(side), maxDepth_(std::min<std::uint64_t>(maxDepth, maxTexels / (std::uint64_t{side} * side))) {}
+
+  /// False when the page is full.
+  bool place(const glm::uvec3& dims, glm::uvec3& at) {
+    if (cursor_.x + dims.x > side_) {
+      cursor_ = {0, cursor_.y + rowHeight_, cursor_.z};
+      rowHeight_ = 0;
+    }
+    if (cursor_.y + dims.y > side_) {
+      cursor_ = {0, 0, cursor_.z + layerDepth_};
+      rowHeight_ = 0;
+      layerDepth_ = 0;
+    }
+    if (cursor_.z + dims.z > maxDepth_) return false;
+    at = cursor_;
+    cursor_.x += dims.x;
+    rowHeight_ = std::max(rowHeight_, dims.y);
+    layerDepth_ = std::max(layerDepth_, dims.z);
+    used_ = glm::max(used_, at + dims);
+    return true;
+  }
+  const glm::uvec3& used() const { return used_; }
+
+ private:
+  std::uint32_t side_;
+  std::uint64_t maxDepth_;
+  glm::uvec3 cursor_{0};
+  std::uint32_t rowHeight_ = 0;
+  std::uint32_t layerDepth_ = 0;
+  glm::uvec3 used_{0};
+};
+
+VkFormat formatOf(const Device& device, ScalarType type) {
+  switch (sizeOf(type)) {
+    case 1:
+      return device.isCpu() ? VK_FORMAT_R16_UNORM : VK_FORMAT_R8_UNORM;
+    case 2:
+      return VK_FORMAT_R16_UNORM;
+    default:
+      return VK_FORMAT_R32_SFLOAT;
+  }
+}
+
+}  // namespace
+
+ValueMap valueMapOf(const Block& block) {
+  switch (block.type) {
+    case ScalarType::U8:
+      return {255.0, 0.0, true, {}};
+    case ScalarType::I8:
+      return {255.0, -128.0, true, {}};
+    case ScalarType::U16:
+      return {65535.0, 0.0, true, {}};
+    case ScalarType::I16:
+      return {65535.0, -32768.0, true, {}};
+    case ScalarType::F32:
+      return {};
+    case ScalarType::U32:
+    case ScalarType::I32:
+    case ScalarType::F64:
+      break;
+  }
+  const ScalarRange range = finiteRange(block);
+  if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0, false, range};
+  return {range.max - range.min, range.min, false, range};
+}
+
+std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block) {
+  const VkFormat format = formatOf(device, block.type);
+  const std::uint64_t maxTexels = device.limits().maxAllocationBytes / texelBytes(format) / 2;
+  glm::uvec3 largest = glm::min(glm::uvec3(block.dims), glm::uvec3(device.limits().maxImageDimension3D));
+  while (volumeOf(largest) > maxTexels) {
+    const int axis = largest.z >= largest.x && largest.z >= largest.y ? 2 : largest.y >= largest.x ? 1 : 0;
+    largest[axis] = (largest[axis] + 1) / 2;
+  }
+  const ValueMap values = valueMapOf(block);
+  std::vector<VolumePiece> pieces;
+  const glm::ivec3 stride = glm::max(glm::ivec3(largest) - 1, glm::ivec3(1));
+  for (int z = 0; z == 0 || z < block.dims.z - 1; z += stride.z) {
+    for (int y = 0; y == 0 || y < block.dims.y - 1; y += stride.y) {
+      for (int x = 0; x == 0 || x < block.dims.x - 1; x += stride.x) {
+        const glm::ivec3 first{x, y, z};
+        const glm::uvec3 dims = glm::min(largest, glm::uvec3(block.dims - first));
+        pieces.push_back({&block, first, dims, format, values, 0, {}});
+      }
+    }
+  }
+  return pieces;
+}
+
+std::vector<PageShape> placeInPages(const Device& device, std::span<VolumePiece> pieces) {
+  std::vector<PageShape> pages;
+  std::vector<std::size_t> order(pieces.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    const auto key = [&](std::size_t i) {
+      return std::tuple(pieces[i].format, ~pieces[i].dims.z, ~pieces[i].dims.y, ~pieces[i].dims.x);
+    };
+    return key(a) < key(b);
+  });
+  for (std::size_t begin = 0; begin < order.size();) {
+    const VkFormat format = pieces[order[begin]].format;
+    std::size_t end = begin;
+    std::uint64_t texels = 0;
+    std::uint32_t widest = 1;
+    for (; end < order.size() && pieces[order[end]].format == format; ++end) {
+      const glm::uvec3& dims = pieces[order[end]].dims;
+      texels += volumeOf(dims);
+      widest = std::max({widest, dims.x, dims.y});
+    }
+    const auto cube = static_cast<std::uint32_t>(std::ceil(std::cbrt(static_cast<double>(texels))));
+    const std::uint32_t side = std::min((std::max(cube, widest) + widest - 1) / widest * widest,
+                                        device.limits().maxImageDimension3D);
+    const std::uint64_t maxTexels = device.limits().maxAllocationBytes / texelBytes(format);
+    while (begin < end) {
+      Packer packer(side, device.limits().maxImageDimension3D, maxTexels);
+      const std::size_t pageBegin = begin;
+      while (begin < end && packer.place(pieces[order[begin]].dims, pieces[order[begin]].place)) {
+        pieces[order[begin]].page = static_cast<std::uint32_t>(pages.size());
+        ++begin;
+      }
+      if (begin == pageBegin || pages.size() == shared::castMaxPages) {
+        throw Error(ErrorCode::OutOfMemory,
+                    fmt::format("{} MiB of volume don't fit {} textures", texels * texelBytes(format) >> 20,
+                                shared::castMaxPages),
+                    device.name());
+      }
+      pages.push_back({packer.used(), format});
+    }
+  }
+  return pages;
+}
+
+}  // namespace vdi::gpu
