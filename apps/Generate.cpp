@@ -1,6 +1,10 @@
 // vdi generate: a volume to a .vdi file, under mpirun too.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <future>
+
 #include "apps/Commands.h"
 #include "apps/Source.h"
 #include "vdi/io/Png.h"
@@ -12,7 +16,7 @@ namespace vdi::apps {
 namespace {
 
 struct Options {
-  std::string raw;  // sidecar; empty: a procedural field
+  std::vector<std::string> raws;  // sidecars, of time steps; none: a procedural field
   std::string field = "turbulence";
   DealOptions deal;
   ViewOptions view;
@@ -21,16 +25,18 @@ struct Options {
   std::string flat;
   std::string volume;
   double time = 0.0;
+  double interval = 1.0;
   std::uint64_t step = 0;
 
   bool wantsVdi() const { return volume.empty() || !output.empty() || !flat.empty(); }
+  std::size_t steps() const { return std::max<std::size_t>(raws.size(), 1); }
+  /// Of the index-th step: picture.png of step 7 is picture_0007.png, when there are several.
+  std::filesystem::path numbered(const std::filesystem::path& path, std::size_t index) const {
+    if (steps() == 1) return path;
+    return path.parent_path() /
+           fmt::format("{}_{:04}{}", path.stem().string(), step + index, path.extension().string());
+  }
 };
-
-std::vector<Block> blocksOf(const Options& options, const std::shared_ptr<gpu::Device>& device,
-                            const comm::Communicator& world) {
-  return options.raw.empty() ? fieldBlocks(options.field, options.deal, device, world.rank(), world.size())
-                             : rawBlocks(options.raw, options.deal, world.rank(), world.size());
-}
 
 void printReport(const std::vector<RankReport>& reports) {
   fmt::print(
@@ -43,45 +49,78 @@ void printReport(const std::vector<RankReport>& reports) {
   }
 }
 
-void writeVdiFiles(const Options& options, Vdi& vdi, const VdiGenerator& generator) {
-  vdi.time = options.time;
-  vdi.timeStep = options.step;
-  if (!options.output.empty()) io::writeVdi(options.output, vdi);
-  if (!options.flat.empty()) io::writePng(options.flat, io::toPicture(flatten(vdi)));
+/// What's the same in all time steps.
+struct Shot {
+  Camera camera;
+  TransferFunction function;
+  GenerateSettings settings;
+};
+
+void writeVdiFiles(const Options& options, std::size_t index, Vdi& vdi, const VdiGenerator& generator) {
+  vdi.time = options.time + static_cast<double>(index) * options.interval;
+  vdi.timeStep = options.step + index;
+  if (!options.output.empty()) io::writeVdi(options.numbered(options.output, index), vdi);
+  if (!options.flat.empty()) io::writePng(options.numbered(options.flat, index), io::toPicture(flatten(vdi)));
   fmt::print("{} x {} lists, {} supersegments, on {}\n", vdi.width, vdi.height, vdi.supersegmentCount(),
              generator.device().name());
   printReport(generator.reports());
 }
 
 /// What the root writes, the others wait for: all ranks fail when it can't.
-void generate(const Options& options, const comm::Communicator& world) {
-  std::shared_ptr<gpu::Device> device;
-  std::vector<Block> blocks;
-  GenerateSettings settings;
-  world.together([&] {
-    settings = makeSettings(options.quality);
-    device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
-    blocks = blocksOf(options, device, world);
-  });
-  VdiGenerator generator(device, comm::Communicator::world());
-  generator.setBlocks(std::move(blocks));
-  Camera camera;
-  TransferFunction function;
-  world.together([&] {
-    camera = makeCamera(options.view, generator.scene());
-    function = makeTransferFunction(options.quality, generator.scene(), generator.scalarRange());
-  });
+void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGenerator& generator,
+           const comm::Communicator& world) {
   if (options.wantsVdi()) {
-    std::optional<Vdi> vdi = generator.generate(camera, function, settings);
+    std::optional<Vdi> vdi = generator.generate(shot.camera, shot.function, shot.settings);
     world.together([&] {
-      if (vdi) writeVdiFiles(options, *vdi, generator);
+      if (!vdi) return;
+      writeVdiFiles(options, index, *vdi, generator);
+      generator.recycle(std::move(*vdi));
     });
   }
   if (options.volume.empty()) return;
-  const std::optional<Image> image = generator.renderVolume(camera, function, settings);
+  const std::optional<Image> image = generator.renderVolume(shot.camera, shot.function, shot.settings);
   world.together([&] {
-    if (image) io::writePng(options.volume, io::toPicture(*image));
+    if (image) io::writePng(options.numbered(options.volume, index), io::toPicture(*image));
   });
+}
+
+void generate(const Options& options, const comm::Communicator& world) {
+  Shot shot;
+  std::shared_ptr<gpu::Device> device;
+  std::vector<Block> blocks;
+  const auto read = [&](std::size_t index) {
+    return rawBlocks(options.raws[index], options.deal, world.rank(), world.size());
+  };
+  world.together([&] {
+    shot.settings = makeSettings(options.quality);
+    device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
+    blocks = options.raws.empty()
+                 ? fieldBlocks(options.field, options.deal, device, world.rank(), world.size())
+                 : read(0);
+  });
+  VdiGenerator generator(device, comm::Communicator::world());
+  generator.setBlocks(std::move(blocks));
+  world.together([&] {
+    shot.camera = makeCamera(options.view, generator.scene());
+    shot.function = makeTransferFunction(options.quality, generator.scene(), generator.scalarRange());
+  });
+  // While a step's frame is made, the next one's values get to the device, and those behind it are read.
+  std::future<std::vector<Block>> reading;
+  const auto startReading = [&](std::size_t index) {
+    if (index < options.steps())
+      reading = std::async(std::launch::async | std::launch::deferred, read, index);
+  };
+  startReading(1);
+  for (std::size_t index = 0; index < options.steps(); ++index) {
+    const bool more = index + 1 < options.steps();
+    if (more) {
+      world.together([&] { blocks = reading.get(); });
+      generator.setNextBlocks(std::move(blocks));
+      startReading(index + 2);
+    }
+    shoot(options, index, shot, generator, world);
+    if (more) generator.advance();
+  }
 }
 
 }  // namespace
@@ -92,10 +131,18 @@ void addGenerate(CLI::App& app, Job& job) {
   command->footer(
       "Examples:\n"
       "  vdi generate --field coil -o coil.vdi --flat coil.png\n"
-      "  mpirun -np 4 vdi generate --raw brain.json --blocks 4x4x4 --layout random -o brain.vdi");
+      "  mpirun -np 4 vdi generate --raw brain.json --blocks 4x4x4 --layout random -o brain.vdi\n"
+      "  vdi generate --raw step*.json -o steps.vdi\n"
+      "The last one writes steps_0000.vdi, steps_0001.vdi and so on, which ParaView opens as a series. "
+      "Viewpoint "
+      "and\n"
+      "transfer function are the same for all steps: where they depend on the volume, on the first one.");
   const auto options = std::make_shared<Options>();
   CLI::Option* raw =
-      command->add_option("--raw", options->raw, "JSON sidecar of a raw volume (docs/raw-volumes.md)")
+      command
+          ->add_option("--raw", options->raws,
+                       "JSON sidecars of raw volumes (docs/raw-volumes.md); several are time steps, whose "
+                       "output files get numbers")
           ->type_name("FILE")
           ->group("Volume and ranks");
   command->add_option("--field", options->field, "procedural field:" + fieldsHelp())
@@ -113,10 +160,13 @@ void addGenerate(CLI::App& app, Job& job) {
   addFile("-o,--output", options->output, "the .vdi file to write");
   addFile("--flat", options->flat, "PNG of the VDI seen from its own viewpoint");
   addFile("--dvr", options->volume, "PNG of plain volume rendering from there");
-  command->add_option("--time", options->time, "simulation time, kept in the file")
+  command->add_option("--time", options->time, "simulation time of the first step, kept in the file")
       ->capture_default_str()
       ->group("Output");
-  command->add_option("--step", options->step, "time step, kept in the file")
+  command->add_option("--interval", options->interval, "simulation time from step to step")
+      ->capture_default_str()
+      ->group("Output");
+  command->add_option("--step", options->step, "number of the first time step, kept in the file")
       ->capture_default_str()
       ->group("Output");
   command->callback([options, &job] {

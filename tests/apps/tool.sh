@@ -88,6 +88,27 @@ works "raw" "$vdi" generate --raw v.json --resolution 40x30 --flat raw.png
 works "raw on 2 ranks" "${mpirun[@]}" 2 "$vdi" generate --raw v.json --resolution 40x30 --blocks 2x2x1 --flat raw2.png
 works "compare" "$vdi" compare --json raw.png raw2.png
 python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "raw: ranks differ"
+# Time steps: as if each were alone, with the first one's camera and transfer function.
+python3 - <<'P'
+import json
+import struct
+for step in range(3):
+    values = [(x * 200 + y * 90 + step * 700) % 4000 for z in range(6) for y in range(8) for x in range(10)]
+    values[:2] = 0, 4000
+    open(f"s{step}.raw", "wb").write(struct.pack("<480H", *values))
+    json.dump({"file": f"s{step}.raw", "dims": [10, 8, 6], "type": "u16"}, open(f"s{step}.json", "w"))
+json.dump({"file": "s9.raw", "dims": [10, 8, 6], "type": "u16"}, open("s9.json", "w"))
+P
+for step in 0 1 2; do works "a step" "$vdi" generate --raw s$step.json --resolution 40x30 --flat alone$step.png; done
+works "steps on 2 ranks" "${mpirun[@]}" 2 "$vdi" generate --raw s0.json s1.json s2.json --resolution 40x30 --step 8 \
+  --time 0.5 --interval 0.25 -o steps.vdi --flat steps.png
+for step in 0 1 2; do
+  works "compare" "$vdi" compare --json alone$step.png "$(printf 'steps_%04d.png' $((8 + step)))"
+  python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "step $step isn't itself"
+done
+works "info" "$vdi" info steps_0009.vdi
+grep -q "step 9" out.txt && grep -q "0.75" out.txt || { fail "info doesn't tell step and time"; cat out.txt; }
+refused 1 "s9.raw" "$vdi" generate --raw s0.json s9.json --resolution 40x30 -o x.vdi
 refused 1 "long.json|v.raw" "$vdi" generate --raw long.json -o x.vdi
 refused 1 "u12" "$vdi" generate --raw type.json -o x.vdi
 refused 1 "spacin" "$vdi" generate --raw field.json -o x.vdi

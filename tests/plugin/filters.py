@@ -98,6 +98,47 @@ series = simple.VDIReader(FileNames=[os.path.join(OUTPUT, "series_0.vdi"), secon
 series.UpdatePipelineInformation()
 check(len(series.TimestepValues) == 2, "a series of files is a series of time steps")
 
+# Values are uploaded when they're new, and only then.
+def upload_seconds(proxy):
+    proxy.UpdatePipeline()
+    proxy.SMProxy.UpdatePropertyInformation()
+    header, row = proxy.SMProxy.GetProperty("Report").GetElement(0).splitlines()[:2]
+    return float(row.split()[3])
+
+
+def changed_by(proxy, change):
+    before = picture(proxy).astype(int)
+    change()
+    return np.abs(picture(proxy) - before).max()
+
+
+grid = vtkImageData()
+grid.SetDimensions(64, 64, 64)
+grid.SetSpacing(0.4, 0.4, 0.4)
+values = 40 + 230 * np.random.RandomState(5).rand(64 ** 3)  # the wavelet's range
+in_place = numpy_to_vtk(values)  # shares the memory, as a simulation's arrays do
+in_place.SetName("RTData")
+grid.GetPointData().SetScalars(in_place)
+producer = simple.TrivialProducer()
+producer.GetClientSideObject().SetOutput(grid)
+watched = vdi_of(producer, CameraFocalPoint=[12, 12, 12])
+check(upload_seconds(watched) > 0, "new values take an upload")
+check(changed_by(watched, lambda: setattr(watched, "CameraPosition", [50, 60, 75])) > 8, "another camera: another picture")
+check(upload_seconds(watched) == 0, "and no upload")
+
+
+def overwrite(*modified):
+    values[:] = np.roll(values, 1000)
+    for thing in modified:
+        thing.Modified()
+    producer.MarkModified(producer.SMProxy)
+
+
+check(changed_by(watched, lambda: overwrite(in_place)) > 8, "values overwritten in an array: another picture")
+check(changed_by(watched, lambda: overwrite(producer.GetClientSideObject())) > 8, "so it is when only their source says so")
+check(changed_by(watched, lambda: setattr(watched, "FillGhosts", 0)) == 0, "ghost layers that nothing lacks change nothing")
+check(changed_by(watched, lambda: setattr(watched, "Input", wavelet)) > 8, "another input: another picture")
+
 # Composite and cell data.
 cells = simple.PointDatatoCellData(Input=wavelet)
 check(picture(vdi_of(cells, ("CELLS", "RTData"))).max() > 60, "cell data")

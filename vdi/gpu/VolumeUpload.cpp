@@ -19,8 +19,8 @@ constexpr std::uint64_t leastImport = 1ULL << 20;
 /// Each takes one of the allocations that a device may have at a time, 4096 or more.
 constexpr std::size_t mostImports = 256;
 
-/// Pinning pages takes one core as long as two take to copy them.
-constexpr std::size_t coresThatCopyFaster = 4;
+/// Fewer take longer to copy values than one takes to pin their pages.
+constexpr std::size_t coresThatCopyFaster = 2;
 
 /// `count` values as texels: the unsigned integer formats shift signed values up, the float format is
 /// relative to the block's range except for f32, which is stored as it is.

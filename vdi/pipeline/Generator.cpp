@@ -176,7 +176,7 @@ struct VdiGenerator::State {
     comm.demandEqual(fingerprintOf(settings),
                      "resolution, supersegments, budget, sampling rate, algorithm or precision");
     mine = {};
-    mine.uploadSeconds = shown.uploadSeconds;
+    mine.uploadSeconds = std::exchange(shown.uploadSeconds, 0.0);
     mine.blocks = shown.blocks;
     mine.volumeBytes = shown.bytes;
     return prepared;

@@ -24,7 +24,7 @@ namespace vdi {
 
 /// Wall-clock seconds and bytes of one rank in the last frame.
 struct RankReport {
-  double uploadSeconds = 0.0;          // that setBlocks, or setNextBlocks and advance, took
+  double uploadSeconds = 0.0;          // of setBlocks, or setNextBlocks and advance, since the last frame
   double generateSeconds = 0.0;        // casting and segmenting, transfers included
   double generateDeviceSeconds = 0.0;  // of these, the device's work without transfers
   double searchSeconds = 0.0;  // of these, the first step: bisection's search or the counting of grains

@@ -17,6 +17,7 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "vdi/core/Error.h"
@@ -274,6 +275,32 @@ void addOverlapping(vtkOverlappingAMR* amr, const ArrayChoice& choice, std::vect
   }
 }
 
+/// Filters that pass a data set on give it a new time of modification, its arrays keep theirs.
+void addIdentity(vtkDataObject* leaf, std::vector<std::uint64_t>& identity) {
+  auto* image = vtkImageData::SafeDownCast(leaf);
+  if (image == nullptr) {
+    if (leaf != nullptr) identity.push_back(leaf->GetMTime());
+    return;
+  }
+  const auto addPlace = [&identity](const double* values, int count) {
+    for (int i = 0; i < count; ++i) identity.push_back(std::bit_cast<std::uint64_t>(values[i]));
+  };
+  addPlace(image->GetOrigin(), 3);
+  addPlace(image->GetSpacing(), 3);
+  addPlace(image->GetDirectionMatrix()->GetData(), 9);
+  for (int i = 0; i < 6; ++i) identity.push_back(static_cast<std::uint64_t>(image->GetExtent()[i]));
+  for (vtkDataSetAttributes* attributes : {static_cast<vtkDataSetAttributes*>(image->GetPointData()),
+                                           static_cast<vtkDataSetAttributes*>(image->GetCellData())}) {
+    identity.push_back(static_cast<std::uint64_t>(attributes->GetNumberOfArrays()));
+    for (int i = 0; i < attributes->GetNumberOfArrays(); ++i) {
+      vtkAbstractArray* array = attributes->GetAbstractArray(i);
+      identity.push_back(reinterpret_cast<std::uintptr_t>(array));
+      identity.push_back(array->GetMTime());
+    }
+    identity.push_back(reinterpret_cast<std::uintptr_t>(attributes->GetScalars()));
+  }
+}
+
 constexpr int colorSamples = 1024;
 
 }  // namespace
@@ -294,6 +321,23 @@ std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice)
     addLeaf(iterator->GetCurrentDataObject(), choice, {}, blocks);
   }
   return blocks;
+}
+
+std::vector<std::uint64_t> identityOf(vtkDataObject* data) {
+  std::vector<std::uint64_t> identity;
+  auto* composite = vtkCompositeDataSet::SafeDownCast(data);
+  if (composite == nullptr) {
+    addIdentity(data, identity);
+    return identity;
+  }
+  // Of AMR also which parts of a level are those of another.
+  if (vtkOverlappingAMR::SafeDownCast(data) != nullptr) identity.push_back(data->GetMTime());
+  const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+  for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
+    identity.push_back(iterator->GetCurrentFlatIndex());
+    addIdentity(iterator->GetCurrentDataObject(), identity);
+  }
+  return identity;
 }
 
 vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity,

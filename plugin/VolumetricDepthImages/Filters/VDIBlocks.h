@@ -2,6 +2,7 @@
 #ifndef VDIBlocks_h
 #define VDIBlocks_h
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct ArrayChoice {
   std::string name;
   bool cells = false;  // of cells, else of points
   int component = 0;   // -1: magnitude
+  bool operator==(const ArrayChoice&) const = default;
 };
 
 /// The blocks of an image, or of all images of a composite data set. Scalars are shared, not copied, where
@@ -26,6 +28,10 @@ struct ArrayChoice {
 /// aren't owned. Throws vdi::Error{InvalidArgument}: a data set that isn't vtkImageData, a rotated image, a
 /// missing array.
 std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice);
+
+/// Numbers that are others whenever blocksOf would give other blocks, by VTK's rule that who changes an array
+/// calls its Modified: places of all images, which arrays they have, and when these were modified.
+std::vector<std::uint64_t> identityOf(vtkDataObject* data);
 
 /// ParaView's colour map and opacity function, sampled densely enough for any colour space. Without a colour
 /// map: "Cool to Warm" over [low, high]; without an opacity function: the colour map's own if it has one,

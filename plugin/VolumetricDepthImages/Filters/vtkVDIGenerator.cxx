@@ -15,9 +15,12 @@
 #include <vtkStreamingDemandDrivenPipeline.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "VDIBlocks.h"
 #include "VDIImageData.h"
@@ -28,7 +31,19 @@
 vtkStandardNewMacro(vtkVDIGenerator);
 
 struct vtkVDIGenerator::Internals {
+  /// What tells one set of blocks from another.
+  struct Origin {
+    std::vector<std::uint64_t> Input;  // pv::identityOf
+    /// When what makes the input was modified: in situ, arrays are overwritten in place.
+    vtkMTimeType Upstream = 0;
+    double Time = 0.0;
+    pv::ArrayChoice Choice;
+    bool FillGhosts = true;
+    bool operator==(const Origin&) const = default;
+  };
+
   std::unique_ptr<vdi::VdiGenerator> Generator;  // none until the first update
+  std::optional<Origin> Shown;                   // by the generator
 };
 
 vtkVDIGenerator::vtkVDIGenerator()
@@ -79,6 +94,7 @@ void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
   if (this->Controller == controller) return;
   this->Controller = controller;
   this->Internal->Generator.reset();
+  this->Internal->Shown.reset();
   this->Modified();
 }
 
@@ -190,6 +206,38 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   return 1;
 }
 
+/// Only where something changed: another camera or transfer function needs no upload.
+void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, double time) {
+  vdi::VdiGenerator& generator = *this->Internal->Generator;
+  const vdi::comm::Communicator& comm = generator.communicator();
+  Internals::Origin origin;
+  comm.together([&] {
+    if (vtkInformation* array = this->GetInputArrayInformation(0)) {
+      if (array->Has(vtkDataObject::FIELD_NAME()))
+        origin.Choice.name = array->Get(vtkDataObject::FIELD_NAME());
+      if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) {
+        origin.Choice.cells =
+            array->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_CELLS;
+      }
+    }
+    origin.Choice.component = this->Component;
+    origin.FillGhosts = this->FillGhosts;
+    origin.Time = time;
+    if (input != nullptr) origin.Input = pv::identityOf(input);
+    if (auto* upstream = vtkDemandDrivenPipeline::SafeDownCast(this->GetInputExecutive(0, 0)))
+      origin.Upstream = upstream->GetPipelineMTime();
+  });
+  std::array<std::uint64_t, 1> changed{this->Internal->Shown == origin ? 0U : 1U};
+  comm.allReduceMax(changed);
+  if (changed[0] == 0) return;
+  std::vector<vdi::Block> blocks;
+  comm.together([&] { blocks = pv::blocksOf(input, origin.Choice); });
+  this->UpdateProgress(0.05);
+  this->Internal->Shown.reset();
+  generator.setBlocks(std::move(blocks), this->FillGhosts);
+  this->Internal->Shown = origin;
+}
+
 void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* output) {
   if (!this->Internal->Generator) {
     vdi::comm::Communicator comm = pv::communicatorOf(this->Controller);
@@ -198,21 +246,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
     this->Internal->Generator = std::make_unique<vdi::VdiGenerator>(std::move(device), std::move(comm));
   }
   vdi::VdiGenerator& generator = *this->Internal->Generator;
-  std::vector<vdi::Block> blocks;
-  generator.communicator().together([&] {
-    pv::ArrayChoice choice;
-    if (vtkInformation* array = this->GetInputArrayInformation(0)) {
-      if (array->Has(vtkDataObject::FIELD_NAME())) choice.name = array->Get(vtkDataObject::FIELD_NAME());
-      if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) {
-        choice.cells =
-            array->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_CELLS;
-      }
-    }
-    choice.component = this->Component;
-    blocks = pv::blocksOf(input, choice);
-  });
-  this->UpdateProgress(0.05);
-  generator.setBlocks(std::move(blocks), this->FillGhosts);
+  this->ShowBlocks(input, time);
   this->UpdateProgress(0.1);
 
   const vdi::Scene& scene = generator.scene();

@@ -111,6 +111,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   struct Internals;
   void Generate(vtkDataObject* input, double time, vtkImageData* output);
+  void ShowBlocks(vtkDataObject* input, double time);
   void SetReport(const char* text);
 
   std::unique_ptr<Internals> Internal;
