@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <ctime>
@@ -171,6 +172,20 @@ double frameSeconds(const RankReport& r) {
   return r.generateSeconds + r.distributeSeconds + r.compositeSeconds + r.gatherSeconds;
 }
 
+template <typename Work>
+double wallMs(Work work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// What a data set's values take to get to the device.
+struct Upload {
+  double milliseconds = 0.0;
+  std::optional<double>
+      stepMs;  // a time step, whose frame is made while the next one's values are on their way
+};
+
 /// One VDI of a data set and what making it took. Only the root has it.
 struct Made {
   std::optional<Vdi> vdi;
@@ -228,29 +243,73 @@ class Bench {
       blocks = set.field.empty() ? rawBlocks(set.raw, deal, world_.rank(), world_.size())
                                  : fieldBlocks(set.field, deal, device_, world_.rank(), world_.size());
     });
+    upload_ = measureUpload(blocks);
     generator_.setBlocks(std::move(blocks));
+    if (root()) {
+      fmt::print(table_, "{}: upload {:.1f} ms", set.name, upload_.milliseconds);
+      if (upload_.stepMs) fmt::print(table_, "; a frame beside the next upload {:.1f} ms", *upload_.stepMs);
+      fmt::print(table_, "\n");
+    }
     for (int view = 0; view < options_.views; ++view) measureView(set, 360.0 * view / options_.views);
   }
 
-  void measureView(const DataSet& set, double turned) {
+  /// What a view of the data set that's shown is seen with.
+  struct Shot {
     Camera camera;
     TransferFunction function;
+  };
+
+  Shot shotFrom(double turned) {
+    Shot shot;
     world_.together([&] {
-      camera = makeCamera(options_.view, generator_.scene()).azimuth(turned);
-      function = makeTransferFunction(options_.quality, generator_.scene(), generator_.scalarRange());
+      shot.camera = makeCamera(options_.view, generator_.scene()).azimuth(turned);
+      shot.function = makeTransferFunction(options_.quality, generator_.scene(), generator_.scalarRange());
     });
+    return shot;
+  }
+
+  GenerateSettings settingsFor(const std::string& algorithm, std::uint32_t supersegments) const {
+    GenerateSettings settings = makeSettings(options_.quality);
+    settings.algorithm = algorithmFromString(algorithm);
+    if (settings.algorithm == Algorithm::Bisection) {  // which knows no other
+      settings.budget = Budget::List;
+      settings.fill = 1.0;
+    }
+    settings.supersegments = supersegments;
+    return settings;
+  }
+
+  Upload measureUpload(const std::vector<Block>& blocks) {
+    Upload upload;
+    upload.milliseconds =
+        repeated(options_.repeats, [&] { return wallMs([&] { generator_.setBlocks(blocks); }); }).median;
+    std::uint64_t bytes = 0;
+    for (const Block& block : blocks) bytes += block.byteCount();
+    std::array<std::uint64_t, 1> full{3 * bytes > device_->limits().memoryBytes ? 1U : 0U};
+    world_.allReduceMax(full);
+    if (full[0] != 0) return upload;  // no room for two volumes
+    const Shot shot = shotFrom(0.0);
+    const GenerateSettings settings =
+        settingsFor(options_.algorithms.front(), options_.supersegments.front());
+    upload.stepMs = repeated(options_.repeats, [&] {
+                      return wallMs([&] {
+                        generator_.setNextBlocks(blocks);
+                        std::optional<Vdi> vdi = generator_.generate(shot.camera, shot.function, settings);
+                        if (vdi) generator_.recycle(std::move(*vdi));
+                        generator_.advance();
+                      });
+                    }).median;
+    return upload;
+  }
+
+  void measureView(const DataSet& set, double turned) {
+    const auto [camera, function] = shotFrom(turned);
     std::vector<Truth> truths;
     for (const double angle : options_.angles)
       truths.push_back(volumeRendering(camera.azimuth(angle), angle, function));
     for (const std::string& algorithm : options_.algorithms) {
       for (const std::uint32_t supersegments : options_.supersegments) {
-        settings_ = makeSettings(options_.quality);
-        settings_.algorithm = algorithmFromString(algorithm);
-        if (settings_.algorithm == Algorithm::Bisection) {  // which knows no other
-          settings_.budget = Budget::List;
-          settings_.fill = 1.0;
-        }
-        settings_.supersegments = supersegments;
+        settings_ = settingsFor(algorithm, supersegments);
         const Made made = make(camera, function);
         world_.together([&] {
           if (!root()) return;
@@ -333,10 +392,8 @@ class Bench {
       }
       clock_.run();
       renderer.recycle(std::move(seen));
-      const auto start = std::chrono::steady_clock::now();
-      seen = renderer.render(truth.camera, settings_.width, settings_.height, reconstruction_);
-      frames.push_back(
-          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+      frames.push_back(wallMs(
+          [&] { seen = renderer.render(truth.camera, settings_.width, settings_.height, reconstruction_); }));
       ratios.push_back(volumeMs / renderer.renderMilliseconds());
       return renderer.renderMilliseconds();
     });
@@ -361,6 +418,8 @@ class Bench {
                      {"fill", settings_.fill},
                      {"width", settings_.width},
                      {"height", settings_.height},
+                     {"upload_ms", upload_.milliseconds},
+                     {"step_ms", upload_.stepMs ? json(*upload_.stepMs) : json(nullptr)},
                      {"view_deg", turned},
                      {"angle_deg", truth.angle},
                      {"dvr_ms", truth.cast.median},
@@ -390,6 +449,7 @@ class Bench {
   std::shared_ptr<gpu::Device> device_;
   ClockRaiser clock_;
   VdiGenerator generator_;
+  Upload upload_;  // of the data set that's shown
   std::FILE* table_ = nullptr;
   json rows_ = json::array();
 };
@@ -466,7 +526,9 @@ void addBench(CLI::App& app, Job& job) {
       "'faster'\n"
       "are ratios to a volume rendering right before. A GPU is kept busy before each run that counts.\n"
       "JSON has whole frames too, transfers and compositing included (dvr_frame_ms, generate_frame_ms,\n"
-      "render_frame_ms).\n"
+      "render_frame_ms), the upload of the values (upload_ms), and a frame made while the next step's are "
+      "on\n"
+      "their way (step_ms).\n"
       "composite is what merging took under mpirun;\n"
       "render is the device's time for one view of the VDI. SSIM and PSNR compare that view with DVR; JSON "
       "has null\n"

@@ -78,9 +78,11 @@ void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGener
     });
   }
   if (options.volume.empty()) return;
-  const std::optional<Image> image = generator.renderVolume(shot.camera, shot.function, shot.settings);
+  std::optional<Image> image = generator.renderVolume(shot.camera, shot.function, shot.settings);
   world.together([&] {
-    if (image) io::writePng(options.numbered(options.volume, index), io::toPicture(*image));
+    if (!image) return;
+    io::writePng(options.numbered(options.volume, index), io::toPicture(*image));
+    generator.recycle(std::move(*image));
   });
 }
 
@@ -133,10 +135,9 @@ void addGenerate(CLI::App& app, Job& job) {
       "  vdi generate --field coil -o coil.vdi --flat coil.png\n"
       "  mpirun -np 4 vdi generate --raw brain.json --blocks 4x4x4 --layout random -o brain.vdi\n"
       "  vdi generate --raw step*.json -o steps.vdi\n"
-      "The last one writes steps_0000.vdi, steps_0001.vdi and so on, which ParaView opens as a series. "
-      "Viewpoint "
-      "and\n"
-      "transfer function are the same for all steps: where they depend on the volume, on the first one.");
+      "The last one writes steps_0000.vdi, steps_0001.vdi and so on, which ParaView opens as a series. All "
+      "steps\n"
+      "have the same viewpoint and transfer function; where these depend on the volume, on the first one.");
   const auto options = std::make_shared<Options>();
   CLI::Option* raw =
       command

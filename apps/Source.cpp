@@ -295,8 +295,9 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
 
 void addReconstructionOption(CLI::App& command, std::string& name) {
   command
-      .add_option("--reconstruction", name,
-                  "between lists: smooth, which blends two of them, or constant, as in the paper; faster")
+      .add_option(
+          "--reconstruction", name,
+          "between lists: smooth, which blends two of them, or constant, as in the paper; faster on a CPU")
       ->type_name("NAME")
       ->capture_default_str();
 }

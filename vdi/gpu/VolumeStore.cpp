@@ -90,6 +90,7 @@ void VolumeStore::dropNext() {
   if (!onItsWay_.valid()) return;
   try {
     onItsWay_.get();
+    next().blocks.clear();
   } catch (const std::exception&) {
     next() = {};  // nobody will ask for it
   }
