@@ -42,6 +42,13 @@ uint ordered(float value) {
   return (bits >> 31) != 0u ? ~bits : bits | 0x80000000u;
 }
 
+float unordered(uint bits) { return uintBitsToFloat((bits >> 31) != 0u ? bits & 0x7FFFFFFFu : ~bits); }
+
+// Smallest, and largest inverted, of what the workgroup's invocations have found.
+shared uint least;
+shared uint leastInverted;
+
+// By a workgroup, whose invocations take a row of texels each at a time.
 void measure(CellPiece piece, uint pieceIndex, uint cell) {
   uint index = cell - piece.firstCell;
   uvec3 cellAt = uvec3(index % piece.cellDims.x, (index / piece.cellDims.x) % piece.cellDims.y,
@@ -50,19 +57,32 @@ void measure(CellPiece piece, uint pieceIndex, uint cell) {
   ivec3 last = min(ivec3((cellAt + 1u) * cellSide) + 1, ivec3(piece.dims) - 1);
   const float largest = 3.402823466e38;
   vec2 range = vec2(largest, -largest);
-  for (int z = first.z; z <= last.z; ++z) {
-    for (int y = first.y; y <= last.y; ++y) {
-      for (int x = first.x; x <= last.x; ++x) {
-        float value = texelAt(piece.page, ivec3(piece.place) + ivec3(x, y, z));
-        // What isn't finite is transparent, and so is what's interpolated with it.
-        if (abs(value) <= largest) range = vec2(min(range.x, value), max(range.y, value));
-      }
+  if (gl_LocalInvocationIndex == 0u) {
+    least = ~0u;
+    leastInverted = ~0u;
+  }
+  barrier();
+  int rows = last.y - first.y + 1;
+  int count = rows * (last.z - first.z + 1);
+  for (int row = int(gl_LocalInvocationIndex); row < count; row += int(cellsGroup)) {
+    ivec3 at = ivec3(piece.place) + ivec3(first.x, first.y + row % rows, first.z + row / rows);
+    for (int x = first.x; x <= last.x; ++x, ++at.x) {
+      float value = texelAt(piece.page, at);
+      // What isn't finite is transparent, and so is what's interpolated with it.
+      if (abs(value) <= largest) range = vec2(min(range.x, value), max(range.y, value));
     }
   }
-  push.ranges.at[cell] = range;
   if (range.x <= range.y) {
-    atomicMin(push.pieceRanges.at[2u * pieceIndex], ordered(range.x));
-    atomicMin(push.pieceRanges.at[2u * pieceIndex + 1u], ~ordered(range.y));
+    atomicMin(least, ordered(range.x));
+    atomicMin(leastInverted, ~ordered(range.y));
+  }
+  barrier();
+  if (gl_LocalInvocationIndex != 0u) return;
+  bool found = least != ~0u;
+  push.ranges.at[cell] = found ? vec2(unordered(least), unordered(~leastInverted)) : vec2(largest, -largest);
+  if (found) {
+    atomicMin(push.pieceRanges.at[2u * pieceIndex], least);
+    atomicMin(push.pieceRanges.at[2u * pieceIndex + 1u], leastInverted);
   }
 }
 
@@ -81,11 +101,13 @@ void classify(CellPiece piece, uint cell) {
 }
 
 void main() {
-  uint cell = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * cellsGroup;
+  bool byGroups = push.mode == cellsModeMeasure;
+  uint group = gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x;
+  uint cell = byGroups ? group : group * cellsGroup + gl_LocalInvocationIndex;
   if (cell >= push.cellCount) return;
   uint index = pieceOf(cell);
   CellPiece piece = push.pieces.at[index];
-  if (push.mode == cellsModeMeasure) {
+  if (byGroups) {
     measure(piece, index, cell);
   } else {
     classify(piece, cell);

@@ -31,7 +31,11 @@ void CellsPass::record(Commands& commands, const shared::CellsConstants& constan
     pipeline.bindImages(images, sampler_);
     boundVersion_ = pagesVersion;
   }
-  commands.dispatchMany(pipeline, constants, constants.cellCount, shared::cellsGroup);
+  const bool byGroups = constants.mode == shared::cellsModeMeasure;
+  commands.dispatchMany(
+      pipeline, constants,
+      byGroups ? std::uint64_t{constants.cellCount} * shared::cellsGroup : constants.cellCount,
+      shared::cellsGroup);
 }
 
 }  // namespace vdi::gpu
