@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "BuildCommit.h"
 #include "apps/Commands.h"
@@ -303,19 +304,19 @@ class Bench {
   }
 
   void measureView(const DataSet& set, double turned) {
-    const auto [camera, function] = shotFrom(turned);
+    const Shot shot = shotFrom(turned);
     std::vector<Truth> truths;
     for (const double angle : options_.angles)
-      truths.push_back(volumeRendering(camera.azimuth(angle), angle, function));
+      truths.push_back(volumeRendering(shot.camera.azimuth(angle), angle, shot.function));
     for (const std::string& algorithm : options_.algorithms) {
       for (const std::uint32_t supersegments : options_.supersegments) {
         settings_ = settingsFor(algorithm, supersegments);
-        const Made made = make(camera, function);
+        const Made made = make(shot);
         world_.together([&] {
           if (!root()) return;
           VdiRenderer renderer(device_);
           renderer.setVdi(*made.vdi);
-          for (const Truth& truth : truths) addRow(set.name, turned, function, made, renderer, truth);
+          for (const Truth& truth : truths) addRow(set.name, turned, shot.function, made, renderer, truth);
         });
       }
     }
@@ -345,7 +346,7 @@ class Bench {
     return truth;
   }
 
-  Made make(const Camera& camera, const TransferFunction& function) {
+  Made make(const Shot& shot) {
     Made made;
     std::vector<double> composites;
     std::vector<double> frames;
@@ -354,11 +355,11 @@ class Bench {
     std::vector<double> writes;
     made.generate = repeated(options_.repeats, [&] {
       clock_.run();
-      generator_.renderVolume(camera, function, settings_);
+      generator_.renderVolume(shot.camera, shot.function, settings_);
       const double volumeMs = deviceMs();
       if (made.vdi) generator_.recycle(std::move(*made.vdi));
       clock_.run();
-      made.vdi = generator_.generate(camera, function, settings_);
+      made.vdi = generator_.generate(shot.camera, shot.function, settings_);
       composites.push_back(
           slowest(generator_.reports(), [](const RankReport& r) { return r.compositeSeconds; }));
       frames.push_back(slowest(generator_.reports(), frameSeconds));
@@ -391,7 +392,7 @@ class Bench {
         volumeMs = deviceMs();
       }
       clock_.run();
-      renderer.recycle(std::move(seen));
+      renderer.recycle(std::exchange(seen, {}));
       frames.push_back(wallMs(
           [&] { seen = renderer.render(truth.camera, settings_.width, settings_.height, reconstruction_); }));
       ratios.push_back(volumeMs / renderer.renderMilliseconds());

@@ -89,19 +89,19 @@ void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGener
 void generate(const Options& options, const comm::Communicator& world) {
   Shot shot;
   std::shared_ptr<gpu::Device> device;
-  std::vector<Block> blocks;
+  std::vector<Block> first;
   const auto read = [&](std::size_t index) {
     return rawBlocks(options.raws[index], options.deal, world.rank(), world.size());
   };
   world.together([&] {
     shot.settings = makeSettings(options.quality);
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
-    blocks = options.raws.empty()
-                 ? fieldBlocks(options.field, options.deal, device, world.rank(), world.size())
-                 : read(0);
+    first = options.raws.empty()
+                ? fieldBlocks(options.field, options.deal, device, world.rank(), world.size())
+                : read(0);
   });
   VdiGenerator generator(device, comm::Communicator::world());
-  generator.setBlocks(std::move(blocks));
+  generator.setBlocks(std::move(first));
   world.together([&] {
     shot.camera = makeCamera(options.view, generator.scene());
     shot.function = makeTransferFunction(options.quality, generator.scene(), generator.scalarRange());
@@ -116,8 +116,9 @@ void generate(const Options& options, const comm::Communicator& world) {
   for (std::size_t index = 0; index < options.steps(); ++index) {
     const bool more = index + 1 < options.steps();
     if (more) {
-      world.together([&] { blocks = reading.get(); });
-      generator.setNextBlocks(std::move(blocks));
+      std::vector<Block> next;
+      world.together([&] { next = reading.get(); });
+      generator.setNextBlocks(std::move(next));
       startReading(index + 2);
     }
     shoot(options, index, shot, generator, world);
