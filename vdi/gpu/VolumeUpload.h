@@ -13,9 +13,9 @@
 
 namespace vdi::gpu {
 
-/// Runs on the device's transfer queue. Values that are texels as they are, the device copies from the
-/// block's own memory, where the driver can import that (VK_EXT_external_memory_host). Others go through two
-/// staging buffers: one is filled while the device copies from the other.
+/// Runs on the device's transfer queue, through two staging buffers: one is filled, by all cores, while the
+/// device copies from the other. A process with one core rather lets the device copy values that are texels
+/// as they are from the block's own memory, where the driver can import that (VK_EXT_external_memory_host).
 class VolumeUpload {
  public:
   explicit VolumeUpload(std::shared_ptr<Device> device);
