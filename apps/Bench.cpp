@@ -183,8 +183,8 @@ double wallMs(Work work) {
 /// What a data set's values take to get to the device.
 struct Upload {
   double milliseconds = 0.0;
-  std::optional<double>
-      stepMs;  // a time step, whose frame is made while the next one's values are on their way
+  /// Of a time step, whose frame is made while the next one's values are on their way.
+  std::optional<double> stepMs;
 };
 
 /// One VDI of a data set and what making it took. Only the root has it.

@@ -32,9 +32,7 @@ struct Options {
   std::size_t steps() const { return std::max<std::size_t>(raws.size(), 1); }
   /// Of the index-th step: picture.png of step 7 is picture_0007.png, when there are several.
   std::filesystem::path numbered(const std::filesystem::path& path, std::size_t index) const {
-    if (steps() == 1) return path;
-    return path.parent_path() /
-           fmt::format("{}_{:04}{}", path.stem().string(), step + index, path.extension().string());
+    return steps() == 1 ? path : withSuffix(path, fmt::format("{:04}", step + index));
   }
 };
 

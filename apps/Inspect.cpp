@@ -28,14 +28,6 @@ struct RenderOptions {
   std::string reconstruction = "smooth";
 };
 
-/// picture.png at 20 degrees: picture_20deg.png, when there are several.
-std::filesystem::path nameFor(const std::string& output, double azimuth, bool several) {
-  if (!several) return output;
-  const std::filesystem::path path(output);
-  return path.parent_path() /
-         fmt::format("{}_{:g}deg{}", path.stem().string(), azimuth, path.extension().string());
-}
-
 void render(const RenderOptions& options) {
   const Vdi vdi = io::readVdi(options.input);
   const std::vector<int> size = options.resolution.empty() ? std::vector<int>{vdi.width, vdi.height}
@@ -45,7 +37,8 @@ void render(const RenderOptions& options) {
   renderer.setVdi(vdi);
   for (const double azimuth : options.azimuths) {
     const Camera camera = turned(chosenCamera(options.camera, vdi.camera), azimuth, options.elevation);
-    const std::filesystem::path path = nameFor(options.output, azimuth, options.azimuths.size() > 1);
+    std::filesystem::path path = options.output;
+    if (options.azimuths.size() > 1) path = withSuffix(path, fmt::format("{:g}deg", azimuth));
     io::writePng(path, io::toPicture(renderer.render(camera, size[0], size[1], reconstruction)));
     fmt::print("{}: {:.2f} ms on the device\n", path.string(), renderer.renderMilliseconds());
   }

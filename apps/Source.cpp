@@ -79,6 +79,10 @@ std::vector<int> parseSizes(const std::string& text, std::size_t count) {
   return sizes;
 }
 
+std::filesystem::path withSuffix(const std::filesystem::path& path, const std::string& suffix) {
+  return path.parent_path() / (path.stem().string() + "_" + suffix + path.extension().string());
+}
+
 std::string fieldsHelp() {
   std::string text;
   for (const FieldInfo& info : fields()) text += "\n  " + info.name + ": " + info.description;

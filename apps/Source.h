@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -82,6 +83,9 @@ TransferFunction makeTransferFunction(const QualityOptions& options, const Scene
 
 /// Of views of a VDI: a name that reconstructionFromString knows.
 void addReconstructionOption(CLI::App& command, std::string& name);
+
+/// Of several files of one name: folder/picture.png with the suffix 20deg is folder/picture_20deg.png.
+std::filesystem::path withSuffix(const std::filesystem::path& path, const std::string& suffix);
 
 /// "640x360" or "96x96x96"; throws Error{InvalidArgument}.
 std::vector<int> parseSizes(const std::string& text, std::size_t count);

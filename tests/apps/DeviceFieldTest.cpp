@@ -3,19 +3,14 @@
 
 #include "apps/DeviceField.h"
 #include "apps/Fields.h"
+#include "tests/Devices.h"
 #include "vdi/core/Error.h"
 
 using namespace vdi;
 using namespace vdi::apps;
+using test::device;
 
 namespace {
-
-std::shared_ptr<gpu::Device> device() {
-  gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
-  request.validation = true;
-  static const std::shared_ptr<gpu::Device> instance = gpu::Device::create(request);
-  return instance;
-}
 
 /// How many of the part's values differ by more than `tolerance`, of 1000.
 template <typename T>

@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/Devices.h"
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
@@ -16,15 +17,9 @@
 
 using namespace vdi;
 using namespace vdi::gpu;
+using test::device;
 
 namespace {
-
-std::shared_ptr<Device> device() {
-  DeviceRequest request = requestFromEnvironment(0);
-  request.validation = true;
-  static const std::shared_ptr<Device> instance = Device::create(request);
-  return instance;
-}
 
 shared::Brick brick(const glm::vec3& lo, const glm::vec3& hi) {
   shared::Brick b{};

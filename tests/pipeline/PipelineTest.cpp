@@ -6,6 +6,7 @@
 #include <iterator>
 #include <optional>
 
+#include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
@@ -18,24 +19,13 @@
 using namespace vdi;
 using apps::Joint;
 using apps::Layout;
+using test::device;
 
 namespace {
 
-std::shared_ptr<gpu::Device> makeDevice(bool gpuPrograms) {
-  gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
-  request.validation = true;
-  request.gpuPrograms = gpuPrograms;
-  return gpu::Device::create(request);
-}
-
-std::shared_ptr<gpu::Device> device() {
-  static const std::shared_ptr<gpu::Device> instance = makeDevice(false);
-  return instance;
-}
-
 /// Another one, which does as a GPU does.
 std::shared_ptr<gpu::Device> deviceAsGpu() {
-  static const std::shared_ptr<gpu::Device> instance = makeDevice(true);
+  static const std::shared_ptr<gpu::Device> instance = test::makeDevice(true);
   return instance;
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <variant>
 
+#include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -13,15 +14,9 @@
 using namespace vdi;
 using apps::Joint;
 using apps::Layout;
+using test::device;
 
 namespace {
-
-std::shared_ptr<gpu::Device> device() {
-  gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
-  request.validation = true;
-  static const std::shared_ptr<gpu::Device> instance = gpu::Device::create(request);
-  return instance;
-}
 
 struct TimeStep {
   std::vector<Block> blocks;

@@ -31,11 +31,8 @@ void CellsPass::record(Commands& commands, const shared::CellsConstants& constan
     pipeline.bindImages(images, sampler_);
     boundVersion_ = pagesVersion;
   }
-  const bool byGroups = constants.mode == shared::cellsModeMeasure;
-  commands.dispatchMany(
-      pipeline, constants,
-      byGroups ? std::uint64_t{constants.cellCount} * shared::cellsGroup : constants.cellCount,
-      shared::cellsGroup);
+  const bool byGroups = constants.mode == shared::cellsModeMeasure;  // a workgroup a cell
+  commands.dispatchMany(pipeline, constants, constants.cellCount, byGroups ? 1 : shared::cellsGroup);
 }
 
 }  // namespace vdi::gpu

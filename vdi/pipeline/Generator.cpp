@@ -126,15 +126,15 @@ struct VdiGenerator::State {
   RankReport mine;
   std::vector<RankReport> reports;
 
-  /// By one of the caster's ways.
+  /// By one of VolumeStore's ways.
   Step sendBlocks(std::vector<Block> blocks, bool fillGhosts,
-                  void (detail::RayCaster::*send)(std::span<const Block>, const Scene&)) {
+                  void (gpu::VolumeStore::*send)(std::span<const Block>, const Scene&)) {
     Stopwatch watch;
     Step step;
     comm.together([&] { validate(blocks); });
     if (fillGhosts) blocks = comm::exchangeGhosts(comm, std::move(blocks));
     step.scene = comm::globalScene(comm, localScene(blocks));
-    comm.together([&] { ((*caster).*send)(blocks, step.scene); });
+    comm.together([&] { (caster->volume().*send)(blocks, step.scene); });
     for (const Block& block : blocks) step.bytes += block.byteCount();
     step.blocks = blocks.size();
     step.uploadSeconds = watch.lap();
@@ -144,15 +144,15 @@ struct VdiGenerator::State {
   /// What's there now.
   void show(const Step& step) {
     shown = step;
-    const ScalarRange& mine = caster->valueRange();
-    std::array<double, 2> least{mine.min, -mine.max};
+    const ScalarRange& own = caster->volume().valueRange();
+    std::array<double, 2> least{own.min, -own.max};
     comm.allReduceMin(least);
     range = {least[0], -least[1]};
   }
 
   void dropNext() {
     next.reset();
-    caster->dropNext();
+    caster->volume().dropNext();
   }
 
   /// What generate and renderVolume have in common: checked parameters and this rank's lists.
@@ -272,14 +272,14 @@ void VdiGenerator::setBlocks(std::vector<Block> blocks, bool fillGhosts) {
   s.dropNext();
   s.shown = {};  // where a rank fails, nobody shows anything
   s.range = {};
-  s.show(s.sendBlocks(std::move(blocks), fillGhosts, &detail::RayCaster::setBlocks));
+  s.show(s.sendBlocks(std::move(blocks), fillGhosts, &gpu::VolumeStore::setBlocks));
 }
 
 void VdiGenerator::setNextBlocks(std::vector<Block> blocks, bool fillGhosts) {
   State& s = *state_;
   s.dropNext();
   try {
-    s.next = s.sendBlocks(std::move(blocks), fillGhosts, &detail::RayCaster::setNextBlocks);
+    s.next = s.sendBlocks(std::move(blocks), fillGhosts, &gpu::VolumeStore::setNextBlocks);
   } catch (...) {
     s.dropNext();  // a rank that hasn't failed may have sent its own
     throw;
@@ -291,8 +291,8 @@ void VdiGenerator::advance() {
   Stopwatch watch;
   const std::optional<Step> next = std::exchange(s.next, std::nullopt);
   if (!next) throw Error(ErrorCode::InvalidArgument, "no next blocks were set");
-  s.comm.together([&] { s.caster->awaitNext(); });
-  s.caster->showNext();
+  s.comm.together([&] { s.caster->volume().awaitNext(); });
+  s.caster->volume().showNext();
   s.show(*next);
   s.shown.uploadSeconds += watch.lap();
 }

@@ -14,22 +14,6 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
       commands_(device_),
       survey_(device_) {}
 
-void RayCaster::setBlocks(std::span<const Block> blocks, const Scene& scene) {
-  volume_.setBlocks(blocks, scene);
-}
-void RayCaster::setNextBlocks(std::span<const Block> blocks, const Scene& scene) {
-  volume_.setNextBlocks(blocks, scene);
-}
-void RayCaster::awaitNext() {
-  volume_.awaitNext();
-}
-void RayCaster::showNext() {
-  volume_.showNext();
-}
-void RayCaster::dropNext() {
-  volume_.dropNext();
-}
-
 shared::CastParams RayCaster::prepare(const Request& request) {
   volume_.setTable(request.table);
   shared::CastParams params = gpu::castGeometry(request.scene, request.view, request.lattice);

@@ -26,13 +26,8 @@ class RayCaster {
  public:
   explicit RayCaster(std::shared_ptr<gpu::Device> device);
 
-  /// gpu/VolumeStore's.
-  void setBlocks(std::span<const Block> blocks, const Scene& scene);
-  void setNextBlocks(std::span<const Block> blocks, const Scene& scene);
-  void awaitNext();
-  void showNext();
-  void dropNext();
-  const ScalarRange& valueRange() const { return volume_.valueRange(); }
+  /// What's cast through: blocks are set there.
+  gpu::VolumeStore& volume() { return volume_; }
 
   struct Request {
     const Scene& scene;
