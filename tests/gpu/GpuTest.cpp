@@ -1,9 +1,12 @@
 // Device choice, prefix sums, merging and the kd-tree, each against something plain.
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <numeric>
 #include <random>
+#include <thread>
 #include <vector>
 
 #include "tests/Devices.h"
@@ -94,6 +97,36 @@ TEST_CASE("prefix sums equal the host's at awkward sizes") {
     }
     CHECK(wrong == 0);
   }
+  CHECK(device()->validationMessages() == "");
+}
+
+TEST_CASE("commands may go as soon as they were waited for, whichever thread made them") {
+  const auto work = [](std::uint32_t word, bool& right) {
+    const Buffer from(device(), 4096, MemoryKind::Upload);
+    const Buffer to(device(), 4096, MemoryKind::Readback);
+    const Buffer filled(device(), 4096, MemoryKind::Readback);
+    from.mappedAs<std::uint32_t>()[7] = word;
+    for (int i = 0; i < 300; ++i) {
+      Commands copies(device(), QueueKind::Transfer);
+      copies.begin();
+      copies.copy(from, 0, to, 0, 4096);
+      copies.submit();
+      Commands commands(device());
+      commands.begin();
+      commands.waitFor(copies);
+      commands.fill(filled, word);
+      commands.submitAndWait();
+    }
+    right = to.mappedAs<std::uint32_t>()[7] == word && filled.mappedAs<std::uint32_t>()[1023] == word;
+  };
+  std::array<bool, 3> right{};
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t i = 0; i < right.size(); ++i) {
+      threads.emplace_back(work, static_cast<std::uint32_t>(i + 1), std::ref(right[i]));
+    }
+  }
+  CHECK(right == std::array<bool, 3>{true, true, true});
   CHECK(device()->validationMessages() == "");
 }
 

@@ -3,6 +3,7 @@
 #include <cassert>
 #include <utility>
 
+#include "vdi/core/Error.h"
 #include "vdi/gpu/ComputePipeline.h"
 #include "vdi/gpu/Memory.h"
 
@@ -41,12 +42,6 @@ Commands::Commands(std::shared_ptr<Device> device, QueueKind kind) : device_(std
     const VkCommandBufferAllocateInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr,
                                                  pool_, VK_COMMAND_BUFFER_LEVEL_PRIMARY, 1};
     check(vkAllocateCommandBuffers(device_->handle(), &bufferInfo, &buffer_), "vkAllocateCommandBuffers");
-    const VkFenceCreateInfo fenceInfo{VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, nullptr, 0};
-    check(vkCreateFence(device_->handle(), &fenceInfo, nullptr, &fence_), "vkCreateFence");
-    const VkSemaphoreTypeCreateInfo timeline{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO, nullptr,
-                                             VK_SEMAPHORE_TYPE_TIMELINE, 0};
-    const VkSemaphoreCreateInfo semaphoreInfo{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &timeline, 0};
-    check(vkCreateSemaphore(device_->handle(), &semaphoreInfo, nullptr, &done_), "vkCreateSemaphore");
     const VkQueryPoolCreateInfo queryInfo{
         VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO, nullptr, 0, VK_QUERY_TYPE_TIMESTAMP, maxMarks + 1, 0};
     check(vkCreateQueryPool(device_->handle(), &queryInfo, nullptr, &queries_), "vkCreateQueryPool");
@@ -57,15 +52,16 @@ Commands::Commands(std::shared_ptr<Device> device, QueueKind kind) : device_(std
 }
 
 Commands::~Commands() {
-  if (state_ == State::Submitted) vkWaitForFences(device_->handle(), 1, &fence_, VK_TRUE, UINT64_MAX);
+  try {
+    if (state_ == State::Submitted) device_->wait(kind_, last_);
+  } catch (const Error&) {  // the device is lost: nothing runs any more
+  }
   release();
 }
 
 void Commands::release() noexcept {
   VkDevice device = device_->handle();
   if (queries_ != VK_NULL_HANDLE) vkDestroyQueryPool(device, queries_, nullptr);
-  if (done_ != VK_NULL_HANDLE) vkDestroySemaphore(device, done_, nullptr);
-  if (fence_ != VK_NULL_HANDLE) vkDestroyFence(device, fence_, nullptr);
   if (pool_ != VK_NULL_HANDLE) vkDestroyCommandPool(device, pool_, nullptr);
 }
 
@@ -84,8 +80,8 @@ void Commands::begin() {
 
 void Commands::waitFor(const Commands& other) {
   assert(state_ == State::Recording);
-  waits_.push_back({VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, nullptr, other.done_, other.submissions_,
-                    VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, 0});
+  waits_.push_back({VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, nullptr, device_->submissionsDone(other.kind_),
+                    other.last_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, 0});
 }
 
 void Commands::submit() {
@@ -95,20 +91,7 @@ void Commands::submit() {
   // Makes what was written visible to the host after wait().
   memoryBarrier(true);
   check(vkEndCommandBuffer(buffer_), "vkEndCommandBuffer");
-  const VkCommandBufferSubmitInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO, nullptr, buffer_,
-                                             0};
-  const VkSemaphoreSubmitInfo done{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, nullptr, done_, submissions_ + 1,
-                                   VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,    0};
-  const VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2,
-                           nullptr,
-                           0,
-                           static_cast<std::uint32_t>(waits_.size()),
-                           waits_.data(),
-                           1,
-                           &bufferInfo,
-                           1,
-                           &done};
-  device_->submit(kind_, info, fence_);
+  last_ = device_->submit(kind_, waits_, buffer_);
   state_ = State::Submitted;
   ++submissions_;
 }
@@ -116,9 +99,8 @@ void Commands::submit() {
 /// After a lost device the submission counts as not done: each further begin or wait throws again.
 void Commands::wait() {
   if (state_ != State::Submitted) return;
-  check(vkWaitForFences(device_->handle(), 1, &fence_, VK_TRUE, UINT64_MAX), "vkWaitForFences");
+  device_->wait(kind_, last_);
   state_ = State::Idle;
-  check(vkResetFences(device_->handle(), 1, &fence_), "vkResetFences");
   readTimes();
 }
 

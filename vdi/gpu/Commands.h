@@ -1,4 +1,4 @@
-// One reusable command buffer with its fence and timestamps. begin, record, submit, wait; then begin again.
+// One reusable command buffer with its timestamps. begin, record, submit, wait; then begin again.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -42,8 +42,8 @@ class Commands {
   /// others too, is finished and visible to what's recorded. What was recorded and not submitted is dropped,
   /// so an exception between begin and submit does no harm.
   void begin();
-  /// What's recorded waits, on the device, for the last submission of `other`, which must not be destroyed
-  /// before this is done. For another queue's: begin's barrier reaches its own queue only.
+  /// What's recorded waits, on the device, for the last submission of `other`. For another queue's: begin's
+  /// barrier reaches its own queue only.
   void waitFor(const Commands& other);
   void submit();
   /// How often that was done: more than while something was recorded tells that it wasn't dropped.
@@ -125,14 +125,13 @@ class Commands {
   QueueKind kind_;
   VkCommandPool pool_ = VK_NULL_HANDLE;
   VkCommandBuffer buffer_ = VK_NULL_HANDLE;
-  VkFence fence_ = VK_NULL_HANDLE;
-  VkSemaphore done_ = VK_NULL_HANDLE;  // timeline: counts submissions
   std::vector<VkSemaphoreSubmitInfo> waits_;
   VkQueryPool queries_ = VK_NULL_HANDLE;
   std::vector<std::string> marks_;
   std::vector<StageTime> times_;
   State state_ = State::Idle;
   std::uint64_t submissions_ = 0;
+  std::uint64_t last_ = 0;  // the last submission's number on its queue
 };
 
 }  // namespace vdi::gpu

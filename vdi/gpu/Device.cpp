@@ -308,6 +308,10 @@ struct Device::State {
   struct Queue {
     VkQueue handle = VK_NULL_HANDLE;
     std::uint32_t family = 0;
+    // Timeline: counts submissions that are done. It lives as long as the device because drivers may touch it
+    // a moment longer than the submission takes: Mesa 22.3's queue thread does.
+    VkSemaphore done = VK_NULL_HANDLE;
+    std::uint64_t submissions = 0;
   };
   std::array<Queue, 2> queues;  // by kind
   VkPipelineCache cache = VK_NULL_HANDLE;
@@ -325,6 +329,9 @@ struct Device::State {
   Queue& queue(QueueKind kind) { return queues[static_cast<std::size_t>(kind)]; }
 
   ~State() {
+    for (const Queue& queue : queues) {
+      if (queue.done != VK_NULL_HANDLE) vkDestroySemaphore(device, queue.done, nullptr);
+    }
     if (cache != VK_NULL_HANDLE) vkDestroyPipelineCache(device, cache, nullptr);
     if (device != VK_NULL_HANDLE) vkDestroyDevice(device, nullptr);
     if (messenger != VK_NULL_HANDLE) {
@@ -482,7 +489,13 @@ std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
   state->limits = chosen.limits;
   vkGetPhysicalDeviceMemoryProperties(chosen.handle, &state->memory);
   state->device = makeDevice(chosen);
-  for (State::Queue& queue : state->queues) vkGetDeviceQueue(state->device, queue.family, 0, &queue.handle);
+  const VkSemaphoreTypeCreateInfo timeline{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO, nullptr,
+                                           VK_SEMAPHORE_TYPE_TIMELINE, 0};
+  const VkSemaphoreCreateInfo semaphoreInfo{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &timeline, 0};
+  for (State::Queue& queue : state->queues) {
+    vkGetDeviceQueue(state->device, queue.family, 0, &queue.handle);
+    check(vkCreateSemaphore(state->device, &semaphoreInfo, nullptr, &queue.done), "vkCreateSemaphore");
+  }
   if (state->limits.hostPointerAlignment > 0) {
     state->hostPointerProperties = reinterpret_cast<PFN_vkGetMemoryHostPointerPropertiesEXT>(
         vkGetDeviceProcAddr(state->device, "vkGetMemoryHostPointerPropertiesEXT"));
@@ -566,9 +579,35 @@ std::string Device::validationMessages() const {
   return state_->log.text();
 }
 
-void Device::submit(QueueKind kind, const VkSubmitInfo2& info, VkFence fence) {
+std::uint64_t Device::submit(QueueKind kind, std::span<const VkSemaphoreSubmitInfo> waits,
+                             VkCommandBuffer commands) {
+  const VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO, nullptr, commands, 0};
   const std::lock_guard lock(state_->queueMutex);
-  check(vkQueueSubmit2(state_->queue(kind).handle, 1, &info, fence), "vkQueueSubmit2");
+  State::Queue& queue = state_->queue(kind);
+  const VkSemaphoreSubmitInfo done{
+      VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, nullptr, queue.done, queue.submissions + 1,
+      VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,    0};
+  const VkSubmitInfo2 info{VK_STRUCTURE_TYPE_SUBMIT_INFO_2,
+                           nullptr,
+                           0,
+                           static_cast<std::uint32_t>(waits.size()),
+                           waits.data(),
+                           1,
+                           &buffer,
+                           1,
+                           &done};
+  check(vkQueueSubmit2(queue.handle, 1, &info, VK_NULL_HANDLE), "vkQueueSubmit2");
+  return ++queue.submissions;
+}
+
+void Device::wait(QueueKind kind, std::uint64_t submissions) const {
+  const VkSemaphoreWaitInfo info{
+      VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO, nullptr, 0, 1, &state_->queue(kind).done, &submissions};
+  check(vkWaitSemaphores(state_->device, &info, UINT64_MAX), "vkWaitSemaphores");
+}
+
+VkSemaphore Device::submissionsDone(QueueKind kind) const {
+  return state_->queue(kind).done;
 }
 
 }  // namespace vdi::gpu

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 namespace vdi::gpu {
@@ -98,8 +99,14 @@ class Device {
   std::uint32_t validationMessageCount() const;
   std::string validationMessages() const;
 
-  /// Serialises vkQueueSubmit2 between threads.
-  void submit(QueueKind kind, const VkSubmitInfo2& info, VkFence fence);
+  /// Submits to a queue; the result is how many submissions that queue has had, this one included, which is
+  /// what its timeline semaphore reaches when this one is done. From any thread.
+  std::uint64_t submit(QueueKind kind, std::span<const VkSemaphoreSubmitInfo> waits,
+                       VkCommandBuffer commands);
+  /// Waits for that many. Throws Error{DeviceFailure} on device loss.
+  void wait(QueueKind kind, std::uint64_t submissions) const;
+  /// For `waits` of submit.
+  VkSemaphore submissionsDone(QueueKind kind) const;
 
  private:
   struct State;
