@@ -381,7 +381,7 @@ class Bench {
 
   void addRow(const std::string& name, double turned, const TransferFunction& function, const Made& made,
               VdiRenderer& renderer, const Truth& truth) {
-    Image seen;
+    ImageBytes seen;
     std::vector<double> ratios;
     std::vector<double> frames;
     const Spread render = repeated(options_.repeats, [&] {
@@ -392,9 +392,10 @@ class Bench {
         volumeMs = deviceMs();
       }
       clock_.run();
-      renderer.recycle(std::exchange(seen, {}));
-      frames.push_back(wallMs(
-          [&] { seen = renderer.render(truth.camera, settings_.width, settings_.height, reconstruction_); }));
+      frames.push_back(wallMs([&] {
+        seen = renderer.renderBytes(truth.camera, settings_.width, settings_.height, Alpha::Premultiplied,
+                                    reconstruction_);
+      }));
       ratios.push_back(volumeMs / renderer.renderMilliseconds());
       return renderer.renderMilliseconds();
     });

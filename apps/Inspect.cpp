@@ -39,7 +39,8 @@ void render(const RenderOptions& options) {
     const Camera camera = turned(chosenCamera(options.camera, vdi.camera), azimuth, options.elevation);
     std::filesystem::path path = options.output;
     if (options.azimuths.size() > 1) path = withSuffix(path, fmt::format("{:g}deg", azimuth));
-    io::writePng(path, io::toPicture(renderer.render(camera, size[0], size[1], reconstruction)));
+    io::writePng(path, io::toPicture(renderer.renderBytes(camera, size[0], size[1], Alpha::Premultiplied,
+                                                          reconstruction)));
     fmt::print("{}: {:.2f} ms on the device\n", path.string(), renderer.renderMilliseconds());
   }
 }

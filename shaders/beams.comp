@@ -8,10 +8,13 @@
 layout(local_size_x = renderBeamGroup) in;
 // Else as they come: a CPU doesn't wait, but has its caches.
 layout(constant_id = 0) const bool mostFirst = true;
+// What the picture is left in (shared/render.h).
+layout(constant_id = 1) const uint pictureForm = renderPictureFloats;
 layout(push_constant, scalar) uniform Push { RenderRays rays; };
 layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 #include "view.glsl"
+#include "picture.glsl"
 #include "beam.glsl"
 
 float least(vec4 values) { return min(min(values.x, values.y), min(values.z, values.w)); }
@@ -132,8 +135,7 @@ void main() {
     for (uint i = own; i < renderRegion * renderRegion; i += renderBeamGroup) {
       uvec2 at = corner + uvec2(i % renderRegion, i / renderRegion);
       if (any(greaterThanEqual(at, size))) continue;
-      params.colors.at[at.y * params.width + at.x] = vec4(0.0);
-      params.depths.at[at.y * params.width + at.x] = infinity;
+      leavePixel(at.y * params.width + at.x, vec4(0.0), infinity);
     }
     return;
   }

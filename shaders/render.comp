@@ -26,11 +26,14 @@ layout(constant_id = 3) const int piecesAtOnce = 1;
 const int mostPiecesAtOnce = 3;
 // How the pixels of a tile are dealt to invocations (shared/render.h).
 layout(constant_id = 4) const uint pixelOrder = renderOrderSquares;
+// What it's left in (shared/render.h).
+layout(constant_id = 5) const uint pictureForm = renderPictureFloats;
 
 // What is behind changes a pixel by less than a quarter of 1/255.
 const float opaque = 1.0 - 1.0 / 1024.0;
 
 #include "view.glsl"
+#include "picture.glsl"
 
 Ray ray;
 
@@ -96,11 +99,9 @@ void renderPixels(uint tile) {
   if (along) accumulate(lookAlongLists(line, stretch));
   if (walks) walk(line);
   if (!hasPixel || rayShare != 0u) return;
-  uint index = at.y * params.width + at.x;
-  params.colors.at[index] = accumulated.light;
   bool met = accumulated.light.a > 0.0;
   float fraction = clamp((accumulated.entered - line.depths.x) / max(line.depths.y, 1e-30), 0.0, 1.0);
-  params.depths.at[index] = met ? mix(stretch.x, stretch.y, fraction) : infinity;
+  leavePixel(at.y * params.width + at.x, accumulated.light, met ? mix(stretch.x, stretch.y, fraction) : infinity);
 }
 
 // The i-th of the queue.

@@ -14,6 +14,9 @@ inline constexpr uint renderKinds = 24;
 inline constexpr uint renderOrderSquares = 0;
 inline constexpr uint renderOrderColumns = 1;
 inline constexpr uint renderOrderRows = 2;
+inline constexpr uint renderPictureFloats = 0;
+inline constexpr uint renderPictureBytes = 1;
+inline constexpr uint renderPictureStraightBytes = 2;
 inline constexpr uint expandGroup = 64;
 inline constexpr uint expandModeSegments = 0;
 inline constexpr uint expandModeMasks = 1;
@@ -34,6 +37,10 @@ const uint renderKinds = 24;        // of tiles, by how much there is to look at
 const uint renderOrderSquares = 0;
 const uint renderOrderColumns = 1;
 const uint renderOrderRows = 2;
+// Of its colours: premultiplied, four floats; premultiplied, straight, four bytes.
+const uint renderPictureFloats = 0;
+const uint renderPictureBytes = 1;
+const uint renderPictureStraightBytes = 2;
 const uint expandGroup = 64;
 const uint expandModeSegments = 0;  // one invocation a supersegment
 const uint expandModeMasks = 1;     // one a list
@@ -105,7 +112,7 @@ struct RenderParams {
   VDI_ADDRESS(ListHeads) heads;
   VDI_ADDRESS(PieceArray) segments;  // compact array
   VDI_ADDRESS(MaskArray) tileMasks;
-  VDI_ADDRESS(Vec4Array) colors;       // [height][width]
+  VDI_ADDRESS(Vec4Array) colors;       // [height][width]; bytes: a word each
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
   VDI_ADDRESS(TileQueueAddress) queue;
   VDI_ADDRESS(UintArray) waiting;  // [renderKinds][tiles]: the tiles of the queue, as row * tiles in a row + column

@@ -291,9 +291,44 @@ TEST_CASE("a picture in the memory of another one is the same") {
     INFO(width << " x " << height);
     generator.recycle(volumeOf(width, height));
     CHECK(same(volumeOf(40, 30), volume));
-    renderer.recycle(renderer.render(test::oblique().azimuth(20.0), width, height));
+    renderer.render(test::oblique().azimuth(20.0), width, height);
     CHECK(same(renderer.render(test::oblique(), 40, 30), view));
   }
+}
+
+TEST_CASE("bytes of a view are those of its floats, whichever was asked for before") {
+  const auto dealt = test::deal("shells", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(dealt.mine);
+  VdiRenderer renderer(device());
+  renderer.setVdi(*generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(40, 30, 5)));
+  for (const auto& [width, height] : {std::pair(61, 47), std::pair(33, 64), std::pair(61, 47)}) {
+    INFO(width << " x " << height);
+    const Camera camera = test::oblique().azimuth(width);
+    const Image floats = renderer.render(camera, width, height);
+    for (const Alpha alpha : {Alpha::Premultiplied, Alpha::Straight}) {
+      const ImageBytes bytes = renderer.renderBytes(camera, width, height, alpha);
+      CHECK((bytes.width == width && bytes.height == height));
+      REQUIRE(bytes.rgba.size() == floats.rgba.size());
+      CHECK(std::ranges::equal(bytes.depth, floats.depth));
+      int most = 0;
+      int translucent = 0;
+      for (std::size_t i = 0; i < bytes.rgba.size(); ++i) {
+        const glm::vec4& shares = floats.rgba[i];
+        translucent += shares.a > 0.1F && shares.a < 0.9F ? 1 : 0;
+        const float weight = alpha == Alpha::Straight && shares.a > 0.0F ? 1.0F / shares.a : 1.0F;
+        for (int c = 0; c < 4; ++c) {
+          const int expected = toByte(c < 3 ? shares[c] * weight : shares.a);
+          most = std::max(most, std::abs(bytes.rgba[i][c] - expected));
+        }
+      }
+      // A division on a device may be off by its last bits.
+      CHECK(most <= (alpha == Alpha::Straight ? 1 : 0));
+      CHECK(translucent > 100);
+    }
+  }
+  CHECK(device()->validationMessages() == "");
 }
 
 TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the reference") {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <limits>
+#include <span>
 #include <vector>
 
 namespace vdi {
@@ -25,6 +26,17 @@ struct Image {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   }
 };
+
+/// A picture as screens take it, in memory of its maker. Row 0 is the bottom row.
+struct ImageBytes {
+  int width = 0;
+  int height = 0;
+  std::span<const glm::u8vec4> rgba;  // [height][width], premultiplied or straight
+  std::span<const float> depth;       // [height][width], as in Image
+};
+
+/// Whether colours are as bright as they shine (light that's been weighed with alpha), or as they are.
+enum class Alpha { Premultiplied, Straight };
 
 /// The nearest 8-bit code of a share in [0, 1], clamped; 0 for what isn't a number. Rounds as std::lround
 /// does, which is a call for each and takes four times as long.

@@ -97,7 +97,8 @@ RenderPass::RenderPass(const std::shared_ptr<Device>& device)
 
 std::vector<std::uint32_t> RenderPass::specialization(const shared::RenderParams& params,
                                                       const shared::RenderRays& rays,
-                                                      Reconstruction reconstruction) const {
+                                                      Reconstruction reconstruction,
+                                                      std::uint32_t form) const {
   const std::uint32_t smooth = reconstruction == Reconstruction::Smooth ? 1 : 0;
   const std::uint32_t invocations = shares_ * shared::renderPictureTile * shared::renderPictureTile;
   std::uint32_t piecesAtOnce = 1;
@@ -108,21 +109,22 @@ std::vector<std::uint32_t> RenderPass::specialization(const shared::RenderParams
     piecesAtOnce = 3;
     pixelOrder = course.way.x == crossed ? shared::renderOrderColumns : shared::renderOrderRows;
   }
-  return {smooth, shares_, invocations, piecesAtOnce, pixelOrder};
+  return {smooth, shares_, invocations, piecesAtOnce, pixelOrder, form};
 }
 
 void RenderPass::record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,
-                        Reconstruction reconstruction) {
+                        Reconstruction reconstruction, std::uint32_t form) {
   const std::uint64_t tiles = std::uint64_t{groupsFor(params.width, shared::renderPictureTile)} *
                               groupsFor(params.height, shared::renderPictureTile);
   waiting_.reserve(device_, tiles * shared::renderKinds * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
   params.queue = queue_.address();
   params.waiting = waiting_.address();
   beams_.update(commands, params);
-  commands.dispatch(beams_.with({shares_ > 1 ? 1U : 0U}), rays, groupsFor(params.width, shared::renderRegion),
+  commands.dispatch(beams_.with({shares_ > 1 ? 1U : 0U, form}), rays,
+                    groupsFor(params.width, shared::renderRegion),
                     groupsFor(params.height, shared::renderRegion));
   commands.barrier();
-  commands.dispatchIndirect(render_.with(specialization(params, rays, reconstruction)), rays, queue_);
+  commands.dispatchIndirect(render_.with(specialization(params, rays, reconstruction, form)), rays, queue_);
 }
 
 }  // namespace vdi::gpu

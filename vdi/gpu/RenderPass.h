@@ -24,14 +24,14 @@ shared::RenderRays renderRays(const View& original, const View& view);
 class RenderPass {
  public:
   explicit RenderPass(const std::shared_ptr<Device>& device);
-  /// Behind a barrier. `params`: but for the queue.
+  /// Behind a barrier. `params`: but for the queue. `form`: shared::renderPicture...
   void record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,
-              Reconstruction reconstruction);
+              Reconstruction reconstruction, std::uint32_t form);
 
  private:
   std::vector<std::uint32_t> specialization(const shared::RenderParams& params,
-                                            const shared::RenderRays& rays,
-                                            Reconstruction reconstruction) const;
+                                            const shared::RenderRays& rays, Reconstruction reconstruction,
+                                            std::uint32_t form) const;
 
   std::shared_ptr<Device> device_;
   std::uint32_t shares_;

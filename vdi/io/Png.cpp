@@ -27,21 +27,32 @@ class PngImage {
   png_image image_{};
 };
 
-}  // namespace
-
-Picture toPicture(const Image& image, const glm::vec3& background) {
+/// `byteOf`: a pixel's channel.
+template <typename Pixels, typename ByteOf>
+Picture pictureOf(const Pixels& image, ByteOf byteOf) {
   Picture picture{image.width, image.height, {}};
-  picture.rgb.resize(image.pixelCount() * 3);
+  picture.rgb.resize(image.rgba.size() * 3);
   const auto width = static_cast<std::size_t>(image.width);
   const auto height = static_cast<std::size_t>(image.height);
   std::uint8_t* out = picture.rgb.data();
   for (std::size_t y = 0; y < height; ++y) {
     for (std::size_t x = 0; x < width; ++x) {
-      const glm::vec4& rgba = image.rgba[(height - 1 - y) * width + x];
-      for (int c = 0; c < 3; ++c) *out++ = toByte(rgba[c] + (1.0F - rgba.a) * background[c]);
+      const auto& rgba = image.rgba[(height - 1 - y) * width + x];
+      for (int c = 0; c < 3; ++c) *out++ = byteOf(rgba, c);
     }
   }
   return picture;
+}
+
+}  // namespace
+
+Picture toPicture(const Image& image, const glm::vec3& background) {
+  return pictureOf(
+      image, [&](const glm::vec4& rgba, int c) { return toByte(rgba[c] + (1.0F - rgba.a) * background[c]); });
+}
+
+Picture toPicture(const ImageBytes& image) {
+  return pictureOf(image, [](const glm::u8vec4& rgba, int c) { return rgba[c]; });
 }
 
 void writePng(const std::filesystem::path& path, const Picture& picture) {

@@ -20,6 +20,9 @@ struct Picture {
 /// The image over a background, rounded to 8 bits and turned upside down (Image has row 0 at the bottom).
 Picture toPicture(const Image& image, const glm::vec3& background = glm::vec3(0.0F));
 
+/// The same of premultiplied bytes, over black.
+Picture toPicture(const ImageBytes& image);
+
 void writePng(const std::filesystem::path& path, const Picture& picture);  // atomic; throws Error{Io}
 Picture readPng(const std::filesystem::path& path);  // any PNG; throws Error{Io}, Error{Format}
 

@@ -1,29 +1,39 @@
 #include "vdi/pipeline/PictureBuffers.h"
 
+#include <cassert>
+
 #include "vdi/core/Parallel.h"
 
 namespace vdi::detail {
 
 using gpu::MemoryKind;
 
-void PictureBuffers::reserve(const std::shared_ptr<gpu::Device>& device, std::uint64_t pixels) {
+void PictureBuffers::reserve(const std::shared_ptr<gpu::Device>& device, std::uint64_t pixels,
+                             std::uint64_t colorBytes) {
   pixels_ = pixels;
-  colors_.reserve(device, pixels * sizeof(glm::vec4), MemoryKind::DeviceLocal);
+  colorBytes_ = pixels * colorBytes;
+  colors_.reserve(device, colorBytes_, MemoryKind::DeviceLocal);
   depths_.reserve(device, pixels * sizeof(float), MemoryKind::DeviceLocal);
-  readback_.reserve(device, pixels * (sizeof(glm::vec4) + sizeof(float)), MemoryKind::Readback);
+  readback_.reserve(device, colorBytes_ + pixels * sizeof(float), MemoryKind::Readback);
 }
 
 void PictureBuffers::recordDownload(gpu::Commands& commands) const {
-  const std::uint64_t colorBytes = pixels_ * sizeof(glm::vec4);
   commands.barrier();
   commands.mark("download");
-  commands.copy(colors_, 0, readback_, 0, colorBytes);
-  commands.copy(depths_, 0, readback_, colorBytes, pixels_ * sizeof(float));
+  commands.copy(colors_, 0, readback_, 0, colorBytes_);
+  commands.copy(depths_, 0, readback_, colorBytes_, pixels_ * sizeof(float));
 }
 
 void PictureBuffers::copyTo(Image& image, std::size_t first) const {
+  assert(colorBytes_ == pixels_ * sizeof(glm::vec4));
   replaceTail<glm::vec4>(image.rgba, first, readback_.mappedAs<glm::vec4>().first(pixels_));
   replaceTail<float>(image.depth, first, readback_.mappedAs<float>().subspan(pixels_ * 4, pixels_));
+}
+
+ImageBytes PictureBuffers::bytes(int width, int height) const {
+  assert(colorBytes_ == pixels_ * sizeof(glm::u8vec4));
+  return {width, height, readback_.mappedAs<const glm::u8vec4>().first(pixels_),
+          readback_.mappedAs<const float>().subspan(pixels_, pixels_)};
 }
 
 }  // namespace vdi::detail

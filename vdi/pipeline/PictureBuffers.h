@@ -12,18 +12,23 @@ namespace vdi::detail {
 
 class PictureBuffers {
  public:
-  void reserve(const std::shared_ptr<gpu::Device>& device, std::uint64_t pixels);
+  /// `colorBytes`: of a pixel, those of a glm::vec4 or of a glm::u8vec4.
+  void reserve(const std::shared_ptr<gpu::Device>& device, std::uint64_t pixels,
+               std::uint64_t colorBytes = sizeof(glm::vec4));
 
-  std::uint64_t colors() const { return colors_.address(); }  // glm::vec4 each
+  std::uint64_t colors() const { return colors_.address(); }
   std::uint64_t depths() const { return depths_.address(); }  // float each
 
   /// Behind what writes them; a stage named "download".
   void recordDownload(gpu::Commands& commands) const;
-  /// After that has run: makes them the image's pixels from the first-th on.
+  /// After that has run: makes them (a glm::vec4 each) the image's pixels from the first-th on.
   void copyTo(Image& image, std::size_t first) const;
+  /// After that has run: the pixels, a glm::u8vec4 each; they stay until the next reserve or download.
+  ImageBytes bytes(int width, int height) const;
 
  private:
   std::uint64_t pixels_ = 0;
+  std::uint64_t colorBytes_ = 0;  // of all of them
   gpu::Buffer colors_;
   gpu::Buffer depths_;
   gpu::Buffer readback_;  // colours, then depths

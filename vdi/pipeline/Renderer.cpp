@@ -38,7 +38,9 @@ struct VdiRenderer::State {
   float farthest = 0.0F;
   float binScale = 0.0F;
   double milliseconds = 0.0;
-  Image spare;  // for its memory
+
+  /// Into `picture`. `form`: shared::renderPicture...
+  void render(const View& view, Reconstruction reconstruction, std::uint32_t form);
 
   /// What fits staging is on its way while the caller goes on; more waits for the part before.
   static constexpr std::uint64_t stagingBytes = std::uint64_t{128} << 20;
@@ -168,35 +170,40 @@ void VdiRenderer::setVdi(const Vdi& vdi) {
   s.original = std::make_unique<View>(vdi.view());
 }
 
+void VdiRenderer::State::render(const View& view, Reconstruction reconstruction, std::uint32_t form) {
+  if (!original) throw Error(ErrorCode::InvalidArgument, "there is no VDI to render yet");
+  picture.reserve(device,
+                  static_cast<std::uint64_t>(view.width()) * static_cast<std::uint64_t>(view.height()),
+                  form == shared::renderPictureFloats ? sizeof(glm::vec4) : sizeof(glm::u8vec4));
+  shared::RenderParams params = gpu::renderGeometry(*original, view);
+  params.heads = heads.address();
+  params.segments = segments.address();
+  params.tileMasks = tileMasks.address();
+  params.binScale = binScale;
+  params.colors = picture.colors();
+  params.depths = picture.depths();
+  params.nearest = nearest;
+  params.farthest = farthest;
+  commands.begin();  // behind setVdi's uploads
+  commands.mark("render");
+  pass.record(commands, params, gpu::renderRays(*original, view), reconstruction, form);
+  picture.recordDownload(commands);
+  commands.submitAndWait();
+  milliseconds = commands.stageTimes().front().milliseconds;
+}
+
 Image VdiRenderer::render(const Camera& camera, int width, int height, Reconstruction reconstruction) {
-  State& s = *state_;
-  if (!s.original) throw Error(ErrorCode::InvalidArgument, "there is no VDI to render yet");
-  const View view(camera, width, height);
-  s.picture.reserve(s.device, static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height));
-  shared::RenderParams params = gpu::renderGeometry(*s.original, view);
-  params.heads = s.heads.address();
-  params.segments = s.segments.address();
-  params.tileMasks = s.tileMasks.address();
-  params.binScale = s.binScale;
-  params.colors = s.picture.colors();
-  params.depths = s.picture.depths();
-  params.nearest = s.nearest;
-  params.farthest = s.farthest;
-  s.commands.begin();  // behind setVdi's uploads
-  s.commands.mark("render");
-  s.pass.record(s.commands, params, gpu::renderRays(*s.original, view), reconstruction);
-  s.picture.recordDownload(s.commands);
-  s.commands.submitAndWait();
-  s.milliseconds = s.commands.stageTimes().front().milliseconds;
-  Image image = std::exchange(s.spare, {});
-  image.width = width;
-  image.height = height;
-  s.picture.copyTo(image, 0);
+  state_->render(View(camera, width, height), reconstruction, shared::renderPictureFloats);
+  Image image{width, height, {}, {}};
+  state_->picture.copyTo(image, 0);
   return image;
 }
 
-void VdiRenderer::recycle(Image&& image) {
-  state_->spare = std::move(image);
+ImageBytes VdiRenderer::renderBytes(const Camera& camera, int width, int height, Alpha alpha,
+                                    Reconstruction reconstruction) {
+  state_->render(View(camera, width, height), reconstruction,
+                 alpha == Alpha::Straight ? shared::renderPictureStraightBytes : shared::renderPictureBytes);
+  return state_->picture.bytes(width, height);
 }
 
 double VdiRenderer::renderMilliseconds() const {

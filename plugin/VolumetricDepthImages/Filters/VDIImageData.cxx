@@ -33,6 +33,24 @@ auto* addField(vtkFieldData* fields, const char* name, int components, vtkIdType
   return array->GetPointer(0);
 }
 
+/// Memory of what's shown of the image: four bytes a pixel.
+unsigned char* addColors(vtkImageData* image, std::size_t pixels) {
+  vtkNew<vtkUnsignedCharArray> colors;
+  colors->SetName("RGBA");
+  colors->SetNumberOfComponents(4);
+  colors->SetNumberOfTuples(static_cast<vtkIdType>(pixels));
+  image->GetPointData()->SetScalars(colors);
+  return colors->GetPointer(0);
+}
+
+void addDepth(vtkImageData* image, std::span<const float> depths) {
+  vtkNew<vtkFloatArray> array;
+  array->SetName("Depth");
+  array->SetNumberOfTuples(static_cast<vtkIdType>(depths.size()));
+  vdi::copyInParallel(std::as_bytes(depths), array->GetPointer(0));
+  image->GetPointData()->AddArray(array);
+}
+
 /// The field array of that name, type and number of components; throws if it's there in another shape.
 template <typename Array>
 Array* field(vtkFieldData* fields, const char* name, int components, vtkIdType tuples) {
@@ -61,15 +79,18 @@ vdi::ListsOf<Segment> listsFrom(vtkUnsignedIntArray* offsets, Array* segments) {
 
 }  // namespace
 
+void setPicture(vtkImageData* image, const vdi::ImageBytes& picture) {
+  image->SetDimensions(picture.width, picture.height, 1);
+  vdi::copyInParallel(std::as_bytes(picture.rgba), addColors(image, picture.rgba.size()));
+  addDepth(image, picture.depth);
+}
+
 void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth) {
   image->SetDimensions(picture.width, picture.height, 1);
-  vtkNew<vtkUnsignedCharArray> colors;
-  colors->SetName("RGBA");
-  colors->SetNumberOfComponents(4);
-  colors->SetNumberOfTuples(static_cast<vtkIdType>(picture.pixelCount()));
+  unsigned char* const bytes = addColors(image, picture.rgba.size());
   constexpr std::size_t least = 1U << 15;  // pixels
   vdi::inParallel(picture.rgba.size(), least, [&](std::size_t first, std::size_t last) {
-    unsigned char* out = colors->GetPointer(0) + 4 * first;
+    unsigned char* out = bytes + 4 * first;
     for (std::size_t i = first; i < last; ++i) {
       const glm::vec4& pixel = picture.rgba[i];
       const float unmultiply = pixel.a > 0.0F ? 1.0F / pixel.a : 0.0F;
@@ -77,13 +98,7 @@ void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth) 
       *out++ = vdi::toByte(pixel.a);
     }
   });
-  image->GetPointData()->SetScalars(colors);
-  if (!withDepth) return;
-  vtkNew<vtkFloatArray> depth;
-  depth->SetName("Depth");
-  depth->SetNumberOfTuples(static_cast<vtkIdType>(picture.depth.size()));
-  vdi::copyInParallel(std::as_bytes(std::span(picture.depth)), depth->GetPointer(0));
-  image->GetPointData()->AddArray(depth);
+  if (withDepth) addDepth(image, picture.depth);
 }
 
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {

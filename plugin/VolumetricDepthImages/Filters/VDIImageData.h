@@ -24,6 +24,8 @@ class vtkImageData;
 
 namespace pv {
 
+/// Makes `image` w x h x 1 with RGBA and Depth. `picture` is straight.
+void setPicture(vtkImageData* image, const vdi::ImageBytes& picture);
 /// Makes `image` w x h x 1 with RGBA, and Depth if `withDepth`.
 void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth);
 /// The flat picture of the VDI and the VDI itself.

@@ -117,9 +117,8 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
     camera = internal.Original;
   }
   const bool own = this->Resolution[0] <= 0 || this->Resolution[1] <= 0;
-  vdi::Image picture = internal.Renderer->render(camera, own ? internal.Width : this->Resolution[0],
-                                                 own ? internal.Height : this->Resolution[1],
-                                                 static_cast<vdi::Reconstruction>(this->Reconstruction));
-  pv::setPicture(output, picture, true);
-  internal.Renderer->recycle(std::move(picture));
+  pv::setPicture(output, internal.Renderer->renderBytes(
+                             camera, own ? internal.Width : this->Resolution[0],
+                             own ? internal.Height : this->Resolution[1], vdi::Alpha::Straight,
+                             static_cast<vdi::Reconstruction>(this->Reconstruction)));
 }
