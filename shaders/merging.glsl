@@ -7,7 +7,23 @@ vec4 appearanceOf(StoredGrain grain, float sampleStep) {
   return appearanceOf(light.rgb, light.a, grain.span.y - grain.span.x, sampleStep);
 }
 
+float amountOf(StoredGrain grain, vec4 appearance) {
+  return (grain.span.y - grain.span.x) * differenceOf(vec4(0.0), appearance);
+}
+
+// Where they are then, and of whom it's the place.
+const uint placeOfBoth = 0u;
+const uint placeOfFirst = 1u;
+const uint placeOfSecond = 2u;
+
 // x, y: appearances of a and b.
+uint placeOf(StoredGrain a, vec4 x, StoredGrain b, vec4 y) {
+  float lengths = (a.span.y - a.span.x) + (b.span.y - b.span.x);
+  if (b.span.x - a.span.y < lengths * 0.9999) return placeOfBoth;
+  if (amountOf(b, y) <= amountOf(a, x) * 1.0001) return placeOfFirst;
+  return a.before < 1.0 ? placeOfSecond : placeOfBoth;
+}
+
 float costOf(StoredGrain a, vec4 x, StoredGrain b, vec4 y) {
   if (isCut(b)) return unlimited;
   float first = a.span.y - a.span.x;
@@ -15,20 +31,23 @@ float costOf(StoredGrain a, vec4 x, StoredGrain b, vec4 y) {
   float whole = b.span.y - a.span.x;
   float gap = b.span.x - a.span.y;
   float weight = weightBehind(a.before) / whole;
-  // What's below, where there's no gap.
+  // What's last, where there's no gap.
   if (!(gap > 0.0)) return 2.0 * weight * first * second * differenceOf(x, y);
+  if (placeOf(a, x, b, y) != placeOfBoth) return 2.0 * weight * whole * min(amountOf(a, x), amountOf(b, y));
   vec4 both = first * x + second * y;
   return weight * (first * differenceOf(whole * x, both) + second * differenceOf(whole * y, both) +
                    gap * differenceOf(vec4(0.0), both));
 }
 
-StoredGrain merged(StoredGrain a, StoredGrain b) {
+StoredGrain merged(StoredGrain a, vec4 x, StoredGrain b, vec4 y) {
+  uint place = placeOf(a, x, b, y);
   vec4 light = lightOf(b);
   float opticalDepth = lightOf(a).a;
   a.light.rgb += (1.0 - opacityOf(opticalDepth)) * light.rgb;
   opticalDepth = min(opticalDepth + light.a, maxOpticalDepth);
   a.light.a = isCut(a) ? -opticalDepth : opticalDepth;
-  a.span.y = b.span.y;
+  if (place == placeOfSecond) a.span.x = b.span.x;
+  if (place != placeOfFirst) a.span.y = b.span.y;
   return a;
 }
 

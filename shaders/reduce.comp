@@ -84,7 +84,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
     }
     bool merges = excess > 0u && isCheapest(i, previous, cost, next, limit);
     if (merges) {
-      a.stored = merged(a.stored, b.stored);
+      a.stored = merged(a.stored, a.appearance, b.stored, b.appearance);
       --excess;
     }
     push.grains.at[base + left++] = a.stored;

@@ -81,6 +81,7 @@ uint mergeOnce(uint count, uint excess, float limit, out float others) {
     StoredGrain grain;
     vec4 appearance;
     StoredGrain next;
+    vec4 nextAppearance;
     if (present) {
       cost = costs[i];
       grain = load(i);
@@ -88,6 +89,7 @@ uint mergeOnce(uint count, uint excess, float limit, out float others) {
       if (cost <= limit && excess > 0u) {  // there's a next one, or its cost were unlimited
         chosen = isCheapest(i, i > 0u ? costs[i - 1u] : unlimited, cost, costs[i + 1u], limit);
         next = load(i + 1u);
+        nextAppearance = appearances[i + 1u];
       }
     }
     subgroupBarrier();  // all have read what's written below
@@ -95,7 +97,7 @@ uint mergeOnce(uint count, uint excess, float limit, out float others) {
     uint mask = subgroupBallot(chosen).x;
     uint before = bitCount(mask & ((1u << own) - 1u));
     if (chosen && before < excess) {
-      grain = merged(grain, next);
+      grain = merged(grain, appearance, next, nextAppearance);
       appearance = appearanceOf(grain, push.step);
     } else if (cost < unlimited) {
       others += cost;

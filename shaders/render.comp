@@ -29,8 +29,9 @@ layout(constant_id = 4) const uint pixelOrder = renderOrderSquares;
 // What it's left in (shared/render.h).
 layout(constant_id = 5) const uint pictureForm = renderPictureFloats;
 
-// What is behind changes a pixel by less than a quarter of 1/255.
+// What is behind changes a pixel by a quarter of 1/255 at most, and by a half where a ray goes through many lists.
 const float opaque = 1.0 - 1.0 / 1024.0;
+const float opaqueAcross = 1.0 - 1.0 / 512.0;
 
 #include "view.glsl"
 #include "picture.glsl"

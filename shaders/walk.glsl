@@ -169,7 +169,7 @@ void walk(PictureLine line) {
       columns &= ~(1u << i);
       float shortening = mix(shortenings.x, shortenings.y, (float(i) + 0.5) / float(renderTile));
       accumulate(lookAtColumn(line, (tile << renderTileShift) + i, shortening, looks >> i, hints));
-      if (accumulated.light.a >= opaque) return;
+      if (accumulated.light.a >= opaqueAcross) return;
     }
     if (tile == lastTile) return;
   }

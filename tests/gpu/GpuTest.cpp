@@ -239,7 +239,8 @@ TEST_CASE("teams merge grains as single invocations do") {
                  : 1;
   }
   CHECK(wrong == 0);
-  // Each list's outermost depths, and what shines through all of it, stay what they were.
+  // Each list's first depth, and what shines through all of it, stay what they were; nothing gets behind its
+  // last one.
   std::uint32_t off = 0;
   for (std::size_t list = 0; list < lists.written.size(); ++list) {
     if (lists.written[list] == 0) continue;
@@ -251,7 +252,7 @@ TEST_CASE("teams merge grains as single invocations do") {
       depthLeft -= std::log2(1.0F - teams[i].opacity);
     const bool sound =
         teams[lists.leftOffsets[list]].front == lists.grains[lists.offsets[list]].span.x &&
-        teams[lists.leftOffsets[list + 1] - 1].back == lists.grains[lists.offsets[list + 1] - 1].span.y &&
+        teams[lists.leftOffsets[list + 1] - 1].back <= lists.grains[lists.offsets[list + 1] - 1].span.y &&
         std::abs(depth - depthLeft) < 0.02F * depth + 1e-3F;
     off += sound || depth > 15.0F ? 0 : 1;
   }

@@ -132,6 +132,37 @@ TEST_CASE("merging keeps what stands out and gives up what's alike") {
   CHECK(list[1].back == 31.0F);
 }
 
+TEST_CASE(
+    "far apart, merging leaves emptiness empty, light where most of it was, and the list's first depth") {
+  // Faint ones in front of a bright one and behind it.
+  const std::vector<Interval> samples{sample(0, 0.5F, 0.001F), sample(40, 0.5F, 0.5F),
+                                      sample(100, 0.5F, 0.002F)};
+  const auto list = segmentByMerging(samples, {2, 1.0F, false});
+  REQUIRE(list.size() == 2);
+  CHECK(list[0].front == 0.0F);
+  CHECK(list[0].back == 1.0F);
+  CHECK(list[1].front == 40.0F);
+  CHECK(list[1].back == 41.0F);
+  const auto two = segmentByMerging({samples.data() + 1, 2}, {1, 1.0F, false});
+  REQUIRE(two.size() == 1);
+  CHECK(two[0].front == 40.0F);
+  CHECK(two[0].back == 41.0F);
+  CHECK(transmittance(two) == Approx(0.5F * 0.998F));
+  // In front of it there's something, so that the fainter one may go to the one behind.
+  const std::vector<Interval> faintFirst{sample(0, 0.5F, 0.4F), sample(50, 0.5F, 0.001F),
+                                         sample(90, 0.5F, 0.4F)};
+  const auto behind = segmentByMerging(faintFirst, {2, 1.0F, false});
+  REQUIRE(behind.size() == 2);
+  CHECK(behind[0].back - behind[0].front == 1.0F);
+  CHECK(behind[1].back - behind[1].front == 1.0F);
+  CHECK(transmittance(behind) == Approx(0.6F * 0.999F * 0.6F));
+  // Near each other they're one.
+  const std::vector<Interval> near{sample(0, 0.5F, 0.4F), sample(2, 0.5F, 0.01F)};
+  const auto joined = segmentByMerging(near, {1, 1.0F, false});
+  REQUIRE(joined.size() == 1);
+  CHECK(joined[0].back == 3.0F);
+}
+
 TEST_CASE("merging never joins what gaps keep apart") {
   std::vector<Interval> samples;
   for (int k = 0; k < 40; ++k)

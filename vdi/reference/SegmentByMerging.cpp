@@ -114,20 +114,47 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
   return grains;
 }
 
+/// Where two neighbours are that were merged. Far apart, the fainter one's light goes to the place of the
+/// other: spread over the gap too, at least as much would be where it wasn't, in emptiness that rays couldn't
+/// pass any more. But a list stays where it begins, for that's its depth in a picture.
+enum class Place { OfBoth, OfFirst, OfSecond };
+
+/// How much there is of a grain.
+float amountOf(const Grain& grain) {
+  return (grain.back - grain.front) * distance({}, grain.appearance);
+}
+
+/// What's as long, or as much, counts as longer, or more, whichever way it was rounded.
+Place placeOf(const Grain& a, const Grain& b) {
+  const float lengths = (a.back - a.front) + (b.back - b.front);
+  if (b.front - a.back < lengths * 0.9999F) return Place::OfBoth;
+  if (amountOf(b) <= amountOf(a) * 1.0001F) return Place::OfFirst;
+  return a.before < 1.0F ? Place::OfSecond : Place::OfBoth;
+}
+
+/// Appearances are those that costs were computed from; the result has none yet.
 Grain merged(const Grain& a, const Grain& b) {
   Grain result = a;
   result.absorb(b.back, b.red, b.green, b.blue, b.opticalDepth);
+  const Place place = placeOf(a, b);
+  if (place == Place::OfFirst) result.back = a.back;
+  if (place == Place::OfSecond) result.front = b.front;
   return result;
 }
 
 /// What merging two neighbours changes: the sum over both, and over the gap between them, of the distance to
-/// their mean times the length.
+/// what's there then times the length.
 float costOf(const Grain& a, const Grain& b) {
   if (b.cut) return unlimited;
   const float first = a.back - a.front;
   const float second = b.back - b.front;
   const float whole = b.back - a.front;
   const float gap = std::max(b.front - a.back, 0.0F);
+  const Place place = placeOf(a, b);
+  if (place != Place::OfBoth) {
+    // Missing where it was, too much where it's now.
+    return weightBehind(a.before) * 2.0F * amountOf(place == Place::OfFirst ? b : a);
+  }
   const auto mean = [&](float x, float y) { return (first * x + second * y) / whole; };
   const Appearance& x = a.appearance;
   const Appearance& y = b.appearance;
