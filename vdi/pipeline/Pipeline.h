@@ -112,7 +112,8 @@ class VdiRenderer {
   /// next render waits for them there (VDIs of up to 128 MiB; larger ones wait for all but their last part).
   void setVdi(const Vdi& vdi);
   /// Rays end at an opacity of 1 - 1/512, along V_O's of 1 - 1/1024: what's behind changes a colour of 8 bits
-  /// by half a step at most. Throws Error{InvalidArgument} before the first setVdi, and for what View rejects.
+  /// by half a step at most. Throws Error{InvalidArgument} before the first setVdi, and for what View
+  /// rejects.
   Image render(const Camera& camera, int width, int height,
                Reconstruction reconstruction = Reconstruction::Smooth);
   /// The same for a screen: 8 instead of 20 bytes a pixel come from the device, which takes longer than
