@@ -15,6 +15,10 @@ namespace pv {
 /// alone when there's none.
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller);
 
+/// To be called on all ranks before a collective operation: throws vdi::Error{RemoteRank} where another rank
+/// won't enter (VDICollective.h).
+void enterCollective(vtkMultiProcessController* controller, const char* operation);
+
 /// The process's device, made at the first call and kept while anybody holds it. Throws
 /// vdi::Error{DeviceUnavailable}.
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank);
