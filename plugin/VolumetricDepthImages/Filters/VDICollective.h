@@ -14,7 +14,7 @@ namespace pv {
 struct CollectiveEntry {
   static constexpr unsigned long event = 1000 + 5642;  // vtkCommand::UserEvent and any number
 
-  const char* operation;  // the same on all ranks, or none may enter
+  std::string operation;  // the same on all ranks, or none may enter
   std::string refusal;    // why not to enter, from the observer; "": enter
 };
 

@@ -18,7 +18,7 @@ vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller) {
   return vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(*communicator->GetMPIComm()->GetHandle()));
 }
 
-void enterCollective(vtkMultiProcessController* controller, const char* operation) {
+void enterCollective(vtkMultiProcessController* controller, const std::string& operation) {
   if (controller == nullptr) return;
   CollectiveEntry entry{operation, {}};
   controller->InvokeEvent(CollectiveEntry::event, &entry);

@@ -77,20 +77,21 @@ bool WaitsForRange(vtkSMProxy* function, const char* property) {
 }
 
 /// Where each rank has a client of its own (pvbatch --symmetric, Catalyst), each knows the range of its own
-/// data only.
-void WidenOverRanks(double range[2]) {
+/// data only. False where another rank doesn't come along, which the update that follows says.
+bool WidenOverRanks(double range[2]) {
   vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
-  if (!vtkProcessModule::GetProcessModule()->GetSymmetricMPIMode() || controller == nullptr) return;
+  if (!vtkProcessModule::GetProcessModule()->GetSymmetricMPIMode() || controller == nullptr) return true;
   try {
     pv::enterCollective(controller, "range of VolumetricDepthImage's colour map");
   } catch (const vdi::Error&) {
-    return;  // the update that follows says so
+    return false;
   }
   const double mine[2] = {-range[0], range[1]};
   double all[2];
   controller->AllReduce(mine, all, 2, vtkCommunicator::MAX_OP);
   range[0] = -all[0];
   range[1] = all[1];
+  return true;
 }
 
 }  // namespace
@@ -157,6 +158,5 @@ bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, d
       array->GetComponentFiniteRange(component, range);
     }
   }
-  WidenOverRanks(range);
-  return range[0] <= range[1];
+  return WidenOverRanks(range) && range[0] <= range[1];
 }

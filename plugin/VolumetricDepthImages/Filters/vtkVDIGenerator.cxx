@@ -44,6 +44,7 @@ struct vtkVDIGenerator::Internals {
   };
 
   std::unique_ptr<vdi::VdiGenerator> Generator;  // none until the first update
+  std::uint64_t Identity = 0;                    // of the generator: the same on all ranks, and no other's
   std::optional<Origin> Shown;                   // by the generator
   /// The last frame failed. Data counts as newer than any output then: left to the executive, rank 0, whose
   /// empty output isn't what was asked for, would try again alone.
@@ -285,13 +286,31 @@ vdi::Camera vtkVDIGenerator::Viewpoint(const vdi::Box& bounds) const {
   return camera;
 }
 
+/// Where ranks come with generators that don't belong together, these are given up: new ones will.
+void vtkVDIGenerator::Enter() {
+  Internals& internal = *this->Internal;
+  const std::string name = internal.Generator ? fmt::format("{:x}", internal.Identity) : "a new one";
+  try {
+    pv::enterCollective(this->Controller, "VolumetricDepthImage, " + name);
+  } catch (const vdi::Error&) {
+    internal.Generator.reset();
+    internal.Shown.reset();
+    throw;
+  }
+}
+
 void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* output) {
-  pv::enterCollective(this->Controller, "VolumetricDepthImage");
+  this->Enter();
   if (!this->Internal->Generator) {
     vdi::comm::Communicator comm = pv::communicatorOf(this->Controller);
     std::shared_ptr<vdi::gpu::Device> device;
     comm.together([&] { device = pv::sharedDevice(comm.localRank()); });
     this->Internal->Generator = std::make_unique<vdi::VdiGenerator>(std::move(device), std::move(comm));
+    const auto& own = this->Internal->Generator;
+    std::array<std::uint64_t, 1> rootsAddress{
+        own->communicator().rank() == 0 ? reinterpret_cast<std::uintptr_t>(own.get()) : 0U};
+    own->communicator().allReduceMax(rootsAddress);
+    this->Internal->Identity = rootsAddress[0];
   }
   vdi::VdiGenerator& generator = *this->Internal->Generator;
   this->ShowBlocks(input, time);

@@ -118,6 +118,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   struct Internals;
   void Generate(vtkDataObject* input, double time, vtkImageData* output);
+  void Enter();
   void ShowBlocks(vtkDataObject* input, double time);
   vdi::ScalarRange StandInRange();
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
