@@ -156,6 +156,13 @@ class Guard {
     return "the script '" + script + "' can't be checked";
   }
 
+  /// After all scripts of a step.
+  void endStep() {
+    const vtkPythonScopeGilEnsurer lock;
+    const vtkSmartPyObject result(PyObject_CallMethod(module_, "end_step", nullptr));
+    if (!result) PyErr_Clear();
+  }
+
  private:
   vtkSmartPyObject module_;
 };
@@ -291,6 +298,7 @@ std::optional<std::string> Engine::execute(vtkDataObject* grid, int step, double
     Helper::MarkProducerModified(channel);
     good = Helper::ExecutePipelines(step, time);
     for (const auto& pipeline : state_->pipelines) good = good && !pipeline->failed();
+    state_->guard->endStep();
   } catch (...) {
     failure = std::current_exception();
   }

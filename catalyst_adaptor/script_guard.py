@@ -4,14 +4,24 @@
 - left alone, the engine prints an exception to where nobody can collect it, and SystemExit ends the process;
 - a script that fails on one rank must stop on all, or the others wait for it;
 - an exception belongs into VTK's log, where all other errors are found;
-- a view without a display ends the process (vtkXOpenGLRenderWindow aborts);
+- a view that is drawn without a display ends the process (vtkXOpenGLRenderWindow aborts);
 - ParaView says once that the folder for extracts can't be made, and leaves out all extracts from then on;
 - what a script that can't be loaded has made by then stays, each time it's tried."""
 
 import ast
+import importlib
 import os
 import sys
 import traceback
+
+
+disabled = []  # extractors, for this step
+
+
+def end_step():
+    """To be called when the engine has run all scripts."""
+    set_enabled(disabled, True)
+    disabled.clear()
 
 
 class ScriptFailed(Exception):
@@ -78,11 +88,10 @@ def install(leave):
     from paraview.catalyst import v2_internals
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    skip = (__name__, "<string>", v2_internals.__file__, "<frozen importlib")
+    skip = (__name__, "<string>", v2_internals.__file__, "<frozen importlib", importlib.__file__)
     other_hook = sys.excepthook
     folders = {}  # of extracts, by module
     loading = {}
-
     def hook(kind, error, trace):
         if kind is not ScriptFailed:
             other_hook(kind, error, trace)
@@ -110,7 +119,7 @@ def install(leave):
 
     def start_loading(path):
         loading.clear()
-        refuse_views_without_display()
+        refuse_drawing_without_display()
         loading["proxies"] = registered_proxies()
 
     def forget_module(name):
@@ -123,15 +132,28 @@ def install(leave):
         folders[module.__name__] = os.environ.get("PARAVIEW_OVERRIDE_EXTRACTS_OUTPUT_DIRECTORY",
                                                   module.options.ExtractsOutputDirectory)
 
-    def demand_folder(result, module):
-        if extract_is_due():
+    def prepare_extracts(result, module):
+        due = due_extractors()
+        if due:
             make_folder(folders.get(module.__name__, ""))
+        drawn = [extractor for extractor in due if draws(extractor)]
+        if leave(not all([has_display(extractor) for extractor in drawn])):
+            set_enabled(drawn, False)
+            disabled.extend(drawn)
+
+    def has_display(extractor):
+        try:
+            demand_display("the extractor of '%s'" % extractor.Writer.FileName)
+        except RuntimeError as error:
+            vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, str(error))
+            return False
+        return True
 
     v2_internals.register_module = guarded(v2_internals.register_module, before=start_loading)
     v2_internals.import_and_validate = guarded(v2_internals.import_and_validate, failed=forget_module)
     v2_internals.do_catalyst_initialize = guarded(v2_internals.do_catalyst_initialize, after=note_folder,
                                                   failed=lambda module: forget_module(module.__name__))
-    v2_internals.do_catalyst_execute = guarded(v2_internals.do_catalyst_execute, after=demand_folder)
+    v2_internals.do_catalyst_execute = guarded(v2_internals.do_catalyst_execute, after=prepare_extracts)
     v2_internals.do_catalyst_finalize = guarded(v2_internals.do_catalyst_finalize)
 
 
@@ -162,19 +184,31 @@ def forget_new_proxies(before):
         manager.UnRegisterProxy(group, name, proxy)
 
 
-def extract_is_due():
-    """Whether the engine will call an extractor in this step."""
+def due_extractors():
+    """Those that the engine will call in this step."""
     from paraview import servermanager
     from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
     controller = servermanager.vtkSMExtractsController()
     controller.SetTimeStep(helper.GetTimeStep())
     controller.SetTime(helper.GetTime())
-    for extractor in servermanager.ProxyManager().GetProxiesInGroup("extractors").values():
+
+    def due(extractor):
         trigger = extractor.Trigger
         # Other triggers count how often they are asked.
-        if trigger is None or trigger.GetXMLName() != "TimeStep" or controller.IsTriggerActivated(extractor.SMProxy):
-            return True
-    return False
+        return trigger is None or trigger.GetXMLName() != "TimeStep" or controller.IsTriggerActivated(extractor.SMProxy)
+
+    extractors = servermanager.ProxyManager().GetProxiesInGroup("extractors").values()
+    return [extractor for extractor in extractors if controller.IsExtractorEnabled(extractor.SMProxy) and due(extractor)]
+
+
+def draws(extractor):
+    return extractor.Producer is not None and extractor.Producer.GetXMLGroup() == "views"
+
+
+def set_enabled(extractors, enabled):
+    from paraview import servermanager
+    for extractor in extractors:
+        servermanager.vtkSMExtractsController.SetExtractorEnabled(extractor.SMProxy, enabled)
 
 
 def make_folder(folder):
@@ -192,33 +226,23 @@ def make_folder(folder):
 def demand_display(what):
     from paraview.modules.vtkRemotingViews import vtkPVRenderingCapabilitiesInformation as capabilities
     if not capabilities.GetLocalCapabilities() & capabilities.RENDERING:
-        raise RuntimeError("%s needs a display to draw, and there is none (DISPLAY is %r): run the simulation under "
+        raise RuntimeError("%s needs a display to draw, and there is none (DISPLAY is %s): run the simulation under "
                            "xvfb-run -a, or set DISPLAY; a VDI and its extractor need none"
                            % (what, os.environ.get("DISPLAY", "not set")))
 
 
-def refuse_views_without_display():
-    from paraview import servermanager, simple
-    if hasattr(servermanager, "_vdi_guarded"):
+def refuse_drawing_without_display():
+    """Views may be made and filled, as exported scripts do, but not drawn."""
+    from paraview import servermanager
+    if hasattr(servermanager.Proxy, "_vdi_guarded"):
         return
-    servermanager._vdi_guarded = True
-    new_proxy, show, load_state = servermanager.ProxyManager.NewProxy, simple.Show, simple.LoadState
+    servermanager.Proxy._vdi_guarded = True
+    attribute_of = servermanager.Proxy.__getattr__
+    drawing = {"StillRender", "InteractiveRender", "WriteImage", "WriteAnimation", "CaptureWindow", "SaveExtracts"}
 
-    def NewProxy(self, group, name):
-        if group == "views" and name != "SpreadSheetView":
-            demand_display("the view " + name)
-        return new_proxy(self, group, name)
+    def __getattr__(self, name):
+        if name in drawing or (name == "Write" and self.SMProxy.GetXMLGroup() == "exporters"):
+            demand_display("%s of %s" % (name, self.SMProxy.GetXMLLabel()))
+        return attribute_of(self, name)
 
-    def Show(proxy=None, view=None, *arguments, **properties):
-        if not view and not simple.active_objects.view:
-            demand_display("Show, which makes a view,")
-        return show(proxy, view, *arguments, **properties)
-
-    def LoadState(filename, *arguments, **properties):
-        with open(filename, errors="replace") as file:
-            if 'group="views"' in file.read():
-                demand_display("the state '%s', which has views," % filename)
-        return load_state(filename, *arguments, **properties)
-
-    servermanager.ProxyManager.NewProxy = NewProxy
-    simple.Show, simple.LoadState = Show, LoadState
+    servermanager.Proxy.__getattr__ = __getattr__

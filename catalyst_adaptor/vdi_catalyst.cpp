@@ -53,13 +53,24 @@ bool usable(const vdi_catalyst* catalyst) {
   return catalyst != nullptr && catalyst == alive();
 }
 
+/// The first line, and the second where the first says only who speaks.
+std::string firstLine(const std::string& text) {
+  std::size_t end = text.find('\n');
+  std::string line = text.substr(0, end);
+  while (!line.empty() && line.back() == ' ') line.pop_back();
+  if (end == std::string::npos || line.empty() || line.back() != ':') return line;
+  const std::size_t next = end + 1;
+  end = text.find('\n', next);
+  return line + " " + text.substr(next, end == std::string::npos ? end : end - next);
+}
+
 /// By rank 0, on one line for what was printed before: a step whose files are missing is always told.
 void print(vdi_catalyst& self, std::optional<std::int64_t> step) {
   const bool again = self.error == self.printed;
   if (again && !step) return;
   self.printed = self.error;
   const std::string place = step ? "step " + std::to_string(*step) + ": " : "";
-  const std::string text = again ? "again, " + self.error.substr(0, self.error.find('\n')) : self.error;
+  const std::string text = again ? "again, " + firstLine(self.error) : self.error;
   std::fprintf(stderr, "vdi_catalyst: %s%s\n", place.c_str(), text.c_str());
 }
 

@@ -25,8 +25,8 @@
  *
  * What still ends the process, since ParaView, Python or a library does it without asking: a script's os._exit,
  * os.abort or a crash in a module of its; memory that ParaView itself asks for in vain (Debian's VTK aborts);
- * an X server that goes away while a view uses it (Xlib exits), and a view that a script makes past
- * paraview.simple, through vtkSMSessionProxyManager, without a display; a crash of a driver.
+ * an X server that goes away while a view is drawn (Xlib exits), and a view that is drawn without a display
+ * past paraview.simple, by methods of its render window or SMProxy; a crash of a driver.
  */
 #ifndef VDI_CATALYST_H
 #define VDI_CATALYST_H

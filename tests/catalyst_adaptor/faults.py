@@ -19,6 +19,13 @@ image.SelectInputScalars = ["CELLS" if FAULT == "cells" else "POINTS", "V"]
 image.Resolution = [64, 48]
 extractor = CreateExtractor("VDI", image, registrationName="vdi")
 extractor.Writer.FileName = "vdi_{timestep:06d}.vdi"
+if FAULT in ("view", "screenshot", "picture"):
+    view = CreateView("RenderView")  # no fault: scripts that ParaView exports always do
+    Show(grid, view)
+if FAULT == "picture":
+    pictures = CreateExtractor("PNG", view, registrationName="png")
+    pictures.Trigger.UseEndTimeStep = 1
+    pictures.Trigger.EndTimeStep = 2
 options = catalyst.Options()
 options.ExtractsOutputDirectory = OUTPUT
 
@@ -40,7 +47,7 @@ def map_range():
     return [points[0], points[-4]]
 
 
-def catalyst_execute(info):
+def execute(info):
     if FAULT == "defaults" and info.timestep > 1:
         # What the step before has left: the extractor alone updates the filter.
         if map_range() != [0, 240]:
@@ -69,6 +76,11 @@ def catalyst_execute(info):
         other = RenderVDI(Input=image) if rank == 0 else VolumetricDepthImage(Input=grid)
         other.UpdatePipeline(info.time)
     if FAULT == "view":
-        CreateView("RenderView")
-    if FAULT == "show":
-        Show(grid)
+        Render(view)
+    if FAULT == "screenshot":
+        SaveScreenshot(os.path.join(OUTPUT, "screenshot.png"), view)
+
+
+# An exported script has none, and is called only where an extractor is due.
+if FAULT != "picture":
+    catalyst_execute = execute

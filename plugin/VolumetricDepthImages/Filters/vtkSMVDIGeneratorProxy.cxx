@@ -99,26 +99,26 @@ bool WidenOverRanks(double range[2]) {
 vtkStandardNewMacro(vtkSMVDIGeneratorProxy);
 
 void vtkSMVDIGeneratorProxy::UpdatePipeline() {
-  this->ChooseLookupTable();
+  this->ChooseLookupTable(std::nullopt);
   this->Superclass::UpdatePipeline();
 }
 
 void vtkSMVDIGeneratorProxy::UpdatePipeline(double time) {
-  this->ChooseLookupTable();
+  this->ChooseLookupTable(time);
   this->Superclass::UpdatePipeline(time);
 }
 
-void vtkSMVDIGeneratorProxy::PrepareUpstream(vtkSMProxy* proxy) {
+void vtkSMVDIGeneratorProxy::PrepareUpstream(vtkSMProxy* proxy, std::optional<double> time) {
   if (proxy == nullptr) return;
   for (unsigned int i = 0; i < proxy->GetNumberOfProducers(); ++i) {
     vtkSMProxy* producer = proxy->GetProducerProxy(i);
     if (vtkSMSourceProxy::SafeDownCast(producer) == nullptr) continue;  // not maps and the like
-    PrepareUpstream(producer);
-    if (auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(producer)) generator->ChooseLookupTable();
+    PrepareUpstream(producer, time);
+    if (auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(producer)) generator->ChooseLookupTable(time);
   }
 }
 
-void vtkSMVDIGeneratorProxy::ChooseLookupTable() {
+void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time) {
   vtkSMPropertyHelper table(this, "LookupTable");
   vtkSMPropertyHelper scalars(this, "SelectInputScalars");
   const char* name = scalars.GetNumberOfElements() > 4 ? scalars.GetAsString(4) : nullptr;
@@ -134,7 +134,8 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable() {
   const bool opacityWaits = opacity != nullptr && WaitsForRange(opacity, "Points");
   if (mapWaits || opacityWaits) {
     double range[2];
-    if (!this->RangeOfScalars(name, scalars.GetAsInt(3), range)) return;  // not now: there are no data yet
+    if (!this->RangeOfScalars(name, scalars.GetAsInt(3), time, range))
+      return;  // not now: there are no data yet
     if (mapWaits) vtkSMTransferFunctionProxy::RescaleTransferFunction(map, range[0], range[1]);
     if (opacityWaits) vtkSMTransferFunctionProxy::RescaleTransferFunction(opacity, range[0], range[1]);
   }
@@ -143,12 +144,17 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable() {
   this->Chosen = name;
 }
 
-bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, double range[2]) {
+bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, std::optional<double> time,
+                                            double range[2]) {
   range[0] = std::numeric_limits<double>::infinity();
   range[1] = -std::numeric_limits<double>::infinity();
   vtkSMPropertyHelper input(this, "Input");
   if (auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy())) {
-    source->UpdatePipeline();
+    if (time) {
+      source->UpdatePipeline(*time);
+    } else {
+      source->UpdatePipeline();
+    }
     vtkPVDataInformation* data = source->GetDataInformation(input.GetOutputPort());
     if (vtkPVArrayInformation* array = data->GetArrayInformation(name, association)) {
       // The filter's component; one that isn't there is an error of the filter's.

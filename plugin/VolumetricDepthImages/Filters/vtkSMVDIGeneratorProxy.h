@@ -12,6 +12,7 @@
 
 #include <vtkSMSourceProxy.h>
 
+#include <optional>
 #include <string>
 
 #include "vtkVolumetricDepthImagesModule.h"
@@ -26,7 +27,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
 
   /// For proxies behind it that are updated without it: writers, extractors, RenderVDI. Lets all generators
   /// upstream of `proxy` choose their maps. Collective where each rank has a client.
-  static void PrepareUpstream(vtkSMProxy* proxy);
+  static void PrepareUpstream(vtkSMProxy* proxy, std::optional<double> time);
 
  protected:
   vtkSMVDIGeneratorProxy() = default;
@@ -36,9 +37,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkSMVDIGeneratorProxy(const vtkSMVDIGeneratorProxy&) = delete;
   void operator=(const vtkSMVDIGeneratorProxy&) = delete;
 
-  void ChooseLookupTable();
+  /// `time`: that of the update which is to come, if it has one.
+  void ChooseLookupTable(std::optional<double> time);
   /// Of the input's array, over all ranks; false if there's none.
-  bool RangeOfScalars(const char* name, int association, double range[2]);
+  bool RangeOfScalars(const char* name, int association, std::optional<double> time, double range[2]);
 
   std::string Chosen;  // the array whose map this proxy has set
 };

@@ -2,16 +2,18 @@
 
 #include <vtkObjectFactory.h>
 
+#include <optional>
+
 #include "vtkSMVDIGeneratorProxy.h"
 
 vtkStandardNewMacro(vtkSMVDIRendererProxy);
 
 void vtkSMVDIRendererProxy::UpdatePipeline() {
-  vtkSMVDIGeneratorProxy::PrepareUpstream(this);
+  vtkSMVDIGeneratorProxy::PrepareUpstream(this, std::nullopt);
   this->Superclass::UpdatePipeline();
 }
 
 void vtkSMVDIRendererProxy::UpdatePipeline(double time) {
-  vtkSMVDIGeneratorProxy::PrepareUpstream(this);
+  vtkSMVDIGeneratorProxy::PrepareUpstream(this, time);
   this->Superclass::UpdatePipeline(time);
 }
