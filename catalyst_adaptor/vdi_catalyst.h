@@ -11,10 +11,10 @@
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
  * All functions are collective over the communicator. None ends the process: they return VDI_CATALYST_OK or a
- * code below, the same one on all ranks, and rank 0 prints a message to standard error. What repeats is printed
- * in full once; a step that fails is told each time, then in one line, for its files are missing. After an
- * error the next step works again, and blocks and arrays are those of before. Nothing is copied on the host:
- * pointers must stay valid, and their data unchanged, until vdi_catalyst_execute returns.
+ * code below, the same one on all ranks, and rank 0 prints a message to standard error. What repeats is
+ * printed in full once; a step that fails is told each time, then in one line, for its files are missing.
+ * After an error the next step works again, and blocks and arrays are those of before. Nothing is copied on
+ * the host: pointers must stay valid, and their data unchanged, until vdi_catalyst_execute returns.
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData a block, under the name "grid":
@@ -23,10 +23,10 @@
  * enter, or comes with another one, the update fails on all and so does the step. Only in ParaView's own
  * collective filters and views the others wait, as in any MPI program.
  *
- * What still ends the process, since ParaView, Python or a library does it without asking: a script's os._exit,
- * os.abort or a crash in a module of its; memory that ParaView itself asks for in vain (Debian's VTK aborts);
- * an X server that goes away while a view is drawn (Xlib exits), and a view that is drawn without a display
- * past paraview.simple, by methods of its render window or SMProxy; a crash of a driver.
+ * What still ends the process, since ParaView, Python or a library does it without asking: a script's
+ * os._exit, os.abort or a crash in a module of its; memory that ParaView itself asks for in vain (Debian's
+ * VTK aborts); an X server that goes away while a view is drawn (Xlib exits), and a view that is drawn
+ * without a display past paraview.simple, by methods of its render window or SMProxy; a crash of a driver.
  */
 #ifndef VDI_CATALYST_H
 #define VDI_CATALYST_H
@@ -46,8 +46,8 @@ extern "C" {
 /* Results. */
 enum {
   VDI_CATALYST_OK = 0,
-  VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or beyond counting, an
-                                    unknown type, arrays before blocks, a step that's no int */
+  VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or beyond counting,
+                                    an unknown type, arrays before blocks, a step that's no int */
   VDI_CATALYST_ENGINE = 2, /* ParaView's engine can't be started, or was started before in this process */
   VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
 };
@@ -83,9 +83,9 @@ typedef struct vdi_catalyst vdi_catalyst;
 
 /* Starts the engine on a duplicate of the communicator (its Fortran handle) and adds the scripts, the same on
  * all ranks; they are loaded at the first step. A script that is missing or isn't Python, and a plugin that's
- * missing where it loads one (LoadPlugin at its top level), are VDI_CATALYST_SCRIPT here. Once a process, also
- * where it failed. On failure *catalyst is null, and the other functions, given null, do nothing but return
- * VDI_CATALYST_BAD_ARGUMENT. */
+ * missing where it loads one (LoadPlugin at its top level), are VDI_CATALYST_SCRIPT here. Once a process,
+ * also where it failed. On failure *catalyst is null, and the other functions, given null, do nothing but
+ * return VDI_CATALYST_BAD_ARGUMENT. */
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 
