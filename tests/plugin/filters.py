@@ -151,7 +151,7 @@ check(picture(fractal).max() > 60, "an AMR data set of " + amr.GetClientSideObje
 
 # Bad input: an error, not a crash, and the next thing works.
 check(errors_of(lambda: vdi_of(simple.Tetrahedralize(Input=wavelet)).UpdatePipeline()), "an unstructured grid is refused")
-check(errors_of(lambda: vdi_of(wavelet, CameraPosition=[0, 0, 0]).UpdatePipeline()), "a camera on its focal point is refused")
+check(errors_of(lambda: vdi_of(wavelet, CameraViewAngle=0).UpdatePipeline()), "a camera without an angle of view is refused")
 check(errors_of(lambda: vdi_of(wavelet, ("POINTS", "nothing")).UpdatePipeline()), "an array that isn't there is refused")
 check(errors_of(lambda: simple.RenderVDI(Input=wavelet).UpdatePipeline()), "RenderVDI refuses an image that is no VDI")
 broken = os.path.join(OUTPUT, "broken.vdi")
