@@ -113,8 +113,6 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
     const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
     camera = {vector(this->CameraPosition), vector(this->CameraFocalPoint), vector(this->CameraViewUp),
               this->CameraViewAngle,        this->CameraParallelProjection, this->CameraParallelScale};
-  } else if (this->Azimuth == 0.0) {
-    camera = internal.Original;
   }
   const bool own = this->Resolution[0] <= 0 || this->Resolution[1] <= 0;
   pv::setPicture(output, internal.Renderer->renderBytes(

@@ -24,7 +24,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   ///@{
   /**
    * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off) the VDI's own is used,
-   * turned by Azimuth degrees about its focal point.
+   * turned by Azimuth degrees as vtkCamera::Azimuth does: about its focal point, around its view-up as set.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);
