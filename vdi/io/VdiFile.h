@@ -29,9 +29,8 @@ Vdi decode(std::span<const std::byte> bytes);
 /// Reads header and chunk table only; the rest need not be sound, but must be there.
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes);
 
-/// Written under a temporary name beside `path`, then renamed: a reader never sees half a file, and a file
-/// that was there stays when writing fails. Throws Error{Io}, or Error{Format} as encode; both with the path
-/// as context.
+/// Written by writeAtomically (Files.h): a reader never sees half a file, and a file that was there stays when
+/// writing fails. Throws Error{Io}, or Error{Format} as encode; both with the path as context.
 void writeVdi(const std::filesystem::path& path, const Vdi& vdi);
 /// Throws Error{Io} or Error{Format} with the path as context.
 Vdi readVdi(const std::filesystem::path& path);
