@@ -17,5 +17,7 @@ class HelpFormatter : public CLI::Formatter {
 
 /// A check for options: "must be > 0".
 std::string demandPositive(const std::string& text);
+/// A check for options: "must be a whole number from 0 to 2^64 - 1". CLI11 lets others wrap around.
+std::string requireWholeNumber(const std::string& text);
 
 }  // namespace vdi::apps

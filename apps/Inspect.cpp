@@ -7,6 +7,7 @@
 
 #include "apps/Cameras.h"
 #include "apps/Commands.h"
+#include "apps/OutputFiles.h"
 #include "apps/Source.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
@@ -28,17 +29,27 @@ struct RenderOptions {
   std::string reconstruction = "smooth";
 };
 
+/// The picture of one of the azimuths: with several their degrees are added to its name.
+std::filesystem::path pictureOf(const RenderOptions& options, double azimuth) {
+  if (options.azimuths.size() == 1) return options.output;
+  return withSuffix(options.output, fmt::format("{:g}deg", azimuth));
+}
+
 void render(const RenderOptions& options) {
+  std::vector<NamedFile> outputs;
+  for (const double azimuth : options.azimuths)
+    outputs.push_back({fmt::format("the picture of {} degrees", azimuth), pictureOf(options, azimuth)});
+  requireOutputs(outputs, {{"the VDI", options.input}, {"--camera", options.camera.file}});
   const Vdi vdi = io::readVdi(options.input);
   const std::vector<int> size = options.resolution.empty() ? std::vector<int>{vdi.width, vdi.height}
                                                            : parseSizes(options.resolution, 2);
   const Reconstruction reconstruction = reconstructionFromString(options.reconstruction);
   VdiRenderer renderer(gpu::Device::create(gpu::requestFromEnvironment(0)));
   renderer.setVdi(vdi);
+  const Camera start = chosenCamera(options.camera, vdi.camera);
   for (const double azimuth : options.azimuths) {
-    const Camera camera = turned(chosenCamera(options.camera, vdi.camera), azimuth, options.elevation);
-    std::filesystem::path path = options.output;
-    if (options.azimuths.size() > 1) path = withSuffix(path, fmt::format("{:g}deg", azimuth));
+    const Camera camera = turned(start, azimuth, options.elevation);
+    const std::filesystem::path path = pictureOf(options, azimuth);
     io::writePng(path, io::toPicture(renderer.renderBytes(camera, size[0], size[1], Alpha::Premultiplied,
                                                           reconstruction)));
     fmt::print("{}: {:.2f} ms on the device\n", path.string(), renderer.renderMilliseconds());

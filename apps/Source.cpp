@@ -223,7 +223,8 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene) {
   Orbit orbit = options.orbit;
   if (!options.camera.viewUp.empty()) {
     orbit.up = vectorOf(options.camera.viewUp);
-    if (!(glm::length(orbit.up) > 0.0)) throw Error(ErrorCode::InvalidArgument, "--view-up is zero");
+    if (!(glm::length(orbit.up) > 0.0))
+      throw Error(ErrorCode::InvalidArgument, "--view-up must be finite and not zero");
   }
   Camera camera = orbitCamera(scene.bounds, orbit, sensible ? angle : 30.0);
   camera.parallelProjection = options.parallel;
