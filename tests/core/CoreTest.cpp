@@ -17,6 +17,7 @@
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
+#include "vdi/core/Viewpoint.h"
 
 using namespace vdi;
 
@@ -110,6 +111,39 @@ TEST_CASE("rays go through the points that they're named after") {
     CHECK(seen.x == Approx(-view.halfWidth() * (parallel ? 1.0 : 4.0)));
     CHECK(seen.y == Approx(-view.halfHeight() * (parallel ? 1.0 : 4.0)));  // row 0 is the bottom
   }
+}
+
+TEST_CASE("viewpoints from which a VDI shows nothing true are told from others") {
+  const Box bounds{glm::dvec3(-1.0), glm::dvec3(1.0)};
+  Camera original;
+  original.position = {0.0, 0.0, 10.0};
+  const auto issueFrom = [&](const Camera& camera) {
+    return viewpointIssue(bounds, original, View(camera, 64, 48));
+  };
+  CHECK_FALSE(issueFrom(original));
+  for (const double degrees : {-58.0, 30.0, 58.0}) CHECK_FALSE(issueFrom(original.azimuth(degrees)));
+  for (const double degrees : {-62.0, 90.0, 180.0})
+    CHECK(issueFrom(original.azimuth(degrees)) == ViewpointIssue::FarBeside);
+  for (const bool parallel : {false, true}) {
+    Camera camera = original;
+    camera.parallelProjection = parallel;
+    camera.parallelScale = 2.0;
+    original.parallelProjection = parallel;
+    CHECK_FALSE(issueFrom(camera));
+    camera.focalPoint = {0.0, 0.0, 20.0};
+    CHECK(issueFrom(camera) == ViewpointIssue::SeesNothing);  // looks away
+    camera.position = {9.0, 0.0, 10.0};
+    camera.focalPoint = {9.0, 0.0, 0.0};
+    CHECK(issueFrom(camera) == ViewpointIssue::SeesNothing);  // looks past
+    camera.position = {0.9, 0.0, 0.0};
+    CHECK(issueFrom(camera) == ViewpointIssue::Inside);
+    original.position = camera.position;
+    CHECK(issueFrom(camera) != ViewpointIssue::Inside);  // made there
+    original.position = {0.0, 0.0, 10.0};
+  }
+  CHECK_FALSE(viewpointIssue({}, original, View(original, 64, 48)));
+  for (const auto issue : {ViewpointIssue::Inside, ViewpointIssue::SeesNothing, ViewpointIssue::FarBeside})
+    CHECK_FALSE(describe(issue).empty());
 }
 
 TEST_CASE("azimuth turns as vtkCamera does, and back") {
