@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/Cameras.h"
 #include "apps/Commands.h"
@@ -11,6 +12,7 @@
 #include "apps/Source.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
+#include "vdi/core/Viewpoint.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -47,8 +49,12 @@ void render(const RenderOptions& options) {
   VdiRenderer renderer(gpu::Device::create(gpu::requestFromEnvironment(0)));
   renderer.setVdi(vdi);
   const Camera start = chosenCamera(options.camera, vdi.camera);
+  std::set<ViewpointIssue> warned;
   for (const double azimuth : options.azimuths) {
     const Camera camera = turned(start, azimuth, options.elevation);
+    const auto issue = viewpointIssue(vdi.bounds, vdi.camera, View(camera, size[0], size[1]));
+    if (issue && warned.insert(*issue).second)
+      fmt::print(stderr, "vdi: warning, at {} degrees: {}\n", azimuth, describe(*issue));
     const std::filesystem::path path = pictureOf(options, azimuth);
     io::writePng(path, io::toPicture(renderer.renderBytes(camera, size[0], size[1], Alpha::Premultiplied,
                                                           reconstruction)));

@@ -134,6 +134,18 @@ refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step 1844
 refused 2 "beyond" "$vdi" generate --raw s0.json s1.json --step 18446744073709551615 -o x.vdi
 refused 2 "finite" "$vdi" generate --field sphere "${small[@]}" --time nan -o x.vdi
 
+# A viewpoint that shows nothing true is warned of, once each.
+warnings() { grep -c "warning.*$1" err.txt; }
+works "no warning" "$vdi" render one.vdi -o x.png --azimuth -50 0 50
+[ ! -s err.txt ] || { fail "a viewpoint near V_O is warned of"; cat err.txt; }
+works "far beside" "$vdi" render one.vdi -o x.png --azimuth 90 180 --reconstruction constant
+[ "$(warnings degrees)" -eq 1 ] || { fail "far beside: no warning, or several"; cat err.txt; }
+works "inside" "$vdi" render one.vdi -o x.png --position 0.5 0.4 0.4 --focal-point 0 0 0
+[ "$(warnings inside)" -eq 1 ] || { fail "inside: no warning"; cat err.txt; }
+works "past it" "$vdi" render one.vdi -o x.png --position 9 9 9 --focal-point 20 20 20
+[ "$(warnings "doesn't see")" -eq 1 ] || { fail "past it: no warning"; cat err.txt; }
+rm -f x.png x_*.png
+
 # Pipes given as input are refused, not waited for.
 mkfifo pipe pipe.json
 for option in "--camera pipe" "--transfer-function pipe.json"; do
