@@ -1,6 +1,7 @@
 // vdi bench: how long each stage takes and how true the result is.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -12,6 +13,7 @@
 #include "apps/BenchSuites.h"
 #include "apps/Commands.h"
 #include "apps/Fields.h"
+#include "apps/Help.h"
 #include "apps/OutputFiles.h"
 #include "apps/RawVolume.h"
 #include "vdi/core/Error.h"
@@ -39,6 +41,9 @@ void requireSound(const BenchOptions& options) {
     } else {
       (void)fieldIndex(set.field);
     }
+  }
+  for (const double angle : options.angles) {
+    if (!std::isfinite(angle)) throw Error(ErrorCode::InvalidArgument, "angles must be finite", "--angles");
   }
   (void)reconstructionFromString(options.reconstruction);
   for (const std::string& algorithm : options.algorithms) {
@@ -170,6 +175,7 @@ void addBench(CLI::App& app, Job& job) {
   command
       ->add_option("-o,--output", options->output,
                    "JSON file; default: standard output, and the table goes to standard error")
+      ->check(requireFileName)
       ->type_name("FILE");
   command->callback([options, &job] {
     job = {[options](const comm::Communicator& world) { run(*options, world); }, true};

@@ -239,7 +239,7 @@ void addGenerate(CLI::App& app, Job& job) {
   addViewOptions(*command, options->view);
   addQualityOptions(*command, options->quality);
   const auto addFile = [&](const char* name, std::string& file, const char* description) {
-    command->add_option(name, file, description)->type_name("FILE")->group("Output");
+    command->add_option(name, file, description)->check(requireFileName)->type_name("FILE")->group("Output");
   };
   addFile("-o,--output", options->output, "the .vdi file to write");
   addFile("--flat", options->flat, "PNG of the VDI seen from its own viewpoint");

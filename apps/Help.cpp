@@ -62,6 +62,10 @@ std::string demandPositive(const std::string& text) {
   return CLI::detail::lexical_cast(text, value) && value > 0.0 ? "" : "must be > 0, it is " + text;
 }
 
+std::string requireFileName(const std::string& text) {
+  return text.empty() ? "must name a file" : "";
+}
+
 std::string requireWholeNumber(const std::string& text) {
   std::uint64_t value = 0;
   const char* const end = text.data() + text.size();

@@ -163,6 +163,7 @@ void addCameraOptions(CLI::App& command, CameraOptions& options, const std::stri
   command
       .add_option("--camera", options.file,
                   "JSON file of the camera (docs/raw-volumes.md); default: " + otherwise)
+      ->check(requireFileName)
       ->type_name("FILE")
       ->group(viewGroup);
   const auto addVector = [&](const char* name, std::vector<double>& value, const char* description) {

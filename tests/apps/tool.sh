@@ -166,6 +166,9 @@ refused 1 "'position' .*twice" "$vdi" generate --field sphere "${small[@]}" --ca
 refused 1 "no-such-folder" "$vdi" generate --raw none.json -o no-such-folder/x.vdi
 refused 1 "no-such-folder" "$vdi" render none.vdi -o no-such-folder/x.png
 refused 1 "no-such-folder" "$vdi" bench --fields sphere --raw none.json -o no-such-folder/x.json
+refused 2 "output: must name a file" "$vdi" generate --field sphere "${small[@]}" -o ""
+refused 2 "output: must name a file" timeout 60 "$vdi" bench --fields sphere "${small[@]}" -o ""
+refused 2 "angles" "$vdi" bench --fields sphere "${small[@]}" --angles 0 nan -o x.json
 refused 2 "flat would write over .* -o" "$vdi" generate --field sphere "${small[@]}" -o x.vdi --flat ./x.vdi
 refused 2 "would write over" "$vdi" render one.vdi -o one.vdi
 refused 2 "would write over" "$vdi" render one.vdi -o x.png --azimuth 20.00000001 20.00000002
