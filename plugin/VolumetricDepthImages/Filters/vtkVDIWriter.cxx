@@ -36,7 +36,9 @@ void vtkVDIWriter::WriteData() {
       throw vdi::Error(vdi::ErrorCode::InvalidArgument,
                        "the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
     }
-    if (this->FileName == nullptr) throw vdi::Error(vdi::ErrorCode::Io, "no file name was given");
+    if (this->FileName == nullptr || *this->FileName == '\0') {
+      throw vdi::Error(vdi::ErrorCode::Io, "no file name was given, or its pattern has a {field} of no value");
+    }
     vdi::io::writeVdi(this->FileName, vdi);
   } catch (const std::exception& error) {
     this->SetErrorCode(vtkErrorCode::CannotOpenFileError);
