@@ -86,7 +86,8 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
                   {"ranks", world.size()},
                   {"rows", json::array()}};
     for (const BenchRow& row : rows) document["rows"].push_back(toJson(row));
-    const std::string text = document.dump(2) + "\n";
+    // A file's name, which a data set has, may be any bytes.
+    const std::string text = document.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
     if (options.output.empty()) {
       fmt::print("{}", text);
     } else {

@@ -17,7 +17,11 @@ using nlohmann::json;
 
 json readBench(const std::filesystem::path& path) {
   json document = readJson(path);
-  if (!document.is_object() || !document.contains("rows") || !document["rows"].is_array())
+  const auto isObject = [](const json& row) { return row.is_object(); };
+  const bool sound = document.is_object() && document.contains("rows") && document["rows"].is_array() &&
+                     std::all_of(document["rows"].begin(), document["rows"].end(), isObject) &&
+                     document.contains("device") && document["device"].is_string();
+  if (!sound)
     throw Error(ErrorCode::Format, "not a result of vdi bench", path.string());
   return document;
 }

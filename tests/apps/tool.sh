@@ -110,6 +110,9 @@ for step in 0 1 2; do
 done
 works "info" "$vdi" info steps_0009.vdi
 grep -q "step 9" out.txt && grep -q "0.75" out.txt || { fail "info doesn't tell step and time"; cat out.txt; }
+cp v.json $'\xff.json'
+works "bench of a name that isn't UTF-8" "$vdi" bench --raw $'\xff.json' --resolution 40x30 --repeats 1 --angles 0 -o bytes.json
+python3 -c "import json; assert json.load(open('bytes.json'))['rows'][0]['dataset']" || fail "a name's bytes broke the result"
 refused 1 "s9.raw" "$vdi" generate --raw s0.json s9.json --resolution 40x30 -o x.vdi
 refused 1 "long.json|v.raw" "$vdi" generate --raw long.json -o x.vdi
 refused 1 "u12" "$vdi" generate --raw type.json -o x.vdi
@@ -193,6 +196,15 @@ done
 [ -z "$(ls -A | grep -F .tmp)" ] || fail "temporary files were left"
 
 # Bad input.
+truncate -s 1T large.vdi large.png large.json
+refused 1 "large.vdi" "$vdi" render large.vdi -o x.png
+refused 1 "large.png" "$vdi" compare large.png one.png
+refused 1 "large.json" "$vdi" generate --raw large.json -o x.vdi
+rm large.*
+echo '{"device": 5, "rows": [1]}' >odd.json
+refused 1 "not a result .*odd.json" "$vdi" bench --compare odd.json bench.json
+sed 's/"ssim": 0[.]/"ssim": 0.0/' bench.json >worse.json
+refused 1 "regressions" "$vdi" bench --compare bench.json worse.json
 head -c 200 one.vdi >short.vdi
 refused 1 "short.vdi" "$vdi" render short.vdi -o x.png
 refused 1 "v.json" "$vdi" info v.json

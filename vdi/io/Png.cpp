@@ -85,11 +85,18 @@ void writePng(const std::filesystem::path& path, const Picture& picture) {
 }
 
 Picture readPng(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = InputFile(path).readAll();
-  PngImage image;
+  const InputFile file(path);
   const auto demand = [&](bool good, const char* why) {
     if (!good) throw Error(ErrorCode::Format, fmt::format("not a sound PNG: {}", why), path.string());
   };
+  // Before the memory for another file's bytes is taken.
+  constexpr std::uint64_t signatureBytes = 8;
+  const std::vector<std::byte> start = file.read(0, std::min(file.size(), signatureBytes));
+  demand(start.size() == signatureBytes &&
+             png_sig_cmp(reinterpret_cast<png_const_bytep>(start.data()), 0, signatureBytes) == 0,
+         "it doesn't start as one");
+  const std::vector<std::byte> bytes = file.readAll();
+  PngImage image;
   demand(png_image_begin_read_from_memory(image.get(), bytes.data(), bytes.size()) != 0, image->message);
   // A byte of a PNG holds at most 1032 bytes of rows (deflate).
   constexpr std::uint64_t mostPerByte = 1032;
