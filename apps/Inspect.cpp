@@ -142,7 +142,8 @@ void addRender(CLI::App& app, Job& job) {
   addCameraOptions(*command, options->camera, "the one that the VDI was made for");
   command
       ->add_option("--azimuth", options->azimuths,
-                   "degrees to turn the camera about its focal point; several make several pictures")
+                   "degrees to turn the camera about its focal point, around its view-up as set (vtkCamera's "
+                   "Azimuth); several make several pictures")
       ->type_name("DEG")
       ->capture_default_str()
       ->group("Viewpoint");
