@@ -21,8 +21,7 @@ json readBench(const std::filesystem::path& path) {
   const bool sound = document.is_object() && document.contains("rows") && document["rows"].is_array() &&
                      std::all_of(document["rows"].begin(), document["rows"].end(), isObject) &&
                      document.contains("device") && document["device"].is_string();
-  if (!sound)
-    throw Error(ErrorCode::Format, "not a result of vdi bench", path.string());
+  if (!sound) throw Error(ErrorCode::Format, "not a result of vdi bench", path.string());
   return document;
 }
 

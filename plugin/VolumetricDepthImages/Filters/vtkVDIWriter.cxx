@@ -37,7 +37,8 @@ void vtkVDIWriter::WriteData() {
                        "the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
     }
     if (this->FileName == nullptr || *this->FileName == '\0') {
-      throw vdi::Error(vdi::ErrorCode::Io, "no file name was given, or its pattern has a {field} of no value");
+      throw vdi::Error(vdi::ErrorCode::Io,
+                       "no file name was given, or its pattern has a {field} of no value");
     }
     vdi::io::writeVdi(this->FileName, vdi);
   } catch (const std::exception& error) {
