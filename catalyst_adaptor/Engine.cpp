@@ -67,9 +67,9 @@ class Log {
     const std::string text = message.message;
     if (message.verbosity <= vtkLogger::VERBOSITY_ERROR) {
       if (text.find(harmless) != std::string::npos || !self.firstError_.empty()) return;
-      // An object's address tells a user nothing.
-      static const std::regex address(R"( \((0x[0-9a-f]+|nullptr)\))");
-      self.firstError_ = std::regex_replace(text, address, "", std::regex_constants::format_first_only);
+      // An object's address tells a user nothing; some texts start on the next line.
+      static const std::regex address(R"( \((0x[0-9a-f]+|nullptr)\):\s*)");
+      self.firstError_ = std::regex_replace(text, address, ": ", std::regex_constants::format_first_only);
       while (!self.firstError_.empty() && self.firstError_.back() == '\n') self.firstError_.pop_back();
       return;
     }

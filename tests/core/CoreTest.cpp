@@ -154,6 +154,38 @@ TEST_CASE("azimuth turns as vtkCamera does, and back") {
   CHECK(glm::length(right.azimuth(-90.0).position - camera.position) < 1e-12);
 }
 
+TEST_CASE("azimuth turns about view-up as it is set, whatever its direction and length") {
+  // Expected places are those of vtkCamera::Azimuth(50), VTK 9.1.
+  Camera above;  // 20 degrees above what it looks at
+  const double elevation = glm::radians(20.0);
+  above.focalPoint = {1.0, 2.0, 3.0};
+  above.position = above.focalPoint + 10.0 * glm::dvec3(0.0, std::sin(elevation), std::cos(elevation));
+  const glm::dvec3 aboveTurned(8.198463103929544, 5.420201433256687, 9.040227735550538);
+  CHECK(glm::length(above.azimuth(50.0).position - aboveTurned) < 1e-12);
+
+  Camera oblique = above;
+  oblique.position = {4.0, -1.0, 8.0};
+  const glm::dvec3 up(0.3, 0.8, -0.4);
+  const glm::dvec3 turned(4.78054784088795, -3.24459190210122, 4.096227076463522);
+  for (const double length : {1.0, 1e-3, 7.0, 1e-200, 1e200}) {
+    INFO("view-up times " << length);
+    oblique.viewUp = length * up;
+    const Camera there = oblique.azimuth(50.0);
+    CHECK(glm::length(there.position - turned) < 1e-12);
+    CHECK(there.viewUp == oblique.viewUp);
+    CHECK(there.focalPoint == oblique.focalPoint);
+    CHECK(glm::length(there.azimuth(-50.0).position - oblique.position) < 1e-12);
+    CHECK(glm::dot(View(there, 4, 4).up(), up) > 0.0);
+  }
+  oblique.viewUp = glm::dvec3(0.0);  // taken for y
+  const glm::dvec3 aboutY(6.758585044654509, -1.0, 3.915804719075762);
+  CHECK(glm::length(oblique.azimuth(50.0).position - aboutY) < 1e-12);
+  CHECK(View(oblique, 4, 4).up().y > 0.0);
+  oblique.viewUp = 2.0 * (oblique.focalPoint - oblique.position);  // looked along: stays where it is
+  CHECK(glm::length(oblique.azimuth(50.0).position - oblique.position) < 1e-12);
+  CHECK(oblique.azimuth(0.0) == oblique);
+}
+
 TEST_CASE("a camera that can't see is refused, a careless view-up is mended") {
   Camera camera;
   camera.viewUp = camera.focalPoint - camera.position;

@@ -130,7 +130,7 @@ vdi::Camera vtkVDIRenderer::Viewpoint() const {
                         vector(this->CameraViewUp),     this->CameraViewAngle,
                         this->CameraParallelProjection, this->CameraParallelScale};
   if (!this->UseOriginalCamera && own.position != own.focalPoint) return own;
-  return this->Azimuth == 0.0 ? original : original.azimuth(this->Azimuth);
+  return original.azimuth(this->Azimuth);
 }
 
 void vtkVDIRenderer::WarnOf(const vdi::Camera& camera, int width, int height) {
