@@ -132,11 +132,12 @@ struct VdiGenerator::State {
     Stopwatch watch;
     Step step;
     comm.together([&] { validate(blocks); });
-    if (fillGhosts) blocks = comm::exchangeGhosts(comm, std::move(blocks));
-    step.scene = comm::globalScene(comm, localScene(blocks));
-    comm.together([&] { (caster->volume().*send)(blocks, step.scene); });
     for (const Block& block : blocks) step.bytes += block.byteCount();
     step.blocks = blocks.size();
+    blocks = fillGhosts ? comm::exchangeGhosts(comm, std::move(blocks))
+                        : comm::settleOwnership(comm, std::move(blocks));
+    step.scene = comm::globalScene(comm, localScene(blocks));
+    comm.together([&] { (caster->volume().*send)(blocks, step.scene); });
     step.uploadSeconds = watch.lap();
     return step;
   }
