@@ -40,7 +40,7 @@ std::vector<BlockEntry> entriesOf(std::span<const Block> blocks, int rank) {
                   {b.dims.x, b.dims.y, b.dims.z}};
     const auto grid = grids.try_emplace(key, static_cast<std::int32_t>(grids.size())).first->second;
     entries.push_back({b.origin, b.spacing, b.owned, b.owned, b.dims, rank, static_cast<std::int32_t>(i),
-                       grid, isOfCells(b)});
+                       grid, isOfCells(b), b.masked && !b.masked->empty()});
   }
   return entries;
 }
@@ -167,7 +167,7 @@ BlockDirectory::BlockDirectory(const Communicator& comm, std::span<const Block> 
 void BlockDirectory::plantTree() {
   std::vector<Box> boxes;
   boxes.reserve(entries_.size());
-  for (const BlockEntry& entry : entries_) boxes.push_back(entry.owned);
+  for (const BlockEntry& entry : entries_) boxes.emplace_back(entry.storedBox()).include(entry.owned);
   tree_ = std::make_unique<BoxTree>(std::move(boxes));
 }
 

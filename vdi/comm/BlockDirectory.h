@@ -27,9 +27,14 @@ struct BlockEntry {
   std::int32_t block;  // index on its rank
   std::int32_t grid;   // blocks of a rank that share their values have the same one
   bool cells;          // owned boxes end between values, not at values
+  bool masks;          // some stored values mean nothing
 
   double valueVolume() const { return spacing.x * spacing.y * spacing.z; }
-  Box stored() const { return {origin, origin + glm::dvec3(dims - 1) * spacing}; }
+  /// What the stored values stand for, ghost layers included.
+  Box storedBox() const {
+    const glm::dvec3 beyond = cells ? 0.5 * spacing : glm::dvec3(0.0);
+    return {origin - beyond, origin + glm::dvec3(dims - 1) * spacing + beyond};
+  }
 };
 
 /// Levels are told apart by the volume that a value stands for: within a hundredth it's the same level.
@@ -72,7 +77,7 @@ class BlockDirectory {
   /// This rank's, as indices of entries.
   std::size_t firstMine() const { return firstMine_; }
   std::size_t lastMine() const { return lastMine_; }
-  /// Indices of entries whose owned boxes meet `box`, faces included, ascending.
+  /// Indices of entries that own or store something in `box`, faces included, ascending.
   std::vector<std::size_t> meeting(const Box& box) const { return tree_->meeting(box); }
 
  private:

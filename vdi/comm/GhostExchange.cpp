@@ -345,11 +345,15 @@ class Exchange {
     // What the values stand for.
     const Box volume{grid.block.origin + (glm::dvec3(wanted.box.lo) - 0.5) * grid.block.spacing,
                      grid.block.origin + (glm::dvec3(wanted.box.hi) - 0.5) * grid.block.spacing};
+    // First those who own the place, the finest first; of a level those with values there before those that
+    // only close a gap. Then those who store it, where it's nobody's.
     struct Claim {
-      std::size_t donor;
+      bool stored;
       std::int32_t level;
-      bool gap;  // the donor only closes it, its values end before
+      bool gap;
+      std::size_t donor;
       Box box;
+      auto order() const { return std::tuple(stored, -level, gap, donor); }
     };
     std::vector<Claim> claims;
     for (const std::size_t d : directory_.meeting(volume)) {
@@ -357,13 +361,15 @@ class Exchange {
       if (donor.rank == comm_.rank() && static_cast<std::size_t>(donor.grid) == gridIndex) continue;
       // A little more, so that nothing is lost between faces and places that were computed differently.
       const glm::dvec3 spare = latticeTolerance * glm::min(donor.spacing, grid.block.spacing);
-      claims.push_back({d, levelNumber(donor), false, {donor.asked.lo - spare, donor.asked.hi + spare}});
-      if (donor.asked != donor.owned)
-        claims.push_back({d, levelNumber(donor), true, {donor.owned.lo - spare, donor.owned.hi + spare}});
+      const auto claim = [&](bool stored, bool gap, const Box& box) {
+        claims.push_back({stored, levelNumber(donor), gap, d, {box.lo - spare, box.hi + spare}});
+      };
+      claim(false, false, donor.asked);
+      if (donor.asked != donor.owned) claim(false, true, donor.owned);
+      if (!donor.masks && !wanted.keep) claim(true, false, donor.storedBox());
     }
-    std::sort(claims.begin(), claims.end(), [](const Claim& a, const Claim& b) {
-      return std::tuple(-a.level, a.gap, a.donor) < std::tuple(-b.level, b.gap, b.donor);
-    });
+    std::sort(claims.begin(), claims.end(),
+              [](const Claim& a, const Claim& b) { return a.order() < b.order(); });
     std::vector<Box> left{volume};
     for (const Claim& claim : claims) {
       std::vector<Box> rest;

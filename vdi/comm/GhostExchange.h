@@ -27,8 +27,8 @@ std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> 
 /// - a copy, where the neighbour has one at the place, to within 1e-3 of a spacing;
 /// - for cell data, the mean over a finer neighbour's values in the volume that it stands for;
 /// - else interpolated trilinearly in the neighbour's values, of which those beside its own box come first.
-/// Integers are rounded. Where nobody owns a place, the nearest own value stands in; sides with no neighbour
-/// at all get no layer.
+/// Integers are rounded. Where nobody owns a place, a neighbour's ghost value counts, if it has no masked
+/// ones, else the nearest own value; sides with no neighbour at all get no layer.
 ///
 /// Of stored values that aren't the block's own, the caller's ghost layers stay where a neighbour of the same
 /// level or nobody owns the place. Those under finer blocks, at places that coarser ones own, and `masked`
