@@ -175,6 +175,41 @@ ScalarRange finiteRange(const Block& block) {
   return range;
 }
 
+ValueLimits limitsOf(ScalarType type) {
+  if (type == ScalarType::F32) return {1e-30, std::numeric_limits<double>::infinity()};
+  if (type == ScalarType::F64) return {1e-300, 1e300};
+  return {};
+}
+
+ValueSizes valueSizesOf(std::span<const Block> blocks) {
+  ValueSizes sizes;
+  for (const Block& block : blocks) {
+    const double least = limitsOf(block.type).least;
+    withTyped(block.type, block.data, [&](const auto* values) {
+      using T = std::remove_cvref_t<decltype(*values)>;
+      const std::size_t count = block.valueCount();
+      if constexpr (!std::is_floating_point_v<T>) {
+        sizes.usable = true;
+      } else {
+        constexpr std::size_t atOnce = 4096;
+        for (std::size_t first = 0; first < count && !sizes.usable; first += atOnce) {
+          bool usable = false;
+          bool tooSmall = false;
+          for (std::size_t i = first; i < std::min(first + atOnce, count); ++i) {
+            const T size = std::abs(values[i]);
+            usable |= size >= static_cast<T>(least) && size <= std::numeric_limits<T>::max();
+            tooSmall |= size > T{0} && size < static_cast<T>(least);
+          }
+          sizes.usable |= usable;
+          sizes.tooSmall |= tooSmall;
+        }
+      }
+    });
+    if (sizes.usable) break;
+  }
+  return sizes;
+}
+
 void validate(std::span<const Block> blocks) {
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const Block& block = blocks[i];
@@ -185,15 +220,31 @@ void validate(std::span<const Block> blocks) {
                               block.dims.y, block.dims.z),
                   context);
     }
-    if (!finite(block.spacing) || glm::any(glm::lessThanEqual(block.spacing, glm::dvec3(0.0)))) {
+    // What's computed in single precision keeps a distance from its limits.
+    constexpr double leastSpacing = 1e-30;
+    constexpr double mostSpacing = 1e30;
+    if (!finite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(leastSpacing))) ||
+        glm::any(glm::greaterThan(block.spacing, glm::dvec3(mostSpacing)))) {
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("spacing must be finite and > 0, it is ({}, {}, {})", block.spacing.x,
-                              block.spacing.y, block.spacing.z),
+                  fmt::format("spacing must be from {} to {}, it is ({}, {}, {}); other units of length help",
+                              leastSpacing, mostSpacing, block.spacing.x, block.spacing.y, block.spacing.z),
                   context);
     }
     const bool ownsNothing = block.owned.empty();
     if (!finite(block.origin) || (!ownsNothing && (!finite(block.owned.lo) || !finite(block.owned.hi)))) {
       throw Error(ErrorCode::InvalidArgument, "origin and owned box must be finite", context);
+    }
+    constexpr double farthest = 1e12;
+    glm::dvec3 away = glm::abs(block.origin);
+    if (!ownsNothing) away = glm::max(away, glm::max(glm::abs(block.owned.lo), glm::abs(block.owned.hi)));
+    if (glm::any(glm::greaterThan(away, farthest * block.spacing))) {
+      throw Error(
+          ErrorCode::InvalidArgument,
+          fmt::format("it lies at ({}, {}, {}) with a spacing of ({}, {}, {}): more than {} spacings from "
+                      "the origin of the world, positions can't be told apart; an origin nearby helps",
+                      block.origin.x, block.origin.y, block.origin.z, block.spacing.x, block.spacing.y,
+                      block.spacing.z, farthest),
+          context);
     }
     if (block.data == nullptr) throw Error(ErrorCode::InvalidArgument, "a block without data", context);
   }

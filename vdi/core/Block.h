@@ -109,9 +109,25 @@ struct ScalarRange {
 };
 ScalarRange finiteRange(const Block& block);  // stored values' and patches', by several threads
 
-/// Throws Error{InvalidArgument} naming the block's index for: dims < 1, spacing that isn't finite and > 0,
-/// an origin or owned box that isn't finite, null data. A block with an empty owned box is legal and owns no
-/// sample.
+/// Values smaller than `least` in size are lost where all are so small, larger ones than `most` overflow on
+/// the way to the device. For f32 and f64; the other types have no such values.
+struct ValueLimits {
+  double least = 0.0;
+  double most = std::numeric_limits<double>::infinity();
+};
+ValueLimits limitsOf(ScalarType type);
+
+/// Whether there are finite values of usable size, and whether there are some that aren't 0 but too small.
+/// Looks at blocks until it has found a usable value.
+struct ValueSizes {
+  bool usable = false;
+  bool tooSmall = false;
+};
+ValueSizes valueSizesOf(std::span<const Block> blocks);
+
+/// Throws Error{InvalidArgument} naming the block's index for: dims < 1, spacing that isn't in [1e-30, 1e30],
+/// an origin or owned box that isn't finite or more than 1e12 spacings away from 0, where positions can't be
+/// told apart well any more, null data. A block with an empty owned box is legal and owns no sample.
 void validate(std::span<const Block> blocks);
 
 }  // namespace vdi

@@ -22,6 +22,7 @@ struct ValueMap {
   bool whole = false;                // values are whole numbers
   std::optional<ScalarRange> range;  // of finite values, where it had to be found
 };
+/// Throws Error{InvalidArgument} for values beyond limitsOf(type).most.
 ValueMap valueMapOf(const Block& block);
 
 /// A box of a block's values that fits one page.
