@@ -217,3 +217,31 @@ TEST_CASE("blocks of one level that overlap between ranks: refused on all, and t
   }
   CHECK_NOTHROW(many.setBlocks(dealt({block}, world), fill));
 }
+
+TEST_CASE("large blocks, whose values a process with one core lets the device copy, get their patches") {
+  const comm::Communicator world = comm::Communicator::world();
+  // Doubles are always staged. The coarse block takes 2 MiB, and a part of it is covered.
+  const double spacing = 1.0 / 80;
+  const Box middle{glm::dvec3(0.25), glm::dvec3(0.75)};
+  const auto covered = [&middle](const glm::dvec3& p) {
+    return glm::all(glm::lessThan(glm::abs(p - middle.center()), glm::dvec3(0.2501))) ? 0.5 : smooth(p);
+  };
+  std::vector<Block> floats{blockIn(true, {glm::dvec3(0.0), glm::dvec3(1.0)}, spacing, covered),
+                            blockIn(true, middle, spacing / 2, smooth),
+                            blockIn(true, {{1.0, 0.0, 0.0}, {2.0, 1.0, 1.0}}, spacing, smooth)};
+  std::vector<Block> doubles = floats;
+  for (Block& block : doubles) {
+    const auto* from = static_cast<const float*>(block.data);
+    const auto values = std::make_shared<std::vector<double>>(from, from + block.valueCount());
+    block.type = ScalarType::F64;
+    block.data = values->data();
+    block.keepAlive = values;
+  }
+  VdiGenerator many(device(), comm::Communicator::world());
+  many.setBlocks(dealt(floats, world));
+  const auto ofFloats = many.renderVolume(test::oblique(), bands(), settings());
+  many.setBlocks(dealt(doubles, world));
+  const auto ofDoubles = many.renderVolume(test::oblique(), bands(), settings());
+  if (ofFloats) CHECK(differenceOf(*ofFloats, *ofDoubles).worst < 1.0);
+  CHECK(device()->validationMessages() == "");
+}

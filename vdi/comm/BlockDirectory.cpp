@@ -54,8 +54,8 @@ bool overlapBy(const Box& a, const Box& b, const glm::dvec3& tolerance) {
   return glm::all(glm::greaterThan(glm::min(a.hi, b.hi) - glm::max(a.lo, b.lo), tolerance));
 }
 
-/// Faces of all blocks along one axis, in order: those that follow each other within the tolerance become
-/// the lowest of them.
+/// Faces of all blocks along one axis, in order: those that follow each other within the tolerance
+/// become the lowest of them.
 void makeFacesOne(std::span<BlockEntry> entries, int axis) {
   struct Face {
     double at;

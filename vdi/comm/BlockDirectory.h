@@ -12,8 +12,8 @@
 
 namespace vdi::comm {
 
-/// Faces of two blocks that differ by less than that, in spacings of the finer one, are one face; values that
-/// lie so close to each other are one value.
+/// Faces of two blocks that differ by less than that, in spacings of the finer one, are one face;
+/// values that lie so close to each other are one value.
 inline constexpr double latticeTolerance = 1e-3;
 
 /// What other ranks need to know of a block.
@@ -37,7 +37,7 @@ struct BlockEntry {
   }
 };
 
-/// Levels are told apart by the volume that a value stands for: within a hundredth it's the same level.
+/// By the volume that a value stands for: within a hundredth it's the same level.
 enum class Level { Finer, Same, Coarser };
 Level levelOf(const BlockEntry& block, const BlockEntry& comparedWith);
 
@@ -66,10 +66,10 @@ class BoxTree {
 /// Blocks that own nothing aren't in it.
 class BlockDirectory {
  public:
-  /// Collective. With `closeGaps`, what's between blocks of point data that are at most one spacing apart
-  /// gets an owner: the coarser block, of two of one level the lower one, unless something touches its face
-  /// there already. Then faces that differ by less than latticeTolerance become one, by a rule that gives the
-  /// same on every rank.
+  /// Collective. With `closeGaps`, what's between blocks of point data that are at most one spacing
+  /// apart gets an owner: the coarser block, of two of one level the lower one, unless something
+  /// touches its face there already. Then faces that differ by less than latticeTolerance become
+  /// one, by a rule that gives the same on every rank.
   BlockDirectory(const Communicator& comm, std::span<const Block> mine, bool closeGaps);
 
   /// By rank, then by block: the same on every rank.
@@ -91,14 +91,16 @@ class BlockDirectory {
   std::unique_ptr<BoxTree> tree_;
 };
 
-/// Collective. What blocks of this rank own once the finest has got what blocks of different levels share:
-/// `[i]` are the parts that are left of entry firstMine() + i. Where two blocks of one level overlap by more
-/// than latticeTolerance on every axis, throws Error{InvalidArgument} on all ranks that names both, the same
-/// wherever they are.
+/// What is left of a block.
 struct OwnParts {
   std::vector<Box> boxes;
   std::vector<Box> finer;  // boxes that were taken off
 };
+
+/// Collective. What blocks of this rank own once the finest has got what blocks of different levels
+/// share: `[i]` are the parts that are left of entry firstMine() + i. Where two blocks of one level
+/// overlap by more than latticeTolerance on every axis, throws Error{InvalidArgument} on all ranks
+/// that names both, the same wherever they are.
 std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirectory& directory);
 
 }  // namespace vdi::comm

@@ -21,23 +21,32 @@ namespace {
 /// Rays need values that far beyond an owned box, in spacings: a sample's interval may reach there.
 constexpr double reach = 0.5;
 
-/// Of a spacing: more than rounding and latticeTolerance move a face, less than what tells values apart.
+/// Of a spacing: more than rounding and latticeTolerance move a face, less than what tells values
+/// apart.
 constexpr double indexTolerance = 0.01;
 
 /// Per axis, for a mean over finer values; where there are more, these are taken among them.
 constexpr int mostParts = 16;
 
+/// Closed gaps and `reach` are within that many layers of the stored values.
+constexpr int mostLayers = 3;
+
+glm::ivec3 indexOf(const glm::dvec3& index, const Block& block) {
+  const glm::dvec3 beyond(mostLayers);
+  return glm::ivec3(glm::clamp(index, -beyond, glm::dvec3(block.dims) + beyond));
+}
+
 /// Values whose places are in the box, faces included.
 IndexBox valuesIn(const Box& box, const Block& block) {
-  return {glm::ivec3(glm::ceil((box.lo - block.origin) / block.spacing - indexTolerance)),
-          glm::ivec3(glm::floor((box.hi - block.origin) / block.spacing + indexTolerance)) + 1};
+  return {indexOf(glm::ceil((box.lo - block.origin) / block.spacing - indexTolerance), block),
+          indexOf(glm::floor((box.hi - block.origin) / block.spacing + indexTolerance) + 1.0, block)};
 }
 
 /// Values that are interpolated in the box and up to `reach` beyond.
 IndexBox valuesFor(const Box& box, const Block& block) {
   const double beyond = reach - indexTolerance;
-  return {glm::ivec3(glm::floor((box.lo - block.origin) / block.spacing - beyond)),
-          glm::ivec3(glm::ceil((box.hi - block.origin) / block.spacing + beyond)) + 1};
+  return {indexOf(glm::floor((box.lo - block.origin) / block.spacing - beyond), block),
+          indexOf(glm::ceil((box.hi - block.origin) / block.spacing + beyond) + 1.0, block)};
 }
 
 void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
@@ -51,8 +60,8 @@ void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
   boxes = std::move(rest);
 }
 
-/// What a rank asks another for: of the values `box` of a lattice, each the sum over those of its samples
-/// that lie in `clip`, [lo, hi). A value's samples are the middles of its parts.
+/// What a rank asks another for: of the values `box` of a lattice, each the sum over those of its
+/// samples that lie in `clip`, [lo, hi). A value's samples are the middles of its parts.
 struct Request {
   std::int32_t grid;    // on the rank that's asked
   std::int32_t round;   // in which it's answered
@@ -255,8 +264,8 @@ class Exchange {
   }
 
  private:
-  /// First what coincides with donors' own values, then what's interpolated in donors of this level or finer
-  /// ones, then in coarser ones, the coarsest first: each finds the layers that it needs.
+  /// First what coincides with donors' own values, then what's interpolated in donors of this level
+  /// or finer ones, then in coarser ones, the coarsest first: each finds the layers that it needs.
   static constexpr std::int32_t exactRound = 0;
   static constexpr std::int32_t interpolatedRound = 1;
   static constexpr std::int32_t firstCoarserRound = 2;
@@ -308,8 +317,8 @@ class Exchange {
     }
   }
 
-  /// Values around the stored ones, and stored ones that aren't the grid's own but would be interpolated with
-  /// them.
+  /// Values around the stored ones, and stored ones that aren't the grid's own but would be
+  /// interpolated with them.
   static void findWanted(Grid& grid) {
     const IndexBox stored = grid.block.stored();
     IndexBox all = stored;
@@ -345,8 +354,8 @@ class Exchange {
     // What the values stand for.
     const Box volume{grid.block.origin + (glm::dvec3(wanted.box.lo) - 0.5) * grid.block.spacing,
                      grid.block.origin + (glm::dvec3(wanted.box.hi) - 0.5) * grid.block.spacing};
-    // First those who own the place, the finest first; of a level those with values there before those that
-    // only close a gap. Then those who store it, where it's nobody's.
+    // First those who own the place, the finest first; of a level those with values there before
+    // those that only close a gap. Then those who store it, where it's nobody's.
     struct Claim {
       bool stored;
       std::int32_t level;
@@ -359,7 +368,8 @@ class Exchange {
     for (const std::size_t d : directory_.meeting(volume)) {
       const BlockEntry& donor = directory_.entries()[d];
       if (donor.rank == comm_.rank() && static_cast<std::size_t>(donor.grid) == gridIndex) continue;
-      // A little more, so that nothing is lost between faces and places that were computed differently.
+      // A little more, so that nothing is lost between faces and places that were computed
+      // differently.
       const glm::dvec3 spare = latticeTolerance * glm::min(donor.spacing, grid.block.spacing);
       const auto claim = [&](bool stored, bool gap, const Box& box) {
         claims.push_back({stored, levelNumber(donor), gap, d, {box.lo - spare, box.hi + spare}});

@@ -57,8 +57,8 @@ struct IndexBox {
   }
 };
 
-/// What `hole` leaves of `box`: disjoint boxes, six at most. Those below and above it in z are whole slices.
-/// For Box and IndexBox.
+/// What `hole` leaves of `box`: disjoint boxes, six at most. Those below and above it in z are
+/// whole slices. For Box and IndexBox.
 template <typename AnyBox>
 std::vector<AnyBox> without(const AnyBox& box, const AnyBox& hole) {
   const AnyBox common = box.intersection(hole);
@@ -78,8 +78,8 @@ std::vector<AnyBox> without(const AnyBox& box, const AnyBox& hole) {
   return rest;
 }
 
-/// Disjoint boxes that together are the cells of a lattice of `size` that are `open` (x fastest). Boxes grow
-/// along x, then y, then z, so that open cells that are a box stay one.
+/// Disjoint boxes that together are the cells of a lattice of `size` that are `open` (x fastest).
+/// Boxes grow along x, then y, then z, so that open cells that are a box stay one.
 std::vector<IndexBox> coverWithBoxes(const glm::ivec3& size, std::vector<bool> open);
 
 /// What `holes` leave of `box`, as few disjoint boxes whose faces are faces of `box` and `holes`.
