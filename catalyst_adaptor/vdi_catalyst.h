@@ -69,8 +69,16 @@ enum { VDI_CATALYST_POINTS = 0, VDI_CATALYST_CELLS = 1 };
 
 /* One block of a uniform lattice. `cells` counts cells per axis, ghost cells included; point arrays have one
  * value more per axis. `origin` is the lower corner of the first cell, ghost or not. Values lie x fastest,
- * then y, then z. Neighbours either share the points of their common face, or have ghost layers, or neither
- * (then a layer is exchanged between ranks). */
+ * then y, then z.
+ *
+ * Neighbours are blocks of any rank and any spacing. They may share the points of their common face,
+ * or end one cell apart (points), or meet at a face (cells). What a block needs of its neighbours'
+ * values is exchanged, whether it has ghost layers or not. Its own ghost layers are used beside blocks
+ * of equal spacing.
+ *
+ * Blocks of different spacing may overlap: the finest is shown. Blocks of equal spacing may not, except
+ * for ghost layers announced as such. By more than a thousandth of a cell it is an error that names both
+ * blocks. */
 typedef struct vdi_catalyst_block {
   int32_t cells[3];
   int32_t ghost_lo[3]; /* layers of ghost cells at the lower side of each axis */

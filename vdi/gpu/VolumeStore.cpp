@@ -106,11 +106,12 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
   std::vector<VolumePiece> pieces;
   std::vector<PieceRange> piecesOf;  // of each block
   // Blocks that share their values (the parts of a box with holes) share their pieces.
-  std::map<std::tuple<const void*, double, double, double>, PieceRange> known;
+  std::map<std::tuple<const void*, const void*, double, double, double>, PieceRange> known;
   for (const Block& block : step.blocks) {
     PieceRange range;
     if (!block.owned.empty()) {
-      const std::tuple key(block.data, block.origin.x, block.origin.y, block.origin.z);
+      const std::tuple key(block.data, static_cast<const void*>(block.patches.get()), block.origin.x,
+                           block.origin.y, block.origin.z);
       const auto [place, isNew] = known.try_emplace(key);
       if (isNew) {
         const std::vector<VolumePiece> parts = cutToPieces(*device_, block);
@@ -168,9 +169,8 @@ void VolumeStore::layBricks(Step& step, std::span<const PieceRange> piecesOf, co
         // An owned box may reach beyond the outermost values (cells do); only inner cuts bound a piece.
         double lo = block.owned.lo[axis];
         double hi = block.owned.hi[axis];
-        if (piece.first[axis] > 0) lo = std::max(lo, pieceOrigin[axis]);
-        const auto end = piece.first[axis] + static_cast<int>(piece.dims[axis]);
-        if (end < block.dims[axis])
+        if (piece.first[axis] > block.extended().lo[axis]) lo = std::max(lo, pieceOrigin[axis]);
+        if (piece.box().hi[axis] < block.extended().hi[axis])
           hi = std::min(hi, pieceOrigin[axis] + (piece.dims[axis] - 1) * block.spacing[axis]);
         brick.lo[axis] = snapToScene(scene, lo, axis);
         brick.hi[axis] = snapToScene(scene, hi, axis);
