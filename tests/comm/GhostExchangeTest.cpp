@@ -106,8 +106,9 @@ TEST_CASE("a missing corner is filled with the nearest own value") {
   const std::vector<Block> after = comm::exchangeGhosts(world, blocks);
   if (world.rank() != 0) return;
   const Block& block = after.front();
-  REQUIRE(block.extended() == IndexBox{glm::ivec3(0), {4, 4, 3}});
+  REQUIRE(block.extended() == IndexBox{glm::ivec3(0), {5, 5, 3}});
   CHECK(valueAt(block, 3, 1, 1) == 7.0);
+  CHECK(valueAt(block, 4, 1, 1) == 7.0);  // rays look slabReach beyond: two layers of cells
   CHECK(valueAt(block, 1, 3, 1) == 7.0);
   CHECK(valueAt(block, 3, 3, 1) == 5.0);
   CHECK(block.owned.hi == glm::dvec3(3.0));

@@ -8,6 +8,7 @@
 
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
+#include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
 #include "vdi/io/Png.h"
@@ -27,6 +28,11 @@ namespace {
 std::shared_ptr<gpu::Device> deviceAsGpu() {
   static const std::shared_ptr<gpu::Device> instance = test::makeDevice(true);
   return instance;
+}
+
+/// With the layers of values beyond their owned boxes that setBlocks gives them, too.
+std::vector<Block> withLayers(const std::vector<Block>& blocks) {
+  return comm::exchangeGhosts(comm::Communicator::serial(), blocks);
 }
 
 float largestDifference(const Image& a, const Image& b) {
@@ -105,7 +111,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
       const reference::Frame frame(generator.scene(), camera, function, settings);
 
       const auto image = generator.renderVolume(camera, function, settings);
-      const Image expected = reference::renderVolume(frame, dealt.mine);
+      const Image expected = reference::renderVolume(frame, withLayers(dealt.mine));
       CHECK(largestDifference(*image, expected) < 0.5F);
       CHECK(depthsThatDiffer(*image, expected, 1e-3F) <= image->depth.size() / 100);
 
@@ -115,7 +121,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
         GenerateSettings own = settings;
         own.algorithm = algorithm;
         const reference::Frame ownFrame(generator.scene(), camera, function, own);
-        const SupersegmentLists lists = reference::generate(ownFrame, dealt.mine, false);
+        const SupersegmentLists lists = reference::generate(ownFrame, withLayers(dealt.mine), false);
         CHECK(lists.segments.size() > lists.listCount());
         own.precision = Precision::Full;
         const auto full = generator.generate(camera, function, own);
@@ -166,7 +172,7 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
     settings.supersegments = top == 80.0 ? 6 : top == 30.0 ? 1 : 3;
     const TransferFunction function = test::threeHues(top);
     const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
-    const Image expected = reference::renderVolume(frame, dealt.mine);
+    const Image expected = reference::renderVolume(frame, withLayers(dealt.mine));
     CHECK(largestDifference(*generator.renderVolume(test::oblique(), function, settings), expected) <
           byFilter(0.5F, 2.0F));
     for (const Algorithm algorithm : algorithms) {
@@ -174,7 +180,7 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
       GenerateSettings own = settings;
       own.algorithm = algorithm;
       const reference::Frame ownFrame(generator.scene(), test::oblique(), function, own);
-      const SupersegmentLists lists = reference::generate(ownFrame, dealt.mine, false);
+      const SupersegmentLists lists = reference::generate(ownFrame, withLayers(dealt.mine), false);
       const auto vdi = generator.generate(test::oblique(), function, own);
       CHECK(listsThatDiffer(vdi->expandedLists(), lists) <= lists.listCount() / 50);
     }
@@ -234,11 +240,13 @@ TEST_CASE("rays go on behind material of opacity 1, unless they're to end") {
     settings.terminationOpacity = termination;
     const auto vdi = generator.generate(test::oblique(), function, settings);
     const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
-    const SupersegmentLists expected = reference::generate(frame, dealt.mine, false);
+    const SupersegmentLists expected = reference::generate(frame, withLayers(dealt.mine), false);
     CHECK(listsThatDiffer(vdi->expandedLists(), expected) <=
           expected.listCount() / byFilter<std::size_t>(50, 4));
-    CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, dealt.mine)) <
-          byFilter(1.0F, 4.0F));
+    // A device takes values at the scene's faces up to 2/256 of a voxel inside (VolumeStore.cpp); what's
+    // opaque there shows the colour of just that place.
+    CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, withLayers(dealt.mine))) <
+          byFilter(2.0F, 4.0F));
     counts.push_back(vdi->supersegmentCount());
   }
   CHECK(counts[1] > 2 * counts[0]);
@@ -476,9 +484,9 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   const auto vdi = generator.generate(test::oblique(), function, settings);
   CHECK_NOTHROW(validate(*vdi));
   const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
-  const SupersegmentLists expected = reference::generate(frame, dealt.mine, false);
+  const SupersegmentLists expected = reference::generate(frame, withLayers(dealt.mine), false);
   CHECK(listsThatDiffer(vdi->expandedLists(), expected) <= expected.listCount() / 50);
-  CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, dealt.mine)) < 1.0F);
+  CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, withLayers(dealt.mine))) < 1.0F);
   const double share =
       static_cast<double>(vdi->supersegmentCount()) / static_cast<double>(equal->supersegmentCount());
   CHECK(share == Approx(fill).epsilon(0.05));

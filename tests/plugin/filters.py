@@ -62,11 +62,13 @@ for source in (image, read):
 rendered.Resolution = [64, 64]
 check(picture(rendered).shape == (64, 64, 3), "RenderVDI renders at any resolution")
 volume = picture(vdi_of(wavelet, PictureOnly=1)).astype(int)
-check(np.abs(volume - flat).max() <= 1, "from V_O a VDI is the volume's own picture")
+# Straight colour and opacity are bytes, each within 1 of the volume's: over black that makes 2.
+worst = np.abs(volume - flat).max()
+check(worst <= 2, "from V_O a VDI is the volume's own picture, off by %d" % worst)
 for precision in ("Full", "Compact"):
     searched = picture(vdi_of(wavelet, Algorithm="Bisection", Supersegments=2, Precision=precision))
     worst = np.abs(searched - volume).max()
-    check(worst <= 1, "so it is by bisection, in %s precision, off by %d" % (precision.lower(), worst))
+    check(worst <= 2, "so it is by bisection, in %s precision, off by %d" % (precision.lower(), worst))
 by_need = vdi_of(wavelet, Supersegments=6, Budget="Total", Fill=0.5)
 check(np.abs(picture(by_need) - volume).max() <= 1, "so it is with a total budget")
 equal_share = vdi_of(wavelet, Supersegments=6)

@@ -13,13 +13,14 @@
 #include <utility>
 
 #include "vdi/comm/BlockDirectory.h"
+#include "vdi/core/Scene.h"
 
 namespace vdi::comm {
 
 namespace {
 
-/// Rays need values that far beyond an owned box, in spacings: a sample's interval may reach there.
-constexpr double reach = 0.5;
+/// Rays need values that far beyond an owned box, in spacings.
+constexpr double reach = slabReach;
 
 /// Of a spacing: more than rounding and latticeTolerance move a face, less than what tells values
 /// apart.

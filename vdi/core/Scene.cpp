@@ -64,7 +64,7 @@ bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& l
     const glm::dvec3 size = glm::abs(ray.direction);
     longest = std::max({longest, size.x, size.y, size.z});
   }
-  return 0.5 * lattice.step * longest <= scene.minSpacing;
+  return 0.5 * lattice.step * longest <= slabReach * scene.minSpacing;
 }
 
 }  // namespace vdi

@@ -39,9 +39,12 @@ struct DepthLattice {
 /// [1/64, 64] or when a ray would need more than 2^24 samples.
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel);
 
-/// Whether samples are classified by what lies between their two ends, rather than by the scalar in their
-/// middle: where half a sample is no longer than the finest voxel, for beyond its owned box a block has one
-/// layer of values. That's so from about half a sample per voxel on.
+/// How far beyond its owned box a block has values, in its spacings, where it has neighbours.
+inline constexpr double slabReach = 0.9;
+
+/// Whether samples are slabs, classified by what lies between their two ends, rather than by the scalar in
+/// their middle. They are unless half a sample is longer than slabReach of the finest voxel: from somewhat
+/// more than half a sample per voxel on.
 bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice);
 
 }  // namespace vdi

@@ -70,6 +70,13 @@ glm::dvec4 integrate(const Integral& integral, double front, double back, double
   return sum;
 }
 
+/// Rounding leaves no colour brighter than white.
+glm::u16vec4 texelOf(const glm::dvec4& slab) {
+  const glm::u16vec4 half = toHalf(glm::vec4(slab));
+  // Half floats that aren't negative are in the order of their bits.
+  return glm::min(half, glm::u16vec4(half.a));
+}
+
 }  // namespace
 
 std::size_t SlabTable::stripRows() const {
@@ -120,8 +127,7 @@ SlabTable makeSlabTable(const TransferTable& transfer, float length) {
   };
   inParallel(table.height(), 16, [&](std::size_t first, std::size_t end) {
     for (std::size_t y = first; y < end; ++y) {
-      for (std::size_t x = 0; x < slabSide; ++x)
-        table.texels[y * slabSide + x] = toHalf(glm::vec4(texelAt(x, y)));
+      for (std::size_t x = 0; x < slabSide; ++x) table.texels[y * slabSide + x] = texelOf(texelAt(x, y));
     }
   });
   return table;
