@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "catalyst_adaptor/Engine.h"
+#include "catalyst_adaptor/ScriptEnvironment.h"
 
 struct vdi_catalyst {
   MPI_Comm comm = MPI_COMM_NULL;  // a duplicate
@@ -209,6 +210,12 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
   });
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { demandEqualCounts(self->comm, script_count); });
+  }
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(*self, VDI_CATALYST_ENGINE, [] {
+      vdi::catalyst::providePlugin();
+      vdi::catalyst::sharePython();
+    });
   }
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
