@@ -3,7 +3,7 @@
 # Warnings and sanitizers for one target of ours.
 function(vdi_target_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra)
-  target_include_directories(${target} PUBLIC "${CMAKE_SOURCE_DIR}")
+  target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}>")
   if(VDI_SANITIZE)
     target_compile_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE} -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE})
