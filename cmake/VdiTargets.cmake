@@ -49,7 +49,6 @@ function(vdi_add_catch_test name)
   endif()
 endfunction()
 
-# The environment that every test needs: mpirun as root in a container, no interference between ranks on few cores.
 # vdi_virtual_screen(<variable>): a command prefix that gives what follows an X server. Each has a number of its own to start
 # from: a server that is still ending takes the next one's socket away if that has the same number. And none starts anew when
 # its last client has left (-noreset): another rank that comes just then would find no server.
@@ -62,12 +61,12 @@ function(vdi_virtual_screen variable)
   set(${variable} "${XVFB_RUN}" -a -n ${number} -s "-screen 0 1280x1024x24 -noreset" PARENT_SCOPE)
 endfunction()
 
+# vdi_test_properties(<test> TIMEOUT seconds [LABELS ...] [ENVIRONMENT ...]): those, and the environment that every test needs:
+# mpirun as root in a container, no interference between ranks on few cores.
 function(vdi_test_properties test)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "LABELS;ENVIRONMENT")
+  set(mpi OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
+          OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_vader_single_copy_mechanism=none)
   set_tests_properties(
-    ${test}
-    PROPERTIES
-      TIMEOUT "${arg_TIMEOUT}" LABELS "${arg_LABELS}" ENVIRONMENT
-      "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1;OMPI_MCA_btl_vader_single_copy_mechanism=none;${arg_ENVIRONMENT}"
-  )
+    ${test} PROPERTIES TIMEOUT "${arg_TIMEOUT}" LABELS "${arg_LABELS}" ENVIRONMENT "${mpi};${arg_ENVIRONMENT}")
 endfunction()

@@ -107,7 +107,10 @@ for step in 0 1 2; do
   python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "step $step isn't itself"
 done
 works "info" "$vdi" info steps_0009.vdi
-grep -q "step 9" out.txt && grep -q "0.75" out.txt || { fail "info doesn't tell step and time"; cat out.txt; }
+if ! grep -q "step 9" out.txt || ! grep -q "0.75" out.txt; then
+  fail "info doesn't tell step and time"
+  cat out.txt
+fi
 refused 1 "s9.raw" "$vdi" generate --raw s0.json s9.json --resolution 40x30 -o x.vdi
 refused 1 "long.json|v.raw" "$vdi" generate --raw long.json -o x.vdi
 refused 1 "u12" "$vdi" generate --raw type.json -o x.vdi
@@ -124,5 +127,5 @@ refused 2 "0x5" "$vdi" generate --field sphere --resolution 0x5 -o x.vdi
 refused 2 "" "$vdi" frobnicate
 refused 1 "nothing-like-this" env VDI_DEVICE=nothing-like-this "$vdi" generate --field sphere "${small[@]}" -o x.vdi
 refused 1 "no-such-folder" "$vdi" generate --field sphere "${small[@]}" -o no-such-folder/x.vdi
-[ ! -e x.vdi ] && [ ! -e x.png ] || fail "a refused command left a file"
+if [ -e x.vdi ] || [ -e x.png ]; then fail "a refused command left a file"; fi
 exit $((failures > 0))

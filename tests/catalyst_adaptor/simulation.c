@@ -1,5 +1,5 @@
-/* A simulation in C: one block of 8-bit point data a rank, along x. Arguments: the script, then the code that each step
- * must return. Exit status 0 if all did and the error's text was there just when it had to be. */
+/* A simulation in C: one block of 8-bit point data a rank, along x. Arguments: the script, then the code that
+ * each step must return. Exit status 0 if all did and the error's text was there just when it had to be. */
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -46,7 +46,8 @@ int main(int argc, char** argv) {
   vdi_catalyst* second = NULL;
   wrong += expect(rank, "a second initialize", VDI_CATALYST_ENGINE,
                   vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, scripts, &second));
-  wrong += expect(rank, "execute before blocks", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_execute(catalyst, 0, 0.0));
+  wrong += expect(rank, "execute before blocks", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_execute(catalyst, 0, 0.0));
 
   vdi_catalyst_block block = {{N, N, N}, {0, 0, 0}, {0, 0, 0}, {(double)rank * N, 0.0, 0.0}, {1.0, 1.0, 1.0}};
   const vdi_catalyst_block good = block;
@@ -67,7 +68,8 @@ int main(int argc, char** argv) {
     if (code != VDI_CATALYST_OK) wrong += expect(rank, "the error's text", 1, told);
   }
   vdi_catalyst_finalize(catalyst);
-  wrong += expect(rank, "execute without a handle", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_execute(NULL, 1, 0.0));
+  wrong +=
+      expect(rank, "execute without a handle", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_execute(NULL, 1, 0.0));
   MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
   MPI_Finalize();
   return wrong == 0 ? 0 : 1;
