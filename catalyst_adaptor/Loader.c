@@ -1,6 +1,5 @@
 /* libvdi_catalyst.so: what a simulation links. It is small, and loads the engine with ParaView when it is
  * initialised, so that a simulation that doesn't use it doesn't pay for ParaView. */
-#define _GNU_SOURCE /* dladdr */
 #include <dlfcn.h>
 #include <fenv.h>
 #include <mpi.h>
@@ -87,7 +86,7 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
   }
   char message[MESSAGE_SIZE] = "";
   const int failed = load_engine(message);
-  if (failed_anywhere(comm, failed, message)) return VDI_CATALYST_ENGINE;
+  if (failed_anywhere(comm, failed, message) || engine == NULL) return VDI_CATALYST_ENGINE;
   return engine->initialize(fortran_communicator, script_count, scripts, catalyst);
 }
 
