@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "apps/Bench.h"
+#include "apps/BenchCompare.h"
+#include "apps/JsonFile.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::apps {
@@ -16,11 +16,12 @@ namespace {
 using nlohmann::json;
 
 json readBench(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file) throw Error(ErrorCode::Io, "can't read the file", path.string());
-  json document = json::parse(file, nullptr, false);
-  if (!document.is_object() || !document.contains("rows") || !document["rows"].is_array())
-    throw Error(ErrorCode::Format, "not a result of vdi bench", path.string());
+  json document = readJson(path);
+  const auto isObject = [](const json& row) { return row.is_object(); };
+  const bool sound = document.is_object() && document.contains("rows") && document["rows"].is_array() &&
+                     std::all_of(document["rows"].begin(), document["rows"].end(), isObject) &&
+                     document.contains("device") && document["device"].is_string();
+  if (!sound) throw Error(ErrorCode::Format, "not a result of vdi bench", path.string());
   return document;
 }
 
@@ -76,6 +77,7 @@ int compareBenches(const std::filesystem::path& before, const std::filesystem::p
     if (wasBytes >= 0.0 && isBytes > 1.05 * wasBytes) tell(key, "stored_bytes", wasBytes, isBytes);
     const double wasSsim = figure(found->second, "ssim");
     const double isSsim = figure(row, "ssim");
+    if (figure(found->second, "truth_rate") != figure(row, "truth_rate")) continue;  // other pictures
     if (wasSsim >= 0.0 && isSsim >= 0.0 && isSsim < wasSsim - 0.002) tell(key, "ssim", wasSsim, isSsim);
   }
   fmt::print(out, "{} rows compared, {} figures got worse{}\n", compared, worse,

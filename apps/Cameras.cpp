@@ -52,7 +52,7 @@ Camera orbitCamera(const Box& bounds, const Orbit& orbit, double viewAngle) {
 }
 
 Camera turned(const Camera& camera, double azimuthDegrees, double elevationDegrees) {
-  Camera result = azimuthDegrees == 0.0 ? camera : camera.azimuth(azimuthDegrees);
+  Camera result = camera.azimuth(azimuthDegrees);
   if (elevationDegrees == 0.0) return result;
   const View view(result, 1, 1);
   const double angle = radians(elevationDegrees);

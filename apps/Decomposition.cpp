@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <random>
-#include <type_traits>
 #include <utility>
 
 #include "vdi/core/Error.h"
@@ -97,38 +95,6 @@ Block blockOf(const Lattice& lattice, const Part& part, const std::shared_ptr<st
                     : Block::fromPoints(part.dims, origin, lattice.spacing, lattice.type, data.get());
   block.keepAlive = std::shared_ptr<const void>(data, data.get());
   return block;
-}
-
-void storeValue(ScalarType type, void* data, std::size_t index, double value) {
-  const auto store = [&](auto zero) {
-    using T = decltype(zero);
-    auto* values = static_cast<T*>(data);
-    if constexpr (std::is_integral_v<T>) {
-      const double low = static_cast<double>(std::numeric_limits<T>::lowest());
-      const double high = static_cast<double>(std::numeric_limits<T>::max());
-      values[index] = static_cast<T>(std::clamp(std::round(value), low, high));
-    } else {
-      values[index] = static_cast<T>(value);
-    }
-  };
-  switch (type) {
-    case ScalarType::U8:
-      return store(std::uint8_t{});
-    case ScalarType::I8:
-      return store(std::int8_t{});
-    case ScalarType::U16:
-      return store(std::uint16_t{});
-    case ScalarType::I16:
-      return store(std::int16_t{});
-    case ScalarType::U32:
-      return store(std::uint32_t{});
-    case ScalarType::I32:
-      return store(std::int32_t{});
-    case ScalarType::F32:
-      return store(float{});
-    case ScalarType::F64:
-      return store(double{});
-  }
 }
 
 }  // namespace vdi::apps

@@ -53,8 +53,6 @@ Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt);
 
 /// The block that has these values and keeps them.
 Block blockOf(const Lattice& lattice, const Part& part, const std::shared_ptr<std::byte[]>& data);
-/// Writes one value of the given type.
-void storeValue(ScalarType type, void* data, std::size_t index, double value);
 
 /// Calls use(0) .. use(layers - 1), from several threads at once if there are many values in them.
 template <typename Use>

@@ -2,11 +2,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <exception>
 #include <filesystem>
 #include <future>
 
 #include "apps/Commands.h"
+#include "apps/Help.h"
+#include "apps/OutputFiles.h"
+#include "apps/RawVolume.h"
 #include "apps/Source.h"
+#include "vdi/core/Error.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -30,9 +36,11 @@ struct Options {
 
   bool wantsVdi() const { return volume.empty() || !output.empty() || !flat.empty(); }
   std::size_t steps() const { return std::max<std::size_t>(raws.size(), 1); }
+  std::uint64_t number(std::size_t index) const { return step + index; }
+  double timeOf(std::size_t index) const { return time + static_cast<double>(index) * interval; }
   /// Of the index-th step: picture.png of step 7 is picture_0007.png, when there are several.
   std::filesystem::path numbered(const std::filesystem::path& path, std::size_t index) const {
-    return steps() == 1 ? path : withSuffix(path, fmt::format("{:04}", step + index));
+    return steps() == 1 ? path : withSuffix(path, fmt::format("{:04}", number(index)));
   }
 };
 
@@ -55,8 +63,8 @@ struct Shot {
 };
 
 void writeVdiFiles(const Options& options, std::size_t index, Vdi& vdi, const VdiGenerator& generator) {
-  vdi.time = options.time + static_cast<double>(index) * options.interval;
-  vdi.timeStep = options.step + index;
+  vdi.time = options.timeOf(index);
+  vdi.timeStep = options.number(index);
   if (!options.output.empty()) io::writeVdi(options.numbered(options.output, index), vdi);
   if (!options.flat.empty()) io::writePng(options.numbered(options.flat, index), io::toPicture(flatten(vdi)));
   fmt::print("{} x {} lists, {} supersegments, on {}\n", vdi.width, vdi.height, vdi.supersegmentCount(),
@@ -84,44 +92,120 @@ void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGener
   });
 }
 
-void generate(const Options& options, const comm::Communicator& world) {
-  Shot shot;
-  std::shared_ptr<gpu::Device> device;
-  std::vector<Block> first;
-  const auto read = [&](std::size_t index) {
-    return rawBlocks(options.raws[index], options.deal, world.rank(), world.size());
-  };
-  world.together([&] {
-    shot.settings = makeSettings(options.quality);
-    device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
-    first = options.raws.empty()
-                ? fieldBlocks(options.field, options.deal, device, world.rank(), world.size())
-                : read(0);
-  });
-  VdiGenerator generator(device, comm::Communicator::world());
-  generator.setBlocks(std::move(first));
-  world.together([&] {
-    shot.camera = makeCamera(options.view, generator.scene());
-    shot.function = makeTransferFunction(options.quality, generator.scene(), generator.scalarRange());
-  });
-  // While a step's frame is made, the next one's values get to the device, and those behind it are read.
-  std::future<std::vector<Block>> reading;
-  const auto startReading = [&](std::size_t index) {
-    if (index < options.steps())
-      reading = std::async(std::launch::async | std::launch::deferred, read, index);
-  };
-  startReading(1);
-  for (std::size_t index = 0; index < options.steps(); ++index) {
-    const bool more = index + 1 < options.steps();
-    if (more) {
-      std::vector<Block> next;
-      world.together([&] { next = reading.get(); });
-      generator.setNextBlocks(std::move(next));
-      startReading(index + 2);
-    }
-    shoot(options, index, shot, generator, world);
-    if (more) generator.advance();
+/// What can be known before anything takes time. Throws Error.
+void requireSound(const Options& options) {
+  const std::size_t last = options.steps() - 1;
+  if (options.number(last) < last) {
+    throw Error(ErrorCode::InvalidArgument, "the last time step's number is beyond 2^64 - 1", "--step");
   }
+  if (!std::isfinite(options.timeOf(0)) || !std::isfinite(options.timeOf(last))) {
+    throw Error(ErrorCode::InvalidArgument, "the time must be finite", "--time, --interval");
+  }
+}
+
+/// Throws Error if something can't be written, or would be written over something that's read.
+void requireOutputs(const Options& options) {
+  std::vector<NamedFile> inputs{{"--camera", options.view.camera.file},
+                                {"--transfer-function", options.quality.transferFunction}};
+  for (const std::string& sidecar : options.raws) {
+    inputs.push_back({"--raw", sidecar});
+    try {
+      inputs.push_back({"the raw volume", readSidecar(sidecar).data});
+    } catch (const Error&) {  // which is told when it's this step's turn
+    }
+  }
+  std::vector<NamedFile> outputs;
+  const auto add = [&](const char* option, const std::string& path) {
+    for (std::size_t index = 0; index < options.steps() && !path.empty(); ++index)
+      outputs.push_back({option, options.numbered(path, index)});
+  };
+  add("-o", options.output);
+  add("--flat", options.flat);
+  add("--dvr", options.volume);
+  requireOutputs(outputs, inputs);
+}
+
+/// Makes the VDIs of all time steps that can be read. Collective, as its functions are.
+class Series {
+ public:
+  Series(const Options& options, const comm::Communicator& world, std::shared_ptr<gpu::Device> device)
+      : options_(options),
+        world_(world),
+        device_(std::move(device)),
+        generator_(device_, comm::Communicator::world()) {}
+
+  /// Throws the error of the first step that can't be read, once all others are written. The first step of
+  /// all must be sound: camera and transfer function are made for it.
+  void make(const GenerateSettings& settings) {
+    Shot shot;
+    shot.settings = settings;
+    startReading(0);
+    generator_.setBlocks(finishReading());
+    world_.together([&] {
+      shot.camera = makeCamera(options_.view, generator_.scene());
+      shot.function = makeTransferFunction(options_.quality, generator_.scene(), generator_.scalarRange());
+    });
+    // While a step's frame is made, the next one's values get to the device, and those behind it are read.
+    startReading(1);
+    for (std::size_t index = 0; index < options_.steps();) {
+      std::size_t next = index + 1;
+      while (next < options_.steps() && !setNext(next)) ++next;
+      shoot(options_, index, shot, generator_, world_);
+      if (next < options_.steps()) generator_.advance();
+      index = next;
+    }
+    if (firstBad_) std::rethrow_exception(firstBad_);
+  }
+
+ private:
+  std::vector<Block> read(std::size_t index) const {
+    return options_.raws.empty()
+               ? fieldBlocks(options_.field, options_.deal, device_, world_.rank(), world_.size())
+               : rawBlocks(options_.raws[index], options_.deal, world_.rank(), world_.size());
+  }
+  void startReading(std::size_t index) {
+    if (index >= options_.steps()) return;
+    reading_ = std::async(std::launch::async | std::launch::deferred, [this, index] { return read(index); });
+  }
+  std::vector<Block> finishReading() {
+    std::vector<Block> blocks;
+    world_.together([&] { blocks = reading_.get(); });
+    return blocks;
+  }
+  /// False: the step is bad. Starts to read the one behind it in any case.
+  bool setNext(std::size_t index) {
+    std::exception_ptr bad;
+    try {
+      generator_.setNextBlocks(finishReading());
+    } catch (const Error& error) {
+      const std::string what = fmt::format("time step {}: {}", options_.number(index), error.what());
+      bad = std::make_exception_ptr(Error(error.code(), what));
+    } catch (...) {  // on this rank; Error on the others
+      bad = std::current_exception();
+    }
+    if (!firstBad_) firstBad_ = bad;
+    startReading(index + 1);
+    return !bad;
+  }
+
+  const Options& options_;
+  const comm::Communicator& world_;
+  std::shared_ptr<gpu::Device> device_;
+  VdiGenerator generator_;
+  std::exception_ptr firstBad_;
+  std::future<std::vector<Block>> reading_;  // waits at its end, so it comes last
+};
+
+void generate(const Options& options, const comm::Communicator& world) {
+  GenerateSettings settings;
+  std::shared_ptr<gpu::Device> device;
+  world.together([&] {
+    settings = makeSettings(options.quality);
+    requireSound(options);
+    if (world.rank() == 0) requireOutputs(options);
+    device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
+  });
+  Series(options, world, std::move(device)).make(settings);
 }
 
 }  // namespace
@@ -155,7 +239,7 @@ void addGenerate(CLI::App& app, Job& job) {
   addViewOptions(*command, options->view);
   addQualityOptions(*command, options->quality);
   const auto addFile = [&](const char* name, std::string& file, const char* description) {
-    command->add_option(name, file, description)->type_name("FILE")->group("Output");
+    command->add_option(name, file, description)->check(requireFileName)->type_name("FILE")->group("Output");
   };
   addFile("-o,--output", options->output, "the .vdi file to write");
   addFile("--flat", options->flat, "PNG of the VDI seen from its own viewpoint");
@@ -167,6 +251,7 @@ void addGenerate(CLI::App& app, Job& job) {
       ->capture_default_str()
       ->group("Output");
   command->add_option("--step", options->step, "number of the first time step, kept in the file")
+      ->check(requireWholeNumber)
       ->capture_default_str()
       ->group("Output");
   command->callback([options, &job] {

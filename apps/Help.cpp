@@ -1,6 +1,9 @@
 #include "apps/Help.h"
 
+#include <charconv>
+#include <cstdint>
 #include <sstream>
+#include <system_error>
 
 namespace vdi::apps {
 
@@ -57,6 +60,18 @@ std::string HelpFormatter::make_option_desc(const CLI::Option* option) const {
 std::string demandPositive(const std::string& text) {
   double value = 0.0;
   return CLI::detail::lexical_cast(text, value) && value > 0.0 ? "" : "must be > 0, it is " + text;
+}
+
+std::string requireFileName(const std::string& text) {
+  return text.empty() ? "must name a file" : "";
+}
+
+std::string requireWholeNumber(const std::string& text) {
+  std::uint64_t value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [after, error] = std::from_chars(text.data(), end, value);
+  const bool good = error == std::errc() && after == end;
+  return good ? "" : "must be a whole number from 0 to 2^64 - 1, it is " + text;
 }
 
 }  // namespace vdi::apps

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/Cameras.h"
 #include "apps/Commands.h"
+#include "apps/OutputFiles.h"
 #include "apps/Source.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
+#include "vdi/core/Viewpoint.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -28,17 +31,31 @@ struct RenderOptions {
   std::string reconstruction = "smooth";
 };
 
+/// The picture of one of the azimuths: with several their degrees are added to its name.
+std::filesystem::path pictureOf(const RenderOptions& options, double azimuth) {
+  if (options.azimuths.size() == 1) return options.output;
+  return withSuffix(options.output, fmt::format("{:g}deg", azimuth));
+}
+
 void render(const RenderOptions& options) {
+  std::vector<NamedFile> outputs;
+  for (const double azimuth : options.azimuths)
+    outputs.push_back({fmt::format("the picture of {} degrees", azimuth), pictureOf(options, azimuth)});
+  requireOutputs(outputs, {{"the VDI", options.input}, {"--camera", options.camera.file}});
   const Vdi vdi = io::readVdi(options.input);
   const std::vector<int> size = options.resolution.empty() ? std::vector<int>{vdi.width, vdi.height}
                                                            : parseSizes(options.resolution, 2);
   const Reconstruction reconstruction = reconstructionFromString(options.reconstruction);
   VdiRenderer renderer(gpu::Device::create(gpu::requestFromEnvironment(0)));
   renderer.setVdi(vdi);
+  const Camera start = chosenCamera(options.camera, vdi.camera);
+  std::set<ViewpointIssue> warned;
   for (const double azimuth : options.azimuths) {
-    const Camera camera = turned(chosenCamera(options.camera, vdi.camera), azimuth, options.elevation);
-    std::filesystem::path path = options.output;
-    if (options.azimuths.size() > 1) path = withSuffix(path, fmt::format("{:g}deg", azimuth));
+    const Camera camera = turned(start, azimuth, options.elevation);
+    const auto issue = viewpointIssue(vdi.bounds, vdi.camera, View(camera, size[0], size[1]));
+    if (issue && warned.insert(*issue).second)
+      fmt::print(stderr, "vdi: warning, at {} degrees: {}\n", azimuth, describe(*issue));
+    const std::filesystem::path path = pictureOf(options, azimuth);
     io::writePng(path, io::toPicture(renderer.renderBytes(camera, size[0], size[1], Alpha::Premultiplied,
                                                           reconstruction)));
     fmt::print("{}: {:.2f} ms on the device\n", path.string(), renderer.renderMilliseconds());
@@ -125,7 +142,8 @@ void addRender(CLI::App& app, Job& job) {
   addCameraOptions(*command, options->camera, "the one that the VDI was made for");
   command
       ->add_option("--azimuth", options->azimuths,
-                   "degrees to turn the camera about its focal point; several make several pictures")
+                   "degrees to turn the camera about its focal point, around its view-up as set (vtkCamera's "
+                   "Azimuth); several make several pictures")
       ->type_name("DEG")
       ->capture_default_str()
       ->group("Viewpoint");

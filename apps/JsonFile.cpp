@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <limits>
 #include <utility>
 
 #include "vdi/core/Error.h"
+#include "vdi/io/Files.h"
 
 namespace vdi::apps {
 
@@ -30,16 +30,32 @@ std::string joined(const std::set<std::string>& names) {
 
 }  // namespace
 
-JsonFile::JsonFile(std::filesystem::path path, const std::set<std::string>& known) : path_(std::move(path)) {
-  std::ifstream file(path_);
-  if (!file || !std::filesystem::is_regular_file(path_)) {
-    throw Error(ErrorCode::Io, "can't open the file", path_.string());
-  }
+json readJson(const std::filesystem::path& path) {
+  const auto fail = [&](const std::string& what) { throw Error(ErrorCode::Format, what, path.string()); };
+  const io::InputFile file(path);
+  constexpr std::uint64_t mostBytes = std::uint64_t{256} << 20;  // a picture or volume given by mistake
+  if (file.size() > mostBytes) fail(fmt::format("{} bytes are too many for JSON", file.size()));
+  const std::vector<std::byte> bytes = file.readAll();
+  std::vector<std::set<std::string>> open;  // the names so far of each object that is being read
+  const auto noteNames = [&](int, json::parse_event_t event, const json& value) {
+    if (event == json::parse_event_t::object_start) open.emplace_back();
+    if (event == json::parse_event_t::object_end) open.pop_back();
+    if (event == json::parse_event_t::key && !open.back().insert(value.get<std::string>()).second) {
+      fail(fmt::format("the field '{}' stands there twice", value.get<std::string>()));
+    }
+    return true;
+  };
   try {
-    object_ = json::parse(file);
+    const auto* const text = reinterpret_cast<const char*>(bytes.data());
+    return json::parse(text, text + bytes.size(), noteNames);
   } catch (const json::exception& error) {
     fail(fmt::format("not valid JSON: {}", error.what()));
   }
+  return {};
+}
+
+JsonFile::JsonFile(std::filesystem::path path, const std::set<std::string>& known)
+    : path_(std::move(path)), object_(readJson(path_)) {
   if (!object_.is_object()) fail("not a JSON object");
   for (const auto& [key, value] : object_.items()) {
     if (!known.contains(key)) fail(fmt::format("unknown field '{}'; there are {}", key, joined(known)));

@@ -11,10 +11,13 @@
 
 namespace vdi::apps {
 
+/// The document in a file. Throws Error: Io if it can't be read; Format if it isn't JSON or an object has two
+/// fields of one name. Both have the path as context.
+nlohmann::json readJson(const std::filesystem::path& path);
+
 class JsonFile {
  public:
-  /// Throws Error: Io if the file can't be read; Format if it isn't one JSON object or has a field that isn't
-  /// among `known`.
+  /// Throws Error: as readJson; Format if it isn't one JSON object or has a field that isn't among `known`.
   JsonFile(std::filesystem::path path, const std::set<std::string>& known);
 
   const std::filesystem::path& path() const { return path_; }

@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <fstream>
-#include <system_error>
 
 #include "apps/JsonFile.h"
 #include "vdi/core/Error.h"
+#include "vdi/io/Files.h"
 
 namespace vdi::apps {
 
@@ -37,9 +36,7 @@ Lattice readLattice(const JsonFile& sidecar) {
 }
 
 void demandSize(const JsonFile& sidecar, const RawVolume& volume) {
-  std::error_code error;
-  const std::uintmax_t bytes = std::filesystem::file_size(volume.data, error);
-  if (error) throw Error(ErrorCode::Io, "can't open the raw file", volume.data.string());
+  const std::uint64_t bytes = io::InputFile(volume.data).size();
   const glm::dvec3 dims(volume.lattice.size);
   const double wanted = dims.x * dims.y * dims.z * static_cast<double>(sizeOf(volume.lattice.type)) +
                         static_cast<double>(volume.skip);
@@ -71,7 +68,7 @@ Block readPart(const RawVolume& volume, const Part& part) {
   const std::size_t total =
       row * static_cast<std::size_t>(part.dims.y) * static_cast<std::size_t>(part.dims.z);
   const std::shared_ptr<std::byte[]> data(new std::byte[total]);
-  std::ifstream file(volume.data, std::ios::binary);
+  const io::InputFile file(volume.data);
   std::byte* to = data.get();
   const glm::u64vec3 whole(volume.lattice.size);
   const glm::u64vec3 first(part.first);
@@ -79,12 +76,10 @@ Block readPart(const RawVolume& volume, const Part& part) {
     for (int y = 0; y < part.dims.y; ++y) {
       const std::uint64_t line =
           (first.z + static_cast<std::uint64_t>(z)) * whole.y + first.y + static_cast<std::uint64_t>(y);
-      file.seekg(static_cast<std::streamoff>(volume.skip + (line * whole.x + first.x) * size));
-      file.read(reinterpret_cast<char*>(to), static_cast<std::streamsize>(row));
+      file.readInto(volume.skip + (line * whole.x + first.x) * size, {to, row});
       to += row;
     }
   }
-  if (!file) throw Error(ErrorCode::Io, "can't read the raw file", volume.data.string());
   if (volume.bigEndian != (std::endian::native == std::endian::big)) {
     for (std::size_t i = 0; i < total; i += size) std::reverse(data.get() + i, data.get() + i + size);
   }

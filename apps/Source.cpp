@@ -163,6 +163,7 @@ void addCameraOptions(CLI::App& command, CameraOptions& options, const std::stri
   command
       .add_option("--camera", options.file,
                   "JSON file of the camera (docs/raw-volumes.md); default: " + otherwise)
+      ->check(requireFileName)
       ->type_name("FILE")
       ->group(viewGroup);
   const auto addVector = [&](const char* name, std::vector<double>& value, const char* description) {
@@ -223,7 +224,8 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene) {
   Orbit orbit = options.orbit;
   if (!options.camera.viewUp.empty()) {
     orbit.up = vectorOf(options.camera.viewUp);
-    if (!(glm::length(orbit.up) > 0.0)) throw Error(ErrorCode::InvalidArgument, "--view-up is zero");
+    if (!(glm::length(orbit.up) > 0.0))
+      throw Error(ErrorCode::InvalidArgument, "--view-up must be finite and not zero");
   }
   Camera camera = orbitCamera(scene.bounds, orbit, sensible ? angle : 30.0);
   camera.parallelProjection = options.parallel;

@@ -1,6 +1,8 @@
 // vdi: Volumetric Depth Images without ParaView.
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <mpi.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -8,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <iostream>
 #include <memory>
 #include <new>
 #include <string>
@@ -34,9 +37,17 @@ std::string firstLine(std::string_view text) {
   return std::string(text.substr(0, text.find('\n')));
 }
 
+/// What was printed may still be on its way, to a full disk for example.
+void requirePrinted() {
+  std::cout.flush();
+  if (std::cout && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
+  throw vdi::Error(vdi::ErrorCode::Io, "can't write to standard output");
+}
+
 Outcome outcomeOf(const CLI::App& app, const CLI::ParseError& error, bool speaks) {
   if (error.get_exit_code() == 0) {  // --help, --version
     if (speaks) app.exit(error);
+    requirePrinted();
     return {};
   }
   const auto chosen = app.get_subcommands();
@@ -72,16 +83,19 @@ Outcome runTool(int argc, char** argv) {
   vdi::apps::addInfo(app, job);
   vdi::apps::addBench(app, job);
   try {
-    world.together([&] { app.parse(argc, argv); });
+    try {
+      world.together([&] { app.parse(argc, argv); });
+    } catch (const CLI::ParseError& error) {
+      return outcomeOf(app, error, world.rank() == 0);
+    }
     demandEqualArguments(world, argc, argv);
     if (world.size() > 1 && !job.collective) {
       throw vdi::Error(vdi::ErrorCode::InvalidArgument,
                        "this subcommand works on one rank; generate and bench work on several");
     }
     job.run(world);
+    requirePrinted();
     return {};
-  } catch (const CLI::ParseError& error) {
-    return outcomeOf(app, error, world.rank() == 0);
   } catch (const vdi::Error& error) {
     if (error.code() == vdi::ErrorCode::RemoteRank) return {failed, {}};
     return {error.code() == vdi::ErrorCode::InvalidArgument ? badUsage : failed, error.what()};
@@ -122,6 +136,14 @@ int leaveTogether(const Outcome& mine) {
   return -least[1];
 }
 
+/// A standard stream that was closed would be the number of the next file that is opened, and what's printed
+/// would end in it. Each gets a descriptor that can't do what the stream is for, so that printing fails.
+void occupyStandardStreams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(stream, F_GETFD) < 0) (void)::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+}
+
 /// Launchers tell their processes so. Alone, there's no need for MPI, whose start takes seconds on some
 /// machines.
 bool startedByMpi() {
@@ -134,6 +156,7 @@ bool startedByMpi() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  occupyStandardStreams();
   if (!startedByMpi()) {
     const Outcome outcome = runTool(argc, argv);
     if (!outcome.message.empty()) say(outcome.message);

@@ -1,6 +1,9 @@
 // Written against ParaView 5.11: AddPipeline and ExecutePipelines have other signatures from 5.12 on.
+#include <vtkPython.h>  // before all others
+
 #include "catalyst_adaptor/Engine.h"
 
+#include <vtkCallbackCommand.h>
 #include <vtkInSituInitializationHelper.h>
 #include <vtkInSituPipeline.h>
 #include <vtkInSituPipelinePython.h>
@@ -14,14 +17,18 @@
 #include <vtkSMSessionProxyManager.h>
 #include <vtkSMSourceProxy.h>
 #include <vtkSmartPointer.h>
+#include <vtkSmartPyObject.h>
 
 #include <atomic>
 #include <cstdio>
+#include <exception>
 #include <regex>
 #include <stdexcept>
 #include <utility>
 
-#include "catalyst_adaptor/ScriptGuard.h"
+#include "ScriptGuard.h"
+#include "catalyst_adaptor/Agreement.h"
+#include "plugin/VolumetricDepthImages/Filters/VDICollective.h"
 
 namespace vdi::catalyst {
 
@@ -60,9 +67,9 @@ class Log {
     const std::string text = message.message;
     if (message.verbosity <= vtkLogger::VERBOSITY_ERROR) {
       if (text.find(harmless) != std::string::npos || !self.firstError_.empty()) return;
-      // An object's address tells a user nothing.
-      static const std::regex address(R"( \((0x[0-9a-f]+|nullptr)\))");
-      self.firstError_ = std::regex_replace(text, address, "", std::regex_constants::format_first_only);
+      // An object's address tells a user nothing; some texts start on the next line.
+      static const std::regex address(R"( \((0x[0-9a-f]+|nullptr)\):\s*)");
+      self.firstError_ = std::regex_replace(text, address, ": ", std::regex_constants::format_first_only);
       while (!self.firstError_.empty() && self.firstError_.back() == '\n') self.firstError_.pop_back();
       return;
     }
@@ -109,52 +116,165 @@ class Pipeline : public vtkInSituPipeline {
 
 vtkStandardNewMacro(Pipeline);
 
+constexpr const char* agreementCapsule = "vdi::catalyst::Agreement";
+
+/// leave(failed) of script_guard.py: Agreement::leavePart.
+PyObject* leave(PyObject* self, PyObject* failed) {
+  auto* agreement = static_cast<Agreement*>(PyCapsule_GetPointer(self, agreementCapsule));
+  const int truth = agreement != nullptr ? PyObject_IsTrue(failed) : -1;
+  if (truth < 0) return nullptr;
+  return PyBool_FromLong(agreement->leavePart(truth != 0) ? 1 : 0);
+}
+
+PyMethodDef leaveMethod{"leave", leave, METH_O, nullptr};
+
+/// script_guard.py, installed.
+class Guard {
+ public:
+  explicit Guard(Agreement& agreement) {
+    const vtkPythonScopeGilEnsurer lock;
+    constexpr const char* name = "_vdi_guard";
+    vtkSmartPyObject code(Py_CompileString(scriptGuard, name, Py_file_input));
+    if (code) module_.TakeReference(PyImport_ExecCodeModule(name, code));
+    vtkSmartPyObject capsule(PyCapsule_New(&agreement, agreementCapsule, nullptr));
+    vtkSmartPyObject function(capsule ? PyCFunction_New(&leaveMethod, capsule) : nullptr);
+    vtkSmartPyObject done;
+    if (module_ && function)
+      done.TakeReference(PyObject_CallMethod(module_, "install", "O", function.GetPointer()));
+    if (done) return;
+    PyErr_Print();
+    throw std::runtime_error("ParaView's Python modules can't be imported; is python3-paraview installed?");
+  }
+
+  /// What's wrong with a script, as far as that can be known before it runs; "" if nothing is.
+  std::string check(const std::string& script) {
+    const vtkPythonScopeGilEnsurer lock;
+    vtkSmartPyObject result(PyObject_CallMethod(module_, "check_script", "s", script.c_str()));
+    const char* text = result ? PyUnicode_AsUTF8(result) : nullptr;
+    if (text != nullptr) return text;
+    PyErr_Clear();
+    return "the script '" + script + "' can't be checked";
+  }
+
+  /// After all scripts of a step.
+  void endStep() {
+    const vtkPythonScopeGilEnsurer lock;
+    const vtkSmartPyObject result(PyObject_CallMethod(module_, "end_step", nullptr));
+    if (!result) PyErr_Clear();
+  }
+
+ private:
+  vtkSmartPyObject module_;
+};
+
+/// A duplicate for ParaView, in which a mismatch of messages is an error instead of the end.
+class ParaViewComm {
+ public:
+  explicit ParaViewComm(int fortranCommunicator) {
+    if (MPI_Comm_dup(MPI_Comm_f2c(fortranCommunicator), &comm_) != MPI_SUCCESS)
+      throw std::runtime_error("MPI_Comm_dup failed");
+    MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN);
+  }
+  ~ParaViewComm() {
+    int over = 0;
+    MPI_Finalized(&over);
+    if (over == 0) MPI_Comm_free(&comm_);
+  }
+  ParaViewComm(const ParaViewComm&) = delete;
+  ParaViewComm& operator=(const ParaViewComm&) = delete;
+  MPI_Comm get() const { return comm_; }
+
+ private:
+  MPI_Comm comm_ = MPI_COMM_NULL;
+};
+
 }  // namespace
 
 struct Engine::State {
-  State() = default;
+  explicit State(int fortranCommunicator)
+      : comm(fortranCommunicator), agreement(MPI_Comm_f2c(fortranCommunicator)) {}
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 
+  ParaViewComm comm;
+  Agreement agreement;  // apart from ParaView's messages, and from the caller's
   Log log;
+  vtkNew<vtkCallbackCommand> entry;
+  std::optional<Guard> guard;
   vtkSmartPointer<vtkSMSourceProxy> producer;
   std::vector<vtkSmartPointer<Pipeline>> pipelines;
 
   ~State() {
     producer = nullptr;
+    if (auto* controller = vtkMultiProcessController::GetGlobalController())
+      controller->RemoveObserver(entry);
     if (vtkInSituInitializationHelper::IsInitialized()) vtkInSituInitializationHelper::Finalize();
   }
-  void start(int fortranCommunicator, const std::vector<std::string>& scripts);
+  void start();
+  void watchEntries();
+  void add(const std::vector<std::string>& scripts);
+  std::optional<std::string> result(bool good);
 };
 
-void Engine::State::start(int fortranCommunicator, const std::vector<std::string>& scripts) {
+void Engine::State::start() {
   using Helper = vtkInSituInitializationHelper;
   if (!Helper::IsPythonSupported()) throw std::runtime_error("this ParaView was built without Python");
-  Helper::Initialize(static_cast<vtkTypeUInt64>(fortranCommunicator));
+  Helper::Initialize(static_cast<vtkTypeUInt64>(MPI_Comm_c2f(comm.get())));
   Log::silenceOtherOutput();
   auto* manager = vtkSMProxyManager::GetProxyManager();
   auto* proxies = manager != nullptr ? manager->GetActiveSessionProxyManager() : nullptr;
   if (proxies == nullptr) throw std::runtime_error("ParaView's in situ engine doesn't start");
   vtkPythonInterpreter::Initialize(0);  // 0: signals stay the simulation's
-  if (vtkPythonInterpreter::RunSimpleString(scriptGuard) != 0)
-    throw std::runtime_error("ParaView's Python modules can't be imported; is python3-paraview installed?");
+  guard.emplace(agreement);
+  watchEntries();
   producer.TakeReference(vtkSMSourceProxy::SafeDownCast(proxies->NewProxy("sources", "PVTrivialProducer")));
   producer->UpdateVTKObjects();
   Helper::SetProducer(channel, producer);
+}
+
+void Engine::State::watchEntries() {
+  auto* controller = vtkMultiProcessController::GetGlobalController();
+  if (controller == nullptr) return;
+  entry->SetClientData(&agreement);
+  entry->SetCallback([](vtkObject*, unsigned long, void* client, void* data) {
+    auto& asked = *static_cast<pv::CollectiveEntry*>(data);
+    asked.refusal = static_cast<Agreement*>(client)->enter(asked.operation);
+  });
+  controller->AddObserver(pv::CollectiveEntry::event, entry);
+}
+
+void Engine::State::add(const std::vector<std::string>& scripts) {
   for (const std::string& script : scripts) {
     vtkNew<Pipeline> pipeline;
     pipeline->setScript(script);
-    Helper::AddPipeline(pipeline);
+    vtkInSituInitializationHelper::AddPipeline(pipeline);
     pipelines.emplace_back(pipeline);
   }
 }
 
-Engine::Engine(int fortranCommunicator, const std::vector<std::string>& scripts) {
+/// Of what ran on this rank since the log was last asked.
+std::optional<std::string> Engine::State::result(bool good) {
+  std::string error = log.takeFirstError();
+  if (good && error.empty()) return std::nullopt;
+  if (error.find(Agreement::otherFailed) != std::string::npos) return "";
+  return error;
+}
+
+Engine::Engine(int fortranCommunicator) {
   static std::atomic<bool> started = false;  // what's counted is starts in this process, whoever's they are
   if (vtkInSituInitializationHelper::IsInitialized() || started.exchange(true))
     throw std::runtime_error("ParaView's in situ engine starts only once in a process");
-  state_ = std::make_unique<State>();
-  state_->start(fortranCommunicator, scripts);
+  state_ = std::make_unique<State>(fortranCommunicator);
+  state_->start();
+}
+
+void Engine::check(const std::string& script) {
+  const std::string wrong = state_->guard->check(script);
+  if (!wrong.empty()) throw std::runtime_error(wrong);
+}
+
+void Engine::add(const std::vector<std::string>& scripts) {
+  state_->add(scripts);
 }
 
 Engine::~Engine() = default;
@@ -163,22 +283,28 @@ std::optional<std::string> Engine::finish() {
   state_->log.takeFirstError();
   bool good = true;
   for (const auto& pipeline : state_->pipelines) good = pipeline->Finalize() && good;
-  std::string error = state_->log.takeFirstError();
-  if (good && error.empty()) return std::nullopt;
-  return error;
+  state_->agreement.leaveStep();
+  return state_->result(good);
 }
 
-std::optional<std::string> Engine::execute(vtkDataObject* grid, std::int64_t step, double time) {
+std::optional<std::string> Engine::execute(vtkDataObject* grid, int step, double time) {
   using Helper = vtkInSituInitializationHelper;
   state_->log.takeFirstError();
-  auto* producer = vtkPVTrivialProducer::SafeDownCast(state_->producer->GetClientSideObject());
-  producer->SetOutput(grid, time);
-  Helper::MarkProducerModified(channel);
-  bool good = Helper::ExecutePipelines(static_cast<int>(step), time);
-  for (const auto& pipeline : state_->pipelines) good = good && !pipeline->failed();
-  std::string error = state_->log.takeFirstError();
-  if (good && error.empty()) return std::nullopt;
-  return error;
+  std::exception_ptr failure;
+  bool good = true;
+  try {
+    auto* producer = vtkPVTrivialProducer::SafeDownCast(state_->producer->GetClientSideObject());
+    producer->SetOutput(grid, time);
+    Helper::MarkProducerModified(channel);
+    good = Helper::ExecutePipelines(step, time);
+    for (const auto& pipeline : state_->pipelines) good = good && !pipeline->failed();
+    state_->guard->endStep();
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  state_->agreement.leaveStep();
+  if (failure) std::rethrow_exception(failure);
+  return state_->result(good);
 }
 
 }  // namespace vdi::catalyst

@@ -1,7 +1,6 @@
 // ParaView's in situ engine behind a small interface: the only place that depends on its version.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,18 +10,24 @@ class vtkDataObject;
 
 namespace vdi::catalyst {
 
-/// One a process: ParaView can't be started twice. Collective throughout.
+/// One a process: ParaView can't be started twice. Collective throughout, but for check.
 class Engine {
  public:
   /// Throws std::runtime_error when the engine was started before or won't start.
-  Engine(int fortranCommunicator, const std::vector<std::string>& scripts);
+  explicit Engine(int fortranCommunicator);
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
+  /// Throws std::runtime_error with what can be told to be wrong with a script before it runs: a file or a
+  /// plugin that's missing, bad syntax.
+  void check(const std::string& script);
+  /// To be run at each step, in that order.
+  void add(const std::vector<std::string>& scripts);
+
   /// Runs every script on `grid`, also those that failed before. nullopt if all went well on this rank, else
-  /// what went wrong here; "" where a script was stopped because of another rank.
-  std::optional<std::string> execute(vtkDataObject* grid, std::int64_t step, double time);
+  /// what went wrong here; "" where a script was stopped because of another rank. `step` >= 0.
+  std::optional<std::string> execute(vtkDataObject* grid, int step, double time);
 
   /// Runs the scripts' catalyst_finalize, after which only the destructor may follow. Returns as execute
   /// does.

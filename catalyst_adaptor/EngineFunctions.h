@@ -8,7 +8,8 @@
 extern "C" {
 #endif
 
-/* One entry for each function of vdi_catalyst.h, with the same contract. */
+/* One entry for each function of vdi_catalyst.h, with the same contract. initialize gets a communicator that
+ * is one, and a null *catalyst. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*set_blocks)(vdi_catalyst*, int32_t, const vdi_catalyst_block*);

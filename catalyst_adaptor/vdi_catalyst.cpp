@@ -13,15 +13,20 @@
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
 
+#include <array>
 #include <cfenv>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <limits>
 #include <memory>
+#include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "catalyst_adaptor/Engine.h"
@@ -33,14 +38,46 @@ struct vdi_catalyst {
   bool haveBlocks = false;
   vtkSmartPointer<vtkPartitionedDataSet> grid;  // a partition a block
   std::string error;
-  std::string printed;  // so that what fails at every step is told once
+  std::string printed;  // so that what fails at every step is told in full once
 };
 
 namespace {
 
+/// The handle that's alive: there's one engine in a process. What isn't it is a handle that was finalized,
+/// and mustn't be looked into.
+vdi_catalyst*& alive() {
+  static vdi_catalyst* handle = nullptr;
+  return handle;
+}
+
+bool usable(const vdi_catalyst* catalyst) {
+  return catalyst != nullptr && catalyst == alive();
+}
+
+/// The first line, and the second where the first says only who speaks.
+std::string firstLine(const std::string& text) {
+  std::size_t end = text.find('\n');
+  std::string line = text.substr(0, end);
+  while (!line.empty() && line.back() == ' ') line.pop_back();
+  if (end == std::string::npos || line.empty() || line.back() != ':') return line;
+  const std::size_t next = end + 1;
+  end = text.find('\n', next);
+  return line + " " + text.substr(next, end == std::string::npos ? end : end - next);
+}
+
+/// By rank 0, on one line for what was printed before: a step whose files are missing is always told.
+void print(vdi_catalyst& self, std::optional<std::int64_t> step) {
+  const bool again = self.error == self.printed;
+  if (again && !step) return;
+  self.printed = self.error;
+  const std::string place = step ? "step " + std::to_string(*step) + ": " : "";
+  const std::string text = again ? "again, " + firstLine(self.error) : self.error;
+  std::fprintf(stderr, "vdi_catalyst: %s%s\n", place.c_str(), text.c_str());
+}
+
 /// What a failing call comes to: the highest code of any rank, and the text of the lowest rank that has it
-/// and something to say, on all ranks; printed by rank 0 unless it's what was printed last.
-int conclude(vdi_catalyst& self, int code, const std::string& text) {
+/// and something to say, on all ranks; rank 0 prints it. `step`: of execute.
+int conclude(vdi_catalyst& self, int code, const std::string& text, std::optional<std::int64_t> step) {
   int worst = code;
   MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_INT, MPI_MAX, self.comm);
   if (worst == VDI_CATALYST_OK) return worst;
@@ -59,9 +96,7 @@ int conclude(vdi_catalyst& self, int code, const std::string& text) {
   MPI_Bcast(message.data(), length, MPI_CHAR, speaker, self.comm);
   if (message.empty()) message = "a script failed without saying why";
   self.error = "rank " + std::to_string(speaker) + ": " + message;
-  if (self.error == self.printed) return worst;
-  self.printed = self.error;
-  if (rank == 0) std::fprintf(stderr, "vdi_catalyst: %s\n", self.error.c_str());
+  if (rank == 0) print(self, step);
   return worst;
 }
 
@@ -80,7 +115,7 @@ class NoFloatingPointTraps {
 
 /// Runs `work`, which returns nothing or what went wrong; that or an exception becomes `code`.
 template <typename Work>
-int guarded(vdi_catalyst& self, int code, Work work) {
+int guarded(vdi_catalyst& self, int code, Work work, std::optional<std::int64_t> step = std::nullopt) {
   const NoFloatingPointTraps noTraps;
   std::optional<std::string> failure;
   try {
@@ -94,48 +129,54 @@ int guarded(vdi_catalyst& self, int code, Work work) {
   } catch (...) {
     failure = "an unknown exception";
   }
-  return conclude(self, failure ? code : VDI_CATALYST_OK, failure.value_or(""));
+  return conclude(self, failure ? code : VDI_CATALYST_OK, failure.value_or(""), step);
 }
 
 void demand(bool good, const char* what) {
   if (!good) throw std::invalid_argument(what);
 }
 
-/// MPI_COMM_NULL if MPI isn't running or the handle is none.
-MPI_Comm communicatorOf(int32_t fortranHandle) {
-  int running = 0;
-  int over = 0;
-  MPI_Initialized(&running);
-  MPI_Finalized(&over);
-  if (running == 0 || over != 0) return MPI_COMM_NULL;
-  const MPI_Comm comm = MPI_Comm_f2c(fortranHandle);
-  return comm != nullptr ? comm : MPI_COMM_NULL;  // OpenMPI's answer to a wrong handle
+void demandEqual(MPI_Comm comm, std::int64_t value, const char* what) {
+  std::array<std::int64_t, 2> extremes{value, ~value};
+  MPI_Allreduce(MPI_IN_PLACE, extremes.data(), 2, MPI_INT64_T, MPI_MAX, comm);
+  demand(extremes[0] == ~extremes[1], what);
 }
 
-void demandEqualCounts(MPI_Comm comm, int32_t count) {
-  int32_t extremes[2] = {count, -count};
-  MPI_Allreduce(MPI_IN_PLACE, extremes, 2, MPI_INT32_T, MPI_MAX, comm);
-  demand(extremes[0] == -extremes[1], "the ranks give different numbers of scripts");
+/// Of points, of which there are more than cells. Throws where VTK's counts would overflow.
+void demandCountable(const vdi_catalyst_block& block) {
+  std::int64_t points = 1;
+  constexpr std::int64_t most = std::int64_t{1} << 60;
+  for (const int32_t cells : block.cells) {
+    const std::int64_t more = std::int64_t{cells} + 1;
+    demand(more <= std::numeric_limits<int>::max() && points <= most / more,
+           "a block of more cells than can be counted");
+    points *= more;
+  }
 }
 
 void checkBlock(const vdi_catalyst_block& block) {
   for (int axis = 0; axis < 3; ++axis) {
     demand(block.cells[axis] >= 1, "a block needs at least one cell per axis");
     demand(block.ghost_lo[axis] >= 0 && block.ghost_hi[axis] >= 0, "ghost layers can't be negative");
-    demand(block.ghost_lo[axis] + block.ghost_hi[axis] < block.cells[axis],
+    demand(std::int64_t{block.ghost_lo[axis]} + block.ghost_hi[axis] < block.cells[axis],
            "a block of nothing but ghost cells");
     demand(std::isfinite(block.spacing[axis]) && block.spacing[axis] > 0.0, "spacing must be finite and > 0");
     demand(std::isfinite(block.origin[axis]), "the origin must be finite");
   }
+  demandCountable(block);
 }
 
 void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
   bool any = false;
   for (int axis = 0; axis < 3; ++axis) any = any || block.ghost_lo[axis] > 0 || block.ghost_hi[axis] > 0;
   if (!any) return;
-  vtkNew<vtkUnsignedCharArray> ghosts;
-  ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
-  ghosts->SetNumberOfTuples(image->GetNumberOfCells());
+  const vtkIdType count = image->GetNumberOfCells();
+  // Not VTK's own allocation: where that fails, Debian's VTK ends the process.
+  std::unique_ptr<unsigned char[]> marks(new (std::nothrow) unsigned char[static_cast<std::size_t>(count)]);
+  if (!marks) {
+    throw std::runtime_error("no memory for the marks of a block's ghost cells: " + std::to_string(count) +
+                             " bytes");
+  }
   vtkIdType index = 0;
   const auto outside = [&](int axis, int i) {
     return i < block.ghost_lo[axis] || i >= block.cells[axis] - block.ghost_hi[axis];
@@ -144,10 +185,13 @@ void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
     for (int y = 0; y < block.cells[1]; ++y) {
       for (int x = 0; x < block.cells[0]; ++x) {
         const bool ghost = outside(0, x) || outside(1, y) || outside(2, z);
-        ghosts->SetValue(index++, ghost ? vtkDataSetAttributes::DUPLICATECELL : 0);
+        marks[static_cast<std::size_t>(index++)] = ghost ? vtkDataSetAttributes::DUPLICATECELL : 0;
       }
     }
   }
+  vtkNew<vtkUnsignedCharArray> ghosts;
+  ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
+  ghosts->SetArray(marks.release(), count, 0, vtkUnsignedCharArray::VTK_DATA_ARRAY_DELETE);
   image->GetCellData()->AddArray(ghosts);
 }
 
@@ -162,6 +206,17 @@ void markModified(vtkPartitionedDataSet& grid) {
     image->Modified();
   }
   grid.Modified();
+}
+
+/// ParaView counts steps in an int, and files are named by it: another one would be lost, or replace another
+/// step's.
+void demandStep(const vdi_catalyst& self, std::int64_t step) {
+  demand(self.haveBlocks, "no blocks were given yet");
+  constexpr std::int64_t most = std::numeric_limits<int>::max();
+  if (step >= 0 && step <= most) return;
+  throw std::invalid_argument("step " + std::to_string(step) +
+                              " isn't handed over: ParaView counts steps from 0 to " + std::to_string(most) +
+                              "; hand over a smaller number, such as a count of these calls");
 }
 
 int vtkTypeOf(int type) {
@@ -191,15 +246,11 @@ int vtkTypeOf(int type) {
 
 int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
                             vdi_catalyst** catalyst) {
-  if (catalyst == nullptr) return VDI_CATALYST_BAD_ARGUMENT;
-  *catalyst = nullptr;
-  const MPI_Comm comm = communicatorOf(fortran_communicator);
-  if (comm == MPI_COMM_NULL) {
-    std::fprintf(stderr, "vdi_catalyst: there is no MPI, or no communicator has this Fortran handle\n");
-    return VDI_CATALYST_BAD_ARGUMENT;
-  }
+  // Loader.c has seen to it that MPI runs, that the handle is a communicator's and that *catalyst is null.
   auto self = std::make_unique<vdi_catalyst>();
-  if (MPI_Comm_dup(comm, &self->comm) != MPI_SUCCESS) return VDI_CATALYST_BAD_ARGUMENT;
+  if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
+    return VDI_CATALYST_BAD_ARGUMENT;
+  MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
   std::vector<std::string> paths;
   int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     demand(script_count >= 0 && (script_count == 0 || scripts != nullptr), "no scripts given");
@@ -209,7 +260,9 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
     }
   });
   if (code == VDI_CATALYST_OK) {
-    code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { demandEqualCounts(self->comm, script_count); });
+    code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+      demandEqual(self->comm, script_count, "the ranks give different numbers of scripts");
+    });
   }
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_ENGINE, [] {
@@ -219,8 +272,14 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
   }
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
-      self->engine = std::make_unique<vdi::catalyst::Engine>(MPI_Comm_c2f(self->comm), paths);
+      self->engine = std::make_unique<vdi::catalyst::Engine>(MPI_Comm_c2f(self->comm));
       self->grid = vtkSmartPointer<vtkPartitionedDataSet>::New();
+    });
+  }
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(*self, VDI_CATALYST_SCRIPT, [&] {
+      for (const std::string& path : paths) self->engine->check(path);
+      self->engine->add(paths);
     });
   }
   if (code != VDI_CATALYST_OK) {
@@ -228,16 +287,16 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
     MPI_Comm_free(&self->comm);
     return code;
   }
-  *catalyst = self.release();
+  *catalyst = alive() = self.release();
   return VDI_CATALYST_OK;
 }
 
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
-  if (catalyst == nullptr) return VDI_CATALYST_BAD_ARGUMENT;
-  return guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const auto grid = vtkSmartPointer<vtkPartitionedDataSet>::New();
+  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
     demand(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
     for (int i = 0; i < count; ++i) checkBlock(blocks[i]);
-    const auto grid = vtkSmartPointer<vtkPartitionedDataSet>::New();
     grid->SetNumberOfPartitions(static_cast<unsigned int>(count));
     for (int i = 0; i < count; ++i) {
       const vdi_catalyst_block& block = blocks[i];
@@ -248,54 +307,70 @@ int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_cat
       markGhosts(image, block);
       grid->SetPartition(static_cast<unsigned int>(i), image);
     }
-    catalyst->grid = grid;
-    catalyst->haveBlocks = true;
   });
+  if (code != VDI_CATALYST_OK) return code;  // all ranks keep the blocks that they have
+  catalyst->grid = grid;
+  catalyst->haveBlocks = true;
+  return code;
 }
 
 int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
                            const void* const* data) {
-  if (catalyst == nullptr) return VDI_CATALYST_BAD_ARGUMENT;
-  return guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const bool cells = association == VDI_CATALYST_CELLS;
+  std::vector<vtkSmartPointer<vtkDataArray>> arrays;
+  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
     demand(catalyst->haveBlocks, "arrays were given before blocks");
     demand(name != nullptr && *name != '\0', "an array needs a name");
-    demand(association == VDI_CATALYST_POINTS || association == VDI_CATALYST_CELLS, "unknown association");
+    demand(association == VDI_CATALYST_POINTS || cells, "unknown association");
     const int vtkType = vtkTypeOf(type);
     const unsigned int count = catalyst->grid->GetNumberOfPartitions();
     demand(count == 0 || data != nullptr, "an array without data");
-    for (unsigned int i = 0; i < count; ++i)
-      demand(data[i] != nullptr, "an array without data for one of the blocks");
-    const bool cells = association == VDI_CATALYST_CELLS;
     for (unsigned int i = 0; i < count; ++i) {
+      demand(data[i] != nullptr, "an array without data for one of the blocks");
       vtkDataSet* image = catalyst->grid->GetPartition(i);
       const auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtkType));
       array->SetName(name);
       // VTK only reads through this pointer; `save` = 1 leaves the memory the simulation's.
       array->SetVoidArray(const_cast<void*>(data[i]),
                           cells ? image->GetNumberOfCells() : image->GetNumberOfPoints(), 1);
-      auto* attributes =
-          cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
-      attributes->AddArray(array);
+      arrays.push_back(array);
     }
   });
+  if (code != VDI_CATALYST_OK) return code;
+  for (unsigned int i = 0; i < arrays.size(); ++i) {
+    vtkDataSet* image = catalyst->grid->GetPartition(i);
+    auto* attributes =
+        cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
+    attributes->AddArray(arrays[i]);
+  }
+  return code;
 }
 
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
-  if (catalyst == nullptr) return VDI_CATALYST_BAD_ARGUMENT;
-  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT,
-                           [&] { demand(catalyst->haveBlocks, "no blocks were given yet"); });
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  int code = guarded(
+      *catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] { demandStep(*catalyst, step); }, step);
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(
+        *catalyst, VDI_CATALYST_BAD_ARGUMENT,
+        [&] { demandEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
+  }
   if (code != VDI_CATALYST_OK) return code;
-  const int result = guarded(*catalyst, VDI_CATALYST_SCRIPT, [&] {
-    markModified(*catalyst->grid);
-    return catalyst->engine->execute(catalyst->grid, step, time);
-  });
+  const int result = guarded(
+      *catalyst, VDI_CATALYST_SCRIPT,
+      [&] {
+        markModified(*catalyst->grid);
+        return catalyst->engine->execute(catalyst->grid, static_cast<int>(step), time);
+      },
+      step);
   if (result == VDI_CATALYST_OK) catalyst->printed.clear();
   return result;
 }
 
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
-  if (catalyst == nullptr) return VDI_CATALYST_BAD_ARGUMENT;
-  const std::unique_ptr<vdi_catalyst> self(catalyst);
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(), nullptr));
   int code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { return self->engine->finish(); });
   self->grid = nullptr;
   const int ended = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine.reset(); });
@@ -305,5 +380,5 @@ int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
 }
 
 const char* vdi_catalyst_error(const vdi_catalyst* catalyst) {
-  return catalyst != nullptr ? catalyst->error.c_str() : "";
+  return usable(catalyst) ? catalyst->error.c_str() : "";
 }

@@ -11,15 +11,22 @@
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
  * All functions are collective over the communicator. None ends the process: they return VDI_CATALYST_OK or a
- * code below, the same one on all ranks, and rank 0 prints one message to standard error, not again while it
- * repeats; after an error the next step works again. Nothing is copied on the host: pointers must stay valid,
- * and their data unchanged, until vdi_catalyst_execute returns.
+ * code below, the same one on all ranks, and rank 0 prints a message to standard error. What repeats is
+ * printed in full once; a step that fails is told each time, then in one line, for its files are missing.
+ * After an error the next step works again, and blocks and arrays are those of before. Nothing is copied on
+ * the host: pointers must stay valid, and their data unchanged, until vdi_catalyst_execute returns.
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData a block, under the name "grid":
  * TrivialProducer(registrationName="grid"). A script runs on all ranks, and what updates a pipeline is
- * collective: where a rank leaves it before an update that the others enter, they wait, as in any MPI
- * program. An exception on one rank after the last update of a step stops the step on all.
+ * collective. Where a rank's script ends or fails before an update of VolumetricDepthImage that the others
+ * enter, or comes with another one, the update fails on all and so does the step. Only in ParaView's own
+ * collective filters and views the others wait, as in any MPI program.
+ *
+ * What still ends the process, since ParaView, Python or a library does it without asking: a script's
+ * os._exit, os.abort or a crash in a module of its; memory that ParaView itself asks for in vain (Debian's
+ * VTK aborts); an X server that goes away while a view is drawn (Xlib exits), and a view that is drawn
+ * without a display past paraview.simple, by methods of its render window or SMProxy; a crash of a driver.
  */
 #ifndef VDI_CATALYST_H
 #define VDI_CATALYST_H
@@ -39,7 +46,8 @@ extern "C" {
 /* Results. */
 enum {
   VDI_CATALYST_OK = 0,
-  VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer, a size below 1, an unknown type, arrays before blocks */
+  VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or beyond counting,
+                                    an unknown type, arrays before blocks, a step that's no int */
   VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process */
   VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
 };
@@ -61,8 +69,16 @@ enum { VDI_CATALYST_POINTS = 0, VDI_CATALYST_CELLS = 1 };
 
 /* One block of a uniform lattice. `cells` counts cells per axis, ghost cells included; point arrays have one
  * value more per axis. `origin` is the lower corner of the first cell, ghost or not. Values lie x fastest,
- * then y, then z. Neighbours either share the points of their common face, or have ghost layers, or neither
- * (then a layer is exchanged between ranks). */
+ * then y, then z.
+ *
+ * Neighbours are blocks of any rank and any spacing. They may share the points of their common face,
+ * or end one cell apart (points), or meet at a face (cells). What a block needs of its neighbours'
+ * values is exchanged, whether it has ghost layers or not. Its own ghost layers are used beside blocks
+ * of equal spacing.
+ *
+ * Blocks of different spacing may overlap: the finest is shown. Blocks of equal spacing may not, except
+ * for ghost layers announced as such. By more than a thousandth of a cell it is an error that names both
+ * blocks. */
 typedef struct vdi_catalyst_block {
   int32_t cells[3];
   int32_t ghost_lo[3]; /* layers of ghost cells at the lower side of each axis */
@@ -75,12 +91,14 @@ typedef struct vdi_catalyst vdi_catalyst;
 
 /* Loads ParaView, sets the environment variable VDI_PLUGIN to our plugin unless it is set, starts the engine
  * on a duplicate of the communicator (its Fortran handle) and adds the scripts, the same on all ranks; they
- * are loaded at the first step. Once a process. On failure *catalyst is null, and the other functions, given
- * null, do nothing but return VDI_CATALYST_BAD_ARGUMENT. */
+ * are loaded at the first step. A script that is missing or isn't Python, and a plugin that's missing where
+ * it loads one (LoadPlugin at its top level), are VDI_CATALYST_SCRIPT here. Once a process, also where it
+ * failed. On failure *catalyst is null, and the other functions, given null, do nothing but return
+ * VDI_CATALYST_BAD_ARGUMENT. */
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 
-/* This rank's blocks, none included; forgets all arrays. */
+/* This rank's blocks, none included; forgets all arrays. Blocks with ghost layers take a byte a cell. */
 VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count,
                                              const vdi_catalyst_block* blocks);
 
@@ -89,10 +107,12 @@ VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t cou
 VDI_CATALYST_API int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type,
                                             int32_t association, const void* const* data);
 
-/* Runs the scripts on the blocks as they are now. */
+/* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX, since
+ * ParaView counts and names files so; others are VDI_CATALYST_BAD_ARGUMENT each time. */
 VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time);
 
-/* Ends the scripts and the engine and frees `catalyst`. */
+/* Ends the scripts and the engine and frees `catalyst`; a second call does nothing but return
+ * VDI_CATALYST_BAD_ARGUMENT. */
 VDI_CATALYST_API int vdi_catalyst_finalize(vdi_catalyst* catalyst);
 
 /* The text of the last error on this rank; "" if there was none. Valid until the next call. */

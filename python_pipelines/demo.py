@@ -59,9 +59,11 @@ colors = GetColorTransferFunction("V")
 colors.ColorSpace = "RGB"
 colors.RGBPoints = [0.0, 0.05, 0.10, 0.40, 0.12, 0.10, 0.55, 0.85, 0.22, 0.95, 0.90, 0.60,
                     0.30, 0.95, 0.50, 0.15, 0.42, 0.60, 0.05, 0.10]
+colors.ScalarRangeInitialized = 1  # or ParaView's own views, none here, would move the points to the data's range
 opacities = GetOpacityTransferFunction("V")
 opacities.Points = [0.0, 0.0, 0.5, 0.0, 0.06, 0.0, 0.5, 0.0, 0.14, 0.10, 0.5, 0.0,
                     0.24, 0.35, 0.5, 0.0, 0.34, 0.85, 0.5, 0.0, 0.42, 0.95, 0.5, 0.0]
+opacities.ScalarRangeInitialized = 1
 
 image = volume_filter(0, False)
 seen = {angle: RenderVDI(Input=image) for angle in ANGLES}

@@ -1,4 +1,5 @@
-"""The shortest Catalyst script: a Volumetric Depth Image of the array V at every step, as files vdi_000100.vdi, ...
+"""The shortest Catalyst script: a Volumetric Depth Image of the array V at every step, as files vdi_000100.vdi, ..., each with
+its step's number and time inside.
 
 VDI_PLUGIN names the plugin; the adaptor sets it. Copy this file and change array, camera and colours."""
 
@@ -13,7 +14,7 @@ grid = TrivialProducer(registrationName="grid")
 image = VolumetricDepthImage(Input=grid)
 image.SelectInputScalars = ["CELLS", "V"]
 image.Resolution = [640, 360]
-image.CameraPosition = [2.2, 1.7, 2.6]
+image.CameraPosition = [2.6, 2.0, 3.1]  # of the unit cube, all of it
 image.CameraFocalPoint = [0.5, 0.5, 0.5]
 
 extractor = CreateExtractor("VDI", image, registrationName="vdi")

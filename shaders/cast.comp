@@ -23,6 +23,8 @@ layout(constant_id = 6) const bool byNeed = false;
 
 layout(set = 0, binding = 0) uniform sampler3D pages[castMaxPages];
 
+layout(set = 0, binding = 2) uniform sampler2D slabs;  // core/SlabTable.h
+
 layout(push_constant, scalar) uniform Push { CastConstants push; };
 layout(set = 0, binding = 1, scalar) uniform Params { CastParams params; };
 

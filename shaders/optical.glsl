@@ -1,6 +1,6 @@
 // Opacity and optical depth (-log2 of transmittance); twins of vdi/reference/Segmenter.cpp.
 
-const float maxOpticalDepth = 65536.0;
+const float maxOpticalDepth = 65504.0;
 
 float opacityOf(float opticalDepth) {
   const float ln2 = 0.69314718;

@@ -4,11 +4,15 @@
 
 vec3 rayStart;
 vec3 rayDirection;
-float rayUnitsPerDepth;  // world length of a unit of depth / unit distance
+float rayLengthOfDepth;  // world length of a unit of depth
 float rayOpticalDepth;   // so far
 uvec2 rayScene;          // samples [x, y) lie in the scene's bounds
 float rayEnter;          // depth where the ray enters these, and leaves them
 float rayLeave;
+float rayBegin;  // the same as places
+float rayEnd;
+
+#include "slab.glsl"
 
 void setUpRay(uint x, uint y) {
   float u = float(x) + 0.5 - 0.5 * float(params.width);
@@ -18,15 +22,18 @@ void setUpRay(uint x, uint y) {
       params.directionBase + u * params.directionRight + v * params.directionUp;
   rayStart = start;
   rayDirection = direction;
-  rayUnitsPerDepth = length(direction) * params.perUnitDistance / params.step;
+  rayLengthOfDepth = length(direction);
 }
 
-// `precise`: every rank and every pass must find the same position for sample k, since ownership depends on it.
-vec3 samplePosition(uint k) {
-  precise float depth = (float(k) + 0.5) * params.step;
+// A place on the ray counts samples: k is where sample k begins, k + 0.5 its middle. `precise`: every rank and every pass must
+// find the same position for a place, since ownership depends on it.
+vec3 positionAt(float place) {
+  precise float depth = place * params.step;
   precise vec3 position = rayStart + depth * rayDirection;
   return position;
 }
+
+vec3 samplePosition(uint k) { return positionAt(float(k) + 0.5); }
 
 bool contains(vec3 lo, vec3 hi, vec3 p) { return all(greaterThanEqual(p, lo)) && all(lessThan(p, hi)); }
 
@@ -69,6 +76,8 @@ void setUpScene() {
   rayEnter = params.first + clamp(enter, first - params.step, first);
   rayLeave = params.first + clamp(leave, last, last + params.step);
   rayLeave = max(rayLeave, rayEnter + 0.001 * params.step);
+  rayBegin = (rayEnter - params.first) / params.step;
+  rayEnd = (rayLeave - params.first) / params.step;
 }
 
 // Pages beyond pageCount cost nothing: the comparison with a specialisation constant removes them.
@@ -85,26 +94,19 @@ float texel(uint page, vec3 coordinate) {
   return value;
 }
 
-// Straight colour and extinction at a table position; NaN and infinities are transparent.
-vec4 classify(float position) {
-  float last = float(params.tableSize - 1u);
-  if (!(abs(position) <= 3.0e38)) return vec4(0.0);
-  position = clamp(position, 0.0, last);
-  uint below = min(uint(position), params.tableSize - 2u);
-  return mix(params.table.at[below], params.table.at[below + 1u], position - float(below));
-}
-
-// Texture coordinate of sample k; beyond the brick, the nearest one in it.
-vec3 coordinateOf(Brick brick, uint k) {
-  return clamp(samplePosition(k) * brick.texelScale + brick.texelOffset, brick.texelLo, brick.texelHi);
+// Texture coordinate of a place; beyond the brick's values, the nearest one among them.
+vec3 coordinateOf(Brick brick, float place) {
+  return clamp(positionAt(place) * brick.texelScale + brick.texelOffset, brick.texelLo, brick.texelHi);
 }
 
 // Where in the table it lies.
-float tablePosition(Brick brick, uint k) {
-  return (texel(brick.page, coordinateOf(brick, k)) - brick.tableOrigin) * brick.tableScale;
+float tablePosition(Brick brick, float place) {
+  return (texel(brick.page, coordinateOf(brick, place)) - brick.tableOrigin) * brick.tableScale;
 }
 
-vec3 placeAmongCells(Brick brick, uint k) { return max(coordinateOf(brick, k) * brick.cellScale + brick.cellOffset, vec3(0.0)); }
+vec3 placeAmongCells(Brick brick, uint k) {
+  return max(coordinateOf(brick, float(k) + 0.5) * brick.cellScale + brick.cellOffset, vec3(0.0));
+}
 
 uvec3 cellAround(Brick brick, vec3 place) { return min(uvec3(place), brick.cellDims - 1u); }
 
@@ -133,28 +135,19 @@ float backOf(uint k) {
   return k + 1u == rayScene.y ? rayLeave : params.first + float(k + 1u) * params.step;
 }
 
-// What an interval of a ray comes down to.
-struct Sample {
-  vec3 color;  // straight
-  float opticalDepth;
-  float opacity;
-  float overStep;  // opacity of as much of it as is one step long
-};
-
-const Sample transparentSample = Sample(vec3(0.0), 0.0, 0.0, 0.0);
-
-Sample sampleOf(vec4 entry, float length) {
-  float opticalDepth = min(entry.a * rayUnitsPerDepth * length, maxOpticalDepth);
-  float opacity = opacityOf(opticalDepth);
-  // Nearly all intervals are one sample long.
-  float overStep = length == params.step ? opacity : opacityOf(opticalDepth * params.step / length);
-  return Sample(entry.rgb, opticalDepth, opacity, overStep);
+// The places that sample k begins and ends at: samples at the scene's faces are shorter or longer than others. Where samples
+// aren't slabs, both are its middle.
+float beginOf(uint k) {
+  float place = mix(mix(float(k), rayBegin, k == rayScene.x), rayEnd, k == rayScene.y);
+  return mix(float(k) + 0.5, place, params.slabs != 0u);
 }
+float endOf(uint k) { return mix(float(k) + 0.5, beginOf(k + 1u), params.slabs != 0u); }
 
 // What a ray is for, interval by interval; they leave no gaps within a brick.
 void useSample(float front, float back, Sample it);
 
-// Texels that are asked for at a time, and then entries of the table: waiting for one takes a GPU as long as waiting for all.
+// Texels that are asked for at a time, and then slabs: waiting for one takes a GPU as long as waiting for all.
+// 1 where samplesAtOnce isn't.
 layout(constant_id = 3) const uint samplesAhead = 1;
 
 // How many samples are used as one: more while grains are counted (CastParams::countedSamples).
@@ -172,24 +165,32 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
   uint emptyFirst = usedFrom(emptyBegin);
   uint first = usedFrom(begin);
   bool empty = emptyFirst < first;
+  // A sample begins where the last one ended.
+  bool endsMeet = params.slabs != 0u && samplesAtOnce == 1u;
+  float ends[samplesAhead + 1u];  // positions in the transfer table
+  vec4 between[samplesAhead];
+  bool begun = false;
   for (uint batch = empty ? first - samplesAtOnce : first; batch < end; batch += samplesAhead * samplesAtOnce) {
-    float positions[samplesAhead];
-    vec4 entries[samplesAhead];
-    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) positions[i] = tablePosition(brick, batch + i * samplesAtOnce);
-    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) entries[i] = classify(positions[i]);
+    if (!begun || !endsMeet) ends[0] = tablePosition(brick, beginOf(batch));
+    begun = true;
+    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) ends[i + 1u] = tablePosition(brick, endOf(batch + i));
+    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) {
+      between[i] = slabTexel(mix(ends[i + 1u], ends[i], params.slabs != 0u), ends[i + 1u]);
+    }
     [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) {
       uint k = batch + i * samplesAtOnce;
       if (samplesAhead == 1u || k < end) {
         bool here = i == 0u && empty;
-        vec4 entry = here ? vec4(0.0) : entries[i];
         vec2 span = spanOf(here ? emptyFirst : k, k);
-        Sample it = sampleOf(entry, span.y - span.x);
+        vec4 slab = slabOf(between[i], mix(ends[i + 1u], ends[i], params.slabs != 0u), ends[i + 1u]);
+        Sample it = sampleOf(mix(slab, vec4(0.0), bvec4(here)), span.y - span.x);
         useSample(span.x, span.y, it);
         rayOpticalDepth += it.opticalDepth;
         if (rayOpticalDepth >= params.enough) return false;
       }
     }
     empty = false;
+    ends[0] = ends[samplesAhead];
   }
   return true;
 }

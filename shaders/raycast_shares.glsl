@@ -29,7 +29,9 @@ bool castShares(Brick brick, uint begin, uint end) {
     Sample mine = transparentSample;
     if (mayShow) {
       vec2 span = spanOf(own, own);
-      mine = sampleOf(classify(tablePosition(brick, own)), span.y - span.x);
+      float front = tablePosition(brick, beginOf(own));
+      float back = tablePosition(brick, endOf(own));
+      mine = sampleOf(slabOf(slabTexel(front, back), front, back), span.y - span.x);
     }
     uint visible = sharesWhere(mine.opticalDepth > 0.0);
     looking = visible == 0u;

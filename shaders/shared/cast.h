@@ -3,14 +3,12 @@
 #define VDI_SHARED_CAST_H
 #include "lists.h"
 #include "cells.h"
+#include "slab.h"
 #include "volume.h"
 
 #ifndef __cplusplus
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BrickArray { Brick at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer KdNodeArray { KdNode at[]; };
-// TransferTableEntry of core/TransferFunction.h: straight red, green, blue, and extinction. Read at once, for a driver may read the
-// members of a struct one by one.
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer TableArray { vec4 at[]; };
 #endif
 
 VDI_SHARED_BEGIN
@@ -42,7 +40,6 @@ const uint castModeWrite = 1;   // supersegments
 struct CastParams {
   VDI_ADDRESS(BrickArray) bricks;
   VDI_ADDRESS(KdNodeArray) nodes;  // node 0 is the root
-  VDI_ADDRESS(TableArray) table;
   VDI_ADDRESS(CellArray) cells;  // macrocells: 1 where something is visible
   VDI_ADDRESS(FloatArray) sensitivities;  // [h][w]; by merging: tolerances, while counting those of the counted lists
   VDI_ADDRESS(UintArray) counts;          // [h][w]; by merging: room for grains, while counting the grains of these
@@ -62,7 +59,6 @@ struct CastParams {
   vec3 startRight;
   float first;  // depth of the lattice's front
   vec3 startUp;
-  float perUnitDistance;  // step / unit distance
   vec3 directionBase;
   float enough;  // optical depth at which a ray ends
   vec3 directionRight;
@@ -70,13 +66,22 @@ struct CastParams {
   vec3 directionUp;
   uint sampleCount;
   vec3 sceneLo;  // bounds of all ranks' blocks, snapped as the bricks are
-  uint tableSize;
   vec3 sceneHi;
   uint budget;
   uint width;
   uint height;
   uint runsOnly;
   uint nodeCount;  // 0: no bricks
+  // Of the table of slabs (core/SlabTable.h): what straight colours and optical depths are beyond the transfer table's range;
+  // 1 / columns and rows; steps of its square a position; rows of a strip; its slabs a world length.
+  vec4 slabBelow;
+  vec4 slabAbove;
+  vec2 perSlabTexels;
+  float squarePerPosition;
+  float stripRows;
+  float slabsPerDepth;
+  float lastPosition;  // of the transfer table
+  uint slabs;      // 1: samples are classified by what lies between their two ends; 0: by their middle
   StoredForm form;  // of segments
   // While counting grains: every countedStride-th list of every countedStride-th row, from the band's first row on, up to
   // and including the row behind the band, as [rows][countedWidth].

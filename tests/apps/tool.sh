@@ -70,6 +70,8 @@ import json
 bench = json.load(open("bench.json"))
 assert bench["device"] and len(bench["rows"]) >= 2
 assert all(row["dvr_ms"] is None or row["dvr_ms"] > 0 for row in bench["rows"])
+assert all(row["sampling_rate"] == 1 and row["truth_rate"] == 8 for row in bench["rows"])
+assert all(0.9 < row["dvr_ssim"] < 1 and 0.9 < row["ssim"] < 1 for row in bench["rows"])
 P
 
 # A raw volume of 16-bit big-endian cells behind a header.
@@ -111,13 +113,101 @@ if ! grep -q "step 9" out.txt || ! grep -q "0.75" out.txt; then
   fail "info doesn't tell step and time"
   cat out.txt
 fi
+cp v.json $'\xff.json'
+works "bench of a name that isn't UTF-8" "$vdi" bench --raw $'\xff.json' --resolution 40x30 --repeats 1 --angles 0 -o bytes.json
+python3 -c "import json; assert json.load(open('bytes.json'))['rows'][0]['dataset']" || fail "a name's bytes broke the result"
 refused 1 "s9.raw" "$vdi" generate --raw s0.json s9.json --resolution 40x30 -o x.vdi
 refused 1 "long.json|v.raw" "$vdi" generate --raw long.json -o x.vdi
 refused 1 "u12" "$vdi" generate --raw type.json -o x.vdi
 refused 1 "spacin" "$vdi" generate --raw field.json -o x.vdi
 refused 1 "none.json" "$vdi" generate --raw none.json -o x.vdi
 
+# A step that can't be read is left out, and told at the end, with those before and behind it written.
+for ranks in 1 2; do
+  refused 1 "time step 1: .*s9.raw" "${mpirun[@]}" $ranks "$vdi" generate --raw s0.json s9.json s1.json s9.json s2.json \
+    --resolution 40x30 --flat "left$ranks.png"
+  for step in 0 2 4; do
+    works "compare" "$vdi" compare --json alone$((step / 2)).png "$(printf "left${ranks}_%04d.png" $step)"
+    python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "step $step of a broken series"
+  done
+  [ "$(ls left${ranks}_* | wc -l)" -eq 3 ] || fail "a broken series has other pictures"
+done
+works "a late step" "$vdi" generate --raw s0.json s1.json --resolution 40x30 --step 4294967301 -o late.vdi
+works "info" "$vdi" info late_4294967302.vdi
+grep -q "step 4294967302" out.txt || fail "a late step isn't itself"
+refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step=-1 -o x.vdi
+refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step 18446744073709551616 -o x.vdi
+refused 2 "beyond" "$vdi" generate --raw s0.json s1.json --step 18446744073709551615 -o x.vdi
+refused 2 "finite" "$vdi" generate --field sphere "${small[@]}" --time nan -o x.vdi
+
+# A viewpoint that shows nothing true is warned of, once each.
+warnings() { grep -c "warning.*$1" err.txt; }
+works "no warning" "$vdi" render one.vdi -o x.png --azimuth -50 0 50
+[ ! -s err.txt ] || { fail "a viewpoint near V_O is warned of"; cat err.txt; }
+works "far beside" "$vdi" render one.vdi -o x.png --azimuth 90 180 --reconstruction constant
+[ "$(warnings degrees)" -eq 1 ] || { fail "far beside: no warning, or several"; cat err.txt; }
+works "inside" "$vdi" render one.vdi -o x.png --position 0.5 0.4 0.4 --focal-point 0 0 0
+[ "$(warnings inside)" -eq 1 ] || { fail "inside: no warning"; cat err.txt; }
+works "past it" "$vdi" render one.vdi -o x.png --position 9 9 9 --focal-point 20 20 20
+[ "$(warnings "doesn't see")" -eq 1 ] || { fail "past it: no warning"; cat err.txt; }
+rm -f x.png x_*.png
+
+# Pipes given as input are refused, not waited for.
+mkfifo pipe pipe.json
+for option in "--camera pipe" "--transfer-function pipe.json"; do
+  read -r -a words <<<"$option"
+  refused 1 "a pipe .*pipe" timeout 20 "$vdi" generate --field sphere "${small[@]}" "${words[@]}" -o x.vdi
+done
+refused 1 "a pipe .*pipe" timeout 20 "$vdi" generate --raw pipe -o x.vdi
+refused 1 "a pipe .*pipe" timeout 20 "$vdi" render pipe -o x.png
+refused 1 "a pipe .*pipe" timeout 20 "$vdi" info pipe
+refused 1 "a pipe .*pipe" timeout 20 "$vdi" compare pipe one.png
+refused 1 "a pipe .*pipe" timeout 20 "$vdi" bench --compare bench.json pipe
+echo '{"file": "pipe", "dims": [10, 8, 6], "type": "u16"}' >piped.json
+refused 1 "a pipe .*pipe" timeout 20 "$vdi" generate --raw piped.json -o x.vdi
+echo '{"position": [0, 0, 3], "focal_point": [0, 0, 0], "position": [0, 0, 4]}' >twice.json
+refused 1 "'position' .*twice" "$vdi" generate --field sphere "${small[@]}" --camera twice.json -o x.vdi
+
+# Output: nothing is lost, and what can't be written is told before anything else.
+refused 1 "no-such-folder" "$vdi" generate --raw none.json -o no-such-folder/x.vdi
+refused 1 "no-such-folder" "$vdi" render none.vdi -o no-such-folder/x.png
+refused 1 "no-such-folder" "$vdi" bench --fields sphere --raw none.json -o no-such-folder/x.json
+refused 2 "output: must name a file" "$vdi" generate --field sphere "${small[@]}" -o ""
+refused 2 "output: must name a file" timeout 60 "$vdi" bench --fields sphere "${small[@]}" -o ""
+refused 2 "angles" "$vdi" bench --fields sphere "${small[@]}" --angles 0 nan -o x.json
+refused 2 "flat would write over .* -o" "$vdi" generate --field sphere "${small[@]}" -o x.vdi --flat ./x.vdi
+refused 2 "would write over" "$vdi" render one.vdi -o one.vdi
+refused 2 "would write over" "$vdi" render one.vdi -o x.png --azimuth 20.00000001 20.00000002
+refused 2 "would write over the file of the raw" "$vdi" generate --raw v.json --flat v.raw
+works "into devices" "$vdi" generate --field sphere "${small[@]}" -o /dev/null --flat /dev/null
+[ -c /dev/null ] || fail "a device was replaced"
+refused 1 "nobody reads" timeout 60 "$vdi" render one.vdi -o pipe
+cat pipe >piped.png &
+works "into a pipe" timeout 60 "$vdi" render one.vdi -o pipe
+wait $!
+works "compare" "$vdi" compare piped.png one.png
+[ -p pipe ] || fail "a pipe was replaced"
+ln -s linked.json link.json
+works "bench" "$vdi" bench --fields ramp "${small[@]}" --repeats 1 --angles 0 -o link.json
+chmod 640 linked.json
+works "bench again" "$vdi" bench --fields ramp "${small[@]}" --repeats 1 --angles 0 -o link.json
+[ -h link.json ] && [ "$(stat -c %a linked.json)" = 640 ] || fail "a link or a file's mode was replaced"
+for command in "info one.vdi" "compare one.png one.png" "bench --compare bench.json bench.json" "--help"; do
+  refused 1 "standard output|No space" sh -c "'$vdi' $command >/dev/full"
+  refused 1 "standard output|Bad file" sh -c "'$vdi' $command >&-"
+done
+[ -z "$(ls -A | grep -F .tmp)" ] || fail "temporary files were left"
+
 # Bad input.
+truncate -s 1T large.vdi large.png large.json
+refused 1 "large.vdi" "$vdi" render large.vdi -o x.png
+refused 1 "large.png" "$vdi" compare large.png one.png
+refused 1 "large.json" "$vdi" generate --raw large.json -o x.vdi
+rm large.*
+echo '{"device": 5, "rows": [1]}' >odd.json
+refused 1 "not a result .*odd.json" "$vdi" bench --compare odd.json bench.json
+sed 's/"ssim": 0[.]/"ssim": 0.0/' bench.json >worse.json
+refused 1 "regressions" "$vdi" bench --compare bench.json worse.json
 head -c 200 one.vdi >short.vdi
 refused 1 "short.vdi" "$vdi" render short.vdi -o x.png
 refused 1 "v.json" "$vdi" info v.json

@@ -1,5 +1,5 @@
 """Makes a VDI of V at each step and looks at its picture. VDI_TEST_FAIL: after that, "raise:STEP:RANK" raises there on one
-rank, "exit:STEP:RANK" calls sys.exit there; the extract of that step follows and isn't written."""
+rank, "exit:STEP:RANK" calls sys.exit there; the extract of that step follows and isn't written. VDI_TEST_FILE: its name."""
 
 import os
 import sys
@@ -19,7 +19,7 @@ image.Resolution = [64, 48]
 image.CameraPosition = [16, 8, 70]
 image.CameraFocalPoint = [16, 8, 8]
 extractor = CreateExtractor("VDI", image, registrationName="vdi")
-extractor.Writer.FileName = "vdi_{timestep:06d}.vdi"
+extractor.Writer.FileName = os.environ.get("VDI_TEST_FILE", "vdi_{timestep:06d}.vdi")
 options = catalyst.Options()
 options.ExtractsOutputDirectory = os.environ["VDI_OUTPUT"]
 

@@ -1,8 +1,13 @@
 /* A simulation in C: one block of 8-bit point data a rank, along x. Arguments: the script, then the code that
- * each step must return. Exit status 0 if all did and the error's text was there just when it had to be. */
+ * each step must return, or CODE*STEPS. Exit status 0 if all did and the error's text was there just when it
+ * had to be. Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens.
+ * VDI_TEST_GROWTH=KIB: the resident memory grows by less from a quarter of the steps to the last. */
+#include <limits.h>
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
 
@@ -30,6 +35,85 @@ static int expect(int rank, const char* what, int wanted, int code) {
   return 1;
 }
 
+static long resident_kib(void) {
+  long pages = 0;
+  long resident = 0;
+  FILE* file = fopen("/proc/self/statm", "r");
+  if (file == NULL || fscanf(file, "%ld %ld", &pages, &resident) != 2) abort();
+  fclose(file);
+  return resident * (sysconf(_SC_PAGESIZE) / 1024);
+}
+
+/* Blocks that can't be: an error, and the blocks that there were stay. */
+static int bad_blocks(int rank, vdi_catalyst* catalyst, vdi_catalyst_block good) {
+  int wrong = 0;
+  vdi_catalyst_block block = good;
+  block.spacing[1] = 0.0;
+  wrong += expect(rank, "a block without extent", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_set_blocks(catalyst, 1, &block));
+  block = good;
+  block.cells[0] = INT_MAX;
+  wrong +=
+      expect(rank, "INT_MAX cells", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_set_blocks(catalyst, 1, &block));
+  block = good;
+  block.cells[0] = block.cells[1] = block.cells[2] = INT_MAX - 1;
+  wrong += expect(rank, "cells beyond 64 bits", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_set_blocks(catalyst, 1, &block));
+  block = good;
+  block.ghost_lo[0] = block.ghost_hi[0] = INT_MAX;
+  wrong += expect(rank, "ghosts that overflow", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_set_blocks(catalyst, 1, &block));
+  block = good;
+  block.ghost_lo[2] = N;
+  wrong += expect(rank, "nothing but ghosts", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_set_blocks(catalyst, 1, &block));
+  block = good;
+  if (rank == 0) {
+    block.cells[0] = block.cells[1] = block.cells[2] = 1 << 19;
+    block.ghost_lo[0] = 1;
+  }
+  wrong += expect(rank, "one rank's marks beyond its memory", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_set_blocks(catalyst, 1, &block));
+  return wrong;
+}
+
+/* Numbers that ParaView would cut: they name no file. */
+static int bad_steps(int rank, vdi_catalyst* catalyst) {
+  const int64_t steps[] = {3000000000, 4294967301, -1};
+  int wrong = 0;
+  for (int i = 0; i < 3; ++i) {
+    wrong += expect(rank, "a step that is no int", VDI_CATALYST_BAD_ARGUMENT,
+                    vdi_catalyst_execute(catalyst, steps[i], 0.0));
+  }
+  return wrong + expect(rank, "a step that the ranks don't share", VDI_CATALYST_BAD_ARGUMENT,
+                        vdi_catalyst_execute(catalyst, rank == 0 ? 8 : 9, 0.0));
+}
+
+/* "3*200": 200 steps that return 3. */
+static int run_steps(int rank, vdi_catalyst* catalyst, int argc, char** argv) {
+  int wrong = 0;
+  int total = 0;
+  for (int i = 2; i < argc; ++i) total += strchr(argv[i], '*') != NULL ? atoi(strchr(argv[i], '*') + 1) : 1;
+  int step = 0;
+  long before = 0;
+  for (int i = 2; i < argc; ++i) {
+    for (int left = strchr(argv[i], '*') != NULL ? atoi(strchr(argv[i], '*') + 1) : 1; left > 0; --left) {
+      ++step;
+      simulate(rank, step);
+      const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step);
+      wrong += expect(rank, "execute", atoi(argv[i]), code);
+      const int told = vdi_catalyst_error(catalyst)[0] != '\0';
+      if (code != VDI_CATALYST_OK) wrong += expect(rank, "the error's text", 1, told);
+      if (step == total / 4) before = resident_kib();
+    }
+  }
+  const char* most = getenv("VDI_TEST_GROWTH");
+  if (most == NULL) return wrong;
+  const long growth = resident_kib() - before;
+  printf("rank %d: resident memory grew by %ld KiB in %d steps\n", rank, growth, total - total / 4);
+  return wrong + (growth < atol(most) ? 0 : expect(rank, "growth of memory", 0, 1));
+}
+
 int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
   int rank = 0;
@@ -39,6 +123,14 @@ int main(int argc, char** argv) {
 
   vdi_catalyst* catalyst = NULL;
   const char* scripts[] = {argv[1]};
+  const char* initialize = getenv("VDI_TEST_INITIALIZE");
+  if (initialize != NULL) {
+    wrong = expect(rank, "initialize", atoi(initialize),
+                   vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, scripts, &catalyst));
+    wrong += expect(rank, "the handle of a failed initialize", 1, catalyst == NULL);
+    MPI_Finalize();
+    return wrong == 0 ? 0 : 1;
+  }
   wrong += expect(rank, "initialize with a wrong handle", VDI_CATALYST_BAD_ARGUMENT,
                   vdi_catalyst_initialize(12345, 1, scripts, &catalyst));
   wrong += expect(rank, "initialize", VDI_CATALYST_OK,
@@ -49,25 +141,22 @@ int main(int argc, char** argv) {
   wrong += expect(rank, "execute before blocks", VDI_CATALYST_BAD_ARGUMENT,
                   vdi_catalyst_execute(catalyst, 0, 0.0));
 
-  vdi_catalyst_block block = {{N, N, N}, {0, 0, 0}, {0, 0, 0}, {(double)rank * N, 0.0, 0.0}, {1.0, 1.0, 1.0}};
-  const vdi_catalyst_block good = block;
+  const vdi_catalyst_block good = {
+      {N, N, N}, {0, 0, 0}, {0, 0, 0}, {(double)rank * N, 0.0, 0.0}, {1.0, 1.0, 1.0}};
   const void* data[] = {field};
-  block.spacing[1] = 0.0;
-  wrong += expect(rank, "a block without extent", VDI_CATALYST_BAD_ARGUMENT,
-                  vdi_catalyst_set_blocks(catalyst, 1, &block));
   wrong += expect(rank, "set_blocks", VDI_CATALYST_OK, vdi_catalyst_set_blocks(catalyst, 1, &good));
+  wrong += bad_blocks(rank, catalyst, good);
   wrong += expect(rank, "an unknown type", VDI_CATALYST_BAD_ARGUMENT,
                   vdi_catalyst_set_array(catalyst, "V", 99, VDI_CATALYST_POINTS, data));
   wrong += expect(rank, "set_array", VDI_CATALYST_OK,
                   vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_U8, VDI_CATALYST_POINTS, data));
-  for (int step = 1; step <= argc - 2; ++step) {
-    simulate(rank, step);
-    const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step);
-    wrong += expect(rank, "execute", atoi(argv[step + 1]), code);
-    const int told = vdi_catalyst_error(catalyst)[0] != '\0';
-    if (code != VDI_CATALYST_OK) wrong += expect(rank, "the error's text", 1, told);
-  }
-  vdi_catalyst_finalize(catalyst);
+  wrong += bad_steps(rank, catalyst);
+  wrong += run_steps(rank, catalyst, argc, argv);
+  wrong += expect(rank, "finalize", VDI_CATALYST_OK, vdi_catalyst_finalize(catalyst));
+  wrong += expect(rank, "a second finalize", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_finalize(catalyst));
+  wrong +=
+      expect(rank, "execute after it", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_execute(catalyst, 1, 0.0));
+  wrong += expect(rank, "the error's text after it", 0, vdi_catalyst_error(catalyst)[0] != '\0');
   wrong +=
       expect(rank, "execute without a handle", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_execute(NULL, 1, 0.0));
   MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);

@@ -2,6 +2,8 @@
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <catch2/catch.hpp>
@@ -55,6 +57,10 @@ TEST_CASE("a file is written, replaced and read, whole or in part") {
   CHECK(file.readAll() == other);
   CHECK(file.read(3, 1) == bytesOf(1, 7));
   CHECK(file.read(10, 0).empty());
+  std::vector<std::byte> part = bytesOf(2, 0);
+  file.readInto(2, part);
+  CHECK(part == std::vector<std::byte>{std::byte{2}, std::byte{7}});
+  CHECK(test::errorOf([&] { file.readInto(9, part); }).code() == ErrorCode::Io);
   io::writeAtomically(path, {});
   CHECK(io::InputFile(path).readAll().empty());
   CHECK(folder.fileCount() == 1);
@@ -66,6 +72,113 @@ TEST_CASE("a new file has the permissions that any new file has") {
   io::writeAtomically(folder.path() / "f", bytesOf(1, 1));
   ::umask(before);
   CHECK(fs::status(folder.path() / "f").permissions() == fs::perms(0640));
+}
+
+TEST_CASE("a file that is replaced keeps its permissions") {
+  const test::TemporaryFolder folder;
+  const fs::path path = folder.path() / "f";
+  io::writeAtomically(path, bytesOf(1, 1));
+  for (const unsigned mode : {0600U, 0664U, 0755U}) {
+    fs::permissions(path, fs::perms(mode));
+    io::writeAtomically(path, bytesOf(2, 2));
+    CHECK(fs::status(path).permissions() == fs::perms(mode));
+  }
+}
+
+TEST_CASE("a symbolic link stays one, the file that it names is written") {
+  const test::TemporaryFolder folder;
+  fs::create_directory(folder.path() / "sub");
+  const fs::path file = folder.path() / "sub" / "f";
+  const fs::path link = folder.path() / "link";
+  const fs::path second = folder.path() / "second";
+  fs::create_symlink("sub/f", link);
+  fs::create_symlink(link, second);
+  for (std::uint8_t value = 1; value <= 2; ++value) {  // made, then replaced
+    io::writeAtomically(second, bytesOf(10, value));
+    CHECK(fs::is_symlink(link));
+    CHECK(fs::is_symlink(second));
+    CHECK(fs::is_regular_file(fs::symlink_status(file)));
+    CHECK(io::InputFile(file).readAll() == bytesOf(10, value));
+  }
+  CHECK(io::requireWritable(second) == fs::canonical(file));
+  fs::create_symlink("circle", folder.path() / "circle");
+  CHECK(test::errorOf([&] { io::writeAtomically(folder.path() / "circle", {}); }).code() == ErrorCode::Io);
+}
+
+TEST_CASE("devices and pipes are written to, not replaced") {
+  const test::TemporaryFolder folder;
+  io::writeAtomically("/dev/null", bytesOf(10, 1));
+  CHECK(fs::is_character_file("/dev/null"));
+  CHECK(io::requireWritable("/dev/null").empty());
+  const Error full = test::errorOf([&] { io::writeAtomically("/dev/full", bytesOf(10, 1)); });
+  CHECK(std::string(full.what()).find("No space") != std::string::npos);
+
+  const fs::path pipe = folder.path() / "pipe";
+  REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+  const Error nobody = test::errorOf([&] { io::writeAtomically(pipe, bytesOf(10, 1)); });
+  CHECK(std::string(nobody.what()).find("nobody reads") != std::string::npos);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  io::writeAtomically(pipe, bytesOf(10, 1));
+  std::vector<std::byte> got(20);
+  CHECK(::read(reader, got.data(), got.size()) == 10);
+  std::thread leaver([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    ::close(reader);
+  });
+  CHECK(test::errorOf([&] { io::writeAtomically(pipe, bytesOf(1U << 20, 1)); }).code() == ErrorCode::Io);
+  leaver.join();
+  CHECK(fs::is_fifo(pipe));
+  CHECK(folder.fileCount() == 1);
+}
+
+TEST_CASE("what can't be written is known before there's anything to write") {
+  const test::TemporaryFolder folder;
+  const auto refused = [](const fs::path& path) {
+    const Error asked = test::errorOf([&] { io::requireWritable(path); });
+    const Error tried = test::errorOf([&] { io::writeAtomically(path, {}); });
+    CHECK(asked.code() == ErrorCode::Io);
+    CHECK(asked.context() == path.string());
+    CHECK(std::string(asked.what()) == tried.what());
+  };
+  refused(folder.path());
+  refused(folder.path() / "none" / "f");
+  refused(folder.path() / "");
+  refused("");
+  io::writeAtomically(folder.path() / "f", {});
+  refused(folder.path() / "f" / "g");
+  fs::create_symlink("none/f", folder.path() / "link");
+  refused(folder.path() / "link");
+  CHECK(io::requireWritable(folder.path() / "new") == fs::canonical(folder.path()) / "new");
+  CHECK(io::requireWritable(folder.path() / "." / "f") == fs::canonical(folder.path() / "f"));
+  CHECK(folder.fileCount() == 2);
+  if (::geteuid() != 0) {  // root may write anywhere
+    fs::permissions(folder.path() / "f", fs::perms(0400));
+    refused(folder.path() / "f");
+    fs::permissions(folder.path(), fs::perms(0500));
+    refused(folder.path() / "new");
+    fs::permissions(folder.path(), fs::perms(0700));
+  }
+}
+
+TEST_CASE("a process that's killed while it writes leaves the old file, and no other one") {
+  const test::TemporaryFolder folder;
+  const fs::path path = folder.path() / "f";
+  io::writeAtomically(path, bytesOf(1000, 1));
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const rlimit tight{4096, RLIM_INFINITY};
+    ::setrlimit(RLIMIT_FSIZE, &tight);
+    std::signal(SIGXFSZ, SIG_DFL);  // ends the process in the middle of the write
+    io::writeAtomically(path, bytesOf(100000, 2));
+    ::_exit(0);
+  }
+  int status = 0;
+  REQUIRE(::waitpid(child, &status, 0) == child);
+  CHECK(WIFSIGNALED(status));
+  CHECK(io::InputFile(path).readAll() == bytesOf(1000, 1));
+  const int unnamed = ::open(folder.path().c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0600);
+  if (unnamed >= 0) ::close(unnamed);
+  CHECK(folder.fileCount() == (unnamed >= 0 ? 1 : 2));
 }
 
 TEST_CASE("what can't be read is Error{Io} with path and reason") {
@@ -81,7 +194,7 @@ TEST_CASE("what can't be read is Error{Io} with path and reason") {
   CHECK(reading("/dev/zero").find("not a regular file") != std::string::npos);
   const fs::path pipe = folder.path() / "pipe";
   REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
-  CHECK(reading(pipe).find("not a regular file") != std::string::npos);  // and doesn't wait for a writer
+  CHECK(reading(pipe).find("a pipe") != std::string::npos);  // and doesn't wait for a writer
 
   io::writeAtomically(folder.path() / "shrinks", bytesOf(1000, 1));
   const io::InputFile file(folder.path() / "shrinks");

@@ -1,6 +1,9 @@
 // Damaged .vdi files, the same ones in every run: each must be refused with Error{Format}; what passes the
 // checksums because they were made anew must give a VDI that validate() takes. Meant to run under sanitizers
 // too.
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <xxhash.h>
 
 #include <catch2/catch.hpp>
@@ -34,6 +37,10 @@ Outcome outcomeOf(std::span<const std::byte> bytes) {
 }
 
 void put64(std::vector<std::byte>& bytes, std::size_t offset, std::uint64_t value) {
+  std::memcpy(bytes.data() + offset, &value, sizeof(value));
+}
+
+void put32(std::vector<std::byte>& bytes, std::size_t offset, std::uint32_t value) {
   std::memcpy(bytes.data() + offset, &value, sizeof(value));
 }
 
@@ -157,6 +164,52 @@ TEST_CASE("noise below right checksums: refused, or a sound VDI") {
     if (outcomeOf(damaged) == Outcome::Other) ++other;
   }
   CHECK(other == 0);
+}
+
+TEST_CASE("a file that claims more than it holds is refused before memory is taken") {
+  const bool compact = GENERATE(false, true);
+  const Vdi noisy = test::noisyVdi(40, 40, 40);
+  std::vector<std::byte> claims = io::encode(compact ? test::compact(noisy) : noisy);
+  REQUIRE(get32(claims, 40) == 1);  // chunk
+  const std::uint64_t packed = get32(claims, headerBytes + 4);
+  REQUIRE(packed > 100000);
+  const std::uint64_t most = (packed * 255 - 8 - 4 * 1600) / (compact ? 9 : 24);
+  put32(claims, headerBytes, static_cast<std::uint32_t>(most));
+  put32(claims, 32, static_cast<std::uint32_t>(most));  // the budget
+  put64(claims, 48, most);
+  reseal(claims);
+  // In a process of its own, for its largest size is that of all its life.
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const auto largestKilobytes = [] {
+      rusage usage{};
+      ::getrusage(RUSAGE_SELF, &usage);
+      return usage.ru_maxrss;
+    };
+    const long before = largestKilobytes();
+    const bool refused = outcomeOf(claims) == Outcome::Refused;
+    const auto limit = static_cast<long>(most * 8 / 1024 / 4);  // a quarter of the supersegments claimed
+    ::_exit(refused && largestKilobytes() - before < limit ? 0 : 1);
+  }
+  int status = 0;
+  REQUIRE(::waitpid(child, &status, 0) == child);
+  CHECK(WIFEXITED(status));
+  CHECK(WEXITSTATUS(status) == 0);
+}
+
+TEST_CASE("what a packed chunk expands to is known without expanding it") {
+  for (const Vdi& vdi :
+       {test::plausibleVdi(20, 15, 5), test::noisyVdi(20, 15, 5), test::plausibleVdi(1, 1, 1)}) {
+    const auto lists = vdi.listCount();
+    const std::vector<std::byte> packed = io::detail::packLists(test::full(vdi), {}, 0, lists);
+    const std::uint64_t expanded = io::detail::expandedBytes(lists, vdi.supersegmentCount(), Precision::Full);
+    CHECK(io::detail::announcedBytes(packed) == expanded);
+    std::size_t same = 0;
+    for (std::size_t length = 0; length < packed.size(); ++length) {
+      if (io::detail::announcedBytes(std::span(packed).first(length)) == expanded) ++same;
+    }
+    CHECK(same == 0);
+  }
 }
 
 TEST_CASE("bytes of no meaning are refused") {

@@ -279,6 +279,61 @@ TEST_CASE("rays of more samples than depth codes can tell apart give a VDI of fu
   CHECK_NOTHROW(validate(*vdi));
 }
 
+TEST_CASE("what single precision would lose: a right picture or an error") {
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  const auto blockOf = [](ScalarType type, double scale, double spacing = 1.0, double origin = 0.0) {
+    const apps::Lattice lattice{glm::ivec3(8), glm::dvec3(origin), glm::dvec3(spacing), type,
+                                Joint::SharedPoints};
+    return apps::makeBlock(lattice, {{0, 0, 0}, glm::ivec3(8), 0},
+                           [scale](const glm::ivec3& i) { return scale * (1 + i.x) / 8.0; });
+  };
+  const auto shown = [&](const Block& block, double scale) {
+    generator.setBlocks({block});
+    TransferFunction function = test::threeHues(scale, 0.05 * block.owned.size().x);
+    const Camera camera = Camera::framing(block.owned, {-0.5, -0.35, -1.0}, {0.0, 1.0, 0.0});
+    return highestOpacity(*generator.renderVolume(camera, function, test::smallSettings(16, 12))) > 0.9F;
+  };
+  for (const double scale : {1e-28, 1e30}) CHECK(shown(blockOf(ScalarType::F32, scale), scale));
+  for (const double scale : {1e-280, 1e-40, 1e40, 1e290})
+    CHECK(shown(blockOf(ScalarType::F64, scale), scale));
+  for (const double spacing : {1e-29, 1e29}) CHECK(shown(blockOf(ScalarType::F32, 1.0, spacing), 1.0));
+  CHECK(shown(blockOf(ScalarType::F32, 1.0, 1.0, 1e11), 1.0));
+
+  const auto refused = [&](const Block& block, const char* word) {
+    try {
+      generator.setBlocks({block});
+    } catch (const Error& error) {
+      CHECK_THAT(error.what(), Catch::Contains(word));
+      return error.code() == ErrorCode::InvalidArgument;
+    }
+    return false;
+  };
+  for (const double scale : {1e-31, 1e-40, 1e-44})
+    CHECK(refused(blockOf(ScalarType::F32, scale), "too small"));
+  for (const double scale : {1e-304, 1e-310}) CHECK(refused(blockOf(ScalarType::F64, scale), "too small"));
+  CHECK(refused(blockOf(ScalarType::F64, 1e308), "1e+300"));
+  for (const double spacing : {1e-31, 1e-40, 1e31})
+    CHECK(refused(blockOf(ScalarType::F32, 1.0, spacing), "spacing must be"));
+  for (const double origin : {1e13, 1e15})
+    CHECK(refused(blockOf(ScalarType::F32, 1.0, 1.0, origin), "spacings from"));
+  // Small values beside others are as good as 0, and zeros alone are legal.
+  CHECK_NOTHROW(generator.setBlocks({blockOf(ScalarType::F32, 0.0)}));
+  Block beside = blockOf(ScalarType::F32, 1e-40);
+  beside.origin.x += 7.0;
+  beside.owned.lo.x += 7.0;
+  beside.owned.hi.x += 7.0;
+  CHECK_NOTHROW(generator.setBlocks({blockOf(ScalarType::F32, 1.0), beside}));
+  // A fill value that's far beyond the rest.
+  std::vector<double> filled(512, 0.5);
+  filled[100] = 1e36;
+  Block block = blockOf(ScalarType::F64, 1.0);
+  block.data = filled.data();
+  generator.setBlocks({block});
+  CHECK(codeOf([&] {
+          generator.renderVolume(test::oblique(), test::threeHues(1.0), test::smallSettings(16, 12));
+        }) == ErrorCode::InvalidArgument);
+}
+
 TEST_CASE("wrong arguments are refused with their names") {
   VdiGenerator generator(device(), comm::Communicator::serial());
   const Block good = cube(8, 1.0 / 7.0, [](const glm::ivec3&) { return 0.7F; });

@@ -7,7 +7,8 @@ import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
+from vtkmodules.vtkCommonCore import vtkCommand, vtkOutputWindow  # noqa: E402
+from vtkmodules.vtkRenderingCore import vtkCamera  # noqa: E402
 
 POSITION, FOCAL_POINT = [60, 45, 75], [0, 0, 0]
 
@@ -90,6 +91,22 @@ rendered = {
 apart = np.abs(rendered["Smooth"].astype(int) - rendered["Constant"]).mean()
 check(0 < apart < 4, "reconstructions are alike but not equal, off by %.2f on average" % apart)
 
+# Azimuth is vtkCamera's, also where view-up isn't orthogonal to the view direction. (position, view-up, degrees)
+OBLIQUE = ([0, 34, 94], [0, 1, 0], 50), ([60, 45, 75], [0.6, 1.6, -0.8], 50), ([60, 45, 75], [-0.2, 0.1, 0.3], -35)
+for position, view_up, degrees in OBLIQUE:
+    oblique = vdi_of(wavelet, CameraPosition=position, CameraViewUp=view_up)
+    camera = vtkCamera()
+    camera.SetPosition(position)
+    camera.SetFocalPoint(FOCAL_POINT)
+    camera.SetViewUp(view_up)
+    camera.Azimuth(degrees)
+    there = dict(CameraPosition=camera.GetPosition(), CameraFocalPoint=FOCAL_POINT, CameraViewUp=camera.GetViewUp())
+    turned = picture(simple.RenderVDI(Input=oblique, UseOriginalCamera=1, Azimuth=degrees)).astype(int)
+    worst = np.abs(turned - picture(simple.RenderVDI(Input=oblique, **there))).max()
+    check(worst <= 1, "azimuth is vtkCamera's from %s with view-up %s, off by %d" % (position, view_up, worst))
+    similar = ssim(turned.astype(np.uint8), picture(vdi_of(wavelet, PictureOnly=1, **there)))
+    check(similar > 0.97, "which is volume rendering from there, SSIM %.4f" % similar)
+
 # A series is time steps.
 second = os.path.join(OUTPUT, "series_1.vdi")
 simple.SaveData(os.path.join(OUTPUT, "series_0.vdi"), proxy=image)
@@ -152,7 +169,7 @@ check(picture(fractal).max() > 60, "an AMR data set of " + amr.GetClientSideObje
 
 # Bad input: an error, not a crash, and the next thing works.
 check(errors_of(lambda: vdi_of(simple.Tetrahedralize(Input=wavelet)).UpdatePipeline()), "an unstructured grid is refused")
-check(errors_of(lambda: vdi_of(wavelet, CameraPosition=[0, 0, 0]).UpdatePipeline()), "a camera on its focal point is refused")
+check(errors_of(lambda: vdi_of(wavelet, CameraViewAngle=0).UpdatePipeline()), "a camera without an angle of view is refused")
 check(errors_of(lambda: vdi_of(wavelet, ("POINTS", "nothing")).UpdatePipeline()), "an array that isn't there is refused")
 check(errors_of(lambda: simple.RenderVDI(Input=wavelet).UpdatePipeline()), "RenderVDI refuses an image that is no VDI")
 broken = os.path.join(OUTPUT, "broken.vdi")

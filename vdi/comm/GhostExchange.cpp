@@ -5,363 +5,646 @@
 #include <cassert>
 #include <cmath>
 #include <cstring>
+#include <functional>
+#include <limits>
 #include <map>
+#include <memory>
 #include <tuple>
-#include <unordered_map>
+#include <utility>
 
-#include "vdi/core/Error.h"
+#include "vdi/comm/BlockDirectory.h"
 
 namespace vdi::comm {
 
 namespace {
 
-constexpr double latticeTolerance = 1e-3;  // of a spacing
+/// Rays need values that far beyond an owned box, in spacings: a sample's interval may reach there.
+constexpr double reach = 0.5;
 
-/// A block as the other ranks need to know it.
-struct Description {
-  glm::dvec3 origin;  // of the first stored value
-  glm::dvec3 spacing;
-  Box owned;
-  glm::ivec3 dims;
-  std::uint32_t type;
-  std::int32_t rank;
-  std::int32_t index;  // on its rank
-};
+/// Of a spacing: more than rounding and latticeTolerance move a face, less than what tells values
+/// apart.
+constexpr double indexTolerance = 0.01;
 
-/// The values of a block that are its own to give, as a half-open box of lattice indices of its lattice. For
-/// points the owned box runs from value to value, for cells from half a spacing before to half a spacing
-/// behind.
-struct IndexBox {
-  glm::i64vec3 lo{0};
-  glm::i64vec3 hi{0};
-  bool empty() const { return lo.x >= hi.x || lo.y >= hi.y || lo.z >= hi.z; }
-  IndexBox intersection(const IndexBox& other) const {
-    return {glm::max(lo, other.lo), glm::min(hi, other.hi)};
-  }
-  std::uint64_t count() const {
-    if (empty()) return 0;
-    const auto size = glm::u64vec3(hi - lo);
-    return size.x * size.y * size.z;
-  }
-};
+/// Per axis, for a mean over finer values; where there are more, these are taken among them.
+constexpr int mostParts = 16;
 
-/// Blocks whose values lie on one lattice: equal type and spacing, origins whole spacings apart.
-struct LatticeKey {
-  std::uint32_t type;
-  std::array<double, 3> spacing;
-  std::array<std::int64_t, 3> phase;  // origin modulo spacing, in steps of the tolerance
-  bool operator<(const LatticeKey& other) const {
-    return std::tie(type, spacing, phase) < std::tie(other.type, other.spacing, other.phase);
-  }
-};
+/// Closed gaps and `reach` are within that many layers of the stored values.
+constexpr int mostLayers = 3;
 
-glm::i64vec3 round64(const glm::dvec3& v) {
-  return glm::i64vec3(glm::round(v));
+glm::ivec3 indexOf(const glm::dvec3& index, const Block& block) {
+  const glm::dvec3 beyond(mostLayers);
+  return glm::ivec3(glm::clamp(index, -beyond, glm::dvec3(block.dims) + beyond));
 }
 
-LatticeKey keyOf(const Description& block, const glm::dvec3& anchor) {
-  LatticeKey key{block.type, {}, {}};
-  const auto steps = static_cast<std::int64_t>(std::lround(1.0 / latticeTolerance));
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<std::size_t>(axis);
-    // Nine digits: spacings of one data set computed in different ways agree to more than that.
-    const double magnitude = std::pow(10.0, std::floor(std::log10(block.spacing[axis])) - 9.0);
-    key.spacing[a] = std::round(block.spacing[axis] / magnitude) * magnitude;
-    const double position = (block.origin[axis] - anchor[axis]) / block.spacing[axis];
-    const auto phase = static_cast<std::int64_t>(
-        std::llround((position - std::floor(position)) * static_cast<double>(steps)));
-    key.phase[a] = (phase + 1) / 2 % (steps / 2);  // neighbouring steps fall together, 1 and 0 too
+/// Values whose places are in the box, faces included.
+IndexBox valuesIn(const Box& box, const Block& block) {
+  return {indexOf(glm::ceil((box.lo - block.origin) / block.spacing - indexTolerance), block),
+          indexOf(glm::floor((box.hi - block.origin) / block.spacing + indexTolerance) + 1.0, block)};
+}
+
+/// Values that are interpolated in the box and up to `reach` beyond.
+IndexBox valuesFor(const Box& box, const Block& block) {
+  const double beyond = reach - indexTolerance;
+  return {indexOf(glm::floor((box.lo - block.origin) / block.spacing - beyond), block),
+          indexOf(glm::ceil((box.hi - block.origin) / block.spacing + beyond) + 1.0, block)};
+}
+
+void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
+  const auto meets = [&hole](const IndexBox& box) { return !box.intersection(hole).empty(); };
+  if (std::none_of(boxes.begin(), boxes.end(), meets)) return;
+  std::vector<IndexBox> rest;
+  for (const IndexBox& box : boxes) {
+    const std::vector<IndexBox> parts = without(box, hole);
+    rest.insert(rest.end(), parts.begin(), parts.end());
   }
-  return key;
+  boxes = std::move(rest);
 }
 
-/// Index on the anchored lattice of the block's first stored value.
-glm::i64vec3 firstIndex(const Description& block, const glm::dvec3& anchor) {
-  return round64((block.origin - anchor) / block.spacing);
-}
-
-IndexBox storedBox(const Description& block, const glm::dvec3& anchor) {
-  const glm::i64vec3 lo = firstIndex(block, anchor);
-  return {lo, lo + glm::i64vec3(block.dims)};
-}
-
-/// Stored values within the owned box, half a spacing of tolerance being far more than rounding needs.
-IndexBox givenBox(const Description& block, const glm::dvec3& anchor) {
-  const glm::i64vec3 first = firstIndex(block, anchor);
+/// What a rank asks another for: of the values `box` of a lattice, each the sum over those of its
+/// samples that lie in `clip`, [lo, hi). A value's samples are the middles of its parts.
+struct Request {
+  std::int32_t grid;    // on the rank that's asked
+  std::int32_t round;   // in which it's answered
+  std::int32_t copied;  // 1: values as they are, `shift` further in the grid that's asked
+  glm::ivec3 shift;
   IndexBox box;
-  box.lo = first + glm::i64vec3(glm::ceil((block.owned.lo - block.origin) / block.spacing - 0.01));
-  box.hi = first + glm::i64vec3(glm::floor((block.owned.hi - block.origin) / block.spacing + 0.01)) +
-           std::int64_t{1};
-  return box.intersection(storedBox(block, anchor));
-}
+  glm::ivec3 parts;  // per axis
+  glm::dvec3 origin;
+  glm::dvec3 spacing;
+  Box clip;
 
-/// Owned boxes of point data end at values, those of cell data half-way between two.
-bool isCellLike(const Description& block) {
-  const double position = (block.owned.lo.x - block.origin.x) / block.spacing.x;
-  return std::abs(position - std::floor(position) - 0.5) < 0.25;
-}
-
-/// Blocks of one lattice by the cells of a coarse grid that they touch, so that neighbours are found without
-/// comparing all pairs.
-class Neighbourhood {
- public:
-  Neighbourhood(std::span<const Description> blocks, std::span<const std::size_t> members,
-                const glm::dvec3& anchor)
-      : cell_(1) {
-    for (const std::size_t i : members) cell_ = glm::max(cell_, glm::i64vec3(blocks[i].dims));
-    for (const std::size_t i : members) {
-      forEachCell(givenBox(blocks[i], anchor),
-                  [&](const glm::i64vec3& at) { cells_[hash(at)].push_back(i); });
+  double place(int axis, int index, int part) const {
+    const double offset = (part + 0.5) / parts[axis] - 0.5;
+    return origin[axis] + (index + offset) * spacing[axis];
+  }
+  /// Of value `index`, the parts [first, last) along the axis whose samples are in the clip.
+  std::pair<int, int> partsIn(int axis, int index) const {
+    int first = 0;
+    while (first < parts[axis] && place(axis, index, first) < clip.lo[axis]) ++first;
+    int last = first;
+    while (last < parts[axis] && place(axis, index, last) < clip.hi[axis]) ++last;
+    return {first, last};
+  }
+  /// Leaves of the box what has samples in the clip.
+  void trim() {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double lo = std::floor((clip.lo[axis] - origin[axis]) / spacing[axis]) - 1.0;
+      const double hi = std::ceil((clip.hi[axis] - origin[axis]) / spacing[axis]) + 2.0;
+      box.lo[axis] = static_cast<int>(std::max<double>(box.lo[axis], lo));
+      box.hi[axis] = static_cast<int>(std::min<double>(box.hi[axis], hi));
+      const auto empty = [&](int index) {
+        const auto [first, last] = partsIn(axis, index);
+        return first == last;
+      };
+      while (box.lo[axis] < box.hi[axis] && empty(box.lo[axis])) ++box.lo[axis];
+      while (box.lo[axis] < box.hi[axis] && empty(box.hi[axis] - 1)) --box.hi[axis];
     }
   }
-  /// Every block whose given box may intersect `box`, each once.
-  std::vector<std::size_t> near(const IndexBox& box) const {
-    std::vector<std::size_t> found;
-    forEachCell(box, [&](const glm::i64vec3& at) {
-      const auto entry = cells_.find(hash(at));
-      if (entry != cells_.end()) found.insert(found.end(), entry->second.begin(), entry->second.end());
-    });
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    return found;
+};
+
+/// Values that a grid lacks, or has but shouldn't use.
+struct Wanted {
+  IndexBox box;
+  bool keep = false;                    // the caller's: they stay where nobody knows better
+  bool asked = false;                   // somebody has some of them
+  std::size_t copies = 0;               // how many come as they are
+  std::shared_ptr<std::byte[]> values;  // of the block's type
+  std::vector<double> sums;             // where some are means or interpolated
+  std::vector<double> weights;
+};
+
+/// Values that one or several blocks of this rank share.
+struct Grid {
+  Block block;
+  bool cells = false;
+  double volume = 0.0;  // that a value stands for
+  std::vector<Box> owned;
+  std::vector<Box> finer;       // that were taken off these
+  std::vector<IndexBox> given;  // its own values
+  std::vector<Wanted> wanted;
+  IndexBox asked;  // around all values that somebody has
+};
+
+/// Trilinear interpolation in a block's values near some place.
+class Sampler {
+ public:
+  Sampler(const Block& block, const Box& where) : block_(block) {
+    const IndexBox near{glm::ivec3(glm::floor((where.lo - block.origin) / block.spacing)) - 1,
+                        glm::ivec3(glm::ceil((where.hi - block.origin) / block.spacing)) + 2};
+    for (const Patch& patch : block.patchList()) {
+      if (!patch.box.intersection(near).empty()) patches_.push_back(&patch);
+    }
+  }
+  double at(const glm::dvec3& place) const {
+    glm::dvec3 position = (place - block_.origin) / block_.spacing;
+    const glm::dvec3 whole = glm::round(position);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::abs(position[axis] - whole[axis]) < latticeTolerance) position[axis] = whole[axis];
+    }
+    const glm::dvec3 base = glm::floor(position);
+    const glm::dvec3 share = position - base;
+    double sum = 0.0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::ivec3 step{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
+      const glm::dvec3 weight = glm::mix(1.0 - share, share, glm::dvec3(step));
+      const double product = weight.x * weight.y * weight.z;
+      if (product > 0.0) sum += product * value(glm::ivec3(base) + step);
+    }
+    return sum;
   }
 
  private:
-  template <typename Visit>
-  void forEachCell(const IndexBox& box, Visit visit) const {
-    if (box.empty()) return;
-    const auto cellOf = [&](const glm::i64vec3& p) {
-      return glm::i64vec3(glm::floor(glm::dvec3(p) / glm::dvec3(cell_)));
-    };
-    const glm::i64vec3 lo = cellOf(box.lo);
-    const glm::i64vec3 hi = cellOf(box.hi - std::int64_t{1});
-    for (std::int64_t z = lo.z; z <= hi.z; ++z) {
-      for (std::int64_t y = lo.y; y <= hi.y; ++y) {
-        for (std::int64_t x = lo.x; x <= hi.x; ++x) visit({x, y, z});
-      }
+  double value(const glm::ivec3& index) const {
+    const IndexBox all = block_.extended();
+    const glm::ivec3 at = glm::clamp(index, all.lo, all.hi - 1);
+    for (auto patch = patches_.rbegin(); patch != patches_.rend(); ++patch) {
+      if ((*patch)->box.contains(at))
+        return loadValue(block_.type, (*patch)->values.get(), (*patch)->box.position(at));
     }
+    return loadValue(block_.type, block_.data, block_.stored().position(at));
   }
-  static std::uint64_t hash(const glm::i64vec3& p) {
-    const auto u = glm::u64vec3(p);
-    return u.x * 0x9E3779B97F4A7C15ULL ^ u.y * 0xC2B2AE3D27D4EB4FULL ^ u.z * 0x165667B19E3779F9ULL;
-  }
-  glm::i64vec3 cell_;
-  std::unordered_map<std::uint64_t, std::vector<std::size_t>> cells_;
+  const Block& block_;
+  std::vector<const Patch*> patches_;
 };
 
-/// Values of `box` that travel from one block to another.
-struct Transfer {
-  std::size_t donor;      // in the list of all blocks
-  std::size_t recipient;  // likewise
-  IndexBox box;
-};
+template <typename Visit>
+void forEachRow(const IndexBox& box, Visit visit) {
+  for (int z = box.lo.z; z < box.hi.z; ++z) {
+    for (int y = box.lo.y; y < box.hi.y; ++y) visit(glm::ivec3(box.lo.x, y, z));
+  }
+}
 
-/// What a block lacks, and its lattice box once it has it.
-struct Plan {
-  GhostLayers added;
-  IndexBox grown;
-  glm::bvec3 gapAbove{false};  // point data: the cell above belongs to nobody yet
-};
+template <typename Visit>
+void forEachIndex(const IndexBox& box, Visit visit) {
+  forEachRow(box, [&](glm::ivec3 at) {
+    for (; at.x < box.hi.x; ++at.x) visit(at);
+  });
+}
+
+/// All blocks of all ranks get the one type that holds all of theirs.
+void makeTypesOne(const Communicator& comm, std::vector<Block>& blocks) {
+  std::array<std::uint64_t, 8> present{};
+  for (const Block& block : blocks) present[static_cast<std::size_t>(block.type)] = 1;
+  comm.allReduceMax(present);
+  if (std::count(present.begin(), present.end(), 1U) <= 1) return;
+  const auto has = [&](ScalarType type) { return present[static_cast<std::size_t>(type)] != 0; };
+  const bool wide = has(ScalarType::U32) || has(ScalarType::I32) || has(ScalarType::F64);
+  const ScalarType common = wide ? ScalarType::F64 : ScalarType::F32;
+  comm.together([&] {
+    std::map<std::pair<const void*, std::size_t>, std::shared_ptr<const void>> known;
+    for (Block& block : blocks) {
+      if (block.type == common) continue;
+      std::shared_ptr<const void>& copy = known[{block.data, block.valueCount()}];
+      if (!copy) {
+        const std::shared_ptr<std::byte[]> values(new std::byte[block.valueCount() * sizeOf(common)]);
+        for (std::size_t i = 0; i < block.valueCount(); ++i)
+          storeValue(common, values.get(), i, loadValue(block.type, block.data, i));
+        copy = std::shared_ptr<const void>(values, values.get());
+      }
+      block.type = common;
+      block.data = copy.get();
+      block.keepAlive = copy;
+    }
+  });
+}
+
+/// The parts of each block that are its own, in the place of the block.
+std::vector<Block> partsOf(const std::vector<OwnParts>& parts, std::vector<Block> blocks) {
+  std::vector<Block> result;
+  std::size_t entry = 0;
+  for (Block& block : blocks) {
+    if (block.owned.empty()) {
+      result.push_back(std::move(block));
+      continue;
+    }
+    assert(entry < parts.size());
+    for (const Box& part : parts[entry++].boxes) result.emplace_back(block).owned = part;
+  }
+  return result;
+}
 
 class Exchange {
  public:
-  Exchange(const Communicator& comm, std::vector<Block>& mine) : comm_(comm), mine_(mine) { describe(); }
+  Exchange(const Communicator& comm, const BlockDirectory& directory, const std::vector<OwnParts>& parts,
+           std::vector<Block>& blocks)
+      : comm_(comm),
+        directory_(directory),
+        blocks_(blocks),
+        outgoing_(static_cast<std::size_t>(comm.size())) {
+    comm_.together([&] {
+      findLevels();
+      gatherGrids(parts);
+      for (std::size_t i = 0; i < grids_.size(); ++i) {
+        findWanted(grids_[i]);
+        for (std::size_t w = 0; w < grids_[i].wanted.size(); ++w) askFor(i, w);
+      }
+      for (std::size_t i = 0; i < grids_.size(); ++i) makePatches(i);
+    });
+  }
 
-  std::vector<Block> run() {
-    group();
-    planAll();
-    return deliver();
+  void run() {
+    std::vector<std::uint64_t> rounds(levels_.size() + firstCoarserRound, 0);
+    for (const auto& asked : outgoing_) {
+      for (const Asked& one : asked) rounds[static_cast<std::size_t>(one.request.round)] = 1;
+    }
+    comm_.allReduceMax(rounds);
+    if (std::count(rounds.begin(), rounds.end(), 1U) > 0) {
+      sendRequests();
+      for (std::size_t round = 0; round < rounds.size(); ++round) {
+        if (rounds[round] != 0) exchangeValues(static_cast<std::int32_t>(round));
+      }
+    }
+    for (std::size_t i = directory_.firstMine(); i < directory_.lastMine(); ++i) {
+      const BlockEntry& entry = directory_.entries()[i];
+      Block& block = blocks_[static_cast<std::size_t>(entry.block)];
+      const Block& filled = grids_[static_cast<std::size_t>(entry.grid)].block;
+      block.extra = filled.extra;
+      block.patches = filled.patches;
+    }
   }
 
  private:
-  void describe() {
-    std::vector<Description> own;
-    for (std::size_t i = 0; i < mine_.size(); ++i) {
-      const Block& b = mine_[i];
-      if (b.owned.empty()) continue;
-      own.push_back({b.origin, b.spacing, b.owned, b.dims, static_cast<std::uint32_t>(b.type), comm_.rank(),
-                     static_cast<std::int32_t>(i)});
-    }
-    const Gathered gathered = comm_.allGather(std::as_bytes(std::span(own)), sizeof(Description));
-    all_.resize(gathered.bytes.size() / sizeof(Description));
-    if (!all_.empty()) std::memcpy(all_.data(), gathered.bytes.data(), gathered.bytes.size());
-    plans_.resize(all_.size());
-    if (!all_.empty()) anchor_ = all_.front().origin;
+  /// First what coincides with donors' own values, then what's interpolated in donors of this level
+  /// or finer ones, then in coarser ones, the coarsest first: each finds the layers that it needs.
+  static constexpr std::int32_t exactRound = 0;
+  static constexpr std::int32_t interpolatedRound = 1;
+  static constexpr std::int32_t firstCoarserRound = 2;
+
+  struct Asked {
+    Request request;
+    std::size_t grid;
+    std::size_t wanted;
+  };
+
+  void findLevels() {
+    for (const BlockEntry& entry : directory_.entries()) levels_.push_back(entry.valueVolume());
+    std::sort(levels_.begin(), levels_.end(), std::greater<>());
+    const auto same = [](double a, double b) { return b > 0.99 * a; };
+    levels_.erase(std::unique(levels_.begin(), levels_.end(), same), levels_.end());
   }
 
-  void group() {
-    std::map<LatticeKey, std::vector<std::size_t>> lattices;
-    for (std::size_t i = 0; i < all_.size(); ++i) lattices[keyOf(all_[i], anchor_)].push_back(i);
-    for (auto& [key, members] : lattices) groups_.push_back(std::move(members));
+  std::int32_t levelNumber(const BlockEntry& entry) const {
+    const auto isLarger = [](double level, double volume) { return level > volume / 0.99; };
+    return static_cast<std::int32_t>(
+        std::lower_bound(levels_.begin(), levels_.end(), entry.valueVolume(), isLarger) - levels_.begin());
   }
 
-  /// Every rank plans for all blocks: the plan follows from the descriptions alone, so nobody need be asked.
-  void planAll() {
-    for (const auto& members : groups_) {
-      if (members.size() < 2) {
-        for (const std::size_t i : members) plans_[i].grown = storedBox(all_[i], anchor_);
-        continue;
+  void gatherGrids(const std::vector<OwnParts>& parts) {
+    for (std::size_t i = directory_.firstMine(); i < directory_.lastMine(); ++i) {
+      const BlockEntry& entry = directory_.entries()[i];
+      const auto index = static_cast<std::size_t>(entry.grid);
+      if (index >= grids_.size()) {
+        Grid& grid = grids_.emplace_back();
+        grid.block = blocks_[static_cast<std::size_t>(entry.block)];
+        grid.block.extra = {};
+        grid.block.patches = nullptr;
+        grid.cells = entry.cells;
+        grid.volume = entry.valueVolume();
       }
-      const Neighbourhood neighbours(all_, members, anchor_);
-      for (const std::size_t i : members) plan(i, neighbours);
+      Grid& grid = grids_[index];
+      const OwnParts& own = parts[i - directory_.firstMine()];
+      grid.owned.insert(grid.owned.end(), own.boxes.begin(), own.boxes.end());
+      grid.finer.insert(grid.finer.end(), own.finer.begin(), own.finer.end());
+    }
+    for (Grid& grid : grids_) {
+      for (const Box& box : grid.owned) {
+        std::vector<IndexBox> values{valuesIn(box, grid.block).intersection(grid.block.stored())};
+        // Points on a finer block's face are the finer one's.
+        for (const Box& finer : grid.finer) subtract(values, valuesIn(finer, grid.block));
+        std::erase_if(values, [](const IndexBox& part) { return part.empty(); });
+        grid.given.insert(grid.given.end(), values.begin(), values.end());
+      }
     }
   }
 
-  void plan(std::size_t i, const Neighbourhood& neighbours) {
-    const IndexBox stored = storedBox(all_[i], anchor_);
-    const IndexBox given = givenBox(all_[i], anchor_);
-    const bool cells = isCellLike(all_[i]);
-    Plan& plan = plans_[i];
-    plan.grown = stored;
-    for (int axis = 0; axis < 3; ++axis) {
-      for (const bool above : {false, true}) {
-        // Just beyond the given values; stored ghost layers there mean that nothing is lacking on this side.
-        if (above ? stored.hi[axis] > given.hi[axis] : stored.lo[axis] < given.lo[axis]) continue;
-        // Point data lacks something only above: the gap's owner is the block below it.
-        if (!cells && !above) continue;
-        IndexBox layer = given;
-        layer.lo[axis] = above ? given.hi[axis] : given.lo[axis] - 1;
-        layer.hi[axis] = layer.lo[axis] + 1;
-        bool found = false;
-        bool shared = false;
-        for (const std::size_t n : neighbours.near(layer)) {
-          if (n == i || isCellLike(all_[n]) != cells) continue;
-          const IndexBox other = givenBox(all_[n], anchor_);
-          if (other.intersection(layer).empty()) continue;
-          // A neighbour that also has this block's last values shares a face with it: no gap there.
-          IndexBox face = layer;
-          face.lo[axis] += above ? -1 : 1;
-          face.hi[axis] += above ? -1 : 1;
-          (other.intersection(face).empty() ? found : shared) = true;
+  /// Values around the stored ones, and stored ones that aren't the grid's own but would be
+  /// interpolated with them.
+  static void findWanted(Grid& grid) {
+    const IndexBox stored = grid.block.stored();
+    IndexBox all = stored;
+    for (const Box& box : grid.owned) all.include(valuesFor(box, grid.block));
+    for (const IndexBox& box : without(all, stored)) grid.wanted.emplace_back().box = box;
+    const std::size_t around = grid.wanted.size();
+    for (const Box& box : grid.owned) {
+      std::vector<IndexBox> inside{valuesFor(box, grid.block).intersection(stored)};
+      for (const IndexBox& given : grid.given) subtract(inside, given);
+      for (std::size_t i = around; i < grid.wanted.size(); ++i) subtract(inside, grid.wanted[i].box);
+      const auto want = [&](const IndexBox& values, bool keep) {
+        Wanted& wanted = grid.wanted.emplace_back();
+        wanted.box = values;
+        wanted.keep = keep;
+      };
+      if (grid.block.masked) {
+        for (const IndexBox& masked : *grid.block.masked) {
+          for (const IndexBox& values : inside) {
+            const IndexBox common = values.intersection(masked);
+            if (!common.empty()) want(common, false);
+          }
+          subtract(inside, masked);
         }
-        if (!found || (shared && !cells)) continue;
-        (above ? plan.added.hi : plan.added.lo)[axis] = 1;
-        if (!cells) plan.gapAbove[axis] = true;
       }
-    }
-    plan.grown.lo -= glm::i64vec3(plan.added.lo);
-    plan.grown.hi += glm::i64vec3(plan.added.hi);
-    if (plan.grown.lo == stored.lo && plan.grown.hi == stored.hi) return;
-    for (const std::size_t n : neighbours.near(plan.grown)) {
-      if (n == i || isCellLike(all_[n]) != cells) continue;
-      const IndexBox part = givenBox(all_[n], anchor_).intersection(plan.grown);
-      if (!part.empty()) transfers_.push_back({n, i, part});
+      for (const IndexBox& values : inside) want(values, true);
     }
   }
 
-  std::vector<Block> deliver() {
-    const auto ranks = static_cast<std::size_t>(comm_.size());
-    std::vector<std::vector<std::byte>> outgoing(ranks);
-    for (const Transfer& transfer : transfers_) {
-      if (all_[transfer.donor].rank != comm_.rank()) continue;
-      copyOut(transfer, outgoing[static_cast<std::size_t>(all_[transfer.recipient].rank)]);
+  /// Finds who has the values, the finest first.
+  void askFor(std::size_t gridIndex, std::size_t wantedIndex) {
+    Grid& grid = grids_[gridIndex];
+    const Wanted& wanted = grid.wanted[wantedIndex];
+    // What the values stand for.
+    const Box volume{grid.block.origin + (glm::dvec3(wanted.box.lo) - 0.5) * grid.block.spacing,
+                     grid.block.origin + (glm::dvec3(wanted.box.hi) - 0.5) * grid.block.spacing};
+    // First those who own the place, the finest first; of a level those with values there before
+    // those that only close a gap. Then those who store it, where it's nobody's.
+    struct Claim {
+      bool stored;
+      std::int32_t level;
+      bool gap;
+      std::size_t donor;
+      Box box;
+      auto order() const { return std::tuple(stored, -level, gap, donor); }
+    };
+    std::vector<Claim> claims;
+    for (const std::size_t d : directory_.meeting(volume)) {
+      const BlockEntry& donor = directory_.entries()[d];
+      if (donor.rank == comm_.rank() && static_cast<std::size_t>(donor.grid) == gridIndex) continue;
+      // A little more, so that nothing is lost between faces and places that were computed
+      // differently.
+      const glm::dvec3 spare = latticeTolerance * glm::min(donor.spacing, grid.block.spacing);
+      const auto claim = [&](bool stored, bool gap, const Box& box) {
+        claims.push_back({stored, levelNumber(donor), gap, d, {box.lo - spare, box.hi + spare}});
+      };
+      claim(false, false, donor.asked);
+      if (donor.asked != donor.owned) claim(false, true, donor.owned);
+      if (!donor.masks && !wanted.keep) claim(true, false, donor.storedBox());
     }
+    std::sort(claims.begin(), claims.end(),
+              [](const Claim& a, const Claim& b) { return a.order() < b.order(); });
+    std::vector<Box> left{volume};
+    for (const Claim& claim : claims) {
+      std::vector<Box> rest;
+      for (const Box& box : left) {
+        const Box common = box.intersection(claim.box);
+        if (!common.empty()) ask(gridIndex, wantedIndex, directory_.entries()[claim.donor], common);
+        const std::vector<Box> parts = without(box, claim.box);
+        rest.insert(rest.end(), parts.begin(), parts.end());
+      }
+      left = std::move(rest);
+      if (left.empty()) break;
+    }
+  }
+
+  void ask(std::size_t gridIndex, std::size_t wantedIndex, const BlockEntry& donor, const Box& where) {
+    Grid& grid = grids_[gridIndex];
+    Wanted& wanted = grid.wanted[wantedIndex];
+    const double ratio = donor.valueVolume() / grid.volume;
+    const bool finer = ratio < 0.99;
+    const bool coarser = ratio > 1.0 / 0.99;
+    if (wanted.keep && !finer && !coarser) return;
+    Request request{donor.grid,        exactRound,         0,    glm::ivec3(0), wanted.box, glm::ivec3(1),
+                    grid.block.origin, grid.block.spacing, where};
+    if (grid.cells && finer) {
+      const glm::dvec3 parts = glm::round(grid.block.spacing / donor.spacing);
+      request.parts = glm::ivec3(glm::clamp(parts, glm::dvec3(1.0), glm::dvec3(mostParts)));
+    }
+    request.trim();
+    if (request.box.empty()) return;
+    const bool coincides = findShift(request, donor);
+    request.copied = coincides && request.parts == glm::ivec3(1) ? 1 : 0;
+    if (!coincides) request.round = coarser ? firstCoarserRound + levelNumber(donor) : interpolatedRound;
+    wanted.asked = true;
+    grid.asked.include(request.box);
+    if (request.copied != 0) {
+      wanted.copies += request.box.count();
+    } else if (wanted.sums.empty()) {
+      wanted.sums.assign(wanted.box.count(), 0.0);
+      wanted.weights.assign(wanted.box.count(), 0.0);
+    }
+    outgoing_[static_cast<std::size_t>(donor.rank)].push_back({request, gridIndex, wantedIndex});
+  }
+
+  /// Whether all samples are places of the donor's values.
+  static bool findShift(Request& request, const BlockEntry& donor) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const int last = request.parts[axis] - 1;
+      const double begin =
+          (request.place(axis, request.box.lo[axis], 0) - donor.origin[axis]) / donor.spacing[axis];
+      const double end =
+          (request.place(axis, request.box.hi[axis] - 1, last) - donor.origin[axis]) / donor.spacing[axis];
+      const double steps = static_cast<double>(request.box.size()[axis]) * request.parts[axis] - 1.0;
+      if (std::abs(begin - std::round(begin)) > latticeTolerance ||
+          std::abs(end - std::round(end)) > latticeTolerance || std::round(end) - std::round(begin) != steps)
+        return false;
+      if (std::round(begin) < 0.0 || std::round(end) >= donor.dims[axis]) return false;
+      request.shift[axis] = static_cast<int>(std::round(begin)) - request.box.lo[axis];
+    }
+    return true;
+  }
+
+  /// Layers where anybody has values for them, with the nearest own values where nobody has.
+  void makePatches(std::size_t gridIndex) {
+    Grid& grid = grids_[gridIndex];
+    const IndexBox stored = grid.block.stored();
+    IndexBox all = stored;
+    all.include(grid.asked);
+    grid.block.extra = {-all.lo, all.hi - stored.hi};
+    auto patches = std::make_shared<std::vector<Patch>>();
+    for (Wanted& wanted : grid.wanted) {
+      if (wanted.keep && !wanted.asked) continue;
+      const IndexBox box = wanted.box.intersection(all);
+      if (box.empty()) continue;
+      wanted.values = std::shared_ptr<std::byte[]>(new std::byte[box.count() * sizeOf(grid.block.type)]);
+      if (box != wanted.box) {
+        wanted.box = box;
+        if (!wanted.sums.empty()) {
+          wanted.sums.assign(box.count(), 0.0);
+          wanted.weights.assign(box.count(), 0.0);
+        }
+      }
+      if (wanted.copies != box.count()) fillWithOwn(grid, wanted);
+      patches->push_back({box, std::shared_ptr<const void>(wanted.values, wanted.values.get())});
+    }
+    if (!patches->empty()) grid.block.patches = std::move(patches);
+  }
+
+  /// Stored values where these are to stay, else those of the nearest value that's the grid's own.
+  static void fillWithOwn(const Grid& grid, Wanted& wanted) {
+    const std::size_t size = sizeOf(grid.block.type);
+    const IndexBox stored = grid.block.stored();
+    const auto* from = static_cast<const std::byte*>(grid.block.data);
+    std::byte* to = wanted.values.get();
+    forEachIndex(wanted.box, [&](const glm::ivec3& at) {
+      glm::ivec3 best = glm::clamp(at, stored.lo, stored.hi - 1);
+      if (!wanted.keep) {
+        int least = std::numeric_limits<int>::max();
+        for (const IndexBox& given : grid.given) {
+          const glm::ivec3 nearest = glm::clamp(at, given.lo, given.hi - 1);
+          const glm::ivec3 apart = glm::abs(nearest - at);
+          if (apart.x + apart.y + apart.z >= least) continue;
+          least = apart.x + apart.y + apart.z;
+          best = nearest;
+        }
+      }
+      std::memcpy(to, from + stored.position(best) * size, size);
+      to += size;
+    });
+  }
+
+  void sendRequests() {
+    std::vector<Request> requests;
+    std::vector<std::uint64_t> counts;
+    comm_.together([&] {
+      for (const auto& asked : outgoing_) {
+        counts.push_back(asked.size());
+        for (const Asked& one : asked) requests.push_back(one.request);
+      }
+    });
+    incoming_ = comm_.allToAll(std::as_bytes(std::span(requests)), counts, sizeof(Request));
+  }
+
+  /// Answers travel in units of 8 bytes, each begins with one.
+  static constexpr std::size_t unit = 8;
+  static std::size_t answerBytes(const Request& request, ScalarType type) {
+    const std::size_t each = request.copied != 0 ? sizeOf(type) : sizeof(double);
+    return (request.box.count() * each + unit - 1) / unit * unit;
+  }
+
+  void exchangeValues(std::int32_t round) {
     std::vector<std::byte> bytes;
     std::vector<std::uint64_t> counts;
-    for (const auto& part : outgoing) {
-      counts.push_back(part.size());
-      bytes.insert(bytes.end(), part.begin(), part.end());
-    }
-    const Gathered incoming = comm_.allToAll(bytes, counts, 1);
-
-    std::vector<Block> result = std::move(mine_);
-    std::vector<std::byte*> storage(all_.size(), nullptr);
-    for (std::size_t i = 0; i < all_.size(); ++i) {
-      if (all_[i].rank == comm_.rank()) storage[i] = grow(i, result[static_cast<std::size_t>(all_[i].index)]);
-    }
-    std::vector<std::uint64_t> cursor(incoming.offsets.begin(), incoming.offsets.end() - 1);
-    for (const Transfer& transfer : transfers_) {
-      if (all_[transfer.recipient].rank != comm_.rank()) continue;
-      std::uint64_t& at = cursor[static_cast<std::size_t>(all_[transfer.donor].rank)];
-      at += copyIn(transfer, storage[transfer.recipient], incoming.bytes.data() + at);
-    }
-    return result;
-  }
-
-  template <typename Visit>
-  static void forEachRow(const IndexBox& box, Visit visit) {
-    for (std::int64_t z = box.lo.z; z < box.hi.z; ++z) {
-      for (std::int64_t y = box.lo.y; y < box.hi.y; ++y) visit(y, z);
-    }
-  }
-
-  static std::size_t position(const IndexBox& within, std::int64_t x, std::int64_t y, std::int64_t z) {
-    const glm::i64vec3 size = within.hi - within.lo;
-    return static_cast<std::size_t>(((z - within.lo.z) * size.y + (y - within.lo.y)) * size.x +
-                                    (x - within.lo.x));
-  }
-
-  void copyOut(const Transfer& transfer, std::vector<std::byte>& to) const {
-    const Block& donor = mine_[static_cast<std::size_t>(all_[transfer.donor].index)];
-    const IndexBox stored = storedBox(all_[transfer.donor], anchor_);
-    const std::size_t size = sizeOf(donor.type);
-    const auto* data = static_cast<const std::byte*>(donor.data);
-    forEachRow(transfer.box, [&](std::int64_t y, std::int64_t z) {
-      const std::byte* row = data + position(stored, transfer.box.lo.x, y, z) * size;
-      to.insert(to.end(), row, row + static_cast<std::size_t>(transfer.box.hi.x - transfer.box.lo.x) * size);
-    });
-  }
-
-  std::uint64_t copyIn(const Transfer& transfer, std::byte* storage, const std::byte* from) const {
-    const IndexBox& grown = plans_[transfer.recipient].grown;
-    const IndexBox stored = storedBox(all_[transfer.recipient], anchor_);
-    const std::size_t size = sizeOf(static_cast<ScalarType>(all_[transfer.recipient].type));
-    const std::byte* const start = from;
-    forEachRow(transfer.box, [&](std::int64_t y, std::int64_t z) {
-      for (std::int64_t x = transfer.box.lo.x; x < transfer.box.hi.x; ++x, from += size) {
-        const glm::i64vec3 at{x, y, z};
-        const bool own =
-            glm::all(glm::greaterThanEqual(at, stored.lo)) && glm::all(glm::lessThan(at, stored.hi));
-        if (!own) std::memcpy(storage + position(grown, x, y, z) * size, from, size);
+    comm_.together([&] {
+      for (int rank = 0; rank < comm_.size(); ++rank) {
+        const std::size_t before = bytes.size();
+        const std::span<const std::byte> requests = incoming_.of(rank);
+        for (std::size_t at = 0; at < requests.size(); at += sizeof(Request)) {
+          Request request;
+          std::memcpy(&request, requests.data() + at, sizeof(Request));
+          if (request.round == round) answer(request, bytes);
+        }
+        counts.push_back((bytes.size() - before) / unit);
       }
     });
-    return static_cast<std::uint64_t>(from - start);
+    const Gathered answers = comm_.allToAll(bytes, counts, unit);
+    comm_.together([&] {
+      for (std::size_t rank = 0; rank < outgoing_.size(); ++rank) {
+        const std::byte* from = answers.of(static_cast<int>(rank)).data();
+        for (const Asked& asked : outgoing_[rank]) {
+          if (asked.request.round != round) continue;
+          const Grid& grid = grids_[asked.grid];
+          take(asked, from);
+          from += answerBytes(asked.request, grid.block.type);
+        }
+      }
+    });
   }
 
-  /// Replaces the block by a larger copy, the new layers filled with the nearest own values. Returns the
-  /// copy's storage, nullptr if the block lacked nothing.
-  std::byte* grow(std::size_t i, Block& block) const {
-    const Plan& plan = plans_[i];
-    const IndexBox stored = storedBox(all_[i], anchor_);
-    if (plan.grown.lo == stored.lo && plan.grown.hi == stored.hi) return nullptr;
-    const std::size_t size = sizeOf(block.type);
-    const std::shared_ptr<std::byte[]> storage(new std::byte[plan.grown.count() * size]);
-    const auto* data = static_cast<const std::byte*>(block.data);
-    forEachRow(plan.grown, [&](std::int64_t y, std::int64_t z) {
-      const std::int64_t nearestY = std::clamp(y, stored.lo.y, stored.hi.y - 1);
-      const std::int64_t nearestZ = std::clamp(z, stored.lo.z, stored.hi.z - 1);
-      const std::byte* const from = data + position(stored, stored.lo.x, nearestY, nearestZ) * size;
-      const std::size_t row = static_cast<std::size_t>(stored.hi.x - stored.lo.x) * size;
-      std::byte* const to = storage.get() + position(plan.grown, stored.lo.x, y, z) * size;
-      std::memcpy(to, from, row);
-      for (std::int64_t x = plan.grown.lo.x; x < stored.lo.x; ++x)
-        std::memcpy(to - static_cast<std::size_t>(stored.lo.x - x) * size, from, size);
-      for (std::int64_t x = stored.hi.x; x < plan.grown.hi.x; ++x)
-        std::memcpy(to + static_cast<std::size_t>(x - stored.lo.x) * size, from + row - size, size);
-    });
-    block.origin -= glm::dvec3(plan.added.lo) * block.spacing;
-    block.dims += plan.added.lo + plan.added.hi;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (plan.gapAbove[axis]) block.owned.hi[axis] += block.spacing[axis];
+  void answer(const Request& request, std::vector<std::byte>& bytes) const {
+    const Grid& grid = grids_[static_cast<std::size_t>(request.grid)];
+    const std::size_t begin = bytes.size();
+    bytes.resize(begin + answerBytes(request, grid.block.type));
+    std::byte* to = bytes.data() + begin;
+    if (request.copied != 0) {
+      const std::size_t size = sizeOf(grid.block.type);
+      const std::size_t row = static_cast<std::size_t>(request.box.size().x) * size;
+      const auto* from = static_cast<const std::byte*>(grid.block.data);
+      forEachRow(request.box, [&](const glm::ivec3& at) {
+        std::memcpy(to, from + grid.block.stored().position(at + request.shift) * size, row);
+        to += row;
+      });
+      return;
     }
-    block.data = storage.get();
-    block.keepAlive = std::shared_ptr<const void>(storage, storage.get());
-    return storage.get();
+    const Sampler sampler(grid.block, request.clip);
+    std::array<std::vector<std::pair<int, int>>, 3> parts;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int i = request.box.lo[axis]; i < request.box.hi[axis]; ++i)
+        parts[static_cast<std::size_t>(axis)].push_back(request.partsIn(axis, i));
+    }
+    const auto partsAt = [&](int axis, int index) {
+      return parts[static_cast<std::size_t>(axis)][static_cast<std::size_t>(index - request.box.lo[axis])];
+    };
+    forEachIndex(request.box, [&](const glm::ivec3& at) {
+      const auto [x0, x1] = partsAt(0, at.x);
+      const auto [y0, y1] = partsAt(1, at.y);
+      const auto [z0, z1] = partsAt(2, at.z);
+      double sum = 0.0;
+      int finite = 0;
+      for (int z = z0; z < z1; ++z) {
+        for (int y = y0; y < y1; ++y) {
+          for (int x = x0; x < x1; ++x) {
+            const double value =
+                sampler.at({request.place(0, at.x, x), request.place(1, at.y, y), request.place(2, at.z, z)});
+            if (!std::isfinite(value)) continue;
+            sum += value;
+            ++finite;
+          }
+        }
+      }
+      // What isn't finite has no share in a mean; a mean of nothing else isn't finite either.
+      const int count = (x1 - x0) * (y1 - y0) * (z1 - z0);
+      sum = finite > 0 ? sum * count / finite : std::numeric_limits<double>::quiet_NaN();
+      std::memcpy(to, &sum, sizeof(sum));
+      to += sizeof(sum);
+    });
+  }
+
+  void take(const Asked& asked, const std::byte* from) {
+    Grid& grid = grids_[asked.grid];
+    Wanted& wanted = grid.wanted[asked.wanted];
+    const Request& request = asked.request;
+    const ScalarType type = grid.block.type;
+    const std::size_t size = sizeOf(type);
+    if (wanted.sums.empty()) {
+      const std::size_t row = static_cast<std::size_t>(request.box.size().x) * size;
+      forEachRow(request.box, [&](const glm::ivec3& at) {
+        std::memcpy(wanted.values.get() + wanted.box.position(at) * size, from, row);
+        from += row;
+      });
+      return;
+    }
+    const auto shareOf = [&request](int axis, int index) {
+      const auto [first, last] = request.partsIn(axis, index);
+      return static_cast<double>(last - first) / request.parts[axis];
+    };
+    const double each = 1.0 / (static_cast<double>(request.parts.x) * request.parts.y * request.parts.z);
+    std::size_t index = 0;
+    forEachIndex(request.box, [&](const glm::ivec3& at) {
+      double sum = 0.0;
+      if (request.copied != 0) {
+        sum = loadValue(type, from, index);
+      } else {
+        std::memcpy(&sum, from + index * sizeof(sum), sizeof(sum));
+      }
+      ++index;
+      const std::size_t place = wanted.box.position(at);
+      wanted.sums[place] += sum * each;
+      wanted.weights[place] += shareOf(0, at.x) * shareOf(1, at.y) * shareOf(2, at.z);
+      storeValue(type, wanted.values.get(), place, wanted.sums[place] / wanted.weights[place]);
+    });
   }
 
   const Communicator& comm_;
-  std::vector<Block>& mine_;
-  std::vector<Description> all_;
-  glm::dvec3 anchor_{0.0};
-  std::vector<std::vector<std::size_t>> groups_;
-  std::vector<Plan> plans_;
-  std::vector<Transfer> transfers_;
+  const BlockDirectory& directory_;
+  std::vector<Block>& blocks_;
+  std::vector<double> levels_;  // volumes that values stand for, descending
+  std::vector<Grid> grids_;
+  std::vector<std::vector<Asked>> outgoing_;  // by the rank that's asked
+  Gathered incoming_;                         // requests of other ranks
 };
 
 }  // namespace
 
+std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> blocks) {
+  const BlockDirectory directory(comm, blocks, false);
+  const std::vector<OwnParts> parts = settleOverlaps(comm, directory);
+  return partsOf(parts, std::move(blocks));
+}
+
 std::vector<Block> exchangeGhosts(const Communicator& comm, std::vector<Block> blocks) {
-  return Exchange(comm, blocks).run();
+  makeTypesOne(comm, blocks);
+  const BlockDirectory directory(comm, blocks, true);
+  const std::vector<OwnParts> parts = settleOverlaps(comm, directory);
+  Exchange(comm, directory, parts, blocks).run();
+  return partsOf(parts, std::move(blocks));
 }
 
 }  // namespace vdi::comm

@@ -1,4 +1,5 @@
-// Fills in what's missing between blocks: ghost layers, over all blocks of all ranks.
+// Makes blocks of all ranks one volume: who owns what, and the values beside each block that others
+// have.
 #pragma once
 
 #include <vector>
@@ -8,16 +9,43 @@
 
 namespace vdi::comm {
 
-/// Collective. For each block whose values end where a neighbour's begin one spacing further (point data cut
-/// with a gap of one cell, or cell data without ghost cells), returns a copy with one layer of the
-/// neighbour's values on that side; blocks that lack nothing are passed through untouched (no copy).
-/// Neighbours are blocks of any rank with the same scalar type, the same spacing and lattice positions that
-/// differ by whole numbers of spacings, to within 1e-3 of one. Where layers are added but some values of the
-/// layer have no donor (edge of the domain, a missing corner), the nearest own value fills them. Owned boxes:
-/// for a gap of one cell of point data the lower block's owned box grows upward by that cell, so that the gap
-/// has exactly one owner; cell data keeps its boxes. Blocks that already have ghost layers are only donors of
-/// their owned values, and keep their layers. Works for any number of ranks, 1 included; cost: one allGather
-/// of block descriptions, one allToAll of values.
+/// Collective. Gives each place one owner, for blocks of any ranks, levels and lattices.
+///
+/// - Of blocks of different spacing that overlap, the finest owns what they share. A block that finer
+///   ones cover in part becomes several that share its data. One that is covered whole goes.
+/// - Blocks of one level (a value stands for the same volume, to 1 %) that overlap by more than 1e-3 of
+///   a spacing on every axis are an Error{InvalidArgument} on all ranks that names both.
+/// - Faces that differ by less than 1e-3 of a spacing become one.
+///
+/// Blocks that own nothing are passed through. No values travel or are copied.
+std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> blocks);
+
+/// Collective. settleOwnership, and what blocks need of their neighbours' values: all that is
+/// interpolated up to half a spacing beyond the owned boxes, edges and corners included. It comes as
+/// `extra` layers and `patches` of the blocks; what is stored isn't copied. Extra layers and patches
+/// that blocks have already are dropped.
+///
+/// Gaps. Blocks of point data that are at most one spacing apart close the gap first. The coarser one
+/// owns it, of two of one level the lower one.
+///
+/// Values. Neighbours are blocks of any rank whose owned boxes lie at a value's place. The finest
+/// counts. A value is
+/// - a copy, where the neighbour has one at the place, to within 1e-3 of a spacing;
+/// - for cell data, the mean over a finer neighbour's values in the volume that it stands for;
+/// - else interpolated trilinearly in the neighbour's values, for which those beside its own box are
+///   found first.
+/// Integers are rounded. Where nobody owns a place, a neighbour's ghost value counts, if it has no
+/// masked ones, else the nearest own value. Sides with no neighbour at all get no layer.
+///
+/// Stored values that aren't the block's own. The caller's ghost layers stay where a neighbour of the
+/// same level or nobody owns the place. Those under finer blocks, those at places that coarser ones own
+/// and `masked` ones are replaced, where they would be interpolated with the block's own.
+///
+/// Scalar types that differ. All blocks become f32, or f64 if one of them is u32, i32 or f64. Then
+/// blocks of other types are copies.
+///
+/// Cost. Each rank plans for its own blocks. Descriptions of all blocks are gathered, some 200 bytes
+/// each. Values are asked for and sent once, and once more for each level that others interpolate in.
 std::vector<Block> exchangeGhosts(const Communicator& comm, std::vector<Block> blocks);
 
 }  // namespace vdi::comm

@@ -22,28 +22,32 @@ namespace {
 constexpr std::array<std::pair<const char*, std::size_t>, 8> scalarTypes{
     {{"u8", 1}, {"i8", 1}, {"u16", 2}, {"i16", 2}, {"u32", 4}, {"i32", 4}, {"f32", 4}, {"f64", 8}}};
 
-/// Calls `function` with the data as a pointer to its own type.
-template <typename Function>
-auto withTyped(const Block& block, Function function) {
-  switch (block.type) {
+/// Calls `function` with the data as a pointer to their own type.
+template <typename Void, typename Function>
+auto withTyped(ScalarType type, Void* data, Function function) {
+  const auto as = [&](auto zero) {
+    using T = std::conditional_t<std::is_const_v<Void>, const decltype(zero), decltype(zero)>;
+    return function(static_cast<T*>(data));
+  };
+  switch (type) {
     case ScalarType::U8:
-      return function(static_cast<const std::uint8_t*>(block.data));
+      return as(std::uint8_t{});
     case ScalarType::I8:
-      return function(static_cast<const std::int8_t*>(block.data));
+      return as(std::int8_t{});
     case ScalarType::U16:
-      return function(static_cast<const std::uint16_t*>(block.data));
+      return as(std::uint16_t{});
     case ScalarType::I16:
-      return function(static_cast<const std::int16_t*>(block.data));
+      return as(std::int16_t{});
     case ScalarType::U32:
-      return function(static_cast<const std::uint32_t*>(block.data));
+      return as(std::uint32_t{});
     case ScalarType::I32:
-      return function(static_cast<const std::int32_t*>(block.data));
+      return as(std::int32_t{});
     case ScalarType::F32:
-      return function(static_cast<const float*>(block.data));
+      return as(float{});
     case ScalarType::F64:
       break;
   }
-  return function(static_cast<const double*>(block.data));
+  return as(double{});
 }
 
 bool finite(const glm::dvec3& v) {
@@ -102,26 +106,43 @@ ScalarType scalarTypeFromString(const std::string& name) {
 
 Block Block::fromPoints(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
                         ScalarType type, const void* data, const GhostLayers& ghosts) {
-  Block block{dims, origin, spacing, {}, type, data, {}};
-  block.owned.lo = origin + spacing * glm::dvec3(ghosts.lo);
-  block.owned.hi = origin + spacing * glm::dvec3(dims - 1 - ghosts.hi);
-  return block;
+  const Box owned{origin + spacing * glm::dvec3(ghosts.lo),
+                  origin + spacing * glm::dvec3(dims - 1 - ghosts.hi)};
+  return {dims, origin, spacing, owned, type, data};
 }
 
 Block Block::fromCells(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
                        ScalarType type, const void* data, const GhostLayers& ghosts) {
-  Block block{dims, origin + 0.5 * spacing, spacing, {}, type, data, {}};
-  block.owned.lo = origin + spacing * glm::dvec3(ghosts.lo);
-  block.owned.hi = origin + spacing * glm::dvec3(dims - ghosts.hi);
-  return block;
+  const Box owned{origin + spacing * glm::dvec3(ghosts.lo), origin + spacing * glm::dvec3(dims - ghosts.hi)};
+  return {dims, origin + 0.5 * spacing, spacing, owned, type, data};
+}
+
+double loadValue(ScalarType type, const void* data, std::size_t index) {
+  return withTyped(type, data, [index](const auto* values) { return static_cast<double>(values[index]); });
+}
+
+void storeValue(ScalarType type, void* data, std::size_t index, double value) {
+  withTyped(type, data, [&](auto* values) {
+    using T = std::remove_pointer_t<decltype(values)>;
+    if constexpr (std::is_integral_v<T>) {
+      constexpr double low = static_cast<double>(std::numeric_limits<T>::lowest());
+      constexpr double high = static_cast<double>(std::numeric_limits<T>::max());
+      values[index] = std::isnan(value) ? T{0} : static_cast<T>(std::clamp(std::round(value), low, high));
+    } else {
+      values[index] = static_cast<T>(value);
+    }
+  });
 }
 
 double valueAt(const Block& block, int i, int j, int k) {
-  assert(i >= 0 && j >= 0 && k >= 0 && i < block.dims.x && j < block.dims.y && k < block.dims.z);
-  const auto row =
-      static_cast<std::size_t>(k) * static_cast<std::size_t>(block.dims.y) + static_cast<std::size_t>(j);
-  const std::size_t index = row * static_cast<std::size_t>(block.dims.x) + static_cast<std::size_t>(i);
-  return withTyped(block, [index](const auto* values) { return static_cast<double>(values[index]); });
+  const glm::ivec3 at{i, j, k};
+  assert(block.extended().contains(at));
+  const std::span<const Patch> patches = block.patchList();
+  for (auto patch = patches.rbegin(); patch != patches.rend(); ++patch) {
+    if (patch->box.contains(at)) return loadValue(block.type, patch->values.get(), patch->box.position(at));
+  }
+  assert(block.stored().contains(at));
+  return loadValue(block.type, block.data, block.stored().position(at));
 }
 
 void ScalarRange::include(const ScalarRange& other) {
@@ -129,8 +150,10 @@ void ScalarRange::include(const ScalarRange& other) {
   max = std::max(max, other.max);
 }
 
-ScalarRange finiteRange(const Block& block) {
-  return withTyped(block, [count = block.valueCount()](const auto* values) {
+namespace {
+
+ScalarRange finiteRangeOf(ScalarType type, const void* data, std::size_t count) {
+  return withTyped(type, data, [count](const auto* values) {
     constexpr std::size_t least = 1 << 19;
     std::mutex mutex;
     ScalarRange range;
@@ -143,6 +166,50 @@ ScalarRange finiteRange(const Block& block) {
   });
 }
 
+}  // namespace
+
+ScalarRange finiteRange(const Block& block) {
+  ScalarRange range = finiteRangeOf(block.type, block.data, block.valueCount());
+  for (const Patch& patch : block.patchList())
+    range.include(finiteRangeOf(block.type, patch.values.get(), patch.box.count()));
+  return range;
+}
+
+ValueLimits limitsOf(ScalarType type) {
+  if (type == ScalarType::F32) return {1e-30, std::numeric_limits<double>::infinity()};
+  if (type == ScalarType::F64) return {1e-300, 1e300};
+  return {};
+}
+
+ValueSizes valueSizesOf(std::span<const Block> blocks) {
+  ValueSizes sizes;
+  for (const Block& block : blocks) {
+    const double least = limitsOf(block.type).least;
+    withTyped(block.type, block.data, [&](const auto* values) {
+      using T = std::remove_cvref_t<decltype(*values)>;
+      const std::size_t count = block.valueCount();
+      if constexpr (!std::is_floating_point_v<T>) {
+        sizes.usable = true;
+      } else {
+        constexpr std::size_t atOnce = 4096;
+        for (std::size_t first = 0; first < count && !sizes.usable; first += atOnce) {
+          bool usable = false;
+          bool tooSmall = false;
+          for (std::size_t i = first; i < std::min(first + atOnce, count); ++i) {
+            const T size = std::abs(values[i]);
+            usable |= size >= static_cast<T>(least) && size <= std::numeric_limits<T>::max();
+            tooSmall |= size > T{0} && size < static_cast<T>(least);
+          }
+          sizes.usable |= usable;
+          sizes.tooSmall |= tooSmall;
+        }
+      }
+    });
+    if (sizes.usable) break;
+  }
+  return sizes;
+}
+
 void validate(std::span<const Block> blocks) {
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const Block& block = blocks[i];
@@ -153,15 +220,31 @@ void validate(std::span<const Block> blocks) {
                               block.dims.y, block.dims.z),
                   context);
     }
-    if (!finite(block.spacing) || glm::any(glm::lessThanEqual(block.spacing, glm::dvec3(0.0)))) {
+    // What's computed in single precision keeps a distance from its limits.
+    constexpr double leastSpacing = 1e-30;
+    constexpr double mostSpacing = 1e30;
+    if (!finite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(leastSpacing))) ||
+        glm::any(glm::greaterThan(block.spacing, glm::dvec3(mostSpacing)))) {
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("spacing must be finite and > 0, it is ({}, {}, {})", block.spacing.x,
-                              block.spacing.y, block.spacing.z),
+                  fmt::format("spacing must be from {} to {}, it is ({}, {}, {}); other units of length help",
+                              leastSpacing, mostSpacing, block.spacing.x, block.spacing.y, block.spacing.z),
                   context);
     }
     const bool ownsNothing = block.owned.empty();
     if (!finite(block.origin) || (!ownsNothing && (!finite(block.owned.lo) || !finite(block.owned.hi)))) {
       throw Error(ErrorCode::InvalidArgument, "origin and owned box must be finite", context);
+    }
+    constexpr double farthest = 1e12;
+    glm::dvec3 away = glm::abs(block.origin);
+    if (!ownsNothing) away = glm::max(away, glm::max(glm::abs(block.owned.lo), glm::abs(block.owned.hi)));
+    if (glm::any(glm::greaterThan(away, farthest * block.spacing))) {
+      throw Error(
+          ErrorCode::InvalidArgument,
+          fmt::format("it lies at ({}, {}, {}) with a spacing of ({}, {}, {}): more than {} spacings from "
+                      "the origin of the world, positions can't be told apart; an origin nearby helps",
+                      block.origin.x, block.origin.y, block.origin.z, block.spacing.x, block.spacing.y,
+                      block.spacing.z, farthest),
+          context);
     }
     if (block.data == nullptr) throw Error(ErrorCode::InvalidArgument, "a block without data", context);
   }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "vdi/core/Box.h"
 
@@ -36,39 +37,69 @@ struct GhostLayers {
   bool operator==(const GhostLayers&) const = default;
 };
 
-/// One axis-aligned lattice of scalars. Values are interpolated trilinearly between lattice points and
-/// clamped beyond the outermost ones. `owned` says which samples are this block's: the owned boxes of all
-/// blocks of all ranks must not overlap (touching is fine, they're half-open).
+/// Values that extend the stored ones or take the place of some.
+struct Patch {
+  IndexBox box;                        // 0 is the first stored value; may be negative, or end beyond dims
+  std::shared_ptr<const void> values;  // [size.z][size.y][size.x], x fastest, of the block's scalar type
+};
+
+/// One axis-aligned lattice of scalars. Values are interpolated trilinearly between lattice points
+/// and clamped beyond the outermost ones. `owned` says which samples are this block's: the owned
+/// boxes of all blocks of all ranks must not overlap (touching is fine, they're half-open), unless
+/// their spacings differ: then the finest owns what they share (comm/GhostExchange.h, which sees to
+/// both).
 ///
-/// Ownership of memory: `data` is read, never copied on the host by the core; `keepAlive`, if set, is what
-/// owns it.
+/// A block's values are those of the indices [-extra.lo, dims + extra.hi): the stored ones and
+/// layers around them. Patches cover all of these layers, and may lie over stored values too. Where
+/// patches lie over stored values the patch's count, where they lie over each other the last one's.
+///
+/// Several blocks may share data, each owning a part of it; then they share extra and patches too.
+///
+/// Ownership of memory: `data` is read, never copied on the host by the core; `keepAlive`, if set,
+/// is what owns it.
 struct Block {
   glm::ivec3 dims{0};       // stored values per axis, ghost layers included; each >= 1
   glm::dvec3 origin{0.0};   // world position of value (0, 0, 0); for cell data the centre of that cell
   glm::dvec3 spacing{1.0};  // world distance of neighbouring values, > 0
-  Box owned;                // world; half-open
+  Box owned{};              // world; half-open
   ScalarType type = ScalarType::F32;
   const void* data = nullptr;  // [dims.z][dims.y][dims.x], x fastest, native byte order
-  std::shared_ptr<const void> keepAlive;
+  std::shared_ptr<const void> keepAlive{};
+  GhostLayers extra{};                                  // layers of values beyond the stored ones, >= 0
+  std::shared_ptr<const std::vector<Patch>> patches{};  // null: none
+  /// Stored values that mean nothing, such as those of hidden points and refined cells: where
+  /// they'd be interpolated with others, the exchange of ghost layers replaces them. Null: none.
+  std::shared_ptr<const std::vector<IndexBox>> masked{};
 
+  IndexBox stored() const { return {glm::ivec3(0), dims}; }
+  IndexBox extended() const { return {-extra.lo, dims + extra.hi}; }
+  std::span<const Patch> patchList() const {
+    return patches ? std::span<const Patch>(*patches) : std::span<const Patch>();
+  }
   std::size_t valueCount() const {
     return static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) *
            static_cast<std::size_t>(dims.z);
   }
   std::size_t byteCount() const { return valueCount() * sizeOf(type); }
 
-  /// Point data: `origin` is the position of the first stored point. Owned: from the first to the last
-  /// non-ghost point.
+  /// Point data: `origin` is the position of the first stored point. Owned: from the first to the
+  /// last non-ghost point.
   static Block fromPoints(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
                           ScalarType type, const void* data, const GhostLayers& ghosts = {});
-  /// Cell data: `dims` counts stored cells, `origin` is the lower corner of the first stored cell. Owned: all
-  /// non-ghost cells, whole.
+  /// Cell data: `dims` counts stored cells, `origin` is the lower corner of the first stored cell.
+  /// Owned: all non-ghost cells, whole.
   static Block fromCells(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
                          ScalarType type, const void* data, const GhostLayers& ghosts = {});
 };
 
-/// Value (i, j, k) of a block as double. Slow: for tests, reference code and metadata.
+/// Value (i, j, k) of a block as double, indices in block.extended(). Slow: for tests, reference
+/// code and metadata.
 double valueAt(const Block& block, int i, int j, int k);
+
+/// Value number `index` of an array of the type.
+double loadValue(ScalarType type, const void* data, std::size_t index);
+/// The nearest value that the type has, for integers 0 for NaN.
+void storeValue(ScalarType type, void* data, std::size_t index, double value);
 
 /// Smallest and largest finite value; {+inf, -inf} when there's none.
 struct ScalarRange {
@@ -77,11 +108,28 @@ struct ScalarRange {
   bool operator==(const ScalarRange&) const = default;
   void include(const ScalarRange& other);
 };
-ScalarRange finiteRange(const Block& block);  // by several threads
+ScalarRange finiteRange(const Block& block);  // stored values' and patches', by several threads
 
-/// Throws Error{InvalidArgument} naming the block's index for: dims < 1, spacing that isn't finite and > 0,
-/// an origin or owned box that isn't finite, null data. A block with an empty owned box is legal and owns no
-/// sample.
+/// Values smaller than `least` in size are lost where all are so small, larger ones than `most`
+/// overflow on the way to the device. For f32 and f64; the other types have no such values.
+struct ValueLimits {
+  double least = 0.0;
+  double most = std::numeric_limits<double>::infinity();
+};
+ValueLimits limitsOf(ScalarType type);
+
+/// Whether there are finite values of usable size, and whether there are some that aren't 0 but too
+/// small. Looks at blocks until it has found a usable value.
+struct ValueSizes {
+  bool usable = false;
+  bool tooSmall = false;
+};
+ValueSizes valueSizesOf(std::span<const Block> blocks);
+
+/// Throws Error{InvalidArgument} naming the block's index for: dims < 1, spacing that isn't in
+/// [1e-30, 1e30], an origin or owned box that isn't finite or more than 1e12 spacings away from 0,
+/// where positions can't be told apart well any more, null data. A block with an empty owned box is
+/// legal and owns no sample.
 void validate(std::span<const Block> blocks);
 
 }  // namespace vdi

@@ -1,8 +1,10 @@
-// Axis-aligned box in world space.
+// Axis-aligned boxes in world space and of lattice indices.
 #pragma once
 
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <limits>
+#include <vector>
 
 namespace vdi {
 
@@ -21,6 +23,66 @@ struct Box {
     lo = glm::min(lo, other.lo);
     hi = glm::max(hi, other.hi);
   }
+  Box intersection(const Box& other) const { return {glm::max(lo, other.lo), glm::min(hi, other.hi)}; }
 };
+
+/// Lattice indices lo <= i < hi on every axis. The default is empty.
+struct IndexBox {
+  glm::ivec3 lo{0};
+  glm::ivec3 hi{0};
+
+  bool operator==(const IndexBox&) const = default;
+
+  bool empty() const { return lo.x >= hi.x || lo.y >= hi.y || lo.z >= hi.z; }
+  glm::ivec3 size() const { return empty() ? glm::ivec3(0) : hi - lo; }
+  std::size_t count() const {
+    const auto n = glm::u64vec3(size());
+    return n.x * n.y * n.z;
+  }
+  bool contains(const glm::ivec3& at) const {
+    return glm::all(glm::greaterThanEqual(at, lo)) && glm::all(glm::lessThan(at, hi));
+  }
+  /// Of the value at `at` in an array of the box's values, x fastest.
+  std::size_t position(const glm::ivec3& at) const {
+    const auto n = glm::u64vec3(hi - lo);
+    const auto i = glm::u64vec3(at - lo);
+    return (i.z * n.y + i.y) * n.x + i.x;
+  }
+  void include(const IndexBox& other) {
+    if (other.empty()) return;
+    *this = empty() ? other : IndexBox{glm::min(lo, other.lo), glm::max(hi, other.hi)};
+  }
+  IndexBox intersection(const IndexBox& other) const {
+    return {glm::max(lo, other.lo), glm::min(hi, other.hi)};
+  }
+};
+
+/// What `hole` leaves of `box`: disjoint boxes, six at most. Those below and above it in z are
+/// whole slices. For Box and IndexBox.
+template <typename AnyBox>
+std::vector<AnyBox> without(const AnyBox& box, const AnyBox& hole) {
+  const AnyBox common = box.intersection(hole);
+  if (common.empty()) return {box};
+  std::vector<AnyBox> rest;
+  AnyBox middle = box;
+  for (int axis = 2; axis >= 0; --axis) {
+    AnyBox part = middle;
+    part.hi[axis] = common.lo[axis];
+    if (!part.empty()) rest.push_back(part);
+    part = middle;
+    part.lo[axis] = common.hi[axis];
+    if (!part.empty()) rest.push_back(part);
+    middle.lo[axis] = common.lo[axis];
+    middle.hi[axis] = common.hi[axis];
+  }
+  return rest;
+}
+
+/// Disjoint boxes that together are the cells of a lattice of `size` that are `open` (x fastest).
+/// Boxes grow along x, then y, then z, so that open cells that are a box stay one.
+std::vector<IndexBox> coverWithBoxes(const glm::ivec3& size, std::vector<bool> open);
+
+/// What `holes` leave of `box`, as few disjoint boxes whose faces are faces of `box` and `holes`.
+std::vector<Box> withoutAll(const Box& box, const std::vector<Box>& holes);
 
 }  // namespace vdi

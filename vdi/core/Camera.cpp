@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -21,14 +22,18 @@ double radians(double degrees) {
   return degrees * std::numbers::pi / 180.0;
 }
 
+/// View-up of length 1; y for a zero one, as vtkCamera::SetViewUp has it. Finite whatever its length is.
+glm::dvec3 unitUp(const glm::dvec3& up) {
+  const glm::dvec3 magnitude = glm::abs(up);
+  const double largest = std::max({magnitude.x, magnitude.y, magnitude.z});
+  return largest > 0.0 ? glm::normalize(up / largest) : glm::dvec3(0.0, 1.0, 0.0);
+}
+
 /// The up direction made orthogonal to `forward`; any orthogonal direction where `up` doesn't say.
 glm::dvec3 orthogonalUp(const glm::dvec3& up, const glm::dvec3& forward) {
-  const double length = glm::length(up);
-  if (length > 0.0) {
-    const glm::dvec3 unit = up / length;
-    const glm::dvec3 rest = unit - glm::dot(unit, forward) * forward;
-    if (glm::length(rest) > 1e-9) return glm::normalize(rest);
-  }
+  const glm::dvec3 unit = unitUp(up);
+  const glm::dvec3 rest = unit - glm::dot(unit, forward) * forward;
+  if (glm::length(rest) > 1e-9) return glm::normalize(rest);
   const glm::dvec3 magnitude = glm::abs(forward);
   glm::dvec3 axis{0.0, 0.0, 1.0};
   if (magnitude.x <= magnitude.y && magnitude.x <= magnitude.z) {
@@ -61,15 +66,14 @@ void validateCamera(const Camera& camera) {
 }  // namespace
 
 Camera Camera::azimuth(double degrees) const {
+  if (degrees == 0.0) return *this;  // to the bit
   const glm::dvec3 fromFocal = position - focalPoint;
-  const double distance = glm::length(fromFocal);
-  if (!(distance > 0.0)) return *this;
-  const glm::dvec3 axis = orthogonalUp(viewUp, -fromFocal / distance);
+  const glm::dvec3 axis = unitUp(viewUp);
   const double angle = radians(degrees);
-  // Rodrigues' rotation; fromFocal is orthogonal to the axis.
+  const double along = glm::dot(axis, fromFocal);  // stays, by Rodrigues' rotation
   Camera turned = *this;
-  turned.position = focalPoint + std::cos(angle) * fromFocal + std::sin(angle) * glm::cross(axis, fromFocal);
-  turned.viewUp = axis;
+  turned.position = focalPoint + std::cos(angle) * fromFocal + std::sin(angle) * glm::cross(axis, fromFocal) +
+                    (1.0 - std::cos(angle)) * along * axis;
   return turned;
 }
 

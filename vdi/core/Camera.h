@@ -23,8 +23,10 @@ struct Camera {
 
   bool operator==(const Camera&) const = default;
 
-  /// The camera turned by `degrees` about the focal point, around the view-up axis made orthogonal to the
-  /// view direction (vtkCamera::Azimuth, positive moves the camera to its own right).
+  /// The camera turned by `degrees` about the focal point, around view-up as it is set, of whatever length;
+  /// positive moves the camera to its own right. View-up stays. That is vtkCamera::Azimuth: the distance
+  /// along view-up stays too, and a camera that looks along view-up stays where it is. A view-up of zero is
+  /// taken for (0, 1, 0), as vtkCamera does.
   Camera azimuth(double degrees) const;
 
   /// A camera looking along `direction` at the whole of `bounds`, as vtkRenderer::ResetCamera places it.
@@ -42,9 +44,8 @@ struct Ray {
 class View {
  public:
   /// Throws Error{InvalidArgument} for a viewport outside 1 .. 32768, a view angle outside (0, 180), a
-  /// parallel scale
-  /// <= 0, values that aren't finite, or a position equal to the focal point. A view-up parallel to the view
-  /// direction is replaced by the axis most orthogonal to it.
+  /// parallel scale <= 0, values that aren't finite, or a position equal to the focal point. A view-up
+  /// parallel to the view direction is replaced by the axis most orthogonal to it, one of zero by (0, 1, 0).
   View(const Camera& camera, int width, int height);
 
   const Camera& camera() const { return camera_; }

@@ -56,4 +56,15 @@ DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPe
   return lattice;
 }
 
+bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice) {
+  double longest = 0.0;  // component of any ray's direction; they're linear in the pixel's coordinates
+  for (int corner = 0; corner < 4; ++corner) {
+    const Ray ray =
+        view.rayThrough((corner & 1) != 0 ? view.width() : 0.0, (corner & 2) != 0 ? view.height() : 0.0);
+    const glm::dvec3 size = glm::abs(ray.direction);
+    longest = std::max({longest, size.x, size.y, size.z});
+  }
+  return 0.5 * lattice.step * longest <= scene.minSpacing;
+}
+
 }  // namespace vdi

@@ -39,4 +39,9 @@ struct DepthLattice {
 /// [1/64, 64] or when a ray would need more than 2^24 samples.
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel);
 
+/// Whether samples are classified by what lies between their two ends, rather than by the scalar in their
+/// middle: where half a sample is no longer than the finest voxel, for beyond its owned box a block has one
+/// layer of values. That's so from about half a sample per voxel on.
+bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice);
+
 }  // namespace vdi

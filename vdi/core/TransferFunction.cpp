@@ -51,6 +51,14 @@ float extinctionOf(double opacity) {
   return std::min(static_cast<float>(-std::log2(1.0 - opacity)), maxExtinction);
 }
 
+glm::vec4 vectorOf(const TransferTableEntry& entry) {
+  return {entry.red, entry.green, entry.blue, entry.extinction};
+}
+
+TransferTableEntry entryOf(const glm::vec4& v) {
+  return {v.r, v.g, v.b, v.a};
+}
+
 /// Smallest distance between two nodes that aren't at the same x.
 template <typename Node>
 double closestNodes(const std::vector<Node>& nodes, double soFar) {
@@ -111,24 +119,25 @@ TransferTable bake(const TransferFunction& transferFunction) {
   table.entries.resize(size);
   for (std::size_t i = 0; i < size; ++i) {
     const double x = table.min + range * static_cast<double>(i) / static_cast<double>(size - 1);
-    const glm::dvec3 color = transferFunction.colorAt(x);
-    table.entries[i] = {static_cast<float>(color.r), static_cast<float>(color.g), static_cast<float>(color.b),
-                        extinctionOf(transferFunction.opacityAt(x))};
+    const float extinction = extinctionOf(transferFunction.opacityAt(x));
+    const glm::vec3 color = glm::vec3(transferFunction.colorAt(x)) * extinction;
+    table.entries[i] = {color.r, color.g, color.b, extinction};
   }
   return table;
 }
 
-TransferTableEntry TransferTable::lookup(double scalar) const {
+double TransferTable::positionOf(double scalar) const {
   assert(entries.size() >= 2 && max > min);
-  if (!std::isfinite(scalar)) return {};
-  const double last = static_cast<double>(entries.size() - 1);
-  const double position = std::clamp((scalar - min) / (max - min) * last, 0.0, last);
-  const auto below = std::min(static_cast<std::size_t>(position), entries.size() - 2);
-  const auto share = static_cast<float>(position - static_cast<double>(below));
-  const TransferTableEntry& a = entries[below];
-  const TransferTableEntry& b = entries[below + 1];
-  const auto mix = [share](float x, float y) { return x + (y - x) * share; };
-  return {mix(a.red, b.red), mix(a.green, b.green), mix(a.blue, b.blue), mix(a.extinction, b.extinction)};
+  if (!std::isfinite(scalar)) return std::numeric_limits<double>::quiet_NaN();
+  return (scalar - min) / (max - min) * static_cast<double>(entries.size() - 1);
+}
+
+TransferTableEntry TransferTable::at(double position) const {
+  if (std::isnan(position)) return {};
+  const double inside = std::clamp(position, 0.0, static_cast<double>(entries.size() - 1));
+  const auto below = std::min(static_cast<std::size_t>(inside), entries.size() - 2);
+  return entryOf(glm::mix(vectorOf(entries[below]), vectorOf(entries[below + 1]),
+                          static_cast<float>(inside - static_cast<double>(below))));
 }
 
 bool TransferTable::visible(double lo, double hi) const {

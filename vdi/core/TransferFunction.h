@@ -38,7 +38,8 @@ void validate(const TransferFunction& transferFunction);
 
 /// One entry of the table that both the reference and the shaders read. `extinction` is -log2(1 - opacity)
 /// per unit distance, so a sample of length d has alpha = 1 - exp2(-extinction * d / unitDistance). Opacity 1
-/// is stored as an extinction of maxExtinction, which is opaque for any practical length.
+/// is stored as an extinction of maxExtinction, which is opaque for any practical length. The colour is
+/// associated: straight colour times extinction, so that means of entries have the colour of what is visible.
 struct TransferTableEntry {
   float red = 0.0F;
   float green = 0.0F;
@@ -47,18 +48,22 @@ struct TransferTableEntry {
   bool operator==(const TransferTableEntry&) const = default;
 };
 
-inline constexpr float maxExtinction = 65536.0F;
+inline constexpr float maxExtinction = 65504.0F;  // the largest half float
 
 /// The function sampled at `entries.size()` evenly spaced scalars from `min` to `max`, linear in between,
-/// clamped outside. Everything in the library that classifies a scalar does it through this table.
+/// constant outside. A *position* in the table is a scalar in units of entries: 0 is `min`,
+/// entries.size() - 1 is `max`.
 struct TransferTable {
   double min = 0.0;
   double max = 1.0;  // > min
   double unitDistance = 1.0;
   std::vector<TransferTableEntry> entries;  // at least 2
 
-  /// NaN and infinite scalars are transparent black.
-  TransferTableEntry lookup(double scalar) const;
+  /// Not clamped; NaN for scalars that aren't finite.
+  double positionOf(double scalar) const;
+  /// The entry there; transparent where the position is NaN.
+  TransferTableEntry at(double position) const;
+  TransferTableEntry lookup(double scalar) const { return at(positionOf(scalar)); }
   bool operator==(const TransferTable&) const = default;
   /// True if some scalar in [lo, hi] has opacity > 0: what empty-space skipping asks.
   bool visible(double lo, double hi) const;

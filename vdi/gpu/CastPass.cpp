@@ -19,6 +19,7 @@ ComputePipelineInfo pipelineInfo() {
   info.pushConstantBytes = sizeof(shared::CastConstants);
   info.imageCount = shared::castMaxPages;
   info.uniformBytes = sizeof(shared::CastParams);
+  info.hasPlane = true;
   return info;
 }
 
@@ -49,6 +50,7 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
   params.step = static_cast<float>(lattice.step);
   params.first = static_cast<float>(lattice.first);
   params.sampleCount = lattice.count;
+  params.slabs = samplesAreSlabs(scene, view, lattice) ? 1U : 0U;
   for (int axis = 0; axis < 3; ++axis) {
     params.sceneLo[axis] = snapToScene(scene, scene.bounds.lo[axis], axis);
     params.sceneHi[axis] = snapToScene(scene, scene.bounds.hi[axis], axis);
@@ -76,15 +78,18 @@ ComputePipeline& CastPass::pipelineFor(const Program& program) {
   const std::size_t pageCount = volume_->pages().size();
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
   PipelineSet& pipelines = program.rayShares > 1 ? sharingPipelines_ : pipelines_;
-  ComputePipeline& pipeline =
-      pipelines.with({program.program, static_cast<std::uint32_t>(pageCount), program.compact, samplesAhead_,
-                      program.rayShares, program.cutAtGaps ? 1U : 0U, program.byNeed ? 1U : 0U});
-  std::uint64_t& bound = boundVersions_[&pipeline];
-  if (bound != volume_->pagesVersion()) {
+  ComputePipeline& pipeline = pipelines.with(
+      {program.program, static_cast<std::uint32_t>(pageCount), program.compact, program.samplesAhead,
+       program.rayShares, program.cutAtGaps ? 1U : 0U, program.byNeed ? 1U : 0U,
+       volume_->mayBeInfinite() ? 1U : 0U, volume_->reachesBeyondTable() ? 1U : 0U});
+  const Bound now{volume_->pagesVersion(), volume_->slabsVersion()};
+  Bound& bound = bound_[&pipeline];
+  if (bound != now) {
     std::array<const Image3D*, shared::castMaxPages> images{};
     for (std::size_t i = 0; i < images.size(); ++i) images[i] = &volume_->pages()[std::min(i, pageCount - 1)];
     pipeline.bindImages(images, sampler_);
-    bound = volume_->pagesVersion();
+    pipeline.bindPlane(volume_->slabs(), sampler_);
+    bound = now;
   }
   return pipeline;
 }
@@ -109,8 +114,10 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   const std::uint32_t shares = stride > 1 ? rayShares_ : 1;
   const std::uint32_t width = (band.width + stride - 1) / stride * shares;
   pipelines_.update(commands, params);
-  commands.dispatch(pipelineFor({program, compact, shares, band.cutAtGaps, params.level >= 0.0F}), constants,
-                    groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
+  // Counted samples may lie apart.
+  const std::uint32_t ahead = stride > 1 ? 1 : samplesAhead_;
+  commands.dispatch(pipelineFor({program, compact, shares, ahead, band.cutAtGaps, params.level >= 0.0F}),
+                    constants, groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
 }
 
 }  // namespace vdi::gpu

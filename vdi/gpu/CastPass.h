@@ -21,8 +21,8 @@ namespace vdi::gpu {
 
 class VolumeStore;
 
-/// The part of CastParams that follows from camera and scene; `perUnitDistance`, addresses and list fields
-/// are left 0.
+/// The part of CastParams that follows from camera and scene; addresses, what concerns the table of slabs,
+/// and list fields are left 0.
 shared::CastParams castGeometry(const Scene& scene, const View& view, const DepthLattice& lattice);
 
 class CastPass {
@@ -54,17 +54,24 @@ class CastPass {
     std::uint32_t program = 0;  // shared::castProgram...
     std::uint32_t compact = 0;
     std::uint32_t rayShares = 1;
+    std::uint32_t samplesAhead = 1;
     bool cutAtGaps = false;
     bool byNeed = false;
   };
   ComputePipeline& pipelineFor(const Program& program);
+  /// Which images a pipeline reads.
+  struct Bound {
+    std::uint64_t pages = 0;
+    std::uint64_t slabs = 0;
+    bool operator==(const Bound&) const = default;
+  };
 
   std::uint32_t samplesAhead_;
   std::uint32_t rayShares_;  // where few rays are cast
   Sampler sampler_;
   PipelineSet pipelines_;
   PipelineSet sharingPipelines_;
-  std::map<const ComputePipeline*, std::uint64_t> boundVersions_;  // of the pages that they're bound to
+  std::map<const ComputePipeline*, Bound> bound_;
   const VolumeStore* volume_ = nullptr;
 };
 

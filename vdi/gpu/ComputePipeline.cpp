@@ -14,6 +14,7 @@ namespace {
 constexpr std::uint32_t guaranteedPushConstantBytes = 128;
 constexpr std::uint32_t imageBinding = 0;
 constexpr std::uint32_t uniformBinding = 1;
+constexpr std::uint32_t planeBinding = 2;
 
 /// Exists just while the pipeline is made.
 class ShaderModule {
@@ -36,10 +37,13 @@ class ShaderModule {
 }  // namespace
 
 ComputePipeline::ComputePipeline(std::shared_ptr<Device> device, const ComputePipelineInfo& info)
-    : device_(std::move(device)), imageCount_(info.imageCount), uniformBytes_(info.uniformBytes) {
+    : device_(std::move(device)),
+      imageCount_(info.imageCount),
+      uniformBytes_(info.uniformBytes),
+      hasPlane_(info.hasPlane) {
   assert(info.pushConstantBytes <= guaranteedPushConstantBytes);
   try {
-    if (imageCount_ > 0 || uniformBytes_ > 0) makeDescriptorSet();
+    if (imageCount_ > 0 || uniformBytes_ > 0 || hasPlane_) makeDescriptorSet();
     makePipeline(info);
   } catch (...) {
     release();
@@ -60,6 +64,7 @@ void ComputePipeline::makeDescriptorSet() {
     sizes.push_back({type, count});
   };
   add(imageBinding, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, imageCount_);
+  add(planeBinding, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, hasPlane_ ? 1 : 0);
   add(uniformBinding, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, uniformBytes_ > 0 ? 1 : 0);
   const VkDescriptorSetLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
                                                    nullptr, 0, static_cast<std::uint32_t>(bindings.size()),
@@ -113,12 +118,30 @@ void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
 
 void ComputePipeline::bindImages(std::span<const Image3D* const> images, const Sampler& sampler) {
   assert(images.size() == imageCount_);
+  bind(imageBinding, images, sampler);
+}
+
+void ComputePipeline::bindPlane(const Image3D& image, const Sampler& sampler) {
+  assert(hasPlane_);
+  const Image3D* const images[] = {&image};
+  bind(planeBinding, images, sampler);
+}
+
+void ComputePipeline::bind(std::uint32_t binding, std::span<const Image3D* const> images,
+                           const Sampler& sampler) {
   std::vector<VkDescriptorImageInfo> infos;
   for (const Image3D* image : images)
     infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
-  const VkWriteDescriptorSet write{
-      VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,    nullptr,      set_,    imageBinding, 0, imageCount_,
-      VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, infos.data(), nullptr, nullptr};
+  const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
+                                   nullptr,
+                                   set_,
+                                   binding,
+                                   0,
+                                   static_cast<std::uint32_t>(infos.size()),
+                                   VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+                                   infos.data(),
+                                   nullptr,
+                                   nullptr};
   vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
 }
 

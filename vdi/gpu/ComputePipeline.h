@@ -31,6 +31,7 @@ struct ComputePipelineInfo {
   std::uint32_t pushConstantBytes = 0;  // at most 128
   std::uint32_t imageCount = 0;         // size of the sampler3D array at set 0, binding 0
   std::uint32_t uniformBytes = 0;       // of the uniform block at set 0, binding 1; 0: none
+  bool hasPlane = false;                // a sampler2D at set 0, binding 2
   bool wholeSubgroups = false;          // of DeviceLimits::subgroupSize, of which the workgroup is a multiple
   std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
 };
@@ -47,6 +48,8 @@ class ComputePipeline {
   /// Writes the descriptor set: exactly imageCount images. Must not be called while a dispatch of this
   /// pipeline is in flight.
   void bindImages(std::span<const Image3D* const> images, const Sampler& sampler);
+  /// Likewise, of the one 2-D image.
+  void bindPlane(const Image3D& image, const Sampler& sampler);
   /// Likewise, a buffer of uniformBytes.
   void bindUniforms(const Buffer& buffer);
 
@@ -56,12 +59,14 @@ class ComputePipeline {
 
  private:
   void makeDescriptorSet();
+  void bind(std::uint32_t binding, std::span<const Image3D* const> images, const Sampler& sampler);
   void makePipeline(const ComputePipelineInfo& info);
   void release() noexcept;
 
   std::shared_ptr<Device> device_;
   std::uint32_t imageCount_ = 0;
   std::uint32_t uniformBytes_ = 0;
+  bool hasPlane_ = false;
   VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
   VkDescriptorPool pool_ = VK_NULL_HANDLE;
   VkDescriptorSet set_ = VK_NULL_HANDLE;

@@ -70,8 +70,10 @@ std::uint64_t texelBytes(VkFormat format) {
       return 2;
     case VK_FORMAT_R32_SFLOAT:
       return 4;
+    case VK_FORMAT_R16G16B16A16_SFLOAT:
+      return 8;
     default:
-      assert(false && "not a format of volumes");
+      assert(false && "not a format of images");
       return 4;
   }
 }
@@ -221,6 +223,14 @@ void Buffer::release() noexcept {
 }
 
 Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format)
+    : Image3D(std::move(device), extent, format, VK_IMAGE_TYPE_3D, VK_IMAGE_VIEW_TYPE_3D) {}
+
+Image3D Image3D::plane(std::shared_ptr<Device> device, const glm::uvec2& extent, VkFormat format) {
+  return {std::move(device), {extent, 1}, format, VK_IMAGE_TYPE_2D, VK_IMAGE_VIEW_TYPE_2D};
+}
+
+Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format, VkImageType type,
+                 VkImageViewType viewType)
     : device_(std::move(device)), extent_(extent), format_(format) {
   assert(glm::all(glm::greaterThan(extent, glm::uvec3(0))));
   const std::uint32_t longest = device_->limits().maxImageDimension3D;
@@ -240,7 +250,7 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
     const VkImageCreateInfo info{VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
                                  nullptr,
                                  0,
-                                 VK_IMAGE_TYPE_3D,
+                                 type,
                                  format,
                                  {extent.x, extent.y, extent.z},
                                  1,
@@ -263,7 +273,7 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
     demandRoom(vkBindImageMemory(device_->handle(), image_, memory_, 0), "vkBindImageMemory", *device_, bytes,
                "texture");
     const VkImageViewCreateInfo viewInfo{
-        VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO, nullptr, 0, image_, VK_IMAGE_VIEW_TYPE_3D, format, {},
+        VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO, nullptr, 0, image_, viewType, format, {},
         {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
     check(vkCreateImageView(device_->handle(), &viewInfo, nullptr, &view_), "vkCreateImageView");
   } catch (...) {

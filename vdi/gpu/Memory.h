@@ -20,7 +20,8 @@ enum class MemoryKind {
   Readback,     // host-visible, cached where there's such a type; coherent
 };
 
-/// Bytes of a texel of the formats that Image3D is made with: R8_UNORM, R16_UNORM, R32_SFLOAT; asserts one of
+/// Bytes of a texel of the formats that Image3D is made with: R8_UNORM, R16_UNORM, R32_SFLOAT,
+/// R16G16B16A16_SFLOAT; asserts one of
 /// them.
 std::uint64_t texelBytes(VkFormat format);
 
@@ -87,6 +88,8 @@ class Image3D {
   /// Throws Error{OutOfMemory} as Buffer does, Error{InvalidArgument} for an extent beyond
   /// maxImageDimension3D. No extent may be 0.
   Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format);
+  /// A 2-D one. Same errors; its depth is 1.
+  static Image3D plane(std::shared_ptr<Device> device, const glm::uvec2& extent, VkFormat format);
   ~Image3D();
   Image3D(Image3D&& other) noexcept;
   Image3D& operator=(Image3D&& other) noexcept;
@@ -100,6 +103,8 @@ class Image3D {
   VkFormat format() const { return format_; }
 
  private:
+  Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format, VkImageType type,
+          VkImageViewType viewType);
   void release() noexcept;
   std::shared_ptr<Device> device_;
   VkImage image_ = VK_NULL_HANDLE;

@@ -88,6 +88,14 @@ ValueMap valueMapOf(const Block& block) {
       break;
   }
   const ScalarRange range = finiteRange(block);
+  const double most = limitsOf(block.type).most;
+  if (range.min < -most || range.max > most) {
+    throw Error(
+        ErrorCode::InvalidArgument,
+        fmt::format("a block of {} has values from {} to {}, those beyond {} in size can't be handled; "
+                    "other units help",
+                    toString(block.type), range.min, range.max, most));
+  }
   if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0, false, range};
   return {range.max - range.min, range.min, false, range};
 }
@@ -95,7 +103,8 @@ ValueMap valueMapOf(const Block& block) {
 std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block) {
   const VkFormat format = formatOf(device, block.type);
   const std::uint64_t maxTexels = device.limits().maxAllocationBytes / texelBytes(format) / 2;
-  glm::uvec3 largest = glm::min(glm::uvec3(block.dims), glm::uvec3(device.limits().maxImageDimension3D));
+  const IndexBox all = block.extended();
+  glm::uvec3 largest = glm::min(glm::uvec3(all.size()), glm::uvec3(device.limits().maxImageDimension3D));
   while (volumeOf(largest) > maxTexels) {
     const int axis = largest.z >= largest.x && largest.z >= largest.y ? 2 : largest.y >= largest.x ? 1 : 0;
     largest[axis] = (largest[axis] + 1) / 2;
@@ -103,11 +112,11 @@ std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block) {
   const ValueMap values = valueMapOf(block);
   std::vector<VolumePiece> pieces;
   const glm::ivec3 stride = glm::max(glm::ivec3(largest) - 1, glm::ivec3(1));
-  for (int z = 0; z == 0 || z < block.dims.z - 1; z += stride.z) {
-    for (int y = 0; y == 0 || y < block.dims.y - 1; y += stride.y) {
-      for (int x = 0; x == 0 || x < block.dims.x - 1; x += stride.x) {
+  for (int z = all.lo.z; z == all.lo.z || z < all.hi.z - 1; z += stride.z) {
+    for (int y = all.lo.y; y == all.lo.y || y < all.hi.y - 1; y += stride.y) {
+      for (int x = all.lo.x; x == all.lo.x || x < all.hi.x - 1; x += stride.x) {
         const glm::ivec3 first{x, y, z};
-        const glm::uvec3 dims = glm::min(largest, glm::uvec3(block.dims - first));
+        const glm::uvec3 dims = glm::min(largest, glm::uvec3(all.hi - first));
         pieces.push_back({&block, first, dims, format, values, 0, {}});
       }
     }

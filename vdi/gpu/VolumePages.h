@@ -22,21 +22,24 @@ struct ValueMap {
   bool whole = false;                // values are whole numbers
   std::optional<ScalarRange> range;  // of finite values, where it had to be found
 };
+/// Throws Error{InvalidArgument} for values beyond limitsOf(type).most.
 ValueMap valueMapOf(const Block& block);
 
 /// A box of a block's values that fits one page.
 struct VolumePiece {
   const Block* block = nullptr;
-  glm::ivec3 first{0};  // index of its first value in the block
+  glm::ivec3 first{0};  // index of its first value in the block; negative in a layer below the stored values
   glm::uvec3 dims{0};
   VkFormat format = VK_FORMAT_UNDEFINED;
   ValueMap values;
   std::uint32_t page = 0;
-  glm::uvec3 place{0};  // in the page, texels
+  glm::uvec3 place{0};                                                // in the page, texels
+  IndexBox box() const { return {first, first + glm::ivec3(dims)}; }  // of the block's indices
   bool samePlaceAs(const VolumePiece& other) const { return dims == other.dims && format == other.format; }
 };
 
-/// Pieces of the block that fit a page each. They overlap by one value, so that each interpolates by itself.
+/// Pieces of the block, extra layers included, that fit a page each. They overlap by one value, so that each
+/// interpolates by itself.
 std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block);
 
 struct PageShape {

@@ -11,7 +11,9 @@
 #include <tuple>
 #include <utility>
 
+#include "shaders/shared/slab.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Parallel.h"
 #include "vdi/gpu/KdTree.h"
 
 namespace vdi::gpu {
@@ -104,11 +106,12 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
   std::vector<VolumePiece> pieces;
   std::vector<PieceRange> piecesOf;  // of each block
   // Blocks that share their values (the parts of a box with holes) share their pieces.
-  std::map<std::tuple<const void*, double, double, double>, PieceRange> known;
+  std::map<std::tuple<const void*, const void*, double, double, double>, PieceRange> known;
   for (const Block& block : step.blocks) {
     PieceRange range;
     if (!block.owned.empty()) {
-      const std::tuple key(block.data, block.origin.x, block.origin.y, block.origin.z);
+      const std::tuple key(block.data, static_cast<const void*>(block.patches.get()), block.origin.x,
+                           block.origin.y, block.origin.z);
       const auto [place, isNew] = known.try_emplace(key);
       if (isNew) {
         const std::vector<VolumePiece> parts = cutToPieces(*device_, block);
@@ -166,9 +169,8 @@ void VolumeStore::layBricks(Step& step, std::span<const PieceRange> piecesOf, co
         // An owned box may reach beyond the outermost values (cells do); only inner cuts bound a piece.
         double lo = block.owned.lo[axis];
         double hi = block.owned.hi[axis];
-        if (piece.first[axis] > 0) lo = std::max(lo, pieceOrigin[axis]);
-        const auto end = piece.first[axis] + static_cast<int>(piece.dims[axis]);
-        if (end < block.dims[axis])
+        if (piece.first[axis] > block.extended().lo[axis]) lo = std::max(lo, pieceOrigin[axis]);
+        if (piece.box().hi[axis] < block.extended().hi[axis])
           hi = std::min(hi, pieceOrigin[axis] + (piece.dims[axis] - 1) * block.spacing[axis]);
         brick.lo[axis] = snapToScene(scene, lo, axis);
         brick.hi[axis] = snapToScene(scene, hi, axis);
@@ -236,6 +238,15 @@ void VolumeStore::finish(Step& step) {
   step.range = rangeOf(step);
 }
 
+bool VolumeStore::mayBeInfinite() const {
+  return std::ranges::any_of(pages(),
+                             [](const Image3D& page) { return page.format() == VK_FORMAT_R32_SFLOAT; });
+}
+
+bool VolumeStore::reachesBeyondTable() const {
+  return valueRange().min < table_.min || valueRange().max > table_.max;
+}
+
 /// After cells were measured.
 ScalarRange VolumeStore::rangeOf(const Step& step) const {
   ScalarRange range;
@@ -290,8 +301,12 @@ void VolumeStore::runCells(Step& step, bool measure) {
   commands_.submitAndWait();
 }
 
-void VolumeStore::setTable(const TransferTable& table) {
-  if (table_ == table) return;
+void VolumeStore::setTable(const TransferTable& table, float slabLength) {
+  const bool isNew = table_ != table;
+  if (!isNew && slabTable_.length == slabLength) return;
+  slabTable_ = makeSlabTable(table, slabLength);
+  uploadSlabs();
+  if (!isNew) return;
   table_ = table;
   visibleBeforeBuffer_.reserve(device_, (table_.entries.size() + 1) * sizeof(std::uint32_t),
                                MemoryKind::Upload);
@@ -300,12 +315,27 @@ void VolumeStore::setTable(const TransferTable& table) {
   for (std::size_t i = 0; i < table_.entries.size(); ++i) {
     visibleBefore[i + 1] = visibleBefore[i] + (table_.entries[i].extinction > 0.0F ? 1 : 0);
   }
-  const auto bytes = std::span(table_.entries).size_bytes();
-  tableBuffer_.reserve(device_, bytes, MemoryKind::Upload);
-  std::memcpy(tableBuffer_.mapped().data(), table_.entries.data(), bytes);
   Step& step = steps_[shown_];
   placeTable(step);
   runCells(step, false);
+}
+
+void VolumeStore::uploadSlabs() {
+  const auto bytes = std::as_bytes(std::span(slabTable_.texels));
+  const glm::uvec2 extent(shared::slabSide, slabTable_.height());
+  const bool isNew = !slabs_ || glm::uvec2(slabs_.extent()) != extent;
+  if (isNew) {
+    slabs_ = Image3D::plane(device_, extent, VK_FORMAT_R16G16B16A16_SFLOAT);
+    ++slabsVersion_;
+  }
+  slabStaging_.reserve(device_, bytes.size(), MemoryKind::Upload);
+  copyInParallel(bytes, slabStaging_.mapped().data());
+  commands_.begin();
+  if (isNew) commands_.clear(slabs_);
+  commands_.beginUpload(slabs_);
+  commands_.copyToImage(slabStaging_, 0, slabs_, glm::uvec3(0), slabs_.extent());
+  commands_.endUpload(slabs_);
+  commands_.submitAndWait();
 }
 
 void VolumeStore::placeTable(Step& step) {

@@ -13,6 +13,7 @@
 #include "shaders/shared/volume.h"
 #include "vdi/core/Block.h"
 #include "vdi/core/Scene.h"
+#include "vdi/core/SlabTable.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/gpu/CellsPass.h"
 #include "vdi/gpu/Commands.h"
@@ -50,22 +51,30 @@ class VolumeStore {
   /// Waits until nothing is on its way any more, which can't be stopped, and forgets it.
   void dropNext();
 
-  /// Cheap when the table is the one of the last call.
-  void setTable(const TransferTable& table);
+  /// Cheap when the table is the one of the last call, and so is the length of its slabs, in unit distances.
+  void setTable(const TransferTable& table, float slabLength);
 
   /// Of this rank's finite values.
   const ScalarRange& valueRange() const { return shown().range; }
+  /// Whether there may be values that aren't finite.
+  bool mayBeInfinite() const;
+  /// Whether there are values outside of the table's range.
+  bool reachesBeyondTable() const;
   bool empty() const { return shown().tree.empty(); }
   std::uint32_t nodeCount() const { return static_cast<std::uint32_t>(shown().tree.size()); }
   std::uint32_t tableSize() const { return static_cast<std::uint32_t>(table_.entries.size()); }
   VkDeviceAddress bricks() const { return shown().brickBuffer.address(); }
   VkDeviceAddress nodes() const { return shown().nodeBuffer.address(); }
-  VkDeviceAddress table() const { return tableBuffer_.address(); }
+  /// Of setTable.
+  const SlabTable& slabTable() const { return slabTable_; }
+  const Image3D& slabs() const { return slabs_; }
   /// Macrocells, for the bricks' firstCell: 1 where the table makes anything visible.
   VkDeviceAddress cells() const { return shown().visibleBuffer.address(); }
   std::span<const Image3D> pages() const { return shown().pages; }
   /// Which pages they are: descriptor sets that name others must be written again.
   std::uint64_t pagesVersion() const { return shown().pagesVersion; }
+  /// Likewise of slabs.
+  std::uint64_t slabsVersion() const { return slabsVersion_; }
 
  private:
   /// Pieces [first, last) are a block's.
@@ -101,6 +110,7 @@ class VolumeStore {
   void layBricks(Step& step, std::span<const PieceRange> piecesOf, const Scene& scene) const;
   void layCells(Step& step) const;
   void finish(Step& step);
+  void uploadSlabs();
   void placeTable(Step& step);
   void runCells(Step& step, bool measure);
   ScalarRange rangeOf(const Step& step) const;
@@ -116,7 +126,10 @@ class VolumeStore {
   CellsPass cellsPass_;
   Buffer pieceRanges_;  // read back
   Buffer visibleBeforeBuffer_;
-  Buffer tableBuffer_;
+  SlabTable slabTable_;
+  Image3D slabs_;
+  std::uint64_t slabsVersion_ = 0;
+  Buffer slabStaging_;
 };
 
 }  // namespace vdi::gpu

@@ -31,7 +31,7 @@ void convertRow(const void* from, std::size_t first, std::size_t count, std::byt
   for (std::size_t i = 0; i < count; ++i) texels[i] = convert(values[i]);
 }
 
-void writeRow(const Block& block, VkFormat format, const ValueMap& values, std::size_t first,
+void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap& values, std::size_t first,
               std::size_t count, std::byte* to) {
   const auto relative = [&values](auto value) {
     return static_cast<float>((static_cast<double>(value) - values.offset) / values.scale);
@@ -39,53 +39,70 @@ void writeRow(const Block& block, VkFormat format, const ValueMap& values, std::
   const bool wide = format == VK_FORMAT_R16_UNORM;
   using U8 = std::uint8_t;
   using U16 = std::uint16_t;
-  switch (block.type) {
+  switch (type) {
     case ScalarType::U8:
       if (wide) {
-        return convertRow<U8, U16>(block.data, first, count, to,
-                                   [](U8 v) { return static_cast<U16>(v * 257); });
+        return convertRow<U8, U16>(data, first, count, to, [](U8 v) { return static_cast<U16>(v * 257); });
       }
-      std::memcpy(to, static_cast<const U8*>(block.data) + first, count);
+      std::memcpy(to, static_cast<const U8*>(data) + first, count);
       return;
     case ScalarType::I8:
       if (wide) {
-        return convertRow<std::int8_t, U16>(block.data, first, count, to,
+        return convertRow<std::int8_t, U16>(data, first, count, to,
                                             [](std::int8_t v) { return static_cast<U16>((v + 128) * 257); });
       }
-      return convertRow<std::int8_t, U8>(block.data, first, count, to,
+      return convertRow<std::int8_t, U8>(data, first, count, to,
                                          [](std::int8_t v) { return static_cast<U8>(v + 128); });
     case ScalarType::U16:
-      std::memcpy(to, static_cast<const U16*>(block.data) + first, count * 2);
+      std::memcpy(to, static_cast<const U16*>(data) + first, count * 2);
       return;
     case ScalarType::I16:
-      return convertRow<std::int16_t, U16>(block.data, first, count, to,
+      return convertRow<std::int16_t, U16>(data, first, count, to,
                                            [](std::int16_t v) { return static_cast<U16>(v + 32768); });
     case ScalarType::F32:
-      std::memcpy(to, static_cast<const float*>(block.data) + first, count * 4);
+      std::memcpy(to, static_cast<const float*>(data) + first, count * 4);
       return;
     case ScalarType::U32:
-      return convertRow<std::uint32_t, float>(block.data, first, count, to, relative);
+      return convertRow<std::uint32_t, float>(data, first, count, to, relative);
     case ScalarType::I32:
-      return convertRow<std::int32_t, float>(block.data, first, count, to, relative);
+      return convertRow<std::int32_t, float>(data, first, count, to, relative);
     case ScalarType::F64:
-      return convertRow<double, float>(block.data, first, count, to, relative);
+      return convertRow<double, float>(data, first, count, to, relative);
   }
 }
 
-/// Texels of a box of the piece, tightly packed.
-void writeBox(const VolumePiece& piece, const glm::uvec3& at, const glm::uvec3& box, std::byte* to) {
+/// An array of values that texels are made of.
+struct Source {
+  IndexBox box;  // in the block's indices
+  const void* values;
+};
+
+/// Texels of `box`, in the block's indices, tightly packed: the stored values, and the patches over them.
+void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
   const Block& block = *piece.block;
-  const std::uint64_t rowBytes = box.x * texelBytes(piece.format);
-  const auto blockDims = glm::u64vec3(block.dims);
-  const glm::u64vec3 start = glm::u64vec3(piece.first) + glm::u64vec3(at);
+  std::vector<Source> sources{{block.stored(), block.data}};
+  for (const Patch& patch : block.patchList()) sources.push_back({patch.box, patch.values.get()});
+  std::erase_if(sources, [&](const Source& source) { return source.box.intersection(box).empty(); });
+  const std::uint64_t bytes = texelBytes(piece.format);
+  const glm::ivec3 size = box.size();
   constexpr std::size_t atOnce = 1 << 20;  // bytes
-  const std::size_t rows = std::size_t{box.y} * box.z;
+  const auto rows = static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
+  const std::size_t rowBytes = static_cast<std::size_t>(size.x) * bytes;
   inParallel(rows, atOnce / rowBytes + 1, [&](std::size_t firstRow, std::size_t lastRow) {
-    for (std::size_t row = firstRow; row < lastRow; ++row) {
-      const std::uint64_t y = start.y + row % box.y;
-      const std::uint64_t z = start.z + row / box.y;
-      writeRow(block, piece.format, piece.values, (z * blockDims.y + y) * blockDims.x + start.x, box.x,
-               to + row * rowBytes);
+    const auto rowOf = [&](int y, int z) {
+      return static_cast<std::size_t>(z - box.lo.z) * static_cast<std::size_t>(size.y) +
+             static_cast<std::size_t>(y - box.lo.y);
+    };
+    for (const Source& source : sources) {
+      const IndexBox part = source.box.intersection(box);
+      for (int z = part.lo.z; z < part.hi.z; ++z) {
+        for (int y = part.lo.y; y < part.hi.y; ++y) {
+          if (rowOf(y, z) < firstRow || rowOf(y, z) >= lastRow) continue;
+          writeRow(block.type, source.values, piece.format, piece.values,
+                   source.box.position({part.lo.x, y, z}), static_cast<std::size_t>(part.size().x),
+                   to + box.position({part.lo.x, y, z}) * bytes);
+        }
+      }
     }
   });
 }
@@ -117,53 +134,62 @@ void VolumeUpload::turnOver() {
   filling().filled = 0;
 }
 
-/// False if the memory can't be imported, or isn't worth it. `imported` must live until the copies are done.
+/// The piece's stored values. False if the memory can't be imported, or isn't worth it. `imported` must live
+/// until the copies are done.
 bool VolumeUpload::copyDirectly(const VolumePiece& piece, const Image3D& page,
                                 std::vector<Buffer>& imported) {
   const Block& block = *piece.block;
-  const std::uint64_t bytes = texelBytes(piece.format);
-  const auto dims = glm::u64vec3(block.dims);
-  const auto at = glm::u64vec3(piece.first);
-  const std::uint64_t first = ((at.z * dims.y + at.y) * dims.x + at.x) * bytes;
-  const glm::u64vec3 last = at + glm::u64vec3(piece.dims) - std::uint64_t{1};
-  const std::uint64_t end = ((last.z * dims.y + last.y) * dims.x + last.x + 1) * bytes;
-  if (usableCores() >= coresThatCopyFaster || !isTexels(piece) || end - first < leastImport ||
+  const IndexBox stored = block.stored();
+  const IndexBox part = piece.box().intersection(stored);
+  if (part.empty() || usableCores() >= coresThatCopyFaster || !isTexels(piece) ||
       imported.size() == mostImports)
     return false;
+  const std::uint64_t bytes = texelBytes(piece.format);
+  const std::uint64_t first = stored.position(part.lo) * bytes;
+  const std::uint64_t end = (stored.position(part.hi - 1) + 1) * bytes;
+  if (end - first < leastImport) return false;
   std::optional<ImportedBuffer> source =
       importHostMemory(device_, static_cast<const std::byte*>(block.data) + first, end - first);
   if (!source || source->offset % bytes != 0) return false;
-  filling().commands.copyToImage(source->buffer, source->offset, page, piece.place, piece.dims,
-                                 {static_cast<std::uint32_t>(dims.x), static_cast<std::uint32_t>(dims.y)});
+  filling().commands.copyToImage(
+      source->buffer, source->offset, page, piece.place + glm::uvec3(part.lo - piece.first),
+      glm::uvec3(part.size()),
+      {static_cast<std::uint32_t>(block.dims.x), static_cast<std::uint32_t>(block.dims.y)});
   imported.push_back(std::move(source->buffer));
   return true;
 }
 
-void VolumeUpload::stage(const VolumePiece& piece, const Image3D& page) {
+/// `values`: a part of the piece, in the block's indices.
+void VolumeUpload::stage(const VolumePiece& piece, const IndexBox& values, const Image3D& page) {
   const std::uint64_t bytes = texelBytes(piece.format);
-  const std::uint64_t rowBytes = piece.dims.x * bytes;
-  const std::uint64_t sliceBytes = rowBytes * piece.dims.y;
+  const glm::u64vec3 size(values.size());
+  const std::uint64_t rowBytes = size.x * bytes;
+  const std::uint64_t sliceBytes = rowBytes * size.y;
   // As many whole slices at a time as the staging buffer has room for, or as many whole rows of one slice.
   // Vulkan wants offsets in multiples of 4.
-  glm::uvec3 at{0};
-  while (at.z < piece.dims.z) {
-    const bool slices = at.y == 0 && sliceBytes <= stagingBytes;
+  glm::ivec3 at = values.lo;
+  while (at.z < values.hi.z) {
+    const bool slices = at.y == values.lo.y && sliceBytes <= stagingBytes;
     filling().filled = (filling().filled + 3) / 4 * 4;
     if (filling().filled + (slices ? sliceBytes : rowBytes) > stagingBytes) turnOver();
     Half& half = filling();
     half.staging.reserve(device_, stagingBytes, MemoryKind::Upload);
     const std::uint64_t room = stagingBytes - half.filled;
-    glm::uvec3 box{piece.dims.x, piece.dims.y, 1};
+    const auto fitting = [room](int left, std::uint64_t each) {
+      return static_cast<int>(std::min<std::uint64_t>(static_cast<std::uint64_t>(left), room / each));
+    };
+    IndexBox box{at, {values.hi.x, values.hi.y, at.z + 1}};
     if (slices) {
-      box.z = static_cast<std::uint32_t>(std::min<std::uint64_t>(piece.dims.z - at.z, room / sliceBytes));
+      box.hi.z = at.z + fitting(values.hi.z - at.z, sliceBytes);
     } else {
-      box.y = static_cast<std::uint32_t>(std::min<std::uint64_t>(piece.dims.y - at.y, room / rowBytes));
+      box.hi.y = at.y + fitting(values.hi.y - at.y, rowBytes);
     }
-    writeBox(piece, at, box, half.staging.mapped().data() + half.filled);
-    half.commands.copyToImage(half.staging, half.filled, page, piece.place + at, box);
-    half.filled += rowBytes * box.y * box.z;
-    at.y += box.y;
-    if (at.y == piece.dims.y) at = {0, 0, at.z + box.z};
+    writeBox(piece, box, half.staging.mapped().data() + half.filled);
+    half.commands.copyToImage(half.staging, half.filled, page, piece.place + glm::uvec3(at - piece.first),
+                              glm::uvec3(box.size()));
+    half.filled += box.count() * bytes;
+    at.y = box.hi.y;
+    if (at.y == values.hi.y) at = {values.lo.x, values.lo.y, box.hi.z};
   }
 }
 
@@ -181,9 +207,20 @@ void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Imag
   };
   try {
     for (const Image3D& page : pages) filling().commands.beginUpload(page);
+    std::vector<const VolumePiece*> direct;
     for (const VolumePiece& piece : pieces) {
-      const Image3D& page = pages[piece.page];
-      if (!copyDirectly(piece, page, imported)) stage(piece, page);
+      if (copyDirectly(piece, pages[piece.page], imported)) {
+        direct.push_back(&piece);
+      } else {
+        stage(piece, piece.box(), pages[piece.page]);
+      }
+    }
+    if (!direct.empty()) filling().commands.barrier();  // patches come over the values that were copied
+    for (const VolumePiece* piece : direct) {
+      for (const Patch& patch : piece->block->patchList()) {
+        const IndexBox part = patch.box.intersection(piece->box());
+        if (!part.empty()) stage(*piece, part, pages[piece->page]);
+      }
     }
     for (const Image3D& page : pages) filling().commands.endUpload(page);
     filling().commands.submit();

@@ -16,6 +16,7 @@ namespace vdi::gpu {
 /// Runs on the device's transfer queue, through two staging buffers: one is filled, by all cores, while the
 /// device copies from the other. A process with one core rather lets the device copy values that are texels
 /// as they are from the block's own memory, where the driver can import that (VK_EXT_external_memory_host).
+/// Values of patches are put among the staged ones, or copied once the block's own are there.
 class VolumeUpload {
  public:
   explicit VolumeUpload(std::shared_ptr<Device> device);
@@ -37,7 +38,7 @@ class VolumeUpload {
   };
 
   bool copyDirectly(const VolumePiece& piece, const Image3D& page, std::vector<Buffer>& imported);
-  void stage(const VolumePiece& piece, const Image3D& page);
+  void stage(const VolumePiece& piece, const IndexBox& values, const Image3D& page);
   Half& filling() { return halves_[current_]; }
   void turnOver();
 

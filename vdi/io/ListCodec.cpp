@@ -211,6 +211,37 @@ bool canExpandTo(std::uint64_t packedBytes, std::uint64_t bytes) {
   return bytes <= packedBytes * 255 && packedBytes <= bound;
 }
 
+std::optional<std::uint64_t> announcedBytes(std::span<const std::byte> packed) {
+  // Sequences of a token, literals, and a match's offset and length; the last one ends behind its literals.
+  // LZ4's "Block Format Description" has the details.
+  constexpr std::size_t more = 15;  // of a length of four bits: bytes follow, until one isn't 255
+  constexpr std::size_t offsetBytes = 2;
+  constexpr std::size_t shortestMatch = 4;
+  std::uint64_t total = 0;
+  std::size_t at = 0;
+  const auto lengthOf = [&](std::size_t bits) {  // leaves `at` beyond the end where the block breaks off
+    std::uint64_t length = bits;
+    std::size_t byte = bits == more ? 255 : 0;
+    while (byte == 255) {
+      byte = at < packed.size() ? std::to_integer<std::size_t>(packed[at]) : 0;
+      length += byte;
+      ++at;
+    }
+    return length;
+  };
+  while (at < packed.size()) {
+    const auto token = std::to_integer<std::size_t>(packed[at++]);
+    const std::uint64_t literals = lengthOf(token >> 4U);
+    if (at > packed.size() || literals > packed.size() - at) return std::nullopt;
+    at += literals;
+    total += literals;
+    if (at == packed.size()) return total;
+    at += offsetBytes;
+    total += lengthOf(token & more) + shortestMatch;
+  }
+  return std::nullopt;
+}
+
 template <typename Segment>
 std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode& code, std::size_t first,
                                  std::size_t last) {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,9 @@ constexpr std::uint64_t expandedBytes(std::uint64_t lists, std::uint64_t superse
 
 /// Whether an LZ4 block of `packedBytes` can expand to `bytes`: what a decoder asks before it allocates.
 bool canExpandTo(std::uint64_t packedBytes, std::uint64_t bytes);
+
+/// How many bytes an LZ4 block says that it expands to, found without expanding it; nullopt if it breaks off.
+std::optional<std::uint64_t> announcedBytes(std::span<const std::byte> packed);
 
 /// Lists [first, last); with compact ones goes their code. Lossless, deterministic. Throws Error{Io} for more
 /// than LZ4 takes at once (2 GiB).

@@ -4,7 +4,9 @@
 #include <png.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
+#include <span>
 
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
@@ -44,6 +46,17 @@ Picture pictureOf(const Pixels& image, ByteOf byteOf) {
   return picture;
 }
 
+constexpr std::uint32_t largestSide = 32768;  // as View
+
+/// As the first chunk of a sound PNG has it.
+std::uint64_t bitsPerPixel(std::span<const std::byte> png) {
+  constexpr std::size_t depthAt = 24;
+  constexpr std::size_t colorTypeAt = 25;
+  constexpr std::array<std::uint64_t, 7> channels{1, 0, 3, 1, 2, 0, 4};  // by colour type
+  return std::to_integer<std::uint64_t>(png[depthAt]) *
+         channels.at(std::to_integer<std::size_t>(png[colorTypeAt]));
+}
+
 }  // namespace
 
 Picture toPicture(const Image& image, const glm::vec3& background) {
@@ -72,16 +85,25 @@ void writePng(const std::filesystem::path& path, const Picture& picture) {
 }
 
 Picture readPng(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = InputFile(path).readAll();
-  PngImage image;
+  const InputFile file(path);
   const auto demand = [&](bool good, const char* why) {
     if (!good) throw Error(ErrorCode::Format, fmt::format("not a sound PNG: {}", why), path.string());
   };
+  // Before the memory for another file's bytes is taken.
+  constexpr std::uint64_t signatureBytes = 8;
+  const std::vector<std::byte> start = file.read(0, std::min(file.size(), signatureBytes));
+  demand(start.size() == signatureBytes &&
+             png_sig_cmp(reinterpret_cast<png_const_bytep>(start.data()), 0, signatureBytes) == 0,
+         "it doesn't start as one");
+  const std::vector<std::byte> bytes = file.readAll();
+  PngImage image;
   demand(png_image_begin_read_from_memory(image.get(), bytes.data(), bytes.size()) != 0, image->message);
-  // A byte of a PNG holds at most 1032 bytes of rows (deflate), each of at most 8 pixels.
-  constexpr std::uint64_t mostPixelsPerByte = std::uint64_t{1032} * 8;
-  demand(std::uint64_t{image->width} * image->height <= bytes.size() * mostPixelsPerByte,
+  // A byte of a PNG holds at most 1032 bytes of rows (deflate).
+  constexpr std::uint64_t mostPerByte = 1032;
+  demand(std::uint64_t{image->width} * image->height * bitsPerPixel(bytes) <= bytes.size() * mostPerByte * 8,
          "its header says that it's larger than its bytes can hold");
+  demand(image->width <= largestSide && image->height <= largestSide,
+         "it's more than 32768 pixels wide or high");
   image->format = PNG_FORMAT_RGB;
   Picture picture{static_cast<int>(image->width), static_cast<int>(image->height), {}};
   picture.rgb.resize(std::size_t{3} * image->width * image->height);

@@ -260,13 +260,21 @@ std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> b
   return chunks;
 }
 
-/// Returns the depth code that the chunk's supersegments have.
-template <typename Segment>
-DepthCode decodeChunk(const Chunk& chunk, std::span<const std::byte> data, ListsOf<Segment>& lists) {
-  const auto packed = data.subspan(chunk.dataOffset, chunk.packedBytes);
+/// Before memory is taken for it: that the chunk is what was written, and expands to what the table says.
+void requireSound(const Chunk& chunk, std::span<const std::byte> packed, Precision precision) {
   if (chunk.checksum != checksumOf(packed)) {
     fail(fmt::format("the checksum of the chunk from list {} on is wrong", chunk.firstList));
   }
+  if (detail::announcedBytes(packed) !=
+      detail::expandedBytes(chunk.listCount, chunk.supersegmentCount, precision)) {
+    fail(fmt::format("the chunk from list {} on doesn't hold {} supersegments", chunk.firstList,
+                     chunk.supersegmentCount));
+  }
+}
+
+/// Returns the depth code that the chunk's supersegments have.
+template <typename Segment>
+DepthCode decodeChunk(const Chunk& chunk, std::span<const std::byte> packed, ListsOf<Segment>& lists) {
   try {
     return detail::unpackLists(
         packed, static_cast<std::uint32_t>(chunk.firstSupersegment),
@@ -288,6 +296,10 @@ VdiFileInfo infoOf(const Header& header, std::uint64_t fileBytes) {
       header.supersegmentCount *
           (precisionOf(header) == Precision::Compact ? sizeof(CompactSupersegment) : sizeof(Supersegment));
   return info;
+}
+
+Header readHeader(const InputFile& file) {
+  return parseHeader(file.read(0, std::min<std::uint64_t>(file.size(), sizeof(Header))), file.size());
 }
 
 /// Runs `work` with the path as the context of its Format errors.
@@ -332,12 +344,14 @@ Vdi decode(std::span<const std::byte> bytes) {
   const std::vector<Chunk> chunks = parseTable(header, bytes.subspan(sizeof(Header)));
   Vdi vdi = vdiOf(header);
   const auto data = bytes.subspan(sizeof(Header) + tableBytesOf(header));
+  const auto packedOf = [&](const Chunk& chunk) { return data.subspan(chunk.dataOffset, chunk.packedBytes); };
+  for (const Chunk& chunk : chunks) requireSound(chunk, packedOf(chunk), precisionOf(header));
   std::visit(
       [&](auto& lists) {
         lists.offsets.resize(std::size_t{header.width} * header.height + 1);
         lists.segments.resize(header.supersegmentCount);
         for (const Chunk& chunk : chunks) {
-          const DepthCode code = decodeChunk(chunk, data, lists);
+          const DepthCode code = decodeChunk(chunk, packedOf(chunk), lists);
           if (chunk.firstList == 0) vdi.depthCode = code;
           if (code != vdi.depthCode) fail("its chunks have different depth codes");
         }
@@ -359,15 +373,17 @@ void writeVdi(const std::filesystem::path& path, const Vdi& vdi) {
 }
 
 Vdi readVdi(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = InputFile(path).readAll();
-  return withPath(path, [&] { return decode(bytes); });
+  const InputFile file(path);
+  return withPath(path, [&] {
+    static_cast<void>(readHeader(file));  // before the memory for another file's bytes is taken
+    return decode(file.readAll());
+  });
 }
 
 VdiFileInfo readVdiInfo(const std::filesystem::path& path) {
   const InputFile file(path);
   return withPath(path, [&] {
-    std::vector<std::byte> start = file.read(0, std::min<std::uint64_t>(file.size(), sizeof(Header)));
-    const Header header = parseHeader(start, file.size());
+    const Header header = readHeader(file);
     static_cast<void>(parseTable(header, file.read(sizeof(Header), tableBytesOf(header))));
     return infoOf(header, file.size());
   });

@@ -23,15 +23,14 @@ struct VdiFileInfo {
 /// machine (little-endian). Throws Error{Format} for a VDI that decode would refuse.
 std::vector<std::byte> encode(const Vdi& vdi);
 /// Throws Error{Format} for bytes that are truncated, altered, of another version or encoding, or whose
-/// header asks for more memory than their number can justify (before that is allocated; a sound file expands
-/// 255 times at most). The result has passed validate(Vdi).
+/// header or chunk table asks for more memory than what the chunks expand to (before that is allocated; they
+/// expand 255 times at most). The result has passed validate(Vdi).
 Vdi decode(std::span<const std::byte> bytes);
 /// Reads header and chunk table only; the rest need not be sound, but must be there.
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes);
 
-/// Written under a temporary name beside `path`, then renamed: a reader never sees half a file, and a file
-/// that was there stays when writing fails. Throws Error{Io}, or Error{Format} as encode; both with the path
-/// as context.
+/// Written by writeAtomically (Files.h): a reader never sees half a file, and a file that was there stays
+/// when writing fails. Throws Error{Io}, or Error{Format} as encode; both with the path as context.
 void writeVdi(const std::filesystem::path& path, const Vdi& vdi);
 /// Throws Error{Io} or Error{Format} with the path as context.
 Vdi readVdi(const std::filesystem::path& path);

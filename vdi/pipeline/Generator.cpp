@@ -101,7 +101,21 @@ struct Step {
   std::uint64_t blocks = 0;
   std::uint64_t bytes = 0;
   double uploadSeconds = 0.0;
+  bool doubles = false;  // some of this rank's are f64
 };
+
+/// Collective. Where no rank has anything but zeros and values that are lost, nothing would be seen.
+void demandUsableValues(const comm::Communicator& comm, std::span<const Block> blocks) {
+  const ValueSizes own = valueSizesOf(blocks);
+  std::array<std::uint64_t, 2> any{own.usable ? 1U : 0U, own.tooSmall ? 1U : 0U};
+  comm.allReduceMax(any);
+  if (any[0] != 0 || any[1] == 0) return;
+  throw Error(
+      ErrorCode::InvalidArgument,
+      fmt::format("all values are 0 or smaller than {} (f32) or {} (f64) in size, too small to be told "
+                  "apart; other units help",
+                  limitsOf(ScalarType::F32).least, limitsOf(ScalarType::F64).least));
+}
 
 }  // namespace
 
@@ -132,11 +146,16 @@ struct VdiGenerator::State {
     Stopwatch watch;
     Step step;
     comm.together([&] { validate(blocks); });
-    if (fillGhosts) blocks = comm::exchangeGhosts(comm, std::move(blocks));
+    demandUsableValues(comm, blocks);
+    for (const Block& block : blocks) {
+      step.bytes += block.byteCount();
+      step.doubles = step.doubles || block.type == ScalarType::F64;
+    }
+    step.blocks = blocks.size();
+    blocks = fillGhosts ? comm::exchangeGhosts(comm, std::move(blocks))
+                        : comm::settleOwnership(comm, std::move(blocks));
     step.scene = comm::globalScene(comm, localScene(blocks));
     comm.together([&] { (caster->volume().*send)(blocks, step.scene); });
-    for (const Block& block : blocks) step.bytes += block.byteCount();
-    step.blocks = blocks.size();
     step.uploadSeconds = watch.lap();
     return step;
   }
@@ -162,6 +181,18 @@ struct VdiGenerator::State {
     TransferTable table;
   };
 
+  /// Of f64 there are floats on the device that say where in the block's range a value lies.
+  void demandSpans(const TransferTable& table) const {
+    constexpr double most = 1e33;
+    const double span = range.max - range.min;
+    if (!shown.doubles || !(span > most * (table.max - table.min))) return;
+    throw Error(
+        ErrorCode::InvalidArgument,
+        fmt::format("the values are from {} to {}, the transfer function's from {} to {}: more than a "
+                    "factor of {}; missing values as NaN rather than a large number help",
+                    range.min, range.max, table.min, table.max, most));
+  }
+
   std::unique_ptr<Prepared> prepare(const Camera& camera, const TransferFunction& function,
                                     const GenerateSettings& settings) {
     std::unique_ptr<Prepared> prepared;
@@ -170,6 +201,7 @@ struct VdiGenerator::State {
       const View view(camera, settings.width, settings.height);
       prepared = std::make_unique<Prepared>(
           Prepared{view, depthLattice(shown.scene, view, settings.samplesPerVoxel), bake(function)});
+      demandSpans(prepared->table);
     });
     comm.demandEqual(fingerprintOf(camera), "camera");
     comm.demandEqual(fingerprintOf(function), "transfer function");

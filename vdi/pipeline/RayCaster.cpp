@@ -15,15 +15,20 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
       survey_(device_) {}
 
 shared::CastParams RayCaster::prepare(const Request& request) {
-  volume_.setTable(request.table);
+  volume_.setTable(request.table, slabLength(request.lattice, request.table));
   shared::CastParams params = gpu::castGeometry(request.scene, request.view, request.lattice);
   params.bricks = volume_.bricks();
   params.nodes = volume_.nodes();
-  params.table = volume_.table();
+  const SlabTable& slabs = volume_.slabTable();
+  params.slabBelow = slabs.below;
+  params.slabAbove = slabs.above;
+  params.perSlabTexels = 1.0F / glm::vec2(volume_.slabs().extent());
+  params.lastPosition = static_cast<float>(slabs.positions - 1);
+  params.squarePerPosition = static_cast<float>(shared::slabStripStep) / params.lastPosition;
+  params.stripRows = static_cast<float>(slabs.stripRows());
+  params.slabsPerDepth = static_cast<float>(1.0 / (request.table.unitDistance * slabs.length));
   params.cells = volume_.cells();
-  params.tableSize = volume_.tableSize();
   params.nodeCount = volume_.nodeCount();
-  params.perUnitDistance = static_cast<float>(request.lattice.step / request.table.unitDistance);
   params.enough = terminationOpticalDepth(request.settings);
   params.budget = request.settings.supersegments;
   params.mostPerList = mostPerList(request.settings.supersegments, request.settings.budget);

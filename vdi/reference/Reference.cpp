@@ -15,9 +15,9 @@ struct SceneRay {
   glm::vec3 direction;
   float step;
 
-  glm::vec3 sample(std::uint32_t k) const {
-    return start + (static_cast<float>(k) + 0.5F) * step * direction;
-  }
+  /// `place` counts samples: k is where sample k begins, k + 0.5 its middle.
+  glm::vec3 at(float place) const { return start + place * step * direction; }
+  glm::vec3 sample(std::uint32_t k) const { return at(static_cast<float>(k) + 0.5F); }
 };
 
 SceneRay rayOf(const Frame& frame, int x, int y) {
@@ -44,16 +44,17 @@ OwnedBox ownedBox(const Scene& scene, const Block& block) {
 }
 
 double interpolate(const Block& block, const glm::dvec3& world) {
-  const glm::dvec3 last = glm::dvec3(block.dims - 1);
-  const glm::dvec3 position = glm::clamp((world - block.origin) / block.spacing, glm::dvec3(0.0), last);
-  const glm::ivec3 base = glm::min(glm::ivec3(position), glm::max(block.dims - 2, glm::ivec3(0)));
+  const IndexBox all = block.extended();
+  const glm::dvec3 position =
+      glm::clamp((world - block.origin) / block.spacing, glm::dvec3(all.lo), glm::dvec3(all.hi - 1));
+  const glm::ivec3 base = glm::min(glm::ivec3(glm::floor(position)), glm::max(all.hi - 2, all.lo));
   const glm::dvec3 share = position - glm::dvec3(base);
   double sum = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     const glm::ivec3 step{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
     const glm::dvec3 weight = glm::mix(1.0 - share, share, glm::dvec3(step));
     const double product = weight.x * weight.y * weight.z;
-    const glm::ivec3 at = glm::min(base + step, block.dims - 1);
+    const glm::ivec3 at = glm::min(base + step, all.hi - 1);
     if (product > 0.0) sum += product * valueAt(block, at.x, at.y, at.z);
   }
   return sum;
@@ -130,7 +131,9 @@ Frame::Frame(const Scene& theScene, const Camera& camera, const TransferFunction
       view(camera, theSettings.width, theSettings.height),
       lattice(depthLattice(theScene, view, theSettings.samplesPerVoxel)),
       table(bake(transferFunction)),
-      settings(theSettings) {
+      settings(theSettings),
+      slabs(samplesAreSlabs(theScene, view, lattice)),
+      slabTable(makeSlabTable(table, slabLength(lattice, table))) {
   validate(theSettings);
 }
 
@@ -151,24 +154,39 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
             [](const Piece& a, const Piece& b) { return a.range.first < b.range.first; });
 
   const SceneStretch scene = sceneStretch(frame, ray);
-  const float unitsPerDepth = glm::length(ray.direction) / static_cast<float>(frame.table.unitDistance);
+  const float slabsPerDepth =
+      glm::length(ray.direction) / static_cast<float>(frame.table.unitDistance) / frame.slabTable.length;
   const float enough = terminationOpticalDepth(frame.settings);
+  // The place where sample k begins: those at the scene's faces are shorter or longer.
+  const auto placeOf = [&](std::uint32_t k) {
+    const auto front = static_cast<float>(frame.lattice.first);
+    if (k == scene.samples.first) return (scene.enter - front) / ray.step;
+    if (k == scene.samples.last) return (scene.leave - front) / ray.step;
+    return static_cast<float>(k);
+  };
+  const auto slabOf = [&](std::uint32_t k, const Block& block) {
+    const auto positionAt = [&](float place) {
+      const glm::dvec3 world = glm::dvec3(ray.at(place)) + frame.scene.bounds.center();
+      return frame.table.positionOf(interpolate(block, world));
+    };
+    const double middle = positionAt(static_cast<float>(k) + 0.5F);
+    if (!frame.slabs) return frame.slabTable.between(middle, middle);
+    return frame.slabTable.between(positionAt(placeOf(k)), positionAt(placeOf(k + 1)));
+  };
   std::vector<Interval> samples;
   float total = 0.0F;
   for (const Piece& piece : pieces) {
     const std::uint32_t first = (piece.range.first + atOnce - 1) / atOnce * atOnce;
     for (std::uint32_t k = first; k < piece.range.last; k += atOnce) {
       const std::uint32_t end = std::min(k + atOnce, scene.samples.last);
-      const glm::dvec3 world = glm::dvec3(ray.sample(k)) + frame.scene.bounds.center();
-      const TransferTableEntry entry = frame.table.lookup(interpolate(*piece.block, world));
       const float front =
           k == scene.samples.first ? scene.enter : static_cast<float>(frame.lattice.frontOf(k));
       const float back =
           end == scene.samples.last ? scene.leave : static_cast<float>(frame.lattice.frontOf(end));
-      const float opticalDepth = std::min(entry.extinction * unitsPerDepth * (back - front), maxExtinction);
-      const float opacity = opacityOf(opticalDepth);
-      samples.push_back(
-          {front, back, entry.red * opacity, entry.green * opacity, entry.blue * opacity, opticalDepth});
+      const Slab slab = slabOf(k, *piece.block);
+      const float opticalDepth = std::min(slab.opticalDepth * slabsPerDepth * (back - front), maxExtinction);
+      const glm::vec3 color = slab.color * opacityOf(opticalDepth);
+      samples.push_back({front, back, color.r, color.g, color.b, opticalDepth});
       total += opticalDepth;
       if (total >= enough) return samples;
     }

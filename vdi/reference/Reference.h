@@ -12,6 +12,7 @@
 #include "vdi/core/Image.h"
 #include "vdi/core/Reconstruction.h"
 #include "vdi/core/Scene.h"
+#include "vdi/core/SlabTable.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/reference/Segmenter.h"
@@ -25,6 +26,8 @@ struct Frame {
   DepthLattice lattice;
   TransferTable table;
   GenerateSettings settings;
+  bool slabs = true;  // samplesAreSlabs
+  SlabTable slabTable;
 
   /// Throws as depthLattice, bake and View do.
   Frame(const Scene& scene, const Camera& camera, const TransferFunction& transferFunction,

@@ -13,7 +13,6 @@
 #include <vtkPiecewiseFunction.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
-#include <vtkUniformGridAMRDataIterator.h>
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
@@ -110,6 +109,17 @@ TypedArray typed(vtkDataArray* array, int component) {
   return result;
 }
 
+/// Throws where values would be read that aren't there.
+void demandLength(vtkDataArray* array, const glm::ivec3& values, const std::string& block) {
+  const vtkIdType needed = vtkIdType{values.x} * values.y * values.z;
+  if (array->GetNumberOfTuples() >= needed) return;
+  throw Error(ErrorCode::InvalidArgument,
+              fmt::format("the array '{}' has {} values, {} x {} x {} are needed",
+                          array->GetName() != nullptr ? array->GetName() : "", array->GetNumberOfTuples(),
+                          values.x, values.y, values.z),
+              block);
+}
+
 /// Where an image's cells lie.
 struct Lattice {
   glm::dvec3 origin;  // lower corner of the first cell
@@ -118,86 +128,85 @@ struct Lattice {
   glm::ivec3 cells;
 };
 
-/// Cells of the image that are its own, as disjoint boxes [lo, hi) of cell indices: all of them in one box
-/// unless ghost or blanked cells say otherwise, or `finer` blocks of an AMR data set cover some. Boxes grow
-/// along x, then y, then z, so that whole ghost layers leave one box.
-struct CellBox {
-  glm::ivec3 lo;
-  glm::ivec3 hi;
-};
-
-std::vector<CellBox> ownCells(vtkImageData* image, const Lattice& lattice,
-                              const std::vector<vdi::Box>& finer) {
-  constexpr unsigned char notOurs = vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::REFINEDCELL |
-                                    vtkDataSetAttributes::HIDDENCELL;
-  const glm::ivec3& cells = lattice.cells;
-  vtkUnsignedCharArray* ghosts = image->GetCellGhostArray();
-  if (ghosts == nullptr && finer.empty()) return {{glm::ivec3(0), cells}};
-  const auto index = [&](int x, int y, int z) {
-    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(cells.y) + static_cast<std::size_t>(y)) *
-               static_cast<std::size_t>(cells.x) +
-           static_cast<std::size_t>(x);
-  };
-  std::vector<bool> open(index(cells.x - 1, cells.y - 1, cells.z - 1) + 1, true);
-  if (ghosts != nullptr) {
-    const unsigned char* flags = ghosts->GetPointer(0);
-    for (std::size_t i = 0; i < open.size(); ++i) open[i] = (flags[i] & notOurs) == 0;
-  }
-  for (const vdi::Box& box : finer) {
-    // Finer boxes begin and end with coarse cells; a cell is covered if its middle is.
-    const glm::dvec3 lo = glm::ceil((box.lo - lattice.origin) / lattice.spacing - 0.5);
-    const glm::dvec3 hi = glm::ceil((box.hi - lattice.origin) / lattice.spacing - 0.5);
-    const glm::ivec3 first(glm::clamp(lo, glm::dvec3(0.0), glm::dvec3(cells)));
-    const glm::ivec3 last(glm::clamp(hi, glm::dvec3(0.0), glm::dvec3(cells)));
-    for (int z = first.z; z < last.z; ++z) {
-      for (int y = first.y; y < last.y; ++y) {
-        for (int x = first.x; x < last.x; ++x) open[index(x, y, z)] = false;
-      }
-    }
-  }
-  const auto allOpen = [&](const CellBox& box) {
-    for (int z = box.lo.z; z < box.hi.z; ++z) {
-      for (int y = box.lo.y; y < box.hi.y; ++y) {
-        for (int x = box.lo.x; x < box.hi.x; ++x) {
-          if (!open[index(x, y, z)]) return false;
-        }
-      }
-    }
-    return true;
-  };
-  std::vector<CellBox> boxes;
-  for (int z = 0; z < cells.z; ++z) {
-    for (int y = 0; y < cells.y; ++y) {
-      for (int x = 0; x < cells.x; ++x) {
-        if (!open[index(x, y, z)]) continue;
-        CellBox box{{x, y, z}, {x + 1, y + 1, z + 1}};
-        for (int axis = 0; axis < 3; ++axis) {
-          while (box.hi[axis] < cells[axis]) {
-            CellBox next = box;
-            next.lo[axis] = box.hi[axis];
-            next.hi[axis] = box.hi[axis] + 1;
-            if (!allOpen(next)) break;
-            box.hi[axis] = next.hi[axis];
-          }
-        }
-        for (int k = box.lo.z; k < box.hi.z; ++k) {
-          for (int j = box.lo.y; j < box.hi.y; ++j) {
-            for (int i = box.lo.x; i < box.hi.x; ++i) open[index(i, j, k)] = false;
-          }
-        }
-        boxes.push_back(box);
-      }
-    }
-  }
-  return boxes;
+/// The image's flags, null if there are none. Throws if there are fewer than the image has points or cells.
+const unsigned char* flagsOf(vtkUnsignedCharArray* ghosts, const glm::ivec3& values,
+                             const std::string& block) {
+  if (ghosts == nullptr) return nullptr;
+  demandLength(ghosts, values, block);
+  return ghosts->GetPointer(0);
 }
 
-void addImage(vtkImageData* image, const ArrayChoice& choice, const std::vector<vdi::Box>& finer,
+/// What an image's vtkGhostType says of its cells and of the values on its lattice.
+struct Blanking {
+  std::vector<vdi::IndexBox> own;     // cells that are drawn, as disjoint boxes
+  std::vector<vdi::IndexBox> masked;  // values that mean nothing
+};
+
+constexpr unsigned char cellsNotDrawn = vtkDataSetAttributes::DUPLICATECELL |
+                                        vtkDataSetAttributes::REFINEDCELL | vtkDataSetAttributes::HIDDENCELL;
+constexpr unsigned char cellsWithoutMeaning =
+    vtkDataSetAttributes::REFINEDCELL | vtkDataSetAttributes::HIDDENCELL;
+
+/// A cell is drawn unless it's somebody else's, refined or hidden, or one of its points is hidden, as VTK has
+/// it. A point that only such refined and hidden cells touch means nothing, nor does a hidden one.
+Blanking blankingOf(vtkImageData* image, const Lattice& lattice, bool ofCells, const std::string& block) {
+  const vdi::IndexBox cells{glm::ivec3(0), lattice.cells};
+  const vdi::IndexBox points{glm::ivec3(0), lattice.points};
+  const unsigned char* cellFlags = flagsOf(image->GetCellGhostArray(), lattice.cells, block);
+  const unsigned char* pointFlags = flagsOf(image->GetPointGhostArray(), lattice.points, block);
+  const auto any = [](const unsigned char* flags, std::size_t count, unsigned char wanted) {
+    return flags != nullptr &&
+           std::any_of(flags, flags + count, [wanted](unsigned char flag) { return (flag & wanted) != 0; });
+  };
+  const bool hiddenPoints = any(pointFlags, points.count(), vtkDataSetAttributes::HIDDENPOINT);
+  if (!hiddenPoints && !any(cellFlags, cells.count(), cellsNotDrawn)) return {{cells}, {}};
+  std::vector<bool> drawn(cells.count(), true);
+  std::vector<bool> meaning(cells.count(), true);
+  for (std::size_t i = 0; cellFlags != nullptr && i < drawn.size(); ++i) {
+    drawn[i] = (cellFlags[i] & cellsNotDrawn) == 0;
+    meaning[i] = (cellFlags[i] & cellsWithoutMeaning) == 0;
+  }
+  const auto forEach = [](const vdi::IndexBox& box, auto visit) {
+    for (int z = box.lo.z; z < box.hi.z; ++z) {
+      for (int y = box.lo.y; y < box.hi.y; ++y) {
+        for (int x = box.lo.x; x < box.hi.x; ++x) visit(glm::ivec3(x, y, z));
+      }
+    }
+  };
+  const auto cellsAround = [&](const glm::ivec3& point) {
+    return vdi::IndexBox{point - 1, point + 1}.intersection(cells);
+  };
+  const auto isHidden = [&](const glm::ivec3& point) {
+    return hiddenPoints && (pointFlags[points.position(point)] & vtkDataSetAttributes::HIDDENPOINT) != 0;
+  };
+  forEach(hiddenPoints ? points : vdi::IndexBox(), [&](const glm::ivec3& point) {
+    if (!isHidden(point)) return;
+    forEach(cellsAround(point), [&](const glm::ivec3& cell) {
+      drawn[cells.position(cell)] = false;
+      meaning[cells.position(cell)] = false;
+    });
+  });
+  std::vector<bool> masked(ofCells ? cells.count() : points.count(), false);
+  if (ofCells) {
+    for (std::size_t i = 0; i < masked.size(); ++i) masked[i] = !meaning[i];
+  } else {
+    forEach(points, [&](const glm::ivec3& point) {
+      bool touched = false;
+      forEach(cellsAround(point),
+              [&](const glm::ivec3& cell) { touched = touched || meaning[cells.position(cell)]; });
+      masked[points.position(point)] = isHidden(point) || !touched;
+    });
+  }
+  return {vdi::coverWithBoxes(cells.hi, std::move(drawn)),
+          vdi::coverWithBoxes(ofCells ? cells.hi : points.hi, std::move(masked))};
+}
+
+void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string& name,
               std::vector<vdi::Block>& blocks) {
   if (image->GetNumberOfPoints() == 0) return;
   if (!image->GetDirectionMatrix()->IsIdentity()) {
     throw Error(ErrorCode::InvalidArgument,
-                "rotated images (a direction matrix) can't be handled; resample them first");
+                "rotated images (a direction matrix) can't be handled; resample them first", name);
   }
   auto* attributes =
       choice.cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
@@ -207,7 +216,6 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::vector<
     throw Error(ErrorCode::InvalidArgument,
                 fmt::format("a block has no {} array '{}'", choice.cells ? "cell" : "point", choice.name));
   }
-  const TypedArray scalars = typed(array, choice.component);
   int extent[6];
   image->GetExtent(extent);
   Lattice lattice;
@@ -219,25 +227,30 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::vector<
   }
   lattice.cells = glm::max(lattice.points - 1, glm::ivec3(1));
   const auto& [origin, spacing, points, cells] = lattice;
+  demandLength(array, choice.cells ? cells : points, name);
+  const TypedArray scalars = typed(array, choice.component);
   // The deleter's copy of the smart pointer is what keeps the array alive.
   const std::shared_ptr<const void> keepAlive(
       scalars.array->GetVoidPointer(0), [array = scalars.array](const void*) mutable { array = nullptr; });
-  for (const CellBox& box : ownCells(image, lattice, finer)) {
-    vdi::Block block = choice.cells
-                           ? vdi::Block::fromCells(cells, origin, spacing, scalars.type, keepAlive.get())
-                           : vdi::Block::fromPoints(points, origin, spacing, scalars.type, keepAlive.get());
+  Blanking blanking = blankingOf(image, lattice, choice.cells, name);
+  vdi::Block block = choice.cells
+                         ? vdi::Block::fromCells(cells, origin, spacing, scalars.type, keepAlive.get())
+                         : vdi::Block::fromPoints(points, origin, spacing, scalars.type, keepAlive.get());
+  block.keepAlive = keepAlive;
+  if (!blanking.masked.empty())
+    block.masked = std::make_shared<std::vector<vdi::IndexBox>>(std::move(blanking.masked));
+  for (const vdi::IndexBox& box : blanking.own) {
     // A lattice that is one point thick has no cell there, and so owns nothing.
     for (int axis = 0; axis < 3; ++axis) {
       if (points[axis] == 1) continue;
       block.owned.lo[axis] = origin[axis] + box.lo[axis] * spacing[axis];
       block.owned.hi[axis] = origin[axis] + box.hi[axis] * spacing[axis];
     }
-    block.keepAlive = keepAlive;
-    blocks.push_back(std::move(block));
+    blocks.push_back(block);
   }
 }
 
-void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, const std::vector<vdi::Box>& finer,
+void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, const std::string& name,
              std::vector<vdi::Block>& blocks) {
   if (leaf == nullptr) return;
   auto* image = vtkImageData::SafeDownCast(leaf);
@@ -249,30 +262,7 @@ void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, const std::vector<v
             "or AMR data sets (Resample To Image makes it of anything)",
             leaf->GetClassName()));
   }
-  addImage(image, choice, finer, blocks);
-}
-
-/// Blocks of a level with what the levels above it leave of them. Where every level's blocks lie is known on
-/// all ranks.
-void addOverlapping(vtkOverlappingAMR* amr, const ArrayChoice& choice, std::vector<vdi::Block>& blocks) {
-  const auto iterator = vtkSmartPointer<vtkUniformGridAMRDataIterator>::Take(
-      vtkUniformGridAMRDataIterator::SafeDownCast(amr->NewIterator()));
-  unsigned int level = amr->GetNumberOfLevels();
-  std::vector<vdi::Box> finer;
-  for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
-    if (iterator->GetCurrentLevel() != level) {
-      level = iterator->GetCurrentLevel();
-      finer.clear();
-      for (unsigned int above = level + 1; above < amr->GetNumberOfLevels(); ++above) {
-        for (unsigned int i = 0; i < amr->GetNumberOfDataSets(above); ++i) {
-          double b[6];
-          amr->GetBounds(above, i, b);
-          finer.push_back({{b[0], b[2], b[4]}, {b[1], b[3], b[5]}});
-        }
-      }
-    }
-    addLeaf(iterator->GetCurrentDataObject(), choice, finer, blocks);
-  }
+  addImage(image, choice, name, blocks);
 }
 
 /// Filters that pass a data set on give it a new time of modification, its arrays keep theirs.
@@ -309,16 +299,13 @@ std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice)
   std::vector<vdi::Block> blocks;
   auto* composite = vtkCompositeDataSet::SafeDownCast(data);
   if (composite == nullptr) {
-    addLeaf(data, choice, {}, blocks);
-    return blocks;
-  }
-  if (auto* amr = vtkOverlappingAMR::SafeDownCast(data)) {
-    addOverlapping(amr, choice, blocks);
+    addLeaf(data, choice, "the image", blocks);
     return blocks;
   }
   const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
   for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
-    addLeaf(iterator->GetCurrentDataObject(), choice, {}, blocks);
+    addLeaf(iterator->GetCurrentDataObject(), choice,
+            fmt::format("block {} of {}", iterator->GetCurrentFlatIndex(), data->GetClassName()), blocks);
   }
   return blocks;
 }

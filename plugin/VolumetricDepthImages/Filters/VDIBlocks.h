@@ -24,9 +24,11 @@ struct ArrayChoice {
 };
 
 /// The blocks of an image, or of all images of a composite data set. Scalars are shared, not copied, where
-/// VTK has them contiguous with one component and of a type that the library knows. Ghost and blanked cells
-/// aren't owned. Throws vdi::Error{InvalidArgument}: a data set that isn't vtkImageData, a rotated image, a
-/// missing array.
+/// VTK has them contiguous with one component and of a type that the library knows. Cells that vtkGhostType
+/// calls duplicate, refined or hidden aren't owned, nor those with a hidden point; values of refined and
+/// hidden ones are masked. Levels of AMR data come as they are: the finest owns what they share once the
+/// blocks of all ranks meet. Throws vdi::Error{InvalidArgument}: a data set that isn't vtkImageData, a
+/// rotated image, a missing array, one or a vtkGhostType that's shorter than the image.
 std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice);
 
 /// Numbers that are others whenever blocksOf would give other blocks, by VTK's rule that who changes an array

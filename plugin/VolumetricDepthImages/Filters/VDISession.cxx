@@ -5,6 +5,9 @@
 #include <vtkMPICommunicator.h>
 #include <vtkMultiProcessController.h>
 
+#include "VDICollective.h"
+#include "vdi/core/Error.h"
+
 namespace pv {
 
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller) {
@@ -13,6 +16,13 @@ vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller) {
   if (communicator == nullptr || controller->GetNumberOfProcesses() == 1)
     return vdi::comm::Communicator::serial();
   return vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(*communicator->GetMPIComm()->GetHandle()));
+}
+
+void enterCollective(vtkMultiProcessController* controller, const std::string& operation) {
+  if (controller == nullptr) return;
+  CollectiveEntry entry{operation, {}};
+  controller->InvokeEvent(CollectiveEntry::event, &entry);
+  if (!entry.refusal.empty()) throw vdi::Error(vdi::ErrorCode::RemoteRank, entry.refusal);
 }
 
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank) {

@@ -3,6 +3,7 @@
 #define VDISession_h
 
 #include <memory>
+#include <string>
 
 #include "vdi/comm/Communicator.h"
 #include "vdi/gpu/Device.h"
@@ -14,6 +15,10 @@ namespace pv {
 /// A communicator over the controller's MPI communicator (a duplicate: collective), or over this process
 /// alone when there's none.
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller);
+
+/// To be called on all ranks before a collective operation: throws vdi::Error{RemoteRank} where another rank
+/// won't enter (VDICollective.h).
+void enterCollective(vtkMultiProcessController* controller, const std::string& operation);
 
 /// The process's device, made at the first call and kept while anybody holds it. Throws
 /// vdi::Error{DeviceUnavailable}.

@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "VDIArrays.h"
 #include "VDIBlocks.h"
 #include "VDIImageData.h"
 #include "VDISession.h"
@@ -43,7 +44,15 @@ struct vtkVDIGenerator::Internals {
   };
 
   std::unique_ptr<vdi::VdiGenerator> Generator;  // none until the first update
+  std::uint64_t Identity = 0;                    // of the generator: the same on all ranks, and no other's
   std::optional<Origin> Shown;                   // by the generator
+  /// The last frame failed. Data counts as newer than any output then: left to the executive, rank 0, whose
+  /// empty output isn't what was asked for, would try again alone.
+  bool Failed = false;
+  /// Of the map that stands in for none: the first frame's range, kept while the array is the same, or films
+  /// would flicker.
+  std::optional<vdi::ScalarRange> FirstRange;
+  pv::ArrayChoice FirstChoice;
 };
 
 vtkVDIGenerator::vtkVDIGenerator()
@@ -99,6 +108,7 @@ void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
 }
 
 vtkMTimeType vtkVDIGenerator::GetMTime() {
+  if (this->Internal->Failed) this->Modified();
   vtkMTimeType time = this->Superclass::GetMTime();
   if (this->LookupTable) time = std::max(time, this->LookupTable->GetMTime());
   if (this->ScalarOpacityFunction) time = std::max(time, this->ScalarOpacityFunction->GetMTime());
@@ -158,10 +168,12 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
 
 namespace {
 
-vdi::Camera cameraOf(const double* position, const double* focalPoint, const double* viewUp, double angle,
-                     bool parallel, double scale) {
-  const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
-  return {vector(position), vector(focalPoint), vector(viewUp), angle, parallel, scale};
+/// In situ, a script's misspelt channel is a source without data.
+void demandInput(vtkDataObject* input) {
+  if (input != nullptr && std::strcmp(input->GetClassName(), "vtkDataObject") != 0) return;
+  throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                   "the input has no data; in a Catalyst script, TrivialProducer(registrationName=...) names "
+                   "what the simulation hands over, \"grid\" for vdi_catalyst");
 }
 
 std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
@@ -191,6 +203,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   if (input != nullptr && input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP())) {
     time = input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
   }
+  this->Internal->Failed = true;
   try {
     this->Generate(input, time, output);
   } catch (const vdi::Error& error) {
@@ -203,6 +216,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     vtkErrorMacro(<< error.what());
     return 0;
   }
+  this->Internal->Failed = false;
   return 1;
 }
 
@@ -226,24 +240,77 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, double time) {
     if (input != nullptr) origin.Input = pv::identityOf(input);
     if (auto* upstream = vtkDemandDrivenPipeline::SafeDownCast(this->GetInputExecutive(0, 0)))
       origin.Upstream = upstream->GetPipelineMTime();
+    demandInput(input);
   });
+  // What the ranks do next depends on these; the generator compares the rest.
+  comm.demandEqual(std::hash<std::string>()(origin.Choice.name), "SelectInputScalars, the array");
+  comm.demandEqual(origin.Choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells");
+  comm.demandEqual(static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component");
+  comm.demandEqual(this->FillGhosts ? 1U : 0U, "FillGhosts");
+  comm.demandEqual(this->PictureOnly ? 1U : 0U, "PictureOnly");
   std::array<std::uint64_t, 1> changed{this->Internal->Shown == origin ? 0U : 1U};
   comm.allReduceMax(changed);
   if (changed[0] == 0) return;
   std::vector<vdi::Block> blocks;
-  comm.together([&] { blocks = pv::blocksOf(input, origin.Choice); });
+  comm.together([&] {
+    pv::demandArray(input, this->GetInputAlgorithm(0, 0), origin.Choice);
+    blocks = pv::blocksOf(input, origin.Choice);
+  });
   this->UpdateProgress(0.05);
   this->Internal->Shown.reset();
   generator.setBlocks(std::move(blocks), this->FillGhosts);
   this->Internal->Shown = origin;
+  if (this->Internal->FirstRange && !(this->Internal->FirstChoice == origin.Choice))
+    this->Internal->FirstRange.reset();
+  this->Internal->FirstChoice = origin.Choice;
+}
+
+vdi::ScalarRange vtkVDIGenerator::StandInRange() {
+  Internals& internal = *this->Internal;
+  if (internal.FirstRange) return *internal.FirstRange;
+  vdi::ScalarRange range = internal.Generator->scalarRange();
+  if (range.min < range.max) return *(internal.FirstRange = range);
+  // Of nothing, or of one value everywhere: no range to keep.
+  const double low = range.min <= range.max ? range.min : 0.0;
+  return {low, low + 1.0};
+}
+
+vdi::Camera vtkVDIGenerator::Viewpoint(const vdi::Box& bounds) const {
+  const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
+  vdi::Camera camera{vector(this->CameraPosition), vector(this->CameraFocalPoint), vector(this->CameraViewUp),
+                     this->CameraViewAngle,        this->CameraParallelProjection, this->CameraParallelScale};
+  const bool usable = this->CameraViewAngle > 0.0 && this->CameraViewAngle < 180.0;  // else View says so
+  if (camera.position != camera.focalPoint || !usable) return camera;
+  camera = vdi::Camera::framing(bounds, {0.0, 0.0, -1.0}, camera.viewUp, camera.viewAngle);
+  camera.parallelProjection = this->CameraParallelProjection;
+  return camera;
+}
+
+/// Where ranks come with generators that don't belong together, these are given up: new ones will.
+void vtkVDIGenerator::Enter() {
+  Internals& internal = *this->Internal;
+  const std::string name = internal.Generator ? fmt::format("{:x}", internal.Identity) : "a new one";
+  try {
+    pv::enterCollective(this->Controller, "VolumetricDepthImage, " + name);
+  } catch (const vdi::Error&) {
+    internal.Generator.reset();
+    internal.Shown.reset();
+    throw;
+  }
 }
 
 void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* output) {
+  this->Enter();
   if (!this->Internal->Generator) {
     vdi::comm::Communicator comm = pv::communicatorOf(this->Controller);
     std::shared_ptr<vdi::gpu::Device> device;
     comm.together([&] { device = pv::sharedDevice(comm.localRank()); });
     this->Internal->Generator = std::make_unique<vdi::VdiGenerator>(std::move(device), std::move(comm));
+    const auto& own = this->Internal->Generator;
+    std::array<std::uint64_t, 1> rootsAddress{
+        own->communicator().rank() == 0 ? reinterpret_cast<std::uintptr_t>(own.get()) : 0U};
+    own->communicator().allReduceMax(rootsAddress);
+    this->Internal->Identity = rootsAddress[0];
   }
   vdi::VdiGenerator& generator = *this->Internal->Generator;
   this->ShowBlocks(input, time);
@@ -253,16 +320,10 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
   const double diagonal = scene.bounds.empty() ? 1.0 : glm::length(scene.bounds.size());
   const double unit =
       this->ScalarOpacityUnitDistance > 0.0 ? this->ScalarOpacityUnitDistance : 0.01 * diagonal;
-  vdi::ScalarRange range = generator.scalarRange();
-  if (!(range.min < range.max)) {
-    const double low = range.min <= range.max ? range.min : 0.0;
-    range = {low, low + 1.0};
-  }
+  const vdi::ScalarRange range = this->StandInRange();
   const vdi::TransferFunction function =
       pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min, range.max, unit);
-  const vdi::Camera camera =
-      cameraOf(this->CameraPosition, this->CameraFocalPoint, this->CameraViewUp, this->CameraViewAngle,
-               this->CameraParallelProjection, this->CameraParallelScale);
+  const vdi::Camera camera = this->Viewpoint(scene.bounds);
   vdi::GenerateSettings settings;
   settings.width = this->Resolution[0];
   settings.height = this->Resolution[1];

@@ -6,7 +6,7 @@
  * vtkOverlappingAMR or vtkNonOverlappingAMR. Each rank brings the blocks it has, in any arrangement. Output
  * on rank 0: a vtkImageData of Resolution with the picture seen from the camera, and the VDI in its field
  * data (VDIImageData.h has the arrays); empty on other ranks. Collective: all ranks of the controller update
- * together; when one fails, all return 0.
+ * together; when one fails, all return 0, and all try again when asked again.
  */
 #ifndef vtkVDIGenerator_h
 #define vtkVDIGenerator_h
@@ -18,6 +18,11 @@
 
 #include "vtkVolumetricDepthImagesModule.h"
 
+namespace vdi {
+struct Box;
+struct Camera;
+struct ScalarRange;
+}  // namespace vdi
 class vtkMultiProcessController;
 class vtkPiecewiseFunction;
 class vtkScalarsToColors;
@@ -31,7 +36,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   ///@{
   /**
    * Colour map; its scalar opacity function is used unless SetScalarOpacityFunction gave another one. None:
-   * "Cool to Warm" over the scalars' range.
+   * "Cool to Warm" over the range that the scalars have at the first frame of that array.
    */
   void SetLookupTable(vtkScalarsToColors* table);
   void SetScalarOpacityFunction(vtkPiecewiseFunction* function);
@@ -79,7 +84,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   ///@{
   /**
-   * The viewpoint V_O, as vtkCamera has it.
+   * The viewpoint V_O, as vtkCamera has it. Where position and focal point are the same, as they are unless
+   * set, the camera looks along -z at the whole scene, as vtkRenderer::ResetCamera places it; view-up, angle
+   * and projection are used then too, the parallel scale isn't.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);
@@ -111,7 +118,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   struct Internals;
   void Generate(vtkDataObject* input, double time, vtkImageData* output);
+  void Enter();
   void ShowBlocks(vtkDataObject* input, double time);
+  vdi::ScalarRange StandInRange();
+  vdi::Camera Viewpoint(const vdi::Box& bounds) const;
   void SetReport(const char* text);
 
   std::unique_ptr<Internals> Internal;
@@ -131,7 +141,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   bool FillGhosts = true;
   bool PictureOnly = false;
   int TimeStep = 0;
-  double CameraPosition[3] = {0.0, 0.0, 1.0};
+  double CameraPosition[3] = {0.0, 0.0, 0.0};
   double CameraFocalPoint[3] = {0.0, 0.0, 0.0};
   double CameraViewUp[3] = {0.0, 1.0, 0.0};
   double CameraViewAngle = 30.0;

@@ -6,11 +6,13 @@
 #include <vtkObjectFactory.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
+#include <set>
 #include <utility>
 
 #include "VDIImageData.h"
 #include "VDISession.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Viewpoint.h"
 #include "vdi/pipeline/Pipeline.h"
 
 vtkStandardNewMacro(vtkVDIRenderer);
@@ -20,6 +22,8 @@ struct vtkVDIRenderer::Internals {
   vtkDataObject* Uploaded = nullptr;           // whose VDI the renderer has; compared, never followed
   vtkMTimeType UploadedTime = 0;
   vdi::Camera Original;
+  vdi::Box Bounds;
+  std::set<vdi::ViewpointIssue> Warned;
   int Width = 0;
   int Height = 0;
 };
@@ -105,20 +109,33 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
     internal.Uploaded = input;
     internal.UploadedTime = input->GetMTime();
     internal.Original = vdi.camera;
+    internal.Bounds = vdi.bounds;
     internal.Width = vdi.width;
     internal.Height = vdi.height;
   }
-  vdi::Camera camera = internal.Original.azimuth(this->Azimuth);
-  if (!this->UseOriginalCamera) {
-    const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
-    camera = {vector(this->CameraPosition), vector(this->CameraFocalPoint), vector(this->CameraViewUp),
-              this->CameraViewAngle,        this->CameraParallelProjection, this->CameraParallelScale};
-  } else if (this->Azimuth == 0.0) {
-    camera = internal.Original;
-  }
+  const vdi::Camera camera = this->Viewpoint();
   const bool own = this->Resolution[0] <= 0 || this->Resolution[1] <= 0;
-  pv::setPicture(output, internal.Renderer->renderBytes(
-                             camera, own ? internal.Width : this->Resolution[0],
-                             own ? internal.Height : this->Resolution[1], vdi::Alpha::Straight,
-                             static_cast<vdi::Reconstruction>(this->Reconstruction)));
+  const int width = own ? internal.Width : this->Resolution[0];
+  const int height = own ? internal.Height : this->Resolution[1];
+  this->WarnOf(camera, width, height);
+  pv::setPicture(output,
+                 internal.Renderer->renderBytes(camera, width, height, vdi::Alpha::Straight,
+                                                static_cast<vdi::Reconstruction>(this->Reconstruction)));
+}
+
+vdi::Camera vtkVDIRenderer::Viewpoint() const {
+  const vdi::Camera& original = this->Internal->Original;
+  const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
+  const vdi::Camera own{vector(this->CameraPosition),   vector(this->CameraFocalPoint),
+                        vector(this->CameraViewUp),     this->CameraViewAngle,
+                        this->CameraParallelProjection, this->CameraParallelScale};
+  if (!this->UseOriginalCamera && own.position != own.focalPoint) return own;
+  return original.azimuth(this->Azimuth);
+}
+
+void vtkVDIRenderer::WarnOf(const vdi::Camera& camera, int width, int height) {
+  Internals& internal = *this->Internal;
+  const auto issue =
+      vdi::viewpointIssue(internal.Bounds, internal.Original, vdi::View(camera, width, height));
+  if (issue && internal.Warned.insert(*issue).second) vtkWarningMacro(<< describe(*issue));
 }

@@ -15,6 +15,10 @@
 
 #include "vtkVolumetricDepthImagesModule.h"
 
+namespace vdi {
+struct Camera;
+}
+
 class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm {
  public:
   static vtkVDIRenderer* New();
@@ -23,8 +27,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
 
   ///@{
   /**
-   * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off) the VDI's own is used,
-   * turned by Azimuth degrees about its focal point.
+   * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off), and where position and
+   * focal point are the same, as they are unless set, the VDI's own is used, turned by Azimuth degrees as
+   * vtkCamera::Azimuth does: about its focal point, around its view-up as set. A viewpoint that shows nothing
+   * true (vdi::ViewpointIssue) gets a warning, once each.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);
@@ -57,9 +63,11 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
 
   struct Internals;
   void Render(vtkDataObject* input, vtkImageData* output);
+  vdi::Camera Viewpoint() const;
+  void WarnOf(const vdi::Camera& camera, int width, int height);
 
   std::unique_ptr<Internals> Internal;
-  double CameraPosition[3] = {0.0, 0.0, 1.0};
+  double CameraPosition[3] = {0.0, 0.0, 0.0};
   double CameraFocalPoint[3] = {0.0, 0.0, 0.0};
   double CameraViewUp[3] = {0.0, 1.0, 0.0};
   double CameraViewAngle = 30.0;

@@ -5,6 +5,8 @@
 #include <vtkInformation.h>
 #include <vtkObjectFactory.h>
 
+#include <cstdint>
+
 #include "VDIImageData.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/VdiFile.h"
@@ -36,7 +38,11 @@ void vtkVDIWriter::WriteData() {
       throw vdi::Error(vdi::ErrorCode::InvalidArgument,
                        "the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
     }
-    if (this->FileName == nullptr) throw vdi::Error(vdi::ErrorCode::Io, "no file name was given");
+    if (this->FileName == nullptr || *this->FileName == '\0') {
+      throw vdi::Error(vdi::ErrorCode::Io,
+                       "no file name was given, or its pattern has a {field} of no value");
+    }
+    if (this->TimeStep >= 0) vdi.timeStep = static_cast<std::uint64_t>(this->TimeStep);
     vdi::io::writeVdi(this->FileName, vdi);
   } catch (const std::exception& error) {
     this->SetErrorCode(vtkErrorCode::CannotOpenFileError);

@@ -21,6 +21,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIWriter : public vtkWriter {
   vtkSetFilePathMacro(FileName);
   vtkGetFilePathMacro(FileName);
 
+  /// The simulation's step, kept in the file; -1 (default): the VDI's own.
+  vtkSetMacro(TimeStep, int);
+
  protected:
   vtkVDIWriter();
   ~vtkVDIWriter() override;
@@ -33,6 +36,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIWriter : public vtkWriter {
   void operator=(const vtkVDIWriter&) = delete;
 
   char* FileName = nullptr;
+  int TimeStep = -1;
 };
 
 #endif

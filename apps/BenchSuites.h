@@ -1,0 +1,50 @@
+// What `vdi bench` is asked to measure, and the suites of docs/benchmarks.md.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "apps/Source.h"
+
+namespace vdi::apps {
+
+struct BenchOptions {
+  std::vector<std::string> raws;
+  std::vector<std::string> fields;
+  DealOptions deal;
+  ViewOptions view;
+  QualityOptions quality;
+  std::vector<double> angles{0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0};
+  std::vector<std::string> algorithms;       // empty: merge, or the suite's
+  std::vector<std::uint32_t> supersegments;  // empty: 25, or the suite's
+  int views = 0;                             // 0: 1, or the suite's
+  int repeats = 5;
+  std::string reconstruction = "smooth";
+  double truthRate = 8.0;  // samples per voxel of the volume rendering that all are compared with
+  std::string suite;       // empty, or a name that suiteNames() has
+  std::string output;
+  std::vector<std::string> comparison;
+};
+
+struct DataSet {
+  std::string name;
+  std::string field;  // or, if empty:
+  std::string raw;    // sidecar
+  std::string size;
+  std::string type;
+};
+
+const std::vector<std::string>& suiteNames();
+
+/// Fills in what the suite says, or what holds without one, where the options leave it open.
+void applySuite(BenchOptions& options);
+
+/// The suite's (those of them that --fields names), or the raw volumes and fields of the options.
+std::vector<DataSet> dataSets(const BenchOptions& options);
+
+/// What VDIs are made with. Bisection gets the one budget that it knows.
+GenerateSettings benchSettings(const BenchOptions& options, const std::string& algorithm,
+                               std::uint32_t supersegments);
+
+}  // namespace vdi::apps

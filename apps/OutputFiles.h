@@ -1,0 +1,20 @@
+// Checks of what a command will write, made before it computes anything.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace vdi::apps {
+
+/// A file and where its name comes from, such as "--flat", for messages.
+struct NamedFile {
+  std::string origin;
+  std::filesystem::path path;
+};
+
+/// Throws Error: Io if one of `outputs` can't be written (as io::requireWritable), InvalidArgument if two of
+/// them are one file or one is among `inputs`. Devices and pipes may be written twice.
+void requireOutputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs);
+
+}  // namespace vdi::apps

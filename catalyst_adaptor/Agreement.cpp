@@ -1,0 +1,55 @@
+#include "catalyst_adaptor/Agreement.h"
+
+#include <array>
+#include <functional>
+#include <stdexcept>
+
+namespace vdi::catalyst {
+
+Agreement::Agreement(MPI_Comm comm) {
+  if (MPI_Comm_dup(comm, &comm_) != MPI_SUCCESS) throw std::runtime_error("MPI_Comm_dup failed");
+  MPI_Comm_set_errhandler(comm_, MPI_ERRORS_RETURN);
+}
+
+Agreement::~Agreement() {
+  int over = 0;
+  MPI_Finalized(&over);
+  if (over == 0) MPI_Comm_free(&comm_);
+}
+
+Agreement::Meeting Agreement::meet(Place place, bool failed, std::int64_t operation) const {
+  const auto at = static_cast<std::int64_t>(place);
+  // Maxima of x and -x, or ~x, are both ends.
+  std::array<std::int64_t, 5> extremes{at, -at, failed ? 1 : 0, operation, ~operation};
+  const int result = MPI_Allreduce(MPI_IN_PLACE, extremes.data(), static_cast<int>(extremes.size()),
+                                   MPI_INT64_T, MPI_MAX, comm_);
+  if (result != MPI_SUCCESS) return {Place::StepOver, Place::StepOver, true, false};  // nobody to wait for
+  return {static_cast<Place>(-extremes[1]), static_cast<Place>(extremes[0]), extremes[2] != 0,
+          extremes[3] == ~extremes[4]};
+}
+
+std::string Agreement::enter(const std::string& operation) {
+  const auto hash = static_cast<std::int64_t>(std::hash<std::string>()(operation) >> 1U);
+  const Meeting meeting = meet(Place::Entering, false, hash);
+  if (meeting.last == Place::Entering && meeting.same) return {};
+  if (meeting.failed) return otherFailed;
+  return "the ranks' scripts don't do the same: here comes an update of " +
+         operation.substr(0, operation.find(',')) + ", on another rank " +
+         (meeting.last == Place::Entering ? "that of another one" : "the script has ended before it") +
+         "; updates are collective, all ranks must do them in the same order";
+}
+
+bool Agreement::leavePart(bool failed) {
+  Meeting meeting{};
+  do {
+    meeting = meet(Place::PartOver, failed, 0);
+  } while (meeting.first == Place::Entering);
+  return meeting.failed || meeting.last == Place::StepOver;
+}
+
+void Agreement::leaveStep() {
+  while (meet(Place::StepOver, false, 0).first != Place::StepOver) {
+  }
+}
+
+}  // namespace vdi::catalyst

@@ -1,0 +1,248 @@
+"""Stands between ParaView's engine and the scripts that it calls; libvdi_catalyst.so has it inside, as a module.
+
+`install`, called once before the first script, wraps the functions through which the engine calls scripts:
+- left alone, the engine prints an exception to where nobody can collect it, and SystemExit ends the process;
+- a script that fails on one rank must stop on all, or the others wait for it;
+- an exception belongs into VTK's log, where all other errors are found;
+- a view that is drawn without a display ends the process (vtkXOpenGLRenderWindow aborts);
+- ParaView says once that the folder for extracts can't be made, and leaves out all extracts from then on;
+- what a script that can't be loaded has made by then stays, each time it's tried."""
+
+import ast
+import importlib
+import os
+import sys
+import traceback
+
+
+disabled = []  # extractors, for this step
+
+
+def end_step():
+    """To be called when the engine has run all scripts."""
+    set_enabled(disabled, True)
+    disabled.clear()
+
+
+class ScriptFailed(Exception):
+    """Reported already."""
+
+
+def check_script(path):
+    """What's wrong with a script, as far as that can be known before it runs; "" if nothing is."""
+    if not os.path.exists(path):
+        return "the script '%s' isn't there" % path
+    if not os.access(path, os.R_OK):
+        return "the script '%s' can't be read" % path
+    if os.path.isdir(path):
+        if os.path.exists(os.path.join(path, "__init__.py")):
+            return ""
+        return "the script '%s' is a folder without __init__.py" % path
+    if path.lower().endswith(".zip"):
+        return ""
+    try:
+        with open(path, "rb") as file:
+            tree = ast.parse(file.read(), path)
+    except (SyntaxError, ValueError, OSError) as error:
+        line = getattr(error, "lineno", None)
+        return "the script '%s'%s: %s" % (path, "" if line is None else ", line %d" % line, getattr(error, "msg", error))
+    for statement in tree.body:
+        call = getattr(statement, "value", None)
+        if isinstance(call, ast.Call) and call.args:
+            name = getattr(call.func, "id", getattr(call.func, "attr", None))
+            if name in ("LoadPlugin", "LoadPlugins"):
+                wrong = check_plugin(path, call.args[0])
+                if wrong:
+                    return "the script '%s', line %d: %s" % (path, statement.lineno, wrong)
+    return ""
+
+
+def check_plugin(script, argument):
+    try:
+        plugin = eval(compile(ast.Expression(argument), script, "eval"), {"os": os, "__file__": script})
+    except KeyError as error:
+        return ("the environment has no %s, which is to name the plugin that LoadPlugin loads, "
+                "VolumetricDepthImages.so" % error.args[0])
+    except Exception:
+        return ""  # made from what only the script knows
+    if not isinstance(plugin, str):
+        return ""
+    if not os.path.isfile(plugin):
+        return "the plugin '%s' isn't there" % plugin
+    import ctypes
+    try:
+        ctypes.CDLL(os.path.abspath(plugin))
+    except OSError as error:
+        return "the plugin can't be loaded: %s" % error
+    return ""
+
+
+def text_of(error, skip):
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not frame.filename.startswith(skip)]
+    what = "".join(traceback.format_exception_only(type(error), error)).strip()
+    return (what + "\n" + "".join(traceback.format_list(frames))).strip()
+
+
+def install(leave):
+    """`leave(failed)`: waits until a part of a script has ended on all ranks; whether it failed on any."""
+    from paraview.catalyst import v2_internals
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    skip = (__name__, "<string>", v2_internals.__file__, "<frozen importlib", importlib.__file__)
+    other_hook = sys.excepthook
+    folders = {}  # of extracts, by module
+    loading = {}
+    def hook(kind, error, trace):
+        if kind is not ScriptFailed:
+            other_hook(kind, error, trace)
+
+    sys.excepthook = hook
+
+    def guarded(function, before=None, after=None, failed=None):
+        def call(*arguments):
+            result, wrong = None, False
+            try:
+                if before:
+                    before(*arguments)
+                result = function(*arguments)
+                if after:
+                    after(result, *arguments)
+            except BaseException as error:
+                wrong = True
+                vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, text_of(error, skip))
+            if leave(wrong):
+                if failed:
+                    failed(*arguments)
+                raise ScriptFailed()
+            return result
+        return call
+
+    def start_loading(path):
+        loading.clear()
+        refuse_drawing_without_display()
+        loading["proxies"] = registered_proxies()
+
+    def forget_module(name):
+        from paraview.catalyst import importers
+        importers._path_finder_instance._registered_files.pop(name, None)
+        sys.modules.pop(name, None)
+        forget_new_proxies(loading.get("proxies"))
+
+    def note_folder(result, module):
+        folders[module.__name__] = os.environ.get("PARAVIEW_OVERRIDE_EXTRACTS_OUTPUT_DIRECTORY",
+                                                  module.options.ExtractsOutputDirectory)
+
+    def prepare_extracts(result, module):
+        due = due_extractors()
+        if due:
+            make_folder(folders.get(module.__name__, ""))
+        drawn = [extractor for extractor in due if draws(extractor)]
+        if leave(not all([has_display(extractor) for extractor in drawn])):
+            set_enabled(drawn, False)
+            disabled.extend(drawn)
+
+    def has_display(extractor):
+        try:
+            demand_display("the extractor of '%s'" % extractor.Writer.FileName)
+        except RuntimeError as error:
+            vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, str(error))
+            return False
+        return True
+
+    v2_internals.register_module = guarded(v2_internals.register_module, before=start_loading)
+    v2_internals.import_and_validate = guarded(v2_internals.import_and_validate, failed=forget_module)
+    v2_internals.do_catalyst_initialize = guarded(v2_internals.do_catalyst_initialize, after=note_folder,
+                                                  failed=lambda module: forget_module(module.__name__))
+    v2_internals.do_catalyst_execute = guarded(v2_internals.do_catalyst_execute, after=prepare_extracts)
+    v2_internals.do_catalyst_finalize = guarded(v2_internals.do_catalyst_finalize)
+
+
+def registered_proxies():
+    """Of all groups: (group, name, proxy)."""
+    from paraview import servermanager
+    iterator = servermanager.vtkSMProxyIterator()
+    iterator.SetSessionProxyManager(servermanager.ProxyManager().SMProxyManager)
+    iterator.SkipPrototypesOn()
+    found = set()
+    iterator.Begin()
+    while not iterator.IsAtEnd():
+        found.add((iterator.GetGroup(), iterator.GetKey(), iterator.GetProxy()))
+        iterator.Next()
+    return found
+
+
+def forget_new_proxies(before):
+    if before is None:
+        return
+    from paraview import servermanager
+    controller = servermanager.ParaViewPipelineController()
+    manager = servermanager.ProxyManager().SMProxyManager
+    new = registered_proxies() - before
+    for proxy in sorted({proxy for _, _, proxy in new}, key=lambda proxy: -proxy.GetGlobalID()):
+        controller.UnRegisterProxy(proxy)  # what hangs on it goes too
+    for group, name, proxy in registered_proxies() - before:
+        manager.UnRegisterProxy(group, name, proxy)
+
+
+def due_extractors():
+    """Those that the engine will call in this step."""
+    from paraview import servermanager
+    from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
+    controller = servermanager.vtkSMExtractsController()
+    controller.SetTimeStep(helper.GetTimeStep())
+    controller.SetTime(helper.GetTime())
+
+    def due(extractor):
+        trigger = extractor.Trigger
+        # Other triggers count how often they are asked.
+        return trigger is None or trigger.GetXMLName() != "TimeStep" or controller.IsTriggerActivated(extractor.SMProxy)
+
+    extractors = servermanager.ProxyManager().GetProxiesInGroup("extractors").values()
+    return [extractor for extractor in extractors if controller.IsExtractorEnabled(extractor.SMProxy) and due(extractor)]
+
+
+def draws(extractor):
+    return extractor.Producer is not None and extractor.Producer.GetXMLGroup() == "views"
+
+
+def set_enabled(extractors, enabled):
+    from paraview import servermanager
+    for extractor in extractors:
+        servermanager.vtkSMExtractsController.SetExtractorEnabled(extractor.SMProxy, enabled)
+
+
+def make_folder(folder):
+    if not folder:
+        raise RuntimeError("options.ExtractsOutputDirectory is empty, so this step's files aren't written; '.' is here")
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise RuntimeError("the folder '%s' for this step's files can't be made, they aren't written: %s" %
+                           (folder, error.strerror)) from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise RuntimeError("the folder '%s' can't be written to, so this step's files aren't written" % folder)
+
+
+def demand_display(what):
+    from paraview.modules.vtkRemotingViews import vtkPVRenderingCapabilitiesInformation as capabilities
+    if not capabilities.GetLocalCapabilities() & capabilities.RENDERING:
+        raise RuntimeError("%s needs a display to draw, and there is none (DISPLAY is %s): run the simulation under "
+                           "xvfb-run -a, or set DISPLAY; a VDI and its extractor need none"
+                           % (what, os.environ.get("DISPLAY", "not set")))
+
+
+def refuse_drawing_without_display():
+    """Views may be made and filled, as exported scripts do, but not drawn."""
+    from paraview import servermanager
+    if hasattr(servermanager.Proxy, "_vdi_guarded"):
+        return
+    servermanager.Proxy._vdi_guarded = True
+    attribute_of = servermanager.Proxy.__getattr__
+    drawing = {"StillRender", "InteractiveRender", "WriteImage", "WriteAnimation", "CaptureWindow", "SaveExtracts"}
+
+    def __getattr__(self, name):
+        if name in drawing or (name == "Write" and self.SMProxy.GetXMLGroup() == "exporters"):
+            demand_display("%s of %s" % (name, self.SMProxy.GetXMLLabel()))
+        return attribute_of(self, name)
+
+    servermanager.Proxy.__getattr__ = __getattr__

@@ -1,0 +1,87 @@
+#include "VDIArrays.h"
+
+#include <fmt/format.h>
+#include <vtkAlgorithm.h>
+#include <vtkCellData.h>
+#include <vtkCompositeDataIterator.h>
+#include <vtkCompositeDataSet.h>
+#include <vtkDataArray.h>
+#include <vtkDataSetAttributes.h>
+#include <vtkImageData.h>
+#include <vtkPointData.h>
+#include <vtkSmartPointer.h>
+
+#include <string>
+
+#include "vdi/core/Error.h"
+
+namespace pv {
+
+namespace {
+
+vtkDataSetAttributes* attributesOf(vtkImageData* image, bool cells) {
+  return cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
+}
+
+/// Without ghost marks, which nobody wants to see.
+std::string namesOf(vtkDataSetAttributes* attributes) {
+  std::string names;
+  for (int i = 0; i < attributes->GetNumberOfArrays(); ++i) {
+    vtkDataArray* array = attributes->GetArray(i);
+    if (array == nullptr || array->GetName() == nullptr) continue;
+    const std::string name = array->GetName();
+    if (name == vtkDataSetAttributes::GhostArrayName()) continue;
+    names += fmt::format("{}'{}'", names.empty() ? "" : ", ", name);
+    if (array->GetNumberOfComponents() > 1)
+      names += fmt::format(" ({} components)", array->GetNumberOfComponents());
+  }
+  return names.empty() ? "none" : names;
+}
+
+bool has(vtkDataSetAttributes* attributes, const std::string& name) {
+  if (name.empty()) return attributes->GetScalars() != nullptr;
+  if (attributes->GetArray(name.c_str()) != nullptr) return true;
+  // ParaView's names of components: velocity_X, velocity_Magnitude.
+  const std::size_t end = name.rfind('_');
+  if (end == std::string::npos) return false;
+  vtkDataArray* whole = attributes->GetArray(name.substr(0, end).c_str());
+  return whole != nullptr && whole->GetNumberOfComponents() > 1;
+}
+
+void demandOf(vtkDataObject* leaf, const ArrayChoice& choice) {
+  auto* image = vtkImageData::SafeDownCast(leaf);
+  if (image == nullptr || image->GetNumberOfPoints() == 0) return;
+  if (has(attributesOf(image, choice.cells), choice.name)) return;
+  const std::string wanted = choice.name.empty() ? "active scalars" : fmt::format("array '{}'", choice.name);
+  const bool otherHas = !choice.name.empty() && has(attributesOf(image, !choice.cells), choice.name);
+  throw vdi::Error(
+      vdi::ErrorCode::InvalidArgument,
+      fmt::format("there is no {} of {}{}; of points there are: {}; of cells: {}", wanted,
+                  choice.cells ? "cells" : "points",
+                  otherHas ? fmt::format(" (SelectInputScalars = ['{}', '{}'] asks for the one of {})",
+                                         choice.cells ? "POINTS" : "CELLS", choice.name,
+                                         choice.cells ? "points" : "cells")
+                           : "",
+                  namesOf(image->GetPointData()), namesOf(image->GetCellData())));
+}
+
+}  // namespace
+
+void demandArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice) {
+  // What the source itself made.
+  if (producer != nullptr && producer->IsA("vtkPVPostFilter") != 0 &&
+      producer->GetNumberOfInputConnections(0) > 0) {
+    if (vtkDataObject* original = producer->GetInputDataObject(0, 0)) data = original;
+  }
+  auto* composite = vtkCompositeDataSet::SafeDownCast(data);
+  if (composite == nullptr) {
+    demandOf(data, choice);
+    return;
+  }
+  const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+  for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
+    demandOf(iterator->GetCurrentDataObject(), choice);
+  }
+}
+
+}  // namespace pv

@@ -1,0 +1,19 @@
+#include "vtkSMVDIWriterProxy.h"
+
+#include <vtkObjectFactory.h>
+
+#include <optional>
+
+#include "vtkSMVDIGeneratorProxy.h"
+
+vtkStandardNewMacro(vtkSMVDIWriterProxy);
+
+void vtkSMVDIWriterProxy::UpdatePipeline() {
+  vtkSMVDIGeneratorProxy::PrepareUpstream(this, std::nullopt);
+  this->Superclass::UpdatePipeline();
+}
+
+void vtkSMVDIWriterProxy::UpdatePipeline(double time) {
+  vtkSMVDIGeneratorProxy::PrepareUpstream(this, time);
+  this->Superclass::UpdatePipeline(time);
+}

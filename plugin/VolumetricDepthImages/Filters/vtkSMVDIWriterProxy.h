@@ -1,0 +1,31 @@
+/**
+ * @class vtkSMVDIWriterProxy
+ * @brief lets the generators behind a .vdi file choose their colour maps before it's written
+ *
+ * A writer updates what is behind it without asking the proxies there (vtkSMVDIGeneratorProxy).
+ */
+#ifndef vtkSMVDIWriterProxy_h
+#define vtkSMVDIWriterProxy_h
+
+#include <vtkSMPWriterProxy.h>
+
+#include "vtkVolumetricDepthImagesModule.h"
+
+class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIWriterProxy : public vtkSMPWriterProxy {
+ public:
+  static vtkSMVDIWriterProxy* New();
+  vtkTypeMacro(vtkSMVDIWriterProxy, vtkSMPWriterProxy);
+
+  void UpdatePipeline() override;
+  void UpdatePipeline(double time) override;
+
+ protected:
+  vtkSMVDIWriterProxy() = default;
+  ~vtkSMVDIWriterProxy() override = default;
+
+ private:
+  vtkSMVDIWriterProxy(const vtkSMVDIWriterProxy&) = delete;
+  void operator=(const vtkSMVDIWriterProxy&) = delete;
+};
+
+#endif

@@ -1,0 +1,20 @@
+// The table of slabs: what the part of a ray that a sample stands for shows (core/TransferFunction.h, shaders/slab.glsl).
+#ifndef VDI_SHARED_SLAB_H
+#define VDI_SHARED_SLAB_H
+#include "interop.h"
+
+VDI_SHARED_BEGIN
+
+// Texels per side of the table's square part; and how far apart, in texels, a row of its strips begins behind the last one:
+// rows share a texel, so that filtering needs no other row.
+#ifdef __cplusplus
+inline constexpr uint slabSide = 256;
+inline constexpr uint slabStripStep = slabSide - 1;
+#else
+const uint slabSide = 256u;
+const uint slabStripStep = slabSide - 1u;
+#endif
+
+VDI_SHARED_END
+
+#endif

@@ -1,0 +1,76 @@
+// What a slab, the part of a ray that a sample stands for, shows: one look into the table of slabs. Twin of
+// vdi/core/SlabTable.cpp, whose header says what is where.
+//
+// Needs: shared/cast.h, optical.glsl; params, slabs, rayLengthOfDepth.
+
+// What an interval of a ray comes down to.
+struct Sample {
+  vec3 color;  // straight
+  float opticalDepth;
+  float opacity;
+  float overStep;  // opacity of as much of it as is one step long
+};
+
+const Sample transparentSample = Sample(vec3(0.0), 0.0, 0.0, 0.0);
+
+Sample sampleOf(vec4 colorAndDepth, float length) {
+  float opticalDepth = min(colorAndDepth.a * params.slabsPerDepth * rayLengthOfDepth * length, maxOpticalDepth);
+  float opacity = opacityOf(opticalDepth);
+  // Nearly all intervals are one sample long.
+  float overStep = length == params.step ? opacity : opacityOf(opticalDepth * params.step / length);
+  return Sample(colorAndDepth.rgb, opticalDepth, opacity, overStep);
+}
+
+// What needs code of its own, by the blocks' values: are there any that aren't finite, and any beyond the transfer table's range?
+layout(constant_id = 7) const bool mayBeInfinite = true;
+layout(constant_id = 8) const bool reachesBeyond = true;
+
+// No branches from here on, so that several looks are on their way at a time: mix selects.
+
+bool isFinite(float value) { return !mayBeInfinite || abs(value) <= 3.0e38; }
+
+// Premultiplied colour and opacity of a slab between two positions in the transfer table, as far as it lies within that. A NaN
+// at one end is taken for what's at the other.
+vec4 slabTexel(float front, float back) {
+  float first = front;
+  float last = back;
+  if (mayBeInfinite) {
+    first = mix(mix(0.0, back, isFinite(back)), front, isFinite(front));
+    last = mix(first, back, isFinite(back));
+  }
+  first = clamp(first, 0.0, params.lastPosition);
+  last = clamp(last, 0.0, params.lastPosition);
+  float span = abs(last - first);
+  vec2 square = vec2(first, last) * params.squarePerPosition;
+  float middle = 0.5 * (first + last);
+  float row = min(floor(middle * (1.0 / float(slabStripStep))), params.stripRows - 1.0);
+  float level = max(ceil(log2(span)), 0.0);
+  vec2 strip = vec2(middle - row * float(slabStripStep), float(slabSide) + level * params.stripRows + row);
+  bool isNear = span * params.squarePerPosition < 1.0;
+  return textureLod(slabs, (mix(square, strip, bvec2(isNear)) + 0.5) * params.perSlabTexels, 0.0);
+}
+
+// Straight colour and optical depth of the whole slab, where `texel` is slabTexel's. A NaN at one end takes half of what's
+// visible at the other.
+vec4 slabOf(vec4 texel, float front, float back) {
+  const float perLn2 = 1.44269504;
+  bool isThin = texel.a < 1e-3;
+  float depth = mix(-log2(1.0 - texel.a), texel.a * (1.0 + 0.5 * texel.a) * perLn2, isThin);  // opticalDepthOf
+  vec4 slab = vec4(texel.rgb / max(texel.a, 1.0e-30), min(depth, maxOpticalDepth));
+  if (reachesBeyond) {
+    // A part of it may be like the table's ends.
+    float low = min(front, back);
+    float high = max(front, back);
+    float span = high - low;
+    float inside = min(high, params.lastPosition) - max(low, 0.0);
+    vec3 depths = vec3(slab.a * inside, params.slabBelow.a * max(-low, 0.0),
+                       params.slabAbove.a * max(high - params.lastPosition, 0.0)) / span;
+    float sum = depths.x + depths.y + depths.z;
+    vec3 color = depths.x * slab.rgb + depths.y * params.slabBelow.rgb + depths.z * params.slabAbove.rgb;
+    bool isSome = inside > 0.0;
+    bool isNotAll = inside < span;
+    slab = mix(slab, vec4(color / max(sum, 1.0e-30), sum), bvec4(isSome && isNotAll));
+  }
+  if (mayBeInfinite) slab.a *= mix(0.0, 0.5, isFinite(front)) + mix(0.0, 0.5, isFinite(back));
+  return slab;
+}

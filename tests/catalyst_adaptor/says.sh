@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# says.sh PATTERN... -- COMMAND...: runs the command; fails where that fails or says nothing that matches one of the
+# patterns (grep -E).
+set -uo pipefail
+patterns=()
+while [ "$1" != -- ]; do
+  patterns+=("$1")
+  shift
+done
+shift
+said=$("$@" 2>&1)
+status=$?
+printf '%s\n' "$said"
+for pattern in "${patterns[@]}"; do
+  grep -qE -- "$pattern" <<<"$said" || { echo "nothing that it said matches: $pattern"; status=1; }
+done
+exit "$status"

@@ -1,0 +1,173 @@
+"""What the filters do unless told otherwise, and what they say when a script asks for what isn't there."""
+
+import os
+import sys
+
+import numpy as np
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from pvtest import *  # noqa: E402,F403
+from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow  # noqa: E402
+from vtkmodules.vtkRenderingCore import vtkRenderer  # noqa: E402
+
+SIZE = [64, 48]
+
+
+class Messages:
+    """The texts of VTK's errors or warnings while it's entered."""
+
+    def __init__(self, event):
+        self.event, self.texts = event, []
+
+    def __enter__(self):
+        def note(caller, event, text):
+            self.texts.append(text)
+
+        note.CallDataType = "string0"
+        self.observer = vtkOutputWindow.GetInstance().AddObserver(self.event, note)
+        return self.texts
+
+    def __exit__(self, *error):
+        vtkOutputWindow.GetInstance().RemoveObserver(self.observer)
+
+
+def field(center, scale=1.0):
+    """A ball of points 'ball', cells 'layers' and points 'velocity' on [0, 4]^3 about `center`."""
+    n = 17
+    image = vtkImageData()
+    image.SetDimensions(n, n, n)
+    image.SetSpacing(0.25, 0.25, 0.25)
+    image.SetOrigin(*(np.array(center) - 2))
+    z, y, x = np.meshgrid(*[np.linspace(-2, 2, n)] * 3, indexing="ij")
+    ball = scale * np.clip(4 - x * x - y * y - z * z, 0, None)
+
+    def add(attributes, name, values):
+        array = numpy_to_vtk(values, deep=True)
+        array.SetName(name)
+        attributes.AddArray(array)
+
+    add(image.GetPointData(), "ball", ball.ravel())
+    add(image.GetPointData(), "velocity", np.stack([ball.ravel() - 1, np.full(n ** 3, 50.0), 0 * ball.ravel()], axis=1))
+    add(image.GetCellData(), "layers", np.repeat(np.arange(16.0), 256))
+    return image
+
+
+def producer_of(image):
+    producer = simple.TrivialProducer()
+    producer.GetClientSideObject().SetOutput(image)
+    return producer
+
+
+def filter_of(source, association="POINTS", name="ball", **properties):
+    image = simple.VolumetricDepthImage(Input=source)
+    image.SelectInputScalars = [association, name]
+    image.Resolution = SIZE
+    for key, value in properties.items():
+        setattr(image, key, value)
+    return image
+
+
+def errors_of(proxy):
+    with Messages("ErrorEvent") as texts:
+        proxy.UpdatePipeline(0.0)  # with a time, since ParaView skips an update without when nothing has changed
+    return "\n".join(texts)
+
+
+source = producer_of(field([7, 0, -3]))
+proxies = []
+
+# The camera that nobody set is ParaView's.
+image = filter_of(source)
+seen = picture(image)
+renderer = vtkRenderer()
+renderer.ResetCamera(5, 9, -2, 2, -5, -1)
+camera = renderer.GetActiveCamera()
+as_reset = filter_of(source, CameraPosition=list(camera.GetPosition()), CameraFocalPoint=list(camera.GetFocalPoint()))
+check(seen.max() > 60, "without a camera there is something to see")
+check(seen[0].max() == 0 and seen[-1].max() == 0 and seen[:, 0].max() == 0, "and all of the scene is in the picture")
+check(np.abs(seen.astype(int) - picture(as_reset)).max() <= 1, "it is where vtkRenderer.ResetCamera puts it")
+check(list(image.CameraPosition) == list(image.CameraFocalPoint), "and the properties stay those of a camera not set")
+parallel = picture(filter_of(source, CameraParallelProjection=1))
+check(parallel.max() > 60 and parallel[0].max() == 0, "so it is in parallel projection")
+made = filter_of(source, CameraPosition=[15, 4, 4], CameraFocalPoint=[7, 0, -3])
+check(np.abs(picture(simple.RenderVDI(Input=made)).astype(int) - picture(made)).max() <= 2,
+      "RenderVDI without a camera looks from where the VDI was made")
+
+# Viewpoints that show nothing true.
+for what, position, focal_point, word in (
+        ("inside the scene", [7.1, 0, -3], [7, 0, -4], "inside"),
+        ("that looks past it", [15, 4, 4], [15, 40, 4], "doesn't see"),
+        ("behind it", [-1, -4, -10], [7, 0, -3], "degrees")):
+    rendered = simple.RenderVDI(Input=made, CameraPosition=position, CameraFocalPoint=focal_point)
+    with Messages("WarningEvent") as texts:
+        rendered.UpdatePipeline()
+        first = [text for text in texts if word in text]
+        rendered.CameraPosition = [p + 0.01 for p in position]
+        rendered.UpdatePipeline()
+    check(len(first) == 1, "a viewpoint %s gets a warning" % what)
+    check(len([text for text in texts if word in text]) == 1, "and only one")
+with Messages("WarningEvent") as texts:
+    simple.RenderVDI(Input=made, UseOriginalCamera=1, Azimuth=20).UpdatePipeline()
+check(not texts, "a viewpoint near the VDI's own gets none")
+
+# Arrays that aren't there, or not there.
+for association, name, words in (
+        ("CELLS", "ball", ["no array 'ball' of cells", "['POINTS', 'ball']", "'velocity' (3 components)", "of cells: 'layers'"]),
+        ("POINTS", "layers", ["no array 'layers' of points", "['CELLS', 'layers']", "'ball'"]),
+        ("POINTS", "bell", ["no array 'bell' of points", "'ball'", "of cells: 'layers'"])):
+    wrong = filter_of(source, association, name)
+    for attempt in ("first", "second"):
+        text = errors_of(wrong)
+        missing = [word for word in words if word not in text]
+        check(not missing, "%s of %s: the %s error says what there is %s" % (name, association, attempt, missing))
+check(not errors_of(filter_of(source, "CELLS", "layers")), "cells where there are cells are fine")
+
+# Colour maps: the default keeps its first range, whoever updates; set points stay.
+def range_of(name):
+    points = list(simple.GetColorTransferFunction(name).RGBPoints)
+    opacities = list(simple.GetOpacityTransferFunction(name).Points)
+    return [round(v, 4) for v in (points[0], points[-4], opacities[0], opacities[-4])]
+
+
+def saved(proxy, name):
+    path = os.path.join(OUTPUT, name)
+    simple.SaveData(path, proxy=proxy)
+    return picture(simple.OpenDataFile(path))
+
+
+def renamed(image, name):
+    array = image.GetPointData().GetArray("ball")
+    array.SetName(name)
+    return image
+
+
+moving = producer_of(renamed(field([0, 0, 0]), "kept"))
+written = filter_of(moving, name="kept")
+first = saved(written, "kept_0.vdi")
+check(range_of("kept") == [0, 4, 0, 4], "a map that nobody set has the range of the array, also when only a writer updates")
+moving.GetClientSideObject().SetOutput(renamed(field([0, 0, 0], scale=0.5), "kept"))
+moving.MarkModified(moving.SMProxy)
+second = saved(written, "kept_1.vdi")
+check(range_of("kept") == [0, 4, 0, 4] and np.abs(first.astype(int) - second).max() > 30,
+      "and keeps it when the values get smaller")
+written.UpdatePipeline()
+check(range_of("kept") == [0, 4, 0, 4], "also when the filter is updated")
+written.LookupTable = None
+before = picture(written)
+moving.GetClientSideObject().SetOutput(renamed(field([0, 0, 0], scale=0.25), "kept"))
+moving.MarkModified(moving.SMProxy)
+check(np.abs(picture(written).astype(int) - before).max() > 8, "the stand-in for no map keeps its range too")
+
+for name, low, high in (("set", -2.0, 9.0), ("unit", 0.0, 1.0)):
+    colors, opacity = set_colors(name, low, high)
+    given = producer_of(renamed(field([0, 0, 0]), name))
+    filter_of(given, name=name).UpdatePipeline()
+    check(range_of(name) == [low, high, low, high], "points set on [%g, %g] stay there" % (low, high))
+preset = simple.GetColorTransferFunction("preset")
+preset.ApplyPreset("Viridis (matplotlib)", True)
+simple.GetOpacityTransferFunction("preset").Points = [0, 0, 0.5, 0, 2, 1, 0.5, 0]
+filter_of(producer_of(renamed(field([0, 0, 0]), "preset")), name="preset").UpdatePipeline()
+check(range_of("preset") == [0, 4, 0, 2], "a preset waits for the range, opacities set beside it don't move")
+check(not errors_of(filter_of(source, "POINTS", "velocity", Component=0)), "a component is rendered")
+check(range_of("velocity") == [-1, 3, -1, 3], "and its map has the range of the component, not of the magnitude")
+finish()

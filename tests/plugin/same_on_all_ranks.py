@@ -1,0 +1,55 @@
+"""With a client on each rank (pvbatch --symmetric, as Catalyst has it): what fails fails on all ranks, as often as it's asked,
+and what the ranks are told differently is an error. Each of these would hang instead, so the time limit counts."""
+
+import os
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from pvtest import *  # noqa: E402,F403
+from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
+from paraview.modules.vtkRemotingCore import vtkProcessModule  # noqa: E402
+
+rank = vtkProcessModule.GetProcessModule().GetPartitionId()
+
+
+def errors_of(proxy):
+    texts = []
+
+    def note(caller, event, text):
+        texts.append(text)
+
+    note.CallDataType = "string0"
+    observer = vtkOutputWindow.GetInstance().AddObserver("ErrorEvent", note)
+    proxy.UpdatePipeline(0.0)
+    vtkOutputWindow.GetInstance().RemoveObserver(observer)
+    return "\n".join(texts)
+
+
+def filter_of(source, name="RTData", **properties):
+    image = simple.VolumetricDepthImage(Input=source)
+    image.SelectInputScalars = ["POINTS", name]
+    image.Resolution = [64, 48]
+    for key, value in properties.items():
+        setattr(image, key, value)
+    return image
+
+
+wavelet = simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8])
+nothing = filter_of(simple.TrivialProducer(registrationName="gird"))
+for attempt in ("first", "second", "third"):
+    check(errors_of(nothing), "rank %d: an input without data fails the %s time" % (rank, attempt))
+image = filter_of(wavelet, "RTDate")  # one for all, since each makes pipelines for the device anew
+for attempt in ("first", "second"):
+    check("no array 'RTDate'" in errors_of(image), "rank %d: a missing array fails the %s time" % (rank, attempt))
+image.SelectInputScalars = ["POINTS", "RTData"]
+check(not errors_of(image), "rank %d: mended, it works" % rank)
+
+for name, values in (("FillGhosts", (0, 1)), ("PictureOnly", (0, 1)), ("Component", (0, -1)), ("Supersegments", (4, 5)),
+                     ("SelectInputScalars", (["POINTS", "RTData"], ["CELLS", "RTData"])),
+                     ("Resolution", ([64, 48], [48, 64])), ("CameraViewAngle", (30, 31))):
+    setattr(image, name, values[rank > 0])
+    text = errors_of(image)
+    check("different values" in text, "rank %d: %s that differs is an error" % (rank, name))
+    setattr(image, name, values[0])
+    check(not errors_of(image), "rank %d: and equal again it works" % rank)
+finish()

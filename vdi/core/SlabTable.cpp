@@ -1,0 +1,191 @@
+#include "vdi/core/SlabTable.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "shaders/shared/slab.h"
+#include "vdi/core/Half.h"
+#include "vdi/core/Parallel.h"
+#include "vdi/core/Supersegment.h"
+
+namespace vdi {
+
+namespace {
+
+using gpu::shared::slabSide;
+using gpu::shared::slabStripStep;
+
+glm::dvec4 vectorOf(const TransferTableEntry& entry) {
+  return {entry.red, entry.green, entry.blue, entry.extinction};
+}
+
+/// Of the transfer table, linear between entries and constant outside, from position 0 on.
+class Integral {
+ public:
+  explicit Integral(const std::vector<TransferTableEntry>& entries)
+      : entries_(entries), sums_(entries.size()) {
+    for (std::size_t i = 1; i < entries.size(); ++i)
+      sums_[i] = sums_[i - 1] + 0.5 * (vectorOf(entries[i - 1]) + vectorOf(entries[i]));
+  }
+  glm::dvec4 at(double position) const {
+    const double inside = std::clamp(position, 0.0, static_cast<double>(entries_.size() - 1));
+    const auto below = std::min(static_cast<std::size_t>(inside), entries_.size() - 2);
+    const double share = inside - static_cast<double>(below);
+    const glm::dvec4 a = vectorOf(entries_[below]);
+    const glm::dvec4 b = vectorOf(entries_[below + 1]);
+    return sums_[below] + share * (a + 0.5 * share * (b - a)) + (position - inside) * glm::mix(a, b, share);
+  }
+
+ private:
+  const std::vector<TransferTableEntry>& entries_;
+  std::vector<glm::dvec4> sums_;  // up to each entry
+};
+
+/// Premultiplied colour and opacity of what has that mean entry along `length`.
+glm::dvec4 accumulated(const glm::dvec4& mean, double length) {
+  const double depth = std::max(mean.a, 0.0) * length;
+  if (!(depth > 0.0)) return glm::dvec4(0.0);
+  const double opacity = -std::expm1(-depth * 0.69314718055994531);
+  return glm::max(mean / mean.a, 0.0) * opacity;
+}
+
+/// In parts of equal length, front to back, for in each of them light comes from all places alike; as many as
+/// it takes to tell the transfer function's features apart.
+glm::dvec4 integrate(const Integral& integral, double front, double back, double length) {
+  constexpr double thin = 0.1;     // optical depth that hides nothing behind it
+  constexpr double opaque = 16.0;  // that lets nothing through
+  constexpr int mostParts = 64;
+  const double span = back - front;
+  const glm::dvec4 start = integral.at(front);
+  const glm::dvec4 mean = (integral.at(back) - start) / span;
+  if (mean.a * length <= thin) return accumulated(mean, length);
+  const int parts = std::clamp(static_cast<int>(std::abs(span)), 1, mostParts);
+  glm::dvec4 sum(0.0);
+  glm::dvec4 before = start;
+  for (int part = 1; part <= parts && sum.a < 1.0 - std::exp2(-opaque); ++part) {
+    const glm::dvec4 here = integral.at(front + span * part / parts);
+    sum += (1.0 - sum.a) * accumulated((here - before) / (span / parts), length / parts);
+    before = here;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::size_t SlabTable::stripRows() const {
+  return (positions - 1 + slabStripStep - 1) / slabStripStep;
+}
+
+std::size_t SlabTable::levels() const {
+  // Up to what's one step of the square.
+  const double step = static_cast<double>(positions - 1) / slabStripStep;
+  return static_cast<std::size_t>(std::max(std::ceil(std::log2(step)), 0.0)) + 1;
+}
+
+std::size_t SlabTable::height() const {
+  return slabSide + levels() * stripRows();
+}
+
+float slabLength(const DepthLattice& lattice, const TransferTable& table) {
+  return lattice.step > 0.0 ? static_cast<float>(lattice.step / table.unitDistance) : 1.0F;
+}
+
+SlabTable makeSlabTable(const TransferTable& transfer, float length) {
+  SlabTable table;
+  table.length = length;
+  table.positions = transfer.entries.size();
+  table.texels.resize(table.height() * slabSide);
+  const Integral integral(transfer.entries);
+  const auto point = [&](double position) { return accumulated(vectorOf(transfer.at(position)), length); };
+  const double last = static_cast<double>(table.positions - 1);
+  const auto endOf = [&](double position) {
+    const glm::vec4 entry = vectorOf(transfer.at(position));
+    return entry.a > 0.0F ? glm::vec4(glm::vec3(entry) / entry.a, std::min(entry.a * length, maxExtinction))
+                          : glm::vec4(0.0F);
+  };
+  table.below = endOf(0.0);
+  table.above = endOf(last);
+  const auto texelAt = [&](std::size_t x, std::size_t y) -> glm::dvec4 {
+    if (y < slabSide) {
+      const double front = last * static_cast<double>(x) / slabStripStep;
+      const double back = last * static_cast<double>(y) / slabStripStep;
+      return x == y ? point(front) : integrate(integral, front, back, length);
+    }
+    const std::size_t level = (y - slabSide) / table.stripRows();
+    const std::size_t row = (y - slabSide) % table.stripRows();
+    const double middle = std::min(static_cast<double>(row * slabStripStep + x), last);
+    if (level == 0) return point(middle);
+    const double half = 0.5 * std::exp2(static_cast<double>(level));
+    return accumulated((integral.at(middle + half) - integral.at(middle - half)) / (2.0 * half), length);
+  };
+  inParallel(table.height(), 16, [&](std::size_t first, std::size_t end) {
+    for (std::size_t y = first; y < end; ++y) {
+      for (std::size_t x = 0; x < slabSide; ++x)
+        table.texels[y * slabSide + x] = toHalf(glm::vec4(texelAt(x, y)));
+    }
+  });
+  return table;
+}
+
+namespace {
+
+/// Linear between texels; within one row where y is a whole number.
+glm::vec4 texelsAt(const SlabTable& table, double x, double y) {
+  const auto column = std::min(static_cast<std::size_t>(x), std::size_t{slabSide} - 2);
+  const auto row = std::min(static_cast<std::size_t>(y), table.height() - 2);
+  const auto inRow = [&](std::size_t at) {
+    return glm::mix(fromHalf(table.texels[at * slabSide + column]),
+                    fromHalf(table.texels[at * slabSide + column + 1]),
+                    static_cast<float>(x - static_cast<double>(column)));
+  };
+  return glm::mix(inRow(row), inRow(row + 1), static_cast<float>(y - static_cast<double>(row)));
+}
+
+/// What a filtered texel stands for.
+Slab slabOf(const glm::vec4& texel) {
+  if (!(texel.a > 0.0F)) return {};
+  return {glm::vec3(texel) / texel.a, opticalDepthOf(texel.a)};
+}
+
+/// Both within the transfer table.
+glm::vec4 inside(const SlabTable& table, double front, double back) {
+  const double last = static_cast<double>(table.positions - 1);
+  const double toSquare = slabStripStep / last;
+  const double span = std::abs(back - front);
+  if (span * toSquare >= 1.0) return texelsAt(table, front * toSquare, back * toSquare);
+  const double level = std::max(std::ceil(std::log2(span)), 0.0);
+  const double middle = 0.5 * (front + back);
+  const double row = std::min(std::floor(middle / slabStripStep), static_cast<double>(table.stripRows() - 1));
+  return texelsAt(table, middle - row * slabStripStep,
+                  slabSide + level * static_cast<double>(table.stripRows()) + row);
+}
+
+}  // namespace
+
+Slab SlabTable::between(double front, double back) const {
+  if (std::isnan(front) || std::isnan(back)) {
+    if (std::isnan(front)) front = back;
+    if (std::isnan(back)) back = front;
+    if (std::isnan(back)) return {};
+    Slab slab = between(front, back);
+    slab.opticalDepth *= 0.5F;
+    return slab;
+  }
+  const double last = static_cast<double>(positions - 1);
+  const double frontInside = std::clamp(front, 0.0, last);
+  const double backInside = std::clamp(back, 0.0, last);
+  const Slab slab = slabOf(inside(*this, frontInside, backInside));
+  const double span = std::abs(back - front);
+  const double spanInside = std::abs(backInside - frontInside);
+  if (!(spanInside > 0.0 && spanInside < span)) return slab;
+  // A part of it is like the table's ends.
+  const auto shareOf = [&](double length) { return static_cast<float>(length / span); };
+  const float depth = slab.opticalDepth * shareOf(spanInside);
+  const float depthBelow = below.a * shareOf(std::max(-std::min(front, back), 0.0));
+  const float depthAbove = above.a * shareOf(std::max(std::max(front, back) - last, 0.0));
+  const float sum = depth + depthBelow + depthAbove;
+  if (!(sum > 0.0F)) return {};
+  return {(depth * slab.color + depthBelow * glm::vec3(below) + depthAbove * glm::vec3(above)) / sum, sum};
+}
+
+}  // namespace vdi

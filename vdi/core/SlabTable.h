@@ -1,0 +1,59 @@
+// Pre-integrated classification (Engel, Kraus and Ertl, High-Quality Pre-Integrated Volume Rendering Using
+// Hardware-Accelerated Pixel Shading, 2001): what a slab, the part of a ray that one sample stands for, shows
+// when scalars run linearly from one value at its front to another at its back. No feature of the transfer
+// function between the two is missed, however thin, and what's in front hides what's behind.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "vdi/core/Scene.h"
+#include "vdi/core/TransferFunction.h"
+
+namespace vdi {
+
+/// A slab of the table's length.
+struct Slab {
+  glm::vec3 color{0.0F};  // straight
+  float opticalDepth = 0.0F;
+};
+
+/// A texture of slabs of one length, so made that one filtered look is enough for any slab:
+///
+/// Texels are premultiplied colour and opacity, whose means are right; optical depths of opaque slabs would
+/// outshine all others.
+///
+///     rows 0 .. slabSide - 1        the square: texel (x, y) runs from x to y, in slabSide - 1 steps over
+///     the
+///                                   transfer table's range
+///     then levels() x stripRows()   the strips: slabs whose ends are nearer than one step of the square.
+///                                   Strip l holds those of 2^l positions of the transfer table, or of none
+///                                   for l = 0, by the position in their middle
+///
+/// A strip is cut in rows that share a texel: entry e stands in row e / slabStripStep, column
+/// e % slabStripStep, and again at the end of the row before.
+struct SlabTable {
+  float length = 1.0F;               // of its slabs, in unit distances
+  std::size_t positions = 0;         // of the transfer table: TransferTable::entries.size()
+  std::vector<glm::u16vec4> texels;  // [height()][slabSide]: half floats (core/Half.h)
+  glm::vec4 below{0.0F};  // slabs all below the transfer table's range: straight colour and optical depth
+  glm::vec4 above{0.0F};  // and all above it
+
+  std::size_t stripRows() const;
+  std::size_t levels() const;
+  std::size_t height() const;
+
+  /// From one position in the transfer table to another. Outside its range the function is constant; a NaN at
+  /// one end takes half of what's visible at the other.
+  Slab between(double front, double back) const;
+};
+
+/// One step of the lattice straight ahead: what samples are long, or near that.
+float slabLength(const DepthLattice& lattice, const TransferTable& table);
+
+/// `length`: in unit distances, > 0.
+SlabTable makeSlabTable(const TransferTable& table, float length);
+
+}  // namespace vdi
