@@ -606,9 +606,26 @@ TEST_CASE("thousands of small blocks in one pass") {
   const GenerateSettings settings = test::smallSettings();
   VdiGenerator many(device(), comm::Communicator::serial());
   VdiGenerator one(device(), comm::Communicator::serial());
-  many.setBlocks(dealt.mine, false);
+  many.setBlocks(dealt.mine);
   one.setBlocks(whole.mine);
   const auto image = many.renderVolume(test::oblique(), function, settings);
+  CHECK(largestDifference(*image, *one.renderVolume(test::oblique(), function, settings)) < 1.0F);
+}
+
+TEST_CASE("a block that's cut to fit the device's images shows no cut") {
+  const auto whole = test::deal("turbulence", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  // Steep, so that samples beside a cut depend on what's beyond.
+  TransferFunction function = test::threeHues(1.0);
+  function.opacities = {{0.0, 0.0}, {0.5, 0.0}, {0.52, 1.0}, {0.54, 0.0}, {1.0, 0.0}};
+  const GenerateSettings settings = test::smallSettings();
+  gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
+  request.mostImageDimension3D = 24;
+  VdiGenerator cut(gpu::Device::create(request), comm::Communicator::serial());
+  VdiGenerator one(device(), comm::Communicator::serial());
+  cut.setBlocks(whole.mine);
+  one.setBlocks(whole.mine);
+  const auto image = cut.renderVolume(test::oblique(), function, settings);
   CHECK(largestDifference(*image, *one.renderVolume(test::oblique(), function, settings)) < 1.0F);
 }
 

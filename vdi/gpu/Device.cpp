@@ -486,6 +486,10 @@ std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
   state->name = chosen.summary.name;
   state->cpu = chosen.summary.type == VK_PHYSICAL_DEVICE_TYPE_CPU;
   state->gpuPrograms = !state->cpu || request.gpuPrograms;
+  if (request.mostImageDimension3D > 0) {
+    state->limits.maxImageDimension3D =
+        std::min(state->limits.maxImageDimension3D, request.mostImageDimension3D);
+  }
   state->limits = chosen.limits;
   vkGetPhysicalDeviceMemoryProperties(chosen.handle, &state->memory);
   state->device = makeDevice(chosen);

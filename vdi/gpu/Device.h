@@ -21,6 +21,8 @@ struct DeviceRequest {
   /// Runs what's the fastest on GPUs on a CPU too, so that it can be tested there; see
   /// Device::runsGpuPrograms.
   bool gpuPrograms = false;
+  /// A smaller limit than the device's own, so that what is cut to fit can be tested; 0: the device's.
+  std::uint32_t mostImageDimension3D = 0;
 };
 
 /// The request that the environment asks for: VDI_DEVICE is the selector, VDI_VALIDATION=1 turns validation

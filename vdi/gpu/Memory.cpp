@@ -234,7 +234,7 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
     : device_(std::move(device)), extent_(extent), format_(format) {
   assert(glm::all(glm::greaterThan(extent, glm::uvec3(0))));
   const std::uint32_t longest = device_->limits().maxImageDimension3D;
-  if (glm::any(glm::greaterThan(extent, glm::uvec3(longest)))) {
+  if (type == VK_IMAGE_TYPE_3D && glm::any(glm::greaterThan(extent, glm::uvec3(longest)))) {
     throw Error(ErrorCode::InvalidArgument,
                 fmt::format("a texture of {} x {} x {} is beyond the device's {} per axis", extent.x,
                             extent.y, extent.z, longest),

@@ -111,10 +111,14 @@ std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block) {
   }
   const ValueMap values = valueMapOf(block);
   std::vector<VolumePiece> pieces;
-  const glm::ivec3 stride = glm::max(glm::ivec3(largest) - 1, glm::ivec3(1));
-  for (int z = all.lo.z; z == all.lo.z || z < all.hi.z - 1; z += stride.z) {
-    for (int y = all.lo.y; y == all.lo.y || y < all.hi.y - 1; y += stride.y) {
-      for (int x = all.lo.x; x == all.lo.x || x < all.hi.x - 1; x += stride.x) {
+  // Neighbours share a face's values and one layer beyond on either side.
+  const glm::ivec3 stride = glm::max(glm::ivec3(largest) - 1 - 2 * pieceMargin, glm::ivec3(1));
+  const auto next = [&](int at, int axis) {
+    return at + static_cast<int>(largest[axis]) < all.hi[axis] ? at + stride[axis] : all.hi[axis];
+  };
+  for (int z = all.lo.z; z < all.hi.z; z = next(z, 2)) {
+    for (int y = all.lo.y; y < all.hi.y; y = next(y, 1)) {
+      for (int x = all.lo.x; x < all.hi.x; x = next(x, 0)) {
         const glm::ivec3 first{x, y, z};
         const glm::uvec3 dims = glm::min(largest, glm::uvec3(all.hi - first));
         pieces.push_back({&block, first, dims, format, values, 0, {}});

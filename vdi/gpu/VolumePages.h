@@ -38,8 +38,12 @@ struct VolumePiece {
   bool samePlaceAs(const VolumePiece& other) const { return dims == other.dims && format == other.format; }
 };
 
-/// Pieces of the block, extra layers included, that fit a page each. They overlap by one value, so that each
-/// interpolates by itself.
+/// Values of a piece beyond the samples that it serves, where the block was cut: samples look half a voxel
+/// beyond the face.
+constexpr int pieceMargin = 1;
+
+/// Pieces of the block, extra layers included, that fit a page each. They overlap, so that each interpolates
+/// by itself.
 std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block);
 
 struct PageShape {

@@ -169,9 +169,10 @@ void VolumeStore::layBricks(Step& step, std::span<const PieceRange> piecesOf, co
         // An owned box may reach beyond the outermost values (cells do); only inner cuts bound a piece.
         double lo = block.owned.lo[axis];
         double hi = block.owned.hi[axis];
-        if (piece.first[axis] > block.extended().lo[axis]) lo = std::max(lo, pieceOrigin[axis]);
+        if (piece.first[axis] > block.extended().lo[axis])
+          lo = std::max(lo, pieceOrigin[axis] + pieceMargin * block.spacing[axis]);
         if (piece.box().hi[axis] < block.extended().hi[axis])
-          hi = std::min(hi, pieceOrigin[axis] + (piece.dims[axis] - 1) * block.spacing[axis]);
+          hi = std::min(hi, pieceOrigin[axis] + (piece.dims[axis] - 1.0 - pieceMargin) * block.spacing[axis]);
         brick.lo[axis] = snapToScene(scene, lo, axis);
         brick.hi[axis] = snapToScene(scene, hi, axis);
         const double scale = 1.0 / (block.spacing[axis] * extent[axis]);

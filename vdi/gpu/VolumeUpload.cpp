@@ -88,23 +88,24 @@ void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
   constexpr std::size_t atOnce = 1 << 20;  // bytes
   const auto rows = static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
   const std::size_t rowBytes = static_cast<std::size_t>(size.x) * bytes;
-  inParallel(rows, atOnce / rowBytes + 1, [&](std::size_t firstRow, std::size_t lastRow) {
-    const auto rowOf = [&](int y, int z) {
-      return static_cast<std::size_t>(z - box.lo.z) * static_cast<std::size_t>(size.y) +
-             static_cast<std::size_t>(y - box.lo.y);
-    };
-    for (const Source& source : sources) {
-      const IndexBox part = source.box.intersection(box);
-      for (int z = part.lo.z; z < part.hi.z; ++z) {
-        for (int y = part.lo.y; y < part.hi.y; ++y) {
-          if (rowOf(y, z) < firstRow || rowOf(y, z) >= lastRow) continue;
-          writeRow(block.type, source.values, piece.format, piece.values,
-                   source.box.position({part.lo.x, y, z}), static_cast<std::size_t>(part.size().x),
-                   to + box.position({part.lo.x, y, z}) * bytes);
-        }
-      }
-    }
-  });
+  inParallel(rows, atOnce / std::max<std::size_t>(rowBytes, 1) + 1,
+             [&](std::size_t firstRow, std::size_t lastRow) {
+               const auto rowOf = [&](int y, int z) {
+                 return static_cast<std::size_t>(z - box.lo.z) * static_cast<std::size_t>(size.y) +
+                        static_cast<std::size_t>(y - box.lo.y);
+               };
+               for (const Source& source : sources) {
+                 const IndexBox part = source.box.intersection(box);
+                 for (int z = part.lo.z; z < part.hi.z; ++z) {
+                   for (int y = part.lo.y; y < part.hi.y; ++y) {
+                     if (rowOf(y, z) < firstRow || rowOf(y, z) >= lastRow) continue;
+                     writeRow(block.type, source.values, piece.format, piece.values,
+                              source.box.position({part.lo.x, y, z}), static_cast<std::size_t>(part.size().x),
+                              to + box.position({part.lo.x, y, z}) * bytes);
+                   }
+                 }
+               }
+             });
 }
 
 /// Whether the block's values are texels of the piece's format as they are.
