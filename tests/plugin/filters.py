@@ -7,7 +7,7 @@ import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonCore import vtkCommand, vtkOutputWindow  # noqa: E402
+from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
 from vtkmodules.vtkRenderingCore import vtkCamera  # noqa: E402
 
 POSITION, FOCAL_POINT = [60, 45, 75], [0, 0, 0]
