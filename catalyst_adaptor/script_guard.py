@@ -92,6 +92,7 @@ def install(leave):
     other_hook = sys.excepthook
     folders = {}  # of extracts, by module
     loading = {}
+
     def hook(kind, error, trace):
         if kind is not ScriptFailed:
             other_hook(kind, error, trace)

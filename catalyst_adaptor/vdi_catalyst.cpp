@@ -30,6 +30,7 @@
 #include <vector>
 
 #include "catalyst_adaptor/Engine.h"
+#include "catalyst_adaptor/ScriptEnvironment.h"
 
 struct vdi_catalyst {
   MPI_Comm comm = MPI_COMM_NULL;  // a duplicate
@@ -133,17 +134,6 @@ int guarded(vdi_catalyst& self, int code, Work work, std::optional<std::int64_t>
 
 void demand(bool good, const char* what) {
   if (!good) throw std::invalid_argument(what);
-}
-
-/// MPI_COMM_NULL if MPI isn't running or the handle is none.
-MPI_Comm communicatorOf(int32_t fortranHandle) {
-  int running = 0;
-  int over = 0;
-  MPI_Initialized(&running);
-  MPI_Finalized(&over);
-  if (running == 0 || over != 0) return MPI_COMM_NULL;
-  const MPI_Comm comm = MPI_Comm_f2c(fortranHandle);
-  return comm != nullptr ? comm : MPI_COMM_NULL;  // OpenMPI's answer to a wrong handle
 }
 
 void demandEqual(MPI_Comm comm, std::int64_t value, const char* what) {
@@ -256,15 +246,10 @@ int vtkTypeOf(int type) {
 
 int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
                             vdi_catalyst** catalyst) {
-  if (catalyst == nullptr) return VDI_CATALYST_BAD_ARGUMENT;
-  *catalyst = nullptr;
-  const MPI_Comm comm = communicatorOf(fortran_communicator);
-  if (comm == MPI_COMM_NULL) {
-    std::fprintf(stderr, "vdi_catalyst: there is no MPI, or no communicator has this Fortran handle\n");
-    return VDI_CATALYST_BAD_ARGUMENT;
-  }
+  // Loader.c has seen to it that MPI runs, that the handle is a communicator's and that *catalyst is null.
   auto self = std::make_unique<vdi_catalyst>();
-  if (MPI_Comm_dup(comm, &self->comm) != MPI_SUCCESS) return VDI_CATALYST_BAD_ARGUMENT;
+  if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
+    return VDI_CATALYST_BAD_ARGUMENT;
   MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
   std::vector<std::string> paths;
   int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
@@ -277,6 +262,12 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
       demandEqual(self->comm, script_count, "the ranks give different numbers of scripts");
+    });
+  }
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(*self, VDI_CATALYST_ENGINE, [] {
+      vdi::catalyst::providePlugin();
+      vdi::catalyst::sharePython();
     });
   }
   if (code == VDI_CATALYST_OK) {

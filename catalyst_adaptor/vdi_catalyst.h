@@ -48,7 +48,7 @@ enum {
   VDI_CATALYST_OK = 0,
   VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or beyond counting,
                                     an unknown type, arrays before blocks, a step that's no int */
-  VDI_CATALYST_ENGINE = 2, /* ParaView's engine can't be started, or was started before in this process */
+  VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process */
   VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
 };
 
@@ -89,11 +89,12 @@ typedef struct vdi_catalyst_block {
 
 typedef struct vdi_catalyst vdi_catalyst;
 
-/* Starts the engine on a duplicate of the communicator (its Fortran handle) and adds the scripts, the same on
- * all ranks; they are loaded at the first step. A script that is missing or isn't Python, and a plugin that's
- * missing where it loads one (LoadPlugin at its top level), are VDI_CATALYST_SCRIPT here. Once a process,
- * also where it failed. On failure *catalyst is null, and the other functions, given null, do nothing but
- * return VDI_CATALYST_BAD_ARGUMENT. */
+/* Loads ParaView, sets the environment variable VDI_PLUGIN to our plugin unless it is set, starts the engine
+ * on a duplicate of the communicator (its Fortran handle) and adds the scripts, the same on all ranks; they
+ * are loaded at the first step. A script that is missing or isn't Python, and a plugin that's missing where
+ * it loads one (LoadPlugin at its top level), are VDI_CATALYST_SCRIPT here. Once a process, also where it
+ * failed. On failure *catalyst is null, and the other functions, given null, do nothing but return
+ * VDI_CATALYST_BAD_ARGUMENT. */
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 

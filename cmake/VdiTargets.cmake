@@ -3,7 +3,7 @@
 # Warnings and sanitizers for one target of ours.
 function(vdi_target_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra)
-  target_include_directories(${target} PUBLIC "${CMAKE_SOURCE_DIR}")
+  target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}>")
   if(VDI_SANITIZE)
     target_compile_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE} -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE})
@@ -20,36 +20,46 @@ function(vdi_add_library name)
   vdi_target_options(vdi_${name})
 endfunction()
 
+# The environment that every test needs: mpirun as root in a container, no interference between ranks on few cores.
+set(VDI_TEST_ENVIRONMENT OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
+                         OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_vader_single_copy_mechanism=none)
+
 # vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 1 2 3] [TIMEOUT seconds] [LABELS ...]): program test_<name> with
-# Catch2's main (or tests/MpiMain.cpp when RANKS is given) and one ctest per rank count. Every test has a time limit.
+# Catch2's main (or tests/MpiMain.cpp when RANKS is given), and a ctest for each of its cases and rank counts. Every case has
+# a time limit.
 function(vdi_add_catch_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;LABELS;ENVIRONMENT")
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
-  if(arg_RANKS)
-    set(main vdi_test_mpi_main)
-  else()
-    set(main vdi_test_main)
-  endif()
   add_executable(test_${name} ${arg_SOURCES})
-  target_link_libraries(test_${name} PRIVATE ${main} ${arg_LINK})
-  vdi_target_options(test_${name})
   if(arg_RANKS)
-    target_link_libraries(test_${name} PRIVATE MPI::MPI_CXX)
-    foreach(ranks IN LISTS arg_RANKS)
-      set(test ${name}_np${ranks})
-      add_test(NAME ${test} COMMAND ${MPIEXEC_EXECUTABLE} --oversubscribe ${MPIEXEC_NUMPROC_FLAG} ${ranks}
-                                    $<TARGET_FILE:test_${name}>)
-      vdi_test_properties(${test} TIMEOUT ${arg_TIMEOUT} LABELS ${arg_LABELS} ENVIRONMENT ${arg_ENVIRONMENT})
-    endforeach()
+    target_link_libraries(test_${name} PRIVATE vdi_test_mpi_main MPI::MPI_CXX ${arg_LINK})
   else()
-    add_test(NAME ${name} COMMAND test_${name})
-    vdi_test_properties(${name} TIMEOUT ${arg_TIMEOUT} LABELS ${arg_LABELS} ENVIRONMENT ${arg_ENVIRONMENT})
+    target_link_libraries(test_${name} PRIVATE vdi_test_main ${arg_LINK})
   endif()
+  vdi_target_options(test_${name})
+  set(tests "${CMAKE_CURRENT_BINARY_DIR}/${name}_tests.cmake")
+  add_custom_command(
+    TARGET test_${name}
+    POST_BUILD
+    COMMAND
+      ${CMAKE_COMMAND} -D "NAME=${name}" -D "PROGRAM=$<TARGET_FILE:test_${name}>" -D "RANKS=${arg_RANKS}" -D
+      "LAUNCHER=${MPIEXEC_EXECUTABLE};--oversubscribe;${MPIEXEC_NUMPROC_FLAG}" -D "TIMEOUT=${arg_TIMEOUT}" -D
+      "LABELS=${arg_LABELS}" -D "ENVIRONMENT=${VDI_TEST_ENVIRONMENT};${arg_ENVIRONMENT}" -D "OUTPUT=${tests}" -P
+      "${CMAKE_SOURCE_DIR}/cmake/DiscoverTests.cmake"
+    BYPRODUCTS "${tests}"
+    VERBATIM)
+  # Until it's built there is a test that fails.
+  file(CONFIGURE OUTPUT ${name}_include.cmake CONTENT "if(EXISTS \"${tests}\")
+  include(\"${tests}\")
+else()
+  add_test(${name}_not_built ${name}_not_built)
+endif()
+" @ONLY)
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${CMAKE_CURRENT_BINARY_DIR}/${name}_include.cmake")
 endfunction()
 
-# The environment that every test needs: mpirun as root in a container, no interference between ranks on few cores.
 # vdi_virtual_screen(<variable>): a command prefix that gives what follows an X server. Each has a number of its own to start
 # from: a server that is still ending takes the next one's socket away if that has the same number. And none starts anew when
 # its last client has left (-noreset): another rank that comes just then would find no server.
@@ -62,12 +72,10 @@ function(vdi_virtual_screen variable)
   set(${variable} "${XVFB_RUN}" -a -n ${number} -s "-screen 0 1280x1024x24 -noreset" PARENT_SCOPE)
 endfunction()
 
+# vdi_test_properties(<test> TIMEOUT seconds [LABELS ...] [ENVIRONMENT ...]): those, and the environment that every test needs.
 function(vdi_test_properties test)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "LABELS;ENVIRONMENT")
   set_tests_properties(
-    ${test}
-    PROPERTIES
-      TIMEOUT "${arg_TIMEOUT}" LABELS "${arg_LABELS}" ENVIRONMENT
-      "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1;OMPI_MCA_btl_vader_single_copy_mechanism=none;${arg_ENVIRONMENT}"
-  )
+    ${test} PROPERTIES TIMEOUT "${arg_TIMEOUT}" LABELS "${arg_LABELS}" ENVIRONMENT
+                       "${VDI_TEST_ENVIRONMENT};${arg_ENVIRONMENT}")
 endfunction()

@@ -1,7 +1,7 @@
 """Catalyst script of the demo: at each step a VDI of V, its picture from where it was made and from 5, 20 and 50 degrees
 beside it, each next to plain volume rendering from the same viewpoint, and how alike they are (SSIM).
 
-Environment: VDI_PLUGIN (VolumetricDepthImages.so), VDI_OUTPUT (folder), VDI_WIDTH and VDI_HEIGHT (of the pictures)."""
+Environment: VDI_PLUGIN (the plugin; the adaptor sets it), VDI_OUTPUT (folder), VDI_WIDTH and VDI_HEIGHT (of the pictures)."""
 
 import os
 

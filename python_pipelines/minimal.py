@@ -1,7 +1,7 @@
 """The shortest Catalyst script: a Volumetric Depth Image of the array V at every step, as files vdi_000100.vdi, ..., each with
 its step's number and time inside.
 
-VDI_PLUGIN names VolumetricDepthImages.so. Copy this file and change array, camera and colours."""
+VDI_PLUGIN names the plugin; the adaptor sets it. Copy this file and change array, camera and colours."""
 
 import os
 

@@ -85,6 +85,9 @@ static int bad_steps(int rank, vdi_catalyst* catalyst) {
     wrong += expect(rank, "a step that is no int", VDI_CATALYST_BAD_ARGUMENT,
                     vdi_catalyst_execute(catalyst, steps[i], 0.0));
   }
+  int size = 0;
+  MPI_Comm_size(MPI_COMM_WORLD, &size);
+  if (size == 1) return wrong;
   return wrong + expect(rank, "a step that the ranks don't share", VDI_CATALYST_BAD_ARGUMENT,
                         vdi_catalyst_execute(catalyst, rank == 0 ? 8 : 9, 0.0));
 }

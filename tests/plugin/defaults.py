@@ -7,7 +7,7 @@ import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow  # noqa: E402
+from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
 from vtkmodules.vtkRenderingCore import vtkRenderer  # noqa: E402
 
 SIZE = [64, 48]
@@ -112,7 +112,8 @@ check(not texts, "a viewpoint near the VDI's own gets none")
 
 # Arrays that aren't there, or not there.
 for association, name, words in (
-        ("CELLS", "ball", ["no array 'ball' of cells", "['POINTS', 'ball']", "'velocity' (3 components)", "of cells: 'layers'"]),
+        ("CELLS", "ball",
+         ["no array 'ball' of cells", "['POINTS', 'ball']", "'velocity' (3 components)", "of cells: 'layers'"]),
         ("POINTS", "layers", ["no array 'layers' of points", "['CELLS', 'layers']", "'ball'"]),
         ("POINTS", "bell", ["no array 'bell' of points", "'ball'", "of cells: 'layers'"])):
     wrong = filter_of(source, association, name)
@@ -121,6 +122,7 @@ for association, name, words in (
         missing = [word for word in words if word not in text]
         check(not missing, "%s of %s: the %s error says what there is %s" % (name, association, attempt, missing))
 check(not errors_of(filter_of(source, "CELLS", "layers")), "cells where there are cells are fine")
+
 
 # Colour maps: the default keeps its first range, whoever updates; set points stay.
 def range_of(name):

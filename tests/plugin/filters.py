@@ -7,7 +7,7 @@ import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonCore import vtkCommand, vtkOutputWindow  # noqa: E402
+from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
 from vtkmodules.vtkRenderingCore import vtkCamera  # noqa: E402
 
 POSITION, FOCAL_POINT = [60, 45, 75], [0, 0, 0]
@@ -116,6 +116,7 @@ simple.SaveData(second, proxy=vdi_of(wavelet, Supersegments=3))
 series = simple.VDIReader(FileNames=[os.path.join(OUTPUT, "series_0.vdi"), second])
 series.UpdatePipelineInformation()
 check(len(series.TimestepValues) == 2, "a series of files is a series of time steps")
+
 
 # Values are uploaded when they're new, and only then.
 def upload_seconds(proxy):

@@ -1,5 +1,5 @@
-"""Runs inside the real ParaView (--script, which sets no __file__): uses the plugin as a person would, then leaves the file gui.done with "ok" or what
-went wrong. tests/plugin/gui.sh takes the picture of the window and ends the program."""
+"""Runs inside the real ParaView (--script, which sets no __file__): uses the plugin as a person would, then leaves the file
+gui.done with "ok" or what went wrong. tests/plugin/gui.sh takes the picture of the window and ends the program."""
 
 import os
 import sys

@@ -66,7 +66,9 @@ def blocks_source(deal, count=4, cells=8, kind="float32", as_cells=False):
 
 def set_colors(name, low, high, peak=0.8):
     """A three-hue colour map with a ramp of opacity, for both ParaView's volume rendering and ours."""
-    at = lambda share: low + share * (high - low)
+    def at(share):
+        return low + share * (high - low)
+
     colors = simple.GetColorTransferFunction(name)
     colors.ColorSpace = "RGB"
     colors.RGBPoints = [at(0), 0.1, 0.2, 0.9, at(0.5), 0.9, 0.9, 0.2, at(1), 0.9, 0.1, 0.1]

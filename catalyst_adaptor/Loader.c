@@ -1,0 +1,118 @@
+/* libvdi_catalyst.so: what a simulation links. It is small, and loads the engine with ParaView when it is
+ * initialised, so that a simulation that doesn't use it doesn't pay for ParaView. */
+#include <dlfcn.h>
+#include <fenv.h>
+#include <mpi.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "catalyst_adaptor/EngineFunctions.h"
+
+enum { MESSAGE_SIZE = 4096, PATH_SIZE = 2048 };
+
+/* Null until the engine is loaded. Like the loaded library itself, there is one a process. */
+static const vdi_catalyst_functions* engine;
+
+/* The engine lies in a folder beside this library. 0 if this library's own place is unknown or too long. */
+static int engine_path(char path[PATH_SIZE]) {
+  Dl_info self;
+  if (dladdr((const void*)&engine, &self) == 0 || self.dli_fname == NULL) return 0;
+  const char* slash = strrchr(self.dli_fname, '/');
+  const int folder = slash != NULL ? (int)(slash - self.dli_fname) : 1;
+  const int length = snprintf(path, PATH_SIZE, "%.*s/" VDI_CATALYST_ENGINE_FILE, folder,
+                              slash != NULL ? self.dli_fname : ".");
+  return length < PATH_SIZE;
+}
+
+/* Loads the engine, unless it is. Returns 0, or 1 with what went wrong in `message`. */
+static int load_engine(char message[MESSAGE_SIZE]) {
+  if (engine != NULL) return 0;
+  char path[PATH_SIZE];
+  if (!engine_path(path)) {
+    snprintf(message, MESSAGE_SIZE, "the engine can't be found: the path of libvdi_catalyst.so is unknown");
+    return 1;
+  }
+  /* Simulations may trap floating-point exceptions, which are ordinary in libraries' initialisers. */
+  fenv_t traps;
+  feholdexcept(&traps);
+  /* Local: ParaView's symbols and those of the many libraries below it don't mix with the simulation's. */
+  void* library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+  engine = library != NULL ? dlsym(library, VDI_CATALYST_ENGINE_SYMBOL) : NULL;
+  const char* reason = engine == NULL ? dlerror() : NULL;
+  fesetenv(&traps);
+  if (engine != NULL) return 0;
+  snprintf(
+      message, MESSAGE_SIZE,
+      "the engine %s can't be loaded: %s; it needs ParaView 5.11 with Python on every node (Debian 12: "
+      "python3-paraview), its libraries on the loader's path (LD_LIBRARY_PATH), and libvdi_catalyst.so of "
+      "the same version of pv-vdi",
+      path, reason != NULL ? reason : "no reason is known");
+  return 1;
+}
+
+/* MPI_COMM_NULL if MPI isn't running or the handle is none. */
+static MPI_Comm communicator_of(int32_t fortran_handle) {
+  int running = 0;
+  int over = 0;
+  MPI_Initialized(&running);
+  MPI_Finalized(&over);
+  if (!running || over) return MPI_COMM_NULL;
+  const MPI_Comm comm = MPI_Comm_f2c(fortran_handle);
+  return comm != NULL ? comm : MPI_COMM_NULL; /* OpenMPI's answer to a wrong handle */
+}
+
+/* Whether a rank failed. Rank 0 prints the message of the lowest one that did. */
+static int failed_anywhere(MPI_Comm comm, int failed, char message[MESSAGE_SIZE]) {
+  int rank = 0;
+  int size = 0;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &size);
+  int speaker = failed ? rank : size;
+  MPI_Allreduce(MPI_IN_PLACE, &speaker, 1, MPI_INT, MPI_MIN, comm);
+  if (speaker == size) return 0;
+  MPI_Bcast(message, MESSAGE_SIZE, MPI_CHAR, speaker, comm);
+  if (rank == 0) fprintf(stderr, "vdi_catalyst: rank %d: %s\n", speaker, message);
+  return 1;
+}
+
+int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
+                            vdi_catalyst** catalyst) {
+  if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
+  *catalyst = NULL;
+  const MPI_Comm comm = communicator_of(fortran_communicator);
+  if (comm == MPI_COMM_NULL) {
+    fprintf(stderr, "vdi_catalyst: there is no MPI, or no communicator has this Fortran handle\n");
+    return VDI_CATALYST_BAD_ARGUMENT;
+  }
+  char message[MESSAGE_SIZE] = "";
+  const int failed = load_engine(message);
+  if (failed_anywhere(comm, failed, message) || engine == NULL) return VDI_CATALYST_ENGINE;
+  return engine->initialize(fortran_communicator, script_count, scripts, catalyst);
+}
+
+/* Without an engine there are no handles either. */
+static int usable(const vdi_catalyst* catalyst) {
+  return engine != NULL && catalyst != NULL;
+}
+
+int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
+  return usable(catalyst) ? engine->set_blocks(catalyst, count, blocks) : VDI_CATALYST_BAD_ARGUMENT;
+}
+
+int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
+                           const void* const* data) {
+  return usable(catalyst) ? engine->set_array(catalyst, name, type, association, data)
+                          : VDI_CATALYST_BAD_ARGUMENT;
+}
+
+int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
+  return usable(catalyst) ? engine->execute(catalyst, step, time) : VDI_CATALYST_BAD_ARGUMENT;
+}
+
+int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
+  return usable(catalyst) ? engine->finalize(catalyst) : VDI_CATALYST_BAD_ARGUMENT;
+}
+
+const char* vdi_catalyst_error(const vdi_catalyst* catalyst) {
+  return usable(catalyst) ? engine->error(catalyst) : "";
+}

@@ -1,0 +1,45 @@
+#include <Python.h>  // first, as it asks
+
+#include "catalyst_adaptor/ScriptEnvironment.h"
+
+#include <dlfcn.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+namespace vdi::catalyst {
+
+namespace {
+
+/// The library or program that holds this function; empty if unknown.
+template <typename Function>
+std::filesystem::path fileOf(Function* function) {
+  Dl_info file;
+  if (dladdr(reinterpret_cast<const void*>(function), &file) == 0 || file.dli_fname == nullptr) return {};
+  return std::filesystem::absolute(file.dli_fname);
+}
+
+}  // namespace
+
+void providePlugin() {
+  if (const char* given = std::getenv("VDI_PLUGIN"); given != nullptr && *given != '\0') return;
+  // This library lies in a folder of its own beside libvdi_catalyst.so, and plugins lie beside that one.
+  const auto plugin = fileOf(&providePlugin).parent_path().parent_path() / VDI_PLUGIN_FILE;
+  std::error_code unreadable;
+  if (!std::filesystem::exists(plugin, unreadable)) {
+    throw std::runtime_error("there is no ParaView plugin at " + plugin.string() +
+                             "; install pv-vdi whole, or set VDI_PLUGIN to the path of its "
+                             "VolumetricDepthImages.so");
+  }
+  setenv("VDI_PLUGIN", plugin.c_str(), 1);
+}
+
+void sharePython() {
+  // A program that is a Python itself can't be opened again, and needs not be.
+  dlopen(fileOf(&Py_IsInitialized).c_str(), RTLD_NOW | RTLD_NOLOAD | RTLD_GLOBAL);
+}
+
+}  // namespace vdi::catalyst

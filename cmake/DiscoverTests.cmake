@@ -1,0 +1,37 @@
+# Writes OUTPUT, a file for ctest with a test for each case of the Catch2 program PROGRAM: "NAME: case", or, where there are
+# RANKS, "NAME_np3: case" for each number of them, started by LAUNCHER (mpiexec ... -n). Each gets TIMEOUT, LABELS and
+# ENVIRONMENT. Catch2's own catch_discover_tests knows neither several launchers nor lists as properties.
+execute_process(
+  COMMAND ${CMAKE_COMMAND} -E env ASAN_OPTIONS=detect_leaks=0 "${PROGRAM}" --list-test-names-only
+  OUTPUT_VARIABLE cases
+  OUTPUT_STRIP_TRAILING_WHITESPACE)
+if(NOT cases)
+  message(FATAL_ERROR "${PROGRAM} lists no tests")
+endif()
+set(semicolon "<semicolon>") # in a name; else it separates names
+string(REPLACE ";" "${semicolon}" cases "${cases}")
+string(REPLACE "\n" ";" cases "${cases}")
+
+set(tests "")
+# add(<test> <arguments of add_test, written as in the file>)
+function(add test command)
+  set(tests
+      "${tests}add_test(${test} ${command})
+set_tests_properties(${test} PROPERTIES TIMEOUT ${TIMEOUT} LABELS [==[${LABELS}]==] ENVIRONMENT [==[${ENVIRONMENT}]==])\n"
+      PARENT_SCOPE)
+endfunction()
+
+foreach(case IN LISTS cases)
+  string(REPLACE "${semicolon}" ";" case "${case}")
+  # What Catch2's command line would take for more than a name.
+  string(REGEX REPLACE "([][,\\])" "\\\\\\1" pattern "${case}")
+  set(command "[==[${PROGRAM}]==] [==[${pattern}]==] --warn NoTests") # or no match would pass
+  foreach(ranks IN LISTS RANKS)
+    list(JOIN LAUNCHER " " launcher)
+    add("[==[${NAME}_np${ranks}: ${case}]==]" "${launcher} ${ranks} ${command}")
+  endforeach()
+  if(NOT RANKS)
+    add("[==[${NAME}: ${case}]==]" "${command}")
+  endif()
+endforeach()
+file(WRITE "${OUTPUT}" "${tests}")

@@ -1,0 +1,63 @@
+# What `cmake --install` puts where, and the packages that CMake and pkg-config find there.
+include(CMakePackageConfigHelpers)
+
+set(headerDir "${CMAKE_INSTALL_INCLUDEDIR}/pv-vdi")
+set(dataDir "${CMAKE_INSTALL_DATADIR}/pv-vdi")
+set(cmakeDir "${CMAKE_INSTALL_LIBDIR}/cmake/pv-vdi")
+set(pkgConfigDir "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+
+# vdi_install_pkg_config(<name>): from cmake/<name>.pc.in; the prefix is found from where the file lies.
+function(vdi_install_pkg_config name)
+  file(RELATIVE_PATH toPrefix "/prefix/${pkgConfigDir}" /prefix)
+  string(REGEX REPLACE "/$" "" toPrefix "${toPrefix}")
+  configure_file("${CMAKE_SOURCE_DIR}/cmake/${name}.pc.in" "${CMAKE_BINARY_DIR}/${name}.pc" @ONLY)
+  install(FILES "${CMAKE_BINARY_DIR}/${name}.pc" DESTINATION "${pkgConfigDir}")
+endfunction()
+
+# The library without VTK, with the headers that its facade vdi/pipeline/Pipeline.h includes and those of its files.
+install(
+  TARGETS vdi
+  EXPORT pv-vdi-vdi-targets
+  INCLUDES DESTINATION "${headerDir}")
+install(
+  DIRECTORY vdi/core vdi/io
+  DESTINATION "${headerDir}/vdi"
+  FILES_MATCHING PATTERN "*.h"
+  PATTERN ListCodec.h EXCLUDE)
+install(FILES vdi/comm/Communicator.h DESTINATION "${headerDir}/vdi/comm")
+install(FILES vdi/gpu/Device.h DESTINATION "${headerDir}/vdi/gpu")
+install(FILES vdi/pipeline/Pipeline.h DESTINATION "${headerDir}/vdi/pipeline")
+install(EXPORT pv-vdi-vdi-targets NAMESPACE pv-vdi:: DESTINATION "${cmakeDir}")
+vdi_install_pkg_config(pv-vdi)
+
+install(TARGETS vdi_tool)
+
+if(VDI_BUILD_PARAVIEW)
+  install(
+    TARGETS vdi_catalyst
+    EXPORT pv-vdi-catalyst-targets
+    INCLUDES DESTINATION "${headerDir}")
+  install(TARGETS vdi_catalyst_engine DESTINATION "${CMAKE_INSTALL_LIBDIR}/pv-vdi")
+  install(FILES catalyst_adaptor/vdi_catalyst.h catalyst_adaptor/vdi_catalyst.f90 DESTINATION "${headerDir}")
+  install(EXPORT pv-vdi-catalyst-targets NAMESPACE pv-vdi:: DESTINATION "${cmakeDir}")
+  vdi_install_pkg_config(pv-vdi-catalyst)
+  install(DIRECTORY python_pipelines DESTINATION "${dataDir}" FILES_MATCHING PATTERN "*.py")
+  set(pluginDir "${CMAKE_INSTALL_LIBDIR}/${PARAVIEW_PLUGIN_SUBDIR}")
+  install(TARGETS VolumetricDepthImages DESTINATION "${pluginDir}/VolumetricDepthImages")
+  install(FILES "${CMAKE_BINARY_DIR}/lib/${PARAVIEW_PLUGIN_SUBDIR}/pv-vdi.plugins.xml" DESTINATION "${pluginDir}")
+  # The file from which a ParaView in the same bin/ learns what plugins there are, one list of plugins a line.
+  file(RELATIVE_PATH pluginList "/prefix/${CMAKE_INSTALL_BINDIR}"
+       "/prefix/${pluginDir}/pv-vdi.plugins.xml")
+  file(CONFIGURE OUTPUT paraview.conf CONTENT "@pluginList@\n" @ONLY)
+  install(FILES "${CMAKE_CURRENT_BINARY_DIR}/paraview.conf" DESTINATION "${CMAKE_INSTALL_BINDIR}")
+endif()
+
+configure_package_config_file(cmake/pv-vdi-config.cmake.in pv-vdi-config.cmake INSTALL_DESTINATION "${cmakeDir}"
+                              PATH_VARS headerDir)
+write_basic_package_version_file(pv-vdi-config-version.cmake COMPATIBILITY SameMinorVersion)
+install(FILES "${CMAKE_BINARY_DIR}/pv-vdi-config.cmake" "${CMAKE_BINARY_DIR}/pv-vdi-config-version.cmake"
+        DESTINATION "${cmakeDir}")
+
+install(FILES README.md CHANGELOG.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" RENAME copyright)
+install(DIRECTORY docs DESTINATION "${CMAKE_INSTALL_DOCDIR}")
