@@ -1,4 +1,4 @@
-// The table of slabs: what the part of a ray that a sample stands for shows (core/TransferFunction.h, shaders/slab.glsl).
+// The table of slabs: what the part of a ray that a sample stands for shows (core/SlabTable.h, shaders/slab.glsl).
 #ifndef VDI_SHARED_SLAB_H
 #define VDI_SHARED_SLAB_H
 #include "interop.h"
