@@ -13,8 +13,10 @@
  * All functions are collective over the communicator. None ends the process: they return VDI_CATALYST_OK or a
  * code below, the same one on all ranks, and rank 0 prints a message to standard error. What repeats is
  * printed in full once; a step that fails is told each time, then in one line, for its files are missing.
- * After an error the next step works again, and blocks and arrays are those of before. Nothing is copied on
- * the host: pointers must stay valid, and their data unchanged, until vdi_catalyst_execute returns.
+ * After an error the next step works again, and blocks and arrays are those of before. Values are
+ * used where they are: pointers must stay valid, and their data unchanged, until vdi_catalyst_execute
+ * returns. The host holds copies of the layers beside blocks only, and of whole blocks where the scalar
+ * types of blocks differ.
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData a block, under the name "grid":

@@ -23,10 +23,10 @@ CellsPass::CellsPass(std::shared_ptr<Device> device)
     : sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
 
 void CellsPass::record(Commands& commands, const shared::CellsConstants& constants,
-                       std::span<const Image3D> pages, std::uint64_t pagesVersion) {
+                       std::span<const SampledImage> pages, std::uint64_t pagesVersion) {
   ComputePipeline& pipeline = pipelines_.with({static_cast<std::uint32_t>(pages.size())});
   if (boundVersion_ != pagesVersion) {
-    std::array<const Image3D*, shared::castMaxPages> images{};
+    std::array<const SampledImage*, shared::castMaxPages> images{};
     for (std::size_t i = 0; i < images.size(); ++i) images[i] = &pages[std::min(i, pages.size() - 1)];
     pipeline.bindImages(images, sampler_);
     boundVersion_ = pagesVersion;

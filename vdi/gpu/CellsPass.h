@@ -17,8 +17,8 @@ class CellsPass {
   explicit CellsPass(std::shared_ptr<Device> device);
   /// One of the cellsMode's. `pages`: at least one, which the pieces lie in; `pagesVersion` changes when they
   /// do.
-  void record(Commands& commands, const shared::CellsConstants& constants, std::span<const Image3D> pages,
-              std::uint64_t pagesVersion);
+  void record(Commands& commands, const shared::CellsConstants& constants,
+              std::span<const SampledImage> pages, std::uint64_t pagesVersion);
 
  private:
   Sampler sampler_;

@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint32_t maxMarks = 64;
 
 /// Waits for everything before; everything after waits for it.
-void changeLayout(VkCommandBuffer commands, const Image3D& image, VkImageLayout from, VkImageLayout to) {
+void changeLayout(VkCommandBuffer commands, const SampledImage& image, VkImageLayout from, VkImageLayout to) {
   const VkImageMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
                                       nullptr,
                                       VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT,
@@ -177,7 +177,7 @@ void Commands::update(const Buffer& buffer, std::span<const std::byte> bytes) {
   vkCmdUpdateBuffer(buffer_, buffer.handle(), 0, bytes.size(), bytes.data());
 }
 
-void Commands::clear(const Image3D& image) {
+void Commands::clear(const SampledImage& image) {
   changeLayout(buffer_, image, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   const VkClearColorValue zero{};
   const VkImageSubresourceRange all{VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
@@ -185,17 +185,17 @@ void Commands::clear(const Image3D& image) {
   endUpload(image);
 }
 
-void Commands::beginUpload(const Image3D& image) {
+void Commands::beginUpload(const SampledImage& image) {
   changeLayout(buffer_, image, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL,
                VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
 }
 
-void Commands::endUpload(const Image3D& image) {
+void Commands::endUpload(const SampledImage& image) {
   changeLayout(buffer_, image, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
                VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
 }
 
-void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to,
+void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const SampledImage& to,
                            const glm::uvec3& texelOffset, const glm::uvec3& texelExtent,
                            const glm::uvec2& pitch) {
   assert(glm::all(glm::lessThanEqual(texelOffset + texelExtent, to.extent())));

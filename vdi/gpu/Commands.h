@@ -16,7 +16,7 @@ namespace vdi::gpu {
 
 class Buffer;
 class ComputePipeline;
-class Image3D;
+class SampledImage;
 
 struct StageTime {
   std::string name;
@@ -95,14 +95,14 @@ class Commands {
   void update(const Buffer& buffer, std::span<const std::byte> bytes);
   /// Fills a new image with zeros and makes it ready to be sampled: texels that nothing is copied to would
   /// otherwise hold anything, NaN included, and a NaN spoils its neighbours even with weight 0.
-  void clear(const Image3D& image);
+  void clear(const SampledImage& image);
   /// From ready to be sampled to ready for copyToImage, with its texels as they are.
-  void beginUpload(const Image3D& image);
+  void beginUpload(const SampledImage& image);
   /// And back.
-  void endUpload(const Image3D& image);
+  void endUpload(const SampledImage& image);
   /// Texels, x fastest, from the buffer into a box of the image. `pitch`: texels from row to row and rows
   /// from slice to slice; 0: tightly packed.
-  void copyToImage(const Buffer& from, std::uint64_t fromOffset, const Image3D& to,
+  void copyToImage(const Buffer& from, std::uint64_t fromOffset, const SampledImage& to,
                    const glm::uvec3& texelOffset, const glm::uvec3& texelExtent,
                    const glm::uvec2& pitch = glm::uvec2(0));
 

@@ -116,21 +116,21 @@ void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
         "vkCreateComputePipelines");
 }
 
-void ComputePipeline::bindImages(std::span<const Image3D* const> images, const Sampler& sampler) {
+void ComputePipeline::bindImages(std::span<const SampledImage* const> images, const Sampler& sampler) {
   assert(images.size() == imageCount_);
   bind(imageBinding, images, sampler);
 }
 
-void ComputePipeline::bindPlane(const Image3D& image, const Sampler& sampler) {
+void ComputePipeline::bindPlane(const SampledImage& image, const Sampler& sampler) {
   assert(hasPlane_);
-  const Image3D* const images[] = {&image};
+  const SampledImage* const images[] = {&image};
   bind(planeBinding, images, sampler);
 }
 
-void ComputePipeline::bind(std::uint32_t binding, std::span<const Image3D* const> images,
+void ComputePipeline::bind(std::uint32_t binding, std::span<const SampledImage* const> images,
                            const Sampler& sampler) {
   std::vector<VkDescriptorImageInfo> infos;
-  for (const Image3D* image : images)
+  for (const SampledImage* image : images)
     infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
   const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
                                    nullptr,

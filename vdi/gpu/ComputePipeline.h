@@ -47,9 +47,9 @@ class ComputePipeline {
 
   /// Writes the descriptor set: exactly imageCount images. Must not be called while a dispatch of this
   /// pipeline is in flight.
-  void bindImages(std::span<const Image3D* const> images, const Sampler& sampler);
+  void bindImages(std::span<const SampledImage* const> images, const Sampler& sampler);
   /// Likewise, of the one 2-D image.
-  void bindPlane(const Image3D& image, const Sampler& sampler);
+  void bindPlane(const SampledImage& image, const Sampler& sampler);
   /// Likewise, a buffer of uniformBytes.
   void bindUniforms(const Buffer& buffer);
 
@@ -59,7 +59,7 @@ class ComputePipeline {
 
  private:
   void makeDescriptorSet();
-  void bind(std::uint32_t binding, std::span<const Image3D* const> images, const Sampler& sampler);
+  void bind(std::uint32_t binding, std::span<const SampledImage* const> images, const Sampler& sampler);
   void makePipeline(const ComputePipelineInfo& info);
   void release() noexcept;
 

@@ -222,15 +222,15 @@ void Buffer::release() noexcept {
   device_.reset();
 }
 
-Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format)
-    : Image3D(std::move(device), extent, format, VK_IMAGE_TYPE_3D, VK_IMAGE_VIEW_TYPE_3D) {}
+SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format)
+    : SampledImage(std::move(device), extent, format, VK_IMAGE_TYPE_3D, VK_IMAGE_VIEW_TYPE_3D) {}
 
-Image3D Image3D::plane(std::shared_ptr<Device> device, const glm::uvec2& extent, VkFormat format) {
+SampledImage SampledImage::plane(std::shared_ptr<Device> device, const glm::uvec2& extent, VkFormat format) {
   return {std::move(device), {extent, 1}, format, VK_IMAGE_TYPE_2D, VK_IMAGE_VIEW_TYPE_2D};
 }
 
-Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format, VkImageType type,
-                 VkImageViewType viewType)
+SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format,
+                           VkImageType type, VkImageViewType viewType)
     : device_(std::move(device)), extent_(extent), format_(format) {
   assert(glm::all(glm::greaterThan(extent, glm::uvec3(0))));
   const std::uint32_t longest = device_->limits().maxImageDimension3D;
@@ -282,15 +282,15 @@ Image3D::Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFor
   }
 }
 
-Image3D::~Image3D() {
+SampledImage::~SampledImage() {
   release();
 }
 
-Image3D::Image3D(Image3D&& other) noexcept {
+SampledImage::SampledImage(SampledImage&& other) noexcept {
   *this = std::move(other);
 }
 
-Image3D& Image3D::operator=(Image3D&& other) noexcept {
+SampledImage& SampledImage::operator=(SampledImage&& other) noexcept {
   if (this == &other) return *this;
   release();
   device_ = std::move(other.device_);
@@ -303,7 +303,7 @@ Image3D& Image3D::operator=(Image3D&& other) noexcept {
   return *this;
 }
 
-void Image3D::release() noexcept {
+void SampledImage::release() noexcept {
   if (!device_) return;
   if (view_ != VK_NULL_HANDLE) vkDestroyImageView(device_->handle(), view_, nullptr);
   if (image_ != VK_NULL_HANDLE) vkDestroyImage(device_->handle(), image_, nullptr);

@@ -20,7 +20,7 @@ enum class MemoryKind {
   Readback,     // host-visible, cached where there's such a type; coherent
 };
 
-/// Bytes of a texel of the formats that Image3D is made with: R8_UNORM, R16_UNORM, R32_SFLOAT,
+/// Bytes of a texel of the formats that SampledImage is made with: R8_UNORM, R16_UNORM, R32_SFLOAT,
 /// R16G16B16A16_SFLOAT; asserts one of
 /// them.
 std::uint64_t texelBytes(VkFormat format);
@@ -79,22 +79,22 @@ struct ImportedBuffer {
 std::optional<ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& device, const void* data,
                                                std::uint64_t bytes);
 
-/// A sampled 3-D image with one mip level, optimal tiling, and its view, for both kinds of queues. First
-/// Commands::clear, then filled between Commands::beginUpload and endUpload. Usage: sampled, transfer
-/// destination.
-class Image3D {
+/// A 3-D or 2-D image that shaders sample, with one mip level, optimal tiling, and its view, for both kinds
+/// of queues. First Commands::clear, then filled between Commands::beginUpload and endUpload. Usage: sampled,
+/// transfer destination.
+class SampledImage {
  public:
-  Image3D() = default;
-  /// Throws Error{OutOfMemory} as Buffer does, Error{InvalidArgument} for an extent beyond
+  SampledImage() = default;
+  /// A 3-D one. Throws Error{OutOfMemory} as Buffer does, Error{InvalidArgument} for an extent beyond
   /// maxImageDimension3D. No extent may be 0.
-  Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format);
-  /// A 2-D one. Same errors; its depth is 1.
-  static Image3D plane(std::shared_ptr<Device> device, const glm::uvec2& extent, VkFormat format);
-  ~Image3D();
-  Image3D(Image3D&& other) noexcept;
-  Image3D& operator=(Image3D&& other) noexcept;
-  Image3D(const Image3D&) = delete;
-  Image3D& operator=(const Image3D&) = delete;
+  SampledImage(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format);
+  /// A 2-D one, whose depth is 1. Throws Error{OutOfMemory}.
+  static SampledImage plane(std::shared_ptr<Device> device, const glm::uvec2& extent, VkFormat format);
+  ~SampledImage();
+  SampledImage(SampledImage&& other) noexcept;
+  SampledImage& operator=(SampledImage&& other) noexcept;
+  SampledImage(const SampledImage&) = delete;
+  SampledImage& operator=(const SampledImage&) = delete;
 
   explicit operator bool() const { return image_ != VK_NULL_HANDLE; }
   VkImage handle() const { return image_; }
@@ -103,8 +103,8 @@ class Image3D {
   VkFormat format() const { return format_; }
 
  private:
-  Image3D(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format, VkImageType type,
-          VkImageViewType viewType);
+  SampledImage(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format, VkImageType type,
+               VkImageViewType viewType);
   void release() noexcept;
   std::shared_ptr<Device> device_;
   VkImage image_ = VK_NULL_HANDLE;

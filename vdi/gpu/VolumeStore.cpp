@@ -149,7 +149,7 @@ void VolumeStore::makePages(Step& step, std::vector<VolumePiece> pieces) {
   for (const PageShape& shape : placeInPages(*device_, step.pieces))
     step.pages.emplace_back(device_, shape.extent, shape.format);
   commands_.begin();
-  for (const Image3D& page : step.pages) commands_.clear(page);
+  for (const SampledImage& page : step.pages) commands_.clear(page);
   commands_.submitAndWait();
 }
 
@@ -241,7 +241,7 @@ void VolumeStore::finish(Step& step) {
 
 bool VolumeStore::mayBeInfinite() const {
   return std::ranges::any_of(pages(),
-                             [](const Image3D& page) { return page.format() == VK_FORMAT_R32_SFLOAT; });
+                             [](const SampledImage& page) { return page.format() == VK_FORMAT_R32_SFLOAT; });
 }
 
 bool VolumeStore::reachesBeyondTable() const {
@@ -326,7 +326,7 @@ void VolumeStore::uploadSlabs() {
   const glm::uvec2 extent(shared::slabSide, slabTable_.height());
   const bool isNew = !slabs_ || glm::uvec2(slabs_.extent()) != extent;
   if (isNew) {
-    slabs_ = Image3D::plane(device_, extent, VK_FORMAT_R16G16B16A16_SFLOAT);
+    slabs_ = SampledImage::plane(device_, extent, VK_FORMAT_R16G16B16A16_SFLOAT);
     ++slabsVersion_;
   }
   slabStaging_.reserve(device_, bytes.size(), MemoryKind::Upload);

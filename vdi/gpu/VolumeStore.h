@@ -67,10 +67,10 @@ class VolumeStore {
   VkDeviceAddress nodes() const { return shown().nodeBuffer.address(); }
   /// Of setTable.
   const SlabTable& slabTable() const { return slabTable_; }
-  const Image3D& slabs() const { return slabs_; }
+  const SampledImage& slabs() const { return slabs_; }
   /// Macrocells, for the bricks' firstCell: 1 where the table makes anything visible.
   VkDeviceAddress cells() const { return shown().visibleBuffer.address(); }
-  std::span<const Image3D> pages() const { return shown().pages; }
+  std::span<const SampledImage> pages() const { return shown().pages; }
   /// Which pages they are: descriptor sets that name others must be written again.
   std::uint64_t pagesVersion() const { return shown().pagesVersion; }
   /// Likewise of slabs.
@@ -87,7 +87,7 @@ class VolumeStore {
   struct Step {
     std::vector<Block> blocks;  // until their values are copied
     std::vector<VolumePiece> pieces;
-    std::vector<Image3D> pages;
+    std::vector<SampledImage> pages;
     std::uint64_t pagesVersion = 0;
     std::vector<shared::Brick> bricks;  // leaves; table fields are filled by placeTable
     std::vector<std::uint32_t> pieceOfBrick;
@@ -127,7 +127,7 @@ class VolumeStore {
   Buffer pieceRanges_;  // read back
   Buffer visibleBeforeBuffer_;
   SlabTable slabTable_;
-  Image3D slabs_;
+  SampledImage slabs_;
   std::uint64_t slabsVersion_ = 0;
   Buffer slabStaging_;
 };

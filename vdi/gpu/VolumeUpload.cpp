@@ -137,7 +137,7 @@ void VolumeUpload::turnOver() {
 
 /// The piece's stored values. False if the memory can't be imported, or isn't worth it. `imported` must live
 /// until the copies are done.
-bool VolumeUpload::copyDirectly(const VolumePiece& piece, const Image3D& page,
+bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& page,
                                 std::vector<Buffer>& imported) {
   const Block& block = *piece.block;
   const IndexBox stored = block.stored();
@@ -161,7 +161,7 @@ bool VolumeUpload::copyDirectly(const VolumePiece& piece, const Image3D& page,
 }
 
 /// `values`: a part of the piece, in the block's indices.
-void VolumeUpload::stage(const VolumePiece& piece, const IndexBox& values, const Image3D& page) {
+void VolumeUpload::stage(const VolumePiece& piece, const IndexBox& values, const SampledImage& page) {
   const std::uint64_t bytes = texelBytes(piece.format);
   const glm::u64vec3 size(values.size());
   const std::uint64_t rowBytes = size.x * bytes;
@@ -201,13 +201,13 @@ void VolumeUpload::begin(const Commands& before) {
   half.filled = 0;
 }
 
-void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Image3D> pages) {
+void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const SampledImage> pages) {
   std::vector<Buffer> imported;
   const auto waitForAll = [&] {
     for (Half& half : halves_) half.commands.wait();
   };
   try {
-    for (const Image3D& page : pages) filling().commands.beginUpload(page);
+    for (const SampledImage& page : pages) filling().commands.beginUpload(page);
     std::vector<const VolumePiece*> direct;
     for (const VolumePiece& piece : pieces) {
       if (copyDirectly(piece, pages[piece.page], imported)) {
@@ -223,7 +223,7 @@ void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Imag
         if (!part.empty()) stage(*piece, part, pages[piece->page]);
       }
     }
-    for (const Image3D& page : pages) filling().commands.endUpload(page);
+    for (const SampledImage& page : pages) filling().commands.endUpload(page);
     filling().commands.submit();
     waitForAll();
   } catch (...) {

@@ -25,7 +25,7 @@ class VolumeUpload {
   void begin(const Commands& before);
   /// Copies the pieces to their places in the pages, which stay ready to be sampled. Returns when all is
   /// there and host data isn't needed any more. May be called by any thread, while others use the device.
-  void run(std::span<const VolumePiece> pieces, std::span<const Image3D> pages);
+  void run(std::span<const VolumePiece> pieces, std::span<const SampledImage> pages);
   /// What run submitted last: to be waited for by other queues.
   const Commands& last() const { return halves_[current_].commands; }
 
@@ -37,8 +37,8 @@ class VolumeUpload {
     std::uint64_t filled = 0;
   };
 
-  bool copyDirectly(const VolumePiece& piece, const Image3D& page, std::vector<Buffer>& imported);
-  void stage(const VolumePiece& piece, const IndexBox& values, const Image3D& page);
+  bool copyDirectly(const VolumePiece& piece, const SampledImage& page, std::vector<Buffer>& imported);
+  void stage(const VolumePiece& piece, const IndexBox& values, const SampledImage& page);
   Half& filling() { return halves_[current_]; }
   void turnOver();
 
