@@ -10,6 +10,7 @@
 
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
+#include "vdi/reference/Reference.h"
 
 using namespace vdi;
 using comm::Communicator;
@@ -55,23 +56,6 @@ std::vector<Block> dealt(const std::vector<Block>& all, const Communicator& worl
   return mine;
 }
 
-double interpolated(const Block& block, const glm::dvec3& place) {
-  const IndexBox all = block.extended();
-  const glm::dvec3 position =
-      glm::clamp((place - block.origin) / block.spacing, glm::dvec3(all.lo), glm::dvec3(all.hi - 1));
-  const glm::ivec3 base(glm::floor(position));
-  const glm::dvec3 share = position - glm::dvec3(base);
-  double sum = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::ivec3 step{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
-    const glm::dvec3 weight = glm::mix(1.0 - share, share, glm::dvec3(step));
-    const double product = weight.x * weight.y * weight.z;
-    const glm::ivec3 at = base + step;
-    if (product > 0.0) sum += product * valueAt(block, at.x, at.y, at.z);
-  }
-  return sum;
-}
-
 /// The largest error of what's interpolated in any block of any rank, in its owned box and up to half a
 /// spacing beyond, as far as that's in `where`.
 double worstError(const Communicator& world, const std::vector<Block>& blocks, const Box& where,
@@ -86,7 +70,7 @@ double worstError(const Communicator& world, const std::vector<Block>& blocks, c
     for (int i = 0; i < 500; ++i) {
       const glm::dvec3 place =
           around.lo + glm::dvec3(share(generator), share(generator), share(generator)) * around.size();
-      const double error = std::abs(interpolated(block, place) - field(place));
+      const double error = std::abs(reference::interpolate(block, place) - field(place));
       worst = std::max(worst, std::isfinite(error) ? error : std::numeric_limits<double>::infinity());
     }
   }

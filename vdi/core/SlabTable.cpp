@@ -15,24 +15,20 @@ namespace {
 using gpu::shared::slabSide;
 using gpu::shared::slabStripStep;
 
-glm::dvec4 vectorOf(const TransferTableEntry& entry) {
-  return {entry.red, entry.green, entry.blue, entry.extinction};
-}
-
 /// Of the transfer table, linear between entries and constant outside, from position 0 on.
 class Integral {
  public:
   explicit Integral(const std::vector<TransferTableEntry>& entries)
       : entries_(entries), sums_(entries.size()) {
     for (std::size_t i = 1; i < entries.size(); ++i)
-      sums_[i] = sums_[i - 1] + 0.5 * (vectorOf(entries[i - 1]) + vectorOf(entries[i]));
+      sums_[i] = sums_[i - 1] + 0.5 * (glm::dvec4(entries[i - 1].vector()) + glm::dvec4(entries[i].vector()));
   }
   glm::dvec4 at(double position) const {
     const double inside = std::clamp(position, 0.0, static_cast<double>(entries_.size() - 1));
     const auto below = std::min(static_cast<std::size_t>(inside), entries_.size() - 2);
     const double share = inside - static_cast<double>(below);
-    const glm::dvec4 a = vectorOf(entries_[below]);
-    const glm::dvec4 b = vectorOf(entries_[below + 1]);
+    const glm::dvec4 a = entries_[below].vector();
+    const glm::dvec4 b = entries_[below + 1].vector();
     return sums_[below] + share * (a + 0.5 * share * (b - a)) + (position - inside) * glm::mix(a, b, share);
   }
 
@@ -103,10 +99,10 @@ SlabTable makeSlabTable(const TransferTable& transfer, float length) {
   table.positions = transfer.entries.size();
   table.texels.resize(table.height() * slabSide);
   const Integral integral(transfer.entries);
-  const auto point = [&](double position) { return accumulated(vectorOf(transfer.at(position)), length); };
+  const auto point = [&](double position) { return accumulated(transfer.at(position).vector(), length); };
   const double last = static_cast<double>(table.positions - 1);
   const auto endOf = [&](double position) {
-    const glm::vec4 entry = vectorOf(transfer.at(position));
+    const glm::vec4 entry = transfer.at(position).vector();
     return entry.a > 0.0F ? glm::vec4(glm::vec3(entry) / entry.a, std::min(entry.a * length, maxExtinction))
                           : glm::vec4(0.0F);
   };

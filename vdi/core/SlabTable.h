@@ -20,17 +20,14 @@ struct Slab {
   float opticalDepth = 0.0F;
 };
 
-/// A texture of slabs of one length, so made that one filtered look is enough for any slab:
+/// A texture of slabs of one length. One filtered look is enough for any slab. Texels are premultiplied
+/// colour and opacity, whose means are right; optical depths of opaque slabs would outshine all others.
 ///
-/// Texels are premultiplied colour and opacity, whose means are right; optical depths of opaque slabs would
-/// outshine all others.
-///
-///     rows 0 .. slabSide - 1        the square: texel (x, y) runs from x to y, in slabSide - 1 steps over
-///     the
-///                                   transfer table's range
-///     then levels() x stripRows()   the strips: slabs whose ends are nearer than one step of the square.
-///                                   Strip l holds those of 2^l positions of the transfer table, or of none
-///                                   for l = 0, by the position in their middle
+/// - Rows 0 .. slabSide - 1 are the square. Texel (x, y) runs from x to y, in slabSide - 1 steps over the
+///   transfer table's range.
+/// - Then come levels() strips of stripRows() rows: slabs whose ends are nearer than one step of the
+///   square, by the position in their middle. Strip l holds those of 2^l positions of the transfer table,
+///   strip 0 those of none.
 ///
 /// A strip is cut in rows that share a texel: entry e stands in row e / slabStripStep, column
 /// e % slabStripStep, and again at the end of the row before.

@@ -51,14 +51,6 @@ float extinctionOf(double opacity) {
   return std::min(static_cast<float>(-std::log2(1.0 - opacity)), maxExtinction);
 }
 
-glm::vec4 vectorOf(const TransferTableEntry& entry) {
-  return {entry.red, entry.green, entry.blue, entry.extinction};
-}
-
-TransferTableEntry entryOf(const glm::vec4& v) {
-  return {v.r, v.g, v.b, v.a};
-}
-
 /// Smallest distance between two nodes that aren't at the same x.
 template <typename Node>
 double closestNodes(const std::vector<Node>& nodes, double soFar) {
@@ -136,8 +128,9 @@ TransferTableEntry TransferTable::at(double position) const {
   if (std::isnan(position)) return {};
   const double inside = std::clamp(position, 0.0, static_cast<double>(entries.size() - 1));
   const auto below = std::min(static_cast<std::size_t>(inside), entries.size() - 2);
-  return entryOf(glm::mix(vectorOf(entries[below]), vectorOf(entries[below + 1]),
-                          static_cast<float>(inside - static_cast<double>(below))));
+  const glm::vec4 entry = glm::mix(entries[below].vector(), entries[below + 1].vector(),
+                                   static_cast<float>(inside - static_cast<double>(below)));
+  return {entry.r, entry.g, entry.b, entry.a};
 }
 
 bool TransferTable::visible(double lo, double hi) const {

@@ -45,6 +45,7 @@ struct TransferTableEntry {
   float green = 0.0F;
   float blue = 0.0F;
   float extinction = 0.0F;
+  glm::vec4 vector() const { return {red, green, blue, extinction}; }
   bool operator==(const TransferTableEntry&) const = default;
 };
 

@@ -34,6 +34,9 @@ struct Frame {
         const GenerateSettings& settings);
 };
 
+/// Trilinear, among all values that the block has; beyond the outermost ones, clamped to these.
+double interpolate(const Block& block, const glm::dvec3& world);
+
 /// The samples of the ray through the centre of pixel (x, y) that `blocks` own, front to back, transparent
 /// ones included, up to the one with which the ray's opacity reaches the termination opacity.
 /// With `atOnce`, just the samples of the lattice's multiples of it, each in place of that many.
