@@ -118,8 +118,7 @@ class Bench {
     upload.stepMs = repeated(options_.repeats, [&] {
                       return wallMs([&] {
                         generator_.setNextBlocks(blocks);
-                        std::optional<Vdi> vdi = generator_.generate(shot.camera, shot.function, settings);
-                        if (vdi) generator_.recycle(std::move(*vdi));
+                        generator_.generate(shot.camera, shot.function, settings);
                         generator_.advance();
                       });
                     }).median;
@@ -164,7 +163,7 @@ class Bench {
     std::optional<Image> image;
     truth.dvr.device = repeated(options_.repeats, [&] {
       clock_.run();
-      if (image) generator_.recycle(std::move(*image));
+      image.reset();  // its memory is the next one's
       image = generator_.renderVolume(camera, function, settings_);
       frames.push_back(slowest(generator_.reports(), frameSeconds));
       return deviceMs();
@@ -190,7 +189,7 @@ class Bench {
       clock_.run();
       generator_.renderVolume(shot.camera, shot.function, settings_);
       const double volumeMs = deviceMs();
-      if (made.vdi) generator_.recycle(std::move(*made.vdi));
+      made.vdi.reset();
       clock_.run();
       made.vdi = generator_.generate(shot.camera, shot.function, settings_);
       composites.push_back(

@@ -80,7 +80,6 @@ void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGener
     world.together([&] {
       if (!vdi) return;
       writeVdiFiles(options, index, *vdi, generator);
-      generator.recycle(std::move(*vdi));
     });
   }
   if (options.volume.empty()) return;
@@ -88,7 +87,6 @@ void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGener
   world.together([&] {
     if (!image) return;
     io::writePng(options.numbered(options.volume, index), io::toPicture(*image));
-    generator.recycle(std::move(*image));
   });
 }
 

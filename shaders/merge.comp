@@ -1,5 +1,5 @@
 // Puts the ranks' sub-supersegments of each list in order of depth. Each rank's are in order already, and no two overlap,
-// so the next one is the one whose front is nearest among the ranks' heads.
+// so the next one is the one whose front is nearest among the heads of those ranks that have any. Or makes them one colour.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/composite.h"
@@ -11,7 +11,7 @@ layout(push_constant, scalar) uniform Push { MergeConstants push; };
 #include "exact.glsl"
 #include "store.glsl"
 
-uint subOffset(uint rank, uint list) { return push.subOffsets.at[rank * (push.listCount + 1u) + list]; }
+uint subOffset(uint rank, uint list) { return push.subOffsets.at[rank * push.rowLength + list]; }
 
 void countList(uint list) {
   uint total = 0u;
@@ -19,50 +19,78 @@ void countList(uint list) {
   push.counts.at[list] = total;
 }
 
-// Comparable within a list.
-float frontOf(SegmentArray segments, uint i) {
-  if (compactForm) return float(depthCodes(CompactArray(segments).at[i]).x);
-  return segments.at[i].front;
+// Comparable within a list: codes, if it has such.
+vec2 depthsOf(uint i) {
+  if (compactForm) return vec2(depthCodes(CompactArray(push.received).at[i]));
+  Segment segment = push.received.at[i];
+  return vec2(segment.front, segment.back);
 }
 
-void copySegment(SegmentArray from, uint i, uint slot) {
+// Depths that rounded to one code: what ends first was first.
+bool isNearer(vec2 a, vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); }
+
+void copySegment(uint i, uint slot) {
   if (compactForm) {
-    CompactArray(push.merged).at[slot] = CompactArray(from).at[i];
+    CompactArray(push.merged).at[slot] = CompactArray(push.received).at[i];
   } else {
-    push.merged.at[slot] = from.at[i];
+    push.merged.at[slot] = push.received.at[i];
   }
 }
 
 void mergeList(uint list) {
-  for (uint rank = 0u; rank < push.rankCount; ++rank) {
-    push.heads.at[rank * push.listCount + list] = subOffset(rank, list);
-  }
+  uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];
-  for (uint slot = push.offsets.at[list]; slot < end; ++slot) {
-    uint nearest = 0u;
-    float nearestFront = uintBitsToFloat(0x7f800000u);
-    for (uint rank = 0u; rank < push.rankCount; ++rank) {
-      uint head = push.heads.at[rank * push.listCount + list];
-      if (head == subOffset(rank, list + 1u)) continue;
-      SegmentArray segments = push.received.at[rank];
-      float front = frontOf(segments, head);
-      if (front < nearestFront) {
-        nearestFront = front;
-        nearest = rank;
+  if (first == end) return;
+  // There are no more ranks with any than there are supersegments.
+  uint heads = 0u;
+  for (uint rank = 0u; rank < push.rankCount; ++rank) {
+    uint begin = subOffset(rank, list);
+    uint stop = subOffset(rank, list + 1u);
+    if (begin == stop) continue;
+    push.heads.at[first + heads] = MergeHead(begin, stop, depthsOf(begin));
+    ++heads;
+  }
+  for (uint slot = first; slot < end; ++slot) {
+    uint place = first;
+    MergeHead nearest = push.heads.at[first];
+    for (uint i = first + 1u; i < first + heads; ++i) {
+      MergeHead head = push.heads.at[i];
+      if (isNearer(head.depths, nearest.depths)) {
+        nearest = head;
+        place = i;
       }
     }
-    uint head = push.heads.at[nearest * push.listCount + list]++;
-    SegmentArray from = push.received.at[nearest];
-    copySegment(from, head, slot);
+    copySegment(nearest.next, slot);
+    ++nearest.next;
+    if (nearest.next < nearest.end) {
+      nearest.depths = depthsOf(nearest.next);
+      push.heads.at[place] = nearest;
+    } else {
+      --heads;
+      push.heads.at[place] = push.heads.at[first + heads];
+    }
   }
+}
+
+// As flatten in vdi/pipeline/Pipeline.h.
+void flattenList(uint list) {
+  uint first = push.offsets.at[list];
+  uint end = push.offsets.at[list + 1u];
+  vec4 sum = vec4(0.0);
+  float depth = uintBitsToFloat(0x7f800000u);
+  for (uint i = first; i < end; ++i) {
+    Material m = loadSegment(push.merged, i, push.form);
+    if (i == first) depth = m.front;
+    sum += (1.0 - sum.a) * vec4(m.color, opacityOf(m.opticalDepth));
+  }
+  push.colors.at[list] = sum;
+  push.depths.at[list] = depth;
 }
 
 void main() {
   uint list = gl_GlobalInvocationID.x;
   if (list >= push.listCount) return;
-  if (push.mode == mergeModeCount) {
-    countList(list);
-  } else {
-    mergeList(list);
-  }
+  if (push.mode == mergeModeCount) countList(list);
+  if (push.mode == mergeModeMerge) mergeList(list);
+  if (push.mode == mergeModeFlatten) flattenList(list);
 }

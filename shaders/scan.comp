@@ -63,9 +63,19 @@ void addSums() {
   }
 }
 
+void rebase() {
+  uint first = gl_WorkGroupID.x * scanGroup * scanPerThread + gl_LocalInvocationIndex;
+  for (uint i = 0u; i < scanPerThread; ++i) {
+    uint at = first + i * scanGroup;
+    if (at <= push.count) push.prefix.at[at] += push.base;
+  }
+}
+
 void main() {
   if (push.mode == scanModeSum) {
     sumPart();
+  } else if (push.mode == scanModeRebase) {
+    rebase();
   } else {
     addSums();
   }

@@ -9,6 +9,7 @@ VDI_SHARED_BEGIN
 inline constexpr uint compositeGroup = 64;
 inline constexpr uint mergeModeCount = 0;
 inline constexpr uint mergeModeMerge = 1;
+inline constexpr uint mergeModeFlatten = 2;
 inline constexpr uint compositeProgramSearch = 0;
 inline constexpr uint compositeProgramCountGrains = 1;
 inline constexpr uint compositeProgramWriteGrains = 2;
@@ -19,6 +20,7 @@ inline constexpr uint compositeModeWrite = 1;
 const uint compositeGroup = 64;
 const uint mergeModeCount = 0;  // counts[list] = sum over ranks
 const uint mergeModeMerge = 1;  // writes merged
+const uint mergeModeFlatten = 2;  // writes colors and depths, of merged
 const uint compositeProgramSearch = 0;  // as castProgramSearch and so on
 const uint compositeProgramCountGrains = 1;
 const uint compositeProgramWriteGrains = 2;
@@ -27,21 +29,34 @@ const uint compositeModeSearch = 0;
 const uint compositeModeWrite = 1;
 #endif
 
+// Where a rank's part of a list has got to.
+struct MergeHead {
+  uint next;
+  uint end;
+  vec2 depths;  // front and back of the next one, comparable within the list
+};
+
+VDI_SHARED_END
+
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer SegmentsOfRank { SegmentArray at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer MergeHeadArray { MergeHead at[]; };
 #endif
 
+VDI_SHARED_BEGIN
+
 struct MergeConstants {
-  VDI_ADDRESS(SegmentsOfRank) received;  // [ranks]: addresses of each rank's compact lists
-  VDI_ADDRESS(UintArray) subOffsets;     // [ranks][lists + 1], each rank's from 0
-  VDI_ADDRESS(UintArray) heads;          // [ranks][lists], scratch
+  VDI_ADDRESS(SegmentArray) received;    // one rank's lists behind the other's
+  VDI_ADDRESS(UintArray) subOffsets;     // [ranks][rowLength], and one more: a prefix sum of all of them
+  VDI_ADDRESS(MergeHeadArray) heads;     // as many as received, scratch
   VDI_ADDRESS(UintArray) counts;         // [lists]
   VDI_ADDRESS(UintArray) offsets;        // [lists + 1]
   VDI_ADDRESS(SegmentArray) merged;      // ordered by depth within each list
+  VDI_ADDRESS(Vec4Array) colors;         // [lists], premultiplied
+  VDI_ADDRESS(FloatArray) depths;        // [lists]
   uint listCount;
   uint rankCount;
+  uint rowLength;  // >= listCount
   uint mode;
-  uint pad;
   StoredForm form;  // of received and merged
 };
 

@@ -10,11 +10,13 @@ inline constexpr uint scanGroup = 256;
 inline constexpr uint scanPerThread = 8;
 inline constexpr uint scanModeSum = 0;
 inline constexpr uint scanModeAdd = 1;
+inline constexpr uint scanModeRebase = 2;
 #else
 const uint scanGroup = 256;
 const uint scanPerThread = 8;
 const uint scanModeSum = 0;  // values -> prefix within each workgroup's part, sums[group] = total of the part
 const uint scanModeAdd = 1;  // prefix += sums of the groups before
+const uint scanModeRebase = 2;  // prefix += base
 #endif
 
 struct ScanConstants {
@@ -24,6 +26,8 @@ struct ScanConstants {
   VDI_ADDRESS(UintArray) overflow;  // [1], set to 1 when a total doesn't fit 32 bits
   uint count;
   uint mode;
+  uint base;
+  uint pad;
 };
 
 VDI_SHARED_END

@@ -8,6 +8,7 @@
 
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
+#include "tests/pipeline/HostLists.h"
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
@@ -263,16 +264,16 @@ TEST_CASE("a VDI in the memory of another one, whatever its precision and size w
   for (const Precision precision : {Precision::Compact, Precision::Full, Precision::Compact}) {
     settings = test::smallSettings(60, 50, 9);
     settings.precision = precision;
-    generator.recycle(vdiOf());
+    vdiOf();
     settings = test::smallSettings(40, 30, 5);
     Vdi again = vdiOf();
     CHECK(again == first);
     // And in the memory of one that's as large, or smaller.
-    generator.recycle(std::move(again));
+    again = {};
     again = vdiOf();
     CHECK(again == first);
     settings = test::smallSettings(12, 10, 3);
-    generator.recycle(vdiOf());
+    vdiOf();
     settings = test::smallSettings(40, 30, 5);
     CHECK(vdiOf() == first);
   }
@@ -297,7 +298,7 @@ TEST_CASE("a picture in the memory of another one is the same") {
   const Image view = renderer.render(test::oblique(), 40, 30);
   for (const auto& [width, height] : {std::pair(60, 50), std::pair(40, 30), std::pair(9, 7)}) {
     INFO(width << " x " << height);
-    generator.recycle(volumeOf(width, height));
+    volumeOf(width, height);
     CHECK(same(volumeOf(40, 30), volume));
     renderer.render(test::oblique().azimuth(20.0), width, height);
     CHECK(same(renderer.render(test::oblique(), 40, 30), view));
@@ -441,17 +442,31 @@ TEST_CASE("merging and compositing on the device equal the reference") {
   }
   const SupersegmentLists expected = reference::composite(subLists, settings, frame.lattice.step);
   detail::Compositor compositor(device());
-  const SupersegmentLists result = compositor.composite(subLists, {6, 6, frame.lattice.step, algorithm, {}});
+  const SupersegmentLists result =
+      test::composite(device(), compositor, subLists, {6, 6, frame.lattice.step, algorithm, {}});
   CHECK(listsThatDiffer(result, expected) <= expected.listCount() / 50);
-  std::vector<glm::vec4> rgba(result.listCount());
-  std::vector<float> depth(result.listCount());
-  detail::flattenMerged(subLists, rgba, depth);
+  // The flat picture of what was merged, by the device and by the host, is that of what was composited.
+  detail::Compositor::Merged merged;
+  compositor.merge(test::HostSubLists(device(), subLists).parts(), {}, merged);
+  gpu::Buffer colors;
+  gpu::Buffer depths;
+  compositor.flatten(merged, {}, colors, depths);
+  gpu::Buffer seen(device(), result.listCount() * 20, gpu::MemoryKind::Readback);
+  gpu::Commands commands(device());
+  commands.begin();
+  commands.copy(colors, 0, seen, 0, result.listCount() * 16);
+  commands.copy(depths, 0, seen, result.listCount() * 16, result.listCount() * 4);
+  commands.submitAndWait();
   for (std::size_t i = 0; i < result.listCount(); ++i) {
     CHECK(result.countOf(i) <= 6);
     glm::vec4 sum(0.0F);
     for (const Supersegment& s : result.list(i))
       sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
-    for (int c = 0; c < 4; ++c) CHECK(std::abs(sum[c] - rgba[i][c]) < 0.5F / 255.0F);
+    const glm::vec4 flat = seen.mappedAs<glm::vec4>()[i];
+    for (int c = 0; c < 4; ++c) CHECK(std::abs(sum[c] - flat[c]) < 0.5F / 255.0F);
+    const float front = result.countOf(i) > 0 ? result.list(i).front().front : Image::noDepth;
+    const float depth = seen.mappedAs<float>()[result.listCount() * 4 + i];
+    CHECK((depth == front || std::abs(depth - front) < 1e-5F));
   }
   // Codes in, codes out: what the reference makes of the codes' values.
   const DepthCode code = depthCodeFor(frame.lattice);
@@ -462,7 +477,8 @@ TEST_CASE("merging and compositing on the device equal the reference") {
     subValues.push_back(expanded(subCodes.back(), code));
   }
   const SupersegmentLists ofCodes = reference::composite(subValues, settings, frame.lattice.step);
-  const CompactLists codes = compositor.composite(subCodes, {6, 6, frame.lattice.step, algorithm, code});
+  const CompactLists codes =
+      test::composite(device(), compositor, subCodes, {6, 6, frame.lattice.step, algorithm, code});
   CHECK(listsThatDiffer(expanded(codes, code), expanded(reference::compacted(ofCodes, code), code),
                         oneCode) <= expected.listCount() / 25);
   CHECK(device()->validationMessages() == "");
@@ -511,9 +527,11 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   detail::Compositor compositor(device());
   detail::Compositor::Request request{
       5, mostPerList(5, Budget::Total), frame.lattice.step, Algorithm::Merge, {}};
-  request.level = compositor.survey(subLists, request).levelFor(fill);
-  CHECK(listsThatDiffer(compositor.composite(subLists, request), composited) <= composited.listCount() / 50);
-  CHECK(listsThatDiffer(compositor.composite(subLists, request), composited) <= composited.listCount() / 50);
+  detail::Compositor::Merged merged;
+  compositor.merge(test::HostSubLists(device(), subLists).parts(), {}, merged);
+  request.level = compositor.survey(merged, request).levelFor(fill);
+  CHECK(listsThatDiffer(test::composite(device(), compositor, subLists, request), composited) <=
+        composited.listCount() / 50);
 }
 
 TEST_CASE("programs for GPUs give the same lists as those for CPUs") {

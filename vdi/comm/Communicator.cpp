@@ -117,6 +117,7 @@ struct Communicator::State {
   int rank = 0;
   int size = 1;
   int localRank = 0;
+  std::vector<int> hostLeaders{0};  // [size]
 
   MPI_Comm comm() const { return owned.handle(); }
   bool serial() const { return comm() == MPI_COMM_NULL; }
@@ -162,6 +163,11 @@ Communicator Communicator::fromMpi(int fortranHandle) {
   check(MPI_Comm_split_type(state->comm(), MPI_COMM_TYPE_SHARED, state->rank, MPI_INFO_NULL, node.out()),
         "MPI_Comm_split_type");
   check(MPI_Comm_rank(node.handle(), &state->localRank), "MPI_Comm_rank");
+  int leader = state->rank;
+  check(MPI_Bcast(&leader, 1, MPI_INT, 0, node.handle()), "MPI_Bcast");
+  state->hostLeaders.resize(static_cast<std::size_t>(state->size));
+  check(MPI_Allgather(&leader, 1, MPI_INT, state->hostLeaders.data(), 1, MPI_INT, state->comm()),
+        "MPI_Allgather");
   return Communicator(std::move(state));
 }
 
@@ -181,6 +187,11 @@ int Communicator::size() const {
 }
 int Communicator::localRank() const {
   return state_->localRank;
+}
+
+int Communicator::hostLeader(int rank) const {
+  assert(rank >= 0 && rank < size());
+  return state_->hostLeaders[static_cast<std::size_t>(rank)];
 }
 
 void Communicator::barrier() const {
@@ -281,6 +292,45 @@ Gathered Communicator::allToAll(std::span<const std::byte> bytes, std::span<cons
   return result;
 }
 
+std::vector<std::uint64_t> Communicator::allGatherWords(std::span<const std::uint64_t> words) const {
+  if (state_->serial()) return {words.begin(), words.end()};
+  std::vector<std::uint64_t> all(words.size() * static_cast<std::size_t>(size()));
+  const auto count = static_cast<int>(words.size());
+  check(MPI_Allgather(words.data(), count, MPI_UINT64_T, all.data(), count, MPI_UINT64_T, state_->comm()),
+        "MPI_Allgather");
+  return all;
+}
+
+std::vector<std::uint64_t> Communicator::allToAllWords(std::span<const std::uint64_t> wordsTo) const {
+  assert(wordsTo.size() % static_cast<std::size_t>(size()) == 0);
+  if (state_->serial()) return {wordsTo.begin(), wordsTo.end()};
+  std::vector<std::uint64_t> from(wordsTo.size());
+  const auto count = static_cast<int>(wordsTo.size() / static_cast<std::size_t>(size()));
+  check(MPI_Alltoall(wordsTo.data(), count, MPI_UINT64_T, from.data(), count, MPI_UINT64_T, state_->comm()),
+        "MPI_Alltoall");
+  return from;
+}
+
+void Communicator::allReduceSaturating(std::span<std::uint8_t> values) const {
+  if (state_->serial()) return;
+  const auto add = [](void* other, void* into, int* count, MPI_Datatype*) {
+    const auto* a = static_cast<const std::uint8_t*>(other);
+    auto* b = static_cast<std::uint8_t*>(into);
+    for (int i = 0; i < *count; ++i) b[i] = static_cast<std::uint8_t>(std::min(a[i] + b[i], 255));
+  };
+  MPI_Op saturatingSum = MPI_OP_NULL;
+  check(MPI_Op_create(add, 1, &saturatingSum), "MPI_Op_create");
+  constexpr std::size_t chunk = std::size_t{1} << 30;
+  int result = MPI_SUCCESS;
+  for (std::size_t done = 0; done < values.size() && result == MPI_SUCCESS; done += chunk) {
+    const auto count = static_cast<int>(std::min(chunk, values.size() - done));
+    result =
+        MPI_Allreduce(MPI_IN_PLACE, values.data() + done, count, MPI_UINT8_T, saturatingSum, state_->comm());
+  }
+  MPI_Op_free(&saturatingSum);
+  check(result, "MPI_Allreduce");
+}
+
 void Communicator::agree(const std::exception_ptr& mine) const {
   if (state_->serial()) {
     if (mine) std::rethrow_exception(mine);
@@ -314,6 +364,68 @@ void Communicator::demandEqual(std::uint64_t fingerprint, const std::string& wha
   if (extremes[0] != ~extremes[1]) {
     throw Error(ErrorCode::InvalidArgument, fmt::format("the ranks were given different values: {}", what));
   }
+}
+
+void Communicator::demandEqual(std::span<const Fingerprint> fingerprints) const {
+  std::vector<std::uint64_t> extremes;
+  for (const Fingerprint& print : fingerprints) extremes.insert(extremes.end(), {print.value, ~print.value});
+  allReduceMax(extremes);
+  for (std::size_t i = 0; i < fingerprints.size(); ++i) {
+    if (extremes[2 * i] != ~extremes[2 * i + 1]) {
+      throw Error(ErrorCode::InvalidArgument,
+                  fmt::format("the ranks were given different values: {}", fingerprints[i].what));
+    }
+  }
+}
+
+/// The MPI requests of messages that are under way.
+struct Messages::State {
+  const Communicator& comm;
+  std::vector<MPI_Request> requests;
+  MPI_Comm handle() const { return comm.state_->comm(); }
+};
+
+namespace {
+
+/// MPI counts in int: larger messages go in several.
+constexpr std::uint64_t largestMessage = 1ULL << 30;
+constexpr int messageTag = 1;
+
+}  // namespace
+
+Messages::Messages(const Communicator& comm) : state_(std::make_unique<State>(State{comm, {}})) {}
+
+Messages::~Messages() {
+  // Memory that a message is on its way to or from must stay: an exception may come by here.
+  if (!state_->requests.empty()) {
+    MPI_Waitall(static_cast<int>(state_->requests.size()), state_->requests.data(), MPI_STATUSES_IGNORE);
+  }
+}
+
+void Messages::send(int to, std::span<const std::byte> bytes) {
+  for (std::uint64_t done = 0; done < bytes.size(); done += largestMessage) {
+    const auto count = static_cast<int>(std::min<std::uint64_t>(largestMessage, bytes.size() - done));
+    state_->requests.push_back(MPI_REQUEST_NULL);
+    check(MPI_Isend(bytes.data() + done, count, MPI_BYTE, to, messageTag, state_->handle(),
+                    &state_->requests.back()),
+          "MPI_Isend");
+  }
+}
+
+void Messages::receive(int from, std::span<std::byte> bytes) {
+  for (std::uint64_t done = 0; done < bytes.size(); done += largestMessage) {
+    const auto count = static_cast<int>(std::min<std::uint64_t>(largestMessage, bytes.size() - done));
+    state_->requests.push_back(MPI_REQUEST_NULL);
+    check(MPI_Irecv(bytes.data() + done, count, MPI_BYTE, from, messageTag, state_->handle(),
+                    &state_->requests.back()),
+          "MPI_Irecv");
+  }
+}
+
+void Messages::wait() {
+  std::vector<MPI_Request> requests = std::move(state_->requests);
+  state_->requests.clear();
+  check(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
 }
 
 }  // namespace vdi::comm

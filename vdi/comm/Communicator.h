@@ -45,6 +45,8 @@ class Communicator {
   int rank() const;
   int size() const;
   int localRank() const;  // rank among those that share this node's memory
+  /// The lowest rank of those that share memory with `rank`: ranks of one host have the same.
+  int hostLeader(int rank) const;
 
   void barrier() const;  // collective
 
@@ -71,6 +73,13 @@ class Communicator {
   Gathered allToAll(std::span<const std::byte> bytes, std::span<const std::uint64_t> counts,
                     std::size_t elementBytes) const;
 
+  /// `words` of each rank, on every rank: [size][words.size()], the same number on all of them.
+  std::vector<std::uint64_t> allGatherWords(std::span<const std::uint64_t> words) const;
+  /// wordsTo: [size][n], n words for each rank; the result has [size][n], n from each.
+  std::vector<std::uint64_t> allToAllWords(std::span<const std::uint64_t> wordsTo) const;
+  /// `smaller` += `other`, byte by byte, ending at 255; over all ranks.
+  void allReduceSaturating(std::span<std::uint8_t> values) const;
+
   /// Collective: nobody leaves alone. With no error on any rank it returns. Otherwise every rank throws: a
   /// rank with an error rethrows its own, the others throw Error{RemoteRank} with the lowest failing rank's
   /// number and text.
@@ -80,10 +89,38 @@ class Communicator {
   /// Collective: throws Error{InvalidArgument} on every rank if `fingerprint` differs between ranks; `what`
   /// says what was compared.
   void demandEqual(std::uint64_t fingerprint, const std::string& what) const;
+  struct Fingerprint {
+    std::uint64_t value;
+    const char* what;
+  };
+  /// The same of several at once.
+  void demandEqual(std::span<const Fingerprint> fingerprints) const;
+
+ private:
+  friend class Messages;
+  struct State;
+  explicit Communicator(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// Messages from rank to rank, all at once. What's sent and where it's received must stay until `wait`, or
+/// until this object goes, which waits too. Messages of a pair of ranks arrive in the order in which they
+/// were sent; both must name the same sizes. Nothing is sent for none.
+class Messages {
+ public:
+  explicit Messages(const Communicator& comm);
+  ~Messages();
+  Messages(const Messages&) = delete;
+  Messages& operator=(const Messages&) = delete;
+  Messages(Messages&&) = delete;
+  Messages& operator=(Messages&&) = delete;
+
+  void send(int to, std::span<const std::byte> bytes);
+  void receive(int from, std::span<std::byte> bytes);
+  void wait();
 
  private:
   struct State;
-  explicit Communicator(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 

@@ -7,7 +7,8 @@
 #include <glm/glm.hpp>
 #include <limits>
 #include <span>
-#include <vector>
+
+#include "vdi/core/HostVector.h"
 
 namespace vdi {
 
@@ -15,10 +16,10 @@ namespace vdi {
 struct Image {
   int width = 0;
   int height = 0;
-  std::vector<glm::vec4> rgba;  // [height][width], premultiplied
+  HostVector<glm::vec4> rgba;  // [height][width], premultiplied
   /// [height][width]: view-space depth of the front of the first sample or supersegment that isn't
   /// transparent, world units; noDepth where there's none. May be empty when depth wasn't asked for.
-  std::vector<float> depth;
+  HostVector<float> depth;
 
   static constexpr float noDepth = std::numeric_limits<float>::infinity();
 

@@ -42,8 +42,8 @@ inline void copyInParallel(std::span<const std::byte> from, void* to) {
 
 /// Makes `from` what `to` holds from place `first` on (at most its size), and nothing behind. What was there
 /// is overwritten: memory that's used again isn't cleared before.
-template <typename T>
-void replaceTail(std::vector<T>& to, std::size_t first, std::span<const T> from) {
+template <typename T, typename Allocator>
+void replaceTail(std::vector<T, Allocator>& to, std::size_t first, std::span<const T> from) {
   static_assert(std::is_trivially_copyable_v<T>);
   if (to.size() > first + from.size()) to.resize(first + from.size());
   const std::size_t inPlace = to.size() - first;

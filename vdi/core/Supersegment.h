@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "vdi/core/HostVector.h"
 #include "vdi/core/Scene.h"
 
 namespace vdi {
@@ -84,8 +85,8 @@ Supersegment expanded(const CompactSupersegment& segment, const DepthCode& code)
 /// Compact lists: list i is segments[offsets[i] .. offsets[i + 1]), front to back, disjoint.
 template <typename Segment>
 struct ListsOf {
-  std::vector<std::uint32_t> offsets{0};  // exclusive prefix sum, listCount() + 1 entries
-  std::vector<Segment> segments;
+  HostVector<std::uint32_t> offsets{0};  // exclusive prefix sum, listCount() + 1 entries
+  HostVector<Segment> segments;
 
   std::size_t listCount() const { return offsets.size() - 1; }
   std::uint32_t countOf(std::size_t list) const { return offsets[list + 1] - offsets[list]; }

@@ -30,8 +30,8 @@ struct Vdi {
   Precision precision() const {
     return std::holds_alternative<CompactLists>(lists) ? Precision::Compact : Precision::Full;
   }
-  const std::vector<std::uint32_t>& offsets() const {  // exclusive prefix sum, a list more than there are
-    return std::visit([](const auto& l) -> const std::vector<std::uint32_t>& { return l.offsets; }, lists);
+  const HostVector<std::uint32_t>& offsets() const {  // exclusive prefix sum, a list more than there are
+    return std::visit([](const auto& l) -> const HostVector<std::uint32_t>& { return l.offsets; }, lists);
   }
   std::size_t listCount() const { return offsets().size() - 1; }
   std::size_t supersegmentCount() const {

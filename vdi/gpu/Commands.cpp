@@ -172,6 +172,11 @@ void Commands::fill(const Buffer& buffer, std::uint32_t word) {
   vkCmdFillBuffer(buffer_, buffer.handle(), 0, VK_WHOLE_SIZE, word);
 }
 
+void Commands::fill(const Buffer& buffer, std::uint64_t offset, std::uint64_t bytes, std::uint32_t word) {
+  assert(offset % 4 == 0 && bytes % 4 == 0 && offset + bytes <= buffer.size());
+  if (bytes > 0) vkCmdFillBuffer(buffer_, buffer.handle(), offset, bytes, word);
+}
+
 void Commands::update(const Buffer& buffer, std::span<const std::byte> bytes) {
   assert(bytes.size() <= buffer.size() && bytes.size() <= 65536 && bytes.size() % 4 == 0);
   vkCmdUpdateBuffer(buffer_, buffer.handle(), 0, bytes.size(), bytes.data());

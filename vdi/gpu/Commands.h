@@ -91,6 +91,8 @@ class Commands {
   void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
             std::uint64_t bytes);
   void fill(const Buffer& buffer, std::uint32_t word);  // the whole buffer
+  /// Whole words.
+  void fill(const Buffer& buffer, std::uint64_t offset, std::uint64_t bytes, std::uint32_t word);
   /// The buffer's first bytes, by way of the command buffer: whole words, 64 KiB at most.
   void update(const Buffer& buffer, std::span<const std::byte> bytes);
   /// Fills a new image with zeros and makes it ready to be sampled: texels that nothing is copied to would

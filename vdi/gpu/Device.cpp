@@ -486,11 +486,12 @@ std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
   state->name = chosen.summary.name;
   state->cpu = chosen.summary.type == VK_PHYSICAL_DEVICE_TYPE_CPU;
   state->gpuPrograms = !state->cpu || request.gpuPrograms;
+  state->limits = chosen.limits;
+  if (!request.importsHostMemory) state->limits.hostPointerAlignment = 0;
   if (request.mostImageDimension3D > 0) {
     state->limits.maxImageDimension3D =
         std::min(state->limits.maxImageDimension3D, request.mostImageDimension3D);
   }
-  state->limits = chosen.limits;
   vkGetPhysicalDeviceMemoryProperties(chosen.handle, &state->memory);
   state->device = makeDevice(chosen);
   const VkSemaphoreTypeCreateInfo timeline{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO, nullptr,

@@ -23,6 +23,8 @@ struct DeviceRequest {
   bool gpuPrograms = false;
   /// A smaller limit than the device's own, so that what is cut to fit can be tested; 0: the device's.
   std::uint32_t mostImageDimension3D = 0;
+  /// False: as a device that can't import the process's memory, so that what goes without it can be tested.
+  bool importsHostMemory = true;
 };
 
 /// The request that the environment asks for: VDI_DEVICE is the selector, VDI_VALIDATION=1 turns validation

@@ -144,7 +144,7 @@ std::optional<ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& de
                                       &external,
                                       0,
                                       size,
-                                      VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                      VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                                       VK_SHARING_MODE_EXCLUSIVE,
                                       0,
                                       nullptr};

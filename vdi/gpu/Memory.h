@@ -69,7 +69,7 @@ class Buffer {
 };
 
 /// Memory of the process as the device sees it: `data` starts `offset` bytes into the buffer, which is for
-/// transfers from it alone, and takes whole pages.
+/// transfers alone, and takes whole pages.
 struct ImportedBuffer {
   Buffer buffer;
   std::uint64_t offset = 0;

@@ -12,7 +12,7 @@ namespace vdi::gpu {
 class MergePass {
  public:
   explicit MergePass(std::shared_ptr<Device> device);
-  /// constants.mode: mergeModeCount, then (after a scan) mergeModeMerge.
+  /// constants.mode: mergeModeCount, then (after a scan) mergeModeMerge, then mergeModeFlatten for a picture.
   void record(Commands& commands, const shared::MergeConstants& constants);
 
  private:

@@ -28,13 +28,30 @@ void ScanPass::record(Commands& commands, const Buffer& values, const Buffer& pr
   overflow_.mappedAs<std::uint32_t>()[0] = 0;
   const std::uint32_t groups = count / perGroup + 1;
   sums_.reserve(device_, std::uint64_t{groups} * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
-  shared::ScanConstants constants{
-      values.address(), prefix.address(), sums_.address(), overflow_.address(), count, shared::scanModeSum};
+  shared::ScanConstants constants{};
+  constants.values = values.address();
+  constants.prefix = prefix.address();
+  constants.sums = sums_.address();
+  constants.overflow = overflow_.address();
+  constants.count = count;
+  constants.mode = shared::scanModeSum;
   commands.barrier();
   commands.dispatch(pipeline_, constants, groups);
   commands.barrier();
   constants.mode = shared::scanModeAdd;
   commands.dispatch(pipeline_, constants, groups);
+  commands.barrier();
+}
+
+void ScanPass::recordRebase(Commands& commands, const Buffer& prefix, std::uint32_t count,
+                            std::uint32_t base) const {
+  shared::ScanConstants constants{};
+  constants.prefix = prefix.address();
+  constants.count = count;
+  constants.mode = shared::scanModeRebase;
+  constants.base = base;
+  commands.barrier();
+  commands.dispatch(pipeline_, constants, count / perGroup + 1);
   commands.barrier();
 }
 

@@ -20,6 +20,9 @@ class ScanPass {
   /// running.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count);
 
+  /// Adds `base` to prefix[0 .. count]. Barriers as record.
+  void recordRebase(Commands& commands, const Buffer& prefix, std::uint32_t count, std::uint32_t base) const;
+
   /// Throws Error{OutOfMemory} if the total of the last finished scan didn't fit 32 bits.
   void demandNoOverflow() const;
 

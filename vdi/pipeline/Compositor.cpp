@@ -1,7 +1,6 @@
 #include "vdi/pipeline/Compositor.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 namespace vdi::detail {
@@ -9,131 +8,140 @@ namespace vdi::detail {
 using gpu::MemoryKind;
 namespace shared = gpu::shared;
 
+namespace {
+
+constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
+
+}  // namespace
+
 Compositor::Compositor(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
       commands_(device_),
       scan_(device_),
+      counts_(device_),
       mergePass_(device_),
       compositePass_(device_),
       builder_(device_),
       survey_(device_) {}
 
-/// Bands of lists whose supersegments, received, merged and composited, take at most an eighth of the device
-/// each.
-template <typename Segment>
-std::vector<Compositor::Band> Compositor::begin(const std::vector<ListsOf<Segment>>& subLists,
-                                                const Request& request) {
-  request_ = request;
+void Compositor::noteTimes() {
+  for (const gpu::StageTime& stage : commands_.stageTimes()) milliseconds_ += stage.milliseconds;
+}
+
+double Compositor::takeMilliseconds() {
+  return std::exchange(milliseconds_, 0.0);
+}
+
+void Compositor::merge(const Distributed& parts, const DepthCode& code, Merged& merged) {
+  const std::uint32_t lists = parts.listCount;
+  const std::uint64_t ranks = parts.subLists.size();
+  // Of each rank a row of counts: as words of four bytes, then as a word each.
+  const std::uint64_t rowWords = gpu::groupsFor(lists, shared::countsPerWord);
+  const std::uint64_t rowLength = rowWords * shared::countsPerWord;
+  const std::uint64_t rows = ranks * rowLength;
+  merged.listCount = lists;
+  merged.total = parts.total;
+  merged.offsets.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
+  merged.segments.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
+  received_.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
+  packedCounts_.reserve(device_, ranks * rowWords * wordBytes, MemoryKind::DeviceLocal);
+  subCounts_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
+  subOffsets_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
+  mergedCounts_.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
+  heads_.reserve(device_, parts.total * sizeof(shared::MergeHead), MemoryKind::DeviceLocal);
+
+  commands_.begin();
+  commands_.mark("receive");
+  const auto copy = [&](const SubLists& sub, const gpu::Buffer& own, std::uint64_t from,
+                        const gpu::Buffer& to, std::uint64_t at, std::uint64_t bytes) {
+    if (sub.access != nullptr) {
+      sub.access->recordRead(commands_, from, to, at, bytes);
+    } else {
+      commands_.copy(own, from, to, at, bytes);
+    }
+  };
+  std::uint64_t received = 0;
+  for (std::uint64_t r = 0; r < ranks; ++r) {
+    const SubLists& sub = parts.subLists[r];
+    copy(sub, *parts.ownSegments, sub.segmentsAt, received_, received, sub.count * parts.segmentBytes);
+    received += sub.count * parts.segmentBytes;
+    if (!sub.wideCounts) {
+      copy(sub, *parts.ownCounts, sub.countsAt, packedCounts_, r * rowWords * wordBytes,
+           rowWords * wordBytes);
+    }
+  }
+  commands_.barrier();
+  shared::CountsConstants unpack{};
+  unpack.packed = packedCounts_.address();
+  unpack.counts = subCounts_.address();
+  unpack.words = static_cast<std::uint32_t>(ranks * rowWords);
+  unpack.mode = shared::countsModeUnpack;
+  counts_.record(commands_, unpack);
+  commands_.barrier();
+  for (std::uint64_t r = 0; r < ranks; ++r) {
+    const SubLists& sub = parts.subLists[r];
+    if (!sub.wideCounts) continue;
+    // What's behind the row's last list must count for nothing.
+    commands_.fill(subCounts_, r * rowLength * wordBytes, rowLength * wordBytes, 0);
+    commands_.barrier();
+    copy(sub, *parts.ownCounts, sub.countsAt, subCounts_, r * rowLength * wordBytes, lists * wordBytes);
+  }
+  scan_.record(commands_, subCounts_, subOffsets_, static_cast<std::uint32_t>(rows));
+
+  shared::MergeConstants merge{};
+  merge.received = received_.address();
+  merge.subOffsets = subOffsets_.address();
+  merge.heads = heads_.address();
+  merge.counts = mergedCounts_.address();
+  merge.offsets = merged.offsets.address();
+  merge.merged = merged.segments.address();
+  merge.listCount = lists;
+  merge.rankCount = static_cast<std::uint32_t>(ranks);
+  merge.rowLength = static_cast<std::uint32_t>(rowLength);
+  merge.form = storedForm(code);
+  commands_.mark("merge");
+  merge.mode = shared::mergeModeCount;
+  if (lists > 0) mergePass_.record(commands_, merge);
+  scan_.record(commands_, mergedCounts_, merged.offsets, lists);
+  merge.mode = shared::mergeModeMerge;
+  if (lists > 0) mergePass_.record(commands_, merge);
+  commands_.submitAndWait();
+  scan_.demandNoOverflow();
+  for (const SubLists& sub : parts.subLists) {
+    if (sub.access != nullptr) sub.access->finish();
+  }
+  noteTimes();
+}
+
+void Compositor::apply(const Merged& merged, const Request& request) {
   settings_.step = static_cast<float>(request.sampleStep);
   settings_.budget = request.budget;
   settings_.mostPerList = request.mostPerList;
   settings_.level = request.level;
   settings_.form = storedForm(request.code);
-  const std::size_t listCount = subLists.front().listCount();
-  const std::uint64_t most = std::max<std::uint64_t>(device_->limits().memoryBytes / 8 / sizeof(Segment), 1);
-  std::vector<Band> bands;
-  for (Band band; band.first < listCount; band.first = band.last) {
-    for (std::uint64_t total = 0; band.last < listCount; ++band.last) {
-      std::uint64_t next = 0;
-      for (const ListsOf<Segment>& sub : subLists) next += sub.countOf(band.last);
-      if (band.last > band.first && total + next > most) break;
-      total += next;
-    }
-    bands.push_back(band);
-  }
-  return bands;
+  settings_.merged = merged.segments.address();
+  settings_.mergedOffsets = merged.offsets.address();
+  settings_.listCount = merged.listCount;
 }
 
-template <typename Segment>
-Survey Compositor::survey(const std::vector<ListsOf<Segment>>& subLists, const Request& request) {
-  surveyed_.reset();
-  const std::vector<Band> bands = begin(subLists, request);
-  Survey sum;
-  for (const Band& band : bands) {
-    merge(subLists, band);
-    sum += survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
-      settings_.survey = address;
-      compositePass_.record(commands, settings_, gpu::CompositePass::Work::Survey, request_.algorithm);
-    });
-  }
-  if (bands.size() == 1) surveyed_ = bands.front();
-  return sum;
+Survey Compositor::survey(const Merged& merged, const Request& request) {
+  if (merged.listCount == 0) return {};
+  apply(merged, request);
+  const Survey survey = survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
+    settings_.survey = address;
+    compositePass_.record(commands, settings_, gpu::CompositePass::Work::Survey, request.algorithm);
+  });
+  noteTimes();
+  return survey;
 }
 
-template <typename Segment>
-ListsOf<Segment> Compositor::composite(const std::vector<ListsOf<Segment>>& subLists,
-                                       const Request& request) {
-  const std::vector<Band> bands = begin(subLists, request);
-  ListsOf<Segment> result;
-  result.offsets.reserve(subLists.front().listCount() + 1);
-  const std::optional<Band> merged = std::exchange(surveyed_, std::nullopt);
-  for (const Band& band : bands) {
-    if (merged != band) merge(subLists, band);
-    compositeBand(band, result);
-  }
-  return result;
-}
-
-/// Of all ranks: supersegments to received_, offsets from 0 to subOffsets_. Returns how many supersegments.
-template <typename Segment>
-std::uint64_t Compositor::upload(const std::vector<ListsOf<Segment>>& subLists, const Band& band) {
-  const std::size_t listCount = band.listCount();
-  std::uint64_t total = 0;
-  for (const ListsOf<Segment>& sub : subLists) total += sub.offsets[band.last] - sub.offsets[band.first];
-  staging_.reserve(device_, total * sizeof(Segment), MemoryKind::Upload);
-  received_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
-  rankAddresses_.reserve(device_, subLists.size() * sizeof(std::uint64_t), MemoryKind::Upload);
-  subOffsets_.reserve(device_, subLists.size() * (listCount + 1) * sizeof(std::uint32_t), MemoryKind::Upload);
-  std::uint64_t at = 0;
-  for (std::size_t rank = 0; rank < subLists.size(); ++rank) {
-    const ListsOf<Segment>& sub = subLists[rank];
-    const std::uint32_t begin = sub.offsets[band.first];
-    const std::uint64_t bytes = (sub.offsets[band.last] - begin) * sizeof(Segment);
-    if (bytes > 0) std::memcpy(staging_.mapped().data() + at, sub.segments.data() + begin, bytes);
-    rankAddresses_.mappedAs<std::uint64_t>()[rank] = received_.address() + at;
-    const auto offsets = subOffsets_.mappedAs<std::uint32_t>().subspan(rank * (listCount + 1), listCount + 1);
-    for (std::size_t i = 0; i <= listCount; ++i) offsets[i] = sub.offsets[band.first + i] - begin;
-    at += bytes;
-  }
-  return total;
-}
-
-/// All ranks' supersegments of each list, by depth, to merged_ and mergedOffsets_.
-template <typename Segment>
-void Compositor::merge(const std::vector<ListsOf<Segment>>& subLists, const Band& band) {
-  const std::uint32_t listCount = band.listCount();
-  const std::uint64_t total = upload(subLists, band);
-  const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
-  heads_.reserve(device_, subLists.size() * words, MemoryKind::DeviceLocal);
-  mergedCounts_.reserve(device_, words, MemoryKind::DeviceLocal);
-  mergedOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
-  merged_.reserve(device_, total * sizeof(Segment), MemoryKind::DeviceLocal);
-
-  shared::MergeConstants merge{};
-  merge.received = rankAddresses_.address();
-  merge.subOffsets = subOffsets_.address();
-  merge.heads = heads_.address();
-  merge.counts = mergedCounts_.address();
-  merge.offsets = mergedOffsets_.address();
-  merge.merged = merged_.address();
-  merge.listCount = listCount;
-  merge.form = settings_.form;
-  merge.rankCount = static_cast<std::uint32_t>(subLists.size());
-  commands_.begin();
-  commands_.copy(staging_, 0, received_, 0, total * sizeof(Segment));
-  merge.mode = shared::mergeModeCount;
-  mergePass_.record(commands_, merge);
-  scan_.record(commands_, mergedCounts_, mergedOffsets_, listCount);
-  merge.mode = shared::mergeModeMerge;
-  mergePass_.record(commands_, merge);
-  commands_.submitAndWait();
-  settings_.merged = merged_.address();
-  settings_.mergedOffsets = mergedOffsets_.address();
-  settings_.listCount = listCount;
-}
-
-template <typename Segment>
-void Compositor::compositeBand(const Band& band, ListsOf<Segment>& result) {
+void Compositor::composite(const Merged& merged, const Request& request, DeviceLists& lists) {
+  lists.offsets.reserve(device_, (std::uint64_t{merged.listCount} + 1) * wordBytes, MemoryKind::DeviceLocal);
+  lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
+  lists.listCount = merged.listCount;
+  lists.count = 0;
+  if (merged.listCount == 0) return;
+  apply(merged, request);
   const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
     settings_.sensitivities = targets.sensitivities;
     settings_.counts = targets.counts;
@@ -144,39 +152,37 @@ void Compositor::compositeBand(const Band& band, ListsOf<Segment>& result) {
     settings_.left = targets.left;
     settings_.status = targets.status;
     using Work = gpu::CompositePass::Work;
-    compositePass_.record(commands, settings_, write ? Work::Write : Work::Search, request_.algorithm);
+    compositePass_.record(commands, settings_, write ? Work::Write : Work::Search, request.algorithm);
   };
   ListBuilder::Request build;
-  build.width = band.listCount();
+  build.width = merged.listCount;
   build.rows = 1;
-  build.algorithm = request_.algorithm;
-  build.most = {request_.mostPerList, true};
-  build.sampleStep = request_.sampleStep;
-  build.code = request_.code;
-  builder_.build(build, record, result);
+  build.algorithm = request.algorithm;
+  build.most = {request.mostPerList, true};
+  build.sampleStep = request.sampleStep;
+  build.code = request.code;
+  builder_.build(build, record, lists);
+  milliseconds_ += builder_.times().all;
 }
 
-template Survey Compositor::survey(const std::vector<SupersegmentLists>&, const Request&);
-template Survey Compositor::survey(const std::vector<CompactLists>&, const Request&);
-template SupersegmentLists Compositor::composite(const std::vector<SupersegmentLists>&, const Request&);
-template CompactLists Compositor::composite(const std::vector<CompactLists>&, const Request&);
-
-void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::vec4> rgba,
-                   std::span<float> depth) {
-  std::vector<Supersegment> merged;
-  for (std::size_t i = 0; i < rgba.size(); ++i) {
-    merged.clear();
-    for (const SupersegmentLists& sub : subLists) {
-      const auto list = sub.list(i);
-      merged.insert(merged.end(), list.begin(), list.end());
-    }
-    std::sort(merged.begin(), merged.end(),
-              [](const Supersegment& a, const Supersegment& b) { return a.front < b.front; });
-    glm::vec4 sum(0.0F);
-    for (const Supersegment& s : merged) sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
-    rgba[i] = sum;
-    depth[i] = merged.empty() ? Image::noDepth : merged.front().front;
-  }
+void Compositor::flatten(const Merged& merged, const DepthCode& code, gpu::Buffer& colors,
+                         gpu::Buffer& depths) {
+  colors.reserve(device_, merged.listCount * sizeof(glm::vec4), MemoryKind::DeviceLocal);
+  depths.reserve(device_, merged.listCount * sizeof(float), MemoryKind::DeviceLocal);
+  if (merged.listCount == 0) return;
+  shared::MergeConstants constants{};
+  constants.offsets = merged.offsets.address();
+  constants.merged = merged.segments.address();
+  constants.colors = colors.address();
+  constants.depths = depths.address();
+  constants.listCount = merged.listCount;
+  constants.mode = shared::mergeModeFlatten;
+  constants.form = storedForm(code);
+  commands_.begin();
+  commands_.mark("flatten");
+  mergePass_.record(commands_, constants);
+  commands_.submitAndWait();
+  noteTimes();
 }
 
 }  // namespace vdi::detail

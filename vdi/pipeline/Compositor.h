@@ -4,13 +4,12 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 
-#include "vdi/core/Image.h"
-#include "vdi/core/Vdi.h"
 #include "vdi/gpu/CompositePass.h"
+#include "vdi/gpu/CountsPass.h"
 #include "vdi/gpu/MergePass.h"
+#include "vdi/pipeline/Distributor.h"
 #include "vdi/pipeline/ListBuilder.h"
 #include "vdi/pipeline/SurveyBuffer.h"
 
@@ -29,55 +28,45 @@ class Compositor {
     float level = -1.0F;  // of all owners' survey together, with Budget::Total
   };
 
-  /// What the owner's lists need.
-  template <typename Segment>
-  Survey survey(const std::vector<ListsOf<Segment>>& subLists, const Request& request);
+  /// All ranks' supersegments of some lists, each list's in order of depth; on the device.
+  struct Merged {
+    gpu::Buffer segments;
+    gpu::Buffer offsets;  // [listCount + 1]
+    std::uint32_t listCount = 0;
+    std::uint64_t total = 0;
+  };
+  void merge(const Distributed& parts, const DepthCode& code, Merged& merged);
 
-  /// subLists[r] are rank r's supersegments of the owner's lists. The result has at most
-  /// `mostPerList` a list.
-  template <typename Segment>
-  ListsOf<Segment> composite(const std::vector<ListsOf<Segment>>& subLists, const Request& request);
+  /// What these lists need.
+  Survey survey(const Merged& merged, const Request& request);
+  /// At most `mostPerList` supersegments a list.
+  void composite(const Merged& merged, const Request& request, DeviceLists& lists);
+  /// The flat picture: each list's supersegments composited, as [listCount] glm::vec4 and [listCount] float.
+  void flatten(const Merged& merged, const DepthCode& code, gpu::Buffer& colors, gpu::Buffer& depths);
+
+  /// Device time of all that has been done since the last call.
+  double takeMilliseconds();
 
  private:
-  /// Lists [first, last).
-  struct Band {
-    std::size_t first = 0;
-    std::size_t last = 0;
-    std::uint32_t listCount() const { return static_cast<std::uint32_t>(last - first); }
-    bool operator==(const Band&) const = default;
-  };
-  template <typename Segment>
-  std::vector<Band> begin(const std::vector<ListsOf<Segment>>& subLists, const Request& request);
-  template <typename Segment>
-  void merge(const std::vector<ListsOf<Segment>>& subLists, const Band& band);
-  template <typename Segment>
-  void compositeBand(const Band& band, ListsOf<Segment>& result);
-  template <typename Segment>
-  std::uint64_t upload(const std::vector<ListsOf<Segment>>& subLists, const Band& band);
+  void apply(const Merged& merged, const Request& request);
+  void noteTimes();
 
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
   gpu::ScanPass scan_;
+  gpu::CountsPass counts_;
   gpu::MergePass mergePass_;
   gpu::CompositePass compositePass_;
   ListBuilder builder_;
-  gpu::Buffer staging_;
   gpu::Buffer received_;
-  gpu::Buffer rankAddresses_;
+  gpu::Buffer packedCounts_;
+  gpu::Buffer subCounts_;
   gpu::Buffer subOffsets_;
   gpu::Buffer heads_;
   gpu::Buffer mergedCounts_;
-  gpu::Buffer mergedOffsets_;
-  gpu::Buffer merged_;
   gpu::shared::CompositeParams settings_{};
-  Request request_;
   SurveyBuffer survey_;
-  std::optional<Band> surveyed_;  // the only band of a survey, still merged
+  double milliseconds_ = 0.0;
 };
-
-/// The flat picture of the owner's lists: all ranks' supersegments of each list composited in order of depth.
-/// Host code.
-void flattenMerged(std::span<const SupersegmentLists> subLists, std::span<glm::vec4> rgba,
-                   std::span<float> depth);
 
 }  // namespace vdi::detail

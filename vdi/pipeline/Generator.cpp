@@ -1,19 +1,23 @@
 // VdiGenerator: the four stages in order, and who waits for whom.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <type_traits>
 #include <utility>
-#include <variant>
 
-#include "vdi/comm/DirectSend.h"
+#include "vdi/comm/Exchange.h"
 #include "vdi/comm/GhostExchange.h"
+#include "vdi/comm/GlobalScene.h"
+#include "vdi/comm/Ownership.h"
 #include "vdi/core/Error.h"
-#include "vdi/core/Parallel.h"
 #include "vdi/pipeline/Compositor.h"
+#include "vdi/pipeline/Distributor.h"
+#include "vdi/pipeline/Gather.h"
 #include "vdi/pipeline/Pipeline.h"
 #include "vdi/pipeline/RayCaster.h"
 
@@ -123,20 +127,47 @@ struct VdiGenerator::State {
   State(std::shared_ptr<gpu::Device> theDevice, comm::Communicator theComm)
       : device(std::move(theDevice)), comm(std::move(theComm)) {
     comm.together([&] {
+      const comm::Transport transport = comm::transportFromEnvironment();
+      const bool shares = comm.size() > 1 && transport == comm::Transport::Shared;
+      using Visible = detail::HostPool::Visible;
+      pool = std::make_shared<detail::HostPool>(device, shares ? Visible::ToHost : Visible::ToProcess);
       caster = std::make_unique<detail::RayCaster>(device);
       compositor = std::make_unique<detail::Compositor>(device);
+      distributor = std::make_unique<detail::Distributor>(device, comm, transport);
+      gather = std::make_unique<detail::Gather>(device, comm, transport, root);
+      scan = std::make_unique<gpu::ScanPass>(device);
     });
   }
+  ~State() {
+    if (pool) pool->detach();  // VDIs may outlive this
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  State(State&&) = delete;
+  State& operator=(State&&) = delete;
 
   std::shared_ptr<gpu::Device> device;
   comm::Communicator comm;
+  std::shared_ptr<detail::HostPool> pool;  // of VDIs and pictures
   std::unique_ptr<detail::RayCaster> caster;
   std::unique_ptr<detail::Compositor> compositor;
+  std::unique_ptr<detail::Distributor> distributor;
+  std::unique_ptr<detail::Gather> gather;
+  std::unique_ptr<gpu::ScanPass> scan;
+  detail::DeviceLists band;  // of this rank's own lists
+  /// Of the lists that this rank owns, by band.
+  struct OwnedBand {
+    comm::Ownership owned;
+    std::uint64_t firstList = 0;
+    detail::Compositor::Merged merged;
+    detail::DeviceLists lists;
+    gpu::Buffer colors;
+    gpu::Buffer depths;
+  };
+  std::vector<OwnedBand> bands;
   Step shown;
   ScalarRange range;  // of what's shown, global
   std::optional<Step> next;
-  std::variant<SupersegmentLists, CompactLists> spare;  // for their memory
-  Image spareImage;
   RankReport mine;
   std::vector<RankReport> reports;
 
@@ -203,10 +234,12 @@ struct VdiGenerator::State {
           Prepared{view, depthLattice(shown.scene, view, settings.samplesPerVoxel), bake(function)});
       demandSpans(prepared->table);
     });
-    comm.demandEqual(fingerprintOf(camera), "camera");
-    comm.demandEqual(fingerprintOf(function), "transfer function");
-    comm.demandEqual(fingerprintOf(settings),
-                     "resolution, supersegments, budget, sampling rate, algorithm or precision");
+    const std::array prints{comm::Communicator::Fingerprint{fingerprintOf(camera), "camera"},
+                            comm::Communicator::Fingerprint{fingerprintOf(function), "transfer function"},
+                            comm::Communicator::Fingerprint{
+                                fingerprintOf(settings),
+                                "resolution, supersegments, budget, sampling rate, algorithm or precision"}};
+    comm.demandEqual(prints);
     mine = {};
     mine.uploadSeconds = std::exchange(shown.uploadSeconds, 0.0);
     mine.blocks = shown.blocks;
@@ -229,32 +262,77 @@ struct VdiGenerator::State {
     if (any[0] != 0) throw Error(ErrorCode::Cancelled, "stopped on request");
   }
 
-  template <typename Segment>
-  ListsOf<Segment> takeSpare() {
-    auto* lists = std::get_if<ListsOf<Segment>>(&spare);
-    return lists != nullptr ? std::exchange(*lists, {}) : ListsOf<Segment>();
+  detail::RayCaster::Request requestOf(const Prepared& prepared, const GenerateSettings& settings,
+                                       bool runsOnly, const DepthCode& code) const {
+    return {shown.scene, prepared.view,   prepared.lattice, prepared.table,
+            settings,    comm.size() > 1, runsOnly,         code};
   }
 
-  /// The VDI's lists, on the root; what it is that's sent and stored, Segment says.
+  /// The VDI's lists; what it is that's sent and stored, Segment says. With one rank.
   template <typename Segment>
-  ListsOf<Segment> makeLists(const Prepared& prepared, const GenerateSettings& settings,
-                             const DepthCode& code, const Progress& progress) {
-    const bool alone = comm.size() == 1;
+  ListsOf<Segment> makeListsAlone(const Prepared& prepared, const GenerateSettings& settings,
+                                  const DepthCode& code, const Progress& progress) {
     Stopwatch watch;
-    ListsOf<Segment> lists;
-    cancellable(progress, 0.8, [&](const detail::RayCaster::Progress& report) {
-      lists = caster->lists<Segment>(
-          {shown.scene, prepared.view, prepared.lattice, prepared.table, settings, !alone, false, code},
-          report, takeSpare<Segment>());
+    auto lists = detail::listsIn<Segment>(pool);
+    detail::ListDownload<Segment> download(lists, *pool);
+    cancellable(progress, 0.95, [&](const detail::RayCaster::Progress& report) {
+      detail::RayCaster::Cast cast = caster->begin(requestOf(prepared, settings, false, code));
+      lists.offsets.reserve(std::uint64_t{cast.build.width} * cast.height + 1);
+      for (std::uint32_t row = 0; row < cast.height; row += cast.rowsPerBand) {
+        const std::uint32_t end = std::min(cast.height, row + cast.rowsPerBand);
+        caster->makeBand(cast, row, end, band,
+                         [&](gpu::Commands& commands) { download.record(commands, *scan, band); });
+        download.finish();
+        if (!report(static_cast<double>(end) / cast.height)) break;
+      }
     });
     mine.subSupersegments = lists.segments.size();
     mine.generateSeconds = watch.lap();
     noteTimes();
-    if (alone) return lists;
-    comm::Received<Segment> received = comm::distribute(comm, lists);
-    spare = std::exchange(lists, {});
-    mine.bytesSent = received.bytesSent;
-    mine.distributeSeconds = watch.lap();
+    return lists;
+  }
+
+  /// Collective: this rank's lists, band after band, to those who own them, where they're merged by depth.
+  void makeOwnedBands(const Prepared& prepared, const GenerateSettings& settings, bool runsOnly,
+                      const DepthCode& code, const Progress& progress) {
+    Stopwatch watch;
+    detail::RayCaster::Cast cast;
+    comm.together([&] { cast = caster->begin(requestOf(prepared, settings, runsOnly, code)); });
+    std::array<double, 1> rows{static_cast<double>(cast.rowsPerBand)};
+    comm.allReduceMin(rows);  // all ranks' bands are the same
+    const auto rowsPerBand = static_cast<std::uint32_t>(rows[0]);
+    const std::uint64_t width = cast.build.width;
+    const auto ownership = comm::Ownership::equal(width * cast.height, comm.size());
+    bands.resize((cast.height + rowsPerBand - 1) / rowsPerBand);
+    compositor->takeMilliseconds();
+    for (std::size_t i = 0; i < bands.size(); ++i) {
+      OwnedBand& own = bands[i];
+      const auto row = static_cast<std::uint32_t>(i) * rowsPerBand;
+      const std::uint32_t end = std::min(cast.height, row + rowsPerBand);
+      own.firstList = row * width;
+      own.owned = ownership.within(row * width, end * width);
+      cancellable(progress, 0.8, [&](const detail::RayCaster::Progress& report) {
+        caster->makeBand(cast, row, end, band);
+        report(static_cast<double>(end) / cast.height);
+      });
+      mine.subSupersegments += band.count;
+      mine.generateSeconds += watch.lap();
+      const detail::Distributed parts = distributor->distribute(band, own.owned, detail::segmentBytes(code));
+      mine.bytesSent += distributor->bytesSent();
+      mine.distributeSeconds += watch.lap();
+      comm.together([&] { compositor->merge(parts, code, own.merged); });
+      mine.compositeSeconds += watch.lap();
+    }
+    noteTimes();
+  }
+
+  /// Collective: the VDI's lists, on the root.
+  template <typename Segment>
+  ListsOf<Segment> makeLists(const Prepared& prepared, const GenerateSettings& settings,
+                             const DepthCode& code, const Progress& progress) {
+    if (comm.size() == 1) return makeListsAlone<Segment>(prepared, settings, code, progress);
+    makeOwnedBands(prepared, settings, false, code, progress);
+    Stopwatch watch;
     detail::Compositor::Request request{settings.supersegments,
                                         mostPerList(settings.supersegments, settings.budget),
                                         prepared.lattice.step,
@@ -263,20 +341,118 @@ struct VdiGenerator::State {
                                         -1.0F};
     if (settings.budget == Budget::Total) {
       Survey survey;
-      comm.together([&] { survey = compositor->survey(received.subLists, request); });
+      comm.together([&] {
+        for (const OwnedBand& own : bands) survey += compositor->survey(own.merged, request);
+      });
       comm.allReduceSum(survey.supersegments);
       comm.allReduceSum(std::span(&survey.equally, 1));
       request.level = survey.levelFor(settings.fill);
     }
     cancellable(progress, 0.95, [&](const detail::RayCaster::Progress& report) {
-      lists = compositor->composite(received.subLists, request);
+      for (OwnedBand& own : bands) compositor->composite(own.merged, request, own.lists);
       report(1.0);
     });
-    received = {};
-    mine.compositeSeconds = watch.lap();
-    lists = comm::gatherLists(comm, lists, root);
+    mine.compositeDeviceSeconds = 1e-3 * compositor->takeMilliseconds();
+    mine.compositeSeconds += watch.lap();
+    ListsOf<Segment> lists = gatherLists<Segment>(settings);
     mine.gatherSeconds = watch.lap();
     return lists;
+  }
+
+  /// Collective. Where a rank's lists of a band begin among all: supersegments of the bands before, and of
+  /// the ranks before in this one. The last one is how many there are.
+  std::vector<std::uint64_t> firstSegments() const {
+    std::vector<std::uint64_t> counts;
+    for (const OwnedBand& own : bands) counts.push_back(own.lists.count);
+    const std::vector<std::uint64_t> all = comm.allGatherWords(counts);
+    std::vector<std::uint64_t> firsts;
+    std::uint64_t before = 0;
+    for (std::size_t b = 0; b < bands.size(); ++b) {
+      for (int r = 0; r < comm.size(); ++r) {
+        if (r == comm.rank()) firsts.push_back(before);
+        before += all[static_cast<std::size_t>(r) * bands.size() + b];
+      }
+    }
+    firsts.push_back(before);
+    return firsts;
+  }
+
+  /// Collective: the owners' lists, on the root.
+  template <typename Segment>
+  ListsOf<Segment> gatherLists(const GenerateSettings& settings) {
+    const std::vector<std::uint64_t> firsts = firstSegments();
+    const std::uint64_t total = firsts.back();
+    const std::uint64_t listCount =
+        static_cast<std::uint64_t>(settings.width) * static_cast<std::uint64_t>(settings.height);
+    ListsOf<Segment> lists;
+    std::vector<detail::Gather::Piece> pieces;
+    comm.together([&] {
+      if (total > std::numeric_limits<std::uint32_t>::max()) {
+        throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI");
+      }
+      if (comm.rank() == root) {
+        lists = detail::listsIn<Segment>(pool);
+        lists.offsets.resize(listCount + 1);
+        lists.offsets[listCount] = static_cast<std::uint32_t>(total);
+        lists.segments.reserve(std::max<std::uint64_t>(total, 1));
+        lists.segments.resize(total);
+      }
+      for (std::size_t b = 0; b < bands.size(); ++b) {
+        const OwnedBand& own = bands[b];
+        const std::uint64_t firstList = own.firstList + own.owned.of(comm.rank()).first;
+        pieces.push_back({&own.lists.offsets, 0, firstList * sizeof(std::uint32_t),
+                          own.lists.listCount * sizeof(std::uint32_t)});
+        pieces.push_back(
+            {&own.lists.segments, 1, firsts[b] * sizeof(Segment), own.lists.count * sizeof(Segment)});
+      }
+    });
+    const std::array<void*, 2> arrays{lists.offsets.data(), lists.segments.data()};
+    gather->run(*pool, arrays, pieces, [&](gpu::Commands& commands) {
+      for (std::size_t b = 0; b < bands.size(); ++b) {
+        scan->recordRebase(commands, bands[b].lists.offsets, bands[b].lists.listCount,
+                           static_cast<std::uint32_t>(firsts[b]));
+      }
+    });
+    mine.bytesSent += gather->bytesSent();
+    return lists;
+  }
+
+  /// Collective: the picture of all ranks' volumes, on the root. The limit case of the paper's section 5.3:
+  /// one supersegment a run, composited in order of depth.
+  Image renderTogether(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress) {
+    makeOwnedBands(prepared, settings, true, {}, progress);
+    Stopwatch watch;
+    Image image;
+    std::vector<detail::Gather::Piece> pieces;
+    comm.together([&] {
+      if (comm.rank() == root) image = imageIn(settings);
+      for (OwnedBand& own : bands) {
+        compositor->flatten(own.merged, {}, own.colors, own.depths);
+        const std::uint64_t first = own.firstList + own.owned.of(comm.rank()).first;
+        const std::uint64_t count = own.merged.listCount;
+        pieces.push_back({&own.colors, 0, first * sizeof(glm::vec4), count * sizeof(glm::vec4)});
+        pieces.push_back({&own.depths, 1, first * sizeof(float), count * sizeof(float)});
+      }
+    });
+    mine.compositeDeviceSeconds = 1e-3 * compositor->takeMilliseconds();
+    mine.compositeSeconds += watch.lap();
+    const std::array<void*, 2> arrays{image.rgba.data(), image.depth.data()};
+    gather->run(*pool, arrays, pieces, {});
+    mine.bytesSent += gather->bytesSent();
+    mine.gatherSeconds = watch.lap();
+    return image;
+  }
+
+  /// Of the settings' size, not cleared.
+  Image imageIn(const GenerateSettings& settings) const {
+    Image image;
+    image.width = settings.width;
+    image.height = settings.height;
+    image.rgba = HostVector<glm::vec4>(HostAllocator<glm::vec4>(pool));
+    image.depth = HostVector<float>(HostAllocator<float>(pool));
+    image.rgba.resize(image.pixelCount());
+    image.depth.resize(image.pixelCount());
+    return image;
   }
 
   void noteTimes() {
@@ -352,56 +528,22 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
   return vdi;
 }
 
-void VdiGenerator::recycle(Vdi&& vdi) {
-  state_->spare = std::move(vdi.lists);
-}
-
-void VdiGenerator::recycle(Image&& image) {
-  state_->spareImage = std::move(image);
-}
-
 std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
                                                 const TransferFunction& transferFunction,
                                                 const GenerateSettings& settings, const Progress& progress) {
   State& s = *state_;
   const auto prepared = s.prepare(camera, transferFunction, settings);
-  const bool alone = s.comm.size() == 1;
-  Stopwatch watch;
-  const detail::RayCaster::Request request{
-      s.shown.scene, prepared->view, prepared->lattice, prepared->table, settings, !alone, !alone, {}};
-  Image image = std::exchange(s.spareImage, {});
-  SupersegmentLists lists;
-  s.cancellable(progress, 0.9, [&](const detail::RayCaster::Progress& report) {
-    if (alone) {
-      image = s.caster->image(request, report, std::move(image));
-    } else {
-      lists = s.caster->lists<Supersegment>(request, report);
-    }
-  });
-  s.mine.subSupersegments = lists.segments.size();
-  s.mine.generateSeconds = watch.lap();
-  s.noteTimes();
-  if (!alone) {
-    // The limit case of the paper's section 5.3: one supersegment a run, composited in order of depth.
-    const comm::Received<Supersegment> received = comm::distribute(s.comm, lists);
-    s.mine.bytesSent = received.bytesSent;
-    s.mine.distributeSeconds = watch.lap();
-    const std::size_t owned = received.subLists.front().listCount();
-    std::vector<glm::vec4> rgba(owned);
-    std::vector<float> depth(owned);
-    detail::flattenMerged(received.subLists, rgba, depth);
-    s.mine.compositeSeconds = watch.lap();
-    const auto colors = s.comm.gather(std::as_bytes(std::span(rgba)), sizeof(glm::vec4), root);
-    const auto depths = s.comm.gather(std::as_bytes(std::span(depth)), sizeof(float), root);
-    if (s.comm.rank() == root) {
-      image.width = settings.width;
-      image.height = settings.height;
-      image.rgba.resize(image.pixelCount());
-      image.depth.resize(image.pixelCount());
-      copyInParallel(colors.bytes, image.rgba.data());
-      copyInParallel(depths.bytes, image.depth.data());
-    }
-    s.mine.gatherSeconds = watch.lap();
+  Image image;
+  if (s.comm.size() > 1) {
+    image = s.renderTogether(*prepared, settings, progress);
+  } else {
+    Stopwatch watch;
+    s.cancellable(progress, 0.95, [&](const detail::RayCaster::Progress& report) {
+      image = s.imageIn(settings);
+      s.caster->render(s.requestOf(*prepared, settings, false, {}), report, *s.pool, image);
+    });
+    s.mine.generateSeconds = watch.lap();
+    s.noteTimes();
   }
   s.shareReports();
   if (progress) progress(1.0);

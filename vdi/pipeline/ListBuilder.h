@@ -1,4 +1,4 @@
-// From intervals to compact lists on the device, band by band, and download (paper, section 4). What casts
+// From intervals to compact lists, on the device, band by band (paper, section 4). What casts
 // rays and what composites share it; not part of the library's interface. vdi/reference/Segmenter.h describes
 // the algorithms.
 //   bisection: search of sensitivities, prefix sum of the counts, write.
@@ -11,13 +11,13 @@
 #include <memory>
 
 #include "vdi/core/GenerateSettings.h"
-#include "vdi/core/Vdi.h"
 #include "vdi/gpu/AllotPass.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/ReducePass.h"
 #include "vdi/gpu/ScanPass.h"
+#include "vdi/pipeline/DeviceLists.h"
 
 namespace vdi::detail {
 
@@ -30,6 +30,7 @@ struct BandTargets {
   std::uint64_t grains = 0;
   std::uint64_t written = 0;
   std::uint64_t left = 0;
+  std::uint64_t quotas = 0;
   std::uint64_t status = 0;
 };
 
@@ -78,29 +79,22 @@ class ListBuilder {
     }
   };
 
-  /// Runs all steps and appends what was written to `result`, compact or full as its type says: to its
-  /// offsets, and behind as many supersegments as these speak of, where it may have others still. Throws
-  /// Error{OutOfMemory} when the supersegments don't fit, Error{DeviceFailure} if a list's written count
-  /// isn't its stored count.
-  template <typename Segment>
-  void build(const Request& request, const Record& record, ListsOf<Segment>& result);
+  /// Recorded behind the last step, when the lists' counts are known.
+  using Finish = std::function<void(gpu::Commands&)>;
+  /// Runs all steps, and waits for them: `lists` are what was written, compact or full as the code says.
+  /// Throws Error{OutOfMemory} when the supersegments don't fit, Error{DeviceFailure} if a list's written
+  /// count isn't its stored count.
+  void build(const Request& request, const Record& record, DeviceLists& lists, const Finish& finish = {});
 
   /// Of the last build, without downloads.
   const ListTimes& times() const { return times_; }
 
  private:
-  template <typename Segment>
-  void buildByBisection(const Request& request, const Record& record, ListsOf<Segment>& result);
-  template <typename Segment>
-  void buildByMerging(const Request& request, const Record& record, ListsOf<Segment>& result);
-  enum class Wanted { Total, Offsets };
-  std::uint64_t scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts, gpu::Buffer& offsets,
-                             Wanted wanted);
-  template <typename Segment>
-  void appendOffsets(std::uint32_t listCount, ListsOf<Segment>& result) const;
-  template <typename Segment>
-  void download(std::uint32_t listCount, std::uint64_t total, ListsOf<Segment>& result);
-  void wait();
+  void buildByBisection(const Request& request, const Record& record, DeviceLists& lists,
+                        const Finish& finish);
+  void buildByMerging(const Request& request, const Record& record, DeviceLists& lists, const Finish& finish);
+  std::uint64_t scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts, gpu::Buffer& offsets);
+  void end(const Finish& finish);
 
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
@@ -109,17 +103,14 @@ class ListBuilder {
   gpu::ReducePass reduce_;
   gpu::Buffer sensitivities_;
   gpu::Buffer counts_;
-  gpu::Buffer offsets_;
   gpu::Buffer grainOffsets_;
   gpu::Buffer grains_;
   gpu::Buffer written_;
   gpu::Buffer left_;
   gpu::Buffer countedTolerances_;
   gpu::Buffer countedGrains_;
-  gpu::Buffer segments_;
   gpu::Buffer status_;
-  gpu::Buffer offsetsReadback_;
-  gpu::Buffer segmentsReadback_;
+  gpu::Buffer total_;
   ListTimes times_;
 };
 

@@ -26,8 +26,8 @@ void PictureBuffers::recordDownload(gpu::Commands& commands) const {
 
 void PictureBuffers::copyTo(Image& image, std::size_t first) const {
   assert(colorBytes_ == pixels_ * sizeof(glm::vec4));
-  replaceTail<glm::vec4>(image.rgba, first, readback_.mappedAs<glm::vec4>().first(pixels_));
-  replaceTail<float>(image.depth, first, readback_.mappedAs<float>().subspan(pixels_ * 4, pixels_));
+  replaceTail(image.rgba, first, readback_.mappedAs<const glm::vec4>().first(pixels_));
+  replaceTail(image.depth, first, readback_.mappedAs<const float>().subspan(pixels_ * 4, pixels_));
 }
 
 ImageBytes PictureBuffers::bytes(int width, int height) const {

@@ -31,6 +31,7 @@ struct RankReport {
   double writeSeconds = 0.0;   // and the second
   double distributeSeconds = 0.0;
   double compositeSeconds = 0.0;
+  double compositeDeviceSeconds = 0.0;  // of these, the device's work, and the copying of what was received
   double gatherSeconds = 0.0;
   std::uint64_t blocks = 0;
   std::uint64_t volumeBytes = 0;
@@ -74,14 +75,9 @@ class VdiGenerator {
 
   /// The VDI on rank 0, nullopt on the others. Camera, transfer function and settings must be equal on all
   /// ranks (Error{InvalidArgument} on all of them otherwise). A scene that's empty or out of sight gives a
-  /// VDI with empty lists.
+  /// VDI with empty lists. Devices write to the VDI's memory; when it goes, the next frame's takes its place.
   std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
                               const GenerateSettings& settings, const Progress& progress = {});
-
-  /// Takes a VDI that nobody needs any more, so that the next one of its precision is made in its memory:
-  /// fresh memory costs more than copying to it. Likewise a picture, for renderVolume. Not collective.
-  void recycle(Vdi&& vdi);
-  void recycle(Image&& image);
 
   /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0.
   /// supersegments and algorithm of the settings are ignored.

@@ -1,6 +1,7 @@
 #include "vdi/pipeline/RayCaster.h"
 
 #include <algorithm>
+#include <ranges>
 
 namespace vdi::detail {
 
@@ -65,107 +66,113 @@ float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) 
   return survey.levelFor(request.settings.fill);
 }
 
-template <typename Segment>
-ListsOf<Segment> RayCaster::lists(const Request& request, const Progress& progress, ListsOf<Segment> result) {
-  const auto width = static_cast<std::uint32_t>(request.view.width());
-  const auto height = static_cast<std::uint32_t>(request.view.height());
-  result.offsets.assign(1, 0);
-  const bool nothingThere = volume_.empty() || request.lattice.count == 0;
-  if (nothingThere) {
-    result.offsets.assign(static_cast<std::size_t>(width) * height + 1, 0);
-    result.segments.clear();
-    return result;
-  }
-  result.offsets.reserve(static_cast<std::size_t>(width) * height + 1);
-  shared::CastParams params = prepare(request);
-  // What has no budget needs no merging: one try with the coarsest sensitivity does.
-  const Algorithm algorithm = request.runsOnly ? Algorithm::Bisection : request.settings.algorithm;
-  const std::uint32_t band = rowsPerBand(request, ListBuilder::bytesPerList(params.mostPerList, algorithm));
-  // With cuts at gaps each list's runs must be counted.
-  const std::uint32_t stride = request.cutAtGaps ? 1 : shared::countedStride;
-  params.countedStride = stride;
-  params.countedSamples =
-      stride > 1 ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments) : 1;
+RayCaster::Cast RayCaster::begin(const Request& request) {
+  Cast cast;
   times_ = {};
+  cast.height = static_cast<std::uint32_t>(request.view.height());
+  cast.cutAtGaps = request.cutAtGaps;
+  cast.nothingThere = volume_.empty() || request.lattice.count == 0;
+  if (!cast.nothingThere) cast.params = prepare(request);
+  const std::uint32_t most = mostPerList(request.settings.supersegments, request.settings.budget);
+  ListBuilder::Request& build = cast.build;
+  build.width = static_cast<std::uint32_t>(request.view.width());
+  // What has no budget needs no merging: one try with the coarsest sensitivity does.
+  build.algorithm = request.runsOnly ? Algorithm::Bisection : request.settings.algorithm;
+  // With cuts at gaps each list's runs must be counted.
+  build.countedStride = request.cutAtGaps ? 1 : shared::countedStride;
+  build.most = {most, !request.cutAtGaps};
+  build.sampleStep = request.lattice.step;
+  build.code = request.code;
+  cast.rowsPerBand = rowsPerBand(request, ListBuilder::bytesPerList(most, build.algorithm));
+  cast.params.countedStride = build.countedStride;
+  cast.params.countedSamples =
+      build.countedStride > 1
+          ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments)
+          : 1;
   // What a list needs is known when all ranks' parts of it are together: parts have N_S each.
-  if (request.settings.budget == Budget::Total && !request.cutAtGaps) {
-    params.level = levelOfNeed(params, request);
+  if (request.settings.budget == Budget::Total && !request.cutAtGaps && !cast.nothingThere) {
+    cast.params.level = levelOfNeed(cast.params, request);
   }
-  for (std::uint32_t row = 0; row < height; row += band) {
-    const std::uint32_t end = std::min(height, row + band);
-    ListBuilder::Request build;
-    build.width = width;
-    build.rows = end - row;
-    build.rowBehind = end < height;
-    build.countedStride = stride;
-    build.algorithm = algorithm;
-    build.most = {params.mostPerList, !request.cutAtGaps};
-    build.sampleStep = request.lattice.step;
-    build.code = request.code;
-    params.countedWidth = build.countedWidth();
-    const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
-      // The shader counts lists from the picture's first; the targets hold just this band's.
-      const std::uint64_t skipped = std::uint64_t{row} * width * sizeof(std::uint32_t);
-      params.sensitivities = targets.sensitivities - skipped;
-      params.counts = targets.counts - skipped;
-      params.offsets = targets.offsets - skipped;
-      params.segments = targets.segments;
-      params.grains = targets.grains;
-      params.written = targets.written - skipped;
-      params.left = targets.left - skipped;
-      params.status = targets.status;
-      if (!write && algorithm == Algorithm::Merge) {
-        params.sensitivities = targets.sensitivities;
-        params.counts = targets.counts;
-      }
-      using Work = gpu::CastPass::Work;
-      pass_.record(commands, params, write ? Work::Write : Work::Search, algorithm,
-                   {width, row, end, stride, request.cutAtGaps, params.form});
-    };
-    builder_.build(build, record, result);
-    times_ += builder_.times();
-    if (!progress(static_cast<double>(end) / height)) break;
-  }
-  result.segments.resize(result.offsets.back());
-  return result;
+  return cast;
 }
 
-template SupersegmentLists RayCaster::lists(const Request&, const Progress&, SupersegmentLists);
-template CompactLists RayCaster::lists(const Request&, const Progress&, CompactLists);
+void RayCaster::makeEmpty(std::uint32_t listCount, DeviceLists& lists, const ListBuilder::Finish& finish) {
+  lists.offsets.reserve(device_, (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t),
+                        gpu::MemoryKind::DeviceLocal);
+  lists.segments.reserve(device_, 0, gpu::MemoryKind::DeviceLocal);
+  lists.listCount = listCount;
+  lists.count = 0;
+  commands_.begin();
+  commands_.fill(lists.offsets, 0);
+  if (finish) finish(commands_);
+  commands_.submitAndWait();
+}
 
-Image RayCaster::image(const Request& request, const Progress& progress, Image image) {
+void RayCaster::makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists,
+                         const ListBuilder::Finish& finish) {
+  ListBuilder::Request build = cast.build;
+  build.rows = lastRow - firstRow;
+  build.rowBehind = lastRow < cast.height;
+  if (cast.nothingThere) return makeEmpty(build.listCount(), lists, finish);
+  shared::CastParams& params = cast.params;
+  params.countedWidth = build.countedWidth();
+  const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
+    // The shader counts lists from the picture's first; the targets hold just this band's.
+    const std::uint64_t skipped = std::uint64_t{firstRow} * build.width * sizeof(std::uint32_t);
+    params.sensitivities = targets.sensitivities - skipped;
+    params.counts = targets.counts - skipped;
+    params.offsets = targets.offsets - skipped;
+    params.segments = targets.segments;
+    params.grains = targets.grains;
+    params.written = targets.written - skipped;
+    params.left = targets.left - skipped;
+    params.status = targets.status;
+    if (!write && build.algorithm == Algorithm::Merge) {
+      params.sensitivities = targets.sensitivities;
+      params.counts = targets.counts;
+    }
+    using Work = gpu::CastPass::Work;
+    pass_.record(commands, params, write ? Work::Write : Work::Search, build.algorithm,
+                 {build.width, firstRow, lastRow, build.countedStride, cast.cutAtGaps, params.form});
+  };
+  builder_.build(build, record, lists, finish);
+  times_ += builder_.times();
+}
+
+void RayCaster::render(const Request& request, const Progress& progress, HostPool& pool, Image& image) {
   const auto width = static_cast<std::uint32_t>(request.view.width());
   const auto height = static_cast<std::uint32_t>(request.view.height());
-  image.width = request.view.width();
-  image.height = request.view.height();
+  times_ = {};
   if (volume_.empty() || request.lattice.count == 0) {
-    image.rgba.assign(image.pixelCount(), glm::vec4(0.0F));
-    image.depth.assign(image.pixelCount(), Image::noDepth);
-    return image;
+    std::ranges::fill(image.rgba, glm::vec4(0.0F));
+    std::ranges::fill(image.depth, Image::noDepth);
+    return;
   }
-  image.rgba.reserve(image.pixelCount());
-  image.depth.reserve(image.pixelCount());
   shared::CastParams params = prepare(request);
   const std::uint32_t band = rowsPerBand(request, sizeof(glm::vec4) + sizeof(float));
-  times_ = {};
   for (std::uint32_t row = 0; row < height; row += band) {
     const std::uint32_t end = std::min(height, row + band);
     const std::uint64_t first = std::uint64_t{row} * width;
-    picture_.reserve(device_, std::uint64_t{end - row} * width);
-    params.colors = picture_.colors() - first * sizeof(glm::vec4);
-    params.depths = picture_.depths() - first * sizeof(float);
+    const std::uint64_t pixels = std::uint64_t{end - row} * width;
+    colors_.reserve(device_, pixels * sizeof(glm::vec4), gpu::MemoryKind::DeviceLocal);
+    depths_.reserve(device_, pixels * sizeof(float), gpu::MemoryKind::DeviceLocal);
+    params.colors = colors_.address() - first * sizeof(glm::vec4);
+    params.depths = depths_.address() - first * sizeof(float);
     commands_.begin();
     commands_.mark("cast");
     pass_.record(commands_, params, gpu::CastPass::Work::Volume, Algorithm::Merge, {width, row, end});
-    picture_.recordDownload(commands_);
+    commands_.barrier();
+    commands_.mark("download");
+    const HostPool::Place colors = pool.placeOf(image.rgba.data() + first);
+    const HostPool::Place depths = pool.placeOf(image.depth.data() + first);
+    colors.access->recordWrite(commands_, colors_, 0, colors.at, pixels * sizeof(glm::vec4));
+    depths.access->recordWrite(commands_, depths_, 0, depths.at, pixels * sizeof(float));
     commands_.submitAndWait();
+    colors.access->finish();
+    depths.access->finish();
     times_.all += commands_.stageTimes().front().milliseconds;
-    picture_.copyTo(image, first);
     if (!progress(static_cast<double>(end) / height)) break;
   }
-  image.rgba.resize(image.pixelCount(), glm::vec4(0.0F));
-  image.depth.resize(image.pixelCount(), Image::noDepth);
-  return image;
 }
 
 }  // namespace vdi::detail

@@ -13,11 +13,10 @@
 #include "vdi/core/Image.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
-#include "vdi/core/Vdi.h"
 #include "vdi/gpu/CastPass.h"
 #include "vdi/gpu/VolumeStore.h"
+#include "vdi/pipeline/HostAccess.h"
 #include "vdi/pipeline/ListBuilder.h"
-#include "vdi/pipeline/PictureBuffers.h"
 #include "vdi/pipeline/SurveyBuffer.h"
 
 namespace vdi::detail {
@@ -42,25 +41,37 @@ class RayCaster {
   /// Called with the share done; returning false ends the work early with what's there.
   using Progress = std::function<bool(double)>;
 
-  /// One list per pixel, in the memory of `result`.
-  template <typename Segment>
-  ListsOf<Segment> lists(const Request& request, const Progress& progress, ListsOf<Segment> result = {});
-  /// DVR, in the memory of `image`.
-  Image image(const Request& request, const Progress& progress, Image image = {});
-  /// Of the last of them, without transfers. Of a picture: `all`.
+  /// Lists of one frame, one per pixel, which are made band after band.
+  struct Cast {
+    gpu::shared::CastParams params{};
+    ListBuilder::Request build;  // but for the band's rows
+    bool cutAtGaps = false;
+    bool nothingThere = false;
+    std::uint32_t height = 0;
+    std::uint32_t rowsPerBand = 1;  // what fits; a multiple of shared::countedStride, or all
+  };
+  Cast begin(const Request& request);
+  /// Rows [firstRow, lastRow), which begin at a multiple of shared::countedStride.
+  void makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists,
+                const ListBuilder::Finish& finish = {});
+  /// DVR: all pixels of `image`, which is as large as the view and has its memory from `pool`.
+  void render(const Request& request, const Progress& progress, HostPool& pool, Image& image);
+  /// Of the last frame, without transfers. Of a picture: `all`.
   const ListTimes& times() const { return times_; }
 
  private:
   gpu::shared::CastParams prepare(const Request& request);
   float levelOfNeed(gpu::shared::CastParams params, const Request& request);
   std::uint32_t rowsPerBand(const Request& request, std::uint64_t bytesPerPixel) const;
+  void makeEmpty(std::uint32_t listCount, DeviceLists& lists, const ListBuilder::Finish& finish);
 
   std::shared_ptr<gpu::Device> device_;
   gpu::VolumeStore volume_;
   gpu::CastPass pass_;
   ListBuilder builder_;
   gpu::Commands commands_;
-  PictureBuffers picture_;
+  gpu::Buffer colors_;
+  gpu::Buffer depths_;
   SurveyBuffer survey_;
   ListTimes times_;
 };

@@ -51,7 +51,7 @@ struct VdiRenderer::State {
 
   /// Calls use(at, first, count) for parts of `values` that lie in staging, `at` bytes into it.
   template <typename T, typename Use>
-  void inParts(const std::vector<T>& values, Use use) {
+  void inParts(const HostVector<T>& values, Use use) {
     for (std::size_t first = 0; first < values.size();) {
       if (stagingUsed + sizeof(T) > staging.size()) {
         uploads.submitAndWait();

@@ -62,7 +62,7 @@ Array* field(vtkFieldData* fields, const char* name, int components, vtkIdType t
 }
 
 template <typename Segment, typename T>
-void copySegments(const std::vector<Segment>& segments, T* to) {
+void copySegments(const vdi::HostVector<Segment>& segments, T* to) {
   vdi::copyInParallel(std::as_bytes(std::span(segments)), to);
 }
 
@@ -105,7 +105,7 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
   setPicture(image, vdi::flatten(vdi), false);
   vtkNew<vtkUnsignedIntArray> counts;
   counts->SetName("SupersegmentCount");
-  const std::vector<std::uint32_t>& offsets = vdi.offsets();
+  const auto& offsets = vdi.offsets();
   counts->SetNumberOfTuples(static_cast<vtkIdType>(vdi.listCount()));
   for (std::size_t i = 0; i < vdi.listCount(); ++i)
     counts->SetValue(static_cast<vtkIdType>(i), offsets[i + 1] - offsets[i]);

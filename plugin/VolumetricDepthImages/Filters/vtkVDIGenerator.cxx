@@ -347,10 +347,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
   if (this->PictureOnly) {
     std::optional<vdi::Image> picture = generator.renderVolume(camera, function, settings, progress);
     takeReport();
-    if (picture) {
-      pv::setPicture(output, *picture, true);
-      generator.recycle(std::move(*picture));
-    }
+    if (picture) pv::setPicture(output, *picture, true);
   } else {
     std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
     takeReport();
@@ -358,7 +355,6 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
     vdi->time = time;
     vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));
     pv::setVdi(output, *vdi);
-    generator.recycle(std::move(*vdi));
   }
   output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
 }

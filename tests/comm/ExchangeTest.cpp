@@ -1,0 +1,123 @@
+// What ranks send each other, through shared memory and by messages, on any number of ranks.
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <cstring>
+
+#include "vdi/comm/Exchange.h"
+#include "vdi/comm/GlobalScene.h"
+#include "vdi/core/Error.h"
+
+using namespace vdi;
+using comm::Communicator;
+using comm::Exchange;
+using comm::Transport;
+
+namespace {
+
+std::byte valueOf(int from, int to, std::size_t i, int round) {
+  return static_cast<std::byte>((static_cast<std::size_t>(from) * 31 + static_cast<std::size_t>(to) * 7 + i +
+                                 static_cast<std::size_t>(round)) %
+                                251);
+}
+
+/// Some pairs have nothing for each other, and sizes change from round to round.
+std::uint64_t bytesOf(int from, int to, int round) {
+  const int kind = (from * 5 + to * 3 + round) % 4;
+  return kind == 0 ? 0
+                   : static_cast<std::uint64_t>(kind) * 1000 * static_cast<std::uint64_t>(1 + round * round);
+}
+
+}  // namespace
+
+TEST_CASE("every rank receives what every rank has for it, round after round") {
+  const Communicator world = Communicator::world();
+  const Transport transport = GENERATE(Transport::Shared, Transport::Mpi);
+  INFO((transport == Transport::Shared ? "shared" : "mpi"));
+  Exchange exchange(world, transport);
+  for (const int round : {0, 1, 7, 2, 3}) {
+    std::vector<Exchange::Outgoing> pieces;
+    std::uint64_t total = 0;
+    for (int to = 0; to < world.size(); ++to) {
+      if (to == world.rank() || bytesOf(world.rank(), to, round) == 0) continue;
+      pieces.push_back({to, total, bytesOf(world.rank(), to, round), {static_cast<std::uint64_t>(round), 3}});
+      total += pieces.back().bytes + 5;
+    }
+    const Exchange::Place outbox = exchange.outbox(total);
+    REQUIRE(outbox.memory->bytes().size() >= outbox.at + total);
+    for (const Exchange::Outgoing& piece : pieces) {
+      for (std::size_t i = 0; i < piece.bytes; ++i) {
+        outbox.memory->bytes()[outbox.at + piece.at + i] = valueOf(world.rank(), piece.to, i, round);
+      }
+    }
+    const std::vector<Exchange::Incoming> incoming = exchange.send(pieces);
+    std::size_t next = 0;
+    for (int from = 0; from < world.size(); ++from) {
+      if (from == world.rank() || bytesOf(from, world.rank(), round) == 0) continue;
+      REQUIRE(next < incoming.size());
+      const Exchange::Incoming& piece = incoming[next++];
+      CHECK(piece.from == from);
+      REQUIRE(piece.bytes == bytesOf(from, world.rank(), round));
+      CHECK(piece.note == Exchange::Note{static_cast<std::uint64_t>(round), 3});
+      bool same = true;
+      for (std::size_t i = 0; i < piece.bytes; ++i) {
+        same =
+            same && piece.place.memory->bytes()[piece.place.at + i] == valueOf(from, world.rank(), i, round);
+      }
+      CHECK(same);
+    }
+    CHECK(next == incoming.size());
+    if (world.size() > 1) CHECK(exchange.sharesMemoryWith(0) == (transport == Transport::Shared));
+    world.barrier();  // before anybody writes the next round's
+  }
+}
+
+TEST_CASE("the transport that the environment asks for") {
+  setenv("VDI_TRANSPORT", "mpi", 1);
+  CHECK(comm::transportFromEnvironment() == Transport::Mpi);
+  setenv("VDI_TRANSPORT", "pigeon", 1);
+  CHECK_THROWS_AS(comm::transportFromEnvironment(), Error);
+  unsetenv("VDI_TRANSPORT");
+  CHECK(comm::transportFromEnvironment() == Transport::Shared);
+}
+
+TEST_CASE("memory that ranks share: opened by name, and gone when nobody has it") {
+  const Communicator world = Communicator::world();
+  const auto memory = HostMemory::shared(1000);
+  REQUIRE(!memory->name().empty());
+  const auto again = HostMemory::open(memory->name(), 1000);
+  memory->bytes()[999] = std::byte{7};
+  CHECK(again->bytes()[999] == std::byte{7});
+  memory->unlink();
+  CHECK_THROWS_AS(HostMemory::open(memory->name(), 1000), Error);
+  CHECK(again->bytes()[999] == std::byte{7});
+  CHECK(HostMemory::shared(1000)->name() != memory->name());
+}
+
+TEST_CASE("sums of bytes end at 255") {
+  const Communicator world = Communicator::world();
+  std::vector<std::uint8_t> values(1000);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::uint8_t>(i % 256);
+  const std::vector<std::uint8_t> mine = values;
+  world.allReduceSaturating(values);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    CHECK(values[i] == std::min<std::size_t>(mine[i] * static_cast<std::size_t>(world.size()), 255));
+  }
+}
+
+TEST_CASE("the global scene is the union of what the ranks hold") {
+  const Communicator world = Communicator::world();
+  const int last = world.size() - 1;
+  Scene local;  // rank 0 holds nothing, unless it's alone
+  if (world.rank() > 0 || last == 0) {
+    const double r = world.rank();
+    local.bounds = {{r, -r, 5.0}, {r + 1.0, 1.0, 6.0 + r}};
+    local.minSpacing = 0.5 / (r + 1.0);
+  }
+  const Scene scene = comm::globalScene(world, local);
+  const double first = last == 0 ? 0.0 : 1.0;
+  CHECK(scene.bounds == Box{{first, -1.0 * last, 5.0}, {last + 1.0, 1.0, 6.0 + last}});
+  CHECK(scene.minSpacing == 0.5 / (last + 1.0));
+  const Scene nothing = comm::globalScene(world, Scene());
+  CHECK(nothing.bounds.empty());
+  CHECK(nothing.minSpacing == 0.0);
+}

@@ -1,0 +1,158 @@
+#include "vdi/comm/Exchange.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include "vdi/core/Error.h"
+
+namespace vdi::comm {
+
+namespace {
+
+/// Pieces begin at multiples of it: what devices copy fast.
+constexpr std::uint64_t alignment = 256;
+
+std::uint64_t aligned(std::uint64_t bytes) {
+  return (bytes + alignment - 1) / alignment * alignment;
+}
+
+/// A name as words, which ranks exchange.
+using NameWords = std::array<std::uint64_t, 8>;
+
+NameWords wordsOf(const std::string& name) {
+  NameWords words{};
+  assert(name.size() < sizeof(words));
+  std::memcpy(words.data(), name.data(), name.size());
+  return words;
+}
+
+std::string nameOf(std::span<const std::uint64_t> words) {
+  return {reinterpret_cast<const char*>(words.data())};
+}
+
+}  // namespace
+
+Transport transportFromEnvironment() {
+  const char* value = std::getenv("VDI_TRANSPORT");
+  if (value == nullptr || std::strcmp(value, "") == 0 || std::strcmp(value, "shared") == 0)
+    return Transport::Shared;
+  if (std::strcmp(value, "mpi") == 0) return Transport::Mpi;
+  throw Error(ErrorCode::InvalidArgument,
+              fmt::format("VDI_TRANSPORT is '{}'; there are: shared, mpi", value));
+}
+
+Exchange::Exchange(const Communicator& comm, Transport transport) : comm_(comm), transport_(transport) {}
+
+bool Exchange::sharesMemoryWith(int rank) const {
+  return window_ != nullptr && comm_.hostLeader(rank) == comm_.hostLeader(comm_.rank());
+}
+
+Exchange::Place Exchange::outbox(std::uint64_t bytes) {
+  if (transport_ == Transport::Shared && comm_.size() > 1) {
+    const std::vector<std::uint64_t> wanted = comm_.allGatherWords(std::array{aligned(bytes)});
+    const bool grows = parts_.empty() || !std::equal(wanted.begin(), wanted.end(), parts_.begin(),
+                                                     [](auto a, auto b) { return a <= b; });
+    if (grows) shareNewWindow(wanted);
+    if (window_) return outbox_;
+  }
+  comm_.together([&] {
+    if (!outbox_.memory || outbox_.memory->bytes().size() < bytes) {
+      outbox_ = {};
+      outbox_.memory = HostMemory::anonymous(bytes + bytes / 2);
+    }
+  });
+  return outbox_;
+}
+
+/// Of each host one, whose leader makes it. Where that fails the host has none.
+void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
+  const int leader = comm_.hostLeader(comm_.rank());
+  window_.reset();
+  outbox_ = {};
+  parts_.assign(sizes.begin(), sizes.end());
+  // A half more, so that slow growth doesn't make a new one every frame.
+  for (std::uint64_t& part : parts_) part = aligned(part + part / 2);
+  std::uint64_t total = 0;
+  for (int r = 0; r < comm_.size(); ++r) {
+    if (comm_.hostLeader(r) != leader) continue;
+    if (r == comm_.rank()) outbox_.at = total;
+    total += parts_[static_cast<std::size_t>(r)];
+  }
+  std::string name;
+  if (comm_.rank() == leader) {
+    try {
+      window_ = HostMemory::shared(total);
+      name = window_->name();
+    } catch (const Error&) {  // too little shared memory: messages
+    }
+  }
+  const std::vector<std::uint64_t> names = comm_.allGatherWords(wordsOf(name));
+  const std::size_t words = NameWords().size();
+  messages_ = false;
+  for (int r = 0; r < comm_.size(); ++r) {
+    const int other = comm_.hostLeader(r);
+    if (other != leader ||
+        nameOf(std::span(names).subspan(static_cast<std::size_t>(other) * words, words)).empty())
+      messages_ = true;
+  }
+  name = nameOf(std::span(names).subspan(static_cast<std::size_t>(leader) * words, words));
+  comm_.together([&] {
+    if (comm_.rank() != leader && !name.empty()) window_ = HostMemory::open(name, total);
+  });
+  if (window_) window_->unlink();  // all have it
+  outbox_.memory = window_;
+  if (!window_) outbox_.at = 0;
+}
+
+std::vector<Exchange::Incoming> Exchange::send(std::span<const Outgoing> pieces) {
+  constexpr std::size_t headerWords = 4;
+  const auto ranks = static_cast<std::size_t>(comm_.size());
+  std::vector<std::uint64_t> headers(ranks * headerWords, 0);
+  for (const Outgoing& piece : pieces) {
+    assert(piece.to != comm_.rank() && piece.to < comm_.size());
+    const std::uint64_t header[]{outbox_.at + piece.at, piece.bytes, piece.note[0], piece.note[1]};
+    std::copy(
+        std::begin(header), std::end(header),
+        headers.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(piece.to) * headerWords));
+  }
+  // Who has a header has what it speaks of, where memory is shared: it's sent when that has been written.
+  const std::vector<std::uint64_t> from = comm_.allToAllWords(headers);
+  std::vector<Incoming> incoming;
+  std::uint64_t messageBytes = 0;
+  for (std::size_t r = 0; r < ranks; ++r) {
+    const std::uint64_t* header = &from[r * headerWords];
+    if (header[1] == 0) continue;
+    Incoming piece{static_cast<int>(r), {window_, header[0]}, header[1], {header[2], header[3]}};
+    if (!sharesMemoryWith(piece.from)) {
+      piece.place = {nullptr, messageBytes};
+      messageBytes += aligned(piece.bytes);
+    }
+    incoming.push_back(std::move(piece));
+  }
+  if (!messages_) return incoming;
+  comm_.together([&] {
+    if (messageBytes > 0 && (!inbox_ || inbox_->bytes().size() < messageBytes)) {
+      inbox_.reset();
+      inbox_ = HostMemory::anonymous(messageBytes + messageBytes / 2);
+    }
+  });
+  Messages messages(comm_);
+  for (Incoming& piece : incoming) {
+    if (piece.place.memory) continue;
+    piece.place.memory = inbox_;
+    messages.receive(piece.from, inbox_->bytes().subspan(piece.place.at, piece.bytes));
+  }
+  for (const Outgoing& piece : pieces) {
+    if (piece.bytes == 0 || sharesMemoryWith(piece.to)) continue;
+    messages.send(piece.to, outbox_.memory->bytes().subspan(outbox_.at + piece.at, piece.bytes));
+  }
+  messages.wait();
+  return incoming;
+}
+
+}  // namespace vdi::comm

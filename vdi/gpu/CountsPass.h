@@ -1,0 +1,21 @@
+// Dispatches counts.comp: how many supersegments lists hold, as ranks tell each other.
+#pragma once
+
+#include <memory>
+
+#include "shaders/shared/counts.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/ComputePipeline.h"
+
+namespace vdi::gpu {
+
+class CountsPass {
+ public:
+  explicit CountsPass(std::shared_ptr<Device> device);
+  void record(Commands& commands, const shared::CountsConstants& constants) const;
+
+ private:
+  ComputePipeline pipeline_;
+};
+
+}  // namespace vdi::gpu

@@ -1,0 +1,81 @@
+// Each rank's lists to those who own them (paper, section 5.2). Not part of the library's interface.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "vdi/comm/Exchange.h"
+#include "vdi/comm/Ownership.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/CountsPass.h"
+#include "vdi/gpu/Device.h"
+#include "vdi/pipeline/DeviceLists.h"
+#include "vdi/pipeline/HostAccess.h"
+
+namespace vdi::detail {
+
+/// Memory of the host that a device has been made known to, as long as somebody else uses it.
+class HostAccesses {
+ public:
+  explicit HostAccesses(std::shared_ptr<gpu::Device> device) : device_(std::move(device)) {}
+  HostAccess& of(const std::shared_ptr<HostMemory>& memory);
+  /// Forgets those that nobody else uses any more.
+  void tidy();
+
+ private:
+  std::shared_ptr<gpu::Device> device_;
+  std::map<const HostMemory*, std::unique_ptr<HostAccess>> accesses_;
+};
+
+/// One rank's part of the lists that the receiver owns: their counts, then their supersegments.
+struct SubLists {
+  HostAccess* access = nullptr;  // null: this rank's own, on the device
+  std::uint64_t countsAt = 0;    // bytes into the memory, or into Distributed::ownCounts
+  bool wideCounts = false;       // a word each; else a byte
+  std::uint64_t segmentsAt = 0;  // bytes into the memory, or into Distributed::ownSegments
+  std::uint64_t count = 0;       // supersegments
+};
+
+/// What the owner of lists has of them, by rank; ranks that have none are left out. It stays until the next
+/// distribution, or until the lists are made that were distributed.
+struct Distributed {
+  std::vector<SubLists> subLists;
+  const gpu::Buffer* ownCounts = nullptr;
+  const gpu::Buffer* ownSegments = nullptr;
+  std::uint32_t listCount = 0;
+  std::uint64_t segmentBytes = 0;
+  std::uint64_t total = 0;  // supersegments
+};
+
+class Distributor {
+ public:
+  Distributor(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm, comm::Transport transport);
+
+  /// Collective. `lists`: all of a band, on every rank; `owned`: who gets which of them.
+  Distributed distribute(const DeviceLists& lists, const comm::Ownership& owned, std::uint64_t segmentBytes);
+
+  std::uint64_t bytesSent() const { return bytesSent_; }  // by the last one, to other ranks
+  double milliseconds() const { return milliseconds_; }   // device time of the last one
+
+ private:
+  struct Piece;
+  void pack(const DeviceLists& lists, const comm::Ownership& owned);
+  void recordPack(const DeviceLists& lists, bool wide);
+
+  std::shared_ptr<gpu::Device> device_;
+  const comm::Communicator& comm_;
+  comm::Exchange exchange_;
+  HostAccesses accesses_;
+  gpu::Commands commands_;
+  gpu::CountsPass counts_;
+  gpu::Buffer packed_;
+  gpu::Buffer tooLarge_;
+  gpu::Buffer boundaryOffsets_;  // of the supersegments, where each rank's begin, [ranks + 1]
+  bool wide_ = false;
+  std::uint64_t bytesSent_ = 0;
+  double milliseconds_ = 0.0;
+};
+
+}  // namespace vdi::detail
