@@ -10,22 +10,31 @@ layout(push_constant, scalar) uniform Push { AllotConstants push; };
 #include "tolerance.glsl"
 
 uint mostGrains;
+uint mostQuota;
+uint mostRuns;
 bool allExact;
 float exponents;
 float countedLists;
 
+// Whether this is one rank of several.
+layout(constant_id = 0) const bool together = false;
+
 struct Counted {
   float tolerance;
   uint grains;
+  uint quota;
 };
 
 Counted countedAt(uint x, uint y) {
   uint at = y * push.countedWidth + x;
-  return Counted(push.countedTolerances.at[at], push.countedGrains.at[at]);
+  return Counted(push.countedTolerances.at[at], push.countedGrains.at[at], together ? push.countedQuotas.at[at] : 0u);
 }
 
 void consider(Counted counted) {
-  if (counted.grains == 0u) return;
+  // All ranks find the same tolerance: those that have nothing in a list where others have something, too.
+  if (together ? counted.tolerance == 0.0 : counted.grains == 0u) return;
+  mostQuota = max(mostQuota, counted.quota & 0xffffu);
+  mostRuns = max(mostRuns, counted.quota >> 16);
   mostGrains = max(mostGrains, counted.grains);
   if (counted.tolerance >= 0.0) allExact = false;
   exponents += log2(counted.tolerance < 0.0 ? finestTolerance / toleranceRatio : counted.tolerance);
@@ -49,6 +58,8 @@ void main() {
   uint right = min((x + beyond) >> push.strideShift, push.countedWidth - 1u);
   uint above = min((y + beyond) >> push.strideShift, push.countedRows - 1u);
   mostGrains = 0u;
+  mostQuota = 0u;
+  mostRuns = 0u;
   allExact = true;
   exponents = 0.0;
   countedLists = 0.0;
@@ -61,6 +72,14 @@ void main() {
   consider(rightBelow);
   consider(leftAbove);
   consider(rightAbove);
+  uint room = mostGrains + uncountedSpareGrains + mostGrains / 4u;
+  if (together) {
+    // Where none of the counted lists has anything of this rank's, this one may have.
+    uint quota = mostQuota > 0u ? mostQuota : push.budget;
+    uint runs = mostRuns + 1u;
+    push.quotas.at[list] = quota | runs << 16;
+    room += runs;
+  }
   push.tolerances.at[list] = allExact ? -1.0 : exp2(exponents / countedLists);
-  push.rooms.at[list] = mostGrains + uncountedSpareGrains + mostGrains / 4u;
+  push.rooms.at[list] = room;
 }

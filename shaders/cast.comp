@@ -30,9 +30,11 @@ layout(set = 0, binding = 1, scalar) uniform Params { CastParams params; };
 
 const bool volumeOnly = castProgram == castProgramVolume;
 const bool surveysGrains = castProgram == castProgramSurvey;
-const bool countsGrains = castProgram == castProgramCountGrains || surveysGrains;
+const bool countsLevels = castProgram == castProgramCountLevels;
+const bool countsGrains = castProgram == castProgramCountGrains || surveysGrains || countsLevels;
 const bool writesGrains = castProgram == castProgramWriteGrains;
 
+#define SEVERAL_RANKS
 #include "lists.glsl"
 #include "grains.glsl"
 
@@ -92,7 +94,9 @@ void main() {
     return;
   }
 
-  if (countsGrains) {
+  if (countsLevels) {
+    countLevels();
+  } else if (countsGrains) {
     countGrains();
   } else if (writesGrains) {
     writeGrains();

@@ -3,7 +3,7 @@
 // side in one walk; writing does one.
 //
 // Needs: optical.glsl, appearance.glsl; params with sensitivities, counts, offsets, grains, written, left, status,
-// survey; bool writesGrains, cutAtGaps, byNeed, uint rayShares, constants; uint rayShare; void walk(): feeds every interval
+// survey; where SEVERAL_RANKS is defined, levels, levelShift and quotas too; bool writesGrains, cutAtGaps, byNeed, uint rayShares, constants; uint rayShare; void walk(): feeds every interval
 // of the list to grainsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
@@ -35,7 +35,9 @@ vec2 needTolerances;
 // What's written; see Allotment in vdi/reference/Segmenter.h.
 float grainTolerance;
 float grainAllotted;
-uint grainRoom;
+uint grainRoom;     // of those that don't begin a run, where there are several ranks
+uint grainRuns;     // grains that begin a run; counted where there are several ranks
+uint grainSlots;    // of all
 uint grainBase;  // where the list's grains are
 uint grainsBegun;
 bool grainOpen;
@@ -50,22 +52,21 @@ bool grainCut;  // the next grain starts a run
 
 void closeGrain() {
   uint slot = grainsBegun - 1u;
-  if (grainOpen && slot < grainRoom) {
+  if (grainOpen && slot < grainSlots) {
     params.grains.at[grainBase + slot] = storedGrain(grainSpan, beforeGrain, grainLight, grainStartsRun);
   }
   grainOpen = false;
 }
 
 void adaptTolerance() {
-  uint left = grainRoom - min(grainRoom, grainsBegun);
+  uint left = grainRoom - min(grainRoom, grainsBegun - grainRuns);
   if (left >= spareGrains) return;
   float base = grainAllotted < 0.0 ? finestTolerance / toleranceRatio : grainAllotted;
   grainTolerance = left == 0u ? unlimited : base * pow(toleranceRatio, float(spareGrains - left));
 }
 
-// Nothing but a run's start may open a grain once the room for them is used up. With cuts at gaps it isn't, unless
-// the program that counted rounded otherwise.
-bool roomForGrain() { return (cutAtGaps && grainCut) || grainsBegun < grainRoom; }
+// Nothing but a run's start may open a grain once the room for them is used up.
+bool roomForGrain() { return (cutAtGaps && grainCut) || grainsBegun - grainRuns < grainRoom; }
 
 void beginGrain(float front, vec4 x) {
   closeGrain();
@@ -73,6 +74,7 @@ void beginGrain(float front, vec4 x) {
   grainFirst = x;
   grainDeviation = 0.0;
   grainStartsRun = cutAtGaps && grainCut;
+  if (grainStartsRun) ++grainRuns;
   grainSpan.x = front;
   beforeGrain = grainsBefore;
   grainLight = vec4(0.0);
@@ -156,6 +158,7 @@ void walkForGrains() {
     countedGrains[level] = 0u;
   }
   grainsBegun = 0u;
+  grainRuns = 0u;
   grainOpen = false;
   grainFirst = vec4(0.0);
   grainDeviation = 0.0;
@@ -240,22 +243,45 @@ float toleranceOfLevel(uint level) {
   return level + 1u == surveyLevels ? unlimited : finestTolerance * pow(toleranceRatio, float(level - 1u));
 }
 
+// Where the list's grains are, and how many there may be. Returns how many supersegments they may become, but for runs.
+uint roomOfList() {
+  grainBase = params.offsets.at[listIndex];
+  grainSlots = params.counts.at[listIndex];
+  grainRoom = grainSlots;
+#ifdef SEVERAL_RANKS
+  if (cutAtGaps) {
+    uint quota = params.quotas.at[listIndex];
+    grainRoom -= quota >> 16;
+    return quota & 0xffffu;
+  }
+#endif
+  return params.budget;
+}
+
+// The list has more runs than its neighbours that were counted: it's written again, in a room for these.
+void askForRoom() {
+  atomicAdd(params.status.at[0], 1u);
+#ifdef SEVERAL_RANKS
+  params.counts.at[listIndex] = grainRoom + grainsRuns;
+  params.quotas.at[listIndex] = (params.quotas.at[listIndex] & 0xffffu) | grainsRuns << 16;
+#endif
+}
+
 void writeGrains() {
-  grainRoom = params.counts.at[listIndex];
-  if (grainRoom == 0u) {
+  if (params.counts.at[listIndex] == 0u) {
     params.written.at[listIndex] = 0u;
     params.left.at[listIndex] = 0u;
     return;
   }
-  grainBase = params.offsets.at[listIndex];
+  uint most = roomOfList();
   grainAllotted = params.sensitivities.at[listIndex];
   grainTolerance = grainAllotted;
   if (byNeed) needTolerances = vec2(toleranceOfLevel(levelBelow()), toleranceOfLevel(levelBelow() + 1u));
   walkForGrains();
   closeGrain();
-  uint written = min(grainsBegun, grainRoom);
-  if (written != grainsBegun) atomicAdd(params.status.at[0], 1u);
-  uint most = max(params.budget, cutAtGaps ? grainsRuns : 1u);
+  uint written = min(grainsBegun, grainSlots);
+  if (written != grainsBegun) askForRoom();
+  most = max(most, cutAtGaps ? grainsRuns : 1u);
   if (byNeed) {
     most = interpolatedCount(min(countedGrains[0], params.mostPerList),
                              min(countedGrains[1], params.mostPerList), roundingOf(listIndex));
@@ -263,6 +289,45 @@ void writeGrains() {
   params.written.at[listIndex] = written;
   params.left.at[listIndex] = min(written, most);
 }
+
+#ifdef SEVERAL_RANKS
+uint levelByte(uint count) { return min((count + (1u << params.levelShift) - 1u) >> params.levelShift, 255u); }
+
+// Grains at a tolerance, for all invocations that share the ray.
+uint grainsAtTolerance(uint tolerance) {
+  uint share = tolerance * rayShares / uint(toleranceLevels);
+  uint from = gl_SubgroupInvocationID - rayShare + share;  // who counts for it
+  uint result = 0u;
+  [[unroll]] for (int i = 0; i < countedLevels; ++i) {
+    uint counted = rayShares == 1u ? countedGrains[i] : subgroupShuffle(countedGrains[i], from);
+    if (tolerance == share * uint(countedLevels) + uint(i)) result = counted;
+  }
+  return result;
+}
+
+// What other ranks are told of the list.
+void countLevels() {
+  walkForGrains();
+  uint words[countedLevelWords];
+  words[0] = levelByte(grainsVisible);
+  words[1] = 0u;
+  words[2] = 0u;
+  for (uint tolerance = 0u; tolerance < uint(toleranceLevels); ++tolerance) {
+    uint place = countedTolerance + tolerance;
+    uint bits = levelByte(grainsAtTolerance(tolerance)) << (8u * (place & 3u));
+    if (place < 4u) {
+      words[0] |= bits;
+    } else if (place < 8u) {
+      words[1] |= bits;
+    } else {
+      words[2] |= bits;
+    }
+  }
+  words[2] |= levelByte(grainsRuns) << (8u * (countedRuns & 3u));
+  if (rayShare != 0u) return;
+  for (uint i = 0u; i < countedLevelWords; ++i) params.levels.at[listIndex * countedLevelWords + i] = words[i];
+}
+#endif
 
 // What a workgroup's lists add to the survey.
 shared uint surveyed[surveyLevels + 1u];

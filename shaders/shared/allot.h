@@ -17,11 +17,16 @@ struct AllotConstants {
   VDI_ADDRESS(UintArray) countedGrains;       // likewise: these
   VDI_ADDRESS(FloatArray) tolerances;         // [rows][width]
   VDI_ADDRESS(UintArray) rooms;               // likewise
+  // With other ranks, else 0: in the low half of a word, how many supersegments this rank may have in the list; in the high
+  // half, how much of the room is for grains that begin runs. And what that is in the counted lists.
+  VDI_ADDRESS(UintArray) countedQuotas;
+  VDI_ADDRESS(UintArray) quotas;
   uint width;
   uint rows;
   uint countedWidth;
   uint countedRows;
   uint strideShift;  // log2 of the stride
+  uint budget;       // with other ranks: N_S
 };
 
 VDI_SHARED_END

@@ -22,6 +22,7 @@ inline constexpr uint castProgramSearch = 1;
 inline constexpr uint castProgramCountGrains = 2;
 inline constexpr uint castProgramWriteGrains = 3;
 inline constexpr uint castProgramSurvey = 4;
+inline constexpr uint castProgramCountLevels = 5;
 inline constexpr uint castModeSearch = 0;
 inline constexpr uint castModeWrite = 1;
 #else
@@ -33,6 +34,7 @@ const uint castProgramSearch = 1;       // by bisection: one program that does b
 const uint castProgramCountGrains = 2;  // by merging: tolerances and counts
 const uint castProgramWriteGrains = 3;
 const uint castProgramSurvey = 4;       // for the total budget: what lists need
+const uint castProgramCountLevels = 5;  // by merging, with other ranks: counts at all tolerances (quota.h)
 const uint castModeSearch = 0;  // sensitivities and counts
 const uint castModeWrite = 1;   // supersegments
 #endif
@@ -52,6 +54,8 @@ struct CastParams {
   VDI_ADDRESS(FloatArray) depths;         // [h][w]
   VDI_ADDRESS(UintArray) status;          // [1]: lists whose written count differs from the stored one
   VDI_ADDRESS(UintArray) survey;          // [surveyLevels + 1][2]
+  VDI_ADDRESS(UintArray) levels;          // [rows][countedWidth][countedLevelWords]
+  VDI_ADDRESS(UintArray) quotas;          // [h][w]; with other ranks: as in AllotConstants
   // Ray of pixel (x, y): start = startBase + u * startRight + v * startUp, direction likewise, with u = x + 0.5 - w/2 and
   // v = y + 0.5 - h/2. Start: at the front of the sample lattice, relative to the scene's centre.
   vec3 startBase;
@@ -90,6 +94,7 @@ struct CastParams {
   uint countedSamples;  // one sample stands for that many, those of a multiple of it
   uint mostPerList;
   float level;  // of the survey; negative: equal budgets
+  uint levelShift;  // of levels
 };
 
 struct CastConstants {

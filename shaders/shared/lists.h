@@ -27,6 +27,18 @@ const uint uncountedSpareGrains = 8;
 const uint countedStride = 4;
 #endif
 
+// What a rank tells the others of a list that it has counted, as bytes of these words, the first one lowest: visible samples,
+// grains at each tolerance, runs. Each is divided by 2^levelShift, rounded up, and 255 at most.
+#ifdef __cplusplus
+inline constexpr uint countedLevelWords = 3;
+inline constexpr uint countedTolerance = 1;
+inline constexpr uint countedRuns = 9;
+#else
+const uint countedLevelWords = 3;
+const uint countedTolerance = 1;  // place of the finest tolerance's
+const uint countedRuns = 9;
+#endif
+
 // A survey: what all lists would hold at each level, then what they would equally; a pair of words each, the low one first.
 // Survey of core/Budget.h.
 #ifdef __cplusplus

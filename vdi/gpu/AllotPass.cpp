@@ -13,10 +13,10 @@ ComputePipelineInfo pipelineInfo() {
 
 }  // namespace
 
-AllotPass::AllotPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
+AllotPass::AllotPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
 
-void AllotPass::record(Commands& commands, const shared::AllotConstants& constants) const {
-  commands.dispatch(pipeline_, constants, groupsFor(constants.width, shared::allotGroup), constants.rows);
+void AllotPass::record(Commands& commands, const shared::AllotConstants& constants) {
+  commands.dispatch(pipelines_.with({constants.quotas != 0 ? 1U : 0U}), constants, groupsFor(constants.width, shared::allotGroup), constants.rows);
 }
 
 }  // namespace vdi::gpu

@@ -12,10 +12,10 @@ namespace vdi::gpu {
 class AllotPass {
  public:
   explicit AllotPass(std::shared_ptr<Device> device);
-  void record(Commands& commands, const shared::AllotConstants& constants) const;
+  void record(Commands& commands, const shared::AllotConstants& constants);
 
  private:
-  ComputePipeline pipeline_;
+  PipelineSet pipelines_;  // for one rank, and for one of several
 };
 
 }  // namespace vdi::gpu

@@ -100,6 +100,7 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   const bool writes = work == Work::Write;
   const std::uint32_t program = work == Work::Volume                ? shared::castProgramVolume
                                 : work == Work::Survey              ? shared::castProgramSurvey
+                                : work == Work::CountLevels         ? shared::castProgramCountLevels
                                 : algorithm == Algorithm::Bisection ? shared::castProgramSearch
                                 : writes                            ? shared::castProgramWriteGrains
                                                                     : shared::castProgramCountGrains;
@@ -107,7 +108,8 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   const std::uint32_t compact = program == shared::castProgramSearch ? isCompact(band.form) : 0;
   const shared::CastConstants constants{writes ? shared::castModeWrite : shared::castModeSearch,
                                         band.firstRow, band.lastRow};
-  const bool counts = program == shared::castProgramCountGrains || program == shared::castProgramSurvey;
+  const bool counts = program == shared::castProgramCountGrains || program == shared::castProgramSurvey ||
+                      program == shared::castProgramCountLevels;
   const std::uint32_t stride = counts ? band.countedStride : 1;
   // The row behind the band is counted too.
   const std::uint32_t rows = (band.lastRow - band.firstRow + stride - 1) / stride + (stride > 1 ? 1 : 0);

@@ -33,9 +33,10 @@ class CastPass {
   /// recorded.
   void bind(const VolumeStore& volume) { volume_ = &volume; }
 
-  /// What a dispatch does: the picture; or what lists need (merging); or the first step of an algorithm
-  /// (sensitivities or tolerances, and counts), or its second one (supersegments or grains).
-  enum class Work { Volume, Survey, Search, Write };
+  /// What a dispatch does: the picture; or what lists need (merging); or what this rank tells others of its lists
+  /// (merging); or the first step of an algorithm (sensitivities or tolerances, and counts), or its second one
+  /// (supersegments or grains).
+  enum class Work { Volume, Survey, CountLevels, Search, Write };
   struct Band {
     std::uint32_t width = 0;
     std::uint32_t firstRow = 0;

@@ -292,6 +292,19 @@ struct VdiGenerator::State {
     return lists;
   }
 
+  /// Collective: one tolerance for what all ranks have in a list, and who owns which lists.
+  comm::Ownership agreeOnLists(detail::RayCaster::Cast& cast) {
+    const std::uint64_t width = cast.build.width;
+    const std::uint64_t lists = width * cast.height;
+    if (!cast.agreed) return comm::Ownership::equal(lists, comm.size());
+    std::span<std::uint8_t> levels;
+    comm.together([&] { levels = caster->countLevels(cast); });
+    comm.allReduceSaturating(levels);
+    std::vector<std::uint32_t> weights;
+    comm.together([&] { weights = caster->agree(cast); });
+    return comm::Ownership::balanced(lists, comm.size(), weights, width * cast.build.countedStride);
+  }
+
   /// Collective: this rank's lists, band after band, to those who own them, where they're merged by depth.
   void makeOwnedBands(const Prepared& prepared, const GenerateSettings& settings, bool runsOnly,
                       const DepthCode& code, const Progress& progress) {
@@ -302,7 +315,7 @@ struct VdiGenerator::State {
     comm.allReduceMin(rows);  // all ranks' bands are the same
     const auto rowsPerBand = static_cast<std::uint32_t>(rows[0]);
     const std::uint64_t width = cast.build.width;
-    const auto ownership = comm::Ownership::equal(width * cast.height, comm.size());
+    const comm::Ownership ownership = agreeOnLists(cast);
     bands.resize((cast.height + rowsPerBand - 1) / rowsPerBand);
     compositor->takeMilliseconds();
     for (std::size_t i = 0; i < bands.size(); ++i) {

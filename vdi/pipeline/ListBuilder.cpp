@@ -112,27 +112,54 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
   targets.sensitivities = countedTolerances_.address();
   targets.counts = countedGrains_.address();
   targets.status = status_.address();
+  shared::AllotConstants allot{};
+  allot.countedTolerances = countedTolerances_.address();
+  allot.countedGrains = countedGrains_.address();
+  allot.tolerances = sensitivities_.address();
+  allot.rooms = counts_.address();
+  allot.width = request.width;
+  allot.rows = request.rows;
+  allot.countedWidth = request.countedWidth();
+  allot.countedRows = request.countedRows();
+  allot.strideShift = static_cast<std::uint32_t>(std::countr_zero(request.countedStride));
   commands_.begin();
   commands_.mark("search");
-  record(commands_, targets, false);
-  commands_.barrier();
-  allot_.record(commands_,
-                {countedTolerances_.address(), countedGrains_.address(), sensitivities_.address(),
-                 counts_.address(), request.width, request.rows, request.countedWidth(),
-                 request.countedRows(), static_cast<std::uint32_t>(std::countr_zero(request.countedStride))});
-  const std::uint64_t grainTotal = scanAndTotal(listCount, counts_, grainOffsets_);
+  if (request.agreed) {
+    quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
+    allot.countedTolerances = request.agreed->tolerances;
+    allot.countedGrains = request.agreed->grains;
+    allot.countedQuotas = request.agreed->quotas;
+    allot.quotas = quotas_.address();
+    allot.budget = request.agreed->budget;
+    targets.quotas = quotas_.address();
+  } else {
+    record(commands_, targets, false);
+    commands_.barrier();
+  }
+  allot_.record(commands_, allot);
 
-  grains_.reserve(device_, grainTotal * sizeof(shared::StoredGrain), MemoryKind::DeviceLocal);
   targets.sensitivities = sensitivities_.address();
   targets.counts = counts_.address();
   targets.offsets = grainOffsets_.address();
-  targets.grains = grains_.address();
   targets.written = written_.address();
   targets.left = left_.address();
-  commands_.begin();
-  commands_.mark("write");
-  record(commands_, targets, true);
+  const auto writeGrains = [&] {
+    const std::uint64_t grainTotal = scanAndTotal(listCount, counts_, grainOffsets_);
+    grains_.reserve(device_, grainTotal * sizeof(shared::StoredGrain), MemoryKind::DeviceLocal);
+    targets.grains = grains_.address();
+    commands_.begin();
+    commands_.mark("write");
+    record(commands_, targets, true);
+  };
+  writeGrains();
   lists.count = scanAndTotal(listCount, left_, lists.offsets);
+  // Lists between the counted ones may have more runs than these. They've said how many: now all fit.
+  if (auto& tooLong = status_.mappedAs<std::uint32_t>()[0]; request.agreed && tooLong != 0) {
+    tooLong = 0;
+    commands_.begin();
+    writeGrains();
+    lists.count = scanAndTotal(listCount, left_, lists.offsets);
+  }
 
   lists.segments.reserve(device_, lists.count * segmentBytes(request.code), MemoryKind::DeviceLocal);
   shared::ReduceConstants reduce{};

@@ -4,11 +4,13 @@
 //   bisection: search of sensitivities, prefix sum of the counts, write.
 //   merge: count of grains, of all lists or one in countedStride x countedStride; allotment to all lists,
 //   prefix sum, write of grains; prefix sum of what's to be left of them, reduce.
+//   merge, with other ranks: the same with counts that all of them agreed on.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/gpu/AllotPass.h"
@@ -70,6 +72,15 @@ class ListBuilder {
     gpu::ReducePass::MostPerList most;
     double sampleStep = 1.0;
     DepthCode code;  // of compact lists
+    /// Merging, with other ranks: what they agreed on about the counted lists (shaders/shared/quota.h), which
+    /// aren't counted again. The first one of them is the band's.
+    struct Agreed {
+      std::uint64_t tolerances = 0;
+      std::uint64_t grains = 0;
+      std::uint64_t quotas = 0;
+      std::uint32_t budget = 1;
+    };
+    std::optional<Agreed> agreed;
 
     std::uint32_t listCount() const { return width * rows; }
     /// Of the lists that are counted: every countedStride-th, the row behind the band's last one included.
@@ -103,6 +114,7 @@ class ListBuilder {
   gpu::ReducePass reduce_;
   gpu::Buffer sensitivities_;
   gpu::Buffer counts_;
+  gpu::Buffer quotas_;
   gpu::Buffer grainOffsets_;
   gpu::Buffer grains_;
   gpu::Buffer written_;

@@ -13,6 +13,7 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
       pass_(device_),
       builder_(device_),
       commands_(device_),
+      quotaPass_(device_),
       survey_(device_) {}
 
 shared::CastParams RayCaster::prepare(const Request& request) {
@@ -78,8 +79,9 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
   build.width = static_cast<std::uint32_t>(request.view.width());
   // What has no budget needs no merging: one try with the coarsest sensitivity does.
   build.algorithm = request.runsOnly ? Algorithm::Bisection : request.settings.algorithm;
-  // With cuts at gaps each list's runs must be counted.
-  build.countedStride = request.cutAtGaps ? 1 : shared::countedStride;
+  // With cuts at gaps each list's runs must be counted, unless ranks agree on what they counted.
+  cast.agreed = request.cutAtGaps && build.algorithm == Algorithm::Merge;
+  build.countedStride = request.cutAtGaps && !cast.agreed ? 1 : shared::countedStride;
   build.most = {most, !request.cutAtGaps};
   build.sampleStep = request.lattice.step;
   build.code = request.code;
@@ -94,6 +96,86 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
     cast.params.level = levelOfNeed(cast.params, request);
   }
   return cast;
+}
+
+namespace {
+
+/// What quantises counts to bytes: whether grains are too many must still show.
+std::uint32_t levelShiftFor(std::uint32_t budget) {
+  std::uint32_t shift = 0;
+  while ((shared::grainsPerBudget * budget >> shift) >= 255) ++shift;
+  return shift;
+}
+
+}  // namespace
+
+std::span<std::uint8_t> RayCaster::countLevels(Cast& cast) {
+  const std::uint32_t width = cast.build.countedWidth();
+  const std::uint32_t rows = gpu::groupsFor(cast.height, cast.build.countedStride);
+  const std::uint64_t bytes = std::uint64_t{width} * rows * shared::countedLevelWords * sizeof(std::uint32_t);
+  levels_.reserve(device_, bytes, gpu::MemoryKind::DeviceLocal);
+  levelsSum_.reserve(device_, bytes, gpu::MemoryKind::DeviceLocal);
+  if (!levelsOnHost_ || levelsOnHost_->memory()->bytes().size() < bytes) {
+    levelsOnHost_ = std::make_unique<HostAccess>(device_, HostMemory::anonymous(bytes));
+  }
+  cast.params.levels = levels_.address();
+  cast.params.levelShift = levelShiftFor(cast.build.most.supersegments);
+  cast.params.countedWidth = width;
+  commands_.begin();
+  if (cast.nothingThere) {
+    commands_.fill(levels_, 0);
+  } else {
+    commands_.mark("search");
+    pass_.record(commands_, cast.params, gpu::CastPass::Work::CountLevels, Algorithm::Merge,
+                 {cast.build.width, 0, cast.height, cast.build.countedStride, true, cast.params.form});
+  }
+  commands_.barrier();
+  commands_.mark("download");
+  levelsOnHost_->recordWrite(commands_, levels_, 0, 0, bytes);
+  commands_.submitAndWait();
+  levelsOnHost_->finish();
+  if (!cast.nothingThere) {
+    const double milliseconds = commands_.stageTimes().front().milliseconds;
+    times_ += {milliseconds, milliseconds, 0.0};
+  }
+  return {reinterpret_cast<std::uint8_t*>(levelsOnHost_->memory()->bytes().data()), bytes};
+}
+
+std::vector<std::uint32_t> RayCaster::agree(Cast& cast) {
+  const std::uint32_t width = cast.build.countedWidth();
+  const std::uint32_t rows = gpu::groupsFor(cast.height, cast.build.countedStride);
+  const std::uint64_t words = std::uint64_t{width} * rows * sizeof(std::uint32_t);
+  agreedTolerances_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
+  agreedGrains_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
+  agreedQuotas_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
+  weights_.reserve(device_, rows * sizeof(std::uint32_t), gpu::MemoryKind::DeviceLocal);
+  weightsReadback_.reserve(device_, rows * sizeof(std::uint32_t), gpu::MemoryKind::Readback);
+  shared::QuotaConstants quota{};
+  quota.own = levels_.address();
+  quota.sum = levelsSum_.address();
+  quota.tolerances = agreedTolerances_.address();
+  quota.grains = agreedGrains_.address();
+  quota.quotas = agreedQuotas_.address();
+  quota.weights = weights_.address();
+  quota.width = width;
+  quota.rows = rows;
+  quota.budget = cast.build.most.supersegments;
+  quota.levelShift = cast.params.levelShift;
+  quota.levelCount = Survey::levels - 2;
+  commands_.begin();
+  levelsOnHost_->recordRead(commands_, 0, levelsSum_, 0, words * shared::countedLevelWords);
+  commands_.fill(weights_, 0);
+  commands_.barrier();
+  quotaPass_.record(commands_, quota);
+  commands_.barrier();
+  commands_.copy(weights_, 0, weightsReadback_, 0, rows * sizeof(std::uint32_t));
+  commands_.submitAndWait();
+  levelsOnHost_->finish();
+  const auto weights = weightsReadback_.mappedAs<std::uint32_t>().first(rows);
+  std::vector<std::uint32_t> result(weights.begin(), weights.end());
+  // Each counted list stands for a square of lists.
+  for (std::uint32_t& weight : result) weight *= cast.build.countedStride * cast.build.countedStride;
+  return result;
 }
 
 void RayCaster::makeEmpty(std::uint32_t listCount, DeviceLists& lists, const ListBuilder::Finish& finish) {
@@ -116,6 +198,12 @@ void RayCaster::makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastR
   if (cast.nothingThere) return makeEmpty(build.listCount(), lists, finish);
   shared::CastParams& params = cast.params;
   params.countedWidth = build.countedWidth();
+  if (cast.agreed) {
+    const std::uint64_t first =
+        std::uint64_t{firstRow / build.countedStride} * build.countedWidth() * sizeof(std::uint32_t);
+    build.agreed = {agreedTolerances_.address() + first, agreedGrains_.address() + first,
+                    agreedQuotas_.address() + first, build.most.supersegments};
+  }
   const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
     // The shader counts lists from the picture's first; the targets hold just this band's.
     const std::uint64_t skipped = std::uint64_t{firstRow} * build.width * sizeof(std::uint32_t);
@@ -126,6 +214,7 @@ void RayCaster::makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastR
     params.grains = targets.grains;
     params.written = targets.written - skipped;
     params.left = targets.left - skipped;
+    params.quotas = targets.quotas - skipped;
     params.status = targets.status;
     if (!write && build.algorithm == Algorithm::Merge) {
       params.sensitivities = targets.sensitivities;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "vdi/core/Block.h"
 #include "vdi/core/Camera.h"
@@ -14,6 +15,7 @@
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/gpu/CastPass.h"
+#include "vdi/gpu/QuotaPass.h"
 #include "vdi/gpu/VolumeStore.h"
 #include "vdi/pipeline/HostAccess.h"
 #include "vdi/pipeline/ListBuilder.h"
@@ -49,8 +51,15 @@ class RayCaster {
     bool nothingThere = false;
     std::uint32_t height = 0;
     std::uint32_t rowsPerBand = 1;  // what fits; a multiple of shared::countedStride, or all
+    bool agreed = false;            // with other ranks
   };
   Cast begin(const Request& request);
+  /// Several ranks, merging: what this one has in the lists that are counted, for all ranks to add up byte by byte
+  /// (Communicator::allReduceSaturating). Valid until the next call; zeros where there's nothing.
+  std::span<std::uint8_t> countLevels(Cast& cast);
+  /// The sum of all ranks' levels in their place: from it follow tolerances, and this rank's shares of lists.
+  /// Returns how many supersegments all ranks together will have in each stretch of shared::countedStride rows.
+  std::vector<std::uint32_t> agree(Cast& cast);
   /// Rows [firstRow, lastRow), which begin at a multiple of shared::countedStride.
   void makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists,
                 const ListBuilder::Finish& finish = {});
@@ -70,6 +79,15 @@ class RayCaster {
   gpu::CastPass pass_;
   ListBuilder builder_;
   gpu::Commands commands_;
+  gpu::QuotaPass quotaPass_;
+  gpu::Buffer levels_;
+  gpu::Buffer levelsSum_;
+  std::unique_ptr<HostAccess> levelsOnHost_;
+  gpu::Buffer agreedTolerances_;
+  gpu::Buffer agreedGrains_;
+  gpu::Buffer agreedQuotas_;
+  gpu::Buffer weights_;
+  gpu::Buffer weightsReadback_;
   gpu::Buffer colors_;
   gpu::Buffer depths_;
   SurveyBuffer survey_;

@@ -1,0 +1,70 @@
+// From what all ranks counted of a list together: the tolerance that fits the sum of their grains, and how many of the list's
+// supersegments this rank may have. Twin of agreedAllotment in vdi/reference/SegmentByMerging.cpp.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared/quota.h"
+
+layout(local_size_x = quotaGroup) in;
+layout(push_constant, scalar) uniform Push { QuotaConstants push; };
+
+#include "tolerance.glsl"
+
+struct Levels {
+  uint words[countedLevelWords];
+};
+
+Levels ownOf(uint list) {
+  Levels levels;
+  for (uint i = 0u; i < countedLevelWords; ++i) levels.words[i] = push.own.at[list * countedLevelWords + i];
+  return levels;
+}
+
+Levels sumOf(uint list) {
+  Levels levels;
+  for (uint i = 0u; i < countedLevelWords; ++i) levels.words[i] = push.sum.at[list * countedLevelWords + i];
+  return levels;
+}
+
+uint countOf(Levels levels, uint place) {
+  uint word = place < 4u ? levels.words[0] : place < 8u ? levels.words[1] : levels.words[2];
+  return ((word >> (8u * (place & 3u))) & 255u) << push.levelShift;
+}
+
+void main() {
+  uint x = gl_GlobalInvocationID.x;
+  uint y = gl_GlobalInvocationID.y;
+  if (x >= push.width) return;
+  uint list = y * push.width + x;
+  Levels own = ownOf(list);
+  Levels sum = sumOf(list);
+  float tolerance = 0.0;
+  uint grains = 0u;
+  uint quota = 0u;
+  if (countOf(sum, 0u) > 0u) {
+    uint room = grainsPerBudget * push.budget;
+    // Runs of all ranks may be more than that; each rank then keeps its own.
+    tolerance = unlimitedTolerance;
+    uint place = countedRuns;
+    if (countOf(sum, 0u) <= push.budget) {
+      tolerance = -1.0;
+      place = 0u;
+    } else {
+      float coarser = finestTolerance * pow(toleranceRatio, float(push.levelCount - 1u));
+      for (uint level = push.levelCount; level-- > 0u;) {
+        if (countOf(sum, countedTolerance + level) <= room) {
+          tolerance = coarser;
+          place = countedTolerance + level;
+        }
+        coarser /= toleranceRatio;
+      }
+    }
+    grains = countOf(own, place);
+    uint all = max(countOf(sum, place), 1u);
+    uint wanted = min(all, push.budget);
+    quota = (grains * wanted + all - 1u) / all;
+    atomicAdd(push.weights.at[y], wanted);
+  }
+  push.tolerances.at[list] = tolerance;
+  push.grains.at[list] = grains;
+  push.quotas.at[list] = min(quota, 0xffffu) | min(countOf(own, countedRuns), 0xffffu) << 16;
+}

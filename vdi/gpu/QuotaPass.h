@@ -1,0 +1,21 @@
+// Dispatches quota.comp: what ranks agree on about lists that they've counted together.
+#pragma once
+
+#include <memory>
+
+#include "shaders/shared/quota.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/ComputePipeline.h"
+
+namespace vdi::gpu {
+
+class QuotaPass {
+ public:
+  explicit QuotaPass(std::shared_ptr<Device> device);
+  void record(Commands& commands, const shared::QuotaConstants& constants) const;
+
+ private:
+  ComputePipeline pipeline_;
+};
+
+}  // namespace vdi::gpu
