@@ -58,6 +58,7 @@ void useSample(float front, float back, Sample it) {
 void walk() { castRay(); }
 
 void main() {
+  if (writesGrains && params.guard.at[0] == 0u) return;
   uvec2 at = gl_WorkGroupID.xy * uvec2(castGroupX, castGroupY) +
              uvec2(gl_LocalInvocationIndex % castGroupX, gl_LocalInvocationIndex / castGroupX);
   uint x = at.x;

@@ -36,6 +36,7 @@ void walk() {
 }
 
 void main() {
+  if (writesGrains && params.guard.at[0] == 0u) return;
   listIndex = gl_GlobalInvocationID.x;
   bool hasList = listIndex < params.listCount;
   if (surveysGrains) {
@@ -43,6 +44,19 @@ void main() {
     return;
   }
   if (!hasList) return;
+  // A list that fits stays as it is: store.comp takes it from what was merged.
+  uint count = params.mergedOffsets.at[listIndex + 1u] - params.mergedOffsets.at[listIndex];
+  bool fits = !byNeed && count <= params.budget;
+  if (fits && countsGrains) {
+    params.sensitivities.at[listIndex] = -1.0;
+    params.counts.at[listIndex] = 0u;
+    return;
+  }
+  if (fits && writesGrains) {
+    params.written.at[listIndex] = 0u;
+    params.left.at[listIndex] = count;
+    return;
+  }
   if (countsGrains) {
     countGrains();
   } else if (writesGrains) {

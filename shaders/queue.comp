@@ -11,6 +11,7 @@ shared uint found;
 shared uint firstPlace;
 
 void main() {
+  if (push.guard.at[0] == 0u) return;
   uint list = gl_GlobalInvocationID.x;
   if (gl_LocalInvocationIndex == 0u) found = 0u;
   barrier();

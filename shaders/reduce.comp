@@ -106,6 +106,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
 }
 
 void main() {
+  if (push.guard.at[0] == 0u) return;
   uint list = gl_GlobalInvocationID.x;
   if (list >= push.listCount) return;
   uint count = push.written.at[list];

@@ -5,6 +5,8 @@
 
 layout(local_size_x = scanGroup) in;
 layout(push_constant, scalar) uniform Push { ScanConstants push; };
+layout(constant_id = 0) const bool guards = false;
+layout(constant_id = 1) const bool guardedBefore = false;
 
 shared uint64_t threadTotals[scanGroup];
 
@@ -49,7 +51,13 @@ void addSums() {
     barrier();
   }
   uint64_t before = threadTotals[0];
-  if (gl_LocalInvocationIndex == 0u && before + push.sums.at[gl_WorkGroupID.x] > 0xfffffffful) push.overflow.at[0] = 1u;
+  uint64_t behind = before + push.sums.at[gl_WorkGroupID.x];
+  if (gl_LocalInvocationIndex == 0u && behind > 0xfffffffful) push.overflow.at[0] = 1u;
+  if (guards && gl_LocalInvocationIndex == 0u && gl_WorkGroupID.x + 1u == gl_NumWorkGroups.x) {
+    bool fits = behind <= push.room;
+    if (guardedBefore) fits = fits && push.guardBefore.at[0] == 1u;
+    push.guard.at[0] = fits ? 1u : 0u;
+  }
   uint first = gl_WorkGroupID.x * scanGroup * scanPerThread + gl_LocalInvocationIndex;
   // All are asked for before any is written: a GPU would wait for each of them otherwise.
   uint values[scanPerThread];

@@ -11,6 +11,9 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 #include "store.glsl"
 #include "grain.glsl"
 
+// Compositing: lists without grains are in ReduceConstants::fitting.
+layout(constant_id = 3) const bool mayFit = false;
+
 // The latest codes that aren't in memory yet. Four that fill a piece of a cache line go there together: neighbouring invocations
 // write to different lines, and a GPU takes as long for 8 bytes of one as for 32 (storing takes 0.55 of the time on an H200).
 uvec2 waiting[3];
@@ -34,11 +37,36 @@ void storeCode(uvec2 code, uint at, uint i, uint count) {
   waiting[2] = code;
 }
 
+// Two ranks may have rounded depths to codes that overlap.
+uvec2 behindReach(uvec2 code) {
+  uvec2 depths = depthCodes(code);
+  uint front = min(max(depths.x, storeReach), uint(mostDepthCode) - 1u);
+  uint back = max(depths.y, front + 1u);
+  storeReach = back;
+  return uvec2((code.x & 0xf0000000u) | front | back << 14, code.y);
+}
+
+void copyFitting(uint from, uint slot, uint count) {
+  beginStoring();
+  for (uint i = 0u; i < count; ++i) {
+    if (compactForm) {
+      storeCode(behindReach(CompactArray(push.fitting).at[from + i]), slot + i, i, count);
+    } else {
+      push.segments.at[slot + i] = push.fitting.at[from + i];
+    }
+  }
+}
+
 void main() {
+  if (push.guard.at[0] == 0u) return;
   uint list = gl_GlobalInvocationID.x;
   if (list >= push.listCount) return;
   uint count = push.left.at[list];
   if (count == 0u) return;
+  if (mayFit && push.written.at[list] == 0u) {
+    copyFitting(push.fittingOffsets.at[list], push.offsets.at[list], count);
+    return;
+  }
   uint first = push.grainOffsets.at[list];
   uint slot = push.offsets.at[list];
   beginStoring();

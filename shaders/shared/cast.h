@@ -56,6 +56,7 @@ struct CastParams {
   VDI_ADDRESS(UintArray) survey;          // [surveyLevels + 1][2]
   VDI_ADDRESS(UintArray) levels;          // [rows][countedWidth][countedLevelWords]
   VDI_ADDRESS(UintArray) quotas;          // [h][w]; with other ranks: as in AllotConstants
+  VDI_ADDRESS(UintArray) guard;           // [1]: 0 if there's no room for the grains that are to be written
   // Ray of pixel (x, y): start = startBase + u * startRight + v * startUp, direction likewise, with u = x + 0.5 - w/2 and
   // v = y + 0.5 - h/2. Start: at the front of the sample lattice, relative to the scene's centre.
   vec3 startBase;

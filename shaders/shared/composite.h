@@ -72,6 +72,7 @@ struct CompositeParams {
   VDI_ADDRESS(UintArray) left;
   VDI_ADDRESS(UintArray) status;
   VDI_ADDRESS(UintArray) survey;
+  VDI_ADDRESS(UintArray) guard;  // as in CastParams
   float step;  // of the sample lattice
   uint budget;
   uint runsOnly;  // 0

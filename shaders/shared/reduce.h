@@ -24,6 +24,9 @@ struct ReduceConstants {
   VDI_ADDRESS(UintArray) queue;         // [lists]: those that teams reduce, in any order
   VDI_ADDRESS(UintArray) queued;        // [1]: how many
   VDI_ADDRESS(SegmentArray) segments;
+  VDI_ADDRESS(SegmentArray) fitting;    // compositing: lists that are left as they are, those that have no grains; else 0
+  VDI_ADDRESS(UintArray) fittingOffsets;  // [lists + 1]: where they are
+  VDI_ADDRESS(UintArray) guard;         // [1]: 0 if there's no room for what's left, or the grains aren't there
   float step;  // of the sample lattice
   uint listCount;
   uint teamCapacity;  // grains of a list that a team has room for; 0: there are no teams

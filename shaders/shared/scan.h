@@ -24,10 +24,13 @@ struct ScanConstants {
   VDI_ADDRESS(UintArray) prefix;  // count + 1 entries
   VDI_ADDRESS(UintArray) sums;
   VDI_ADDRESS(UintArray) overflow;  // [1], set to 1 when a total doesn't fit 32 bits
+  // Set to 1 if the total is `room` at most, and what `guardBefore` points to is 1; else to 0. 0: nothing is set, or asked.
+  VDI_ADDRESS(UintArray) guard;
+  VDI_ADDRESS(UintArray) guardBefore;
   uint count;
   uint mode;
   uint base;
-  uint pad;
+  uint room;
 };
 
 VDI_SHARED_END

@@ -55,7 +55,7 @@ ListsOf<Segment> download(const std::shared_ptr<gpu::Device>& device, const deta
   auto lists = detail::listsIn<Segment>(pool);
   detail::ListDownload<Segment> download(lists, *pool);
   gpu::Commands commands(device);
-  const gpu::ScanPass scan(device);
+  gpu::ScanPass scan(device);
   commands.begin();
   download.record(commands, scan, onDevice);
   commands.submitAndWait();

@@ -447,7 +447,8 @@ TEST_CASE("merging and compositing on the device equal the reference") {
   CHECK(listsThatDiffer(result, expected) <= expected.listCount() / 50);
   // The flat picture of what was merged, by the device and by the host, is that of what was composited.
   detail::Compositor::Merged merged;
-  compositor.merge(test::HostSubLists(device(), subLists).parts(), {}, merged);
+  const test::HostSubLists parts(device(), subLists);
+  compositor.merge(parts.parts(), {}, merged);
   gpu::Buffer colors;
   gpu::Buffer depths;
   compositor.flatten(merged, {}, colors, depths);
@@ -528,7 +529,8 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   detail::Compositor::Request request{
       5, mostPerList(5, Budget::Total), frame.lattice.step, Algorithm::Merge, {}};
   detail::Compositor::Merged merged;
-  compositor.merge(test::HostSubLists(device(), subLists).parts(), {}, merged);
+  const test::HostSubLists parts(device(), subLists);
+  compositor.merge(parts.parts(), {}, merged);
   request.level = compositor.survey(merged, request).levelFor(fill);
   CHECK(listsThatDiffer(test::composite(device(), compositor, subLists, request), composited) <=
         composited.listCount() / 50);

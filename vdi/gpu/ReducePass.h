@@ -36,7 +36,7 @@ class ReducePass {
   ComputePipeline find_;
   PipelineSet team_;  // by capacity
   ComputePipeline alone_;
-  PipelineSet store_;  // by precision
+  PipelineSet store_;  // by precision, and whether lists may fit
   Buffer queue_;
   Buffer queued_;
 };

@@ -1,6 +1,7 @@
 #include "vdi/gpu/ScanPass.h"
 
-#include "shaders/shared/scan.h"
+#include <algorithm>
+
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Device.h"
 
@@ -21,37 +22,53 @@ constexpr std::uint32_t perGroup = shared::scanGroup * shared::scanPerThread;
 
 ScanPass::ScanPass(std::shared_ptr<Device> device)
     : device_(std::move(device)),
-      pipeline_(device_, pipelineInfo()),
+      pipelines_(device_, pipelineInfo()),
       overflow_(device_, sizeof(std::uint32_t), MemoryKind::Readback) {}
 
-void ScanPass::record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count) {
+void ScanPass::recordBoth(Commands& commands, shared::ScanConstants constants, ComputePipeline& pipeline) {
   overflow_.mappedAs<std::uint32_t>()[0] = 0;
-  const std::uint32_t groups = count / perGroup + 1;
+  const std::uint32_t groups = constants.count / perGroup + 1;
   sums_.reserve(device_, std::uint64_t{groups} * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
-  shared::ScanConstants constants{};
-  constants.values = values.address();
-  constants.prefix = prefix.address();
   constants.sums = sums_.address();
   constants.overflow = overflow_.address();
-  constants.count = count;
   constants.mode = shared::scanModeSum;
   commands.barrier();
-  commands.dispatch(pipeline_, constants, groups);
+  commands.dispatch(pipeline, constants, groups);
   commands.barrier();
   constants.mode = shared::scanModeAdd;
-  commands.dispatch(pipeline_, constants, groups);
+  commands.dispatch(pipeline, constants, groups);
   commands.barrier();
 }
 
+void ScanPass::record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count) {
+  shared::ScanConstants constants{};
+  constants.values = values.address();
+  constants.prefix = prefix.address();
+  constants.count = count;
+  recordBoth(commands, constants, pipelines_.with({0, 0}));
+}
+
+void ScanPass::record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count,
+                      const Buffer& guard, std::uint64_t room, const Buffer* before) {
+  shared::ScanConstants constants{};
+  constants.values = values.address();
+  constants.prefix = prefix.address();
+  constants.count = count;
+  constants.guard = guard.address();
+  constants.guardBefore = before != nullptr ? before->address() : 0;
+  constants.room = static_cast<std::uint32_t>(std::min<std::uint64_t>(room, 0xffffffffU));
+  recordBoth(commands, constants, pipelines_.with({1, before != nullptr ? 1U : 0U}));
+}
+
 void ScanPass::recordRebase(Commands& commands, const Buffer& prefix, std::uint32_t count,
-                            std::uint32_t base) const {
+                            std::uint32_t base) {
   shared::ScanConstants constants{};
   constants.prefix = prefix.address();
   constants.count = count;
   constants.mode = shared::scanModeRebase;
   constants.base = base;
   commands.barrier();
-  commands.dispatch(pipeline_, constants, count / perGroup + 1);
+  commands.dispatch(pipelines_.with({0, 0}), constants, count / perGroup + 1);
   commands.barrier();
 }
 

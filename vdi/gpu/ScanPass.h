@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "shaders/shared/scan.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/ComputePipeline.h"
 #include "vdi/gpu/Memory.h"
@@ -19,16 +20,23 @@ class ScanPass {
   /// Records its barriers, also one at the start and one at the end. Nothing that was recorded before may be
   /// running.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count);
+  /// The same, and whether the total fits: `guard` (a word) becomes 1 if it's `room` at most, and, if it's given,
+  /// the word `before` is 1; else 0. What's dispatched next can look at it, and do nothing, before the host has
+  /// seen the total.
+  void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count,
+              const Buffer& guard, std::uint64_t room, const Buffer* before = nullptr);
 
   /// Adds `base` to prefix[0 .. count]. Barriers as record.
-  void recordRebase(Commands& commands, const Buffer& prefix, std::uint32_t count, std::uint32_t base) const;
+  void recordRebase(Commands& commands, const Buffer& prefix, std::uint32_t count, std::uint32_t base);
 
   /// Throws Error{OutOfMemory} if the total of the last finished scan didn't fit 32 bits.
   void demandNoOverflow() const;
 
  private:
+  void recordBoth(Commands& commands, shared::ScanConstants constants, ComputePipeline& pipeline);
+
   std::shared_ptr<Device> device_;
-  ComputePipeline pipeline_;
+  PipelineSet pipelines_;  // without guard, with one, with one that looks at another one
   Buffer sums_;  // of workgroups
   Buffer overflow_;
 };

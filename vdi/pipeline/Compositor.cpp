@@ -28,11 +28,21 @@ void Compositor::noteTimes() {
   for (const gpu::StageTime& stage : commands_.stageTimes()) milliseconds_ += stage.milliseconds;
 }
 
+void Compositor::wait() {
+  if (!std::exchange(merging_, false)) return;
+  commands_.wait();
+  for (HostAccess* access : receivedFrom_) access->finish();
+  scan_.demandNoOverflow();
+  noteTimes();
+}
+
 double Compositor::takeMilliseconds() {
+  wait();
   return std::exchange(milliseconds_, 0.0);
 }
 
 void Compositor::merge(const Distributed& parts, const DepthCode& code, Merged& merged) {
+  wait();
   const std::uint32_t lists = parts.listCount;
   const std::uint64_t ranks = parts.subLists.size();
   // Of each rank a row of counts: as words of four bytes, then as a word each.
@@ -105,12 +115,12 @@ void Compositor::merge(const Distributed& parts, const DepthCode& code, Merged& 
   scan_.record(commands_, mergedCounts_, merged.offsets, lists);
   merge.mode = shared::mergeModeMerge;
   if (lists > 0) mergePass_.record(commands_, merge);
-  commands_.submitAndWait();
-  scan_.demandNoOverflow();
+  commands_.submit();
+  merging_ = true;
+  receivedFrom_.clear();
   for (const SubLists& sub : parts.subLists) {
-    if (sub.access != nullptr) sub.access->finish();
+    if (sub.access != nullptr) receivedFrom_.push_back(sub.access);
   }
-  noteTimes();
 }
 
 void Compositor::apply(const Merged& merged, const Request& request) {
@@ -125,6 +135,7 @@ void Compositor::apply(const Merged& merged, const Request& request) {
 }
 
 Survey Compositor::survey(const Merged& merged, const Request& request) {
+  wait();
   if (merged.listCount == 0) return {};
   apply(merged, request);
   const Survey survey = survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
@@ -140,7 +151,7 @@ void Compositor::composite(const Merged& merged, const Request& request, DeviceL
   lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
   lists.listCount = merged.listCount;
   lists.count = 0;
-  if (merged.listCount == 0) return;
+  if (merged.listCount == 0) return wait();
   apply(merged, request);
   const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
     settings_.sensitivities = targets.sensitivities;
@@ -151,6 +162,7 @@ void Compositor::composite(const Merged& merged, const Request& request, DeviceL
     settings_.written = targets.written;
     settings_.left = targets.left;
     settings_.status = targets.status;
+    settings_.guard = targets.guard;
     using Work = gpu::CompositePass::Work;
     compositePass_.record(commands, settings_, write ? Work::Write : Work::Search, request.algorithm);
   };
@@ -161,12 +173,16 @@ void Compositor::composite(const Merged& merged, const Request& request, DeviceL
   build.most = {request.mostPerList, true};
   build.sampleStep = request.sampleStep;
   build.code = request.code;
+  build.fitting = merged.segments.address();
+  build.fittingOffsets = merged.offsets.address();
   builder_.build(build, record, lists);
   milliseconds_ += builder_.times().all;
+  wait();
 }
 
 void Compositor::flatten(const Merged& merged, const DepthCode& code, gpu::Buffer& colors,
                          gpu::Buffer& depths) {
+  wait();
   colors.reserve(device_, merged.listCount * sizeof(glm::vec4), MemoryKind::DeviceLocal);
   depths.reserve(device_, merged.listCount * sizeof(float), MemoryKind::DeviceLocal);
   if (merged.listCount == 0) return;

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <memory>
-#include <span>
+#include <vector>
 
 #include "vdi/gpu/CompositePass.h"
 #include "vdi/gpu/CountsPass.h"
@@ -35,7 +35,9 @@ class Compositor {
     std::uint32_t listCount = 0;
     std::uint64_t total = 0;
   };
+  /// Goes on on the device when this returns: `parts` must stay until `wait`, which any other call does first.
   void merge(const Distributed& parts, const DepthCode& code, Merged& merged);
+  void wait();
 
   /// What these lists need.
   Survey survey(const Merged& merged, const Request& request);
@@ -50,6 +52,8 @@ class Compositor {
  private:
   void apply(const Merged& merged, const Request& request);
   void noteTimes();
+  std::vector<HostAccess*> receivedFrom_;  // by the merge that goes on
+  bool merging_ = false;
 
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;

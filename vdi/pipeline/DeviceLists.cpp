@@ -7,7 +7,7 @@
 namespace vdi::detail {
 
 template <typename Segment>
-void ListDownload<Segment>::record(gpu::Commands& commands, const gpu::ScanPass& scan,
+void ListDownload<Segment>::record(gpu::Commands& commands, gpu::ScanPass& scan,
                                    const DeviceLists& band) {
   const std::size_t firstList = lists_.listCount();
   const std::size_t firstSegment = lists_.segments.size();

@@ -42,7 +42,7 @@ class ListDownload {
   ListDownload(ListsOf<Segment>& lists, HostPool& pool) : lists_(lists), pool_(pool) {}
 
   /// A stage named "download". The band's offsets become those of the host's lists.
-  void record(gpu::Commands& commands, const gpu::ScanPass& scan, const DeviceLists& band);
+  void record(gpu::Commands& commands, gpu::ScanPass& scan, const DeviceLists& band);
   /// When the commands are done.
   void finish();
 

@@ -292,17 +292,22 @@ struct VdiGenerator::State {
     return lists;
   }
 
-  /// Collective: one tolerance for what all ranks have in a list, and who owns which lists.
-  comm::Ownership agreeOnLists(detail::RayCaster::Cast& cast) {
-    const std::uint64_t width = cast.build.width;
-    const std::uint64_t lists = width * cast.height;
-    if (!cast.agreed) return comm::Ownership::equal(lists, comm.size());
+  /// Collective: one tolerance for what all ranks have in a list.
+  void agreeOnLists(detail::RayCaster::Cast& cast) {
+    if (!cast.agreed) return;
     std::span<std::uint8_t> levels;
     comm.together([&] { levels = caster->countLevels(cast); });
     comm.allReduceSaturating(levels);
-    std::vector<std::uint32_t> weights;
-    comm.together([&] { weights = caster->agree(cast); });
-    return comm::Ownership::balanced(lists, comm.size(), weights, width * cast.build.countedStride);
+    comm.together([&] { caster->agree(cast); });
+  }
+
+  /// Who owns which of the picture's lists: the same on all ranks.
+  comm::Ownership ownershipOf(const detail::RayCaster::Cast& cast) {
+    const std::uint64_t width = cast.build.width;
+    const std::uint64_t lists = width * cast.height;
+    if (!cast.agreed) return comm::Ownership::equal(lists, comm.size());
+    return comm::Ownership::balanced(lists, comm.size(), caster->agreedWeights(cast),
+                                     width * cast.build.countedStride);
   }
 
   /// Collective: this rank's lists, band after band, to those who own them, where they're merged by depth.
@@ -315,7 +320,8 @@ struct VdiGenerator::State {
     comm.allReduceMin(rows);  // all ranks' bands are the same
     const auto rowsPerBand = static_cast<std::uint32_t>(rows[0]);
     const std::uint64_t width = cast.build.width;
-    const comm::Ownership ownership = agreeOnLists(cast);
+    agreeOnLists(cast);
+    std::optional<comm::Ownership> ownership;
     bands.resize((cast.height + rowsPerBand - 1) / rowsPerBand);
     compositor->takeMilliseconds();
     for (std::size_t i = 0; i < bands.size(); ++i) {
@@ -323,11 +329,13 @@ struct VdiGenerator::State {
       const auto row = static_cast<std::uint32_t>(i) * rowsPerBand;
       const std::uint32_t end = std::min(cast.height, row + rowsPerBand);
       own.firstList = row * width;
-      own.owned = ownership.within(row * width, end * width);
       cancellable(progress, 0.8, [&](const detail::RayCaster::Progress& report) {
+        compositor->wait();  // for the band before, whose lists are in the memory of this one's
         caster->makeBand(cast, row, end, band);
+        if (!ownership) ownership = ownershipOf(cast);
         report(static_cast<double>(end) / cast.height);
       });
+      own.owned = ownership->within(row * width, end * width);
       mine.subSupersegments += band.count;
       mine.generateSeconds += watch.lap();
       const detail::Distributed parts = distributor->distribute(band, own.owned, detail::segmentBytes(code));

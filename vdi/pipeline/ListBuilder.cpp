@@ -19,7 +19,9 @@ ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
       allot_(device_),
       reduce_(device_),
       status_(device_, sizeof(std::uint32_t), MemoryKind::Readback),
-      total_(device_, sizeof(std::uint32_t), MemoryKind::Readback) {}
+      grainsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
+      segmentsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
+      totals_(device_, 2 * sizeof(std::uint32_t), MemoryKind::Readback) {}
 
 shared::StoredForm storedForm(const DepthCode& code) {
   return {code.first, code.step};
@@ -64,17 +66,13 @@ void ListBuilder::end(const Finish& finish) {
   }
 }
 
-/// Ends the recording with the prefix sum of counts, and returns the sum of all.
-std::uint64_t ListBuilder::scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts,
-                                        gpu::Buffer& offsets) {
-  scan_.record(commands_, counts, offsets, listCount);
-  end([&](gpu::Commands& commands) {
-    commands.mark("download");
-    commands.copy(offsets, std::uint64_t{listCount} * sizeof(std::uint32_t), total_, 0,
-                  sizeof(std::uint32_t));
-  });
-  scan_.demandNoOverflow();
-  return total_.mappedAs<std::uint32_t>()[0];
+constexpr std::size_t grainTotal = 0;
+constexpr std::size_t segmentTotal = 1;
+
+/// The last one of the offsets is to be one of totals_.
+void ListBuilder::recordTotal(const gpu::Buffer& offsets, std::uint32_t listCount, std::size_t which) {
+  commands_.copy(offsets, std::uint64_t{listCount} * sizeof(std::uint32_t), totals_,
+                 which * sizeof(std::uint32_t), sizeof(std::uint32_t));
 }
 
 void ListBuilder::buildByBisection(const Request& request, const Record& record, DeviceLists& lists,
@@ -87,7 +85,11 @@ void ListBuilder::buildByBisection(const Request& request, const Record& record,
   commands_.begin();
   commands_.mark("search");
   record(commands_, targets, false);
-  lists.count = scanAndTotal(request.listCount(), counts_, lists.offsets);
+  scan_.record(commands_, counts_, lists.offsets, request.listCount());
+  recordTotal(lists.offsets, request.listCount(), segmentTotal);
+  end({});
+  scan_.demandNoOverflow();
+  lists.count = totals_.mappedAs<std::uint32_t>()[segmentTotal];
 
   lists.segments.reserve(device_, lists.count * segmentBytes(request.code), MemoryKind::DeviceLocal);
   targets.segments = lists.segments.address();
@@ -97,6 +99,9 @@ void ListBuilder::buildByBisection(const Request& request, const Record& record,
   end(finish);
 }
 
+/// All steps in one submission: the memory for grains and supersegments is that of the frame before, and where
+/// it's too small the steps that need it do nothing. Then they're submitted again, with memory for what was
+/// counted.
 void ListBuilder::buildByMerging(const Request& request, const Record& record, DeviceLists& lists,
                                  const Finish& finish) {
   const std::uint32_t listCount = request.listCount();
@@ -108,73 +113,107 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
   countedTolerances_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
   countedGrains_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
   left_.reserve(device_, words, MemoryKind::DeviceLocal);
-  BandTargets targets;
-  targets.sensitivities = countedTolerances_.address();
-  targets.counts = countedGrains_.address();
-  targets.status = status_.address();
-  shared::AllotConstants allot{};
-  allot.countedTolerances = countedTolerances_.address();
-  allot.countedGrains = countedGrains_.address();
-  allot.tolerances = sensitivities_.address();
-  allot.rooms = counts_.address();
-  allot.width = request.width;
-  allot.rows = request.rows;
-  allot.countedWidth = request.countedWidth();
-  allot.countedRows = request.countedRows();
-  allot.strideShift = static_cast<std::uint32_t>(std::countr_zero(request.countedStride));
-  commands_.begin();
-  commands_.mark("search");
-  if (request.agreed) {
-    quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
-    allot.countedTolerances = request.agreed->tolerances;
-    allot.countedGrains = request.agreed->grains;
-    allot.countedQuotas = request.agreed->quotas;
-    allot.quotas = quotas_.address();
-    allot.budget = request.agreed->budget;
-    targets.quotas = quotas_.address();
-  } else {
-    record(commands_, targets, false);
-    commands_.barrier();
-  }
-  allot_.record(commands_, allot);
+  grains_.reserve(device_, 0, MemoryKind::DeviceLocal);
+  lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
+  if (request.agreed) quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
 
-  targets.sensitivities = sensitivities_.address();
-  targets.counts = counts_.address();
-  targets.offsets = grainOffsets_.address();
-  targets.written = written_.address();
-  targets.left = left_.address();
-  const auto writeGrains = [&] {
-    const std::uint64_t grainTotal = scanAndTotal(listCount, counts_, grainOffsets_);
-    grains_.reserve(device_, grainTotal * sizeof(shared::StoredGrain), MemoryKind::DeviceLocal);
+  const auto search = [&] {
+    shared::AllotConstants allot{};
+    allot.countedTolerances = countedTolerances_.address();
+    allot.countedGrains = countedGrains_.address();
+    allot.tolerances = sensitivities_.address();
+    allot.rooms = counts_.address();
+    allot.width = request.width;
+    allot.rows = request.rows;
+    allot.countedWidth = request.countedWidth();
+    allot.countedRows = request.countedRows();
+    allot.strideShift = static_cast<std::uint32_t>(std::countr_zero(request.countedStride));
+    commands_.mark("search");
+    if (request.agreed) {
+      allot.countedTolerances = request.agreed->tolerances;
+      allot.countedGrains = request.agreed->grains;
+      allot.countedQuotas = request.agreed->quotas;
+      allot.quotas = quotas_.address();
+      allot.budget = request.agreed->budget;
+    } else {
+      BandTargets targets;
+      targets.sensitivities = countedTolerances_.address();
+      targets.counts = countedGrains_.address();
+      targets.status = status_.address();
+      targets.guard = grainsFit_.address();
+      record(commands_, targets, false);
+      commands_.barrier();
+    }
+    allot_.record(commands_, allot);
+  };
+  const auto write = [&] {
+    BandTargets targets;
+    targets.sensitivities = sensitivities_.address();
+    targets.counts = counts_.address();
+    targets.offsets = grainOffsets_.address();
     targets.grains = grains_.address();
-    commands_.begin();
+    targets.written = written_.address();
+    targets.left = left_.address();
+    targets.quotas = request.agreed ? quotas_.address() : 0;
+    targets.status = status_.address();
+    targets.guard = grainsFit_.address();
+    scan_.record(commands_, counts_, grainOffsets_, listCount, grainsFit_,
+                 grains_.size() / sizeof(shared::StoredGrain));
     commands_.mark("write");
     record(commands_, targets, true);
+    scan_.record(commands_, left_, lists.offsets, listCount, segmentsFit_,
+                 lists.segments.size() / segmentBytes(request.code), &grainsFit_);
+    recordTotal(grainOffsets_, listCount, grainTotal);
+    recordTotal(lists.offsets, listCount, segmentTotal);
   };
-  writeGrains();
-  lists.count = scanAndTotal(listCount, left_, lists.offsets);
-  // Lists between the counted ones may have more runs than these. They've said how many: now all fit.
-  if (auto& tooLong = status_.mappedAs<std::uint32_t>()[0]; request.agreed && tooLong != 0) {
-    tooLong = 0;
-    commands_.begin();
-    writeGrains();
-    lists.count = scanAndTotal(listCount, left_, lists.offsets);
-  }
+  const auto reduce = [&] {
+    shared::ReduceConstants constants{};
+    constants.grains = grains_.address();
+    constants.grainOffsets = grainOffsets_.address();
+    constants.written = written_.address();
+    constants.left = left_.address();
+    constants.offsets = lists.offsets.address();
+    constants.segments = lists.segments.address();
+    constants.fitting = request.fitting;
+    constants.fittingOffsets = request.fittingOffsets;
+    constants.guard = segmentsFit_.address();
+    constants.step = static_cast<float>(request.sampleStep);
+    constants.listCount = listCount;
+    constants.form = storedForm(request.code);
+    commands_.mark("reduce");
+    reduce_.record(commands_, constants, request.most);
+  };
 
-  lists.segments.reserve(device_, lists.count * segmentBytes(request.code), MemoryKind::DeviceLocal);
-  shared::ReduceConstants reduce{};
-  reduce.grains = grains_.address();
-  reduce.grainOffsets = grainOffsets_.address();
-  reduce.written = written_.address();
-  reduce.left = left_.address();
-  reduce.offsets = lists.offsets.address();
-  reduce.segments = lists.segments.address();
-  reduce.step = static_cast<float>(request.sampleStep);
-  reduce.listCount = listCount;
-  reduce.form = storedForm(request.code);
+  enum class From { Search, Write, Reduce };
+  for (std::optional<From> from = From::Search; from;) {
+    commands_.begin();
+    if (*from == From::Search) search();
+    if (*from != From::Reduce) write();
+    if (*from == From::Reduce) commands_.fill(segmentsFit_, 1);
+    commands_.barrier();
+    reduce();
+    end({});
+    const auto totals = totals_.mappedAs<std::uint32_t>();
+    auto& tooLong = status_.mappedAs<std::uint32_t>()[0];
+    const std::uint64_t grainBytes = totals[grainTotal] * sizeof(shared::StoredGrain);
+    const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(request.code);
+    if (grains_.size() < grainBytes) {
+      grains_.reserve(device_, grainBytes, MemoryKind::DeviceLocal);
+      from = From::Write;
+    } else if (request.agreed && tooLong != 0 && *from != From::Reduce) {
+      // Lists between the counted ones may have more runs than these. They've said how many.
+      tooLong = 0;
+      from = From::Write;
+    } else if (scan_.demandNoOverflow(); lists.segments.size() < listBytes) {
+      lists.segments.reserve(device_, listBytes, MemoryKind::DeviceLocal);
+      from = From::Reduce;
+    } else {
+      from.reset();
+    }
+    lists.count = totals[segmentTotal];
+  }
+  if (!finish) return;
   commands_.begin();
-  commands_.mark("reduce");
-  if (lists.count > 0) reduce_.record(commands_, reduce, request.most);
   end(finish);
 }
 

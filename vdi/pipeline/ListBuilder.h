@@ -34,6 +34,7 @@ struct BandTargets {
   std::uint64_t left = 0;
   std::uint64_t quotas = 0;
   std::uint64_t status = 0;
+  std::uint64_t guard = 0;
 };
 
 /// What the shaders call the form that lists of that type have in memory.
@@ -81,6 +82,9 @@ class ListBuilder {
       std::uint32_t budget = 1;
     };
     std::optional<Agreed> agreed;
+    /// Merging, of lists that were merged by depth: those that fit are these. 0: none are.
+    std::uint64_t fitting = 0;
+    std::uint64_t fittingOffsets = 0;
 
     std::uint32_t listCount() const { return width * rows; }
     /// Of the lists that are counted: every countedStride-th, the row behind the band's last one included.
@@ -104,7 +108,7 @@ class ListBuilder {
   void buildByBisection(const Request& request, const Record& record, DeviceLists& lists,
                         const Finish& finish);
   void buildByMerging(const Request& request, const Record& record, DeviceLists& lists, const Finish& finish);
-  std::uint64_t scanAndTotal(std::uint32_t listCount, const gpu::Buffer& counts, gpu::Buffer& offsets);
+  void recordTotal(const gpu::Buffer& offsets, std::uint32_t listCount, std::size_t which);
   void end(const Finish& finish);
 
   std::shared_ptr<gpu::Device> device_;
@@ -122,7 +126,9 @@ class ListBuilder {
   gpu::Buffer countedTolerances_;
   gpu::Buffer countedGrains_;
   gpu::Buffer status_;
-  gpu::Buffer total_;
+  gpu::Buffer grainsFit_;    // guards: shaders/shared/scan.h
+  gpu::Buffer segmentsFit_;
+  gpu::Buffer totals_;       // of grains, and of supersegments
   ListTimes times_;
 };
 

@@ -141,7 +141,7 @@ std::span<std::uint8_t> RayCaster::countLevels(Cast& cast) {
   return {reinterpret_cast<std::uint8_t*>(levelsOnHost_->memory()->bytes().data()), bytes};
 }
 
-std::vector<std::uint32_t> RayCaster::agree(Cast& cast) {
+void RayCaster::agree(Cast& cast) {
   const std::uint32_t width = cast.build.countedWidth();
   const std::uint32_t rows = gpu::groupsFor(cast.height, cast.build.countedStride);
   const std::uint64_t words = std::uint64_t{width} * rows * sizeof(std::uint32_t);
@@ -169,8 +169,13 @@ std::vector<std::uint32_t> RayCaster::agree(Cast& cast) {
   quotaPass_.record(commands_, quota);
   commands_.barrier();
   commands_.copy(weights_, 0, weightsReadback_, 0, rows * sizeof(std::uint32_t));
-  commands_.submitAndWait();
+  commands_.submit();
+}
+
+std::vector<std::uint32_t> RayCaster::agreedWeights(const Cast& cast) {
+  commands_.wait();
   levelsOnHost_->finish();
+  const std::uint32_t rows = gpu::groupsFor(cast.height, cast.build.countedStride);
   const auto weights = weightsReadback_.mappedAs<std::uint32_t>().first(rows);
   std::vector<std::uint32_t> result(weights.begin(), weights.end());
   // Each counted list stands for a square of lists.
@@ -216,6 +221,7 @@ void RayCaster::makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastR
     params.left = targets.left - skipped;
     params.quotas = targets.quotas - skipped;
     params.status = targets.status;
+    params.guard = targets.guard;
     if (!write && build.algorithm == Algorithm::Merge) {
       params.sensitivities = targets.sensitivities;
       params.counts = targets.counts;

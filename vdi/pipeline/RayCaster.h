@@ -57,9 +57,12 @@ class RayCaster {
   /// Several ranks, merging: what this one has in the lists that are counted, for all ranks to add up byte by byte
   /// (Communicator::allReduceSaturating). Valid until the next call; zeros where there's nothing.
   std::span<std::uint8_t> countLevels(Cast& cast);
-  /// The sum of all ranks' levels in their place: from it follow tolerances, and this rank's shares of lists.
-  /// Returns how many supersegments all ranks together will have in each stretch of shared::countedStride rows.
-  std::vector<std::uint32_t> agree(Cast& cast);
+  /// The sum of all ranks' levels in their place: from it follow tolerances, and this rank's shares of lists. Goes
+  /// on on the device when this returns.
+  void agree(Cast& cast);
+  /// After that: how many supersegments all ranks together will have in each stretch of shared::countedStride
+  /// rows.
+  std::vector<std::uint32_t> agreedWeights(const Cast& cast);
   /// Rows [firstRow, lastRow), which begin at a multiple of shared::countedStride.
   void makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists,
                 const ListBuilder::Finish& finish = {});
