@@ -96,6 +96,29 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
   });
 }
 
+const char* const footer =
+    R"(Each time is the median over the repeats, of the slowest rank. DVR and generate are device times of the
+rank's own volume rendering and of its (sub-)VDI, compact, without transfers; the columns '/ DVR' and 'faster'
+are ratios to a volume rendering right before. A GPU is kept busy before each run that counts.
+composite is what merging took under mpirun; render is the device's time for one view of the VDI. SSIM and
+PSNR compare that view with the truth: DVR at --truth-rate samples per voxel. DVR SSIM compares DVR at the
+VDI's own --sampling-rate with it.
+Below each VDI's views are its stages on several ranks, wall and device time of the slowest rank and the mean,
+and the whole frame.
+JSON has, beside what the table has:
+  frame_ms, volume_rendering_ms  a whole VDI and a whole picture: wall on the root's host, all ranks ready to
+                                 result there
+  vdis_per_second                VDIs one behind the other on an orbit (--frames), wall on the root's host
+  generate_ms, distribute_ms, composite_ms, gather_ms
+                                 device time of the first, wall of the others; slowest rank
+  stages                         all of them: wall_ms and device_ms, slowest rank and mean
+  sub_supersegments, bytes_sent  of all ranks, in one frame
+  dvr_frame_ms, generate_frame_ms, render_frame_ms
+                                 sums of the slowest rank's stages, transfers included
+  upload_ms, step_ms             the upload of the values, and a frame made while the next step's are on their
+                                 way
+  null                           what wasn't measured, and the infinite PSNR of equal pictures)";
+
 void run(BenchOptions options, const comm::Communicator& world) {
   if (!options.comparison.empty()) {
     int regressions = 0;
@@ -115,22 +138,7 @@ void run(BenchOptions options, const comm::Communicator& world) {
 void addBench(CLI::App& app, Job& job) {
   CLI::App* command = app.add_subcommand(
       "bench", "Time every stage on this device and compare a VDI's views with volume rendering");
-  command->footer(
-      "Each time is the median over the repeats, of the slowest rank. DVR and generate are device times of "
-      "the\n"
-      "rank's own volume rendering and of its (sub-)VDI, compact, without transfers; the columns '/ DVR' and "
-      "'faster'\n"
-      "are ratios to a volume rendering right before. A GPU is kept busy before each run that counts.\n"
-      "JSON has whole frames too, transfers and compositing included (dvr_frame_ms, generate_frame_ms,\n"
-      "render_frame_ms), the upload of the values (upload_ms), and a frame made while the next step's are "
-      "on\n"
-      "their way (step_ms).\n"
-      "composite is what merging took under mpirun;\n"
-      "render is the device's time for one view of the VDI. SSIM and PSNR compare that view with the "
-      "truth:\n"
-      "DVR at --truth-rate samples per voxel. DVR SSIM compares DVR at the VDI's own --sampling-rate with "
-      "it.\n"
-      "JSON has null for what wasn't measured and for the infinite PSNR of equal pictures.");
+  command->footer(footer);
   const auto options = std::make_shared<BenchOptions>();
   command
       ->add_option("--fields", options->fields,
@@ -155,6 +163,12 @@ void addBench(CLI::App& app, Job& job) {
       ->capture_default_str();
   addReconstructionOption(*command, options->reconstruction);
   command->add_option("--repeats", options->repeats, "runs of which the median counts, after one warm-up")
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--frames", options->frames,
+          "VDIs made one behind the other on an orbit of 20 viewpoints, for vdis_per_second; 0: none")
+      ->check(CLI::Range(0, 1000000))
       ->capture_default_str();
   command
       ->add_option("--truth-rate", options->truthRate,

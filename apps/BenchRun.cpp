@@ -140,6 +140,7 @@ class Bench {
           renderer.setVdi(*made.vdi);
           for (const Truth& truth : truths)
             addRow(set.name, turned, made, truth, seen(truth, shot, renderer));
+          fmt::print(table_, "{}", stageLines(made.figures.frames));
         });
       }
     }
@@ -180,20 +181,24 @@ class Bench {
 
   Made make(const Shot& shot) {
     Made made;
-    std::vector<double> composites;
+    FrameLog log;
+    std::vector<double> volumes;
     std::vector<double> frames;
     std::vector<double> ratios;
     std::vector<double> searches;
     std::vector<double> writes;
     made.figures.device = repeated(options_.repeats, [&] {
       clock_.run();
-      generator_.renderVolume(shot.camera, shot.function, settings_);
+      std::optional<Image> image;
+      volumes.push_back(
+          readyMs(world_, [&] { image = generator_.renderVolume(shot.camera, shot.function, settings_); }));
+      if (image) generator_.recycle(std::move(*image));
       const double volumeMs = deviceMs();
       made.vdi.reset();
       clock_.run();
-      made.vdi = generator_.generate(shot.camera, shot.function, settings_);
-      composites.push_back(
-          slowest(generator_.reports(), [](const RankReport& r) { return r.compositeSeconds; }));
+      const double wallMs =
+          readyMs(world_, [&] { made.vdi = generator_.generate(shot.camera, shot.function, settings_); });
+      log.add(wallMs, generator_.reports());
       frames.push_back(slowest(generator_.reports(), frameSeconds));
       ratios.push_back(volumeMs > 0.0 ? deviceMs() / volumeMs : 0.0);
       searches.push_back(slowest(generator_.reports(), [](const RankReport& r) { return r.searchSeconds; }));
@@ -202,9 +207,15 @@ class Bench {
     });
     made.figures.overDvr = spreadOf(lastOf(ratios));
     made.figures.frame = spreadOf(lastOf(frames));
-    made.figures.compositeMs = spreadOf(lastOf(composites)).median;
     made.figures.searchMs = spreadOf(lastOf(searches)).median;
     made.figures.writeMs = spreadOf(lastOf(writes)).median;
+    made.figures.frames = log.figures(static_cast<std::size_t>(options_.repeats));
+    made.figures.frames.volumeRendering = spreadOf(lastOf(volumes));
+    if (options_.frames > 0) {
+      made.figures.frames.orbitFrames = options_.frames;
+      made.figures.frames.vdisPerSecond =
+          vdisPerSecond(generator_, clock_, {shot.camera, shot.function, settings_}, options_.frames);
+    }
     world_.together([&] {
       if (!root()) return;
       made.figures.supersegments = made.vdi->supersegmentCount();
@@ -244,7 +255,6 @@ class Bench {
               const ViewFigures& view) {
     BenchRow row;
     row.dataset = name;
-    row.ranks = world_.size();
     row.settings = settings_;
     row.reconstruction = reconstruction_;
     row.truthRate = options_.truthRate;

@@ -20,6 +20,7 @@ struct BenchOptions {
   std::vector<std::uint32_t> supersegments;  // empty: 25, or the suite's
   int views = 0;                             // 0: 1, or the suite's
   int repeats = 5;
+  int frames = 20;  // of the orbit that VDIs per second are counted on; 0: they aren't
   std::string reconstruction = "smooth";
   double truthRate = 8.0;  // samples per voxel of the volume rendering that all are compared with
   std::string suite;       // empty, or a name that suiteNames() has
