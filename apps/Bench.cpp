@@ -9,6 +9,7 @@
 
 #include "BuildCommit.h"
 #include "apps/BenchCompare.h"
+#include "apps/BenchRanks.h"
 #include "apps/BenchRun.h"
 #include "apps/BenchSuites.h"
 #include "apps/Commands.h"
@@ -33,8 +34,9 @@ std::string today() {
 }
 
 /// What can be known before anything takes time. Throws Error.
-void requireSound(const BenchOptions& options) {
+void requireSound(const BenchOptions& options, int ranks) {
   if (options.repeats < 1) throw Error(ErrorCode::InvalidArgument, "--repeats must be at least 1");
+  if (options.suite == ranksSuite) requireSoundRanks(options, ranks);
   for (const DataSet& set : dataSets(options)) {
     if (set.field.empty()) {
       (void)readSidecar(set.raw);
@@ -68,7 +70,7 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
       for (const std::string& raw : options.raws) inputs.push_back({"--raw", raw});
       requireOutputs({{"-o", options.output}}, inputs);
     }
-    requireSound(options);
+    requireSound(options, world.size());
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
   });
   // The table must not get between the lines of the JSON.
@@ -77,15 +79,19 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
     fmt::print(table, "device: {}, ranks: {}, commit: {}; milliseconds, dB, MiB\n", device->name(),
                world.size(), buildCommit);
   }
-  const std::vector<BenchRow> rows = runBench(options, world, device, table);
+  std::vector<json> rows;
+  if (options.suite == ranksSuite) {
+    rows = runRanks(options, world, device, table);
+  } else {
+    for (const BenchRow& row : runBench(options, world, device, table)) rows.push_back(toJson(row));
+  }
   world.together([&] {
     if (world.rank() != 0) return;
     json document{{"device", device->name()},
                   {"commit", buildCommit},
                   {"date", today()},
                   {"ranks", world.size()},
-                  {"rows", json::array()}};
-    for (const BenchRow& row : rows) document["rows"].push_back(toJson(row));
+                  {"rows", rows}};
     // A file's name, which a data set has, may be any bytes.
     const std::string text = document.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
     if (options.output.empty()) {
@@ -178,8 +184,35 @@ void addBench(CLI::App& app, Job& job) {
       ->add_option(
           "--suite", options->suite,
           "data sets, sizes, viewpoints and N_S of docs/benchmarks.md: paper (needs a GPU and 32 GiB), "
-          "small (a minute on a CPU); --fields picks some of it")
+          "small (a minute on a CPU); --fields picks some of it; or ranks: whole frames on fewer and more of "
+          "mpirun's ranks, of the volume and picture that the options say")
       ->check(CLI::IsMember(suiteNames()));
+  const char* const ranksGroup = "Suite ranks";
+  command
+      ->add_option("--scaling", options->scalings,
+                   "strong: --size is shared by all ranks; weak: each rank has --size-per-rank")
+      ->check(CLI::IsMember({"strong", "weak"}))
+      ->capture_default_str()
+      ->group(ranksGroup);
+  command
+      ->add_option("--layouts", options->layouts,
+                   "layouts to run, instead of --layout. Slabs are one block a rank; others cut the fixed "
+                   "volume into --blocks and a growing one into blocks of that size")
+      ->type_name("LAYOUT")
+      ->capture_default_str()
+      ->group(ranksGroup);
+  command
+      ->add_option("--rank-counts", options->rankCounts,
+                   "how many of mpirun's ranks to run on; default: 1, 2, 4 and so on, and all")
+      ->type_name("N")
+      ->group(ranksGroup);
+  command
+      ->add_option(
+          "--size-per-rank", options->sizePerRank,
+          "values per axis that each rank has in weak scaling; default: half of --size on each axis, "
+          "so that 8 ranks have the fixed volume")
+      ->type_name("XxYxZ")
+      ->group(ranksGroup);
   command
       ->add_option(
           "--compare", options->comparison,

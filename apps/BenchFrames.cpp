@@ -98,6 +98,36 @@ double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInp
   return 1e3 * frames / milliseconds;
 }
 
+FrameFigures measureFrames(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int repeats,
+                           int orbitFrames) {
+  const comm::Communicator& comm = generator.communicator();
+  const Spread pictures = repeated(repeats, [&] {
+    clock.run();
+    std::optional<Image> image;
+    const double milliseconds =
+        readyMs(comm, [&] { image = generator.renderVolume(input.camera, input.function, input.settings); });
+    if (image) generator.recycle(std::move(*image));
+    return milliseconds;
+  });
+  FrameLog log;
+  repeated(repeats, [&] {
+    clock.run();
+    std::optional<Vdi> vdi;
+    const double milliseconds =
+        readyMs(comm, [&] { vdi = generator.generate(input.camera, input.function, input.settings); });
+    log.add(milliseconds, generator.reports());
+    if (vdi) generator.recycle(std::move(*vdi));
+    return milliseconds;
+  });
+  FrameFigures figures = log.figures(static_cast<std::size_t>(repeats));
+  figures.volumeRendering = pictures;
+  if (orbitFrames > 0) {
+    figures.orbitFrames = orbitFrames;
+    figures.vdisPerSecond = vdisPerSecond(generator, clock, input, orbitFrames);
+  }
+  return figures;
+}
+
 std::string stageLines(const FrameFigures& figures) {
   std::string text;
   if (figures.ranks > 1) {
@@ -120,6 +150,17 @@ std::string stageLines(const FrameFigures& figures) {
                         1e-6 * static_cast<double>(figures.subSupersegments));
   }
   return text + "\n";
+}
+
+void addSettings(json& row, const GenerateSettings& settings) {
+  row["algorithm"] = toString(settings.algorithm);
+  row["precision"] = toString(settings.precision);
+  row["supersegments"] = settings.supersegments;
+  row["budget"] = toString(settings.budget);
+  row["fill"] = settings.fill;
+  row["width"] = settings.width;
+  row["height"] = settings.height;
+  row["sampling_rate"] = settings.samplesPerVoxel;
 }
 
 void addFigures(json& row, const FrameFigures& figures) {

@@ -86,8 +86,16 @@ struct FrameInput {
 /// other ranks' figures mean nothing.
 double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int frames);
 
+/// Repeated frames and pictures, after one of each that doesn't count, and vdisPerSecond if `orbitFrames`
+/// isn't 0. Collective.
+FrameFigures measureFrames(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int repeats,
+                           int orbitFrames);
+
 /// Lines for a table: every stage, if there are several ranks, and the whole frame. With a line end each.
 std::string stageLines(const FrameFigures& figures);
+
+/// Adds what VDIs are made with to a row.
+void addSettings(nlohmann::json& row, const GenerateSettings& settings);
 
 /// Adds the figures to a row. null: not measured, or no such stage on one rank.
 void addFigures(nlohmann::json& row, const FrameFigures& figures);

@@ -37,18 +37,9 @@ std::string tableLine(const BenchRow& row) {
 }
 
 json toJson(const BenchRow& row) {
-  const GenerateSettings& settings = row.settings;
   json object{
       {"dataset", row.dataset},
-      {"algorithm", toString(settings.algorithm)},
-      {"precision", toString(settings.precision)},
       {"reconstruction", toString(row.reconstruction)},
-      {"supersegments", settings.supersegments},
-      {"budget", toString(settings.budget)},
-      {"fill", settings.fill},
-      {"width", settings.width},
-      {"height", settings.height},
-      {"sampling_rate", settings.samplesPerVoxel},
       {"truth_rate", row.truthRate},
       {"upload_ms", row.upload.milliseconds},
       {"step_ms", row.upload.stepMs ? json(*row.upload.stepMs) : json(nullptr)},
@@ -73,6 +64,7 @@ json toJson(const BenchRow& row) {
       {"psnr_db", finiteOrNull(row.view.fromTruth.psnrDb)},
       {"supersegment_count", row.generation.supersegments},
       {"stored_bytes", row.generation.storedBytes}};
+  addSettings(object, row.settings);
   addFigures(object, row.generation.frames);
   return object;
 }

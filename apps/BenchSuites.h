@@ -26,6 +26,11 @@ struct BenchOptions {
   std::string suite;       // empty, or a name that suiteNames() has
   std::string output;
   std::vector<std::string> comparison;
+  // Of the suite `ranks`:
+  std::vector<std::string> scalings{"strong", "weak"};
+  std::vector<std::string> layouts{"slabs", "interleaved", "random"};
+  std::vector<int> rankCounts;  // empty: 1, 2, 4 ... and all
+  std::string sizePerRank;      // of weak scaling; empty: half of deal.size on each axis
 };
 
 struct DataSet {
@@ -37,6 +42,9 @@ struct DataSet {
 };
 
 const std::vector<std::string>& suiteNames();
+
+/// The suite of fewer and more ranks, which has no data sets of its own.
+inline constexpr const char* ranksSuite = "ranks";
 
 /// Fills in what the suite says, or what holds without one, where the options leave it open.
 void applySuite(BenchOptions& options);

@@ -18,12 +18,12 @@ works() {
 holds() {
   python3 - || { echo "FAILED  $1"; cat out.txt err.txt; failures=$((failures + 1)); }
 }
-small=(--fields interface --size 24x20x18 --resolution 80x60 --supersegments 8 --repeats 2 --frames 2)
+small=(--fields interface --size 24x20x18 --resolution 80x60 --supersegments 8 --repeats 2)
 
 # Stages, bytes and sub-supersegments.
-works "bench on 3 ranks" "${mpirun[@]}" 3 "$vdi" bench "${small[@]}" --angles 0 --blocks 3x2x2 -o three.json
+works "bench on 3 ranks" "${mpirun[@]}" 3 "$vdi" bench "${small[@]}" --frames 2 --angles 0 --blocks 3x2x2 -o three.json
 cp out.txt table.txt
-works "bench on 1 rank" "$vdi" bench "${small[@]}" --angles 0 -o one.json
+works "bench on 1 rank" "$vdi" bench "${small[@]}" --frames 2 --angles 0 -o one.json
 holds "figures of stages" <<'P'
 import json
 table = open("table.txt").read()
@@ -53,4 +53,46 @@ import json
 row, = json.load(open("none.json"))["rows"]
 assert row["vdis_per_second"] is None and row["orbit_frames"] == 0, row
 P
+
+# Suite ranks: every layout on 1, 2 and 3 ranks, of a fixed and of a growing volume.
+works "suite ranks" "${mpirun[@]}" 3 "$vdi" bench --suite ranks "${small[@]}" --frames 1 --blocks 4x2x2 \
+  --size-per-rank 12x10x8 -o ranks.json
+holds "suite ranks" <<'P'
+import json
+document = json.load(open("ranks.json"))
+rows = {(row["scaling"], row["layout"], row["ranks"]): row for row in document["rows"]}
+layouts = ("slabs", "interleaved", "random")
+assert len(document["rows"]) == len(rows) == 18 and document["ranks"] == 3, rows.keys()
+for (scaling, layout, ranks), row in rows.items():
+    size = row["size"]
+    if scaling == "strong":
+        assert size == [24, 20, 18], row
+    else:  # the third axis is the shortest, then the second
+        assert size == {1: [12, 10, 8], 2: [12, 10, 16], 3: [12, 10, 24]}[ranks], row
+    blocks = row["blocks"][0] * row["blocks"][1] * row["blocks"][2]
+    assert blocks == ranks if layout == "slabs" else blocks >= ranks, row
+    assert row["frame_ms"] > 0 and row["generate_ms"] > 0 and row["volume_rendering_ms"] > 0, row
+    assert (row["bytes_sent"] > 0) == (row["composite_ms"] is not None) == (ranks > 1), row
+    one = rows[scaling, layout, 1]
+    assert abs(row["frame_speedup"] * row["frame_ms"] - one["frame_ms"]) < 1e-6 * one["frame_ms"], row
+    assert abs(row["vdis_speedup"] * one["vdis_per_second"] / row["vdis_per_second"] - 1) < 1e-6, row
+assert rows["strong", "slabs", 1]["sub_supersegments"] < rows["strong", "random", 3]["sub_supersegments"]
+P
+works "ranks that were chosen" "${mpirun[@]}" 3 "$vdi" bench --suite ranks "${small[@]}" --frames 0 --scaling strong \
+  --layouts slabs --rank-counts 2 -o two.json
+holds "ranks that were chosen" <<'P'
+import json
+row, = json.load(open("two.json"))["rows"]
+assert row["ranks"] == 2 and row["frame_speedup"] is None and row["vdis_per_second"] is None, row
+P
+works "a suite with itself" "$vdi" bench --compare ranks.json ranks.json
+grep -q "^18 rows" out.txt || { echo "FAILED  rows of several rank counts are mixed up"; failures=$((failures + 1)); }
+for wrong in "--rank-counts 3" "--layouts spiral" "--size-per-rank 5x5" "--scaling both"; do
+  read -r -a options <<<"$wrong"
+  if "${mpirun[@]}" 2 "$vdi" bench --suite ranks "${small[@]}" "${options[@]}" >out.txt 2>err.txt; then
+    echo "FAILED  $wrong was taken"
+    failures=$((failures + 1))
+  fi
+  grep -q "^vdi: " err.txt || { echo "FAILED  nothing is said of $wrong"; failures=$((failures + 1)); }
+done
 exit $((failures > 0))
