@@ -15,6 +15,7 @@
 #include "apps/Commands.h"
 #include "apps/Fields.h"
 #include "apps/Help.h"
+#include "apps/IcetCompositor.h"
 #include "apps/OutputFiles.h"
 #include "apps/RawVolume.h"
 #include "vdi/core/Error.h"
@@ -36,6 +37,10 @@ std::string today() {
 /// What can be known before anything takes time. Throws Error.
 void requireSound(const BenchOptions& options, int ranks) {
   if (options.repeats < 1) throw Error(ErrorCode::InvalidArgument, "--repeats must be at least 1");
+  if (!options.rival.empty() && !IcetCompositor::available()) {
+    throw Error(ErrorCode::InvalidArgument,
+                "this vdi was built without IceT, which is Debian's package paraview-dev", "--rival");
+  }
   if (options.suite == ranksSuite) requireSoundRanks(options, ranks);
   for (const DataSet& set : dataSets(options)) {
     if (set.field.empty()) {
@@ -123,6 +128,16 @@ JSON has, beside what the table has:
                                  sums of the slowest rank's stages, transfers included
   upload_ms, step_ms             the upload of the values, and a frame made while the next step's are on their
                                  way
+  rival_icet_ms                  with --rival icet: a whole picture, wall on the root's host. Each rank casts the
+                                 samples of the whole scene that lie in its own blocks into a picture of floats
+                                 (rival_render_ms, with download); IceT blends these in order of visibility and
+                                 collects them (rival_composite_ms). Beside it: volume_rendering_ms and frame_ms
+  rival_redistribute_ms          if planes don't separate the ranks' blocks: the time to move the values to one
+                                 box a rank, ghost layers included, upload excluded. Once a time step. null: not
+                                 needed
+  rival_bytes_sent, rival_redistributed_bytes
+                                 of all ranks: in one picture, as IceT counts it, and in the redistribution
+  rival_max_difference           of a channel of its picture from renderVolume's, in 1/255
   null                           what wasn't measured, and the infinite PSNR of equal pictures)";
 
 void run(BenchOptions options, const comm::Communicator& world) {
@@ -187,6 +202,12 @@ void addBench(CLI::App& app, Job& job) {
           "small (a minute on a CPU); --fields picks some of it; or ranks: whole frames on fewer and more of "
           "mpirun's ranks, of the volume and picture that the options say")
       ->check(CLI::IsMember(suiteNames()));
+  command
+      ->add_option(
+          "--rival", options->rival,
+          "icet: beside the VDI, volume rendering of the same volume, camera and devices, composited by "
+          "IceT; under mpirun, on one rank too. Takes the volume's memory twice. See below")
+      ->check(CLI::IsMember({"icet"}));
   const char* const ranksGroup = "Suite ranks";
   command
       ->add_option("--scaling", options->scalings,

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "apps/BenchFrames.h"
+#include "apps/BenchRival.h"
 #include "apps/RankGroup.h"
 #include "apps/RawVolume.h"
 #include "vdi/core/Error.h"
@@ -118,18 +119,23 @@ class RankSuite {
  private:
   void measureOn(const RankGroup& group) {
     VdiGenerator generator(device_, group.communicator());
+    std::optional<IcetRival> rival;
+    if (!options_.rival.empty()) rival.emplace(device_, group.communicator(), group.handle());
     for (const DataSet& set : dataSets(options_)) {
       for (const std::string& scaling : options_.scalings) {
         if (scaling == "weak" && set.field.empty()) continue;  // a file can't grow
         for (const std::string& layout : options_.layouts) {
           generator.setBlocks({});  // makes room
-          measure(setupOf(options_, set, scaling, layout, generator.communicator().size()), generator);
+          if (rival) rival->dropBlocks();
+          measure(setupOf(options_, set, scaling, layout, generator.communicator().size()), generator,
+                  rival ? &*rival : nullptr);
         }
       }
     }
   }
 
-  void measure(const Setup& setup, VdiGenerator& generator) {
+  /// `rival`: null, if none was asked for.
+  void measure(const Setup& setup, VdiGenerator& generator, IcetRival* rival) {
     const comm::Communicator& comm = generator.communicator();
     std::vector<Block> blocks;
     comm.together([&] {
@@ -147,18 +153,26 @@ class RankSuite {
       input.camera = makeCamera(options_.view, generator.scene());
       input.function = makeTransferFunction(options_.quality, generator.scene(), generator.scalarRange());
     });
+    std::optional<RivalFigures> rivalFigures;
+    if (rival != nullptr) {
+      input.settings = makeSettings(options_.quality);
+      rival->setBlocks(blocks, generator.scene(), options_.repeats);
+      const std::optional<Image> ours = generator.renderVolume(input.camera, input.function, input.settings);
+      rivalFigures = rival->measure(clock_, input, options_.repeats, ours);
+    }
+    blocks.clear();
     for (const std::string& algorithm : options_.algorithms) {
       for (const std::uint32_t supersegments : options_.supersegments) {
         input.settings = benchSettings(options_, algorithm, supersegments);
         const FrameFigures figures =
             measureFrames(generator, clock_, input, options_.repeats, options_.frames);
-        if (comm.rank() == 0) addRow(setup, input.settings, uploadMs, figures);
+        if (comm.rank() == 0) addRow(setup, input.settings, uploadMs, figures, rivalFigures);
       }
     }
   }
 
   void addRow(const Setup& setup, const GenerateSettings& settings, double uploadMs,
-              const FrameFigures& figures) {
+              const FrameFigures& figures, const std::optional<RivalFigures>& rival) {
     const std::string key = fmt::format("{}, {}, {}, {}, {}", setup.set.name, setup.scaling, setup.layout,
                                         toString(settings.algorithm), settings.supersegments);
     if (setup.ranks == 1) oneRank_[key] = {figures.wall.median, figures.vdisPerSecond};
@@ -183,6 +197,7 @@ class RankSuite {
                orDash(figures.vdisPerSecond), orDash(more), figures.volumeRendering.median,
                static_cast<double>(figures.bytesSent) / (1 << 20),
                1e-6 * static_cast<double>(figures.subSupersegments));
+    if (rival) fmt::print(table_, "{}", rivalLine(*rival));
     std::fflush(table_);
     json row{{"dataset", setup.set.name},
              {"scaling", setup.scaling},
@@ -195,6 +210,7 @@ class RankSuite {
              {"vdis_speedup", more ? json(*more) : json(nullptr)}};
     addSettings(row, settings);
     addFigures(row, figures);
+    if (rival) addRival(row, *rival);
     rows_.push_back(std::move(row));
   }
 

@@ -66,6 +66,7 @@ json toJson(const BenchRow& row) {
       {"stored_bytes", row.generation.storedBytes}};
   addSettings(object, row.settings);
   addFigures(object, row.generation.frames);
+  if (row.rival) addRival(object, *row.rival);
   return object;
 }
 

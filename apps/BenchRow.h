@@ -7,6 +7,7 @@
 #include <string>
 
 #include "apps/BenchFrames.h"
+#include "apps/BenchRival.h"
 #include "apps/Timing.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/ImageMetrics.h"
@@ -58,6 +59,7 @@ struct BenchRow {
   DvrFigures dvr;
   GenerationFigures generation;
   ViewFigures view;
+  std::optional<RivalFigures> rival;  // of the VDI's viewpoint
 };
 
 std::string tableHead();

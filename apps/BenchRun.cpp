@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "apps/BenchRival.h"
+#include "apps/RankGroup.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
@@ -56,7 +58,11 @@ class Bench {
         reconstruction_(reconstructionFromString(options.reconstruction)),
         device_(device),
         clock_(device),
-        generator_(std::move(device), comm::Communicator::world()) {}
+        generator_(std::move(device), comm::Communicator::world()) {
+    if (options.rival.empty()) return;
+    all_.emplace(world, world.size());
+    rival_.emplace(device_, all_->communicator(), all_->handle());
+  }
 
   /// Table lines go to `table`. Empty on all ranks but the root.
   std::vector<BenchRow> rows(std::FILE* table) {
@@ -79,7 +85,9 @@ class Bench {
                                  : fieldBlocks(set.field, deal, device_, world_.rank(), world_.size());
     });
     upload_ = measureUpload(blocks);
-    generator_.setBlocks(std::move(blocks));
+    generator_.setBlocks(blocks);
+    if (rival_) rival_->setBlocks(blocks, generator_.scene(), options_.repeats);
+    blocks.clear();
     if (root()) {
       fmt::print(table_, "{}: upload {:.1f} ms", set.name, upload_.milliseconds);
       if (upload_.stepMs) fmt::print(table_, "; a frame beside the next upload {:.1f} ms", *upload_.stepMs);
@@ -130,6 +138,7 @@ class Bench {
     std::vector<Truth> truths;
     for (const double angle : options_.angles)
       truths.push_back(volumeRendering(shot.camera.azimuth(angle), angle, shot.function));
+    if (rival_) measureRival(shot);
     for (const std::string& algorithm : options_.algorithms) {
       for (const std::uint32_t supersegments : options_.supersegments) {
         settings_ = benchSettings(options_, algorithm, supersegments);
@@ -144,6 +153,14 @@ class Bench {
         });
       }
     }
+  }
+
+  void measureRival(const Shot& shot) {
+    std::optional<Image> ours = generator_.renderVolume(shot.camera, shot.function, settings_);
+    rivalFigures_ = rival_->measure(clock_, {shot.camera, shot.function, settings_}, options_.repeats, ours);
+    if (!root()) return;
+    fmt::print(table_, "{}", rivalLine(*rivalFigures_));
+    generator_.recycle(std::move(*ours));
   }
 
   /// Of the last generation or volume rendering.
@@ -264,6 +281,7 @@ class Bench {
     row.dvr = truth.dvr;
     row.generation = made.figures;
     row.view = view;
+    row.rival = rivalFigures_;
     fmt::print(table_, "{}\n", tableLine(row));
     std::fflush(table_);
     rows_.push_back(std::move(row));
@@ -276,7 +294,10 @@ class Bench {
   std::shared_ptr<gpu::Device> device_;
   ClockRaiser clock_;
   VdiGenerator generator_;
-  UploadTimes upload_;  // of the data set that's shown
+  std::optional<RankGroup> all_;  // as the rival needs them
+  std::optional<IcetRival> rival_;
+  std::optional<RivalFigures> rivalFigures_;  // of the viewpoint that's shown
+  UploadTimes upload_;                        // of the data set that's shown
   std::FILE* table_ = nullptr;
   std::vector<BenchRow> rows_;
 };

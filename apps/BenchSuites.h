@@ -24,6 +24,7 @@ struct BenchOptions {
   std::string reconstruction = "smooth";
   double truthRate = 8.0;  // samples per voxel of the volume rendering that all are compared with
   std::string suite;       // empty, or a name that suiteNames() has
+  std::string rival;       // empty, or icet
   std::string output;
   std::vector<std::string> comparison;
   // Of the suite `ranks`:

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# vdi bench on several ranks. $1: vdi, $2: mpirun and its options, as one word list.
+# vdi bench on several ranks. $1: vdi, $2: mpirun and its options, as one word list, $3: icet if vdi was built with it.
 set -uo pipefail
 vdi=$1
 read -r -a mpirun <<<"$2"
@@ -95,4 +95,42 @@ for wrong in "--rank-counts 3" "--layouts spiral" "--size-per-rank 5x5" "--scali
   fi
   grep -q "^vdi: " err.txt || { echo "FAILED  nothing is said of $wrong"; failures=$((failures + 1)); }
 done
+
+# The rival: volume rendering composited by IceT has our picture, wherever the blocks are.
+if [ "$3" != icet ]; then
+  if "${mpirun[@]}" 2 "$vdi" bench --rival icet "${small[@]}" >out.txt 2>err.txt; then
+    echo "FAILED  a rival that isn't there"
+    failures=$((failures + 1))
+  fi
+  grep -q "built without IceT" err.txt || { echo "FAILED  nothing is said of IceT"; failures=$((failures + 1)); }
+  exit $((failures > 0))
+fi
+rival=(--rival icet --fields mixing --size 24x20x18 --resolution 80x60 --supersegments 8 --repeats 1 --frames 0)
+for deal in "slabs 1x1x3 shared" "random 3x3x3 shared" "random 3x3x3 cells"; do
+  read -r layout blocks joint <<<"$deal"
+  # A camera that sees the slabs one behind the other, so that their order counts.
+  works "rival, $deal" "${mpirun[@]}" 3 "$vdi" bench "${rival[@]}" --angles 0 --azimuth 155 --layout "$layout" \
+    --blocks "$blocks" --joint "$joint" -o "rival_${layout}_$joint.json"
+done
+works "rival in the suite ranks" "${mpirun[@]}" 3 "$vdi" bench --suite ranks "${rival[@]}" --scaling strong \
+  --layouts interleaved --blocks 4x3x3 --joint gap --parallel -o rival_ranks.json
+holds "the rival" <<'P'
+import json
+for name in ("slabs_shared", "random_shared", "random_cells", "ranks"):
+    for row in json.load(open(f"rival_{name}.json"))["rows"]:
+        assert row["rival"] == "icet" and 0 <= row["rival_max_difference"] < 0.1, (name, row)
+        assert row["rival_icet_ms"] >= row["rival_composite_ms"] > 0 and row["rival_render_ms"] > 0, (name, row)
+        picture = row["width"] * row["height"] * 16
+        assert row["ranks"] == 1 or 0 < row["rival_bytes_sent"] < 3 * picture, (name, row)
+        convex = name == "slabs_shared" or row["ranks"] == 1
+        assert (row["rival_redistribute_ms"] is None) == convex, (name, row)
+        assert (row["rival_redistributed_bytes"] == 0) == convex, (name, row)
+        values = 24 * 20 * 18 * 4  # and some that several blocks have
+        assert row["rival_redistributed_bytes"] < 1.5 * values, (name, row)
+P
+if "$vdi" bench --rival icet "${small[@]}" >out.txt 2>err.txt; then
+  echo "FAILED  a rival without MPI"
+  failures=$((failures + 1))
+fi
+grep -q "mpirun" err.txt || { echo "FAILED  nothing is said of mpirun"; failures=$((failures + 1)); }
 exit $((failures > 0))
