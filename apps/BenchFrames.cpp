@@ -21,7 +21,7 @@ struct StageSource {
 constexpr std::array<StageSource, frameStages> sources{
     {{"generate", &RankReport::generateSeconds, &RankReport::generateDeviceSeconds},
      {"distribute", &RankReport::distributeSeconds, nullptr},
-     {"composite", &RankReport::compositeSeconds, nullptr},
+     {"composite", &RankReport::compositeSeconds, &RankReport::compositeDeviceSeconds},
      {"gather", &RankReport::gatherSeconds, nullptr}}};
 
 RankTimes over(const std::vector<RankReport>& reports, double RankReport::*seconds) {
@@ -86,9 +86,7 @@ double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInp
   assert(frames >= 1);
   constexpr int orbit = 20;
   const auto make = [&](int frame) {
-    std::optional<Vdi> vdi =
-        generator.generate(input.camera.azimuth(360.0 * frame / orbit), input.function, input.settings);
-    if (vdi) generator.recycle(std::move(*vdi));
+    generator.generate(input.camera.azimuth(360.0 * frame / orbit), input.function, input.settings);
   };
   clock.run();
   make(orbit - 1);
@@ -103,20 +101,14 @@ FrameFigures measureFrames(VdiGenerator& generator, ClockRaiser& clock, const Fr
   const comm::Communicator& comm = generator.communicator();
   const Spread pictures = repeated(repeats, [&] {
     clock.run();
-    std::optional<Image> image;
-    const double milliseconds =
-        readyMs(comm, [&] { image = generator.renderVolume(input.camera, input.function, input.settings); });
-    if (image) generator.recycle(std::move(*image));
-    return milliseconds;
+    return readyMs(comm, [&] { generator.renderVolume(input.camera, input.function, input.settings); });
   });
   FrameLog log;
   repeated(repeats, [&] {
     clock.run();
-    std::optional<Vdi> vdi;
     const double milliseconds =
-        readyMs(comm, [&] { vdi = generator.generate(input.camera, input.function, input.settings); });
+        readyMs(comm, [&] { generator.generate(input.camera, input.function, input.settings); });
     log.add(milliseconds, generator.reports());
-    if (vdi) generator.recycle(std::move(*vdi));
     return milliseconds;
   });
   FrameFigures figures = log.figures(static_cast<std::size_t>(repeats));

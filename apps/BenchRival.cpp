@@ -147,7 +147,7 @@ std::vector<Block> IcetRival::makeConvex(const std::vector<Block>& blocks, int r
 IcetRival::Timed IcetRival::draw(const FrameInput& input, const PixelBox& drawn,
                                  const std::vector<int>& order) {
   Timed timed;
-  if (image_) own_.recycle(std::move(*image_));
+  image_.reset();  // its memory is the next one's
   comm_.together([&] {
     timed.renderMs =
         wallMs([&] { image_ = own_.renderVolume(input.camera, input.function, input.settings); });

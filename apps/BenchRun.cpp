@@ -156,11 +156,9 @@ class Bench {
   }
 
   void measureRival(const Shot& shot) {
-    std::optional<Image> ours = generator_.renderVolume(shot.camera, shot.function, settings_);
+    const std::optional<Image> ours = generator_.renderVolume(shot.camera, shot.function, settings_);
     rivalFigures_ = rival_->measure(clock_, {shot.camera, shot.function, settings_}, options_.repeats, ours);
-    if (!root()) return;
-    fmt::print(table_, "{}", rivalLine(*rivalFigures_));
-    generator_.recycle(std::move(*ours));
+    if (root()) fmt::print(table_, "{}", rivalLine(*rivalFigures_));
   }
 
   /// Of the last generation or volume rendering.
@@ -206,10 +204,8 @@ class Bench {
     std::vector<double> writes;
     made.figures.device = repeated(options_.repeats, [&] {
       clock_.run();
-      std::optional<Image> image;
       volumes.push_back(
-          readyMs(world_, [&] { image = generator_.renderVolume(shot.camera, shot.function, settings_); }));
-      if (image) generator_.recycle(std::move(*image));
+          readyMs(world_, [&] { generator_.renderVolume(shot.camera, shot.function, settings_); }));
       const double volumeMs = deviceMs();
       made.vdi.reset();
       clock_.run();
