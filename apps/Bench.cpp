@@ -116,6 +116,8 @@ PSNR compare that view with the truth: DVR at --truth-rate samples per voxel. DV
 VDI's own --sampling-rate with it.
 Below each VDI's views are its stages on several ranks, wall and device time of the slowest rank and the mean,
 and the whole frame.
+The table of suite ranks has the wall clock of the slowest rank for each stage, and whole frames; 'faster' and
+'more' compare the frame and VDIs/s with one rank's of the same layout, DVR is volume_rendering_ms.
 JSON has, beside what the table has:
   frame_ms, volume_rendering_ms  a whole VDI and a whole picture: wall on the root's host, all ranks ready to
                                  result there
@@ -128,15 +130,17 @@ JSON has, beside what the table has:
                                  sums of the slowest rank's stages, transfers included
   upload_ms, step_ms             the upload of the values, and a frame made while the next step's are on their
                                  way
-  rival_icet_ms                  with --rival icet: a whole picture, wall on the root's host. Each rank casts the
-                                 samples of the whole scene that lie in its own blocks into a picture of floats
-                                 (rival_render_ms, with download); IceT blends these in order of visibility and
-                                 collects them (rival_composite_ms). Beside it: volume_rendering_ms and frame_ms
+  rival_icet_ms                  with --rival icet: a whole picture, wall on the root's host. Each rank casts
+                                 the samples of the whole scene that lie in its own blocks into a picture of
+                                 floats (rival_render_ms, with download); IceT blends these in order of
+                                 visibility and collects them (rival_composite_ms). To be compared with
+                                 volume_rendering_ms, and with frame_ms, which makes more than a picture
   rival_redistribute_ms          if planes don't separate the ranks' blocks: the time to move the values to one
                                  box a rank, ghost layers included, upload excluded. Once a time step. null: not
                                  needed
   rival_bytes_sent, rival_redistributed_bytes
-                                 of all ranks: in one picture, as IceT counts it, and in the redistribution
+                                 of all ranks: in one picture, as IceT counts it; values that were moved,
+                                 without ghost layers
   rival_max_difference           of a channel of its picture from renderVolume's, in 1/255
   null                           what wasn't measured, and the infinite PSNR of equal pictures)";
 
