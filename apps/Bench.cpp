@@ -39,7 +39,8 @@ void requireSound(const BenchOptions& options, int ranks) {
   if (options.repeats < 1) throw Error(ErrorCode::InvalidArgument, "--repeats must be at least 1");
   if (!options.rival.empty() && !IcetCompositor::available()) {
     throw Error(ErrorCode::InvalidArgument,
-                "this vdi was built without IceT, which is Debian's package paraview-dev", "--rival");
+                "this vdi was built without IceT: it takes Debian's paraview-dev and VDI_BUILD_PARAVIEW",
+                "--rival");
   }
   if (options.suite == ranksSuite) requireSoundRanks(options, ranks);
   for (const DataSet& set : dataSets(options)) {
