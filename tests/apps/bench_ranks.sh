@@ -39,7 +39,8 @@ for name in ("generate", "distribute", "composite", "gather"):
         assert row[name + "_ms"] == wall["slowest"], row
 device = row["stages"]["generate"]["device_ms"]
 assert row["generate_ms"] == device["slowest"] >= device["mean"] > 0, row
-assert row["sub_supersegments"] > row["supersegment_count"] > 0, row
+assert row["stages"]["composite"]["device_ms"]["slowest"] > 0, row
+assert row["sub_supersegments"] >= row["supersegment_count"] > 0, row
 assert row["bytes_sent"] > 0 and row["volume_rendering_ms"] > 0, row
 assert row["orbit_frames"] == 2 and row["vdis_per_second"] > 0, row
 alone, = json.load(open("one.json"))["rows"]
@@ -72,11 +73,11 @@ for (scaling, layout, ranks), row in rows.items():
     blocks = row["blocks"][0] * row["blocks"][1] * row["blocks"][2]
     assert blocks == ranks if layout == "slabs" else blocks >= ranks, row
     assert row["frame_ms"] > 0 and row["generate_ms"] > 0 and row["volume_rendering_ms"] > 0, row
+    assert row["sub_supersegments"] > 0, row
     assert (row["bytes_sent"] > 0) == (row["composite_ms"] is not None) == (ranks > 1), row
     one = rows[scaling, layout, 1]
     assert abs(row["frame_speedup"] * row["frame_ms"] - one["frame_ms"]) < 1e-6 * one["frame_ms"], row
     assert abs(row["vdis_speedup"] * one["vdis_per_second"] / row["vdis_per_second"] - 1) < 1e-6, row
-assert rows["strong", "slabs", 1]["sub_supersegments"] < rows["strong", "random", 3]["sub_supersegments"]
 P
 works "ranks that were chosen" "${mpirun[@]}" 3 "$vdi" bench --suite ranks "${small[@]}" --frames 0 --scaling strong \
   --layouts slabs --rank-counts 2 -o two.json
