@@ -9,11 +9,13 @@
 
 #include "BuildCommit.h"
 #include "apps/BenchCompare.h"
+#include "apps/BenchRanks.h"
 #include "apps/BenchRun.h"
 #include "apps/BenchSuites.h"
 #include "apps/Commands.h"
 #include "apps/Fields.h"
 #include "apps/Help.h"
+#include "apps/IcetCompositor.h"
 #include "apps/OutputFiles.h"
 #include "apps/RawVolume.h"
 #include "vdi/core/Error.h"
@@ -33,8 +35,14 @@ std::string today() {
 }
 
 /// What can be known before anything takes time. Throws Error.
-void requireSound(const BenchOptions& options) {
+void requireSound(const BenchOptions& options, int ranks) {
   if (options.repeats < 1) throw Error(ErrorCode::InvalidArgument, "--repeats must be at least 1");
+  if (!options.rival.empty() && !IcetCompositor::available()) {
+    throw Error(ErrorCode::InvalidArgument,
+                "this vdi was built without IceT: it takes Debian's paraview-dev and VDI_BUILD_PARAVIEW",
+                "--rival");
+  }
+  if (options.suite == ranksSuite) requireSoundRanks(options, ranks);
   for (const DataSet& set : dataSets(options)) {
     if (set.field.empty()) {
       (void)readSidecar(set.raw);
@@ -68,7 +76,7 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
       for (const std::string& raw : options.raws) inputs.push_back({"--raw", raw});
       requireOutputs({{"-o", options.output}}, inputs);
     }
-    requireSound(options);
+    requireSound(options, world.size());
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
   });
   // The table must not get between the lines of the JSON.
@@ -77,15 +85,19 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
     fmt::print(table, "device: {}, ranks: {}, commit: {}; milliseconds, dB, MiB\n", device->name(),
                world.size(), buildCommit);
   }
-  const std::vector<BenchRow> rows = runBench(options, world, device, table);
+  std::vector<json> rows;
+  if (options.suite == ranksSuite) {
+    rows = runRanks(options, world, device, table);
+  } else {
+    for (const BenchRow& row : runBench(options, world, device, table)) rows.push_back(toJson(row));
+  }
   world.together([&] {
     if (world.rank() != 0) return;
     json document{{"device", device->name()},
                   {"commit", buildCommit},
                   {"date", today()},
                   {"ranks", world.size()},
-                  {"rows", json::array()}};
-    for (const BenchRow& row : rows) document["rows"].push_back(toJson(row));
+                  {"rows", rows}};
     // A file's name, which a data set has, may be any bytes.
     const std::string text = document.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
     if (options.output.empty()) {
@@ -95,6 +107,43 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
     }
   });
 }
+
+const char* const footer =
+    R"(Each time is the median over the repeats, of the slowest rank. DVR and generate are device times of the
+rank's own volume rendering and of its (sub-)VDI, compact, without transfers; the columns '/ DVR' and 'faster'
+are ratios to a volume rendering right before. A GPU is kept busy before each run that counts.
+composite is what merging took under mpirun; render is the device's time for one view of the VDI. SSIM and
+PSNR compare that view with the truth: DVR at --truth-rate samples per voxel. DVR SSIM compares DVR at the
+VDI's own --sampling-rate with it.
+Below each VDI's views are its stages on several ranks, wall and device time of the slowest rank and the mean,
+and the whole frame.
+The table of suite ranks has the wall clock of the slowest rank for each stage, and whole frames; 'faster' and
+'more' compare the frame and VDIs/s with one rank's of the same layout, DVR is volume_rendering_ms.
+JSON has, beside what the table has:
+  frame_ms, volume_rendering_ms  a whole VDI and a whole picture: wall on the root's host, all ranks ready to
+                                 result there
+  vdis_per_second                VDIs one behind the other on an orbit (--frames), wall on the root's host
+  generate_ms, distribute_ms, composite_ms, gather_ms
+                                 device time of the first, wall of the others; slowest rank
+  stages                         all of them: wall_ms and device_ms, slowest rank and mean
+  sub_supersegments, bytes_sent  of all ranks, in one frame
+  dvr_frame_ms, generate_frame_ms, render_frame_ms
+                                 sums of the slowest rank's stages, transfers included
+  upload_ms, step_ms             the upload of the values, and a frame made while the next step's are on their
+                                 way
+  rival_icet_ms                  with --rival icet: a whole picture, wall on the root's host. Each rank casts
+                                 the samples of the whole scene that lie in its own blocks into a picture of
+                                 floats (rival_render_ms, with download); IceT blends these in order of
+                                 visibility and collects them (rival_composite_ms). To be compared with
+                                 volume_rendering_ms, and with frame_ms, which makes more than a picture
+  rival_redistribute_ms          if planes don't separate the ranks' blocks: the time to move the values to one
+                                 box a rank, ghost layers included, upload excluded. Once a time step. null: not
+                                 needed
+  rival_bytes_sent, rival_redistributed_bytes
+                                 of all ranks: in one picture, as IceT counts it; values that were moved,
+                                 without ghost layers
+  rival_max_difference           of a channel of its picture from renderVolume's, in 1/255
+  null                           what wasn't measured, and the infinite PSNR of equal pictures)";
 
 void run(BenchOptions options, const comm::Communicator& world) {
   if (!options.comparison.empty()) {
@@ -115,22 +164,7 @@ void run(BenchOptions options, const comm::Communicator& world) {
 void addBench(CLI::App& app, Job& job) {
   CLI::App* command = app.add_subcommand(
       "bench", "Time every stage on this device and compare a VDI's views with volume rendering");
-  command->footer(
-      "Each time is the median over the repeats, of the slowest rank. DVR and generate are device times of "
-      "the\n"
-      "rank's own volume rendering and of its (sub-)VDI, compact, without transfers; the columns '/ DVR' and "
-      "'faster'\n"
-      "are ratios to a volume rendering right before. A GPU is kept busy before each run that counts.\n"
-      "JSON has whole frames too, transfers and compositing included (dvr_frame_ms, generate_frame_ms,\n"
-      "render_frame_ms), the upload of the values (upload_ms), and a frame made while the next step's are "
-      "on\n"
-      "their way (step_ms).\n"
-      "composite is what merging took under mpirun;\n"
-      "render is the device's time for one view of the VDI. SSIM and PSNR compare that view with the "
-      "truth:\n"
-      "DVR at --truth-rate samples per voxel. DVR SSIM compares DVR at the VDI's own --sampling-rate with "
-      "it.\n"
-      "JSON has null for what wasn't measured and for the infinite PSNR of equal pictures.");
+  command->footer(footer);
   const auto options = std::make_shared<BenchOptions>();
   command
       ->add_option("--fields", options->fields,
@@ -157,6 +191,12 @@ void addBench(CLI::App& app, Job& job) {
   command->add_option("--repeats", options->repeats, "runs of which the median counts, after one warm-up")
       ->capture_default_str();
   command
+      ->add_option(
+          "--frames", options->frames,
+          "VDIs made one behind the other on an orbit of 20 viewpoints, for vdis_per_second; 0: none")
+      ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  command
       ->add_option("--truth-rate", options->truthRate,
                    "samples per voxel of the volume rendering that pictures are compared with, 1/64 to 64")
       ->capture_default_str();
@@ -164,8 +204,41 @@ void addBench(CLI::App& app, Job& job) {
       ->add_option(
           "--suite", options->suite,
           "data sets, sizes, viewpoints and N_S of docs/benchmarks.md: paper (needs a GPU and 32 GiB), "
-          "small (a minute on a CPU); --fields picks some of it")
+          "small (a minute on a CPU); --fields picks some of it; or ranks: whole frames on fewer and more of "
+          "mpirun's ranks, of the volume and picture that the options say")
       ->check(CLI::IsMember(suiteNames()));
+  command
+      ->add_option(
+          "--rival", options->rival,
+          "icet: beside the VDI, volume rendering of the same volume, camera and devices, composited by "
+          "IceT; under mpirun, on one rank too. Takes the volume's memory twice. See below")
+      ->check(CLI::IsMember({"icet"}));
+  const char* const ranksGroup = "Suite ranks";
+  command
+      ->add_option("--scaling", options->scalings,
+                   "strong: --size is shared by all ranks; weak: each rank has --size-per-rank")
+      ->check(CLI::IsMember({"strong", "weak"}))
+      ->capture_default_str()
+      ->group(ranksGroup);
+  command
+      ->add_option("--layouts", options->layouts,
+                   "layouts to run, instead of --layout. Slabs are one block a rank; others cut the fixed "
+                   "volume into --blocks and a growing one into blocks of that size")
+      ->type_name("LAYOUT")
+      ->capture_default_str()
+      ->group(ranksGroup);
+  command
+      ->add_option("--rank-counts", options->rankCounts,
+                   "how many of mpirun's ranks to run on; default: 1, 2, 4 and so on, and all")
+      ->type_name("N")
+      ->group(ranksGroup);
+  command
+      ->add_option(
+          "--size-per-rank", options->sizePerRank,
+          "values per axis that each rank has in weak scaling; default: half of --size on each axis, "
+          "so that 8 ranks have the fixed volume")
+      ->type_name("XxYxZ")
+      ->group(ranksGroup);
   command
       ->add_option(
           "--compare", options->comparison,

@@ -27,10 +27,12 @@ json readBench(const std::filesystem::path& path) {
 
 std::string keyOf(const json& row) {
   std::string key;
-  for (const char* field :
-       {"dataset", "algorithm", "supersegments", "width", "height", "view_deg", "angle_deg"}) {
+  for (const char* field : {"dataset", "algorithm", "supersegments", "width", "height", "view_deg",
+                            "angle_deg", "scaling", "layout", "size"}) {
     if (row.contains(field)) key.append(key.empty() ? 0 : 1, ' ').append(row[field].dump());
   }
+  // One suite has rows of several rank counts. Otherwise files of different counts may be compared.
+  if (row.contains("scaling") && row.contains("ranks")) key += " on " + row["ranks"].dump();
   return key;
 }
 
@@ -58,7 +60,7 @@ int compareBenches(const std::filesystem::path& before, const std::filesystem::p
     const auto found = old.find(key);
     if (found == old.end()) continue;
     ++compared;
-    for (const char* name : {"dvr", "generate", "render"}) {
+    for (const char* name : {"dvr", "generate", "render", "frame"}) {
       const std::string field = std::string(name) + "_ms";
       double was = figure(found->second, field.c_str());
       double is = figure(row, field.c_str());
@@ -66,6 +68,7 @@ int compareBenches(const std::filesystem::path& before, const std::filesystem::p
                               figure(row, (std::string(name) + "_spread_ms").c_str()));
       if (was < 0.0 || is < 0.0) continue;
       if (!sameDevice) {
+        if (figure(found->second, "dvr_ms") < 0.0 || figure(row, "dvr_ms") < 0.0) continue;
         was /= std::max(figure(found->second, "dvr_ms"), 1e-9);
         is /= std::max(figure(row, "dvr_ms"), 1e-9);
         noise = 0.0;

@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "apps/BenchFrames.h"
+#include "apps/BenchRival.h"
 #include "apps/Timing.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/ImageMetrics.h"
@@ -29,11 +31,11 @@ struct DvrFigures {
 /// What making a VDI took, and how large it is. Only the root has the sizes.
 struct GenerationFigures {
   Spread device;   // ms
-  Spread frame;    // ms
+  Spread frame;    // ms, the stages of the slowest rank
   Spread overDvr;  // device time over that of volume rendering right before it
   double searchMs = 0.0;
   double writeMs = 0.0;
-  double compositeMs = 0.0;
+  FrameFigures frames;
   std::size_t supersegments = 0;
   std::size_t storedBytes = 0;
 };
@@ -48,7 +50,6 @@ struct ViewFigures {
 
 struct BenchRow {
   std::string dataset;
-  int ranks = 1;
   GenerateSettings settings;
   Reconstruction reconstruction{};
   double truthRate = 0.0;     // samples per voxel of the volume rendering that both views are compared with
@@ -58,6 +59,7 @@ struct BenchRow {
   DvrFigures dvr;
   GenerationFigures generation;
   ViewFigures view;
+  std::optional<RivalFigures> rival;  // of the VDI's viewpoint
 };
 
 std::string tableHead();

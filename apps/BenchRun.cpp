@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "apps/BenchRival.h"
+#include "apps/RankGroup.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
@@ -56,7 +58,11 @@ class Bench {
         reconstruction_(reconstructionFromString(options.reconstruction)),
         device_(device),
         clock_(device),
-        generator_(std::move(device), comm::Communicator::world()) {}
+        generator_(std::move(device), comm::Communicator::world()) {
+    if (options.rival.empty()) return;
+    all_.emplace(world, world.size());
+    rival_.emplace(device_, all_->communicator(), all_->handle());
+  }
 
   /// Table lines go to `table`. Empty on all ranks but the root.
   std::vector<BenchRow> rows(std::FILE* table) {
@@ -79,7 +85,9 @@ class Bench {
                                  : fieldBlocks(set.field, deal, device_, world_.rank(), world_.size());
     });
     upload_ = measureUpload(blocks);
-    generator_.setBlocks(std::move(blocks));
+    generator_.setBlocks(blocks);
+    if (rival_) rival_->setBlocks(blocks, generator_.scene(), options_.repeats);
+    blocks.clear();
     if (root()) {
       fmt::print(table_, "{}: upload {:.1f} ms", set.name, upload_.milliseconds);
       if (upload_.stepMs) fmt::print(table_, "; a frame beside the next upload {:.1f} ms", *upload_.stepMs);
@@ -130,6 +138,7 @@ class Bench {
     std::vector<Truth> truths;
     for (const double angle : options_.angles)
       truths.push_back(volumeRendering(shot.camera.azimuth(angle), angle, shot.function));
+    if (rival_) measureRival(shot);
     for (const std::string& algorithm : options_.algorithms) {
       for (const std::uint32_t supersegments : options_.supersegments) {
         settings_ = benchSettings(options_, algorithm, supersegments);
@@ -140,9 +149,16 @@ class Bench {
           renderer.setVdi(*made.vdi);
           for (const Truth& truth : truths)
             addRow(set.name, turned, made, truth, seen(truth, shot, renderer));
+          fmt::print(table_, "{}", stageLines(made.figures.frames));
         });
       }
     }
+  }
+
+  void measureRival(const Shot& shot) {
+    const std::optional<Image> ours = generator_.renderVolume(shot.camera, shot.function, settings_);
+    rivalFigures_ = rival_->measure(clock_, {shot.camera, shot.function, settings_}, options_.repeats, ours);
+    if (root()) fmt::print(table_, "{}", rivalLine(*rivalFigures_));
   }
 
   /// Of the last generation or volume rendering.
@@ -180,20 +196,22 @@ class Bench {
 
   Made make(const Shot& shot) {
     Made made;
-    std::vector<double> composites;
+    FrameLog log;
+    std::vector<double> volumes;
     std::vector<double> frames;
     std::vector<double> ratios;
     std::vector<double> searches;
     std::vector<double> writes;
     made.figures.device = repeated(options_.repeats, [&] {
       clock_.run();
-      generator_.renderVolume(shot.camera, shot.function, settings_);
+      volumes.push_back(
+          readyMs(world_, [&] { generator_.renderVolume(shot.camera, shot.function, settings_); }));
       const double volumeMs = deviceMs();
       made.vdi.reset();
       clock_.run();
-      made.vdi = generator_.generate(shot.camera, shot.function, settings_);
-      composites.push_back(
-          slowest(generator_.reports(), [](const RankReport& r) { return r.compositeSeconds; }));
+      const double wallMs =
+          readyMs(world_, [&] { made.vdi = generator_.generate(shot.camera, shot.function, settings_); });
+      log.add(wallMs, generator_.reports());
       frames.push_back(slowest(generator_.reports(), frameSeconds));
       ratios.push_back(volumeMs > 0.0 ? deviceMs() / volumeMs : 0.0);
       searches.push_back(slowest(generator_.reports(), [](const RankReport& r) { return r.searchSeconds; }));
@@ -202,9 +220,15 @@ class Bench {
     });
     made.figures.overDvr = spreadOf(lastOf(ratios));
     made.figures.frame = spreadOf(lastOf(frames));
-    made.figures.compositeMs = spreadOf(lastOf(composites)).median;
     made.figures.searchMs = spreadOf(lastOf(searches)).median;
     made.figures.writeMs = spreadOf(lastOf(writes)).median;
+    made.figures.frames = log.figures(static_cast<std::size_t>(options_.repeats));
+    made.figures.frames.volumeRendering = spreadOf(lastOf(volumes));
+    if (options_.frames > 0) {
+      made.figures.frames.orbitFrames = options_.frames;
+      made.figures.frames.vdisPerSecond =
+          vdisPerSecond(generator_, clock_, {shot.camera, shot.function, settings_}, options_.frames);
+    }
     world_.together([&] {
       if (!root()) return;
       made.figures.supersegments = made.vdi->supersegmentCount();
@@ -244,7 +268,6 @@ class Bench {
               const ViewFigures& view) {
     BenchRow row;
     row.dataset = name;
-    row.ranks = world_.size();
     row.settings = settings_;
     row.reconstruction = reconstruction_;
     row.truthRate = options_.truthRate;
@@ -254,6 +277,7 @@ class Bench {
     row.dvr = truth.dvr;
     row.generation = made.figures;
     row.view = view;
+    row.rival = rivalFigures_;
     fmt::print(table_, "{}\n", tableLine(row));
     std::fflush(table_);
     rows_.push_back(std::move(row));
@@ -266,7 +290,10 @@ class Bench {
   std::shared_ptr<gpu::Device> device_;
   ClockRaiser clock_;
   VdiGenerator generator_;
-  UploadTimes upload_;  // of the data set that's shown
+  std::optional<RankGroup> all_;  // as the rival needs them
+  std::optional<IcetRival> rival_;
+  std::optional<RivalFigures> rivalFigures_;  // of the viewpoint that's shown
+  UploadTimes upload_;                        // of the data set that's shown
   std::FILE* table_ = nullptr;
   std::vector<BenchRow> rows_;
 };

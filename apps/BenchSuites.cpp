@@ -23,7 +23,7 @@ std::vector<DataSet> suiteSets(const std::string& suite) {
 }  // namespace
 
 const std::vector<std::string>& suiteNames() {
-  static const std::vector<std::string> names{"paper", "small"};
+  static const std::vector<std::string> names{"paper", "small", ranksSuite};
   return names;
 }
 
@@ -48,7 +48,7 @@ void applySuite(BenchOptions& options) {
 }
 
 std::vector<DataSet> dataSets(const BenchOptions& options) {
-  if (!options.suite.empty()) {
+  if (!options.suite.empty() && options.suite != ranksSuite) {
     std::vector<DataSet> sets = suiteSets(options.suite);
     if (!options.fields.empty()) {
       std::erase_if(sets, [&](const DataSet& set) {
@@ -61,7 +61,10 @@ std::vector<DataSet> dataSets(const BenchOptions& options) {
   for (const std::string& sidecar : options.raws)
     sets.push_back({std::filesystem::path(sidecar).stem().string(), "", sidecar, "", ""});
   std::vector<std::string> fields = options.fields;
-  if (fields.empty() && options.raws.empty()) fields = {"turbulence", "mixing", "coil"};
+  if (fields.empty() && options.raws.empty()) {
+    fields = options.suite == ranksSuite ? std::vector<std::string>{"interface"}
+                                         : std::vector<std::string>{"turbulence", "mixing", "coil"};
+  }
   for (const std::string& field : fields)
     sets.push_back({field, field, "", options.deal.size, options.deal.type});
   return sets;

@@ -20,11 +20,18 @@ struct BenchOptions {
   std::vector<std::uint32_t> supersegments;  // empty: 25, or the suite's
   int views = 0;                             // 0: 1, or the suite's
   int repeats = 5;
+  int frames = 20;  // of the orbit that VDIs per second are counted on; 0: they aren't
   std::string reconstruction = "smooth";
   double truthRate = 8.0;  // samples per voxel of the volume rendering that all are compared with
   std::string suite;       // empty, or a name that suiteNames() has
+  std::string rival;       // empty, or icet
   std::string output;
   std::vector<std::string> comparison;
+  // Of the suite `ranks`:
+  std::vector<std::string> scalings{"strong", "weak"};
+  std::vector<std::string> layouts{"slabs", "interleaved", "random"};
+  std::vector<int> rankCounts;  // empty: 1, 2, 4 ... and all
+  std::string sizePerRank;      // of weak scaling; empty: half of deal.size on each axis
 };
 
 struct DataSet {
@@ -36,6 +43,9 @@ struct DataSet {
 };
 
 const std::vector<std::string>& suiteNames();
+
+/// The suite of fewer and more ranks, which has no data sets of its own.
+inline constexpr const char* ranksSuite = "ranks";
 
 /// Fills in what the suite says, or what holds without one, where the options leave it open.
 void applySuite(BenchOptions& options);

@@ -1,0 +1,17 @@
+# IceT, which composites whole pictures of many ranks: ParaView's, or one that is installed by itself. Defines IceT_FOUND and
+# the target IceT::MPI. ParaView's own target for it asks for all of ParaView.
+find_path(IceT_INCLUDE_DIR IceTMPI.h PATH_SUFFIXES paraview-5.11/vtkicet/src/include)
+find_library(IceT_CORE_LIBRARY NAMES IceTCore vtkIceTCore-pv5.11)
+find_library(IceT_MPI_LIBRARY NAMES IceTMPI vtkIceTMPI-pv5.11)
+mark_as_advanced(IceT_INCLUDE_DIR IceT_CORE_LIBRARY IceT_MPI_LIBRARY)
+
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(IceT REQUIRED_VARS IceT_MPI_LIBRARY IceT_CORE_LIBRARY IceT_INCLUDE_DIR)
+if(IceT_FOUND AND NOT TARGET IceT::MPI)
+  add_library(IceT::Core UNKNOWN IMPORTED)
+  set_property(TARGET IceT::Core PROPERTY IMPORTED_LOCATION "${IceT_CORE_LIBRARY}")
+  target_include_directories(IceT::Core INTERFACE "${IceT_INCLUDE_DIR}")
+  add_library(IceT::MPI UNKNOWN IMPORTED)
+  set_property(TARGET IceT::MPI PROPERTY IMPORTED_LOCATION "${IceT_MPI_LIBRARY}")
+  target_link_libraries(IceT::MPI INTERFACE IceT::Core MPI::MPI_C)
+endif()
