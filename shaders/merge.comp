@@ -37,19 +37,46 @@ void copySegment(uint i, uint slot) {
   }
 }
 
-void mergeList(uint list) {
-  uint first = push.offsets.at[list];
-  uint end = push.offsets.at[list + 1u];
-  if (first == end) return;
-  // There are no more ranks with any than there are supersegments.
-  uint heads = 0u;
-  for (uint rank = 0u; rank < push.rankCount; ++rank) {
-    uint begin = subOffset(rank, list);
-    uint stop = subOffset(rank, list + 1u);
-    if (begin == stop) continue;
-    push.heads.at[first + heads] = MergeHead(begin, stop, depthsOf(begin));
-    ++heads;
+MergeHead headOf(uint begin, uint end) { return MergeHead(begin, end, depthsOf(begin)); }
+
+// Up to two ranks: their heads, and codes, stay in registers.
+void mergeTwo(MergeHead a, MergeHead b, uint first, uint end) {
+  CompactArray received = CompactArray(push.received);
+  uvec2 codeOfA = uvec2(0u);
+  uvec2 codeOfB = uvec2(0u);
+  if (compactForm) {
+    if (a.next < a.end) codeOfA = received.at[a.next];
+    if (b.next < b.end) codeOfB = received.at[b.next];
   }
+  for (uint slot = first; slot < end; ++slot) {
+    bool fromA = b.next == b.end || (a.next < a.end && isNearer(a.depths, b.depths));
+    MergeHead from = fromA ? a : b;
+    uvec2 code = fromA ? codeOfA : codeOfB;
+    if (compactForm) {
+      storeCode(CompactArray(push.merged), code, slot, slot - first, end - first);
+    } else {
+      copySegment(from.next, slot);
+    }
+    ++from.next;
+    if (from.next < from.end) {
+      if (compactForm) {
+        code = received.at[from.next];
+        from.depths = vec2(depthCodes(code));
+      } else {
+        from.depths = depthsOf(from.next);
+      }
+    }
+    if (fromA) {
+      a = from;
+      codeOfA = code;
+    } else {
+      b = from;
+      codeOfB = code;
+    }
+  }
+}
+
+void mergeMany(uint heads, uint first, uint end) {
   for (uint slot = first; slot < end; ++slot) {
     uint place = first;
     MergeHead nearest = push.heads.at[first];
@@ -70,6 +97,33 @@ void mergeList(uint list) {
       push.heads.at[place] = push.heads.at[first + heads];
     }
   }
+}
+
+void mergeList(uint list) {
+  uint first = push.offsets.at[list];
+  uint end = push.offsets.at[list + 1u];
+  if (first == end) return;
+  MergeHead one = MergeHead(0u, 0u, vec2(0.0));
+  MergeHead two = one;
+  uint heads = 0u;
+  for (uint rank = 0u; rank < push.rankCount; ++rank) {
+    uint begin = subOffset(rank, list);
+    uint stop = subOffset(rank, list + 1u);
+    if (begin == stop) continue;
+    MergeHead head = headOf(begin, stop);
+    if (heads == 0u) one = head;
+    if (heads == 1u) two = head;
+    // There are no more ranks with any than there are supersegments.
+    if (heads >= 2u) push.heads.at[first + heads] = head;
+    ++heads;
+  }
+  if (heads <= 2u) {
+    mergeTwo(one, two, first, end);
+    return;
+  }
+  push.heads.at[first] = one;
+  push.heads.at[first + 1u] = two;
+  mergeMany(heads, first, end);
 }
 
 // As flatten in vdi/pipeline/Pipeline.h.

@@ -14,29 +14,6 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 // Compositing: lists without grains are in ReduceConstants::fitting.
 layout(constant_id = 3) const bool mayFit = false;
 
-// The latest codes that aren't in memory yet. Four that fill a piece of a cache line go there together: neighbouring invocations
-// write to different lines, and a GPU takes as long for 8 bytes of one as for 32 (storing takes 0.55 of the time on an H200).
-uvec2 waiting[3];
-
-// To place `at`, the i-th of `count`.
-void storeCode(uvec2 code, uint at, uint i, uint count) {
-  uint phase = at & 3u;
-  if (phase == 3u && i >= 3u) {
-    FourCompactArray(push.segments).at[at / 4u] =
-        FourCompact(uvec4(waiting[0], waiting[1]), uvec4(waiting[2], code));
-  } else if (phase == 3u || i + 1u == count) {
-    CompactArray codes = CompactArray(push.segments);
-    uint before = min(phase, i);
-    if (before >= 3u) codes.at[at - 3u] = waiting[0];
-    if (before >= 2u) codes.at[at - 2u] = waiting[1];
-    if (before >= 1u) codes.at[at - 1u] = waiting[2];
-    codes.at[at] = code;
-  }
-  waiting[0] = waiting[1];
-  waiting[1] = waiting[2];
-  waiting[2] = code;
-}
-
 // Two ranks may have rounded depths to codes that overlap.
 uvec2 behindReach(uvec2 code) {
   uvec2 depths = depthCodes(code);
@@ -50,7 +27,7 @@ void copyFitting(uint from, uint slot, uint count) {
   beginStoring();
   for (uint i = 0u; i < count; ++i) {
     if (compactForm) {
-      storeCode(behindReach(CompactArray(push.fitting).at[from + i]), slot + i, i, count);
+      storeCode(CompactArray(push.segments), behindReach(CompactArray(push.fitting).at[from + i]), slot + i, i, count);
     } else {
       push.segments.at[slot + i] = push.fitting.at[from + i];
     }
@@ -77,7 +54,7 @@ void main() {
     vec4 light = lightOf(grain);
     Material m = Material(grain.span.x, grain.span.y, light.rgb, light.a);
     if (compactForm) {
-      storeCode(compacted(m, push.form), slot + i, i, count);
+      storeCode(CompactArray(push.segments), compacted(m, push.form), slot + i, i, count);
     } else {
       storeSegment(push.segments, slot + i, m, push.form);
     }

@@ -105,3 +105,25 @@ void storeSegment(SegmentArray segments, uint slot, Material m, StoredForm form)
     segments.at[slot] = Segment(m.front, m.back, m.color.r, m.color.g, m.color.b, opacityOf(m.opticalDepth));
   }
 }
+
+// The latest codes of a list that aren't in memory yet. Four that fill a piece of a cache line go there together: neighbouring
+// invocations write to different lines, and a GPU takes as long for 8 bytes of one as for 32 (storing takes 0.55 of the time on
+// an H200).
+uvec2 waiting[3];
+
+// To place `at`, the i-th of `count`.
+void storeCode(CompactArray codes, uvec2 code, uint at, uint i, uint count) {
+  uint phase = at & 3u;
+  if (phase == 3u && i >= 3u) {
+    FourCompactArray(codes).at[at / 4u] = FourCompact(uvec4(waiting[0], waiting[1]), uvec4(waiting[2], code));
+  } else if (phase == 3u || i + 1u == count) {
+    uint before = min(phase, i);
+    if (before >= 3u) codes.at[at - 3u] = waiting[0];
+    if (before >= 2u) codes.at[at - 2u] = waiting[1];
+    if (before >= 1u) codes.at[at - 1u] = waiting[2];
+    codes.at[at] = code;
+  }
+  waiting[0] = waiting[1];
+  waiting[1] = waiting[2];
+  waiting[2] = code;
+}

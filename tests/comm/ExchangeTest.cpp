@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "vdi/comm/ByteSum.h"
 #include "vdi/comm/Exchange.h"
 #include "vdi/comm/GlobalScene.h"
 #include "vdi/core/Error.h"
@@ -95,12 +96,32 @@ TEST_CASE("memory that ranks share: opened by name, and gone when nobody has it"
 
 TEST_CASE("sums of bytes end at 255") {
   const Communicator world = Communicator::world();
-  std::vector<std::uint8_t> values(1000);
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::uint8_t>(i % 256);
-  const std::vector<std::uint8_t> mine = values;
-  world.allReduceSaturating(values);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    CHECK(values[i] == std::min<std::size_t>(mine[i] * static_cast<std::size_t>(world.size()), 255));
+  const Transport transport = GENERATE(Transport::Shared, Transport::Mpi);
+  comm::ByteSum sum(world, transport);
+  for (const std::size_t size : {std::size_t{1}, std::size_t{1000}, std::size_t{70001}, std::size_t{300}}) {
+    INFO(size << " bytes");
+    const auto valueOf = [](int rank, std::size_t i) {
+      return (i * 7 + static_cast<std::size_t>(rank) * 3) % 256;
+    };
+    const Exchange::Place own = sum.begin(size);
+    for (std::size_t i = 0; i < size; ++i) {
+      own.memory->bytes()[own.at + i] = static_cast<std::byte>(valueOf(world.rank(), i));
+    }
+    std::vector<std::size_t> result(size, 1000);
+    for (const comm::ByteSum::Stretch& stretch : sum.add()) {
+      for (std::size_t i = 0; i < stretch.bytes; ++i) {
+        result[stretch.first + i] =
+            std::to_integer<std::size_t>(stretch.place.memory->bytes()[stretch.place.at + i]);
+      }
+    }
+    bool same = true;
+    for (std::size_t i = 0; i < size; ++i) {
+      std::size_t expected = 0;
+      for (int r = 0; r < world.size(); ++r) expected += valueOf(r, i);
+      same = same && result[i] == std::min<std::size_t>(expected, 255);
+    }
+    CHECK(same);
+    world.barrier();
   }
 }
 

@@ -311,26 +311,6 @@ std::vector<std::uint64_t> Communicator::allToAllWords(std::span<const std::uint
   return from;
 }
 
-void Communicator::allReduceSaturating(std::span<std::uint8_t> values) const {
-  if (state_->serial()) return;
-  const auto add = [](void* other, void* into, int* count, MPI_Datatype*) {
-    const auto* a = static_cast<const std::uint8_t*>(other);
-    auto* b = static_cast<std::uint8_t*>(into);
-    for (int i = 0; i < *count; ++i) b[i] = static_cast<std::uint8_t>(std::min(a[i] + b[i], 255));
-  };
-  MPI_Op saturatingSum = MPI_OP_NULL;
-  check(MPI_Op_create(add, 1, &saturatingSum), "MPI_Op_create");
-  constexpr std::size_t chunk = std::size_t{1} << 30;
-  int result = MPI_SUCCESS;
-  for (std::size_t done = 0; done < values.size() && result == MPI_SUCCESS; done += chunk) {
-    const auto count = static_cast<int>(std::min(chunk, values.size() - done));
-    result =
-        MPI_Allreduce(MPI_IN_PLACE, values.data() + done, count, MPI_UINT8_T, saturatingSum, state_->comm());
-  }
-  MPI_Op_free(&saturatingSum);
-  check(result, "MPI_Allreduce");
-}
-
 void Communicator::agree(const std::exception_ptr& mine) const {
   if (state_->serial()) {
     if (mine) std::rethrow_exception(mine);

@@ -77,8 +77,6 @@ class Communicator {
   std::vector<std::uint64_t> allGatherWords(std::span<const std::uint64_t> words) const;
   /// wordsTo: [size][n], n words for each rank; the result has [size][n], n from each.
   std::vector<std::uint64_t> allToAllWords(std::span<const std::uint64_t> wordsTo) const;
-  /// `smaller` += `other`, byte by byte, ending at 255; over all ranks.
-  void allReduceSaturating(std::span<std::uint8_t> values) const;
 
   /// Collective: nobody leaves alone. With no error on any rank it returns. Otherwise every rank throws: a
   /// rank with an error rethrows its own, the others throw Error{RemoteRank} with the lowest failing rank's

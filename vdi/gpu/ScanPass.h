@@ -20,9 +20,9 @@ class ScanPass {
   /// Records its barriers, also one at the start and one at the end. Nothing that was recorded before may be
   /// running.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count);
-  /// The same, and whether the total fits: `guard` (a word) becomes 1 if it's `room` at most, and, if it's given,
-  /// the word `before` is 1; else 0. What's dispatched next can look at it, and do nothing, before the host has
-  /// seen the total.
+  /// The same, and whether the total fits: `guard` (a word) becomes 1 if it's `room` at most, and, if it's
+  /// given, the word `before` is 1; else 0. What's dispatched next can look at it, and do nothing, before the
+  /// host has seen the total.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count,
               const Buffer& guard, std::uint64_t room, const Buffer* before = nullptr);
 
@@ -37,7 +37,7 @@ class ScanPass {
 
   std::shared_ptr<Device> device_;
   PipelineSet pipelines_;  // without guard, with one, with one that looks at another one
-  Buffer sums_;  // of workgroups
+  Buffer sums_;            // of workgroups
   Buffer overflow_;
 };
 

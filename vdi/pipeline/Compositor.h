@@ -35,7 +35,8 @@ class Compositor {
     std::uint32_t listCount = 0;
     std::uint64_t total = 0;
   };
-  /// Goes on on the device when this returns: `parts` must stay until `wait`, which any other call does first.
+  /// Goes on on the device when this returns: `parts` must stay until `wait`, which any other call does
+  /// first.
   void merge(const Distributed& parts, const DepthCode& code, Merged& merged);
   void wait();
 

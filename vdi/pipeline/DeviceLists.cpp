@@ -7,8 +7,7 @@
 namespace vdi::detail {
 
 template <typename Segment>
-void ListDownload<Segment>::record(gpu::Commands& commands, gpu::ScanPass& scan,
-                                   const DeviceLists& band) {
+void ListDownload<Segment>::record(gpu::Commands& commands, gpu::ScanPass& scan, const DeviceLists& band) {
   const std::size_t firstList = lists_.listCount();
   const std::size_t firstSegment = lists_.segments.size();
   if (firstSegment + band.count > std::numeric_limits<std::uint32_t>::max()) {

@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "vdi/comm/ByteSum.h"
 #include "vdi/comm/Exchange.h"
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/comm/GlobalScene.h"
@@ -136,6 +137,8 @@ struct VdiGenerator::State {
       distributor = std::make_unique<detail::Distributor>(device, comm, transport);
       gather = std::make_unique<detail::Gather>(device, comm, transport, root);
       scan = std::make_unique<gpu::ScanPass>(device);
+      levelSum = std::make_unique<comm::ByteSum>(comm, transport);
+      accesses = std::make_unique<detail::HostAccesses>(device);
     });
   }
   ~State() {
@@ -154,7 +157,9 @@ struct VdiGenerator::State {
   std::unique_ptr<detail::Distributor> distributor;
   std::unique_ptr<detail::Gather> gather;
   std::unique_ptr<gpu::ScanPass> scan;
-  detail::DeviceLists band;  // of this rank's own lists
+  std::unique_ptr<comm::ByteSum> levelSum;
+  std::unique_ptr<detail::HostAccesses> accesses;  // to the memory of levelSum
+  detail::DeviceLists band;                        // of this rank's own lists
   /// Of the lists that this rank owns, by band.
   struct OwnedBand {
     comm::Ownership owned;
@@ -295,10 +300,16 @@ struct VdiGenerator::State {
   /// Collective: one tolerance for what all ranks have in a list.
   void agreeOnLists(detail::RayCaster::Cast& cast) {
     if (!cast.agreed) return;
-    std::span<std::uint8_t> levels;
-    comm.together([&] { levels = caster->countLevels(cast); });
-    comm.allReduceSaturating(levels);
-    comm.together([&] { caster->agree(cast); });
+    const comm::Exchange::Place own = levelSum->begin(detail::RayCaster::levelBytes(cast));
+    comm.together([&] {
+      accesses->tidy();
+      caster->countLevels(cast, accesses->of(own.memory), own.at);
+    });
+    std::vector<detail::RayCaster::LevelSum> sum;
+    for (const comm::ByteSum::Stretch& stretch : levelSum->add()) {
+      sum.push_back({&accesses->of(stretch.place.memory), stretch.place.at, stretch.first, stretch.bytes});
+    }
+    comm.together([&] { caster->agree(cast, sum); });
   }
 
   /// Who owns which of the picture's lists: the same on all ranks.

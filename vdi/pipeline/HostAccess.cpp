@@ -84,7 +84,7 @@ void* HostPool::do_allocate(std::size_t bytes, std::size_t) {
   }
   if (best == nullptr) {
     Block block;
-    block.memory = newMemory(bytes + bytes / 8);  // so that a frame that's a little larger fits too
+    block.memory = newMemory(bytes + bytes / 4);  // so that a frame that's a little larger fits too
     if (device_) block.access = std::make_unique<HostAccess>(device_, block.memory);
     blocks_.push_back(std::move(block));
     best = &blocks_.back();

@@ -99,9 +99,9 @@ void ListBuilder::buildByBisection(const Request& request, const Record& record,
   end(finish);
 }
 
-/// All steps in one submission: the memory for grains and supersegments is that of the frame before, and where
-/// it's too small the steps that need it do nothing. Then they're submitted again, with memory for what was
-/// counted.
+/// All steps in one submission: the memory for grains and supersegments is that of the frame before, and
+/// where it's too small the steps that need it do nothing. Then they're submitted again, with memory for what
+/// was counted, and for a quarter more.
 void ListBuilder::buildByMerging(const Request& request, const Record& record, DeviceLists& lists,
                                  const Finish& finish) {
   const std::uint32_t listCount = request.listCount();
@@ -198,14 +198,14 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
     const std::uint64_t grainBytes = totals[grainTotal] * sizeof(shared::StoredGrain);
     const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(request.code);
     if (grains_.size() < grainBytes) {
-      grains_.reserve(device_, grainBytes, MemoryKind::DeviceLocal);
+      grains_.reserve(device_, grainBytes + grainBytes / 4, MemoryKind::DeviceLocal);
       from = From::Write;
     } else if (request.agreed && tooLong != 0 && *from != From::Reduce) {
       // Lists between the counted ones may have more runs than these. They've said how many.
       tooLong = 0;
       from = From::Write;
     } else if (scan_.demandNoOverflow(); lists.segments.size() < listBytes) {
-      lists.segments.reserve(device_, listBytes, MemoryKind::DeviceLocal);
+      lists.segments.reserve(device_, listBytes + listBytes / 4, MemoryKind::DeviceLocal);
       from = From::Reduce;
     } else {
       from.reset();

@@ -126,9 +126,9 @@ class ListBuilder {
   gpu::Buffer countedTolerances_;
   gpu::Buffer countedGrains_;
   gpu::Buffer status_;
-  gpu::Buffer grainsFit_;    // guards: shaders/shared/scan.h
+  gpu::Buffer grainsFit_;  // guards: shaders/shared/scan.h
   gpu::Buffer segmentsFit_;
-  gpu::Buffer totals_;       // of grains, and of supersegments
+  gpu::Buffer totals_;  // of grains, and of supersegments
   ListTimes times_;
 };
 

@@ -109,18 +109,17 @@ std::uint32_t levelShiftFor(std::uint32_t budget) {
 
 }  // namespace
 
-std::span<std::uint8_t> RayCaster::countLevels(Cast& cast) {
-  const std::uint32_t width = cast.build.countedWidth();
-  const std::uint32_t rows = gpu::groupsFor(cast.height, cast.build.countedStride);
-  const std::uint64_t bytes = std::uint64_t{width} * rows * shared::countedLevelWords * sizeof(std::uint32_t);
+std::uint64_t RayCaster::levelBytes(const Cast& cast) {
+  return std::uint64_t{cast.build.countedWidth()} * gpu::groupsFor(cast.height, cast.build.countedStride) *
+         shared::countedLevelWords * sizeof(std::uint32_t);
+}
+
+void RayCaster::countLevels(Cast& cast, HostAccess& memory, std::uint64_t at) {
+  const std::uint64_t bytes = levelBytes(cast);
   levels_.reserve(device_, bytes, gpu::MemoryKind::DeviceLocal);
-  levelsSum_.reserve(device_, bytes, gpu::MemoryKind::DeviceLocal);
-  if (!levelsOnHost_ || levelsOnHost_->memory()->bytes().size() < bytes) {
-    levelsOnHost_ = std::make_unique<HostAccess>(device_, HostMemory::anonymous(bytes));
-  }
   cast.params.levels = levels_.address();
   cast.params.levelShift = levelShiftFor(cast.build.most.supersegments);
-  cast.params.countedWidth = width;
+  cast.params.countedWidth = cast.build.countedWidth();
   commands_.begin();
   if (cast.nothingThere) {
     commands_.fill(levels_, 0);
@@ -131,20 +130,20 @@ std::span<std::uint8_t> RayCaster::countLevels(Cast& cast) {
   }
   commands_.barrier();
   commands_.mark("download");
-  levelsOnHost_->recordWrite(commands_, levels_, 0, 0, bytes);
+  memory.recordWrite(commands_, levels_, 0, at, bytes);
   commands_.submitAndWait();
-  levelsOnHost_->finish();
+  memory.finish();
   if (!cast.nothingThere) {
     const double milliseconds = commands_.stageTimes().front().milliseconds;
     times_ += {milliseconds, milliseconds, 0.0};
   }
-  return {reinterpret_cast<std::uint8_t*>(levelsOnHost_->memory()->bytes().data()), bytes};
 }
 
-void RayCaster::agree(Cast& cast) {
+void RayCaster::agree(Cast& cast, std::span<const LevelSum> sum) {
   const std::uint32_t width = cast.build.countedWidth();
   const std::uint32_t rows = gpu::groupsFor(cast.height, cast.build.countedStride);
   const std::uint64_t words = std::uint64_t{width} * rows * sizeof(std::uint32_t);
+  levelsSum_.reserve(device_, levelBytes(cast), gpu::MemoryKind::DeviceLocal);
   agreedTolerances_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
   agreedGrains_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
   agreedQuotas_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
@@ -162,8 +161,12 @@ void RayCaster::agree(Cast& cast) {
   quota.budget = cast.build.most.supersegments;
   quota.levelShift = cast.params.levelShift;
   quota.levelCount = Survey::levels - 2;
+  sumsOnHost_.clear();
   commands_.begin();
-  levelsOnHost_->recordRead(commands_, 0, levelsSum_, 0, words * shared::countedLevelWords);
+  for (const LevelSum& stretch : sum) {
+    stretch.memory->recordRead(commands_, stretch.at, levelsSum_, stretch.first, stretch.bytes);
+    sumsOnHost_.push_back(stretch.memory);
+  }
   commands_.fill(weights_, 0);
   commands_.barrier();
   quotaPass_.record(commands_, quota);
@@ -174,7 +177,7 @@ void RayCaster::agree(Cast& cast) {
 
 std::vector<std::uint32_t> RayCaster::agreedWeights(const Cast& cast) {
   commands_.wait();
-  levelsOnHost_->finish();
+  for (HostAccess* memory : sumsOnHost_) memory->finish();
   const std::uint32_t rows = gpu::groupsFor(cast.height, cast.build.countedStride);
   const auto weights = weightsReadback_.mappedAs<std::uint32_t>().first(rows);
   std::vector<std::uint32_t> result(weights.begin(), weights.end());

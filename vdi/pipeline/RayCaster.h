@@ -54,12 +54,19 @@ class RayCaster {
     bool agreed = false;            // with other ranks
   };
   Cast begin(const Request& request);
-  /// Several ranks, merging: what this one has in the lists that are counted, for all ranks to add up byte by byte
-  /// (Communicator::allReduceSaturating). Valid until the next call; zeros where there's nothing.
-  std::span<std::uint8_t> countLevels(Cast& cast);
-  /// The sum of all ranks' levels in their place: from it follow tolerances, and this rank's shares of lists. Goes
-  /// on on the device when this returns.
-  void agree(Cast& cast);
+  /// Several ranks, merging: what this one has in the lists that are counted, levelBytes of it, is written to
+  /// that place of the host's memory, for all ranks to add up byte by byte (comm::ByteSum).
+  void countLevels(Cast& cast, HostAccess& memory, std::uint64_t at);
+  static std::uint64_t levelBytes(const Cast& cast);
+  /// The sum of all ranks' levels, in stretches. From it follow tolerances, and this rank's shares of lists.
+  /// Goes on on the device when this returns; the sum must stay until agreedWeights.
+  struct LevelSum {
+    HostAccess* memory = nullptr;
+    std::uint64_t at = 0;
+    std::uint64_t first = 0;
+    std::uint64_t bytes = 0;
+  };
+  void agree(Cast& cast, std::span<const LevelSum> sum);
   /// After that: how many supersegments all ranks together will have in each stretch of shared::countedStride
   /// rows.
   std::vector<std::uint32_t> agreedWeights(const Cast& cast);
@@ -85,7 +92,7 @@ class RayCaster {
   gpu::QuotaPass quotaPass_;
   gpu::Buffer levels_;
   gpu::Buffer levelsSum_;
-  std::unique_ptr<HostAccess> levelsOnHost_;
+  std::vector<HostAccess*> sumsOnHost_;
   gpu::Buffer agreedTolerances_;
   gpu::Buffer agreedGrains_;
   gpu::Buffer agreedQuotas_;
