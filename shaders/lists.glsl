@@ -27,7 +27,7 @@ void searchOrWriteList(bool write) {
   if (write && params.counts.at[listIndex] == 0u) return;
   beginStoring();
   float known = write ? params.sensitivities.at[listIndex] : 0.0;
-  SearchResult result = searchList(write, known, params.budget, params.runsOnly != 0u);
+  SearchResult result = searchList(write, known, params.budget);
   if (write) {
     if (result.count != params.counts.at[listIndex]) atomicAdd(params.status.at[0], 1u);
   } else {

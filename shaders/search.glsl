@@ -51,19 +51,18 @@ struct SearchResult {
   uint count;
 };
 
-// With `write`, walks once with `known` and lets emitSegment write; else searches. `runsOnly`: no search, one supersegment
-// a run, which is all that a flat image needs (paper, section 5.3).
-SearchResult searchList(bool write, float known, uint budget, bool runsOnly) {
+// With `write`, walks once with `known` and lets emitSegment write; else searches.
+SearchResult searchList(bool write, float known, uint budget) {
   search.writing = write;
   float tooFine = smallestSensitivity;
   float fits = largestSensitivity;
   uint most = budget;
   SearchResult best = SearchResult(largestSensitivity, 0u);
-  float sensitivity = write ? known : runsOnly ? largestSensitivity : smallestSensitivity;
+  float sensitivity = write ? known : smallestSensitivity;
   // Try 0 is the first one, try 1 the one that always fits, the others bisect. One loop, so that there's one copy of walk.
   for (int i = 0; i < mostTries + 2; ++i) {
     uint count = searchTry(sensitivity);
-    if (write || runsOnly) return SearchResult(sensitivity, count);
+    if (write) return SearchResult(sensitivity, count);
     if (i == 0) {
       most = cutAtGaps ? max(budget, search.runs) : budget;
       if (search.visible <= most) return SearchResult(-1.0, search.visible);

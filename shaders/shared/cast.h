@@ -75,7 +75,6 @@ struct CastParams {
   uint budget;
   uint width;
   uint height;
-  uint runsOnly;
   uint nodeCount;  // 0: no bricks
   // Of the table of slabs (core/SlabTable.h): what straight colours and optical depths are beyond the transfer table's range;
   // 1 / columns and rows; steps of its square a position; rows of a strip; its slabs a world length.

@@ -75,7 +75,6 @@ struct CompositeParams {
   VDI_ADDRESS(UintArray) guard;  // as in CastParams
   float step;  // of the sample lattice
   uint budget;
-  uint runsOnly;  // 0
   uint listCount;
   uint mostPerList;
   float level;  // as in CastParams

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <iterator>
 #include <optional>
 
@@ -15,6 +16,7 @@
 #include "vdi/io/Png.h"
 #include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/RayCaster.h"
 #include "vdi/reference/Compaction.h"
 #include "vdi/reference/Reference.h"
 
@@ -483,6 +485,68 @@ TEST_CASE("merging and compositing on the device equal the reference") {
   CHECK(listsThatDiffer(expanded(codes, code), expanded(reference::compacted(ofCodes, code), code),
                         oneCode) <= expected.listCount() / 25);
   CHECK(device()->validationMessages() == "");
+}
+
+TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the reference") {
+  // Many small blocks dealt at random: lists with many runs, some with more than the counted ones beside
+  // them.
+  const auto blocks = GENERATE(glm::ivec3(3, 3, 3), glm::ivec3(9, 8, 9));
+  const std::uint32_t supersegments = GENERATE(3U, 8U, 200U);
+  INFO(blocks.x << " blocks across, " << supersegments << " supersegments");
+  const auto dealt = test::deal("turbulence", {40, 36, 40}, blocks, Layout::Random, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  const TransferFunction function = test::threeHues(0.8);
+  GenerateSettings settings = test::smallSettings(61, 43, supersegments);
+  settings.samplesPerVoxel = supersegments == 200 ? 8.0 : 1.0;
+  settings.precision = Precision::Full;
+  const Scene scene = localScene(dealt.all);
+  const reference::Frame frame(scene, test::oblique(), function, settings);
+  constexpr std::size_t ranks = 3;
+  std::vector<std::vector<Block>> blocksOf(ranks);
+  const std::vector<Block> all = withLayers(dealt.all);
+  for (std::size_t i = 0; i < all.size(); ++i) blocksOf[i * 7 % ranks].push_back(all[i]);
+  const std::vector<SupersegmentLists> expected = reference::generateTogether(frame, blocksOf);
+
+  // Each rank's ray caster, and the sum as ranks would make it.
+  const auto own = GENERATE(false, true) ? deviceAsGpu() : device();
+  std::vector<std::unique_ptr<detail::RayCaster>> casters;
+  std::vector<detail::RayCaster::Cast> casts;
+  std::vector<std::uint8_t> sum;
+  const detail::RayCaster::Request request{scene,    frame.view, frame.lattice, frame.table,
+                                           settings, true,       false,         {}};
+  for (std::size_t r = 0; r < ranks; ++r) {
+    casters.push_back(std::make_unique<detail::RayCaster>(own));
+    casters.back()->volume().setBlocks(blocksOf[r], scene);
+    casts.push_back(casters.back()->begin(request));
+    const std::uint64_t bytes = detail::RayCaster::levelBytes(casts.back());
+    detail::HostAccess memory(own, HostMemory::anonymous(bytes));
+    casters.back()->countLevels(casts.back(), memory, 0);
+    sum.resize(bytes, 0);
+    for (std::size_t i = 0; i < bytes; ++i) {
+      sum[i] = static_cast<std::uint8_t>(
+          std::min(sum[i] + std::to_integer<int>(memory.memory()->bytes()[i]), 255));
+    }
+  }
+  detail::HostAccess memory(own, HostMemory::anonymous(sum.size()));
+  std::memcpy(memory.memory()->bytes().data(), sum.data(), sum.size());
+  const detail::RayCaster::LevelSum stretch{&memory, 0, 0, sum.size()};
+  std::size_t supersegmentsInAll = 0;
+  std::vector<std::vector<std::uint32_t>> weights;
+  for (std::size_t r = 0; r < ranks; ++r) {
+    casters[r]->agree(casts[r], std::span(&stretch, 1));
+    detail::DeviceLists lists;
+    casters[r]->makeBand(casts[r], 0, 43, lists);
+    weights.push_back(casters[r]->agreedWeights(casts[r]));
+    const SupersegmentLists made = test::download<Supersegment>(own, lists);
+    CHECK(listsThatDiffer(made, expected[r]) <= made.listCount() / 40);
+    supersegmentsInAll += made.segments.size();
+  }
+  CHECK(weights[1] == weights[0]);  // or ranks would own other lists than others think
+  CHECK(weights[2] == weights[0]);
+  std::uint64_t weight = 0;
+  for (const std::uint32_t w : weights[0]) weight += w;
+  CHECK(static_cast<double>(weight) > 0.5 * static_cast<double>(supersegmentsInAll));
+  CHECK(own->validationMessages() == "");
 }
 
 TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists") {

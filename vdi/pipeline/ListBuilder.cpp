@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 
 #include "vdi/core/Error.h"
 
@@ -115,9 +116,18 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
   left_.reserve(device_, words, MemoryKind::DeviceLocal);
   grains_.reserve(device_, 0, MemoryKind::DeviceLocal);
   lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
-  if (request.agreed) quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
+  const bool quotas = request.agreed || request.runsOnly;
+  if (quotas) quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
 
+  // Most lists have no more runs; others ask for more.
+  const auto takeRuns = [&] {
+    constexpr std::uint32_t runs = 3;
+    commands_.fill(sensitivities_, std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max()));
+    commands_.fill(counts_, runs);
+    commands_.fill(quotas_, runs << 16U);
+  };
   const auto search = [&] {
+    if (request.runsOnly) return takeRuns();
     shared::AllotConstants allot{};
     allot.countedTolerances = countedTolerances_.address();
     allot.countedGrains = countedGrains_.address();
@@ -154,7 +164,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
     targets.grains = grains_.address();
     targets.written = written_.address();
     targets.left = left_.address();
-    targets.quotas = request.agreed ? quotas_.address() : 0;
+    targets.quotas = quotas ? quotas_.address() : 0;
     targets.status = status_.address();
     targets.guard = grainsFit_.address();
     scan_.record(commands_, counts_, grainOffsets_, listCount, grainsFit_,
@@ -200,8 +210,8 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
     if (grains_.size() < grainBytes) {
       grains_.reserve(device_, grainBytes + grainBytes / 4, MemoryKind::DeviceLocal);
       from = From::Write;
-    } else if (request.agreed && tooLong != 0 && *from != From::Reduce) {
-      // Lists between the counted ones may have more runs than these. They've said how many.
+    } else if (quotas && tooLong != 0 && *from != From::Reduce) {
+      // Lists that weren't counted may have more runs than was expected. They've said how many.
       tooLong = 0;
       from = From::Write;
     } else if (scan_.demandNoOverflow(); lists.segments.size() < listBytes) {

@@ -82,6 +82,8 @@ class ListBuilder {
       std::uint32_t budget = 1;
     };
     std::optional<Agreed> agreed;
+    /// Merging, with other ranks: one supersegment a run, as a picture needs. Nothing is counted.
+    bool runsOnly = false;
     /// Merging, of lists that were merged by depth: those that fit are these. 0: none are.
     std::uint64_t fitting = 0;
     std::uint64_t fittingOffsets = 0;

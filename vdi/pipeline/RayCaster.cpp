@@ -35,7 +35,6 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.budget = request.settings.supersegments;
   params.mostPerList = mostPerList(request.settings.supersegments, request.settings.budget);
   params.level = -1.0F;
-  params.runsOnly = request.runsOnly ? 1U : 0U;
   params.form = storedForm(request.code);
   if (!volume_.empty()) pass_.bind(volume_);
   return params;
@@ -77,12 +76,13 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
   const std::uint32_t most = mostPerList(request.settings.supersegments, request.settings.budget);
   ListBuilder::Request& build = cast.build;
   build.width = static_cast<std::uint32_t>(request.view.width());
-  // What has no budget needs no merging: one try with the coarsest sensitivity does.
-  build.algorithm = request.runsOnly ? Algorithm::Bisection : request.settings.algorithm;
+  build.runsOnly = request.runsOnly;
+  build.algorithm = request.runsOnly ? Algorithm::Merge : request.settings.algorithm;
   // With cuts at gaps each list's runs must be counted, unless ranks agree on what they counted.
-  cast.agreed = request.cutAtGaps && build.algorithm == Algorithm::Merge;
-  build.countedStride = request.cutAtGaps && !cast.agreed ? 1 : shared::countedStride;
-  build.most = {most, !request.cutAtGaps};
+  cast.agreed = request.cutAtGaps && build.algorithm == Algorithm::Merge && !request.runsOnly;
+  build.countedStride =
+      build.algorithm == Algorithm::Bisection && request.cutAtGaps ? 1 : shared::countedStride;
+  build.most = {request.runsOnly ? 1 : most, !request.cutAtGaps};
   build.sampleStep = request.lattice.step;
   build.code = request.code;
   cast.rowsPerBand = rowsPerBand(request, ListBuilder::bytesPerList(most, build.algorithm));

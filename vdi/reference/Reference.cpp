@@ -211,6 +211,20 @@ Image renderVolume(const Frame& frame, std::span<const Block> blocks) {
   return image;
 }
 
+namespace {
+
+/// The counted lists around a list along an axis: before and behind it; the last one where there's none
+/// behind.
+int countedBefore(int i) {
+  return i - i % countedStride;
+}
+int countedBehind(int i, int size) {
+  const int next = countedBefore(i + countedStride - 1);
+  return next < size ? next : countedBefore(i);
+}
+
+}  // namespace
+
 SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bool cutAtGaps) {
   SegmentRules rules{frame.settings.supersegments, static_cast<float>(frame.lattice.step), cutAtGaps};
   const int width = frame.view.width();
@@ -233,16 +247,10 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
     const std::vector<Interval> samples = castRay(frame, blocks, x, y);
     if (frame.settings.algorithm == Algorithm::Bisection) return segmentByBisection(samples, rules);
     if (cutAtGaps) return segmentByMerging(samples, rules);
-    // The counted lists left and right, below and above; the last ones where there's none beyond.
-    const auto before = [](int i) { return i - i % countedStride; };
-    const auto after = [&](int i, int size) {
-      const int next = before(i + countedStride - 1);
-      return next < size ? next : before(i);
-    };
-    const int left = before(x);
-    const int right = after(x, width);
-    const int below = before(y);
-    const int above = after(y, height);
+    const int left = countedBefore(x);
+    const int right = countedBehind(x, width);
+    const int below = countedBefore(y);
+    const int above = countedBehind(y, height);
     SegmentRules own = rules;
     own.rounding = roundingOf(static_cast<std::uint32_t>(y * width + x));
     const Allotment counted[] = {allotmentAt(left, below), allotmentAt(right, below),
@@ -257,6 +265,53 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
     }
   }
   return lists;
+}
+
+std::vector<SupersegmentLists> generateTogether(const Frame& frame,
+                                                std::span<const std::vector<Block>> ranks) {
+  const std::uint32_t budget = mostPerList(frame.settings.supersegments, frame.settings.budget);
+  const SegmentRules rules{budget, static_cast<float>(frame.lattice.step), true};
+  const std::uint32_t atOnce = countedSamplesFor(frame.lattice.count, frame.settings.supersegments);
+  const int width = frame.view.width();
+  const int height = frame.view.height();
+  const int countedWidth = (width + countedStride - 1) / countedStride;
+  const int countedHeight = (height + countedStride - 1) / countedStride;
+  std::vector<std::vector<Allotment>> agreed(ranks.size());  // of each rank's counted lists
+  for (int y = 0; y < countedHeight; ++y) {
+    for (int x = 0; x < countedWidth; ++x) {
+      std::vector<CountedLevels> levels;
+      CountedLevels sum;
+      for (const std::vector<Block>& blocks : ranks) {
+        levels.push_back(countedLevels(castRay(frame, blocks, x * countedStride, y * countedStride, atOnce),
+                                       rules, atOnce));
+        sum.shift = levels.back().shift;
+        sum += levels.back();
+      }
+      for (std::size_t r = 0; r < ranks.size(); ++r)
+        agreed[r].push_back(agreedAllotment(levels[r], sum, budget));
+    }
+  }
+  std::vector<SupersegmentLists> result(ranks.size());
+  for (std::size_t r = 0; r < ranks.size(); ++r) {
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const auto at = [&](int column, int row) {
+          return agreed[r][static_cast<std::size_t>(row / countedStride * countedWidth +
+                                                    column / countedStride)];
+        };
+        const int left = countedBefore(x);
+        const int right = countedBehind(x, width);
+        const int below = countedBefore(y);
+        const int above = countedBehind(y, height);
+        const Allotment counted[] = {at(left, below), at(right, below), at(left, above), at(right, above)};
+        const auto list =
+            segmentByMerging(castRay(frame, ranks[r], x, y), rules, agreedAllotmentBetween(counted, budget));
+        result[r].segments.insert(result[r].segments.end(), list.begin(), list.end());
+        result[r].offsets.push_back(static_cast<std::uint32_t>(result[r].segments.size()));
+      }
+    }
+  }
+  return result;
 }
 
 namespace {

@@ -50,6 +50,11 @@ Image renderVolume(const Frame& frame, std::span<const Block> blocks);
 /// blocks there are.
 SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bool cutAtGaps);
 
+/// By merging: the sub-VDIs of several ranks that agree on one tolerance for each list; `ranks` are their
+/// blocks.
+std::vector<SupersegmentLists> generateTogether(const Frame& frame,
+                                                std::span<const std::vector<Block>> ranks);
+
 /// The ranks' lists of each pixel merged by depth and segmented again to the budget (paper,
 /// section 5.2). All inputs have the same number of lists. Of the settings: supersegments, budget, fill and
 /// algorithm.

@@ -65,8 +65,9 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
                             std::size_t room = std::numeric_limits<std::size_t>::max()) {
   std::vector<Grain> grains;
   float tolerance = allotted;
+  std::size_t runs = 0;  // grains that begin one
   const auto adaptTolerance = [&] {
-    const std::size_t left = room - std::min(room, grains.size());
+    const std::size_t left = room - std::min(room, grains.size() - runs);
     if (left >= spareGrains) return;
     const float base = allotted < 0.0F ? finestTolerance / toleranceRatio : allotted;
     tolerance =
@@ -101,6 +102,7 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
       } else {
         grains.push_back(
             {i.front, i.back, i.red, i.green, i.blue, i.opticalDepth, rules.cutAtGaps && cut, before});
+        runs += rules.cutAtGaps && cut ? 1 : 0;
         first = x;
         deviation = 0.0F;
         open = true;
@@ -308,12 +310,90 @@ Allotment allotmentBetween(std::span<const Allotment> counted) {
   return result;
 }
 
+CountedLevels& CountedLevels::operator+=(const CountedLevels& other) {
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    counts[i] = static_cast<std::uint8_t>(std::min(counts[i] + other.counts[i], 255));
+  return *this;
+}
+
+std::uint32_t levelShiftFor(std::uint32_t budget) {
+  std::uint32_t shift = 0;
+  while ((grainsPerBudget * budget >> shift) >= 255) ++shift;
+  return shift;
+}
+
+CountedLevels countedLevels(std::span<const Interval> intervals, const SegmentRules& rules,
+                            std::size_t atOnce) {
+  CountedLevels levels;
+  levels.shift = levelShiftFor(rules.budget);
+  const auto byteOf = [&](std::size_t count) {
+    const std::size_t quantised = (count + (std::size_t{1} << levels.shift) - 1) >> levels.shift;
+    return static_cast<std::uint8_t>(std::min<std::size_t>(quantised, 255));
+  };
+  levels.counts.front() = byteOf(visibleSamples(intervals, atOnce));
+  float tolerance = finestTolerance;
+  for (std::size_t level = 1; level <= toleranceLevels; ++level, tolerance *= toleranceRatio)
+    levels.counts[level] = byteOf(grainsOf(intervals, tolerance, rules).size());
+  levels.counts.back() = byteOf(countRuns(intervals));
+  return levels;
+}
+
+Allotment agreedAllotment(const CountedLevels& own, const CountedLevels& sum, std::uint32_t budget) {
+  const auto countOf = [](const CountedLevels& levels, std::size_t place) {
+    return std::uint32_t{levels.counts[place]} << levels.shift;
+  };
+  const std::size_t runsPlace = own.counts.size() - 1;
+  Allotment result;
+  result.tolerance = 0.0F;
+  if (countOf(sum, 0) == 0) return result;
+  std::size_t place = 0;
+  result.tolerance = -1.0F;
+  if (countOf(sum, 0) > budget) {
+    place = 1;
+    result.tolerance = finestTolerance;
+    while (place < runsPlace && countOf(sum, place) > grainsPerBudget * budget) {
+      ++place;
+      result.tolerance *= toleranceRatio;
+    }
+    if (place == runsPlace) result.tolerance = unlimited;
+  }
+  result.grains = countOf(own, place);
+  const std::uint32_t all = std::max(countOf(sum, place), 1U);
+  const std::uint32_t wanted = std::min(all, budget);
+  result.quota = (result.grains * wanted + all - 1) / all;
+  result.runs = countOf(own, runsPlace);
+  return result;
+}
+
+Allotment agreedAllotmentBetween(std::span<const Allotment> counted, std::uint32_t budget) {
+  std::vector<Allotment> known;
+  Allotment most;
+  for (const Allotment& a : counted) {
+    if (a.tolerance == 0.0F) continue;
+    known.push_back(a);
+    // Ranks that have nothing where others have something find the same tolerance.
+    known.back().grains = std::max(a.grains, 1U);
+    most.grains = std::max(most.grains, a.grains);
+    most.quota = std::max(most.quota, a.quota);
+    most.runs = std::max(most.runs, a.runs);
+  }
+  Allotment result = allotmentBetween(known);
+  result.grains = most.grains;
+  result.room = most.grains + uncountedSpareGrains + most.grains / 4;
+  // Where none of the counted lists has anything of this rank's, this one may have.
+  result.quota = most.quota > 0 ? most.quota : budget;
+  result.runs = most.runs + 1;
+  return result;
+}
+
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules,
                                            const Allotment& allotment) {
   std::vector<Grain> grains;
   if (allotment.room > 0) grains = grainsOf(intervals, allotment.tolerance, rules, allotment.room);
   const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
-  mergeCheapest(grains, std::max(budgetOf(intervals, rules, 1, rules.rounding), runs), rules.sampleStep);
+  const std::size_t budget =
+      allotment.quota > 0 ? allotment.quota : budgetOf(intervals, rules, 1, rules.rounding);
+  mergeCheapest(grains, std::max(budget, runs), rules.sampleStep);
   std::vector<Supersegment> list;
   list.reserve(grains.size());
   for (const Grain& g : grains)

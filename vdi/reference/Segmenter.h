@@ -3,6 +3,7 @@
 // (paper, section 5.2). The shaders' twin is shaders/segmenter.glsl and shaders/search.glsl.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -95,12 +96,16 @@ inline constexpr float hiddenWeight = 0.15F;
 /// What step 2 may do for a list: its tolerance, and the grains that counting found. There's room for a few
 /// more; when fewer than spareGrains of that are left, the tolerance grows by toleranceRatio with each
 /// further grain, and the last one takes all that's left. So a list that wasn't counted can't overflow,
-/// however wrong its allotment is. With cutAtGaps each list must be counted, for there's no saying how many
-/// runs it has otherwise.
+/// however wrong its allotment is. Runs aren't bounded by that: a device that finds more of them than it has
+/// room for writes the list again.
 struct Allotment {
   float tolerance = -1.0F;  // negative: each interval is a grain
   std::uint32_t grains = 0;
   std::uint32_t room = 0;  // >= grains + spareGrains, or 0 for a list that's known to be empty
+  /// With other ranks, see agreedAllotment: how many supersegments the list may become, but for runs, and how
+  /// many runs are expected. Grains that begin a run take no room. 0: the rules' budget.
+  std::uint32_t quota = 0;
+  std::uint32_t runs = 0;
   bool operator==(const Allotment&) const = default;
 };
 inline constexpr std::uint32_t spareGrains = 4;
@@ -118,6 +123,25 @@ Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& r
 /// Of a list among counted ones: the geometric mean of their tolerances, room for the most grains. Those that
 /// hold nothing have no say.
 Allotment allotmentBetween(std::span<const Allotment> counted);
+
+/// What a rank has in a counted list, in a form that ranks add up: visible samples, grains at each tolerance,
+/// runs. Each is divided by 2^shift, rounded up, and ends at 255, and so do sums.
+struct CountedLevels {
+  std::array<std::uint8_t, toleranceLevels + 2> counts{};
+  std::uint32_t shift = 0;
+  CountedLevels& operator+=(const CountedLevels& other);
+};
+/// The smallest at which it still shows whether there are more than grainsPerBudget * budget grains.
+std::uint32_t levelShiftFor(std::uint32_t budget);
+CountedLevels countedLevels(std::span<const Interval> intervals, const SegmentRules& rules,
+                            std::size_t atOnce);
+/// One tolerance for what all ranks have in a list: the finest at which the sum of their grains is at most
+/// grainsPerBudget * budget. Of the supersegments that come of the sum, a rank gets as large a share as it
+/// has of the grains. So all ranks together send about as much as one would make. The tolerance is 0 where
+/// nobody has anything.
+Allotment agreedAllotment(const CountedLevels& own, const CountedLevels& sum, std::uint32_t budget);
+/// Of a list among such counted ones.
+Allotment agreedAllotmentBetween(std::span<const Allotment> counted, std::uint32_t budget);
 
 /// Adds a counted list.
 void addTo(Survey& survey, std::span<const Interval> intervals, const SegmentRules& rules,
