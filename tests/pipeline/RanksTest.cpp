@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <optional>
 
 #include "tests/Scenes.h"
@@ -122,6 +123,79 @@ TEST_CASE(
     const auto count = static_cast<double>(vdi->supersegmentCount());
     CHECK(count / static_cast<double>(equal->supersegmentCount()) == Approx(fill).epsilon(0.05));
   }
+}
+
+TEST_CASE("ways between ranks: shared memory, messages, staging memory: the same VDI and picture") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto dealt = test::deal("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random, Joint::SharedPoints,
+                                ScalarType::U8, world.rank(), world.size());
+  const GenerateSettings settings = test::smallSettings(61, 45, 6);
+  const TransferFunction function = test::threeHues(80.0);
+  gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
+  request.importsHostMemory = false;
+  const auto copying = gpu::Device::create(request);
+  std::optional<Vdi> expected;
+  std::optional<Image> picture;
+  for (const char* transport : {"shared", "mpi"}) {
+    for (const auto& own : {device(), copying}) {
+      INFO(transport << (own == copying ? ", without imported memory" : ""));
+      setenv("VDI_TRANSPORT", transport, 1);
+      VdiGenerator generator(own, comm::Communicator::world());
+      unsetenv("VDI_TRANSPORT");
+      generator.setBlocks(dealt.mine);
+      for (int frame = 0; frame < 2; ++frame) {  // the second one in the memory of the first one
+        const auto vdi = generator.generate(test::oblique(), function, settings);
+        const auto image = generator.renderVolume(test::oblique(), function, settings);
+        if (world.rank() != 0) continue;
+        if (!expected) expected = *vdi;
+        if (!picture) picture = *image;
+        CHECK(*vdi == *expected);
+        CHECK(image->rgba == picture->rgba);
+        CHECK(image->depth == picture->depth);
+      }
+    }
+  }
+  setenv("VDI_TRANSPORT", "pigeon", 1);
+  CHECK_THROWS_AS(VdiGenerator(device(), comm::Communicator::world()), Error);
+  unsetenv("VDI_TRANSPORT");
+}
+
+TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of one rank") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto dealt = test::deal("turbulence", {49, 49, 49}, {16, 16, 16}, Layout::Random, Joint::SharedPoints,
+                                ScalarType::F32, world.rank(), world.size());
+  const GenerateSettings settings = test::smallSettings(56, 44, 5);
+  VdiGenerator many(device(), comm::Communicator::world());
+  many.setBlocks(dealt.mine);
+  const auto volume = many.renderVolume(test::oblique(), test::threeHues(0.8), settings);
+  const auto vdi = many.generate(test::oblique(), test::threeHues(0.8), settings);
+  if (world.rank() != 0) return;
+  const auto whole = test::deal("turbulence", {49, 49, 49}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                ScalarType::F32, 0, 1);
+  VdiGenerator one(device(), comm::Communicator::serial());
+  one.setBlocks(whole.mine);
+  const auto truth = one.renderVolume(test::oblique(), test::threeHues(0.8), settings);
+  REQUIRE(anythingSeen(*truth));
+  CHECK(largestDifference(*volume, *truth) < 1.0F);
+  CHECK_NOTHROW(validate(*vdi));
+  CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
+}
+
+TEST_CASE("all ranks together send little more than one rank makes") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto subSupersegments = [&](int ranks) {
+    const auto dealt = test::deal("turbulence", {40, 40, 40}, {5, 5, 5}, Layout::Random, Joint::SharedPoints,
+                                  ScalarType::F32, ranks == 1 ? 0 : world.rank(), ranks);
+    VdiGenerator generator(device(),
+                           ranks == 1 ? comm::Communicator::serial() : comm::Communicator::world());
+    generator.setBlocks(dealt.mine);
+    generator.generate(test::oblique(), test::threeHues(0.8), test::smallSettings(96, 72, 12));
+    double sum = 0.0;
+    for (const RankReport& report : generator.reports()) sum += static_cast<double>(report.subSupersegments);
+    return sum;
+  };
+  const double together = subSupersegments(world.size());
+  if (world.rank() == 0) CHECK(together < 1.7 * subSupersegments(1));
 }
 
 TEST_CASE("tiny pictures: more ranks than rows and pixels") {

@@ -119,12 +119,10 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
   const bool quotas = request.agreed || request.runsOnly;
   if (quotas) quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
 
-  // Most lists have no more runs; others ask for more.
   const auto takeRuns = [&] {
-    constexpr std::uint32_t runs = 3;
     commands_.fill(sensitivities_, std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max()));
-    commands_.fill(counts_, runs);
-    commands_.fill(quotas_, runs << 16U);
+    commands_.fill(counts_, expectedRuns_);
+    commands_.fill(quotas_, expectedRuns_ << 16U);
   };
   const auto search = [&] {
     if (request.runsOnly) return takeRuns();
@@ -213,6 +211,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
     } else if (quotas && tooLong != 0 && *from != From::Reduce) {
       // Lists that weren't counted may have more runs than was expected. They've said how many.
       tooLong = 0;
+      if (request.runsOnly) expectedRuns_ = manyRuns;
       from = From::Write;
     } else if (scan_.demandNoOverflow(); lists.segments.size() < listBytes) {
       lists.segments.reserve(device_, listBytes + listBytes / 4, MemoryKind::DeviceLocal);

@@ -131,6 +131,10 @@ class ListBuilder {
   gpu::Buffer grainsFit_;  // guards: shaders/shared/scan.h
   gpu::Buffer segmentsFit_;
   gpu::Buffer totals_;  // of grains, and of supersegments
+  /// Of a picture's lists: most have no more. Once some had, there's room for as many as bytesPerList speaks of.
+  static constexpr std::uint32_t fewRuns = 3;
+  static constexpr std::uint32_t manyRuns = 8;
+  std::uint32_t expectedRuns_ = fewRuns;
   ListTimes times_;
 };
 
