@@ -17,6 +17,7 @@
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/ReducePass.h"
 #include "vdi/gpu/ScanPass.h"
+#include "vdi/gpu/VulkanDevice.h"
 
 using namespace vdi;
 using namespace vdi::gpu;
@@ -72,6 +73,34 @@ TEST_CASE("more memory than the device has is refused with the figures") {
     CHECK(buffer.mapped().size() == 1 << 20);
   }
   CHECK(device()->allocatedBytes() == held);
+}
+
+TEST_CASE("a smaller limit of textures than the device's is kept to") {
+  DeviceRequest request = requestFromEnvironment(0);
+  request.mostImageDimension3D = 24;
+  const auto small = Device::create(request);
+  CHECK(small->limits().maxImageDimension3D == 24);
+  CHECK_THROWS_AS(SampledImage(small, {25, 1, 1}, VK_FORMAT_R8_UNORM), Error);
+}
+
+TEST_CASE("validation messages name the object that's wrong") {
+  DeviceRequest request = requestFromEnvironment(0);
+  request.validation = true;
+  const auto own = Device::create(request);
+  const Buffer buffer(own, 64, MemoryKind::Readback);
+  CHECK(own->validationMessages() == "");
+  const VkBufferViewCreateInfo wrong{VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
+                                     nullptr,
+                                     0,
+                                     buffer.handle(),
+                                     VK_FORMAT_R32_UINT,
+                                     0,
+                                     VK_WHOLE_SIZE};  // of a buffer without texels
+  VkBufferView view = VK_NULL_HANDLE;
+  if (vkCreateBufferView(own->vulkan().handle(), &wrong, nullptr, &view) == VK_SUCCESS)
+    vkDestroyBufferView(own->vulkan().handle(), view, nullptr);
+  CHECK(own->validationMessageCount() > 0);
+  CHECK_THAT(own->validationMessages(), Catch::Contains("readback buffer of 64 bytes"));
 }
 
 TEST_CASE("prefix sums equal the host's at awkward sizes") {
