@@ -212,6 +212,7 @@ Image renderVolume(const Frame& frame, std::span<const Block> blocks) {
 }
 
 SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bool cutAtGaps) {
+  constexpr int stride = countedStride;
   SegmentRules rules{frame.settings.supersegments, static_cast<float>(frame.lattice.step), cutAtGaps};
   const int width = frame.view.width();
   const int height = frame.view.height();
@@ -220,8 +221,8 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
   // A rank's own lists get N_S each: what a list needs is known when all ranks' are together.
   if (frame.settings.budget == Budget::Total && !cutAtGaps) {
     Survey survey;
-    for (int y = 0; y < height; y += countedStride) {
-      for (int x = 0; x < width; x += countedStride)
+    for (int y = 0; y < height; y += stride) {
+      for (int x = 0; x < width; x += stride)
         addTo(survey, castRay(frame, blocks, x, y, atOnce), rules, atOnce);
     }
     rules.level = survey.levelFor(frame.settings.fill);
@@ -234,9 +235,9 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
     if (frame.settings.algorithm == Algorithm::Bisection) return segmentByBisection(samples, rules);
     if (cutAtGaps) return segmentByMerging(samples, rules);
     // The counted lists left and right, below and above; the last ones where there's none beyond.
-    const auto before = [](int i) { return i - i % countedStride; };
+    const auto before = [](int i) { return i - i % stride; };
     const auto after = [&](int i, int size) {
-      const int next = before(i + countedStride - 1);
+      const int next = before(i + stride - 1);
       return next < size ? next : before(i);
     };
     const int left = before(x);
