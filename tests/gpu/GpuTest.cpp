@@ -112,7 +112,7 @@ TEST_CASE("prefix sums equal the host's at awkward sizes") {
     const Buffer values(device(), (count + 1ULL) * 4, MemoryKind::Upload);
     const Buffer prefix(device(), (count + 1ULL) * 4, MemoryKind::Readback);
     const auto in = values.mappedAs<std::uint32_t>();
-    for (std::uint32_t i = 0; i < count; ++i) in[i] = generator() % 50;
+    for (std::uint32_t i = 0; i < count; ++i) in[i] = static_cast<std::uint32_t>(generator() % 50);
     commands.begin();
     scan.record(commands, values, prefix, count);
     commands.submitAndWait();
@@ -186,11 +186,10 @@ struct Grains {
 
   explicit Grains(std::uint32_t lists) {
     std::mt19937 generator(11);
-    const auto random = [&] { return static_cast<float>(generator() % 1000 + 1) / 1024.0F; };
+    const auto below = [&](std::uint32_t end) { return static_cast<std::uint32_t>(generator() % end); };
+    const auto random = [&] { return static_cast<float>(below(1000) + 1) / 1024.0F; };
     for (std::uint32_t list = 0; list < lists; ++list) {
-      const std::uint32_t count = list % 5 == 0    ? 0
-                                  : list % 97 == 1 ? 400 + generator() % 300
-                                                   : generator() % 38;
+      const std::uint32_t count = list % 5 == 0 ? 0 : list % 97 == 1 ? 400 + below(300) : below(38);
       const bool alike = list % 7 == 2;
       const bool gaps = list % 3 == 1;
       const bool cuts = gaps && list % 2 == 0;
