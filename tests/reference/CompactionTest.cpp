@@ -87,7 +87,8 @@ TEST_CASE("codes of codes are the same codes") {
   std::mt19937 random(9);
   for (int trial = 0; trial < 50; ++trial) {
     CompactLists lists;
-    lists.segments = compacted(randomList(random, 20, 2.0F), code);
+    const std::vector<CompactSupersegment> codes = compacted(randomList(random, 20, 2.0F), code);
+    lists.segments.assign(codes.begin(), codes.end());
     lists.offsets = {0, 20};
     const CompactLists again = compacted(expanded(lists, code), code);
     for (std::size_t i = 0; i < 20; ++i) {
