@@ -8,9 +8,9 @@
 
 #include "apps/Decomposition.h"
 #include "vdi/gpu/Commands.h"
-#include "vdi/gpu/ComputePipeline.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/PipelineSet.h"
 
 namespace vdi::apps {
 

@@ -25,7 +25,8 @@ install(
   FILES_MATCHING PATTERN "*.h"
   PATTERN ListCodec.h EXCLUDE)
 install(FILES vdi/comm/Communicator.h DESTINATION "${headerDir}/vdi/comm")
-install(FILES vdi/gpu/Device.h DESTINATION "${headerDir}/vdi/gpu")
+install(FILES vdi/gpu/Device.h vdi/gpu/DeviceLimits.h vdi/gpu/DeviceRequest.h
+        DESTINATION "${headerDir}/vdi/gpu")
 install(FILES vdi/pipeline/Pipeline.h DESTINATION "${headerDir}/vdi/pipeline")
 install(EXPORT pv-vdi-vdi-targets NAMESPACE pv-vdi:: DESTINATION "${cmakeDir}")
 vdi_install_pkg_config(pv-vdi)

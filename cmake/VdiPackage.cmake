@@ -16,7 +16,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 # What shows in no library's list: Vulkan's driver, the modules that scripts import, what our headers include.
-set(CPACK_DEBIAN_PACKAGE_DEPENDS "mesa-vulkan-drivers | vulkan-icd, libglm-dev, libvulkan-dev")
+set(CPACK_DEBIAN_PACKAGE_DEPENDS "mesa-vulkan-drivers | vulkan-icd, libglm-dev")
 if(VDI_BUILD_PARAVIEW)
   string(APPEND CPACK_DEBIAN_PACKAGE_DEPENDS ", paraview, python3-paraview")
 endif()

@@ -2,7 +2,7 @@
 
 # Warnings and sanitizers for one target of ours.
 function(vdi_target_options target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}>")
   if(VDI_SANITIZE)
     target_compile_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE} -fno-omit-frame-pointer)

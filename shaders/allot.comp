@@ -7,8 +7,6 @@
 layout(local_size_x = allotGroup) in;
 layout(push_constant, scalar) uniform Push { AllotConstants push; };
 
-#include "tolerance.glsl"
-
 uint mostGrains;
 uint mostQuota;
 uint mostRuns;

@@ -1,9 +1,6 @@
 // Material over one sample; twin of Appearance in vdi/reference/SegmentByMerging.cpp.
 //
-// Needs: optical.glsl.
-
-const float hiddenWeight = 0.15;
-const float unlimited = 3.4e38;
+// Needs: shared/segmenting.h, optical.glsl.
 
 // Premultiplied colour and opacity of `opticalDepth` over `length`, brought to one sample.
 vec4 appearanceOf(vec3 color, float opticalDepth, float length, float sampleStep) {

@@ -10,8 +10,6 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 
 #include "grain.glsl"
-#include "tolerance.glsl"
-
 void walk();
 
 float grainsBefore;  // transmittance so far

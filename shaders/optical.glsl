@@ -1,6 +1,6 @@
-// Opacity and optical depth (-log2 of transmittance); twins of vdi/reference/Segmenter.cpp.
-
-const float maxOpticalDepth = 65504.0;
+// Opacity and optical depth (-log2 of transmittance); twins of vdi/core/Supersegment.cpp.
+//
+// Needs: shared/segmenting.h.
 
 float opacityOf(float opticalDepth) {
   const float ln2 = 0.69314718;

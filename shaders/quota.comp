@@ -7,8 +7,6 @@
 layout(local_size_x = quotaGroup) in;
 layout(push_constant, scalar) uniform Push { QuotaConstants push; };
 
-#include "tolerance.glsl"
-
 struct Levels {
   uint words[countedLevelWords];
 };
@@ -43,7 +41,7 @@ void main() {
   if (countOf(sum, 0u) > 0u) {
     uint room = grainsPerBudget * push.budget;
     // Runs of all ranks may be more than that; each rank then keeps its own.
-    tolerance = unlimitedTolerance;
+    tolerance = unlimited;
     uint place = countedRuns;
     if (countOf(sum, 0u) <= push.budget) {
       tolerance = -1.0;

@@ -229,15 +229,14 @@ bool castBrick(uint index) {
 
 float component(vec3 v, uint axis) { return axis == 0u ? v.x : axis == 1u ? v.y : v.z; }
 
-const int kdStackSize = 40;  // VolumeStore builds no deeper tree
 
 void castRay() {
   rayOpticalDepth = 0.0;
   if (params.nodeCount == 0u || rayScene.x == rayScene.y) return;
   // Parts of the ray, in units of depth from the lattice's front. They overlap by the rounding error: a brick decides by
   // itself, exactly, which samples are its own; the order of visits comes from the signs of the direction alone.
-  uint stackNode[kdStackSize];
-  vec2 stackPart[kdStackSize];
+  uint stackNode[kdMaxDepth];
+  vec2 stackPart[kdMaxDepth];
   int top = 0;
   uint node = 0u;
   vec2 part = vec2(0.0, float(params.sampleCount) * params.step);

@@ -3,12 +3,6 @@
 //
 // Needs: segmenter.glsl; void walk(): feeds every interval of the list to searchAdd, front to back.
 
-const float smallestSensitivity = 1e-4;
-const float largestSensitivity = 2.0;
-const int mostTries = 22;
-const float goodFill = 0.85;
-const float closeBounds = 1.001;
-
 struct SearchState {
   bool writing;
   uint emitted;

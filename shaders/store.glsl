@@ -3,13 +3,6 @@
 //
 // Needs: shared/lists.h, exact.glsl, optical.glsl.
 
-const float mostDepthCode = 16383.0;
-const float mostCarriedDepth = 1.0 / 16.0;
-const float mostDepthChange = 0.25;
-const float thinnestStep = 0.0002;
-const float mostColorChange = 3.0 / 255.0;
-const float unseen = 1e-6;
-
 // A supersegment whose optical depth doesn't get lost when its opacity rounds to 1.
 struct Material {
   float front;

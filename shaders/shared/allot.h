@@ -5,11 +5,7 @@
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint allotGroup = 64;
-#else
-const uint allotGroup = 64;
-#endif
+VDI_CONST uint allotGroup = 64;
 
 // A band of lists, of which every stride-th in a row of every stride-th row is counted.
 struct AllotConstants {

@@ -13,31 +13,17 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Kd
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint castGroupX = 8;
-inline constexpr uint castGroupY = 8;
-inline constexpr uint castMaxPages = 8;
-inline constexpr uint castProgramVolume = 0;
-inline constexpr uint castProgramSearch = 1;
-inline constexpr uint castProgramCountGrains = 2;
-inline constexpr uint castProgramWriteGrains = 3;
-inline constexpr uint castProgramSurvey = 4;
-inline constexpr uint castProgramCountLevels = 5;
-inline constexpr uint castModeSearch = 0;
-inline constexpr uint castModeWrite = 1;
-#else
-const uint castGroupX = 8;
-const uint castGroupY = 8;
-const uint castMaxPages = 8;
-const uint castProgramVolume = 0;       // DVR: colours and depths
-const uint castProgramSearch = 1;       // by bisection: one program that does both of the modes
-const uint castProgramCountGrains = 2;  // by merging: tolerances and counts
-const uint castProgramWriteGrains = 3;
-const uint castProgramSurvey = 4;       // for the total budget: what lists need
-const uint castProgramCountLevels = 5;  // by merging, with other ranks: counts at all tolerances (quota.h)
-const uint castModeSearch = 0;  // sensitivities and counts
-const uint castModeWrite = 1;   // supersegments
-#endif
+VDI_CONST uint castGroupX = 8;
+VDI_CONST uint castGroupY = 8;
+VDI_CONST uint castMaxPages = 8;
+VDI_CONST uint castProgramVolume = 0;       // DVR: colours and depths
+VDI_CONST uint castProgramSearch = 1;       // by bisection: one program that does both of the modes
+VDI_CONST uint castProgramCountGrains = 2;  // by merging: tolerances and counts
+VDI_CONST uint castProgramWriteGrains = 3;
+VDI_CONST uint castProgramSurvey = 4;       // for the total budget: what lists need
+VDI_CONST uint castProgramCountLevels = 5;  // by merging, with other ranks: counts at all tolerances (quota.h)
+VDI_CONST uint castModeSearch = 0;  // sensitivities and counts
+VDI_CONST uint castModeWrite = 1;   // supersegments
 
 struct CastParams {
   VDI_ADDRESS(BrickArray) bricks;

@@ -5,15 +5,9 @@
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint cellsGroup = 64;
-inline constexpr uint cellsModeMeasure = 0;
-inline constexpr uint cellsModeClassify = 1;
-#else
-const uint cellsGroup = 64;
-const uint cellsModeMeasure = 0;   // texels -> ranges
-const uint cellsModeClassify = 1;  // ranges and transfer table -> visible
-#endif
+VDI_CONST uint cellsGroup = 64;
+VDI_CONST uint cellsModeMeasure = 0;   // texels -> ranges
+VDI_CONST uint cellsModeClassify = 1;  // ranges and transfer table -> visible
 
 // The macrocells of a piece of a texture page: cell c of an axis has the texels [c * cellSide, (c + 1) * cellSide] of the
 // piece, and one more at either end, which a filter may touch when it rounds.

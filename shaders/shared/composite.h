@@ -5,29 +5,16 @@
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint compositeGroup = 64;
-inline constexpr uint mergeModeCount = 0;
-inline constexpr uint mergeModeMerge = 1;
-inline constexpr uint mergeModeFlatten = 2;
-inline constexpr uint compositeProgramSearch = 0;
-inline constexpr uint compositeProgramCountGrains = 1;
-inline constexpr uint compositeProgramWriteGrains = 2;
-inline constexpr uint compositeProgramSurvey = 3;
-inline constexpr uint compositeModeSearch = 0;
-inline constexpr uint compositeModeWrite = 1;
-#else
-const uint compositeGroup = 64;
-const uint mergeModeCount = 0;  // counts[list] = sum over ranks
-const uint mergeModeMerge = 1;  // writes merged
-const uint mergeModeFlatten = 2;  // writes colors and depths, of merged
-const uint compositeProgramSearch = 0;  // as castProgramSearch and so on
-const uint compositeProgramCountGrains = 1;
-const uint compositeProgramWriteGrains = 2;
-const uint compositeProgramSurvey = 3;
-const uint compositeModeSearch = 0;
-const uint compositeModeWrite = 1;
-#endif
+VDI_CONST uint compositeGroup = 64;
+VDI_CONST uint mergeModeCount = 0;  // counts[list] = sum over ranks
+VDI_CONST uint mergeModeMerge = 1;  // writes merged
+VDI_CONST uint mergeModeFlatten = 2;  // writes colors and depths, of merged
+VDI_CONST uint compositeProgramSearch = 0;  // as castProgramSearch and so on
+VDI_CONST uint compositeProgramCountGrains = 1;
+VDI_CONST uint compositeProgramWriteGrains = 2;
+VDI_CONST uint compositeProgramSurvey = 3;
+VDI_CONST uint compositeModeSearch = 0;
+VDI_CONST uint compositeModeWrite = 1;
 
 // Where a rank's part of a list has got to.
 struct MergeHead {

@@ -5,19 +5,11 @@
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint countsGroup = 256;
-inline constexpr uint countsPerWord = 4;
-inline constexpr uint countsModePack = 0;
-inline constexpr uint countsModePackWide = 1;
-inline constexpr uint countsModeUnpack = 2;
-#else
-const uint countsGroup = 256;
-const uint countsPerWord = 4;  // lists whose counts are the bytes of a word, the first one lowest
-const uint countsModePack = 0;      // offsets -> packed, and tooLarge if a count has no room in a byte
-const uint countsModePackWide = 1;  // offsets -> packed, a word each
-const uint countsModeUnpack = 2;    // packed, bytes -> counts
-#endif
+VDI_CONST uint countsGroup = 256;
+VDI_CONST uint countsPerWord = 4;  // lists whose counts are the bytes of a word, the first one lowest
+VDI_CONST uint countsModePack = 0;      // offsets -> packed, and tooLarge if a count has no room in a byte
+VDI_CONST uint countsModePackWide = 1;  // offsets -> packed, a word each
+VDI_CONST uint countsModeUnpack = 2;    // packed, bytes -> counts
 
 struct CountsConstants {
   VDI_ADDRESS(UintArray) offsets;   // [listCount + 1]

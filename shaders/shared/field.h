@@ -5,11 +5,7 @@
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint fieldGroup = 64;
-#else
-const uint fieldGroup = 64;
-#endif
+VDI_CONST uint fieldGroup = 64;
 
 struct FieldConstants {
   VDI_ADDRESS(FloatArray) values;  // [size.z][size.y][size.x], in [0, 1]

@@ -2,50 +2,15 @@
 #ifndef VDI_SHARED_LISTS_H
 #define VDI_SHARED_LISTS_H
 #include "interop.h"
+#include "segmenting.h"
 
 VDI_SHARED_BEGIN
 
-// Room for grains, in multiples of a list's budget, and what's added to it; as in vdi/reference/Segmenter.h.
-#ifdef __cplusplus
-inline constexpr uint grainsPerBudget = 2;
-inline constexpr uint spareGrains = 4;
-inline constexpr uint uncountedSpareGrains = 8;
-inline constexpr uint countedStride = 4;
-// Of a list that may hold `most` supersegments, where gaps don't demand more.
-inline uint64_t mostGrains(uint64_t most) {
-  const uint64_t grains = grainsPerBudget * most;
-  return grains + grains / 4 + uncountedSpareGrains;
-}
-inline uint countedSamplesFor(uint lattice, uint budget) {
-  const uint share = lattice / (16 * budget);
-  return share < 1 ? 1 : share > 2 ? 2 : share;
-}
-#else
-const uint grainsPerBudget = 2;
-const uint spareGrains = 4;
-const uint uncountedSpareGrains = 8;
-const uint countedStride = 4;
-#endif
-
 // What a rank tells the others of a list that it has counted, as bytes of these words, the first one lowest: visible samples,
 // grains at each tolerance, runs. Each is divided by 2^levelShift, rounded up, and 255 at most.
-#ifdef __cplusplus
-inline constexpr uint countedLevelWords = 3;
-inline constexpr uint countedTolerance = 1;
-inline constexpr uint countedRuns = 9;
-#else
-const uint countedLevelWords = 3;
-const uint countedTolerance = 1;  // place of the finest tolerance's
-const uint countedRuns = 9;
-#endif
-
-// A survey: what all lists would hold at each level, then what they would equally; a pair of words each, the low one first.
-// Survey of core/Budget.h.
-#ifdef __cplusplus
-inline constexpr uint surveyLevels = 10;
-#else
-const uint surveyLevels = 10;
-#endif
+VDI_CONST uint countedLevelWords = 3;
+VDI_CONST uint countedTolerance = 1;  // place of the finest tolerance's
+VDI_CONST uint countedRuns = 9;
 
 // Supersegment of core/Vdi.h.
 struct Segment {

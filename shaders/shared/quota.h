@@ -5,11 +5,7 @@
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint quotaGroup = 64;
-#else
-const uint quotaGroup = 64;
-#endif
+VDI_CONST uint quotaGroup = 64;
 
 struct QuotaConstants {
   VDI_ADDRESS(UintArray) own;      // [rows][width][countedLevelWords]: what this rank counted

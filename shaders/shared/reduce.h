@@ -5,15 +5,9 @@
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint queueGroup = 256;
-inline constexpr uint reduceGroup = 64;
-inline constexpr uint storeGroup = 64;
-#else
-const uint queueGroup = 256;
-const uint reduceGroup = 64;
-const uint storeGroup = 64;
-#endif
+VDI_CONST uint queueGroup = 256;
+VDI_CONST uint reduceGroup = 64;
+VDI_CONST uint storeGroup = 64;
 
 struct ReduceConstants {
   VDI_ADDRESS(GrainArray) grains;

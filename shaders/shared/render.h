@@ -5,53 +5,29 @@
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint renderPictureTile = 8;
-inline constexpr uint renderRegion = 16;
-inline constexpr uint renderBeamGroup = 32;
-inline constexpr uint renderMostGroups = 65535;
-inline constexpr uint renderKinds = 24;
-inline constexpr uint renderOrderSquares = 0;
-inline constexpr uint renderOrderColumns = 1;
-inline constexpr uint renderOrderRows = 2;
-inline constexpr uint renderPictureFloats = 0;
-inline constexpr uint renderPictureBytes = 1;
-inline constexpr uint renderPictureStraightBytes = 2;
-inline constexpr uint expandGroup = 64;
-inline constexpr uint expandModeSegments = 0;
-inline constexpr uint expandModeMasks = 1;
-inline constexpr uint expandModeTiles = 2;
-inline constexpr uint expandModeLargeTiles = 3;
-inline constexpr int renderTileShift = 3;
-inline constexpr int renderTile = 1 << renderTileShift;
-inline constexpr int renderLargeTile = 64;
-inline constexpr int renderMostMarks = 4096;
-inline constexpr int renderBins = 64;
-#else
-const uint renderPictureTile = 8;  // pixels per side of what a workgroup renders
-const uint renderRegion = 16;      // of the beam that says whether there's anything to render: a multiple of that
-const uint renderBeamGroup = 32;
-const uint renderMostGroups = 65535;  // every device allows them
-const uint renderKinds = 24;        // of tiles, by how much there is to look at
+VDI_CONST uint renderPictureTile = 8;  // pixels per side of what a workgroup renders
+VDI_CONST uint renderRegion = 16;      // of the beam that says whether there's anything to render: a multiple of that
+VDI_CONST uint renderBeamGroup = 32;
+VDI_CONST uint renderMostGroups = 65535;  // every device allows them
+VDI_CONST uint renderKinds = 24;        // of tiles, by how much there is to look at
 // Of a tile's pixels: neighbouring invocations have squares of them (along a Z), or pairs of columns, or pairs of rows.
-const uint renderOrderSquares = 0;
-const uint renderOrderColumns = 1;
-const uint renderOrderRows = 2;
+VDI_CONST uint renderOrderSquares = 0;
+VDI_CONST uint renderOrderColumns = 1;
+VDI_CONST uint renderOrderRows = 2;
 // Of its colours: premultiplied, four floats; premultiplied, straight, four bytes.
-const uint renderPictureFloats = 0;
-const uint renderPictureBytes = 1;
-const uint renderPictureStraightBytes = 2;
-const uint expandGroup = 64;
-const uint expandModeSegments = 0;  // one invocation a supersegment
-const uint expandModeMasks = 1;     // one a list
-const uint expandModeTiles = 2;     // one a tile
-const uint expandModeLargeTiles = 3;  // one a large tile
-const int renderTileShift = 3;
-const int renderTile = 1 << renderTileShift;  // lists per side of a tile
-const int renderLargeTile = 64;       // a multiple of that
-const int renderMostMarks = 4096;     // tiles of an axis (beam.glsl)
-const int renderBins = 64;            // parts of the depth range: bits of a mask
-#endif
+VDI_CONST uint renderPictureFloats = 0;
+VDI_CONST uint renderPictureBytes = 1;
+VDI_CONST uint renderPictureStraightBytes = 2;
+VDI_CONST uint expandGroup = 64;
+VDI_CONST uint expandModeSegments = 0;  // one invocation a supersegment
+VDI_CONST uint expandModeMasks = 1;     // one a list
+VDI_CONST uint expandModeTiles = 2;     // one a tile
+VDI_CONST uint expandModeLargeTiles = 3;  // one a large tile
+VDI_CONST int renderTileShift = 3;
+VDI_CONST int renderTile = 1 << renderTileShift;  // lists per side of a tile
+VDI_CONST int renderLargeTile = 64;       // a multiple of that
+VDI_CONST int renderMostMarks = 4096;     // tiles of an axis (beam.glsl)
+VDI_CONST int renderBins = 64;            // parts of the depth range: bits of a mask
 
 // A supersegment as rendering wants it.
 struct RenderSegment {

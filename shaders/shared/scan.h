@@ -5,19 +5,11 @@
 
 VDI_SHARED_BEGIN
 
-#ifdef __cplusplus
-inline constexpr uint scanGroup = 256;
-inline constexpr uint scanPerThread = 8;
-inline constexpr uint scanModeSum = 0;
-inline constexpr uint scanModeAdd = 1;
-inline constexpr uint scanModeRebase = 2;
-#else
-const uint scanGroup = 256;
-const uint scanPerThread = 8;
-const uint scanModeSum = 0;  // values -> prefix within each workgroup's part, sums[group] = total of the part
-const uint scanModeAdd = 1;  // prefix += sums of the groups before
-const uint scanModeRebase = 2;  // prefix += base
-#endif
+VDI_CONST uint scanGroup = 256;
+VDI_CONST uint scanPerThread = 8;
+VDI_CONST uint scanModeSum = 0;  // values -> prefix within each workgroup's part, sums[group] = total of the part
+VDI_CONST uint scanModeAdd = 1;  // prefix += sums of the groups before
+VDI_CONST uint scanModeRebase = 2;  // prefix += base
 
 struct ScanConstants {
   VDI_ADDRESS(UintArray) values;

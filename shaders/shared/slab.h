@@ -7,13 +7,8 @@ VDI_SHARED_BEGIN
 
 // Texels per side of the table's square part; and how far apart, in texels, a row of its strips begins behind the last one:
 // rows share a texel, so that filtering needs no other row.
-#ifdef __cplusplus
-inline constexpr uint slabSide = 256;
-inline constexpr uint slabStripStep = slabSide - 1;
-#else
-const uint slabSide = 256u;
-const uint slabStripStep = slabSide - 1u;
-#endif
+VDI_CONST uint slabSide = 256u;
+VDI_CONST uint slabStripStep = slabSide - 1u;
 
 VDI_SHARED_END
 

@@ -6,11 +6,10 @@
 VDI_SHARED_BEGIN
 
 // Texels per side of a macrocell (cells.comp).
-#ifdef __cplusplus
-inline constexpr uint cellSide = 16;
-#else
-const uint cellSide = 16;
-#endif
+VDI_CONST uint cellSide = 16;
+
+// The deepest kd-tree over bricks that cast.comp has stack for.
+VDI_CONST int kdMaxDepth = 40;
 
 // A box of samples that one piece of one texture page serves. Positions are relative to the scene's centre, snapped to
 // the scene's lattice (core/Scene.h).

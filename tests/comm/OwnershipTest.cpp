@@ -38,7 +38,8 @@ TEST_CASE("every list has one owner, in rank order") {
       CHECK(most <= lists / static_cast<std::uint64_t>(ranks) + 2 * Ownership::granularity);
       std::mt19937 random(7);
       std::vector<std::uint32_t> weights((lists + 99) / 100);
-      for (std::uint32_t& weight : weights) weight = random() % 3 == 0 ? random() % 5000 : 0;
+      for (std::uint32_t& weight : weights)
+        weight = random() % 3 == 0 ? static_cast<std::uint32_t>(random() % 5000) : 0;
       checkCovers(Ownership::balanced(lists, ranks, weights, 100), lists, ranks);
     }
   }

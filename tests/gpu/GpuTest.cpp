@@ -17,6 +17,7 @@
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/ReducePass.h"
 #include "vdi/gpu/ScanPass.h"
+#include "vdi/gpu/VulkanDevice.h"
 
 using namespace vdi;
 using namespace vdi::gpu;
@@ -74,6 +75,34 @@ TEST_CASE("more memory than the device has is refused with the figures") {
   CHECK(device()->allocatedBytes() == held);
 }
 
+TEST_CASE("a smaller limit of textures than the device's is kept to") {
+  DeviceRequest request = requestFromEnvironment(0);
+  request.mostImageDimension3D = 24;
+  const auto small = Device::create(request);
+  CHECK(small->limits().maxImageDimension3D == 24);
+  CHECK_THROWS_AS(SampledImage(small, {25, 1, 1}, VK_FORMAT_R8_UNORM), Error);
+}
+
+TEST_CASE("validation messages name the object that's wrong") {
+  DeviceRequest request = requestFromEnvironment(0);
+  request.validation = true;
+  const auto own = Device::create(request);
+  const Buffer buffer(own, 64, MemoryKind::Readback);
+  CHECK(own->validationMessages() == "");
+  const VkBufferViewCreateInfo wrong{VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO,
+                                     nullptr,
+                                     0,
+                                     buffer.handle(),
+                                     VK_FORMAT_R32_UINT,
+                                     0,
+                                     VK_WHOLE_SIZE};  // of a buffer without texels
+  VkBufferView view = VK_NULL_HANDLE;
+  if (vkCreateBufferView(own->vulkan().handle(), &wrong, nullptr, &view) == VK_SUCCESS)
+    vkDestroyBufferView(own->vulkan().handle(), view, nullptr);
+  CHECK(own->validationMessageCount() > 0);
+  CHECK_THAT(own->validationMessages(), Catch::Contains("readback buffer of 64 bytes"));
+}
+
 TEST_CASE("prefix sums equal the host's at awkward sizes") {
   std::mt19937 generator(3);
   ScanPass scan(device());
@@ -83,7 +112,7 @@ TEST_CASE("prefix sums equal the host's at awkward sizes") {
     const Buffer values(device(), (count + 1ULL) * 4, MemoryKind::Upload);
     const Buffer prefix(device(), (count + 1ULL) * 4, MemoryKind::Readback);
     const auto in = values.mappedAs<std::uint32_t>();
-    for (std::uint32_t i = 0; i < count; ++i) in[i] = generator() % 50;
+    for (std::uint32_t i = 0; i < count; ++i) in[i] = static_cast<std::uint32_t>(generator() % 50);
     commands.begin();
     scan.record(commands, values, prefix, count);
     commands.submitAndWait();
@@ -157,11 +186,10 @@ struct Grains {
 
   explicit Grains(std::uint32_t lists) {
     std::mt19937 generator(11);
-    const auto random = [&] { return static_cast<float>(generator() % 1000 + 1) / 1024.0F; };
+    const auto below = [&](std::uint32_t end) { return static_cast<std::uint32_t>(generator() % end); };
+    const auto random = [&] { return static_cast<float>(below(1000) + 1) / 1024.0F; };
     for (std::uint32_t list = 0; list < lists; ++list) {
-      const std::uint32_t count = list % 5 == 0    ? 0
-                                  : list % 97 == 1 ? 400 + generator() % 300
-                                                   : generator() % 38;
+      const std::uint32_t count = list % 5 == 0 ? 0 : list % 97 == 1 ? 400 + below(300) : below(38);
       const bool alike = list % 7 == 2;
       const bool gaps = list % 3 == 1;
       const bool cuts = gaps && list % 2 == 0;
@@ -201,6 +229,7 @@ std::vector<shared::Segment> reduced(const Grains& lists, ReducePass::Teams team
   const Buffer left = uploaded(lists.left);
   const Buffer leftOffsets = uploaded(lists.leftOffsets);
   const Buffer segments(device(), lists.leftOffsets.back() * sizeof(shared::Segment), MemoryKind::Readback);
+  const Buffer guard = uploaded(std::vector<std::uint32_t>{1});  // there's room
   shared::ReduceConstants constants{};
   constants.grains = grains.address();
   constants.grainOffsets = offsets.address();
@@ -208,6 +237,7 @@ std::vector<shared::Segment> reduced(const Grains& lists, ReducePass::Teams team
   constants.left = left.address();
   constants.offsets = leftOffsets.address();
   constants.segments = segments.address();
+  constants.guard = guard.address();
   constants.step = 0.125F;
   constants.listCount = static_cast<std::uint32_t>(lists.written.size());
   ReducePass pass(device(), teams);

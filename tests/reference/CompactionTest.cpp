@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "vdi/core/Scene.h"
 #include "vdi/core/Vdi.h"
 
 using namespace vdi;

@@ -181,7 +181,7 @@ Slab SlabTable::between(double front, double back) const {
   const double spanInside = std::abs(backInside - frontInside);
   if (!(spanInside > 0.0 && spanInside < span)) return slab;
   // A part of it is like the table's ends.
-  const auto shareOf = [&](double length) { return static_cast<float>(length / span); };
+  const auto shareOf = [&](double part) { return static_cast<float>(part / span); };
   const float depth = slab.opticalDepth * shareOf(spanInside);
   const float depthBelow = below.a * shareOf(std::max(-std::min(front, back), 0.0));
   const float depthAbove = above.a * shareOf(std::max(std::max(front, back) - last, 0.0));

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "vdi/core/EnumNames.h"
+#include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 
 namespace vdi {

@@ -7,9 +7,10 @@
 #include <vector>
 
 #include "vdi/core/HostVector.h"
-#include "vdi/core/Scene.h"
 
 namespace vdi {
+
+struct DepthLattice;
 
 /// How a VDI's supersegments are held, sent between ranks and written to files.
 enum class Precision : std::uint32_t {

@@ -59,9 +59,9 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
   params.height = static_cast<std::uint32_t>(view.height());
   // A position is the sum of a start and a depth times a direction, each rounded to 24 bits.
   const glm::dvec3 half = 0.5 * scene.bounds.size();
-  const double reach = glm::length(glm::dvec3(params.startBase)) + lattice.count * lattice.step +
-                       glm::length(half) +
-                       std::max(view.width(), view.height()) * glm::length(params.startRight);
+  const double reach =
+      glm::length(glm::dvec3(params.startBase)) + lattice.count * lattice.step + glm::length(half) +
+      static_cast<float>(std::max(view.width(), view.height())) * glm::length(params.startRight);
   params.coordinateError = static_cast<float>(reach * 0x1p-21);
   return params;
 }

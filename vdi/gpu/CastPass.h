@@ -10,6 +10,7 @@
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/ComputePipeline.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/PipelineSet.h"
 
 namespace vdi {
 struct DepthLattice;

@@ -6,6 +6,7 @@
 #include "vdi/core/Error.h"
 #include "vdi/gpu/ComputePipeline.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/VulkanResult.h"
 
 namespace vdi::gpu {
 
@@ -37,14 +38,15 @@ void changeLayout(VkCommandBuffer commands, const SampledImage& image, VkImageLa
 Commands::Commands(std::shared_ptr<Device> device, QueueKind kind) : device_(std::move(device)), kind_(kind) {
   try {
     const VkCommandPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr, 0,
-                                           device_->queueFamily(kind_)};
-    check(vkCreateCommandPool(device_->handle(), &poolInfo, nullptr, &pool_), "vkCreateCommandPool");
+                                           device_->vulkan().queueFamily(kind_)};
+    check(vkCreateCommandPool(device_->vulkan().handle(), &poolInfo, nullptr, &pool_), "vkCreateCommandPool");
     const VkCommandBufferAllocateInfo bufferInfo{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr,
                                                  pool_, VK_COMMAND_BUFFER_LEVEL_PRIMARY, 1};
-    check(vkAllocateCommandBuffers(device_->handle(), &bufferInfo, &buffer_), "vkAllocateCommandBuffers");
+    check(vkAllocateCommandBuffers(device_->vulkan().handle(), &bufferInfo, &buffer_),
+          "vkAllocateCommandBuffers");
     const VkQueryPoolCreateInfo queryInfo{
         VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO, nullptr, 0, VK_QUERY_TYPE_TIMESTAMP, maxMarks + 1, 0};
-    check(vkCreateQueryPool(device_->handle(), &queryInfo, nullptr, &queries_), "vkCreateQueryPool");
+    check(vkCreateQueryPool(device_->vulkan().handle(), &queryInfo, nullptr, &queries_), "vkCreateQueryPool");
   } catch (...) {
     release();
     throw;
@@ -53,14 +55,14 @@ Commands::Commands(std::shared_ptr<Device> device, QueueKind kind) : device_(std
 
 Commands::~Commands() {
   try {
-    if (state_ == State::Submitted) device_->wait(kind_, last_);
+    if (state_ == State::Submitted) device_->vulkan().wait(kind_, last_);
   } catch (const Error&) {  // the device is lost: nothing runs any more
   }
   release();
 }
 
 void Commands::release() noexcept {
-  VkDevice device = device_->handle();
+  VkDevice device = device_->vulkan().handle();
   if (queries_ != VK_NULL_HANDLE) vkDestroyQueryPool(device, queries_, nullptr);
   if (pool_ != VK_NULL_HANDLE) vkDestroyCommandPool(device, pool_, nullptr);
 }
@@ -69,8 +71,8 @@ void Commands::begin() {
   wait();
   marks_.clear();
   waits_.clear();
-  vkResetQueryPool(device_->handle(), queries_, 0, maxMarks + 1);
-  check(vkResetCommandPool(device_->handle(), pool_, 0), "vkResetCommandPool");
+  vkResetQueryPool(device_->vulkan().handle(), queries_, 0, maxMarks + 1);
+  check(vkResetCommandPool(device_->vulkan().handle(), pool_, 0), "vkResetCommandPool");
   const VkCommandBufferBeginInfo info{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr,
                                       VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT, nullptr};
   check(vkBeginCommandBuffer(buffer_, &info), "vkBeginCommandBuffer");
@@ -80,18 +82,22 @@ void Commands::begin() {
 
 void Commands::waitFor(const Commands& other) {
   assert(state_ == State::Recording);
-  waits_.push_back({VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, nullptr, device_->submissionsDone(other.kind_),
-                    other.last_, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, 0});
+  waits_.push_back({VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, nullptr,
+                    device_->vulkan().submissionsDone(other.kind_), other.last_,
+                    VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, 0});
 }
 
 void Commands::submit() {
   assert(state_ == State::Recording);
   state_ = State::Idle;
-  if (!marks_.empty()) writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
+  if (!marks_.empty()) {
+    device_->vulkan().endLabel(buffer_);
+    writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
+  }
   // Makes what was written visible to the host after wait().
   memoryBarrier(true);
   check(vkEndCommandBuffer(buffer_), "vkEndCommandBuffer");
-  last_ = device_->submit(kind_, waits_, buffer_);
+  last_ = device_->vulkan().submit(kind_, waits_, buffer_);
   state_ = State::Submitted;
   ++submissions_;
 }
@@ -99,7 +105,7 @@ void Commands::submit() {
 /// After a lost device the submission counts as not done: each further begin or wait throws again.
 void Commands::wait() {
   if (state_ != State::Submitted) return;
-  device_->wait(kind_, last_);
+  device_->vulkan().wait(kind_, last_);
   state_ = State::Idle;
   readTimes();
 }
@@ -223,7 +229,9 @@ void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const S
 
 void Commands::mark(std::string name) {
   assert(state_ == State::Recording && marks_.size() < maxMarks);
+  if (!marks_.empty()) device_->vulkan().endLabel(buffer_);
   writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
+  device_->vulkan().beginLabel(buffer_, name);
   marks_.push_back(std::move(name));
 }
 
@@ -235,10 +243,11 @@ void Commands::readTimes() {
   times_.clear();
   if (marks_.empty()) return;
   std::vector<std::uint64_t> ticks(marks_.size() + 1);
-  check(vkGetQueryPoolResults(device_->handle(), queries_, 0, static_cast<std::uint32_t>(ticks.size()),
-                              ticks.size() * sizeof(std::uint64_t), ticks.data(), sizeof(std::uint64_t),
-                              VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
-        "vkGetQueryPoolResults");
+  check(
+      vkGetQueryPoolResults(device_->vulkan().handle(), queries_, 0, static_cast<std::uint32_t>(ticks.size()),
+                            ticks.size() * sizeof(std::uint64_t), ticks.data(), sizeof(std::uint64_t),
+                            VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
+      "vkGetQueryPoolResults");
   const DeviceLimits& limits = device_->limits();
   const std::uint64_t validBits = ~std::uint64_t{0} >> (64U - limits.timestampBits);
   for (std::size_t i = 0; i < marks_.size(); ++i) {

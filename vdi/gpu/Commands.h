@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "vdi/gpu/Device.h"
+#include "vdi/gpu/VulkanDevice.h"
 
 namespace vdi::gpu {
 
@@ -109,7 +110,7 @@ class Commands {
                    const glm::uvec2& pitch = glm::uvec2(0));
 
   /// Marks the start of a named stage on the device's clock; it ends at the next mark, or at submit. Up to 64
-  /// a submission.
+  /// a submission. Debuggers show its commands under that name.
   void mark(std::string name);
   /// Device time of each stage of the last submission that was waited for, in order.
   const std::vector<StageTime>& stageTimes() const { return times_; }

@@ -7,7 +7,7 @@
 #include "shaders/shared/composite.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/gpu/Commands.h"
-#include "vdi/gpu/ComputePipeline.h"
+#include "vdi/gpu/PipelineSet.h"
 
 namespace vdi::gpu {
 

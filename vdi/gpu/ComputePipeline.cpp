@@ -1,11 +1,12 @@
 #include "vdi/gpu/ComputePipeline.h"
 
-#include <algorithm>
 #include <cassert>
+#include <string>
 #include <utility>
 
-#include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
+#include "vdi/gpu/VulkanDevice.h"
+#include "vdi/gpu/VulkanResult.h"
 
 namespace vdi::gpu {
 
@@ -19,7 +20,8 @@ constexpr std::uint32_t planeBinding = 2;
 /// Exists just while the pipeline is made.
 class ShaderModule {
  public:
-  ShaderModule(const Device& device, std::span<const std::uint32_t> code) : device_(device.handle()) {
+  ShaderModule(const Device& device, std::span<const std::uint32_t> code)
+      : device_(device.vulkan().handle()) {
     const VkShaderModuleCreateInfo info{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO, nullptr, 0,
                                         code.size_bytes(), code.data()};
     check(vkCreateShaderModule(device_, &info, nullptr, &module_), "vkCreateShaderModule");
@@ -69,14 +71,15 @@ void ComputePipeline::makeDescriptorSet() {
   const VkDescriptorSetLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
                                                    nullptr, 0, static_cast<std::uint32_t>(bindings.size()),
                                                    bindings.data()};
-  check(vkCreateDescriptorSetLayout(device_->handle(), &layoutInfo, nullptr, &setLayout_),
+  check(vkCreateDescriptorSetLayout(device_->vulkan().handle(), &layoutInfo, nullptr, &setLayout_),
         "vkCreateDescriptorSetLayout");
   const VkDescriptorPoolCreateInfo poolInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, nullptr,     0, 1,
                                             static_cast<std::uint32_t>(sizes.size()),      sizes.data()};
-  check(vkCreateDescriptorPool(device_->handle(), &poolInfo, nullptr, &pool_), "vkCreateDescriptorPool");
+  check(vkCreateDescriptorPool(device_->vulkan().handle(), &poolInfo, nullptr, &pool_),
+        "vkCreateDescriptorPool");
   const VkDescriptorSetAllocateInfo setInfo{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO, nullptr, pool_, 1,
                                             &setLayout_};
-  check(vkAllocateDescriptorSets(device_->handle(), &setInfo, &set_), "vkAllocateDescriptorSets");
+  check(vkAllocateDescriptorSets(device_->vulkan().handle(), &setInfo, &set_), "vkAllocateDescriptorSets");
 }
 
 void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
@@ -88,7 +91,8 @@ void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
                                               &setLayout_,
                                               info.pushConstantBytes > 0 ? 1U : 0U,
                                               &range};
-  check(vkCreatePipelineLayout(device_->handle(), &layoutInfo, nullptr, &layout_), "vkCreatePipelineLayout");
+  check(vkCreatePipelineLayout(device_->vulkan().handle(), &layoutInfo, nullptr, &layout_),
+        "vkCreatePipelineLayout");
   std::vector<VkSpecializationMapEntry> entries;
   for (std::uint32_t id = 0; id < info.specialization.size(); ++id) {
     entries.push_back({id, id * static_cast<std::uint32_t>(sizeof(std::uint32_t)), sizeof(std::uint32_t)});
@@ -111,9 +115,14 @@ void ComputePipeline::makePipeline(const ComputePipelineInfo& info) {
       layout_,
       VK_NULL_HANDLE,
       -1};
-  check(vkCreateComputePipelines(device_->handle(), device_->pipelineCache(), 1, &pipelineInfo, nullptr,
-                                 &pipeline_),
+  check(vkCreateComputePipelines(device_->vulkan().handle(), device_->vulkan().pipelineCache(), 1,
+                                 &pipelineInfo, nullptr, &pipeline_),
         "vkCreateComputePipelines");
+  const std::string name(info.code.empty() ? info.shader : "a shader without a name");
+  device_->vulkan().setName(VK_OBJECT_TYPE_PIPELINE, pipeline_, name);
+  device_->vulkan().setName(VK_OBJECT_TYPE_PIPELINE_LAYOUT, layout_, "layout of " + name);
+  if (set_ != VK_NULL_HANDLE)
+    device_->vulkan().setName(VK_OBJECT_TYPE_DESCRIPTOR_SET, set_, "descriptors of " + name);
 }
 
 void ComputePipeline::bindImages(std::span<const SampledImage* const> images, const Sampler& sampler) {
@@ -142,7 +151,7 @@ void ComputePipeline::bind(std::uint32_t binding, std::span<const SampledImage* 
                                    infos.data(),
                                    nullptr,
                                    nullptr};
-  vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
+  vkUpdateDescriptorSets(device_->vulkan().handle(), 1, &write, 0, nullptr);
 }
 
 void ComputePipeline::bindUniforms(const Buffer& buffer) {
@@ -150,46 +159,11 @@ void ComputePipeline::bindUniforms(const Buffer& buffer) {
   const VkWriteDescriptorSet write{
       VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set_,  uniformBinding, 0, 1,
       VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,      nullptr, &info, nullptr};
-  vkUpdateDescriptorSets(device_->handle(), 1, &write, 0, nullptr);
-}
-
-PipelineSet::PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common)
-    : device_(std::move(device)), common_(std::move(common)) {
-  if (common_.uniformBytes == 0) return;
-  uniforms_ = std::make_shared<const Buffer>(device_, common_.uniformBytes, MemoryKind::DeviceLocal);
-}
-
-PipelineSet::PipelineSet(const PipelineSet& updated, ComputePipelineInfo common)
-    : device_(updated.device_), common_(std::move(common)), uniforms_(updated.uniforms_) {
-  assert(common_.uniformBytes == updated.common_.uniformBytes);
-}
-
-void PipelineSet::updateBytes(Commands& commands, std::span<const std::byte> bytes) {
-  assert(bytes.size() == common_.uniformBytes);
-  // What was recorded may have been dropped.
-  const bool wasSubmitted = updatedBy_ == &commands && commands.submissions() > updatedBehind_;
-  if (wasSubmitted && std::ranges::equal(bytes, updated_)) return;
-  commands.barrier();
-  commands.update(*uniforms_, bytes);
-  commands.barrier();
-  updated_.assign(bytes.begin(), bytes.end());
-  updatedBy_ = &commands;
-  updatedBehind_ = commands.submissions();
-}
-
-ComputePipeline& PipelineSet::with(const std::vector<std::uint32_t>& specialization) {
-  std::unique_ptr<ComputePipeline>& pipeline = pipelines_[specialization];
-  if (!pipeline) {
-    ComputePipelineInfo info = common_;
-    info.specialization = specialization;
-    pipeline = std::make_unique<ComputePipeline>(device_, info);
-    if (uniforms_) pipeline->bindUniforms(*uniforms_);
-  }
-  return *pipeline;
+  vkUpdateDescriptorSets(device_->vulkan().handle(), 1, &write, 0, nullptr);
 }
 
 void ComputePipeline::release() noexcept {
-  VkDevice device = device_->handle();
+  VkDevice device = device_->vulkan().handle();
   if (pipeline_ != VK_NULL_HANDLE) vkDestroyPipeline(device, pipeline_, nullptr);
   if (layout_ != VK_NULL_HANDLE) vkDestroyPipelineLayout(device, layout_, nullptr);
   if (pool_ != VK_NULL_HANDLE) vkDestroyDescriptorPool(device, pool_, nullptr);

@@ -6,18 +6,15 @@
 #include <vulkan/vulkan.h>
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <span>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "vdi/gpu/Memory.h"
 
 namespace vdi::gpu {
 
-class Commands;
 class Device;
 
 /// SPIR-V of `shaders/<name>.comp`, compiled at build time and embedded in the library; asserts that the name
@@ -72,34 +69,6 @@ class ComputePipeline {
   VkDescriptorSet set_ = VK_NULL_HANDLE;
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkPipeline pipeline_ = VK_NULL_HANDLE;
-};
-
-/// Pipelines of one shader that differ in specialisation, each made when it's first asked for.
-class PipelineSet {
- public:
-  /// `common`: but for the specialisation.
-  PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common);
-  /// With the uniforms of another set, which updates them.
-  PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);
-  ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
-  /// What the uniforms of all pipelines are for what's recorded next; nothing is recorded where they are that
-  /// already. They're in the device's own memory, where shaders read them as fast as constants: a GPU would
-  /// fetch them from the host's memory again and again.
-  template <typename Uniforms>
-  void update(Commands& commands, const Uniforms& uniforms) {
-    updateBytes(commands, std::as_bytes(std::span(&uniforms, 1)));
-  }
-
- private:
-  void updateBytes(Commands& commands, std::span<const std::byte> bytes);
-
-  std::shared_ptr<Device> device_;
-  ComputePipelineInfo common_;
-  std::shared_ptr<const Buffer> uniforms_;  // of all of them; none: they have no uniforms
-  std::vector<std::byte> updated_;          // what they are since the last update
-  const Commands* updatedBy_ = nullptr;     // where that was recorded
-  std::uint64_t updatedBehind_ = 0;         // and behind how many submissions of it
-  std::map<std::vector<std::uint32_t>, std::unique_ptr<ComputePipeline>> pipelines_;
 };
 
 }  // namespace vdi::gpu

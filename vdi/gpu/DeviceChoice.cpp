@@ -6,7 +6,6 @@
 #include <cctype>
 
 #include "vdi/core/Error.h"
-#include "vdi/gpu/Device.h"
 
 namespace vdi::gpu {
 
@@ -17,33 +16,18 @@ std::string lower(std::string text) {
   return text;
 }
 
-const char* typeName(VkPhysicalDeviceType type) {
+const char* typeName(DeviceType type) {
   switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+    case DeviceType::Discrete:
       return "discrete";
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+    case DeviceType::Integrated:
       return "integrated";
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+    case DeviceType::Virtual:
       return "virtual";
-    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+    case DeviceType::Cpu:
       return "CPU";
     default:
       return "other";
-  }
-}
-
-int preference(VkPhysicalDeviceType type) {
-  switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
-      return 4;
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
-      return 3;
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
-      return 2;
-    case VK_PHYSICAL_DEVICE_TYPE_CPU:
-      return 1;
-    default:
-      return 0;
   }
 }
 
@@ -75,9 +59,9 @@ std::size_t chooseDevice(std::span<const DeviceSummary> devices, const DeviceReq
   for (std::size_t i = 0; i < devices.size(); ++i) {
     if (!devices[i].refusals.empty() || !selected(devices[i], i, request.selector)) continue;
     if (!best.empty()) {
-      const int lead = preference(devices[i].type) - preference(devices[best.front()].type);
-      if (lead < 0) continue;
-      if (lead > 0) best.clear();
+      const DeviceType before = devices[best.front()].type;
+      if (devices[i].type < before) continue;
+      if (devices[i].type > before) best.clear();
     }
     best.push_back(i);
   }

@@ -1,7 +1,5 @@
-// Which of a machine's devices to use: the part of Device::create that needs no Vulkan call.
+// Which of a machine's devices to use: the part of Device::create that has nothing to do with Vulkan.
 #pragma once
-
-#include <vulkan/vulkan.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -9,16 +7,19 @@
 #include <string>
 #include <vector>
 
+#include "vdi/gpu/DeviceRequest.h"
+
 namespace vdi::gpu {
 
-struct DeviceRequest;
+/// The later, the better.
+enum class DeviceType { Other, Cpu, Virtual, Integrated, Discrete };
 
 struct DeviceSummary {
   std::string name;
-  VkPhysicalDeviceType type = VK_PHYSICAL_DEVICE_TYPE_OTHER;
+  DeviceType type = DeviceType::Other;
   std::string driver;                 // name and version
   std::uint64_t memoryBytes = 0;      // of the largest device-local heap
-  std::vector<std::string> refusals;  // everything that's demanded and missing; empty: usable
+  std::vector<std::string> refusals;  // everything that's required and missing; empty: usable
 };
 
 /// A line per device: index, name, type, driver, memory, "usable" or why not. One line that says so when

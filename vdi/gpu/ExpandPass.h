@@ -5,7 +5,7 @@
 
 #include "shaders/shared/render.h"
 #include "vdi/gpu/Commands.h"
-#include "vdi/gpu/ComputePipeline.h"
+#include "vdi/gpu/PipelineSet.h"
 
 namespace vdi::gpu {
 

@@ -61,7 +61,7 @@ class Builder {
       return;
     }
     const Plane plane = choosePlane(bricks);
-    if (plane.axis < 0 || depth >= kdMaxDepth) {
+    if (plane.axis < 0 || depth >= shared::kdMaxDepth) {
       throw Error(ErrorCode::InvalidArgument, "the owned boxes of two blocks overlap");
     }
     std::vector<Brick> below;

@@ -12,9 +12,6 @@ struct KdTree {
   std::vector<shared::Brick> bricks;  // one per leaf; a brick that a plane had to cut appears once per part
 };
 
-/// The deepest tree that cast.comp has stack for.
-inline constexpr int kdMaxDepth = 40;
-
 /// Splits space by faces of bricks until every leaf holds one brick or none, cutting as few bricks as it can.
 /// Disjoint boxes can always be separated so; throws Error{InvalidArgument} when two overlap.
 KdTree buildKdTree(std::vector<shared::Brick> bricks);

@@ -9,6 +9,8 @@
 
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Device.h"
+#include "vdi/gpu/VulkanDevice.h"
+#include "vdi/gpu/VulkanResult.h"
 
 namespace vdi::gpu {
 
@@ -42,22 +44,34 @@ VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::
                         const void* chain, const char* what) {
   const VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, chain, needs.size, type};
   VkDeviceMemory memory = VK_NULL_HANDLE;
-  demandRoom(vkAllocateMemory(device.handle(), &info, nullptr, &memory), "vkAllocateMemory", device,
+  demandRoom(vkAllocateMemory(device.vulkan().handle(), &info, nullptr, &memory), "vkAllocateMemory", device,
              needs.size, what);
   device.accountAllocation(static_cast<std::int64_t>(needs.size));
   return memory;
+}
+
+const char* nameOf(MemoryKind kind) {
+  switch (kind) {
+    case MemoryKind::DeviceLocal:
+      return "device-local";
+    case MemoryKind::Upload:
+      return "upload";
+    case MemoryKind::Readback:
+      return "readback";
+  }
+  return "unknown";
 }
 
 std::uint32_t memoryTypeFor(const Device& device, std::uint32_t typeBits, MemoryKind kind) {
   constexpr VkMemoryPropertyFlags host =
       VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
   if (kind == MemoryKind::DeviceLocal)
-    return device.memoryType(typeBits, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
+    return device.vulkan().memoryType(typeBits, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
   if (kind == MemoryKind::Readback) {
-    const auto cached = device.findMemoryType(typeBits, host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
+    const auto cached = device.vulkan().findMemoryType(typeBits, host | VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
     if (cached) return *cached;
   }
-  return device.memoryType(typeBits, host);
+  return device.vulkan().memoryType(typeBits, host);
 }
 
 }  // namespace
@@ -97,23 +111,25 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
                                   VK_SHARING_MODE_EXCLUSIVE,
                                   0,
                                   nullptr};
-    demandRoom(vkCreateBuffer(device_->handle(), &info, nullptr, &buffer_), "vkCreateBuffer", *device_, words,
-               "buffer");
+    demandRoom(vkCreateBuffer(device_->vulkan().handle(), &info, nullptr, &buffer_), "vkCreateBuffer",
+               *device_, words, "buffer");
     VkMemoryRequirements needs;
-    vkGetBufferMemoryRequirements(device_->handle(), buffer_, &needs);
+    vkGetBufferMemoryRequirements(device_->vulkan().handle(), buffer_, &needs);
     const VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO, nullptr,
                                           VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT, 0};
     memory_ =
         allocate(*device_, needs, memoryTypeFor(*device_, needs.memoryTypeBits, kind), &flags, "buffer");
     allocated_ = needs.size;
-    demandRoom(vkBindBufferMemory(device_->handle(), buffer_, memory_, 0), "vkBindBufferMemory", *device_,
-               words, "buffer");
+    demandRoom(vkBindBufferMemory(device_->vulkan().handle(), buffer_, memory_, 0), "vkBindBufferMemory",
+               *device_, words, "buffer");
     const VkBufferDeviceAddressInfo addressInfo{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, nullptr,
                                                 buffer_};
-    address_ = vkGetBufferDeviceAddress(device_->handle(), &addressInfo);
+    address_ = vkGetBufferDeviceAddress(device_->vulkan().handle(), &addressInfo);
+    device_->vulkan().setName(VK_OBJECT_TYPE_BUFFER, buffer_,
+                              fmt::format("{} buffer of {} bytes", nameOf(kind), size_));
     if (kind != MemoryKind::DeviceLocal) {
       void* data = nullptr;
-      check(vkMapMemory(device_->handle(), memory_, 0, VK_WHOLE_SIZE, 0, &data), "vkMapMemory");
+      check(vkMapMemory(device_->vulkan().handle(), memory_, 0, VK_WHOLE_SIZE, 0, &data), "vkMapMemory");
       mapped_ = {static_cast<std::byte*>(data), size_};
     }
   } catch (...) {
@@ -148,23 +164,23 @@ std::optional<ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& de
                                       VK_SHARING_MODE_EXCLUSIVE,
                                       0,
                                       nullptr};
-  if (vkCreateBuffer(device->handle(), &bufferInfo, nullptr, &buffer.buffer_) != VK_SUCCESS) {
+  if (vkCreateBuffer(device->vulkan().handle(), &bufferInfo, nullptr, &buffer.buffer_) != VK_SUCCESS) {
     buffer.buffer_ = VK_NULL_HANDLE;
     return std::nullopt;
   }
   VkMemoryRequirements needs;
-  vkGetBufferMemoryRequirements(device->handle(), buffer.buffer_, &needs);
-  const std::optional<std::uint32_t> type =
-      device->findMemoryType(needs.memoryTypeBits & device->memoryTypesOfHostPointer(pages), 0);
+  vkGetBufferMemoryRequirements(device->vulkan().handle(), buffer.buffer_, &needs);
+  const std::optional<std::uint32_t> type = device->vulkan().findMemoryType(
+      needs.memoryTypeBits & device->vulkan().memoryTypesOfHostPointer(pages), 0);
   if (!type || needs.size > size) return std::nullopt;
   const VkImportMemoryHostPointerInfoEXT import{VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT,
                                                 nullptr, handleType, pages};
   const VkMemoryAllocateInfo memoryInfo{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, &import, size, *type};
-  if (vkAllocateMemory(device->handle(), &memoryInfo, nullptr, &buffer.memory_) != VK_SUCCESS) {
+  if (vkAllocateMemory(device->vulkan().handle(), &memoryInfo, nullptr, &buffer.memory_) != VK_SUCCESS) {
     buffer.memory_ = VK_NULL_HANDLE;
     return std::nullopt;
   }
-  if (vkBindBufferMemory(device->handle(), buffer.buffer_, buffer.memory_, 0) != VK_SUCCESS)
+  if (vkBindBufferMemory(device->vulkan().handle(), buffer.buffer_, buffer.memory_, 0) != VK_SUCCESS)
     return std::nullopt;
   return result;
 }
@@ -210,8 +226,8 @@ bool Buffer::reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes,
 
 void Buffer::release() noexcept {
   if (!device_) return;
-  if (buffer_ != VK_NULL_HANDLE) vkDestroyBuffer(device_->handle(), buffer_, nullptr);
-  if (memory_ != VK_NULL_HANDLE) vkFreeMemory(device_->handle(), memory_, nullptr);
+  if (buffer_ != VK_NULL_HANDLE) vkDestroyBuffer(device_->vulkan().handle(), buffer_, nullptr);
+  if (memory_ != VK_NULL_HANDLE) vkFreeMemory(device_->vulkan().handle(), memory_, nullptr);
   device_->accountAllocation(-static_cast<std::int64_t>(allocated_));
   buffer_ = VK_NULL_HANDLE;
   memory_ = VK_NULL_HANDLE;
@@ -243,8 +259,8 @@ SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& ext
   // Drivers compute with sizes that overflow beyond what they can hold: ours decides first.
   const std::uint64_t bytes = std::uint64_t{extent.x} * extent.y * extent.z * texelBytes(format);
   if (bytes > device_->limits().maxAllocationBytes) throwOutOfMemory(*device_, bytes, "texture");
-  const std::array families{device_->queueFamily(QueueKind::Compute),
-                            device_->queueFamily(QueueKind::Transfer)};
+  const std::array families{device_->vulkan().queueFamily(QueueKind::Compute),
+                            device_->vulkan().queueFamily(QueueKind::Transfer)};
   const bool shared = families[0] != families[1];
   try {
     const VkImageCreateInfo info{VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
@@ -262,20 +278,22 @@ SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& ext
                                  shared ? 2U : 0U,
                                  families.data(),
                                  VK_IMAGE_LAYOUT_UNDEFINED};
-    demandRoom(vkCreateImage(device_->handle(), &info, nullptr, &image_), "vkCreateImage", *device_, bytes,
-               "texture");
+    demandRoom(vkCreateImage(device_->vulkan().handle(), &info, nullptr, &image_), "vkCreateImage", *device_,
+               bytes, "texture");
     VkMemoryRequirements needs;
-    vkGetImageMemoryRequirements(device_->handle(), image_, &needs);
+    vkGetImageMemoryRequirements(device_->vulkan().handle(), image_, &needs);
     memory_ =
         allocate(*device_, needs, memoryTypeFor(*device_, needs.memoryTypeBits, MemoryKind::DeviceLocal),
                  nullptr, "texture");
     allocated_ = needs.size;
-    demandRoom(vkBindImageMemory(device_->handle(), image_, memory_, 0), "vkBindImageMemory", *device_, bytes,
-               "texture");
+    demandRoom(vkBindImageMemory(device_->vulkan().handle(), image_, memory_, 0), "vkBindImageMemory",
+               *device_, bytes, "texture");
     const VkImageViewCreateInfo viewInfo{
         VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO, nullptr, 0, image_, viewType, format, {},
         {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};
-    check(vkCreateImageView(device_->handle(), &viewInfo, nullptr, &view_), "vkCreateImageView");
+    check(vkCreateImageView(device_->vulkan().handle(), &viewInfo, nullptr, &view_), "vkCreateImageView");
+    device_->vulkan().setName(VK_OBJECT_TYPE_IMAGE, image_,
+                              fmt::format("texture of {} x {} x {}", extent.x, extent.y, extent.z));
   } catch (...) {
     release();
     throw;
@@ -305,9 +323,9 @@ SampledImage& SampledImage::operator=(SampledImage&& other) noexcept {
 
 void SampledImage::release() noexcept {
   if (!device_) return;
-  if (view_ != VK_NULL_HANDLE) vkDestroyImageView(device_->handle(), view_, nullptr);
-  if (image_ != VK_NULL_HANDLE) vkDestroyImage(device_->handle(), image_, nullptr);
-  if (memory_ != VK_NULL_HANDLE) vkFreeMemory(device_->handle(), memory_, nullptr);
+  if (view_ != VK_NULL_HANDLE) vkDestroyImageView(device_->vulkan().handle(), view_, nullptr);
+  if (image_ != VK_NULL_HANDLE) vkDestroyImage(device_->vulkan().handle(), image_, nullptr);
+  if (memory_ != VK_NULL_HANDLE) vkFreeMemory(device_->vulkan().handle(), memory_, nullptr);
   device_->accountAllocation(-static_cast<std::int64_t>(allocated_));
   view_ = VK_NULL_HANDLE;
   image_ = VK_NULL_HANDLE;
@@ -325,11 +343,11 @@ Sampler::Sampler(std::shared_ptr<Device> device) : device_(std::move(device)) {
   info.addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
   info.addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
   info.addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
-  check(vkCreateSampler(device_->handle(), &info, nullptr, &sampler_), "vkCreateSampler");
+  check(vkCreateSampler(device_->vulkan().handle(), &info, nullptr, &sampler_), "vkCreateSampler");
 }
 
 Sampler::~Sampler() {
-  vkDestroySampler(device_->handle(), sampler_, nullptr);
+  vkDestroySampler(device_->vulkan().handle(), sampler_, nullptr);
 }
 
 }  // namespace vdi::gpu

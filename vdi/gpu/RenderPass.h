@@ -8,8 +8,8 @@
 #include "shaders/shared/render.h"
 #include "vdi/core/Reconstruction.h"
 #include "vdi/gpu/Commands.h"
-#include "vdi/gpu/ComputePipeline.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/PipelineSet.h"
 
 namespace vdi {
 class View;

@@ -7,7 +7,7 @@
 
 #include "shaders/shared/scan.h"
 #include "vdi/gpu/Commands.h"
-#include "vdi/gpu/ComputePipeline.h"
+#include "vdi/gpu/PipelineSet.h"
 #include "vdi/gpu/Memory.h"
 
 namespace vdi::gpu {

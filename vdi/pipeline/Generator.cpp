@@ -18,6 +18,7 @@
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Distributor.h"
+#include "vdi/pipeline/Fingerprint.h"
 #include "vdi/pipeline/Gather.h"
 #include "vdi/pipeline/Pipeline.h"
 #include "vdi/pipeline/RayCaster.h"
@@ -41,64 +42,6 @@ class Stopwatch {
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
-
-/// FNV-1a over the bytes of plain values: equal parameters have equal fingerprints on every rank.
-class Fingerprint {
- public:
-  template <typename T>
-  void add(const T& value) {
-    static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
-    std::array<unsigned char, sizeof(T)> bytes{};
-    std::memcpy(bytes.data(), &value, sizeof(T));
-    for (const unsigned char byte : bytes) hash_ = (hash_ ^ byte) * 0x100000001b3ULL;
-  }
-  void add(const glm::dvec3& v) {
-    for (int axis = 0; axis < 3; ++axis) add(v[axis]);
-  }
-  std::uint64_t value() const { return hash_; }
-
- private:
-  std::uint64_t hash_ = 0xcbf29ce484222325ULL;
-};
-
-std::uint64_t fingerprintOf(const Camera& camera) {
-  Fingerprint print;
-  print.add(camera.position);
-  print.add(camera.focalPoint);
-  print.add(camera.viewUp);
-  print.add(camera.viewAngle);
-  print.add(camera.parallelProjection);
-  print.add(camera.parallelScale);
-  return print.value();
-}
-
-std::uint64_t fingerprintOf(const TransferFunction& function) {
-  Fingerprint print;
-  for (const ColorNode& node : function.colors) {
-    print.add(node.x);
-    print.add(node.color);
-  }
-  for (const OpacityNode& node : function.opacities) {
-    print.add(node.x);
-    print.add(node.opacity);
-  }
-  print.add(function.unitDistance);
-  return print.value();
-}
-
-std::uint64_t fingerprintOf(const GenerateSettings& settings) {
-  Fingerprint print;
-  print.add(settings.width);
-  print.add(settings.height);
-  print.add(settings.supersegments);
-  print.add(settings.budget);
-  print.add(settings.fill);
-  print.add(settings.samplesPerVoxel);
-  print.add(settings.algorithm);
-  print.add(settings.precision);
-  print.add(settings.terminationOpacity);
-  return print.value();
-}
 
 /// What's known of a time step's blocks.
 struct Step {
@@ -239,11 +182,12 @@ struct VdiGenerator::State {
           Prepared{view, depthLattice(shown.scene, view, settings.samplesPerVoxel), bake(function)});
       demandSpans(prepared->table);
     });
-    const std::array prints{comm::Communicator::Fingerprint{fingerprintOf(camera), "camera"},
-                            comm::Communicator::Fingerprint{fingerprintOf(function), "transfer function"},
-                            comm::Communicator::Fingerprint{
-                                fingerprintOf(settings),
-                                "resolution, supersegments, budget, sampling rate, algorithm or precision"}};
+    const std::array prints{
+        comm::Communicator::Fingerprint{detail::fingerprintOf(camera), "camera"},
+        comm::Communicator::Fingerprint{detail::fingerprintOf(function), "transfer function"},
+        comm::Communicator::Fingerprint{
+            detail::fingerprintOf(settings),
+            "resolution, supersegments, budget, sampling rate, algorithm or precision"}};
     comm.demandEqual(prints);
     mine = {};
     mine.uploadSeconds = std::exchange(shown.uploadSeconds, 0.0);

@@ -8,11 +8,12 @@ namespace vdi::reference {
 
 namespace {
 
-constexpr float mostCarriedDepth = 1.0F / 16.0F;
-constexpr float mostDepthChange = 0.25F;  // of the supersegment's own
-constexpr float thinnestStep = 0.0002F;   // of opticalDepthOfCode
-constexpr float mostColorChange = 3.0F / 255.0F;
-constexpr float unseen = 1e-6F;
+using shared::mostCarriedDepth;
+using shared::mostColorChange;
+using shared::mostDepthChange;
+using shared::thinnestStep;
+using shared::unseen;
+static_assert(shared::mostDepthCode == static_cast<float>(DepthCode::largest));
 
 std::uint32_t codeOfOpticalDepth(float opticalDepth) {
   const float code = std::log2(1.0F + 16.0F * std::max(opticalDepth, 0.0F)) * (4095.0F / 16.0F);

@@ -213,13 +213,15 @@ Image renderVolume(const Frame& frame, std::span<const Block> blocks) {
 
 namespace {
 
+constexpr int stride = countedStride;
+
 /// The counted lists around a list along an axis: before and behind it; the last one where there's none
 /// behind.
 int countedBefore(int i) {
-  return i - i % countedStride;
+  return i - i % stride;
 }
 int countedBehind(int i, int size) {
-  const int next = countedBefore(i + countedStride - 1);
+  const int next = countedBefore(i + stride - 1);
   return next < size ? next : countedBefore(i);
 }
 
@@ -234,8 +236,8 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
   // A rank's own lists get N_S each: what a list needs is known when all ranks' are together.
   if (frame.settings.budget == Budget::Total && !cutAtGaps) {
     Survey survey;
-    for (int y = 0; y < height; y += countedStride) {
-      for (int x = 0; x < width; x += countedStride)
+    for (int y = 0; y < height; y += stride) {
+      for (int x = 0; x < width; x += stride)
         addTo(survey, castRay(frame, blocks, x, y, atOnce), rules, atOnce);
     }
     rules.level = survey.levelFor(frame.settings.fill);
@@ -274,15 +276,15 @@ std::vector<SupersegmentLists> generateTogether(const Frame& frame,
   const std::uint32_t atOnce = countedSamplesFor(frame.lattice.count, frame.settings.supersegments);
   const int width = frame.view.width();
   const int height = frame.view.height();
-  const int countedWidth = (width + countedStride - 1) / countedStride;
-  const int countedHeight = (height + countedStride - 1) / countedStride;
+  const int countedWidth = (width + stride - 1) / stride;
+  const int countedHeight = (height + stride - 1) / stride;
   std::vector<std::vector<Allotment>> agreed(ranks.size());  // of each rank's counted lists
   for (int y = 0; y < countedHeight; ++y) {
     for (int x = 0; x < countedWidth; ++x) {
       std::vector<CountedLevels> levels;
       CountedLevels sum;
       for (const std::vector<Block>& blocks : ranks) {
-        levels.push_back(countedLevels(castRay(frame, blocks, x * countedStride, y * countedStride, atOnce),
+        levels.push_back(countedLevels(castRay(frame, blocks, x * stride, y * stride, atOnce),
                                        rules, atOnce));
         sum.shift = levels.back().shift;
         sum += levels.back();
@@ -296,8 +298,8 @@ std::vector<SupersegmentLists> generateTogether(const Frame& frame,
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const auto at = [&](int column, int row) {
-          return agreed[r][static_cast<std::size_t>(row / countedStride * countedWidth +
-                                                    column / countedStride)];
+          return agreed[r][static_cast<std::size_t>(row / stride * countedWidth +
+                                                    column / stride)];
         };
         const int left = countedBefore(x);
         const int right = countedBehind(x, width);

@@ -11,7 +11,7 @@ namespace vdi::reference {
 
 namespace {
 
-constexpr float unlimited = 3.4e38F;
+using shared::unlimited;
 
 /// Colour and opacity of material over one sample.
 struct Appearance {
@@ -233,7 +233,8 @@ void mergeCheapest(std::vector<Grain>& grains, std::size_t most, float sampleSte
 
 namespace {
 
-static_assert(Survey::levels == toleranceLevels + 2);
+static_assert(Survey::levels == toleranceLevels + 2 && Survey::levels == shared::surveyLevels);
+static_assert(shared::maxOpticalDepth == maxExtinction);
 
 std::size_t visibleSamples(std::span<const Interval> intervals, std::size_t atOnce) {
   return atOnce * static_cast<std::size_t>(

@@ -1,6 +1,7 @@
 // How the intervals along one ray become supersegments: the exchangeable piece of generation and compositing.
 // Generation feeds it samples, compositing feeds it sub-supersegments; both are intervals of constant colour
-// (paper, section 5.2). The shaders' twin is shaders/segmenter.glsl and shaders/search.glsl.
+// (paper, section 5.2). The constants are in shaders/shared/segmenting.h. The shaders' twin is
+// shaders/segmenter.glsl and shaders/search.glsl.
 #pragma once
 
 #include <array>
@@ -8,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "shaders/shared/segmenting.h"
 #include "vdi/core/Budget.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Vdi.h"
@@ -60,11 +62,11 @@ std::size_t countRuns(std::span<const Interval> intervals);
 ///   at least
 ///     85 % of what the list may hold, or the bounds are closer than a factor of 1.001, or after 22 tries.
 ///     The smallest sensitivity that was seen to fit wins.
-inline constexpr float smallestSensitivity = 1e-4F;
-inline constexpr float largestSensitivity = 2.0F;  // the norm of a difference of two vectors in [0, 1]^4
-inline constexpr int mostTries = 22;
-inline constexpr float goodFill = 0.85F;
-inline constexpr float closeBounds = 1.001F;
+using shared::closeBounds;
+using shared::goodFill;
+using shared::largestSensitivity;
+using shared::mostTries;
+using shared::smallestSensitivity;
 std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals, const SegmentRules& rules);
 
 /// The default: no search for a sensitivity, and nothing that depends on one threshold for the whole list.
@@ -87,11 +89,11 @@ std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals
 /// The tolerances are counted side by side in one walk along the ray, so that a device needs two walks in
 /// all (Budget::Total takes one more, for its Survey); and where no gaps must be kept, only one ray of
 /// countedStride x countedStride is counted, see Allotment.
-inline constexpr int toleranceLevels = 8;
-inline constexpr float finestTolerance = 0.002F;
-inline constexpr float toleranceRatio = 4.0F;
-inline constexpr std::uint32_t grainsPerBudget = 2;
-inline constexpr float hiddenWeight = 0.15F;
+using shared::finestTolerance;
+using shared::grainsPerBudget;
+using shared::hiddenWeight;
+using shared::toleranceLevels;
+using shared::toleranceRatio;
 
 /// What step 2 may do for a list: its tolerance, and the grains that counting found. There's room for a few
 /// more; when fewer than spareGrains of that are left, the tolerance grows by toleranceRatio with each
@@ -108,15 +110,10 @@ struct Allotment {
   std::uint32_t runs = 0;
   bool operator==(const Allotment&) const = default;
 };
-inline constexpr std::uint32_t spareGrains = 4;
-inline constexpr std::uint32_t uncountedSpareGrains = 8;  // and a quarter of `grains`
-inline constexpr int countedStride = 4;
-/// A ray that's counted for others takes one sample for this many: the more, the longer rays are for their
-/// lists' budget, for a device waits for the longest ray.
-constexpr std::uint32_t countedSamplesFor(std::uint32_t latticeCount, std::uint32_t budget) {
-  const std::uint32_t share = latticeCount / (16 * budget);
-  return share < 1 ? 1 : share > 2 ? 2 : share;
-}
+using shared::countedSamplesFor;
+using shared::countedStride;
+using shared::spareGrains;
+using shared::uncountedSpareGrains;
 
 /// Counts. `atOnce`: samples that an interval stands for.
 Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce = 1);
