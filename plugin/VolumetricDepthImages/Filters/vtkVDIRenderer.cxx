@@ -6,7 +6,7 @@
 #include <vtkObjectFactory.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
-#include <set>
+#include <optional>
 #include <utility>
 
 #include "VDIImageData.h"
@@ -23,7 +23,7 @@ struct vtkVDIRenderer::Internals {
   vtkMTimeType UploadedTime = 0;
   vdi::Camera Original;
   vdi::Box Bounds;
-  std::set<vdi::ViewpointIssue> Warned;
+  std::optional<vdi::ViewpointIssue> Warned;  // of the last picture
   int Width = 0;
   int Height = 0;
 };
@@ -137,5 +137,6 @@ void vtkVDIRenderer::WarnOf(const vdi::Camera& camera, int width, int height) {
   Internals& internal = *this->Internal;
   const auto issue =
       vdi::viewpointIssue(internal.Bounds, internal.Original, vdi::View(camera, width, height));
-  if (issue && internal.Warned.insert(*issue).second) vtkWarningMacro(<< describe(*issue));
+  if (issue && issue != internal.Warned) vtkWarningMacro(<< describe(*issue));
+  internal.Warned = issue;
 }

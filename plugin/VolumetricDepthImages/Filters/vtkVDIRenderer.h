@@ -30,7 +30,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
    * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off), and where position and
    * focal point are the same, as they are unless set, the VDI's own is used, turned by Azimuth degrees as
    * vtkCamera::Azimuth does: about its focal point, around its view-up as set. A viewpoint that shows nothing
-   * true (vdi::ViewpointIssue) gets a warning, once each.
+   * true (vdi::ViewpointIssue) gets a warning, unless the picture before had the same.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);

@@ -1,9 +1,11 @@
-// Property widget `vdi_camera_from_view`: a button that copies the active view's camera into the proxy's
-// Camera properties.
+// Property widget `vdi_camera_from_view`: a button that sets a RenderVDI's camera to the active view's, and a
+// line that says why it can't.
 #ifndef pqCameraFromViewWidget_h
 #define pqCameraFromViewWidget_h
 
 #include <pqPropertyWidget.h>
+
+class QLabel;
 
 class pqCameraFromViewWidget : public pqPropertyWidget {
   Q_OBJECT
@@ -14,6 +16,9 @@ class pqCameraFromViewWidget : public pqPropertyWidget {
 
  private Q_SLOTS:
   void copyCamera();
+
+ private:
+  QLabel* Line;
 };
 
 #endif
