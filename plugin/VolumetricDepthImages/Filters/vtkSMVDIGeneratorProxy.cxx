@@ -112,6 +112,18 @@ vdi::Camera cameraOf(vtkCamera* camera) {
           camera->GetParallelProjection() != 0, camera->GetParallelScale()};
 }
 
+/// Whether somebody has placed the view's camera: it isn't where new views have it.
+bool isPlaced(vtkSMRenderViewProxy* view) {
+  vtkSMProxy* initial =
+      view->GetSessionProxyManager()->GetPrototypeProxy(view->GetXMLGroup(), view->GetXMLName());
+  const auto isInitial = [initial](const char* property, const double* now) {
+    return vtkSMPropertyHelper(initial, property).GetDoubleArray() == std::vector<double>(now, now + 3);
+  };
+  vtkCamera* camera = view->GetActiveCamera();
+  return !isInitial("CameraPosition", camera->GetPosition()) ||
+         !isInitial("CameraFocalPoint", camera->GetFocalPoint());
+}
+
 /// The view's size; larger ones are brought down to as many pixels as 1920 x 1080 has, for a VDI's time and
 /// size grow with them.
 std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
@@ -177,9 +189,7 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   vtkSMRenderViewProxy* view = this->ActiveView();
   if (view == nullptr) return;
   vtkSMProxy* shown = this->RepresentationIn(view);
-  // A script's new view has a camera that nobody has placed.
-  const vtkNew<vtkCamera> initial;
-  const bool placed = !(cameraOf(view->GetActiveCamera()) == cameraOf(initial));
+  const bool placed = isPlaced(view);
   if (shown == nullptr && !placed) return;
   vtkSMPropertyHelper unit(this, "ScalarOpacityUnitDistance");
   if (unit.GetAsDouble() == 0.0 && shown != nullptr && shown->GetProperty("ScalarOpacityUnitDistance") != nullptr)
