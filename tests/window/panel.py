@@ -58,8 +58,8 @@ def save_data(window, name):
     wait_for(name, lambda: os.path.exists(name), 60)
 
 
-def is_making(window):
-    return window.text_that_begins("Making the VDI anew") is not None
+def is_making(window, panel):
+    return window.text_that_begins("Making the VDI anew", panel) is not None
 
 
 def first_session(window):
@@ -94,30 +94,43 @@ def first_session(window):
     time.sleep(1)
     editor = window.find("Color Map and Opacity of the VDI", "dialog").box
     window.screenshot("5_colors.png")
+    panel = window.find("Properties", "frame")
     right, top = editor[0] + editor[2] - 56, editor[1] + 199
     with Pulse(window) as pulse:
         window.drag((right, top), (right, top + 90), steps=30, seconds=1.5)
-        wait_for("new VDI", lambda: is_making(window), 30)
-        window.screenshot("6_making.png")
-        wait_for("end of making the VDI", lambda: not is_making(window), 120)
+        window.screenshot("6_dragged.png")
+        wait_for("new VDI", lambda: is_making(window, panel), 30)
+        window.screenshot("7_making.png")
+        wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
         time.sleep(1)
-    window.screenshot("7_edited.png")
+    window.screenshot("8_edited.png")
     print("a colour edit: the window took at most %.3f s to answer" % pulse.longest, flush=True)
     check(pulse.longest <= ANSWER_SECONDS, "an edit doesn't freeze the window")
-    window.close_dialog("Color Map and Opacity of the VDI")
+    window.click("builtin:")  # nothing is shown of that
+    check(not window.has("Color Map and Opacity of the VDI", "dialog"), "the editor closes where nothing is shown")
+    window.click("VolumetricDepthImage1")
+    panel = window.find("Properties", "frame")
+
+    window.drag((x + width // 2, y + height // 2), (x + width // 2 - 60, y + height // 2 + 30))
+    time.sleep(1)
+    before = window.values()
+    window.click("Regenerate From This View")
+    wait_for("new VDI", lambda: is_making(window, panel), 30)
+    wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
+    check(window.values() != before, "the button sets the camera")
 
     window.menu("Tools", "Stop Trace")
     trace = wait_for("trace", lambda: window.text_that_begins("# trace generated"))
     with open(path("trace.py"), "w") as file:
         file.write(LOAD + trace + REPLAY)
-    window.screenshot("8_trace.png")
+    window.screenshot("9_trace.png")
     window.close_dialog("Script Editor")
     for name in ("CameraPosition", "Resolution", "ScalarOpacityUnitDistance"):
         check("volumetricDepthImage1.%s = " % name in trace, "the trace has " + name)
 
     save_data(window, vdi)
     time.sleep(1)
-    window.screenshot("9_saved.png")
+    window.screenshot("10_saved.png")
     check(not window.has("Configure Writer", "dialog") and not window.has("OK", "push button"),
           "Save Data asks nothing twice")
     window.menu("File", "Save State...")
@@ -130,14 +143,17 @@ def first_session(window):
 
 def second_session(window, state):
     vdi = path("from_state.vdi")
-    load_plugin(window)
+    window.click("Reset Session", "push button")
+    if window.has("Yes", "push button"):
+        window.click("Yes", "push button")
+    wait_for("empty pipeline", lambda: not window.has("VolumetricDepthImage1"))
     window.menu("File", "Load State...")
     window.find("File name:", seconds=10)
     window.type(state)
     window.key("Return")
     wait_for("filter", lambda: window.has("VolumetricDepthImage1"), 120)
     time.sleep(5)
-    window.screenshot("10_state.png")
+    window.screenshot("11_state.png")
     window.click("VolumetricDepthImage1")
     save_data(window, vdi)
     return vdi
@@ -146,7 +162,6 @@ def second_session(window, state):
 with Screen() as screen:
     with Window(screen, output=OUTPUT) as window:
         vdi, state = first_session(window)
-    with Window(screen, output=OUTPUT) as window:
         from_state = second_session(window, state)
     replayed = path("replayed.vdi")
     subprocess.run(["pvbatch", os.path.join(OUTPUT, "trace.py")], check=True, timeout=200,

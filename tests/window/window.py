@@ -124,6 +124,8 @@ class Screen:
         with os.fdopen(read) as number:
             os.environ["DISPLAY"] = ":" + number.readline().strip()
         self.bus = Bus()
+        # Where Qt looks first; asking the session's bus instead, it often comes too late to notice that it's wanted.
+        subprocess.run(["xprop", "-root", "-f", "AT_SPI_BUS", "8s", "-set", "AT_SPI_BUS", self.bus.address], check=True)
         self.manager = subprocess.Popen(["openbox", "--sm-disable"], stderr=subprocess.DEVNULL)
         return self
 
@@ -144,9 +146,8 @@ class Window:
         shutil.rmtree(home, ignore_errors=True)
         os.makedirs(home)
         environment = dict(os.environ, HOME=home, QT_ACCESSIBILITY="1", QT_LINUX_ACCESSIBILITY_ALWAYS_ON="1",
-                           AT_SPI_BUS_ADDRESS=self.screen.bus.address, LC_ALL="C.UTF-8",
-                           PV_PLUGIN_CONFIG_FILE=os.environ.get("VDI_PLUGIN_LIST", ""))
-        for _ in range(30):
+                           LC_ALL="C.UTF-8", PV_PLUGIN_CONFIG_FILE=os.environ.get("VDI_PLUGIN_LIST", ""))
+        for _ in range(40):
             self.log = open(os.path.join(self.output, "paraview.log"), "w+")
             self.process = subprocess.Popen(["paraview", "--disable-registry", *self.arguments], env=environment,
                                             stdout=self.log, stderr=subprocess.STDOUT)
@@ -154,7 +155,7 @@ class Window:
             program = wait_for("ParaView on the bus", lambda: self.screen.bus.program(self.process.pid))
             self.root = Widget(self.screen.bus, program)
             try:
-                wait_for("answer of ParaView", self._answers, 1.5)
+                wait_for("answer of ParaView", self._answers, 1)
                 self.place()
                 return self
             except AssertionError:  # Qt 5.15 is often on the bus and has nothing to say there, until its end
@@ -233,9 +234,9 @@ class Window:
     def is_enabled(self, name, role="push button"):
         return self.find(name, role).has(Widget.ENABLED)
 
-    def text_that_begins(self, begin):
+    def text_that_begins(self, begin, within=None):
         """The visible text, of a label or an editor, that begins so; None if there is none."""
-        for widget in self.widgets():
+        for widget in self.widgets(within):
             try:
                 text = widget.text if widget.role == "text" else widget.name
             except GLib.Error:

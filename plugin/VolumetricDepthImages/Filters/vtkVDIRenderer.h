@@ -62,6 +62,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   void operator=(const vtkVDIRenderer&) = delete;
 
   struct Internals;
+  bool IsOther(vtkDataObject* input);
   void Render(vtkDataObject* input, vtkImageData* output);
   vdi::Camera Viewpoint() const;
   void WarnOf(const vdi::Camera& camera, int width, int height);

@@ -7,6 +7,7 @@
 #include <QPointer>
 
 class QDialog;
+class QLabel;
 class QPushButton;
 
 class pqVDIColorsWidget : public pqPropertyWidget {
@@ -19,9 +20,11 @@ class pqVDIColorsWidget : public pqPropertyWidget {
  private Q_SLOTS:
   void edit();
   void mapChanged();
+  void closeWhereNothingIsShown();
 
  private:
   QPushButton* Button;
+  QLabel* Line;
   QPointer<QDialog> Dialog;
 };
 
