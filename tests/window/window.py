@@ -319,6 +319,11 @@ class Window:
         self.type(item)
         self.key("Return")
 
+    def select(self, row):
+        """In the pipeline browser; row 0 is the server."""
+        x, y, _, _ = self.find("Pipeline Browser", "frame").box
+        self.click((x + 70, y + 32 + 22 * row))
+
     def close_dialog(self, title):
         """By the button of the window manager's frame."""
         for window in xdotool("search", "--onlyvisible", "--name", "^%s$" % title).split():
