@@ -107,9 +107,8 @@ bool WidenOverRanks(double range[2]) {
 
 vdi::Camera cameraOf(vtkCamera* camera) {
   const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
-  return {vector(camera->GetPosition()),        vector(camera->GetFocalPoint()),
-          vector(camera->GetViewUp()),          camera->GetViewAngle(),
-          camera->GetParallelProjection() != 0, camera->GetParallelScale()};
+  return {vector(camera->GetPosition()), vector(camera->GetFocalPoint()),      vector(camera->GetViewUp()),
+          camera->GetViewAngle(),        camera->GetParallelProjection() != 0, camera->GetParallelScale()};
 }
 
 /// Whether somebody has placed the view's camera: it isn't where new views have it.
@@ -132,7 +131,9 @@ std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
   const double width = std::max(size.GetAsInt(0), 1);
   const double height = std::max(size.GetAsInt(1), 1);
   const double scale = std::min(1.0, std::sqrt(most / (width * height)));
-  const auto scaled = [scale](double length) { return std::max(1, static_cast<int>(std::lround(scale * length))); };
+  const auto scaled = [scale](double length) {
+    return std::max(1, static_cast<int>(std::lround(scale * length)));
+  };
   return {scaled(width), scaled(height)};
 }
 
@@ -192,7 +193,8 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   const bool placed = isPlaced(view);
   if (shown == nullptr && !placed) return;
   vtkSMPropertyHelper unit(this, "ScalarOpacityUnitDistance");
-  if (unit.GetAsDouble() == 0.0 && shown != nullptr && shown->GetProperty("ScalarOpacityUnitDistance") != nullptr)
+  if (unit.GetAsDouble() == 0.0 && shown != nullptr &&
+      shown->GetProperty("ScalarOpacityUnitDistance") != nullptr)
     unit.Set(vtkSMPropertyHelper(shown, "ScalarOpacityUnitDistance").GetAsDouble());
   if (placed && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
                     vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray())
@@ -217,10 +219,12 @@ void vtkSMVDIGeneratorProxy::SetCamera(vtkSMProxy* proxy, vtkSMRenderViewProxy* 
 
 std::string vtkSMVDIGeneratorProxy::WhyNot(vtkSMViewProxy* view) {
   auto* renderView = vtkSMRenderViewProxy::SafeDownCast(view);
-  if (renderView == nullptr) return "The active view has no camera. Click into a 3-D view (Render View) first.";
+  if (renderView == nullptr)
+    return "The active view has no camera. Click into a 3-D view (Render View) first.";
   constexpr int planar = 1;  // vtkPVRenderView::INTERACTION_MODE_2D
   if (vtkSMPropertyHelper(renderView, "InteractionMode", true).GetAsInt() == planar)
-    return "The active view is in 2-D mode. Click into a 3-D view that shows the volume, or on the view's 2D button.";
+    return "The active view is in 2-D mode. Click into a 3-D view that shows the volume, or on the view's 2D "
+           "button.";
   return {};
 }
 
@@ -238,10 +242,11 @@ double vtkSMVDIGeneratorProxy::DegreesFrom(vtkSMRenderViewProxy* view) {
     const std::vector<double> v = vtkSMPropertyHelper(this, name).GetDoubleArray();
     return glm::dvec3(v[0], v[1], v[2]);
   };
-  const vdi::Camera own{.position = vector("CameraPosition"),
-                        .focalPoint = vector("CameraFocalPoint"),
-                        .viewUp = vector("CameraViewUp"),
-                        .parallelProjection = vtkSMPropertyHelper(this, "CameraParallelProjection").GetAsInt() != 0};
+  const vdi::Camera own{
+      .position = vector("CameraPosition"),
+      .focalPoint = vector("CameraFocalPoint"),
+      .viewUp = vector("CameraViewUp"),
+      .parallelProjection = vtkSMPropertyHelper(this, "CameraParallelProjection").GetAsInt() != 0};
   return vdi::degreesBetween(this->InputBounds(), own, cameraOf(view->GetActiveCamera()));
 }
 

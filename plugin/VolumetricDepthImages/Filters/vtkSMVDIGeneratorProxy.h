@@ -8,9 +8,10 @@
  * values. Proxies that a state file makes take nothing.
  *
  * When nobody has set LookupTable, the proxy takes ParaView's colour map for the chosen array, the one that a
- * representation of the input uses in the active view, or would use, with its opacity function. A user who sets another one, or none after that, is
- * left alone. A map or opacity function that is still as ParaView made it, or holds a preset on [0, 1], gets
- * the range that the array has then, once; control points that somebody has set stay where they are.
+ * representation of the input uses in the active view, or would use, with its opacity function. A user who
+ * sets another one, or none after that, is left alone. A map or opacity function that is still as ParaView
+ * made it, or holds a preset on [0, 1], gets the range that the array has then, once; control points that
+ * somebody has set stay where they are.
  */
 #ifndef vtkSMVDIGeneratorProxy_h
 #define vtkSMVDIGeneratorProxy_h
@@ -38,7 +39,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
 
   int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
 
-  /// The array by which the active view colours the input, at creation (vtkSMVDIGeneratorInitializationHelper).
+  /// The array by which the active view colours the input, at creation
+  /// (vtkSMVDIGeneratorInitializationHelper).
   void TakeArrayFromView();
 
   /// Sets the camera properties of `proxy`, one with a viewpoint (VolumetricDepthImage, RenderVDI), to the

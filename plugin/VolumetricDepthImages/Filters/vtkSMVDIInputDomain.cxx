@@ -14,8 +14,7 @@ int vtkSMVDIInputDomain::IsInDomain(vtkSMProperty* property) {
   for (unsigned int i = 0; i < input->GetNumberOfUncheckedProxies(); ++i) {
     auto* source = vtkSMSourceProxy::SafeDownCast(input->GetUncheckedProxy(i));
     if (source == nullptr) return vtkSMDomain::NOT_IN_DOMAIN;
-    vtkPVDataInformation* data =
-        source->GetDataInformation(input->GetUncheckedOutputPortForConnection(i));
+    vtkPVDataInformation* data = source->GetDataInformation(input->GetUncheckedOutputPortForConnection(i));
     if (data == nullptr || data->GetArrayInformation("VDI.offsets", vtkDataObject::FIELD) == nullptr)
       return vtkSMDomain::NOT_IN_DOMAIN;
   }

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 #include <vtkCompositeDataSet.h>
+#include <vtkDataArray.h>
 #include <vtkDataObject.h>
 #include <vtkDataSetAttributes.h>
+#include <vtkFieldData.h>
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
@@ -11,6 +13,7 @@
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkPiecewiseFunction.h>
+#include <vtkPointData.h>
 #include <vtkScalarsToColors.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
@@ -210,6 +213,20 @@ void demandInput(vtkDataObject* input) {
                    "what the simulation hands over, \"grid\" for vdi_catalyst");
 }
 
+/// Arrays keep their ranges, which ParaView asks for after an update: half a second for a large VDI.
+void findRanges(vtkFieldData* fields) {
+  for (int i = 0; i < fields->GetNumberOfArrays(); ++i) {
+    vtkDataArray* array = fields->GetArray(i);
+    if (array == nullptr) continue;
+    const int components = array->GetNumberOfComponents();
+    for (int component = components > 1 ? -1 : 0; component < components; ++component) {
+      double range[2];
+      array->GetRange(range, component);
+      array->GetFiniteRange(range, component);
+    }
+  }
+}
+
 std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
   std::string text =
       "rank  blocks  volume MiB  upload s  generate s  distribute s  composite s  gather s  sent MiB  device "
@@ -318,10 +335,12 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, double time) {
     pv::demandArray(input, this->GetInputAlgorithm(0, 0), origin.Choice);
     blocks = pv::blocksOf(input, origin.Choice);
   });
-  std::array<std::uint64_t, 1> inverseVolume{0};  // doubles that aren't negative are ordered as their bits are
+  std::array<std::uint64_t, 1> inverseVolume{
+      0};  // doubles that aren't negative are ordered as their bits are
   for (const vdi::Block& block : blocks) {
     const double volume = block.spacing.x * block.spacing.y * block.spacing.z;
-    if (volume > 0.0) inverseVolume[0] = std::max(inverseVolume[0], std::bit_cast<std::uint64_t>(1.0 / volume));
+    if (volume > 0.0)
+      inverseVolume[0] = std::max(inverseVolume[0], std::bit_cast<std::uint64_t>(1.0 / volume));
   }
   comm.allReduceMax(inverseVolume);
   this->Internal->VoxelVolume = inverseVolume[0] > 0 ? 1.0 / std::bit_cast<double>(inverseVolume[0]) : 0.0;
@@ -437,25 +456,27 @@ void vtkVDIGenerator::Prepare() {
     return;  // said by the update that comes instead
   }
   preparation->Time = this->CurrentMTime();
-  preparation->Worker = std::jthread([&internal, &own = *preparation, frame = std::move(frame),
-                                      step = std::max(this->TimeStep, 0)] {
-    try {
-      vdi::VdiGenerator& generator = *internal.Generator;
-      std::optional<vdi::Vdi> vdi =
-          generator.generate(frame.Camera, frame.Function, frame.Settings, [&own](double done) {
-            own.Share = done;
-            return !own.Unwanted;
-          });
-      vdi->time = internal.Shown->Time;
-      vdi->timeStep = static_cast<std::uint64_t>(step);
-      pv::setVdi(own.Output, *vdi);
-      generator.recycle(std::move(*vdi));
-      own.Good = true;
-    } catch (const std::exception&) {
-      own.Good = false;  // likewise: the update tries again, and says why if it can't either
-    }
-    own.Done = true;
-  });
+  preparation->Worker = std::jthread(
+      [&internal, &own = *preparation, frame = std::move(frame), step = std::max(this->TimeStep, 0)] {
+        try {
+          vdi::VdiGenerator& generator = *internal.Generator;
+          std::optional<vdi::Vdi> vdi =
+              generator.generate(frame.Camera, frame.Function, frame.Settings, [&own](double done) {
+                own.Share = done;
+                return !own.Unwanted;
+              });
+          vdi->time = internal.Shown->Time;
+          vdi->timeStep = static_cast<std::uint64_t>(step);
+          pv::setVdi(own.Output, *vdi);
+          generator.recycle(std::move(*vdi));
+          findRanges(own.Output->GetPointData());
+          findRanges(own.Output->GetFieldData());
+          own.Good = true;
+        } catch (const std::exception&) {
+          own.Good = false;  // likewise: the update tries again, and says why if it can't either
+        }
+        own.Done = true;
+      });
   internal.Preparing = std::move(preparation);
 }
 
@@ -463,7 +484,8 @@ void vtkVDIGenerator::Prepare() {
 bool vtkVDIGenerator::TakePreparation(vtkDataObject* input, double time, vtkImageData* output) {
   Internals& internal = *this->Internal;
   const bool ready = internal.Preparing && internal.Preparing->Done && internal.Preparing->Good &&
-                     internal.Preparing->Time == internal.Executed && internal.Shown == this->OriginOf(input, time);
+                     internal.Preparing->Time == internal.Executed &&
+                     internal.Shown == this->OriginOf(input, time);
   if (ready) {
     output->ShallowCopy(internal.Preparing->Output);
     const vdi::VdiGenerator& generator = *internal.Generator;

@@ -104,10 +104,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   ///@{
   /**
-   * How a window gets a new VDI without waiting for it. After Hold, changed maps and properties don't make the
-   * output out of date, until Release; another input still does. Prepare starts to make the VDI of the
-   * properties and maps as they are now, in a thread of its own, and returns; what it began before is given up.
-   * The update after Release takes that VDI if nothing has changed since, and makes one otherwise.
+   * How a window gets a new VDI without waiting for it. After Hold, changed maps and properties don't make
+   * the output out of date, until Release; another input still does. Prepare starts to make the VDI of the
+   * properties and maps as they are now, in a thread of its own, and returns; what it began before is given
+   * up. The update after Release takes that VDI if nothing has changed since, and makes one otherwise.
    */
   void Hold();
   void Prepare();

@@ -88,7 +88,8 @@ int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs,
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
   if (this->IsOther(vtkDataObject::GetData(inputs[0]))) {
-    // A picture of nothing, of the size that was announced: a failure would be tried, and told, again and again.
+    // A picture of nothing, of the size that was announced: a failure would be tried, and told, again and
+    // again.
     int extent[6];
     outputs->GetInformationObject(0)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent);
     output->SetExtent(extent);

@@ -24,8 +24,7 @@ pqCameraFromViewWidget::pqCameraFromViewWidget(vtkSMProxy* proxy, vtkSMProperty*
   layout->setContentsMargins(0, 0, 0, 0);
   auto* button = new QPushButton(tr("Use the active view's camera"), this);
   button->setObjectName("CameraFromView");
-  button->setToolTip(
-      tr("Looks at the VDI from the active view's camera, and turns Use Original Camera off"));
+  button->setToolTip(tr("Looks at the VDI from the active view's camera, and turns Use Original Camera off"));
   layout->addWidget(button);
   this->Line->setWordWrap(true);
   this->Line->hide();

@@ -14,10 +14,9 @@ class pqCameraFromViewWidget : public pqPropertyWidget {
   pqCameraFromViewWidget(vtkSMProxy* proxy, vtkSMProperty* property, QWidget* parent = nullptr);
   ~pqCameraFromViewWidget() override;
 
- private Q_SLOTS:
-  void copyCamera();
-
  private:
+  Q_SLOT void copyCamera();
+
   QLabel* Line;
 };
 

@@ -15,7 +15,8 @@ void pqVDIBehavior::startup() {
 
 void pqVDIBehavior::shutdown() {
   // What it made belongs to the sources.
-  if (pqApplicationCore* core = pqApplicationCore::instance()) this->disconnect(core->getServerManagerModel());
+  if (pqApplicationCore* core = pqApplicationCore::instance())
+    this->disconnect(core->getServerManagerModel());
 }
 
 void pqVDIBehavior::sourceAdded(pqPipelineSource* source) {

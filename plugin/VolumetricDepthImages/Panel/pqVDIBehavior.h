@@ -13,8 +13,8 @@ class pqVDIBehavior : public QObject {
   void startup();
   void shutdown();
 
- private Q_SLOTS:
-  void sourceAdded(pqPipelineSource* source);
+ private:
+  Q_SLOT void sourceAdded(pqPipelineSource* source);
 };
 
 #endif

@@ -13,7 +13,8 @@
 
 pqVDIColorsWidget::pqVDIColorsWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget* parent)
     : pqPropertyWidget(proxy, parent),
-      Button(new QPushButton(QIcon(":/pqWidgets/Icons/pqEditColor.svg"), tr("Edit Color Map and Opacity"), this)),
+      Button(new QPushButton(QIcon(":/pqWidgets/Icons/pqEditColor.svg"), tr("Edit Color Map and Opacity"),
+                             this)),
       Line(new QLabel(tr("Show the VDI in the active view first."), this)) {
   this->setShowLabel(false);
   auto* layout = new QVBoxLayout(this);
@@ -24,9 +25,10 @@ pqVDIColorsWidget::pqVDIColorsWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget*
   this->Line->hide();
   layout->addWidget(this->Line);
   this->connect(this->Button, &QPushButton::clicked, this, &pqVDIColorsWidget::edit);
-  pqCoreUtilities::connect(proxy->GetProperty("LookupTable"), vtkCommand::ModifiedEvent, this, SLOT(mapChanged()));
-  // Before the dialog is there, so that these come before its own: ParaView's editor takes it for granted that
-  // something is shown in the active view.
+  pqCoreUtilities::connect(proxy->GetProperty("LookupTable"), vtkCommand::ModifiedEvent, this,
+                           SLOT(mapChanged()));
+  // Before the dialog is there, so that these come before its own: ParaView's editor takes it for granted
+  // that something is shown in the active view.
   const pqActiveObjects& active = pqActiveObjects::instance();
   this->connect(&active, QOverload<pqDataRepresentation*>::of(&pqActiveObjects::representationChanged), this,
                 &pqVDIColorsWidget::closeWhereNothingIsShown);

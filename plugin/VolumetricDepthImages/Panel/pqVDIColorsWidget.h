@@ -17,12 +17,11 @@ class pqVDIColorsWidget : public pqPropertyWidget {
   pqVDIColorsWidget(vtkSMProxy* proxy, vtkSMProperty* property, QWidget* parent = nullptr);
   ~pqVDIColorsWidget() override;
 
- private Q_SLOTS:
-  void edit();
-  void mapChanged();
-  void closeWhereNothingIsShown();
-
  private:
+  Q_SLOT void edit();
+  Q_SLOT void mapChanged();
+  Q_SLOT void closeWhereNothingIsShown();
+
   QPushButton* Button;
   QLabel* Line;
   QPointer<QDialog> Dialog;

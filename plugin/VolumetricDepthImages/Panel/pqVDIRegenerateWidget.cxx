@@ -13,7 +13,8 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
   this->setShowLabel(false);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
-  auto* button = new QPushButton(QIcon(":/VolumetricDepthImages/vdi.svg"), tr("Regenerate From This View"), this);
+  auto* button =
+      new QPushButton(QIcon(":/VolumetricDepthImages/vdi.svg"), tr("Regenerate From This View"), this);
   button->setObjectName("Regenerate");
   button->setToolTip(tr("Makes the VDI anew from the camera of the active view, at its size"));
   layout->addWidget(button);

@@ -1,5 +1,5 @@
-// Property widget `vdi_regenerate`: a button that makes the VDI anew from the active view, and a line that says
-// how far that is, or why it can't be.
+// Property widget `vdi_regenerate`: a button that makes the VDI anew from the active view, and a line that
+// says how far that is, or why it can't be.
 #ifndef pqVDIRegenerateWidget_h
 #define pqVDIRegenerateWidget_h
 
@@ -14,11 +14,10 @@ class pqVDIRegenerateWidget : public pqPropertyWidget {
   pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty* property, QWidget* parent = nullptr);
   ~pqVDIRegenerateWidget() override;
 
- private Q_SLOTS:
-  void regenerate();
-  void showProgress(int percent);
-
  private:
+  Q_SLOT void regenerate();
+  Q_SLOT void showProgress(int percent);
+
   QLabel* Line;
 };
 

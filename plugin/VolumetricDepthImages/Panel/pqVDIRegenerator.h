@@ -1,5 +1,5 @@
-// Makes the VDI of one VolumetricDepthImage anew without making the window wait: after a colour map or opacity
-// function was edited, from a view's camera, and by itself where the filter's Auto is on.
+// Makes the VDI of one VolumetricDepthImage anew without making the window wait: after a colour map or
+// opacity function was edited, from a view's camera, and by itself where the filter's Auto is on.
 //
 // While a map is being edited the filter is held: it shows what it has. Once the edit has rested and no mouse
 // button is down, a thread makes the new VDI, which takes the old one's place when it's there. Where that
@@ -36,13 +36,12 @@ class pqVDIRegenerator : public QObject {
   /// Percent of the VDI that's being made; -1: none is.
   void progress(int percent);
 
- private Q_SLOTS:
-  void watchMaps();
-  void mapChanged();
-  void look();
-  void lookAtViews();
-
  private:
+  Q_SLOT void watchMaps();
+  Q_SLOT void mapChanged();
+  Q_SLOT void look();
+  Q_SLOT void lookAtViews();
+
   enum class State { Idle, Waiting, Preparing };
 
   vtkSMVDIGeneratorProxy* generator() const;
@@ -53,7 +52,7 @@ class pqVDIRegenerator : public QObject {
 
   pqPipelineSource* Source;
   State Now = State::Idle;
-  QTimer Looking;        // while something is under way
+  QTimer Looking;         // while something is under way
   QTimer LookingAtViews;  // for Auto
   QElapsedTimer Resting;  // since the last edit
   qint64 Rest = 0;        // milliseconds that it has to
