@@ -468,7 +468,6 @@ void vtkVDIGenerator::Prepare() {
           vdi->time = internal.Shown->Time;
           vdi->timeStep = static_cast<std::uint64_t>(step);
           pv::setVdi(own.Output, *vdi);
-          generator.recycle(std::move(*vdi));
           findRanges(own.Output->GetPointData());
           findRanges(own.Output->GetFieldData());
           own.Good = true;
