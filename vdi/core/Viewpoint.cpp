@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -48,10 +49,17 @@ std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const Camera& or
   const bool elsewhere = eye != original.position;
   if (elsewhere && within(0) && within(1) && within(2)) return ViewpointIssue::Inside;
   if (outside(bounds, view)) return ViewpointIssue::SeesNothing;
-  const glm::dvec3 center = bounds.center();
-  const double cosine = glm::dot(directionTo(center, original), directionTo(center, view.camera()));
-  if (cosine < std::cos(farBesideDegrees * std::numbers::pi / 180.0)) return ViewpointIssue::FarBeside;
+  const double depth = view.parallel() ? 1.0 : view.toView(bounds.center()).z;
+  const double diameter = glm::length(bounds.size()) / (2.0 * view.halfHeight() * depth) * view.height();
+  if (depth > 0.0 && diameter < farAwayPixels) return ViewpointIssue::FarAway;
+  if (degreesBetween(bounds, original, view.camera()) > farBesideDegrees) return ViewpointIssue::FarBeside;
   return std::nullopt;
+}
+
+double degreesBetween(const Box& bounds, const Camera& original, const Camera& camera) {
+  const glm::dvec3 center = bounds.center();
+  const double cosine = glm::dot(directionTo(center, original), directionTo(center, camera));
+  return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
 }
 
 std::string describe(ViewpointIssue issue) {
@@ -60,6 +68,8 @@ std::string describe(ViewpointIssue issue) {
       return "the viewpoint is inside the VDI's scene; move it outside, what is behind it isn't seen";
     case ViewpointIssue::SeesNothing:
       return "the viewpoint doesn't see the VDI's scene, which lies behind the camera or beside the picture";
+    case ViewpointIssue::FarAway:
+      return "the viewpoint is so far away that the VDI's scene is a dot; move it nearer";
     case ViewpointIssue::FarBeside:
       return fmt::format(
           "the viewpoint is more than {:.0f} degrees from where the VDI was made, so the picture is rough; "

@@ -13,16 +13,23 @@ namespace vdi {
 enum class ViewpointIssue {
   Inside,       // the camera is inside the scene, and isn't V_O: what's behind it is missing
   SeesNothing,  // the scene is outside of the picture
+  FarAway,      // the scene is smaller in the picture than farAwayPixels
   FarBeside     // more than farBesideDegrees from where the VDI was made: lists are seen from their sides
 };
 
 /// Between the directions in which the scene's centre is seen from V_O and from the viewpoint.
 constexpr double farBesideDegrees = 60.0;
 
+/// Of the sphere around the scene: its diameter in the picture.
+constexpr double farAwayPixels = 4.0;
+
 /// The first that applies, in that order; nullopt where nothing does, and for an empty scene. `bounds` are
 /// Vdi::bounds and `original` Vdi::camera. A cheap test of the scene's box: where it says nothing, the
 /// picture may still be empty.
 std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const Camera& original, const View& view);
+
+/// By how many degrees the directions differ in which `original` and `camera` see the scene's centre.
+double degreesBetween(const Box& bounds, const Camera& original, const Camera& camera);
 
 /// In words for a warning.
 std::string describe(ViewpointIssue issue);

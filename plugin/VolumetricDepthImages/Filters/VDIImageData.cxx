@@ -144,9 +144,13 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
   parameters[3] = static_cast<double>(vdi.timeStep);
 }
 
+bool hasVdi(vtkImageData* image) {
+  return image->GetFieldData()->GetAbstractArray("VDI.offsets") != nullptr;
+}
+
 bool getVdi(vtkDataObject* data, vdi::Vdi& vdi) {
   auto* image = vtkImageData::SafeDownCast(data);
-  if (image == nullptr || image->GetFieldData()->GetAbstractArray("VDI.offsets") == nullptr) return false;
+  if (image == nullptr || !hasVdi(image)) return false;
   vtkFieldData* fields = image->GetFieldData();
   auto* offsets = field<vtkUnsignedIntArray>(fields, "VDI.offsets", 1, -1);
   const double* camera = field<vtkDoubleArray>(fields, "VDI.camera", 1, 12)->GetPointer(0);

@@ -30,6 +30,8 @@ void setPicture(vtkImageData* image, const vdi::ImageBytes& picture);
 void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth);
 /// The flat picture of the VDI and the VDI itself.
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi);
+/// Whether the image carries one, sound or not.
+bool hasVdi(vtkImageData* image);
 /// False if the data object carries no VDI (what a rank other than the root has). Throws vdi::Error{Format}
 /// for one that isn't sound.
 bool getVdi(vtkDataObject* data, vdi::Vdi& vdi);

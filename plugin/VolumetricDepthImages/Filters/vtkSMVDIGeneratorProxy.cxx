@@ -1,6 +1,8 @@
 #include "vtkSMVDIGeneratorProxy.h"
 
+#include <vtkCamera.h>
 #include <vtkCommunicator.h>
+#include <vtkDataObject.h>
 #include <vtkMultiProcessController.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
@@ -10,6 +12,11 @@
 #include <vtkSMInputProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
+#include <vtkSMProxySelectionModel.h>
+#include <vtkSMRenderViewProxy.h>
+#include <vtkSMRepresentationProxy.h>
+#include <vtkSMSessionProxyManager.h>
+#include <vtkSMTrace.h>
 #include <vtkSMTransferFunctionManager.h>
 #include <vtkSMTransferFunctionPresets.h>
 #include <vtkSMTransferFunctionProxy.h>
@@ -17,13 +24,17 @@
 #include <vtk_jsoncpp.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <vector>
 
 #include "VDISession.h"
+#include "vdi/core/Box.h"
+#include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Viewpoint.h"
 
 namespace {
 
@@ -94,18 +105,169 @@ bool WidenOverRanks(double range[2]) {
   return true;
 }
 
+vdi::Camera cameraOf(vtkCamera* camera) {
+  const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
+  return {vector(camera->GetPosition()), vector(camera->GetFocalPoint()),      vector(camera->GetViewUp()),
+          camera->GetViewAngle(),        camera->GetParallelProjection() != 0, camera->GetParallelScale()};
+}
+
+/// Whether somebody has placed the view's camera: it isn't where new views have it.
+bool isPlaced(vtkSMRenderViewProxy* view) {
+  vtkSMProxy* initial =
+      view->GetSessionProxyManager()->GetPrototypeProxy(view->GetXMLGroup(), view->GetXMLName());
+  const auto isInitial = [initial](const char* property, const double* now) {
+    return vtkSMPropertyHelper(initial, property).GetDoubleArray() == std::vector<double>(now, now + 3);
+  };
+  vtkCamera* camera = view->GetActiveCamera();
+  return !isInitial("CameraPosition", camera->GetPosition()) ||
+         !isInitial("CameraFocalPoint", camera->GetFocalPoint());
+}
+
+/// The view's size; larger ones are brought down to as many pixels as 1920 x 1080 has, for a VDI's time and
+/// size grow with them.
+std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
+  constexpr double most = 1920.0 * 1080.0;
+  const vtkSMPropertyHelper size(view, "ViewSize");
+  const double width = std::max(size.GetAsInt(0), 1);
+  const double height = std::max(size.GetAsInt(1), 1);
+  const double scale = std::min(1.0, std::sqrt(most / (width * height)));
+  const auto scaled = [scale](double length) {
+    return std::max(1, static_cast<int>(std::lround(scale * length)));
+  };
+  return {scaled(width), scaled(height)};
+}
+
 }  // namespace
 
 vtkStandardNewMacro(vtkSMVDIGeneratorProxy);
 
 void vtkSMVDIGeneratorProxy::UpdatePipeline() {
-  this->ChooseLookupTable(std::nullopt);
+  this->TakeWhatIsNotSet(std::nullopt);
   this->Superclass::UpdatePipeline();
 }
 
 void vtkSMVDIGeneratorProxy::UpdatePipeline(double time) {
-  this->ChooseLookupTable(time);
+  this->TakeWhatIsNotSet(time);
   this->Superclass::UpdatePipeline(time);
+}
+
+int vtkSMVDIGeneratorProxy::LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) {
+  this->Taken = true;
+  return this->Superclass::LoadXMLState(element, locator);
+}
+
+void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
+  SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what the view shows");
+  this->TakeFromView();
+  this->ChooseLookupTable(time);
+}
+
+vtkSMRenderViewProxy* vtkSMVDIGeneratorProxy::ActiveView() {
+  vtkSMProxySelectionModel* active = this->GetSessionProxyManager()->GetSelectionModel("ActiveView");
+  return active != nullptr ? vtkSMRenderViewProxy::SafeDownCast(active->GetCurrentProxy()) : nullptr;
+}
+
+vtkSMProxy* vtkSMVDIGeneratorProxy::RepresentationIn(vtkSMRenderViewProxy* view) {
+  vtkSMPropertyHelper input(this, "Input");
+  auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
+  if (view == nullptr || source == nullptr) return nullptr;
+  return view->FindRepresentation(source, static_cast<int>(input.GetOutputPort()));
+}
+
+void vtkSMVDIGeneratorProxy::TakeArrayFromView() {
+  vtkSMProxy* shown = this->RepresentationIn(this->ActiveView());
+  if (shown == nullptr || shown->GetProperty("ColorArrayName") == nullptr) return;
+  const vtkSMPropertyHelper colored(shown, "ColorArrayName");
+  const int association = colored.GetInputArrayAssociation();
+  const std::string name = colored.GetInputArrayNameToProcess() ? colored.GetInputArrayNameToProcess() : "";
+  if (name.empty() || (association != vtkDataObject::POINT && association != vtkDataObject::CELL)) return;
+  vtkSMPropertyHelper(this, "SelectInputScalars").SetInputArrayToProcess(association, name.c_str());
+}
+
+void vtkSMVDIGeneratorProxy::TakeFromView() {
+  if (this->Taken) return;
+  this->Taken = true;
+  vtkSMRenderViewProxy* view = this->ActiveView();
+  if (view == nullptr) return;
+  vtkSMProxy* shown = this->RepresentationIn(view);
+  const bool placed = isPlaced(view);
+  if (shown == nullptr && !placed) return;
+  vtkSMPropertyHelper unit(this, "ScalarOpacityUnitDistance");
+  if (unit.GetAsDouble() == 0.0 && shown != nullptr &&
+      shown->GetProperty("ScalarOpacityUnitDistance") != nullptr)
+    unit.Set(vtkSMPropertyHelper(shown, "ScalarOpacityUnitDistance").GetAsDouble());
+  if (placed && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
+                    vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray())
+    SetCamera(this, view);
+  vtkSMPropertyHelper resolution(this, "Resolution");
+  if (resolution.GetAsInt(0) == 0 && resolution.GetAsInt(1) == 0) {
+    const std::array<int, 2> size = resolutionOf(view);
+    resolution.Set(size.data(), 2);
+  }
+  this->UpdateVTKObjects();
+}
+
+void vtkSMVDIGeneratorProxy::SetCamera(vtkSMProxy* proxy, vtkSMRenderViewProxy* view) {
+  vtkCamera* camera = view->GetActiveCamera();
+  vtkSMPropertyHelper(proxy, "CameraPosition").Set(camera->GetPosition(), 3);
+  vtkSMPropertyHelper(proxy, "CameraFocalPoint").Set(camera->GetFocalPoint(), 3);
+  vtkSMPropertyHelper(proxy, "CameraViewUp").Set(camera->GetViewUp(), 3);
+  vtkSMPropertyHelper(proxy, "CameraViewAngle").Set(camera->GetViewAngle());
+  vtkSMPropertyHelper(proxy, "CameraParallelProjection").Set(camera->GetParallelProjection());
+  vtkSMPropertyHelper(proxy, "CameraParallelScale").Set(camera->GetParallelScale());
+}
+
+std::string vtkSMVDIGeneratorProxy::WhyNot(vtkSMViewProxy* view) {
+  auto* renderView = vtkSMRenderViewProxy::SafeDownCast(view);
+  if (renderView == nullptr)
+    return "The active view has no camera. Click into a 3-D view (Render View) first.";
+  constexpr int planar = 1;  // vtkPVRenderView::INTERACTION_MODE_2D
+  if (vtkSMPropertyHelper(renderView, "InteractionMode", true).GetAsInt() == planar)
+    return "The active view is in 2-D mode. Click into a 3-D view that shows the volume, or on the view's 2D "
+           "button.";
+  return {};
+}
+
+vdi::Box vtkSMVDIGeneratorProxy::InputBounds() {
+  const vtkSMPropertyHelper input(this, "Input");
+  auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
+  if (source == nullptr) return {};
+  double b[6];
+  source->GetDataInformation(input.GetOutputPort())->GetBounds(b);
+  return {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
+}
+
+double vtkSMVDIGeneratorProxy::DegreesFrom(vtkSMRenderViewProxy* view) {
+  const auto vector = [this](const char* name) {
+    const std::vector<double> v = vtkSMPropertyHelper(this, name).GetDoubleArray();
+    return glm::dvec3(v[0], v[1], v[2]);
+  };
+  const vdi::Camera own{
+      .position = vector("CameraPosition"),
+      .focalPoint = vector("CameraFocalPoint"),
+      .viewUp = vector("CameraViewUp"),
+      .parallelProjection = vtkSMPropertyHelper(this, "CameraParallelProjection").GetAsInt() != 0};
+  return vdi::degreesBetween(this->InputBounds(), own, cameraOf(view->GetActiveCamera()));
+}
+
+std::string vtkSMVDIGeneratorProxy::SetViewpoint(vtkSMViewProxy* view) {
+  if (std::string why = WhyNot(view); !why.empty()) return why;
+  auto* renderView = vtkSMRenderViewProxy::SafeDownCast(view);
+  const std::array<int, 2> size = resolutionOf(renderView);
+  const vdi::Camera camera = cameraOf(renderView->GetActiveCamera());
+  try {
+    const auto issue = vdi::viewpointIssue(this->InputBounds(), camera, vdi::View(camera, size[0], size[1]));
+    if (issue == vdi::ViewpointIssue::SeesNothing)
+      return "This view doesn't see the volume, which lies behind its camera or beside its picture.";
+  } catch (const vdi::Error& error) {
+    return error.what();
+  }
+  this->Taken = true;
+  SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the view's camera");
+  SetCamera(this, renderView);
+  vtkSMPropertyHelper(this, "Resolution").Set(size.data(), 2);
+  this->UpdateVTKObjects();
+  return {};
 }
 
 void vtkSMVDIGeneratorProxy::PrepareUpstream(vtkSMProxy* proxy, std::optional<double> time) {
@@ -114,7 +276,7 @@ void vtkSMVDIGeneratorProxy::PrepareUpstream(vtkSMProxy* proxy, std::optional<do
     vtkSMProxy* producer = proxy->GetProducerProxy(i);
     if (vtkSMSourceProxy::SafeDownCast(producer) == nullptr) continue;  // not maps and the like
     PrepareUpstream(producer, time);
-    if (auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(producer)) generator->ChooseLookupTable(time);
+    if (auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(producer)) generator->TakeWhatIsNotSet(time);
   }
 }
 
@@ -126,9 +288,11 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time) {
       table.GetNumberOfElements() == 0 || table.GetAsProxy() == nullptr || !this->Chosen.empty();
   if (!ours || name == nullptr || *name == '\0' || this->Chosen == name) return;
   vtkNew<vtkSMTransferFunctionManager> manager;
-  vtkSMProxy* map = manager->GetColorTransferFunction(name, this->GetSessionProxyManager());
+  vtkSMProxy* map = this->MapInView(name, scalars.GetAsInt(3));
+  if (map == nullptr) map = manager->GetColorTransferFunction(name, this->GetSessionProxyManager());
   if (map == nullptr) return;
-  vtkSMProxy* opacity = manager->GetOpacityTransferFunction(name, this->GetSessionProxyManager());
+  vtkSMProxy* opacity = vtkSMPropertyHelper(map, "ScalarOpacityFunction", true).GetAsProxy();
+  if (opacity == nullptr) opacity = manager->GetOpacityTransferFunction(name, this->GetSessionProxyManager());
   // What nobody has used yet is still on [0, 1]: give it the array's range, as a representation does.
   const bool mapWaits = WaitsForRange(map, "RGBPoints");
   const bool opacityWaits = opacity != nullptr && WaitsForRange(opacity, "Points");
@@ -142,6 +306,15 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time) {
   table.Set(map);
   this->UpdateVTKObjects();
   this->Chosen = name;
+}
+
+vtkSMProxy* vtkSMVDIGeneratorProxy::MapInView(const std::string& name, int association) {
+  vtkSMProxy* shown = this->RepresentationIn(this->ActiveView());
+  if (shown == nullptr || shown->GetProperty("ColorArrayName") == nullptr) return nullptr;
+  const vtkSMPropertyHelper colored(shown, "ColorArrayName");
+  const char* by = colored.GetInputArrayNameToProcess();
+  if (by == nullptr || name != by || association != colored.GetInputArrayAssociation()) return nullptr;
+  return vtkSMPropertyHelper(shown, "LookupTable", true).GetAsProxy();
 }
 
 bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, std::optional<double> time,

@@ -1,11 +1,17 @@
 /**
  * @class vtkSMVDIGeneratorProxy
- * @brief gives VolumetricDepthImage the colour map of its array
+ * @brief gives VolumetricDepthImage what the active view shows: viewpoint, size, colour map and opacity
+ *
+ * What isn't set at the first update is taken from the active view, if that is a render view that shows its
+ * input or whose camera somebody has placed: the camera where position and focal point are the same,
+ * Resolution where it is 0 0, ScalarOpacityUnitDistance where it is 0. Traces and state files have these
+ * values. Proxies that a state file makes take nothing.
  *
  * When nobody has set LookupTable, the proxy takes ParaView's colour map for the chosen array, the one that a
- * representation would use, with its opacity function. A user who sets another one, or none after that, is
- * left alone. A map or opacity function that is still as ParaView made it, or holds a preset on [0, 1], gets
- * the range that the array has then, once; control points that somebody has set stay where they are.
+ * representation of the input uses in the active view, or would use, with its opacity function. A user who
+ * sets another one, or none after that, is left alone. A map or opacity function that is still as ParaView
+ * made it, or holds a preset on [0, 1], gets the range that the array has then, once; control points that
+ * somebody has set stay where they are.
  */
 #ifndef vtkSMVDIGeneratorProxy_h
 #define vtkSMVDIGeneratorProxy_h
@@ -17,6 +23,12 @@
 
 #include "vtkVolumetricDepthImagesModule.h"
 
+namespace vdi {
+struct Box;
+}
+class vtkSMRenderViewProxy;
+class vtkSMViewProxy;
+
 class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourceProxy {
  public:
   static vtkSMVDIGeneratorProxy* New();
@@ -25,8 +37,25 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   void UpdatePipeline() override;
   void UpdatePipeline(double time) override;
 
+  int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
+
+  /// The array by which the active view colours the input, at creation
+  /// (vtkSMVDIGeneratorInitializationHelper).
+  void TakeArrayFromView();
+
+  /// Sets the camera properties of `proxy`, one with a viewpoint (VolumetricDepthImage, RenderVDI), to the
+  /// camera of `view`, for UpdateVTKObjects to send.
+  static void SetCamera(vtkSMProxy* proxy, vtkSMRenderViewProxy* view);
+  /// Why no viewpoint can be had from the view; empty where one can.
+  static std::string WhyNot(vtkSMViewProxy* view);
+  /// Sets camera and Resolution to the view's, and traces it. The result is empty, or why the view can't be
+  /// used; nothing is set then.
+  std::string SetViewpoint(vtkSMViewProxy* view);
+  /// By how many degrees the view sees the middle of the input from elsewhere than the camera that's set.
+  double DegreesFrom(vtkSMRenderViewProxy* view);
+
   /// For proxies behind it that are updated without it: writers, extractors, RenderVDI. Lets all generators
-  /// upstream of `proxy` choose their maps. Collective where each rank has a client.
+  /// upstream of `proxy` take what isn't set. Collective where each rank has a client.
   static void PrepareUpstream(vtkSMProxy* proxy, std::optional<double> time);
 
  protected:
@@ -37,11 +66,20 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkSMVDIGeneratorProxy(const vtkSMVDIGeneratorProxy&) = delete;
   void operator=(const vtkSMVDIGeneratorProxy&) = delete;
 
+  void TakeWhatIsNotSet(std::optional<double> time);
+  void TakeFromView();
+  vtkSMRenderViewProxy* ActiveView();
+  vdi::Box InputBounds();
+  /// How the view shows the input; null if it never has.
+  vtkSMProxy* RepresentationIn(vtkSMRenderViewProxy* view);
   /// `time`: that of the update which is to come, if it has one.
   void ChooseLookupTable(std::optional<double> time);
+  /// By which the active view colours the input by that array; null if it doesn't.
+  vtkSMProxy* MapInView(const std::string& name, int association);
   /// Of the input's array, over all ranks; false if there's none.
   bool RangeOfScalars(const char* name, int association, std::optional<double> time, double range[2]);
 
+  bool Taken = false;  // what the view has
   std::string Chosen;  // the array whose map this proxy has set
 };
 

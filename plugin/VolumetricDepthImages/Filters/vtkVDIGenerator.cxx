@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 #include <vtkCompositeDataSet.h>
+#include <vtkDataArray.h>
 #include <vtkDataObject.h>
 #include <vtkDataSetAttributes.h>
+#include <vtkFieldData.h>
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
@@ -11,14 +13,19 @@
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkPiecewiseFunction.h>
+#include <vtkPointData.h>
 #include <vtkScalarsToColors.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -31,16 +38,36 @@
 
 vtkStandardNewMacro(vtkVDIGenerator);
 
+/// What tells one set of blocks from another.
+struct vtkVDIGenerator::Origin {
+  std::vector<std::uint64_t> Input;  // pv::identityOf
+  /// When what makes the input was modified: in situ, arrays are overwritten in place.
+  vtkMTimeType Upstream = 0;
+  double Time = 0.0;
+  pv::ArrayChoice Choice;
+  bool FillGhosts = true;
+  bool operator==(const Origin&) const = default;
+};
+
+/// What a frame of given blocks depends on.
+struct vtkVDIGenerator::Frame {
+  vdi::Camera Camera;
+  vdi::TransferFunction Function;
+  vdi::GenerateSettings Settings;
+};
+
 struct vtkVDIGenerator::Internals {
-  /// What tells one set of blocks from another.
-  struct Origin {
-    std::vector<std::uint64_t> Input;  // pv::identityOf
-    /// When what makes the input was modified: in situ, arrays are overwritten in place.
-    vtkMTimeType Upstream = 0;
-    double Time = 0.0;
-    pv::ArrayChoice Choice;
-    bool FillGhosts = true;
-    bool operator==(const Origin&) const = default;
+  /// A VDI that a thread makes of the generator's blocks; who has one keeps off the generator.
+  struct Preparation {
+    vtkMTimeType Time = 0;  // of the maps and properties that it's made of
+    std::atomic<double> Share{0.0};
+    std::atomic<bool> Unwanted{false};
+    std::atomic<bool> Done{false};
+    vtkNew<vtkImageData> Output;  // the thread's until Done
+    bool Good = false;            // likewise
+    std::jthread Worker;          // last: joined before the rest goes
+
+    ~Preparation() { Unwanted = true; }
   };
 
   std::unique_ptr<vdi::VdiGenerator> Generator;  // none until the first update
@@ -49,10 +76,14 @@ struct vtkVDIGenerator::Internals {
   /// The last frame failed. Data counts as newer than any output then: left to the executive, rank 0, whose
   /// empty output isn't what was asked for, would try again alone.
   bool Failed = false;
+  bool Held = false;
+  vtkMTimeType Executed = 0;  // CurrentMTime of the last frame
+  double VoxelVolume = 0.0;   // of the smallest voxel of all ranks; 0 without any
   /// Of the map that stands in for none: the first frame's range, kept while the array is the same, or films
   /// would flicker.
   std::optional<vdi::ScalarRange> FirstRange;
   pv::ArrayChoice FirstChoice;
+  std::unique_ptr<Preparation> Preparing;  // last: its thread uses the generator
 };
 
 vtkVDIGenerator::vtkVDIGenerator()
@@ -102,13 +133,19 @@ void vtkVDIGenerator::SetScalarOpacityFunction(vtkPiecewiseFunction* function) {
 void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
   if (this->Controller == controller) return;
   this->Controller = controller;
+  this->DropPreparation();
   this->Internal->Generator.reset();
   this->Internal->Shown.reset();
   this->Modified();
 }
 
 vtkMTimeType vtkVDIGenerator::GetMTime() {
+  if (this->Internal->Held) return this->Internal->Executed;
   if (this->Internal->Failed) this->Modified();
+  return this->CurrentMTime();
+}
+
+vtkMTimeType vtkVDIGenerator::CurrentMTime() {
   vtkMTimeType time = this->Superclass::GetMTime();
   if (this->LookupTable) time = std::max(time, this->LookupTable->GetMTime());
   if (this->ScalarOpacityFunction) time = std::max(time, this->ScalarOpacityFunction->GetMTime());
@@ -127,8 +164,8 @@ int vtkVDIGenerator::RequestInformation(vtkInformation*, vtkInformationVector**,
   // The other ranks' pictures are empty; announcing that keeps the pipeline from asking them for more again
   // and again.
   const bool root = this->Controller == nullptr || this->Controller->GetLocalProcessId() == 0;
-  const int extent[6] = {
-      0, root ? this->Resolution[0] - 1 : -1, 0, root ? this->Resolution[1] - 1 : -1, 0, root ? 0 : -1};
+  const auto [width, height] = this->PictureSize();
+  const int extent[6] = {0, root ? width - 1 : -1, 0, root ? height - 1 : -1, 0, root ? 0 : -1};
   vtkInformation* info = outputs->GetInformationObject(0);
   info->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent, 6);
   info->Set(vtkDataObject::SPACING(), 1.0, 1.0, 1.0);
@@ -176,6 +213,20 @@ void demandInput(vtkDataObject* input) {
                    "what the simulation hands over, \"grid\" for vdi_catalyst");
 }
 
+/// Arrays keep their ranges, which ParaView asks for after an update: half a second for a large VDI.
+void findRanges(vtkFieldData* fields) {
+  for (int i = 0; i < fields->GetNumberOfArrays(); ++i) {
+    vtkDataArray* array = fields->GetArray(i);
+    if (array == nullptr) continue;
+    const int components = array->GetNumberOfComponents();
+    for (int component = components > 1 ? -1 : 0; component < components; ++component) {
+      double range[2];
+      array->GetRange(range, component);
+      array->GetFiniteRange(range, component);
+    }
+  }
+}
+
 std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
   std::string text =
       "rank  blocks  volume MiB  upload s  generate s  distribute s  composite s  gather s  sent MiB  device "
@@ -198,17 +249,25 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
                                  vtkInformationVector* outputs) {
   vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
   vtkImageData* output = vtkImageData::GetData(outputs);
+  vtkNew<vtkImageData> earlier;
+  earlier->ShallowCopy(output);
   output->Initialize();
   double time = 0.0;
   if (input != nullptr && input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP())) {
     time = input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
   }
   this->Internal->Failed = true;
+  this->Internal->Executed = this->CurrentMTime();
   try {
     this->Generate(input, time, output);
   } catch (const vdi::Error& error) {
     output->Initialize();
-    if (error.code() == vdi::ErrorCode::Cancelled) return 1;
+    if (error.code() == vdi::ErrorCode::Cancelled) {
+      // As ParaView's filters: it's not tried again until something changes.
+      this->Internal->Failed = false;
+      this->KeepEarlier(earlier, output);
+      return 1;
+    }
     vtkErrorMacro(<< error.what());
     return 0;
   } catch (const std::exception& error) {
@@ -220,26 +279,46 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   return 1;
 }
 
+/// What an abort leaves on rank 0: the picture that was there, or one that shows nothing.
+void vtkVDIGenerator::KeepEarlier(vtkImageData* earlier, vtkImageData* output) {
+  if (this->Controller != nullptr && this->Controller->GetLocalProcessId() != 0) return;
+  const auto [width, height] = this->PictureSize();
+  int size[3];
+  earlier->GetDimensions(size);
+  if (size[0] == width && size[1] == height) {
+    output->ShallowCopy(earlier);
+  } else {
+    vdi::Image nothing{.width = width, .height = height, .rgba = {}, .depth = {}};
+    nothing.rgba.resize(nothing.pixelCount());
+    pv::setPicture(output, nothing, false);
+  }
+}
+
+vtkVDIGenerator::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input, double time) {
+  Origin origin;
+  if (vtkInformation* array = this->GetInputArrayInformation(0)) {
+    if (array->Has(vtkDataObject::FIELD_NAME())) origin.Choice.name = array->Get(vtkDataObject::FIELD_NAME());
+    if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) {
+      origin.Choice.cells =
+          array->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_CELLS;
+    }
+  }
+  origin.Choice.component = this->Component;
+  origin.FillGhosts = this->FillGhosts;
+  origin.Time = time;
+  if (input != nullptr) origin.Input = pv::identityOf(input);
+  if (auto* upstream = vtkDemandDrivenPipeline::SafeDownCast(this->GetInputExecutive(0, 0)))
+    origin.Upstream = upstream->GetPipelineMTime();
+  return origin;
+}
+
 /// Only where something changed: another camera or transfer function needs no upload.
 void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, double time) {
   vdi::VdiGenerator& generator = *this->Internal->Generator;
   const vdi::comm::Communicator& comm = generator.communicator();
-  Internals::Origin origin;
+  Origin origin;
   comm.together([&] {
-    if (vtkInformation* array = this->GetInputArrayInformation(0)) {
-      if (array->Has(vtkDataObject::FIELD_NAME()))
-        origin.Choice.name = array->Get(vtkDataObject::FIELD_NAME());
-      if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) {
-        origin.Choice.cells =
-            array->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_CELLS;
-      }
-    }
-    origin.Choice.component = this->Component;
-    origin.FillGhosts = this->FillGhosts;
-    origin.Time = time;
-    if (input != nullptr) origin.Input = pv::identityOf(input);
-    if (auto* upstream = vtkDemandDrivenPipeline::SafeDownCast(this->GetInputExecutive(0, 0)))
-      origin.Upstream = upstream->GetPipelineMTime();
+    origin = this->OriginOf(input, time);
     demandInput(input);
   });
   // What the ranks do next depends on these; the generator compares the rest.
@@ -256,6 +335,15 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, double time) {
     pv::demandArray(input, this->GetInputAlgorithm(0, 0), origin.Choice);
     blocks = pv::blocksOf(input, origin.Choice);
   });
+  std::array<std::uint64_t, 1> inverseVolume{
+      0};  // doubles that aren't negative are ordered as their bits are
+  for (const vdi::Block& block : blocks) {
+    const double volume = block.spacing.x * block.spacing.y * block.spacing.z;
+    if (volume > 0.0)
+      inverseVolume[0] = std::max(inverseVolume[0], std::bit_cast<std::uint64_t>(1.0 / volume));
+  }
+  comm.allReduceMax(inverseVolume);
+  this->Internal->VoxelVolume = inverseVolume[0] > 0 ? 1.0 / std::bit_cast<double>(inverseVolume[0]) : 0.0;
   this->UpdateProgress(0.05);
   this->Internal->Shown.reset();
   generator.setBlocks(std::move(blocks), this->FillGhosts);
@@ -293,10 +381,118 @@ void vtkVDIGenerator::Enter() {
   try {
     pv::enterCollective(this->Controller, "VolumetricDepthImage, " + name);
   } catch (const vdi::Error&) {
+    this->DropPreparation();
     internal.Generator.reset();
     internal.Shown.reset();
     throw;
   }
+}
+
+std::array<int, 2> vtkVDIGenerator::PictureSize() const {
+  if (this->Resolution[0] == 0 && this->Resolution[1] == 0) return {1280, 720};
+  return {this->Resolution[0], this->Resolution[1]};
+}
+
+/// Of the generator's blocks and the properties and maps as they are.
+vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame() {
+  const vdi::Box& bounds = this->Internal->Generator->scene().bounds;
+  const glm::dvec3 size = bounds.empty() ? glm::dvec3(0.0) : bounds.size();
+  double unit = this->ScalarOpacityUnitDistance;
+  if (unit <= 0.0) {
+    const double volume = size.x * size.y * size.z;
+    unit = volume > 0.0 ? glm::length(size) * std::cbrt(this->Internal->VoxelVolume / volume) : 1.0;
+  }
+  const vdi::ScalarRange range = this->StandInRange();
+  Frame frame{.Camera = this->Viewpoint(bounds),
+              .Function = pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min,
+                                                 range.max, unit),
+              .Settings = {}};
+  vdi::GenerateSettings& settings = frame.Settings;
+  const auto [width, height] = this->PictureSize();
+  settings.width = width;
+  settings.height = height;
+  settings.supersegments = static_cast<std::uint32_t>(std::max(this->Supersegments, 0));
+  settings.samplesPerVoxel = this->SamplingRate;
+  settings.algorithm = static_cast<vdi::Algorithm>(this->Algorithm);
+  settings.budget = static_cast<vdi::Budget>(this->Budget);
+  settings.fill = this->Fill;
+  settings.precision = static_cast<vdi::Precision>(this->Precision);
+  settings.terminationOpacity = this->PictureOnly
+                                    ? std::min(this->TerminationOpacity, vdi::pictureTermination)
+                                    : this->TerminationOpacity;
+  return frame;
+}
+
+void vtkVDIGenerator::Hold() {
+  this->Internal->Held = true;
+}
+
+void vtkVDIGenerator::Release() {
+  this->Internal->Held = false;
+}
+
+int vtkVDIGenerator::GetPreparation() {
+  const auto& preparing = this->Internal->Preparing;
+  if (!preparing) return -1;
+  if (preparing->Done) return preparing->Good ? 100 : -1;
+  return std::clamp(static_cast<int>(100.0 * preparing->Share), 0, 99);
+}
+
+void vtkVDIGenerator::DropPreparation() {
+  this->Internal->Preparing.reset();
+}
+
+void vtkVDIGenerator::Prepare() {
+  Internals& internal = *this->Internal;
+  this->DropPreparation();
+  if (!internal.Generator || internal.Generator->communicator().size() != 1 || !internal.Shown ||
+      this->PictureOnly)
+    return;
+  auto preparation = std::make_unique<Internals::Preparation>();
+  Frame frame;
+  try {
+    frame = this->CurrentFrame();
+  } catch (const vdi::Error&) {
+    return;  // said by the update that comes instead
+  }
+  preparation->Time = this->CurrentMTime();
+  preparation->Worker = std::jthread(
+      [&internal, &own = *preparation, frame = std::move(frame), step = std::max(this->TimeStep, 0)] {
+        try {
+          vdi::VdiGenerator& generator = *internal.Generator;
+          std::optional<vdi::Vdi> vdi =
+              generator.generate(frame.Camera, frame.Function, frame.Settings, [&own](double done) {
+                own.Share = done;
+                return !own.Unwanted;
+              });
+          vdi->time = internal.Shown->Time;
+          vdi->timeStep = static_cast<std::uint64_t>(step);
+          pv::setVdi(own.Output, *vdi);
+          findRanges(own.Output->GetPointData());
+          findRanges(own.Output->GetFieldData());
+          own.Good = true;
+        } catch (const std::exception&) {
+          own.Good = false;  // likewise: the update tries again, and says why if it can't either
+        }
+        own.Done = true;
+      });
+  internal.Preparing = std::move(preparation);
+}
+
+/// Makes sure that no thread uses the generator. True if `output` is what one has made of just this.
+bool vtkVDIGenerator::TakePreparation(vtkDataObject* input, double time, vtkImageData* output) {
+  Internals& internal = *this->Internal;
+  const bool ready = internal.Preparing && internal.Preparing->Done && internal.Preparing->Good &&
+                     internal.Preparing->Time == internal.Executed &&
+                     internal.Shown == this->OriginOf(input, time);
+  if (ready) {
+    output->ShallowCopy(internal.Preparing->Output);
+    const vdi::VdiGenerator& generator = *internal.Generator;
+    this->SetReport(reportOf(generator.reports(), generator.device().name()).c_str());
+    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+  }
+  this->DropPreparation();
+  return ready;
 }
 
 void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* output) {
@@ -313,29 +509,10 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
     this->Internal->Identity = rootsAddress[0];
   }
   vdi::VdiGenerator& generator = *this->Internal->Generator;
+  if (this->TakePreparation(input, time, output)) return;
   this->ShowBlocks(input, time);
   this->UpdateProgress(0.1);
-
-  const vdi::Scene& scene = generator.scene();
-  const double diagonal = scene.bounds.empty() ? 1.0 : glm::length(scene.bounds.size());
-  const double unit =
-      this->ScalarOpacityUnitDistance > 0.0 ? this->ScalarOpacityUnitDistance : 0.01 * diagonal;
-  const vdi::ScalarRange range = this->StandInRange();
-  const vdi::TransferFunction function =
-      pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min, range.max, unit);
-  const vdi::Camera camera = this->Viewpoint(scene.bounds);
-  vdi::GenerateSettings settings;
-  settings.width = this->Resolution[0];
-  settings.height = this->Resolution[1];
-  settings.supersegments = static_cast<std::uint32_t>(std::max(this->Supersegments, 0));
-  settings.samplesPerVoxel = this->SamplingRate;
-  settings.algorithm = static_cast<vdi::Algorithm>(this->Algorithm);
-  settings.budget = static_cast<vdi::Budget>(this->Budget);
-  settings.fill = this->Fill;
-  settings.precision = static_cast<vdi::Precision>(this->Precision);
-  settings.terminationOpacity = this->PictureOnly
-                                    ? std::min(this->TerminationOpacity, vdi::pictureTermination)
-                                    : this->TerminationOpacity;
+  const auto [camera, function, settings] = this->CurrentFrame();
   const auto progress = [this](double done) {
     this->UpdateProgress(0.1 + 0.9 * done);
     return !this->CheckAbort();

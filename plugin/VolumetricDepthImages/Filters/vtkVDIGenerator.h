@@ -14,6 +14,7 @@
 #include <vtkImageAlgorithm.h>
 #include <vtkSmartPointer.h>
 
+#include <array>
 #include <memory>
 
 #include "vtkVolumetricDepthImagesModule.h"
@@ -44,8 +45,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   ///@{
   /**
-   * Distance over which the opacity function holds, in world units; 0 (default): a hundredth of the scene's
-   * diagonal.
+   * Distance over which the opacity function holds, in world units; 0 (default): the scene's diagonal by the
+   * cube root of the number of voxels in it, as ParaView's volume representation starts with.
    */
   vtkSetClampMacro(ScalarOpacityUnitDistance, double, 0.0, VTK_DOUBLE_MAX);
   vtkGetMacro(ScalarOpacityUnitDistance, double);
@@ -53,7 +54,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   /// Component of a multi-component array; -1: magnitude.
   vtkSetMacro(Component, int);
-  /// Lists of the VDI: columns and rows.
+  /// Lists of the VDI: columns and rows. 0 0 (default): 1280 x 720.
   vtkSetVector2Macro(Resolution, int);
   /// N_S, the most supersegments in a list.
   vtkSetMacro(Supersegments, int);
@@ -101,6 +102,21 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   /// Time and memory of the last frame, a line per rank; empty on ranks other than 0.
   vtkGetStringMacro(Report);
 
+  ///@{
+  /**
+   * How a window gets a new VDI without waiting for it. After Hold, changed maps and properties don't make
+   * the output out of date, until Release; another input still does. Prepare starts to make the VDI of the
+   * properties and maps as they are now, in a thread of its own, and returns; what it began before is given
+   * up. The update after Release takes that VDI if nothing has changed since, and makes one otherwise.
+   */
+  void Hold();
+  void Prepare();
+  void Release();
+  ///@}
+  /// Of what Prepare has begun, in percent; 100 when it's there. -1: nothing is prepared, because nothing was
+  /// begun, it went wrong, or it can't be: before the first update, with PictureOnly and on several ranks.
+  int GetPreparation();
+
   vtkMTimeType GetMTime() override;
 
  protected:
@@ -117,11 +133,20 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void operator=(const vtkVDIGenerator&) = delete;
 
   struct Internals;
+  struct Origin;
+  struct Frame;
   void Generate(vtkDataObject* input, double time, vtkImageData* output);
   void Enter();
   void ShowBlocks(vtkDataObject* input, double time);
   vdi::ScalarRange StandInRange();
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
+  Frame CurrentFrame();
+  vtkMTimeType CurrentMTime();
+  Origin OriginOf(vtkDataObject* input, double time);
+  void DropPreparation();
+  bool TakePreparation(vtkDataObject* input, double time, vtkImageData* output);
+  void KeepEarlier(vtkImageData* earlier, vtkImageData* output);
+  std::array<int, 2> PictureSize() const;
   void SetReport(const char* text);
 
   std::unique_ptr<Internals> Internal;
@@ -130,7 +155,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkSmartPointer<vtkPiecewiseFunction> ScalarOpacityFunction;
   double ScalarOpacityUnitDistance = 0.0;
   int Component = 0;
-  int Resolution[2] = {1280, 720};
+  int Resolution[2] = {0, 0};
   int Supersegments = 25;
   double SamplingRate = 1.0;
   int Algorithm = 1;

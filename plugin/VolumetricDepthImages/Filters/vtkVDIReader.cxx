@@ -51,6 +51,9 @@ int vtkVDIReader::RequestInformation(vtkInformation*, vtkInformationVector**, vt
     try {
       if (this->FileName == nullptr) throw vdi::Error(vdi::ErrorCode::Io, "no file name was given");
       const vdi::io::VdiFileInfo file = vdi::io::readVdiInfo(this->FileName);
+      const double range[2] = {file.header.time, file.header.time};
+      info->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), range, 1);
+      info->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
       extent[1] = file.header.width - 1;
       extent[3] = file.header.height - 1;
       extent[5] = 0;
@@ -71,7 +74,9 @@ int vtkVDIReader::RequestData(vtkInformation*, vtkInformationVector**, vtkInform
   output->Initialize();
   if (!isRoot()) return 1;
   try {
-    pv::setVdi(output, vdi::io::readVdi(this->FileName));
+    const vdi::Vdi vdi = vdi::io::readVdi(this->FileName);
+    pv::setVdi(output, vdi);
+    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), vdi.time);
   } catch (const std::exception& error) {
     output->Initialize();
     vtkErrorMacro(<< error.what());

@@ -1,12 +1,14 @@
 #include "vtkVDIRenderer.h"
 
+#include <vtkDataArray.h>
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
 #include <vtkObjectFactory.h>
+#include <vtkPointData.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
-#include <set>
+#include <optional>
 #include <utility>
 
 #include "VDIImageData.h"
@@ -21,9 +23,10 @@ struct vtkVDIRenderer::Internals {
   std::unique_ptr<vdi::VdiRenderer> Renderer;  // none until there's a VDI
   vtkDataObject* Uploaded = nullptr;           // whose VDI the renderer has; compared, never followed
   vtkMTimeType UploadedTime = 0;
+  vtkDataObject* Other = nullptr;  // the input without a VDI of which was told; compared, never followed
   vdi::Camera Original;
   vdi::Box Bounds;
-  std::set<vdi::ViewpointIssue> Warned;
+  std::optional<vdi::ViewpointIssue> Warned;  // of the last picture
   int Width = 0;
   int Height = 0;
 };
@@ -84,6 +87,17 @@ int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs,
                                 vtkInformationVector* outputs) {
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
+  if (this->IsOther(vtkDataObject::GetData(inputs[0]))) {
+    // A picture of nothing, of the size that was announced: a failure would be tried, and told, again and
+    // again.
+    int extent[6];
+    outputs->GetInformationObject(0)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent);
+    output->SetExtent(extent);
+    output->AllocateScalars(VTK_UNSIGNED_CHAR, 4);
+    output->GetPointData()->GetScalars()->Fill(0.0);
+    output->GetPointData()->GetScalars()->SetName("RGBA");
+    return 1;
+  }
   try {
     this->Render(vtkDataObject::GetData(inputs[0]), output);
   } catch (const std::exception& error) {
@@ -94,16 +108,25 @@ int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs,
   return 1;
 }
 
+/// Whether `input` has data but no VDI, which is said once.
+bool vtkVDIRenderer::IsOther(vtkDataObject* input) {
+  auto* image = vtkImageData::SafeDownCast(input);
+  if (image == nullptr || image->GetNumberOfPoints() == 0 || pv::hasVdi(image)) {
+    this->Internal->Other = nullptr;
+    return false;
+  }
+  if (input != this->Internal->Other)
+    vtkErrorMacro("the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
+  this->Internal->Other = input;
+  return true;
+}
+
 void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
   Internals& internal = *this->Internal;
   if (input != internal.Uploaded || input->GetMTime() != internal.UploadedTime) {
     internal.Uploaded = nullptr;
     vdi::Vdi vdi;
-    if (!pv::getVdi(input, vdi)) {
-      if (vtkImageData::SafeDownCast(input)->GetNumberOfPoints() == 0) return;  // another rank has it
-      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                       "the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
-    }
+    if (!pv::getVdi(input, vdi)) return;  // another rank has it
     if (!internal.Renderer) internal.Renderer = std::make_unique<vdi::VdiRenderer>(pv::sharedDevice(0));
     internal.Renderer->setVdi(vdi);
     internal.Uploaded = input;
@@ -137,5 +160,6 @@ void vtkVDIRenderer::WarnOf(const vdi::Camera& camera, int width, int height) {
   Internals& internal = *this->Internal;
   const auto issue =
       vdi::viewpointIssue(internal.Bounds, internal.Original, vdi::View(camera, width, height));
-  if (issue && internal.Warned.insert(*issue).second) vtkWarningMacro(<< describe(*issue));
+  if (issue && issue != internal.Warned) vtkWarningMacro(<< describe(*issue));
+  internal.Warned = issue;
 }

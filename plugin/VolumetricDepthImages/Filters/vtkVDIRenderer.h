@@ -30,7 +30,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
    * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off), and where position and
    * focal point are the same, as they are unless set, the VDI's own is used, turned by Azimuth degrees as
    * vtkCamera::Azimuth does: about its focal point, around its view-up as set. A viewpoint that shows nothing
-   * true (vdi::ViewpointIssue) gets a warning, once each.
+   * true (vdi::ViewpointIssue) gets a warning, unless the picture before had the same.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);
@@ -62,6 +62,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   void operator=(const vtkVDIRenderer&) = delete;
 
   struct Internals;
+  bool IsOther(vtkDataObject* input);
   void Render(vtkDataObject* input, vtkImageData* output);
   vdi::Camera Viewpoint() const;
   void WarnOf(const vdi::Camera& camera, int width, int height);

@@ -1,25 +1,34 @@
 #include "pqCameraFromViewWidget.h"
 
 #include <pqActiveObjects.h>
+#include <pqApplicationCore.h>
+#include <pqPipelineSource.h>
+#include <pqServerManagerModel.h>
+#include <pqUndoStack.h>
 #include <pqView.h>
-#include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
-#include <vtkSMViewProxy.h>
+#include <vtkSMRenderViewProxy.h>
+#include <vtkSMTrace.h>
+#include <QLabel>
 #include <QPushButton>
 #include <QVBoxLayout>
 
-#include <vector>
+#include <string>
+
+#include "vtkSMVDIGeneratorProxy.h"
 
 pqCameraFromViewWidget::pqCameraFromViewWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget* parent)
-    : pqPropertyWidget(proxy, parent) {
+    : pqPropertyWidget(proxy, parent), Line(new QLabel(this)) {
   this->setShowLabel(false);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
   auto* button = new QPushButton(tr("Use the active view's camera"), this);
   button->setObjectName("CameraFromView");
-  button->setToolTip(
-      tr("Copies position, focal point, view-up, angle, projection and scale of the active view's camera"));
+  button->setToolTip(tr("Looks at the VDI from the active view's camera, and turns Use Original Camera off"));
   layout->addWidget(button);
+  this->Line->setWordWrap(true);
+  this->Line->hide();
+  layout->addWidget(this->Line);
   this->connect(button, &QPushButton::clicked, this, &pqCameraFromViewWidget::copyCamera);
 }
 
@@ -27,20 +36,20 @@ pqCameraFromViewWidget::~pqCameraFromViewWidget() = default;
 
 void pqCameraFromViewWidget::copyCamera() {
   pqView* view = pqActiveObjects::instance().activeView();
-  vtkSMProxy* from = view != nullptr ? view->getProxy() : nullptr;
-  vtkSMProxy* to = this->proxy();
-  if (from == nullptr || from->GetProperty("CameraPosition") == nullptr) return;  // not a view with a camera
-  from->UpdatePropertyInformation();
-  for (const char* name : {"Position", "FocalPoint", "ViewUp", "ViewAngle", "ParallelScale"}) {
-    const std::string property = std::string("Camera") + name;
-    // The view's "...Info" properties hold what the user's mouse has done.
-    const std::string info = property + "Info";
-    const std::string source = from->GetProperty(info.c_str()) != nullptr ? info : property;
-    const std::vector<double> values = vtkSMPropertyHelper(from, source.c_str()).GetDoubleArray();
-    vtkSMPropertyHelper(to, property.c_str()).Set(values.data(), static_cast<unsigned int>(values.size()));
+  vtkSMViewProxy* from = view != nullptr ? view->getViewProxy() : nullptr;
+  const std::string why = vtkSMVDIGeneratorProxy::WhyNot(from);
+  this->Line->setText(QString::fromStdString(why));
+  this->Line->setVisible(!why.empty());
+  if (!why.empty()) return;
+  BEGIN_UNDO_SET(tr("Use the view's camera"));
+  {
+    SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this->proxy()).arg("comment", "the view's camera");
+    vtkSMVDIGeneratorProxy::SetCamera(this->proxy(), vtkSMRenderViewProxy::SafeDownCast(from));
+    vtkSMPropertyHelper(this->proxy(), "UseOriginalCamera").Set(0);
+    this->proxy()->UpdateVTKObjects();
   }
-  vtkSMPropertyHelper(to, "CameraParallelProjection")
-      .Set(vtkSMPropertyHelper(from, "CameraParallelProjection").GetAsInt());
-  Q_EMIT this->changeAvailable();
-  Q_EMIT this->changeFinished();
+  END_UNDO_SET();
+  if (auto* source =
+          pqApplicationCore::instance()->getServerManagerModel()->findItem<pqPipelineSource*>(this->proxy()))
+    source->renderAllViews();
 }

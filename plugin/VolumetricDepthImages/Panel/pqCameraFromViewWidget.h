@@ -1,9 +1,11 @@
-// Property widget `vdi_camera_from_view`: a button that copies the active view's camera into the proxy's
-// Camera properties.
+// Property widget `vdi_camera_from_view`: a button that sets a RenderVDI's camera to the active view's, and a
+// line that says why it can't.
 #ifndef pqCameraFromViewWidget_h
 #define pqCameraFromViewWidget_h
 
 #include <pqPropertyWidget.h>
+
+class QLabel;
 
 class pqCameraFromViewWidget : public pqPropertyWidget {
   Q_OBJECT
@@ -12,8 +14,10 @@ class pqCameraFromViewWidget : public pqPropertyWidget {
   pqCameraFromViewWidget(vtkSMProxy* proxy, vtkSMProperty* property, QWidget* parent = nullptr);
   ~pqCameraFromViewWidget() override;
 
- private Q_SLOTS:
-  void copyCamera();
+ private:
+  Q_SLOT void copyCamera();
+
+  QLabel* Line;
 };
 
 #endif

@@ -1,0 +1,31 @@
+/**
+ * @class vtkVDIFileSeriesReader
+ * @brief reads .vdi files as the time steps of one series
+ *
+ * A step's time is the one in its file. Where two files have the same time, as those of one data set from
+ * several viewpoints have, the steps are counted instead, from 0.
+ */
+#ifndef vtkVDIFileSeriesReader_h
+#define vtkVDIFileSeriesReader_h
+
+#include <vtkFileSeriesReader.h>
+
+#include "vtkVolumetricDepthImagesModule.h"
+
+class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSeriesReader {
+ public:
+  static vtkVDIFileSeriesReader* New();
+  vtkTypeMacro(vtkVDIFileSeriesReader, vtkFileSeriesReader);
+
+ protected:
+  vtkVDIFileSeriesReader() = default;
+  ~vtkVDIFileSeriesReader() override = default;
+
+  int RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+
+ private:
+  vtkVDIFileSeriesReader(const vtkVDIFileSeriesReader&) = delete;
+  void operator=(const vtkVDIFileSeriesReader&) = delete;
+};
+
+#endif

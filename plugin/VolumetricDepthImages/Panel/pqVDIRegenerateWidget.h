@@ -1,0 +1,24 @@
+// Property widget `vdi_regenerate`: a button that makes the VDI anew from the active view, and a line that
+// says how far that is, or why it can't be.
+#ifndef pqVDIRegenerateWidget_h
+#define pqVDIRegenerateWidget_h
+
+#include <pqPropertyWidget.h>
+
+class QLabel;
+
+class pqVDIRegenerateWidget : public pqPropertyWidget {
+  Q_OBJECT
+
+ public:
+  pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty* property, QWidget* parent = nullptr);
+  ~pqVDIRegenerateWidget() override;
+
+ private:
+  Q_SLOT void regenerate();
+  Q_SLOT void showProgress(int percent);
+
+  QLabel* Line;
+};
+
+#endif

@@ -1,0 +1,175 @@
+#include "pqVDIRegenerator.h"
+
+#include <pqActiveObjects.h>
+#include <pqApplicationCore.h>
+#include <pqCoreUtilities.h>
+#include <pqDataRepresentation.h>
+#include <pqOutputPort.h>
+#include <pqPipelineSource.h>
+#include <pqServerManagerModel.h>
+#include <pqUndoStack.h>
+#include <pqView.h>
+#include <vtkCamera.h>
+#include <vtkCommand.h>
+#include <vtkSMProperty.h>
+#include <vtkSMPropertyHelper.h>
+#include <vtkSMRenderViewProxy.h>
+#include <vtkWeakPointer.h>
+#include <QApplication>
+
+#include <algorithm>
+#include <string>
+
+#include "vtkSMVDIGeneratorProxy.h"
+
+namespace {
+
+constexpr int lookMilliseconds = 40;
+constexpr int lookAtViewsMilliseconds = 250;
+/// How long an edit rests before the VDI is made anew.
+constexpr int editRestMilliseconds = 400;
+
+std::array<double, 10> numbersOf(vtkCamera* camera) {
+  std::array<double, 10> numbers{};
+  camera->GetPosition(numbers.data());
+  camera->GetFocalPoint(&numbers[3]);
+  camera->GetViewUp(&numbers[6]);
+  numbers[9] = camera->GetParallelScale();
+  return numbers;
+}
+
+}  // namespace
+
+struct pqVDIRegenerator::Watched {
+  vtkWeakPointer<vtkObject> Map;
+  unsigned long Observer = 0;
+};
+
+pqVDIRegenerator::pqVDIRegenerator(pqPipelineSource* source) : QObject(source), Source(source) {
+  this->Looking.setInterval(lookMilliseconds);
+  this->connect(&this->Looking, &QTimer::timeout, this, &pqVDIRegenerator::look);
+  this->LookingAtViews.setInterval(lookAtViewsMilliseconds);
+  this->connect(&this->LookingAtViews, &QTimer::timeout, this, &pqVDIRegenerator::lookAtViews);
+  this->LookingAtViews.start();
+  for (const char* name : {"LookupTable", "ScalarOpacityFunction"}) {
+    pqCoreUtilities::connect(source->getProxy()->GetProperty(name), vtkCommand::ModifiedEvent, this,
+                             SLOT(watchMaps()));
+  }
+  this->watchMaps();
+}
+
+pqVDIRegenerator::~pqVDIRegenerator() {
+  this->forgetMaps();
+}
+
+vtkSMVDIGeneratorProxy* pqVDIRegenerator::generator() const {
+  return vtkSMVDIGeneratorProxy::SafeDownCast(this->Source->getProxy());
+}
+
+pqVDIRegenerator* pqVDIRegenerator::of(vtkSMVDIGeneratorProxy* proxy) {
+  auto* source = pqApplicationCore::instance()->getServerManagerModel()->findItem<pqPipelineSource*>(proxy);
+  return source != nullptr ? source->findChild<pqVDIRegenerator*>() : nullptr;
+}
+
+void pqVDIRegenerator::forgetMaps() {
+  for (const Watched& watched : this->Maps) {
+    if (watched.Map != nullptr) watched.Map->RemoveObserver(watched.Observer);
+  }
+  this->Maps.clear();
+}
+
+void pqVDIRegenerator::watchMaps() {
+  this->forgetMaps();
+  const auto watch = [this](vtkSMProxy* map) {
+    if (map == nullptr) return;
+    this->Maps.push_back(
+        {map, pqCoreUtilities::connect(map, vtkCommand::PropertyModifiedEvent, this, SLOT(mapChanged()))});
+  };
+  vtkSMProxy* table = vtkSMPropertyHelper(this->generator(), "LookupTable").GetAsProxy();
+  watch(table);
+  if (table != nullptr) watch(vtkSMPropertyHelper(table, "ScalarOpacityFunction", true).GetAsProxy());
+  watch(vtkSMPropertyHelper(this->generator(), "ScalarOpacityFunction").GetAsProxy());
+}
+
+bool pqVDIRegenerator::isShown() const {
+  const QList<pqView*> views = this->Source->getViews();
+  return std::any_of(views.begin(), views.end(), [this](pqView* view) {
+    const QList<pqOutputPort*> ports = this->Source->getOutputPorts();
+    return std::any_of(ports.begin(), ports.end(), [view](pqOutputPort* port) {
+      pqDataRepresentation* shown = port->getRepresentation(view);
+      return shown != nullptr && shown->isVisible();
+    });
+  });
+}
+
+void pqVDIRegenerator::hold(int restMilliseconds) {
+  if (this->Now == State::Idle) this->generator()->InvokeCommand("Hold");
+  this->Now = State::Waiting;
+  this->Rest = restMilliseconds;
+  this->Resting.start();
+  this->Looking.start();
+}
+
+void pqVDIRegenerator::mapChanged() {
+  if (this->Source->modifiedState() == pqProxy::UNINITIALIZED || !this->isShown()) return;
+  this->hold(editRestMilliseconds);
+}
+
+void pqVDIRegenerator::look() {
+  if (QApplication::mouseButtons() != Qt::NoButton) {
+    this->Resting.start();
+    return;
+  }
+  if (this->Now == State::Waiting) {
+    if (this->Resting.elapsed() < this->Rest) return;
+    this->generator()->InvokeCommand("Prepare");
+    this->Now = State::Preparing;
+    Q_EMIT this->progress(0);
+    return;
+  }
+  vtkSMProperty* preparation = this->generator()->GetProperty("Preparation");
+  this->generator()->UpdatePropertyInformation(preparation);
+  const int percent = vtkSMPropertyHelper(preparation).GetAsInt();
+  if (percent >= 0 && percent < 100) {
+    Q_EMIT this->progress(percent);
+    return;
+  }
+  this->finish();
+}
+
+void pqVDIRegenerator::finish() {
+  this->Looking.stop();
+  this->Now = State::Idle;
+  this->generator()->InvokeCommand("Release");
+  this->generator()->MarkDirty(this->generator());
+  Q_EMIT this->progress(-1);
+  this->Source->renderAllViews();
+}
+
+QString pqVDIRegenerator::regenerate(pqView* view) {
+  const bool made = this->Source->modifiedState() != pqProxy::UNINITIALIZED;
+  const bool idle = this->Now == State::Idle;
+  if (made) this->hold(0);
+  BEGIN_UNDO_SET(tr("Regenerate VDI"));
+  const std::string why = this->generator()->SetViewpoint(view != nullptr ? view->getViewProxy() : nullptr);
+  END_UNDO_SET();
+  if (made && idle && !why.empty()) this->finish();
+  return QString::fromStdString(why);
+}
+
+void pqVDIRegenerator::lookAtViews() {
+  vtkSMVDIGeneratorProxy* own = this->generator();
+  if (vtkSMPropertyHelper(own, "Auto").GetAsInt() == 0 || this->Now != State::Idle ||
+      this->Source->modifiedState() == pqProxy::UNINITIALIZED)
+    return;
+  pqView* view = pqActiveObjects::instance().activeView();
+  auto* proxy = view != nullptr ? vtkSMRenderViewProxy::SafeDownCast(view->getViewProxy()) : nullptr;
+  if (proxy == nullptr || !this->Source->getViews().contains(view) || !this->isShown()) return;
+  const std::array<double, 10> camera = numbersOf(proxy->GetActiveCamera());
+  const bool moves = camera != this->LastCamera || QApplication::mouseButtons() != Qt::NoButton;
+  if (moves) this->Tried = false;
+  this->LastCamera = camera;
+  if (moves || this->Tried) return;
+  this->Tried = true;
+  if (own->DegreesFrom(proxy) > vtkSMPropertyHelper(own, "AutoAngle").GetAsDouble()) this->regenerate(view);
+}

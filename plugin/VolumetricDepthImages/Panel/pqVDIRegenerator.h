@@ -1,0 +1,65 @@
+// Makes the VDI of one VolumetricDepthImage anew without making the window wait: after a colour map or
+// opacity function was edited, from a view's camera, and by itself where the filter's Auto is on.
+//
+// While a map is being edited the filter is held: it shows what it has. Once the edit has rested and no mouse
+// button is down, a thread makes the new VDI, which takes the old one's place when it's there. Where that
+// can't be (several ranks), the next rendering makes it, as with any filter of ParaView.
+#ifndef pqVDIRegenerator_h
+#define pqVDIRegenerator_h
+
+#include <QElapsedTimer>
+#include <QObject>
+#include <QPointer>
+#include <QTimer>
+
+#include <array>
+#include <vector>
+
+class pqPipelineSource;
+class pqView;
+class vtkSMVDIGeneratorProxy;
+
+class pqVDIRegenerator : public QObject {
+  Q_OBJECT
+
+ public:
+  /// `source` is a VolumetricDepthImage; owns this.
+  explicit pqVDIRegenerator(pqPipelineSource* source);
+  ~pqVDIRegenerator() override;
+
+  /// From the camera of the view, at its size. The result is empty, or why that can't be.
+  QString regenerate(pqView* view);
+  /// That of a proxy, null if it's none of a VolumetricDepthImage in the pipeline.
+  static pqVDIRegenerator* of(vtkSMVDIGeneratorProxy* proxy);
+
+ Q_SIGNALS:
+  /// Percent of the VDI that's being made; -1: none is.
+  void progress(int percent);
+
+ private:
+  Q_SLOT void watchMaps();
+  Q_SLOT void mapChanged();
+  Q_SLOT void look();
+  Q_SLOT void lookAtViews();
+
+  enum class State { Idle, Waiting, Preparing };
+
+  vtkSMVDIGeneratorProxy* generator() const;
+  bool isShown() const;
+  void hold(int restMilliseconds);
+  void finish();
+  void forgetMaps();
+
+  pqPipelineSource* Source;
+  State Now = State::Idle;
+  QTimer Looking;         // while something is under way
+  QTimer LookingAtViews;  // for Auto
+  QElapsedTimer Resting;  // since the last edit
+  qint64 Rest = 0;        // milliseconds that it has to
+  std::array<double, 10> LastCamera{};
+  bool Tried = false;  // to make a VDI from where the camera rests
+  struct Watched;
+  std::vector<Watched> Maps;
+};
+
+#endif

@@ -1,0 +1,112 @@
+"""What VolumetricDepthImage takes from the active view, and that traces and states make it anew."""
+
+import os
+import sys
+
+import numpy as np
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from pvtest import *  # noqa: E402,F403
+from paraview import smtrace  # noqa: E402
+
+OPACITY = [80, 0, 0.5, 0, 300, 0.1, 0.5, 0, 550, 0.9, 0.5, 0]
+SIZE, POSITION, UP = [160, 120], [40, 30, 50], [0.1, 0.9, 0.2]
+
+
+def taken(image):
+    return [list(image.CameraPosition), list(image.CameraFocalPoint), list(image.CameraViewUp), image.CameraViewAngle,
+            image.CameraParallelProjection, image.CameraParallelScale, list(image.Resolution),
+            image.ScalarOpacityUnitDistance, list(image.SelectInputScalars)]
+
+
+def session():
+    """A wavelet with a second array, shown as a volume coloured by that one."""
+    wavelet = simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8])
+    twice = simple.Calculator(Input=wavelet, Function="2*RTData", ResultArrayName="twice")
+    view = make_view(SIZE, POSITION, [1, 0, -1])
+    view.CameraViewUp, view.CameraViewAngle = UP, 25
+    representation = simple.Show(twice, view)
+    representation.SetRepresentationType("Volume")
+    simple.ColorBy(representation, ("POINTS", "twice"))
+    representation.ScalarOpacityUnitDistance = 2.5
+    simple.GetOpacityTransferFunction("twice").Points = OPACITY
+    simple.Render(view)
+    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp, view.CameraViewAngle = POSITION, [1, 0, -1], UP, 25
+    return twice, view, representation
+
+
+# Nothing to take.
+alone = simple.VolumetricDepthImage(Input=simple.Wavelet())
+alone.Resolution = [32, 24]
+alone.UpdatePipeline()
+check(list(alone.CameraPosition) == [0, 0, 0], "without a view no camera is set")
+unplaced = simple.CreateView("RenderView")
+other = simple.VolumetricDepthImage(Input=simple.Wavelet())
+other.Resolution = [32, 24]
+other.UpdatePipeline()
+check(list(other.CameraPosition) == [0, 0, 0], "nor from a view whose camera nobody has placed")
+explicit = simple.VolumetricDepthImage(Input=simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8]), Resolution=[32, 24],
+                                       ScalarOpacityUnitDistance=np.sqrt(3))
+check(np.abs(picture(explicit).astype(int) - picture(simple.VolumetricDepthImage(
+    Input=simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8]), Resolution=[32, 24]))).max() <= 1,
+      "without a view the unit distance is that of ParaView's volumes")
+simple.ResetSession()
+
+smtrace.start_trace()
+source, view, representation = session()
+image = simple.VolumetricDepthImage(registrationName="vdi", Input=source)
+check(list(image.SelectInputScalars) == ["POINTS", "twice"], "a new filter has the array that colours the volume")
+image.UpdatePipeline()
+check(taken(image)[:2] == [POSITION, [1, 0, -1]] and image.CameraViewAngle == 25
+      and np.allclose(image.CameraViewUp, view.GetActiveCamera().GetViewUp()), "the first update takes the view's camera")
+check(list(image.Resolution) == SIZE, "its size")
+check(image.ScalarOpacityUnitDistance == 2.5, "the volume's unit distance")
+check(image.LookupTable == representation.LookupTable, "and its colour map")
+view.CameraPosition = [50, 0, 0]
+image.UpdatePipeline()
+check(list(image.CameraPosition) == POSITION, "the second takes nothing")
+simple.Hide(source, view)
+first, values = picture(image), taken(image)
+check(first.max() > 60 and first.std() > 10, "it shows something")
+write_png("view_defaults.png", first)
+trace = smtrace.stop_trace()
+
+kept = simple.VolumetricDepthImage(Input=source, CameraPosition=[0, 60, 1], Resolution=[64, 48], SelectInputScalars=[
+    "POINTS", "RTData"])
+kept.UpdatePipeline()
+check(list(kept.CameraPosition) == [0, 60, 1] and list(kept.Resolution) == [64, 48]
+      and list(kept.SelectInputScalars) == ["POINTS", "RTData"], "what a script has set stays")
+
+state_file = os.path.join(OUTPUT, "view_defaults.pvsm")
+simple.Delete(kept)
+simple.SaveState(state_file)
+for what, load in (("trace", lambda: exec(trace, {})), ("state", lambda: simple.LoadState(state_file))):
+    simple.ResetSession()
+    load()
+    simple.GetOpacityTransferFunction("twice").Points = OPACITY  # traces have what was set in the window, not by scripts
+    again = simple.FindSource("vdi")
+    check(again is not None, "a %s makes the filter again" % what)
+    different = [a for a, b in zip(taken(again), values) if a != b]
+    check(not different, "with the same values %s" % different)
+    check(np.abs(picture(again).astype(int) - first).max() <= 1, "and the same picture")
+
+# Edits count at once in scripts; a window holds the filter.
+again.SMProxy.InvokeCommand("Hold")
+simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0, 0.5, 0]
+check(np.abs(picture(again).astype(int) - first).max() <= 1, "while it is held, the filter keeps what it has")
+again.SMProxy.InvokeCommand("Prepare")
+percent = 0
+while 0 <= percent < 100:
+    again.SMProxy.UpdatePropertyInformation()
+    percent = again.GetProperty("Preparation").GetData()
+check(percent == 100, "what is prepared gets there")
+check(np.abs(picture(again).astype(int) - first).max() <= 1, "and waits for the release")
+again.SMProxy.InvokeCommand("Release")
+again.SMProxy.MarkDirty(again.SMProxy)
+check(picture(again).max() == 0, "which takes it")
+simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 1, 0.5, 0]
+check(picture(again).max() > 60, "after it edits count at once again")
+again.SMProxy.InvokeCommand("Prepare")
+simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0, 0.5, 0]
+check(picture(again).max() == 0, "what was prepared of older points isn't taken")
+finish()

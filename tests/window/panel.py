@@ -1,0 +1,170 @@
+"""By mouse, as the guide says it: from a shown volume to a VDI in two clicks, its opacity edited, saved as data and as a
+state, the trace replayed and the state loaded. Leaves a screenshot of each step in VDI_TEST_OUTPUT."""
+
+import os
+import subprocess
+import sys
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from window import Pulse, Screen, Window, wait_for  # noqa: E402
+
+OUTPUT = os.path.join(os.environ["VDI_TEST_OUTPUT"], "panel")
+os.makedirs(OUTPUT, exist_ok=True)
+ANSWER_SECONDS = 1.0  # the longest that the window may take to answer while a colour is edited
+LOAD = """
+from paraview import simple
+simple.LoadDistributedPlugin("VolumetricDepthImages", remote=False, ns=globals())
+"""
+REPLAY = """
+import os
+from paraview.simple import FindSource, SaveData
+SaveData(os.environ["VDI_REPLAYED"], proxy=FindSource("VolumetricDepthImage1"))
+"""
+failures = []
+
+
+def check(good, what):
+    print(("ok      " if good else "FAILED  ") + what, flush=True)
+    if not good:
+        failures.append(what)
+
+
+def path(name):
+    full = os.path.join(OUTPUT, name)
+    if os.path.exists(full):
+        os.remove(full)
+    return full
+
+
+def bytes_of(name):
+    with open(name, "rb") as file:
+        return file.read()
+
+
+def load_plugin(window):
+    window.menu("Tools", "Manage Plugins...")
+    window.click("VolumetricDepthImages")
+    window.click("Load Selected")
+    wait_for("loaded plugin", lambda: not window.is_enabled("Load Selected"))
+    window.close_dialog("Plugin Manager")
+
+
+def save_data(window, name):
+    window.menu("File", "Save Data...")
+    window.find("File name:", seconds=10)
+    window.type(name)
+    window.key("Return")
+    wait_for(name, lambda: os.path.exists(name), 60)
+
+
+def is_making(window, panel):
+    return window.text_that_begins("Making the VDI anew", panel) is not None
+
+
+def first_session(window):
+    vdi, state = path("first.vdi"), path("state.pvsm")
+    window.menu("Tools", "Start Trace")
+    window.click("OK", "push button")
+    load_plugin(window)
+    window.menu("Sources", "Alphabetical", "Wavelet")
+    window.click("Apply")
+    window.choose("Outline", "Volume")
+    window.click("Yes", "push button")
+    time.sleep(2)
+    x, y, width, height = window.view()
+    window.drag((x + width // 2, y + height // 2), (x + width // 2 + 120, y + height // 2 - 70))
+    time.sleep(1)
+    window.screenshot("1_volume.png")
+
+    window.menu("Filters", "Volumetric Depth Images")
+    window.screenshot("2_menu.png")
+    window.key("Escape", "Escape")
+    window.menu("Filters", "Volumetric Depth Images", "Volumetric Depth Image")
+    window.screenshot("3_filter.png")
+    window.click("Apply")
+    wait_for("VDI", lambda: not window.is_enabled("Apply"), 120)
+    time.sleep(1)
+    window.screenshot("4_applied.png")
+    values = window.values()
+    check(any(value.startswith("1.73205") for value in values), "the unit distance is the volume's")
+    check(any(value.isdigit() and abs(int(value) - width) < 8 for value in values), "the width is the view's")
+
+    window.click("Edit Color Map and Opacity")
+    time.sleep(1)
+    editor = window.find("Color Map and Opacity of the VDI", "dialog").box
+    window.screenshot("5_colors.png")
+    panel = window.find("Properties", "frame")
+    right, top = editor[0] + editor[2] - 56, editor[1] + 199
+    with Pulse(window) as pulse:
+        window.drag((right, top), (right, top + 90), steps=30, seconds=1.5)
+        window.screenshot("6_dragged.png")
+        wait_for("new VDI", lambda: is_making(window, panel), 30)
+        window.screenshot("7_making.png")
+        wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
+        time.sleep(1)
+    window.screenshot("8_edited.png")
+    print("a colour edit: the window took at most %.3f s to answer" % pulse.longest, flush=True)
+    check(pulse.longest <= ANSWER_SECONDS, "an edit doesn't freeze the window")
+    window.select(0)  # nothing is shown of that
+    check(not window.has("Color Map and Opacity of the VDI", "dialog"), "the editor closes where nothing is shown")
+    window.select(2)
+    panel = window.find("Properties", "frame")
+
+    window.drag((x + width // 2, y + height // 2), (x + width // 2 - 60, y + height // 2 + 30))
+    time.sleep(1)
+    before = window.values()
+    window.click("Regenerate From This View")
+    wait_for("new VDI", lambda: is_making(window, panel), 30)
+    wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
+    check(window.values() != before, "the button sets the camera")
+
+    window.menu("Tools", "Stop Trace")
+    trace = wait_for("trace", lambda: window.text_that_begins("# trace generated"))
+    with open(path("trace.py"), "w") as file:
+        file.write(LOAD + trace + REPLAY)
+    window.screenshot("9_trace.png")
+    window.close_dialog("Script Editor")
+    for name in ("CameraPosition", "Resolution", "ScalarOpacityUnitDistance"):
+        check("volumetricDepthImage1.%s = " % name in trace, "the trace has " + name)
+
+    save_data(window, vdi)
+    time.sleep(1)
+    window.screenshot("10_saved.png")
+    check(not window.has("Configure Writer", "dialog") and not window.has("OK", "push button"),
+          "Save Data asks nothing twice")
+    window.menu("File", "Save State...")
+    window.find("File name:", seconds=10)
+    window.type(state)
+    window.key("Return")
+    wait_for(state, lambda: os.path.exists(state))
+    return vdi, state
+
+
+def second_session(window, state):
+    vdi = path("from_state.vdi")
+    window.click("Reset Session", "push button")
+    if window.has("Yes", "push button"):
+        window.click("Yes", "push button")
+    time.sleep(2)
+    window.menu("File", "Load State...")
+    window.find("File name:", seconds=10)
+    window.type(state)
+    window.key("Return")
+    time.sleep(20)
+    window.screenshot("11_state.png")
+    window.select(2)
+    save_data(window, vdi)
+    return vdi
+
+
+with Screen() as screen:
+    with Window(screen, output=OUTPUT) as window:
+        vdi, state = first_session(window)
+        from_state = second_session(window, state)
+    replayed = path("replayed.vdi")
+    subprocess.run(["pvbatch", os.path.join(OUTPUT, "trace.py")], check=True, timeout=200,
+                   env=dict(os.environ, VDI_REPLAYED=replayed, PV_PLUGIN_CONFIG_FILE=os.environ["VDI_PLUGIN_LIST"]))
+check(bytes_of(from_state) == bytes_of(vdi), "a state that is loaded makes the same VDI")
+check(bytes_of(replayed) == bytes_of(vdi), "a trace that is replayed makes the same VDI")
+sys.exit(1 if failures else 0)
