@@ -55,14 +55,14 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
 std::vector<SupersegmentLists> generateTogether(const Frame& frame,
                                                 std::span<const std::vector<Block>> ranks);
 
-/// The ranks' lists of each pixel merged by depth and segmented again to the budget (paper,
+/// The ranks' lists of each pixel interleaved by depth and segmented again to the budget (paper,
 /// section 5.2). All inputs have the same number of lists. Of the settings: supersegments, budget, fill and
 /// algorithm.
 SupersegmentLists composite(std::span<const SupersegmentLists> subLists, const GenerateSettings& settings,
                             double sampleStep);
 
 /// The VDI seen by `view`. Each supersegment fills the part of its pixel's frustum between its two depths;
-/// rays walk through the frusta of V_O's pixels in order, whatever their direction.
+/// rays traverse the frusta of V_O's pixels in order, whatever their direction.
 Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction);
 
 }  // namespace vdi::reference
