@@ -199,6 +199,28 @@ TEST_CASE("all ranks together send little more than one rank makes") {
   if (world.rank() == 0) CHECK(together < 1.7 * subSupersegments(1));
 }
 
+TEST_CASE("a large picture in bands, most of which are empty: the picture of one rank") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto parts = test::decompose("shells", {16, 16, 16}, {2, 2, 2}, Layout::Interleaved, Joint::Cells,
+                                     ScalarType::F32, world.rank(), world.size());
+  const GenerateSettings settings = test::smallSettings(640, 360, 5);
+  Camera camera = test::oblique(true);
+  camera.parallelScale *= 6.0;  // lists of the upper and lower bands are many, and empty
+  VdiGenerator many(device(), comm::Communicator::world());
+  many.setBlocks(parts.mine);
+  const auto vdi = many.generate(camera, test::threeHues(0.8), settings);
+  const auto volume = many.renderVolume(camera, test::threeHues(0.8), settings);
+  if (world.rank() != 0) return;
+  const auto whole = test::decompose("shells", {16, 16, 16}, {1, 1, 1}, Layout::OnOneRank, Joint::Cells,
+                                     ScalarType::F32, 0, 1);
+  VdiGenerator one(device(), comm::Communicator::serial());
+  one.setBlocks(whole.mine);
+  const auto truth = one.renderVolume(camera, test::threeHues(0.8), settings);
+  CHECK(vdi->supersegmentCount() > 100);
+  CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
+  CHECK(largestDifference(*volume, *truth) < 1.0F);
+}
+
 TEST_CASE("tiny pictures: more ranks than rows and pixels") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,

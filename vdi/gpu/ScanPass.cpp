@@ -1,6 +1,7 @@
 #include "vdi/gpu/ScanPass.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Device.h"
@@ -28,7 +29,11 @@ ScanPass::ScanPass(std::shared_ptr<Device> device)
 void ScanPass::recordBoth(Commands& commands, shared::ScanConstants constants, ComputePipeline& pipeline) {
   overflow_.mappedAs<std::uint32_t>()[0] = 0;
   const std::uint32_t groups = constants.count / perGroup + 1;
-  sums_.reserve(device_, std::uint64_t{groups} * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
+  const std::uint64_t sumBytes = std::uint64_t{groups} * sizeof(std::uint32_t);
+  if (!sums_ || sums_.size() < sumBytes) {
+    outgrown_.push_back(std::move(sums_));
+    sums_ = Buffer(device_, sumBytes + sumBytes / 2, MemoryKind::DeviceLocal);
+  }
   constants.sums = sums_.address();
   constants.overflow = overflow_.address();
   constants.mode = shared::scanModeSum;

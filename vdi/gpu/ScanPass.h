@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "shaders/shared/scan.h"
 #include "vdi/gpu/Commands.h"
@@ -38,6 +39,9 @@ class ScanPass {
   std::shared_ptr<Device> device_;
   PipelineSet pipelines_;  // without guard, with one, with one that looks at another one
   Buffer sums_;            // of workgroups
+  /// Those that were too small for a later scan: what was recorded before may still use them. They're a few,
+  /// and small, for each is half as large again as the one before.
+  std::vector<Buffer> outgrown_;
   Buffer overflow_;
 };
 
