@@ -1,0 +1,122 @@
+#include "VDIPiece.h"
+
+#include <vtkDataArray.h>
+#include <vtkDoubleArray.h>
+#include <vtkFieldData.h>
+#include <vtkImageData.h>
+#include <vtkIntArray.h>
+#include <vtkNew.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkStringArray.h>
+#include <vtkUnsignedCharArray.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "VDIImageData.h"
+#include "vdi/core/Error.h"
+#include "vdi/io/VdiFile.h"
+
+namespace pv {
+
+namespace {
+
+constexpr const char* sizeName = "VDI.size";
+constexpr const char* fileName = "VDI.file";
+constexpr const char* problemName = "VDI.problem";
+constexpr const char* boundsName = "VDI.bounds";
+
+void setProblem(vtkFieldData* fields, const std::string& text) {
+  fields->Initialize();
+  vtkNew<vtkStringArray> array;
+  array->SetName(problemName);
+  array->InsertNextValue(text);
+  fields->AddArray(array);
+}
+
+void packFile(vtkImageData* image, vtkFieldData* fields) {
+  vdi::Vdi vdi;
+  getVdi(image, vdi);
+  const std::vector<std::byte> bytes = vdi::io::encode(vdi);
+  vtkNew<vtkUnsignedCharArray> array;
+  array->SetName(fileName);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(bytes.size()));
+  std::memcpy(array->GetPointer(0), bytes.data(), bytes.size());
+  fields->AddArray(array);
+  fields->AddArray(image->GetFieldData()->GetAbstractArray(boundsName));
+}
+
+void packArrays(vtkImageData* image, vtkFieldData* fields) {
+  fields->ShallowCopy(image->GetFieldData());
+  int dimensions[3];
+  image->GetDimensions(dimensions);
+  vtkNew<vtkIntArray> size;
+  size->SetName(sizeName);
+  size->InsertNextValue(dimensions[0]);
+  size->InsertNextValue(dimensions[1]);
+  fields->AddArray(size);
+}
+
+}  // namespace
+
+void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
+  piece->Initialize();
+  vtkNew<vtkPoints> points;
+  points->InsertNextPoint(0.0, 0.0, 0.0);
+  piece->SetPoints(points);
+  if (data == nullptr) return;
+  vtkFieldData* fields = piece->GetFieldData();
+  auto* image = vtkImageData::SafeDownCast(data);
+  const bool isVdi = image != nullptr && image->GetFieldData()->GetAbstractArray("VDI.offsets") != nullptr;
+  if (!isVdi) {
+    const bool isElsewhere = image != nullptr && image->GetNumberOfPoints() == 0;
+    if (!isElsewhere) {
+      setProblem(
+          fields,
+          "This data set has no VDI. Make one of it: Filters > Volumetric Depth Images > Volumetric Depth "
+          "Image.");
+    }
+    return;
+  }
+  try {
+    if (crosses) {
+      packFile(image, fields);
+    } else {
+      packArrays(image, fields);
+    }
+  } catch (const std::exception& error) {
+    setProblem(fields, error.what());
+  }
+}
+
+bool boundsOf(vtkPolyData* piece, double bounds[6]) {
+  auto* array = vtkDoubleArray::SafeDownCast(piece->GetFieldData()->GetAbstractArray(boundsName));
+  if (array == nullptr || array->GetNumberOfValues() != 6) return false;
+  std::copy_n(array->GetPointer(0), 6, bounds);
+  return bounds[0] <= bounds[1] && bounds[2] <= bounds[3] && bounds[4] <= bounds[5];
+}
+
+std::optional<vdi::Vdi> unpackVdi(vtkDataObject* piece) {
+  vtkFieldData* fields = piece->GetFieldData();
+  if (auto* problem = vtkStringArray::SafeDownCast(fields->GetAbstractArray(problemName)))
+    throw vdi::Error(vdi::ErrorCode::InvalidArgument, problem->GetValue(0));
+  if (auto* file = vtkUnsignedCharArray::SafeDownCast(fields->GetAbstractArray(fileName))) {
+    const std::span<const unsigned char> bytes(file->GetPointer(0),
+                                               static_cast<std::size_t>(file->GetNumberOfValues()));
+    return vdi::io::decode(std::as_bytes(bytes));
+  }
+  auto* size = vtkIntArray::SafeDownCast(fields->GetAbstractArray(sizeName));
+  if (size == nullptr || size->GetNumberOfValues() != 2) return std::nullopt;
+  vtkNew<vtkImageData> image;
+  image->SetDimensions(size->GetValue(0), size->GetValue(1), 1);
+  image->SetFieldData(fields);
+  vdi::Vdi vdi;
+  if (!getVdi(image, vdi)) return std::nullopt;
+  return vdi;
+}
+
+}  // namespace pv

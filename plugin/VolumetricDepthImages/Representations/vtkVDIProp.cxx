@@ -1,0 +1,281 @@
+#include "vtkVDIProp.h"
+
+#include <vtkMatrix3x3.h>
+#include <vtkMatrix4x4.h>
+#include <vtkNew.h>
+#include <vtkObjectFactory.h>
+#include <vtkOpenGLCamera.h>
+#include <vtkOpenGLError.h>
+#include <vtkOpenGLFramebufferObject.h>
+#include <vtkOpenGLQuadHelper.h>
+#include <vtkOpenGLRenderWindow.h>
+#include <vtkOpenGLShaderCache.h>
+#include <vtkOpenGLState.h>
+#include <vtkPolyData.h>
+#include <vtkRenderer.h>
+#include <vtkShaderProgram.h>
+#include <vtkTextActor.h>
+#include <vtkTextProperty.h>
+#include <vtkTextureObject.h>
+#include <vtk_glew.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "VDIPiece.h"
+#include "VDISession.h"
+#include "VDIView.h"
+#include "vdi/core/Error.h"
+#include "vdi/pipeline/Pipeline.h"
+
+vtkStandardNewMacro(vtkVDIProp);
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double secondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+constexpr const char* pictureShader = R"(//VTK::System::Dec
+//VTK::Output::Dec
+in vec2 texCoord;
+uniform sampler2D picture;
+void main() { gl_FragData[0] = texture(picture, texCoord); }
+)";
+
+/// A renderer's part of its window, in pixels.
+struct Viewport {
+  glm::ivec2 size{0};
+  glm::ivec2 corner{0};
+};
+
+Viewport viewportOf(vtkRenderer* renderer) {
+  Viewport port;
+  renderer->GetTiledSizeAndOrigin(&port.size.x, &port.size.y, &port.corner.x, &port.corner.y);
+  return port;
+}
+
+pv::ViewMatrices matricesOf(vtkRenderer* renderer) {
+  vtkMatrix4x4* worldToView = nullptr;
+  vtkMatrix4x4* viewToClip = nullptr;
+  vtkMatrix4x4* worldToClip = nullptr;
+  vtkMatrix3x3* normals = nullptr;
+  auto* camera = vtkOpenGLCamera::SafeDownCast(renderer->GetActiveCamera());
+  camera->GetKeyMatrices(renderer, worldToView, normals, viewToClip, worldToClip);
+  return {worldToView, viewToClip};
+}
+
+/// The depth buffer of what is being drawn to. Not vtkRenderWindow::GetZbufferData, which reads the window's:
+/// passes draw elsewhere.
+void readDepths(vtkOpenGLRenderWindow* window, const Viewport& port, std::vector<float>& depths) {
+  depths.resize(static_cast<std::size_t>(port.size.x) * static_cast<std::size_t>(port.size.y));
+  GLint samples = 0;
+  glGetIntegerv(GL_SAMPLES, &samples);
+  if (samples > 1) {
+    window->GetZbufferData(port.corner.x, port.corner.y, port.corner.x + port.size.x - 1,
+                           port.corner.y + port.size.y - 1, depths.data());
+    return;
+  }
+  vtkOpenGLState* state = window->GetState();
+  GLint drawn = 0;
+  glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &drawn);
+  state->PushReadFramebufferBinding();
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, static_cast<GLuint>(drawn));
+  state->vtkglPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(port.corner.x, port.corner.y, port.size.x, port.size.y, GL_DEPTH_COMPONENT, GL_FLOAT,
+               depths.data());
+  state->PopReadFramebufferBinding();
+}
+
+}  // namespace
+
+struct vtkVDIProp::Internals {
+  std::unique_ptr<vdi::VdiRenderer> Renderer;  // none until there's a VDI, and after a failure
+  vtkSmartPointer<vtkDataObject> Piece;
+  vtkMTimeType PieceTime = 0;
+  bool HasVdi = false;
+  bool HasFailed = false;  // to render this piece
+  double Bounds[6] = {1.0, -1.0, 1.0, -1.0, 1.0, -1.0};
+
+  vtkNew<vtkTextActor> Message;
+  std::string Obstacle;
+  std::string Problem;
+  std::string Said;  // as an error
+
+  vtkNew<vtkTextureObject> Texture;
+  std::unique_ptr<vtkOpenGLQuadHelper> Quad;
+  std::vector<float> Window;  // depth buffer
+  std::vector<float> Ends;
+
+  /// Of a frame's work: what it takes however many pixels it has is small.
+  std::optional<double> SecondsPerPixel;
+  double Reduction = 1.0;  // pixels of the viewport on a pixel's side, in interactive frames
+
+  void ShowMessage() {
+    const std::string& text = this->Obstacle.empty() ? this->Problem : this->Obstacle;
+    this->Message->SetInput(text.c_str());
+    this->Message->SetVisibility(!text.empty());
+  }
+};
+
+vtkVDIProp::vtkVDIProp() : Internal(new Internals) {
+  vtkTextActor* message = this->Internal->Message;
+  message->SetTextScaleModeToNone();
+  message->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
+  message->SetPosition(0.03, 0.5);
+  message->GetTextProperty()->SetFontSize(16);
+  message->GetTextProperty()->SetVerticalJustificationToCentered();
+  message->GetTextProperty()->SetBackgroundColor(0.1, 0.1, 0.1);
+  message->GetTextProperty()->SetBackgroundOpacity(0.8);
+  message->SetPickable(false);
+  message->SetVisibility(false);
+}
+
+vtkVDIProp::~vtkVDIProp() = default;
+
+void vtkVDIProp::PrintSelf(ostream& os, vtkIndent indent) {
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Reconstruction: " << this->Reconstruction << "\n"
+     << indent << "FrameRate: " << this->FrameRate << "\n"
+     << indent << "Problem: " << this->Internal->Problem << "\n";
+}
+
+vtkTextActor* vtkVDIProp::GetMessageActor() {
+  return this->Internal->Message;
+}
+
+void vtkVDIProp::SetObstacle(const std::string& text) {
+  if (this->Internal->Obstacle == text) return;
+  this->Internal->Obstacle = text;
+  this->Internal->ShowMessage();
+}
+
+void vtkVDIProp::Say(const std::string& text) {
+  this->Internal->Problem = text;
+  this->Internal->ShowMessage();
+  if (text.empty() || text == this->Internal->Said) return;
+  this->Internal->Said = text;
+  vtkErrorMacro(<< text);
+}
+
+void vtkVDIProp::SetPiece(vtkDataObject* piece) {
+  Internals& internal = *this->Internal;
+  const vtkMTimeType time = piece != nullptr ? piece->GetMTime() : 0;
+  if (piece == internal.Piece && time == internal.PieceTime) return;
+  internal.Piece = piece;
+  internal.PieceTime = time;
+  internal.HasVdi = false;
+  internal.HasFailed = false;
+  std::fill_n(internal.Bounds, 6, 0.0);
+  this->Modified();
+  this->Say({});
+  if (piece == nullptr) return;
+  try {
+    const std::optional<vdi::Vdi> vdi = pv::unpackVdi(piece);
+    if (!vdi) return;
+    if (auto* data = vtkPolyData::SafeDownCast(piece)) pv::boundsOf(data, internal.Bounds);
+    if (vdi->supersegmentCount() == 0)
+      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                       "This VDI is empty: its viewpoint saw nothing of its scene.");
+    if (!internal.Renderer) internal.Renderer = std::make_unique<vdi::VdiRenderer>(pv::sharedDevice(0));
+    internal.Renderer->setVdi(*vdi);
+    internal.HasVdi = true;
+  } catch (const std::exception& error) {
+    internal.Renderer.reset();
+    this->Say(error.what());
+  }
+}
+
+double* vtkVDIProp::GetBounds() {
+  return this->Internal->HasVdi ? this->Internal->Bounds : nullptr;
+}
+
+void vtkVDIProp::ReleaseGraphicsResources(vtkWindow* window) {
+  this->Internal->Quad.reset();
+  this->Internal->Texture->ReleaseGraphicsResources(window);
+  this->Superclass::ReleaseGraphicsResources(window);
+}
+
+int vtkVDIProp::RenderVolumetricGeometry(vtkViewport* viewport) {
+  Internals& internal = *this->Internal;
+  auto* renderer = vtkRenderer::SafeDownCast(viewport);
+  auto* window = renderer ? vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()) : nullptr;
+  const bool isDrawn = internal.HasVdi && !internal.HasFailed && internal.Obstacle.empty();
+  if (window == nullptr || renderer->GetSelector() != nullptr || !isDrawn) return 0;
+  try {
+    this->Draw(renderer, window);
+  } catch (const std::exception& error) {
+    internal.HasFailed = true;
+    internal.Renderer.reset();  // a lost device stays lost
+    this->Say(error.what());
+    return 0;
+  }
+  return 1;
+}
+
+void vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
+  Internals& internal = *this->Internal;
+  const Viewport port = viewportOf(renderer);
+  if (port.size.x < 1 || port.size.y < 1) return;
+  const Clock::time_point start = Clock::now();
+  const double windowPixels = static_cast<double>(port.size.x) * port.size.y;
+  const bool isInteractive = window->GetDesiredUpdateRate() >= 1.0;
+  double reduction = 1.0;
+  if (isInteractive && internal.SecondsPerPixel) {
+    reduction = std::sqrt(std::max(1.0, *internal.SecondsPerPixel * windowPixels * this->FrameRate));
+    // What changes from frame to frame would flicker.
+    const double ratio = reduction / internal.Reduction;
+    if (ratio > 0.8 && ratio < 1.25) reduction = internal.Reduction;
+    internal.Reduction = reduction;
+  }
+  const glm::ivec2 size = glm::max(glm::ivec2(glm::ceil(glm::dvec2(port.size) / reduction)), 1);
+
+  const pv::ViewMatrices matrices = matricesOf(renderer);
+  readDepths(window, port, internal.Window);
+  const bool hasObjects =
+      std::any_of(internal.Window.begin(), internal.Window.end(), [](float z) { return z < 1.0F; });
+  internal.Ends.resize(hasObjects ? static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) : 0);
+  if (hasObjects) pv::depthsOf(matrices, internal.Window, port.size, size, internal.Ends);
+
+  const vdi::ImageBytes picture =
+      internal.Renderer->renderBytes(matrices.view(size.x, size.y), internal.Ends, vdi::Alpha::Premultiplied,
+                                     static_cast<vdi::Reconstruction>(this->Reconstruction));
+
+  vtkOpenGLState* state = window->GetState();
+  vtkOpenGLState::ScopedglEnableDisable blends(state, GL_BLEND);
+  vtkOpenGLState::ScopedglEnableDisable testsDepth(state, GL_DEPTH_TEST);
+  vtkOpenGLState::ScopedglDepthMask writesDepth(state);
+  vtkOpenGLState::ScopedglBlendFuncSeparate blendFunction(state);
+  state->vtkglEnable(GL_BLEND);
+  state->vtkglDisable(GL_DEPTH_TEST);
+  state->vtkglDepthMask(GL_FALSE);
+  state->vtkglBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  vtkTextureObject* texture = internal.Texture;
+  texture->SetContext(window);
+  texture->SetMinificationFilter(vtkTextureObject::Linear);
+  texture->SetMagnificationFilter(vtkTextureObject::Linear);
+  texture->SetWrapS(vtkTextureObject::ClampToEdge);
+  texture->SetWrapT(vtkTextureObject::ClampToEdge);
+  // VTK's call takes a pointer to what it only reads.
+  texture->Create2DFromRaw(static_cast<unsigned int>(size.x), static_cast<unsigned int>(size.y), 4,
+                           VTK_UNSIGNED_CHAR, const_cast<glm::u8vec4*>(picture.rgba.data()));
+  if (!internal.Quad) {
+    internal.Quad = std::make_unique<vtkOpenGLQuadHelper>(window, nullptr, pictureShader, "");
+  } else {
+    window->GetShaderCache()->ReadyShaderProgram(internal.Quad->Program);
+  }
+  texture->Activate();
+  internal.Quad->Program->SetUniformi("picture", texture->GetTextureUnit());
+  internal.Quad->Render();
+  texture->Deactivate();
+  vtkOpenGLCheckErrorMacro("failed to draw the VDI");
+
+  const double measured = secondsSince(start) / (static_cast<double>(size.x) * size.y);
+  internal.SecondsPerPixel =
+      internal.SecondsPerPixel ? 0.5 * (*internal.SecondsPerPixel + measured) : measured;
+}

@@ -1,0 +1,126 @@
+#include "vtkVDIRepresentation.h"
+
+#include <vtkAlgorithmOutput.h>
+#include <vtkInformation.h>
+#include <vtkInformationVector.h>
+#include <vtkObjectFactory.h>
+#include <vtkPVRenderView.h>
+#include <vtkPVSession.h>
+#include <vtkPVView.h>
+#include <vtkPolyData.h>
+#include <vtkProcessModule.h>
+#include <vtkRenderer.h>
+#include <vtkTextActor.h>
+
+#include "VDIPiece.h"
+#include "vtkVDIProp.h"
+
+vtkStandardNewMacro(vtkVDIRepresentation);
+
+namespace {
+
+/// Whether the data are in another process than the one that shows pictures.
+bool isDataElsewhere() {
+  switch (vtkProcessModule::GetProcessType()) {
+    case vtkProcessModule::PROCESS_SERVER:
+    case vtkProcessModule::PROCESS_DATA_SERVER:
+    case vtkProcessModule::PROCESS_RENDER_SERVER:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Whether pictures can be drawn by several processes; the same on all of them.
+bool drawsOnSeveral() {
+  if (isDataElsewhere()) return true;
+  vtkProcessModule* module = vtkProcessModule::GetProcessModule();
+  if (module->GetNumberOfLocalPartitions() > 1) return true;
+  auto* session = vtkPVSession::SafeDownCast(module->GetSession());
+  return session != nullptr && session->GetController(vtkPVSession::RENDER_SERVER_ROOT) != nullptr;
+}
+
+}  // namespace
+
+vtkVDIRepresentation::vtkVDIRepresentation() {
+  pv::packVdi(nullptr, false, this->Piece);
+}
+
+vtkVDIRepresentation::~vtkVDIRepresentation() = default;
+
+void vtkVDIRepresentation::PrintSelf(ostream& os, vtkIndent indent) {
+  this->Superclass::PrintSelf(os, indent);
+  this->Prop->PrintSelf(os, indent.GetNextIndent());
+}
+
+void vtkVDIRepresentation::SetReconstruction(int reconstruction) {
+  this->Prop->SetReconstruction(reconstruction);
+}
+
+void vtkVDIRepresentation::SetFrameRate(double rate) {
+  this->Prop->SetFrameRate(rate);
+}
+
+void vtkVDIRepresentation::SetVisibility(bool visible) {
+  this->Superclass::SetVisibility(visible);
+  this->Prop->SetVisibility(visible);
+  if (!visible) this->Prop->GetMessageActor()->SetVisibility(false);
+}
+
+int vtkVDIRepresentation::FillInputPortInformation(int, vtkInformation* info) {
+  // Anything: what's no VDI gets a message, and composite data come whole.
+  info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject");
+  info->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
+  return 1;
+}
+
+int vtkVDIRepresentation::RequestData(vtkInformation* request, vtkInformationVector** inputs,
+                                      vtkInformationVector* outputs) {
+  const bool hasInput = inputs[0]->GetNumberOfInformationObjects() > 0;  // clients have none
+  pv::packVdi(hasInput ? vtkDataObject::GetData(inputs[0]) : nullptr, isDataElsewhere(), this->Piece);
+  this->Piece->Modified();
+  return this->Superclass::RequestData(request, inputs, outputs);
+}
+
+int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in,
+                                             vtkInformation* out) {
+  if (!this->Superclass::ProcessViewRequest(request, in, out)) return 0;
+  if (request == vtkPVView::REQUEST_UPDATE()) {
+    // A VDI's real size would make the view render remotely and with less detail.
+    constexpr unsigned long tiny = 1;
+    vtkPVRenderView::SetPiece(in, this, this->Piece, tiny);
+    vtkPVRenderView::SetDeliverToClientAndRenderingProcesses(in, this, /*deliver_to_client*/ true,
+                                                             /*gather_before_delivery*/ false);
+    double bounds[6];
+    if (pv::boundsOf(this->Piece, bounds)) vtkPVRenderView::SetGeometryBounds(in, this, bounds);
+    if (drawsOnSeveral()) vtkPVRenderView::SetRequiresDistributedRendering(in, this, false);
+  } else if (request == vtkPVView::REQUEST_UPDATE_LOD()) {
+    if (drawsOnSeveral()) vtkPVRenderView::SetRequiresDistributedRenderingLOD(in, this, false);
+  } else if (request == vtkPVView::REQUEST_RENDER()) {
+    auto* view = vtkPVRenderView::SafeDownCast(in->Get(vtkPVView::VIEW()));
+    const bool isDistributed = view != nullptr && view->GetUseDistributedRenderingForRender();
+    this->Prop->SetObstacle(isDistributed
+                                ? "A VDI can't be shown beside what is drawn on all ranks:\nhide the "
+                                  "objects of representation Volume."
+                                : "");
+    vtkAlgorithmOutput* port = vtkPVRenderView::GetPieceProducer(in, this);
+    if (port != nullptr) this->Prop->SetPiece(port->GetProducer()->GetOutputDataObject(port->GetIndex()));
+  }
+  return 1;
+}
+
+bool vtkVDIRepresentation::AddToView(vtkView* view) {
+  auto* renderView = vtkPVRenderView::SafeDownCast(view);
+  if (renderView == nullptr) return false;
+  renderView->GetRenderer()->AddViewProp(this->Prop);
+  renderView->GetNonCompositedRenderer()->AddViewProp(this->Prop->GetMessageActor());
+  return this->Superclass::AddToView(view);
+}
+
+bool vtkVDIRepresentation::RemoveFromView(vtkView* view) {
+  auto* renderView = vtkPVRenderView::SafeDownCast(view);
+  if (renderView == nullptr) return false;
+  renderView->GetRenderer()->RemoveViewProp(this->Prop);
+  renderView->GetNonCompositedRenderer()->RemoveViewProp(this->Prop->GetMessageActor());
+  return this->Superclass::RemoveFromView(view);
+}
