@@ -37,7 +37,7 @@ vdi::View ViewMatrices::view(int width, int height) const {
 }
 
 float ViewMatrices::depthOf(float window) const {
-  if (window >= 1.0F) return std::numeric_limits<float>::infinity();
+  if (window >= backgroundDepth) return std::numeric_limits<float>::infinity();
   const double clip = 2.0 * window - 1.0;
   // z of clip coordinates is depthOffset - depthScale * depth; by perspective it's divided by depth.
   const double depth =

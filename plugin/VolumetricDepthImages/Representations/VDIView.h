@@ -11,6 +11,9 @@ class vtkMatrix4x4;
 
 namespace pv {
 
+/// Of depth buffers: what's there, and beyond, is background.
+constexpr float backgroundDepth = 1.0F - 8.0F / 16777216.0F;
+
 /// A view of OpenGL's: from its two matrices, so that tiles, stereo and explicit projections are right.
 class ViewMatrices {
  public:
@@ -19,8 +22,7 @@ class ViewMatrices {
 
   /// Throws as vdi::View does.
   vdi::View view(int width, int height) const;
-  /// Depth along the view axis of a value of the depth buffer, in [0, 1]; infinity for 1, where nothing was
-  /// drawn.
+  /// Depth along the view axis of a value of the depth buffer, in [0, 1]; infinity for the background.
   float depthOf(float window) const;
 
  private:

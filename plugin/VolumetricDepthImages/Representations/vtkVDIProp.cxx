@@ -48,6 +48,16 @@ uniform sampler2D picture;
 void main() { gl_FragData[0] = texture(picture, texCoord); }
 )";
 
+/// At the far plane, but for a few steps of a depth buffer of 24 bits: as far as anybody sees, background.
+constexpr const char* depthShader = R"(//VTK::System::Dec
+//VTK::Output::Dec
+in vec2 texCoord;
+void main() {
+  gl_FragData[0] = vec4(texCoord, 0.0, 0.0);  // isn't written
+  gl_FragDepth = 1.0 - 4.0 / 16777216.0;
+}
+)";
+
 /// A renderer's part of its window, in pixels.
 struct Viewport {
   glm::ivec2 size{0};
@@ -109,6 +119,7 @@ struct vtkVDIProp::Internals {
 
   vtkNew<vtkTextureObject> Texture;
   std::unique_ptr<vtkOpenGLQuadHelper> Quad;
+  std::unique_ptr<vtkOpenGLQuadHelper> DepthQuad;
   std::vector<float> Window;  // depth buffer
   std::vector<float> Ends;
 
@@ -197,6 +208,7 @@ double* vtkVDIProp::GetBounds() {
 
 void vtkVDIProp::ReleaseGraphicsResources(vtkWindow* window) {
   this->Internal->Quad.reset();
+  this->Internal->DepthQuad.reset();
   this->Internal->Texture->ReleaseGraphicsResources(window);
   this->Superclass::ReleaseGraphicsResources(window);
 }
@@ -205,8 +217,9 @@ int vtkVDIProp::RenderVolumetricGeometry(vtkViewport* viewport) {
   Internals& internal = *this->Internal;
   auto* renderer = vtkRenderer::SafeDownCast(viewport);
   auto* window = renderer ? vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()) : nullptr;
-  const bool isDrawn = internal.HasVdi && !internal.HasFailed && internal.Obstacle.empty();
-  if (window == nullptr || renderer->GetSelector() != nullptr || !isDrawn) return 0;
+  if (window == nullptr || renderer->GetSelector() != nullptr) return 0;
+  if (this->MarksDepth) this->MarkDepth(window);
+  if (!internal.HasVdi || internal.HasFailed || !internal.Obstacle.empty()) return 0;
   try {
     this->Draw(renderer, window);
   } catch (const std::exception& error) {
@@ -216,6 +229,25 @@ int vtkVDIProp::RenderVolumetricGeometry(vtkViewport* viewport) {
     return 0;
   }
   return 1;
+}
+
+void vtkVDIProp::MarkDepth(vtkOpenGLRenderWindow* window) {
+  vtkOpenGLState* state = window->GetState();
+  vtkOpenGLState::ScopedglEnableDisable testsDepth(state, GL_DEPTH_TEST);
+  vtkOpenGLState::ScopedglDepthMask writesDepth(state);
+  vtkOpenGLState::ScopedglColorMask writesColor(state);
+  vtkOpenGLState::ScopedglDepthFunc depthFunction(state);
+  state->vtkglEnable(GL_DEPTH_TEST);
+  state->vtkglDepthFunc(GL_LESS);
+  state->vtkglDepthMask(GL_TRUE);
+  state->vtkglColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  std::unique_ptr<vtkOpenGLQuadHelper>& quad = this->Internal->DepthQuad;
+  if (!quad) {
+    quad = std::make_unique<vtkOpenGLQuadHelper>(window, nullptr, depthShader, "");
+  } else {
+    window->GetShaderCache()->ReadyShaderProgram(quad->Program);
+  }
+  quad->Render();
 }
 
 void vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
@@ -237,8 +269,8 @@ void vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
 
   const pv::ViewMatrices matrices = matricesOf(renderer);
   readDepths(window, port, internal.Window);
-  const bool hasObjects =
-      std::any_of(internal.Window.begin(), internal.Window.end(), [](float z) { return z < 1.0F; });
+  const bool hasObjects = std::any_of(internal.Window.begin(), internal.Window.end(),
+                                      [](float z) { return z < pv::backgroundDepth; });
   internal.Ends.resize(hasObjects ? static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) : 0);
   if (hasObjects) pv::depthsOf(matrices, internal.Window, port.size, size, internal.Ends);
 

@@ -38,6 +38,10 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// Says why there's nothing to see; in a renderer that draws after this prop's.
   vtkTextActor* GetMessageActor();
 
+  /// Whether pixels in front of which nothing opaque was drawn get a depth just short of the background's.
+  /// IceT, compositing by depth, drops them otherwise, colour and all. Default off.
+  vtkSetMacro(MarksDepth, bool);
+
   /// vdi::Reconstruction: 1 (default) blends neighbouring lists, 0 shows each as it is.
   vtkSetClampMacro(Reconstruction, int, 0, 1);
   vtkGetMacro(Reconstruction, int);
@@ -59,9 +63,11 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
 
   struct Internals;
   void Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
+  void MarkDepth(vtkOpenGLRenderWindow* window);
   void Say(const std::string& text);
 
   std::unique_ptr<Internals> Internal;
+  bool MarksDepth = false;
   int Reconstruction = 1;
   double FrameRate = 30.0;
 };

@@ -3,6 +3,7 @@
 #include <vtkAlgorithmOutput.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
+#include <vtkMPIMoveData.h>
 #include <vtkObjectFactory.h>
 #include <vtkPVRenderView.h>
 #include <vtkPVSession.h>
@@ -31,13 +32,18 @@ bool isDataElsewhere() {
   }
 }
 
-/// Whether pictures can be drawn by several processes; the same on all of them.
-bool drawsOnSeveral() {
+/// Whether there are a client and a server, which both can draw; the same on both.
+bool hasServer() {
   if (isDataElsewhere()) return true;
-  vtkProcessModule* module = vtkProcessModule::GetProcessModule();
-  if (module->GetNumberOfLocalPartitions() > 1) return true;
-  auto* session = vtkPVSession::SafeDownCast(module->GetSession());
+  auto* session = vtkPVSession::SafeDownCast(vtkProcessModule::GetProcessModule()->GetSession());
   return session != nullptr && session->GetController(vtkPVSession::RENDER_SERVER_ROOT) != nullptr;
+}
+
+/// Whether there are ranks without a client: all of them always draw, and IceT puts their pictures together.
+bool drawsOnRanks() {
+  vtkProcessModule* module = vtkProcessModule::GetProcessModule();
+  return vtkProcessModule::GetProcessType() == vtkProcessModule::PROCESS_BATCH &&
+         module->GetNumberOfLocalPartitions() > 1;
 }
 
 }  // namespace
@@ -93,12 +99,15 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
                                                              /*gather_before_delivery*/ false);
     double bounds[6];
     if (pv::boundsOf(this->Piece, bounds)) vtkPVRenderView::SetGeometryBounds(in, this, bounds);
-    if (drawsOnSeveral()) vtkPVRenderView::SetRequiresDistributedRendering(in, this, false);
+    // Objects are drawn where the VDI is, all of them.
+    if (hasServer()) vtkPVRenderView::SetRequiresDistributedRendering(in, this, false);
+    if (drawsOnRanks()) vtkPVRenderView::SetForceDataDistributionMode(in, vtkMPIMoveData::COLLECT);
   } else if (request == vtkPVView::REQUEST_UPDATE_LOD()) {
-    if (drawsOnSeveral()) vtkPVRenderView::SetRequiresDistributedRenderingLOD(in, this, false);
+    if (hasServer()) vtkPVRenderView::SetRequiresDistributedRenderingLOD(in, this, false);
   } else if (request == vtkPVView::REQUEST_RENDER()) {
     auto* view = vtkPVRenderView::SafeDownCast(in->Get(vtkPVView::VIEW()));
-    const bool isDistributed = view != nullptr && view->GetUseDistributedRenderingForRender();
+    const bool isDistributed = hasServer() && view != nullptr && view->GetUseDistributedRenderingForRender();
+    this->Prop->SetMarksDepth(drawsOnRanks());
     this->Prop->SetObstacle(isDistributed
                                 ? "A VDI can't be shown beside what is drawn on all ranks:\nhide the "
                                   "objects of representation Volume."
