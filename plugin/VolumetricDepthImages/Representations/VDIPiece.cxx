@@ -30,14 +30,6 @@ constexpr const char* fileName = "VDI.file";
 constexpr const char* problemName = "VDI.problem";
 constexpr const char* boundsName = "VDI.bounds";
 
-void setProblem(vtkFieldData* fields, const std::string& text) {
-  fields->Initialize();
-  vtkNew<vtkStringArray> array;
-  array->SetName(problemName);
-  array->InsertNextValue(text);
-  fields->AddArray(array);
-}
-
 void packFile(vtkImageData* image, vtkFieldData* fields) {
   vdi::Vdi vdi;
   getVdi(image, vdi);
@@ -63,33 +55,41 @@ void packArrays(vtkImageData* image, vtkFieldData* fields) {
 
 }  // namespace
 
-void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
+void packNothing(vtkPolyData* piece) {
   piece->Initialize();
   vtkNew<vtkPoints> points;
   points->InsertNextPoint(0.0, 0.0, 0.0);
   piece->SetPoints(points);
-  if (data == nullptr) return;
-  vtkFieldData* fields = piece->GetFieldData();
+}
+
+void packProblem(const std::string& text, vtkPolyData* piece) {
+  packNothing(piece);
+  vtkNew<vtkStringArray> array;
+  array->SetName(problemName);
+  array->InsertNextValue(text);
+  piece->GetFieldData()->AddArray(array);
+}
+
+void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
+  packNothing(piece);
   auto* image = vtkImageData::SafeDownCast(data);
-  const bool isVdi = image != nullptr && image->GetFieldData()->GetAbstractArray("VDI.offsets") != nullptr;
-  if (!isVdi) {
-    const bool isElsewhere = image != nullptr && image->GetNumberOfPoints() == 0;
-    if (!isElsewhere) {
-      setProblem(
-          fields,
-          "This data set has no VDI. Make one of it: Filters > Volumetric Depth Images > Volumetric Depth "
-          "Image.");
-    }
+  if (image != nullptr && image->GetNumberOfPoints() == 0) {
+    packProblem("There is no VDI to show: what makes it has failed.", piece);
+    return;
+  }
+  if (image == nullptr || image->GetFieldData()->GetAbstractArray("VDI.offsets") == nullptr) {
+    packProblem("There is no VDI in this data set. The filter Volumetric Depth Image makes one of it.",
+                piece);
     return;
   }
   try {
     if (crosses) {
-      packFile(image, fields);
+      packFile(image, piece->GetFieldData());
     } else {
-      packArrays(image, fields);
+      packArrays(image, piece->GetFieldData());
     }
   } catch (const std::exception& error) {
-    setProblem(fields, error.what());
+    packProblem(error.what(), piece);
   }
 }
 

@@ -16,8 +16,11 @@ class vtkPolyData;
 
 namespace pv {
 
-/// Makes `piece` the VDI of `data`, which may be nullptr, or the reason why there's none. `crosses`: it
-/// leaves the process. Throws nothing: what's wrong becomes the problem.
+/// Makes `piece` nothing, as ranks and clients without a VDI have it.
+void packNothing(vtkPolyData* piece);
+/// Makes `piece` a problem.
+void packProblem(const std::string& text, vtkPolyData* piece);
+/// Makes `piece` the VDI of `data`, or a problem. `crosses`: it leaves the process.
 void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece);
 /// World bounds as VTK has them, where the piece has a VDI with a scene in it.
 bool boundsOf(vtkPolyData* piece, double bounds[6]);

@@ -23,6 +23,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <sstream>
 #include <vector>
 
 #include "VDIPiece.h"
@@ -57,6 +58,20 @@ void main() {
   gl_FragDepth = 1.0 - 4.0 / 16777216.0;
 }
 )";
+
+/// In lines of at most `columns`, broken at blanks.
+std::string wrapped(const std::string& text, std::size_t columns) {
+  std::string lines;
+  std::size_t column = 0;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    const bool fits = column + 1 + word.size() <= columns;
+    if (column > 0) lines += fits ? ' ' : '\n';
+    column = (column > 0 && fits ? column + 1 : 0) + word.size();
+    lines += word;
+  }
+  return lines;
+}
 
 /// A renderer's part of its window, in pixels.
 struct Viewport {
@@ -127,10 +142,14 @@ struct vtkVDIProp::Internals {
   std::optional<double> SecondsPerPixel;
   double Reduction = 1.0;  // pixels of the viewport on a pixel's side, in interactive frames
 
-  void ShowMessage() {
+  int Width = 400;  // of the viewport, pixels
+
+  void ShowMessage(bool isVisible) {
+    constexpr int letter = 9;  // pixels
     const std::string& text = this->Obstacle.empty() ? this->Problem : this->Obstacle;
-    this->Message->SetInput(text.c_str());
-    this->Message->SetVisibility(!text.empty());
+    const auto columns = static_cast<std::size_t>(std::max(this->Width / letter, 20));
+    this->Message->SetInput(wrapped(text, columns).c_str());
+    this->Message->SetVisibility(isVisible && !text.empty());
   }
 };
 
@@ -156,6 +175,11 @@ void vtkVDIProp::PrintSelf(ostream& os, vtkIndent indent) {
      << indent << "Problem: " << this->Internal->Problem << "\n";
 }
 
+void vtkVDIProp::SetVisibility(vtkTypeBool visible) {
+  this->Superclass::SetVisibility(visible);
+  this->Internal->ShowMessage(visible != 0);
+}
+
 vtkTextActor* vtkVDIProp::GetMessageActor() {
   return this->Internal->Message;
 }
@@ -163,12 +187,12 @@ vtkTextActor* vtkVDIProp::GetMessageActor() {
 void vtkVDIProp::SetObstacle(const std::string& text) {
   if (this->Internal->Obstacle == text) return;
   this->Internal->Obstacle = text;
-  this->Internal->ShowMessage();
+  this->Internal->ShowMessage(this->GetVisibility() != 0);
 }
 
 void vtkVDIProp::Say(const std::string& text) {
   this->Internal->Problem = text;
-  this->Internal->ShowMessage();
+  this->Internal->ShowMessage(this->GetVisibility() != 0);
   if (text.empty() || text == this->Internal->Said) return;
   this->Internal->Said = text;
   vtkErrorMacro(<< text);
@@ -196,6 +220,14 @@ void vtkVDIProp::SetPiece(vtkDataObject* piece) {
     if (!internal.Renderer) internal.Renderer = std::make_unique<vdi::VdiRenderer>(pv::sharedDevice(0));
     internal.Renderer->setVdi(*vdi);
     internal.HasVdi = true;
+  } catch (const vdi::Error& error) {
+    internal.Renderer.reset();
+    const bool lacksDevice = error.code() == vdi::ErrorCode::DeviceUnavailable;
+    this->Say((lacksDevice
+                   ? "To show a VDI, this computer needs a Vulkan driver; Mesa's lavapipe (Debian's package "
+                     "mesa-vulkan-drivers) needs no GPU. Found: "
+                   : "") +
+              std::string(error.what()));
   } catch (const std::exception& error) {
     internal.Renderer.reset();
     this->Say(error.what());
@@ -218,6 +250,11 @@ int vtkVDIProp::RenderVolumetricGeometry(vtkViewport* viewport) {
   auto* renderer = vtkRenderer::SafeDownCast(viewport);
   auto* window = renderer ? vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()) : nullptr;
   if (window == nullptr || renderer->GetSelector() != nullptr) return 0;
+  const Viewport port = viewportOf(renderer);
+  if (port.size.x != internal.Width) {
+    internal.Width = port.size.x;
+    internal.ShowMessage(this->GetVisibility() != 0);
+  }
   if (this->MarksDepth) this->MarkDepth(window);
   if (!internal.HasVdi || internal.HasFailed || !internal.Obstacle.empty()) return 0;
   try {

@@ -35,7 +35,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   void SetPiece(vtkDataObject* piece);
   /// Says `text` in place of the VDI, which isn't drawn while there's a text.
   void SetObstacle(const std::string& text);
-  /// Says why there's nothing to see; in a renderer that draws after this prop's.
+  /// Says why there's nothing to see; in a renderer of the same size that draws after this prop's.
   vtkTextActor* GetMessageActor();
 
   /// Whether pixels in front of which nothing opaque was drawn get a depth just short of the background's.
@@ -49,6 +49,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   vtkSetClampMacro(FrameRate, double, 1.0, 1000.0);
   vtkGetMacro(FrameRate, double);
 
+  void SetVisibility(vtkTypeBool visible) override;
   double* GetBounds() override;
   int RenderVolumetricGeometry(vtkViewport* viewport) override;
   void ReleaseGraphicsResources(vtkWindow* window) override;

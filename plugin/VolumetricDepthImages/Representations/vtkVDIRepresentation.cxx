@@ -4,6 +4,7 @@
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
 #include <vtkMPIMoveData.h>
+#include <vtkMultiProcessController.h>
 #include <vtkObjectFactory.h>
 #include <vtkPVRenderView.h>
 #include <vtkPVSession.h>
@@ -32,6 +33,11 @@ bool isDataElsewhere() {
   }
 }
 
+bool isRoot() {
+  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
+  return controller == nullptr || controller->GetLocalProcessId() == 0;
+}
+
 /// Whether there are a client and a server, which both can draw; the same on both.
 bool hasServer() {
   if (isDataElsewhere()) return true;
@@ -49,7 +55,7 @@ bool drawsOnRanks() {
 }  // namespace
 
 vtkVDIRepresentation::vtkVDIRepresentation() {
-  pv::packVdi(nullptr, false, this->Piece);
+  pv::packNothing(this->Piece);
 }
 
 vtkVDIRepresentation::~vtkVDIRepresentation() = default;
@@ -70,7 +76,6 @@ void vtkVDIRepresentation::SetFrameRate(double rate) {
 void vtkVDIRepresentation::SetVisibility(bool visible) {
   this->Superclass::SetVisibility(visible);
   this->Prop->SetVisibility(visible);
-  if (!visible) this->Prop->GetMessageActor()->SetVisibility(false);
 }
 
 int vtkVDIRepresentation::FillInputPortInformation(int, vtkInformation* info) {
@@ -82,15 +87,28 @@ int vtkVDIRepresentation::FillInputPortInformation(int, vtkInformation* info) {
 
 int vtkVDIRepresentation::RequestData(vtkInformation* request, vtkInformationVector** inputs,
                                       vtkInformationVector* outputs) {
-  const bool hasInput = inputs[0]->GetNumberOfInformationObjects() > 0;  // clients have none
-  pv::packVdi(hasInput ? vtkDataObject::GetData(inputs[0]) : nullptr, isDataElsewhere(), this->Piece);
+  const bool hasInput = inputs[0]->GetNumberOfInformationObjects() > 0;
+  if (hasInput && isRoot()) {
+    pv::packVdi(vtkDataObject::GetData(inputs[0]), isDataElsewhere(), this->Piece);
+  } else {
+    pv::packNothing(this->Piece);  // clients have no input, other ranks no VDI
+  }
+  this->HasPacked = true;
   this->Piece->Modified();
   return this->Superclass::RequestData(request, inputs, outputs);
 }
 
 int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in,
                                              vtkInformation* out) {
+  const bool updates = request == vtkPVView::REQUEST_UPDATE() && this->GetNeedsUpdate();
+  this->HasPacked = false;
   if (!this->Superclass::ProcessViewRequest(request, in, out)) return 0;
+  auto* view = vtkPVRenderView::SafeDownCast(in->Get(vtkPVView::VIEW()));
+  if (updates && !this->HasPacked && isRoot() && view != nullptr && !view->IsCached(this)) {
+    // The input's update has failed. What it was before isn't what is asked for.
+    pv::packProblem("There is no VDI to show: what makes it has failed.", this->Piece);
+    view->ClearCache(this);
+  }
   if (request == vtkPVView::REQUEST_UPDATE()) {
     // A VDI's real size would make the view render remotely and with less detail.
     constexpr unsigned long tiny = 1;
@@ -105,11 +123,10 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
   } else if (request == vtkPVView::REQUEST_UPDATE_LOD()) {
     if (hasServer()) vtkPVRenderView::SetRequiresDistributedRenderingLOD(in, this, false);
   } else if (request == vtkPVView::REQUEST_RENDER()) {
-    auto* view = vtkPVRenderView::SafeDownCast(in->Get(vtkPVView::VIEW()));
     const bool isDistributed = hasServer() && view != nullptr && view->GetUseDistributedRenderingForRender();
     this->Prop->SetMarksDepth(drawsOnRanks());
     this->Prop->SetObstacle(isDistributed
-                                ? "A VDI can't be shown beside what is drawn on all ranks:\nhide the "
+                                ? "A VDI can't be shown beside what is drawn on all ranks: hide the "
                                   "objects of representation Volume."
                                 : "");
     vtkAlgorithmOutput* port = vtkPVRenderView::GetPieceProducer(in, this);

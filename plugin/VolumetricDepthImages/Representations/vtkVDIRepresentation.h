@@ -45,6 +45,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   void operator=(const vtkVDIRepresentation&) = delete;
 
   vtkNew<vtkPolyData> Piece;  // pv::packVdi
+  bool HasPacked = false;     // in the update that's going on
   vtkNew<vtkVDIProp> Prop;
 };
 
