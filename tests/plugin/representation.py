@@ -1,5 +1,5 @@
 """The representation VDI: against the representation Volume at the viewpoint of generation, alone and with an opaque object in
-it; against `vdi render` of other cameras; what is shown by default; what is said where there is nothing to show."""
+it; against `vdi render` of other cameras; what Show alone shows."""
 
 import os
 import subprocess
@@ -99,15 +99,6 @@ def elsewhere():
     simple.Delete(view)
 
 
-def nothing_to_show():
-    view = pvtest.make_view(SIZE, CAMERA, CENTER)
-    wavelet = simple.Wavelet()
-    simple.Show(wavelet, view).SetRepresentationType("VDI")
-    check(screenshot(view, "no_vdi").std() > 5, "what is no VDI gets a message in the view")
-    simple.Delete(view)
-
-
 volume_beside_vdi()
 elsewhere()
-nothing_to_show()
 pvtest.finish()

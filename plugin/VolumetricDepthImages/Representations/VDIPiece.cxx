@@ -4,7 +4,6 @@
 #include <vtkDoubleArray.h>
 #include <vtkFieldData.h>
 #include <vtkImageData.h>
-#include <vtkIntArray.h>
 #include <vtkNew.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
@@ -25,7 +24,6 @@ namespace pv {
 
 namespace {
 
-constexpr const char* sizeName = "VDI.size";
 constexpr const char* fileName = "VDI.file";
 constexpr const char* problemName = "VDI.problem";
 constexpr const char* boundsName = "VDI.bounds";
@@ -40,17 +38,6 @@ void packFile(vtkImageData* image, vtkFieldData* fields) {
   std::memcpy(array->GetPointer(0), bytes.data(), bytes.size());
   fields->AddArray(array);
   fields->AddArray(image->GetFieldData()->GetAbstractArray(boundsName));
-}
-
-void packArrays(vtkImageData* image, vtkFieldData* fields) {
-  fields->ShallowCopy(image->GetFieldData());
-  int dimensions[3];
-  image->GetDimensions(dimensions);
-  vtkNew<vtkIntArray> size;
-  size->SetName(sizeName);
-  size->InsertNextValue(dimensions[0]);
-  size->InsertNextValue(dimensions[1]);
-  fields->AddArray(size);
 }
 
 }  // namespace
@@ -86,7 +73,7 @@ void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
     if (crosses) {
       packFile(image, piece->GetFieldData());
     } else {
-      packArrays(image, piece->GetFieldData());
+      piece->GetFieldData()->ShallowCopy(image->GetFieldData());
     }
   } catch (const std::exception& error) {
     packProblem(error.what(), piece);
@@ -109,10 +96,7 @@ std::optional<vdi::Vdi> unpackVdi(vtkDataObject* piece) {
                                                static_cast<std::size_t>(file->GetNumberOfValues()));
     return vdi::io::decode(std::as_bytes(bytes));
   }
-  auto* size = vtkIntArray::SafeDownCast(fields->GetAbstractArray(sizeName));
-  if (size == nullptr || size->GetNumberOfValues() != 2) return std::nullopt;
   vtkNew<vtkImageData> image;
-  image->SetDimensions(size->GetValue(0), size->GetValue(1), 1);
   image->SetFieldData(fields);
   vdi::Vdi vdi;
   if (!getVdi(image, vdi)) return std::nullopt;

@@ -1,6 +1,6 @@
 // A VDI on its way to where it is drawn: what ParaView's delivery carries between processes. Field data of a
 // vtkPolyData with one point, for without points nothing is sent:
-//   within a process  the arrays of the VDI's image (VDIImageData.h), shared with it, and VDI.size: int [2]
+//   within a process  the arrays of the VDI's image (VDIImageData.h), shared with it
 //   between two       VDI.file: unsigned char [n], a .vdi file
 // and VDI.problem: a string, instead of either where there's no VDI to show.
 #ifndef VDIPiece_h
