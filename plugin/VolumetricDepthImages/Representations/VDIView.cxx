@@ -53,7 +53,8 @@ void depthsOf(const ViewMatrices& matrices, std::span<const float> window, const
   vdi::inParallel(depths.size(), least, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       const auto width = static_cast<std::size_t>(size.x);
-      const glm::dvec2 centre{static_cast<double>(i % width) + 0.5, static_cast<double>(i / width) + 0.5};
+      const std::size_t row = i / width;
+      const glm::dvec2 centre = glm::dvec2(i % width, row) + 0.5;
       const glm::ivec2 at =
           glm::min(glm::ivec2(centre * glm::dvec2(windowSize) / glm::dvec2(size)), windowSize - 1);
       depths[i] =

@@ -1,5 +1,7 @@
 #include "vtkVDIProp.h"
 
+#include <vtkInformation.h>
+#include <vtkInformationObjectBaseVectorKey.h>
 #include <vtkMatrix3x3.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
@@ -8,6 +10,7 @@
 #include <vtkOpenGLError.h>
 #include <vtkOpenGLFramebufferObject.h>
 #include <vtkOpenGLQuadHelper.h>
+#include <vtkOpenGLRenderPass.h>
 #include <vtkOpenGLRenderWindow.h>
 #include <vtkOpenGLShaderCache.h>
 #include <vtkOpenGLState.h>
@@ -106,15 +109,16 @@ void readDepths(vtkOpenGLRenderWindow* window, const Viewport& port, std::vector
                            port.corner.y + port.size.y - 1, depths.data());
     return;
   }
-  vtkOpenGLState* state = window->GetState();
+  // Past vtkOpenGLState, which binds its own objects only: what it knows holds again in the end.
   GLint drawn = 0;
+  GLint read = 0;
   glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &drawn);
-  state->PushReadFramebufferBinding();
+  glGetIntegerv(GL_READ_FRAMEBUFFER_BINDING, &read);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, static_cast<GLuint>(drawn));
-  state->vtkglPixelStorei(GL_PACK_ALIGNMENT, 1);
+  window->GetState()->vtkglPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(port.corner.x, port.corner.y, port.size.x, port.size.y, GL_DEPTH_COMPONENT, GL_FLOAT,
                depths.data());
-  state->PopReadFramebufferBinding();
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, static_cast<GLuint>(read));
 }
 
 }  // namespace
@@ -126,6 +130,8 @@ struct vtkVDIProp::Internals {
   bool HasVdi = false;
   bool HasFailed = false;  // to render this piece
   double Bounds[6] = {1.0, -1.0, 1.0, -1.0, 1.0, -1.0};
+
+  bool IsPeeled = false;  // volumes are, in this frame
 
   vtkNew<vtkTextActor> Message;
   std::string Obstacle;
@@ -246,6 +252,19 @@ void vtkVDIProp::ReleaseGraphicsResources(vtkWindow* window) {
 }
 
 int vtkVDIProp::RenderVolumetricGeometry(vtkViewport* viewport) {
+  // Depth peeling draws layer by layer, with shaders that it changes.
+  vtkInformation* keys = this->GetPropertyKeys();
+  this->Internal->IsPeeled = keys != nullptr && keys->Has(vtkOpenGLRenderPass::RenderPasses());
+  return this->Internal->IsPeeled ? 0 : this->DrawIn(viewport);
+}
+
+int vtkVDIProp::RenderOverlay(vtkViewport* viewport) {
+  if (!this->Internal->IsPeeled) return 0;
+  this->Internal->IsPeeled = false;
+  return this->DrawIn(viewport);
+}
+
+int vtkVDIProp::DrawIn(vtkViewport* viewport) {
   Internals& internal = *this->Internal;
   auto* renderer = vtkRenderer::SafeDownCast(viewport);
   auto* window = renderer ? vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()) : nullptr;

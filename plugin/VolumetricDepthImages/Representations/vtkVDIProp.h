@@ -3,6 +3,7 @@
  * @brief draws a Volumetric Depth Image among the objects of an OpenGL renderer
  *
  * Drawn with the volumes: after all opaque geometry, which hides what lies behind it, and blended over it.
+ * Where volumes are peeled together with translucent geometry, after that, too.
  * While the window is interactive (vtkRenderWindow::GetDesiredUpdateRate of 1 and more), it has as few pixels
  * as it takes to be drawn FrameRate times a second.
  *
@@ -52,6 +53,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   void SetVisibility(vtkTypeBool visible) override;
   double* GetBounds() override;
   int RenderVolumetricGeometry(vtkViewport* viewport) override;
+  int RenderOverlay(vtkViewport* viewport) override;
   void ReleaseGraphicsResources(vtkWindow* window) override;
 
  protected:
@@ -63,6 +65,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   void operator=(const vtkVDIProp&) = delete;
 
   struct Internals;
+  int DrawIn(vtkViewport* viewport);
   void Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
   void MarkDepth(vtkOpenGLRenderWindow* window);
   void Say(const std::string& text);

@@ -13,6 +13,8 @@
 #include <vtkProcessModule.h>
 #include <vtkRenderer.h>
 #include <vtkTextActor.h>
+#include <vtkVolume.h>
+#include <vtkVolumeCollection.h>
 
 #include "VDIPiece.h"
 #include "vtkVDIProp.h"
@@ -50,6 +52,20 @@ bool drawsOnRanks() {
   vtkProcessModule* module = vtkProcessModule::GetProcessModule();
   return vtkProcessModule::GetProcessType() == vtkProcessModule::PROCESS_BATCH &&
          module->GetNumberOfLocalPartitions() > 1;
+}
+
+/// Whether the view draws where the VDI isn't. Volumes insist on that; on ranks without a client they are
+/// wrong when all data are on the first one.
+bool drawsVolumesOnRanks(vtkPVRenderView* view) {
+  if (hasServer()) return view->GetUseDistributedRenderingForRender();
+  if (!drawsOnRanks()) return false;
+  vtkVolumeCollection* volumes = view->GetRenderer()->GetVolumes();
+  vtkCollectionSimpleIterator at;
+  volumes->InitTraversal(at);
+  while (vtkVolume* volume = volumes->GetNextVolume(at)) {
+    if (volume->GetVisibility() != 0) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -123,12 +139,12 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
   } else if (request == vtkPVView::REQUEST_UPDATE_LOD()) {
     if (hasServer()) vtkPVRenderView::SetRequiresDistributedRenderingLOD(in, this, false);
   } else if (request == vtkPVView::REQUEST_RENDER()) {
-    const bool isDistributed = hasServer() && view != nullptr && view->GetUseDistributedRenderingForRender();
     this->Prop->SetMarksDepth(drawsOnRanks());
-    this->Prop->SetObstacle(isDistributed
-                                ? "A VDI can't be shown beside what is drawn on all ranks: hide the "
-                                  "objects of representation Volume."
-                                : "");
+    this->Prop->SetObstacle(
+        view != nullptr && drawsVolumesOnRanks(view)
+            ? "A VDI can't be shown beside a volume that is drawn on all ranks: hide the objects "
+              "of representation Volume."
+            : "");
     vtkAlgorithmOutput* port = vtkPVRenderView::GetPieceProducer(in, this);
     if (port != nullptr) this->Prop->SetPiece(port->GetProducer()->GetOutputDataObject(port->GetIndex()));
   }
