@@ -9,7 +9,7 @@ import pvtest
 from paraview import simple
 from pvtest import check
 
-SIZE, CAMERA, CENTER = [480, 360], [80, 56, 92], [0, 0, 0]
+SIZE, CAMERA, CENTER = [320, 240], [80, 56, 92], [0, 0, 0]
 VDI = os.path.join(pvtest.OUTPUT, "representation.vdi")
 
 
@@ -94,6 +94,20 @@ def elsewhere():
     large = pvtest.read_png(path).astype(float)
     small = large.reshape(SIZE[1], 2, SIZE[0], 2, 3).mean(axis=(1, 3)).astype(np.uint8)
     compare(small, screenshot(view, "small"), 0.98, "a picture larger than the window")
+    # A translucent object is drawn by peeling. Beside the VDI, it changes nothing of it.
+    sphere = simple.Sphere(Radius=6, Center=[0, -120, 0], PhiResolution=32, ThetaResolution=32)
+    translucent = simple.Show(sphere, view)
+    translucent.Opacity, translucent.DiffuseColor = 0.5, [0, 0, 1]
+    view.CameraParallelScale = 130
+    view.CameraParallelProjection = 1
+    beside = screenshot(view, "translucent")
+    simple.Hide(sphere, view)
+    without = screenshot(view, "without_translucent")
+    different = np.abs(beside.astype(int) - without).max(axis=2) > 2
+    share = different.mean()
+    print("a translucent sphere beside a VDI: {:.2%} of the pixels differ".format(share))
+    check(0 < share < 0.01 and without.std() > 5, "a translucent object beside a VDI changes nothing of it")
+    view.CameraParallelProjection = 0
     view.Background = [0.2, 0.5, 0.3]
     check(np.allclose(screenshot(view, "background")[2, 2], [51, 128, 77], atol=1), "the background is the view's")
     simple.Delete(view)
