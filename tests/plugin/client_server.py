@@ -121,4 +121,16 @@ with Session() as session:
         print("an orbit sends {} bytes, {} with the VDI hidden: ParaView's own words about each frame".format(shown, hidden))
         check(shown == hidden and shown < 5000, "and sends nothing of the VDI or of pictures")
 
+    # A volume is drawn on the server's ranks: the view says why the VDI isn't, and shows it when the volume is gone.
+    view = pvtest.make_view(SIZE, CAMERA, CENTER)
+    image = generated(view)
+    volume = simple.Show(image.Input, view)
+    volume.SetRepresentationType("Volume")
+    simple.Show(image, view)
+    simple.Render(view)
+    check("beside a volume" in pvtest.message_in(view), "beside a volume of the server there is a message")
+    simple.Hide(image.Input, view)
+    picture = screenshot(view, "client_server_volume_hidden.png")
+    check(pvtest.message_in(view) == "" and picture.std() > 20, "and without it the VDI again")
+
 pvtest.finish()

@@ -42,6 +42,15 @@ simple.Show(sphere, view)
 simple.SaveScreenshot(path("with an object", MODE), view, ImageResolution=SIZE)
 done("with an object")
 
+if MODE == "compare":
+    volume = simple.Show(source, view)
+    volume.SetRepresentationType("Volume")
+    simple.Render(view)
+    check("beside a volume" in pvtest.message_in(view), "beside a volume on several ranks there is a message")
+    simple.Hide(source, view)
+    simple.Render(view)
+    check(pvtest.message_in(view) == "", "and none without it")
+
 files = [os.path.join(pvtest.OUTPUT, "ranks_{}.vdi".format(step)) for step in range(3)]
 if MODE == "write":
     for step, file in enumerate(files):
