@@ -128,7 +128,8 @@ struct vtkVDIProp::Internals {
   vtkSmartPointer<vtkDataObject> Piece;
   vtkMTimeType PieceTime = 0;
   bool HasVdi = false;
-  bool HasFailed = false;  // to render this piece
+  vtkMTimeType FailedTime = 0;  // of the piece that has failed to render before
+  bool HasFailed = false;       // to render this piece
   double Bounds[6] = {1.0, -1.0, 1.0, -1.0, 1.0, -1.0};
 
   bool IsPeeled = false;  // volumes are, in this frame
@@ -281,6 +282,10 @@ int vtkVDIProp::DrawIn(vtkViewport* viewport) {
   } catch (const std::exception& error) {
     internal.HasFailed = true;
     internal.Renderer.reset();  // a lost device stays lost
+    if (internal.FailedTime != internal.PieceTime) {
+      internal.FailedTime = internal.PieceTime;
+      internal.Piece = nullptr;  // once more with the next frame
+    }
     this->Say(error.what());
     return 0;
   }
