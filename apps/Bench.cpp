@@ -176,7 +176,7 @@ void addBench(CLI::App& app, Job& job) {
   command->add_option("--raw", options->raws, "JSON sidecars of raw volumes to run (docs/raw-volumes.md)")
       ->type_name("FILE")
       ->group("Volume and ranks");
-  addDealOptions(*command, options->deal);
+  addDecompositionOptions(*command, options->decomposition);
   addViewOptions(*command, options->view);
   addQualityOptions(*command, options->quality, QualityUse::Several);
   command->add_option("--algorithms", options->algorithms, "merge (the default), bisection or both")

@@ -45,7 +45,7 @@ std::vector<int> rankCounts(const BenchOptions& options, int ranks) {
 /// How large the volume is that one rank has in weak scaling.
 glm::ivec3 sizePerRank(const BenchOptions& options) {
   if (!options.sizePerRank.empty()) return sizesOf(options.sizePerRank);
-  return glm::max(sizesOf(options.deal.size) / 2, glm::ivec3(2));
+  return glm::max(sizesOf(options.decomposition.size) / 2, glm::ivec3(2));
 }
 
 /// What one line is measured on.
@@ -62,9 +62,10 @@ struct Setup {
 Setup setupOf(const BenchOptions& options, const DataSet& set, const std::string& scaling,
               const std::string& layout, int ranks) {
   Setup setup{set, scaling, layout, ranks};
-  const glm::ivec3 fixed = set.field.empty() ? readSidecar(set.raw).lattice.size : sizesOf(options.deal.size);
+  const glm::ivec3 fixed =
+      set.field.empty() ? readSidecar(set.raw).lattice.size : sizesOf(options.decomposition.size);
   setup.size = fixed;
-  setup.blocks = sizesOf(options.deal.blocks);
+  setup.blocks = sizesOf(options.decomposition.blocks);
   if (scaling == "weak") {
     const glm::ivec3 own = sizePerRank(options);
     const glm::ivec3 growth = growthFor(ranks, own);
@@ -139,13 +140,13 @@ class RankSuite {
     const comm::Communicator& comm = generator.communicator();
     std::vector<Block> blocks;
     comm.together([&] {
-      DealOptions deal = options_.deal;
-      deal.size = textOf(setup.size);
-      deal.blocks = textOf(setup.blocks);
-      deal.layout = setup.layout;
+      DecompositionOptions decomposition = options_.decomposition;
+      decomposition.size = textOf(setup.size);
+      decomposition.blocks = textOf(setup.blocks);
+      decomposition.layout = setup.layout;
       blocks = setup.set.field.empty()
-                   ? rawBlocks(setup.set.raw, deal, comm.rank(), comm.size())
-                   : fieldBlocks(setup.set.field, deal, device_, comm.rank(), comm.size());
+                   ? rawBlocks(setup.set.raw, decomposition, comm.rank(), comm.size())
+                   : fieldBlocks(setup.set.field, decomposition, device_, comm.rank(), comm.size());
     });
     const double uploadMs = readyMs(comm, [&] { generator.setBlocks(blocks); });
     FrameInput input;
@@ -242,8 +243,8 @@ glm::ivec3 growthFor(int ranks, const glm::ivec3& sizePerRank) {
 }
 
 void requireSoundRanks(const BenchOptions& options, int ranks) {
-  (void)sizesOf(options.deal.size);
-  (void)sizesOf(options.deal.blocks);
+  (void)sizesOf(options.decomposition.size);
+  (void)sizesOf(options.decomposition.blocks);
   if (!options.sizePerRank.empty()) (void)sizesOf(options.sizePerRank);
   for (const std::string& layout : options.layouts) (void)layoutFromString(layout);
   for (const int count : options.rankCounts) {

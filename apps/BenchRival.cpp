@@ -75,8 +75,8 @@ PixelBox pixelsOf(const Box& box, const FrameInput& input) {
   const glm::ivec2 whole(input.settings.width, input.settings.height);
   if (box.empty()) return {glm::ivec2(0), glm::ivec2(1)};  // IceT wants one at least
   const View view(input.camera, whole.x, whole.y);
-  glm::dvec2 least(whole);
-  glm::dvec2 most(0.0);
+  glm::dvec2 minimum(whole);
+  glm::dvec2 maximum(0.0);
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 world{(corner & 1) != 0 ? box.hi.x : box.lo.x, (corner & 2) != 0 ? box.hi.y : box.lo.y,
                            (corner & 4) != 0 ? box.hi.z : box.lo.z};
@@ -85,11 +85,11 @@ PixelBox pixelsOf(const Box& box, const FrameInput& input) {
     const glm::dvec2 half =
         glm::dvec2(view.halfWidth(), view.halfHeight()) * (view.parallel() ? 1.0 : seen.z);
     const glm::dvec2 at = 0.5 * (glm::dvec2(seen) / half + 1.0) * glm::dvec2(whole);
-    least = glm::min(least, at);
-    most = glm::max(most, at);
+    minimum = glm::min(minimum, at);
+    maximum = glm::max(maximum, at);
   }
-  const glm::ivec2 first = glm::clamp(glm::ivec2(glm::floor(least)) - 1, glm::ivec2(0), whole - 1);
-  const glm::ivec2 last = glm::clamp(glm::ivec2(glm::ceil(most)) + 1, first + 1, whole);
+  const glm::ivec2 first = glm::clamp(glm::ivec2(glm::floor(minimum)) - 1, glm::ivec2(0), whole - 1);
+  const glm::ivec2 last = glm::clamp(glm::ivec2(glm::ceil(maximum)) + 1, first + 1, whole);
   return {first, last - first};
 }
 
@@ -182,8 +182,8 @@ RivalFigures IcetRival::measure(ClockRaiser& clock, const FrameInput& input, int
       throw Error(ErrorCode::InvalidArgument, "the rival's picture has another size");
     for (std::size_t i = 0; i < timed.picture.size(); ++i) {
       const glm::vec4 off = glm::abs(timed.picture[i] - ours->rgba[i]);
-      const double most = std::max({off.x, off.y, off.z, off.w});
-      figures.maxDifference = std::max(figures.maxDifference, 255.0 * most);
+      const double maximum = std::max({off.x, off.y, off.z, off.w});
+      figures.maxDifference = std::max(figures.maxDifference, 255.0 * maximum);
     }
   });
   return figures;

@@ -55,7 +55,7 @@ json toJson(const BenchRow& row) {
       {"generate_over_dvr", row.generation.overDvr.median},
       {"dvr_over_render", row.generation.frames.ranks == 1 ? json(row.view.dvrOverDevice) : json(nullptr)},
       {"generate_frame_ms", row.generation.frame.median},
-      {"generate_search_ms", row.generation.searchMs},
+      {"generate_search_ms", row.generation.countMs},
       {"generate_write_ms", row.generation.writeMs},
       {"render_ms", row.view.device.median},
       {"render_frame_ms", row.view.frame.median},

@@ -33,7 +33,7 @@ struct GenerationFigures {
   Spread device;   // ms
   Spread frame;    // ms, the stages of the slowest rank
   Spread overDvr;  // device time over that of volume rendering right before it
-  double searchMs = 0.0;
+  double countMs = 0.0;
   double writeMs = 0.0;
   FrameFigures frames;
   std::size_t supersegments = 0;

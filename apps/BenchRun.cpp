@@ -78,11 +78,12 @@ class Bench {
   void measure(const DataSet& set) {
     std::vector<Block> blocks;
     world_.together([&] {
-      DealOptions deal = options_.deal;
-      if (!set.size.empty()) deal.size = set.size;
-      if (!set.type.empty()) deal.type = set.type;
-      blocks = set.field.empty() ? rawBlocks(set.raw, deal, world_.rank(), world_.size())
-                                 : fieldBlocks(set.field, deal, device_, world_.rank(), world_.size());
+      DecompositionOptions decomposition = options_.decomposition;
+      if (!set.size.empty()) decomposition.size = set.size;
+      if (!set.type.empty()) decomposition.type = set.type;
+      blocks = set.field.empty()
+                   ? rawBlocks(set.raw, decomposition, world_.rank(), world_.size())
+                   : fieldBlocks(set.field, decomposition, device_, world_.rank(), world_.size());
     });
     upload_ = measureUpload(blocks);
     generator_.setBlocks(blocks);
@@ -200,7 +201,7 @@ class Bench {
     std::vector<double> volumes;
     std::vector<double> frames;
     std::vector<double> ratios;
-    std::vector<double> searches;
+    std::vector<double> counts;
     std::vector<double> writes;
     made.figures.device = repeated(options_.repeats, [&] {
       clock_.run();
@@ -214,13 +215,13 @@ class Bench {
       log.add(wallMs, generator_.reports());
       frames.push_back(slowest(generator_.reports(), frameSeconds));
       ratios.push_back(volumeMs > 0.0 ? deviceMs() / volumeMs : 0.0);
-      searches.push_back(slowest(generator_.reports(), [](const RankReport& r) { return r.searchSeconds; }));
+      counts.push_back(slowest(generator_.reports(), [](const RankReport& r) { return r.countSeconds; }));
       writes.push_back(slowest(generator_.reports(), [](const RankReport& r) { return r.writeSeconds; }));
       return deviceMs();
     });
     made.figures.overDvr = spreadOf(lastOf(ratios));
     made.figures.frame = spreadOf(lastOf(frames));
-    made.figures.searchMs = spreadOf(lastOf(searches)).median;
+    made.figures.countMs = spreadOf(lastOf(counts)).median;
     made.figures.writeMs = spreadOf(lastOf(writes)).median;
     made.figures.frames = log.figures(static_cast<std::size_t>(options_.repeats));
     made.figures.frames.volumeRendering = spreadOf(lastOf(volumes));

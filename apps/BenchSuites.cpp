@@ -66,7 +66,7 @@ std::vector<DataSet> dataSets(const BenchOptions& options) {
                                          : std::vector<std::string>{"turbulence", "mixing", "coil"};
   }
   for (const std::string& field : fields)
-    sets.push_back({field, field, "", options.deal.size, options.deal.type});
+    sets.push_back({field, field, "", options.decomposition.size, options.decomposition.type});
   return sets;
 }
 

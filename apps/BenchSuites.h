@@ -12,7 +12,7 @@ namespace vdi::apps {
 struct BenchOptions {
   std::vector<std::string> raws;
   std::vector<std::string> fields;
-  DealOptions deal;
+  DecompositionOptions decomposition;
   ViewOptions view;
   QualityOptions quality;
   std::vector<double> angles{0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0};

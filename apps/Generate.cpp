@@ -24,7 +24,7 @@ namespace {
 struct Options {
   std::vector<std::string> raws;  // sidecars, of time steps; none: a procedural field
   std::string field = "turbulence";
-  DealOptions deal;
+  DecompositionOptions decomposition;
   ViewOptions view;
   QualityOptions quality;
   std::string output;
@@ -158,8 +158,8 @@ class Series {
  private:
   std::vector<Block> read(std::size_t index) const {
     return options_.raws.empty()
-               ? fieldBlocks(options_.field, options_.deal, device_, world_.rank(), world_.size())
-               : rawBlocks(options_.raws[index], options_.deal, world_.rank(), world_.size());
+               ? fieldBlocks(options_.field, options_.decomposition, device_, world_.rank(), world_.size())
+               : rawBlocks(options_.raws[index], options_.decomposition, world_.rank(), world_.size());
   }
   void startReading(std::size_t index) {
     if (index >= options_.steps()) return;
@@ -232,7 +232,7 @@ void addGenerate(CLI::App& app, Job& job) {
       ->capture_default_str()
       ->excludes(raw)
       ->group("Volume and ranks");
-  addDealOptions(*command, options->deal);
+  addDecompositionOptions(*command, options->decomposition);
   raw->excludes("--size")->excludes("--type");
   addViewOptions(*command, options->view);
   addQualityOptions(*command, options->quality);

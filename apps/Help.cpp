@@ -57,7 +57,7 @@ std::string HelpFormatter::make_option_desc(const CLI::Option* option) const {
   return text;
 }
 
-std::string demandPositive(const std::string& text) {
+std::string requirePositive(const std::string& text) {
   double value = 0.0;
   return CLI::detail::lexical_cast(text, value) && value > 0.0 ? "" : "must be > 0, it is " + text;
 }

@@ -16,7 +16,7 @@ class HelpFormatter : public CLI::Formatter {
 };
 
 /// A check for options: "must be > 0".
-std::string demandPositive(const std::string& text);
+std::string requirePositive(const std::string& text);
 /// A check for options: "must name a file", for an empty name would count as none given.
 std::string requireFileName(const std::string& text);
 /// A check for options: "must be a whole number from 0 to 2^64 - 1". CLI11 lets others wrap around.

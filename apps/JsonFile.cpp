@@ -33,8 +33,8 @@ std::string joined(const std::set<std::string>& names) {
 json readJson(const std::filesystem::path& path) {
   const auto fail = [&](const std::string& what) { throw Error(ErrorCode::Format, what, path.string()); };
   const io::InputFile file(path);
-  constexpr std::uint64_t mostBytes = std::uint64_t{256} << 20;  // a picture or volume given by mistake
-  if (file.size() > mostBytes) fail(fmt::format("{} bytes are too many for JSON", file.size()));
+  constexpr std::uint64_t maxBytes = std::uint64_t{256} << 20;  // a picture or volume given by mistake
+  if (file.size() > maxBytes) fail(fmt::format("{} bytes are too many for JSON", file.size()));
   const std::vector<std::byte> bytes = file.readAll();
   std::vector<std::set<std::string>> open;  // the names so far of each object that is being read
   const auto noteNames = [&](int, json::parse_event_t event, const json& value) {
@@ -116,13 +116,13 @@ std::string JsonFile::choice(const char* name, const std::set<std::string>& choi
 
 std::vector<std::vector<double>> JsonFile::rows(const char* name, std::size_t width) const {
   const json& value = at(name);
-  const auto demand = [&](bool good) {
+  const auto require = [&](bool good) {
     if (!good) fail(fmt::format("'{}' must be a list of lists of {} numbers", name, width));
   };
-  demand(value.is_array());
+  require(value.is_array());
   std::vector<std::vector<double>> rows;
   for (const json& row : value) {
-    demand(isNumbers(row, width));
+    require(isNumbers(row, width));
     rows.push_back(row.get<std::vector<double>>());
   }
   return rows;

@@ -14,7 +14,7 @@ namespace vdi::apps {
 
 namespace {
 
-constexpr double mostBytes = 9.0e18;  // what file offsets can express
+constexpr double maxBytes = 9.0e18;  // what file offsets can express
 
 Lattice readLattice(const JsonFile& sidecar) {
   Lattice lattice;
@@ -35,12 +35,12 @@ Lattice readLattice(const JsonFile& sidecar) {
   return lattice;
 }
 
-void demandSize(const JsonFile& sidecar, const RawVolume& volume) {
+void requireSize(const JsonFile& sidecar, const RawVolume& volume) {
   const std::uint64_t bytes = io::InputFile(volume.data).size();
   const glm::dvec3 dims(volume.lattice.size);
   const double wanted = dims.x * dims.y * dims.z * static_cast<double>(sizeOf(volume.lattice.type)) +
                         static_cast<double>(volume.skip);
-  if (wanted > mostBytes) sidecar.fail(fmt::format("'dims' and 'skip' ask for {:g} bytes", wanted));
+  if (wanted > maxBytes) sidecar.fail(fmt::format("'dims' and 'skip' ask for {:g} bytes", wanted));
   const glm::u64vec3 size(volume.lattice.size);
   const std::uint64_t expected = volume.skip + size.x * size.y * size.z * sizeOf(volume.lattice.type);
   if (bytes != expected) {
@@ -58,7 +58,7 @@ RawVolume readSidecar(const std::filesystem::path& path) {
   volume.lattice = readLattice(sidecar);
   volume.bigEndian = sidecar.has("endianness") && sidecar.choice("endianness", {"little", "big"}) == "big";
   if (sidecar.has("skip")) volume.skip = sidecar.count("skip");
-  demandSize(sidecar, volume);
+  requireSize(sidecar, volume);
   return volume;
 }
 

@@ -28,9 +28,9 @@ Lattice commonLattice(const comm::Communicator& comm, const std::vector<Block>& 
     Cells,
     Points
   };
-  std::array<double, 16> most{};
-  most.fill(none);
-  const auto include = [&](std::size_t at, double value) { most[at] = std::max(most[at], value); };
+  std::array<double, 16> maximum{};
+  maximum.fill(none);
+  const auto include = [&](std::size_t at, double value) { maximum[at] = std::max(maximum[at], value); };
   for (const Block& block : blocks) {
     for (int axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<std::size_t>(axis);
@@ -43,24 +43,25 @@ Lattice commonLattice(const comm::Communicator& comm, const std::vector<Block>& 
     include(MinusType, -static_cast<double>(block.type));
     include(block.owned.lo.x < block.origin.x - 0.25 * block.spacing.x ? Cells : Points, 1.0);
   }
-  comm.allReduceMax(most);
+  comm.allReduceMax(maximum);
   Lattice lattice;
-  if (most[Type] == none) return lattice;  // nobody has anything
-  bool one = most[Type] == -most[MinusType] && (most[Cells] == none || most[Points] == none);
+  if (maximum[Type] == none) return lattice;  // nobody has anything
+  bool one = maximum[Type] == -maximum[MinusType] && (maximum[Cells] == none || maximum[Points] == none);
   for (std::size_t a = 0; a < 3; ++a)
-    one = one && most[Spacing + a] + most[MinusSpacing + a] <= 1e-6 * most[Spacing + a];
+    one = one && maximum[Spacing + a] + maximum[MinusSpacing + a] <= 1e-6 * maximum[Spacing + a];
   if (!one) {
     throw Error(ErrorCode::InvalidArgument,
                 "blocks of several spacings, types or associations can't be redistributed");
   }
-  lattice.type = static_cast<ScalarType>(static_cast<std::uint32_t>(most[Type]));
-  lattice.joint = most[Cells] != none ? Joint::Cells : Joint::SharedPoints;
+  lattice.type = static_cast<ScalarType>(static_cast<std::uint32_t>(maximum[Type]));
+  lattice.joint = maximum[Cells] != none ? Joint::Cells : Joint::SharedPoints;
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
-    const double first = -most[Origin + a];
-    lattice.spacing[axis] = most[Spacing + a];
-    lattice.size[axis] = 1 + static_cast<int>(std::lround((most[Last + a] - first) / most[Spacing + a]));
-    lattice.origin[axis] = first - (lattice.joint == Joint::Cells ? 0.5 * most[Spacing + a] : 0.0);
+    const double first = -maximum[Origin + a];
+    lattice.spacing[axis] = maximum[Spacing + a];
+    lattice.size[axis] =
+        1 + static_cast<int>(std::lround((maximum[Last + a] - first) / maximum[Spacing + a]));
+    lattice.origin[axis] = first - (lattice.joint == Joint::Cells ? 0.5 * maximum[Spacing + a] : 0.0);
   }
   return lattice;
 }
@@ -86,16 +87,16 @@ void copyValues(const IndexBox& part, const IndexBox& source, const std::byte* f
 }
 
 /// What messages are made of: more than 2^31 of them never go to one rank, whatever their size.
-constexpr std::size_t grain = 64;
+constexpr std::size_t preSegment = 64;
 
 std::size_t padded(std::size_t bytes) {
-  return (bytes + grain - 1) / grain * grain;
+  return (bytes + preSegment - 1) / preSegment * preSegment;
 }
 
 }  // namespace
 
 Redistributed redistribute(const comm::Communicator& comm, const std::vector<Block>& blocks) {
-  static_assert(sizeof(IndexBox) <= grain);
+  static_assert(sizeof(IndexBox) <= preSegment);
   const Lattice lattice = commonLattice(comm, blocks);
   const std::size_t bytes = sizeOf(lattice.type);
   const bool cells = lattice.joint == Joint::Cells;
@@ -119,12 +120,12 @@ Redistributed redistribute(const comm::Communicator& comm, const std::vector<Blo
         const IndexBox part = place.intersection(valuesOf(rank));
         if (rank == comm.rank() || part.empty()) continue;
         const std::size_t at = message.size();
-        message.resize(at + grain + padded(part.count() * bytes));
+        message.resize(at + preSegment + padded(part.count() * bytes));
         std::memcpy(message.data() + at, &part, sizeof(part));
-        copyValues(part, place, static_cast<const std::byte*>(block.data), part, message.data() + at + grain,
-                   bytes);
+        copyValues(part, place, static_cast<const std::byte*>(block.data), part,
+                   message.data() + at + preSegment, bytes);
       }
-      counts[static_cast<std::size_t>(rank)] = (message.size() - begin) / grain;
+      counts[static_cast<std::size_t>(rank)] = (message.size() - begin) / preSegment;
     }
     if (own.empty()) return;
     data = std::shared_ptr<std::byte[]>(new std::byte[own.count() * bytes]);
@@ -136,13 +137,13 @@ Redistributed redistribute(const comm::Communicator& comm, const std::vector<Blo
     }
   });
   result.bytesSent = message.size();
-  const comm::Gathered received = comm.allToAll(message, counts, grain);
+  const comm::Gathered received = comm.allToAll(message, counts, preSegment);
   if (own.empty()) return result;
   for (std::size_t at = 0; at < received.bytes.size();) {
     IndexBox part;
     std::memcpy(&part, received.bytes.data() + at, sizeof(part));
-    copyValues(part, part, received.bytes.data() + at + grain, own, data.get(), bytes);
-    at += grain + padded(part.count() * bytes);
+    copyValues(part, part, received.bytes.data() + at + preSegment, own, data.get(), bytes);
+    at += preSegment + padded(part.count() * bytes);
   }
   result.blocks.push_back(blockOf(lattice, {own.lo, own.size(), comm.rank()}, data));
   return result;

@@ -53,7 +53,7 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-const char* const dealGroup = "Volume and ranks";
+const char* const decompositionGroup = "Volume and ranks";
 const char* const viewGroup = "Viewpoint";
 const char* const qualityGroup = "VDI";
 
@@ -89,38 +89,39 @@ std::string fieldsHelp() {
   return text;
 }
 
-void addDealOptions(CLI::App& command, DealOptions& options) {
+void addDecompositionOptions(CLI::App& command, DecompositionOptions& options) {
   command.add_option("--size", options.size, "values per axis of a field")
       ->type_name("XxYxZ")
       ->capture_default_str()
-      ->group(dealGroup);
+      ->group(decompositionGroup);
   command.add_option("--type", options.type, "scalar type of a field: u8, i8, u16, i16, u32, i32, f32, f64")
       ->type_name("TYPE")
       ->capture_default_str()
-      ->group(dealGroup);
+      ->group(decompositionGroup);
   command.add_option("--seed", options.seed, "of random fields and layouts")
       ->capture_default_str()
-      ->group(dealGroup);
+      ->group(decompositionGroup);
   command.add_option("--blocks", options.blocks, "blocks per axis")
       ->type_name("XxYxZ")
       ->capture_default_str()
-      ->group(dealGroup);
+      ->group(decompositionGroup);
   command
       .add_option("--layout", options.layout,
                   "which rank holds which block: " + joined(layoutNames()) +
                       "; on fewer blocks than ranks some hold nothing")
       ->type_name("LAYOUT")
       ->capture_default_str()
-      ->group(dealGroup);
+      ->group(decompositionGroup);
   command
       .add_option("--joint", options.joint,
                   "neighbouring blocks both hold the points of their common face (shared), no point is held "
                   "twice (gap), or cell data (cells); default: shared, or what the raw volume is")
       ->type_name("JOINT")
-      ->group(dealGroup);
+      ->group(decompositionGroup);
 }
 
-std::vector<Block> rawBlocks(const std::string& sidecar, const DealOptions& options, int rank, int ranks) {
+std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOptions& options, int rank,
+                             int ranks) {
   RawVolume volume = readSidecar(sidecar);
   if (!options.joint.empty()) {
     const Joint joint = jointOf(options.joint);
@@ -139,7 +140,7 @@ std::vector<Block> rawBlocks(const std::string& sidecar, const DealOptions& opti
   return blocks;
 }
 
-std::vector<Block> fieldBlocks(const std::string& name, const DealOptions& options,
+std::vector<Block> fieldBlocks(const std::string& name, const DecompositionOptions& options,
                                const std::shared_ptr<gpu::Device>& device, int rank, int ranks) {
   Lattice lattice;
   lattice.size = vectorOf(parseSizes(options.size, 3));
@@ -211,7 +212,7 @@ void addViewOptions(CLI::App& command, ViewOptions& options) {
   orbit(
       command.add_option("--elevation", options.orbit.elevation, "degrees above it")->capture_default_str());
   orbit(command.add_option("--zoom", options.orbit.zoom, "> 1 goes nearer")
-            ->check(demandPositive)
+            ->check(requirePositive)
             ->capture_default_str());
   orbit(command.add_flag("--parallel", options.parallel, "parallel projection of the whole scene"))
       ->excludes("--view-angle");
@@ -295,7 +296,7 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
           "--unit-distance", options.unitDistance,
           "world units of material that have the transfer function's opacity; default: the file's, or "
           "a fiftieth of the scene's diagonal")
-      ->check(demandPositive)
+      ->check(requirePositive)
       ->group(qualityGroup);
 }
 

@@ -20,7 +20,7 @@
 namespace vdi::apps {
 
 /// How a volume is cut and dealt.
-struct DealOptions {
+struct DecompositionOptions {
   std::string size = "96x96x96";
   std::string type = "f32";
   std::uint32_t seed = 1;
@@ -28,13 +28,14 @@ struct DealOptions {
   std::string layout = "interleaved";
   std::string joint;  // empty: the raw volume's, or shared points
 };
-void addDealOptions(CLI::App& command, DealOptions& options);
+void addDecompositionOptions(CLI::App& command, DecompositionOptions& options);
 
 /// The blocks of a procedural field that `rank` of `ranks` holds, made by its device. Throws Error.
-std::vector<Block> fieldBlocks(const std::string& field, const DealOptions& options,
+std::vector<Block> fieldBlocks(const std::string& field, const DecompositionOptions& options,
                                const std::shared_ptr<gpu::Device>& device, int rank, int ranks);
 /// The blocks of a raw volume; size and type are the sidecar's. Throws Error.
-std::vector<Block> rawBlocks(const std::string& sidecar, const DealOptions& options, int rank, int ranks);
+std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOptions& options, int rank,
+                             int ranks);
 /// "name: description" of each field, for --help.
 std::string fieldsHelp();
 

@@ -15,9 +15,9 @@ namespace vdi::apps {
 
 struct Spread {
   double median = 0.0;
-  double least = 0.0;
-  double most = 0.0;
-  double width() const { return most - least; }
+  double minimum = 0.0;
+  double maximum = 0.0;
+  double width() const { return maximum - minimum; }
 };
 /// Of one value or more.
 Spread spreadOf(std::vector<double> values);

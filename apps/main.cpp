@@ -56,10 +56,10 @@ Outcome outcomeOf(const CLI::App& app, const CLI::ParseError& error, bool speaks
 }
 
 /// Ranks that were started with other arguments would wait for each other in different places.
-void demandEqualArguments(const vdi::comm::Communicator& world, int argc, char** argv) {
+void requireEqualArguments(const vdi::comm::Communicator& world, int argc, char** argv) {
   std::string all;
   for (int i = 1; i < argc; ++i) all += std::string(argv[i]) + '\n';
-  world.demandEqual(std::hash<std::string>{}(all), "command line");
+  world.requireEqual(std::hash<std::string>{}(all), "command line");
 }
 
 Outcome runTool(int argc, char** argv) {
@@ -88,7 +88,7 @@ Outcome runTool(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
       return outcomeOf(app, error, world.rank() == 0);
     }
-    demandEqualArguments(world, argc, argv);
+    requireEqualArguments(world, argc, argv);
     if (world.size() > 1 && !job.collective) {
       throw vdi::Error(vdi::ErrorCode::InvalidArgument,
                        "this subcommand works on one rank; generate and bench work on several");
@@ -118,9 +118,9 @@ int leaveTogether(const Outcome& mine) {
   int size = 1;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   MPI_Comm_size(MPI_COMM_WORLD, &size);
-  std::array<int, 2> least{mine.message.empty() ? size : rank, -mine.status};
+  std::array<int, 2> minimum{mine.message.empty() ? size : rank, -mine.status};
   MPI_Request request = MPI_REQUEST_NULL;
-  MPI_Iallreduce(MPI_IN_PLACE, least.data(), 2, MPI_INT, MPI_MIN, MPI_COMM_WORLD, &request);
+  MPI_Iallreduce(MPI_IN_PLACE, minimum.data(), 2, MPI_INT, MPI_MIN, MPI_COMM_WORLD, &request);
   const auto start = std::chrono::steady_clock::now();
   int done = 0;
   MPI_Test(&request, &done, MPI_STATUS_IGNORE);
@@ -132,8 +132,8 @@ int leaveTogether(const Outcome& mine) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
     MPI_Test(&request, &done, MPI_STATUS_IGNORE);
   }
-  if (least[0] == rank) say(mine.message);
-  return -least[1];
+  if (minimum[0] == rank) say(mine.message);
+  return -minimum[1];
 }
 
 /// A standard stream that was closed would be the number of the next file that is opened, and what's printed

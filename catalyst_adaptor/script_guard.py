@@ -144,7 +144,7 @@ def install(leave):
 
     def has_display(extractor):
         try:
-            demand_display("the extractor of '%s'" % extractor.Writer.FileName)
+            require_display("the extractor of '%s'" % extractor.Writer.FileName)
         except RuntimeError as error:
             vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, str(error))
             return False
@@ -224,7 +224,7 @@ def make_folder(folder):
         raise RuntimeError("the folder '%s' can't be written to, so this step's files aren't written" % folder)
 
 
-def demand_display(what):
+def require_display(what):
     from paraview.modules.vtkRemotingViews import vtkPVRenderingCapabilitiesInformation as capabilities
     if not capabilities.GetLocalCapabilities() & capabilities.RENDERING:
         raise RuntimeError("%s needs a display to draw, and there is none (DISPLAY is %s): run the simulation under "
@@ -243,7 +243,7 @@ def refuse_drawing_without_display():
 
     def __getattr__(self, name):
         if name in drawing or (name == "Write" and self.SMProxy.GetXMLGroup() == "exporters"):
-            demand_display("%s of %s" % (name, self.SMProxy.GetXMLLabel()))
+            require_display("%s of %s" % (name, self.SMProxy.GetXMLLabel()))
         return attribute_of(self, name)
 
     servermanager.Proxy.__getattr__ = __getattr__

@@ -132,38 +132,39 @@ int guarded(vdi_catalyst& self, int code, Work work, std::optional<std::int64_t>
   return conclude(self, failure ? code : VDI_CATALYST_OK, failure.value_or(""), step);
 }
 
-void demand(bool good, const char* what) {
+void require(bool good, const char* what) {
   if (!good) throw std::invalid_argument(what);
 }
 
-void demandEqual(MPI_Comm comm, std::int64_t value, const char* what) {
+void requireEqual(MPI_Comm comm, std::int64_t value, const char* what) {
   std::array<std::int64_t, 2> extremes{value, ~value};
   MPI_Allreduce(MPI_IN_PLACE, extremes.data(), 2, MPI_INT64_T, MPI_MAX, comm);
-  demand(extremes[0] == ~extremes[1], what);
+  require(extremes[0] == ~extremes[1], what);
 }
 
 /// Of points, of which there are more than cells. Throws where VTK's counts would overflow.
-void demandCountable(const vdi_catalyst_block& block) {
+void requireCountable(const vdi_catalyst_block& block) {
   std::int64_t points = 1;
-  constexpr std::int64_t most = std::int64_t{1} << 60;
+  constexpr std::int64_t maximum = std::int64_t{1} << 60;
   for (const int32_t cells : block.cells) {
     const std::int64_t more = std::int64_t{cells} + 1;
-    demand(more <= std::numeric_limits<int>::max() && points <= most / more,
-           "a block of more cells than can be counted");
+    require(more <= std::numeric_limits<int>::max() && points <= maximum / more,
+            "a block of more cells than can be counted");
     points *= more;
   }
 }
 
 void checkBlock(const vdi_catalyst_block& block) {
   for (int axis = 0; axis < 3; ++axis) {
-    demand(block.cells[axis] >= 1, "a block needs at least one cell per axis");
-    demand(block.ghost_lo[axis] >= 0 && block.ghost_hi[axis] >= 0, "ghost layers can't be negative");
-    demand(std::int64_t{block.ghost_lo[axis]} + block.ghost_hi[axis] < block.cells[axis],
-           "a block of nothing but ghost cells");
-    demand(std::isfinite(block.spacing[axis]) && block.spacing[axis] > 0.0, "spacing must be finite and > 0");
-    demand(std::isfinite(block.origin[axis]), "the origin must be finite");
+    require(block.cells[axis] >= 1, "a block needs at least one cell per axis");
+    require(block.ghost_lo[axis] >= 0 && block.ghost_hi[axis] >= 0, "ghost layers can't be negative");
+    require(std::int64_t{block.ghost_lo[axis]} + block.ghost_hi[axis] < block.cells[axis],
+            "a block of nothing but ghost cells");
+    require(std::isfinite(block.spacing[axis]) && block.spacing[axis] > 0.0,
+            "spacing must be finite and > 0");
+    require(std::isfinite(block.origin[axis]), "the origin must be finite");
   }
-  demandCountable(block);
+  requireCountable(block);
 }
 
 void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
@@ -210,13 +211,13 @@ void markModified(vtkPartitionedDataSet& grid) {
 
 /// ParaView counts steps in an int, and files are named by it: another one would be lost, or replace another
 /// step's.
-void demandStep(const vdi_catalyst& self, std::int64_t step) {
-  demand(self.haveBlocks, "no blocks were given yet");
-  constexpr std::int64_t most = std::numeric_limits<int>::max();
-  if (step >= 0 && step <= most) return;
-  throw std::invalid_argument("step " + std::to_string(step) +
-                              " isn't handed over: ParaView counts steps from 0 to " + std::to_string(most) +
-                              "; hand over a smaller number, such as a count of these calls");
+void requireStep(const vdi_catalyst& self, std::int64_t step) {
+  require(self.haveBlocks, "no blocks were given yet");
+  constexpr std::int64_t maximum = std::numeric_limits<int>::max();
+  if (step >= 0 && step <= maximum) return;
+  throw std::invalid_argument(
+      "step " + std::to_string(step) + " isn't handed over: ParaView counts steps from 0 to " +
+      std::to_string(maximum) + "; hand over a smaller number, such as a count of these calls");
 }
 
 int vtkTypeOf(int type) {
@@ -253,15 +254,15 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
   MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
   std::vector<std::string> paths;
   int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    demand(script_count >= 0 && (script_count == 0 || scripts != nullptr), "no scripts given");
+    require(script_count >= 0 && (script_count == 0 || scripts != nullptr), "no scripts given");
     for (int i = 0; i < script_count; ++i) {
-      demand(scripts[i] != nullptr, "a script's path is null");
+      require(scripts[i] != nullptr, "a script's path is null");
       paths.emplace_back(scripts[i]);
     }
   });
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
-      demandEqual(self->comm, script_count, "the ranks give different numbers of scripts");
+      requireEqual(self->comm, script_count, "the ranks give different numbers of scripts");
     });
   }
   if (code == VDI_CATALYST_OK) {
@@ -295,7 +296,7 @@ int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_cat
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const auto grid = vtkSmartPointer<vtkPartitionedDataSet>::New();
   const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    demand(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
+    require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
     for (int i = 0; i < count; ++i) checkBlock(blocks[i]);
     grid->SetNumberOfPartitions(static_cast<unsigned int>(count));
     for (int i = 0; i < count; ++i) {
@@ -320,14 +321,14 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
   const bool cells = association == VDI_CATALYST_CELLS;
   std::vector<vtkSmartPointer<vtkDataArray>> arrays;
   const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    demand(catalyst->haveBlocks, "arrays were given before blocks");
-    demand(name != nullptr && *name != '\0', "an array needs a name");
-    demand(association == VDI_CATALYST_POINTS || cells, "unknown association");
+    require(catalyst->haveBlocks, "arrays were given before blocks");
+    require(name != nullptr && *name != '\0', "an array needs a name");
+    require(association == VDI_CATALYST_POINTS || cells, "unknown association");
     const int vtkType = vtkTypeOf(type);
     const unsigned int count = catalyst->grid->GetNumberOfPartitions();
-    demand(count == 0 || data != nullptr, "an array without data");
+    require(count == 0 || data != nullptr, "an array without data");
     for (unsigned int i = 0; i < count; ++i) {
-      demand(data[i] != nullptr, "an array without data for one of the blocks");
+      require(data[i] != nullptr, "an array without data for one of the blocks");
       vtkDataSet* image = catalyst->grid->GetPartition(i);
       const auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtkType));
       array->SetName(name);
@@ -350,11 +351,11 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   int code = guarded(
-      *catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] { demandStep(*catalyst, step); }, step);
+      *catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] { requireStep(*catalyst, step); }, step);
   if (code == VDI_CATALYST_OK) {
     code = guarded(
         *catalyst, VDI_CATALYST_BAD_ARGUMENT,
-        [&] { demandEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
+        [&] { requireEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
   }
   if (code != VDI_CATALYST_OK) return code;
   const int result = guarded(

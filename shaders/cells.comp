@@ -45,8 +45,8 @@ uint ordered(float value) {
 float unordered(uint bits) { return uintBitsToFloat((bits >> 31) != 0u ? bits & 0x7FFFFFFFu : ~bits); }
 
 // Smallest, and largest inverted, of what the workgroup's invocations have found.
-shared uint least;
-shared uint leastInverted;
+shared uint minimum;
+shared uint minInverted;
 
 // By a workgroup, whose invocations take a row of texels each at a time.
 void measure(CellPiece piece, uint pieceIndex, uint cell) {
@@ -58,8 +58,8 @@ void measure(CellPiece piece, uint pieceIndex, uint cell) {
   const float largest = 3.402823466e38;
   vec2 range = vec2(largest, -largest);
   if (gl_LocalInvocationIndex == 0u) {
-    least = ~0u;
-    leastInverted = ~0u;
+    minimum = ~0u;
+    minInverted = ~0u;
   }
   barrier();
   int rows = last.y - first.y + 1;
@@ -73,16 +73,16 @@ void measure(CellPiece piece, uint pieceIndex, uint cell) {
     }
   }
   if (range.x <= range.y) {
-    atomicMin(least, ordered(range.x));
-    atomicMin(leastInverted, ~ordered(range.y));
+    atomicMin(minimum, ordered(range.x));
+    atomicMin(minInverted, ~ordered(range.y));
   }
   barrier();
   if (gl_LocalInvocationIndex != 0u) return;
-  bool found = least != ~0u;
-  push.ranges.at[cell] = found ? vec2(unordered(least), unordered(~leastInverted)) : vec2(largest, -largest);
+  bool found = minimum != ~0u;
+  push.ranges.at[cell] = found ? vec2(unordered(minimum), unordered(~minInverted)) : vec2(largest, -largest);
   if (found) {
-    atomicMin(push.pieceRanges.at[2u * pieceIndex], least);
-    atomicMin(push.pieceRanges.at[2u * pieceIndex + 1u], leastInverted);
+    atomicMin(push.pieceRanges.at[2u * pieceIndex], minimum);
+    atomicMin(push.pieceRanges.at[2u * pieceIndex + 1u], minInverted);
   }
 }
 

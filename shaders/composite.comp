@@ -1,4 +1,4 @@
-// Segments merged lists again, to at most N_S supersegments each: sub-supersegments are samples of varying length.
+// Segments interleaved lists again, to at most N_S supersegments each: sub-supersegments are samples of varying length.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/composite.h"
@@ -9,26 +9,26 @@ layout(set = 0, binding = 1, scalar) uniform Params { CompositeParams params; };
 
 layout(constant_id = 0) const uint compositeProgram = compositeProgramSearch;
 layout(constant_id = 1) const bool byNeed = false;  // CompositeParams::level
-const bool surveysGrains = compositeProgram == compositeProgramSurvey;
-const bool countsGrains = compositeProgram == compositeProgramCountGrains || surveysGrains;
-const bool writesGrains = compositeProgram == compositeProgramWriteGrains;
+const bool fillsHistogram = compositeProgram == compositeProgramHistogram;
+const bool countsPreSegments = compositeProgram == compositeProgramCountPreSegments || fillsHistogram;
+const bool writesPreSegments = compositeProgram == compositeProgramWritePreSegments;
 
-const uint rayShares = 1u;
-const uint rayShare = 0u;
+const uint lanesPerRay = 1u;
+const uint rayLane = 0u;
 const bool cutAtGaps = false;  // a gap is a transparent sample
 
 #include "lists.glsl"
-#include "grains.glsl"
+#include "pre_segments.glsl"
 
-void walk() {
-  SegmentArray merged = params.merged;
+void feedIntervals() {
+  SegmentArray interleaved = params.interleaved;
   StoredForm form = params.form;
-  uint end = params.mergedOffsets.at[listIndex + 1u];
-  for (uint i = params.mergedOffsets.at[listIndex]; i < end; ++i) {
-    Material s = loadSegment(merged, i, form);
-    if (countsGrains || writesGrains) {
+  uint end = params.interleavedOffsets.at[listIndex + 1u];
+  for (uint i = params.interleavedOffsets.at[listIndex]; i < end; ++i) {
+    OpticalSegment s = loadSegment(interleaved, i, form);
+    if (countsPreSegments || writesPreSegments) {
       vec4 x = appearanceOf(s.color, s.opticalDepth, s.back - s.front, params.step);
-      grainsAdd(s.front, s.back, s.color, opacityOf(s.opticalDepth), s.opticalDepth, x);
+      preSegmentsAdd(s.front, s.back, s.color, opacityOf(s.opticalDepth), s.opticalDepth, x);
     } else {
       searchAdd(s.front, s.back, s.color, s.opticalDepth);
     }
@@ -36,31 +36,31 @@ void walk() {
 }
 
 void main() {
-  if (writesGrains && params.guard.at[0] == 0u) return;
+  if (writesPreSegments && params.guard.at[0] == 0u) return;
   listIndex = gl_GlobalInvocationID.x;
   bool hasList = listIndex < params.listCount;
-  if (surveysGrains) {
-    surveyGrains(hasList);
+  if (fillsHistogram) {
+    addToHistogram(hasList);
     return;
   }
   if (!hasList) return;
   // A list that fits stays as it is: store.comp takes it from what was merged.
-  uint count = params.mergedOffsets.at[listIndex + 1u] - params.mergedOffsets.at[listIndex];
+  uint count = params.interleavedOffsets.at[listIndex + 1u] - params.interleavedOffsets.at[listIndex];
   bool fits = !byNeed && count <= params.budget;
-  if (fits && countsGrains) {
-    params.sensitivities.at[listIndex] = -1.0;
-    params.counts.at[listIndex] = 0u;
+  if (fits && countsPreSegments) {
+    params.thresholds.at[listIndex] = -1.0;
+    params.capacities.at[listIndex] = 0u;
     return;
   }
-  if (fits && writesGrains) {
+  if (fits && writesPreSegments) {
     params.written.at[listIndex] = 0u;
     params.left.at[listIndex] = count;
     return;
   }
-  if (countsGrains) {
-    countGrains();
-  } else if (writesGrains) {
-    writeGrains();
+  if (countsPreSegments) {
+    countPreSegments();
+  } else if (writesPreSegments) {
+    writePreSegments();
   } else {
     searchOrWriteList(push.mode == compositeModeWrite);
   }

@@ -10,13 +10,13 @@ layout(push_constant, scalar) uniform Push { ExpandConstants push; };
 #include "optical.glsl"
 #include "exact.glsl"
 #include "store.glsl"
-#include "pieces.glsl"
+#include "render_segment.glsl"
 
 void expandSegment(uint i) {
-  Material m = loadSegment(push.from, i, push.form);
-  float density = m.opticalDepth / (m.back - m.front);
+  OpticalSegment segment = loadSegment(push.from, i, push.form);
+  float density = segment.opticalDepth / (segment.back - segment.front);
   push.segments.at[push.first + i] =
-      RenderSegment(m.front, m.back, density, packedPieceColor(m.color / opacityOf(m.opticalDepth)));
+      RenderSegment(segment.front, segment.back, density, packedSegmentColor(segment.color / opacityOf(segment.opticalDepth)));
 }
 
 void maskList(uint list) {
@@ -24,8 +24,8 @@ void maskList(uint list) {
   uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];
   for (uint i = first; i < end; ++i) {
-    RenderSegment piece = push.segments.at[i];
-    mask |= maskOf(piece.front, piece.back, push.nearest, push.binScale);
+    RenderSegment segment = push.segments.at[i];
+    mask |= maskOf(segment.front, segment.back, push.nearest, push.binScale);
   }
   push.heads.at[list] = ListHead(first, end - first, mask);
 }
@@ -38,16 +38,17 @@ void maskTile(ivec2 tile, uint index) {
   for (int y = begin.y; y < end.y; ++y) {
     for (int x = begin.x; x < end.x; ++x) mask |= push.heads.at[uint(y) * uint(push.lists.x) + uint(x)].mask;
   }
-  push.tileMasks.at[index] = mask;
+  push.tileDepthMasks.at[index] = mask;
 }
 
 void maskLargeTile(ivec2 largeTile, ivec2 tiles, uint index) {
   uint64_t mask = 0ul;
   ivec2 end = min((largeTile + 1) * (renderLargeTile / renderTile), tiles);
   for (int y = largeTile.y * (renderLargeTile / renderTile); y < end.y; ++y) {
-    for (int x = largeTile.x * (renderLargeTile / renderTile); x < end.x; ++x) mask |= push.tileMasks.at[uint(y * tiles.x + x)];
+    for (int x = largeTile.x * (renderLargeTile / renderTile); x < end.x; ++x)
+        mask |= push.tileDepthMasks.at[uint(y * tiles.x + x)];
   }
-  push.tileMasks.at[index] = mask;
+  push.tileDepthMasks.at[index] = mask;
 }
 
 void main() {

@@ -2,7 +2,7 @@
 // these. What it goes from and to is called a column here, be it a row, and what lies across, a row. How far it has come is
 // counted in columns from its start, or as a fraction of its stretch.
 //
-// Needs: view.glsl, beam.glsl; params, ray.
+// Needs: view.glsl, packet.glsl; params, ray.
 
 struct PictureLine {
   bool byColumns;
@@ -29,8 +29,8 @@ PictureLine pictureLine(vec2 stretch) {
   line.start = line.byColumns ? start.x : start.y;
   line.row = line.byColumns ? start.y : start.x;
   float along = line.byColumns ? whole.x : whole.y;
-  const float leastColumns = 1e-4;  // rays that stay where they are get through their column, too
-  line.columns = max(abs(along), leastColumns);
+  const float minColumns = 1e-4;  // rays that stay where they are get through their column, too
+  line.columns = max(abs(along), minColumns);
   line.direction = along < 0.0 ? -1.0 : 1.0;
   float perColumn = 1.0 / line.columns;
   line.rows = (line.byColumns ? whole.y : whole.x) * perColumn;
@@ -41,9 +41,9 @@ PictureLine pictureLine(vec2 stretch) {
   float change = depths.y - depths.x;
   line.depths = change < 0.0 ? vec2(-depths.x, -change) : vec2(depths.x, change);
   line.bins = vec2(depths.x - params.nearest, change) * params.binScale;
-  int most = columnCount(line.byColumns) - 1;
-  line.first = clamp(int(floor(line.start)), 0, most);
-  line.last = clamp(int(floor(line.start + line.direction * line.columns)), 0, most);
+  int maximum = columnCount(line.byColumns) - 1;
+  line.first = clamp(int(floor(line.start)), 0, maximum);
+  line.last = clamp(int(floor(line.start + line.direction * line.columns)), 0, maximum);
   return line;
 }
 

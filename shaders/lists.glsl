@@ -1,6 +1,6 @@
 // One list from intervals to stored supersegments: search in one dispatch, write in a later one.
 //
-// Needs: params with sensitivities, counts, offsets, segments, form, status; void walk().
+// Needs: params with thresholds, capacities, offsets, segments, form, status; void feedIntervals().
 
 uint listIndex;
 
@@ -8,30 +8,30 @@ uint listIndex;
 #include "appearance.glsl"
 #include "exact.glsl"
 #include "store.glsl"
-void emitSegment(Material m);
+void emitSegment(OpticalSegment segment);
 #include "segmenter.glsl"
 #include "search.glsl"
 
-void emitSegment(Material m) {
-  if (search.writing && search.emitted < params.counts.at[listIndex]) {
+void emitSegment(OpticalSegment segment) {
+  if (search.writing && search.emitted < params.capacities.at[listIndex]) {
     uint slot = params.offsets.at[listIndex] + search.emitted;
     SegmentArray segments = params.segments;
     StoredForm form = params.form;
-    storeSegment(segments, slot, m, form);
+    storeSegment(segments, slot, segment, form);
   }
   ++search.emitted;
 }
 
 void searchOrWriteList(bool write) {
   segmenterStep = params.step;
-  if (write && params.counts.at[listIndex] == 0u) return;
+  if (write && params.capacities.at[listIndex] == 0u) return;
   beginStoring();
-  float known = write ? params.sensitivities.at[listIndex] : 0.0;
+  float known = write ? params.thresholds.at[listIndex] : 0.0;
   SearchResult result = searchList(write, known, params.budget);
   if (write) {
-    if (result.count != params.counts.at[listIndex]) atomicAdd(params.status.at[0], 1u);
+    if (result.count != params.capacities.at[listIndex]) atomicAdd(params.status.at[0], 1u);
   } else {
-    params.sensitivities.at[listIndex] = result.sensitivity;
-    params.counts.at[listIndex] = result.count;
+    params.thresholds.at[listIndex] = result.sensitivity;
+    params.capacities.at[listIndex] = result.count;
   }
 }

@@ -1,14 +1,14 @@
-// Two neighbouring grains become one: what that costs, and what comes of it. Twin of vdi/reference/SegmentByMerging.cpp.
+// Two neighbouring pre-segments become one: what that costs, and what comes of it. Twin of vdi/reference/SegmentByMerging.cpp.
 //
-// Needs: optical.glsl, appearance.glsl, grain.glsl.
+// Needs: optical.glsl, appearance.glsl, stored_pre_segment.glsl.
 
-vec4 appearanceOf(StoredGrain grain, float sampleStep) {
-  vec4 light = lightOf(grain);
-  return appearanceOf(light.rgb, light.a, grain.span.y - grain.span.x, sampleStep);
+vec4 appearanceOf(StoredPreSegment preSegment, float sampleStep) {
+  vec4 light = lightOf(preSegment);
+  return appearanceOf(light.rgb, light.a, preSegment.span.y - preSegment.span.x, sampleStep);
 }
 
-float amountOf(StoredGrain grain, vec4 appearance) {
-  return (grain.span.y - grain.span.x) * differenceOf(vec4(0.0), appearance);
+float amountOf(StoredPreSegment preSegment, vec4 appearance) {
+  return (preSegment.span.y - preSegment.span.x) * differenceOf(vec4(0.0), appearance);
 }
 
 // Where they are then, and of whom it's the place.
@@ -17,14 +17,14 @@ const uint placeOfFirst = 1u;
 const uint placeOfSecond = 2u;
 
 // x, y: appearances of a and b.
-uint placeOf(StoredGrain a, vec4 x, StoredGrain b, vec4 y) {
+uint placeOf(StoredPreSegment a, vec4 x, StoredPreSegment b, vec4 y) {
   float lengths = (a.span.y - a.span.x) + (b.span.y - b.span.x);
   if (b.span.x - a.span.y < lengths * 0.9999) return placeOfBoth;
   if (amountOf(b, y) <= amountOf(a, x) * 1.0001) return placeOfFirst;
   return a.before < 1.0 ? placeOfSecond : placeOfBoth;
 }
 
-float costOf(StoredGrain a, vec4 x, StoredGrain b, vec4 y) {
+float costOf(StoredPreSegment a, vec4 x, StoredPreSegment b, vec4 y) {
   if (isCut(b)) return unlimited;
   float first = a.span.y - a.span.x;
   float second = b.span.y - b.span.x;
@@ -39,7 +39,7 @@ float costOf(StoredGrain a, vec4 x, StoredGrain b, vec4 y) {
                    gap * differenceOf(vec4(0.0), both));
 }
 
-StoredGrain merged(StoredGrain a, vec4 x, StoredGrain b, vec4 y) {
+StoredPreSegment merged(StoredPreSegment a, vec4 x, StoredPreSegment b, vec4 y) {
   uint place = placeOf(a, x, b, y);
   vec4 light = lightOf(b);
   float opticalDepth = lightOf(a).a;

@@ -1,5 +1,5 @@
-// From what all ranks counted of a list together: the tolerance that fits the sum of their grains, and how many of the list's
-// supersegments this rank may have. Twin of agreedAllotment in vdi/reference/SegmentByMerging.cpp.
+// From what all ranks counted of a list together: the tolerance that fits the sum of their pre-segments, and how many
+// of the list's supersegments this rank may have. Twin of agreedTolerance in vdi/reference/SegmentByMerging.cpp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/quota.h"
@@ -36,10 +36,10 @@ void main() {
   Levels own = ownOf(list);
   Levels sum = sumOf(list);
   float tolerance = 0.0;
-  uint grains = 0u;
+  uint preSegments = 0u;
   uint quota = 0u;
   if (countOf(sum, 0u) > 0u) {
-    uint room = grainsPerBudget * push.budget;
+    uint room = preSegmentsPerBudget * push.budget;
     // Runs of all ranks may be more than that; each rank then keeps its own.
     tolerance = unlimited;
     uint place = countedRuns;
@@ -56,13 +56,13 @@ void main() {
         coarser /= toleranceRatio;
       }
     }
-    grains = countOf(own, place);
+    preSegments = countOf(own, place);
     uint all = max(countOf(sum, place), 1u);
     uint wanted = min(all, push.budget);
-    quota = (grains * wanted + all - 1u) / all;
+    quota = (preSegments * wanted + all - 1u) / all;
     atomicAdd(push.weights.at[y], wanted);
   }
   push.tolerances.at[list] = tolerance;
-  push.grains.at[list] = grains;
+  push.preSegments.at[list] = preSegments;
   push.quotas.at[list] = min(quota, 0xffffu) | min(countOf(own, countedRuns), 0xffffu) << 16;
 }

@@ -1,6 +1,6 @@
 // One ray through the kd-tree of bricks, front to back, sample by sample.
 //
-// Needs: shared/cast.h, optical.glsl; params, pages, pageCount, rayShares, rayShare; useSample (below).
+// Needs: shared/cast.h, optical.glsl; params, pages, pageCount, lanesPerRay, rayLane; useSample (below).
 
 vec3 rayStart;
 vec3 rayDirection;
@@ -150,7 +150,7 @@ void useSample(float front, float back, Sample it);
 // 1 where samplesAtOnce isn't.
 layout(constant_id = 3) const uint samplesAhead = 1;
 
-// How many samples are used as one: more while grains are counted (CastParams::countedSamples).
+// How many samples are used as one: more while pre-segments are counted (CastParams::countedSamples).
 uint samplesAtOnce;
 
 // Of what samples `first` to `last` stand for.
@@ -195,7 +195,7 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
   return true;
 }
 
-#include "raycast_shares.glsl"
+#include "raycast_lanes.glsl"
 
 const uint shortGap = 32u;  // samples
 
@@ -203,7 +203,7 @@ const uint shortGap = 32u;  // samples
 bool castBrick(uint index) {
   Brick brick = params.bricks.at[index];
   uvec2 range = samplesIn(brick.lo, brick.hi);
-  if (rayShares > 1u) return castShares(brick, range.x, range.y);
+  if (lanesPerRay > 1u) return castLanes(brick, range.x, range.y);
   vec3 cellsPerSample = rayDirection * params.step * brick.texelScale * brick.cellScale;
   uint k = range.x;
   while (k < range.y) {

@@ -1,6 +1,6 @@
-// Merges the grains of lists that have too many, in rounds, until as few are left as the list may hold. Twin of
-// mergeCheapest in vdi/reference/SegmentByMerging.cpp. One invocation a list, which streams through its grains; for devices
-// and lists that reduce_team.comp isn't for.
+// Merges the pre-segments of lists that have too many, in rounds, until as few are left as the list may hold. Twin of
+// mergeCheapest in vdi/reference/SegmentByMerging.cpp. One invocation a list, which streams through its pre-segments;
+// for devices and lists that reduce_subgroup.comp isn't for.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/reduce.h"
@@ -10,34 +10,34 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
 #include "optical.glsl"
 #include "appearance.glsl"
-#include "grain.glsl"
+#include "stored_pre_segment.glsl"
 #include "merging.glsl"
 
-struct Grain {
-  StoredGrain stored;
+struct PreSegment {
+  StoredPreSegment stored;
   vec4 appearance;
 };
 
-// The list's grains, one after the other; the next one is on its way while one is used.
+// The list's pre-segments, one after the other; the next one is on its way while one is used.
 uint base;
-uint grainCount;
+uint preSegmentCount;
 uint nextRead;
-StoredGrain grainAhead;
+StoredPreSegment preSegmentAhead;
 
 void beginReading(uint count) {
-  grainCount = count;
+  preSegmentCount = count;
   nextRead = 1u;
-  grainAhead = push.grains.at[base];
+  preSegmentAhead = push.preSegments.at[base];
 }
 
-Grain readGrain() {
-  StoredGrain grain = grainAhead;
-  if (nextRead < grainCount) grainAhead = push.grains.at[base + nextRead];
+PreSegment readPreSegment() {
+  StoredPreSegment preSegment = preSegmentAhead;
+  if (nextRead < preSegmentCount) preSegmentAhead = push.preSegments.at[base + nextRead];
   ++nextRead;
-  return Grain(grain, appearanceOf(grain, push.step));
+  return PreSegment(preSegment, appearanceOf(preSegment, push.step));
 }
 
-float costOf(Grain a, Grain b) { return costOf(a.stored, a.appearance, b.stored, b.appearance); }
+float costOf(PreSegment a, PreSegment b) { return costOf(a.stored, a.appearance, b.stored, b.appearance); }
 
 // Of the mergers that are possible.
 float costSum;
@@ -54,32 +54,32 @@ void addCost(float cost) {
   costsFinite += finite ? 1.0 : 0.0;
 }
 
-// Of at least two grains.
+// Of at least two pre-segments.
 void sumCosts(uint count) {
   beginReading(count);
   beginCosts();
-  Grain a = readGrain();
+  PreSegment a = readPreSegment();
   for (uint i = 1u; i < count; ++i) {
-    Grain b = readGrain();
+    PreSegment b = readPreSegment();
     addCost(costOf(a, b));
     a = b;
   }
 }
 
-// One round, in place, of at least two grains; `excess` of them at most go. Returns how many are left.
+// One round, in place, of at least two pre-segments; `excess` of them at most go. Returns how many are left.
 uint mergeOnce(uint count, uint excess, float limit) {
   uint left = 0u;
   float previous = unlimited;
   beginReading(count);
-  Grain a = readGrain();
-  Grain b = readGrain();
+  PreSegment a = readPreSegment();
+  PreSegment b = readPreSegment();
   float cost = costOf(a, b);
   beginCosts();
   for (uint i = 0u; i < count;) {
-    Grain c = b;
+    PreSegment c = b;
     float next = unlimited;
     if (i + 2u < count) {
-      c = readGrain();
+      c = readPreSegment();
       next = costOf(b, c);
     }
     bool merges = excess > 0u && isCheapest(i, previous, cost, next, limit);
@@ -87,7 +87,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
       a.stored = merged(a.stored, a.appearance, b.stored, b.appearance);
       --excess;
     }
-    push.grains.at[base + left++] = a.stored;
+    push.preSegments.at[base + left++] = a.stored;
     previous = merges ? next : cost;
     addCost(previous);
     i += merges ? 2u : 1u;
@@ -97,7 +97,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
     if (merges) {
       cost = unlimited;
       if (i + 1u < count) {
-        b = readGrain();
+        b = readPreSegment();
         cost = costOf(a, b);
       }
     }
@@ -110,12 +110,12 @@ void main() {
   uint list = gl_GlobalInvocationID.x;
   if (list >= push.listCount) return;
   uint count = push.written.at[list];
-  uint most = push.left.at[list];
-  if (count <= most || count <= push.teamCapacity) return;
-  base = push.grainOffsets.at[list];
+  uint maxCount = push.left.at[list];
+  if (count <= maxCount || count <= push.subgroupCapacity) return;
+  base = push.preSegmentOffsets.at[list];
   sumCosts(count);
-  while (count > most) {
+  while (count > maxCount) {
     if (costsFinite == 0.0) break;  // just cuts are left; there are no more of them than may be
-    count = mergeOnce(count, count - most, limitOf(costSum, costsFinite));
+    count = mergeOnce(count, count - maxCount, limitOf(costSum, costsFinite));
   }
 }

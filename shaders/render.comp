@@ -1,4 +1,4 @@
-// Renders a VDI from a new viewpoint, where beams.comp has found tiles of its picture that may show something; twin of
+// Renders a VDI from a new viewpoint, where cull.comp has found tiles of its picture that may show something; twin of
 // vdi/reference/Render.cpp. A ray is straight in V_O's view space, where each list fills the frustum of its pixel, so the ray
 // crosses lists one after the other as a line crosses the cells of a picture.
 #version 460
@@ -9,7 +9,7 @@
 #include "shared/render.h"
 #include "masks.glsl"
 #include "exact.glsl"
-#include "pieces.glsl"
+#include "render_segment.glsl"
 
 layout(local_size_x_id = 2) in;
 layout(push_constant, scalar) uniform Push { RenderRays rays; };
@@ -19,11 +19,12 @@ layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 layout(constant_id = 0) const bool smoothReconstruction = true;
 // Invocations side by side that share a ray: 1, or 2, which each look at one of the two lists of a column. Few rays meet
 // anything, and a GPU waits for the longest of them.
-layout(constant_id = 1) const uint rayShares = 1;
-uint rayShare;
-// Supersegments that a look reads at a time: where rays are long in their columns, a GPU rather waits for several at once.
-layout(constant_id = 3) const int piecesAtOnce = 1;
-const int mostPiecesAtOnce = 3;
+layout(constant_id = 1) const uint lanesPerRay = 1;
+uint rayLane;
+// Supersegments that an intersection reads at a time: where rays are long in their columns, a GPU rather waits for
+// several at once.
+layout(constant_id = 3) const int segmentsAtOnce = 1;
+const int maxSegmentsAtOnce = 3;
 // How the pixels of a tile are dealt to invocations (shared/render.h).
 layout(constant_id = 4) const uint pixelOrder = renderOrderSquares;
 // What it's left in (shared/render.h).
@@ -61,19 +62,19 @@ vec2 insideFrustum() {
   return stretch;
 }
 
-#include "beam.glsl"
+#include "packet.glsl"
 #include "line.glsl"
-#include "marks.glsl"
-#include "look.glsl"
+#include "tile_mask.glsl"
+#include "intersect.glsl"
 
-Look accumulated;
+Intersection accumulated;
 
-void accumulate(Look behind) {
+void accumulate(Intersection behind) {
   accumulated.light += (1.0 - accumulated.light.a) * behind.light;
   accumulated.entered = min(accumulated.entered, behind.entered);
 }
 
-#include "walk.glsl"
+#include "traverse.glsl"
 
 uvec2 placeOf(uint i) {
   if (pixelOrder == renderOrderSquares) {
@@ -86,7 +87,7 @@ uvec2 placeOf(uint i) {
 void renderPixels(uint tile) {
   uint across = pictureTiles().x;
   uvec2 corner = uvec2(tile % across, tile / across) * renderPictureTile;
-  uvec2 at = corner + placeOf(gl_LocalInvocationIndex / rayShares);
+  uvec2 at = corner + placeOf(gl_LocalInvocationIndex / lanesPerRay);
   bool hasPixel = at.x < params.width && at.y < params.height;
   ray = rayAt(vec2(at) + 0.5);
   accumulated = nothing;
@@ -95,12 +96,12 @@ void renderPixels(uint tile) {
   bool meets = hasPixel && stretch.x < stretch.y;
   PictureLine line = pictureLine(stretch);
   bool along = smoothReconstruction && meets && line.columns < 1.0;
-  bool walks = meets && !along;
-  beginLooking(line, stretch);
-  markBeam(beamOf(corner, renderPictureTile), line, walks);
-  if (along) accumulate(lookAlongLists(line, stretch));
-  if (walks) walk(line);
-  if (!hasPixel || rayShare != 0u) return;
+  bool traverses = meets && !along;
+  beginIntersecting(line, stretch);
+  findTiles(packetOf(corner, renderPictureTile), line, traverses);
+  if (along) accumulate(intersectAlongLists(line, stretch));
+  if (traverses) traverse(line);
+  if (!hasPixel || rayLane != 0u) return;
   bool met = accumulated.light.a > 0.0;
   float fraction = clamp((accumulated.entered - line.depths.x) / max(line.depths.y, 1e-30), 0.0, 1.0);
   leavePixel(at.y * params.width + at.x, accumulated.light, met ? mix(stretch.x, stretch.y, fraction) : infinity);
@@ -123,10 +124,10 @@ void emptyQueue() {
 }
 
 void main() {
-  rayShare = gl_LocalInvocationIndex % rayShares;
+  rayLane = gl_LocalInvocationIndex % lanesPerRay;
   for (uint i = gl_WorkGroupID.x; i < params.queue.at.count; i += gl_NumWorkGroups.x) {
     renderPixels(waitingTile(i));
-    barrier();  // before the marks are used again
+    barrier();  // before the tile masks are used again
   }
   barrier();  // behind all invocations' last look at the queue
   if (gl_LocalInvocationIndex == 0u && atomicAdd(params.queue.at.finished, 1u) + 1u == gl_NumWorkGroups.x) emptyQueue();

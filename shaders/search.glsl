@@ -1,7 +1,7 @@
 // The sensitivity search of vdi/reference/Segmenter.h, and writing with what it found. One function does both, so that
 // the very same instructions count and write.
 //
-// Needs: segmenter.glsl; void walk(): feeds every interval of the list to searchAdd, front to back.
+// Needs: segmenter.glsl; void feedIntervals(): feeds every interval of the list to searchAdd, front to back.
 
 struct SearchState {
   bool writing;
@@ -14,7 +14,7 @@ struct SearchState {
 
 SearchState search;
 
-void walk();
+void feedIntervals();
 
 void searchAdd(float front, float back, vec3 color, float opticalDepth) {
   if (front > search.runReach) search.runVisible = false;
@@ -27,7 +27,7 @@ void searchAdd(float front, float back, vec3 color, float opticalDepth) {
   segmenterAdd(front, back, color, opticalDepth);
 }
 
-// Walks once. Returns the number of supersegments.
+// Feeds the list once. Returns the number of supersegments.
 uint searchTry(float sensitivity) {
   search.emitted = 0u;
   search.visible = 0u;
@@ -35,7 +35,7 @@ uint searchTry(float sensitivity) {
   search.runReach = -1.0;
   search.runVisible = false;
   segmenterBegin(sensitivity);
-  walk();
+  feedIntervals();
   segmenterEnd();
   return search.emitted;
 }
@@ -45,29 +45,30 @@ struct SearchResult {
   uint count;
 };
 
-// With `write`, walks once with `known` and lets emitSegment write; else searches.
+// With `write`, feeds the list once with `known` and lets emitSegment write; else searches.
 SearchResult searchList(bool write, float known, uint budget) {
   search.writing = write;
   float tooFine = smallestSensitivity;
   float fits = largestSensitivity;
-  uint most = budget;
+  uint maxCount = budget;
   SearchResult best = SearchResult(largestSensitivity, 0u);
   float sensitivity = write ? known : smallestSensitivity;
-  // Try 0 is the first one, try 1 the one that always fits, the others bisect. One loop, so that there's one copy of walk.
-  for (int i = 0; i < mostTries + 2; ++i) {
+  // Try 0 is the first one, try 1 the one that always fits, the others bisect. One loop, so that there's one copy of
+  // feedIntervals.
+  for (int i = 0; i < maxTries + 2; ++i) {
     uint count = searchTry(sensitivity);
     if (write) return SearchResult(sensitivity, count);
     if (i == 0) {
-      most = cutAtGaps ? max(budget, search.runs) : budget;
-      if (search.visible <= most) return SearchResult(-1.0, search.visible);
-      if (count <= most) return SearchResult(sensitivity, count);
+      maxCount = cutAtGaps ? max(budget, search.runs) : budget;
+      if (search.visible <= maxCount) return SearchResult(-1.0, search.visible);
+      if (count <= maxCount) return SearchResult(sensitivity, count);
       sensitivity = largestSensitivity;
       continue;
     }
-    if (count <= most) {
+    if (count <= maxCount) {
       fits = sensitivity;
       best = SearchResult(sensitivity, count);
-      if (i > 1 && float(count) >= goodFill * float(most)) break;
+      if (i > 1 && float(count) >= goodFill * float(maxCount)) break;
     } else {
       tooFine = sensitivity;
     }

@@ -1,7 +1,7 @@
 // How intervals become supersegments, for one sensitivity: the exchangeable piece. The algorithm is
 // segmentWithSensitivity of vdi/reference/Segmenter.cpp, as a state machine that's fed interval by interval.
 //
-// Needs: optical.glsl, appearance.glsl, store.glsl; bool cutAtGaps, constant; void emitSegment(Material m).
+// Needs: optical.glsl, appearance.glsl, store.glsl; bool cutAtGaps, constant; void emitSegment(OpticalSegment segment).
 
 struct SegmenterState {
   float sensitivity;
@@ -24,7 +24,7 @@ void segmenterBegin(float sensitivity) {
 }
 
 void segmenterClose() {
-  emitSegment(Material(segmenter.front, segmenter.back, segmenter.color, segmenter.opticalDepth));
+  emitSegment(OpticalSegment(segmenter.front, segmenter.back, segmenter.color, segmenter.opticalDepth));
   segmenter.open = false;
 }
 

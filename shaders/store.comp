@@ -1,4 +1,5 @@
-// Stores what grains are left as supersegments: one invocation a list, for what rounding one leaves over goes to the next.
+// Stores what pre-segments are left as supersegments: one invocation a list, for what rounding one leaves over goes to
+// the next.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/reduce.h"
@@ -9,15 +10,15 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 #include "optical.glsl"
 #include "exact.glsl"
 #include "store.glsl"
-#include "grain.glsl"
+#include "stored_pre_segment.glsl"
 
-// Compositing: lists without grains are in ReduceConstants::fitting.
+// Compositing: lists without pre-segments are in ReduceConstants::fitting.
 layout(constant_id = 3) const bool mayFit = false;
 
 // Two ranks may have rounded depths to codes that overlap.
 uvec2 behindReach(uvec2 code) {
   uvec2 depths = depthCodes(code);
-  uint front = min(max(depths.x, storeReach), uint(mostDepthCode) - 1u);
+  uint front = min(max(depths.x, storeReach), uint(maxDepthCode) - 1u);
   uint back = max(depths.y, front + 1u);
   storeReach = back;
   return uvec2((code.x & 0xf0000000u) | front | back << 14, code.y);
@@ -44,19 +45,19 @@ void main() {
     copyFitting(push.fittingOffsets.at[list], push.offsets.at[list], count);
     return;
   }
-  uint first = push.grainOffsets.at[list];
+  uint first = push.preSegmentOffsets.at[list];
   uint slot = push.offsets.at[list];
   beginStoring();
-  StoredGrain ahead = push.grains.at[first];
+  StoredPreSegment ahead = push.preSegments.at[first];
   for (uint i = 0u; i < count; ++i) {
-    StoredGrain grain = ahead;
-    if (i + 1u < count) ahead = push.grains.at[first + i + 1u];
-    vec4 light = lightOf(grain);
-    Material m = Material(grain.span.x, grain.span.y, light.rgb, light.a);
+    StoredPreSegment preSegment = ahead;
+    if (i + 1u < count) ahead = push.preSegments.at[first + i + 1u];
+    vec4 light = lightOf(preSegment);
+    OpticalSegment segment = OpticalSegment(preSegment.span.x, preSegment.span.y, light.rgb, light.a);
     if (compactForm) {
-      storeCode(CompactArray(push.segments), compacted(m, push.form), slot + i, i, count);
+      storeCode(CompactArray(push.segments), compacted(segment, push.form), slot + i, i, count);
     } else {
-      storeSegment(push.segments, slot + i, m, push.form);
+      storeSegment(push.segments, slot + i, segment, push.form);
     }
   }
 }

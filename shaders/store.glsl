@@ -4,7 +4,7 @@
 // Needs: shared/lists.h, exact.glsl, optical.glsl.
 
 // A supersegment whose optical depth doesn't get lost when its opacity rounds to 1.
-struct Material {
+struct OpticalSegment {
   float front;
   float back;
   vec3 color;  // premultiplied
@@ -36,15 +36,15 @@ vec2 codedDepths(uvec2 packed, StoredForm form) {
   return form.depthFirst + vec2(depthCodes(packed)) * form.depthStep;
 }
 
-Material loadSegment(SegmentArray segments, uint i, StoredForm form) {
+OpticalSegment loadSegment(SegmentArray segments, uint i, StoredForm form) {
   if (compactForm) {
     uvec2 packed = CompactArray(segments).at[i];
     vec2 depths = codedDepths(packed, form);
     float opticalDepth = codedOpticalDepth(packed);
-    return Material(depths.x, depths.y, codedColor(packed) * opacityOf(opticalDepth), opticalDepth);
+    return OpticalSegment(depths.x, depths.y, codedColor(packed) * opacityOf(opticalDepth), opticalDepth);
   }
   Segment s = segments.at[i];
-  return Material(s.front, s.back, vec3(s.red, s.green, s.blue), opticalDepthOf(s.opacity));
+  return OpticalSegment(s.front, s.back, vec3(s.red, s.green, s.blue), opticalDepthOf(s.opacity));
 }
 
 // What rounding the list's supersegments so far has left over.
@@ -62,40 +62,41 @@ void beginStoring() {
   storeCarriedLight = vec3(0.0);
 }
 
-uvec2 compacted(Material m, StoredForm form) {
-  vec2 places = round((vec2(m.front, m.back) - form.depthFirst) / form.depthStep);
-  uvec2 codes = uvec2(clamp(places, vec2(0.0), vec2(mostDepthCode)));
-  uint front = min(max(codes.x, storeReach), uint(mostDepthCode) - 1u);
+uvec2 compacted(OpticalSegment segment, StoredForm form) {
+  vec2 places = round((vec2(segment.front, segment.back) - form.depthFirst) / form.depthStep);
+  uvec2 codes = uvec2(clamp(places, vec2(0.0), vec2(maxDepthCode)));
+  uint front = min(max(codes.x, storeReach), uint(maxDepthCode) - 1u);
   uint back = max(codes.y, front + 1u);
   storeReach = back;
 
-  float slack = mostDepthChange * m.opticalDepth + thinnestStep;
-  uint depth = codeOfOpticalDepth(m.opticalDepth + clamp(storeCarriedDepth, -slack, slack));
+  float slack = maxDepthChange * segment.opticalDepth + thinnestStep;
+  uint depth = codeOfOpticalDepth(segment.opticalDepth + clamp(storeCarriedDepth, -slack, slack));
   float stored = opticalDepthOfCode(depth);
 
-  vec3 light = exp2(-storeDepth) * m.color;
+  vec3 light = exp2(-storeDepth) * segment.color;
   float seen = exp2(-storeStoredDepth) * opacityOf(stored);
-  vec3 straight = m.color / opacityOf(m.opticalDepth);
+  vec3 straight = segment.color / opacityOf(segment.opticalDepth);
   vec3 color = straight;
   if (seen > unseen) {
-    color = clamp((storeCarriedLight + light) / seen, straight - mostColorChange, straight + mostColorChange);
+    color = clamp((storeCarriedLight + light) / seen, straight - maxColorChange, straight + maxColorChange);
   }
   vec3 colorCodes = round(clamp(color, vec3(0.0), vec3(1.0)) * 255.0);
 
   storeCarriedLight += light - seen / 255.0 * colorCodes;
-  storeCarriedDepth = clamp(storeCarriedDepth + m.opticalDepth - stored, -mostCarriedDepth, mostCarriedDepth);
-  storeDepth += m.opticalDepth;
+  storeCarriedDepth = clamp(storeCarriedDepth + segment.opticalDepth - stored, -maxCarriedDepth, maxCarriedDepth);
+  storeDepth += segment.opticalDepth;
   storeStoredDepth += stored;
   uvec3 c = uvec3(colorCodes);
   return uvec2(front | back << 14 | (depth & 0xfu) << 28, c.r | c.g << 8 | c.b << 16 | (depth >> 4) << 24);
 }
 
 // The supersegments of a list one after the other, front to back, after beginStoring.
-void storeSegment(SegmentArray segments, uint slot, Material m, StoredForm form) {
+void storeSegment(SegmentArray segments, uint slot, OpticalSegment segment, StoredForm form) {
   if (compactForm) {
-    CompactArray(segments).at[slot] = compacted(m, form);
+    CompactArray(segments).at[slot] = compacted(segment, form);
   } else {
-    segments.at[slot] = Segment(m.front, m.back, m.color.r, m.color.g, m.color.b, opacityOf(m.opticalDepth));
+    segments.at[slot] = Segment(segment.front, segment.back, segment.color.r, segment.color.g, segment.color.b,
+        opacityOf(segment.opticalDepth));
   }
 }
 

@@ -17,27 +17,27 @@ inline double topOf(ScalarType type) {
 }
 
 /// The blocks that `rank` of `ranks` holds of a field on a lattice whose longest side is 1.
-struct Dealt {
+struct Decomposed {
   apps::Lattice lattice;
   std::vector<Block> mine;
   std::vector<Block> all;
 };
 
-inline Dealt deal(const char* field, const glm::ivec3& size, const glm::ivec3& blocks, apps::Layout layout,
-                  apps::Joint joint, ScalarType type, int rank, int ranks) {
-  Dealt dealt;
+inline Decomposed decompose(const char* field, const glm::ivec3& size, const glm::ivec3& blocks,
+                            apps::Layout layout, apps::Joint joint, ScalarType type, int rank, int ranks) {
+  Decomposed decomposed;
   const bool cells = joint == apps::Joint::Cells;
   const double spacing = 1.0 / (glm::max(size.x, glm::max(size.y, size.z)) - (cells ? 0 : 1));
-  dealt.lattice = {size, glm::dvec3(0.0), glm::dvec3(spacing), type, joint};
+  decomposed.lattice = {size, glm::dvec3(0.0), glm::dvec3(spacing), type, joint};
   const apps::Field value = apps::makeField(field, 7);
   for (const apps::Part& part : apps::decompose(size, blocks, layout, joint, ranks, 3)) {
-    Block block = apps::makeBlock(dealt.lattice, part, [&](const glm::ivec3& index) {
+    Block block = apps::makeBlock(decomposed.lattice, part, [&](const glm::ivec3& index) {
       return value((glm::dvec3(index) + (cells ? 0.5 : 0.0)) * spacing) * topOf(type);
     });
-    dealt.all.push_back(block);
-    if (part.owner == rank) dealt.mine.push_back(block);
+    decomposed.all.push_back(block);
+    if (part.owner == rank) decomposed.mine.push_back(block);
   }
-  return dealt;
+  return decomposed;
 }
 
 /// Three hues; transparent below a third; `top` is the scalar of full opacity. Unit distance: a twentieth of

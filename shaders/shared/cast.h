@@ -16,33 +16,33 @@ VDI_SHARED_BEGIN
 VDI_CONST uint castGroupX = 8;
 VDI_CONST uint castGroupY = 8;
 VDI_CONST uint castMaxPages = 8;
-VDI_CONST uint castProgramVolume = 0;       // DVR: colours and depths
-VDI_CONST uint castProgramSearch = 1;       // by bisection: one program that does both of the modes
-VDI_CONST uint castProgramCountGrains = 2;  // by merging: tolerances and counts
-VDI_CONST uint castProgramWriteGrains = 3;
-VDI_CONST uint castProgramSurvey = 4;       // for the total budget: what lists need
+VDI_CONST uint castProgramVolume = 0;            // DVR: colours and depths
+VDI_CONST uint castProgramSearch = 1;            // by bisection: one program that does both of the modes
+VDI_CONST uint castProgramCountPreSegments = 2;  // by merging: tolerances and counts
+VDI_CONST uint castProgramWritePreSegments = 3;
+VDI_CONST uint castProgramHistogram = 4;    // for the total budget: what lists need
 VDI_CONST uint castProgramCountLevels = 5;  // by merging, with other ranks: counts at all tolerances (quota.h)
-VDI_CONST uint castModeSearch = 0;  // sensitivities and counts
-VDI_CONST uint castModeWrite = 1;   // supersegments
+VDI_CONST uint castModeSearch = 0;          // sensitivities and counts
+VDI_CONST uint castModeWrite = 1;           // supersegments
 
 struct CastParams {
   VDI_ADDRESS(BrickArray) bricks;
-  VDI_ADDRESS(KdNodeArray) nodes;  // node 0 is the root
-  VDI_ADDRESS(CellArray) cells;  // macrocells: 1 where something is visible
-  VDI_ADDRESS(FloatArray) sensitivities;  // [h][w]; by merging: tolerances, while counting those of the counted lists
-  VDI_ADDRESS(UintArray) counts;          // [h][w]; by merging: room for grains, while counting the grains of these
-  VDI_ADDRESS(UintArray) offsets;         // [h][w], exclusive prefix sum of counts
-  VDI_ADDRESS(SegmentArray) segments;     // compact; by bisection
-  VDI_ADDRESS(GrainArray) grains;          // compact; by merging
-  VDI_ADDRESS(UintArray) written;         // [h][w]: grains
-  VDI_ADDRESS(UintArray) left;            // [h][w]: how many are to be left of them
-  VDI_ADDRESS(Vec4Array) colors;          // [h][w], premultiplied
-  VDI_ADDRESS(FloatArray) depths;         // [h][w]
-  VDI_ADDRESS(UintArray) status;          // [1]: lists whose written count differs from the stored one
-  VDI_ADDRESS(UintArray) survey;          // [surveyLevels + 1][2]
-  VDI_ADDRESS(UintArray) levels;          // [rows][countedWidth][countedLevelWords]
-  VDI_ADDRESS(UintArray) quotas;          // [h][w]; with other ranks: as in AllotConstants
-  VDI_ADDRESS(UintArray) guard;           // [1]: 0 if there's no room for the grains that are to be written
+  VDI_ADDRESS(KdNodeArray) nodes;            // node 0 is the root
+  VDI_ADDRESS(CellArray) cells;              // macrocells: 1 where something is visible
+  VDI_ADDRESS(FloatArray) thresholds;        // [h][w]; by merging: tolerances, while counting those of the counted lists
+  VDI_ADDRESS(UintArray) capacities;         // [h][w]; by merging: room for pre-segments, while counting the pre-segments of these
+  VDI_ADDRESS(UintArray) offsets;            // [h][w], exclusive prefix sum of capacities
+  VDI_ADDRESS(SegmentArray) segments;        // compact; by bisection
+  VDI_ADDRESS(PreSegmentArray) preSegments;  // compact; by merging
+  VDI_ADDRESS(UintArray) written;            // [h][w]: pre-segments
+  VDI_ADDRESS(UintArray) left;               // [h][w]: how many are to be left of them
+  VDI_ADDRESS(Vec4Array) colors;             // [h][w], premultiplied
+  VDI_ADDRESS(FloatArray) depths;            // [h][w]
+  VDI_ADDRESS(UintArray) status;             // [1]: lists whose written count differs from the stored one
+  VDI_ADDRESS(UintArray) histogram;          // [histogramLevels + 1][2]
+  VDI_ADDRESS(UintArray) levels;             // [rows][countedWidth][countedLevelWords]
+  VDI_ADDRESS(UintArray) quotas;             // [h][w]; with other ranks: as in InterpolateConstants
+  VDI_ADDRESS(UintArray) guard;              // [1]: 0 if there's no room for the pre-segments that are to be written
   // Ray of pixel (x, y): start = startBase + u * startRight + v * startUp, direction likewise, with u = x + 0.5 - w/2 and
   // v = y + 0.5 - h/2. Start: at the front of the sample lattice, relative to the scene's centre.
   vec3 startBase;
@@ -73,13 +73,13 @@ struct CastParams {
   float lastPosition;  // of the transfer table
   uint slabs;      // 1: samples are classified by what lies between their two ends; 0: by their middle
   StoredForm form;  // of segments
-  // While counting grains: every countedStride-th list of every countedStride-th row, from the band's first row on, up to
+  // While counting pre-segments: every countedStride-th list of every countedStride-th row, from the band's first row on, up to
   // and including the row behind the band, as [rows][countedWidth].
   uint countedStride;
   uint countedWidth;
   uint countedSamples;  // one sample stands for that many, those of a multiple of it
-  uint mostPerList;
-  float level;  // of the survey; negative: equal budgets
+  uint maxPerList;
+  float level;      // of the histogram; negative: equal budgets
   uint levelShift;  // of levels
 };
 

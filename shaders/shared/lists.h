@@ -1,4 +1,4 @@
-// Supersegments, and the grains that they're merged from.
+// Supersegments, and the pre-segments that they're merged from.
 #ifndef VDI_SHARED_LISTS_H
 #define VDI_SHARED_LISTS_H
 #include "interop.h"
@@ -7,7 +7,7 @@
 VDI_SHARED_BEGIN
 
 // What a rank tells the others of a list that it has counted, as bytes of these words, the first one lowest: visible samples,
-// grains at each tolerance, runs. Each is divided by 2^levelShift, rounded up, and 255 at most.
+// pre-segments at each tolerance, runs. Each is divided by 2^levelShift, rounded up, and 255 at most.
 VDI_CONST uint countedLevelWords = 3;
 VDI_CONST uint countedTolerance = 1;  // place of the finest tolerance's
 VDI_CONST uint countedRuns = 9;
@@ -22,8 +22,9 @@ struct Segment {
   float opacity;
 };
 
-// A grain in memory: 32 bytes, so that it's a whole piece of a cache line where neighbouring invocations read different lists.
-struct StoredGrain {
+// A pre-segment in memory: 32 bytes, so that it's a whole piece of a cache line where neighbouring invocations read
+// different lists.
+struct StoredPreSegment {
   vec2 span;     // front, back
   float before;  // transmittance of what's in front of it
   float unused;
@@ -44,7 +45,7 @@ inline uint isCompact(const StoredForm& form) { return form.depthStep > 0.0F ? 1
 VDI_SHARED_END
 
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer GrainArray { StoredGrain at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer PreSegmentArray { StoredPreSegment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CompactArray { uvec2 at[]; };
 struct FourCompact {

@@ -1,4 +1,4 @@
-// Parameters of beams.comp and render.comp: a VDI seen from anywhere. And of expand.comp, which prepares it.
+// Parameters of cull.comp and render.comp: a VDI seen from anywhere. And of expand.comp, which prepares it.
 #ifndef VDI_SHARED_RENDER_H
 #define VDI_SHARED_RENDER_H
 #include "lists.h"
@@ -6,10 +6,10 @@
 VDI_SHARED_BEGIN
 
 VDI_CONST uint renderPictureTile = 8;  // pixels per side of what a workgroup renders
-VDI_CONST uint renderRegion = 16;      // of the beam that says whether there's anything to render: a multiple of that
-VDI_CONST uint renderBeamGroup = 32;
-VDI_CONST uint renderMostGroups = 65535;  // every device allows them
-VDI_CONST uint renderKinds = 24;        // of tiles, by how much there is to look at
+VDI_CONST uint renderRegion = 16;      // of the packet that says whether there's anything to render: a multiple of that
+VDI_CONST uint renderCullGroup = 32;
+VDI_CONST uint renderMaxGroups = 65535;  // every device allows them
+VDI_CONST uint renderKinds = 24;         // of tiles, by how much there is to look at
 // Of a tile's pixels: neighbouring invocations have squares of them (along a Z), or pairs of columns, or pairs of rows.
 VDI_CONST uint renderOrderSquares = 0;
 VDI_CONST uint renderOrderColumns = 1;
@@ -25,16 +25,16 @@ VDI_CONST uint expandModeTiles = 2;     // one a tile
 VDI_CONST uint expandModeLargeTiles = 3;  // one a large tile
 VDI_CONST int renderTileShift = 3;
 VDI_CONST int renderTile = 1 << renderTileShift;  // lists per side of a tile
-VDI_CONST int renderLargeTile = 64;       // a multiple of that
-VDI_CONST int renderMostMarks = 4096;     // tiles of an axis (beam.glsl)
-VDI_CONST int renderBins = 64;            // parts of the depth range: bits of a mask
+VDI_CONST int renderLargeTile = 64;               // a multiple of that
+VDI_CONST int renderMaxTiles = 4096;              // tiles of an axis (packet.glsl)
+VDI_CONST int renderBins = 64;                    // parts of the depth range: bits of a mask
 
 // A supersegment as rendering wants it.
 struct RenderSegment {
   float front;
   float back;
   float density;  // optical depth per depth, along its list
-  uint color;     // straight; pieces.glsl
+  uint color;     // straight; render_segment.glsl
 };
 
 // What a ray asks of each list that it crosses: its supersegments in the compact array, and its mask.
@@ -58,7 +58,7 @@ VDI_SHARED_END
 #ifndef __cplusplus
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer RenderSegmentArray { RenderSegment at[]; };
 // RenderSegments as render.comp reads them: at once; TableArray in cast.h says why.
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer PieceArray { uvec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer RenderSegmentWords { uvec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ListHeads { ListHead at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer TileQueueAddress { TileQueue at; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer MaskArray { uint64_t at[]; };
@@ -70,11 +70,11 @@ VDI_SHARED_BEGIN
 // the VDI's depth range; a mask a list, one a tile of 8 x 8 lists, and one a large
 // tile of 64 x 64.
 struct ExpandConstants {
-  VDI_ADDRESS(UintArray) offsets;                // [lists + 1]
-  VDI_ADDRESS(SegmentArray) from;                // compact array, as stored: a part of the supersegments
-  VDI_ADDRESS(RenderSegmentArray) segments;      // all
-  VDI_ADDRESS(ListHeads) heads;                  // [lists]
-  VDI_ADDRESS(MaskArray) tileMasks;              // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
+  VDI_ADDRESS(UintArray) offsets;            // [lists + 1]
+  VDI_ADDRESS(SegmentArray) from;            // compact array, as stored: a part of the supersegments
+  VDI_ADDRESS(RenderSegmentArray) segments;  // all
+  VDI_ADDRESS(ListHeads) heads;              // [lists]
+  VDI_ADDRESS(MaskArray) tileDepthMasks;     // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
   uint mode;
   uint first;  // supersegment that `from` starts with
   uint count;  // supersegments of `from`
@@ -86,8 +86,8 @@ struct ExpandConstants {
 
 struct RenderParams {
   VDI_ADDRESS(ListHeads) heads;
-  VDI_ADDRESS(PieceArray) segments;  // compact array
-  VDI_ADDRESS(MaskArray) tileMasks;
+  VDI_ADDRESS(RenderSegmentWords) segments;  // compact array
+  VDI_ADDRESS(MaskArray) tileDepthMasks;
   VDI_ADDRESS(Vec4Array) colors;       // [height][width]; bytes: a word each
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
   VDI_ADDRESS(FloatArray) ends;        // [height][width], if hasEnds: the new view's depths at which rays end

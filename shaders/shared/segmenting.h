@@ -11,7 +11,7 @@ VDI_CONST float maxOpticalDepth = 65504.0F;  // maxExtinction of core/TransferFu
 // Bisection.
 VDI_CONST float smallestSensitivity = 1e-4F;
 VDI_CONST float largestSensitivity = 2.0F;  // the norm of a difference of two vectors in [0, 1]^4
-VDI_CONST int mostTries = 22;
+VDI_CONST int maxTries = 22;
 VDI_CONST float goodFill = 0.85F;
 VDI_CONST float closeBounds = 1.001F;
 
@@ -21,28 +21,28 @@ VDI_CONST int toleranceLevels = 8;
 VDI_CONST float finestTolerance = 0.002F;
 VDI_CONST float toleranceRatio = 4.0F;
 VDI_CONST float hiddenWeight = 0.15F;
-// Room for grains, in multiples of a list's budget, and what's added to it.
-VDI_CONST uint grainsPerBudget = 2;
-VDI_CONST uint spareGrains = 4;
-VDI_CONST uint uncountedSpareGrains = 8;  // and a quarter of the grains
+// Room for pre-segments, in multiples of a list's budget, and what's added to it.
+VDI_CONST uint preSegmentsPerBudget = 2;
+VDI_CONST uint sparePreSegments = 4;
+VDI_CONST uint uncountedSparePreSegments = 8;  // and a quarter of the pre-segments
 VDI_CONST uint countedStride = 4;
-// A survey: what all lists would hold at each level, then what they would equally; a pair of words each, the low one first.
-// Survey of core/Budget.h.
-VDI_CONST uint surveyLevels = 10;
+// A cumulative histogram: what all lists would hold at each level, then what they would equally; a pair of words each,
+// the low one first. SupersegmentHistogram of core/Budget.h.
+VDI_CONST uint histogramLevels = 10;
 
 // Codes.
-VDI_CONST float mostDepthCode = 16383.0F;
-VDI_CONST float mostCarriedDepth = 1.0F / 16.0F;
-VDI_CONST float mostDepthChange = 0.25F;  // of the supersegment's own
-VDI_CONST float thinnestStep = 0.0002F;   // of opticalDepthOfCode
-VDI_CONST float mostColorChange = 3.0F / 255.0F;
+VDI_CONST float maxDepthCode = 16383.0F;
+VDI_CONST float maxCarriedDepth = 1.0F / 16.0F;
+VDI_CONST float maxDepthChange = 0.25F;  // of the supersegment's own
+VDI_CONST float thinnestStep = 0.0002F;  // of opticalDepthOfCode
+VDI_CONST float maxColorChange = 3.0F / 255.0F;
 VDI_CONST float unseen = 1e-6F;
 
 #ifdef __cplusplus
-// Of a list that may hold `most` supersegments, where gaps don't demand more.
-constexpr uint64_t mostGrains(uint64_t most) {
-  const uint64_t grains = grainsPerBudget * most;
-  return grains + grains / 4 + uncountedSpareGrains;
+// Of a list that may hold `maximum` supersegments, where gaps don't require more.
+constexpr uint64_t maxPreSegments(uint64_t maximum) {
+  const uint64_t preSegments = preSegmentsPerBudget * maximum;
+  return preSegments + preSegments / 4 + uncountedSparePreSegments;
 }
 // A ray that's counted for others takes one sample for this many: the more, the longer rays are for their lists' budget,
 // for a device waits for the longest ray.

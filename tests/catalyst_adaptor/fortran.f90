@@ -17,12 +17,12 @@ program fortran_simulation
   script = argument(1:length) // c_null_char
   call mpi_init(error)
   call mpi_comm_rank(mpi_comm_world, rank, error)
-  call demand(vdi_catalyst_initialize(mpi_comm_world, 1, [c_loc(script)], catalyst))
+  call require(vdi_catalyst_initialize(mpi_comm_world, 1, [c_loc(script)], catalyst))
 
   blocks(1)%cells = n
   blocks(1)%origin = [real(rank * n, c_double), 0.0_c_double, 0.0_c_double]
-  call demand(vdi_catalyst_set_blocks(catalyst, 1, blocks))
-  call demand(vdi_catalyst_set_array(catalyst, "V" // c_null_char, vdi_catalyst_f64, vdi_catalyst_points, [c_loc(field)]))
+  call require(vdi_catalyst_set_blocks(catalyst, 1, blocks))
+  call require(vdi_catalyst_set_array(catalyst, "V" // c_null_char, vdi_catalyst_f64, vdi_catalyst_points, [c_loc(field)]))
   do step = 1, 2
     do k = 0, n
       do j = 0, n
@@ -31,14 +31,14 @@ program fortran_simulation
         end do
       end do
     end do
-    call demand(vdi_catalyst_execute(catalyst, step, 0.5d0 * step))
+    call require(vdi_catalyst_execute(catalyst, step, 0.5d0 * step))
   end do
-  call demand(vdi_catalyst_finalize(catalyst))
+  call require(vdi_catalyst_finalize(catalyst))
   call mpi_finalize(error)
 
 contains
 
-  subroutine demand(code)
+  subroutine require(code)
     integer(c_int), intent(in) :: code
     if (code /= vdi_catalyst_ok) call mpi_abort(mpi_comm_world, 1, error)
   end subroutine

@@ -13,7 +13,7 @@
 
 #include "catalyst_adaptor/vdi_catalyst.h"
 
-enum { MOST_KIB_BEFORE = 2048 };
+enum { MAX_KIB_BEFORE = 2048 };
 
 typedef struct cost {
   int libraries;
@@ -80,7 +80,7 @@ int main(int argc, char** argv) {
   const cost linked = measure();
   print(rank, "linked", none, linked);
   if (linked.of_paraview > 0) fail("ParaView, Python or Vulkan is loaded before it is needed");
-  if (linked.resident_kib - none.resident_kib > MOST_KIB_BEFORE) fail("linking alone costs too much memory");
+  if (linked.resident_kib - none.resident_kib > MAX_KIB_BEFORE) fail("linking alone costs too much memory");
 
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**) =
       dlsym(library, "vdi_catalyst_initialize");

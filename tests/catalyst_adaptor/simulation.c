@@ -110,11 +110,11 @@ static int run_steps(int rank, vdi_catalyst* catalyst, int argc, char** argv) {
       if (step == total / 4) before = resident_kib();
     }
   }
-  const char* most = getenv("VDI_TEST_GROWTH");
-  if (most == NULL) return wrong;
+  const char* maximum = getenv("VDI_TEST_GROWTH");
+  if (maximum == NULL) return wrong;
   const long growth = resident_kib() - before;
   printf("rank %d: resident memory grew by %ld KiB in %d steps\n", rank, growth, total - total / 4);
-  return wrong + (growth < atol(most) ? 0 : expect(rank, "growth of memory", 0, 1));
+  return wrong + (growth < atol(maximum) ? 0 : expect(rank, "growth of memory", 0, 1));
 }
 
 int main(int argc, char** argv) {

@@ -110,7 +110,7 @@ TEST_CASE("a communicator of one rank, without MPI") {
   CHECK(valuesOf<std::uint32_t>(alone.gather(bytesOf(data), 4, 0).of(0)) == data);
   CHECK(valuesOf<std::uint32_t>(alone.allToAll(bytesOf(data), std::vector<std::uint64_t>{3}, 4).of(0)) ==
         data);
-  CHECK_NOTHROW(alone.demandEqual(5, "x"));
+  CHECK_NOTHROW(alone.requireEqual(5, "x"));
   CHECK_NOTHROW(alone.together([] {}));
   CHECK_THROWS_AS(alone.together([] { throw std::out_of_range("mine"); }), std::out_of_range);
 }
@@ -262,14 +262,14 @@ TEST_CASE("what isn't an exception, and a text longer than a message, arrive too
   }
 }
 
-TEST_CASE("demandEqual: every rank throws if one differs") {
+TEST_CASE("requireEqual: every rank throws if one differs") {
   const Communicator world = Communicator::world();
   for (const std::uint64_t value :
        {std::uint64_t{0}, std::uint64_t{1}, ~std::uint64_t{0}, std::uint64_t{1} << 63}) {
-    CHECK_NOTHROW(world.demandEqual(value, "the same"));
+    CHECK_NOTHROW(world.requireEqual(value, "the same"));
     for (int odd = 0; odd < world.size() && world.size() > 1; ++odd) {
       const std::uint64_t mine = world.rank() == odd ? value + 1 : value;
-      const Thrown thrown = thrownBy([&] { world.demandEqual(mine, "camera"); });
+      const Thrown thrown = thrownBy([&] { world.requireEqual(mine, "camera"); });
       CHECK(thrown.code == ErrorCode::InvalidArgument);
       CHECK(thrown.text.find("camera") != std::string::npos);
     }
@@ -347,7 +347,7 @@ TEST_CASE("more than 2 GiB between two ranks", "[.][large]") {
     mine.resize(count);
     for (std::uint64_t i = 0; i < count; ++i) mine[i] = {i, i * i, ~i};
   }
-  const auto demandSame = [&](const comm::Gathered& received) {
+  const auto requireSame = [&](const comm::Gathered& received) {
     const auto part = received.of(world.size() - 1);
     REQUIRE(part.size() == count * sizeof(Element));
     std::uint64_t wrong = 0;
@@ -361,7 +361,7 @@ TEST_CASE("more than 2 GiB between two ranks", "[.][large]") {
   std::vector<std::uint64_t> counts(static_cast<std::size_t>(world.size()), 0);
   if (sender) counts.front() = count;
   const comm::Gathered exchanged = world.allToAll(bytesOf(mine), counts, sizeof(Element));
-  if (world.rank() == 0) demandSame(exchanged);
+  if (world.rank() == 0) requireSame(exchanged);
   const comm::Gathered gathered = world.gather(bytesOf(mine), sizeof(Element), 0);
-  if (world.rank() == 0) demandSame(gathered);
+  if (world.rank() == 0) requireSame(gathered);
 }

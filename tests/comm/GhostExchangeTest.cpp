@@ -15,8 +15,8 @@ double marker(const glm::ivec3& index) {
   return index.x + 20 * index.y + 400 * index.z;
 }
 
-std::vector<Block> dealt(const apps::Lattice& lattice, const glm::ivec3& blocks, apps::Layout layout,
-                         const Communicator& world) {
+std::vector<Block> decomposed(const apps::Lattice& lattice, const glm::ivec3& blocks, apps::Layout layout,
+                              const Communicator& world) {
   std::vector<Block> mine;
   for (const apps::Part& part :
        apps::decompose(lattice.size, blocks, layout, lattice.joint, world.size(), 11)) {
@@ -72,7 +72,7 @@ TEST_CASE("blocks of a whole lattice get their neighbours' values, and all of sp
   const auto layout = GENERATE(apps::Layout::Interleaved, apps::Layout::Random, apps::Layout::OnOneRank);
   const auto type = GENERATE(ScalarType::U16, ScalarType::F32, ScalarType::F64);
   const apps::Lattice lattice{{13, 9, 11}, {-3.0, 1e3, 0.1}, {0.1, 2.0, 1.0 / 3.0}, type, joint};
-  const std::vector<Block> before = dealt(lattice, {3, 2, 4}, layout, world);
+  const std::vector<Block> before = decomposed(lattice, {3, 2, 4}, layout, world);
   const std::vector<Block> after = comm::exchangeGhosts(world, before);
   REQUIRE(after.size() == before.size());
   double volume = 0.0;  // owned here, then by all

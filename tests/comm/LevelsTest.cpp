@@ -47,7 +47,7 @@ Block blockIn(Kind kind, const Box& box, const glm::ivec3& cells, ScalarType typ
 }
 
 /// Each rank's share.
-std::vector<Block> dealt(const std::vector<Block>& all, const Communicator& world) {
+std::vector<Block> decomposed(const std::vector<Block>& all, const Communicator& world) {
   std::vector<Block> mine;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (static_cast<int>((i * 7 + i / 3) % static_cast<std::size_t>(world.size())) == world.rank())
@@ -134,7 +134,7 @@ ErrorCode codeOf(const std::function<void()>& call, std::string& text) {
 TEST_CASE("three levels side by side: a linear field has no seams") {
   const Communicator world = Communicator::world();
   const Kind kind = GENERATE(Kind::Points, Kind::Cells);
-  const std::vector<Block> after = comm::exchangeGhosts(world, dealt(cubes(kind, {4, 8, 16}), world));
+  const std::vector<Block> after = comm::exchangeGhosts(world, decomposed(cubes(kind, {4, 8, 16}), world));
   // In the outermost half of a coarse cell there's nothing to interpolate with, and a finer cell may look
   // there.
   const Box inner = shrunk(cube(0.0, 3.0), kind == Kind::Cells ? 0.25 : 0.0);
@@ -155,7 +155,7 @@ TEST_CASE("three levels side by side: a curved field is off by what the coarsest
         const glm::ivec3 side(glm::round(block.owned.size() / block.spacing));
         all.push_back(blockIn(kind, block.owned, side, ScalarType::F64, curved));
       }
-      return comm::exchangeGhosts(world, dealt(all, world));
+      return comm::exchangeGhosts(world, decomposed(all, world));
     };
     const Box inner = shrunk(cube(0.0, 3.0), 0.25);
     const double levels = worstError(world, cubesOf({4, 8, 16}), inner, curved);
@@ -171,9 +171,9 @@ TEST_CASE("spacings that are no power of two apart") {
   const Communicator world = Communicator::world();
   const auto cells = GENERATE(std::vector<int>{3, 9, 27}, std::vector<int>{4, 6, 10}, std::vector<int>{5, 7});
   INFO(cells[0] << " to " << cells.back() << " cells");
-  const auto points = comm::exchangeGhosts(world, dealt(cubes(Kind::Points, cells), world));
+  const auto points = comm::exchangeGhosts(world, decomposed(cubes(Kind::Points, cells), world));
   CHECK(worstError(world, points, cube(0.0, 3.0)) < rounding);
-  const auto means = comm::exchangeGhosts(world, dealt(cubes(Kind::Cells, cells), world));
+  const auto means = comm::exchangeGhosts(world, decomposed(cubes(Kind::Cells, cells), world));
   // Where cells of two levels aren't whole in each other, both sides look at each other: not to the last bit.
   const bool whole = cells[0] == 3;
   const double step = 100.0 / cells[0];  // the field's along a coarse cell's diagonal
@@ -201,7 +201,7 @@ TEST_CASE("a finer block over a coarse one owns the place, and what it covers do
   all.push_back(blockIn(kind, fine, cells, ScalarType::F64, garbage(finest)));
   const glm::ivec3 finestCells(glm::round(finest.size() * 16.0 * static_cast<double>(ratio * ratio)));
   all.push_back(blockIn(kind, finest, finestCells));
-  const std::vector<Block> mine = dealt(all, world);
+  const std::vector<Block> mine = decomposed(all, world);
   if (!fill) {
     const std::vector<Block> after = comm::settleOwnership(world, mine);
     CHECK(placesWithoutOneOwner(world, after, cube(0.0, 1.0)) == 0);
@@ -223,7 +223,7 @@ TEST_CASE("lattices that nearly fit, or don't: no seam") {
   all.push_back(
       blockIn(kind, {{1.0, 0.0, 0.0}, {2.0 * (1.0 + 1e-6), 1.0 + 1e-6, 1.0 + 1e-6}}, glm::ivec3(10)));
   all.push_back(blockIn(kind, {{0.0, 1.0 + 1e-6, 0.03}, {2.0, 2.0, 1.03}}, {20, 10, 10}));
-  const std::vector<Block> after = comm::exchangeGhosts(world, dealt(all, world));
+  const std::vector<Block> after = comm::exchangeGhosts(world, decomposed(all, world));
   const Box inner{{0.1, 0.1, 0.2}, {1.9, 1.9, 0.8}};
   CHECK(worstError(world, after, inner) < 1e-3);
   CHECK(placesWithoutOneOwner(world, after, inner) == 0);
@@ -238,7 +238,7 @@ TEST_CASE("blocks of other types: all become one that holds them") {
   all.push_back(blockIn(Kind::Points, cube(0.0, 1.0), glm::ivec3(10), type, field));
   all.push_back(
       blockIn(Kind::Points, {{1.0, 0.0, 0.0}, {2.0, 1.0, 1.0}}, glm::ivec3(10), ScalarType::F32, field));
-  const std::vector<Block> after = comm::exchangeGhosts(world, dealt(all, world));
+  const std::vector<Block> after = comm::exchangeGhosts(world, decomposed(all, world));
   for (const Block& block : after) {
     CHECK(block.type == common);
     CHECK(block.extra.lo.x + block.extra.hi.x == 1);
@@ -258,7 +258,7 @@ TEST_CASE("gaps of points between levels get an owner") {
   std::vector<Block> all;
   all.push_back(blockIn(Kind::Points, cube(0.0, 1.0), glm::ivec3(first)));
   all.push_back(blockIn(Kind::Points, {{1.0 + gap, 0.0, 0.0}, {2.0 + gap, 1.0, 1.0}}, glm::ivec3(second)));
-  const std::vector<Block> after = comm::exchangeGhosts(world, dealt(all, world));
+  const std::vector<Block> after = comm::exchangeGhosts(world, decomposed(all, world));
   const Box domain{glm::dvec3(0.0), {2.0 + gap, 1.0, 1.0}};
   CHECK(placesWithoutOneOwner(world, after, domain) == 0);
   CHECK(worstError(world, after, domain) < rounding);
@@ -269,7 +269,7 @@ TEST_CASE("points that are more than a cell apart stay apart") {
   std::vector<Block> all;
   all.push_back(blockIn(Kind::Points, cube(0.0, 1.0), glm::ivec3(4)));
   all.push_back(blockIn(Kind::Points, {{1.51, 0.0, 0.0}, {2.51, 1.0, 1.0}}, glm::ivec3(4)));
-  const std::vector<Block> mine = dealt(all, world);
+  const std::vector<Block> mine = decomposed(all, world);
   const std::vector<Block> after = comm::exchangeGhosts(world, mine);
   REQUIRE(after.size() == mine.size());
   for (std::size_t i = 0; i < after.size(); ++i) {
@@ -289,8 +289,8 @@ TEST_CASE("faces that differ by rounding, or by 1e-4 of a voxel, are one; filled
     const glm::dvec3 shift = off * glm::dvec3(i % 2 != 0, i / 2 % 2 != 0, i / 4 != 0);
     all.push_back(blockIn(Kind::Cells, {lo + shift, lo + 1.0}, glm::ivec3(10)));
   }
-  const auto after =
-      fill ? comm::exchangeGhosts(world, dealt(all, world)) : comm::settleOwnership(world, dealt(all, world));
+  const auto after = fill ? comm::exchangeGhosts(world, decomposed(all, world))
+                          : comm::settleOwnership(world, decomposed(all, world));
   for (const Block& block : after) {
     for (int axis = 0; axis < 3; ++axis) {
       const double face = block.owned.lo[axis] > 0.5 ? block.owned.lo[axis] : block.owned.hi[axis];

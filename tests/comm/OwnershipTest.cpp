@@ -33,9 +33,9 @@ TEST_CASE("every list has one owner, in rank order") {
       INFO(lists << " lists, " << ranks << " ranks");
       const Ownership equal = Ownership::equal(lists, ranks);
       checkCovers(equal, lists, ranks);
-      std::uint64_t most = 0;
-      for (int r = 0; r < ranks; ++r) most = std::max(most, equal.of(r).count());
-      CHECK(most <= lists / static_cast<std::uint64_t>(ranks) + 2 * Ownership::granularity);
+      std::uint64_t maximum = 0;
+      for (int r = 0; r < ranks; ++r) maximum = std::max(maximum, equal.of(r).count());
+      CHECK(maximum <= lists / static_cast<std::uint64_t>(ranks) + 2 * Ownership::granularity);
       std::mt19937 random(7);
       std::vector<std::uint32_t> weights((lists + 99) / 100);
       for (std::uint32_t& weight : weights)
@@ -60,17 +60,17 @@ TEST_CASE("what's in one corner of a picture is shared by all") {
   for (std::size_t i = 0; i < weights.size() / 10; ++i) weights[i] = 4 * width * 20;
   constexpr int ranks = 16;
   const Ownership ownership = Ownership::balanced(width * height, ranks, weights, 4 * width);
-  std::uint64_t most = 0;
+  std::uint64_t maximum = 0;
   std::uint64_t total = 0;
   for (int r = 0; r < ranks; ++r) {
     const ListRange range = ownership.of(r);
     const std::uint64_t full =
         std::min(range.last, width * height / 10) - std::min(range.first, width * height / 10);
     const std::uint64_t work = full * 20 + range.count();
-    most = std::max(most, work);
+    maximum = std::max(maximum, work);
     total += work;
   }
-  CHECK(most * ranks < total * 11 / 10);
+  CHECK(maximum * ranks < total * 11 / 10);
 }
 
 TEST_CASE("a band's part of what ranks own") {

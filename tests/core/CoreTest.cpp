@@ -84,9 +84,9 @@ TEST_CASE("the range of a block's finite values, wherever they stand") {
 
     std::vector<std::int8_t> bytes(static_cast<std::size_t>(count));
     for (std::int8_t& value : bytes) value = static_cast<std::int8_t>(generator() % 100 - 50);
-    const auto [least, most] = std::minmax_element(bytes.begin(), bytes.end());
+    const auto [minimum, maximum] = std::minmax_element(bytes.begin(), bytes.end());
     CHECK(finiteRange(Block::fromPoints({count, 1, 1}, {}, one, ScalarType::I8, bytes.data())) ==
-          ScalarRange{static_cast<double>(*least), static_cast<double>(*most)});
+          ScalarRange{static_cast<double>(*minimum), static_cast<double>(*maximum)});
   }
   const double nothing[] = {std::numeric_limits<double>::infinity(),
                             std::numeric_limits<double>::quiet_NaN()};
@@ -305,21 +305,21 @@ TEST_CASE("a VDI that isn't sound is refused") {
   });
 }
 
-TEST_CASE("the level of a survey: where lists hold the wanted total") {
-  Survey survey;
-  survey.supersegments = {1000, 800, 600, 300, 200, 100, 50, 20, 10, 10};
-  survey.equally = 600;
-  CHECK(survey.levelFor(1.0) == 2.0F);
-  CHECK(survey.levelFor(0.75) == Approx(2.5F));  // 450
-  CHECK(survey.levelFor(0.001) == 9.0F);         // less than one each can't be
-  survey.equally = 2000;
-  CHECK(survey.levelFor(1.0) == 0.0F);  // all samples are fewer than wanted
-  survey.equally = 900;
-  CHECK(survey.levelFor(1.0) == Approx(0.5F));
-  Survey twice = survey;
-  twice += survey;
-  CHECK(twice.levelFor(0.3) == survey.levelFor(0.3));
-  CHECK(Survey().levelFor(1.0) == 0.0F);
+TEST_CASE("the level of a histogram: where lists hold the wanted total") {
+  SupersegmentHistogram histogram;
+  histogram.supersegments = {1000, 800, 600, 300, 200, 100, 50, 20, 10, 10};
+  histogram.equally = 600;
+  CHECK(histogram.levelFor(1.0) == 2.0F);
+  CHECK(histogram.levelFor(0.75) == Approx(2.5F));  // 450
+  CHECK(histogram.levelFor(0.001) == 9.0F);         // less than one each can't be
+  histogram.equally = 2000;
+  CHECK(histogram.levelFor(1.0) == 0.0F);  // all samples are fewer than wanted
+  histogram.equally = 900;
+  CHECK(histogram.levelFor(1.0) == Approx(0.5F));
+  SupersegmentHistogram twice = histogram;
+  twice += histogram;
+  CHECK(twice.levelFor(0.3) == histogram.levelFor(0.3));
+  CHECK(SupersegmentHistogram().levelFor(1.0) == 0.0F);
   const auto countAt = [](std::size_t level) { return std::array{40, 30, 20, 15, 12, 9, 6, 3, 2, 1}[level]; };
   CHECK(supersegmentsAt(0.0F, 0.5F, countAt) == 40);
   CHECK(supersegmentsAt(1.5F, 0.5F, countAt) == 25);
@@ -343,7 +343,7 @@ TEST_CASE("budgets and fills that can't be are refused") {
   settings.fill = 0.5;
   settings.budget = Budget::List;
   CHECK_THROWS_AS(validate(settings), Error);
-  CHECK(mostPerList(25, Budget::List) == 25);
-  CHECK(mostPerList(25, Budget::Total) == 50);
-  CHECK(mostPerList(1000, Budget::Total) == mostSupersegments);
+  CHECK(maxPerList(25, Budget::List) == 25);
+  CHECK(maxPerList(25, Budget::Total) == 50);
+  CHECK(maxPerList(1000, Budget::Total) == maxSupersegments);
 }

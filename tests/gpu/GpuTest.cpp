@@ -77,7 +77,7 @@ TEST_CASE("more memory than the device has is refused with the figures") {
 
 TEST_CASE("a smaller limit of textures than the device's is kept to") {
   DeviceRequest request = requestFromEnvironment(0);
-  request.mostImageDimension3D = 24;
+  request.maxImageDimension3D = 24;
   const auto small = Device::create(request);
   CHECK(small->limits().maxImageDimension3D == 24);
   CHECK_THROWS_AS(SampledImage(small, {25, 1, 1}, VK_FORMAT_R8_UNORM), Error);
@@ -116,7 +116,7 @@ TEST_CASE("prefix sums equal the host's at awkward sizes") {
     commands.begin();
     scan.record(commands, values, prefix, count);
     commands.submitAndWait();
-    CHECK_NOTHROW(scan.demandNoOverflow());
+    CHECK_NOTHROW(scan.requireNoOverflow());
     const auto out = prefix.mappedAs<std::uint32_t>();
     std::uint32_t expected = 0;
     std::uint32_t wrong = 0;
@@ -169,22 +169,22 @@ TEST_CASE("a prefix sum beyond 32 bits is noticed") {
   commands.begin();
   scan.record(commands, values, prefix, count);
   commands.submitAndWait();
-  CHECK_THROWS_AS(scan.demandNoOverflow(), Error);
+  CHECK_THROWS_AS(scan.requireNoOverflow(), Error);
 }
 
 namespace {
 
-/// Grains of many lists, as writing leaves them: none, few, many, more than a team has room for; some all
-/// alike, some with gaps, some with cuts at these.
-struct Grains {
-  static constexpr std::uint32_t most = 12;  // N_S
-  std::vector<shared::StoredGrain> grains;
+/// Pre-segments of many lists, as writing leaves them: none, few, many, more than a subgroup has room for;
+/// some all alike, some with gaps, some with cuts at these.
+struct PreSegments {
+  static constexpr std::uint32_t maxCount = 12;  // N_S
+  std::vector<shared::StoredPreSegment> preSegments;
   std::vector<std::uint32_t> offsets{0};
   std::vector<std::uint32_t> written;
   std::vector<std::uint32_t> left;
   std::vector<std::uint32_t> leftOffsets{0};
 
-  explicit Grains(std::uint32_t lists) {
+  explicit PreSegments(std::uint32_t lists) {
     std::mt19937 generator(11);
     const auto below = [&](std::uint32_t end) { return static_cast<std::uint32_t>(generator() % end); };
     const auto random = [&] { return static_cast<float>(below(1000) + 1) / 1024.0F; };
@@ -203,12 +203,12 @@ struct Grains {
         const float back = at + (alike ? 0.5F : random());
         const float depth = alike ? 0.25F : 0.5F * random();
         const glm::vec3 color = alike ? glm::vec3(0.125F) : 0.3F * glm::vec3(random(), random(), random());
-        grains.push_back({{at, back}, before, 0.0F, {color, gap && cuts ? -depth : depth}});
+        preSegments.push_back({{at, back}, before, 0.0F, {color, gap && cuts ? -depth : depth}});
         before *= std::exp2(-depth);
         at = back;
       }
       written.push_back(count);
-      left.push_back(std::min(count, std::max(most, runs)));
+      left.push_back(std::min(count, std::max(maxCount, runs)));
       offsets.push_back(offsets.back() + count);
       leftOffsets.push_back(leftOffsets.back() + left.back());
     }
@@ -222,8 +222,8 @@ Buffer uploaded(const std::vector<T>& values) {
   return buffer;
 }
 
-std::vector<shared::Segment> reduced(const Grains& lists, ReducePass::Teams teams) {
-  const Buffer grains = uploaded(lists.grains);
+std::vector<shared::Segment> reduced(const PreSegments& lists, ReducePass::Subgroups subgroups) {
+  const Buffer preSegments = uploaded(lists.preSegments);
   const Buffer offsets = uploaded(lists.offsets);
   const Buffer written = uploaded(lists.written);
   const Buffer left = uploaded(lists.left);
@@ -231,8 +231,8 @@ std::vector<shared::Segment> reduced(const Grains& lists, ReducePass::Teams team
   const Buffer segments(device(), lists.leftOffsets.back() * sizeof(shared::Segment), MemoryKind::Readback);
   const Buffer guard = uploaded(std::vector<std::uint32_t>{1});  // there's room
   shared::ReduceConstants constants{};
-  constants.grains = grains.address();
-  constants.grainOffsets = offsets.address();
+  constants.preSegments = preSegments.address();
+  constants.preSegmentOffsets = offsets.address();
   constants.written = written.address();
   constants.left = left.address();
   constants.offsets = leftOffsets.address();
@@ -240,10 +240,10 @@ std::vector<shared::Segment> reduced(const Grains& lists, ReducePass::Teams team
   constants.guard = guard.address();
   constants.step = 0.125F;
   constants.listCount = static_cast<std::uint32_t>(lists.written.size());
-  ReducePass pass(device(), teams);
+  ReducePass pass(device(), subgroups);
   Commands commands(device());
   commands.begin();
-  pass.record(commands, constants, {Grains::most, false});
+  pass.record(commands, constants, {PreSegments::maxCount, false});
   commands.submitAndWait();
   const auto result = segments.mappedAs<shared::Segment>();
   return {result.begin(), result.end()};
@@ -251,20 +251,20 @@ std::vector<shared::Segment> reduced(const Grains& lists, ReducePass::Teams team
 
 }  // namespace
 
-TEST_CASE("teams merge grains as single invocations do") {
+TEST_CASE("subgroups merge pre-segments as single invocations do") {
   if (device()->limits().subgroupSize == 0) {
-    WARN("this device can't have teams");
+    WARN("this device can't have subgroups");
     return;
   }
-  const Grains lists(3000);
-  const std::vector<shared::Segment> alone = reduced(lists, ReducePass::Teams::No);
-  const std::vector<shared::Segment> teams = reduced(lists, ReducePass::Teams::Yes);
-  REQUIRE(alone.size() == teams.size());
+  const PreSegments lists(3000);
+  const std::vector<shared::Segment> alone = reduced(lists, ReducePass::Subgroups::No);
+  const std::vector<shared::Segment> subgroups = reduced(lists, ReducePass::Subgroups::Yes);
+  REQUIRE(alone.size() == subgroups.size());
   std::uint32_t wrong = 0;
   for (std::size_t i = 0; i < alone.size(); ++i) {
     const auto near = [](float a, float b) { return std::abs(a - b) <= 1e-5F * std::abs(b); };
-    wrong += near(alone[i].front, teams[i].front) && near(alone[i].back, teams[i].back) &&
-                     near(alone[i].red, teams[i].red) && near(alone[i].opacity, teams[i].opacity)
+    wrong += near(alone[i].front, subgroups[i].front) && near(alone[i].back, subgroups[i].back) &&
+                     near(alone[i].red, subgroups[i].red) && near(alone[i].opacity, subgroups[i].opacity)
                  ? 0
                  : 1;
   }
@@ -277,12 +277,13 @@ TEST_CASE("teams merge grains as single invocations do") {
     float depth = 0.0F;
     float depthLeft = 0.0F;
     for (std::uint32_t i = lists.offsets[list]; i < lists.offsets[list + 1]; ++i)
-      depth += std::abs(lists.grains[i].light.a);
+      depth += std::abs(lists.preSegments[i].light.a);
     for (std::uint32_t i = lists.leftOffsets[list]; i < lists.leftOffsets[list + 1]; ++i)
-      depthLeft -= std::log2(1.0F - teams[i].opacity);
+      depthLeft -= std::log2(1.0F - subgroups[i].opacity);
     const bool sound =
-        teams[lists.leftOffsets[list]].front == lists.grains[lists.offsets[list]].span.x &&
-        teams[lists.leftOffsets[list + 1] - 1].back <= lists.grains[lists.offsets[list + 1] - 1].span.y &&
+        subgroups[lists.leftOffsets[list]].front == lists.preSegments[lists.offsets[list]].span.x &&
+        subgroups[lists.leftOffsets[list + 1] - 1].back <=
+            lists.preSegments[lists.offsets[list + 1] - 1].span.y &&
         std::abs(depth - depthLeft) < 0.02F * depth + 1e-3F;
     off += sound || depth > 15.0F ? 0 : 1;
   }

@@ -173,10 +173,10 @@ TEST_CASE("a file that claims more than it holds is refused before memory is tak
   REQUIRE(get32(claims, 40) == 1);  // chunk
   const std::uint64_t packed = get32(claims, headerBytes + 4);
   REQUIRE(packed > 100000);
-  const std::uint64_t most = (packed * 255 - 8 - 4 * 1600) / (compact ? 9 : 24);
-  put32(claims, headerBytes, static_cast<std::uint32_t>(most));
-  put32(claims, 32, static_cast<std::uint32_t>(most));  // the budget
-  put64(claims, 48, most);
+  const std::uint64_t maxCount = (packed * 255 - 8 - 4 * 1600) / (compact ? 9 : 24);
+  put32(claims, headerBytes, static_cast<std::uint32_t>(maxCount));
+  put32(claims, 32, static_cast<std::uint32_t>(maxCount));  // the budget
+  put64(claims, 48, maxCount);
   reseal(claims);
   // In a process of its own, for its largest size is that of all its life.
   const pid_t child = ::fork();
@@ -188,7 +188,7 @@ TEST_CASE("a file that claims more than it holds is refused before memory is tak
     };
     const long before = largestKilobytes();
     const bool refused = outcomeOf(claims) == Outcome::Refused;
-    const auto limit = static_cast<long>(most * 8 / 1024 / 4);  // a quarter of the supersegments claimed
+    const auto limit = static_cast<long>(maxCount * 8 / 1024 / 4);  // a quarter of the supersegments claimed
     ::_exit(refused && largestKilobytes() - before < limit ? 0 : 1);
   }
   int status = 0;

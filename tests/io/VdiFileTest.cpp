@@ -232,18 +232,18 @@ TEST_CASE("info is known without the lists") {
   Vdi expected = vdi;
   expected.lists = SupersegmentLists();
   std::vector<std::byte> bytes = io::InputFile(path).readAll();
-  const auto demandGood = [&](const io::VdiFileInfo& info) {
+  const auto requireGood = [&](const io::VdiFileInfo& info) {
     CHECK(info.version == 1);
     CHECK(info.header == expected);
     CHECK(info.supersegmentCount == test::full(vdi).segments.size());
     CHECK(info.storedBytes == bytes.size());
     CHECK(info.expandedBytes == test::full(vdi).segments.size() * 24 + test::full(vdi).offsets.size() * 4);
   };
-  demandGood(io::readVdiInfo(path));
-  demandGood(io::decodeInfo(bytes));
+  requireGood(io::readVdiInfo(path));
+  requireGood(io::decodeInfo(bytes));
   bytes.back() ^= std::byte{1};  // in a list
   io::writeAtomically(path, bytes);
-  demandGood(io::readVdiInfo(path));
+  requireGood(io::readVdiInfo(path));
   CHECK(test::errorOf([&] { io::readVdi(path); }).code() == ErrorCode::Format);
   bytes.pop_back();
   io::writeAtomically(path, bytes);

@@ -72,8 +72,8 @@ ListsOf<Segment> composite(const std::shared_ptr<gpu::Device>& device, detail::C
                            const std::vector<ListsOf<Segment>>& subLists,
                            const detail::Compositor::Request& request) {
   const HostSubLists parts(device, subLists);
-  detail::Compositor::Merged merged;
-  compositor.merge(parts.parts(), request.code, merged);
+  detail::Compositor::Interleaved merged;
+  compositor.interleave(parts.parts(), request.code, merged);
   detail::DeviceLists lists;
   compositor.composite(merged, request, lists);
   return download<Segment>(device, lists);

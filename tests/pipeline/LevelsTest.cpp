@@ -71,7 +71,7 @@ TransferFunction bands() {
   return function;
 }
 
-std::vector<Block> dealt(const std::vector<Block>& all, const comm::Communicator& world) {
+std::vector<Block> decomposed(const std::vector<Block>& all, const comm::Communicator& world) {
   std::vector<Block> mine;
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (static_cast<int>((i + i / 4) % static_cast<std::size_t>(world.size())) == world.rank())
@@ -159,7 +159,7 @@ TEST_CASE("three levels, side by side and over each other: the picture of a unif
     for (const int ratio : {0, 2, 4}) {
       INFO((cells ? "cells" : "points") << ", overlapping with ratio " << ratio);
       const auto all = ratio == 0 ? sideBySide(cells, linear) : overEachOther(cells, linear, ratio);
-      many.setBlocks(dealt(all, world));
+      many.setBlocks(decomposed(all, world));
       const auto volume = many.renderVolume(test::oblique(), bands(), settings());
       const auto vdi = many.generate(test::oblique(), bands(), settings());
       if (!volume) continue;
@@ -181,7 +181,7 @@ TEST_CASE("a curved field: no worse than the coarsest level alone, on any number
   for (const bool cells : {false, true}) {
     INFO((cells ? "cells" : "points"));
     const auto all = sideBySide(cells, smooth);
-    many.setBlocks(dealt(all, world));
+    many.setBlocks(decomposed(all, world));
     const auto volume = many.renderVolume(test::oblique(), bands(), settings());
     if (!volume) continue;
     one.setBlocks(all);
@@ -209,13 +209,13 @@ TEST_CASE("blocks of one level that overlap between ranks: refused on all, and t
   shifted.owned.lo.x += 0.5;
   shifted.owned.hi.x += 0.5;
   try {
-    many.setBlocks(dealt({block, shifted}, world), fill);
+    many.setBlocks(decomposed({block, shifted}, world), fill);
     FAIL("nothing was thrown");
   } catch (const Error& error) {
     CHECK(error.code() == ErrorCode::InvalidArgument);
     CHECK_THAT(error.what(), Catch::Contains("block 0 of rank 0") && Catch::Contains("overlap"));
   }
-  CHECK_NOTHROW(many.setBlocks(dealt({block}, world), fill));
+  CHECK_NOTHROW(many.setBlocks(decomposed({block}, world), fill));
 }
 
 TEST_CASE("large blocks, whose values a process with one core lets the device copy, get their patches") {
@@ -238,9 +238,9 @@ TEST_CASE("large blocks, whose values a process with one core lets the device co
     block.keepAlive = values;
   }
   VdiGenerator many(device(), comm::Communicator::world());
-  many.setBlocks(dealt(floats, world));
+  many.setBlocks(decomposed(floats, world));
   const auto ofFloats = many.renderVolume(test::oblique(), bands(), settings());
-  many.setBlocks(dealt(doubles, world));
+  many.setBlocks(decomposed(doubles, world));
   const auto ofDoubles = many.renderVolume(test::oblique(), bands(), settings());
   if (ofFloats) CHECK(differenceOf(*ofFloats, *ofDoubles).worst < 1.0);
   CHECK(device()->validationMessages() == "");

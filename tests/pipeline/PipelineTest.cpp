@@ -100,21 +100,21 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
                                   ScalarType::U32, ScalarType::I32, ScalarType::F32, ScalarType::F64}) {
       if (parallel && type != ScalarType::F32) continue;
       INFO(toString(type) << (parallel ? ", parallel" : ", perspective"));
-      const auto dealt = test::deal("turbulence", {26, 22, 24}, {2, 2, 2}, Layout::OnOneRank,
-                                    Joint::SharedPoints, type, 0, 1);
+      const auto decomposed = test::decompose("turbulence", {26, 22, 24}, {2, 2, 2}, Layout::OnOneRank,
+                                              Joint::SharedPoints, type, 0, 1);
       const TransferFunction function = test::threeHues(test::topOf(type) * 0.8);
       // Odd sizes: the last row and column are between counted ones and nothing.
       const GenerateSettings settings = test::smallSettings(47, 35, 8);
       const Camera camera = test::oblique(parallel);
       VdiGenerator generator(device(), comm::Communicator::serial());
-      generator.setBlocks(dealt.mine);
+      generator.setBlocks(decomposed.mine);
       ScalarRange range;
-      for (const Block& block : dealt.mine) range.include(finiteRange(block));
+      for (const Block& block : decomposed.mine) range.include(finiteRange(block));
       CHECK(generator.scalarRange() == range);
       const reference::Frame frame(generator.scene(), camera, function, settings);
 
       const auto image = generator.renderVolume(camera, function, settings);
-      const Image expected = reference::renderVolume(frame, withLayers(dealt.mine));
+      const Image expected = reference::renderVolume(frame, withLayers(decomposed.mine));
       CHECK(largestDifference(*image, expected) < 0.5F);
       CHECK(depthsThatDiffer(*image, expected, 1e-3F) <= image->depth.size() / 100);
 
@@ -124,7 +124,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
         GenerateSettings own = settings;
         own.algorithm = algorithm;
         const reference::Frame ownFrame(generator.scene(), camera, function, own);
-        const SupersegmentLists lists = reference::generate(ownFrame, withLayers(dealt.mine), false);
+        const SupersegmentLists lists = reference::generate(ownFrame, withLayers(decomposed.mine), false);
         CHECK(lists.segments.size() > lists.listCount());
         own.precision = Precision::Full;
         const auto full = generator.generate(camera, function, own);
@@ -163,10 +163,10 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
 
 TEST_CASE("macrocells that rays pass and samples that are counted as one: as in the reference") {
   // Several macrocells along each axis, most of them empty.
-  const auto dealt = test::deal("coil", {70, 75, 66}, {1, 2, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::U8, 0, 1);
+  const auto decomposed = test::decompose("coil", {70, 75, 66}, {1, 2, 1}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   GenerateSettings settings = test::smallSettings(41, 33, 6);
   settings.precision = Precision::Full;
   for (const double top : {80.0, 30.0, 200.0}) {  // the last one: next to nothing is visible
@@ -175,7 +175,7 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
     settings.supersegments = top == 80.0 ? 6 : top == 30.0 ? 1 : 3;
     const TransferFunction function = test::threeHues(top);
     const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
-    const Image expected = reference::renderVolume(frame, withLayers(dealt.mine));
+    const Image expected = reference::renderVolume(frame, withLayers(decomposed.mine));
     CHECK(largestDifference(*generator.renderVolume(test::oblique(), function, settings), expected) <
           byFilter(0.5F, 2.0F));
     for (const Algorithm algorithm : algorithms) {
@@ -183,7 +183,7 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
       GenerateSettings own = settings;
       own.algorithm = algorithm;
       const reference::Frame ownFrame(generator.scene(), test::oblique(), function, own);
-      const SupersegmentLists lists = reference::generate(ownFrame, withLayers(dealt.mine), false);
+      const SupersegmentLists lists = reference::generate(ownFrame, withLayers(decomposed.mine), false);
       const auto vdi = generator.generate(test::oblique(), function, own);
       CHECK(listsThatDiffer(vdi->expandedLists(), lists) <= lists.listCount() / 50);
     }
@@ -229,26 +229,26 @@ TEST_CASE(
 }
 
 TEST_CASE("rays go on behind material of opacity 1, unless they're to end") {
-  const auto dealt = test::deal("shells", {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("shells", {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   TransferFunction function = test::threeHues(1.0);
   function.opacities = {{0.0, 0.0}, {0.5, 0.0}, {0.6, 1.0}, {1.0, 1.0}};
   GenerateSettings settings = test::smallSettings(40, 30, 12);
   settings.precision = Precision::Full;
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   std::vector<std::size_t> counts;
   for (const double termination : {0.9999, 1.0}) {
     INFO(termination);
     settings.terminationOpacity = termination;
     const auto vdi = generator.generate(test::oblique(), function, settings);
     const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
-    const SupersegmentLists expected = reference::generate(frame, withLayers(dealt.mine), false);
+    const SupersegmentLists expected = reference::generate(frame, withLayers(decomposed.mine), false);
     CHECK(listsThatDiffer(vdi->expandedLists(), expected) <=
           expected.listCount() / byFilter<std::size_t>(50, 4));
     // A device takes values at the scene's faces up to 2/256 of a voxel inside (VolumeStore.cpp); what's
     // opaque there shows the colour of just that place.
-    CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, withLayers(dealt.mine))) <
+    CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, withLayers(decomposed.mine))) <
           byFilter(2.0F, 4.0F));
     counts.push_back(vdi->supersegmentCount());
   }
@@ -256,10 +256,10 @@ TEST_CASE("rays go on behind material of opacity 1, unless they're to end") {
 }
 
 TEST_CASE("a VDI in the memory of another one, whatever its precision and size were, is the same") {
-  const auto dealt = test::deal("mixing", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("mixing", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   GenerateSettings settings = test::smallSettings(40, 30, 5);
   const auto vdiOf = [&] { return *generator.generate(test::oblique(), test::threeHues(1.0), settings); };
   const Vdi first = vdiOf();
@@ -282,10 +282,10 @@ TEST_CASE("a VDI in the memory of another one, whatever its precision and size w
 }
 
 TEST_CASE("a picture in the memory of another one is the same") {
-  const auto dealt = test::deal("mixing", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("mixing", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   const auto volumeOf = [&](int width, int height) {
     return *generator.renderVolume(test::oblique(), test::threeHues(1.0),
                                    test::smallSettings(width, height, 5));
@@ -308,10 +308,10 @@ TEST_CASE("a picture in the memory of another one is the same") {
 }
 
 TEST_CASE("bytes of a view are those of its floats, whichever was asked for before") {
-  const auto dealt = test::deal("shells", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("shells", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   VdiRenderer renderer(device());
   renderer.setVdi(*generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(40, 30, 5)));
   for (const auto& [width, height] : {std::pair(61, 47), std::pair(33, 64), std::pair(61, 47)}) {
@@ -323,7 +323,7 @@ TEST_CASE("bytes of a view are those of its floats, whichever was asked for befo
       CHECK((bytes.width == width && bytes.height == height));
       REQUIRE(bytes.rgba.size() == floats.rgba.size());
       CHECK(std::ranges::equal(bytes.depth, floats.depth));
-      int most = 0;
+      int maximum = 0;
       int translucent = 0;
       for (std::size_t i = 0; i < bytes.rgba.size(); ++i) {
         const glm::vec4& shares = floats.rgba[i];
@@ -331,11 +331,11 @@ TEST_CASE("bytes of a view are those of its floats, whichever was asked for befo
         const float weight = alpha == Alpha::Straight && shares.a > 0.0F ? 1.0F / shares.a : 1.0F;
         for (int c = 0; c < 4; ++c) {
           const int expected = toByte(c < 3 ? shares[c] * weight : shares.a);
-          most = std::max(most, std::abs(bytes.rgba[i][c] - expected));
+          maximum = std::max(maximum, std::abs(bytes.rgba[i][c] - expected));
         }
       }
       // A division on a device may be off by its last bits.
-      CHECK(most <= (alpha == Alpha::Straight ? 1 : 0));
+      CHECK(maximum <= (alpha == Alpha::Straight ? 1 : 0));
       CHECK(translucent > 100);
     }
   }
@@ -343,12 +343,12 @@ TEST_CASE("bytes of a view are those of its floats, whichever was asked for befo
 }
 
 TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the reference") {
-  const auto dealt = test::deal("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::U8, 0, 1);
+  const auto decomposed = test::decompose("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   const auto vdi = generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
   VdiRenderer renderer(device());
   renderer.setVdi(*vdi);
@@ -396,12 +396,12 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the refe
 }
 
 TEST_CASE("rays that end at objects, of any part of an image plane: as in the reference") {
-  const auto dealt = test::deal("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::U8, 0, 1);
+  const auto decomposed = test::decompose("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   const auto vdi = generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
   VdiRenderer renderer(device());
   renderer.setVdi(*vdi);
@@ -488,12 +488,12 @@ TEST_CASE("a ray that ends within a supersegment sees the part of it in front") 
 }
 
 TEST_CASE("a picture of more tiles than a device has workgroups side by side") {
-  const auto dealt =
-      test::deal("ramp", {8, 8, 8}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("ramp", {8, 8, 8}, {1, 1, 1}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   Camera camera = test::oblique(true);
   camera.parallelScale = 0.1;  // the volume is all around
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   const auto vdi = generator.generate(camera, test::threeHues(2.0), test::smallSettings(16, 16, 4));
   VdiRenderer renderer(device());
   renderer.setVdi(*vdi);
@@ -519,19 +519,19 @@ TEST_CASE("a picture of more tiles than a device has workgroups side by side") {
 }
 
 TEST_CASE("merging and compositing on the device equal the reference") {
-  const auto dealt = test::deal("turbulence", {26, 22, 24}, {3, 3, 3}, Layout::Random, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("turbulence", {26, 22, 24}, {3, 3, 3}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   const TransferFunction function = test::threeHues(0.8);
   const Algorithm algorithm = GENERATE(from_range(std::begin(algorithms), std::end(algorithms)));
   INFO(toString(algorithm));
   GenerateSettings settings = test::smallSettings(40, 30, 6);
   settings.algorithm = algorithm;
-  const Scene scene = localScene(dealt.all);
+  const Scene scene = localScene(decomposed.all);
   const reference::Frame frame(scene, test::oblique(), function, settings);
   std::vector<SupersegmentLists> subLists;
   for (std::size_t rank = 0; rank < 3; ++rank) {
     std::vector<Block> mine;
-    for (std::size_t i = rank; i < dealt.all.size(); i += 3) mine.push_back(dealt.all[i]);
+    for (std::size_t i = rank; i < decomposed.all.size(); i += 3) mine.push_back(decomposed.all[i]);
     subLists.push_back(reference::generate(frame, mine, true));
   }
   const SupersegmentLists expected = reference::composite(subLists, settings, frame.lattice.step);
@@ -540,9 +540,9 @@ TEST_CASE("merging and compositing on the device equal the reference") {
       test::composite(device(), compositor, subLists, {6, 6, frame.lattice.step, algorithm, {}});
   CHECK(listsThatDiffer(result, expected) <= expected.listCount() / 50);
   // The flat picture of what was merged, by the device and by the host, is that of what was composited.
-  detail::Compositor::Merged merged;
+  detail::Compositor::Interleaved merged;
   const test::HostSubLists parts(device(), subLists);
-  compositor.merge(parts.parts(), {}, merged);
+  compositor.interleave(parts.parts(), {}, merged);
   gpu::Buffer colors;
   gpu::Buffer depths;
   compositor.flatten(merged, {}, colors, depths);
@@ -585,17 +585,17 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
   const auto blocks = GENERATE(glm::ivec3(3, 3, 3), glm::ivec3(9, 8, 9));
   const std::uint32_t supersegments = GENERATE(3U, 8U, 200U);
   INFO(blocks.x << " blocks across, " << supersegments << " supersegments");
-  const auto dealt = test::deal("turbulence", {40, 36, 40}, blocks, Layout::Random, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("turbulence", {40, 36, 40}, blocks, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   const TransferFunction function = test::threeHues(0.8);
   GenerateSettings settings = test::smallSettings(61, 43, supersegments);
   settings.samplesPerVoxel = supersegments == 200 ? 8.0 : 1.0;
   settings.precision = Precision::Full;
-  const Scene scene = localScene(dealt.all);
+  const Scene scene = localScene(decomposed.all);
   const reference::Frame frame(scene, test::oblique(), function, settings);
   constexpr std::size_t ranks = 3;
   std::vector<std::vector<Block>> blocksOf(ranks);
-  const std::vector<Block> all = withLayers(dealt.all);
+  const std::vector<Block> all = withLayers(decomposed.all);
   for (std::size_t i = 0; i < all.size(); ++i) blocksOf[i * 7 % ranks].push_back(all[i]);
   const std::vector<SupersegmentLists> expected = reference::generateTogether(frame, blocksOf);
 
@@ -644,22 +644,22 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
 TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists") {
   const double fill = GENERATE(1.0, 0.5);
   INFO("fill " << fill);
-  const auto dealt = test::deal("turbulence", {40, 40, 40}, {2, 2, 2}, Layout::Random, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("turbulence", {40, 40, 40}, {2, 2, 2}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   const TransferFunction function = test::threeHues(0.8);
   GenerateSettings settings = test::smallSettings(61, 43, 5);
   settings.precision = Precision::Full;
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   const auto equal = generator.generate(test::oblique(), function, settings);
   settings.budget = Budget::Total;
   settings.fill = fill;
   const auto vdi = generator.generate(test::oblique(), function, settings);
   CHECK_NOTHROW(validate(*vdi));
   const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
-  const SupersegmentLists expected = reference::generate(frame, withLayers(dealt.mine), false);
+  const SupersegmentLists expected = reference::generate(frame, withLayers(decomposed.mine), false);
   CHECK(listsThatDiffer(vdi->expandedLists(), expected) <= expected.listCount() / 50);
-  CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, withLayers(dealt.mine))) < 1.0F);
+  CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, withLayers(decomposed.mine))) < 1.0F);
   const double share =
       static_cast<double>(vdi->supersegmentCount()) / static_cast<double>(equal->supersegmentCount());
   CHECK(share == Approx(fill).epsilon(0.05));
@@ -675,7 +675,7 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   std::vector<SupersegmentLists> subLists;
   for (std::size_t rank = 0; rank < 3; ++rank) {
     std::vector<Block> mine;
-    for (std::size_t i = rank; i < dealt.all.size(); i += 3) mine.push_back(dealt.all[i]);
+    for (std::size_t i = rank; i < decomposed.all.size(); i += 3) mine.push_back(decomposed.all[i]);
     subLists.push_back(reference::generate(equalFrame, mine, true));
   }
   settings.budget = Budget::Total;
@@ -683,11 +683,11 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   const SupersegmentLists composited = reference::composite(subLists, settings, frame.lattice.step);
   detail::Compositor compositor(device());
   detail::Compositor::Request request{
-      5, mostPerList(5, Budget::Total), frame.lattice.step, Algorithm::Merge, {}};
-  detail::Compositor::Merged merged;
+      5, maxPerList(5, Budget::Total), frame.lattice.step, Algorithm::Merge, {}};
+  detail::Compositor::Interleaved merged;
   const test::HostSubLists parts(device(), subLists);
-  compositor.merge(parts.parts(), {}, merged);
-  request.level = compositor.survey(merged, request).levelFor(fill);
+  compositor.interleave(parts.parts(), {}, merged);
+  request.level = compositor.histogram(merged, request).levelFor(fill);
   CHECK(listsThatDiffer(test::composite(device(), compositor, subLists, request), composited) <=
         composited.listCount() / 50);
 }
@@ -696,8 +696,8 @@ TEST_CASE("programs for GPUs give the same lists as those for CPUs") {
   const Budget budget = GENERATE(Budget::List, Budget::Total);
   const std::uint32_t supersegments = GENERATE(1U, 6U, 255U);
   INFO(supersegments << " supersegments, budget " << toString(budget));
-  const auto dealt = test::deal("turbulence", {64, 64, 64}, {2, 2, 2}, Layout::Random, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("turbulence", {64, 64, 64}, {2, 2, 2}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   const TransferFunction function = test::threeHues(0.8);
   GenerateSettings settings = test::smallSettings(117, 91, supersegments);
   settings.precision = Precision::Full;
@@ -705,7 +705,7 @@ TEST_CASE("programs for GPUs give the same lists as those for CPUs") {
   settings.budget = budget;
   const auto made = [&](const std::shared_ptr<gpu::Device>& on) {
     VdiGenerator generator(on, comm::Communicator::serial());
-    generator.setBlocks(dealt.mine);
+    generator.setBlocks(decomposed.mine);
     return *generator.generate(test::oblique(), function, settings);
   };
   const Vdi expected = made(device());
@@ -717,23 +717,23 @@ TEST_CASE("programs for GPUs give the same lists as those for CPUs") {
 }
 
 TEST_CASE("a VDI equals DVR at V_O and stays close around it") {
-  const auto dealt = test::deal("mixing", {48, 48, 48}, {2, 2, 2}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("mixing", {48, 48, 48}, {2, 2, 2}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   const TransferFunction function = test::threeHues(1.0);
   const GenerateSettings settings = test::smallSettings(128, 96, 20);
   const Camera camera = test::oblique();
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   const auto vdi = generator.generate(camera, function, settings);
   VdiRenderer renderer(device());
   renderer.setVdi(*vdi);
-  const std::pair<double, double> leastSsim[] = {{0.0, 0.995}, {5.0, 0.98}, {20.0, 0.96}, {50.0, 0.90}};
-  for (const auto& [angle, least] : leastSsim) {
+  const std::pair<double, double> minSsim[] = {{0.0, 0.995}, {5.0, 0.98}, {20.0, 0.96}, {50.0, 0.90}};
+  for (const auto& [angle, minimum] : minSsim) {
     INFO(angle << " degrees");
     const Camera other = camera.azimuth(angle);
     const auto truth = generator.renderVolume(other, function, settings);
     const ImageDifference difference = differenceOf(renderer.render(other, 128, 96), *truth);
-    CHECK(difference.ssim >= least);
+    CHECK(difference.ssim >= minimum);
     if (angle == 0.0) CHECK(difference.meanError < 0.5);
   }
 }
@@ -743,9 +743,9 @@ TEST_CASE("VDIs that are set before the last one's upload has ended are seen who
   const Camera camera = test::oblique();
   std::vector<Vdi> vdis;
   for (const char* field : {"mixing", "sphere", "turbulence"}) {
-    const auto dealt = test::deal(field, {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                  ScalarType::F32, 0, 1);
-    generator.setBlocks(dealt.mine);
+    const auto decomposed = test::decompose(field, {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank,
+                                            Joint::SharedPoints, ScalarType::F32, 0, 1);
+    generator.setBlocks(decomposed.mine);
     GenerateSettings settings = test::smallSettings(96 + 32 * static_cast<int>(vdis.size()), 80, 10);
     settings.precision = vdis.size() == 1 ? Precision::Full : Precision::Compact;
     vdis.push_back(*generator.generate(camera, test::threeHues(1.0), settings));
@@ -765,15 +765,15 @@ TEST_CASE("VDIs that are set before the last one's upload has ended are seen who
 }
 
 TEST_CASE("nothing is made anew between frames of the same size") {
-  const auto dealt = test::deal("shells", {20, 20, 20}, {2, 2, 2}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto decomposed = test::decompose("shells", {20, 20, 20}, {2, 2, 2}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
   const GenerateSettings settings = test::smallSettings();
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   const auto first = generator.generate(test::oblique(), test::threeHues(1.0), settings);
   const std::uint64_t held = device()->allocatedBytes();
   for (int i = 0; i < 3; ++i) {
-    generator.setBlocks(dealt.mine);
+    generator.setBlocks(decomposed.mine);
     const auto again = generator.generate(test::oblique(), test::threeHues(1.0), settings);
     CHECK(*again == *first);
     CHECK(device()->allocatedBytes() == held);
@@ -781,30 +781,30 @@ TEST_CASE("nothing is made anew between frames of the same size") {
 }
 
 TEST_CASE("thousands of small blocks in one pass") {
-  const auto dealt = test::deal("turbulence", {61, 61, 61}, {15, 15, 15}, Layout::OnOneRank,
-                                Joint::SharedPoints, ScalarType::U8, 0, 1);
-  CHECK(dealt.mine.size() == 3375);
-  const auto whole = test::deal("turbulence", {61, 61, 61}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::U8, 0, 1);
+  const auto decomposed = test::decompose("turbulence", {61, 61, 61}, {15, 15, 15}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
+  CHECK(decomposed.mine.size() == 3375);
+  const auto whole = test::decompose("turbulence", {61, 61, 61}, {1, 1, 1}, Layout::OnOneRank,
+                                     Joint::SharedPoints, ScalarType::U8, 0, 1);
   const TransferFunction function = test::threeHues(80.0);
   const GenerateSettings settings = test::smallSettings();
   VdiGenerator many(device(), comm::Communicator::serial());
   VdiGenerator one(device(), comm::Communicator::serial());
-  many.setBlocks(dealt.mine);
+  many.setBlocks(decomposed.mine);
   one.setBlocks(whole.mine);
   const auto image = many.renderVolume(test::oblique(), function, settings);
   CHECK(largestDifference(*image, *one.renderVolume(test::oblique(), function, settings)) < 1.0F);
 }
 
 TEST_CASE("a block that's cut to fit the device's images shows no cut") {
-  const auto whole = test::deal("turbulence", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto whole = test::decompose("turbulence", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank,
+                                     Joint::SharedPoints, ScalarType::F32, 0, 1);
   // Steep, so that samples beside a cut depend on what's beyond.
   TransferFunction function = test::threeHues(1.0);
   function.opacities = {{0.0, 0.0}, {0.5, 0.0}, {0.52, 1.0}, {0.54, 0.0}, {1.0, 0.0}};
   const GenerateSettings settings = test::smallSettings();
   gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
-  request.mostImageDimension3D = 24;
+  request.maxImageDimension3D = 24;
   VdiGenerator cut(gpu::Device::create(request), comm::Communicator::serial());
   VdiGenerator one(device(), comm::Communicator::serial());
   cut.setBlocks(whole.mine);

@@ -67,9 +67,10 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
     INFO(c.name);
     // A field with structure up to the domain's faces, so that a lost or doubled sample shows.
     const glm::ivec3 size{34, 30, 37};
-    const auto dealt =
-        test::deal("turbulence", size, c.blocks, c.layout, c.joint, c.type, world.rank(), world.size());
-    const auto whole = test::deal("turbulence", size, {1, 1, 1}, Layout::OnOneRank, c.joint, c.type, 0, 1);
+    const auto decomposed =
+        test::decompose("turbulence", size, c.blocks, c.layout, c.joint, c.type, world.rank(), world.size());
+    const auto whole =
+        test::decompose("turbulence", size, {1, 1, 1}, Layout::OnOneRank, c.joint, c.type, 0, 1);
     const TransferFunction function = test::threeHues(test::topOf(c.type) * 0.8);
     const GenerateSettings settings = test::smallSettings();
     const Camera camera = test::oblique(c.parallel);
@@ -81,7 +82,7 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
       REQUIRE(anythingSeen(*truth));
     }
 
-    many.setBlocks(dealt.mine);
+    many.setBlocks(decomposed.mine);
     auto volume = many.renderVolume(camera, function, settings);
     if (root) CHECK(largestDifference(*volume, *truth) < 1.0F);
     volume.reset();  // the next one is made in its memory
@@ -106,10 +107,10 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
 TEST_CASE(
     "a total budget over all ranks: the picture of one, as many supersegments as equally, unequal lists") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto dealt = test::deal("turbulence", {34, 30, 37}, {3, 3, 3}, Layout::Random, Joint::SharedPoints,
-                                ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {3, 3, 3}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
   VdiGenerator generator(device(), comm::Communicator::world());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   GenerateSettings settings = test::smallSettings(61, 45, 5);
   const auto truth = generator.renderVolume(test::oblique(), test::threeHues(0.8), settings);
   const auto equal = generator.generate(test::oblique(), test::threeHues(0.8), settings);
@@ -127,8 +128,8 @@ TEST_CASE(
 
 TEST_CASE("ways between ranks: shared memory, messages, staging memory: the same VDI and picture") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto dealt = test::deal("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random, Joint::SharedPoints,
-                                ScalarType::U8, world.rank(), world.size());
+  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::U8, world.rank(), world.size());
   const GenerateSettings settings = test::smallSettings(61, 45, 6);
   const TransferFunction function = test::threeHues(80.0);
   gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
@@ -142,7 +143,7 @@ TEST_CASE("ways between ranks: shared memory, messages, staging memory: the same
       setenv("VDI_TRANSPORT", transport, 1);
       VdiGenerator generator(own, comm::Communicator::world());
       unsetenv("VDI_TRANSPORT");
-      generator.setBlocks(dealt.mine);
+      generator.setBlocks(decomposed.mine);
       for (int frame = 0; frame < 2; ++frame) {  // the second one in the memory of the first one
         const auto vdi = generator.generate(test::oblique(), function, settings);
         const auto image = generator.renderVolume(test::oblique(), function, settings);
@@ -162,16 +163,16 @@ TEST_CASE("ways between ranks: shared memory, messages, staging memory: the same
 
 TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of one rank") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto dealt = test::deal("turbulence", {49, 49, 49}, {16, 16, 16}, Layout::Random, Joint::SharedPoints,
-                                ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::decompose("turbulence", {49, 49, 49}, {16, 16, 16}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
   const GenerateSettings settings = test::smallSettings(56, 44, 5);
   VdiGenerator many(device(), comm::Communicator::world());
-  many.setBlocks(dealt.mine);
+  many.setBlocks(decomposed.mine);
   const auto volume = many.renderVolume(test::oblique(), test::threeHues(0.8), settings);
   const auto vdi = many.generate(test::oblique(), test::threeHues(0.8), settings);
   if (world.rank() != 0) return;
-  const auto whole = test::deal("turbulence", {49, 49, 49}, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::F32, 0, 1);
+  const auto whole = test::decompose("turbulence", {49, 49, 49}, {1, 1, 1}, Layout::OnOneRank,
+                                     Joint::SharedPoints, ScalarType::F32, 0, 1);
   VdiGenerator one(device(), comm::Communicator::serial());
   one.setBlocks(whole.mine);
   const auto truth = one.renderVolume(test::oblique(), test::threeHues(0.8), settings);
@@ -184,11 +185,11 @@ TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of o
 TEST_CASE("all ranks together send little more than one rank makes") {
   const comm::Communicator world = comm::Communicator::world();
   const auto subSupersegments = [&](int ranks) {
-    const auto dealt = test::deal("turbulence", {40, 40, 40}, {5, 5, 5}, Layout::Random, Joint::SharedPoints,
-                                  ScalarType::F32, ranks == 1 ? 0 : world.rank(), ranks);
-    VdiGenerator generator(device(),
-                           ranks == 1 ? comm::Communicator::serial() : comm::Communicator::world());
-    generator.setBlocks(dealt.mine);
+    const auto decomposed =
+        test::decompose("turbulence", {40, 40, 40}, {5, 5, 5}, Layout::Random, Joint::SharedPoints,
+                        ScalarType::F32, ranks == 1 ? 0 : world.rank(), ranks);
+    VdiGenerator generator(device(), ranks == 1 ? comm::Communicator::serial() : comm::Communicator::world());
+    generator.setBlocks(decomposed.mine);
     generator.generate(test::oblique(), test::threeHues(0.8), test::smallSettings(96, 72, 12));
     double sum = 0.0;
     for (const RankReport& report : generator.reports()) sum += static_cast<double>(report.subSupersegments);
@@ -200,10 +201,10 @@ TEST_CASE("all ranks together send little more than one rank makes") {
 
 TEST_CASE("tiny pictures: more ranks than rows and pixels") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto dealt = test::deal("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved, Joint::SharedPoints,
-                                ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
+                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
   VdiGenerator generator(device(), comm::Communicator::world());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(3, 1), std::pair(1, 2)}) {
     for (const std::uint32_t supersegments : {1U, 7U}) {
       for (const Budget budget : {Budget::List, Budget::Total}) {
@@ -218,15 +219,15 @@ TEST_CASE("tiny pictures: more ranks than rows and pixels") {
 
 TEST_CASE("a rank that fails takes nobody down, and the next frame works") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto dealt = test::deal("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved, Joint::SharedPoints,
-                                ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
+                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
   VdiGenerator generator(device(), comm::Communicator::world());
-  auto broken = dealt.mine;
+  auto broken = decomposed.mine;
   if (world.rank() == world.size() - 1) {
     broken.emplace_back();  // no data, no dims
   }
   CHECK_THROWS_AS(generator.setBlocks(broken), Error);
-  CHECK_NOTHROW(generator.setBlocks(dealt.mine));
+  CHECK_NOTHROW(generator.setBlocks(decomposed.mine));
   GenerateSettings settings = test::smallSettings(16, 12);
   if (world.rank() == 0) settings.supersegments = 0;
   CHECK_THROWS_AS(generator.generate(test::oblique(), test::threeHues(1.0), settings), Error);
@@ -235,45 +236,45 @@ TEST_CASE("a rank that fails takes nobody down, and the next frame works") {
 
 TEST_CASE("the next step, while this one is shown: all ranks advance, or none does") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto dealtOf = [&](const char* field) {
-    return test::deal(field, {34, 30, 37}, {3, 2, 3}, Layout::Random, Joint::Gap, ScalarType::F32,
-                      world.rank(), world.size());
+  const auto decomposedOf = [&](const char* field) {
+    return test::decompose(field, {34, 30, 37}, {3, 2, 3}, Layout::Random, Joint::Gap, ScalarType::F32,
+                           world.rank(), world.size());
   };
-  const auto first = dealtOf("turbulence");
-  const auto second = dealtOf("shells");
+  const auto first = decomposedOf("turbulence");
+  const auto second = decomposedOf("shells");
   const GenerateSettings settings = test::smallSettings();
   const TransferFunction function = test::threeHues(0.8);
   VdiGenerator fresh(device(), comm::Communicator::world());
-  const auto truthOf = [&](const test::Dealt& dealt) {
-    fresh.setBlocks(dealt.mine);
+  const auto truthOf = [&](const test::Decomposed& decomposed) {
+    fresh.setBlocks(decomposed.mine);
     return fresh.renderVolume(test::oblique(), function, settings);
   };
   const auto firstTruth = truthOf(first);
   const auto secondTruth = truthOf(second);
   VdiGenerator generator(device(), comm::Communicator::world());
-  const auto demandShown = [&](const std::optional<Image>& truth) {
+  const auto requireShown = [&](const std::optional<Image>& truth) {
     const auto vdi = generator.generate(test::oblique(), function, settings);
     if (vdi) CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
   };
   generator.setBlocks(first.mine);
   generator.setNextBlocks(second.mine);
-  demandShown(firstTruth);
+  requireShown(firstTruth);
   auto broken = second.mine;
   if (world.rank() == world.size() - 1) broken.emplace_back();
   CHECK_THROWS_AS(generator.setNextBlocks(broken), Error);
   CHECK_THROWS_AS(generator.advance(), Error);
-  demandShown(firstTruth);
+  requireShown(firstTruth);
   generator.setNextBlocks(second.mine);
   generator.advance();
-  demandShown(secondTruth);
+  requireShown(secondTruth);
 }
 
 TEST_CASE("parameters that differ between ranks are refused on every rank") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto dealt = test::deal("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved, Joint::SharedPoints,
-                                ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
+                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
   VdiGenerator generator(device(), comm::Communicator::world());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   const GenerateSettings settings = test::smallSettings(16, 12);
   Camera camera = test::oblique();
   if (world.rank() == 1) camera.viewAngle += 1e-9;

@@ -153,8 +153,8 @@ namespace {
 
 /// All algorithms, budgets and precisions: at most the budget, and from V_O the volume's own picture. From
 /// the side: as much light as the volume's picture has, to a few per cent.
-void demandFaithful(VdiGenerator& generator, const Camera& camera, const TransferFunction& function,
-                    GenerateSettings settings) {
+void requireFaithful(VdiGenerator& generator, const Camera& camera, const TransferFunction& function,
+                     GenerateSettings settings) {
   const auto volume = generator.renderVolume(camera, function, settings);
   const auto side = generator.renderVolume(camera.azimuth(20.0), function, settings);
   CHECK(highestOpacity(*volume) > 0.2F);
@@ -215,19 +215,19 @@ TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's p
     bands.opacities.push_back({(i + 0.5) / 20.0, 0.3});
   }
   bands.unitDistance = 0.05;
-  demandFaithful(generator, test::oblique(), bands, settings);
+  requireFaithful(generator, test::oblique(), bands, settings);
   // As wide as a voxel's step.
-  demandFaithful(generator, test::oblique(), band(0.5, 0.5 / 69.0), settings);
+  requireFaithful(generator, test::oblique(), band(0.5, 0.5 / 69.0), settings);
 
   generator.setBlocks({cube(16, 1.0 / 15.0, [](const glm::ivec3&) { return 0.7F; })});
-  demandFaithful(generator, test::oblique(), test::threeHues(1.0), settings);
+  requireFaithful(generator, test::oblique(), test::threeHues(1.0), settings);
 
   generator.setBlocks(
       {cube(17, 1.0 / 16.0, [](const glm::ivec3& i) { return i == glm::ivec3(8) ? 1.0F : 0.0F; })});
   // At one sample a voxel it's chance whether volume rendering itself meets it from the side.
   GenerateSettings fine = test::smallSettings(160, 120, 6);
   fine.samplesPerVoxel = 4.0;
-  demandFaithful(generator, test::oblique(), band(1.0, 0.8), fine);
+  requireFaithful(generator, test::oblique(), band(1.0, 0.8), fine);
 }
 
 TEST_CASE("voxels 50 times as long as wide") {
@@ -240,18 +240,18 @@ TEST_CASE("voxels 50 times as long as wide") {
   generator.setBlocks({block});
   const Camera camera =
       Camera::framing({glm::dvec3(0.0), glm::dvec3(0.39, 0.39, 2.0)}, {-1.0, -0.4, -0.5}, {0.0, 1.0, 0.0});
-  demandFaithful(generator, camera, test::threeHues(1.0), test::smallSettings(64, 48, 10));
+  requireFaithful(generator, camera, test::threeHues(1.0), test::smallSettings(64, 48, 10));
 }
 
 TEST_CASE("one supersegment a list and 255, pictures of one pixel and of one row") {
-  const auto dealt = test::deal("turbulence", {30, 30, 30}, {2, 2, 2}, Layout::OnOneRank, Joint::SharedPoints,
-                                ScalarType::U8, 0, 1);
+  const auto decomposed = test::decompose("turbulence", {30, 30, 30}, {2, 2, 2}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
   VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(dealt.mine);
+  generator.setBlocks(decomposed.mine);
   const TransferFunction function = test::threeHues(80.0);
   for (const std::uint32_t budget : {1U, 255U}) {
     INFO(budget);
-    demandFaithful(generator, test::oblique(), function, test::smallSettings(48, 36, budget));
+    requireFaithful(generator, test::oblique(), function, test::smallSettings(48, 36, budget));
   }
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(5, 1), std::pair(1, 7)}) {
     INFO(width << " x " << height);

@@ -25,7 +25,7 @@ struct TimeStep {
 
 TimeStep timeStep(const char* field, const glm::ivec3& size, ScalarType type) {
   return {
-      test::deal(field, size, {2, 1, 2}, Layout::OnOneRank, Joint::SharedPoints, type, 0, 1).mine,
+      test::decompose(field, size, {2, 1, 2}, Layout::OnOneRank, Joint::SharedPoints, type, 0, 1).mine,
       type,
   };
 }

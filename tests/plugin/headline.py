@@ -11,16 +11,16 @@ import numpy as np
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from pvtest import *  # noqa: E402,F403
 
-VARIANTS = {  # name: (deal, kind, cell data, parallel scale)
+VARIANTS = {  # name: (layout, kind, cell data, parallel scale)
     "random": ("random", "float32", False, None),
     "cells": ("random", "float32", True, None),
     "uint16_parallel": ("random", "uint16", False, 0.75),
 }
 mode = sys.argv[1]
-for name, (deal, kind, as_cells, scale) in VARIANTS.items():
+for name, (layout, kind, as_cells, scale) in VARIANTS.items():
     association = "CELLS" if as_cells else "POINTS"
     high = {"float32": 1.0, "uint8": 200.0, "uint16": 60000.0}[kind]
-    source = blocks_source(deal, kind=kind, as_cells=as_cells)
+    source = blocks_source(layout, kind=kind, as_cells=as_cells)
     set_colors("scalars", 0, high)
     view = make_view([240, 180], [1.9, 1.4, 2.1], [0.5, 0.5, 0.5], scale)
     image = vdi_filter(source, view, association, "scalars", 0.05)

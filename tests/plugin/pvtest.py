@@ -17,7 +17,7 @@ simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=False, ns=simple.__dict__)
 
 OUTPUT = os.environ.get("VDI_TEST_OUTPUT", ".")
 
-# Runs on every rank. A layered field on the unit cube in BLOCKS^3 blocks, dealt out by DEAL ("random", "slabs",
+# Runs on every rank. A layered field on the unit cube in BLOCKS^3 blocks, dealt out by LAYOUT ("random", "slabs",
 # "interleaved"), as point data with shared points or cell data, of a numpy type; `self` is the Programmable Source.
 BLOCKS_SCRIPT = """
 import numpy as np
@@ -26,12 +26,12 @@ from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPartitionedDataSet
 from vtkmodules.vtkParallelCore import vtkMultiProcessController
 controller = vtkMultiProcessController.GetGlobalController()
 rank, ranks = controller.GetLocalProcessId(), controller.GetNumberOfProcesses()
-count, cells, deal, kind, as_cells = {count}, {cells}, "{deal}", "{kind}", {as_cells}
+count, cells, layout, kind, as_cells = {count}, {cells}, "{layout}", "{kind}", {as_cells}
 n = count * cells
 owners = np.random.RandomState(11).randint(0, ranks, count ** 3)
-if deal == "interleaved":
+if layout == "interleaved":
     owners = np.arange(count ** 3) % ranks
-elif deal == "slabs":
+elif layout == "slabs":
     owners = np.arange(count ** 3) * ranks // count ** 3
 output = self.GetPartitionedDataSetOutput() if hasattr(self, "GetPartitionedDataSetOutput") else self.GetOutputDataObject(0)
 mine = np.flatnonzero(owners == rank)
@@ -55,11 +55,11 @@ for number, image in enumerate(blocks):
 """
 
 
-def blocks_source(deal, count=4, cells=8, kind="float32", as_cells=False):
+def blocks_source(layout, count=4, cells=8, kind="float32", as_cells=False):
     """A multiblock data set whose blocks each rank makes by itself."""
     source = simple.ProgrammableSource()
     source.OutputDataSetType = "vtkMultiblockDataSet"
-    source.Script = BLOCKS_SCRIPT.format(count=count, cells=cells, deal=deal, kind=kind, as_cells=as_cells)
+    source.Script = BLOCKS_SCRIPT.format(count=count, cells=cells, layout=layout, kind=kind, as_cells=as_cells)
     source.UpdatePipeline()
     return source
 

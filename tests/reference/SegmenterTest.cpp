@@ -180,7 +180,7 @@ TEST_CASE("merging never joins what gaps keep apart") {
   CHECK(segmentByMerging(samples, {2, 1.0F, true}).size() == 4);  // as many as there are runs
 }
 
-TEST_CASE("a list that wasn't counted fits however wrong its allotment is, and loses no light") {
+TEST_CASE("a list that wasn't counted fits however wrong its interpolated tolerance is, and loses no light") {
   std::mt19937 generator(3);
   std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
   std::vector<Interval> samples;
@@ -191,25 +191,27 @@ TEST_CASE("a list that wasn't counted fits however wrong its allotment is, and l
     expected *= 1.0F - opacity;
   }
   const SegmentRules rules{100, 1.0F, false};
-  for (const std::uint32_t grains : {0U, 3U, 40U}) {
-    const Allotment neighbours[] = {{-1.0F, grains, grains + spareGrains}, {}};
-    const Allotment guessed = allotmentBetween(neighbours);
-    CHECK(guessed.room >= grains + uncountedSpareGrains);
+  for (const std::uint32_t preSegments : {0U, 3U, 40U}) {
+    const ListTolerance neighbours[] = {{-1.0F, preSegments, preSegments + sparePreSegments}, {}};
+    const ListTolerance guessed = interpolatedTolerance(neighbours);
+    CHECK(guessed.room >= preSegments + uncountedSparePreSegments);
     const auto list = segmentByMerging(samples, rules, guessed);
     CHECK(list.size() <= guessed.room);
     CHECK(list.size() >= guessed.room / 2);
     CHECK(transmittance(list) == Approx(expected).epsilon(1e-3));
   }
   // Between lists that hold nothing there's room for something small all the same.
-  const Allotment nothing[] = {{}, {}};
-  CHECK(segmentByMerging({samples.data(), 3}, rules, allotmentBetween(nothing)).size() >= 2);
-  CHECK(segmentByMerging(samples, rules, Allotment()).empty());  // known to be empty
+  const ListTolerance nothing[] = {{}, {}};
+  CHECK(segmentByMerging({samples.data(), 3}, rules, interpolatedTolerance(nothing)).size() >= 2);
+  CHECK(segmentByMerging(samples, rules, ListTolerance()).empty());  // known to be empty
 }
 
-TEST_CASE("an allotment between counted lists: the mean of their tolerances, room for the most grains") {
-  const Allotment counted[] = {{0.01F, 20, 24}, {0.04F, 30, 34}, {}, {0.02F, 10, 14}};
-  const Allotment between = allotmentBetween(counted);
+TEST_CASE(
+    "an interpolated tolerance between counted lists: the mean of their tolerances, room for the most "
+    "pre-segments") {
+  const ListTolerance counted[] = {{0.01F, 20, 24}, {0.04F, 30, 34}, {}, {0.02F, 10, 14}};
+  const ListTolerance between = interpolatedTolerance(counted);
   CHECK(between.tolerance == Approx(0.02F));
-  CHECK(between.grains == 30);
-  CHECK(between.room == 30 + uncountedSpareGrains + 7);
+  CHECK(between.preSegments == 30);
+  CHECK(between.room == 30 + uncountedSparePreSegments + 7);
 }

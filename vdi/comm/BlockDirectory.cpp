@@ -102,8 +102,8 @@ void BoxTree::build(std::size_t node) {
   Box all;
   for (std::size_t i = first; i < last; ++i) all.include(boxes_[order_[i]]);
   nodes_[node].bounds = all;
-  constexpr std::size_t mostInLeaf = 4;
-  if (last - first <= mostInLeaf) return;
+  constexpr std::size_t maxInLeaf = 4;
+  if (last - first <= maxInLeaf) return;
   const glm::dvec3 size = all.size();
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   const std::size_t middle = (first + last) / 2;

@@ -42,7 +42,7 @@ class ElementType {
   MPI_Datatype type_ = MPI_DATATYPE_NULL;
 };
 
-constexpr std::uint64_t mostElements = std::numeric_limits<int>::max();
+constexpr std::uint64_t maxElements = std::numeric_limits<int>::max();
 
 /// Counts and displacements as MPI takes them.
 struct Layout {
@@ -52,16 +52,16 @@ struct Layout {
 
   explicit Layout(std::span<const std::uint64_t> sizes) {
     for (const std::uint64_t size : sizes) {
-      starts.push_back(static_cast<int>(std::min(total, mostElements)));
-      counts.push_back(static_cast<int>(std::min(size, mostElements)));
+      starts.push_back(static_cast<int>(std::min(total, maxElements)));
+      counts.push_back(static_cast<int>(std::min(size, maxElements)));
       total += size;
     }
   }
-  void demandFits() const {
-    if (total <= mostElements) return;
+  void requireFits() const {
+    if (total <= maxElements) return;
     throw Error(
         ErrorCode::Communication,
-        fmt::format("{} elements for one rank in one exchange; MPI's counts end at {}", total, mostElements));
+        fmt::format("{} elements for one rank in one exchange; MPI's counts end at {}", total, maxElements));
   }
 };
 
@@ -124,7 +124,7 @@ struct Communicator::State {
 
   template <typename T>
   void allReduce(std::span<T> values, MPI_Datatype type, MPI_Op operation) const {
-    assert(values.size() <= mostElements);
+    assert(values.size() <= maxElements);
     if (serial()) return;
     check(
         MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), type, operation, comm()),
@@ -239,7 +239,7 @@ Gathered Communicator::allGather(std::span<const std::byte> bytes, std::size_t e
   std::optional<ElementType> type;
   Gathered result;
   together([&] {
-    layout.demandFits();
+    layout.requireFits();
     type.emplace(elementBytes);
     result = emptyGathered(layout, elementBytes);
   });
@@ -258,7 +258,7 @@ Gathered Communicator::gather(std::span<const std::byte> bytes, std::size_t elem
   std::optional<ElementType> type;
   Gathered result;
   together([&] {
-    layout.demandFits();
+    layout.requireFits();
     type.emplace(elementBytes);
     if (rank() == root) result = emptyGathered(layout, elementBytes);
   });
@@ -281,8 +281,8 @@ Gathered Communicator::allToAll(std::span<const std::byte> bytes, std::span<cons
   std::optional<ElementType> type;
   Gathered result;
   together([&] {
-    out.demandFits();
-    in.demandFits();
+    out.requireFits();
+    in.requireFits();
     type.emplace(elementBytes);
     result = emptyGathered(in, elementBytes);
   });
@@ -337,7 +337,7 @@ void Communicator::together(const std::function<void()>& work) const {
   agree(error);
 }
 
-void Communicator::demandEqual(std::uint64_t fingerprint, const std::string& what) const {
+void Communicator::requireEqual(std::uint64_t fingerprint, const std::string& what) const {
   // The largest of x and of ~x are x and ~x on every rank only if all have the same x.
   std::array<std::uint64_t, 2> extremes{fingerprint, ~fingerprint};
   allReduceMax(extremes);
@@ -346,7 +346,7 @@ void Communicator::demandEqual(std::uint64_t fingerprint, const std::string& wha
   }
 }
 
-void Communicator::demandEqual(std::span<const Fingerprint> fingerprints) const {
+void Communicator::requireEqual(std::span<const Fingerprint> fingerprints) const {
   std::vector<std::uint64_t> extremes;
   for (const Fingerprint& print : fingerprints) extremes.insert(extremes.end(), {print.value, ~print.value});
   allReduceMax(extremes);

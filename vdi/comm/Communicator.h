@@ -86,13 +86,13 @@ class Communicator {
   void together(const std::function<void()>& work) const;
   /// Collective: throws Error{InvalidArgument} on every rank if `fingerprint` differs between ranks; `what`
   /// says what was compared.
-  void demandEqual(std::uint64_t fingerprint, const std::string& what) const;
+  void requireEqual(std::uint64_t fingerprint, const std::string& what) const;
   struct Fingerprint {
     std::uint64_t value;
     const char* what;
   };
   /// The same of several at once.
-  void demandEqual(std::span<const Fingerprint> fingerprints) const;
+  void requireEqual(std::span<const Fingerprint> fingerprints) const;
 
  private:
   friend class Messages;

@@ -27,13 +27,13 @@ constexpr double reach = slabReach;
 constexpr double indexTolerance = 0.01;
 
 /// Per axis, for a mean over finer values; where there are more, these are taken among them.
-constexpr int mostParts = 16;
+constexpr int maxParts = 16;
 
 /// Closed gaps and `reach` are within that many layers of the stored values.
-constexpr int mostLayers = 3;
+constexpr int maxLayers = 3;
 
 glm::ivec3 indexOf(const glm::dvec3& index, const Block& block) {
-  const glm::dvec3 beyond(mostLayers);
+  const glm::dvec3 beyond(maxLayers);
   return glm::ivec3(glm::clamp(index, -beyond, glm::dvec3(block.dims) + beyond));
 }
 
@@ -406,7 +406,7 @@ class Exchange {
                     grid.block.origin, grid.block.spacing, where};
     if (grid.cells && finer) {
       const glm::dvec3 parts = glm::round(grid.block.spacing / donor.spacing);
-      request.parts = glm::ivec3(glm::clamp(parts, glm::dvec3(1.0), glm::dvec3(mostParts)));
+      request.parts = glm::ivec3(glm::clamp(parts, glm::dvec3(1.0), glm::dvec3(maxParts)));
     }
     request.trim();
     if (request.box.empty()) return;
@@ -477,12 +477,12 @@ class Exchange {
     forEachIndex(wanted.box, [&](const glm::ivec3& at) {
       glm::ivec3 best = glm::clamp(at, stored.lo, stored.hi - 1);
       if (!wanted.keep) {
-        int least = std::numeric_limits<int>::max();
+        int minimum = std::numeric_limits<int>::max();
         for (const IndexBox& given : grid.given) {
           const glm::ivec3 nearest = glm::clamp(at, given.lo, given.hi - 1);
           const glm::ivec3 apart = glm::abs(nearest - at);
-          if (apart.x + apart.y + apart.z >= least) continue;
-          least = apart.x + apart.y + apart.z;
+          if (apart.x + apart.y + apart.z >= minimum) continue;
+          minimum = apart.x + apart.y + apart.z;
           best = nearest;
         }
       }

@@ -6,7 +6,7 @@
 namespace vdi::comm {
 
 Scene globalScene(const Communicator& comm, const Scene& local) {
-  std::array<double, 7> least{
+  std::array<double, 7> minimum{
       local.bounds.lo.x,
       local.bounds.lo.y,
       local.bounds.lo.z,
@@ -14,11 +14,11 @@ Scene globalScene(const Communicator& comm, const Scene& local) {
       -local.bounds.hi.y,
       -local.bounds.hi.z,
       local.minSpacing > 0.0 ? local.minSpacing : std::numeric_limits<double>::infinity()};
-  comm.allReduceMin(least);
+  comm.allReduceMin(minimum);
   Scene scene;
-  scene.bounds.lo = {least[0], least[1], least[2]};
-  scene.bounds.hi = {-least[3], -least[4], -least[5]};
-  scene.minSpacing = least[6] < std::numeric_limits<double>::infinity() ? least[6] : 0.0;
+  scene.bounds.lo = {minimum[0], minimum[1], minimum[2]};
+  scene.bounds.hi = {-minimum[3], -minimum[4], -minimum[5]};
+  scene.minSpacing = minimum[6] < std::numeric_limits<double>::infinity() ? minimum[6] : 0.0;
   return scene;
 }
 

@@ -60,10 +60,10 @@ template <typename T>
 ScalarRange finiteRangeOf(std::span<const T> values) {
   using Limits = std::numeric_limits<T>;
   constexpr std::size_t lanes = 64 / sizeof(T);
-  std::array<T, lanes> least;
-  std::array<T, lanes> most;
-  least.fill(Limits::max());
-  most.fill(Limits::lowest());
+  std::array<T, lanes> minimum;
+  std::array<T, lanes> maximum;
+  minimum.fill(Limits::max());
+  maximum.fill(Limits::lowest());
   const auto include = [&](std::size_t lane, T value) {
     T low = value;
     T high = value;
@@ -72,16 +72,16 @@ ScalarRange finiteRangeOf(std::span<const T> values) {
       low = finite ? value : Limits::max();
       high = finite ? value : Limits::lowest();
     }
-    least[lane] = low < least[lane] ? low : least[lane];
-    most[lane] = high > most[lane] ? high : most[lane];
+    minimum[lane] = low < minimum[lane] ? low : minimum[lane];
+    maximum[lane] = high > maximum[lane] ? high : maximum[lane];
   };
   std::size_t i = 0;
   for (; i + lanes <= values.size(); i += lanes) {
     for (std::size_t lane = 0; lane < lanes; ++lane) include(lane, values[i + lane]);
   }
   for (; i < values.size(); ++i) include(0, values[i]);
-  const T low = *std::min_element(least.begin(), least.end());
-  const T high = *std::max_element(most.begin(), most.end());
+  const T low = *std::min_element(minimum.begin(), minimum.end());
+  const T high = *std::max_element(maximum.begin(), maximum.end());
   if (high < low) return {};  // no finite value
   return {static_cast<double>(low), static_cast<double>(high)};
 }
@@ -154,10 +154,10 @@ namespace {
 
 ScalarRange finiteRangeOf(ScalarType type, const void* data, std::size_t count) {
   return withTyped(type, data, [count](const auto* values) {
-    constexpr std::size_t least = 1 << 19;
+    constexpr std::size_t minimum = 1 << 19;
     std::mutex mutex;
     ScalarRange range;
-    inParallel(count, least, [&](std::size_t first, std::size_t last) {
+    inParallel(count, minimum, [&](std::size_t first, std::size_t last) {
       const ScalarRange part = finiteRangeOf(std::span(values + first, last - first));
       const std::lock_guard lock(mutex);
       range.include(part);
@@ -184,7 +184,7 @@ ValueLimits limitsOf(ScalarType type) {
 ValueSizes valueSizesOf(std::span<const Block> blocks) {
   ValueSizes sizes;
   for (const Block& block : blocks) {
-    const double least = limitsOf(block.type).least;
+    const double minimum = limitsOf(block.type).minimum;
     withTyped(block.type, block.data, [&](const auto* values) {
       using T = std::remove_cvref_t<decltype(*values)>;
       const std::size_t count = block.valueCount();
@@ -197,8 +197,8 @@ ValueSizes valueSizesOf(std::span<const Block> blocks) {
           bool tooSmall = false;
           for (std::size_t i = first; i < std::min(first + atOnce, count); ++i) {
             const T size = std::abs(values[i]);
-            usable |= size >= static_cast<T>(least) && size <= std::numeric_limits<T>::max();
-            tooSmall |= size > T{0} && size < static_cast<T>(least);
+            usable |= size >= static_cast<T>(minimum) && size <= std::numeric_limits<T>::max();
+            tooSmall |= size > T{0} && size < static_cast<T>(minimum);
           }
           sizes.usable |= usable;
           sizes.tooSmall |= tooSmall;
@@ -221,13 +221,13 @@ void validate(std::span<const Block> blocks) {
                   context);
     }
     // What's computed in single precision keeps a distance from its limits.
-    constexpr double leastSpacing = 1e-30;
-    constexpr double mostSpacing = 1e30;
-    if (!finite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(leastSpacing))) ||
-        glm::any(glm::greaterThan(block.spacing, glm::dvec3(mostSpacing)))) {
+    constexpr double minSpacing = 1e-30;
+    constexpr double maxSpacing = 1e30;
+    if (!finite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(minSpacing))) ||
+        glm::any(glm::greaterThan(block.spacing, glm::dvec3(maxSpacing)))) {
       throw Error(ErrorCode::InvalidArgument,
                   fmt::format("spacing must be from {} to {}, it is ({}, {}, {}); other units of length help",
-                              leastSpacing, mostSpacing, block.spacing.x, block.spacing.y, block.spacing.z),
+                              minSpacing, maxSpacing, block.spacing.x, block.spacing.y, block.spacing.z),
                   context);
     }
     const bool ownsNothing = block.owned.empty();

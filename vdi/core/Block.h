@@ -110,11 +110,11 @@ struct ScalarRange {
 };
 ScalarRange finiteRange(const Block& block);  // stored values' and patches', by several threads
 
-/// Values smaller than `least` in size are lost where all are so small, larger ones than `most`
+/// Values smaller than `minimum` in size are lost where all are so small, larger ones than `maximum`
 /// overflow on the way to the device. For f32 and f64; the other types have no such values.
 struct ValueLimits {
-  double least = 0.0;
-  double most = std::numeric_limits<double>::infinity();
+  double minimum = 0.0;
+  double maximum = std::numeric_limits<double>::infinity();
 };
 ValueLimits limitsOf(ScalarType type);
 

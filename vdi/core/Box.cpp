@@ -52,7 +52,7 @@ std::vector<IndexBox> coverWithBoxes(const glm::ivec3& size, std::vector<bool> o
 namespace {
 
 /// The holes' faces cut the box into a lattice of cells, of which each is whole in or out.
-constexpr std::size_t mostCells = std::size_t{1} << 22;
+constexpr std::size_t maxCells = std::size_t{1} << 22;
 
 std::vector<Box> cut(const Box& box, const std::vector<Box>& holes) {
   std::array<std::vector<double>, 3> faces;
@@ -71,7 +71,7 @@ std::vector<Box> cut(const Box& box, const std::vector<Box>& holes) {
                      glm::ivec3(faces[0].size() - 1, faces[1].size() - 1, faces[2].size() - 1)};
   const auto largest = std::max_element(faces.begin(), faces.end(),
                                         [](const auto& a, const auto& b) { return a.size() < b.size(); });
-  if (all.count() > mostCells) {  // too many for one lattice: two halves
+  if (all.count() > maxCells) {  // too many for one lattice: two halves
     const auto axis = static_cast<int>(largest - faces.begin());
     std::vector<Box> parts;
     for (const bool upper : {false, true}) {

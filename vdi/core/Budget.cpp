@@ -18,7 +18,7 @@ Budget budgetFromString(const std::string& name) {
   return namedValue(name, "budget", budgetNames);
 }
 
-float Survey::levelFor(double fill) const {
+float SupersegmentHistogram::levelFor(double fill) const {
   const double wanted = fill * static_cast<double>(equally);
   for (std::size_t level = 0; level + 1 < levels; ++level) {
     const auto here = static_cast<double>(supersegments[level]);

@@ -11,7 +11,7 @@ namespace vdi {
 
 enum class Budget : std::uint32_t {
   List = 0,  // up to N_S each, as in the paper
-  /// In all as many as with N_S each: lists where much changes get more, up to mostPerList, others less.
+  /// In all as many as with N_S each: lists where much changes get more, up to maxPerList, others less.
   Total = 1,
 };
 
@@ -19,23 +19,23 @@ const char* toString(Budget budget);  // "list", "total"
 /// Throws Error{InvalidArgument} that lists the names there are.
 Budget budgetFromString(const std::string& name);
 
-constexpr std::uint32_t mostSupersegments = 1024;  // of a list
+constexpr std::uint32_t maxSupersegments = 1024;  // of a list
 
 /// What a list may hold. Twice N_S is enough: four times gave no better pictures.
-constexpr std::uint32_t mostPerList(std::uint32_t supersegments, Budget budget) {
-  return budget == Budget::List ? supersegments : std::min(2 * supersegments, mostSupersegments);
+constexpr std::uint32_t maxPerList(std::uint32_t supersegments, Budget budget) {
+  return budget == Budget::List ? supersegments : std::min(2 * supersegments, maxSupersegments);
 }
 
 /// What lists need, counted before Budget::Total hands out: how many supersegments all of them would have at
 /// each of several levels of coarseness. Level 0 keeps every sample, the last one leaves one supersegment a
-/// list, and those between are the tolerances of merging (vdi/reference/Segmenter.h). Surveys of parts of a
-/// picture add up.
-struct Survey {
+/// list, and those between are the tolerances of merging (vdi/reference/Segmenter.h). Histograms of parts of
+/// a picture add up.
+struct SupersegmentHistogram {
   static constexpr std::size_t levels = 10;
-  std::array<std::uint64_t, levels> supersegments{};  // lists held to mostPerList
+  std::array<std::uint64_t, levels> supersegments{};  // lists held to maxPerList
   std::uint64_t equally = 0;                          // with at most N_S in each list
-  bool operator==(const Survey&) const = default;
-  Survey& operator+=(const Survey& other) {
+  bool operator==(const SupersegmentHistogram&) const = default;
+  SupersegmentHistogram& operator+=(const SupersegmentHistogram& other) {
     for (std::size_t level = 0; level < levels; ++level) supersegments[level] += other.supersegments[level];
     equally += other.equally;
     return *this;
@@ -52,10 +52,11 @@ constexpr float roundingOf(std::uint32_t index) {
   return static_cast<float>((index * 0x9E3779B1U) >> 8U) * 0x1p-24F;
 }
 
-/// What a list gets at a level in [0, Survey::levels - 1]; `countAt(k)` says what it would hold at level k.
+/// What a list gets at a level in [0, SupersegmentHistogram::levels - 1]; `countAt(k)` says what it would
+/// hold at level k.
 template <typename CountAt>
 std::uint32_t supersegmentsAt(float level, float rounding, CountAt countAt) {
-  const auto below = std::min(static_cast<std::size_t>(level), Survey::levels - 2);
+  const auto below = std::min(static_cast<std::size_t>(level), SupersegmentHistogram::levels - 2);
   const float share = level - static_cast<float>(below);
   const auto a = static_cast<float>(countAt(below));
   const auto b = static_cast<float>(countAt(below + 1));

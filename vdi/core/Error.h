@@ -15,7 +15,7 @@ enum class ErrorCode {
   OutOfMemory,        // the device or the host can't hold what was asked for; the message has the figure
   DeviceFailure,      // a Vulkan call failed
   Io,                 // a file can't be opened, read or written
-  Format,             // the bytes of a file or message aren't what the format demands
+  Format,             // the bytes of a file or message aren't what the format requires
   Communication,      // an MPI call failed
   RemoteRank,         // this rank is well, another one failed; the message carries the other rank's text
   Cancelled,          // the progress callback asked to stop

@@ -26,18 +26,18 @@ Algorithm algorithmFromString(const std::string& name) {
 }
 
 void validate(const GenerateSettings& settings) {
-  const auto demand = [](bool good, const char* field, auto value, const char* range) {
+  const auto require = [](bool good, const char* field, auto value, const char* range) {
     if (!good)
       throw Error(ErrorCode::InvalidArgument,
                   fmt::format("{} must lie in {}, it is {}", field, range, value));
   };
-  demand(settings.width >= 1 && settings.width <= 32768, "width", settings.width, "[1, 32768]");
-  demand(settings.height >= 1 && settings.height <= 32768, "height", settings.height, "[1, 32768]");
-  demand(settings.supersegments >= 1 && settings.supersegments <= mostSupersegments, "supersegments",
-         settings.supersegments, "[1, 1024]");
-  demand(settings.samplesPerVoxel >= 1.0 / 64.0 && settings.samplesPerVoxel <= 64.0, "samples per voxel",
-         settings.samplesPerVoxel, "[1/64, 64]");
-  demand(settings.fill > 0.0 && settings.fill <= 1.0, "fill", settings.fill, "(0, 1]");
+  require(settings.width >= 1 && settings.width <= 32768, "width", settings.width, "[1, 32768]");
+  require(settings.height >= 1 && settings.height <= 32768, "height", settings.height, "[1, 32768]");
+  require(settings.supersegments >= 1 && settings.supersegments <= maxSupersegments, "supersegments",
+          settings.supersegments, "[1, 1024]");
+  require(settings.samplesPerVoxel >= 1.0 / 64.0 && settings.samplesPerVoxel <= 64.0, "samples per voxel",
+          settings.samplesPerVoxel, "[1/64, 64]");
+  require(settings.fill > 0.0 && settings.fill <= 1.0, "fill", settings.fill, "(0, 1]");
   if (settings.budget == Budget::List && settings.fill != 1.0) {
     throw Error(ErrorCode::InvalidArgument,
                 fmt::format("a fill of {} needs the total budget", settings.fill));
@@ -45,8 +45,8 @@ void validate(const GenerateSettings& settings) {
   if (settings.budget == Budget::Total && settings.algorithm != Algorithm::Merge) {
     throw Error(ErrorCode::InvalidArgument, "the total budget needs the merge algorithm");
   }
-  demand(settings.terminationOpacity > 0.0 && settings.terminationOpacity <= 1.0, "termination opacity",
-         settings.terminationOpacity, "(0, 1]");
+  require(settings.terminationOpacity > 0.0 && settings.terminationOpacity <= 1.0, "termination opacity",
+          settings.terminationOpacity, "(0, 1]");
 }
 
 float terminationOpticalDepth(const GenerateSettings& settings) {

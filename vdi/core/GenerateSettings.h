@@ -25,7 +25,7 @@ constexpr double pictureTermination = 0.9999;
 struct GenerateSettings {
   int width = 1280;
   int height = 720;
-  std::uint32_t supersegments = 25;  // N_S, 1 .. mostSupersegments
+  std::uint32_t supersegments = 25;  // N_S, 1 .. maxSupersegments
   /// Total: N_S is what lists have on average, where they have that many samples; needs Algorithm::Merge.
   Budget budget = Budget::List;
   double fill = 1.0;             // (0, 1]; with Budget::Total, share of what N_S each would give that's made

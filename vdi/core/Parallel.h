@@ -16,13 +16,14 @@ namespace vdi {
 std::size_t usableCores();
 
 /// Calls work(first, last) for ranges that make up [0, count), from several threads at once where each has at
-/// least `least` elements. `least` is what takes some 100 us: a thread takes half of that to start. Returns
-/// when all is done; an exception of `work` comes out here. Where no thread can be had, the calling one does
-/// its part.
+/// least `minimum` elements. `minimum` is what takes some 100 us: a thread takes half of that to start.
+/// Returns when all is done; an exception of `work` comes out here. Where no thread can be had, the calling
+/// one does its part.
 template <typename Work>
-void inParallel(std::size_t count, std::size_t least, Work work) {
-  constexpr std::size_t mostThreads = 16;
-  const std::size_t threads = std::clamp<std::size_t>(count / least, 1, std::min(usableCores(), mostThreads));
+void inParallel(std::size_t count, std::size_t minimum, Work work) {
+  constexpr std::size_t maxThreads = 16;
+  const std::size_t threads =
+      std::clamp<std::size_t>(count / minimum, 1, std::min(usableCores(), maxThreads));
   const std::size_t share = (count + threads - 1) / threads;
   std::vector<std::future<void>> others;
   for (std::size_t first = share; first < count; first += share) {

@@ -50,12 +50,12 @@ glm::dvec4 accumulated(const glm::dvec4& mean, double length) {
 glm::dvec4 integrate(const Integral& integral, double front, double back, double length) {
   constexpr double thin = 0.1;     // optical depth that hides nothing behind it
   constexpr double opaque = 16.0;  // that lets nothing through
-  constexpr int mostParts = 64;
+  constexpr int maxParts = 64;
   const double span = back - front;
   const glm::dvec4 start = integral.at(front);
   const glm::dvec4 mean = (integral.at(back) - start) / span;
   if (mean.a * length <= thin) return accumulated(mean, length);
-  const int parts = std::clamp(static_cast<int>(std::abs(span)), 1, mostParts);
+  const int parts = std::clamp(static_cast<int>(std::abs(span)), 1, maxParts);
   glm::dvec4 sum(0.0);
   glm::dvec4 before = start;
   for (int part = 1; part <= parts && sum.a < 1.0 - std::exp2(-opaque); ++part) {

@@ -18,7 +18,7 @@ struct Vdi {
   Camera camera;  // V_O
   int width = 0;
   int height = 0;
-  std::uint32_t budget = 0;  // the most that a list may hold: N_S, or mostPerList
+  std::uint32_t budget = 0;  // the most that a list may hold: N_S, or maxPerList
   Box bounds;                // of the scene, world
   double sampleStep = 0.0;   // depth interval of one sample (DepthLattice::step)
   double time = 0.0;         // simulation time, 0 when unknown

@@ -30,8 +30,8 @@ ComputePipelineInfo sharingPipelineInfo() {
 }
 
 /// One for each tolerance; a power of 2.
-constexpr std::uint32_t mostRayShares = 8;
-static_assert(shared::castGroupX % mostRayShares == 0);
+constexpr std::uint32_t maxLanesPerRay = 8;
+static_assert(shared::castGroupX % maxLanesPerRay == 0);
 
 }  // namespace
 
@@ -68,19 +68,19 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
 
 CastPass::CastPass(const std::shared_ptr<Device>& device)
     : samplesAhead_(device->runsGpuPrograms() ? 4 : 1),
-      rayShares_(device->runsGpuPrograms() ? std::clamp(device->limits().subgroupSize, 1U, mostRayShares)
-                                           : 1),
+      lanesPerRay_(device->runsGpuPrograms() ? std::clamp(device->limits().subgroupSize, 1U, maxLanesPerRay)
+                                             : 1),
       sampler_(device),
       pipelines_(device, pipelineInfo()),
-      sharingPipelines_(pipelines_, sharingPipelineInfo()) {}
+      lanePipelines_(pipelines_, sharingPipelineInfo()) {}
 
 ComputePipeline& CastPass::pipelineFor(const Program& program) {
   const std::size_t pageCount = volume_->pages().size();
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
-  PipelineSet& pipelines = program.rayShares > 1 ? sharingPipelines_ : pipelines_;
+  PipelineSet& pipelines = program.lanesPerRay > 1 ? lanePipelines_ : pipelines_;
   ComputePipeline& pipeline = pipelines.with(
       {program.program, static_cast<std::uint32_t>(pageCount), program.compact, program.samplesAhead,
-       program.rayShares, program.cutAtGaps ? 1U : 0U, program.byNeed ? 1U : 0U,
+       program.lanesPerRay, program.cutAtGaps ? 1U : 0U, program.byNeed ? 1U : 0U,
        volume_->mayBeInfinite() ? 1U : 0U, volume_->reachesBeyondTable() ? 1U : 0U});
   const Bound now{volume_->pagesVersion(), volume_->slabsVersion()};
   Bound& bound = bound_[&pipeline];
@@ -99,26 +99,26 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   assert(volume_ != nullptr && band.firstRow < band.lastRow);
   const bool writes = work == Work::Write;
   const std::uint32_t program = work == Work::Volume                ? shared::castProgramVolume
-                                : work == Work::Survey              ? shared::castProgramSurvey
+                                : work == Work::Histogram           ? shared::castProgramHistogram
                                 : work == Work::CountLevels         ? shared::castProgramCountLevels
                                 : algorithm == Algorithm::Bisection ? shared::castProgramSearch
-                                : writes                            ? shared::castProgramWriteGrains
-                                                                    : shared::castProgramCountGrains;
+                                : writes                            ? shared::castProgramWritePreSegments
+                                                                    : shared::castProgramCountPreSegments;
   // Just the search stores supersegments itself.
   const std::uint32_t compact = program == shared::castProgramSearch ? isCompact(band.form) : 0;
   const shared::CastConstants constants{writes ? shared::castModeWrite : shared::castModeSearch,
                                         band.firstRow, band.lastRow};
-  const bool counts = program == shared::castProgramCountGrains || program == shared::castProgramSurvey ||
-                      program == shared::castProgramCountLevels;
+  const bool counts = program == shared::castProgramCountPreSegments ||
+                      program == shared::castProgramHistogram || program == shared::castProgramCountLevels;
   const std::uint32_t stride = counts ? band.countedStride : 1;
   // The row behind the band is counted too.
   const std::uint32_t rows = (band.lastRow - band.firstRow + stride - 1) / stride + (stride > 1 ? 1 : 0);
-  const std::uint32_t shares = stride > 1 ? rayShares_ : 1;
-  const std::uint32_t width = (band.width + stride - 1) / stride * shares;
+  const std::uint32_t lanes = stride > 1 ? lanesPerRay_ : 1;
+  const std::uint32_t width = (band.width + stride - 1) / stride * lanes;
   pipelines_.update(commands, params);
   // Counted samples may lie apart.
   const std::uint32_t ahead = stride > 1 ? 1 : samplesAhead_;
-  commands.dispatch(pipelineFor({program, compact, shares, ahead, band.cutAtGaps, params.level >= 0.0F}),
+  commands.dispatch(pipelineFor({program, compact, lanes, ahead, band.cutAtGaps, params.level >= 0.0F}),
                     constants, groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
 }
 

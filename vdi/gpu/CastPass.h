@@ -34,10 +34,10 @@ class CastPass {
   /// recorded.
   void bind(const VolumeStore& volume) { volume_ = &volume; }
 
-  /// What a dispatch does: the picture; or what lists need (merging); or what this rank tells others of its lists
-  /// (merging); or the first step of an algorithm (sensitivities or tolerances, and counts), or its second one
-  /// (supersegments or grains).
-  enum class Work { Volume, Survey, CountLevels, Search, Write };
+  /// What a dispatch does: the picture; or what lists need (merging); or what this rank tells others of its
+  /// lists (merging); or the first step of an algorithm (sensitivities or tolerances, and counts), or its
+  /// second one (supersegments or pre-segments).
+  enum class Work { Volume, Histogram, CountLevels, Count, Write };
   struct Band {
     std::uint32_t width = 0;
     std::uint32_t firstRow = 0;
@@ -55,7 +55,7 @@ class CastPass {
   struct Program {
     std::uint32_t program = 0;  // shared::castProgram...
     std::uint32_t compact = 0;
-    std::uint32_t rayShares = 1;
+    std::uint32_t lanesPerRay = 1;
     std::uint32_t samplesAhead = 1;
     bool cutAtGaps = false;
     bool byNeed = false;
@@ -69,10 +69,10 @@ class CastPass {
   };
 
   std::uint32_t samplesAhead_;
-  std::uint32_t rayShares_;  // where few rays are cast
+  std::uint32_t lanesPerRay_;  // where few rays are cast
   Sampler sampler_;
   PipelineSet pipelines_;
-  PipelineSet sharingPipelines_;
+  PipelineSet lanePipelines_;
   std::map<const ComputePipeline*, Bound> bound_;
   const VolumeStore* volume_ = nullptr;
 };

@@ -20,10 +20,10 @@ CompositePass::CompositePass(std::shared_ptr<Device> device)
 void CompositePass::record(Commands& commands, const shared::CompositeParams& params, Work work,
                            Algorithm algorithm) {
   const bool write = work == Work::Write;
-  const std::uint32_t program = work == Work::Survey                ? shared::compositeProgramSurvey
+  const std::uint32_t program = work == Work::Histogram             ? shared::compositeProgramHistogram
                                 : algorithm == Algorithm::Bisection ? shared::compositeProgramSearch
-                                : write                             ? shared::compositeProgramWriteGrains
-                                                                    : shared::compositeProgramCountGrains;
+                                : write                             ? shared::compositeProgramWritePreSegments
+                                        : shared::compositeProgramCountPreSegments;
   const std::uint32_t mode = write ? shared::compositeModeWrite : shared::compositeModeSearch;
   pipelines_.update(commands, params);
   commands.dispatch(pipelines_.with({program, params.level >= 0.0F ? 1U : 0U, isCompact(params.form)}),

@@ -1,4 +1,4 @@
-// Dispatches composite.comp: merged lists segmented again, to the budget.
+// Dispatches composite.comp: interleaved lists segmented again, to the budget.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ class CompositePass {
   explicit CompositePass(std::shared_ptr<Device> device);
   /// What a dispatch does: what lists need (merging); or the first step of the algorithm, or, after a scan,
   /// its second one.
-  enum class Work { Survey, Search, Write };
+  enum class Work { Histogram, Count, Write };
   void record(Commands& commands, const shared::CompositeParams& params, Work work, Algorithm algorithm);
 
  private:

@@ -18,9 +18,9 @@ DeviceCandidate choose(const Instance& instance, const DeviceRequest& request) {
   const std::vector<DeviceCandidate> candidates = instance.candidates();
   DeviceCandidate chosen = candidates[chooseDevice(summariesOf(candidates), request)];
   if (!request.importsHostMemory) chosen.limits.hostPointerAlignment = 0;
-  if (request.mostImageDimension3D > 0) {
+  if (request.maxImageDimension3D > 0) {
     chosen.limits.maxImageDimension3D =
-        std::min(chosen.limits.maxImageDimension3D, request.mostImageDimension3D);
+        std::min(chosen.limits.maxImageDimension3D, request.maxImageDimension3D);
   }
   return chosen;
 }

@@ -16,7 +16,7 @@ struct DeviceRequest {
   /// Device::runsGpuPrograms.
   bool gpuPrograms = false;
   /// A smaller limit than the device's own, so that what is cut to fit can be tested; 0: the device's.
-  std::uint32_t mostImageDimension3D = 0;
+  std::uint32_t maxImageDimension3D = 0;
   /// False: as a device that can't import the process's memory, so that what goes without it can be tested.
   bool importsHostMemory = true;
 };

@@ -33,8 +33,8 @@ double mebibytes(std::uint64_t bytes) {
       device.name());
 }
 
-void demandRoom(VkResult result, const char* call, const Device& device, std::uint64_t bytes,
-                const char* what) {
+void requireRoom(VkResult result, const char* call, const Device& device, std::uint64_t bytes,
+                 const char* what) {
   if (result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY)
     throwOutOfMemory(device, bytes, what);
   check(result, call);
@@ -44,8 +44,8 @@ VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::
                         const void* chain, const char* what) {
   const VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, chain, needs.size, type};
   VkDeviceMemory memory = VK_NULL_HANDLE;
-  demandRoom(vkAllocateMemory(device.vulkan().handle(), &info, nullptr, &memory), "vkAllocateMemory", device,
-             needs.size, what);
+  requireRoom(vkAllocateMemory(device.vulkan().handle(), &info, nullptr, &memory), "vkAllocateMemory", device,
+              needs.size, what);
   device.accountAllocation(static_cast<std::int64_t>(needs.size));
   return memory;
 }
@@ -111,8 +111,8 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
                                   VK_SHARING_MODE_EXCLUSIVE,
                                   0,
                                   nullptr};
-    demandRoom(vkCreateBuffer(device_->vulkan().handle(), &info, nullptr, &buffer_), "vkCreateBuffer",
-               *device_, words, "buffer");
+    requireRoom(vkCreateBuffer(device_->vulkan().handle(), &info, nullptr, &buffer_), "vkCreateBuffer",
+                *device_, words, "buffer");
     VkMemoryRequirements needs;
     vkGetBufferMemoryRequirements(device_->vulkan().handle(), buffer_, &needs);
     const VkMemoryAllocateFlagsInfo flags{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO, nullptr,
@@ -120,8 +120,8 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
     memory_ =
         allocate(*device_, needs, memoryTypeFor(*device_, needs.memoryTypeBits, kind), &flags, "buffer");
     allocated_ = needs.size;
-    demandRoom(vkBindBufferMemory(device_->vulkan().handle(), buffer_, memory_, 0), "vkBindBufferMemory",
-               *device_, words, "buffer");
+    requireRoom(vkBindBufferMemory(device_->vulkan().handle(), buffer_, memory_, 0), "vkBindBufferMemory",
+                *device_, words, "buffer");
     const VkBufferDeviceAddressInfo addressInfo{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, nullptr,
                                                 buffer_};
     address_ = vkGetBufferDeviceAddress(device_->vulkan().handle(), &addressInfo);
@@ -210,11 +210,12 @@ bool Buffer::reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes,
   assert(buffer_ == VK_NULL_HANDLE || (kind == MemoryKind::DeviceLocal) == mapped_.empty());
   if (buffer_ != VK_NULL_HANDLE && size_ >= bytes) return false;
   const bool grows = buffer_ != VK_NULL_HANDLE;
-  const std::uint64_t most = std::min(device->limits().maxAllocationBytes, device->limits().maxBufferBytes);
+  const std::uint64_t maximum =
+      std::min(device->limits().maxAllocationBytes, device->limits().maxBufferBytes);
   release();  // first, so that both needn't fit at once
-  if (grows && bytes < most) {
+  if (grows && bytes < maximum) {
     try {
-      *this = Buffer(device, std::min(bytes + bytes / 2, most), kind);
+      *this = Buffer(device, std::min(bytes + bytes / 2, maximum), kind);
       return true;
     } catch (const Error& error) {
       if (error.code() != ErrorCode::OutOfMemory) throw;
@@ -278,16 +279,16 @@ SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& ext
                                  shared ? 2U : 0U,
                                  families.data(),
                                  VK_IMAGE_LAYOUT_UNDEFINED};
-    demandRoom(vkCreateImage(device_->vulkan().handle(), &info, nullptr, &image_), "vkCreateImage", *device_,
-               bytes, "texture");
+    requireRoom(vkCreateImage(device_->vulkan().handle(), &info, nullptr, &image_), "vkCreateImage", *device_,
+                bytes, "texture");
     VkMemoryRequirements needs;
     vkGetImageMemoryRequirements(device_->vulkan().handle(), image_, &needs);
     memory_ =
         allocate(*device_, needs, memoryTypeFor(*device_, needs.memoryTypeBits, MemoryKind::DeviceLocal),
                  nullptr, "texture");
     allocated_ = needs.size;
-    demandRoom(vkBindImageMemory(device_->vulkan().handle(), image_, memory_, 0), "vkBindImageMemory",
-               *device_, bytes, "texture");
+    requireRoom(vkBindImageMemory(device_->vulkan().handle(), image_, memory_, 0), "vkBindImageMemory",
+                *device_, bytes, "texture");
     const VkImageViewCreateInfo viewInfo{
         VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO, nullptr, 0, image_, viewType, format, {},
         {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1}};

@@ -17,66 +17,66 @@ ComputePipelineInfo pipelineInfo(std::string_view shader) {
   return info;
 }
 
-ComputePipelineInfo teamInfo() {
-  ComputePipelineInfo info = pipelineInfo("reduce_team");
+ComputePipelineInfo subgroupInfo() {
+  ComputePipelineInfo info = pipelineInfo("reduce_subgroup");
   info.wholeSubgroups = true;
   return info;
 }
 
 /// Of shared memory, which every device has.
 constexpr std::uint32_t sharedBytes = 16384;
-/// What a grain takes of it in reduce_team.comp.
-constexpr std::uint32_t grainBytes = 48;
+/// What a pre-segment takes of it in reduce_subgroup.comp.
+constexpr std::uint32_t preSegmentBytes = 48;
 
 /// What a list takes, as far as there's room for that.
-std::uint32_t teamCapacity(std::uint64_t grains) {
+std::uint32_t subgroupCapacity(std::uint64_t preSegments) {
   constexpr std::uint64_t unit = 16;
-  constexpr std::uint64_t largest = sharedBytes / grainBytes / unit * unit;
-  return static_cast<std::uint32_t>(std::min((grains + unit - 1) / unit * unit, largest));
+  constexpr std::uint64_t largest = sharedBytes / preSegmentBytes / unit * unit;
+  return static_cast<std::uint32_t>(std::min((preSegments + unit - 1) / unit * unit, largest));
 }
 
 }  // namespace
 
 ReducePass::ReducePass(const std::shared_ptr<Device>& device)
-    : ReducePass(device,
-                 device->runsGpuPrograms() && device->limits().subgroupSize > 0 ? Teams::Yes : Teams::No) {}
+    : ReducePass(device, device->runsGpuPrograms() && device->limits().subgroupSize > 0 ? Subgroups::Yes
+                                                                                        : Subgroups::No) {}
 
-ReducePass::ReducePass(std::shared_ptr<Device> device, Teams teams)
+ReducePass::ReducePass(std::shared_ptr<Device> device, Subgroups subgroups)
     : device_(std::move(device)),
-      teams_(teams),
-      find_(device_, pipelineInfo("queue")),
-      team_(device_, teamInfo()),
+      subgroups_(subgroups),
+      find_(device_, pipelineInfo("long_lists")),
+      subgroup_(device_, subgroupInfo()),
       alone_(device_, pipelineInfo("reduce")),
       store_(device_, pipelineInfo("store")),
-      queued_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal) {}
+      longListCount_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal) {}
 
-void ReducePass::record(Commands& commands, shared::ReduceConstants constants, const MostPerList& most) {
+void ReducePass::record(Commands& commands, shared::ReduceConstants constants, const MaxPerList& maxPerList) {
   bool alone = true;
-  if (teams_ == Teams::Yes) {
-    const std::uint64_t grains = shared::mostGrains(most.supersegments);
-    constants.teamCapacity = teamCapacity(grains);
-    alone = !most.always || grains > constants.teamCapacity;
-    recordTeams(commands, constants);
+  if (subgroups_ == Subgroups::Yes) {
+    const std::uint64_t preSegments = shared::maxPreSegments(maxPerList.supersegments);
+    constants.subgroupCapacity = subgroupCapacity(preSegments);
+    alone = !maxPerList.always || preSegments > constants.subgroupCapacity;
+    recordSubgroups(commands, constants);
   }
   if (alone) commands.dispatch(alone_, constants, groupsFor(constants.listCount, shared::reduceGroup));
   commands.barrier();
-  commands.dispatch(store_.with({0, 0, isCompact(constants.form), constants.fitting != 0 ? 1U : 0U}), constants,
-                    groupsFor(constants.listCount, shared::storeGroup));
+  commands.dispatch(store_.with({0, 0, isCompact(constants.form), constants.fitting != 0 ? 1U : 0U}),
+                    constants, groupsFor(constants.listCount, shared::storeGroup));
 }
 
-void ReducePass::recordTeams(Commands& commands, shared::ReduceConstants& constants) {
-  queue_.reserve(device_, std::uint64_t{constants.listCount} * sizeof(std::uint32_t),
-                 MemoryKind::DeviceLocal);
-  constants.queue = queue_.address();
-  constants.queued = queued_.address();
+void ReducePass::recordSubgroups(Commands& commands, shared::ReduceConstants& constants) {
+  longLists_.reserve(device_, std::uint64_t{constants.listCount} * sizeof(std::uint32_t),
+                     MemoryKind::DeviceLocal);
+  constants.longLists = longLists_.address();
+  constants.longListCount = longListCount_.address();
   const std::array<std::uint32_t, 1> none{};
-  commands.update(queued_, std::as_bytes(std::span(none)));
+  commands.update(longListCount_, std::as_bytes(std::span(none)));
   commands.barrier();
-  commands.dispatch(find_, constants, groupsFor(constants.listCount, shared::queueGroup));
+  commands.dispatch(find_, constants, groupsFor(constants.listCount, shared::longListsGroup));
   commands.barrier();
-  constexpr std::uint32_t mostTeams = 16384;  // enough for any device; each takes list after list
-  commands.dispatch(team_.with({device_->limits().subgroupSize, constants.teamCapacity}), constants,
-                    std::min(constants.listCount, mostTeams));
+  constexpr std::uint32_t maxSubgroups = 16384;  // enough for any device; each takes list after list
+  commands.dispatch(subgroup_.with({device_->limits().subgroupSize, constants.subgroupCapacity}), constants,
+                    std::min(constants.listCount, maxSubgroups));
 }
 
 }  // namespace vdi::gpu

@@ -1,5 +1,5 @@
-// Dispatches queue.comp, reduce_team.comp, reduce.comp and store.comp: grains merged, and stored as
-// supersegments.
+// Dispatches long_lists.comp, reduce_subgroup.comp, reduce.comp and store.comp: pre-segments merged, and
+// stored as supersegments.
 #pragma once
 
 #include <memory>
@@ -14,32 +14,32 @@ namespace vdi::gpu {
 
 class ReducePass {
  public:
-  /// Whether a team merges a list, where it has room for that, or a single invocation.
-  enum class Teams { Yes, No };
+  /// Whether a subgroup merges a list, where it has room for that, or a single invocation.
+  enum class Subgroups { Yes, No };
 
-  /// Teams: where the device has DeviceLimits::subgroupSize and runs programs for GPUs.
+  /// Subgroups: where the device has DeviceLimits::subgroupSize and runs programs for GPUs.
   explicit ReducePass(const std::shared_ptr<Device>& device);
-  ReducePass(std::shared_ptr<Device> device, Teams teams);
+  ReducePass(std::shared_ptr<Device> device, Subgroups subgroups);
 
-  struct MostPerList {
+  struct MaxPerList {
     std::uint32_t supersegments = 1;
-    bool always = true;  // or more, where gaps demand that
+    bool always = true;  // or more, where gaps require that
   };
 
-  /// `constants` without queue, queued and teamCapacity.
-  void record(Commands& commands, shared::ReduceConstants constants, const MostPerList& most);
+  /// `constants` without longLists, longListCount and subgroupCapacity.
+  void record(Commands& commands, shared::ReduceConstants constants, const MaxPerList& maxPerList);
 
  private:
-  void recordTeams(Commands& commands, shared::ReduceConstants& constants);
+  void recordSubgroups(Commands& commands, shared::ReduceConstants& constants);
 
   std::shared_ptr<Device> device_;
-  Teams teams_;
+  Subgroups subgroups_;
   ComputePipeline find_;
-  PipelineSet team_;  // by capacity
+  PipelineSet subgroup_;  // by capacity
   ComputePipeline alone_;
   PipelineSet store_;  // by precision, and whether lists may fit
-  Buffer queue_;
-  Buffer queued_;
+  Buffer longLists_;
+  Buffer longListCount_;
 };
 
 }  // namespace vdi::gpu

@@ -22,7 +22,7 @@ ComputePipelineInfo pipelineInfo(std::string_view shader) {
 
 /// Invocations that share a ray (render.comp). With more, what each of them has to set up costs more than
 /// they save.
-std::uint32_t sharesFor(const Device& device) {
+std::uint32_t lanesPerRayFor(const Device& device) {
   return device.runsGpuPrograms() && device.limits().subgroupSize > 0 ? 2 : 1;
 }
 
@@ -46,9 +46,9 @@ Course courseOf(const shared::RenderParams& params, const shared::RenderRays& ra
           glm::abs(placeAt(params.farthest) - placeAt(params.nearest)) / params.pixelSize};
 }
 
-ComputePipelineInfo renderInfo(std::uint32_t shares) {
+ComputePipelineInfo renderInfo(std::uint32_t lanes) {
   ComputePipelineInfo info = pipelineInfo("render");
-  info.wholeSubgroups = shares > 1;
+  info.wholeSubgroups = lanes > 1;
   return info;
 }
 
@@ -62,7 +62,7 @@ shared::RenderParams renderGeometry(const View& original, const View& view) {
   params.height = static_cast<std::uint32_t>(view.height());
   params.lists = {original.width(), original.height()};
   // View allows no more.
-  assert(std::max(original.width(), original.height()) <= shared::renderMostMarks * shared::renderTile);
+  assert(std::max(original.width(), original.height()) <= shared::renderMaxTiles * shared::renderTile);
   return params;
 }
 
@@ -84,9 +84,9 @@ shared::RenderRays renderRays(const View& original, const View& view) {
 
 RenderPass::RenderPass(const std::shared_ptr<Device>& device)
     : device_(device),
-      shares_(sharesFor(*device)),
-      beams_(device, pipelineInfo("beams")),
-      render_(beams_, renderInfo(shares_)),
+      lanesPerRay_(lanesPerRayFor(*device)),
+      cull_(device, pipelineInfo("cull")),
+      render_(cull_, renderInfo(lanesPerRay_)),
       queue_(device, sizeof(shared::TileQueue), MemoryKind::DeviceLocal) {
   const shared::TileQueue empty{{0, 1, 1}, 0, 0, {}};
   Commands commands(device);
@@ -100,16 +100,16 @@ std::vector<std::uint32_t> RenderPass::specialization(const shared::RenderParams
                                                       Reconstruction reconstruction,
                                                       std::uint32_t form) const {
   const std::uint32_t smooth = reconstruction == Reconstruction::Smooth ? 1 : 0;
-  const std::uint32_t invocations = shares_ * shared::renderPictureTile * shared::renderPictureTile;
-  std::uint32_t piecesAtOnce = 1;
+  const std::uint32_t invocations = lanesPerRay_ * shared::renderPictureTile * shared::renderPictureTile;
+  std::uint32_t segmentsAtOnce = 1;
   std::uint32_t pixelOrder = shared::renderOrderSquares;
   const Course course = courseOf(params, rays);
   const float crossed = glm::max(course.way.x, course.way.y);
-  if (shares_ > 1 && course.isNear && crossed >= 1.0F) {
-    piecesAtOnce = 3;
+  if (lanesPerRay_ > 1 && course.isNear && crossed >= 1.0F) {
+    segmentsAtOnce = 3;
     pixelOrder = course.way.x == crossed ? shared::renderOrderColumns : shared::renderOrderRows;
   }
-  return {smooth, shares_, invocations, piecesAtOnce, pixelOrder, form};
+  return {smooth, lanesPerRay_, invocations, segmentsAtOnce, pixelOrder, form};
 }
 
 void RenderPass::record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,
@@ -119,8 +119,8 @@ void RenderPass::record(Commands& commands, shared::RenderParams params, const s
   waiting_.reserve(device_, tiles * shared::renderKinds * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
   params.queue = queue_.address();
   params.waiting = waiting_.address();
-  beams_.update(commands, params);
-  commands.dispatch(beams_.with({shares_ > 1 ? 1U : 0U, form}), rays,
+  cull_.update(commands, params);
+  commands.dispatch(cull_.with({lanesPerRay_ > 1 ? 1U : 0U, form}), rays,
                     groupsFor(params.width, shared::renderRegion),
                     groupsFor(params.height, shared::renderRegion));
   commands.barrier();

@@ -1,4 +1,4 @@
-// Dispatches beams.comp and render.comp: a VDI seen from a new viewpoint.
+// Dispatches cull.comp and render.comp: a VDI seen from a new viewpoint.
 #pragma once
 
 #include <cstdint>
@@ -34,8 +34,8 @@ class RenderPass {
                                             std::uint32_t form) const;
 
   std::shared_ptr<Device> device_;
-  std::uint32_t shares_;
-  PipelineSet beams_;
+  std::uint32_t lanesPerRay_;
+  PipelineSet cull_;
   PipelineSet render_;
   Buffer queue_;
   Buffer waiting_;

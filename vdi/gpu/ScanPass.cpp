@@ -72,7 +72,7 @@ void ScanPass::recordRebase(Commands& commands, const Buffer& prefix, std::uint3
   commands.barrier();
 }
 
-void ScanPass::demandNoOverflow() const {
+void ScanPass::requireNoOverflow() const {
   if (overflow_.mappedAs<std::uint32_t>()[0] != 0) {
     throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI", device_->name());
   }

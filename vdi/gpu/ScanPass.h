@@ -7,8 +7,8 @@
 
 #include "shaders/shared/scan.h"
 #include "vdi/gpu/Commands.h"
-#include "vdi/gpu/PipelineSet.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/PipelineSet.h"
 
 namespace vdi::gpu {
 
@@ -30,7 +30,7 @@ class ScanPass {
   void recordRebase(Commands& commands, const Buffer& prefix, std::uint32_t count, std::uint32_t base);
 
   /// Throws Error{OutOfMemory} if the total of the last finished scan didn't fit 32 bits.
-  void demandNoOverflow() const;
+  void requireNoOverflow() const;
 
  private:
   void recordBoth(Commands& commands, shared::ScanConstants constants, ComputePipeline& pipeline);

@@ -88,13 +88,13 @@ ValueMap valueMapOf(const Block& block) {
       break;
   }
   const ScalarRange range = finiteRange(block);
-  const double most = limitsOf(block.type).most;
-  if (range.min < -most || range.max > most) {
+  const double maximum = limitsOf(block.type).maximum;
+  if (range.min < -maximum || range.max > maximum) {
     throw Error(
         ErrorCode::InvalidArgument,
         fmt::format("a block of {} has values from {} to {}, those beyond {} in size can't be handled; "
                     "other units help",
-                    toString(block.type), range.min, range.max, most));
+                    toString(block.type), range.min, range.max, maximum));
   }
   if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0, false, range};
   return {range.max - range.min, range.min, false, range};

@@ -14,10 +14,10 @@ namespace {
 constexpr std::uint64_t stagingBytes = 32ULL << 20;  // each of the two
 
 /// Below that, importing memory takes longer than copying it.
-constexpr std::uint64_t leastImport = 1ULL << 20;
+constexpr std::uint64_t minImport = 1ULL << 20;
 
 /// Each takes one of the allocations that a device may have at a time, 4096 or more.
-constexpr std::size_t mostImports = 256;
+constexpr std::size_t maxImports = 256;
 
 /// Fewer take longer to copy values than one takes to pin their pages.
 constexpr std::size_t coresThatCopyFaster = 2;
@@ -143,12 +143,12 @@ bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& pa
   const IndexBox stored = block.stored();
   const IndexBox part = piece.box().intersection(stored);
   if (part.empty() || usableCores() >= coresThatCopyFaster || !isTexels(piece) ||
-      imported.size() == mostImports)
+      imported.size() == maxImports)
     return false;
   const std::uint64_t bytes = texelBytes(piece.format);
   const std::uint64_t first = stored.position(part.lo) * bytes;
   const std::uint64_t end = (stored.position(part.hi - 1) + 1) * bytes;
-  if (end - first < leastImport) return false;
+  if (end - first < minImport) return false;
   std::optional<ImportedBuffer> source =
       importHostMemory(device_, static_cast<const std::byte*>(block.data) + first, end - first);
   if (!source || source->offset % bytes != 0) return false;

@@ -144,8 +144,8 @@ struct CompactCoding {
 template <typename Segment>
 using CodingOf = std::conditional_t<std::is_same_v<Segment, Supersegment>, FullCoding, CompactCoding>;
 
-/// Walks the supersegments of a chunk in order: which one each is predicted from, by index in the chunk.
-class Walk {
+/// Traverses the supersegments of a chunk in order: which one each is predicted from, by index in the chunk.
+class Traversal {
  public:
   static constexpr std::size_t none = ~std::size_t{0};
 
@@ -178,10 +178,10 @@ class Walk {
 };
 
 template <typename Coding>
-Context<Coding> contextOf(const Walk::Step& step, std::span<const typename Coding::Segment> segments,
+Context<Coding> contextOf(const Traversal::Step& step, std::span<const typename Coding::Segment> segments,
                           std::size_t index) {
   Context<Coding> context;
-  if (step.reference != Walk::none) context.reference = Coding::fieldsOf(segments[step.reference]);
+  if (step.reference != Traversal::none) context.reference = Coding::fieldsOf(segments[step.reference]);
   context.previous = step.firstOfList ? context.reference.front : Coding::fieldsOf(segments[index - 1]).back;
   return context;
 }
@@ -257,15 +257,15 @@ std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode&
   std::byte* const lengths = plain.data() + Coding::codeBytes;
   std::byte* const columnData = lengths + listCount * sizeof(std::uint32_t);
   if constexpr (Coding::codeBytes > 0) std::memcpy(plain.data(), &code, Coding::codeBytes);
-  Walk walk;
+  Traversal traversal;
   std::size_t index = 0;
   for (std::size_t i = 0; i < listCount; ++i) {
     const std::uint32_t length = lists.countOf(first + i);
     putWord(lengths, listCount, i, length, sizeof(length));
-    walk.beginList(length);
+    traversal.beginList(length);
     for (std::uint32_t j = 0; j < length; ++j, ++index) {
       const Words residuals = Coding::residualsOf(Coding::fieldsOf(segments[index]),
-                                                  contextOf<Coding>(walk.step(), segments, index));
+                                                  contextOf<Coding>(traversal.step(), segments, index));
       std::byte* column = columnData;
       for (std::size_t c = 0; c < columns; ++c) {
         putWord(column, count, index, residuals[c], Coding::bytes[c]);
@@ -300,12 +300,12 @@ DepthCode unpackLists(std::span<const std::byte> packed, std::uint32_t before, s
   const std::byte* const columnData = lengths + ends.size() * sizeof(std::uint32_t);
   DepthCode code;
   if constexpr (Coding::codeBytes > 0) std::memcpy(&code, plain.data(), Coding::codeBytes);
-  Walk walk;
+  Traversal traversal;
   std::size_t index = 0;
   for (std::size_t i = 0; i < ends.size(); ++i) {
     const std::uint32_t length = getWord(lengths, ends.size(), i, sizeof(length));
     if (length > count - index) fail("it has more supersegments than announced");
-    walk.beginList(length);
+    traversal.beginList(length);
     for (std::uint32_t j = 0; j < length; ++j, ++index) {
       Words residuals;
       const std::byte* column = columnData;
@@ -314,7 +314,7 @@ DepthCode unpackLists(std::span<const std::byte> packed, std::uint32_t before, s
         column += count * Coding::bytes[c];
       }
       segments[index] =
-          Coding::segmentOf(Coding::restore(residuals, contextOf<Coding>(walk.step(), segments, index)));
+          Coding::segmentOf(Coding::restore(residuals, contextOf<Coding>(traversal.step(), segments, index)));
     }
     ends[i] = before + static_cast<std::uint32_t>(index);
   }

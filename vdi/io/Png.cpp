@@ -86,29 +86,29 @@ void writePng(const std::filesystem::path& path, const Picture& picture) {
 
 Picture readPng(const std::filesystem::path& path) {
   const InputFile file(path);
-  const auto demand = [&](bool good, const char* why) {
+  const auto require = [&](bool good, const char* why) {
     if (!good) throw Error(ErrorCode::Format, fmt::format("not a sound PNG: {}", why), path.string());
   };
   // Before the memory for another file's bytes is taken.
   constexpr std::uint64_t signatureBytes = 8;
   const std::vector<std::byte> start = file.read(0, std::min(file.size(), signatureBytes));
-  demand(start.size() == signatureBytes &&
-             png_sig_cmp(reinterpret_cast<png_const_bytep>(start.data()), 0, signatureBytes) == 0,
-         "it doesn't start as one");
+  require(start.size() == signatureBytes &&
+              png_sig_cmp(reinterpret_cast<png_const_bytep>(start.data()), 0, signatureBytes) == 0,
+          "it doesn't start as one");
   const std::vector<std::byte> bytes = file.readAll();
   PngImage image;
-  demand(png_image_begin_read_from_memory(image.get(), bytes.data(), bytes.size()) != 0, image->message);
+  require(png_image_begin_read_from_memory(image.get(), bytes.data(), bytes.size()) != 0, image->message);
   // A byte of a PNG holds at most 1032 bytes of rows (deflate).
-  constexpr std::uint64_t mostPerByte = 1032;
-  demand(std::uint64_t{image->width} * image->height * bitsPerPixel(bytes) <= bytes.size() * mostPerByte * 8,
-         "its header says that it's larger than its bytes can hold");
-  demand(image->width <= largestSide && image->height <= largestSide,
-         "it's more than 32768 pixels wide or high");
+  constexpr std::uint64_t maxPerByte = 1032;
+  require(std::uint64_t{image->width} * image->height * bitsPerPixel(bytes) <= bytes.size() * maxPerByte * 8,
+          "its header says that it's larger than its bytes can hold");
+  require(image->width <= largestSide && image->height <= largestSide,
+          "it's more than 32768 pixels wide or high");
   image->format = PNG_FORMAT_RGB;
   Picture picture{static_cast<int>(image->width), static_cast<int>(image->height), {}};
   picture.rgb.resize(std::size_t{3} * image->width * image->height);
   const png_color black{0, 0, 0};
-  demand(png_image_finish_read(image.get(), &black, picture.rgb.data(), 0, nullptr) != 0, image->message);
+  require(png_image_finish_read(image.get(), &black, picture.rgb.data(), 0, nullptr) != 0, image->message);
   return picture;
 }
 

@@ -114,7 +114,7 @@ std::uint64_t chunksOf(std::uint64_t lists, std::uint32_t listsPerChunk) {
 }
 
 /// What validate(Vdi) leaves out: a camera that can be used and numbers that are numbers.
-void demandSoundHeader(const Vdi& vdi) {
+void requireSoundHeader(const Vdi& vdi) {
   try {
     static_cast<void>(vdi.view());
   } catch (const Error& error) {
@@ -175,7 +175,7 @@ Vdi vdiOf(const Header& header) {
   vdi.camera.parallelScale = header.parallelScale;
   vdi.camera.parallelProjection = (header.flags & flagParallel) != 0;
   if (precisionOf(header) == Precision::Compact) vdi.lists = CompactLists();
-  demandSoundHeader(vdi);
+  requireSoundHeader(vdi);
   return vdi;
 }
 
@@ -316,7 +316,7 @@ auto withPath(const std::filesystem::path& path, Work work) {
 }  // namespace
 
 std::vector<std::byte> encode(const Vdi& vdi) {
-  demandSoundHeader(vdi);
+  requireSoundHeader(vdi);
   validate(vdi);
   Header header = headerOf(vdi);
   std::vector<ChunkEntry> table(header.chunkCount);

@@ -19,10 +19,10 @@ Compositor::Compositor(std::shared_ptr<gpu::Device> device)
       commands_(device_),
       scan_(device_),
       counts_(device_),
-      mergePass_(device_),
+      interleavePass_(device_),
       compositePass_(device_),
       builder_(device_),
-      survey_(device_) {}
+      histogram_(device_) {}
 
 void Compositor::noteTimes() {
   for (const gpu::StageTime& stage : commands_.stageTimes()) milliseconds_ += stage.milliseconds;
@@ -32,7 +32,7 @@ void Compositor::wait() {
   if (!std::exchange(merging_, false)) return;
   commands_.wait();
   for (HostAccess* access : receivedFrom_) access->finish();
-  scan_.demandNoOverflow();
+  scan_.requireNoOverflow();
   noteTimes();
 }
 
@@ -41,7 +41,7 @@ double Compositor::takeMilliseconds() {
   return std::exchange(milliseconds_, 0.0);
 }
 
-void Compositor::merge(const Distributed& parts, const DepthCode& code, Merged& merged) {
+void Compositor::interleave(const Distributed& parts, const DepthCode& code, Interleaved& interleaved) {
   wait();
   const std::uint32_t lists = parts.listCount;
   const std::uint64_t ranks = parts.subLists.size();
@@ -49,16 +49,16 @@ void Compositor::merge(const Distributed& parts, const DepthCode& code, Merged& 
   const std::uint64_t rowWords = gpu::groupsFor(lists, shared::countsPerWord);
   const std::uint64_t rowLength = rowWords * shared::countsPerWord;
   const std::uint64_t rows = ranks * rowLength;
-  merged.listCount = lists;
-  merged.total = parts.total;
-  merged.offsets.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
-  merged.segments.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
+  interleaved.listCount = lists;
+  interleaved.total = parts.total;
+  interleaved.offsets.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
+  interleaved.segments.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
   received_.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
   packedCounts_.reserve(device_, ranks * rowWords * wordBytes, MemoryKind::DeviceLocal);
   subCounts_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
   subOffsets_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
-  mergedCounts_.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
-  heads_.reserve(device_, parts.total * sizeof(shared::MergeHead), MemoryKind::DeviceLocal);
+  interleavedCounts_.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
+  heads_.reserve(device_, parts.total * sizeof(shared::InterleaveHead), MemoryKind::DeviceLocal);
 
   commands_.begin();
   commands_.mark("receive");
@@ -98,23 +98,23 @@ void Compositor::merge(const Distributed& parts, const DepthCode& code, Merged& 
   }
   scan_.record(commands_, subCounts_, subOffsets_, static_cast<std::uint32_t>(rows));
 
-  shared::MergeConstants merge{};
-  merge.received = received_.address();
-  merge.subOffsets = subOffsets_.address();
-  merge.heads = heads_.address();
-  merge.counts = mergedCounts_.address();
-  merge.offsets = merged.offsets.address();
-  merge.merged = merged.segments.address();
-  merge.listCount = lists;
-  merge.rankCount = static_cast<std::uint32_t>(ranks);
-  merge.rowLength = static_cast<std::uint32_t>(rowLength);
-  merge.form = storedForm(code);
+  shared::InterleaveConstants constants{};
+  constants.received = received_.address();
+  constants.subOffsets = subOffsets_.address();
+  constants.heads = heads_.address();
+  constants.counts = interleavedCounts_.address();
+  constants.offsets = interleaved.offsets.address();
+  constants.interleaved = interleaved.segments.address();
+  constants.listCount = lists;
+  constants.rankCount = static_cast<std::uint32_t>(ranks);
+  constants.rowLength = static_cast<std::uint32_t>(rowLength);
+  constants.form = storedForm(code);
   commands_.mark("merge");
-  merge.mode = shared::mergeModeCount;
-  if (lists > 0) mergePass_.record(commands_, merge);
-  scan_.record(commands_, mergedCounts_, merged.offsets, lists);
-  merge.mode = shared::mergeModeMerge;
-  if (lists > 0) mergePass_.record(commands_, merge);
+  constants.mode = shared::interleaveModeCount;
+  if (lists > 0) interleavePass_.record(commands_, constants);
+  scan_.record(commands_, interleavedCounts_, interleaved.offsets, lists);
+  constants.mode = shared::interleaveModeWrite;
+  if (lists > 0) interleavePass_.record(commands_, constants);
   commands_.submit();
   merging_ = true;
   receivedFrom_.clear();
@@ -123,80 +123,82 @@ void Compositor::merge(const Distributed& parts, const DepthCode& code, Merged& 
   }
 }
 
-void Compositor::apply(const Merged& merged, const Request& request) {
+void Compositor::apply(const Interleaved& interleaved, const Request& request) {
   settings_.step = static_cast<float>(request.sampleStep);
   settings_.budget = request.budget;
-  settings_.mostPerList = request.mostPerList;
+  settings_.maxPerList = request.maxPerList;
   settings_.level = request.level;
   settings_.form = storedForm(request.code);
-  settings_.merged = merged.segments.address();
-  settings_.mergedOffsets = merged.offsets.address();
-  settings_.listCount = merged.listCount;
+  settings_.interleaved = interleaved.segments.address();
+  settings_.interleavedOffsets = interleaved.offsets.address();
+  settings_.listCount = interleaved.listCount;
 }
 
-Survey Compositor::survey(const Merged& merged, const Request& request) {
+SupersegmentHistogram Compositor::histogram(const Interleaved& interleaved, const Request& request) {
   wait();
-  if (merged.listCount == 0) return {};
-  apply(merged, request);
-  const Survey survey = survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
-    settings_.survey = address;
-    compositePass_.record(commands, settings_, gpu::CompositePass::Work::Survey, request.algorithm);
-  });
+  if (interleaved.listCount == 0) return {};
+  apply(interleaved, request);
+  const SupersegmentHistogram histogram =
+      histogram_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
+        settings_.histogram = address;
+        compositePass_.record(commands, settings_, gpu::CompositePass::Work::Histogram, request.algorithm);
+      });
   noteTimes();
-  return survey;
+  return histogram;
 }
 
-void Compositor::composite(const Merged& merged, const Request& request, DeviceLists& lists) {
-  lists.offsets.reserve(device_, (std::uint64_t{merged.listCount} + 1) * wordBytes, MemoryKind::DeviceLocal);
+void Compositor::composite(const Interleaved& interleaved, const Request& request, DeviceLists& lists) {
+  lists.offsets.reserve(device_, (std::uint64_t{interleaved.listCount} + 1) * wordBytes,
+                        MemoryKind::DeviceLocal);
   lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
-  lists.listCount = merged.listCount;
+  lists.listCount = interleaved.listCount;
   lists.count = 0;
-  if (merged.listCount == 0) return wait();
-  apply(merged, request);
+  if (interleaved.listCount == 0) return wait();
+  apply(interleaved, request);
   const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
-    settings_.sensitivities = targets.sensitivities;
-    settings_.counts = targets.counts;
+    settings_.thresholds = targets.thresholds;
+    settings_.capacities = targets.capacities;
     settings_.offsets = targets.offsets;
     settings_.segments = targets.segments;
-    settings_.grains = targets.grains;
+    settings_.preSegments = targets.preSegments;
     settings_.written = targets.written;
     settings_.left = targets.left;
     settings_.status = targets.status;
     settings_.guard = targets.guard;
     using Work = gpu::CompositePass::Work;
-    compositePass_.record(commands, settings_, write ? Work::Write : Work::Search, request.algorithm);
+    compositePass_.record(commands, settings_, write ? Work::Write : Work::Count, request.algorithm);
   };
   ListBuilder::Request build;
-  build.width = merged.listCount;
+  build.width = interleaved.listCount;
   build.rows = 1;
   build.algorithm = request.algorithm;
-  build.most = {request.mostPerList, true};
+  build.maxPerList = {request.maxPerList, true};
   build.sampleStep = request.sampleStep;
   build.code = request.code;
-  build.fitting = merged.segments.address();
-  build.fittingOffsets = merged.offsets.address();
+  build.fitting = interleaved.segments.address();
+  build.fittingOffsets = interleaved.offsets.address();
   builder_.build(build, record, lists);
   milliseconds_ += builder_.times().all;
   wait();
 }
 
-void Compositor::flatten(const Merged& merged, const DepthCode& code, gpu::Buffer& colors,
+void Compositor::flatten(const Interleaved& interleaved, const DepthCode& code, gpu::Buffer& colors,
                          gpu::Buffer& depths) {
   wait();
-  colors.reserve(device_, merged.listCount * sizeof(glm::vec4), MemoryKind::DeviceLocal);
-  depths.reserve(device_, merged.listCount * sizeof(float), MemoryKind::DeviceLocal);
-  if (merged.listCount == 0) return;
-  shared::MergeConstants constants{};
-  constants.offsets = merged.offsets.address();
-  constants.merged = merged.segments.address();
+  colors.reserve(device_, interleaved.listCount * sizeof(glm::vec4), MemoryKind::DeviceLocal);
+  depths.reserve(device_, interleaved.listCount * sizeof(float), MemoryKind::DeviceLocal);
+  if (interleaved.listCount == 0) return;
+  shared::InterleaveConstants constants{};
+  constants.offsets = interleaved.offsets.address();
+  constants.interleaved = interleaved.segments.address();
   constants.colors = colors.address();
   constants.depths = depths.address();
-  constants.listCount = merged.listCount;
-  constants.mode = shared::mergeModeFlatten;
+  constants.listCount = interleaved.listCount;
+  constants.mode = shared::interleaveModeFlatten;
   constants.form = storedForm(code);
   commands_.begin();
   commands_.mark("flatten");
-  mergePass_.record(commands_, constants);
+  interleavePass_.record(commands_, constants);
   commands_.submitAndWait();
   noteTimes();
 }

@@ -1,5 +1,5 @@
-// The owner's part of compositing, on the device: merge by depth, segment again (paper, section 5.2). Not
-// part of the library's interface.
+// The owner's part of compositing, on the device: interleave by depth, segment again (paper, section 5.2).
+// Not part of the library's interface.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@
 
 #include "vdi/gpu/CompositePass.h"
 #include "vdi/gpu/CountsPass.h"
-#include "vdi/gpu/MergePass.h"
+#include "vdi/gpu/InterleavePass.h"
 #include "vdi/pipeline/Distributor.h"
+#include "vdi/pipeline/HistogramBuffer.h"
 #include "vdi/pipeline/ListBuilder.h"
-#include "vdi/pipeline/SurveyBuffer.h"
 
 namespace vdi::detail {
 
@@ -20,16 +20,16 @@ class Compositor {
   explicit Compositor(std::shared_ptr<gpu::Device> device);
 
   struct Request {
-    std::uint32_t budget = 1;       // N_S
-    std::uint32_t mostPerList = 1;  // N_S, or more with a level
+    std::uint32_t budget = 1;      // N_S
+    std::uint32_t maxPerList = 1;  // N_S, or more with a level
     double sampleStep = 1.0;
     Algorithm algorithm = Algorithm::Merge;
     DepthCode code;       // of compact lists
-    float level = -1.0F;  // of all owners' survey together, with Budget::Total
+    float level = -1.0F;  // of all owners' histogram together, with Budget::Total
   };
 
   /// All ranks' supersegments of some lists, each list's in order of depth; on the device.
-  struct Merged {
+  struct Interleaved {
     gpu::Buffer segments;
     gpu::Buffer offsets;  // [listCount + 1]
     std::uint32_t listCount = 0;
@@ -37,21 +37,22 @@ class Compositor {
   };
   /// Goes on on the device when this returns: `parts` must stay until `wait`, which any other call does
   /// first.
-  void merge(const Distributed& parts, const DepthCode& code, Merged& merged);
+  void interleave(const Distributed& parts, const DepthCode& code, Interleaved& interleaved);
   void wait();
 
   /// What these lists need.
-  Survey survey(const Merged& merged, const Request& request);
-  /// At most `mostPerList` supersegments a list.
-  void composite(const Merged& merged, const Request& request, DeviceLists& lists);
+  SupersegmentHistogram histogram(const Interleaved& interleaved, const Request& request);
+  /// At most `maxPerList` supersegments a list.
+  void composite(const Interleaved& interleaved, const Request& request, DeviceLists& lists);
   /// The flat picture: each list's supersegments composited, as [listCount] glm::vec4 and [listCount] float.
-  void flatten(const Merged& merged, const DepthCode& code, gpu::Buffer& colors, gpu::Buffer& depths);
+  void flatten(const Interleaved& interleaved, const DepthCode& code, gpu::Buffer& colors,
+               gpu::Buffer& depths);
 
   /// Device time of all that has been done since the last call.
   double takeMilliseconds();
 
  private:
-  void apply(const Merged& merged, const Request& request);
+  void apply(const Interleaved& interleaved, const Request& request);
   void noteTimes();
   std::vector<HostAccess*> receivedFrom_;  // by the merge that goes on
   bool merging_ = false;
@@ -60,7 +61,7 @@ class Compositor {
   gpu::Commands commands_;
   gpu::ScanPass scan_;
   gpu::CountsPass counts_;
-  gpu::MergePass mergePass_;
+  gpu::InterleavePass interleavePass_;
   gpu::CompositePass compositePass_;
   ListBuilder builder_;
   gpu::Buffer received_;
@@ -68,9 +69,9 @@ class Compositor {
   gpu::Buffer subCounts_;
   gpu::Buffer subOffsets_;
   gpu::Buffer heads_;
-  gpu::Buffer mergedCounts_;
+  gpu::Buffer interleavedCounts_;
   gpu::shared::CompositeParams settings_{};
-  SurveyBuffer survey_;
+  HistogramBuffer histogram_;
   double milliseconds_ = 0.0;
 };
 

@@ -30,10 +30,10 @@ Gather::Gather(std::shared_ptr<gpu::Device> device, const comm::Communicator& co
     : device_(std::move(device)), comm_(comm), transport_(transport), root_(root), commands_(device_) {}
 
 HostAccess& Gather::openedAccess(const std::string& name, std::uint64_t bytes) {
-  constexpr std::size_t most = 8;  // arrays of a few frames
+  constexpr std::size_t maxCount = 8;  // arrays of a few frames
   std::erase(recent_, name);
   recent_.push_back(name);
-  if (recent_.size() > most) {
+  if (recent_.size() > maxCount) {
     opened_.erase(recent_.front());
     recent_.erase(recent_.begin());
   }

@@ -53,7 +53,7 @@ struct Step {
 };
 
 /// Collective. Where no rank has anything but zeros and values that are lost, nothing would be seen.
-void demandUsableValues(const comm::Communicator& comm, std::span<const Block> blocks) {
+void requireUsableValues(const comm::Communicator& comm, std::span<const Block> blocks) {
   const ValueSizes own = valueSizesOf(blocks);
   std::array<std::uint64_t, 2> any{own.usable ? 1U : 0U, own.tooSmall ? 1U : 0U};
   comm.allReduceMax(any);
@@ -62,7 +62,7 @@ void demandUsableValues(const comm::Communicator& comm, std::span<const Block> b
       ErrorCode::InvalidArgument,
       fmt::format("all values are 0 or smaller than {} (f32) or {} (f64) in size, too small to be told "
                   "apart; other units help",
-                  limitsOf(ScalarType::F32).least, limitsOf(ScalarType::F64).least));
+                  limitsOf(ScalarType::F32).minimum, limitsOf(ScalarType::F64).minimum));
 }
 
 }  // namespace
@@ -107,7 +107,7 @@ struct VdiGenerator::State {
   struct OwnedBand {
     comm::Ownership owned;
     std::uint64_t firstList = 0;
-    detail::Compositor::Merged merged;
+    detail::Compositor::Interleaved interleaved;
     detail::DeviceLists lists;
     gpu::Buffer colors;
     gpu::Buffer depths;
@@ -125,7 +125,7 @@ struct VdiGenerator::State {
     Stopwatch watch;
     Step step;
     comm.together([&] { validate(blocks); });
-    demandUsableValues(comm, blocks);
+    requireUsableValues(comm, blocks);
     for (const Block& block : blocks) {
       step.bytes += block.byteCount();
       step.doubles = step.doubles || block.type == ScalarType::F64;
@@ -143,9 +143,9 @@ struct VdiGenerator::State {
   void show(const Step& step) {
     shown = step;
     const ScalarRange& own = caster->volume().valueRange();
-    std::array<double, 2> least{own.min, -own.max};
-    comm.allReduceMin(least);
-    range = {least[0], -least[1]};
+    std::array<double, 2> minimum{own.min, -own.max};
+    comm.allReduceMin(minimum);
+    range = {minimum[0], -minimum[1]};
   }
 
   void dropNext() {
@@ -161,15 +161,15 @@ struct VdiGenerator::State {
   };
 
   /// Of f64 there are floats on the device that say where in the block's range a value lies.
-  void demandSpans(const TransferTable& table) const {
-    constexpr double most = 1e33;
+  void requireSpans(const TransferTable& table) const {
+    constexpr double maxCount = 1e33;
     const double span = range.max - range.min;
-    if (!shown.doubles || !(span > most * (table.max - table.min))) return;
+    if (!shown.doubles || !(span > maxCount * (table.max - table.min))) return;
     throw Error(
         ErrorCode::InvalidArgument,
         fmt::format("the values are from {} to {}, the transfer function's from {} to {}: more than a "
                     "factor of {}; missing values as NaN rather than a large number help",
-                    range.min, range.max, table.min, table.max, most));
+                    range.min, range.max, table.min, table.max, maxCount));
   }
 
   std::unique_ptr<Prepared> prepare(const Camera& camera, const TransferFunction& function,
@@ -180,7 +180,7 @@ struct VdiGenerator::State {
       const View view(camera, settings.width, settings.height);
       prepared = std::make_unique<Prepared>(
           Prepared{view, depthLattice(shown.scene, view, settings.samplesPerVoxel), bake(function)});
-      demandSpans(prepared->table);
+      requireSpans(prepared->table);
     });
     const std::array prints{
         comm::Communicator::Fingerprint{detail::fingerprintOf(camera), "camera"},
@@ -188,7 +188,7 @@ struct VdiGenerator::State {
         comm::Communicator::Fingerprint{
             detail::fingerprintOf(settings),
             "resolution, supersegments, budget, sampling rate, algorithm or precision"}};
-    comm.demandEqual(prints);
+    comm.requireEqual(prints);
     mine = {};
     mine.uploadSeconds = std::exchange(shown.uploadSeconds, 0.0);
     mine.blocks = shown.blocks;
@@ -296,7 +296,7 @@ struct VdiGenerator::State {
       const detail::Distributed parts = distributor->distribute(band, own.owned, detail::segmentBytes(code));
       mine.bytesSent += distributor->bytesSent();
       mine.distributeSeconds += watch.lap();
-      comm.together([&] { compositor->merge(parts, code, own.merged); });
+      comm.together([&] { compositor->interleave(parts, code, own.interleaved); });
       mine.compositeSeconds += watch.lap();
     }
     noteTimes();
@@ -310,22 +310,22 @@ struct VdiGenerator::State {
     makeOwnedBands(prepared, settings, false, code, progress);
     Stopwatch watch;
     detail::Compositor::Request request{settings.supersegments,
-                                        mostPerList(settings.supersegments, settings.budget),
+                                        maxPerList(settings.supersegments, settings.budget),
                                         prepared.lattice.step,
                                         settings.algorithm,
                                         code,
                                         -1.0F};
     if (settings.budget == Budget::Total) {
-      Survey survey;
+      SupersegmentHistogram histogram;
       comm.together([&] {
-        for (const OwnedBand& own : bands) survey += compositor->survey(own.merged, request);
+        for (const OwnedBand& own : bands) histogram += compositor->histogram(own.interleaved, request);
       });
-      comm.allReduceSum(survey.supersegments);
-      comm.allReduceSum(std::span(&survey.equally, 1));
-      request.level = survey.levelFor(settings.fill);
+      comm.allReduceSum(histogram.supersegments);
+      comm.allReduceSum(std::span(&histogram.equally, 1));
+      request.level = histogram.levelFor(settings.fill);
     }
     cancellable(progress, 0.95, [&](const detail::RayCaster::Progress& report) {
-      for (OwnedBand& own : bands) compositor->composite(own.merged, request, own.lists);
+      for (OwnedBand& own : bands) compositor->composite(own.interleaved, request, own.lists);
       report(1.0);
     });
     mine.compositeDeviceSeconds = 1e-3 * compositor->takeMilliseconds();
@@ -403,9 +403,9 @@ struct VdiGenerator::State {
     comm.together([&] {
       if (comm.rank() == root) image = imageIn(settings);
       for (OwnedBand& own : bands) {
-        compositor->flatten(own.merged, {}, own.colors, own.depths);
+        compositor->flatten(own.interleaved, {}, own.colors, own.depths);
         const std::uint64_t first = own.firstList + own.owned.of(comm.rank()).first;
-        const std::uint64_t count = own.merged.listCount;
+        const std::uint64_t count = own.interleaved.listCount;
         pieces.push_back({&own.colors, 0, first * sizeof(glm::vec4), count * sizeof(glm::vec4)});
         pieces.push_back({&own.depths, 1, first * sizeof(float), count * sizeof(float)});
       }
@@ -433,7 +433,7 @@ struct VdiGenerator::State {
 
   void noteTimes() {
     mine.generateDeviceSeconds = 1e-3 * caster->times().all;
-    mine.searchSeconds = 1e-3 * caster->times().search;
+    mine.countSeconds = 1e-3 * caster->times().count;
     mine.writeSeconds = 1e-3 * caster->times().write;
   }
 
@@ -498,7 +498,7 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
   vdi.camera = camera;
   vdi.width = settings.width;
   vdi.height = settings.height;
-  vdi.budget = mostPerList(settings.supersegments, settings.budget);
+  vdi.budget = maxPerList(settings.supersegments, settings.budget);
   vdi.bounds = s.shown.scene.bounds;
   vdi.sampleStep = prepared->lattice.step;
   return vdi;

@@ -94,7 +94,7 @@ void* HostPool::do_allocate(std::size_t bytes, std::size_t) {
 }
 
 void HostPool::do_deallocate(void* data, std::size_t, std::size_t) {
-  constexpr std::size_t mostUnused = 4;  // two frames' offsets and supersegments
+  constexpr std::size_t maxUnused = 4;  // two frames' offsets and supersegments
   const std::lock_guard lock(mutex_);
   std::size_t unused = 0;
   for (Block& block : blocks_) {
@@ -104,7 +104,7 @@ void HostPool::do_deallocate(void* data, std::size_t, std::size_t) {
     }
     unused += block.used ? 0 : 1;
   }
-  if (unused <= mostUnused && device_) return;
+  if (unused <= maxUnused && device_) return;
   const auto oldest = std::min_element(blocks_.begin(), blocks_.end(), [](const Block& a, const Block& b) {
     return std::pair(a.used, a.freed) < std::pair(b.used, b.freed);
   });

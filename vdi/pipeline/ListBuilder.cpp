@@ -17,10 +17,10 @@ ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
       commands_(device_),
       scan_(device_),
-      allot_(device_),
+      interpolate_(device_),
       reduce_(device_),
       status_(device_, sizeof(std::uint32_t), MemoryKind::Readback),
-      grainsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
+      preSegmentsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
       segmentsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
       totals_(device_, 2 * sizeof(std::uint32_t), MemoryKind::Readback) {}
 
@@ -28,17 +28,17 @@ shared::StoredForm storedForm(const DepthCode& code) {
   return {code.first, code.step};
 }
 
-std::uint64_t ListBuilder::bytesPerList(std::uint32_t most, Algorithm algorithm) {
-  const std::uint64_t segments = std::uint64_t{most} * sizeof(Supersegment);
+std::uint64_t ListBuilder::bytesPerList(std::uint32_t maxCount, Algorithm algorithm) {
+  const std::uint64_t segments = std::uint64_t{maxCount} * sizeof(Supersegment);
   if (algorithm == Algorithm::Bisection) return segments;
-  return segments + shared::mostGrains(most) * sizeof(shared::StoredGrain);
+  return segments + shared::maxPreSegments(maxCount) * sizeof(shared::StoredPreSegment);
 }
 
 void ListBuilder::build(const Request& request, const Record& record, DeviceLists& lists,
                         const Finish& finish) {
   const std::uint64_t words = (std::uint64_t{request.listCount()} + 1) * sizeof(std::uint32_t);
-  sensitivities_.reserve(device_, words, MemoryKind::DeviceLocal);
-  counts_.reserve(device_, words, MemoryKind::DeviceLocal);
+  thresholds_.reserve(device_, words, MemoryKind::DeviceLocal);
+  capacities_.reserve(device_, words, MemoryKind::DeviceLocal);
   lists.offsets.reserve(device_, words, MemoryKind::DeviceLocal);
   lists.listCount = request.listCount();
   status_.mappedAs<std::uint32_t>()[0] = 0;
@@ -62,12 +62,12 @@ void ListBuilder::end(const Finish& finish) {
   for (const gpu::StageTime& stage : commands_.stageTimes()) {
     if (stage.name == "download") continue;
     times_.all += stage.milliseconds;
-    if (stage.name == "search") times_.search += stage.milliseconds;
+    if (stage.name == "count") times_.count += stage.milliseconds;
     if (stage.name == "write") times_.write += stage.milliseconds;
   }
 }
 
-constexpr std::size_t grainTotal = 0;
+constexpr std::size_t preSegmentTotal = 0;
 constexpr std::size_t segmentTotal = 1;
 
 /// The last one of the offsets is to be one of totals_.
@@ -79,17 +79,17 @@ void ListBuilder::recordTotal(const gpu::Buffer& offsets, std::uint32_t listCoun
 void ListBuilder::buildByBisection(const Request& request, const Record& record, DeviceLists& lists,
                                    const Finish& finish) {
   BandTargets targets;
-  targets.sensitivities = sensitivities_.address();
-  targets.counts = counts_.address();
+  targets.thresholds = thresholds_.address();
+  targets.capacities = capacities_.address();
   targets.offsets = lists.offsets.address();
   targets.status = status_.address();
   commands_.begin();
-  commands_.mark("search");
+  commands_.mark("count");
   record(commands_, targets, false);
-  scan_.record(commands_, counts_, lists.offsets, request.listCount());
+  scan_.record(commands_, capacities_, lists.offsets, request.listCount());
   recordTotal(lists.offsets, request.listCount(), segmentTotal);
   end({});
-  scan_.demandNoOverflow();
+  scan_.requireNoOverflow();
   lists.count = totals_.mappedAs<std::uint32_t>()[segmentTotal];
 
   lists.segments.reserve(device_, lists.count * segmentBytes(request.code), MemoryKind::DeviceLocal);
@@ -100,84 +100,84 @@ void ListBuilder::buildByBisection(const Request& request, const Record& record,
   end(finish);
 }
 
-/// All steps in one submission: the memory for grains and supersegments is that of the frame before, and
-/// where it's too small the steps that need it do nothing. Then they're submitted again, with memory for what
-/// was counted, and for a quarter more.
+/// All steps in one submission: the memory for pre-segments and supersegments is that of the frame before,
+/// and where it's too small the steps that need it do nothing. Then they're submitted again, with memory for
+/// what was counted, and for a quarter more.
 void ListBuilder::buildByMerging(const Request& request, const Record& record, DeviceLists& lists,
                                  const Finish& finish) {
   const std::uint32_t listCount = request.listCount();
   const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
   const std::uint64_t countedWords =
       std::uint64_t{request.countedWidth()} * request.countedRows() * sizeof(std::uint32_t);
-  grainOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
+  preSegmentOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
   written_.reserve(device_, words, MemoryKind::DeviceLocal);
   countedTolerances_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
-  countedGrains_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
+  countedPreSegments_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
   left_.reserve(device_, words, MemoryKind::DeviceLocal);
-  grains_.reserve(device_, 0, MemoryKind::DeviceLocal);
+  preSegments_.reserve(device_, 0, MemoryKind::DeviceLocal);
   lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
   const bool quotas = request.agreed || request.runsOnly;
   if (quotas) quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
 
   const auto takeRuns = [&] {
-    commands_.fill(sensitivities_, std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max()));
-    commands_.fill(counts_, expectedRuns_);
+    commands_.fill(thresholds_, std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max()));
+    commands_.fill(capacities_, expectedRuns_);
     commands_.fill(quotas_, expectedRuns_ << 16U);
   };
   const auto search = [&] {
     if (request.runsOnly) return takeRuns();
-    shared::AllotConstants allot{};
-    allot.countedTolerances = countedTolerances_.address();
-    allot.countedGrains = countedGrains_.address();
-    allot.tolerances = sensitivities_.address();
-    allot.rooms = counts_.address();
-    allot.width = request.width;
-    allot.rows = request.rows;
-    allot.countedWidth = request.countedWidth();
-    allot.countedRows = request.countedRows();
-    allot.strideShift = static_cast<std::uint32_t>(std::countr_zero(request.countedStride));
-    commands_.mark("search");
+    shared::InterpolateConstants constants{};
+    constants.countedTolerances = countedTolerances_.address();
+    constants.countedPreSegments = countedPreSegments_.address();
+    constants.tolerances = thresholds_.address();
+    constants.capacities = capacities_.address();
+    constants.width = request.width;
+    constants.rows = request.rows;
+    constants.countedWidth = request.countedWidth();
+    constants.countedRows = request.countedRows();
+    constants.strideShift = static_cast<std::uint32_t>(std::countr_zero(request.countedStride));
+    commands_.mark("count");
     if (request.agreed) {
-      allot.countedTolerances = request.agreed->tolerances;
-      allot.countedGrains = request.agreed->grains;
-      allot.countedQuotas = request.agreed->quotas;
-      allot.quotas = quotas_.address();
-      allot.budget = request.agreed->budget;
+      constants.countedTolerances = request.agreed->tolerances;
+      constants.countedPreSegments = request.agreed->preSegments;
+      constants.countedQuotas = request.agreed->quotas;
+      constants.quotas = quotas_.address();
+      constants.budget = request.agreed->budget;
     } else {
       BandTargets targets;
-      targets.sensitivities = countedTolerances_.address();
-      targets.counts = countedGrains_.address();
+      targets.thresholds = countedTolerances_.address();
+      targets.capacities = countedPreSegments_.address();
       targets.status = status_.address();
-      targets.guard = grainsFit_.address();
+      targets.guard = preSegmentsFit_.address();
       record(commands_, targets, false);
       commands_.barrier();
     }
-    allot_.record(commands_, allot);
+    interpolate_.record(commands_, constants);
   };
   const auto write = [&] {
     BandTargets targets;
-    targets.sensitivities = sensitivities_.address();
-    targets.counts = counts_.address();
-    targets.offsets = grainOffsets_.address();
-    targets.grains = grains_.address();
+    targets.thresholds = thresholds_.address();
+    targets.capacities = capacities_.address();
+    targets.offsets = preSegmentOffsets_.address();
+    targets.preSegments = preSegments_.address();
     targets.written = written_.address();
     targets.left = left_.address();
     targets.quotas = quotas ? quotas_.address() : 0;
     targets.status = status_.address();
-    targets.guard = grainsFit_.address();
-    scan_.record(commands_, counts_, grainOffsets_, listCount, grainsFit_,
-                 grains_.size() / sizeof(shared::StoredGrain));
+    targets.guard = preSegmentsFit_.address();
+    scan_.record(commands_, capacities_, preSegmentOffsets_, listCount, preSegmentsFit_,
+                 preSegments_.size() / sizeof(shared::StoredPreSegment));
     commands_.mark("write");
     record(commands_, targets, true);
     scan_.record(commands_, left_, lists.offsets, listCount, segmentsFit_,
-                 lists.segments.size() / segmentBytes(request.code), &grainsFit_);
-    recordTotal(grainOffsets_, listCount, grainTotal);
+                 lists.segments.size() / segmentBytes(request.code), &preSegmentsFit_);
+    recordTotal(preSegmentOffsets_, listCount, preSegmentTotal);
     recordTotal(lists.offsets, listCount, segmentTotal);
   };
   const auto reduce = [&] {
     shared::ReduceConstants constants{};
-    constants.grains = grains_.address();
-    constants.grainOffsets = grainOffsets_.address();
+    constants.preSegments = preSegments_.address();
+    constants.preSegmentOffsets = preSegmentOffsets_.address();
     constants.written = written_.address();
     constants.left = left_.address();
     constants.offsets = lists.offsets.address();
@@ -189,7 +189,7 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
     constants.listCount = listCount;
     constants.form = storedForm(request.code);
     commands_.mark("reduce");
-    reduce_.record(commands_, constants, request.most);
+    reduce_.record(commands_, constants, request.maxPerList);
   };
 
   enum class From { Search, Write, Reduce };
@@ -203,17 +203,17 @@ void ListBuilder::buildByMerging(const Request& request, const Record& record, D
     end({});
     const auto totals = totals_.mappedAs<std::uint32_t>();
     auto& tooLong = status_.mappedAs<std::uint32_t>()[0];
-    const std::uint64_t grainBytes = totals[grainTotal] * sizeof(shared::StoredGrain);
+    const std::uint64_t preSegmentBytes = totals[preSegmentTotal] * sizeof(shared::StoredPreSegment);
     const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(request.code);
-    if (grains_.size() < grainBytes) {
-      grains_.reserve(device_, grainBytes + grainBytes / 4, MemoryKind::DeviceLocal);
+    if (preSegments_.size() < preSegmentBytes) {
+      preSegments_.reserve(device_, preSegmentBytes + preSegmentBytes / 4, MemoryKind::DeviceLocal);
       from = From::Write;
     } else if (quotas && tooLong != 0 && *from != From::Reduce) {
       // Lists that weren't counted may have more runs than was expected. They've said how many.
       tooLong = 0;
       if (request.runsOnly) expectedRuns_ = manyRuns;
       from = From::Write;
-    } else if (scan_.demandNoOverflow(); lists.segments.size() < listBytes) {
+    } else if (scan_.requireNoOverflow(); lists.segments.size() < listBytes) {
       lists.segments.reserve(device_, listBytes + listBytes / 4, MemoryKind::DeviceLocal);
       from = From::Reduce;
     } else {

@@ -2,9 +2,9 @@
 // rays and what composites share it; not part of the library's interface. vdi/reference/Segmenter.h describes
 // the algorithms.
 //   bisection: search of sensitivities, prefix sum of the counts, write.
-//   merge: count of grains, of all lists or one in countedStride x countedStride; allotment to all lists,
-//   prefix sum, write of grains; prefix sum of what's to be left of them, reduce.
-//   merge, with other ranks: the same with counts that all of them agreed on.
+//   merge: count of pre-segments, of all lists or one in countedStride x countedStride; interpolated
+//   tolerance to all lists, prefix sum, write of pre-segments; prefix sum of what's to be left of them,
+//   reduce. merge, with other ranks: the same with counts that all of them agreed on.
 #pragma once
 
 #include <cstdint>
@@ -13,9 +13,9 @@
 #include <optional>
 
 #include "vdi/core/GenerateSettings.h"
-#include "vdi/gpu/AllotPass.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
+#include "vdi/gpu/InterpolatePass.h"
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/ReducePass.h"
 #include "vdi/gpu/ScanPass.h"
@@ -25,11 +25,11 @@ namespace vdi::detail {
 
 /// Device addresses of one band of lists, counted from the band's first list. See shaders/shared/cast.h.
 struct BandTargets {
-  std::uint64_t sensitivities = 0;
-  std::uint64_t counts = 0;
+  std::uint64_t thresholds = 0;
+  std::uint64_t capacities = 0;
   std::uint64_t offsets = 0;
   std::uint64_t segments = 0;
-  std::uint64_t grains = 0;
+  std::uint64_t preSegments = 0;
   std::uint64_t written = 0;
   std::uint64_t left = 0;
   std::uint64_t quotas = 0;
@@ -44,11 +44,11 @@ gpu::shared::StoredForm storedForm(const DepthCode& code);
 /// prefix sum.
 struct ListTimes {
   double all = 0.0;
-  double search = 0.0;
+  double count = 0.0;
   double write = 0.0;
   ListTimes& operator+=(const ListTimes& other) {
     all += other.all;
-    search += other.search;
+    count += other.count;
     write += other.write;
     return *this;
   }
@@ -58,8 +58,8 @@ class ListBuilder {
  public:
   explicit ListBuilder(std::shared_ptr<gpu::Device> device);
 
-  /// Device bytes that a list of `most` supersegments may take.
-  static std::uint64_t bytesPerList(std::uint32_t most, Algorithm algorithm);
+  /// Device bytes that a list of `maxCount` supersegments may take.
+  static std::uint64_t bytesPerList(std::uint32_t maxCount, Algorithm algorithm);
 
   /// Records the dispatch of the algorithm's first step, or (write) its second one.
   using Record = std::function<void(gpu::Commands&, const BandTargets&, bool write)>;
@@ -70,14 +70,14 @@ class ListBuilder {
     bool rowBehind = false;           // another row follows the band's last one
     std::uint32_t countedStride = 1;  // merge: `rows` is a multiple of it, or nothing follows
     Algorithm algorithm = Algorithm::Merge;
-    gpu::ReducePass::MostPerList most;
+    gpu::ReducePass::MaxPerList maxPerList;
     double sampleStep = 1.0;
     DepthCode code;  // of compact lists
     /// Merging, with other ranks: what they agreed on about the counted lists (shaders/shared/quota.h), which
     /// aren't counted again. The first one of them is the band's.
     struct Agreed {
       std::uint64_t tolerances = 0;
-      std::uint64_t grains = 0;
+      std::uint64_t preSegments = 0;
       std::uint64_t quotas = 0;
       std::uint32_t budget = 1;
     };
@@ -116,22 +116,23 @@ class ListBuilder {
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
   gpu::ScanPass scan_;
-  gpu::AllotPass allot_;
+  gpu::InterpolatePass interpolate_;
   gpu::ReducePass reduce_;
-  gpu::Buffer sensitivities_;
-  gpu::Buffer counts_;
+  gpu::Buffer thresholds_;
+  gpu::Buffer capacities_;
   gpu::Buffer quotas_;
-  gpu::Buffer grainOffsets_;
-  gpu::Buffer grains_;
+  gpu::Buffer preSegmentOffsets_;
+  gpu::Buffer preSegments_;
   gpu::Buffer written_;
   gpu::Buffer left_;
   gpu::Buffer countedTolerances_;
-  gpu::Buffer countedGrains_;
+  gpu::Buffer countedPreSegments_;
   gpu::Buffer status_;
-  gpu::Buffer grainsFit_;  // guards: shaders/shared/scan.h
+  gpu::Buffer preSegmentsFit_;  // guards: shaders/shared/scan.h
   gpu::Buffer segmentsFit_;
-  gpu::Buffer totals_;  // of grains, and of supersegments
-  /// Of a picture's lists: most have no more. Once some had, there's room for as many as bytesPerList speaks of.
+  gpu::Buffer totals_;  // of pre-segments, and of supersegments
+  /// Of a picture's lists: most have no more. Once some had, there's room for as many as bytesPerList speaks
+  /// of.
   static constexpr std::uint32_t fewRuns = 3;
   static constexpr std::uint32_t manyRuns = 8;
   std::uint32_t expectedRuns_ = fewRuns;

@@ -28,8 +28,8 @@ struct RankReport {
   double uploadSeconds = 0.0;          // of setBlocks, or setNextBlocks and advance, since the last frame
   double generateSeconds = 0.0;        // casting and segmenting, transfers included
   double generateDeviceSeconds = 0.0;  // of these, the device's work without transfers
-  double searchSeconds = 0.0;  // of these, the first step: bisection's search or the counting of grains
-  double writeSeconds = 0.0;   // and the second
+  double countSeconds = 0.0;  // of these, the first step: bisection's search or the counting of pre-segments
+  double writeSeconds = 0.0;  // and the second
   double distributeSeconds = 0.0;
   double compositeSeconds = 0.0;
   double compositeDeviceSeconds = 0.0;  // of these, the device's work, and the copying of what was received

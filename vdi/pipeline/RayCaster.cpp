@@ -14,7 +14,7 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
       builder_(device_),
       commands_(device_),
       quotaPass_(device_),
-      survey_(device_) {}
+      histogram_(device_) {}
 
 shared::CastParams RayCaster::prepare(const Request& request) {
   volume_.setTable(request.table, slabLength(request.lattice, request.table));
@@ -33,7 +33,7 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.nodeCount = volume_.nodeCount();
   params.enough = terminationOpticalDepth(request.settings);
   params.budget = request.settings.supersegments;
-  params.mostPerList = mostPerList(request.settings.supersegments, request.settings.budget);
+  params.maxPerList = maxPerList(request.settings.supersegments, request.settings.budget);
   params.level = -1.0F;
   params.form = storedForm(request.code);
   if (!volume_.empty()) pass_.bind(volume_);
@@ -56,14 +56,15 @@ std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytes
 float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) {
   const auto width = static_cast<std::uint32_t>(request.view.width());
   const auto height = static_cast<std::uint32_t>(request.view.height());
-  const Survey survey = survey_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
-    params.survey = address;
-    pass_.record(commands, params, gpu::CastPass::Work::Survey, Algorithm::Merge,
-                 {width, 0, height, params.countedStride, false, params.form});
-  });
+  const SupersegmentHistogram histogram =
+      histogram_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
+        params.histogram = address;
+        pass_.record(commands, params, gpu::CastPass::Work::Histogram, Algorithm::Merge,
+                     {width, 0, height, params.countedStride, false, params.form});
+      });
   const double milliseconds = commands_.stageTimes().front().milliseconds;
   times_ += {milliseconds, milliseconds, 0.0};
-  return survey.levelFor(request.settings.fill);
+  return histogram.levelFor(request.settings.fill);
 }
 
 RayCaster::Cast RayCaster::begin(const Request& request) {
@@ -73,7 +74,7 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
   cast.cutAtGaps = request.cutAtGaps;
   cast.nothingThere = volume_.empty() || request.lattice.count == 0;
   if (!cast.nothingThere) cast.params = prepare(request);
-  const std::uint32_t most = mostPerList(request.settings.supersegments, request.settings.budget);
+  const std::uint32_t maxCount = maxPerList(request.settings.supersegments, request.settings.budget);
   ListBuilder::Request& build = cast.build;
   build.width = static_cast<std::uint32_t>(request.view.width());
   build.runsOnly = request.runsOnly;
@@ -82,10 +83,10 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
   cast.agreed = request.cutAtGaps && build.algorithm == Algorithm::Merge && !request.runsOnly;
   build.countedStride =
       build.algorithm == Algorithm::Bisection && request.cutAtGaps ? 1 : shared::countedStride;
-  build.most = {request.runsOnly ? 1 : most, !request.cutAtGaps};
+  build.maxPerList = {request.runsOnly ? 1 : maxCount, !request.cutAtGaps};
   build.sampleStep = request.lattice.step;
   build.code = request.code;
-  cast.rowsPerBand = rowsPerBand(request, ListBuilder::bytesPerList(most, build.algorithm));
+  cast.rowsPerBand = rowsPerBand(request, ListBuilder::bytesPerList(maxCount, build.algorithm));
   cast.params.countedStride = build.countedStride;
   cast.params.countedSamples =
       build.countedStride > 1
@@ -100,10 +101,10 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
 
 namespace {
 
-/// What quantises counts to bytes: whether grains are too many must still show.
+/// What quantises counts to bytes: whether pre-segments are too many must still show.
 std::uint32_t levelShiftFor(std::uint32_t budget) {
   std::uint32_t shift = 0;
-  while ((shared::grainsPerBudget * budget >> shift) >= 255) ++shift;
+  while ((shared::preSegmentsPerBudget * budget >> shift) >= 255) ++shift;
   return shift;
 }
 
@@ -118,13 +119,13 @@ void RayCaster::countLevels(Cast& cast, HostAccess& memory, std::uint64_t at) {
   const std::uint64_t bytes = levelBytes(cast);
   levels_.reserve(device_, bytes, gpu::MemoryKind::DeviceLocal);
   cast.params.levels = levels_.address();
-  cast.params.levelShift = levelShiftFor(cast.build.most.supersegments);
+  cast.params.levelShift = levelShiftFor(cast.build.maxPerList.supersegments);
   cast.params.countedWidth = cast.build.countedWidth();
   commands_.begin();
   if (cast.nothingThere) {
     commands_.fill(levels_, 0);
   } else {
-    commands_.mark("search");
+    commands_.mark("count");
     pass_.record(commands_, cast.params, gpu::CastPass::Work::CountLevels, Algorithm::Merge,
                  {cast.build.width, 0, cast.height, cast.build.countedStride, true, cast.params.form});
   }
@@ -145,7 +146,7 @@ void RayCaster::agree(Cast& cast, std::span<const LevelSum> sum) {
   const std::uint64_t words = std::uint64_t{width} * rows * sizeof(std::uint32_t);
   levelsSum_.reserve(device_, levelBytes(cast), gpu::MemoryKind::DeviceLocal);
   agreedTolerances_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
-  agreedGrains_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
+  agreedPreSegments_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
   agreedQuotas_.reserve(device_, words, gpu::MemoryKind::DeviceLocal);
   weights_.reserve(device_, rows * sizeof(std::uint32_t), gpu::MemoryKind::DeviceLocal);
   weightsReadback_.reserve(device_, rows * sizeof(std::uint32_t), gpu::MemoryKind::Readback);
@@ -153,14 +154,14 @@ void RayCaster::agree(Cast& cast, std::span<const LevelSum> sum) {
   quota.own = levels_.address();
   quota.sum = levelsSum_.address();
   quota.tolerances = agreedTolerances_.address();
-  quota.grains = agreedGrains_.address();
+  quota.preSegments = agreedPreSegments_.address();
   quota.quotas = agreedQuotas_.address();
   quota.weights = weights_.address();
   quota.width = width;
   quota.rows = rows;
-  quota.budget = cast.build.most.supersegments;
+  quota.budget = cast.build.maxPerList.supersegments;
   quota.levelShift = cast.params.levelShift;
-  quota.levelCount = Survey::levels - 2;
+  quota.levelCount = SupersegmentHistogram::levels - 2;
   sumsOnHost_.clear();
   commands_.begin();
   for (const LevelSum& stretch : sum) {
@@ -209,28 +210,28 @@ void RayCaster::makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastR
   if (cast.agreed) {
     const std::uint64_t first =
         std::uint64_t{firstRow / build.countedStride} * build.countedWidth() * sizeof(std::uint32_t);
-    build.agreed = {agreedTolerances_.address() + first, agreedGrains_.address() + first,
-                    agreedQuotas_.address() + first, build.most.supersegments};
+    build.agreed = {agreedTolerances_.address() + first, agreedPreSegments_.address() + first,
+                    agreedQuotas_.address() + first, build.maxPerList.supersegments};
   }
   const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
     // The shader counts lists from the picture's first; the targets hold just this band's.
     const std::uint64_t skipped = std::uint64_t{firstRow} * build.width * sizeof(std::uint32_t);
-    params.sensitivities = targets.sensitivities - skipped;
-    params.counts = targets.counts - skipped;
+    params.thresholds = targets.thresholds - skipped;
+    params.capacities = targets.capacities - skipped;
     params.offsets = targets.offsets - skipped;
     params.segments = targets.segments;
-    params.grains = targets.grains;
+    params.preSegments = targets.preSegments;
     params.written = targets.written - skipped;
     params.left = targets.left - skipped;
     params.quotas = targets.quotas - skipped;
     params.status = targets.status;
     params.guard = targets.guard;
     if (!write && build.algorithm == Algorithm::Merge) {
-      params.sensitivities = targets.sensitivities;
-      params.counts = targets.counts;
+      params.thresholds = targets.thresholds;
+      params.capacities = targets.capacities;
     }
     using Work = gpu::CastPass::Work;
-    pass_.record(commands, params, write ? Work::Write : Work::Search, build.algorithm,
+    pass_.record(commands, params, write ? Work::Write : Work::Count, build.algorithm,
                  {build.width, firstRow, lastRow, build.countedStride, cast.cutAtGaps, params.form});
   };
   builder_.build(build, record, lists, finish);

@@ -17,9 +17,9 @@
 #include "vdi/gpu/CastPass.h"
 #include "vdi/gpu/QuotaPass.h"
 #include "vdi/gpu/VolumeStore.h"
+#include "vdi/pipeline/HistogramBuffer.h"
 #include "vdi/pipeline/HostAccess.h"
 #include "vdi/pipeline/ListBuilder.h"
-#include "vdi/pipeline/SurveyBuffer.h"
 
 namespace vdi::detail {
 
@@ -94,13 +94,13 @@ class RayCaster {
   gpu::Buffer levelsSum_;
   std::vector<HostAccess*> sumsOnHost_;
   gpu::Buffer agreedTolerances_;
-  gpu::Buffer agreedGrains_;
+  gpu::Buffer agreedPreSegments_;
   gpu::Buffer agreedQuotas_;
   gpu::Buffer weights_;
   gpu::Buffer weightsReadback_;
   gpu::Buffer colors_;
   gpu::Buffer depths_;
-  SurveyBuffer survey_;
+  HistogramBuffer histogram_;
   ListTimes times_;
 };
 

@@ -32,7 +32,7 @@ struct VdiRenderer::State {
   gpu::Buffer offsets;
   gpu::Buffer segments;
   gpu::Buffer heads;
-  gpu::Buffer tileMasks;
+  gpu::Buffer tileDepthMasks;
   detail::PictureBuffers picture;
   std::unique_ptr<View> original;  // none until there's a VDI
   float nearest = 0.0F;
@@ -79,7 +79,7 @@ struct VdiRenderer::State {
     offsets.reserve(device, lists.offsets.size() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
     segments.reserve(device, lists.segments.size() * sizeof(shared::RenderSegment), MemoryKind::DeviceLocal);
     heads.reserve(device, lists.listCount() * sizeof(shared::ListHead), MemoryKind::DeviceLocal);
-    tileMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint64_t), MemoryKind::DeviceLocal);
+    tileDepthMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint64_t), MemoryKind::DeviceLocal);
     const std::uint64_t bytes =
         (lists.offsets.size() + 4) * sizeof(std::uint32_t) + lists.segments.size() * sizeof(Segment);
     staging.reserve(device, std::min(bytes, stagingBytes), MemoryKind::Upload);
@@ -92,7 +92,7 @@ struct VdiRenderer::State {
     constants.offsets = offsets.address();
     constants.segments = segments.address();
     constants.heads = heads.address();
-    constants.tileMasks = tileMasks.address();
+    constants.tileDepthMasks = tileDepthMasks.address();
     constants.nearest = nearest;
     constants.binScale = binScale;
     constants.lists = size;
@@ -138,8 +138,8 @@ template <typename Segment>
 DepthRange depthsOf(const ListsOf<Segment>& lists, const DepthCode& code) {
   DepthRange all;
   std::mutex mutex;
-  constexpr std::size_t least = 1U << 16;  // lists
-  inParallel(lists.listCount(), least, [&](std::size_t first, std::size_t last) {
+  constexpr std::size_t minimum = 1U << 16;  // lists
+  inParallel(lists.listCount(), minimum, [&](std::size_t first, std::size_t last) {
     DepthRange own;
     for (std::size_t i = first; i < last; ++i) {
       const std::span<const Segment> list = lists.list(i);
@@ -186,7 +186,7 @@ void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds
   shared::RenderParams params = gpu::renderGeometry(*original, view);
   params.heads = heads.address();
   params.segments = segments.address();
-  params.tileMasks = tileMasks.address();
+  params.tileDepthMasks = tileDepthMasks.address();
   params.binScale = binScale;
   params.colors = picture.colors();
   params.depths = picture.depths();
@@ -244,8 +244,8 @@ namespace {
 template <typename Segment, typename Value>
 void flattenLists(const ListsOf<Segment>& lists, Value value, Image& image) {
   constexpr float opaque = 0.999999F;
-  constexpr std::size_t least = 4096;  // lists
-  inParallel(image.pixelCount(), least, [&](std::size_t first, std::size_t last) {
+  constexpr std::size_t minimum = 4096;  // lists
+  inParallel(image.pixelCount(), minimum, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       const std::span<const Segment> list = lists.list(i);
       glm::vec4 sum(0.0F);

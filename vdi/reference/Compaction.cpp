@@ -8,12 +8,12 @@ namespace vdi::reference {
 
 namespace {
 
-using shared::mostCarriedDepth;
-using shared::mostColorChange;
-using shared::mostDepthChange;
+using shared::maxCarriedDepth;
+using shared::maxColorChange;
+using shared::maxDepthChange;
 using shared::thinnestStep;
 using shared::unseen;
-static_assert(shared::mostDepthCode == static_cast<float>(DepthCode::largest));
+static_assert(shared::maxDepthCode == static_cast<float>(DepthCode::largest));
 
 std::uint32_t codeOfOpticalDepth(float opticalDepth) {
   const float code = std::log2(1.0F + 16.0F * std::max(opticalDepth, 0.0F)) * (4095.0F / 16.0F);
@@ -36,7 +36,7 @@ class Compactor {
     reach_ = back;
 
     const float own = s.opticalDepth;
-    const float slack = mostDepthChange * own + thinnestStep;
+    const float slack = maxDepthChange * own + thinnestStep;
     const std::uint32_t depth = codeOfOpticalDepth(own + std::clamp(carriedDepth_, -slack, slack));
     const float stored = opticalDepthOfCode(depth);
 
@@ -46,12 +46,12 @@ class Compactor {
     glm::vec3 color = straight;
     if (seen > unseen) {
       color =
-          glm::clamp((carriedLight_ + light) / seen, straight - mostColorChange, straight + mostColorChange);
+          glm::clamp((carriedLight_ + light) / seen, straight - maxColorChange, straight + maxColorChange);
     }
     const glm::vec3 codes = glm::round(glm::clamp(color, 0.0F, 1.0F) * 255.0F);
 
     carriedLight_ += light - seen / 255.0F * codes;
-    carriedDepth_ = std::clamp(carriedDepth_ + own - stored, -mostCarriedDepth, mostCarriedDepth);
+    carriedDepth_ = std::clamp(carriedDepth_ + own - stored, -maxCarriedDepth, maxCarriedDepth);
     depth_ += own;
     storedDepth_ += stored;
     return CompactSupersegment::pack(front, back, static_cast<std::uint32_t>(codes.r),

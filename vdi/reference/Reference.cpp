@@ -235,15 +235,15 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
   const std::uint32_t atOnce = countedSamplesFor(frame.lattice.count, rules.budget);
   // A rank's own lists get N_S each: what a list needs is known when all ranks' are together.
   if (frame.settings.budget == Budget::Total && !cutAtGaps) {
-    Survey survey;
+    SupersegmentHistogram histogram;
     for (int y = 0; y < height; y += stride) {
       for (int x = 0; x < width; x += stride)
-        addTo(survey, castRay(frame, blocks, x, y, atOnce), rules, atOnce);
+        addTo(histogram, castRay(frame, blocks, x, y, atOnce), rules, atOnce);
     }
-    rules.level = survey.levelFor(frame.settings.fill);
+    rules.level = histogram.levelFor(frame.settings.fill);
   }
-  const auto allotmentAt = [&](int x, int y) {
-    return allotmentOf(castRay(frame, blocks, x, y, atOnce), rules, atOnce);
+  const auto listToleranceAt = [&](int x, int y) {
+    return listToleranceOf(castRay(frame, blocks, x, y, atOnce), rules, atOnce);
   };
   const auto listAt = [&](int x, int y) {
     const std::vector<Interval> samples = castRay(frame, blocks, x, y);
@@ -255,9 +255,9 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
     const int above = countedBehind(y, height);
     SegmentRules own = rules;
     own.rounding = roundingOf(static_cast<std::uint32_t>(y * width + x));
-    const Allotment counted[] = {allotmentAt(left, below), allotmentAt(right, below),
-                                 allotmentAt(left, above), allotmentAt(right, above)};
-    return segmentByMerging(samples, own, allotmentBetween(counted));
+    const ListTolerance counted[] = {listToleranceAt(left, below), listToleranceAt(right, below),
+                                     listToleranceAt(left, above), listToleranceAt(right, above)};
+    return segmentByMerging(samples, own, interpolatedTolerance(counted));
   };
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -271,26 +271,26 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
 
 std::vector<SupersegmentLists> generateTogether(const Frame& frame,
                                                 std::span<const std::vector<Block>> ranks) {
-  const std::uint32_t budget = mostPerList(frame.settings.supersegments, frame.settings.budget);
+  const std::uint32_t budget = maxPerList(frame.settings.supersegments, frame.settings.budget);
   const SegmentRules rules{budget, static_cast<float>(frame.lattice.step), true};
   const std::uint32_t atOnce = countedSamplesFor(frame.lattice.count, frame.settings.supersegments);
   const int width = frame.view.width();
   const int height = frame.view.height();
   const int countedWidth = (width + stride - 1) / stride;
   const int countedHeight = (height + stride - 1) / stride;
-  std::vector<std::vector<Allotment>> agreed(ranks.size());  // of each rank's counted lists
+  std::vector<std::vector<ListTolerance>> agreed(ranks.size());  // of each rank's counted lists
   for (int y = 0; y < countedHeight; ++y) {
     for (int x = 0; x < countedWidth; ++x) {
       std::vector<CountedLevels> levels;
       CountedLevels sum;
       for (const std::vector<Block>& blocks : ranks) {
-        levels.push_back(countedLevels(castRay(frame, blocks, x * stride, y * stride, atOnce),
-                                       rules, atOnce));
+        levels.push_back(
+            countedLevels(castRay(frame, blocks, x * stride, y * stride, atOnce), rules, atOnce));
         sum.shift = levels.back().shift;
         sum += levels.back();
       }
       for (std::size_t r = 0; r < ranks.size(); ++r)
-        agreed[r].push_back(agreedAllotment(levels[r], sum, budget));
+        agreed[r].push_back(agreedTolerance(levels[r], sum, budget));
     }
   }
   std::vector<SupersegmentLists> result(ranks.size());
@@ -298,16 +298,16 @@ std::vector<SupersegmentLists> generateTogether(const Frame& frame,
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const auto at = [&](int column, int row) {
-          return agreed[r][static_cast<std::size_t>(row / stride * countedWidth +
-                                                    column / stride)];
+          return agreed[r][static_cast<std::size_t>(row / stride * countedWidth + column / stride)];
         };
         const int left = countedBefore(x);
         const int right = countedBehind(x, width);
         const int below = countedBefore(y);
         const int above = countedBehind(y, height);
-        const Allotment counted[] = {at(left, below), at(right, below), at(left, above), at(right, above)};
+        const ListTolerance counted[] = {at(left, below), at(right, below), at(left, above),
+                                         at(right, above)};
         const auto list =
-            segmentByMerging(castRay(frame, ranks[r], x, y), rules, agreedAllotmentBetween(counted, budget));
+            segmentByMerging(castRay(frame, ranks[r], x, y), rules, agreedToleranceBetween(counted, budget));
         result[r].segments.insert(result[r].segments.end(), list.begin(), list.end());
         result[r].offsets.push_back(static_cast<std::uint32_t>(result[r].segments.size()));
       }
@@ -319,15 +319,15 @@ std::vector<SupersegmentLists> generateTogether(const Frame& frame,
 namespace {
 
 /// All ranks' supersegments of a list, by depth.
-std::vector<Interval> mergedList(std::span<const SupersegmentLists> subLists, std::size_t list) {
-  std::vector<Interval> merged;
+std::vector<Interval> interleavedList(std::span<const SupersegmentLists> subLists, std::size_t list) {
+  std::vector<Interval> interleaved;
   for (const SupersegmentLists& sub : subLists) {
     for (const Supersegment& s : sub.list(list))
-      merged.push_back({s.front, s.back, s.red, s.green, s.blue, opticalDepthOf(s.opacity)});
+      interleaved.push_back({s.front, s.back, s.red, s.green, s.blue, opticalDepthOf(s.opacity)});
   }
-  std::stable_sort(merged.begin(), merged.end(),
+  std::stable_sort(interleaved.begin(), interleaved.end(),
                    [](const Interval& a, const Interval& b) { return a.front < b.front; });
-  return merged;
+  return interleaved;
 }
 
 }  // namespace
@@ -337,14 +337,14 @@ SupersegmentLists composite(std::span<const SupersegmentLists> subLists, const G
   SegmentRules rules{settings.supersegments, static_cast<float>(sampleStep), false};
   const std::size_t listCount = subLists.empty() ? 0 : subLists.front().listCount();
   if (settings.budget == Budget::Total) {
-    Survey survey;
-    for (std::size_t i = 0; i < listCount; ++i) addTo(survey, mergedList(subLists, i), rules);
-    rules.level = survey.levelFor(settings.fill);
+    SupersegmentHistogram histogram;
+    for (std::size_t i = 0; i < listCount; ++i) addTo(histogram, interleavedList(subLists, i), rules);
+    rules.level = histogram.levelFor(settings.fill);
   }
   SupersegmentLists result;
   for (std::size_t i = 0; i < listCount; ++i) {
     rules.rounding = roundingOf(static_cast<std::uint32_t>(i));
-    const auto list = segment(mergedList(subLists, i), rules, settings.algorithm);
+    const auto list = segment(interleavedList(subLists, i), rules, settings.algorithm);
     result.segments.insert(result.segments.end(), list.begin(), list.end());
     result.offsets.push_back(static_cast<std::uint32_t>(result.segments.size()));
   }

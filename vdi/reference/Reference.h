@@ -55,14 +55,14 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
 std::vector<SupersegmentLists> generateTogether(const Frame& frame,
                                                 std::span<const std::vector<Block>> ranks);
 
-/// The ranks' lists of each pixel merged by depth and segmented again to the budget (paper,
+/// The ranks' lists of each pixel interleaved by depth and segmented again to the budget (paper,
 /// section 5.2). All inputs have the same number of lists. Of the settings: supersegments, budget, fill and
 /// algorithm.
 SupersegmentLists composite(std::span<const SupersegmentLists> subLists, const GenerateSettings& settings,
                             double sampleStep);
 
 /// The VDI seen by `view`. Each supersegment fills the part of its pixel's frustum between its two depths;
-/// rays walk through the frusta of V_O's pixels in order, whatever their direction. `ends`: [height][width]
+/// rays traverse the frusta of V_O's pixels in order, whatever their direction. `ends`: [height][width]
 /// of the view, the depths at which its rays end, say at opaque objects; empty: nowhere.
 Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction,
              std::span<const float> ends = {});

@@ -1,4 +1,4 @@
-// A VDI from a new viewpoint: a ray walks through the frusta of V_O's pixels. The shaders' twin is
+// A VDI from a new viewpoint: a ray traverses the frusta of V_O's pixels. The shaders' twin is
 // shaders/render.comp.
 #include <algorithm>
 #include <cassert>
@@ -101,8 +101,8 @@ void addListOf(Accumulator& sum, const SupersegmentLists& lists, const View& ori
   addList(sum, lists.list(index), ray, pixelLength, stretch);
 }
 
-Accumulator walkLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
-                      const Stretch& stretch) {
+Accumulator traverseLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+                          const Stretch& stretch) {
   Accumulator sum;
   const glm::dvec2 start = pixelAt(ray, original, stretch.enter);
   const glm::dvec2 end = pixelAt(ray, original, stretch.leave);
@@ -158,8 +158,8 @@ struct BetweenCentres {
 };
 
 /// A ray that stays in about one place of V_O's picture: the four lists around that.
-Accumulator lookAlongLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
-                           const Stretch& stretch, const glm::dvec2& place) {
+Accumulator intersectAlongLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+                                const Stretch& stretch, const glm::dvec2& place) {
   const BetweenCentres x(place.x);
   const BetweenCentres y(place.y);
   const glm::ivec2 size{original.width(), original.height()};
@@ -180,14 +180,14 @@ Accumulator lookAlongLists(const SupersegmentLists& lists, const View& original,
 /// Reconstruction::Smooth. Column by column, or row by row, whichever the ray crosses more of: then it stays
 /// near the same two lists of each column, and those are blended. Blending across columns as well is worth
 /// nothing (measured) but where the ray crosses hardly any.
-Accumulator walkSmoothly(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
-                         const Stretch& stretch) {
+Accumulator traverseSmoothly(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+                             const Stretch& stretch) {
   const glm::dvec2 start = pixelAt(ray, original, stretch.enter);
   const glm::dvec2 end = pixelAt(ray, original, stretch.leave);
   const glm::dvec2 extent = glm::abs(end - start);
   const int along = 1.001 * extent.x >= extent.y ? 0 : 1;  // diagonals: by columns, whatever rounding does
   const int across = 1 - along;
-  if (extent[along] < 1.0) return lookAlongLists(lists, original, ray, stretch, 0.5 * (start + end));
+  if (extent[along] < 1.0) return intersectAlongLists(lists, original, ray, stretch, 0.5 * (start + end));
   Accumulator sum;
   const glm::ivec2 size{original.width(), original.height()};
   int column = std::clamp(static_cast<int>(std::floor(start[along])), 0, size[along] - 1);
@@ -250,8 +250,8 @@ Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, st
       if (!ends.empty()) stretch.leave = std::min(stretch.leave, static_cast<double>(ends[pixel]));
       if (stretch.empty()) continue;
       const Accumulator sum = reconstruction == Reconstruction::Smooth
-                                  ? walkSmoothly(lists, original, ray, stretch)
-                                  : walkLists(lists, original, ray, stretch);
+                                  ? traverseSmoothly(lists, original, ray, stretch)
+                                  : traverseLists(lists, original, ray, stretch);
       image.rgba[pixel] = sum.rgba();
       image.depth[pixel] = sum.depth();
     }

@@ -1,4 +1,4 @@
-// The shaders' twin is shaders/grains.glsl (step 2) and shaders/reduce.comp (step 3).
+// The shaders' twin is shaders/pre_segments.glsl (step 2) and shaders/reduce.comp (step 3).
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -40,14 +40,14 @@ float weightBehind(float transmittance) {
   return hiddenWeight + (1.0F - hiddenWeight) * transmittance;
 }
 
-struct Grain {
+struct PreSegment {
   float front;
   float back;
   float red;  // premultiplied
   float green;
   float blue;
   float opticalDepth;
-  bool cut;                 // must not be merged with the grain before it
+  bool cut;                 // must not be merged with the pre-segment before it
   float before;             // transmittance of what's in front of it
   Appearance appearance{};  // see setUpCosts
   void absorb(float theBack, float theRed, float theGreen, float theBlue, float theOpticalDepth) {
@@ -60,18 +60,19 @@ struct Grain {
   }
 };
 
-/// A negative tolerance makes each interval a grain. See Allotment for `room`.
-std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted, const SegmentRules& rules,
-                            std::size_t room = std::numeric_limits<std::size_t>::max()) {
-  std::vector<Grain> grains;
-  float tolerance = allotted;
-  std::size_t runs = 0;  // grains that begin one
+/// A negative tolerance makes each interval a pre-segment. See ListTolerance for `room`.
+std::vector<PreSegment> preSegmentsOf(std::span<const Interval> intervals, float initialTolerance,
+                                      const SegmentRules& rules,
+                                      std::size_t room = std::numeric_limits<std::size_t>::max()) {
+  std::vector<PreSegment> preSegments;
+  float tolerance = initialTolerance;
+  std::size_t runs = 0;  // pre-segments that begin one
   const auto adaptTolerance = [&] {
-    const std::size_t left = room - std::min(room, grains.size() - runs);
-    if (left >= spareGrains) return;
-    const float base = allotted < 0.0F ? finestTolerance / toleranceRatio : allotted;
+    const std::size_t left = room - std::min(room, preSegments.size() - runs);
+    if (left >= sparePreSegments) return;
+    const float base = initialTolerance < 0.0F ? finestTolerance / toleranceRatio : initialTolerance;
     tolerance =
-        left == 0 ? unlimited : base * std::pow(toleranceRatio, static_cast<float>(spareGrains - left));
+        left == 0 ? unlimited : base * std::pow(toleranceRatio, static_cast<float>(sparePreSegments - left));
   };
   bool open = false;
   bool cut = true;
@@ -98,9 +99,9 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
     if (tolerance < 0.0F) open = false;
     if (i.opticalDepth > 0.0F) {
       if (open) {
-        grains.back().absorb(i.back, i.red, i.green, i.blue, i.opticalDepth);
+        preSegments.back().absorb(i.back, i.red, i.green, i.blue, i.opticalDepth);
       } else {
-        grains.push_back(
+        preSegments.push_back(
             {i.front, i.back, i.red, i.green, i.blue, i.opticalDepth, rules.cutAtGaps && cut, before});
         runs += rules.cutAtGaps && cut ? 1 : 0;
         first = x;
@@ -113,7 +114,7 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
     before *= 1.0F - opacityOf(i.opticalDepth);
     reach = i.back;
   }
-  return grains;
+  return preSegments;
 }
 
 /// Where two neighbours are that were merged. Far apart, the fainter one's light goes to the place of the
@@ -121,13 +122,13 @@ std::vector<Grain> grainsOf(std::span<const Interval> intervals, float allotted,
 /// pass any more. But a list stays where it begins, for that's its depth in a picture.
 enum class Place { OfBoth, OfFirst, OfSecond };
 
-/// How much there is of a grain.
-float amountOf(const Grain& grain) {
-  return (grain.back - grain.front) * distance({}, grain.appearance);
+/// How much there is of a pre-segment.
+float amountOf(const PreSegment& preSegment) {
+  return (preSegment.back - preSegment.front) * distance({}, preSegment.appearance);
 }
 
 /// What's as long, or as much, counts as longer, or more, whichever way it was rounded.
-Place placeOf(const Grain& a, const Grain& b) {
+Place placeOf(const PreSegment& a, const PreSegment& b) {
   const float lengths = (a.back - a.front) + (b.back - b.front);
   if (b.front - a.back < lengths * 0.9999F) return Place::OfBoth;
   if (amountOf(b) <= amountOf(a) * 1.0001F) return Place::OfFirst;
@@ -135,8 +136,8 @@ Place placeOf(const Grain& a, const Grain& b) {
 }
 
 /// Appearances are those that costs were computed from; the result has none yet.
-Grain merged(const Grain& a, const Grain& b) {
-  Grain result = a;
+PreSegment merged(const PreSegment& a, const PreSegment& b) {
+  PreSegment result = a;
   result.absorb(b.back, b.red, b.green, b.blue, b.opticalDepth);
   const Place place = placeOf(a, b);
   if (place == Place::OfFirst) result.back = a.back;
@@ -146,7 +147,7 @@ Grain merged(const Grain& a, const Grain& b) {
 
 /// What merging two neighbours changes: the sum over both, and over the gap between them, of the distance to
 /// what's there then times the length.
-float costOf(const Grain& a, const Grain& b) {
+float costOf(const PreSegment& a, const PreSegment& b) {
   if (b.cut) return unlimited;
   const float first = a.back - a.front;
   const float second = b.back - b.front;
@@ -167,15 +168,16 @@ float costOf(const Grain& a, const Grain& b) {
 }
 
 /// What costs are computed from.
-void setUpCosts(std::vector<Grain>& grains, float sampleStep) {
-  for (Grain& g : grains)
+void setUpCosts(std::vector<PreSegment>& preSegments, float sampleStep) {
+  for (PreSegment& g : preSegments)
     g.appearance = overOneSample(g.red, g.green, g.blue, g.opticalDepth, g.back - g.front, sampleStep);
 }
 
-/// Costs of merging each grain with the next one; unlimited for the last.
-std::vector<float> costsOf(const std::vector<Grain>& grains) {
-  std::vector<float> costs(grains.size(), unlimited);
-  for (std::size_t i = 0; i + 1 < grains.size(); ++i) costs[i] = costOf(grains[i], grains[i + 1]);
+/// Costs of merging each pre-segment with the next one; unlimited for the last.
+std::vector<float> costsOf(const std::vector<PreSegment>& preSegments) {
+  std::vector<float> costs(preSegments.size(), unlimited);
+  for (std::size_t i = 0; i + 1 < preSegments.size(); ++i)
+    costs[i] = costOf(preSegments[i], preSegments[i + 1]);
   return costs;
 }
 
@@ -199,41 +201,42 @@ bool isCheapest(const std::vector<float>& costs, std::size_t i) {
   return (i == 0 || cheaperThan(costs[i - 1])) && (i + 1 == costs.size() || cheaperThan(costs[i + 1]));
 }
 
-/// One round; `excess` grains at most are to go. Returns the costs of the mergers that weren't made, as they
-/// were before those that were.
-Costs mergeOnce(std::vector<Grain>& grains, std::size_t excess, float limit, float sampleStep) {
-  setUpCosts(grains, sampleStep);
-  const std::vector<float> costs = costsOf(grains);
+/// One round; `excess` pre-segments at most are to go. Returns the costs of the mergers that weren't made, as
+/// they were before those that were.
+Costs mergeOnce(std::vector<PreSegment>& preSegments, std::size_t excess, float limit, float sampleStep) {
+  setUpCosts(preSegments, sampleStep);
+  const std::vector<float> costs = costsOf(preSegments);
   Costs others;
-  std::vector<Grain> left;
-  for (std::size_t i = 0; i < grains.size(); ++i) {
+  std::vector<PreSegment> left;
+  for (std::size_t i = 0; i < preSegments.size(); ++i) {
     if (excess > 0 && costs[i] < unlimited && costs[i] <= limit && isCheapest(costs, i)) {
-      left.push_back(merged(grains[i], grains[i + 1]));
+      left.push_back(merged(preSegments[i], preSegments[i + 1]));
       --excess;
       ++i;  // whose cost isn't the least, or it would have gone instead
     } else {
-      left.push_back(grains[i]);
+      left.push_back(preSegments[i]);
     }
     others.add(costs[i]);
   }
-  grains = std::move(left);
+  preSegments = std::move(left);
   return others;
 }
 
-void mergeCheapest(std::vector<Grain>& grains, std::size_t most, float sampleStep) {
-  if (grains.size() <= most) return;
-  setUpCosts(grains, sampleStep);
+void mergeCheapest(std::vector<PreSegment>& preSegments, std::size_t maxCount, float sampleStep) {
+  if (preSegments.size() <= maxCount) return;
+  setUpCosts(preSegments, sampleStep);
   Costs costs;
-  for (const float cost : costsOf(grains)) costs.add(cost);
-  while (grains.size() > most && costs.finite > 0.0F)
-    costs = mergeOnce(grains, grains.size() - most, costs.limit(), sampleStep);
+  for (const float cost : costsOf(preSegments)) costs.add(cost);
+  while (preSegments.size() > maxCount && costs.finite > 0.0F)
+    costs = mergeOnce(preSegments, preSegments.size() - maxCount, costs.limit(), sampleStep);
 }
 
 }  // namespace
 
 namespace {
 
-static_assert(Survey::levels == toleranceLevels + 2 && Survey::levels == shared::surveyLevels);
+static_assert(SupersegmentHistogram::levels == toleranceLevels + 2 &&
+              SupersegmentHistogram::levels == shared::histogramLevels);
 static_assert(shared::maxOpticalDepth == maxExtinction);
 
 std::size_t visibleSamples(std::span<const Interval> intervals, std::size_t atOnce) {
@@ -242,16 +245,16 @@ std::size_t visibleSamples(std::span<const Interval> intervals, std::size_t atOn
                                     [](const Interval& interval) { return interval.opticalDepth > 0.0F; }));
 }
 
-/// What a list that isn't empty would hold at a level of a Survey.
+/// What a list that isn't empty would hold at a level of a Histogram.
 std::size_t supersegmentsAtLevel(std::span<const Interval> intervals, const SegmentRules& rules,
                                  std::size_t atOnce, std::size_t level) {
   std::size_t count = 1;
   if (level == 0) count = visibleSamples(intervals, atOnce);
-  if (level > 0 && level + 1 < Survey::levels) {
+  if (level > 0 && level + 1 < SupersegmentHistogram::levels) {
     const float tolerance = finestTolerance * std::pow(toleranceRatio, static_cast<float>(level - 1));
-    count = grainsOf(intervals, tolerance, rules).size();
+    count = preSegmentsOf(intervals, tolerance, rules).size();
   }
-  return std::min<std::size_t>(count, mostPerList(rules.budget, Budget::Total));
+  return std::min<std::size_t>(count, maxPerList(rules.budget, Budget::Total));
 }
 
 /// What a list that isn't empty may hold, but for runs.
@@ -265,49 +268,50 @@ std::size_t budgetOf(std::span<const Interval> intervals, const SegmentRules& ru
 
 }  // namespace
 
-void addTo(Survey& survey, std::span<const Interval> intervals, const SegmentRules& rules,
+void addTo(SupersegmentHistogram& histogram, std::span<const Interval> intervals, const SegmentRules& rules,
            std::size_t atOnce) {
   if (visibleSamples(intervals, atOnce) == 0) return;
-  for (std::size_t level = 0; level < Survey::levels; ++level)
-    survey.supersegments[level] += supersegmentsAtLevel(intervals, rules, atOnce, level);
-  survey.equally += std::min(allotmentOf(intervals, rules, atOnce).grains, rules.budget);
+  for (std::size_t level = 0; level < SupersegmentHistogram::levels; ++level)
+    histogram.supersegments[level] += supersegmentsAtLevel(intervals, rules, atOnce, level);
+  histogram.equally += std::min(listToleranceOf(intervals, rules, atOnce).preSegments, rules.budget);
 }
 
-Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce) {
+ListTolerance listToleranceOf(std::span<const Interval> intervals, const SegmentRules& rules,
+                              std::size_t atOnce) {
   const std::size_t visible = visibleSamples(intervals, atOnce);
   if (visible == 0) return {};
   const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
   const std::size_t budget = budgetOf(intervals, rules, atOnce, 0.5F);
-  const std::size_t most = std::max(budget, runs);
+  const std::size_t maxCount = std::max(budget, runs);
   float tolerance = -1.0F;
   std::size_t count = visible;
-  if (visible > most) {
-    const std::size_t room = std::max(grainsPerBudget * budget, runs);
+  if (visible > maxCount) {
+    const std::size_t room = std::max(preSegmentsPerBudget * budget, runs);
     tolerance = finestTolerance;
-    count = grainsOf(intervals, tolerance, rules).size();
+    count = preSegmentsOf(intervals, tolerance, rules).size();
     for (int level = 1; count > room; ++level) {
       tolerance = level < toleranceLevels ? tolerance * toleranceRatio : unlimited;
-      count = grainsOf(intervals, tolerance, rules).size();
+      count = preSegmentsOf(intervals, tolerance, rules).size();
     }
   }
-  const auto grains = static_cast<std::uint32_t>(count);
-  return {tolerance, grains, grains + spareGrains};
+  const auto preSegments = static_cast<std::uint32_t>(count);
+  return {tolerance, preSegments, preSegments + sparePreSegments};
 }
 
-Allotment allotmentBetween(std::span<const Allotment> counted) {
-  Allotment result;
+ListTolerance interpolatedTolerance(std::span<const ListTolerance> counted) {
+  ListTolerance result;
   float exponents = 0.0F;
   float count = 0.0F;
   bool exact = true;
-  for (const Allotment& a : counted) {
-    result.grains = std::max(result.grains, a.grains);
-    if (a.grains == 0) continue;
+  for (const ListTolerance& a : counted) {
+    result.preSegments = std::max(result.preSegments, a.preSegments);
+    if (a.preSegments == 0) continue;
     exact = exact && a.tolerance < 0.0F;
     exponents += std::log2(a.tolerance < 0.0F ? finestTolerance / toleranceRatio : a.tolerance);
     count += 1.0F;
   }
   if (!exact) result.tolerance = std::exp2(exponents / count);
-  result.room = result.grains + uncountedSpareGrains + result.grains / 4;
+  result.room = result.preSegments + uncountedSparePreSegments + result.preSegments / 4;
   return result;
 }
 
@@ -319,7 +323,7 @@ CountedLevels& CountedLevels::operator+=(const CountedLevels& other) {
 
 std::uint32_t levelShiftFor(std::uint32_t budget) {
   std::uint32_t shift = 0;
-  while ((grainsPerBudget * budget >> shift) >= 255) ++shift;
+  while ((preSegmentsPerBudget * budget >> shift) >= 255) ++shift;
   return shift;
 }
 
@@ -334,17 +338,17 @@ CountedLevels countedLevels(std::span<const Interval> intervals, const SegmentRu
   levels.counts.front() = byteOf(visibleSamples(intervals, atOnce));
   float tolerance = finestTolerance;
   for (std::size_t level = 1; level <= toleranceLevels; ++level, tolerance *= toleranceRatio)
-    levels.counts[level] = byteOf(grainsOf(intervals, tolerance, rules).size());
+    levels.counts[level] = byteOf(preSegmentsOf(intervals, tolerance, rules).size());
   levels.counts.back() = byteOf(countRuns(intervals));
   return levels;
 }
 
-Allotment agreedAllotment(const CountedLevels& own, const CountedLevels& sum, std::uint32_t budget) {
+ListTolerance agreedTolerance(const CountedLevels& own, const CountedLevels& sum, std::uint32_t budget) {
   const auto countOf = [](const CountedLevels& levels, std::size_t place) {
     return std::uint32_t{levels.counts[place]} << levels.shift;
   };
   const std::size_t runsPlace = own.counts.size() - 1;
-  Allotment result;
+  ListTolerance result;
   result.tolerance = 0.0F;
   if (countOf(sum, 0) == 0) return result;
   std::size_t place = 0;
@@ -352,58 +356,59 @@ Allotment agreedAllotment(const CountedLevels& own, const CountedLevels& sum, st
   if (countOf(sum, 0) > budget) {
     place = 1;
     result.tolerance = finestTolerance;
-    while (place < runsPlace && countOf(sum, place) > grainsPerBudget * budget) {
+    while (place < runsPlace && countOf(sum, place) > preSegmentsPerBudget * budget) {
       ++place;
       result.tolerance *= toleranceRatio;
     }
     if (place == runsPlace) result.tolerance = unlimited;
   }
-  result.grains = countOf(own, place);
+  result.preSegments = countOf(own, place);
   const std::uint32_t all = std::max(countOf(sum, place), 1U);
   const std::uint32_t wanted = std::min(all, budget);
-  result.quota = (result.grains * wanted + all - 1) / all;
+  result.quota = (result.preSegments * wanted + all - 1) / all;
   result.runs = countOf(own, runsPlace);
   return result;
 }
 
-Allotment agreedAllotmentBetween(std::span<const Allotment> counted, std::uint32_t budget) {
-  std::vector<Allotment> known;
-  Allotment most;
-  for (const Allotment& a : counted) {
+ListTolerance agreedToleranceBetween(std::span<const ListTolerance> counted, std::uint32_t budget) {
+  std::vector<ListTolerance> known;
+  ListTolerance maxCount;
+  for (const ListTolerance& a : counted) {
     if (a.tolerance == 0.0F) continue;
     known.push_back(a);
     // Ranks that have nothing where others have something find the same tolerance.
-    known.back().grains = std::max(a.grains, 1U);
-    most.grains = std::max(most.grains, a.grains);
-    most.quota = std::max(most.quota, a.quota);
-    most.runs = std::max(most.runs, a.runs);
+    known.back().preSegments = std::max(a.preSegments, 1U);
+    maxCount.preSegments = std::max(maxCount.preSegments, a.preSegments);
+    maxCount.quota = std::max(maxCount.quota, a.quota);
+    maxCount.runs = std::max(maxCount.runs, a.runs);
   }
-  Allotment result = allotmentBetween(known);
-  result.grains = most.grains;
-  result.room = most.grains + uncountedSpareGrains + most.grains / 4;
+  ListTolerance result = interpolatedTolerance(known);
+  result.preSegments = maxCount.preSegments;
+  result.room = maxCount.preSegments + uncountedSparePreSegments + maxCount.preSegments / 4;
   // Where none of the counted lists has anything of this rank's, this one may have.
-  result.quota = most.quota > 0 ? most.quota : budget;
-  result.runs = most.runs + 1;
+  result.quota = maxCount.quota > 0 ? maxCount.quota : budget;
+  result.runs = maxCount.runs + 1;
   return result;
 }
 
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules,
-                                           const Allotment& allotment) {
-  std::vector<Grain> grains;
-  if (allotment.room > 0) grains = grainsOf(intervals, allotment.tolerance, rules, allotment.room);
+                                           const ListTolerance& listTolerance) {
+  std::vector<PreSegment> preSegments;
+  if (listTolerance.room > 0)
+    preSegments = preSegmentsOf(intervals, listTolerance.tolerance, rules, listTolerance.room);
   const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
   const std::size_t budget =
-      allotment.quota > 0 ? allotment.quota : budgetOf(intervals, rules, 1, rules.rounding);
-  mergeCheapest(grains, std::max(budget, runs), rules.sampleStep);
+      listTolerance.quota > 0 ? listTolerance.quota : budgetOf(intervals, rules, 1, rules.rounding);
+  mergeCheapest(preSegments, std::max(budget, runs), rules.sampleStep);
   std::vector<Supersegment> list;
-  list.reserve(grains.size());
-  for (const Grain& g : grains)
+  list.reserve(preSegments.size());
+  for (const PreSegment& g : preSegments)
     list.push_back({g.front, g.back, g.red, g.green, g.blue, opacityOf(g.opticalDepth)});
   return list;
 }
 
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules) {
-  return segmentByMerging(intervals, rules, allotmentOf(intervals, rules));
+  return segmentByMerging(intervals, rules, listToleranceOf(intervals, rules));
 }
 
 }  // namespace vdi::reference

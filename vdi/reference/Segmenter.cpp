@@ -110,27 +110,27 @@ std::vector<Supersegment> segmentWithSensitivity(std::span<const Interval> inter
 
 std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals, const SegmentRules& rules) {
   const std::size_t runs = rules.cutAtGaps ? countRuns(intervals) : 1;
-  const std::size_t most = std::max<std::size_t>(rules.budget, runs);
+  const std::size_t maxCount = std::max<std::size_t>(rules.budget, runs);
   const auto visible = std::count_if(intervals.begin(), intervals.end(),
                                      [](const Interval& interval) { return interval.opticalDepth > 0.0F; });
-  if (static_cast<std::size_t>(visible) <= most) return segmentWithSensitivity(intervals, -1.0F, rules);
+  if (static_cast<std::size_t>(visible) <= maxCount) return segmentWithSensitivity(intervals, -1.0F, rules);
 
   std::vector<Supersegment> best = segmentWithSensitivity(intervals, smallestSensitivity, rules);
-  if (best.size() <= most) return best;
+  if (best.size() <= maxCount) return best;
 
   float tooFine = smallestSensitivity;
   float fits = largestSensitivity;
   best = segmentWithSensitivity(intervals, fits, rules);
-  for (int i = 0; i < mostTries && fits > closeBounds * tooFine; ++i) {
+  for (int i = 0; i < maxTries && fits > closeBounds * tooFine; ++i) {
     const float middle = std::sqrt(tooFine * fits);
     std::vector<Supersegment> list = segmentWithSensitivity(intervals, middle, rules);
-    if (list.size() > most) {
+    if (list.size() > maxCount) {
       tooFine = middle;
       continue;
     }
     fits = middle;
     best = std::move(list);
-    if (static_cast<float>(best.size()) >= goodFill * static_cast<float>(most)) break;
+    if (static_cast<float>(best.size()) >= goodFill * static_cast<float>(maxCount)) break;
   }
   return best;
 }

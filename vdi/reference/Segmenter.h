@@ -33,8 +33,8 @@ struct SegmentRules {
   /// True for a sub-VDI that other ranks' supersegments will be merged with: a supersegment then never spans
   /// a gap, for another rank's material may lie there. False: a gap is a transparent sample, as in the paper.
   bool cutAtGaps = false;
-  /// Of a Survey: each list holds what it needs at that level, up to twice the budget (Budget::Total), by
-  /// merging. Negative: each may hold `budget`. Not with cutAtGaps.
+  /// Of a SupersegmentHistogram: each list holds what it needs at that level, up to twice the budget
+  /// (Budget::Total), by merging. Negative: each may hold `budget`. Not with cutAtGaps.
   float level = -1.0F;
   float rounding = 0.5F;  // with a level: roundingOf the list
 };
@@ -65,88 +65,91 @@ std::size_t countRuns(std::span<const Interval> intervals);
 using shared::closeBounds;
 using shared::goodFill;
 using shared::largestSensitivity;
-using shared::mostTries;
+using shared::maxTries;
 using shared::smallestSensitivity;
 std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals, const SegmentRules& rules);
 
 /// The default: no search for a sensitivity, and nothing that depends on one threshold for the whole list.
 ///   1. If no more intervals than the list may hold (see above) aren't transparent, each becomes a
 ///   supersegment.
-///   2. Grains: neighbouring intervals go together as long as their deviation from the grain's first one,
-///   summed over their length and weighted by how much of it V_O sees, stays within a tolerance: sum of w *
-///   |x - x_first| * length / sampleStep, x being colour and opacity over one sample, w = hiddenWeight + (1 -
-///   hiddenWeight) * transmittance in front. The tolerance is the smallest of finestTolerance *
-///   toleranceRatio^j, j = 0 .. toleranceLevels - 1, that gives at most grainsPerBudget * budget grains (or
-///   the number of runs, if that's larger); if none does, it's infinite. As in segmentWithSensitivity, a
-///   transparent interval opens none, and a transparent tail is trimmed.
-///   3. While there are more grains than the list may hold: a round of merging neighbours. The cost of
+///   2. Pre-segments: neighbouring intervals go together as long as their deviation from the pre-segment's
+///   first one, summed over their length and weighted by how much of it V_O sees, stays within a tolerance:
+///   sum of w * |x - x_first| * length / sampleStep, x being colour and opacity over one sample, w =
+///   hiddenWeight + (1 - hiddenWeight) * transmittance in front. The tolerance is the smallest of
+///   finestTolerance * toleranceRatio^j, j = 0 .. toleranceLevels - 1, that gives at most
+///   preSegmentsPerBudget * budget pre-segments (or the number of runs, if that's larger); if none does, it's
+///   infinite. As in segmentWithSensitivity, a transparent interval opens none, and a transparent tail is
+///   trimmed.
+///   3. While there are more pre-segments than the list may hold: a round of merging neighbours. The cost of
 ///   merging two is the sum over both, and over the empty space between them, of w * |x - x_mean| * length.
 ///   Front to back, two are merged if that costs no more than the limit, and no more than merging either of
 ///   them with its other neighbour (of equal costs those at even places count as less), until no more have to
 ///   go. The limit is the mean of all costs; after the
 ///   first round, of those of the mergers that the round before left out, as they were in it. (As good as
 ///   always merging the cheapest two, measured, and it has no list that's searched again for each.)
-/// The tolerances are counted side by side in one walk along the ray, so that a device needs two walks in
-/// all (Budget::Total takes one more, for its Survey); and where no gaps must be kept, only one ray of
-/// countedStride x countedStride is counted, see Allotment.
+/// The tolerances are counted side by side in one pass along the ray, so that a device needs two passes in
+/// all (Budget::Total takes one more, for its SupersegmentHistogram); and where no gaps must be kept, only
+/// one ray of countedStride x countedStride is counted, see ListTolerance.
 using shared::finestTolerance;
-using shared::grainsPerBudget;
 using shared::hiddenWeight;
+using shared::preSegmentsPerBudget;
 using shared::toleranceLevels;
 using shared::toleranceRatio;
 
-/// What step 2 may do for a list: its tolerance, and the grains that counting found. There's room for a few
-/// more; when fewer than spareGrains of that are left, the tolerance grows by toleranceRatio with each
-/// further grain, and the last one takes all that's left. So a list that wasn't counted can't overflow,
-/// however wrong its allotment is. Runs aren't bounded by that: a device that finds more of them than it has
-/// room for writes the list again.
-struct Allotment {
-  float tolerance = -1.0F;  // negative: each interval is a grain
-  std::uint32_t grains = 0;
-  std::uint32_t room = 0;  // >= grains + spareGrains, or 0 for a list that's known to be empty
-  /// With other ranks, see agreedAllotment: how many supersegments the list may become, but for runs, and how
-  /// many runs are expected. Grains that begin a run take no room. 0: the rules' budget.
+/// What step 2 may do for a list: its tolerance, and the pre-segments that counting found. There's room for a
+/// few more; when fewer than sparePreSegments of that are left, the tolerance grows by toleranceRatio with
+/// each further pre-segment, and the last one takes all that's left. So a list that wasn't counted can't
+/// overflow, however wrong its interpolated tolerance is. Runs aren't bounded by that: a device that finds
+/// more of them than it has room for writes the list again.
+struct ListTolerance {
+  float tolerance = -1.0F;  // negative: each interval is a pre-segment
+  std::uint32_t preSegments = 0;
+  std::uint32_t room = 0;  // >= pre-segments + sparePreSegments, or 0 for a list that's known to be empty
+  /// With other ranks, see agreedTolerance: how many supersegments the list may become, but for runs, and how
+  /// many runs are expected. Pre-segments that begin a run take no room. 0: the rules' budget.
   std::uint32_t quota = 0;
   std::uint32_t runs = 0;
-  bool operator==(const Allotment&) const = default;
+  bool operator==(const ListTolerance&) const = default;
 };
 using shared::countedSamplesFor;
 using shared::countedStride;
-using shared::spareGrains;
-using shared::uncountedSpareGrains;
+using shared::sparePreSegments;
+using shared::uncountedSparePreSegments;
 
 /// Counts. `atOnce`: samples that an interval stands for.
-Allotment allotmentOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce = 1);
-/// Of a list among counted ones: the geometric mean of their tolerances, room for the most grains. Those that
-/// hold nothing have no say.
-Allotment allotmentBetween(std::span<const Allotment> counted);
+ListTolerance listToleranceOf(std::span<const Interval> intervals, const SegmentRules& rules,
+                              std::size_t atOnce = 1);
+/// Of a list among counted ones: the geometric mean of their tolerances, room for the most pre-segments.
+/// Those that hold nothing have no say.
+ListTolerance interpolatedTolerance(std::span<const ListTolerance> counted);
 
-/// What a rank has in a counted list, in a form that ranks add up: visible samples, grains at each tolerance,
-/// runs. Each is divided by 2^shift, rounded up, and ends at 255, and so do sums.
+/// What a rank has in a counted list, in a form that ranks add up: visible samples, pre-segments at each
+/// tolerance, runs. Each is divided by 2^shift, rounded up, and ends at 255, and so do sums.
 struct CountedLevels {
   std::array<std::uint8_t, toleranceLevels + 2> counts{};
   std::uint32_t shift = 0;
   CountedLevels& operator+=(const CountedLevels& other);
 };
-/// The smallest at which it still shows whether there are more than grainsPerBudget * budget grains.
+/// The smallest at which it still shows whether there are more than preSegmentsPerBudget * budget
+/// pre-segments.
 std::uint32_t levelShiftFor(std::uint32_t budget);
 CountedLevels countedLevels(std::span<const Interval> intervals, const SegmentRules& rules,
                             std::size_t atOnce);
-/// One tolerance for what all ranks have in a list: the finest at which the sum of their grains is at most
-/// grainsPerBudget * budget. Of the supersegments that come of the sum, a rank gets as large a share as it
-/// has of the grains. So all ranks together send about as much as one would make. The tolerance is 0 where
-/// nobody has anything.
-Allotment agreedAllotment(const CountedLevels& own, const CountedLevels& sum, std::uint32_t budget);
+/// One tolerance for what all ranks have in a list: the finest at which the sum of their pre-segments is at
+/// most preSegmentsPerBudget * budget. Of the supersegments that come of the sum, a rank gets as large a
+/// share as it has of the pre-segments. So all ranks together send about as much as one would make. The
+/// tolerance is 0 where nobody has anything.
+ListTolerance agreedTolerance(const CountedLevels& own, const CountedLevels& sum, std::uint32_t budget);
 /// Of a list among such counted ones.
-Allotment agreedAllotmentBetween(std::span<const Allotment> counted, std::uint32_t budget);
+ListTolerance agreedToleranceBetween(std::span<const ListTolerance> counted, std::uint32_t budget);
 
 /// Adds a counted list.
-void addTo(Survey& survey, std::span<const Interval> intervals, const SegmentRules& rules,
+void addTo(SupersegmentHistogram& histogram, std::span<const Interval> intervals, const SegmentRules& rules,
            std::size_t atOnce = 1);
 
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules,
-                                           const Allotment& allotment);
-/// With the list's own allotment.
+                                           const ListTolerance& listTolerance);
+/// With the list's own interpolated tolerance.
 std::vector<Supersegment> segmentByMerging(std::span<const Interval> intervals, const SegmentRules& rules);
 
 /// The algorithm of that name.

@@ -140,9 +140,9 @@ void Simulation::exchangeAxis(int axis) {
   std::vector<std::vector<float>> in;
   std::vector<std::pair<Block*, Face>> recipients;
   std::vector<MPI_Request> requests;
-  const std::size_t most = blocks_.size() * 2;
-  out.reserve(most);  // the addresses that MPI was given must hold
-  in.reserve(most);
+  const std::size_t maximum = blocks_.size() * 2;
+  out.reserve(maximum);  // the addresses that MPI was given must hold
+  in.reserve(maximum);
   for (Block& block : blocks_) {
     for (const bool above : {false, true}) {
       std::array<int, 3> neighbour = block.at;

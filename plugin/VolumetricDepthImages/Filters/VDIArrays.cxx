@@ -48,7 +48,7 @@ bool has(vtkDataSetAttributes* attributes, const std::string& name) {
   return whole != nullptr && whole->GetNumberOfComponents() > 1;
 }
 
-void demandOf(vtkDataObject* leaf, const ArrayChoice& choice) {
+void requireArrayOf(vtkDataObject* leaf, const ArrayChoice& choice) {
   auto* image = vtkImageData::SafeDownCast(leaf);
   if (image == nullptr || image->GetNumberOfPoints() == 0) return;
   if (has(attributesOf(image, choice.cells), choice.name)) return;
@@ -67,7 +67,7 @@ void demandOf(vtkDataObject* leaf, const ArrayChoice& choice) {
 
 }  // namespace
 
-void demandArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice) {
+void requireArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice) {
   // What the source itself made.
   if (producer != nullptr && producer->IsA("vtkPVPostFilter") != 0 &&
       producer->GetNumberOfInputConnections(0) > 0) {
@@ -75,12 +75,12 @@ void demandArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice&
   }
   auto* composite = vtkCompositeDataSet::SafeDownCast(data);
   if (composite == nullptr) {
-    demandOf(data, choice);
+    requireArrayOf(data, choice);
     return;
   }
   const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
   for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
-    demandOf(iterator->GetCurrentDataObject(), choice);
+    requireArrayOf(iterator->GetCurrentDataObject(), choice);
   }
 }
 

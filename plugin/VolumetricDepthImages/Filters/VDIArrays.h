@@ -13,7 +13,7 @@ namespace pv {
 /// array of the choice where it's asked for. `producer` is what made `data`: ParaView puts a filter behind
 /// each source that makes cell arrays of point arrays and the other way round when asked for them, by
 /// averaging; such an array isn't accepted. Other data than images is left to blocksOf.
-void demandArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice);
+void requireArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice);
 
 }  // namespace pv
 

@@ -110,7 +110,7 @@ TypedArray typed(vtkDataArray* array, int component) {
 }
 
 /// Throws where values would be read that aren't there.
-void demandLength(vtkDataArray* array, const glm::ivec3& values, const std::string& block) {
+void requireLength(vtkDataArray* array, const glm::ivec3& values, const std::string& block) {
   const vtkIdType needed = vtkIdType{values.x} * values.y * values.z;
   if (array->GetNumberOfTuples() >= needed) return;
   throw Error(ErrorCode::InvalidArgument,
@@ -132,7 +132,7 @@ struct Lattice {
 const unsigned char* flagsOf(vtkUnsignedCharArray* ghosts, const glm::ivec3& values,
                              const std::string& block) {
   if (ghosts == nullptr) return nullptr;
-  demandLength(ghosts, values, block);
+  requireLength(ghosts, values, block);
   return ghosts->GetPointer(0);
 }
 
@@ -227,7 +227,7 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
   }
   lattice.cells = glm::max(lattice.points - 1, glm::ivec3(1));
   const auto& [origin, spacing, points, cells] = lattice;
-  demandLength(array, choice.cells ? cells : points, name);
+  requireLength(array, choice.cells ? cells : points, name);
   const TypedArray scalars = typed(array, choice.component);
   // The deleter's copy of the smart pointer is what keeps the array alive.
   const std::shared_ptr<const void> keepAlive(

@@ -88,8 +88,8 @@ void setPicture(vtkImageData* image, const vdi::ImageBytes& picture) {
 void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth) {
   image->SetDimensions(picture.width, picture.height, 1);
   unsigned char* const bytes = addColors(image, picture.rgba.size());
-  constexpr std::size_t least = 1U << 15;  // pixels
-  vdi::inParallel(picture.rgba.size(), least, [&](std::size_t first, std::size_t last) {
+  constexpr std::size_t minimum = 1U << 15;  // pixels
+  vdi::inParallel(picture.rgba.size(), minimum, [&](std::size_t first, std::size_t last) {
     unsigned char* out = bytes + 4 * first;
     for (std::size_t i = first; i < last; ++i) {
       const glm::vec4& pixel = picture.rgba[i];

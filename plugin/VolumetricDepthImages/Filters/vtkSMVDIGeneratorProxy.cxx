@@ -126,11 +126,11 @@ bool isPlaced(vtkSMRenderViewProxy* view) {
 /// The view's size; larger ones are brought down to as many pixels as 1920 x 1080 has, for a VDI's time and
 /// size grow with them.
 std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
-  constexpr double most = 1920.0 * 1080.0;
+  constexpr double maximum = 1920.0 * 1080.0;
   const vtkSMPropertyHelper size(view, "ViewSize");
   const double width = std::max(size.GetAsInt(0), 1);
   const double height = std::max(size.GetAsInt(1), 1);
-  const double scale = std::min(1.0, std::sqrt(most / (width * height)));
+  const double scale = std::min(1.0, std::sqrt(maximum / (width * height)));
   const auto scaled = [scale](double length) {
     return std::max(1, static_cast<int>(std::lround(scale * length)));
   };

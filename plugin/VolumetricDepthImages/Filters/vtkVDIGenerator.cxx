@@ -216,7 +216,7 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
 namespace {
 
 /// In situ, a script's misspelt channel is a source without data.
-void demandInput(vtkDataObject* input) {
+void requireInput(vtkDataObject* input) {
   if (input != nullptr && std::strcmp(input->GetClassName(), "vtkDataObject") != 0) return;
   throw vdi::Error(vdi::ErrorCode::InvalidArgument,
                    "the input has no data; in a Catalyst script, TrivialProducer(registrationName=...) names "
@@ -329,20 +329,20 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, double time) {
   Origin origin;
   comm.together([&] {
     origin = this->OriginOf(input, time);
-    demandInput(input);
+    requireInput(input);
   });
   // What the ranks do next depends on these; the generator compares the rest.
-  comm.demandEqual(std::hash<std::string>()(origin.Choice.name), "SelectInputScalars, the array");
-  comm.demandEqual(origin.Choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells");
-  comm.demandEqual(static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component");
-  comm.demandEqual(this->FillGhosts ? 1U : 0U, "FillGhosts");
-  comm.demandEqual(this->PictureOnly ? 1U : 0U, "PictureOnly");
+  comm.requireEqual(std::hash<std::string>()(origin.Choice.name), "SelectInputScalars, the array");
+  comm.requireEqual(origin.Choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells");
+  comm.requireEqual(static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component");
+  comm.requireEqual(this->FillGhosts ? 1U : 0U, "FillGhosts");
+  comm.requireEqual(this->PictureOnly ? 1U : 0U, "PictureOnly");
   std::array<std::uint64_t, 1> changed{this->Internal->Shown == origin ? 0U : 1U};
   comm.allReduceMax(changed);
   if (changed[0] == 0) return;
   std::vector<vdi::Block> blocks;
   comm.together([&] {
-    pv::demandArray(input, this->GetInputAlgorithm(0, 0), origin.Choice);
+    pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.Choice);
     blocks = pv::blocksOf(input, origin.Choice);
   });
   std::array<std::uint64_t, 1> inverseVolume{

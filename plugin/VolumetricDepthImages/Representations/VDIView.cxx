@@ -49,8 +49,8 @@ void depthsOf(const ViewMatrices& matrices, std::span<const float> window, const
               const glm::ivec2& size, std::span<float> depths) {
   assert(window.size() == static_cast<std::size_t>(windowSize.x) * static_cast<std::size_t>(windowSize.y));
   assert(depths.size() == static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y));
-  constexpr std::size_t least = 1U << 15;  // pixels
-  vdi::inParallel(depths.size(), least, [&](std::size_t first, std::size_t last) {
+  constexpr std::size_t minimum = 1U << 15;  // pixels
+  vdi::inParallel(depths.size(), minimum, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       const auto width = static_cast<std::size_t>(size.x);
       const std::size_t row = i / width;

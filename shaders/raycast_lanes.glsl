@@ -2,28 +2,28 @@
 // are visible. A ray then waits for memory once for all of their samples, and the time that a step takes is that of using what's
 // visible.
 //
-// Needs: raycast.glsl; rayShares, rayShare.
+// Needs: raycast.glsl; lanesPerRay, rayLane.
 
 // The ray's invocations where it's true, as bits.
-uint sharesWhere(bool own) {
-  uint shares = uint(own) << rayShare;
-  for (uint step = 1u; step < rayShares; step *= 2u) shares |= subgroupShuffleXor(shares, step);
-  return shares;
+uint lanesWhere(bool own) {
+  uint lanes = uint(own) << rayLane;
+  for (uint step = 1u; step < lanesPerRay; step *= 2u) lanes |= subgroupShuffleXor(lanes, step);
+  return lanes;
 }
 
-Sample sampleOfShare(Sample own, uint share) {
-  uint from = gl_SubgroupInvocationID - rayShare + share;
+Sample sampleOfLane(Sample own, uint lane) {
+  uint from = gl_SubgroupInvocationID - rayLane + lane;
   return Sample(subgroupShuffle(own.color, from), subgroupShuffle(own.opticalDepth, from), subgroupShuffle(own.opacity, from),
                 subgroupShuffle(own.overStep, from));
 }
 
 // Samples [begin, end), as castSamples; transparent ones next to each other are used as one.
-bool castShares(Brick brick, uint begin, uint end) {
+bool castLanes(Brick brick, uint begin, uint end) {
   uint unused = usedFrom(begin);
   // Cells are asked for until one of them shows something, and again when no sample does.
   bool looking = true;
-  for (uint batch = unused; batch < end; batch += rayShares * samplesAtOnce) {
-    uint own = batch + rayShare * samplesAtOnce;
+  for (uint batch = unused; batch < end; batch += lanesPerRay * samplesAtOnce) {
+    uint own = batch + rayLane * samplesAtOnce;
     bool mayShow = own < end;
     if (mayShow && looking) mayShow = showsAnything(brick, cellAround(brick, placeAmongCells(brick, own)));
     Sample mine = transparentSample;
@@ -33,13 +33,13 @@ bool castShares(Brick brick, uint begin, uint end) {
       float back = tablePosition(brick, endOf(own));
       mine = sampleOf(slabOf(slabTexel(front, back), front, back), span.y - span.x);
     }
-    uint visible = sharesWhere(mine.opticalDepth > 0.0);
+    uint visible = lanesWhere(mine.opticalDepth > 0.0);
     looking = visible == 0u;
     while (visible != 0u) {
-      uint share = uint(findLSB(visible));
+      uint lane = uint(findLSB(visible));
       visible &= visible - 1u;
-      uint k = batch + share * samplesAtOnce;
-      Sample it = sampleOfShare(mine, share);
+      uint k = batch + lane * samplesAtOnce;
+      Sample it = sampleOfLane(mine, lane);
       if (unused < k) {
         vec2 gap = spanOf(unused, k - samplesAtOnce);
         useSample(gap.x, gap.y, transparentSample);

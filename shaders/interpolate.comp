@@ -1,15 +1,15 @@
-// How finely each list may be cut into grains, and how many of them there's room for, from the lists that were counted. Twin
-// of allotmentBetween in vdi/reference/SegmentByMerging.cpp.
+// How finely each list may be cut into pre-segments, and how many of them there's room for, from the lists that were
+// counted. Twin of interpolatedTolerance in vdi/reference/SegmentByMerging.cpp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "shared/allot.h"
+#include "shared/interpolate.h"
 
-layout(local_size_x = allotGroup) in;
-layout(push_constant, scalar) uniform Push { AllotConstants push; };
+layout(local_size_x = interpolateGroup) in;
+layout(push_constant, scalar) uniform Push { InterpolateConstants push; };
 
-uint mostGrains;
-uint mostQuota;
-uint mostRuns;
+uint maxPreSegments;
+uint maxQuota;
+uint maxRuns;
 bool allExact;
 float exponents;
 float countedLists;
@@ -19,21 +19,21 @@ layout(constant_id = 0) const bool together = false;
 
 struct Counted {
   float tolerance;
-  uint grains;
+  uint preSegments;
   uint quota;
 };
 
 Counted countedAt(uint x, uint y) {
   uint at = y * push.countedWidth + x;
-  return Counted(push.countedTolerances.at[at], push.countedGrains.at[at], together ? push.countedQuotas.at[at] : 0u);
+  return Counted(push.countedTolerances.at[at], push.countedPreSegments.at[at], together ? push.countedQuotas.at[at] : 0u);
 }
 
 void consider(Counted counted) {
   // All ranks find the same tolerance: those that have nothing in a list where others have something, too.
-  if (together ? counted.tolerance == 0.0 : counted.grains == 0u) return;
-  mostQuota = max(mostQuota, counted.quota & 0xffffu);
-  mostRuns = max(mostRuns, counted.quota >> 16);
-  mostGrains = max(mostGrains, counted.grains);
+  if (together ? counted.tolerance == 0.0 : counted.preSegments == 0u) return;
+  maxQuota = max(maxQuota, counted.quota & 0xffffu);
+  maxRuns = max(maxRuns, counted.quota >> 16);
+  maxPreSegments = max(maxPreSegments, counted.preSegments);
   if (counted.tolerance >= 0.0) allExact = false;
   exponents += log2(counted.tolerance < 0.0 ? finestTolerance / toleranceRatio : counted.tolerance);
   countedLists += 1.0;
@@ -45,9 +45,9 @@ void main() {
   if (x >= push.width) return;
   uint list = y * push.width + x;
   if (push.strideShift == 0u) {
-    uint grains = push.countedGrains.at[list];
+    uint preSegments = push.countedPreSegments.at[list];
     push.tolerances.at[list] = push.countedTolerances.at[list];
-    push.rooms.at[list] = grains == 0u ? 0u : grains + spareGrains;
+    push.capacities.at[list] = preSegments == 0u ? 0u : preSegments + sparePreSegments;
     return;
   }
   uint left = x >> push.strideShift;
@@ -55,9 +55,9 @@ void main() {
   uint beyond = (1u << push.strideShift) - 1u;
   uint right = min((x + beyond) >> push.strideShift, push.countedWidth - 1u);
   uint above = min((y + beyond) >> push.strideShift, push.countedRows - 1u);
-  mostGrains = 0u;
-  mostQuota = 0u;
-  mostRuns = 0u;
+  maxPreSegments = 0u;
+  maxQuota = 0u;
+  maxRuns = 0u;
   allExact = true;
   exponents = 0.0;
   countedLists = 0.0;
@@ -70,14 +70,14 @@ void main() {
   consider(rightBelow);
   consider(leftAbove);
   consider(rightAbove);
-  uint room = mostGrains + uncountedSpareGrains + mostGrains / 4u;
+  uint room = maxPreSegments + uncountedSparePreSegments + maxPreSegments / 4u;
   if (together) {
     // Where none of the counted lists has anything of this rank's, this one may have.
-    uint quota = mostQuota > 0u ? mostQuota : push.budget;
-    uint runs = mostRuns + 1u;
+    uint quota = maxQuota > 0u ? maxQuota : push.budget;
+    uint runs = maxRuns + 1u;
     push.quotas.at[list] = quota | runs << 16;
     room += runs;
   }
   push.tolerances.at[list] = allExact ? -1.0 : exp2(exponents / countedLists);
-  push.rooms.at[list] = room;
+  push.capacities.at[list] = room;
 }

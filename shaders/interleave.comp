@@ -5,7 +5,7 @@
 #include "shared/composite.h"
 
 layout(local_size_x = compositeGroup) in;
-layout(push_constant, scalar) uniform Push { MergeConstants push; };
+layout(push_constant, scalar) uniform Push { InterleaveConstants push; };
 
 #include "optical.glsl"
 #include "exact.glsl"
@@ -31,16 +31,16 @@ bool isNearer(vec2 a, vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); }
 
 void copySegment(uint i, uint slot) {
   if (compactForm) {
-    CompactArray(push.merged).at[slot] = CompactArray(push.received).at[i];
+    CompactArray(push.interleaved).at[slot] = CompactArray(push.received).at[i];
   } else {
-    push.merged.at[slot] = push.received.at[i];
+    push.interleaved.at[slot] = push.received.at[i];
   }
 }
 
-MergeHead headOf(uint begin, uint end) { return MergeHead(begin, end, depthsOf(begin)); }
+InterleaveHead headOf(uint begin, uint end) { return InterleaveHead(begin, end, depthsOf(begin)); }
 
 // Up to two ranks: their heads, and codes, stay in registers.
-void mergeTwo(MergeHead a, MergeHead b, uint first, uint end) {
+void mergeTwo(InterleaveHead a, InterleaveHead b, uint first, uint end) {
   CompactArray received = CompactArray(push.received);
   uvec2 codeOfA = uvec2(0u);
   uvec2 codeOfB = uvec2(0u);
@@ -50,10 +50,10 @@ void mergeTwo(MergeHead a, MergeHead b, uint first, uint end) {
   }
   for (uint slot = first; slot < end; ++slot) {
     bool fromA = b.next == b.end || (a.next < a.end && isNearer(a.depths, b.depths));
-    MergeHead from = fromA ? a : b;
+    InterleaveHead from = fromA ? a : b;
     uvec2 code = fromA ? codeOfA : codeOfB;
     if (compactForm) {
-      storeCode(CompactArray(push.merged), code, slot, slot - first, end - first);
+      storeCode(CompactArray(push.interleaved), code, slot, slot - first, end - first);
     } else {
       copySegment(from.next, slot);
     }
@@ -79,9 +79,9 @@ void mergeTwo(MergeHead a, MergeHead b, uint first, uint end) {
 void mergeMany(uint heads, uint first, uint end) {
   for (uint slot = first; slot < end; ++slot) {
     uint place = first;
-    MergeHead nearest = push.heads.at[first];
+    InterleaveHead nearest = push.heads.at[first];
     for (uint i = first + 1u; i < first + heads; ++i) {
-      MergeHead head = push.heads.at[i];
+      InterleaveHead head = push.heads.at[i];
       if (isNearer(head.depths, nearest.depths)) {
         nearest = head;
         place = i;
@@ -99,18 +99,18 @@ void mergeMany(uint heads, uint first, uint end) {
   }
 }
 
-void mergeList(uint list) {
+void interleaveList(uint list) {
   uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];
   if (first == end) return;
-  MergeHead one = MergeHead(0u, 0u, vec2(0.0));
-  MergeHead two = one;
+  InterleaveHead one = InterleaveHead(0u, 0u, vec2(0.0));
+  InterleaveHead two = one;
   uint heads = 0u;
   for (uint rank = 0u; rank < push.rankCount; ++rank) {
     uint begin = subOffset(rank, list);
     uint stop = subOffset(rank, list + 1u);
     if (begin == stop) continue;
-    MergeHead head = headOf(begin, stop);
+    InterleaveHead head = headOf(begin, stop);
     if (heads == 0u) one = head;
     if (heads == 1u) two = head;
     // There are no more ranks with any than there are supersegments.
@@ -133,7 +133,7 @@ void flattenList(uint list) {
   vec4 sum = vec4(0.0);
   float depth = uintBitsToFloat(0x7f800000u);
   for (uint i = first; i < end; ++i) {
-    Material m = loadSegment(push.merged, i, push.form);
+    OpticalSegment m = loadSegment(push.interleaved, i, push.form);
     if (i == first) depth = m.front;
     sum += (1.0 - sum.a) * vec4(m.color, opacityOf(m.opticalDepth));
   }
@@ -144,7 +144,7 @@ void flattenList(uint list) {
 void main() {
   uint list = gl_GlobalInvocationID.x;
   if (list >= push.listCount) return;
-  if (push.mode == mergeModeCount) countList(list);
-  if (push.mode == mergeModeMerge) mergeList(list);
-  if (push.mode == mergeModeFlatten) flattenList(list);
+  if (push.mode == interleaveModeCount) countList(list);
+  if (push.mode == interleaveModeWrite) interleaveList(list);
+  if (push.mode == interleaveModeFlatten) flattenList(list);
 }

@@ -1,6 +1,6 @@
 // What a part of a ray meets of a list.
 //
-// Needs: shared/render.h, pieces.glsl, line.glsl; params, opaque, piecesAtOnce, mostPiecesAtOnce.
+// Needs: shared/render.h, render_segment.glsl, line.glsl; params, opaque, segmentsAtOnce, maxSegmentsAtOnce.
 
 bool rayAscends;  // it meets a list's supersegments in their order; else backwards
 // How long the ray is for a change of depth, where that says something; else the length of its whole stretch.
@@ -9,7 +9,7 @@ float raySlant;
 // Else a column's change of depth may be lost in rounding.
 bool changesDepth(PictureLine line) { return line.depths.y > 0.01 * params.farthest; }
 
-void beginLooking(PictureLine line, vec2 stretch) {
+void beginIntersecting(PictureLine line, vec2 stretch) {
   rayAscends = line.bins.y >= 0.0;
   raySlant = (stretch.y - stretch.x) * length(ray.direction) / (changesDepth(line) ? line.depths.y : 1.0);
 }
@@ -22,16 +22,16 @@ float shorteningAt(vec2 place) {
 }
 
 // What a ray sees of something, and the depth that it's met at first, as PictureLine has depths.
-struct Look {
+struct Intersection {
   vec4 light;
   float entered;
 };
 
-const Look nothing = Look(vec4(0.0), infinity);
+const Intersection nothing = Intersection(vec4(0.0), infinity);
 
 // Front and back, as the ray meets them.
-vec2 metDepths(uvec4 piece) {
-  vec2 depths = pieceDepths(piece);
+vec2 metDepths(uvec4 segment) {
+  vec2 depths = segmentDepths(segment);
   return rayAscends ? depths : -depths.yx;
 }
 
@@ -54,80 +54,81 @@ Part partOf(PictureLine line, vec2 fractions, float shortening) {
 
 // What a ray has seen of a list so far.
 struct Seen {
-  vec3 light;  // in units of pieceColorUnit
+  vec3 light;  // in units of segmentColorUnit
   float transmittance;
   float entered;
 };
 
 const Seen nothingYet = Seen(vec3(0.0), 1.0, infinity);
 
-void meet(inout Seen seen, uvec4 piece, vec2 depths, Part part) {
+void meet(inout Seen seen, uvec4 segment, vec2 depths, Part part) {
   float front = max(depths.x, part.low);
   float met = min(depths.y, part.high) - front;
   if (met > 0.0) {
     seen.entered = min(seen.entered, front);
-    float behind = seen.transmittance * exp2(-met * part.slant * pieceDensity(piece));
-    seen.light += (seen.transmittance - behind) * pieceColor(piece);
+    float behind = seen.transmittance * exp2(-met * part.slant * segmentDensity(segment));
+    seen.light += (seen.transmittance - behind) * segmentColor(segment);
     seen.transmittance = behind;
   }
 }
 
-Look lookOf(Seen seen) { return Look(vec4(seen.light * pieceColorUnit, 1.0 - seen.transmittance), seen.entered); }
+Intersection intersectionOf(Seen seen)
+    { return Intersection(vec4(seen.light * segmentColorUnit, 1.0 - seen.transmittance), seen.entered); }
 
 // The i-th of several supersegments from a slot on, where `more` follow in the list; the last one again beyond them.
-uvec4 pieceFrom(uint slot, int i, int more, int step) {
+uvec4 segmentFrom(uint slot, int i, int more, int step) {
   return params.segments.at[slot + uint(i == 0 ? 0 : min(i, more) * step)];
 }
 
-// Where a look is in a list: at piecesAtOnce supersegments.
+// Where an intersection is in a list: at segmentsAtOnce supersegments.
 struct Cursor {
   int place;  // of the first of them, counted as the ray meets them
   uint slot;  // and in the compact array
-  uvec4 pieces[mostPiecesAtOnce];
+  uvec4 segments[maxSegmentsAtOnce];
 };
 
 Cursor cursorAt(int place, uint slot, int last, int step) {
   Cursor at;
   at.place = place;
   at.slot = slot;
-  [[unroll]] for (int i = 0; i < mostPiecesAtOnce; ++i) {
-    if (i < piecesAtOnce) at.pieces[i] = pieceFrom(slot, i, last - place, step);
+  [[unroll]] for (int i = 0; i < maxSegmentsAtOnce; ++i) {
+    if (i < segmentsAtOnce) at.segments[i] = segmentFrom(slot, i, last - place, step);
   }
   return at;
 }
 
-// `list` has at least one supersegment. `hint`: where the last look at a neighbouring list ended, counted as the ray meets
-// them; lists are alike there.
-Look lookAtList(uint list, Part part, inout int hint) {
+// `list` has at least one supersegment. `hint`: where the last intersection with a neighbouring list ended, counted as
+// the ray meets them; lists are alike there.
+Intersection intersectList(uint list, Part part, inout int hint) {
   ListHead head = params.heads.at[list];
   int last = int(head.count) - 1;
   int place = min(hint, last);
   int step = rayAscends ? 1 : -1;
   Cursor at = cursorAt(place, head.first + uint(rayAscends ? place : last - place), last, step);
-  while (at.place > 0 && metDepths(at.pieces[0]).x > part.low) {
-    int back = piecesAtOnce == 1 ? 1 : min(at.place, piecesAtOnce);
+  while (at.place > 0 && metDepths(at.segments[0]).x > part.low) {
+    int back = segmentsAtOnce == 1 ? 1 : min(at.place, segmentsAtOnce);
     at = cursorAt(at.place - back, at.slot - uint(back * step), last, step);
   }
   // Not below, where each takes longer.
-  while (at.place + piecesAtOnce <= last && metDepths(at.pieces[piecesAtOnce - 1]).y <= part.low) {
-    at = cursorAt(at.place + piecesAtOnce, at.slot + uint(piecesAtOnce * step), last, step);
+  while (at.place + segmentsAtOnce <= last && metDepths(at.segments[segmentsAtOnce - 1]).y <= part.low) {
+    at = cursorAt(at.place + segmentsAtOnce, at.slot + uint(segmentsAtOnce * step), last, step);
   }
   Seen seen = nothingYet;
   for (;;) {
-    [[unroll]] for (int i = 0; i < mostPiecesAtOnce; ++i) {
-      if (i == 0 || (i < piecesAtOnce && at.place + i <= last)) meet(seen, at.pieces[i], metDepths(at.pieces[i]), part);
+    [[unroll]] for (int i = 0; i < maxSegmentsAtOnce; ++i) {
+      if (i == 0 || (i < segmentsAtOnce && at.place + i <= last)) meet(seen, at.segments[i], metDepths(at.segments[i]), part);
     }
-    bool isPast = metDepths(at.pieces[piecesAtOnce - 1]).y >= part.high;
-    bool isLast = at.place + piecesAtOnce > last;
+    bool isPast = metDepths(at.segments[segmentsAtOnce - 1]).y >= part.high;
+    bool isLast = at.place + segmentsAtOnce > last;
     if (isPast || isLast) break;  // of two names: || of expressions would branch twice
-    at = cursorAt(at.place + piecesAtOnce, at.slot + uint(piecesAtOnce * step), last, step);
+    at = cursorAt(at.place + segmentsAtOnce, at.slot + uint(segmentsAtOnce * step), last, step);
   }
   hint = at.place;
-  return lookOf(seen);
+  return intersectionOf(seen);
 }
 
 // The same for a part that's most of a list: memory takes about as long for several supersegments as for one.
-Look lookThroughList(uint list, Part part) {
+Intersection intersectWholeList(uint list, Part part) {
   const int atOnce = 4;
   ListHead head = params.heads.at[list];
   int last = int(head.count) - 1;
@@ -136,11 +137,11 @@ Look lookThroughList(uint list, Part part) {
   Seen seen = nothingYet;
   for (int place = 0; place <= last && seen.transmittance > 1.0 - opaque; place += atOnce) {
     uvec4 several[atOnce];
-    [[unroll]] for (int i = 0; i < atOnce; ++i) several[i] = pieceFrom(slot, i, last - place, step);
+    [[unroll]] for (int i = 0; i < atOnce; ++i) several[i] = segmentFrom(slot, i, last - place, step);
     [[unroll]] for (int i = 0; i < atOnce; ++i) {
       if (place + i <= last) meet(seen, several[i], metDepths(several[i]), part);
     }
     slot += uint(atOnce * step);
   }
-  return lookOf(seen);
+  return intersectionOf(seen);
 }

@@ -1,17 +1,17 @@
-// Beams: the rays of a rectangle of the new picture's pixels, which are close to each other. What they pass without
+// Packets: the rays of a rectangle of the new picture's pixels, which are close to each other. What they pass without
 // meeting material is found once for all of them.
 //
 // Needs: shared/render.h, masks.glsl, view.glsl; params.
 
-struct Beam {
+struct RayPacket {
   vec2 first;   // place of the rays of its first column and row
   vec2 extent;  // from there to the last ones
 };
 
 // Of the pixels of a square, as far as they're in the picture.
-Beam beamOf(uvec2 corner, uint size) {
+RayPacket packetOf(uvec2 corner, uint size) {
   uvec2 last = min(corner + size, uvec2(params.width, params.height)) - 1u;
-  return Beam(vec2(corner) + 0.5, vec2(last - corner));
+  return RayPacket(vec2(corner) + 0.5, vec2(last - corner));
 }
 
 int columnCount(bool byColumns) { return byColumns ? params.lists.x : params.lists.y; }
@@ -37,17 +37,17 @@ uint64_t maskBetween(float a, float b) {
 }
 
 // Tiles of both sizes are in one array, the large ones behind.
-uint64_t tileMask(int size, ivec2 tile) {
+uint64_t tileDepthMask(int size, ivec2 tile) {
   ivec2 tiles = tilesOf(params.lists, size);
   ivec2 smallTiles = tilesOf(params.lists, renderTile);
   int first = size == renderTile ? 0 : smallTiles.x * smallTiles.y;
-  return params.tileMasks.at[first + tile.y * tiles.x + tile.x];
+  return params.tileDepthMasks.at[first + tile.y * tiles.x + tile.x];
 }
 
-// In which parts of the depth range the beam may meet material between two edges of a column of tiles. The picture of a
+// In which parts of the depth range the packet may meet material between two edges of a column of tiles. The picture of a
 // quadrilateral of rays on the plane of an edge is the convex hull of those of its corners, if all of these cross it the same
 // way and in front of V_O's eye; and between two planes rays are straight in V_O's picture.
-uint64_t beamMask(Beam beam, bool byColumns, int tile, int first, int last) {
+uint64_t packetMask(RayPacket packet, bool byColumns, int tile, int first, int last) {
   float begin = float(max(tile << renderTileShift, first));
   float end = float(min((tile + 1) << renderTileShift, last + 1));
   vec2 rows = vec2(infinity, -infinity);
@@ -56,7 +56,7 @@ uint64_t beamMask(Beam beam, bool byColumns, int tile, int first, int last) {
   bool descends = true;
   bool finite = true;
   for (int i = 0; i < 8; ++i) {
-    Ray of = rayAt(beam.first + vec2(i & 1, (i >> 1) & 1) * beam.extent);
+    Ray of = rayAt(packet.first + vec2(i & 1, (i >> 1) & 1) * packet.extent);
     EdgeCrossing crossing = edgeCrossing(of, byColumns, i < 4 ? begin : end);
     ascends = ascends && crossing.approach > 0.0;
     descends = descends && crossing.approach < 0.0;
@@ -74,14 +74,14 @@ uint64_t beamMask(Beam beam, bool byColumns, int tile, int first, int last) {
   vec2 places = clamp(rows + 0.5 * float(rowCount) + vec2(-spare, spare), vec2(0.0), vec2(float(rowCount - 1)));
   float spareDepth = 0.05 / params.binScale;
   uint64_t mask = maskBetween(depths.x - spareDepth, depths.y + spareDepth);
-  const int mostTiles = 8;
+  const int maxTiles = 8;
   int size = renderTile;
-  if (places.y - places.x > float(mostTiles * renderTile)) size = renderLargeTile;
+  if (places.y - places.x > float(maxTiles * renderTile)) size = renderLargeTile;
   int column = (tile << renderTileShift) / size;
   int lastRow = int(places.y) / size;
   uint64_t met = 0ul;
   for (int row = int(places.x) / size; row <= lastRow; ++row) {
-    met |= tileMask(size, byColumns ? ivec2(column, row) : ivec2(row, column));
+    met |= tileDepthMask(size, byColumns ? ivec2(column, row) : ivec2(row, column));
   }
   return met & mask;
 }

@@ -1,13 +1,13 @@
 // Finds the tiles of the new picture whose rays may meet material, for render.comp, and leaves the others blank: most of a
-// picture is. Those with much to look at come first, for a GPU waits for the last. A workgroup looks at the beam of a region.
+// picture is. Those with much to look at come first, for a GPU waits for the last. A workgroup looks at the packet of a region.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/render.h"
 #include "masks.glsl"
 
-layout(local_size_x = renderBeamGroup) in;
+layout(local_size_x = renderCullGroup) in;
 // Else as they come: a CPU doesn't wait, but has its caches.
-layout(constant_id = 0) const bool mostFirst = true;
+layout(constant_id = 0) const bool busiestFirst = true;
 // What the picture is left in (shared/render.h).
 layout(constant_id = 1) const uint pictureForm = renderPictureFloats;
 layout(push_constant, scalar) uniform Push { RenderRays rays; };
@@ -15,20 +15,20 @@ layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 #include "view.glsl"
 #include "picture.glsl"
-#include "beam.glsl"
+#include "packet.glsl"
 
-float least(vec4 values) { return min(min(values.x, values.y), min(values.z, values.w)); }
-float most(vec4 values) { return max(max(values.x, values.y), max(values.z, values.w)); }
+float minimum(vec4 values) { return min(min(values.x, values.y), min(values.z, values.w)); }
+float maximum(vec4 values) { return max(max(values.x, values.y), max(values.z, values.w)); }
 
-// Keeps the part of `stretch` where value + t * slope >= 0 for any ray of a beam, of whose corners the components are: between
-// them, where a plane is crossed lies between where the corners cross it, if these cross it the same way.
+// Keeps the part of `stretch` where value + t * slope >= 0 for any ray of a packet, of whose corners the components
+// are: between them, where a plane is crossed lies between where the corners cross it, if these cross it the same way.
 void clipAny(inout vec2 stretch, vec4 value, vec4 slope) {
   vec4 crossing = -value / slope;
-  if (all(greaterThan(slope, vec4(0.0)))) stretch.x = max(stretch.x, least(crossing));
-  if (all(lessThan(slope, vec4(0.0)))) stretch.y = min(stretch.y, most(crossing));
+  if (all(greaterThan(slope, vec4(0.0)))) stretch.x = max(stretch.x, minimum(crossing));
+  if (all(lessThan(slope, vec4(0.0)))) stretch.y = min(stretch.y, maximum(crossing));
 }
 
-// Where a beam is in V_O's frustum: bounds of its place in the picture, and of its depths. Empty: leave <= enter.
+// Where a packet is in V_O's frustum: bounds of its place in the picture, and of its depths. Empty: leave <= enter.
 struct Reach {
   float enter;
   float leave;
@@ -37,11 +37,11 @@ struct Reach {
   vec2 depths;
 };
 
-Reach reachOf(Beam beam) {
-  Ray a = rayAt(beam.first);
-  Ray b = rayAt(beam.first + vec2(beam.extent.x, 0.0));
-  Ray c = rayAt(beam.first + vec2(0.0, beam.extent.y));
-  Ray d = rayAt(beam.first + beam.extent);
+Reach reachOf(RayPacket packet) {
+  Ray a = rayAt(packet.first);
+  Ray b = rayAt(packet.first + vec2(packet.extent.x, 0.0));
+  Ray c = rayAt(packet.first + vec2(0.0, packet.extent.y));
+  Ray d = rayAt(packet.first + packet.extent);
   vec4 originX = vec4(a.origin.x, b.origin.x, c.origin.x, d.origin.x);
   vec4 originY = vec4(a.origin.y, b.origin.y, c.origin.y, d.origin.y);
   vec4 originZ = vec4(a.origin.z, b.origin.z, c.origin.z, d.origin.z);
@@ -66,7 +66,7 @@ Reach reachOf(Beam beam) {
   Reach reach = Reach(stretch.x, stretch.y, vec2(0.0), vec2(params.lists), vec2(params.nearest, params.farthest));
   // Else anywhere: the picture of what's beside V_O's eye has no bounds.
   const float finite = 1e30;
-  if (stretch.y < finite && (parallel || min(least(depthsIn), least(depthsOut)) > 0.0)) {
+  if (stretch.y < finite && (parallel || min(minimum(depthsIn), minimum(depthsOut)) > 0.0)) {
     vec4 pixelsIn = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsIn));
     vec4 pixelsOut = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsOut));
     vec4 xIn = (originX + stretch.x * directionX) * pixelsIn;
@@ -75,9 +75,12 @@ Reach reachOf(Beam beam) {
     vec4 yOut = (originY + stretch.y * directionY) * pixelsOut;
     const float spare = 1.0;  // for rounding
     vec2 middle = 0.5 * vec2(params.lists);
-    reach.low = clamp(vec2(min(least(xIn), least(xOut)), min(least(yIn), least(yOut))) + middle - spare, reach.low, reach.high);
-    reach.high = clamp(vec2(max(most(xIn), most(xOut)), max(most(yIn), most(yOut))) + middle + spare, reach.low, reach.high);
-    reach.depths = clamp(vec2(min(least(depthsIn), least(depthsOut)), max(most(depthsIn), most(depthsOut))), params.nearest,
+    reach.low = clamp(vec2(min(minimum(xIn), minimum(xOut)), min(minimum(yIn), minimum(yOut))) + middle - spare,
+        reach.low, reach.high);
+    reach.high = clamp(vec2(max(maximum(xIn), maximum(xOut)), max(maximum(yIn), maximum(yOut))) + middle + spare,
+        reach.low, reach.high);
+    reach.depths = clamp(vec2(min(minimum(depthsIn), minimum(depthsOut)), max(maximum(depthsIn), maximum(depthsOut))),
+        params.nearest,
                          params.farthest);
   }
   return reach;
@@ -88,9 +91,9 @@ uint countOf(uint64_t mask) {
   return uint(bitCount(words.x) + bitCount(words.y));
 }
 
-// In how many places the beam may meet material: parts of the depth range, tile by tile. Each invocation counts its own.
-uint placesToLookAt(Beam beam) {
-  Reach reach = reachOf(beam);
+// In how many places the packet may meet material: parts of the depth range, tile by tile. Each invocation counts its own.
+uint placesToIntersect(RayPacket packet) {
+  Reach reach = reachOf(packet);
   if (!(reach.enter < reach.leave)) return 0u;
   int own = int(gl_LocalInvocationIndex);
   ivec2 first = min(ivec2(reach.low), params.lists - 1);
@@ -103,13 +106,13 @@ uint placesToLookAt(Beam beam) {
     // Rays that stay about where they are: all tiles.
     if (own >= tiles.x * tiles.y) return 0u;
     ivec2 tile = firstTile + ivec2(own % tiles.x, own / tiles.x);
-    return countOf(tileMask(renderTile, tile) & maskBetween(reach.depths.x, reach.depths.y));
+    return countOf(tileDepthMask(renderTile, tile) & maskBetween(reach.depths.x, reach.depths.y));
   }
   bool byColumns = tiles.x >= tiles.y;
   int end = byColumns ? lastTile.x : lastTile.y;
   uint count = 0u;
-  for (int tile = (byColumns ? firstTile.x : firstTile.y) + own; tile <= end; tile += int(renderBeamGroup)) {
-    count += countOf(beamMask(beam, byColumns, tile, byColumns ? first.x : first.y, byColumns ? last.x : last.y));
+  for (int tile = (byColumns ? firstTile.x : firstTile.y) + own; tile <= end; tile += int(renderCullGroup)) {
+    count += countOf(packetMask(packet, byColumns, tile, byColumns ? first.x : first.y, byColumns ? last.x : last.y));
   }
   return count;
 }
@@ -127,12 +130,12 @@ void main() {
   uint own = gl_LocalInvocationIndex;
   if (own == 0u) places = 0u;
   barrier();
-  uint count = placesToLookAt(beamOf(corner, renderRegion));
+  uint count = placesToIntersect(packetOf(corner, renderRegion));
   if (count > 0u) atomicAdd(places, count);
   barrier();
   uvec2 size = uvec2(params.width, params.height);
   if (places == 0u) {
-    for (uint i = own; i < renderRegion * renderRegion; i += renderBeamGroup) {
+    for (uint i = own; i < renderRegion * renderRegion; i += renderCullGroup) {
       uvec2 at = corner + uvec2(i % renderRegion, i / renderRegion);
       if (any(greaterThanEqual(at, size))) continue;
       leavePixel(at.y * params.width + at.x, vec4(0.0), infinity);
@@ -144,9 +147,9 @@ void main() {
   uvec2 tile = corner / renderPictureTile + uvec2(own % tilesAcross, own / tilesAcross);
   uvec2 tiles = pictureTiles();
   if (any(greaterThanEqual(tile, tiles))) return;
-  uint kind = mostFirst ? renderKinds - 1u - min(magnitude(places), renderKinds - 1u) : 0u;
+  uint kind = busiestFirst ? renderKinds - 1u - min(magnitude(places), renderKinds - 1u) : 0u;
   uint total = atomicAdd(params.queue.at.count, 1u);
-  atomicMax(params.queue.at.groups.x, min(total + 1u, renderMostGroups));
+  atomicMax(params.queue.at.groups.x, min(total + 1u, renderMaxGroups));
   uint place = atomicAdd(params.queue.at.counts[kind], 1u);
   params.waiting.at[kind * tiles.x * tiles.y + place] = tile.y * tiles.x + tile.x;
 }

@@ -1,10 +1,10 @@
-// Finds the lists whose grains reduce_team.comp is to merge: most are empty or fit, and a workgroup each would be too much for
-// those.
+// Finds the lists whose pre-segments reduce_subgroup.comp is to merge: most are empty or fit, and a workgroup each
+// would be too much for those.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/reduce.h"
 
-layout(local_size_x = queueGroup) in;
+layout(local_size_x = longListsGroup) in;
 layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
 shared uint found;
@@ -16,10 +16,10 @@ void main() {
   if (gl_LocalInvocationIndex == 0u) found = 0u;
   barrier();
   uint count = list < push.listCount ? push.written.at[list] : 0u;
-  bool waits = count > 0u && count <= push.teamCapacity && count > push.left.at[list];
+  bool waits = count > 0u && count <= push.subgroupCapacity && count > push.left.at[list];
   uint place = waits ? atomicAdd(found, 1u) : 0u;
   barrier();
-  if (gl_LocalInvocationIndex == 0u) firstPlace = found > 0u ? atomicAdd(push.queued.at[0], found) : 0u;
+  if (gl_LocalInvocationIndex == 0u) firstPlace = found > 0u ? atomicAdd(push.longListCount.at[0], found) : 0u;
   barrier();
-  if (waits) push.queue.at[firstPlace + place] = list;
+  if (waits) push.longLists.at[firstPlace + place] = list;
 }

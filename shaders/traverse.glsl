@@ -1,8 +1,8 @@
 // A ray from column to column of V_O's picture. Reconstruction::Smooth blends the two lists of each that are beside the ray;
-// Reconstruction::Constant looks at those that it crosses, one or two of each. Twin of walkSmoothly and walkLists in
+// Reconstruction::Constant looks at those that it crosses, one or two of each. Twin of traverseSmoothly and traverseLists in
 // vdi/reference/Render.cpp.
 //
-// Needs: masks.glsl, marks.glsl, line.glsl, look.glsl; params, smoothReconstruction, rayShares, rayShare, accumulate.
+// Needs: masks.glsl, tile_mask.glsl, line.glsl, intersect.glsl; params, smoothReconstruction, lanesPerRay, rayLane, accumulate.
 
 uint listOf(bool byColumns, int column, int row) {
   return byColumns ? uint(row) * uint(params.lists.x) + uint(column) : uint(column) * uint(params.lists.x) + uint(row);
@@ -16,28 +16,28 @@ float shareOfNext(float beyond) {
 }
 
 // What a ray's two invocations see, of which each has its own, already weighted.
-Look ofBoth(Look own) {
-  return Look(own.light + subgroupShuffleXor(own.light, 1u), min(own.entered, subgroupShuffleXor(own.entered, 1u)));
+Intersection ofBoth(Intersection own) {
+  return Intersection(own.light + subgroupShuffleXor(own.light, 1u), min(own.entered, subgroupShuffleXor(own.entered, 1u)));
 }
 
 // A ray that stays in about one place of V_O's picture: the four lists around that.
-Look lookAlongLists(PictureLine line, vec2 stretch) {
+Intersection intersectAlongLists(PictureLine line, vec2 stretch) {
   vec2 place = 0.5 * (pictureAt(ray, stretch.x) + pictureAt(ray, stretch.y)) - 0.5;
   vec2 first = floor(place);
   float shareX = shareOfNext(place.x - first.x);
   float shareY = shareOfNext(place.y - first.y);
-  Look sum = nothing;
-  for (uint i = rayShare; i < 4u; i += rayShares) {
+  Intersection sum = nothing;
+  for (uint i = rayLane; i < 4u; i += lanesPerRay) {
     ivec2 side = ivec2(i & 1u, i >> 1);
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(first) + side, ivec2(0), params.lists - 1);
     uint list = listOf(true, pixel.x, pixel.y);
     if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, vec2(line.bins.x, at(line.bins, 1.0)))) continue;
-    Look look = lookThroughList(list, partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5)));
-    sum.light += weight * look.light;
-    sum.entered = min(sum.entered, look.entered);
+    Intersection intersection = intersectWholeList(list, partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5)));
+    sum.light += weight * intersection.light;
+    sum.entered = min(sum.entered, intersection.entered);
   }
-  return rayShares == 1u ? sum : ofBoth(sum);
+  return lanesPerRay == 1u ? sum : ofBoth(sum);
 }
 
 // A column that the ray crosses, and two lists of it: those beside the ray, or those that it enters and leaves the column in.
@@ -52,15 +52,15 @@ struct Column {
 Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
   Column here;
   here.fractions = vec2(min(fractions.x, fractions.y), max(fractions.x, fractions.y));
-  ivec2 mostRow = ivec2(columnCount(!line.byColumns) - 1);
+  ivec2 maxRow = ivec2(columnCount(!line.byColumns) - 1);
   if (smoothReconstruction) {
     float centre = line.row + 0.5 * (edges.x + edges.y) * line.rows - 0.5;
     float below = floor(centre);
     here.share = shareOfNext(centre - below);
-    here.rows = clamp(int(below) + ivec2(0, 1), ivec2(0), mostRow);
+    here.rows = clamp(int(below) + ivec2(0, 1), ivec2(0), maxRow);
   } else {
     vec2 inOut = vec2(min(edges.x, edges.y), max(edges.x, edges.y));
-    here.rows = clamp(ivec2(floor(line.row + inOut * line.rows)), ivec2(0), mostRow);
+    here.rows = clamp(ivec2(floor(line.row + inOut * line.rows)), ivec2(0), maxRow);
     // A diagonal through corners may touch a third one: not enough to look at.
     here.rows.x = clamp(here.rows.x, here.rows.y - 1, here.rows.y + 1);
     here.share = here.rows.x == here.rows.y ? 0.0 : 0.5;
@@ -71,17 +71,17 @@ Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
 
 // Memory takes about as long for several as for one. Half of a tile: a part of it for each of a ray's invocations.
 const int columnsAtOnce = 4;
-// Bits of what columnsToLookAt returns: a column's first and second list.
-const uint firstLook = 1u;
-const uint secondLook = 1u << renderTile;
+// Bits of what listsToIntersect returns: a column's first and second list.
+const uint firstListBit = 1u;
+const uint secondListBit = 1u << renderTile;
 
-// Of the columns of a tile: bits firstLook and secondLook, shifted by c, tell whether the ray may meet something in column c's
-// lists. Each of a ray's invocations finds its part.
-uint columnsToLookAt(PictureLine line, int tile) {
-  const int part = renderTile / int(rayShares);
-  int most = columnCount(line.byColumns) - 1;
-  int first = (tile << renderTileShift) + part * int(rayShare);
-  uint looks = 0u;
+// Of the columns of a tile: bits firstListBit and secondListBit, shifted by c, tell whether the ray may meet something
+// in column c's lists. Each of a ray's invocations finds its part.
+uint listsToIntersect(PictureLine line, int tile) {
+  const int part = renderTile / int(lanesPerRay);
+  int maximum = columnCount(line.byColumns) - 1;
+  int first = (tile << renderTileShift) + part * int(rayLane);
+  uint listBits = 0u;
   float edge = columnsTo(line, float(first));
   float fraction = fractionAfter(line, edge);
   for (int begin = 0; begin < part; begin += columnsAtOnce) {
@@ -90,7 +90,7 @@ uint columnsToLookAt(PictureLine line, int tile) {
       float nextEdge = columnsTo(line, float(column + 1));
       float nextFraction = fractionAfter(line, nextEdge);
       // Columns beyond the line's ends: memory is read where there's a list, and what's read isn't used.
-      Column here = columnAt(line, min(column, most), vec2(edge, nextEdge), vec2(fraction, nextFraction));
+      Column here = columnAt(line, min(column, maximum), vec2(edge, nextEdge), vec2(fraction, nextFraction));
       uint64_t firstMask = params.heads.at[here.lists.x].mask;
       uint64_t secondMask = params.heads.at[here.lists.y].mask;
       vec2 bins = vec2(at(line.bins, fraction), at(line.bins, nextFraction));
@@ -98,13 +98,13 @@ uint columnsToLookAt(PictureLine line, int tile) {
       uint passes = uint(nextEdge != edge);
       uint meetsFirst = passes * uint(here.share < 1.0) * uint(mayMeet(firstMask, bins));
       uint meetsSecond = passes * uint(here.share > 0.0) * uint(mayMeet(secondMask, bins));
-      looks |= (meetsFirst * firstLook + meetsSecond * secondLook) << (begin + i);
+      listBits |= (meetsFirst * firstListBit + meetsSecond * secondListBit) << (begin + i);
       edge = nextEdge;
       fraction = nextFraction;
     }
   }
-  looks <<= part * int(rayShare);
-  return rayShares == 1u ? looks : looks | subgroupShuffleXor(looks, 1u);
+  listBits <<= part * int(rayLane);
+  return lanesPerRay == 1u ? listBits : listBits | subgroupShuffleXor(listBits, 1u);
 }
 
 // Along the line, at the edges of a tile: between them it's nearly straight.
@@ -116,7 +116,7 @@ vec2 shorteningsAt(PictureLine line, int tile) {
   return vec2(shorteningAt(line.byColumns ? first : first.yx), shorteningAt(line.byColumns ? last : last.yx));
 }
 
-Look lookAtSide(PictureLine line, Column here, float shortening, bool second, inout int hint) {
+Intersection intersectSide(PictureLine line, Column here, float shortening, bool second, inout int hint) {
   vec2 fractions = here.fractions;
   if (!smoothReconstruction && here.rows.x != here.rows.y) {
     float edge = float(max(here.rows.x, here.rows.y));
@@ -124,28 +124,28 @@ Look lookAtSide(PictureLine line, Column here, float shortening, bool second, in
     split = clamp(split, fractions.x, fractions.y);
     fractions = second ? vec2(split, fractions.y) : vec2(fractions.x, split);
   }
-  Look look = lookAtList(second ? here.lists.y : here.lists.x, partOf(line, fractions, shortening), hint);
-  if (smoothReconstruction) look.light *= second ? here.share : 1.0 - here.share;
-  return look;
+  Intersection intersection = intersectList(second ? here.lists.y : here.lists.x, partOf(line, fractions, shortening), hint);
+  if (smoothReconstruction) intersection.light *= second ? here.share : 1.0 - here.share;
+  return intersection;
 }
 
-// What the ray meets of a column. `looks`: firstLook, secondLook.
-Look lookAtColumn(PictureLine line, int column, float shortening, uint looks, inout ivec2 hints) {
+// What the ray meets of a column. `listBits`: firstListBit, secondListBit.
+Intersection intersectColumn(PictureLine line, int column, float shortening, uint listBits, inout ivec2 hints) {
   vec2 edges = vec2(columnsTo(line, float(column)), columnsTo(line, float(column + 1)));
   Column here = columnAt(line, column, edges, vec2(fractionAfter(line, edges.x), fractionAfter(line, edges.y)));
-  Look own = nothing;
-  if (rayShares > 1u) {
-    bool second = rayShare != 0u;
-    if ((looks & (second ? secondLook : firstLook)) != 0u) own = lookAtSide(line, here, shortening, second, hints.x);
+  Intersection own = nothing;
+  if (lanesPerRay > 1u) {
+    bool second = rayLane != 0u;
+    if ((listBits & (second ? secondListBit : firstListBit)) != 0u) own = intersectSide(line, here, shortening, second, hints.x);
     if (smoothReconstruction) return ofBoth(own);
     // The first list is in front of the second one.
     float transmittance = subgroupShuffleXor(1.0 - own.light.a, 1u);
     if (second) own.light *= transmittance;
     return ofBoth(own);
   }
-  if ((looks & firstLook) != 0u) own = lookAtSide(line, here, shortening, false, hints.x);
-  if ((looks & secondLook) != 0u) {
-    Look other = lookAtSide(line, here, shortening, true, hints.y);
+  if ((listBits & firstListBit) != 0u) own = intersectSide(line, here, shortening, false, hints.x);
+  if ((listBits & secondListBit) != 0u) {
+    Intersection other = intersectSide(line, here, shortening, true, hints.y);
     own.light += (smoothReconstruction ? 1.0 : 1.0 - own.light.a) * other.light;
     own.entered = min(own.entered, other.entered);
   }
@@ -154,21 +154,21 @@ Look lookAtColumn(PictureLine line, int column, float shortening, uint looks, in
 
 // Tile by tile: first all that there's to look at is found, then looked at, so that rays next to each other do the same at a
 // time.
-void walk(PictureLine line) {
+void traverse(PictureLine line) {
   bool up = line.direction > 0.0;
   int lastTile = line.last >> renderTileShift;
   ivec2 hints = ivec2(0);
   for (int tile = line.first >> renderTileShift;; tile += up ? 1 : -1) {
     tile = nextTile(line, tile, lastTile);
     if (tile < 0) return;
-    uint looks = columnsToLookAt(line, tile);
-    uint columns = (looks | looks / secondLook) & (secondLook - 1u);
+    uint listBits = listsToIntersect(line, tile);
+    uint columns = (listBits | listBits / secondListBit) & (secondListBit - 1u);
     vec2 shortenings = shorteningsAt(line, tile);
     while (columns != 0u) {
       int i = up ? findLSB(columns) : findMSB(columns);
       columns &= ~(1u << i);
       float shortening = mix(shortenings.x, shortenings.y, (float(i) + 0.5) / float(renderTile));
-      accumulate(lookAtColumn(line, (tile << renderTileShift) + i, shortening, looks >> i, hints));
+      accumulate(intersectColumn(line, (tile << renderTileShift) + i, shortening, listBits >> i, hints));
       if (accumulated.light.a >= opaqueAcross) return;
     }
     if (tile == lastTile) return;

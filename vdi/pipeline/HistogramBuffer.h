@@ -11,14 +11,14 @@
 
 namespace vdi::detail {
 
-class SurveyBuffer {
+class HistogramBuffer {
  public:
-  explicit SurveyBuffer(std::shared_ptr<gpu::Device> device);
+  explicit HistogramBuffer(std::shared_ptr<gpu::Device> device);
 
-  /// Records a dispatch that adds to the survey at this device address ([surveyLevels + 1][2] words).
+  /// Records a dispatch that adds to the histogram at this device address ([histogramLevels + 1][2] words).
   using Record = std::function<void(gpu::Commands&, std::uint64_t address)>;
   /// What the dispatch counted.
-  Survey take(gpu::Commands& commands, const Record& record);
+  SupersegmentHistogram take(gpu::Commands& commands, const Record& record);
 
  private:
   gpu::Buffer sums_;

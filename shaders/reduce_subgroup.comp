@@ -1,0 +1,159 @@
+// As reduce.comp, with a subgroup for each list, which is a whole workgroup, whose invocations go through the
+// pre-segments side by side, in shared memory. A GPU is busy with few lists then, and reads and writes them once.
+// Subgroups take one list after the other from those that long_lists.comp found.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_basic : require
+#include "shared/reduce.h"
+
+layout(local_size_x_id = 0) in;  // gl_SubgroupSize, at most 32
+layout(constant_id = 1) const uint capacity = 16u;  // pre-segments of a list
+layout(push_constant, scalar) uniform Push { ReduceConstants push; };
+
+#include "optical.glsl"
+#include "appearance.glsl"
+#include "stored_pre_segment.glsl"
+#include "merging.glsl"
+
+// The list's pre-segments. Arrays of what's read together, so that neighbouring invocations read neighbouring banks.
+shared vec4 lights[capacity];
+shared vec4 appearances[capacity];
+shared vec2 spans[capacity];
+shared float befores[capacity];
+shared float costs[capacity];  // of merging each with the next one; unlimited for the last
+
+const uint subgroupSize = gl_WorkGroupSize.x;
+uint own;  // which of the subgroup
+
+StoredPreSegment load(uint i) { return StoredPreSegment(spans[i], befores[i], 0.0, lights[i]); }
+
+void store(uint i, StoredPreSegment preSegment, vec4 appearance) {
+  spans[i] = preSegment.span;
+  befores[i] = preSegment.before;
+  lights[i] = preSegment.light;
+  appearances[i] = appearance;
+}
+
+// From the device's memory; returns how many of them must not be merged with the one before. `ahead`: the invocation's first one.
+uint loadList(uint base, uint count, StoredPreSegment ahead) {
+  uint cuts = 0u;
+  for (uint i = own; i < count; i += subgroupSize) {
+    StoredPreSegment preSegment = ahead;
+    if (i >= subgroupSize) preSegment = push.preSegments.at[base + i];
+    store(i, preSegment, appearanceOf(preSegment, push.step));
+    if (i > 0u && isCut(preSegment)) ++cuts;
+  }
+  subgroupBarrier();
+  return subgroupAdd(cuts);
+}
+
+void storeList(uint base, uint count) {
+  for (uint i = own; i < count; i += subgroupSize) push.preSegments.at[base + i] = load(i);
+  subgroupBarrier();
+}
+
+// Returns the sum of the invocation's own ones that aren't unlimited.
+float findCosts(uint count) {
+  float mine = 0.0;
+  for (uint i = own; i < count; i += subgroupSize) {
+    float cost = unlimited;
+    if (i + 1u < count) cost = costOf(load(i), appearances[i], load(i + 1u), appearances[i + 1u]);
+    costs[i] = cost;
+    mine += cost < unlimited ? cost : 0.0;
+  }
+  subgroupBarrier();
+  return mine;
+}
+
+// One round; `excess` pre-segments at most go, front to back. Returns how many are left; `others`: sum of what the
+// mergers that weren't made would cost, of the invocation's own ones.
+uint mergeOnce(uint count, uint excess, float limit, out float others) {
+  uint left = 0u;
+  uint absorbed = 0u;  // 1: the first pre-segment of this turn, by the last one of the turn before
+  others = 0.0;
+  for (uint first = 0u; first < count; first += subgroupSize) {
+    uint i = first + own;
+    bool present = i < count;
+    float cost = unlimited;
+    bool chosen = false;
+    StoredPreSegment preSegment;
+    vec4 appearance;
+    StoredPreSegment next;
+    vec4 nextAppearance;
+    if (present) {
+      cost = costs[i];
+      preSegment = load(i);
+      appearance = appearances[i];
+      if (cost <= limit && excess > 0u) {  // there's a next one, or its cost were unlimited
+        chosen = isCheapest(i, i > 0u ? costs[i - 1u] : unlimited, cost, costs[i + 1u], limit);
+        next = load(i + 1u);
+        nextAppearance = appearances[i + 1u];
+      }
+    }
+    subgroupBarrier();  // all have read what's written below
+    // Of the chosen ones, the first `excess` merge.
+    uint mask = subgroupBallot(chosen).x;
+    uint before = bitCount(mask & ((1u << own) - 1u));
+    if (chosen && before < excess) {
+      preSegment = merged(preSegment, appearance, next, nextAppearance);
+      appearance = appearanceOf(preSegment, push.step);
+    } else if (cost < unlimited) {
+      others += cost;
+    }
+    uint chosenBefore = own > 0u ? mask >> (own - 1u) & 1u : 0u;
+    before -= chosenBefore;
+    bool gone = own > 0u ? chosenBefore > 0u && before < excess : absorbed > 0u;
+    uint goneBefore = own > 0u ? absorbed + min(before, excess) : 0u;
+    if (present && !gone) store(left + own - goneBefore, preSegment, appearance);
+    uint mergers = bitCount(mask);
+    uint chosenLast = mask >> (subgroupSize - 1u);
+    left += min(count - first, subgroupSize) - absorbed - min(mergers - chosenLast, excess);
+    absorbed = mergers <= excess ? chosenLast : 0u;
+    excess -= min(mergers, excess);
+  }
+  subgroupBarrier();
+  return left;
+}
+
+void mergeCheapest(uint count, uint maxCount, uint cuts) {
+  float mine = findCosts(count);
+  while (count > maxCount) {
+    uint finite = count - 1u - cuts;
+    if (finite == 0u) break;  // just cuts are left; there are no more of them than may be
+    float limit = limitOf(subgroupAdd(mine), float(finite));
+    count = mergeOnce(count, count - maxCount, limit, mine);
+    if (count > maxCount) findCosts(count);
+  }
+}
+
+struct ListOfPreSegments {
+  uint first;
+  uint count;
+  uint maxCount;  // that may be left
+};
+
+ListOfPreSegments listAt(uint place) {
+  uint list = push.longLists.at[place];
+  return ListOfPreSegments(push.preSegmentOffsets.at[list], push.written.at[list], push.left.at[list]);
+}
+
+void main() {
+  own = gl_SubgroupInvocationID;
+  uint longListCount = push.longListCount.at[0];
+  uint place = gl_WorkGroupID.x;
+  if (place >= longListCount) return;
+  uint step = gl_NumWorkGroups.x;
+  ListOfPreSegments ahead = listAt(place);
+  StoredPreSegment preSegmentAhead;
+  if (own < ahead.count) preSegmentAhead = push.preSegments.at[ahead.first + own];
+  for (; place < longListCount; place += step) {
+    ListOfPreSegments list = ahead;
+    if (place + step < longListCount) ahead = listAt(place + step);
+    uint cuts = loadList(list.first, list.count, preSegmentAhead);
+    if (own < ahead.count) preSegmentAhead = push.preSegments.at[ahead.first + own];
+    mergeCheapest(list.count, list.maxCount, cuts);
+    storeList(list.first, list.maxCount);
+  }
+}

@@ -1,0 +1,23 @@
+// Supersegments as render.comp reads them: the words of RenderSegment.
+//
+// Needs: shared/render.h, exact.glsl.
+
+// Straight colour in 11, 11 and 10 bits; those of codes, in 8 bits, stay as they are.
+const uvec3 maxSegmentColor = uvec3(2040u, 2040u, 1020u);
+
+uint packedSegmentColor(vec3 straight) {
+  uvec3 codes = uvec3(round(clamp(straight, 0.0, 1.0) * vec3(maxSegmentColor)));
+  return codes.r | codes.g << 11 | codes.b << 22;
+}
+
+// In units of segmentColorUnit; green stays where it is.
+const vec3 segmentColorUnit = 1.0 / (vec3(maxSegmentColor) * vec3(1.0, 2048.0, 1.0));
+
+vec3 segmentColor(uvec4 segment) {
+  return vec3(exactFloat(segment.w & 0x7ffu), exactFloat(segment.w & 0x3ff800u), exactFloat(segment.w >> 22));
+}
+
+float segmentDensity(uvec4 segment) { return uintBitsToFloat(segment.z); }
+
+// Front and back.
+vec2 segmentDepths(uvec4 segment) { return uintBitsToFloat(segment.xy); }

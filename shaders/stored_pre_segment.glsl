@@ -1,0 +1,11 @@
+// Pre-segments in memory.
+//
+// Needs: shared/lists.h.
+
+vec4 lightOf(StoredPreSegment preSegment) { return vec4(preSegment.light.rgb, abs(preSegment.light.a)); }
+
+bool isCut(StoredPreSegment preSegment) { return preSegment.light.a < 0.0; }
+
+StoredPreSegment storedPreSegment(vec2 span, float before, vec4 light, bool cut) {
+  return StoredPreSegment(span, before, 0.0, vec4(light.rgb, cut ? -light.a : light.a));
+}

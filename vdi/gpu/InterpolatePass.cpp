@@ -1,0 +1,24 @@
+#include "vdi/gpu/InterpolatePass.h"
+
+namespace vdi::gpu {
+
+namespace {
+
+ComputePipelineInfo pipelineInfo() {
+  ComputePipelineInfo info;
+  info.shader = "interpolate";
+  info.pushConstantBytes = sizeof(shared::InterpolateConstants);
+  return info;
+}
+
+}  // namespace
+
+InterpolatePass::InterpolatePass(std::shared_ptr<Device> device)
+    : pipelines_(std::move(device), pipelineInfo()) {}
+
+void InterpolatePass::record(Commands& commands, const shared::InterpolateConstants& constants) {
+  commands.dispatch(pipelines_.with({constants.quotas != 0 ? 1U : 0U}), constants,
+                    groupsFor(constants.width, shared::interpolateGroup), constants.rows);
+}
+
+}  // namespace vdi::gpu
