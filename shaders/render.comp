@@ -92,6 +92,7 @@ void renderPixels(uint tile) {
   ray = rayAt(vec2(at) + 0.5);
   accumulated = nothing;
   vec2 stretch = insideFrustum();
+  if (params.hasEnds != 0u && hasPixel) stretch.y = min(stretch.y, params.ends.at[at.y * params.width + at.x]);
   bool meets = hasPixel && stretch.x < stretch.y;
   PictureLine line = pictureLine(stretch);
   bool along = smoothReconstruction && meets && line.columns < 1.0;

@@ -90,6 +90,7 @@ struct RenderParams {
   VDI_ADDRESS(MaskArray) tileDepthMasks;
   VDI_ADDRESS(Vec4Array) colors;       // [height][width]; bytes: a word each
   VDI_ADDRESS(FloatArray) depths;      // [height][width]
+  VDI_ADDRESS(FloatArray) ends;        // [height][width], if hasEnds: the new view's depths at which rays end
   VDI_ADDRESS(TileQueueAddress) queue;
   VDI_ADDRESS(UintArray) waiting;  // [renderKinds][tiles]: the tiles of the queue, as row * tiles in a row + column
   float nearest;  // depth range of the VDI, nearest > 0 in perspective
@@ -100,7 +101,7 @@ struct RenderParams {
   uint height;
   ivec2 lists;  // of the VDI: width, height
   float binScale;
-  uint pad;
+  uint hasEnds;
 };
 
 // Ray of the new view's pixel in V_O's view space, as in CastParams: base + u * right + v * up, t = the new view's depth. All that

@@ -395,6 +395,98 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the refe
   CHECK(deviceAsGpu()->validationMessages() == "");
 }
 
+TEST_CASE("rays that end at objects, of any part of an image plane: as in the reference") {
+  const auto decomposed = test::decompose("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank,
+                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
+  const bool parallel = GENERATE(false, true);
+  const Camera camera = test::oblique(parallel);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(decomposed.mine);
+  const auto vdi = generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
+  VdiRenderer renderer(device());
+  renderer.setVdi(*vdi);
+  VdiRenderer rendererAsGpu(deviceAsGpu());
+  rendererAsGpu.setVdi(*vdi);
+  constexpr int width = 65;
+  constexpr int height = 47;
+  for (const double angle : {0.0, 20.0, 160.0}) {
+    const Camera other = camera.azimuth(angle);
+    const View whole(other, width, height);
+    const glm::dvec2 half{whole.halfWidth(), whole.halfHeight()};
+    // Beside the middle, and with oblong pixels.
+    const View part(other, width, height,
+                    ImagePlane{glm::dvec2(-0.9, -0.4) * half, glm::dvec2(0.3, 0.6) * half});
+    for (const View& view : {whole, part}) {
+      // A slanted wall through the middle of the scene; left of it rays go on, right of it none begins.
+      const double middle = view.depthOf(vdi->bounds.center());
+      const double depth = glm::length(vdi->bounds.size());
+      std::vector<float> ends;
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+          const double wall = middle + depth * (0.3 * x / width - 0.2 * y / height);
+          ends.push_back(x < width / 4         ? Image::noDepth
+                         : x > width * 15 / 16 ? 0.0F
+                                               : static_cast<float>(wall));
+        }
+      }
+      for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
+        INFO("from " << angle << ", " << toString(reconstruction) << ", parallel " << parallel);
+        const Image open = reference::render(*vdi, view, reconstruction);
+        const Image expected = reference::render(*vdi, view, reconstruction, ends);
+        std::size_t hidden = 0;
+        std::size_t half = 0;
+        for (std::size_t i = 0; i < ends.size(); ++i) {
+          const bool isOpen = ends[i] == Image::noDepth;
+          if (isOpen) CHECK(expected.rgba[i] == open.rgba[i]);
+          if (ends[i] == 0.0F) CHECK(expected.rgba[i].a == 0.0F);
+          // Smoothly, a column that ends early blends its lists otherwise.
+          if (reconstruction == Reconstruction::Constant) CHECK(expected.rgba[i].a <= open.rgba[i].a + 1e-5F);
+          hidden += open.rgba[i].a > 0.1F && expected.rgba[i].a == 0.0F ? 1 : 0;
+          half += expected.rgba[i].a > 0.0F && expected.rgba[i].a < 0.9F * open.rgba[i].a ? 1 : 0;
+        }
+        CHECK(hidden + half > 50);
+        for (VdiRenderer* each : {&renderer, &rendererAsGpu}) {
+          CHECK(largestDifference(each->render(view, ends, reconstruction), expected) < 2.0F);
+          // No trace of it stays.
+          CHECK(largestDifference(each->render(view, {}, reconstruction), open) < 2.0F);
+        }
+      }
+    }
+  }
+  CHECK(deviceAsGpu()->validationMessages() == "");
+}
+
+TEST_CASE("a ray that ends within a supersegment sees the part of it in front") {
+  Vdi vdi;
+  vdi.camera.position = {0.0, 0.0, 0.0};
+  vdi.camera.focalPoint = {0.0, 0.0, 1.0};
+  vdi.camera.parallelProjection = GENERATE(false, true);
+  constexpr int side = 64;
+  constexpr std::size_t middle = side / 2 * side + side / 2;
+  vdi.width = vdi.height = side;
+  vdi.budget = 1;
+  SupersegmentLists lists;
+  const Supersegment segment{2.0F, 6.0F, 0.6F, 0.0F, 0.0F, 0.75F};
+  lists.offsets = {0};
+  for (int i = 0; i < side * side; ++i) {
+    lists.segments.push_back(segment);
+    lists.offsets.push_back(static_cast<std::uint32_t>(lists.segments.size()));
+  }
+  vdi.lists = lists;
+  VdiRenderer renderer(device());
+  renderer.setVdi(vdi);
+  for (const float part : {0.0F, 0.25F, 0.5F, 1.0F, 2.0F}) {
+    INFO(part);
+    const std::vector<float> ends(side * side, 2.0F + 4.0F * part);
+    const float opacity = 1.0F - std::pow(0.25F, std::min(part, 1.0F));
+    for (const Image& seen : {renderer.render(vdi.view(), ends, Reconstruction::Constant),
+                              reference::render(vdi, vdi.view(), Reconstruction::Constant, ends)}) {
+      CHECK(seen.rgba[middle].a == Approx(opacity).margin(1e-3));
+      CHECK(seen.rgba[middle].r == Approx(0.8F * opacity).margin(1e-3));
+    }
+  }
+}
+
 TEST_CASE("a picture of more tiles than a device has workgroups side by side") {
   const auto decomposed = test::decompose("ramp", {8, 8, 8}, {1, 1, 1}, Layout::OnOneRank,
                                           Joint::SharedPoints, ScalarType::F32, 0, 1);

@@ -134,6 +134,15 @@ def picture(proxy):
     return np.flipud(np.rint(rgba[..., :3] * rgba[..., 3:] / 255)).astype(np.uint8)
 
 
+def message_in(view):
+    """What the representation VDI says in a view instead of showing something, without line breaks; "" if nothing."""
+    actors = view.GetClientSideObject().GetNonCompositedRenderer().GetActors2D()
+    actors.InitTraversal()
+    texts = [actors.GetNextActor2D() for _ in range(actors.GetNumberOfItems())]
+    texts = [text.GetInput() for text in texts if text.IsA("vtkTextActor") and text.GetVisibility()]
+    return " ".join(text for text in texts if "VDI" in text).replace("\n", " ")
+
+
 def read_png(path):
     reader = vtkPNGReader()
     reader.SetFileName(path)

@@ -101,6 +101,21 @@ View::View(const Camera& camera, int width, int height) : camera_(camera), width
   up_ = orthogonalUp(camera.viewUp, forward_);
   right_ = glm::cross(forward_, up_);
   halfHeight_ = camera.parallelProjection ? camera.parallelScale : std::tan(radians(camera.viewAngle) * 0.5);
+  halfWidth_ = halfHeight_ * width / height;
+  pixelSize_ = glm::dvec2(2.0 * halfHeight_ / height);
+}
+
+View::View(const Camera& camera, int width, int height, const ImagePlane& plane)
+    : View(camera, width, height) {
+  const glm::dvec2 extent = plane.high - plane.low;
+  if (!(extent.x > 0.0) || !(extent.y > 0.0) || !finite({plane.low, extent.x}) ||
+      !finite({plane.high, extent.y})) {
+    throw Error(ErrorCode::InvalidArgument, "the image plane must be finite and have an extent");
+  }
+  halfWidth_ = 0.5 * extent.x;
+  halfHeight_ = 0.5 * extent.y;
+  middle_ = 0.5 * (plane.low + plane.high);
+  pixelSize_ = extent / glm::dvec2(width, height);
 }
 
 glm::dvec3 View::toView(const glm::dvec3& world) const {
@@ -109,8 +124,9 @@ glm::dvec3 View::toView(const glm::dvec3& world) const {
 }
 
 Ray View::rayThrough(double x, double y) const {
-  const double scale = 2.0 * halfHeight_ / height_;  // square pixels
-  const glm::dvec3 offset = (x - 0.5 * width_) * scale * right_ + (y - 0.5 * height_) * scale * up_;
+  const glm::dvec2 at{(x - 0.5 * width_) * pixelSize_.x + middle_.x,
+                      (y - 0.5 * height_) * pixelSize_.y + middle_.y};
+  const glm::dvec3 offset = at.x * right_ + at.y * up_;
   if (parallel()) return {camera_.position + offset, forward_};
   return {camera_.position, forward_ + offset};
 }

@@ -39,14 +39,26 @@ struct Ray {
   glm::dvec3 direction;  // world per unit of depth
 };
 
+/// What a picture shows of its image plane: view-space x and y of its lower left and upper right corner, at
+/// depth 1 (perspective) or anywhere (parallel).
+struct ImagePlane {
+  glm::dvec2 low{-1.0};
+  glm::dvec2 high{1.0};
+};
+
 /// A camera with a viewport of width x height pixels: the orthonormal view basis and the mapping between
-/// pixels and rays. Square pixels; the vertical extent is the camera's, as in VTK.
+/// pixels and rays.
 class View {
  public:
   /// Throws Error{InvalidArgument} for a viewport outside 1 .. 32768, a view angle outside (0, 180), a
   /// parallel scale <= 0, values that aren't finite, or a position equal to the focal point. A view-up
   /// parallel to the view direction is replaced by the axis most orthogonal to it, one of zero by (0, 1, 0).
+  /// Square pixels; the vertical extent is the camera's, as in VTK.
   View(const Camera& camera, int width, int height);
+  /// A picture of any part of the camera's image plane, beside its middle and with oblong pixels included:
+  /// tiles, stereo. Of the camera, view angle and parallel scale don't count. Throws as the other one, and
+  /// Error{InvalidArgument} for a plane that isn't finite or has no extent.
+  View(const Camera& camera, int width, int height, const ImagePlane& plane);
 
   const Camera& camera() const { return camera_; }
   int width() const { return width_; }
@@ -59,7 +71,7 @@ class View {
 
   /// Half the height of the image plane: at depth 1 (perspective) or anywhere (parallel), in world units.
   double halfHeight() const { return halfHeight_; }
-  double halfWidth() const { return halfHeight_ * width_ / height_; }
+  double halfWidth() const { return halfWidth_; }
 
   double depthOf(const glm::dvec3& world) const { return glm::dot(world - camera_.position, forward_); }
   glm::dvec3 toView(const glm::dvec3& world) const;
@@ -75,6 +87,9 @@ class View {
   glm::dvec3 up_;
   glm::dvec3 forward_;
   double halfHeight_;
+  double halfWidth_;
+  glm::dvec2 middle_{0.0};  // of the image plane, as ImagePlane has it
+  glm::dvec2 pixelSize_;
 };
 
 }  // namespace vdi

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -115,6 +116,12 @@ class VdiRenderer {
   /// The same for a screen: 8 instead of 20 bytes a pixel come from the device, which takes longer than
   /// rendering. Premultiplied, each byte is toByte of what render gives. Valid until the next call.
   ImageBytes renderBytes(const Camera& camera, int width, int height, Alpha alpha,
+                         Reconstruction reconstruction = Reconstruction::Smooth);
+  /// Either one among other things that are seen. `ends`: [height][width] of the view, the depths at which
+  /// its rays end, at opaque objects; infinity where there's none, empty if there's none at all.
+  Image render(const View& view, std::span<const float> ends,
+               Reconstruction reconstruction = Reconstruction::Smooth);
+  ImageBytes renderBytes(const View& view, std::span<const float> ends, Alpha alpha,
                          Reconstruction reconstruction = Reconstruction::Smooth);
   double renderMilliseconds() const;  // device time of the last render
 

@@ -1,5 +1,6 @@
 // VdiRenderer and flatten: what a viewer does with a VDI.
 #include <algorithm>
+#include <cassert>
 #include <cstring>
 #include <mutex>
 #include <utility>
@@ -39,8 +40,12 @@ struct VdiRenderer::State {
   float binScale = 0.0F;
   double milliseconds = 0.0;
 
+  gpu::Buffer ends;  // of rays; none until they're asked for
+  gpu::Buffer endsStaging;
+
   /// Into `picture`. `form`: shared::renderPicture...
-  void render(const View& view, Reconstruction reconstruction, std::uint32_t form);
+  void render(const View& view, std::span<const float> rayEnds, Reconstruction reconstruction,
+              std::uint32_t form);
 
   /// What fits staging is on its way while the caller goes on; more waits for the part before.
   static constexpr std::uint64_t stagingBytes = std::uint64_t{128} << 20;
@@ -170,10 +175,13 @@ void VdiRenderer::setVdi(const Vdi& vdi) {
   s.original = std::make_unique<View>(vdi.view());
 }
 
-void VdiRenderer::State::render(const View& view, Reconstruction reconstruction, std::uint32_t form) {
+void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds,
+                                Reconstruction reconstruction, std::uint32_t form) {
   if (!original) throw Error(ErrorCode::InvalidArgument, "there is no VDI to render yet");
-  picture.reserve(device,
-                  static_cast<std::uint64_t>(view.width()) * static_cast<std::uint64_t>(view.height()),
+  const std::uint64_t pixels =
+      static_cast<std::uint64_t>(view.width()) * static_cast<std::uint64_t>(view.height());
+  assert(rayEnds.empty() || rayEnds.size() == pixels);
+  picture.reserve(device, pixels,
                   form == shared::renderPictureFloats ? sizeof(glm::vec4) : sizeof(glm::u8vec4));
   shared::RenderParams params = gpu::renderGeometry(*original, view);
   params.heads = heads.address();
@@ -184,8 +192,19 @@ void VdiRenderer::State::render(const View& view, Reconstruction reconstruction,
   params.depths = picture.depths();
   params.nearest = nearest;
   params.farthest = farthest;
+  if (!rayEnds.empty()) {
+    endsStaging.reserve(device, rayEnds.size_bytes(), MemoryKind::Upload);
+    ends.reserve(device, rayEnds.size_bytes(), MemoryKind::DeviceLocal);
+    copyInParallel(std::as_bytes(rayEnds), endsStaging.mapped().data());
+    params.ends = ends.address();
+    params.hasEnds = 1;
+  }
   commands.begin();  // behind setVdi's uploads
   commands.mark("render");
+  if (!rayEnds.empty()) {
+    commands.copy(endsStaging, 0, ends, 0, rayEnds.size_bytes());
+    commands.barrier();
+  }
   pass.record(commands, params, gpu::renderRays(*original, view), reconstruction, form);
   picture.recordDownload(commands);
   commands.submitAndWait();
@@ -193,17 +212,26 @@ void VdiRenderer::State::render(const View& view, Reconstruction reconstruction,
 }
 
 Image VdiRenderer::render(const Camera& camera, int width, int height, Reconstruction reconstruction) {
-  state_->render(View(camera, width, height), reconstruction, shared::renderPictureFloats);
-  Image image{width, height, {}, {}};
+  return render(View(camera, width, height), {}, reconstruction);
+}
+
+Image VdiRenderer::render(const View& view, std::span<const float> ends, Reconstruction reconstruction) {
+  state_->render(view, ends, reconstruction, shared::renderPictureFloats);
+  Image image{view.width(), view.height(), {}, {}};
   state_->picture.copyTo(image, 0);
   return image;
 }
 
 ImageBytes VdiRenderer::renderBytes(const Camera& camera, int width, int height, Alpha alpha,
                                     Reconstruction reconstruction) {
-  state_->render(View(camera, width, height), reconstruction,
+  return renderBytes(View(camera, width, height), {}, alpha, reconstruction);
+}
+
+ImageBytes VdiRenderer::renderBytes(const View& view, std::span<const float> ends, Alpha alpha,
+                                    Reconstruction reconstruction) {
+  state_->render(view, ends, reconstruction,
                  alpha == Alpha::Straight ? shared::renderPictureStraightBytes : shared::renderPictureBytes);
-  return state_->picture.bytes(width, height);
+  return state_->picture.bytes(view.width(), view.height());
 }
 
 double VdiRenderer::renderMilliseconds() const {

@@ -62,7 +62,9 @@ SupersegmentLists composite(std::span<const SupersegmentLists> subLists, const G
                             double sampleStep);
 
 /// The VDI seen by `view`. Each supersegment fills the part of its pixel's frustum between its two depths;
-/// rays traverse the frusta of V_O's pixels in order, whatever their direction.
-Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction);
+/// rays traverse the frusta of V_O's pixels in order, whatever their direction. `ends`: [height][width]
+/// of the view, the depths at which its rays end, say at opaque objects; empty: nowhere.
+Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction,
+             std::span<const float> ends = {});
 
 }  // namespace vdi::reference

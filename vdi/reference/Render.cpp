@@ -1,6 +1,7 @@
 // A VDI from a new viewpoint: a ray traverses the frusta of V_O's pixels. The shaders' twin is
 // shaders/render.comp.
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -222,8 +223,9 @@ Accumulator traverseSmoothly(const SupersegmentLists& lists, const View& origina
 
 }  // namespace
 
-Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction) {
+Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, std::span<const float> ends) {
   Image image = blankImage(view.width(), view.height());
+  assert(ends.empty() || ends.size() == image.pixelCount());
   const SupersegmentLists lists = vdi.expandedLists();
   if (lists.segments.empty()) return image;
   const View original = vdi.view();
@@ -242,13 +244,14 @@ Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction) {
                                  glm::dot(world.direction, original.up()),
                                  glm::dot(world.direction, original.forward())};
       const ViewRay ray{original.toView(world.origin), direction, glm::length(world.direction)};
-      const Stretch stretch = insideFrustum(ray, original, smallest, farthest);
+      const auto pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
+      Stretch stretch = insideFrustum(ray, original, smallest, farthest);
+      if (!ends.empty()) stretch.leave = std::min(stretch.leave, static_cast<double>(ends[pixel]));
       if (stretch.empty()) continue;
       const Accumulator sum = reconstruction == Reconstruction::Smooth
                                   ? traverseSmoothly(lists, original, ray, stretch)
                                   : traverseLists(lists, original, ray, stretch);
-      const auto pixel =
-          static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
       image.rgba[pixel] = sum.rgba();
       image.depth[pixel] = sum.depth();
     }

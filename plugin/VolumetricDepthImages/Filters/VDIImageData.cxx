@@ -112,6 +112,9 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
   image->GetPointData()->AddArray(counts);
 
   vtkFieldData* fields = image->GetFieldData();
+  unsigned int* size = addField<vtkUnsignedIntArray>(fields, "VDI.size", 1, 2);
+  size[0] = static_cast<unsigned int>(vdi.width);
+  size[1] = static_cast<unsigned int>(vdi.height);
   std::copy(offsets.begin(), offsets.end(),
             addField<vtkUnsignedIntArray>(fields, "VDI.offsets", 1, static_cast<vtkIdType>(offsets.size())));
   const auto count = static_cast<vtkIdType>(vdi.supersegmentCount());
@@ -156,10 +159,9 @@ bool getVdi(vtkDataObject* data, vdi::Vdi& vdi) {
   const double* camera = field<vtkDoubleArray>(fields, "VDI.camera", 1, 12)->GetPointer(0);
   const double* bounds = field<vtkDoubleArray>(fields, "VDI.bounds", 1, 6)->GetPointer(0);
   const double* parameters = field<vtkDoubleArray>(fields, "VDI.parameters", 1, 4)->GetPointer(0);
-  int dimensions[3];
-  image->GetDimensions(dimensions);
-  vdi.width = dimensions[0];
-  vdi.height = dimensions[1];
+  const unsigned int* size = field<vtkUnsignedIntArray>(fields, "VDI.size", 1, 2)->GetPointer(0);
+  vdi.width = static_cast<int>(size[0]);
+  vdi.height = static_cast<int>(size[1]);
   for (int axis = 0; axis < 3; ++axis) {
     vdi.camera.position[axis] = camera[axis];
     vdi.camera.focalPoint[axis] = camera[3 + axis];

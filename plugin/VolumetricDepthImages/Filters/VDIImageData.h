@@ -4,7 +4,8 @@
 //   the bottom
 //               SupersegmentCount  unsigned int [h][w]
 //               Depth              float [h][w], of RenderVDI only
-//   field data  VDI.offsets        unsigned int [w*h + 1]
+//   field data  VDI.size           unsigned int [2]: w, h; a pipeline may crop the image
+//               VDI.offsets        unsigned int [w*h + 1]
 //               VDI.supersegments  full precision: float [n][6]: front, back, red, green, blue, opacity
 //               VDI.codes          compact: unsigned int [n][2], vdi::CompactSupersegment
 //               VDI.depthCode      compact: float [2], vdi::DepthCode

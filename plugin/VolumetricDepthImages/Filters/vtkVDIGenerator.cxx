@@ -35,6 +35,7 @@
 #include "VDISession.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/Pipeline.h"
+#include "vtkVDIImageData.h"
 
 vtkStandardNewMacro(vtkVDIGenerator);
 
@@ -157,6 +158,15 @@ int vtkVDIGenerator::FillInputPortInformation(int, vtkInformation* info) {
   // leaf by leaf.
   info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject");
   return 1;
+}
+
+vtkTypeBool vtkVDIGenerator::ProcessRequest(vtkInformation* request, vtkInformationVector** inputs,
+                                            vtkInformationVector* outputs) {
+  if (request->Has(vtkDemandDrivenPipeline::REQUEST_DATA_OBJECT())) {
+    vtkVDIImageData::MakeOutput(outputs);
+    return 1;
+  }
+  return this->Superclass::ProcessRequest(request, inputs, outputs);
 }
 
 int vtkVDIGenerator::RequestInformation(vtkInformation*, vtkInformationVector**,

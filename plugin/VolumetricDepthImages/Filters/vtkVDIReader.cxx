@@ -10,6 +10,7 @@
 #include "VDIImageData.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/VdiFile.h"
+#include "vtkVDIImageData.h"
 
 vtkStandardNewMacro(vtkVDIReader);
 
@@ -42,6 +43,15 @@ int vtkVDIReader::CanReadFile(const char* name) {
   } catch (const vdi::Error&) {
     return 0;
   }
+}
+
+vtkTypeBool vtkVDIReader::ProcessRequest(vtkInformation* request, vtkInformationVector** inputs,
+                                         vtkInformationVector* outputs) {
+  if (request->Has(vtkDemandDrivenPipeline::REQUEST_DATA_OBJECT())) {
+    vtkVDIImageData::MakeOutput(outputs);
+    return 1;
+  }
+  return this->Superclass::ProcessRequest(request, inputs, outputs);
 }
 
 int vtkVDIReader::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) {

@@ -1,0 +1,106 @@
+#include "VDIPiece.h"
+
+#include <vtkDataArray.h>
+#include <vtkDoubleArray.h>
+#include <vtkFieldData.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkStringArray.h>
+#include <vtkUnsignedCharArray.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "VDIImageData.h"
+#include "vdi/core/Error.h"
+#include "vdi/io/VdiFile.h"
+
+namespace pv {
+
+namespace {
+
+constexpr const char* fileName = "VDI.file";
+constexpr const char* problemName = "VDI.problem";
+constexpr const char* boundsName = "VDI.bounds";
+
+void packFile(vtkImageData* image, vtkFieldData* fields) {
+  vdi::Vdi vdi;
+  getVdi(image, vdi);
+  const std::vector<std::byte> bytes = vdi::io::encode(vdi);
+  vtkNew<vtkUnsignedCharArray> array;
+  array->SetName(fileName);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(bytes.size()));
+  std::memcpy(array->GetPointer(0), bytes.data(), bytes.size());
+  fields->AddArray(array);
+  fields->AddArray(image->GetFieldData()->GetAbstractArray(boundsName));
+}
+
+}  // namespace
+
+void packNothing(vtkPolyData* piece) {
+  piece->Initialize();
+  vtkNew<vtkPoints> points;
+  points->InsertNextPoint(0.0, 0.0, 0.0);
+  piece->SetPoints(points);
+}
+
+void packProblem(const std::string& text, vtkPolyData* piece) {
+  packNothing(piece);
+  vtkNew<vtkStringArray> array;
+  array->SetName(problemName);
+  array->InsertNextValue(text);
+  piece->GetFieldData()->AddArray(array);
+}
+
+void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
+  packNothing(piece);
+  auto* image = vtkImageData::SafeDownCast(data);
+  if (image != nullptr && image->GetNumberOfPoints() == 0) {
+    packProblem("There is no VDI to show: what makes it has failed.", piece);
+    return;
+  }
+  if (image == nullptr || image->GetFieldData()->GetAbstractArray("VDI.offsets") == nullptr) {
+    packProblem("There is no VDI in this data set. The filter Volumetric Depth Image makes one of it.",
+                piece);
+    return;
+  }
+  try {
+    if (crosses) {
+      packFile(image, piece->GetFieldData());
+    } else {
+      piece->GetFieldData()->ShallowCopy(image->GetFieldData());
+    }
+  } catch (const std::exception& error) {
+    packProblem(error.what(), piece);
+  }
+}
+
+bool boundsOf(vtkPolyData* piece, double bounds[6]) {
+  auto* array = vtkDoubleArray::SafeDownCast(piece->GetFieldData()->GetAbstractArray(boundsName));
+  if (array == nullptr || array->GetNumberOfValues() != 6) return false;
+  std::copy_n(array->GetPointer(0), 6, bounds);
+  return bounds[0] <= bounds[1] && bounds[2] <= bounds[3] && bounds[4] <= bounds[5];
+}
+
+std::optional<vdi::Vdi> unpackVdi(vtkDataObject* piece) {
+  vtkFieldData* fields = piece->GetFieldData();
+  if (auto* problem = vtkStringArray::SafeDownCast(fields->GetAbstractArray(problemName)))
+    throw vdi::Error(vdi::ErrorCode::InvalidArgument, problem->GetValue(0));
+  if (auto* file = vtkUnsignedCharArray::SafeDownCast(fields->GetAbstractArray(fileName))) {
+    const std::span<const unsigned char> bytes(file->GetPointer(0),
+                                               static_cast<std::size_t>(file->GetNumberOfValues()));
+    return vdi::io::decode(std::as_bytes(bytes));
+  }
+  vtkNew<vtkImageData> image;
+  image->SetFieldData(fields);
+  vdi::Vdi vdi;
+  if (!getVdi(image, vdi)) return std::nullopt;
+  return vdi;
+}
+
+}  // namespace pv

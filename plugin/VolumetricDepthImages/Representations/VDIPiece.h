@@ -1,0 +1,33 @@
+// A VDI on its way to where it is drawn: what ParaView's delivery carries between processes. Field data of a
+// vtkPolyData with one point, for without points nothing is sent:
+//   within a process  the arrays of the VDI's image (VDIImageData.h), shared with it
+//   between two       VDI.file: unsigned char [n], a .vdi file
+// and VDI.problem: a string, instead of either where there's no VDI to show.
+#ifndef VDIPiece_h
+#define VDIPiece_h
+
+#include <optional>
+#include <string>
+
+#include "vdi/core/Vdi.h"
+
+class vtkDataObject;
+class vtkPolyData;
+
+namespace pv {
+
+/// Makes `piece` nothing, as ranks and clients without a VDI have it.
+void packNothing(vtkPolyData* piece);
+/// Makes `piece` a problem.
+void packProblem(const std::string& text, vtkPolyData* piece);
+/// Makes `piece` the VDI of `data`, or a problem. `crosses`: it leaves the process.
+void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece);
+/// World bounds as VTK has them, where the piece has a VDI with a scene in it.
+bool boundsOf(vtkPolyData* piece, double bounds[6]);
+/// nullopt where it's another rank's VDI, or none. Throws vdi::Error for one that isn't sound, and for a
+/// problem.
+std::optional<vdi::Vdi> unpackVdi(vtkDataObject* piece);
+
+}  // namespace pv
+
+#endif

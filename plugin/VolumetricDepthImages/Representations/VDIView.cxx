@@ -1,0 +1,67 @@
+#include "VDIView.h"
+
+#include <vtkMatrix4x4.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cstddef>
+#include <limits>
+
+#include "vdi/core/Parallel.h"
+
+namespace pv {
+
+ViewMatrices::ViewMatrices(vtkMatrix4x4* worldToView, vtkMatrix4x4* viewToClip) {
+  // Transposed: element (i, j) is row j, column i.
+  const auto toView = [&](int row, int column) { return worldToView->GetElement(column, row); };
+  const auto toClip = [&](int row, int column) { return viewToClip->GetElement(column, row); };
+  const glm::dvec3 right{toView(0, 0), toView(0, 1), toView(0, 2)};
+  const glm::dvec3 up{toView(1, 0), toView(1, 1), toView(1, 2)};
+  const glm::dvec3 back{toView(2, 0), toView(2, 1), toView(2, 2)};
+  camera_.position = -(toView(0, 3) * right + toView(1, 3) * up + toView(2, 3) * back);
+  camera_.focalPoint = camera_.position - back;
+  camera_.viewUp = up;
+  camera_.parallelProjection = toClip(3, 3) != 0.0;
+  const glm::dvec2 scale{toClip(0, 0), toClip(1, 1)};
+  // Of clip coordinates at depth 1, where view-space z is -1; the same anywhere if parallel.
+  const glm::dvec2 middle = camera_.parallelProjection ? glm::dvec2(toClip(0, 3), toClip(1, 3))
+                                                       : -glm::dvec2(toClip(0, 2), toClip(1, 2));
+  plane_.low = (glm::dvec2(-1.0) - middle) / scale;
+  plane_.high = (glm::dvec2(1.0) - middle) / scale;
+  depthScale_ = toClip(2, 2);
+  depthOffset_ = toClip(2, 3);
+}
+
+vdi::View ViewMatrices::view(int width, int height) const {
+  return {camera_, width, height, plane_};
+}
+
+float ViewMatrices::depthOf(float window) const {
+  if (window >= backgroundDepth) return std::numeric_limits<float>::infinity();
+  const double clip = 2.0 * window - 1.0;
+  // z of clip coordinates is depthOffset - depthScale * depth; by perspective it's divided by depth.
+  const double depth =
+      camera_.parallelProjection ? (depthOffset_ - clip) / depthScale_ : depthOffset_ / (clip + depthScale_);
+  return static_cast<float>(depth);
+}
+
+void depthsOf(const ViewMatrices& matrices, std::span<const float> window, const glm::ivec2& windowSize,
+              const glm::ivec2& size, std::span<float> depths) {
+  assert(window.size() == static_cast<std::size_t>(windowSize.x) * static_cast<std::size_t>(windowSize.y));
+  assert(depths.size() == static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y));
+  constexpr std::size_t minimum = 1U << 15;  // pixels
+  vdi::inParallel(depths.size(), minimum, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const auto width = static_cast<std::size_t>(size.x);
+      const std::size_t row = i / width;
+      const glm::dvec2 centre = glm::dvec2(i % width, row) + 0.5;
+      const glm::ivec2 at =
+          glm::min(glm::ivec2(centre * glm::dvec2(windowSize) / glm::dvec2(size)), windowSize - 1);
+      depths[i] =
+          matrices.depthOf(window[static_cast<std::size_t>(at.y) * static_cast<std::size_t>(windowSize.x) +
+                                  static_cast<std::size_t>(at.x)]);
+    }
+  });
+}
+
+}  // namespace pv

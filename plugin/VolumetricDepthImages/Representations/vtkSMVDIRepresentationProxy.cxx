@@ -1,0 +1,14 @@
+#include "vtkSMVDIRepresentationProxy.h"
+
+#include <vtkDataObject.h>
+#include <vtkObjectFactory.h>
+
+#include <cstring>
+
+vtkStandardNewMacro(vtkSMVDIRepresentationProxy);
+
+bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
+  if (type != nullptr && std::strcmp(type, "VDI") == 0 && this->GetUsingScalarColoring())
+    this->SetScalarColoring(nullptr, vtkDataObject::POINT);
+  return this->Superclass::SetRepresentationType(type);
+}

@@ -1,0 +1,79 @@
+/**
+ * @class vtkVDIProp
+ * @brief draws a Volumetric Depth Image among the objects of an OpenGL renderer
+ *
+ * Drawn with the volumes: after all opaque geometry, which hides what lies behind it, and blended over it.
+ * Where volumes are peeled together with translucent geometry, after that, too.
+ * While the window is interactive (vtkRenderWindow::GetDesiredUpdateRate of 1 and more), it has as few pixels
+ * as it takes to be drawn FrameRate times a second.
+ *
+ * What goes wrong is said in the view (MessageActor) and, once, as an error; the rest of the picture is
+ * drawn.
+ */
+#ifndef vtkVDIProp_h
+#define vtkVDIProp_h
+
+#include <vtkProp.h>
+
+#include <memory>
+#include <string>
+
+#include "vtkVolumetricDepthImagesRepresentationsModule.h"
+
+class vtkDataObject;
+class vtkOpenGLRenderWindow;
+class vtkRenderer;
+class vtkTextActor;
+
+class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp {
+ public:
+  static vtkVDIProp* New();
+  vtkTypeMacro(vtkVDIProp, vtkProp);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  /// What pv::packVdi made, or nullptr. Its VDI is on its way to the device when this returns. The same again
+  /// costs nothing.
+  void SetPiece(vtkDataObject* piece);
+  /// Says `text` in place of the VDI, which isn't drawn while there's a text.
+  void SetObstacle(const std::string& text);
+  /// Says why there's nothing to see; in a renderer of the same size that draws after this prop's.
+  vtkTextActor* GetMessageActor();
+
+  /// Whether pixels in front of which nothing opaque was drawn get a depth just short of the background's.
+  /// IceT, compositing by depth, drops them otherwise, colour and all. Default off.
+  vtkSetMacro(MarksDepth, bool);
+
+  /// vdi::Reconstruction: 1 (default) blends neighbouring lists, 0 shows each as it is.
+  vtkSetClampMacro(Reconstruction, int, 0, 1);
+  vtkGetMacro(Reconstruction, int);
+  /// Of the VDI's part in interactive frames, per second.
+  vtkSetClampMacro(FrameRate, double, 1.0, 1000.0);
+  vtkGetMacro(FrameRate, double);
+
+  void SetVisibility(vtkTypeBool visible) override;
+  double* GetBounds() override;
+  int RenderVolumetricGeometry(vtkViewport* viewport) override;
+  int RenderOverlay(vtkViewport* viewport) override;
+  void ReleaseGraphicsResources(vtkWindow* window) override;
+
+ protected:
+  vtkVDIProp();
+  ~vtkVDIProp() override;
+
+ private:
+  vtkVDIProp(const vtkVDIProp&) = delete;
+  void operator=(const vtkVDIProp&) = delete;
+
+  struct Internals;
+  int DrawIn(vtkViewport* viewport);
+  void Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
+  void MarkDepth(vtkOpenGLRenderWindow* window);
+  void Say(const std::string& text);
+
+  std::unique_ptr<Internals> Internal;
+  bool MarksDepth = false;
+  int Reconstruction = 1;
+  double FrameRate = 30.0;
+};
+
+#endif

@@ -1,0 +1,168 @@
+#include "vtkVDIRepresentation.h"
+
+#include <vtkAlgorithmOutput.h>
+#include <vtkInformation.h>
+#include <vtkInformationVector.h>
+#include <vtkMPIMoveData.h>
+#include <vtkMultiProcessController.h>
+#include <vtkObjectFactory.h>
+#include <vtkPVRenderView.h>
+#include <vtkPVSession.h>
+#include <vtkPVView.h>
+#include <vtkPolyData.h>
+#include <vtkProcessModule.h>
+#include <vtkRenderer.h>
+#include <vtkTextActor.h>
+#include <vtkVolume.h>
+#include <vtkVolumeCollection.h>
+
+#include "VDIPiece.h"
+#include "vtkVDIProp.h"
+
+vtkStandardNewMacro(vtkVDIRepresentation);
+
+namespace {
+
+/// Whether the data are in another process than the one that shows pictures.
+bool isDataElsewhere() {
+  switch (vtkProcessModule::GetProcessType()) {
+    case vtkProcessModule::PROCESS_SERVER:
+    case vtkProcessModule::PROCESS_DATA_SERVER:
+    case vtkProcessModule::PROCESS_RENDER_SERVER:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool isRoot() {
+  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
+  return controller == nullptr || controller->GetLocalProcessId() == 0;
+}
+
+/// Whether there are a client and a server, which both can draw; the same on both.
+bool hasServer() {
+  if (isDataElsewhere()) return true;
+  auto* session = vtkPVSession::SafeDownCast(vtkProcessModule::GetProcessModule()->GetSession());
+  return session != nullptr && session->GetController(vtkPVSession::RENDER_SERVER_ROOT) != nullptr;
+}
+
+/// Whether there are ranks without a client: all of them always draw, and IceT puts their pictures together.
+bool drawsOnRanks() {
+  vtkProcessModule* module = vtkProcessModule::GetProcessModule();
+  return vtkProcessModule::GetProcessType() == vtkProcessModule::PROCESS_BATCH &&
+         module->GetNumberOfLocalPartitions() > 1;
+}
+
+/// Whether the view draws where the VDI isn't. Volumes insist on that; on ranks without a client they are
+/// wrong when all data are on the first one.
+bool drawsVolumesOnRanks(vtkPVRenderView* view) {
+  if (hasServer()) return view->GetUseDistributedRenderingForRender();
+  if (!drawsOnRanks()) return false;
+  vtkVolumeCollection* volumes = view->GetRenderer()->GetVolumes();
+  vtkCollectionSimpleIterator at;
+  volumes->InitTraversal(at);
+  while (vtkVolume* volume = volumes->GetNextVolume(at)) {
+    if (volume->GetVisibility() != 0) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+vtkVDIRepresentation::vtkVDIRepresentation() {
+  pv::packNothing(this->Piece);
+}
+
+vtkVDIRepresentation::~vtkVDIRepresentation() = default;
+
+void vtkVDIRepresentation::PrintSelf(ostream& os, vtkIndent indent) {
+  this->Superclass::PrintSelf(os, indent);
+  this->Prop->PrintSelf(os, indent.GetNextIndent());
+}
+
+void vtkVDIRepresentation::SetReconstruction(int reconstruction) {
+  this->Prop->SetReconstruction(reconstruction);
+}
+
+void vtkVDIRepresentation::SetFrameRate(double rate) {
+  this->Prop->SetFrameRate(rate);
+}
+
+void vtkVDIRepresentation::SetVisibility(bool visible) {
+  this->Superclass::SetVisibility(visible);
+  this->Prop->SetVisibility(visible);
+}
+
+int vtkVDIRepresentation::FillInputPortInformation(int, vtkInformation* info) {
+  // Anything: what's no VDI gets a message, and composite data come whole.
+  info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject");
+  info->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
+  return 1;
+}
+
+int vtkVDIRepresentation::RequestData(vtkInformation* request, vtkInformationVector** inputs,
+                                      vtkInformationVector* outputs) {
+  const bool hasInput = inputs[0]->GetNumberOfInformationObjects() > 0;
+  if (hasInput && isRoot()) {
+    pv::packVdi(vtkDataObject::GetData(inputs[0]), isDataElsewhere(), this->Piece);
+  } else {
+    pv::packNothing(this->Piece);  // clients have no input, other ranks no VDI
+  }
+  this->HasPacked = true;
+  this->Piece->Modified();
+  return this->Superclass::RequestData(request, inputs, outputs);
+}
+
+int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in,
+                                             vtkInformation* out) {
+  const bool updates = request == vtkPVView::REQUEST_UPDATE() && this->GetNeedsUpdate();
+  this->HasPacked = false;
+  if (!this->Superclass::ProcessViewRequest(request, in, out)) return 0;
+  auto* view = vtkPVRenderView::SafeDownCast(in->Get(vtkPVView::VIEW()));
+  if (updates && !this->HasPacked && isRoot() && view != nullptr && !view->IsCached(this)) {
+    // The input's update has failed. What it was before isn't what is asked for.
+    pv::packProblem("There is no VDI to show: what makes it has failed.", this->Piece);
+    view->ClearCache(this);
+  }
+  if (request == vtkPVView::REQUEST_UPDATE()) {
+    // A VDI's real size would make the view render remotely and with less detail.
+    constexpr unsigned long tiny = 1;
+    vtkPVRenderView::SetPiece(in, this, this->Piece, tiny);
+    vtkPVRenderView::SetDeliverToClientAndRenderingProcesses(in, this, /*deliver_to_client*/ true,
+                                                             /*gather_before_delivery*/ false);
+    double bounds[6];
+    if (pv::boundsOf(this->Piece, bounds)) vtkPVRenderView::SetGeometryBounds(in, this, bounds);
+    // Objects are drawn where the VDI is, all of them.
+    if (hasServer()) vtkPVRenderView::SetRequiresDistributedRendering(in, this, false);
+    if (drawsOnRanks()) vtkPVRenderView::SetForceDataDistributionMode(in, vtkMPIMoveData::COLLECT);
+  } else if (request == vtkPVView::REQUEST_UPDATE_LOD()) {
+    if (hasServer()) vtkPVRenderView::SetRequiresDistributedRenderingLOD(in, this, false);
+  } else if (request == vtkPVView::REQUEST_RENDER()) {
+    this->Prop->SetMarksDepth(drawsOnRanks());
+    this->Prop->SetObstacle(
+        view != nullptr && drawsVolumesOnRanks(view)
+            ? "A VDI can't be shown beside a volume that is drawn on all ranks: hide the objects "
+              "of representation Volume."
+            : "");
+    vtkAlgorithmOutput* port = vtkPVRenderView::GetPieceProducer(in, this);
+    if (port != nullptr) this->Prop->SetPiece(port->GetProducer()->GetOutputDataObject(port->GetIndex()));
+  }
+  return 1;
+}
+
+bool vtkVDIRepresentation::AddToView(vtkView* view) {
+  auto* renderView = vtkPVRenderView::SafeDownCast(view);
+  if (renderView == nullptr) return false;
+  renderView->GetRenderer()->AddViewProp(this->Prop);
+  renderView->GetNonCompositedRenderer()->AddViewProp(this->Prop->GetMessageActor());
+  return this->Superclass::AddToView(view);
+}
+
+bool vtkVDIRepresentation::RemoveFromView(vtkView* view) {
+  auto* renderView = vtkPVRenderView::SafeDownCast(view);
+  if (renderView == nullptr) return false;
+  renderView->GetRenderer()->RemoveViewProp(this->Prop);
+  renderView->GetNonCompositedRenderer()->RemoveViewProp(this->Prop->GetMessageActor());
+  return this->Superclass::RemoveFromView(view);
+}

@@ -1,0 +1,52 @@
+/**
+ * @class vtkVDIRepresentation
+ * @brief shows a Volumetric Depth Image in render views
+ *
+ * Input: the output of vtkVDIGenerator or vtkVDIReader. The VDI goes to where pictures are shown, the client
+ * or the root, and is drawn there (vtkVDIProp): moving the camera moves no data. Other objects of the view
+ * are drawn there, too, for colours alone can't be merged by depth. Where another representation insists on
+ * being drawn on all ranks (ParaView's Volume does), there's a message instead of the VDI.
+ */
+#ifndef vtkVDIRepresentation_h
+#define vtkVDIRepresentation_h
+
+#include <vtkNew.h>
+#include <vtkPVDataRepresentation.h>
+
+#include "vtkVolumetricDepthImagesRepresentationsModule.h"
+
+class vtkPolyData;
+class vtkVDIProp;
+
+class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : public vtkPVDataRepresentation {
+ public:
+  static vtkVDIRepresentation* New();
+  vtkTypeMacro(vtkVDIRepresentation, vtkPVDataRepresentation);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  int ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in, vtkInformation* out) override;
+  void SetVisibility(bool visible) override;
+
+  /// As vtkVDIProp has them.
+  void SetReconstruction(int reconstruction);
+  void SetFrameRate(double rate);
+
+ protected:
+  vtkVDIRepresentation();
+  ~vtkVDIRepresentation() override;
+
+  int FillInputPortInformation(int port, vtkInformation* info) override;
+  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+  bool AddToView(vtkView* view) override;
+  bool RemoveFromView(vtkView* view) override;
+
+ private:
+  vtkVDIRepresentation(const vtkVDIRepresentation&) = delete;
+  void operator=(const vtkVDIRepresentation&) = delete;
+
+  vtkNew<vtkPolyData> Piece;  // pv::packVdi
+  bool HasPacked = false;     // in the update that's going on
+  vtkNew<vtkVDIProp> Prop;
+};
+
+#endif

@@ -1,0 +1,136 @@
+"""pvpython as the client of a pvserver on two ranks: a VDI that is made or read there is drawn here, and orbiting it sends
+nothing. relay.py counts what goes over the socket."""
+
+import os
+import socket
+import subprocess
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+
+import pvtest  # noqa: E402
+from paraview import simple  # noqa: E402
+from pvtest import check  # noqa: E402
+
+SIZE, CAMERA, CENTER = [480, 360], [2.2, 1.9, 2.4], [0.5, 0.5, 0.5]
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def clean_environment():
+    """Without what this process's own MPI has put there, which a new mpirun would take for its own."""
+    ours = ("OMPI_ALLOW", "OMPI_MCA_rmaps_base", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl_vader")
+    return {name: value for name, value in os.environ.items()
+            if not name.startswith(("OMPI_", "PMIX_", "ORTE_")) or name.startswith(ours)}
+
+
+class Session:
+    """A server that has connected to this client, by way of a relay."""
+
+    def __enter__(self):
+        here = os.path.dirname(os.path.abspath(__file__))
+        port = free_port()
+        self.relay = subprocess.Popen(["python3", os.path.join(here, "relay.py"), str(port)], stdin=subprocess.PIPE,
+                                      stdout=subprocess.PIPE, text=True)
+        relayed = self.relay.stdout.readline().strip()
+        self.server = subprocess.Popen([os.environ["MPIEXEC"], "--oversubscribe", "-n", "2", os.environ["PVSERVER"],
+                                        "--reverse-connection", "--client-host=127.0.0.1", "--server-port=" + relayed],
+                                       env=clean_environment(), stdin=subprocess.DEVNULL)
+        simple.ReverseConnect(str(port))
+        simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=True, ns=simple.__dict__)
+        return self
+
+    def __exit__(self, *_):
+        simple.Disconnect()
+        try:
+            self.server.wait(20)
+        except subprocess.TimeoutExpired:
+            self.server.kill()
+        self.relay.kill()
+
+    def bytes(self):
+        self.relay.stdin.write("\n")
+        self.relay.stdin.flush()
+        return int(self.relay.stdout.readline())
+
+
+def screenshot(view, name):
+    path = os.path.join(pvtest.OUTPUT, name)
+    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
+    return pvtest.read_png(path)
+
+
+def show(make_source, name):
+    """A view of a VDI with a sphere in it, from beside its viewpoint."""
+    view = pvtest.make_view(SIZE, CAMERA, CENTER)
+    simple.Show(make_source(view), view)
+    sphere = simple.Sphere(Radius=0.3, Center=[0.7, 0.5, 0.8], ThetaResolution=64, PhiResolution=64)
+    simple.Show(sphere, view)
+    simple.Render(view)
+    view.CameraPosition, view.CameraFocalPoint = [2.7, 1.4, 1.9], CENTER
+    simple.Render(view)
+    return view, screenshot(view, name)
+
+
+def generated(view):
+    source = pvtest.blocks_source("interleaved")
+    pvtest.set_colors("scalars", 0, 1)
+    return pvtest.vdi_filter(source, view, "POINTS", "scalars", 0.05)
+
+
+def orbit(view):
+    for _ in range(10):
+        view.GetActiveCamera().Azimuth(3)
+        view.SMProxy.InteractiveRender()
+    view.SMProxy.StillRender()
+
+
+def bytes_of_orbit(session, view):
+    """Of the same orbit each time, gone once before."""
+    camera = list(view.CameraPosition), list(view.CameraFocalPoint), list(view.CameraViewUp)
+    orbit(view)
+    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = camera
+    view.UpdateVTKObjects()
+    before = session.bytes()
+    orbit(view)
+    return session.bytes() - before
+
+
+path = os.path.join(pvtest.OUTPUT, "client_server.vdi")
+view, expected = show(generated, "client_server_alone.png")
+simple.SaveData(path, proxy=view.Representations[0].Input)
+orbit(view)
+turned = screenshot(view, "client_server_alone_turned.png")
+check(expected.std() > 20 and pvtest.ssim(expected, turned) < 0.95, "the picture shows something, and orbiting changes it")
+
+with Session() as session:
+    for make, what in ((generated, "made"), (lambda view: simple.OpenDataFile(path), "read")):
+        view, seen = show(make, "client_server_{}.png".format(what))
+        likeness = pvtest.ssim(seen, expected)
+        print("a VDI {} on the server: SSIM {:.4f} to the same without a server".format(what, likeness))
+        check(likeness > 0.99, "a VDI that is {} on the server is shown as without one".format(what))
+        shown = bytes_of_orbit(session, view)
+        check(pvtest.ssim(screenshot(view, "client_server_turned.png"), turned) > 0.99, "orbiting turns it")
+        simple.Hide(view.Representations[0].Input, view)
+        simple.Render(view)
+        hidden = bytes_of_orbit(session, view)
+        print("an orbit sends {} bytes, {} with the VDI hidden: ParaView's own words about each frame".format(shown, hidden))
+        check(shown == hidden and shown < 5000, "and sends nothing of the VDI or of pictures")
+
+    # A volume is drawn on the server's ranks: the view says why the VDI isn't, and shows it when the volume is gone.
+    view = pvtest.make_view(SIZE, CAMERA, CENTER)
+    image = generated(view)
+    volume = simple.Show(image.Input, view)
+    volume.SetRepresentationType("Volume")
+    simple.Show(image, view)
+    simple.Render(view)
+    check("beside a volume" in pvtest.message_in(view), "beside a volume of the server there is a message")
+    simple.Hide(image.Input, view)
+    picture = screenshot(view, "client_server_volume_hidden.png")
+    check(pvtest.message_in(view) == "" and picture.std() > 20, "and without it the VDI again")
+
+pvtest.finish()

@@ -1,0 +1,57 @@
+"""Runs inside the real ParaView (--script, which sets no __file__): loads the plugin, prepares the view, and from then on notes
+what the view shows after each drag of the mouse: mouse_view.png, and mouse_camera.json with the camera. What is done with the
+window is in mouse.sh."""
+
+import json
+import os
+import sys
+import traceback
+
+sys.path.insert(0, os.environ["VDI_TEST_SOURCE"])
+OUTPUT = os.environ["VDI_TEST_OUTPUT"]
+
+
+def leave(name, text):
+    """Whole or not at all."""
+    path = os.path.join(OUTPUT, name)
+    with open(path + ".new", "w") as file:
+        file.write(text)
+    os.replace(path + ".new", path)
+
+
+def use():
+    import pvtest  # loads the plugin
+    from paraview import simple
+
+    view = simple.GetActiveViewOrCreate("RenderView")
+    view.OrientationAxesVisibility = view.CenterAxesVisibility = 0
+    view.UseColorPaletteForBackground = 0
+    view.Background = [0, 0, 0]
+    simple.Render(view)
+    frames = []
+    window = view.GetRenderWindow()
+
+    def count(*_):
+        frames.append(window.GetDesiredUpdateRate())
+
+    def note(*_):
+        camera = view.GetActiveCamera()
+        simple.SaveScreenshot(os.path.join(OUTPUT, "mouse_view.png"), view, ImageResolution=view.ViewSize)
+        shown = [simple.GetRepresentation(source, view) for source in simple.GetSources().values()]
+        leave("mouse_camera.json", json.dumps({
+            "size": list(view.ViewSize), "position": camera.GetPosition(), "focal-point": camera.GetFocalPoint(),
+            "view-up": camera.GetViewUp(), "view-angle": camera.GetViewAngle(), "mode": view.InteractionMode.GetData(),
+            "interactive frames": sum(rate >= 1 for rate in frames),
+            "representations": [each.Representation.GetData() for each in shown if each and each.Visibility]}))
+        frames.clear()
+
+    window.AddObserver("EndEvent", count)
+    view.GetInteractor().AddObserver("EndInteractionEvent", note)
+    return pvtest.failures
+
+
+try:
+    use()
+    leave("mouse.ready", "ok")
+except Exception:
+    leave("mouse.ready", traceback.format_exc())

@@ -1,0 +1,52 @@
+"""What mouse.py noted of the view, against the tool's picture for the view's camera; and the window against what was noted.
+Argument: a picture of the whole screen."""
+
+import json
+import os
+import subprocess
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+
+import numpy as np  # noqa: E402
+import pvtest  # noqa: E402
+from pvtest import check  # noqa: E402
+
+with open(os.path.join(pvtest.OUTPUT, "mouse_camera.json")) as file:
+    note = json.load(file)
+print(note)
+expected_path = os.path.join(pvtest.OUTPUT, "mouse_expected.png")
+command = [os.environ["VDI_TOOL"], "render", os.path.join(pvtest.OUTPUT, "mouse_input.vdi"), "-o", expected_path,
+           "--resolution", "{}x{}".format(*note["size"]), "--view-angle", str(note["view-angle"])]
+for name in ("position", "focal-point", "view-up"):
+    command += ["--" + name] + [repr(value) for value in note[name]]
+subprocess.run(command, check=True)
+seen = pvtest.read_png(os.path.join(pvtest.OUTPUT, "mouse_view.png"))
+expected = pvtest.read_png(expected_path)
+likeness = pvtest.ssim(seen, expected)
+print("the view after the drag, against the tool's picture: SSIM {:.4f}".format(likeness))
+check(expected.std() > 10 and likeness > 0.99, "the view shows what the tool renders for its camera")
+check(note["mode"] == "3D", "the view stays in 3-D")
+check(note["representations"] == ["VDI"], "what was opened is shown as a VDI")
+check(note["interactive frames"] > 5, "there are frames while the mouse moves")
+
+# Where the view is on the screen is unknown: where its picture fits best.
+screen = pvtest.read_png(sys.argv[1]).astype(float).mean(axis=2)
+view = seen.astype(float).mean(axis=2)
+freedom = (screen.shape[0] - view.shape[0] + 1, screen.shape[1] - view.shape[1] + 1)
+check(min(freedom) > 0, "the view fits the screen")
+
+
+def correlation(picture, pattern):
+    """At each place of the pattern."""
+    transform = np.fft.rfft2(picture) * np.conj(np.fft.rfft2(pattern, picture.shape))
+    return np.fft.irfft2(transform, picture.shape)[:freedom[0], :freedom[1]]
+
+
+squares = correlation(screen ** 2, np.ones_like(view)) - 2 * correlation(screen, view)
+row, column = np.unravel_index(squares.argmin(), squares.shape)
+there = screen[row:row + view.shape[0], column:column + view.shape[1]]
+difference = np.abs(there - view).mean()
+print("the window shows that picture at {}, {}: mean difference {:.3f} of 255".format(column, row, difference))
+check(difference < 1, "the window shows that picture")
+pvtest.finish()

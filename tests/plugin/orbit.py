@@ -1,0 +1,92 @@
+"""How fast a VDI orbits in a view of 1280 x 720, and that neither that nor time steps take more and more memory. The figures
+are this machine's; on one that does other things as well they're lower."""
+
+import os
+import subprocess
+import time
+
+import pvtest
+from paraview import simple
+from pvtest import check
+
+SIZE, CENTER = [1280, 720], [0.5, 0.5, 0.5]
+
+
+def make(name, *options):
+    path = os.path.join(pvtest.OUTPUT, name)
+    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "-o", path] + list(options), check=True,
+                   stdout=subprocess.DEVNULL)
+    return path
+
+
+def megabytes():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def interactive_seconds(view, frames, degrees):
+    seconds = []
+    for _ in range(frames):
+        view.GetActiveCamera().Azimuth(degrees)
+        start = time.perf_counter()
+        view.SMProxy.InteractiveRender()
+        seconds.append(time.perf_counter() - start)
+    return seconds
+
+
+def shown(source):
+    view = pvtest.make_view(SIZE, [2.2, 1.4, 2.0], CENTER)
+    simple.Show(source, view)
+    simple.Render(view)
+    view.CameraPosition, view.CameraFocalPoint = [2.2, 1.4, 2.0], CENTER
+    simple.Render(view)
+    return view
+
+
+def fluid():
+    view = shown(simple.OpenDataFile(make("orbit.vdi", "--size", "48x48x48", "--resolution", "640x360")))
+    start = time.perf_counter()
+    simple.Render(view)
+    still = time.perf_counter() - start
+    for what, degrees in (("0 to 90 degrees", 3), ("90 to 180 degrees", 3)):
+        before = os.times()
+        seconds = interactive_seconds(view, 30, degrees)
+        after = os.times()
+        used = (after.user + after.system - before.user - before.system) / len(seconds)
+        print("orbit of 1280 x 720, {}: {:.1f} frames/s, the slowest in {:.0f} ms, {:.0f} ms of CPU time each; "
+              "at rest {:.0f} ms".format(what, len(seconds) / sum(seconds), 1e3 * max(seconds), 1e3 * used, 1e3 * still))
+        check(sum(seconds) / len(seconds) < max(0.2, still / 2), "frames are quick while the camera moves")
+    sphere = simple.Show(simple.Sphere(Radius=0.2, Center=CENTER), view)
+    seconds = interactive_seconds(view, 30, 3)
+    print("with an object: {:.1f} frames/s".format(len(seconds) / sum(seconds)))
+    sphere.Visibility = 0
+    simple.Delete(view)
+
+
+def memory():
+    files = [make("orbit_{}.vdi".format(step), "--size", "24x24x24", "--resolution", size)
+             for step, size in enumerate(("200x150", "150x200", "180x180"))]
+    reader = simple.OpenDataFile(files)
+    view = shown(reader)
+    view.ViewSize = [200, 150]
+
+    def orbits(count):
+        interactive_seconds(view, count, 7)
+
+    def steps(count):
+        for step in range(count):
+            view.ViewTime = reader.TimestepValues[step % 3]
+            simple.Render(view)
+
+    for work, count, what in ((orbits, 300, "frames of an orbit"), (steps, 60, "time steps")):
+        work(count // 3)
+        before = megabytes()
+        work(count)
+        grown = megabytes() - before
+        print("{} {}: {:+.1f} MB".format(count, what, grown))
+        check(grown < 15, "{} leave nothing behind".format(what))
+
+
+fluid()
+memory()
+pvtest.finish()

@@ -1,0 +1,118 @@
+"""The representation VDI: against the representation Volume at the viewpoint of generation, alone and with an opaque object in
+it; against `vdi render` of other cameras; what Show alone shows."""
+
+import os
+import subprocess
+
+import numpy as np
+import pvtest
+from paraview import simple
+from pvtest import check
+
+SIZE, CAMERA, CENTER = [320, 240], [80, 56, 92], [0, 0, 0]
+VDI = os.path.join(pvtest.OUTPUT, "representation.vdi")
+
+
+def screenshot(view, name, camera=None):
+    path = os.path.join(pvtest.OUTPUT, "representation_{}.png".format(name))
+    simple.Render(view)  # the first picture of a view moves its camera
+    if camera is not None:
+        view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = camera, CENTER, [0, 1, 0]
+    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
+    return pvtest.read_png(path)
+
+
+def rendered(view, name):
+    """What the tool makes of the VDI for the view's camera."""
+    path = os.path.join(pvtest.OUTPUT, "representation_{}_expected.png".format(name))
+    command = [os.environ["VDI_TOOL"], "render", VDI, "-o", path, "--resolution", "{}x{}".format(*SIZE)]
+    for option, values in (("position", view.CameraPosition), ("focal-point", view.CameraFocalPoint),
+                           ("view-up", view.CameraViewUp)):
+        command += ["--" + option] + [repr(value) for value in values]
+    command += (["--parallel-scale", repr(view.CameraParallelScale)] if view.CameraParallelProjection
+                else ["--view-angle", repr(view.CameraViewAngle)])
+    subprocess.run(command, check=True)
+    return pvtest.read_png(path)
+
+
+def compare(seen, expected, least, what):
+    likeness = pvtest.ssim(seen, expected)
+    print("{}: SSIM {:.4f}".format(what, likeness))
+    check(expected.std() > 20 and likeness >= least, what)
+
+
+def volume_beside_vdi():
+    wavelet = simple.Wavelet(WholeExtent=[-31, 32] * 3)
+    wavelet.UpdatePipeline()
+    pvtest.set_colors("RTData", 37, 277)
+    view = pvtest.make_view(SIZE, CAMERA, CENTER)
+    sphere = simple.Sphere(Radius=14, Center=[10, 0, 14], ThetaResolution=64, PhiResolution=64)
+    plane = simple.Plane(Origin=[-30, -30, -5], Point1=[30, -30, 5], Point2=[-30, 30, 5])
+    volume = simple.Show(wavelet, view)
+    volume.SetRepresentationType("Volume")
+    simple.ColorBy(volume, ("POINTS", "RTData"))
+    volume.ScalarOpacityUnitDistance, volume.Shade = 3, 0
+    simple.HideScalarBarIfNotNeeded(simple.GetColorTransferFunction("RTData"), view)
+    image = pvtest.vdi_filter(wavelet, view, "POINTS", "RTData", 3)
+    pictures = {}
+    for shown in ("volume", "vdi"):
+        if shown == "vdi":
+            simple.Hide(wavelet, view)
+            display = simple.Show(image, view)
+            check(display.Representation == "VDI", "Show alone shows the filter's output as a VDI")
+            check(not display.ColorArrayName[1], "and not coloured by an array")
+        pictures[shown, "alone"] = screenshot(view, shown + "_alone", CAMERA)
+        for thing, what in ((sphere, "sphere"), (plane, "plane")):
+            simple.Show(thing, view)
+            pictures[shown, what] = screenshot(view, "{}_{}".format(shown, what), CAMERA)
+            simple.Hide(thing, view)
+    compare(pictures["vdi", "alone"], pictures["volume", "alone"], 0.99, "a VDI from its viewpoint, as Volume")
+    for what in ("sphere", "plane"):
+        compare(pictures["vdi", what], pictures["volume", what], 0.99, "with a {} in it, as Volume".format(what))
+        check(pvtest.ssim(pictures["vdi", what], pictures["vdi", "alone"]) < 0.97, "and that is seen")
+    simple.SaveData(VDI, proxy=image)
+    simple.Delete(view)
+
+
+def elsewhere():
+    reader = simple.OpenDataFile(VDI)
+    view = pvtest.make_view(SIZE, CAMERA, CENTER)
+    display = simple.Show(reader, view)
+    check(display.Representation == "VDI", "Show alone shows an opened file as a VDI")
+    bounds = reader.GetDataInformation().GetBounds()
+    check(np.allclose(bounds, (-31, 32) * 3), "an opened file has its scene's bounds")
+    simple.Render(view)
+    for camera in ([80, 56, 92], [-60, 30, 110], [0, -130, 20]):
+        seen = screenshot(view, "from", camera)
+        compare(seen, rendered(view, "from"), 0.995, "from {}, as the tool renders it".format(camera))
+    view.CameraParallelProjection, view.CameraParallelScale = 1, 40
+    compare(screenshot(view, "parallel", [-60, 30, 110]), rendered(view, "parallel"), 0.995, "in parallel projection")
+    view.CameraParallelProjection = 0
+    # A larger picture than the window is made of tiles, each with a part of the image plane.
+    path = os.path.join(pvtest.OUTPUT, "representation_large.png")
+    simple.SaveScreenshot(path, view, ImageResolution=[2 * SIZE[0], 2 * SIZE[1]])
+    large = pvtest.read_png(path).astype(float)
+    small = large.reshape(SIZE[1], 2, SIZE[0], 2, 3).mean(axis=(1, 3)).astype(np.uint8)
+    compare(small, screenshot(view, "small"), 0.98, "a picture larger than the window")
+    # A translucent object is drawn by peeling. Beside the VDI, it changes nothing of it.
+    sphere = simple.Sphere(Radius=6, Center=[0, -120, 0], PhiResolution=32, ThetaResolution=32)
+    translucent = simple.Show(sphere, view)
+    translucent.Opacity, translucent.DiffuseColor = 0.5, [0, 0, 1]
+    view.CameraParallelScale = 130
+    view.CameraParallelProjection = 1
+    beside = screenshot(view, "translucent")
+    simple.Hide(sphere, view)
+    without = screenshot(view, "without_translucent")
+    different = np.abs(beside.astype(int) - without).max(axis=2) > 2
+    share = different.mean()
+    print("a translucent sphere beside a VDI: {:.2%} of the pixels differ".format(share))
+    check(0 < share < 0.01 and without.std() > 5, "a translucent object beside a VDI changes nothing of it")
+    view.CameraParallelProjection = 0
+    view.Background = [0.2, 0.5, 0.3]
+    check(np.allclose(screenshot(view, "background")[2, 2], [51, 128, 77], atol=1), "the background is the view's")
+    simple.Delete(view)
+
+
+volume_beside_vdi()
+elsewhere()
+pvtest.finish()

@@ -1,0 +1,76 @@
+"""The representation VDI where there is nothing to show: a series whose steps differ and of which one is damaged and one
+missing, an empty VDI, data that are no VDI. What is wrong is said in the view, and the next good frame is shown."""
+
+import os
+import shutil
+import subprocess
+
+import pvtest
+from paraview import simple
+from pvtest import check
+
+SIZE = [480, 360]
+FOLDER = os.path.join(pvtest.OUTPUT, "faults")
+shutil.rmtree(FOLDER, ignore_errors=True)
+os.makedirs(FOLDER)
+
+
+def make(name, *options):
+    path = os.path.join(FOLDER, name)
+    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "24x24x24",
+                    "-o", path] + list(options), check=True, stdout=subprocess.DEVNULL)
+    return path
+
+
+def look(view, name):
+    path = os.path.join(pvtest.OUTPUT, "faults_{}.png".format(name))
+    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
+    return pvtest.read_png(path)
+
+
+steps = [make("step_0.vdi", "--resolution", "200x150"), make("step_1.vdi", "--resolution", "120x160", "--azimuth", "80"),
+         make("step_2.vdi", "--resolution", "200x150"), make("step_3.vdi", "--resolution", "200x150", "--parallel"),
+         make("step_4.vdi", "--resolution", "160x160")]
+with open(steps[2], "r+b") as file:
+    file.seek(os.path.getsize(steps[2]) // 2)
+    byte = file.read(1)
+    file.seek(-1, os.SEEK_CUR)
+    file.write(bytes([byte[0] ^ 0xff]))
+reader = simple.OpenDataFile(steps)
+view = pvtest.make_view(SIZE, [2.2, 1.9, 2.4], [0.5, 0.5, 0.5])
+simple.Show(reader, view)
+simple.Render(view)
+scene = simple.GetAnimationScene()
+scene.UpdateAnimationUsingDataTimeSteps()
+os.remove(steps[3])
+for step, good in enumerate([True, True, False, False, True]):
+    scene.AnimationTime = reader.TimestepValues[step]
+    picture = look(view, "step_{}".format(step))
+    check(picture[60:300].std() > 5, "step {} shows something".format(step))
+    check((pvtest.message_in(view) == "") == good, "step {} shows {}".format(step, "no message" if good else "a message"))
+
+simple.Hide(reader, view)
+check(not pvtest.message_in(view), "what is hidden says nothing")
+empty = simple.OpenDataFile(make("empty.vdi", "--resolution", "64x64", "--position", "9", "9", "9", "--focal-point", "10", "10",
+                                 "10", "--view-up", "0", "1", "0"))
+simple.Show(empty, view)
+look(view, "empty")
+check("is empty" in pvtest.message_in(view), "an empty VDI gets a message")
+simple.Hide(empty, view)
+wavelet = simple.Wavelet()
+simple.Show(wavelet, view).SetRepresentationType("VDI")
+look(view, "no_vdi")
+check("no VDI in this data set" in pvtest.message_in(view), "what is no VDI gets a message")
+simple.Hide(wavelet, view)
+check(not pvtest.message_in(view), "what is hidden says nothing")
+
+# Views that come and go, with more than one of them on a VDI.
+scene.AnimationTime = reader.TimestepValues[0]
+for _ in range(3):
+    other = pvtest.make_view(SIZE, [2.2, 1.9, 2.4], [0.5, 0.5, 0.5])
+    simple.Show(reader, other)
+    check(look(other, "other").std() > 5, "a view that comes later shows the VDI")
+    simple.Delete(other)
+simple.Show(reader, view)
+check(look(view, "again").std() > 5, "and the first one still does")
+pvtest.finish()
