@@ -434,7 +434,7 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
         const Image open = reference::render(*vdi, view, reconstruction);
         const Image expected = reference::render(*vdi, view, reconstruction, ends);
         std::size_t hidden = 0;
-        std::size_t half = 0;
+        std::size_t dimmed = 0;
         for (std::size_t i = 0; i < ends.size(); ++i) {
           const bool isOpen = ends[i] == Image::noDepth;
           if (isOpen) CHECK(expected.rgba[i] == open.rgba[i]);
@@ -442,9 +442,9 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
           // Smoothly, a column that ends early blends its lists otherwise.
           if (reconstruction == Reconstruction::Constant) CHECK(expected.rgba[i].a <= open.rgba[i].a + 1e-5F);
           hidden += open.rgba[i].a > 0.1F && expected.rgba[i].a == 0.0F ? 1 : 0;
-          half += expected.rgba[i].a > 0.0F && expected.rgba[i].a < 0.9F * open.rgba[i].a ? 1 : 0;
+          dimmed += expected.rgba[i].a > 0.0F && expected.rgba[i].a < 0.9F * open.rgba[i].a ? 1 : 0;
         }
-        CHECK(hidden + half > 50);
+        CHECK(hidden + dimmed > 50);
         for (VdiRenderer* each : {&renderer, &rendererAsGpu}) {
           CHECK(largestDifference(each->render(view, ends, reconstruction), expected) < 2.0F);
           // No trace of it stays.
