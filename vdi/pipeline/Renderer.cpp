@@ -18,7 +18,6 @@
 namespace vdi {
 
 using gpu::MemoryKind;
-namespace shared = gpu::shared;
 
 struct VdiRenderer::State {
   explicit State(std::shared_ptr<gpu::Device> theDevice)

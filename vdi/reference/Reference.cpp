@@ -298,7 +298,8 @@ std::vector<SupersegmentLists> generateTogether(const Frame& frame,
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const auto at = [&](int column, int row) {
-          return agreed[r][static_cast<std::size_t>(row / stride * countedWidth + column / stride)];
+          const int counted = row / stride * countedWidth + column / stride;
+          return agreed[r][static_cast<std::size_t>(counted)];
         };
         const int left = countedBefore(x);
         const int right = countedBehind(x, width);
