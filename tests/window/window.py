@@ -13,6 +13,7 @@ xdotool, openbox, Xvfb, ImageMagick, dbus, at-spi2-core and python3-gi; run it b
 import os
 import shutil
 import subprocess
+import sys
 import threading
 import time
 
@@ -164,7 +165,7 @@ class Window:
             except AssertionError:  # Qt 5.15 is often on the bus and has nothing to say there, until its end
                 self.__exit__()
         print("skipped: Qt doesn't answer on the accessibility bus here, in 40 starts of ParaView", flush=True)
-        os._exit(SKIPPED)
+        sys.exit(SKIPPED)
 
     def __exit__(self, *error):
         if self.process.poll() is None:
