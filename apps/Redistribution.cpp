@@ -87,16 +87,16 @@ void copyValues(const IndexBox& part, const IndexBox& source, const std::byte* f
 }
 
 /// What messages are made of: more than 2^31 of them never go to one rank, whatever their size.
-constexpr std::size_t preSegment = 64;
+constexpr std::size_t granule = 64;
 
 std::size_t padded(std::size_t bytes) {
-  return (bytes + preSegment - 1) / preSegment * preSegment;
+  return (bytes + granule - 1) / granule * granule;
 }
 
 }  // namespace
 
 Redistributed redistribute(const comm::Communicator& comm, const std::vector<Block>& blocks) {
-  static_assert(sizeof(IndexBox) <= preSegment);
+  static_assert(sizeof(IndexBox) <= granule);
   const Lattice lattice = commonLattice(comm, blocks);
   const std::size_t bytes = sizeOf(lattice.type);
   const bool cells = lattice.joint == Joint::Cells;
@@ -120,12 +120,12 @@ Redistributed redistribute(const comm::Communicator& comm, const std::vector<Blo
         const IndexBox part = place.intersection(valuesOf(rank));
         if (rank == comm.rank() || part.empty()) continue;
         const std::size_t at = message.size();
-        message.resize(at + preSegment + padded(part.count() * bytes));
+        message.resize(at + granule + padded(part.count() * bytes));
         std::memcpy(message.data() + at, &part, sizeof(part));
         copyValues(part, place, static_cast<const std::byte*>(block.data), part,
-                   message.data() + at + preSegment, bytes);
+                   message.data() + at + granule, bytes);
       }
-      counts[static_cast<std::size_t>(rank)] = (message.size() - begin) / preSegment;
+      counts[static_cast<std::size_t>(rank)] = (message.size() - begin) / granule;
     }
     if (own.empty()) return;
     data = std::shared_ptr<std::byte[]>(new std::byte[own.count() * bytes]);
@@ -137,13 +137,13 @@ Redistributed redistribute(const comm::Communicator& comm, const std::vector<Blo
     }
   });
   result.bytesSent = message.size();
-  const comm::Gathered received = comm.allToAll(message, counts, preSegment);
+  const comm::Gathered received = comm.allToAll(message, counts, granule);
   if (own.empty()) return result;
   for (std::size_t at = 0; at < received.bytes.size();) {
     IndexBox part;
     std::memcpy(&part, received.bytes.data() + at, sizeof(part));
-    copyValues(part, part, received.bytes.data() + at + preSegment, own, data.get(), bytes);
-    at += preSegment + padded(part.count() * bytes);
+    copyValues(part, part, received.bytes.data() + at + granule, own, data.get(), bytes);
+    at += granule + padded(part.count() * bytes);
   }
   result.blocks.push_back(blockOf(lattice, {own.lo, own.size(), comm.rank()}, data));
   return result;

@@ -338,15 +338,12 @@ void Communicator::together(const std::function<void()>& work) const {
 }
 
 void Communicator::requireEqual(std::uint64_t fingerprint, const std::string& what) const {
-  // The largest of x and of ~x are x and ~x on every rank only if all have the same x.
-  std::array<std::uint64_t, 2> extremes{fingerprint, ~fingerprint};
-  allReduceMax(extremes);
-  if (extremes[0] != ~extremes[1]) {
-    throw Error(ErrorCode::InvalidArgument, fmt::format("the ranks were given different values: {}", what));
-  }
+  const Fingerprint print{fingerprint, what.c_str()};
+  requireEqual(std::span(&print, 1));
 }
 
 void Communicator::requireEqual(std::span<const Fingerprint> fingerprints) const {
+  // The largest of x and of ~x are x and ~x on every rank only if all have the same x.
   std::vector<std::uint64_t> extremes;
   for (const Fingerprint& print : fingerprints) extremes.insert(extremes.end(), {print.value, ~print.value});
   allReduceMax(extremes);

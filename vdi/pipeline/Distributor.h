@@ -60,7 +60,6 @@ class Distributor {
   double milliseconds() const { return milliseconds_; }   // device time of the last one
 
  private:
-  struct Piece;
   void pack(const DeviceLists& lists, const comm::Ownership& owned);
   void recordPack(const DeviceLists& lists, bool wide);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -39,7 +40,6 @@ class Gather {
   struct Array;
   std::vector<Array> shareArrays(HostPool& pool, std::span<void* const> arrays);
   HostAccess& openedAccess(const std::string& name, std::uint64_t bytes);
-  void sendPieces(std::span<const Piece> pieces, std::span<const std::uint64_t> offsets);
 
   std::shared_ptr<gpu::Device> device_;
   const comm::Communicator& comm_;
