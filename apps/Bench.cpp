@@ -12,6 +12,7 @@
 #include "apps/BenchRanks.h"
 #include "apps/BenchRun.h"
 #include "apps/BenchSuites.h"
+#include "apps/BenchViewpoints.h"
 #include "apps/Commands.h"
 #include "apps/Fields.h"
 #include "apps/Help.h"
@@ -43,6 +44,7 @@ void requireSound(const BenchOptions& options, int ranks) {
                 "--rival");
   }
   if (options.suite == ranksSuite) requireSoundRanks(options, ranks);
+  if (options.suite == viewpointsSuite) requireSoundViewpoints(options);
   for (const DataSet& set : dataSets(options)) {
     if (set.field.empty()) {
       (void)readSidecar(set.raw);
@@ -88,6 +90,8 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
   std::vector<json> rows;
   if (options.suite == ranksSuite) {
     rows = runRanks(options, world, device, table);
+  } else if (options.suite == viewpointsSuite) {
+    rows = runViewpoints(options, world, device, table);
   } else {
     for (const BenchRow& row : runBench(options, world, device, table)) rows.push_back(toJson(row));
   }
@@ -117,6 +121,11 @@ PSNR compare that view with the truth: DVR at --truth-rate samples per voxel. DV
 VDI's own --sampling-rate with it.
 Below each VDI's views are its stages on several ranks, wall and device time of the slowest rank and the mean,
 and the whole frame.
+The table of suite viewpoints has least, median and mean SSIM over random viewpoints at the VDI's distance all
+around the focal point ('sphere'), and over four turned from it to each side ('turned'). 'missing' is the share
+of the picture, at worst and on average, where volume rendering shows something and the VDI nothing. A set is
+of several VDIs: 'nearest' shows the one whose viewpoint is nearest by angle, 'blend' the two nearest. MiB and
+ms are those of the whole set.
 The table of suite ranks has the wall clock of the slowest rank for each stage, and whole frames; 'faster' and
 'more' compare the frame and VDIs/s with one rank's of the same layout, DVR is volume_rendering_ms.
 JSON has, beside what the table has:
@@ -191,9 +200,8 @@ void addBench(CLI::App& app, Job& job) {
   command->add_option("--repeats", options->repeats, "runs of which the median counts, after one warm-up")
       ->capture_default_str();
   command
-      ->add_option(
-          "--frames", options->frames,
-          "VDIs made one behind the other on an orbit of 20 viewpoints, for vdis_per_second; 0: none")
+      ->add_option("--frames", options->frames,
+                   "VDIs made on an orbit of 20 viewpoints, for vdis_per_second; 0: none")
       ->check(CLI::Range(0, 1000000))
       ->capture_default_str();
   command
@@ -204,8 +212,9 @@ void addBench(CLI::App& app, Job& job) {
       ->add_option(
           "--suite", options->suite,
           "data sets, sizes, viewpoints and N_S of docs/benchmarks.md: paper (needs a GPU and 32 GiB), "
-          "small (a minute on a CPU); --fields picks some of it; or ranks: whole frames on fewer and more of "
-          "mpirun's ranks, of the volume and picture that the options say")
+          "small (a minute on a CPU); --fields picks some of it; ranks: whole frames on fewer and more of "
+          "mpirun's ranks, of the volume and picture that the options say; or viewpoints: how true VDIs "
+          "of these are from all around")
       ->check(CLI::IsMember(suiteNames()));
   command
       ->add_option(
@@ -239,6 +248,35 @@ void addBench(CLI::App& app, Job& job) {
           "so that 8 ranks have the fixed volume")
       ->type_name("XxYxZ")
       ->group(ranksGroup);
+  const char* const viewpointsGroup = "Suite viewpoints";
+  command->add_option("--viewpoints", options->viewpoints, "random viewpoints; --seed says which")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str()
+      ->group(viewpointsGroup);
+  command->add_option("--turn", options->turn, "degrees that the other four viewpoints are turned by")
+      ->capture_default_str()
+      ->group(viewpointsGroup);
+  command
+      ->add_option(
+          "--zooms", options->zooms,
+          "by how much nearer than the view's camera all viewpoints are; 4: a quarter of the width is "
+          "seen")
+      ->capture_default_str()
+      ->group(viewpointsGroup);
+  command->add_option("--margins", options->margins, "one or several, instead of --margin")
+      ->capture_default_str()
+      ->group(viewpointsGroup);
+  command
+      ->add_option(
+          "--list-resolutions", options->listResolutions,
+          "of the VDIs' pictures, one or several; the views are of --resolution, as VDIs are by default")
+      ->type_name("WxH")
+      ->group(viewpointsGroup);
+  command
+      ->add_option("--sets", options->sets,
+                   "VDIs in a set: 1, 2 (front and back), 4 (a tetrahedron) or 6 (front, back and sides)")
+      ->capture_default_str()
+      ->group(viewpointsGroup);
   command
       ->add_option(
           "--compare", options->comparison,

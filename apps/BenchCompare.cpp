@@ -28,9 +28,10 @@ json readBench(const std::filesystem::path& path) {
 std::string keyOf(const json& row) {
   std::string key;
   for (const char* field : {"dataset", "algorithm", "supersegments", "width", "height", "view_deg",
-                            "angle_deg", "scaling", "layout", "size"}) {
+                            "angle_deg", "scaling", "layout", "size", "zoom", "views", "set", "serves"}) {
     if (row.contains(field)) key.append(key.empty() ? 0 : 1, ' ').append(row[field].dump());
   }
+  if (row.contains("margin") && row["margin"] != 0.0) key += " margin " + row["margin"].dump();
   // One suite has rows of several rank counts. Otherwise files of different counts may be compared.
   if (row.contains("scaling") && row.contains("ranks")) key += " on " + row["ranks"].dump();
   return key;

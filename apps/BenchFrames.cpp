@@ -85,13 +85,23 @@ FrameFigures FrameLog::figures(std::size_t repeats) const {
 double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int frames) {
   assert(frames >= 1);
   constexpr int orbit = 20;
-  const auto make = [&](int frame) {
-    generator.generate(input.camera.azimuth(360.0 * frame / orbit), input.function, input.settings);
+  const auto start = [&](int frame) {
+    return generator.start(input.camera.azimuth(360.0 * frame / orbit), input.function, input.settings);
   };
   clock.run();
-  make(orbit - 1);
+  {  // two, for as many have memory at a time
+    VdiFrame first = start(orbit - 2);
+    generator.finish(start(orbit - 1));
+    generator.finish(std::move(first));
+  }
   const double milliseconds = readyMs(generator.communicator(), [&] {
-    for (int frame = 0; frame < frames; ++frame) make(frame);
+    VdiFrame last = start(0);
+    for (int frame = 1; frame < frames; ++frame) {
+      VdiFrame next = start(frame);
+      generator.finish(std::move(last));
+      last = std::move(next);
+    }
+    generator.finish(std::move(last));
   });
   return 1e3 * frames / milliseconds;
 }
@@ -152,6 +162,7 @@ void addSettings(json& row, const GenerateSettings& settings) {
   row["fill"] = settings.fill;
   row["width"] = settings.width;
   row["height"] = settings.height;
+  row["margin"] = settings.margin;
   row["sampling_rate"] = settings.samplesPerVoxel;
 }
 

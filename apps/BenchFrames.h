@@ -81,9 +81,9 @@ struct FrameInput {
   GenerateSettings settings;
 };
 
-/// VDIs per second on the root's host, one behind the other: `frames` >= 1 of them after one that doesn't
-/// count, on an orbit of 20 viewpoints around the focal point that begins at the input's camera. Collective;
-/// other ranks' figures mean nothing.
+/// VDIs per second on the root's host, each started before the last one is finished: `frames` >= 1 of them
+/// after two that don't count, on an orbit of 20 viewpoints around the focal point that begins at the
+/// input's camera. Collective; other ranks' figures mean nothing.
 double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int frames);
 
 /// Repeated frames and pictures, after one of each that doesn't count, and vdisPerSecond if `orbitFrames`

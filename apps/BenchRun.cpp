@@ -76,15 +76,7 @@ class Bench {
   bool root() const { return world_.rank() == 0; }
 
   void measure(const DataSet& set) {
-    std::vector<Block> blocks;
-    world_.together([&] {
-      DecompositionOptions decomposition = options_.decomposition;
-      if (!set.size.empty()) decomposition.size = set.size;
-      if (!set.type.empty()) decomposition.type = set.type;
-      blocks = set.field.empty()
-                   ? rawBlocks(set.raw, decomposition, world_.rank(), world_.size())
-                   : fieldBlocks(set.field, decomposition, device_, world_.rank(), world_.size());
-    });
+    std::vector<Block> blocks = blocksOf(set, options_, device_, world_);
     upload_ = measureUpload(blocks);
     generator_.setBlocks(blocks);
     if (rival_) rival_->setBlocks(blocks, generator_.scene(), options_.repeats);

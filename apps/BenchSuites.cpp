@@ -23,7 +23,7 @@ std::vector<DataSet> suiteSets(const std::string& suite) {
 }  // namespace
 
 const std::vector<std::string>& suiteNames() {
-  static const std::vector<std::string> names{"paper", "small", ranksSuite};
+  static const std::vector<std::string> names{"paper", "small", ranksSuite, viewpointsSuite};
   return names;
 }
 
@@ -48,7 +48,9 @@ void applySuite(BenchOptions& options) {
 }
 
 std::vector<DataSet> dataSets(const BenchOptions& options) {
-  if (!options.suite.empty() && options.suite != ranksSuite) {
+  const bool hasSets =
+      !options.suite.empty() && options.suite != ranksSuite && options.suite != viewpointsSuite;
+  if (hasSets) {
     std::vector<DataSet> sets = suiteSets(options.suite);
     if (!options.fields.empty()) {
       std::erase_if(sets, [&](const DataSet& set) {
@@ -62,8 +64,9 @@ std::vector<DataSet> dataSets(const BenchOptions& options) {
     sets.push_back({std::filesystem::path(sidecar).stem().string(), "", sidecar, "", ""});
   std::vector<std::string> fields = options.fields;
   if (fields.empty() && options.raws.empty()) {
-    fields = options.suite == ranksSuite ? std::vector<std::string>{"interface"}
-                                         : std::vector<std::string>{"turbulence", "mixing", "coil"};
+    fields = options.suite == ranksSuite        ? std::vector<std::string>{"interface"}
+             : options.suite == viewpointsSuite ? std::vector<std::string>{"mixing", "interface", "coil"}
+                                                : std::vector<std::string>{"turbulence", "mixing", "coil"};
   }
   for (const std::string& field : fields)
     sets.push_back({field, field, "", options.decomposition.size, options.decomposition.type});
@@ -80,6 +83,19 @@ GenerateSettings benchSettings(const BenchOptions& options, const std::string& a
   }
   settings.supersegments = supersegments;
   return settings;
+}
+
+std::vector<Block> blocksOf(const DataSet& set, const BenchOptions& options,
+                            const std::shared_ptr<gpu::Device>& device, const comm::Communicator& world) {
+  std::vector<Block> blocks;
+  world.together([&] {
+    DecompositionOptions decomposition = options.decomposition;
+    if (!set.size.empty()) decomposition.size = set.size;
+    if (!set.type.empty()) decomposition.type = set.type;
+    blocks = set.field.empty() ? rawBlocks(set.raw, decomposition, world.rank(), world.size())
+                               : fieldBlocks(set.field, decomposition, device, world.rank(), world.size());
+  });
+  return blocks;
 }
 
 }  // namespace vdi::apps

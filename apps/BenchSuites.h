@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "apps/Source.h"
+#include "vdi/comm/Communicator.h"
 
 namespace vdi::apps {
 
@@ -32,6 +34,13 @@ struct BenchOptions {
   std::vector<std::string> layouts{"slabs", "interleaved", "random"};
   std::vector<int> rankCounts;  // empty: 1, 2, 4 ... and all
   std::string sizePerRank;      // of weak scaling; empty: half of deal.size on each axis
+  // Of the suite `viewpoints`:
+  int viewpoints = 100;
+  double turn = 20.0;  // degrees
+  std::vector<double> zooms{1.0, 4.0};
+  std::vector<double> margins{0.0};
+  std::vector<int> sets{1};
+  std::vector<std::string> listResolutions;  // of VDIs' pictures; empty: the views'
 };
 
 struct DataSet {
@@ -46,6 +55,8 @@ const std::vector<std::string>& suiteNames();
 
 /// The suite of fewer and more ranks, which has no data sets of its own.
 inline constexpr const char* ranksSuite = "ranks";
+/// The suite of viewpoints around the scene, which has none either.
+inline constexpr const char* viewpointsSuite = "viewpoints";
 
 /// Fills in what the suite says, or what holds without one, where the options leave it open.
 void applySuite(BenchOptions& options);
@@ -56,5 +67,10 @@ std::vector<DataSet> dataSets(const BenchOptions& options);
 /// What VDIs are made with. Bisection gets the one budget that it knows.
 GenerateSettings benchSettings(const BenchOptions& options, const std::string& algorithm,
                                std::uint32_t supersegments);
+
+/// Collective: this rank's blocks of the data set. Size and type are the set's where it names them. All ranks
+/// throw if one does.
+std::vector<Block> blocksOf(const DataSet& set, const BenchOptions& options,
+                            const std::shared_ptr<gpu::Device>& device, const comm::Communicator& world);
 
 }  // namespace vdi::apps

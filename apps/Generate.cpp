@@ -46,12 +46,17 @@ struct Options {
 
 void printReport(const std::vector<RankReport>& reports) {
   fmt::print(
-      "rank  blocks  upload s  generate s  distribute s  composite s  gather s   sent MiB  device MiB\n");
+      "rank  blocks  upload s  generate s  distribute s  composite s  gather s  output s   sent MiB  "
+      "written MiB  device MiB  host MiB\n");
+  const auto mib = [](std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); };
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const RankReport& r = reports[i];
-    fmt::print("{:4}  {:6}  {:8.3f}  {:10.3f}  {:12.3f}  {:11.3f}  {:8.3f}  {:9.2f}  {:10.1f}\n", i, r.blocks,
-               r.uploadSeconds, r.generateSeconds, r.distributeSeconds, r.compositeSeconds, r.gatherSeconds,
-               static_cast<double>(r.bytesSent) / 1048576.0, static_cast<double>(r.deviceBytes) / 1048576.0);
+    fmt::print(
+        "{:4}  {:6}  {:8.3f}  {:10.3f}  {:12.3f}  {:11.3f}  {:8.3f}  {:8.3f}  {:9.2f}  {:11.2f}  {:10.1f}  "
+        "{:8.1f}\n",
+        i, r.blocks, r.uploadSeconds, r.generateSeconds, r.distributeSeconds, r.compositeSeconds,
+        r.gatherSeconds, r.outputSeconds, mib(r.bytesSent), mib(r.bytesWritten), mib(r.deviceBytes),
+        mib(r.hostPeakBytes));
   }
 }
 
@@ -62,24 +67,35 @@ struct Shot {
   GenerateSettings settings;
 };
 
-void writeVdiFiles(const Options& options, std::size_t index, Vdi& vdi, const VdiGenerator& generator) {
+void printOutcome(const GenerateSettings& settings, std::uint64_t supersegments,
+                  const VdiGenerator& generator) {
+  fmt::print("{} x {} lists, {} supersegments, on {}\n", settings.width, settings.height, supersegments,
+             generator.device().name());
+  printReport(generator.reports());
+}
+
+/// With a picture of it, which takes the whole VDI.
+void writeVdiFiles(const Options& options, std::size_t index, Vdi& vdi) {
   vdi.time = options.timeOf(index);
   vdi.timeStep = options.number(index);
   if (!options.output.empty()) io::writeVdi(options.numbered(options.output, index), vdi);
-  if (!options.flat.empty()) io::writePng(options.numbered(options.flat, index), io::toPicture(flatten(vdi)));
-  fmt::print("{} x {} lists, {} supersegments, on {}\n", vdi.width, vdi.height, vdi.supersegmentCount(),
-             generator.device().name());
-  printReport(generator.reports());
+  io::writePng(options.numbered(options.flat, index), io::toPicture(flatten(vdi)));
 }
 
 /// What the root writes, the others wait for: all ranks fail when it can't.
 void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGenerator& generator,
            const comm::Communicator& world) {
-  if (options.wantsVdi()) {
+  if (options.wantsVdi() && options.flat.empty() && !options.output.empty()) {
+    const WrittenVdi written =
+        generator.write(options.numbered(options.output, index), shot.camera, shot.function, shot.settings,
+                        {options.timeOf(index), options.number(index)});
+    if (world.rank() == 0) printOutcome(shot.settings, written.supersegments, generator);
+  } else if (options.wantsVdi()) {
     std::optional<Vdi> vdi = generator.generate(shot.camera, shot.function, shot.settings);
     world.together([&] {
       if (!vdi) return;
-      writeVdiFiles(options, index, *vdi, generator);
+      if (!options.flat.empty()) writeVdiFiles(options, index, *vdi);
+      printOutcome(shot.settings, vdi->supersegmentCount(), generator);
     });
   }
   if (options.volume.empty()) return;
@@ -240,7 +256,8 @@ void addGenerate(CLI::App& app, Job& job) {
     command->add_option(name, file, description)->check(requireFileName)->type_name("FILE")->group("Output");
   };
   addFile("-o,--output", options->output, "the .vdi file to write");
-  addFile("--flat", options->flat, "PNG of the VDI seen from its own viewpoint");
+  addFile("--flat", options->flat,
+          "PNG of the VDI seen from its own viewpoint; gathers the whole VDI on the first rank");
   addFile("--dvr", options->volume, "PNG of plain volume rendering from there");
   command->add_option("--time", options->time, "simulation time of the first step, kept in the file")
       ->capture_default_str()

@@ -57,6 +57,10 @@ void printInfo(const InfoOptions& options) {
     const Vdi& v = info.header;
     fmt::print("{}\n  version          {}\n  lists            {} x {}, at most {} supersegments each\n", file,
                info.version, v.width, v.height, v.budget);
+    if (v.margin != glm::ivec2(0)) {
+      fmt::print("  picture          {} x {}, and a margin of {} lists beside and {} above and below it\n",
+                 v.pictureSize().x, v.pictureSize().y, v.margin.x, v.margin.y);
+    }
     fmt::print("  supersegments    {} ({:.2f} a list), {} precision\n", info.supersegmentCount,
                static_cast<double>(info.supersegmentCount) / (static_cast<double>(v.width) * v.height),
                toString(v.precision()));

@@ -39,8 +39,9 @@ void render(const RenderOptions& options) {
     outputs.push_back({fmt::format("the picture of {} degrees", azimuth), pictureOf(options, azimuth)});
   requireOutputs(outputs, {{"the VDI", options.input}, {"--camera", options.camera.file}});
   const Vdi vdi = io::readVdi(options.input);
-  const std::vector<int> size = options.resolution.empty() ? std::vector<int>{vdi.width, vdi.height}
-                                                           : parseSizes(options.resolution, 2);
+  const glm::ivec2 picture = vdi.pictureSize();
+  const std::vector<int> size =
+      options.resolution.empty() ? std::vector<int>{picture.x, picture.y} : parseSizes(options.resolution, 2);
   const Reconstruction reconstruction = reconstructionFromString(options.reconstruction);
   VdiRenderer renderer(gpu::Device::create(gpu::requestFromEnvironment(0)));
   renderer.setVdi(vdi);
@@ -73,7 +74,8 @@ void addRender(CLI::App& app, Job& job) {
                    "PNG; with several azimuths their degrees are added to its name")
       ->type_name("FILE")
       ->required();
-  command->add_option("--resolution", options->resolution, "pixels; default: the VDI's")->type_name("WxH");
+  command->add_option("--resolution", options->resolution, "pixels; default: those of the VDI's picture")
+      ->type_name("WxH");
   addCameraOptions(*command, options->camera, "the one that the VDI was made for");
   command
       ->add_option("--azimuth", options->azimuths,

@@ -241,6 +241,13 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
       ->type_name("WxH")
       ->capture_default_str()
       ->group(qualityGroup);
+  command
+      .add_option(
+          "--margin", options.margin,
+          "share of the picture, 0 to 4, for which there are lists beyond each of its edges, as far as "
+          "there is something to see: what turning and moving brings into view when it's zoomed in")
+      ->capture_default_str()
+      ->group(qualityGroup);
   if (use == QualityUse::One) {
     command.add_option("--supersegments", options.supersegments, "the most in one list (N_S), 1 to 1024")
         ->capture_default_str()
@@ -314,6 +321,7 @@ GenerateSettings makeSettings(const QualityOptions& options) {
   const std::vector<int> sizes = parseSizes(options.resolution, 2);
   settings.width = sizes[0];
   settings.height = sizes[1];
+  settings.margin = options.margin;
   settings.supersegments = options.supersegments;
   settings.budget = budgetFromString(options.budget);
   settings.fill = options.fill;

@@ -63,6 +63,7 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene);
 
 struct QualityOptions {
   std::string resolution = "640x360";
+  double margin = GenerateSettings().margin;
   std::uint32_t supersegments = 25;
   std::string budget = "list";
   double fill = 1.0;

@@ -1,6 +1,6 @@
-# Writes OUTPUT, a file for ctest with a test for each case of the Catch2 program PROGRAM: "NAME: case", or, where there are
-# RANKS, "NAME_np3: case" for each number of them, started by LAUNCHER (mpiexec ... -n). Each gets TIMEOUT, LABELS and
-# ENVIRONMENT. Catch2's own catch_discover_tests knows neither several launchers nor lists as properties.
+# Writes OUTPUT, a file for ctest with a test for each case of the Catch2 program PROGRAM: "NAME: case". Where there are RANKS
+# it's a test for each number of them, "NAME_np3", of all cases: to start many processes with a device each takes longer than
+# most cases. They're started by LAUNCHER (mpiexec ... -n). Each test gets TIMEOUT, LABELS and ENVIRONMENT. Catch2's own catch_discover_tests knows neither several launchers nor lists as properties.
 execute_process(
   COMMAND ${CMAKE_COMMAND} -E env ASAN_OPTIONS=detect_leaks=0 "${PROGRAM}" --list-test-names-only
   OUTPUT_VARIABLE cases
@@ -21,17 +21,18 @@ set_tests_properties(${test} PROPERTIES TIMEOUT ${TIMEOUT} LABELS [==[${LABELS}]
       PARENT_SCOPE)
 endfunction()
 
+foreach(ranks IN LISTS RANKS)
+  list(JOIN LAUNCHER " " launcher)
+  add("[==[${NAME}_np${ranks}]==]" "${launcher} ${ranks} [==[${PROGRAM}]==] --warn NoTests")
+endforeach()
+if(RANKS)
+  set(cases "")
+endif()
 foreach(case IN LISTS cases)
   string(REPLACE "${semicolon}" ";" case "${case}")
   # What Catch2's command line would take for more than a name.
   string(REGEX REPLACE "([][,\\])" "\\\\\\1" pattern "${case}")
   set(command "[==[${PROGRAM}]==] [==[${pattern}]==] --warn NoTests") # or no match would pass
-  foreach(ranks IN LISTS RANKS)
-    list(JOIN LAUNCHER " " launcher)
-    add("[==[${NAME}_np${ranks}: ${case}]==]" "${launcher} ${ranks} ${command}")
-  endforeach()
-  if(NOT RANKS)
-    add("[==[${NAME}: ${case}]==]" "${command}")
-  endif()
+  add("[==[${NAME}: ${case}]==]" "${command}")
 endforeach()
 file(WRITE "${OUTPUT}" "${tests}")

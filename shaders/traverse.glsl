@@ -94,8 +94,9 @@ uint listsToIntersect(PictureLine line, int tile) {
       uint64_t firstMask = params.heads.at[here.lists.x].mask;
       uint64_t secondMask = params.heads.at[here.lists.y].mask;
       vec2 bins = vec2(at(line.bins, fraction), at(line.bins, nextFraction));
-      // Products, for && would branch: all masks are to be asked for before the first is waited for.
-      uint passes = uint(nextEdge != edge);
+      // Products, for && would branch: all masks are to be asked for before the first is waited for. Where the picture ends
+      // within a tile, rounding may let a line that leaves it reach a column that isn't there.
+      uint passes = uint(nextEdge != edge) * uint(column <= maximum);
       uint meetsFirst = passes * uint(here.share < 1.0) * uint(mayMeet(firstMask, bins));
       uint meetsSecond = passes * uint(here.share > 0.0) * uint(mayMeet(secondMask, bins));
       listBits |= (meetsFirst * firstListBit + meetsSecond * secondListBit) << (begin + i);

@@ -42,6 +42,14 @@ for joint in shared gap cells; do
   works "compare" "$vdi" compare --json one.png turned_20deg.png
   python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] < 0.99, r" || fail "$joint: nothing turned"
 done
+# Without a picture of it a VDI is never whole on one rank: the file is the same.
+works "written from where it is" "$vdi" generate --field turbulence "${small[@]}" --joint cells -o one_written.vdi
+works "written on 3 ranks" "${mpirun[@]}" 3 "$vdi" generate --field turbulence "${small[@]}" --joint cells \
+  --blocks 3x2x2 --layout random -o three_written.vdi
+cmp one.vdi one_written.vdi || fail "the written file isn't the gathered one"
+cmp three.vdi three_written.vdi || fail "on 3 ranks the written file isn't the gathered one"
+refused 1 "no-such-folder" "${mpirun[@]}" 2 "$vdi" generate --field sphere "${small[@]}" -o no-such-folder/x.vdi
+refused 1 "No space" "${mpirun[@]}" 2 "$vdi" generate --field sphere "${small[@]}" -o /dev/full
 works "info" "$vdi" info one.vdi
 grep -q "80 x 60" out.txt || fail "info doesn't tell the resolution"
 grep -q "compact precision" out.txt || fail "info doesn't tell the precision"
@@ -64,6 +72,32 @@ refused 2 "fill" "$vdi" generate --field sphere "${small[@]}" --fill 0.5 -o x.vd
 refused 2 "budget" "$vdi" generate --field sphere "${small[@]}" --budget each -o x.vdi
 refused 2 "precision" "$vdi" generate --field sphere "${small[@]}" --precision double -o x.vdi
 refused 2 "termination" "$vdi" generate --field sphere "${small[@]}" --termination-opacity 0 -o x.vdi
+# Lists beyond the picture's edges: the picture stays, and what turning brings into view is there.
+near=(--field turbulence "${small[@]}" --zoom 4)
+works "generate" "$vdi" generate "${near[@]}" -o cut.vdi --flat cut.png
+works "generate with a margin" "$vdi" generate "${near[@]}" --margin 1 -o kept.vdi --flat kept.png
+cmp cut.png kept.png || fail "a margin changes the picture"
+works "info" "$vdi" info kept.vdi
+grep -q "picture *80 x 60, and a margin of" out.txt || fail "info doesn't tell the margin"
+works "render" "$vdi" render kept.vdi -o kept_again.png
+works "compare" "$vdi" compare --json kept.png kept_again.png
+python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 2, r" || fail "not the picture's own view"
+refused 2 "margin" "$vdi" generate "${near[@]}" --margin 5 -o x.vdi
+
+works "bench all around" "$vdi" bench --suite viewpoints --fields turbulence "${small[@]}" --viewpoints 3 --zooms 4 \
+  --margins 0 1 --sets 1 2 --truth-rate 2 -o around.json
+python3 - <<'P' || fail "around.json isn't what it should be"
+import json
+rows = json.load(open("around.json"))["rows"]
+assert len(rows) == 12, len(rows)  # two margins, two kinds of viewpoints, three ways to serve them
+row = {(r["views"], r["margin"], r["set"], r["serves"]): r for r in rows}
+cut, kept = (row["turned 20", margin, 1, "nearest"] for margin in (0, 1))
+assert cut["missing_most"] > 0.01 > 0.002 > kept["missing_most"], (cut, kept)
+assert kept["ssim"] > cut["ssim"] and kept["stored_bytes"] > cut["stored_bytes"], (cut, kept)
+assert row["sphere", 1, 2, "nearest"]["stored_bytes"] > 1.5 * kept["stored_bytes"]
+P
+refused 2 "sets" "$vdi" bench --suite viewpoints --fields sphere "${small[@]}" --sets 3 -o x.json
+
 works "bench" "$vdi" bench --fields sphere "${small[@]}" --repeats 1 --angles 0 20 -o bench.json
 python3 - <<'P' || fail "bench.json isn't what it should be"
 import json

@@ -72,12 +72,3 @@ TEST_CASE("what's in one corner of a picture is shared by all") {
   }
   CHECK(maximum * ranks < total * 11 / 10);
 }
-
-TEST_CASE("a band's part of what ranks own") {
-  const Ownership whole = Ownership::equal(64, 4);
-  const Ownership band = whole.within(24, 56);
-  CHECK(band.of(0) == ListRange{0, 0});
-  CHECK(band.of(1) == ListRange{0, 8});
-  CHECK(band.of(2) == ListRange{8, 24});
-  CHECK(band.of(3) == ListRange{24, 32});
-}

@@ -13,6 +13,7 @@
 #include "vdi/core/Error.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Image.h"
+#include "vdi/core/Margin.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
@@ -94,13 +95,22 @@ TEST_CASE("the range of a block's finite values, wherever they stand") {
         ScalarRange());
 }
 
+namespace {
+
+Camera cameraAside(bool parallel) {
+  Camera camera;
+  camera.position = {3.0, -2.0, 5.0};
+  camera.focalPoint = {0.5, 0.2, -1.0};
+  camera.parallelProjection = parallel;
+  camera.parallelScale = 2.0;
+  return camera;
+}
+
+}  // namespace
+
 TEST_CASE("rays go through the points that they're named after") {
   for (const bool parallel : {false, true}) {
-    Camera camera;
-    camera.position = {3.0, -2.0, 5.0};
-    camera.focalPoint = {0.5, 0.2, -1.0};
-    camera.parallelProjection = parallel;
-    camera.parallelScale = 2.0;
+    const Camera camera = cameraAside(parallel);
     const View view(camera, 200, 100);
     const Ray middle = view.rayThrough(100.0, 50.0);
     CHECK(glm::length(middle.direction - view.forward()) < 1e-12);
@@ -111,6 +121,74 @@ TEST_CASE("rays go through the points that they're named after") {
     CHECK(seen.x == Approx(-view.halfWidth() * (parallel ? 1.0 : 4.0)));
     CHECK(seen.y == Approx(-view.halfHeight() * (parallel ? 1.0 : 4.0)));  // row 0 is the bottom
   }
+}
+
+TEST_CASE("a margin has pixels of the picture's size around it") {
+  for (const bool parallel : {false, true}) {
+    const Camera camera = cameraAside(parallel);
+    const View picture(camera, 200, 100);
+    const View all = View::withMargin(camera, 200, 100, {30, 7});
+    CHECK(all.width() == 260);
+    CHECK(all.height() == 114);
+    CHECK(all.halfHeight() / picture.halfHeight() == Approx(1.14));
+    CHECK(all.halfWidth() / picture.halfWidth() == Approx(1.3));
+    for (const glm::dvec2 at : {glm::dvec2(0.0), glm::dvec2(200.0, 0.0), glm::dvec2(12.5, 99.5)}) {
+      const Ray ray = picture.rayThrough(at.x, at.y);
+      const Ray same = all.rayThrough(at.x + 30.0, at.y + 7.0);
+      CHECK(glm::length(ray.origin - same.origin) < 1e-12);
+      CHECK(glm::length(ray.direction - same.direction) < 1e-12);
+    }
+  }
+}
+
+TEST_CASE("a margin is as large as asked for, but no larger than the scene") {
+  const Box bounds{glm::dvec3(0.0), glm::dvec3(1.0)};
+  const Scene scene{bounds, 0.02};
+  GenerateSettings settings;
+  settings.width = 160;
+  settings.height = 90;
+  for (const bool parallel : {false, true}) {
+    Camera camera = Camera::framing(bounds, {-0.5, -0.35, -1.0}, {0.0, 1.0, 0.0});
+    camera.parallelProjection = parallel;
+    settings.margin = 0.5;
+    CHECK(marginOf(scene, camera, settings) == glm::ivec2(0));  // all of it is in the picture
+    // Zoomed in, all that was asked for; then all that there is.
+    camera.viewAngle /= 4.0;
+    camera.parallelScale /= 4.0;
+    settings.margin = 0.25;
+    CHECK(marginOf(scene, camera, settings) == glm::ivec2(40, 23));
+    settings.margin = maxMargin;
+    const glm::ivec2 whole = marginOf(scene, camera, settings);
+    CHECK(whole.x < 640);
+    CHECK(whole.y < 360);
+    const View all = viewWithMargin(scene, camera, settings);
+    glm::dvec2 farthest{0.0};
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 p = all.toView({corner & 1, corner >> 1 & 1, corner >> 2});
+      farthest = glm::max(farthest, glm::abs(glm::dvec2(p)) / (parallel ? 1.0 : p.z));
+    }
+    const double pixel = 2.0 * all.halfHeight() / all.height();
+    CHECK(farthest.x <= all.halfWidth());
+    CHECK(farthest.y <= all.halfHeight());
+    CHECK(farthest.x > all.halfWidth() - 3.0 * pixel);
+    CHECK(farthest.y > all.halfHeight() - 3.0 * pixel);
+  }
+  // The scene reaches behind the eye: there's something to see everywhere.
+  Camera inside;
+  inside.position = glm::dvec3(0.5, 0.5, 0.2);
+  inside.focalPoint = glm::dvec3(0.5);
+  settings.margin = 0.5;
+  settings.samplesPerVoxel = 4.0;
+  CHECK(marginOf(scene, inside, settings) == glm::ivec2(80, 45));
+  // Rays so oblique that a sample per voxel couldn't be a slab are left out.
+  settings.samplesPerVoxel = 1.0;
+  settings.margin = maxMargin;
+  const glm::ivec2 margin = marginOf(scene, inside, settings);
+  CHECK(margin.x > 80);
+  CHECK(margin.x < 640);
+  const View all = viewWithMargin(scene, inside, settings);
+  CHECK(samplesAreSlabs(scene, all, depthLattice(scene, all, 1.0)));
+  CHECK(marginOf(Scene(), inside, settings) == glm::ivec2(0));
 }
 
 TEST_CASE("viewpoints from which a VDI shows nothing true are told from others") {
@@ -276,6 +354,11 @@ TEST_CASE("settings and names out of range are refused by name") {
   GenerateSettings settings;
   settings.supersegments = 1025;
   CHECK_THROWS_WITH(validate(settings), Catch::Contains("supersegments") && Catch::Contains("1025"));
+  settings.supersegments = 25;
+  for (const double margin : {-0.1, 4.5, std::numeric_limits<double>::quiet_NaN()}) {
+    settings.margin = margin;
+    CHECK_THROWS_WITH(validate(settings), Catch::Contains("margin"));
+  }
   CHECK_THROWS_WITH(algorithmFromString("magic"), Catch::Contains("bisection"));
   CHECK_THROWS_WITH(scalarTypeFromString("f16"), Catch::Contains("f32"));
 }
@@ -295,6 +378,9 @@ TEST_CASE("a VDI that isn't sound is refused") {
   };
   broken([](Vdi& v) { v.budget = 1; });
   broken([](Vdi& v) { v.width = 3; });
+  broken([](Vdi& v) { v.margin.x = 1; });
+  broken([](Vdi& v) { v.margin.y = -1; });
+  broken([](Vdi& v) { v.margin.y = std::numeric_limits<int>::max(); });
   broken([](Vdi& v) { std::get<SupersegmentLists>(v.lists).offsets.back() = 3; });
   broken([](Vdi& v) { std::get<SupersegmentLists>(v.lists).offsets = {0, 3, 2}; });
   broken([](Vdi& v) { std::get<SupersegmentLists>(v.lists).segments[1].front = 1.5F; });

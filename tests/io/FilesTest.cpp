@@ -5,9 +5,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <csignal>
+#include <optional>
 #include <thread>
 
 #include "tests/io/Samples.h"
@@ -21,26 +23,6 @@ namespace {
 std::vector<std::byte> bytesOf(std::size_t count, std::uint8_t value) {
   return std::vector<std::byte>(count, std::byte{value});
 }
-
-/// Files of this process can't grow beyond `bytes` while this lives.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit tight{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &tight);
-  }
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 }  // namespace
 
@@ -218,7 +200,7 @@ TEST_CASE("what can't be written is Error{Io}, leaves nothing behind and the old
   const fs::path path = folder.path() / "f";
   io::writeAtomically(path, bytesOf(1000, 1));
   {
-    const FileSizeLimit full(4096);
+    const test::FileSizeLimit full(4096);
     CHECK(test::errorOf([&] { io::writeAtomically(path, bytesOf(100000, 2)); }).code() == ErrorCode::Io);
   }
   CHECK(io::InputFile(path).readAll() == bytesOf(1000, 1));
@@ -246,5 +228,61 @@ TEST_CASE("readers beside several writers of one path always see a whole file") 
   } while (writing > 0);
   for (std::thread& writer : writers) writer.join();
   CHECK(torn == 0);
+  CHECK(folder.fileCount() == 1);
+}
+
+TEST_CASE("a file that several write gets its name, and any bytes, once all are finished") {
+  const test::TemporaryFolder folder;
+  const fs::path path = folder.path() / "f";
+  for (const bool old : {false, true}) {
+    INFO(old);
+    if (old) io::writeAtomically(path, bytesOf(5, 9));
+    io::OutputFile file(path);
+    REQUIRE(file.takesOffsets());
+    file.write(6, bytesOf(2, 3));
+    file.reserve(10);
+    const fs::path name = file.share();
+    CHECK(name.is_absolute());
+    {
+      std::optional<io::SharedOutput> other = io::SharedOutput::open(name, path);
+      REQUIRE(other);
+      other->write(8, bytesOf(2, 4));
+      other->finish();
+    }
+    file.write(0, bytesOf(6, 2));
+    CHECK(fs::exists(path) == old);
+    if (old) CHECK(io::InputFile(path).readAll() == bytesOf(5, 9));
+    file.commit();
+    std::vector<std::byte> expected = bytesOf(10, 2);
+    std::fill(expected.begin() + 6, expected.begin() + 8, std::byte{3});
+    std::fill(expected.begin() + 8, expected.end(), std::byte{4});
+    CHECK(io::InputFile(path).readAll() == expected);
+    CHECK(folder.fileCount() == 1);
+    fs::remove(path);
+  }
+}
+
+TEST_CASE("a file that isn't finished leaves nothing, and the old one as it was") {
+  const test::TemporaryFolder folder;
+  const fs::path path = folder.path() / "f";
+  io::writeAtomically(path, bytesOf(5, 9));
+  fs::path name;
+  {
+    io::OutputFile file(path);
+    file.write(0, bytesOf(100, 1));
+    name = file.share();
+    CHECK(folder.fileCount() == 2);
+  }
+  CHECK(folder.fileCount() == 1);
+  CHECK(io::InputFile(path).readAll() == bytesOf(5, 9));
+  CHECK_FALSE(io::SharedOutput::open(name, path));
+  CHECK_FALSE(io::SharedOutput::open(folder.path() / "none" / "f", path));
+  const Error folderError = test::errorOf([&] { (void)io::SharedOutput::open(folder.path(), path); });
+  CHECK(folderError.context() == path.string());
+  {
+    const test::FileSizeLimit full(4096);
+    io::OutputFile file(path);
+    CHECK(test::errorOf([&] { file.reserve(5000); }).code() == ErrorCode::Io);
+  }
   CHECK(folder.fileCount() == 1);
 }

@@ -102,6 +102,12 @@ TEST_CASE("a VDI comes back as it was, to the bit") {
     vdi.camera.parallelProjection = true;
     CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
   }
+  SECTION("with a margin") {
+    Vdi vdi = test::noisyVdi(9, 7, 4);
+    vdi.margin = GENERATE(glm::ivec2(4, 3), glm::ivec2(0, 1));
+    CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
+    CHECK(io::decodeInfo(io::encode(vdi)).header.pictureSize() == glm::ivec2(9, 7) - 2 * vdi.margin);
+  }
   SECTION("the ends of the floats") {
     using Limits = std::numeric_limits<float>;
     Vdi vdi = test::emptyVdi(2, 2, 3);
@@ -160,6 +166,20 @@ TEST_CASE("header and chunk table lie as docs/format.md says") {
   CHECK(offset == bytes.size());
 }
 
+TEST_CASE("a margin makes version 2, and only a margin does") {
+  Vdi vdi = test::noisyVdi(9, 7, 4);
+  CHECK(at<std::uint32_t>(io::encode(vdi), 8) == 1);
+  vdi.margin = {3, 2};
+  const std::vector<std::byte> bytes = io::encode(vdi);
+  CHECK(at<std::uint32_t>(bytes, 8) == 2);
+  CHECK(at<std::uint16_t>(bytes, 44) == 3);
+  CHECK(at<std::uint16_t>(bytes, 46) == 2);
+  CHECK(io::decodeInfo(bytes).version == 2);
+  CHECK_THAT(refusal(bytes, 44, std::uint16_t{5}), Contains("margin"));
+  CHECK_THAT(refusal(bytes, 46, std::uint16_t{4}), Contains("margin"));
+  CHECK_THAT(refusal(bytes, 8, 1U), Contains("flags"));
+}
+
 TEST_CASE("a file written by the first version 1 can be read") {
   const std::vector<std::byte> bytes = fromHex(
       "5644492d46494c4501000000f00000000000000000000000030000000200000003000000001000000100000000000000"
@@ -177,7 +197,7 @@ TEST_CASE("a file written by the first version 1 can be read") {
 
 TEST_CASE("later versions, encodings and flags are named in the refusal") {
   const std::vector<std::byte> sound = io::encode(test::noisyVdi(4, 4, 3));
-  CHECK_THAT(refusal(sound, 8, 2U), Contains("version 2"));
+  CHECK_THAT(refusal(sound, 8, 3U), Contains("version 3"));
   CHECK_THAT(refusal(sound, 12, 256U), Contains("header"));
   CHECK_THAT(refusal(sound, 16, 7U), Contains("encoding 7"));
   CHECK_THAT(refusal(sound, 20, 2U), Contains("flags"));
@@ -263,6 +283,7 @@ TEST_CASE("what decode would refuse isn't written") {
     CHECK(error.context() == path.string());
   };
   refused([](Vdi& vdi) { vdi.width = 7; });
+  refused([](Vdi& vdi) { vdi.margin.x = 4; });
   refused([](Vdi& vdi) { test::full(vdi).offsets.back() += 1; });
   refused([](Vdi& vdi) { vdi.budget = 1; });
   refused([](Vdi& vdi) { test::full(vdi).segments[3].opacity = 0.0F; });

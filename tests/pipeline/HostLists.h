@@ -53,13 +53,16 @@ template <typename Segment>
 ListsOf<Segment> download(const std::shared_ptr<gpu::Device>& device, const detail::DeviceLists& onDevice) {
   const auto pool = std::make_shared<detail::HostPool>(device, detail::HostPool::Visible::ToProcess);
   auto lists = detail::listsIn<Segment>(pool);
-  detail::ListDownload<Segment> download(lists, *pool);
-  gpu::Commands commands(device);
-  gpu::ScanPass scan(device);
-  commands.begin();
-  download.record(commands, scan, onDevice);
-  commands.submitAndWait();
-  download.finish();
+  detail::DownloadMemory memory(device);
+  {
+    detail::ListDownload<Segment> download(lists, *pool, memory, onDevice.listCount, onDevice.count);
+    gpu::Commands commands(device);
+    commands.begin();
+    download.recordOffsets(commands, onDevice, 0);
+    commands.submitAndWait();
+    download.send(onDevice);
+    download.finish();
+  }
   ListsOf<Segment> copy = lists;  // on the heap
   lists = {};
   pool->detach();
@@ -76,6 +79,7 @@ ListsOf<Segment> composite(const std::shared_ptr<gpu::Device>& device, detail::C
   compositor.interleave(parts.parts(), request.code, merged);
   detail::DeviceLists lists;
   compositor.composite(merged, request, lists);
+  compositor.finish();
   return download<Segment>(device, lists);
 }
 

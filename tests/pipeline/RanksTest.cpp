@@ -35,6 +35,17 @@ bool anythingSeen(const Image& image) {
   return seen > image.rgba.size() / 20;
 }
 
+/// That the call throws; Io if it doesn't.
+template <typename Call>
+ErrorCode codeOf(Call call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.code();
+  }
+  return ErrorCode::Io;
+}
+
 struct Case {
   const char* name;
   Layout layout;
@@ -102,6 +113,35 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
       CHECK(many.reports().size() == static_cast<std::size_t>(world.size()));
     }
   }
+}
+
+TEST_CASE("a margin on N ranks: the lists of one rank, and its picture") {
+  const comm::Communicator world = comm::Communicator::world();
+  const bool root = world.rank() == 0;
+  VdiGenerator one(device(), comm::Communicator::serial());
+  VdiGenerator many(device(), comm::Communicator::world());
+  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {2, 2, 2}, Layout::Interleaved,
+                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto whole = test::decompose("turbulence", {34, 30, 37}, {1, 1, 1}, Layout::OnOneRank,
+                                     Joint::SharedPoints, ScalarType::F32, 0, 1);
+  Camera camera = test::oblique();
+  camera.viewAngle /= 3.0;
+  GenerateSettings settings = test::smallSettings(32, 24);
+  settings.margin = 0.5;
+  many.setBlocks(decomposed.mine);
+  std::optional<Vdi> vdi = many.generate(camera, test::threeHues(0.8), settings);
+  if (root) {
+    one.setBlocks(whole.mine);
+    Vdi alone = *one.generate(camera, test::threeHues(0.8), settings);
+    CHECK(vdi->margin == glm::ivec2(16, 12));
+    CHECK(vdi->margin == alone.margin);
+    const Image picture = *one.renderVolume(camera, test::threeHues(0.8), settings);
+    CHECK(largestDifference(flatten(*vdi), picture) < 1.0F);
+    vdi->margin = alone.margin = glm::ivec2(0);  // all lists are the picture then
+    CHECK(largestDifference(flatten(*vdi), flatten(alone)) < 1.5F);
+  }
+  settings.margin = world.rank() == 1 ? 0.25 : 0.5;
+  if (world.size() > 1) CHECK_THROWS_AS(many.generate(camera, test::threeHues(0.8), settings), Error);
 }
 
 TEST_CASE(
@@ -256,6 +296,105 @@ TEST_CASE("a rank that fails takes nobody down, and the next frame works") {
   CHECK_NOTHROW(generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings(16, 12)));
 }
 
+TEST_CASE("frames that overlap are those that are made alone") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto decomposedOf = [&](const char* field) {
+    return test::decompose(field, {30, 34, 27}, {3, 2, 3}, Layout::Random, Joint::SharedPoints,
+                           ScalarType::F32, world.rank(), world.size());
+  };
+  const auto first = decomposedOf("turbulence");
+  const auto second = decomposedOf("shells");
+  /// Viewpoint, function, size, supersegments and blocks change, as frames of a session do.
+  struct Wanted {
+    const test::Decomposed* blocks;
+    double azimuth;
+    double opacity;
+    GenerateSettings settings;
+  };
+  GenerateSettings total = test::smallSettings(31, 23, 4);
+  total.budget = Budget::Total;
+  GenerateSettings full = test::smallSettings(30, 20);
+  full.precision = Precision::Full;
+  GenerateSettings searched = test::smallSettings(30, 20);
+  searched.algorithm = Algorithm::Bisection;
+  const std::vector<Wanted> wanted{{&first, 0, 0.8, test::smallSettings(40, 30)},
+                                   {&first, 40, 0.8, test::smallSettings(40, 30)},
+                                   {&first, 40, 0.2, test::smallSettings(40, 30)},
+                                   {&second, 80, 0.2, test::smallSettings(40, 30)},
+                                   {&second, 80, 0.9, test::smallSettings(50, 40, 3)},
+                                   {&first, 10, 0.9, total},
+                                   {&first, 20, 0.9, total},
+                                   {&second, 20, 0.5, full},
+                                   {&second, 25, 0.5, searched},
+                                   {&second, 29, 0.5, searched}};
+  VdiGenerator generator(device(), comm::Communicator::world());
+  const auto show = [&](VdiGenerator& shown, std::size_t i) {
+    if (i == 0 || wanted[i].blocks != wanted[i - 1].blocks) shown.setBlocks(wanted[i].blocks->mine);
+  };
+  const auto start = [&](std::size_t i) {
+    show(generator, i);
+    return generator.start(test::oblique().azimuth(wanted[i].azimuth), test::threeHues(wanted[i].opacity),
+                           wanted[i].settings);
+  };
+  std::vector<std::optional<Vdi>> alone;
+  VdiGenerator other(device(), comm::Communicator::world());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    show(other, i);
+    alone.push_back(other.generate(test::oblique().azimuth(wanted[i].azimuth),
+                                   test::threeHues(wanted[i].opacity), wanted[i].settings));
+  }
+  std::optional<VdiFrame> last = start(0);
+  for (std::size_t i = 1; i <= wanted.size(); ++i) {
+    INFO("frame " << i - 1);
+    std::optional<VdiFrame> next;
+    if (i < wanted.size()) next = start(i);
+    const auto vdi = generator.finish(std::move(*last));
+    last = std::move(next);
+    REQUIRE(vdi.has_value() == (world.rank() == 0));
+    if (vdi) CHECK(*vdi == *alone[i - 1]);
+    CHECK(generator.reports().size() == (vdi ? static_cast<std::size_t>(world.size()) : 0));
+  }
+}
+
+TEST_CASE("frames that nobody fetches, and frames under way when a rank fails") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const TransferFunction function = test::threeHues(0.8);
+  const GenerateSettings settings = test::smallSettings();
+  VdiGenerator generator(device(), comm::Communicator::world());
+  generator.setBlocks(decomposed.mine);
+  const auto expected = generator.generate(test::oblique(), function, settings);
+  for (int i = 0; i < 5; ++i) generator.start(test::oblique().azimuth(10 * i), function, settings);
+  VdiFrame first = generator.start(test::oblique(), function, settings);
+  generator.start(test::oblique().azimuth(7), function, settings);
+  generator.start(test::oblique().azimuth(8), function, settings);
+  const auto late = generator.finish(std::move(first));  // completed when the third one took its place
+  if (late) CHECK(*late == *expected);
+  // What's refused leaves the frame under way as it is; what's stopped doesn't.
+  VdiFrame kept = generator.start(test::oblique(), function, settings);
+  GenerateSettings wrong = settings;
+  if (world.rank() == 0) wrong.supersegments = 0;
+  CHECK_THROWS_AS(generator.start(test::oblique(), function, wrong), Error);
+  const auto vdi = generator.finish(std::move(kept));
+  if (vdi) CHECK(*vdi == *expected);
+  VdiFrame lost = generator.start(test::oblique(), function, settings);
+  CHECK(codeOf([&] {
+          generator.start(test::oblique(), function, settings,
+                          [&](double) { return world.rank() != world.size() - 1; });
+        }) == ErrorCode::Cancelled);
+  CHECK(codeOf([&] { generator.finish(std::move(lost)); }) == ErrorCode::Cancelled);
+  const auto after = generator.generate(test::oblique(), function, settings);
+  if (after) CHECK(*after == *expected);
+  // A handle may outlive its generator.
+  std::optional<VdiFrame> orphan;
+  {
+    VdiGenerator gone(device(), comm::Communicator::world());
+    gone.setBlocks(decomposed.mine);
+    orphan = gone.start(test::oblique(), function, settings);
+  }
+}
+
 TEST_CASE("the next step, while this one is shown: all ranks advance, or none does") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposedOf = [&](const char* field) {
@@ -300,14 +439,6 @@ TEST_CASE("parameters that differ between ranks are refused on every rank") {
   const GenerateSettings settings = test::smallSettings(16, 12);
   Camera camera = test::oblique();
   if (world.rank() == 1) camera.viewAngle += 1e-9;
-  const auto codeOf = [&](auto call) {
-    try {
-      call();
-    } catch (const Error& error) {
-      return error.code();
-    }
-    return ErrorCode::Io;
-  };
   CHECK(codeOf([&] { generator.generate(camera, test::threeHues(1.0), settings); }) ==
         ErrorCode::InvalidArgument);
   const TransferFunction function = test::threeHues(world.rank() == 1 ? 1.5 : 1.0);

@@ -311,6 +311,21 @@ std::vector<std::uint64_t> Communicator::allToAllWords(std::span<const std::uint
   return from;
 }
 
+namespace {
+
+/// What the work threw; nothing if it didn't.
+template <typename Work>
+std::exception_ptr errorOf(Work&& work) {
+  try {
+    std::forward<Work>(work)();
+  } catch (...) {
+    return std::current_exception();
+  }
+  return nullptr;
+}
+
+}  // namespace
+
 void Communicator::agree(const std::exception_ptr& mine) const {
   if (state_->serial()) {
     if (mine) std::rethrow_exception(mine);
@@ -318,7 +333,10 @@ void Communicator::agree(const std::exception_ptr& mine) const {
   }
   int firstFailing = mine ? rank() : size();
   check(MPI_Allreduce(MPI_IN_PLACE, &firstFailing, 1, MPI_INT, MPI_MIN, state_->comm()), "MPI_Allreduce");
-  if (firstFailing == size()) return;
+  if (firstFailing < size()) failTogether(mine, firstFailing);
+}
+
+void Communicator::failTogether(const std::exception_ptr& mine, int firstFailing) const {
   Text text{};
   if (rank() == firstFailing) text = describe(mine);
   check(MPI_Bcast(text.data(), static_cast<int>(text.size()), MPI_CHAR, firstFailing, state_->comm()),
@@ -328,13 +346,31 @@ void Communicator::agree(const std::exception_ptr& mine) const {
 }
 
 void Communicator::together(const std::function<void()>& work) const {
-  std::exception_ptr error;
-  try {
-    work();
-  } catch (...) {
-    error = std::current_exception();
+  agree(errorOf(work));
+}
+
+bool Communicator::anyTogether(const std::function<bool()>& work) const {
+  if (state_->serial()) return work();
+  bool mine = false;
+  const std::exception_ptr error = errorOf([&] { mine = work(); });
+  std::array<int, 2> least{error ? rank() : size(), mine ? 0 : 1};
+  check(MPI_Allreduce(MPI_IN_PLACE, least.data(), 2, MPI_INT, MPI_MIN, state_->comm()), "MPI_Allreduce");
+  if (least[0] < size()) failTogether(error, least[0]);
+  return least[1] == 0;
+}
+
+std::vector<std::uint64_t> Communicator::gatherTogether(const std::function<std::uint64_t()>& work) const {
+  if (state_->serial()) return {work()};
+  std::array<std::uint64_t, 2> mine{};
+  const std::exception_ptr error = errorOf([&] { mine[1] = work(); });
+  mine[0] = error ? 1 : 0;
+  const std::vector<std::uint64_t> all = allGatherWords(mine);
+  std::vector<std::uint64_t> values;
+  for (std::size_t r = 0; 2 * r < all.size(); ++r) {
+    if (all[2 * r] != 0) failTogether(error, static_cast<int>(r));
+    values.push_back(all[2 * r + 1]);
   }
-  agree(error);
+  return values;
 }
 
 void Communicator::requireEqual(std::uint64_t fingerprint, const std::string& what) const {
@@ -402,6 +438,7 @@ void Messages::receive(int from, std::span<std::byte> bytes) {
 void Messages::wait() {
   std::vector<MPI_Request> requests = std::move(state_->requests);
   state_->requests.clear();
+  if (requests.empty()) return;  // there may be no MPI
   check(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
 }
 

@@ -84,6 +84,10 @@ class Communicator {
   void agree(const std::exception_ptr& mine) const;
   /// Runs `work`, then agree() with what it threw. Collective; `work` itself must not communicate.
   void together(const std::function<void()>& work) const;
+  /// The same, in the same message: whether `work` was true on any rank.
+  bool anyTogether(const std::function<bool()>& work) const;
+  /// The same, in the same message: what `work` gave on each rank.
+  std::vector<std::uint64_t> gatherTogether(const std::function<std::uint64_t()>& work) const;
   /// Collective: throws Error{InvalidArgument} on every rank if `fingerprint` differs between ranks; `what`
   /// says what was compared.
   void requireEqual(std::uint64_t fingerprint, const std::string& what) const;
@@ -97,6 +101,7 @@ class Communicator {
  private:
   friend class Messages;
   struct State;
+  [[noreturn]] void failTogether(const std::exception_ptr& mine, int firstFailing) const;
   explicit Communicator(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };

@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cstdlib>
 #include <cstring>
+#include <numeric>
 #include <string>
 
 #include "vdi/core/Error.h"
@@ -75,8 +76,10 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   window_.reset();
   outbox_ = {};
   parts_.assign(sizes.begin(), sizes.end());
-  // A half more, so that slow growth doesn't make a new one every frame.
-  for (std::uint64_t& part : parts_) part = aligned(part + part / 2);
+  // A half more, so that slow growth doesn't make a new one every frame; and as much as others have, for what
+  // one rank sends in this frame another one may send in the next.
+  const std::uint64_t mean = std::accumulate(parts_.begin(), parts_.end(), std::uint64_t{0}) / parts_.size();
+  for (std::uint64_t& part : parts_) part = aligned(std::max(part + part / 2, 2 * mean));
   std::uint64_t total = 0;
   for (int r = 0; r < comm_.size(); ++r) {
     if (comm_.hostLeader(r) != leader) continue;

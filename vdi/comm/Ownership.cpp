@@ -50,13 +50,4 @@ Ownership Ownership::balanced(std::uint64_t listCount, int ranks, std::span<cons
   return ownership;
 }
 
-Ownership Ownership::within(std::uint64_t first, std::uint64_t last) const {
-  assert(first % granularity == 0);
-  Ownership part;
-  for (const std::uint64_t boundary : boundaries_) {
-    part.boundaries_.push_back(std::clamp(boundary, first, last) - first);
-  }
-  return part;
-}
-
 }  // namespace vdi::comm

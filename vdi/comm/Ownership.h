@@ -34,9 +34,6 @@ class Ownership {
     const auto r = static_cast<std::size_t>(rank);
     return {boundaries_[r], boundaries_[r + 1]};
   }
-  /// Of lists [first, last), counted from `first`: what each rank owns of a band, which begins at a multiple
-  /// of the granularity.
-  Ownership within(std::uint64_t first, std::uint64_t last) const;
   bool operator==(const Ownership&) const = default;
 
  private:

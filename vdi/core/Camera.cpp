@@ -118,6 +118,14 @@ View::View(const Camera& camera, int width, int height, const ImagePlane& plane)
   pixelSize_ = extent / glm::dvec2(width, height);
 }
 
+View View::withMargin(const Camera& camera, int width, int height, const glm::ivec2& margin) {
+  const View picture(camera, width, height);
+  if (margin == glm::ivec2(0)) return picture;  // to the bit
+  const glm::dvec2 half = glm::dvec2(width, height) + 2.0 * glm::dvec2(margin);
+  const glm::dvec2 extent = half * (picture.halfHeight_ / height);
+  return {camera, width + 2 * margin.x, height + 2 * margin.y, ImagePlane{-extent, extent}};
+}
+
 glm::dvec3 View::toView(const glm::dvec3& world) const {
   const glm::dvec3 fromEye = world - camera_.position;
   return {glm::dot(fromEye, right_), glm::dot(fromEye, up_), glm::dot(fromEye, forward_)};

@@ -59,6 +59,9 @@ class View {
   /// tiles, stereo. Of the camera, view angle and parallel scale don't count. Throws as the other one, and
   /// Error{InvalidArgument} for a plane that isn't finite or has no extent.
   View(const Camera& camera, int width, int height, const ImagePlane& plane);
+  /// The first one's picture of width x height pixels, and margin.x more pixels of the same size on its left
+  /// and on its right, margin.y below and above it. Throws as the first one, for all of them.
+  static View withMargin(const Camera& camera, int width, int height, const glm::ivec2& margin);
 
   const Camera& camera() const { return camera_; }
   int width() const { return width_; }

@@ -33,6 +33,7 @@ void validate(const GenerateSettings& settings) {
   };
   require(settings.width >= 1 && settings.width <= 32768, "width", settings.width, "[1, 32768]");
   require(settings.height >= 1 && settings.height <= 32768, "height", settings.height, "[1, 32768]");
+  require(settings.margin >= 0.0 && settings.margin <= maxMargin, "margin", settings.margin, "[0, 4]");
   require(settings.supersegments >= 1 && settings.supersegments <= maxSupersegments, "supersegments",
           settings.supersegments, "[1, 1024]");
   require(settings.samplesPerVoxel >= 1.0 / 64.0 && settings.samplesPerVoxel <= 64.0, "samples per voxel",

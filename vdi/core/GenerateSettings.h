@@ -22,9 +22,14 @@ Algorithm algorithmFromString(const std::string& name);
 /// What is behind material of that opacity changes no pixel by 1/255.
 constexpr double pictureTermination = 0.9999;
 
+constexpr double maxMargin = 4.0;
+
 struct GenerateSettings {
   int width = 1280;
   int height = 720;
+  /// [0, maxMargin]: share of the picture's width that a VDI has lists for beyond its left and right edge,
+  /// and of its height beyond the lower and upper one. No more than there is to see: see marginOf (Margin.h).
+  double margin = 0.0;
   std::uint32_t supersegments = 25;  // N_S, 1 .. maxSupersegments
   /// Total: N_S is what lists have on average, where they have that many samples; needs Algorithm::Merge.
   Budget budget = Budget::List;

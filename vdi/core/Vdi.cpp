@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <span>
 
 #include "vdi/core/Error.h"
 
@@ -23,46 +24,26 @@ bool wellFormed(const Supersegment& segment, float previousBack) {
   return depths && color && segment.opacity > 0.0F && segment.opacity <= 1.0F;
 }
 
-/// What offsets say, whatever the supersegments are.
-void validateOffsets(const Vdi& vdi) {
-  const std::size_t lists = static_cast<std::size_t>(vdi.width) * static_cast<std::size_t>(vdi.height);
-  const auto& offsets = vdi.offsets();
-  if (offsets.size() != lists + 1) fail(fmt::format("{} offsets for {} lists", offsets.size(), lists));
-  if (offsets.front() != 0 || offsets.back() != vdi.supersegmentCount()) {
-    fail(fmt::format("the offsets end at {}, there are {} supersegments", offsets.back(),
-                     vdi.supersegmentCount()));
-  }
-  for (std::size_t i = 0; i < lists; ++i) {
-    if (offsets[i + 1] < offsets[i] || offsets[i + 1] - offsets[i] > vdi.budget) {
-      fail(fmt::format("list {} runs from {} to {} with a budget of {}", i, offsets[i], offsets[i + 1],
-                       vdi.budget));
+/// `number`: of the list in the VDI.
+void validateList(std::span<const Supersegment> list, std::uint64_t number) {
+  float previousBack = 0.0F;
+  for (const Supersegment& segment : list) {
+    if (!wellFormed(segment, previousBack)) {
+      fail(fmt::format("list {} has a supersegment from depth {} to {} with opacity {}", number,
+                       segment.front, segment.back, segment.opacity));
     }
+    previousBack = segment.back;
   }
 }
 
-void validateSegments(const SupersegmentLists& lists) {
-  for (std::size_t i = 0; i < lists.listCount(); ++i) {
-    float previousBack = 0.0F;
-    for (const Supersegment& segment : lists.list(i)) {
-      if (!wellFormed(segment, previousBack)) {
-        fail(fmt::format("list {} has a supersegment from depth {} to {} with opacity {}", i, segment.front,
-                         segment.back, segment.opacity));
-      }
-      previousBack = segment.back;
+void validateList(std::span<const CompactSupersegment> list, std::uint64_t number) {
+  std::uint32_t previousBack = 0;
+  for (const CompactSupersegment& segment : list) {
+    if (segment.front() < previousBack || segment.front() >= segment.back()) {
+      fail(fmt::format("list {} has a supersegment from depth code {} to {}, one before it ends at {}",
+                       number, segment.front(), segment.back(), previousBack));
     }
-  }
-}
-
-void validateSegments(const CompactLists& lists) {
-  for (std::size_t i = 0; i < lists.listCount(); ++i) {
-    std::uint32_t previousBack = 0;
-    for (const CompactSupersegment& segment : lists.list(i)) {
-      if (segment.front() < previousBack || segment.front() >= segment.back()) {
-        fail(fmt::format("list {} has a supersegment from depth code {} to {}, one before it ends at {}", i,
-                         segment.front(), segment.back(), previousBack));
-      }
-      previousBack = segment.back();
-    }
+    previousBack = segment.back();
   }
 }
 
@@ -80,8 +61,14 @@ SupersegmentLists Vdi::expandedLists() const {
   return std::get<SupersegmentLists>(lists);
 }
 
-void validate(const Vdi& vdi) {
+void validateShape(const Vdi& vdi) {
   if (vdi.width < 1 || vdi.height < 1) fail(fmt::format("{} x {} lists", vdi.width, vdi.height));
+  // Without a sum, which large values would overflow.
+  const auto leavesSome = [](int size, int margin) { return margin >= 0 && margin <= (size - 1) / 2; };
+  if (!leavesSome(vdi.width, vdi.margin.x) || !leavesSome(vdi.height, vdi.margin.y)) {
+    fail(fmt::format("a margin of {} and {} of {} x {} lists", vdi.margin.x, vdi.margin.y, vdi.width,
+                     vdi.height));
+  }
   const bool compact = vdi.precision() == Precision::Compact;
   const DepthCode& code = vdi.depthCode;
   const bool usable = code.step > 0.0F && code.first >= 0.0F &&
@@ -91,8 +78,39 @@ void validate(const Vdi& vdi) {
     fail(fmt::format("{} supersegments with depths from {} in steps of {}", toString(vdi.precision()),
                      code.first, code.step));
   }
-  validateOffsets(vdi);
-  std::visit([](const auto& lists) { validateSegments(lists); }, vdi.lists);
+}
+
+template <typename Segment>
+void validateLists(const ListsOf<Segment>& lists, std::size_t first, std::size_t last,
+                   std::uint64_t firstList, std::uint32_t budget) {
+  const auto& offsets = lists.offsets;
+  for (std::size_t i = first; i < last; ++i) {
+    if (offsets[i + 1] < offsets[i] || offsets[i + 1] - offsets[i] > budget ||
+        offsets[i + 1] > lists.segments.size()) {
+      fail(fmt::format("list {} runs from {} to {} with a budget of {}", firstList + (i - first), offsets[i],
+                       offsets[i + 1], budget));
+    }
+  }
+  for (std::size_t i = first; i < last; ++i) validateList(lists.list(i), firstList + (i - first));
+}
+
+template void validateLists(const SupersegmentLists&, std::size_t, std::size_t, std::uint64_t, std::uint32_t);
+template void validateLists(const CompactLists&, std::size_t, std::size_t, std::uint64_t, std::uint32_t);
+
+void validateEnds(const Vdi& vdi) {
+  const std::size_t lists = static_cast<std::size_t>(vdi.width) * static_cast<std::size_t>(vdi.height);
+  const auto& offsets = vdi.offsets();
+  if (offsets.size() != lists + 1) fail(fmt::format("{} offsets for {} lists", offsets.size(), lists));
+  if (offsets.front() != 0 || offsets.back() != vdi.supersegmentCount()) {
+    fail(fmt::format("the offsets end at {}, there are {} supersegments", offsets.back(),
+                     vdi.supersegmentCount()));
+  }
+}
+
+void validate(const Vdi& vdi) {
+  validateShape(vdi);
+  validateEnds(vdi);
+  std::visit([&](const auto& all) { validateLists(all, 0, all.listCount(), 0, vdi.budget); }, vdi.lists);
 }
 
 }  // namespace vdi

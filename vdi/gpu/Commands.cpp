@@ -80,10 +80,11 @@ void Commands::begin() {
   barrier();
 }
 
-void Commands::waitFor(const Commands& other) {
+void Commands::waitFor(const Submission& other) {
   assert(state_ == State::Recording);
+  if (other.number == 0) return;
   waits_.push_back({VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO, nullptr,
-                    device_->vulkan().submissionsDone(other.kind_), other.last_,
+                    device_->vulkan().submissionsDone(other.kind), other.number,
                     VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, 0});
 }
 
@@ -108,6 +109,14 @@ void Commands::wait() {
   device_->vulkan().wait(kind_, last_);
   state_ = State::Idle;
   readTimes();
+}
+
+void Commands::drop() noexcept {
+  try {
+    wait();
+  } catch (const Error&) {  // the device is lost: nothing runs any more
+    state_ = State::Idle;
+  }
 }
 
 void Commands::dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants,

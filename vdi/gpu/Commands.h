@@ -29,6 +29,12 @@ constexpr std::uint32_t groupsFor(std::uint32_t count, std::uint32_t group) {
   return (count + group - 1) / group;
 }
 
+/// One that was handed to a queue: the how-manieth there. 0: none.
+struct Submission {
+  QueueKind kind = QueueKind::Compute;
+  std::uint64_t number = 0;
+};
+
 class Commands {
  public:
   /// Those of a transfer queue only copy: no dispatches, clears or marks.
@@ -43,15 +49,20 @@ class Commands {
   /// others too, is finished and visible to what's recorded. What was recorded and not submitted is dropped,
   /// so an exception between begin and submit does no harm.
   void begin();
-  /// What's recorded waits, on the device, for the last submission of `other`. For another queue's: begin's
-  /// barrier reaches its own queue only.
-  void waitFor(const Commands& other);
+  /// What's recorded waits, on the device, for that submission. For another queue's: begin's barrier reaches
+  /// its own queue only.
+  void waitFor(const Submission& other);
+  void waitFor(const Commands& other) { waitFor(other.last()); }
+  /// The last one, done or not.
+  Submission last() const { return {kind_, last_}; }
   void submit();
   /// How often that was done: more than while something was recorded tells that it wasn't dropped.
   std::uint64_t submissions() const { return submissions_; }
   /// Returns when the submission is done, at once when there's none. Throws Error{DeviceFailure} on device
   /// loss.
   void wait();
+  /// After an error: waits, whatever becomes of the submission. Nothing uses its memory any more.
+  void drop() noexcept;
   void submitAndWait() {
     submit();
     wait();

@@ -50,6 +50,21 @@ VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::
   return memory;
 }
 
+/// Of the queues that may use a buffer or an image.
+class QueueFamilies {
+ public:
+  explicit QueueFamilies(const Device& device)
+      : families_{device.vulkan().queueFamily(QueueKind::Compute),
+                  device.vulkan().queueFamily(QueueKind::Transfer)} {}
+  VkSharingMode mode() const { return several() ? VK_SHARING_MODE_CONCURRENT : VK_SHARING_MODE_EXCLUSIVE; }
+  std::uint32_t count() const { return several() ? 2 : 0; }
+  const std::uint32_t* data() const { return families_.data(); }
+
+ private:
+  bool several() const { return families_[0] != families_[1]; }
+  std::array<std::uint32_t, 2> families_;
+};
+
 const char* nameOf(MemoryKind kind) {
   switch (kind) {
     case MemoryKind::DeviceLocal:
@@ -99,6 +114,7 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
   const DeviceLimits& limits = device_->limits();
   if (words > limits.maxAllocationBytes || words > limits.maxBufferBytes)
     throwOutOfMemory(*device_, words, "buffer");
+  const QueueFamilies families(*device_);
   try {
     const VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
                                   nullptr,
@@ -108,9 +124,9 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
                                       VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                                       VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT |
                                       VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT,
-                                  VK_SHARING_MODE_EXCLUSIVE,
-                                  0,
-                                  nullptr};
+                                  families.mode(),
+                                  families.count(),
+                                  families.data()};
     requireRoom(vkCreateBuffer(device_->vulkan().handle(), &info, nullptr, &buffer_), "vkCreateBuffer",
                 *device_, words, "buffer");
     VkMemoryRequirements needs;
@@ -156,14 +172,15 @@ std::optional<ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& de
   buffer.size_ = size;
   const VkExternalMemoryBufferCreateInfo external{VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO,
                                                   nullptr, handleType};
+  const QueueFamilies families(*device);
   const VkBufferCreateInfo bufferInfo{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
                                       &external,
                                       0,
                                       size,
                                       VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
-                                      VK_SHARING_MODE_EXCLUSIVE,
-                                      0,
-                                      nullptr};
+                                      families.mode(),
+                                      families.count(),
+                                      families.data()};
   if (vkCreateBuffer(device->vulkan().handle(), &bufferInfo, nullptr, &buffer.buffer_) != VK_SUCCESS) {
     buffer.buffer_ = VK_NULL_HANDLE;
     return std::nullopt;
@@ -260,9 +277,7 @@ SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& ext
   // Drivers compute with sizes that overflow beyond what they can hold: ours decides first.
   const std::uint64_t bytes = std::uint64_t{extent.x} * extent.y * extent.z * texelBytes(format);
   if (bytes > device_->limits().maxAllocationBytes) throwOutOfMemory(*device_, bytes, "texture");
-  const std::array families{device_->vulkan().queueFamily(QueueKind::Compute),
-                            device_->vulkan().queueFamily(QueueKind::Transfer)};
-  const bool shared = families[0] != families[1];
+  const QueueFamilies families(*device_);
   try {
     const VkImageCreateInfo info{VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
                                  nullptr,
@@ -275,8 +290,8 @@ SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& ext
                                  VK_SAMPLE_COUNT_1_BIT,
                                  VK_IMAGE_TILING_OPTIMAL,
                                  VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
-                                 shared ? VK_SHARING_MODE_CONCURRENT : VK_SHARING_MODE_EXCLUSIVE,
-                                 shared ? 2U : 0U,
+                                 families.mode(),
+                                 families.count(),
                                  families.data(),
                                  VK_IMAGE_LAYOUT_UNDEFINED};
     requireRoom(vkCreateImage(device_->vulkan().handle(), &info, nullptr, &image_), "vkCreateImage", *device_,

@@ -65,11 +65,12 @@ void ScanPass::record(Commands& commands, const Buffer& values, const Buffer& pr
   recordBoth(commands, constants, pipelines_.with({1, before != nullptr ? 1U : 0U}));
 }
 
-void ScanPass::recordRebase(Commands& commands, const Buffer& prefix, std::uint32_t count,
-                            std::uint32_t base) {
+void ScanPass::recordRebase(Commands& commands, const Buffer& prefix, std::uint64_t first,
+                            std::uint32_t count, std::uint32_t base) {
+  if (count == 0 || base == 0) return;
   shared::ScanConstants constants{};
-  constants.prefix = prefix.address();
-  constants.count = count;
+  constants.prefix = prefix.address() + first * sizeof(std::uint32_t);
+  constants.count = count - 1;  // the shader takes one more
   constants.mode = shared::scanModeRebase;
   constants.base = base;
   commands.barrier();

@@ -27,8 +27,9 @@ class ScanPass {
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count,
               const Buffer& guard, std::uint64_t room, const Buffer* before = nullptr);
 
-  /// Adds `base` to prefix[0 .. count]. Barriers as record.
-  void recordRebase(Commands& commands, const Buffer& prefix, std::uint32_t count, std::uint32_t base);
+  /// Adds `base` to prefix[first .. first + count - 1]. Barriers as record.
+  void recordRebase(Commands& commands, const Buffer& prefix, std::uint64_t first, std::uint32_t count,
+                    std::uint32_t base);
 
   /// Throws Error{OutOfMemory} if the total of the last finished scan didn't fit 32 bits.
   void requireNoOverflow() const;

@@ -7,6 +7,8 @@
 #include <sys/statfs.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cassert>
 #include <cerrno>
 #include <csignal>
@@ -49,6 +51,9 @@ class Descriptor {
   int get() const { return number_; }
   /// Returns close's result.
   int close() { return ::close(std::exchange(number_, -1)); }
+  /// Of one that is none yet.
+  void open(int number) { number_ = number; }
+  int release() { return std::exchange(number_, -1); }
 
  private:
   int number_;
@@ -78,12 +83,17 @@ class PipeSignalBlocked {
   sigset_t before_{};
 };
 
-void writeTo(int descriptor, std::span<const std::byte> bytes, const fs::path& path) {
+/// Behind what was written before, or, where the file has offsets, at one.
+void writeTo(int descriptor, std::optional<std::uint64_t> offset, std::span<const std::byte> bytes,
+             const fs::path& path) {
   while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    const ssize_t written =
+        offset ? ::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(*offset))
+               : ::write(descriptor, bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) fail("write the file", errno, path);
     bytes = bytes.subspan(static_cast<std::size_t>(written));
+    if (offset) *offset += static_cast<std::uint64_t>(written);
   }
 }
 
@@ -135,18 +145,15 @@ void requireWritable(const Destination& to) {
   if (!to.through) requireAccess(to.folder(), W_OK | X_OK, "write into the folder", to.path);
 }
 
-void writeThrough(const Destination& to, std::span<const std::byte> bytes) {
+/// Of a device or pipe.
+int openAsItIs(const fs::path& path) {
   // Not blocking: a pipe without a reader is refused, not waited for.
-  Descriptor file(::open(to.path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
-  if (!file && errno == ENXIO) throw Error(ErrorCode::Io, "nobody reads from the pipe", to.path.string());
-  if (!file) fail("open the file", errno, to.path);
+  Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
+  if (!file && errno == ENXIO) throw Error(ErrorCode::Io, "nobody reads from the pipe", path.string());
+  if (!file) fail("open the file", errno, path);
   const int flags = ::fcntl(file.get(), F_GETFL);
-  if (flags < 0 || ::fcntl(file.get(), F_SETFL, flags & ~O_NONBLOCK) != 0) {
-    fail("open the file", errno, to.path);
-  }
-  const PipeSignalBlocked blocked;
-  writeTo(file.get(), bytes, to.path);
-  if (file.close() != 0) fail("write the file", errno, to.path);
+  if (flags < 0 || ::fcntl(file.get(), F_SETFL, flags & ~O_NONBLOCK) != 0) fail("open the file", errno, path);
+  return file.release();
 }
 
 /// A name in the folder that nobody uses. Process numbers repeat between the nodes of a cluster that share a
@@ -156,72 +163,22 @@ fs::path temporaryName(const Destination& to) {
   return to.folder() / fmt::format(".vdi-{}-{:08x}{:08x}.tmp", ::getpid(), random(), random());
 }
 
-/// Writes the bytes, gives the file the permissions of the one that it replaces, and waits for the disk.
-void fill(int descriptor, const Destination& to, std::span<const std::byte> bytes) {
-  writeTo(descriptor, bytes, to.path);
-  if (to.status) {
-    // Only root may give files away; for others the file becomes their own.
-    static_cast<void>(::fchown(descriptor, to.status->st_uid, to.status->st_gid) == 0);
-    if (::fchmod(descriptor, to.status->st_mode & 07777U) != 0) fail("set permissions", errno, to.path);
-  }
-  if (::fsync(descriptor) != 0) fail("write the file", errno, to.path);
-}
-
-/// The other name of a file until it's renamed.
-class TemporaryName {
- public:
-  TemporaryName(fs::path name, const Destination& to) : name_(std::move(name)), to_(to) {}
-  ~TemporaryName() {
-    if (!name_.empty()) ::unlink(name_.c_str());
-  }
-  TemporaryName(const TemporaryName&) = delete;
-  TemporaryName& operator=(const TemporaryName&) = delete;
-  void rename() {
-    if (::rename(name_.c_str(), to_.file.c_str()) != 0) fail("replace the file", errno, to_.path);
-    name_.clear();
-  }
-
- private:
-  fs::path name_;
-  const Destination& to_;
-};
-
 bool giveName(int descriptor, const fs::path& name) {
   const std::string file = fmt::format("/proc/self/fd/{}", descriptor);
   return ::linkat(AT_FDCWD, file.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
 }
 
-/// By a file that has no name until it's complete. False, and nothing done, where there are none.
-bool replaceByUnnamed(const Destination& to, std::span<const std::byte> bytes) {
-  const Descriptor file(::open(to.folder().c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666));
-  if (!file) return false;
-  fill(file.get(), to, bytes);
-  if (!to.status && giveName(file.get(), to.file)) return true;
-  // A link replaces nothing, a renamed file does.
-  fs::path name;
-  do {
-    name = temporaryName(to);
-    if (giveName(file.get(), name)) {
-      TemporaryName(name, to).rename();
-      return true;
-    }
-  } while (errno == EEXIST);
-  return false;
-}
-
-void replaceByNamed(const Destination& to, std::span<const std::byte> bytes) {
-  fs::path name;
-  int descriptor = -1;
-  do {
-    name = temporaryName(to);
-    descriptor = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  } while (descriptor < 0 && errno == EEXIST);
-  if (descriptor < 0) fail("create the file", errno, to.path);
-  TemporaryName temporary(name, to);
-  Descriptor file(descriptor);
-  fill(file.get(), to, bytes);
-  if (file.close() != 0) fail("write the file", errno, to.path);
-  temporary.rename();
+/// For where a file without a name gets none: without /proc, for example.
+void copyAll(int from, int to, const fs::path& path) {
+  std::vector<std::byte> buffer(std::size_t{1} << 20);
+  for (std::uint64_t at = 0;;) {
+    const ssize_t got = ::pread(from, buffer.data(), buffer.size(), static_cast<off_t>(at));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) fail("read back the file", errno, path);
+    if (got == 0) return;
+    writeTo(to, at, std::span(buffer).first(static_cast<std::size_t>(got)), path);
+    at += static_cast<std::uint64_t>(got);
+  }
 }
 
 /// So that the new name survives a power cut. File systems that can't do this say so by other errors.
@@ -271,15 +228,161 @@ std::vector<std::byte> InputFile::read(std::uint64_t offset, std::uint64_t count
   return bytes;
 }
 
-void writeAtomically(const fs::path& path, std::span<const std::byte> bytes) {
-  const Destination to(path);
-  requireWritable(to);
-  if (to.through) {
-    writeThrough(to, bytes);
-    return;
+struct OutputFile::State {
+  Destination to;
+  Descriptor file{-1};
+  fs::path name;  // until it has its own: none, where there are files without one
+
+  explicit State(const fs::path& path) : to(path) {
+    requireWritable(to);
+    if (to.through) {
+      file.open(openAsItIs(to.path));
+      return;
+    }
+    file.open(::open(to.folder().c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666));
+    if (!file) file.open(createNamed());
   }
-  if (!replaceByUnnamed(to, bytes)) replaceByNamed(to, bytes);
-  synchronizeFolder(to);
+  ~State() {
+    if (!name.empty()) ::unlink(name.c_str());
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  State(State&&) = delete;
+  State& operator=(State&&) = delete;
+
+  int createNamed() {
+    fs::path candidate;
+    int descriptor = -1;
+    do {
+      candidate = temporaryName(to);
+      descriptor = ::open(candidate.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    } while (descriptor < 0 && errno == EEXIST);
+    if (descriptor < 0) fail("create the file", errno, to.path);
+    name = candidate;
+    return descriptor;
+  }
+
+  /// A link replaces nothing, a renamed file does; and other processes find what has a name.
+  void requireName() {
+    if (!name.empty()) return;
+    fs::path candidate;
+    bool named = false;
+    do {
+      candidate = temporaryName(to);
+      named = giveName(file.get(), candidate);
+    } while (!named && errno == EEXIST);
+    if (named) {
+      name = candidate;
+      return;
+    }
+    Descriptor other(createNamed());
+    copyAll(file.get(), other.get(), to.path);
+    file.close();
+    file.open(other.release());
+  }
+
+  /// The permissions of the file that it replaces.
+  void takePermissions() {
+    if (!to.status) return;
+    // Only root may give files away; for others the file becomes their own.
+    static_cast<void>(::fchown(file.get(), to.status->st_uid, to.status->st_gid) == 0);
+    if (::fchmod(file.get(), to.status->st_mode & 07777U) != 0) fail("set permissions", errno, to.path);
+  }
+
+  void close() {
+    if (file.close() != 0) fail("write the file", errno, to.path);
+  }
+
+  void replace() {
+    takePermissions();
+    if (::fsync(file.get()) != 0) fail("write the file", errno, to.path);
+    if (name.empty() && !to.status && giveName(file.get(), to.file)) {
+      close();
+    } else {
+      requireName();
+      close();
+      if (::rename(name.c_str(), to.file.c_str()) != 0) fail("replace the file", errno, to.path);
+      name.clear();
+    }
+    synchronizeFolder(to);
+  }
+};
+
+OutputFile::OutputFile(const fs::path& path) : state_(std::make_unique<State>(path)) {}
+OutputFile::~OutputFile() = default;
+
+bool OutputFile::takesOffsets() const {
+  return !state_->to.through;
+}
+
+void OutputFile::write(std::uint64_t offset, std::span<const std::byte> bytes) {
+  if (takesOffsets()) {
+    writeTo(state_->file.get(), offset, bytes, state_->to.path);
+  } else {
+    const PipeSignalBlocked blocked;
+    writeTo(state_->file.get(), std::nullopt, bytes, state_->to.path);
+  }
+}
+
+void OutputFile::reserve(std::uint64_t bytes) {
+  if (!takesOffsets()) return;
+  const int file = state_->file.get();
+  const auto size = static_cast<off_t>(bytes);
+  int result = 0;
+  do {
+    result = bytes > 0 ? ::fallocate(file, 0, 0, size) : 0;
+  } while (result != 0 && errno == EINTR);
+  // Not every file system can promise room.
+  if (result != 0 && errno == EOPNOTSUPP) result = ::ftruncate(file, size);
+  if (result != 0) fail("write the file", errno, state_->to.path);
+}
+
+fs::path OutputFile::share() {
+  assert(takesOffsets());
+  state_->requireName();
+  return fs::absolute(state_->name);
+}
+
+void OutputFile::commit() {
+  if (takesOffsets()) {
+    state_->replace();
+  } else {
+    state_->close();
+  }
+}
+
+std::optional<SharedOutput> SharedOutput::open(const fs::path& shared, const fs::path& path) {
+  const int descriptor = ::open(shared.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);
+  if (descriptor >= 0) return SharedOutput(path, descriptor);
+  constexpr std::array notThere{ENOENT, ENOTDIR, EACCES, EPERM, EROFS, ESTALE};
+  if (std::find(notThere.begin(), notThere.end(), errno) == notThere.end())
+    fail("open the file", errno, path);
+  return std::nullopt;
+}
+
+SharedOutput::SharedOutput(fs::path path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
+
+SharedOutput::SharedOutput(SharedOutput&& other) noexcept
+    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+SharedOutput::~SharedOutput() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void SharedOutput::write(std::uint64_t offset, std::span<const std::byte> bytes) {
+  writeTo(descriptor_, offset, bytes, path_);
+}
+
+void SharedOutput::finish() {
+  if (::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0) {
+    fail("write the file", errno, path_);
+  }
+}
+
+void writeAtomically(const fs::path& path, std::span<const std::byte> bytes) {
+  OutputFile file(path);
+  file.write(0, bytes);
+  file.commit();
 }
 
 fs::path requireWritable(const fs::path& path) {

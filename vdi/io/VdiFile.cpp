@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Parallel.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/ListCodec.h"
+#include "vdi/io/VdiParts.h"
 
 namespace vdi::io {
 
@@ -20,12 +23,12 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "the .vdi file is read as it lies");
 
 constexpr std::array<char, 8> magicText{'V', 'D', 'I', '-', 'F', 'I', 'L', 'E'};
-constexpr std::uint32_t currentVersion = 1;
+constexpr std::uint32_t plainVersion = 1;   // no margin
+constexpr std::uint32_t marginVersion = 2;  // written only where there is one
 // Encodings are the numbers of Precision.
 static_assert(static_cast<int>(Precision::Full) == 0 && static_cast<int>(Precision::Compact) == 1);
 constexpr std::uint32_t flagParallel = 1;
 constexpr std::uint32_t knownFlags = flagParallel;
-constexpr std::uint32_t chunkLists = 4096;
 constexpr std::uint32_t largestSide = 32768;  // as View
 
 /// docs/format.md has the table.
@@ -40,7 +43,8 @@ struct Header {
   std::uint32_t budget;
   std::uint32_t listsPerChunk;
   std::uint32_t chunkCount;
-  std::uint32_t reserved;
+  std::uint16_t marginX;  // 0 in version 1
+  std::uint16_t marginY;
   std::uint64_t supersegmentCount;
   std::uint64_t dataBytes;
   std::uint64_t timeStep;
@@ -65,7 +69,8 @@ static_assert(offsetof(Header, height) == 28);
 static_assert(offsetof(Header, budget) == 32);
 static_assert(offsetof(Header, listsPerChunk) == 36);
 static_assert(offsetof(Header, chunkCount) == 40);
-static_assert(offsetof(Header, reserved) == 44);
+static_assert(offsetof(Header, marginX) == 44);
+static_assert(offsetof(Header, marginY) == 46);
 static_assert(offsetof(Header, supersegmentCount) == 48);
 static_assert(offsetof(Header, dataBytes) == 56);
 static_assert(offsetof(Header, timeStep) == 64);
@@ -82,11 +87,6 @@ static_assert(offsetof(Header, tableChecksum) == 224);
 static_assert(offsetof(Header, headerChecksum) == 232);
 static_assert(sizeof(Header) == 240);
 
-struct ChunkEntry {
-  std::uint32_t supersegmentCount;
-  std::uint32_t packedBytes;
-  std::uint64_t checksum;
-};
 static_assert(offsetof(ChunkEntry, packedBytes) == 4);
 static_assert(offsetof(ChunkEntry, checksum) == 8);
 static_assert(sizeof(ChunkEntry) == 16);
@@ -109,10 +109,6 @@ Precision precisionOf(const Header& header) {
   return static_cast<Precision>(header.encoding);
 }
 
-std::uint64_t chunksOf(std::uint64_t lists, std::uint32_t listsPerChunk) {
-  return (lists + listsPerChunk - 1) / listsPerChunk;
-}
-
 /// What validate(Vdi) leaves out: a camera that can be used and numbers that are numbers.
 void requireSoundHeader(const Vdi& vdi) {
   try {
@@ -128,19 +124,24 @@ void requireSoundHeader(const Vdi& vdi) {
   if (vdi.budget < 1) fail("a budget of no supersegments");
 }
 
+std::uint64_t listsOf(const Vdi& vdi) {
+  return static_cast<std::uint64_t>(vdi.width) * static_cast<std::uint64_t>(vdi.height);
+}
+
+/// Without what the chunks add to it.
 Header headerOf(const Vdi& vdi) {
   Header header{};
   header.magic = magicText;
-  header.version = currentVersion;
+  header.version = vdi.margin == glm::ivec2(0) ? plainVersion : marginVersion;
   header.headerBytes = sizeof(Header);
   header.encoding = static_cast<std::uint32_t>(vdi.precision());
   header.flags = vdi.camera.parallelProjection ? flagParallel : 0;
   header.width = static_cast<std::uint32_t>(vdi.width);
   header.height = static_cast<std::uint32_t>(vdi.height);
   header.budget = vdi.budget;
-  header.listsPerChunk = chunkLists;
-  header.chunkCount = static_cast<std::uint32_t>(chunksOf(vdi.listCount(), chunkLists));
-  header.supersegmentCount = vdi.supersegmentCount();
+  header.listsPerChunk = listsPerChunk;
+  header.marginX = static_cast<std::uint16_t>(vdi.margin.x);  // validate allows no more
+  header.marginY = static_cast<std::uint16_t>(vdi.margin.y);
   header.timeStep = vdi.timeStep;
   header.time = vdi.time;
   header.sampleStep = vdi.sampleStep;
@@ -160,6 +161,7 @@ Vdi vdiOf(const Header& header) {
   Vdi vdi;
   vdi.width = static_cast<int>(header.width);
   vdi.height = static_cast<int>(header.height);
+  vdi.margin = glm::ivec2(header.marginX, header.marginY);
   vdi.budget = header.budget;
   vdi.time = header.time;
   vdi.timeStep = header.timeStep;
@@ -186,8 +188,9 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   if (start.size() < sizeof(Header)) fail(fmt::format("{} bytes are too few for a header", fileBytes));
   std::memcpy(&header, start.data(), sizeof(Header));
   if (header.magic != magicText) fail("it doesn't start with VDI-FILE");
-  if (header.version != currentVersion) {
-    fail(fmt::format("it has version {}, this program reads version {}", header.version, currentVersion));
+  if (header.version != plainVersion && header.version != marginVersion) {
+    fail(fmt::format("it has version {}, this program reads versions {} and {}", header.version, plainVersion,
+                     marginVersion));
   }
   if (header.headerBytes != sizeof(Header)) fail(fmt::format("its header has {} bytes", header.headerBytes));
   if (header.headerChecksum != checksumOf(header)) fail("the header's checksum is wrong");
@@ -195,11 +198,16 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
     fail(fmt::format("its supersegments have encoding {}, this program reads encodings 0 and 1",
                      header.encoding));
   }
-  if ((header.flags & ~knownFlags) != 0 || header.reserved != 0)
+  const bool hasMargin = header.marginX != 0 || header.marginY != 0;
+  if ((header.flags & ~knownFlags) != 0 || (hasMargin && header.version == plainVersion))
     fail("it uses flags that this program doesn't know");
   const auto goodSide = [](std::uint32_t side) { return side >= 1 && side <= largestSide; };
   if (!goodSide(header.width) || !goodSide(header.height) || header.listsPerChunk == 0) {
     fail(fmt::format("{} x {} lists in chunks of {}", header.width, header.height, header.listsPerChunk));
+  }
+  if (2U * header.marginX >= header.width || 2U * header.marginY >= header.height) {
+    fail(fmt::format("a margin of {} and {} of {} x {} lists", header.marginX, header.marginY, header.width,
+                     header.height));
   }
   const std::uint64_t chunks = chunksOf(std::uint64_t{header.width} * header.height, header.listsPerChunk);
   if (chunks != header.chunkCount) {
@@ -315,27 +323,76 @@ auto withPath(const std::filesystem::path& path, Work work) {
 
 }  // namespace
 
-std::vector<std::byte> encode(const Vdi& vdi) {
-  requireSoundHeader(vdi);
-  validate(vdi);
-  Header header = headerOf(vdi);
-  std::vector<ChunkEntry> table(header.chunkCount);
-  const std::size_t dataStart = sizeof(Header) + tableBytesOf(header);
-  std::vector<std::byte> bytes(dataStart);
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    const std::size_t first = i * chunkLists;
-    const std::size_t last = std::min<std::size_t>(first + chunkLists, vdi.listCount());
-    const std::vector<std::byte> packed = std::visit(
-        [&](const auto& lists) { return detail::packLists(lists, vdi.depthCode, first, last); }, vdi.lists);
-    table[i] = {vdi.offsets()[last] - vdi.offsets()[first], static_cast<std::uint32_t>(packed.size()),
-                checksumOf(packed)};
-    bytes.insert(bytes.end(), packed.begin(), packed.end());
+template <typename Segment>
+void encodeChunks(const ListsOf<Segment>& lists, std::size_t first, std::size_t last, std::uint64_t firstList,
+                  std::uint32_t budget, const DepthCode& code,
+                  const std::function<void(EncodedChunk)>& take) {
+  assert(firstList % listsPerChunk == 0);
+  const auto encodeOne = [&](std::size_t begin) {
+    const std::size_t end = std::min<std::size_t>(begin + listsPerChunk, last);
+    validateLists(lists, begin, end, firstList + (begin - first), budget);
+    EncodedChunk chunk;
+    chunk.bytes = detail::packLists(lists, code, begin, end);
+    chunk.entry = {lists.offsets[end] - lists.offsets[begin], static_cast<std::uint32_t>(chunk.bytes.size()),
+                   checksumOf(chunk.bytes)};
+    return chunk;
+  };
+  constexpr std::size_t atOnce = 64;
+  std::vector<EncodedChunk> chunks;
+  for (std::size_t begin = first; begin < last; begin += chunks.size() * listsPerChunk) {
+    chunks.resize(std::min<std::size_t>(atOnce, chunksOf(last - begin)));
+    inParallel(chunks.size(), 1, [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i) chunks[i] = encodeOne(begin + i * listsPerChunk);
+    });
+    for (EncodedChunk& chunk : chunks) take(std::move(chunk));
   }
-  header.dataBytes = bytes.size() - dataStart;
+}
+
+template void encodeChunks(const SupersegmentLists&, std::size_t, std::size_t, std::uint64_t, std::uint32_t,
+                           const DepthCode&, const std::function<void(EncodedChunk)>&);
+template void encodeChunks(const CompactLists&, std::size_t, std::size_t, std::uint64_t, std::uint32_t,
+                           const DepthCode&, const std::function<void(EncodedChunk)>&);
+
+std::uint64_t headBytes(std::uint64_t lists) {
+  return sizeof(Header) + chunksOf(lists) * sizeof(ChunkEntry);
+}
+
+std::vector<std::byte> encodeHead(const Vdi& vdi, std::span<const ChunkEntry> table) {
+  requireSoundHeader(vdi);
+  validateShape(vdi);
+  assert(table.size() == chunksOf(listsOf(vdi)));
+  Header header = headerOf(vdi);
+  header.chunkCount = static_cast<std::uint32_t>(table.size());
+  for (const ChunkEntry& entry : table) {
+    header.supersegmentCount += entry.supersegmentCount;
+    header.dataBytes += entry.packedBytes;
+  }
+  if (header.supersegmentCount > UINT32_MAX) fail("it would have more than 2^32 supersegments");
   header.tableChecksum = checksumOf(table);
   header.headerChecksum = checksumOf(header);
+  std::vector<std::byte> bytes(headBytes(listsOf(vdi)));
   std::memcpy(bytes.data(), &header, sizeof(Header));
   std::memcpy(bytes.data() + sizeof(Header), table.data(), tableBytesOf(header));
+  return bytes;
+}
+
+std::vector<std::byte> encode(const Vdi& vdi) {
+  requireSoundHeader(vdi);
+  validateShape(vdi);
+  validateEnds(vdi);
+  std::vector<ChunkEntry> table;
+  std::vector<std::byte> bytes(headBytes(vdi.listCount()));
+  const auto append = [&](const EncodedChunk& chunk) {
+    table.push_back(chunk.entry);
+    bytes.insert(bytes.end(), chunk.bytes.begin(), chunk.bytes.end());
+  };
+  std::visit(
+      [&](const auto& lists) {
+        encodeChunks(lists, 0, lists.listCount(), 0, vdi.budget, vdi.depthCode, append);
+      },
+      vdi.lists);
+  const std::vector<std::byte> head = encodeHead(vdi, table);
+  std::copy(head.begin(), head.end(), bytes.begin());
   return bytes;
 }
 

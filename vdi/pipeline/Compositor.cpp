@@ -16,7 +16,9 @@ constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
 
 Compositor::Compositor(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
+      transfers_(device_, gpu::QueueKind::Transfer),
       commands_(device_),
+      flattens_(device_),
       scan_(device_),
       counts_(device_),
       interleavePass_(device_),
@@ -28,6 +30,7 @@ void Compositor::noteTimes() {
   for (const gpu::StageTime& stage : commands_.stageTimes()) milliseconds_ += stage.milliseconds;
 }
 
+/// For the merge.
 void Compositor::wait() {
   if (!std::exchange(merging_, false)) return;
   commands_.wait();
@@ -36,16 +39,71 @@ void Compositor::wait() {
   noteTimes();
 }
 
-double Compositor::takeMilliseconds() {
+void Compositor::finish() {
   wait();
+  if (std::exchange(building_, false)) {
+    builder_.finish();
+    milliseconds_ += builder_.times().all;
+    last_ = builder_.last();
+  }
+  if (std::exchange(flattening_, false)) {
+    flattens_.wait();
+    for (const gpu::StageTime& stage : flattens_.stageTimes()) milliseconds_ += stage.milliseconds;
+  }
+}
+
+void Compositor::drop() {
+  transfers_.drop();
+  commands_.drop();
+  flattens_.drop();
+  builder_.drop();
+  merging_ = flattening_ = building_ = false;
+}
+
+double Compositor::takeMilliseconds() {
   return std::exchange(milliseconds_, 0.0);
 }
 
+/// What came, one rank's behind the other's: supersegments to received_; of each rank a row of counts, as
+/// words of four bytes to packedCounts_, or as a word each to subCounts_.
+void Compositor::receive(const Distributed& parts) {
+  const std::uint64_t ranks = parts.subLists.size();
+  const std::uint64_t rowWords = gpu::groupsFor(parts.listCount, shared::countsPerWord);
+  const std::uint64_t rowLength = rowWords * shared::countsPerWord;
+  received_.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
+  packedCounts_.reserve(device_, ranks * rowWords * wordBytes, MemoryKind::DeviceLocal);
+  const bool anyWide = std::ranges::any_of(parts.subLists, &SubLists::wideCounts);
+  wideCounts_.reserve(device_, anyWide ? ranks * rowLength * wordBytes : 0, MemoryKind::DeviceLocal);
+  const auto copy = [&](const SubLists& sub, const gpu::Buffer& own, std::uint64_t from,
+                        const gpu::Buffer& to, std::uint64_t at, std::uint64_t bytes) {
+    if (sub.access != nullptr) {
+      sub.access->recordRead(transfers_, from, to, at, bytes);
+    } else {
+      transfers_.copy(own, from, to, at, bytes);
+    }
+  };
+  transfers_.begin();
+  transfers_.waitFor(parts.ownWritten);
+  std::uint64_t received = 0;
+  for (std::uint64_t r = 0; r < ranks; ++r) {
+    const SubLists& sub = parts.subLists[r];
+    copy(sub, *parts.ownSegments, sub.segmentsAt, received_, received, sub.count * parts.segmentBytes);
+    received += sub.count * parts.segmentBytes;
+    if (sub.wideCounts) {
+      copy(sub, *parts.ownCounts, sub.countsAt, wideCounts_, r * rowLength * wordBytes,
+           parts.listCount * wordBytes);
+    } else {
+      copy(sub, *parts.ownCounts, sub.countsAt, packedCounts_, r * rowWords * wordBytes,
+           rowWords * wordBytes);
+    }
+  }
+  transfers_.submit();
+}
+
 void Compositor::interleave(const Distributed& parts, const DepthCode& code, Interleaved& interleaved) {
-  wait();
+  finish();
   const std::uint32_t lists = parts.listCount;
   const std::uint64_t ranks = parts.subLists.size();
-  // Of each rank a row of counts: as words of four bytes, then as a word each.
   const std::uint64_t rowWords = gpu::groupsFor(lists, shared::countsPerWord);
   const std::uint64_t rowLength = rowWords * shared::countsPerWord;
   const std::uint64_t rows = ranks * rowLength;
@@ -53,34 +111,15 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Int
   interleaved.total = parts.total;
   interleaved.offsets.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
   interleaved.segments.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
-  received_.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
-  packedCounts_.reserve(device_, ranks * rowWords * wordBytes, MemoryKind::DeviceLocal);
   subCounts_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
   subOffsets_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
   interleavedCounts_.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
   heads_.reserve(device_, parts.total * sizeof(shared::InterleaveHead), MemoryKind::DeviceLocal);
+  receive(parts);
 
   commands_.begin();
-  commands_.mark("receive");
-  const auto copy = [&](const SubLists& sub, const gpu::Buffer& own, std::uint64_t from,
-                        const gpu::Buffer& to, std::uint64_t at, std::uint64_t bytes) {
-    if (sub.access != nullptr) {
-      sub.access->recordRead(commands_, from, to, at, bytes);
-    } else {
-      commands_.copy(own, from, to, at, bytes);
-    }
-  };
-  std::uint64_t received = 0;
-  for (std::uint64_t r = 0; r < ranks; ++r) {
-    const SubLists& sub = parts.subLists[r];
-    copy(sub, *parts.ownSegments, sub.segmentsAt, received_, received, sub.count * parts.segmentBytes);
-    received += sub.count * parts.segmentBytes;
-    if (!sub.wideCounts) {
-      copy(sub, *parts.ownCounts, sub.countsAt, packedCounts_, r * rowWords * wordBytes,
-           rowWords * wordBytes);
-    }
-  }
-  commands_.barrier();
+  commands_.waitFor(transfers_);
+  commands_.mark("unpack");
   shared::CountsConstants unpack{};
   unpack.packed = packedCounts_.address();
   unpack.counts = subCounts_.address();
@@ -89,12 +128,12 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Int
   counts_.record(commands_, unpack);
   commands_.barrier();
   for (std::uint64_t r = 0; r < ranks; ++r) {
-    const SubLists& sub = parts.subLists[r];
-    if (!sub.wideCounts) continue;
+    if (!parts.subLists[r].wideCounts) continue;
     // What's behind the row's last list must count for nothing.
     commands_.fill(subCounts_, r * rowLength * wordBytes, rowLength * wordBytes, 0);
     commands_.barrier();
-    copy(sub, *parts.ownCounts, sub.countsAt, subCounts_, r * rowLength * wordBytes, lists * wordBytes);
+    commands_.copy(wideCounts_, r * rowLength * wordBytes, subCounts_, r * rowLength * wordBytes,
+                   lists * wordBytes);
   }
   scan_.record(commands_, subCounts_, subOffsets_, static_cast<std::uint32_t>(rows));
 
@@ -116,6 +155,7 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Int
   constants.mode = shared::interleaveModeWrite;
   if (lists > 0) interleavePass_.record(commands_, constants);
   commands_.submit();
+  last_ = commands_.last();
   merging_ = true;
   receivedFrom_.clear();
   for (const SubLists& sub : parts.subLists) {
@@ -135,7 +175,7 @@ void Compositor::apply(const Interleaved& interleaved, const Request& request) {
 }
 
 SupersegmentHistogram Compositor::histogram(const Interleaved& interleaved, const Request& request) {
-  wait();
+  finish();
   if (interleaved.listCount == 0) return {};
   apply(interleaved, request);
   const SupersegmentHistogram histogram =
@@ -153,20 +193,23 @@ void Compositor::composite(const Interleaved& interleaved, const Request& reques
   lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
   lists.listCount = interleaved.listCount;
   lists.count = 0;
-  if (interleaved.listCount == 0) return wait();
+  lists.written = {};
+  if (interleaved.listCount == 0) return;
   apply(interleaved, request);
-  const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
-    settings_.thresholds = targets.thresholds;
-    settings_.capacities = targets.capacities;
-    settings_.offsets = targets.offsets;
-    settings_.segments = targets.segments;
-    settings_.preSegments = targets.preSegments;
-    settings_.written = targets.written;
-    settings_.left = targets.left;
-    settings_.status = targets.status;
-    settings_.guard = targets.guard;
+  const auto record = [this, settings = settings_, algorithm = request.algorithm](
+                          gpu::Commands& commands, const BandTargets& targets, bool write) {
+    shared::CompositeParams params = settings;
+    params.thresholds = targets.thresholds;
+    params.capacities = targets.capacities;
+    params.offsets = targets.offsets;
+    params.segments = targets.segments;
+    params.preSegments = targets.preSegments;
+    params.written = targets.written;
+    params.left = targets.left;
+    params.status = targets.status;
+    params.guard = targets.guard;
     using Work = gpu::CompositePass::Work;
-    compositePass_.record(commands, settings_, write ? Work::Write : Work::Count, request.algorithm);
+    compositePass_.record(commands, params, write ? Work::Write : Work::Count, algorithm);
   };
   ListBuilder::Request build;
   build.width = interleaved.listCount;
@@ -177,14 +220,13 @@ void Compositor::composite(const Interleaved& interleaved, const Request& reques
   build.code = request.code;
   build.fitting = interleaved.segments.address();
   build.fittingOffsets = interleaved.offsets.address();
-  builder_.build(build, record, lists);
-  milliseconds_ += builder_.times().all;
-  wait();
+  builder_.start(build, record, lists);
+  building_ = true;
+  last_ = builder_.last();
 }
 
 void Compositor::flatten(const Interleaved& interleaved, const DepthCode& code, gpu::Buffer& colors,
                          gpu::Buffer& depths) {
-  wait();
   colors.reserve(device_, interleaved.listCount * sizeof(glm::vec4), MemoryKind::DeviceLocal);
   depths.reserve(device_, interleaved.listCount * sizeof(float), MemoryKind::DeviceLocal);
   if (interleaved.listCount == 0) return;
@@ -196,11 +238,12 @@ void Compositor::flatten(const Interleaved& interleaved, const DepthCode& code, 
   constants.listCount = interleaved.listCount;
   constants.mode = shared::interleaveModeFlatten;
   constants.form = storedForm(code);
-  commands_.begin();
-  commands_.mark("flatten");
-  interleavePass_.record(commands_, constants);
-  commands_.submitAndWait();
-  noteTimes();
+  flattens_.begin();
+  flattens_.mark("flatten");
+  interleavePass_.record(flattens_, constants);
+  flattens_.submit();
+  flattening_ = true;
+  last_ = flattens_.last();
 }
 
 }  // namespace vdi::detail

@@ -35,30 +35,44 @@ class Compositor {
     std::uint32_t listCount = 0;
     std::uint64_t total = 0;
   };
-  /// Goes on on the device when this returns: `parts` must stay until `wait`, which any other call does
-  /// first.
+  /// Goes on on the device when this returns: `parts` must stay until `finish`. What came is copied by the
+  /// transfer queue, beside what the device computes.
   void interleave(const Distributed& parts, const DepthCode& code, Interleaved& interleaved);
-  void wait();
 
-  /// What these lists need.
+  /// What these lists need. Waits for what was started.
   SupersegmentHistogram histogram(const Interleaved& interleaved, const Request& request);
-  /// At most `maxPerList` supersegments a list.
+  /// Makes lists of at most `maxPerList` supersegments. Goes on on the device when this returns;
+  /// `interleaved` and `lists` must stay until `finish`.
   void composite(const Interleaved& interleaved, const Request& request, DeviceLists& lists);
   /// The flat picture: each list's supersegments composited, as [listCount] glm::vec4 and [listCount] float.
+  /// Goes on on the device likewise.
   void flatten(const Interleaved& interleaved, const DepthCode& code, gpu::Buffer& colors,
                gpu::Buffer& depths);
+  /// Waits for what was started; then `lists` are complete. Throws what ListBuilder::finish throws.
+  void finish();
+  /// Waits, and drops it: after an error.
+  void drop();
+  /// The last thing that was submitted.
+  gpu::Submission last() const { return last_; }
 
-  /// Device time of all that has been done since the last call.
+  /// Device time of all that has been done since the last call, but for the transfer queue's.
   double takeMilliseconds();
 
  private:
   void apply(const Interleaved& interleaved, const Request& request);
+  void receive(const Distributed& parts);
+  void wait();
   void noteTimes();
   std::vector<HostAccess*> receivedFrom_;  // by the merge that goes on
   bool merging_ = false;
+  bool flattening_ = false;
+  bool building_ = false;
+  gpu::Submission last_;
 
   std::shared_ptr<gpu::Device> device_;
+  gpu::Commands transfers_;
   gpu::Commands commands_;
+  gpu::Commands flattens_;
   gpu::ScanPass scan_;
   gpu::CountsPass counts_;
   gpu::InterleavePass interleavePass_;
@@ -66,6 +80,7 @@ class Compositor {
   ListBuilder builder_;
   gpu::Buffer received_;
   gpu::Buffer packedCounts_;
+  gpu::Buffer wideCounts_;
   gpu::Buffer subCounts_;
   gpu::Buffer subOffsets_;
   gpu::Buffer heads_;

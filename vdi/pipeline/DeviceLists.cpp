@@ -1,41 +1,108 @@
 #include "vdi/pipeline/DeviceLists.h"
 
+#include <algorithm>
+#include <cassert>
+#include <initializer_list>
 #include <limits>
 
 #include "vdi/core/Error.h"
 
 namespace vdi::detail {
 
+namespace {
+
+constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
+
+}  // namespace
+
 template <typename Segment>
-void ListDownload<Segment>::record(gpu::Commands& commands, gpu::ScanPass& scan, const DeviceLists& band) {
-  const std::size_t firstList = lists_.listCount();
-  const std::size_t firstSegment = lists_.segments.size();
+ListDownload<Segment>::ListDownload(ListsOf<Segment>& lists, HostPool& pool, DownloadMemory& memory,
+                                    std::uint64_t listCount, std::uint64_t expected)
+    : lists_(lists), pool_(pool), memory_(memory), listCount_(listCount) {
+  lists_.offsets.resize(listCount + 1);
+  lists_.segments.reserve(std::max<std::uint64_t>(expected, 1));
+  memory_.offsets.reserve(memory_.device, (listCount + 1) * wordBytes, gpu::MemoryKind::DeviceLocal);
+}
+
+template <typename Segment>
+ListDownload<Segment>::~ListDownload() {
+  for (gpu::Commands& transfer : memory_.transfers) transfer.drop();
+  memory_.commands.drop();
+}
+
+template <typename Segment>
+void ListDownload<Segment>::recordOffsets(gpu::Commands& commands, const DeviceLists& band,
+                                          std::uint64_t firstList) {
+  if (firstList == 0 && band.listCount == listCount_) return;  // they go as they are
+  // The last one says where the next band begins, which says so itself, perhaps before this one is done anew.
+  const std::uint64_t words = band.listCount + (firstList + band.listCount == listCount_ ? 1 : 0);
+  commands.copy(band.offsets, 0, memory_.offsets, firstList * wordBytes, words * wordBytes);
+}
+
+template <typename Segment>
+void ListDownload<Segment>::waitForTransfers() {
+  for (gpu::Commands& transfer : memory_.transfers) transfer.wait();
+  for (const void* data : std::initializer_list<const void*>{lists_.offsets.data(), lists_.segments.data()}) {
+    if (const HostPool::Place place = pool_.placeOf(data); place.access != nullptr) place.access->finish();
+  }
+}
+
+/// Where more came than was expected, what's there is copied. As many more are expected of the lists that
+/// follow.
+template <typename Segment>
+void ListDownload<Segment>::makeRoom(std::uint64_t count) {
+  if (count <= lists_.segments.capacity()) return;
+  waitForTransfers();
+  const double share = static_cast<double>(listCount_) / static_cast<double>(firstList_);
+  const auto expected = static_cast<std::uint64_t>(1.1 * share * static_cast<double>(count));
+  lists_.segments.reserve(std::max(expected, count));
+}
+
+template <typename Segment>
+gpu::Submission ListDownload<Segment>::send(const DeviceLists& band) {
+  gpu::Commands& transfer = memory_.transfers[bands_.size() % memory_.transfers.size()];
+  const std::uint64_t firstSegment = lists_.segments.size();
   if (firstSegment + band.count > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI");
   }
-  lists_.offsets.resize(firstList + band.listCount + 1);
+  bands_.push_back({firstList_, band.listCount, firstSegment});
+  firstList_ += band.listCount;
+  makeRoom(firstSegment + band.count);
   lists_.segments.resize(firstSegment + band.count);
-  if (firstSegment > 0) {
-    scan.recordRebase(commands, band.offsets, band.listCount, static_cast<std::uint32_t>(firstSegment));
+  transfer.begin();
+  transfer.waitFor(band.written);
+  if (isWhole()) {
+    const HostPool::Place place = pool_.placeOf(lists_.offsets.data());
+    place.access->recordWrite(transfer, band.offsets, 0, place.at, (listCount_ + 1) * wordBytes);
   }
-  commands.barrier();
-  commands.mark("download");
-  const auto write = [&](const gpu::Buffer& from, const void* to, std::uint64_t bytes) {
-    const HostPool::Place place = pool_.placeOf(to);
-    place.access->recordWrite(commands, from, 0, place.at, bytes);
-    written_.push_back(place.access);
-  };
-  write(band.offsets, lists_.offsets.data() + firstList,
-        (std::uint64_t{band.listCount} + 1) * sizeof(std::uint32_t));
   if (band.count > 0) {
-    write(band.segments, lists_.segments.data() + firstSegment, band.count * sizeof(Segment));
+    const HostPool::Place place = pool_.placeOf(lists_.segments.data() + firstSegment);
+    place.access->recordWrite(transfer, band.segments, 0, place.at, band.count * sizeof(Segment));
   }
+  transfer.submit();
+  return transfer.last();
 }
 
 template <typename Segment>
 void ListDownload<Segment>::finish() {
-  for (HostAccess* access : written_) access->finish();
-  written_.clear();
+  assert(firstList_ == listCount_);
+  if (!isWhole()) downloadOffsets();
+  waitForTransfers();
+}
+
+/// Counted from the picture's first supersegment on.
+template <typename Segment>
+void ListDownload<Segment>::downloadOffsets() {
+  memory_.commands.begin();
+  for (const Band& band : bands_) {
+    const std::uint32_t behind = band.firstList + band.listCount == listCount_ ? 1 : 0;
+    memory_.scan.recordRebase(memory_.commands, memory_.offsets, band.firstList, band.listCount + behind,
+                              static_cast<std::uint32_t>(band.firstSegment));
+  }
+  memory_.commands.barrier();
+  const HostPool::Place place = pool_.placeOf(lists_.offsets.data());
+  place.access->recordWrite(memory_.commands, memory_.offsets, 0, place.at, (listCount_ + 1) * wordBytes);
+  memory_.commands.submitAndWait();
 }
 
 template class ListDownload<Supersegment>;

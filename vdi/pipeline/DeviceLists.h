@@ -1,11 +1,13 @@
 // Lists on a device, and their way to the host. Not part of the library's interface.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "vdi/core/Supersegment.h"
+#include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/ScanPass.h"
 #include "vdi/pipeline/HostAccess.h"
@@ -18,6 +20,7 @@ struct DeviceLists {
   gpu::Buffer segments;  // [count], CompactSupersegments or Supersegments
   std::uint32_t listCount = 0;
   std::uint64_t count = 0;
+  gpu::Submission written;  // what other queues wait for
 };
 
 /// Of one supersegment: compact lists have a depth code.
@@ -34,22 +37,60 @@ ListsOf<Segment> listsIn(const std::shared_ptr<HostPool>& pool) {
   return lists;
 }
 
-/// Appends lists of a device to those of the host, band after band.
+/// What downloads need and keep from frame to frame.
+struct DownloadMemory {
+  explicit DownloadMemory(const std::shared_ptr<gpu::Device>& theDevice)
+      : device(theDevice),
+        transfers{gpu::Commands(theDevice, gpu::QueueKind::Transfer),
+                  gpu::Commands(theDevice, gpu::QueueKind::Transfer)},
+        commands(theDevice),
+        scan(theDevice) {}
+  std::shared_ptr<gpu::Device> device;
+  std::array<gpu::Commands, 2> transfers;  // taken in turns
+  gpu::Commands commands;
+  gpu::ScanPass scan;
+  gpu::Buffer offsets;  // of all bands
+};
+
+/// Lists of a device on their way to the host, band after band, while the device makes the next ones.
+/// Supersegments go as soon as they're there. Offsets go at the end: what they begin with is known then.
 template <typename Segment>
 class ListDownload {
  public:
-  /// `lists`: of listsIn(pool).
-  ListDownload(ListsOf<Segment>& lists, HostPool& pool) : lists_(lists), pool_(pool) {}
+  /// `lists`: of listsIn(pool). `expected`: supersegments that there may be; more take another copy.
+  ListDownload(ListsOf<Segment>& lists, HostPool& pool, DownloadMemory& memory, std::uint64_t listCount,
+               std::uint64_t expected);
+  ~ListDownload();
+  ListDownload(const ListDownload&) = delete;
+  ListDownload& operator=(const ListDownload&) = delete;
+  ListDownload(ListDownload&&) = delete;
+  ListDownload& operator=(ListDownload&&) = delete;
 
-  /// A stage named "download". The band's offsets become those of the host's lists.
-  void record(gpu::Commands& commands, gpu::ScanPass& scan, const DeviceLists& band);
-  /// When the commands are done.
+  /// Behind the steps that make the band: `firstList` is its first one.
+  void recordOffsets(gpu::Commands& commands, const DeviceLists& band, std::uint64_t firstList);
+  /// Bands in their order, each when it's there. The result is what uses the band's memory.
+  gpu::Submission send(const DeviceLists& band);
+  /// Waits until the lists are there.
   void finish();
 
  private:
+  void makeRoom(std::uint64_t count);
+  void downloadOffsets();
+  /// One band is all of the picture.
+  bool isWhole() const { return bands_.size() == 1 && bands_.front().listCount == listCount_; }
+  void waitForTransfers();
+
+  struct Band {
+    std::uint64_t firstList = 0;
+    std::uint32_t listCount = 0;
+    std::uint64_t firstSegment = 0;
+  };
   ListsOf<Segment>& lists_;
   HostPool& pool_;
-  std::vector<HostAccess*> written_;
+  DownloadMemory& memory_;
+  std::uint64_t listCount_;
+  std::uint64_t firstList_ = 0;  // of the band that's next
+  std::vector<Band> bands_;
 };
 
 }  // namespace vdi::detail

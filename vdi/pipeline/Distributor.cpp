@@ -29,12 +29,6 @@ std::uint64_t packedAt(std::uint64_t list, bool wide) {
   return wide ? list * wordBytes : list / shared::countsPerWord * wordBytes;
 }
 
-double deviceMilliseconds(const gpu::Commands& commands) {
-  double sum = 0.0;
-  for (const gpu::StageTime& stage : commands.stageTimes()) sum += stage.milliseconds;
-  return sum;
-}
-
 }  // namespace
 
 HostAccess& HostAccesses::of(const std::shared_ptr<HostMemory>& memory) {
@@ -54,10 +48,11 @@ Distributor::Distributor(std::shared_ptr<gpu::Device> device, const comm::Commun
       exchange_(comm, transport),
       accesses_(device_),
       commands_(device_),
+      transfers_(device_, gpu::QueueKind::Transfer),
       counts_(device_),
       tooLarge_(device_, wordBytes, MemoryKind::Readback) {}
 
-void Distributor::recordPack(const DeviceLists& lists, bool wide) {
+void Distributor::recordCounts(gpu::Commands& commands, const DeviceLists& lists, bool wide) {
   const std::uint64_t bytes = packedBytes(lists.listCount, wide);
   packed_.reserve(device_, bytes, MemoryKind::DeviceLocal);
   shared::CountsConstants constants{};
@@ -67,27 +62,26 @@ void Distributor::recordPack(const DeviceLists& lists, bool wide) {
   constants.listCount = lists.listCount;
   constants.words = static_cast<std::uint32_t>(bytes / wordBytes);
   constants.mode = wide ? shared::countsModePackWide : shared::countsModePack;
-  counts_.record(commands_, constants);
+  counts_.record(commands, constants);
 }
 
 /// All lists' counts to packed_, and where each rank's supersegments begin to boundaryOffsets_.
-void Distributor::pack(const DeviceLists& lists, const comm::Ownership& owned) {
+void Distributor::recordPack(gpu::Commands& commands, const DeviceLists& lists,
+                             const comm::Ownership& owned) {
   const auto ranks = static_cast<std::uint64_t>(owned.ranks());
   boundaryOffsets_.reserve(device_, (ranks + 1) * wordBytes, MemoryKind::Readback);
   tooLarge_.mappedAs<std::uint32_t>()[0] = 0;
-  commands_.begin();
-  commands_.mark("pack");
-  recordPack(lists, false);
+  recordCounts(commands, lists, false);
   for (std::uint64_t r = 0; r <= ranks; ++r) {
     const std::uint64_t list = r < ranks ? owned.of(static_cast<int>(r)).first : lists.listCount;
-    commands_.copy(lists.offsets, list * wordBytes, boundaryOffsets_, r * wordBytes, wordBytes);
+    commands.copy(lists.offsets, list * wordBytes, boundaryOffsets_, r * wordBytes, wordBytes);
   }
-  commands_.submitAndWait();
-  milliseconds_ += deviceMilliseconds(commands_);
-  wide_ = tooLarge_.mappedAs<std::uint32_t>()[0] != 0;
-  if (!wide_) return;
+}
+
+/// Where a count has no room in a byte: all of them as words.
+void Distributor::packWide(const DeviceLists& lists) {
   commands_.begin();
-  recordPack(lists, true);
+  recordCounts(commands_, lists, true);
   commands_.submitAndWait();
 }
 
@@ -95,7 +89,6 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
                                     std::uint64_t segmentBytes) {
   const int ranks = owned.ranks();
   bytesSent_ = 0;
-  milliseconds_ = 0.0;
   // What each rank gets of this one's, and where that lies in the outbox.
   std::vector<comm::Exchange::Outgoing> pieces;
   std::uint64_t outboxBytes = 0;
@@ -103,38 +96,37 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
     return std::uint64_t{boundaryOffsets_.mappedAs<std::uint32_t>()[static_cast<std::size_t>(rank)]};
   };
   const auto segmentsOf = [&](int rank) { return firstSegment(rank + 1) - firstSegment(rank); };
-  comm_.together([&] {
-    pack(lists, owned);
-    for (int r = 0; r < ranks; ++r) {
-      if (r == comm_.rank() || segmentsOf(r) == 0) continue;
-      comm::Exchange::Outgoing piece;
-      piece.to = r;
-      piece.at = outboxBytes;
-      piece.bytes = aligned(packedBytes(owned.of(r).count(), wide_)) + segmentsOf(r) * segmentBytes;
-      piece.note = {segmentsOf(r), wide_ ? 1U : 0U};
-      outboxBytes += aligned(piece.bytes);
-      bytesSent_ += piece.bytes;
-      pieces.push_back(piece);
-    }
-  });
+  wide_ = tooLarge_.mappedAs<std::uint32_t>()[0] != 0;
+  for (int r = 0; r < ranks; ++r) {
+    if (r == comm_.rank() || segmentsOf(r) == 0) continue;
+    comm::Exchange::Outgoing piece;
+    piece.to = r;
+    piece.at = outboxBytes;
+    piece.bytes = aligned(packedBytes(owned.of(r).count(), wide_)) + segmentsOf(r) * segmentBytes;
+    piece.note = {segmentsOf(r), wide_ ? 1U : 0U};
+    outboxBytes += aligned(piece.bytes);
+    bytesSent_ += piece.bytes;
+    pieces.push_back(piece);
+  }
   const comm::Exchange::Place outbox = exchange_.outbox(outboxBytes);
   comm_.together([&] {
     accesses_.tidy();
+    if (wide_) packWide(lists);
     if (pieces.empty()) return;
     HostAccess& access = accesses_.of(outbox.memory);
-    commands_.begin();
-    commands_.mark("send");
+    transfers_.begin();
+    transfers_.waitFor(lists.written);
+    if (wide_) transfers_.waitFor(commands_);
     for (const comm::Exchange::Outgoing& piece : pieces) {
       const comm::ListRange range = owned.of(piece.to);
       const std::uint64_t at = outbox.at + piece.at;
       const std::uint64_t countBytes = packedBytes(range.count(), wide_);
-      access.recordWrite(commands_, packed_, packedAt(range.first, wide_), at, countBytes);
-      access.recordWrite(commands_, lists.segments, firstSegment(piece.to) * segmentBytes,
+      access.recordWrite(transfers_, packed_, packedAt(range.first, wide_), at, countBytes);
+      access.recordWrite(transfers_, lists.segments, firstSegment(piece.to) * segmentBytes,
                          at + aligned(countBytes), segmentsOf(piece.to) * segmentBytes);
     }
-    commands_.submitAndWait();
+    transfers_.submitAndWait();
     access.finish();
-    milliseconds_ += deviceMilliseconds(commands_);
   });
   const std::vector<comm::Exchange::Incoming> incoming = exchange_.send(pieces);
 
@@ -142,6 +134,7 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
   const comm::ListRange mine = owned.of(comm_.rank());
   result.ownCounts = &packed_;
   result.ownSegments = &lists.segments;
+  result.ownWritten = wide_ ? commands_.last() : lists.written;
   result.listCount = static_cast<std::uint32_t>(mine.count());
   result.segmentBytes = segmentBytes;
   const auto addOwn = [&] {

@@ -44,6 +44,7 @@ struct Distributed {
   std::vector<SubLists> subLists;
   const gpu::Buffer* ownCounts = nullptr;
   const gpu::Buffer* ownSegments = nullptr;
+  gpu::Submission ownWritten;  // these
   std::uint32_t listCount = 0;
   std::uint64_t segmentBytes = 0;
   std::uint64_t total = 0;  // supersegments
@@ -53,28 +54,34 @@ class Distributor {
  public:
   Distributor(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm, comm::Transport transport);
 
-  /// Collective. `lists`: all of a band, on every rank; `owned`: who gets which of them.
+  /// Behind the steps that make `lists`: what the host and other ranks need to know of them. `owned`: who
+  /// gets which of them. What was distributed before must have been composited.
+  void recordPack(gpu::Commands& commands, const DeviceLists& lists, const comm::Ownership& owned);
+  /// Collective, when that's done. `lists`: all of a band, on every rank. What's sent goes by way of the
+  /// transfer queue: the device may make other lists meanwhile. What came stays until a distribution after
+  /// the next one of this object or another.
   Distributed distribute(const DeviceLists& lists, const comm::Ownership& owned, std::uint64_t segmentBytes);
+  /// Waits for what was submitted: after an error.
+  void drop() { transfers_.drop(); }
 
   std::uint64_t bytesSent() const { return bytesSent_; }  // by the last one, to other ranks
-  double milliseconds() const { return milliseconds_; }   // device time of the last one
 
  private:
-  void pack(const DeviceLists& lists, const comm::Ownership& owned);
-  void recordPack(const DeviceLists& lists, bool wide);
+  void recordCounts(gpu::Commands& commands, const DeviceLists& lists, bool wide);
+  void packWide(const DeviceLists& lists);
 
   std::shared_ptr<gpu::Device> device_;
   const comm::Communicator& comm_;
   comm::Exchange exchange_;
   HostAccesses accesses_;
   gpu::Commands commands_;
+  gpu::Commands transfers_;
   gpu::CountsPass counts_;
   gpu::Buffer packed_;
   gpu::Buffer tooLarge_;
   gpu::Buffer boundaryOffsets_;  // of the supersegments, where each rank's begin, [ranks + 1]
   bool wide_ = false;
   std::uint64_t bytesSent_ = 0;
-  double milliseconds_ = 0.0;
 };
 
 }  // namespace vdi::detail

@@ -22,9 +22,9 @@ class Fingerprint {
   template <typename T>
   void add(const T& value) {
     static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
-    const std::size_t end = bytes_.size();
-    bytes_.resize(end + sizeof(T));
-    std::memcpy(bytes_.data() + end, &value, sizeof(T));
+    std::array<std::byte, sizeof(T)> own{};
+    std::memcpy(own.data(), &value, sizeof(T));
+    for (const std::byte byte : own) bytes_.push_back(byte);
   }
   void add(const glm::dvec3& v) {
     for (int axis = 0; axis < 3; ++axis) add(v[axis]);
@@ -68,6 +68,7 @@ std::uint64_t fingerprintOf(const GenerateSettings& settings) {
   Fingerprint print;
   print.add(settings.width);
   print.add(settings.height);
+  print.add(settings.margin);
   print.add(settings.supersegments);
   print.add(settings.budget);
   print.add(settings.fill);

@@ -16,121 +16,131 @@ struct ArrayHeader {
   std::array<char, nameBytes> memory{};  // empty: others can't open it
   std::uint64_t memoryBytes = 0;
   std::uint64_t at = 0;
+  std::uint64_t bytes = 0;
 };
 
 }  // namespace
 
-struct Gather::Array {
-  HostAccess* access = nullptr;  // null: by messages
-  std::uint64_t at = 0;
-};
-
-Gather::Gather(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm, comm::Transport transport,
-               int root)
-    : device_(std::move(device)), comm_(comm), transport_(transport), root_(root), commands_(device_) {}
-
-HostAccess& Gather::openedAccess(const std::string& name, std::uint64_t bytes) {
-  constexpr std::size_t maxCount = 8;  // arrays of a few frames
-  std::erase(recent_, name);
-  recent_.push_back(name);
-  if (recent_.size() > maxCount) {
-    opened_.erase(recent_.front());
-    recent_.erase(recent_.begin());
-  }
-  std::unique_ptr<HostAccess>& access = opened_[name];
+HostAccess& OpenedMemory::of(const std::string& name, std::uint64_t bytes) {
+  std::unique_ptr<HostAccess>& access = accesses_[name];
   if (!access) access = std::make_unique<HostAccess>(device_, HostMemory::open(name, bytes));
   return *access;
 }
 
-/// Where this rank's device writes each array to.
-std::vector<Gather::Array> Gather::shareArrays(HostPool& pool, std::span<void* const> arrays) {
-  const bool isRoot = comm_.rank() == root_;
-  std::vector<Array> result;
-  std::vector<std::byte> bytes;
-  if (isRoot) {
-    for (const void* data : arrays) {
-      const HostPool::Place place = pool.placeOf(data);
-      ArrayHeader header;
-      const HostMemory& memory = *place.access->memory();
-      std::copy(memory.name().begin(), memory.name().end(), header.memory.begin());
-      header.memoryBytes = memory.bytes().size();
-      header.at = place.at;
-      const auto* begin = reinterpret_cast<const std::byte*>(&header);
-      bytes.insert(bytes.end(), begin, begin + sizeof(header));
-      result.push_back({place.access, place.at});
-    }
-  }
-  bytes = comm_.broadcast(std::move(bytes), root_);
-  if (isRoot) return result;
-  const bool here =
-      transport_ == comm::Transport::Shared && comm_.hostLeader(root_) == comm_.hostLeader(comm_.rank());
-  result.resize(bytes.size() / sizeof(ArrayHeader));
-  for (std::size_t i = 0; i < result.size(); ++i) {
-    ArrayHeader header;
-    std::memcpy(&header, bytes.data() + i * sizeof(header), sizeof(header));
-    if (!here || header.memory.front() == '\0') continue;
-    result[i] = {&openedAccess(header.memory.data(), header.memoryBytes), header.at};
-  }
-  return result;
+void OpenedMemory::keep(const std::vector<std::string>& names) {
+  std::erase_if(accesses_, [&](const auto& entry) {
+    return std::find(names.begin(), names.end(), entry.first) == names.end();
+  });
 }
 
-void Gather::run(HostPool& pool, std::span<void* const> arrays, std::span<const Piece> pieces,
-                 const std::function<void(gpu::Commands&)>& before) {
+Gather::Gather(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm, comm::Transport transport,
+               int root, std::shared_ptr<OpenedMemory> opened)
+    : device_(std::move(device)),
+      comm_(comm),
+      transport_(transport),
+      root_(root),
+      opened_(std::move(opened)) {}
+
+/// For the other ranks: the arrays, then all memory that the pool has.
+std::vector<std::byte> Gather::describe(HostPool& pool, std::span<const std::span<std::byte>> arrays) {
+  std::vector<ArrayHeader> headers;
+  for (const std::span<std::byte> array : arrays) {
+    const HostPool::Place place = pool.placeOf(array.data());
+    const HostMemory& memory = *place.access->memory();
+    ArrayHeader header;
+    std::copy(memory.name().begin(), memory.name().end(), header.memory.begin());
+    header.memoryBytes = memory.bytes().size();
+    header.at = place.at;
+    header.bytes = array.size();
+    headers.push_back(header);
+    arrays_.push_back({place.access, place.at, array.size(), array.data()});
+  }
+  for (const std::string& name : pool.names()) {
+    ArrayHeader header;
+    std::copy(name.begin(), name.end(), header.memory.begin());
+    headers.push_back(header);
+  }
+  const auto bytes = std::as_bytes(std::span(headers));
+  return {bytes.begin(), bytes.end()};
+}
+
+void Gather::open(std::span<const std::byte> described) {
+  const bool here =
+      transport_ == comm::Transport::Shared && comm_.hostLeader(root_) == comm_.hostLeader(comm_.rank());
+  std::vector<ArrayHeader> headers(described.size() / sizeof(ArrayHeader));
+  std::memcpy(headers.data(), described.data(), described.size());
+  std::vector<std::string> names;
+  names.reserve(headers.size());
+  for (const ArrayHeader& header : headers) names.emplace_back(header.memory.data());
+  opened_->keep(names);
+  for (const ArrayHeader& header : headers) {
+    if (header.bytes == 0) continue;  // not an array
+    Array array{nullptr, header.at, header.bytes, nullptr};
+    if (here && header.memory.front() != '\0')
+      array.access = &opened_->of(header.memory.data(), header.memoryBytes);
+    arrays_.push_back(array);
+  }
+}
+
+void Gather::begin(HostPool& pool, std::span<const std::span<std::byte>> arrays) {
   const bool isRoot = comm_.rank() == root_;
   bytesSent_ = 0;
-  std::vector<Array> targets;
-  std::exception_ptr error;
-  try {
-    targets = shareArrays(pool, arrays);
-  } catch (...) {
-    error = std::current_exception();
-  }
-  comm_.agree(error);
-
-  // The pieces of those who can't write there come as messages: what, and then the bytes.
-  std::vector<std::uint64_t> messages;  // of this rank: array, at, bytes
-  std::uint64_t messageBytes = 0;
-  for (const Piece& piece : pieces) {
-    const bool asMessage = targets[piece.array].access == nullptr;
-    messages.insert(messages.end(), {piece.array, piece.at, asMessage ? piece.bytes : 0});
-    if (asMessage) messageBytes += piece.bytes;
-    if (!isRoot) bytesSent_ += piece.bytes;
-  }
+  std::vector<std::byte> described;
   comm_.together([&] {
-    if (messageBytes > 0 && (!outbox_ || outbox_->memory()->bytes().size() < messageBytes)) {
-      outbox_ = std::make_unique<HostAccess>(device_, HostMemory::anonymous(messageBytes + messageBytes / 2));
-    }
-    commands_.begin();
-    if (before) before(commands_);
-    commands_.barrier();
-    std::uint64_t outboxAt = 0;
-    for (const Piece& piece : pieces) {
-      const Array& target = targets[piece.array];
-      if (target.access != nullptr) {
-        target.access->recordWrite(commands_, *piece.from, 0, target.at + piece.at, piece.bytes);
-      } else {
-        outbox_->recordWrite(commands_, *piece.from, 0, outboxAt, piece.bytes);
-        outboxAt += piece.bytes;
-      }
-    }
-    commands_.submitAndWait();
-    for (const Array& target : targets) {
-      if (target.access != nullptr) target.access->finish();
-    }
-    if (outboxAt > 0) outbox_->finish();
+    drop();
+    if (isRoot) described = describe(pool, arrays);
   });
+  described = comm_.broadcast(std::move(described), root_);
+  comm_.together([&] {
+    if (!isRoot) open(described);
+  });
+}
 
-  const std::vector<std::uint64_t> all = comm_.allGatherWords(messages);
+gpu::Commands& Gather::nextTransfer() {
+  if (transfersUsed_ == transfers_.size())
+    transfers_.push_back(std::make_unique<gpu::Commands>(device_, gpu::QueueKind::Transfer));
+  return *transfers_[transfersUsed_++];
+}
+
+void Gather::send(std::span<const Piece> pieces, const gpu::Submission& after) {
+  gpu::Commands& transfer = nextTransfer();
+  transfer.begin();
+  transfer.waitFor(after);
+  for (const Piece& piece : pieces) {
+    const Array& array = arrays_[piece.array];
+    Message message{piece, after};
+    if (array.access != nullptr) {
+      array.access->recordWrite(transfer, *piece.from, 0, array.at + piece.at, piece.bytes);
+      message.piece.bytes = 0;
+    }
+    messages_.push_back(message);
+    if (comm_.rank() != root_) bytesSent_ += piece.bytes;
+  }
+  transfer.submit();
+}
+
+void Gather::drop() {
+  for (const std::unique_ptr<gpu::Commands>& transfer : transfers_) transfer->drop();
+  transfersUsed_ = 0;
+  messages_.clear();
+  arrays_.clear();
+}
+
+/// The pieces of those who can't write there: what, and then the bytes.
+void Gather::sendMessages() {
+  std::vector<std::uint64_t> words;
+  for (const Message& message : messages_)
+    words.insert(words.end(), {message.piece.array, message.piece.at, message.piece.bytes});
+  const std::vector<std::uint64_t> all = comm_.allGatherWords(words);
   comm::Messages underWay(comm_);
-  constexpr std::size_t words = 3;
-  const std::size_t perRank = messages.size();
+  constexpr std::size_t perMessage = 3;
   std::uint64_t outboxAt = 0;
   for (int r = 0; r < comm_.size(); ++r) {
-    for (std::size_t i = 0; i < perRank; i += words) {
-      const std::uint64_t* message = &all[static_cast<std::size_t>(r) * perRank + i];
+    for (std::size_t i = 0; i < words.size(); i += perMessage) {
+      const std::uint64_t* message = &all[static_cast<std::size_t>(r) * words.size() + i];
       const std::uint64_t bytes = message[2];
       if (bytes == 0) continue;
-      if (isRoot) underWay.receive(r, {static_cast<std::byte*>(arrays[message[0]]) + message[1], bytes});
+      if (comm_.rank() == root_) underWay.receive(r, {arrays_[message[0]].data + message[1], bytes});
       if (r == comm_.rank()) {
         underWay.send(root_, outbox_->memory()->bytes().subspan(outboxAt, bytes));
         outboxAt += bytes;
@@ -138,9 +148,36 @@ void Gather::run(HostPool& pool, std::span<void* const> arrays, std::span<const 
     }
   }
   underWay.wait();
-  if (isRoot) {
-    for (const Array& target : targets) target.access->memory()->unlink();  // those who can have opened it
+}
+
+void Gather::finish() {
+  std::uint64_t outboxBytes = 0;
+  for (const Message& message : messages_) outboxBytes += message.piece.bytes;
+  comm_.together([&] {
+    if (outboxBytes > 0) {
+      if (!outbox_ || outbox_->memory()->bytes().size() < outboxBytes)
+        outbox_ = std::make_unique<HostAccess>(device_, HostMemory::anonymous(outboxBytes + outboxBytes / 2));
+      gpu::Commands& transfer = nextTransfer();
+      transfer.begin();
+      std::uint64_t at = 0;
+      for (const Message& message : messages_) {
+        transfer.waitFor(message.after);
+        outbox_->recordWrite(transfer, *message.piece.from, 0, at, message.piece.bytes);
+        at += message.piece.bytes;
+      }
+      transfer.submit();
+    }
+    for (const std::unique_ptr<gpu::Commands>& transfer : transfers_) transfer->wait();
+    for (const Array& array : arrays_) {
+      if (array.access != nullptr) array.access->finish();
+    }
+    if (outboxBytes > 0) outbox_->finish();
+  });
+  sendMessages();
+  if (comm_.rank() == root_) {
+    for (const Array& array : arrays_) array.access->memory()->unlink();  // those who can have opened it
   }
+  drop();
 }
 
 }  // namespace vdi::detail

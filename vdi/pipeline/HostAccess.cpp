@@ -67,6 +67,15 @@ HostPool::Place HostPool::placeOf(const void* data) {
   return {};
 }
 
+std::vector<std::string> HostPool::names() {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> names;
+  for (const Block& block : blocks_) {
+    if (!block.memory->name().empty()) names.push_back(block.memory->name());
+  }
+  return names;
+}
+
 void HostPool::detach() noexcept {
   const std::lock_guard lock(mutex_);
   for (Block& block : blocks_) block.access.reset();

@@ -6,6 +6,7 @@
 #include <memory_resource>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "vdi/core/HostMemory.h"
@@ -66,6 +67,8 @@ class HostPool final : public std::pmr::memory_resource {
     std::uint64_t at = 0;
   };
   Place placeOf(const void* data);
+  /// Of all memory that vectors have or may get, as other processes open it; not of what they can't.
+  std::vector<std::string> names();
 
   /// Lets go of the device. Vectors that are in use stay as they are.
   void detach() noexcept;

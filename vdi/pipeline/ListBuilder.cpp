@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <bit>
+#include <cassert>
 #include <limits>
+#include <utility>
 
 #include "vdi/core/Error.h"
 
@@ -34,8 +35,10 @@ std::uint64_t ListBuilder::bytesPerList(std::uint32_t maxCount, Algorithm algori
   return segments + shared::maxPreSegments(maxCount) * sizeof(shared::StoredPreSegment);
 }
 
-void ListBuilder::build(const Request& request, const Record& record, DeviceLists& lists,
-                        const Finish& finish) {
+/// What the host may do while the device is at work for another builder.
+void ListBuilder::reserve() {
+  const Request& request = started_->request;
+  DeviceLists& lists = *started_->lists;
   const std::uint64_t words = (std::uint64_t{request.listCount()} + 1) * sizeof(std::uint32_t);
   thresholds_.reserve(device_, words, MemoryKind::DeviceLocal);
   capacities_.reserve(device_, words, MemoryKind::DeviceLocal);
@@ -43,11 +46,58 @@ void ListBuilder::build(const Request& request, const Record& record, DeviceList
   lists.listCount = request.listCount();
   status_.mappedAs<std::uint32_t>()[0] = 0;
   times_ = {};
+  if (request.algorithm == Algorithm::Bisection) return;
+  const std::uint64_t countedWords =
+      std::uint64_t{request.countedWidth()} * request.countedRows() * sizeof(std::uint32_t);
+  preSegmentOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
+  written_.reserve(device_, words, MemoryKind::DeviceLocal);
+  countedTolerances_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
+  countedPreSegments_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
+  left_.reserve(device_, words, MemoryKind::DeviceLocal);
+  preSegments_.reserve(device_, 0, MemoryKind::DeviceLocal);
+  lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
+  if (hasQuotas()) quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
+}
+
+void ListBuilder::start(const Request& request, Record record, DeviceLists& lists, Behind behind,
+                        const gpu::Submission& after) {
+  commands_.wait();
+  started_ = Started{request, std::move(record), std::move(behind), &lists};
+  reserve();
   if (request.algorithm == Algorithm::Bisection) {
-    buildByBisection(request, record, lists, finish);
+    submitBisection(after);
   } else {
-    buildByMerging(request, record, lists, finish);
+    submitMerging(From::Search, after);
   }
+}
+
+void ListBuilder::startEmpty(std::uint32_t listCount, DeviceLists& lists, const Behind& behind) {
+  commands_.wait();
+  started_ = Started{{}, {}, behind, &lists, true};
+  lists.offsets.reserve(device_, (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t),
+                        MemoryKind::DeviceLocal);
+  lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
+  lists.listCount = listCount;
+  status_.mappedAs<std::uint32_t>()[0] = 0;
+  times_ = {};
+  commands_.begin();
+  commands_.fill(lists.offsets, 0);
+  commands_.barrier();
+  submit();
+}
+
+void ListBuilder::finish() {
+  assert(started_);
+  if (started_->empty) {
+    commands_.wait();
+    started_->lists->count = 0;
+  } else if (started_->request.algorithm == Algorithm::Bisection) {
+    finishBisection();
+  } else {
+    finishMerging();
+  }
+  started_->lists->written = commands_.last();
+  started_.reset();
   if (const std::uint32_t wrong = status_.mappedAs<std::uint32_t>()[0]; wrong != 0) {
     throw Error(ErrorCode::DeviceFailure,
                 fmt::format("{} lists were written with another count than was stored", wrong),
@@ -55,12 +105,20 @@ void ListBuilder::build(const Request& request, const Record& record, DeviceList
   }
 }
 
-/// Submits, waits, and adds up the times.
-void ListBuilder::end(const Finish& finish) {
-  if (finish) finish(commands_);
-  commands_.submitAndWait();
+void ListBuilder::drop() {
+  commands_.drop();
+  started_.reset();
+}
+
+/// With what comes behind the steps.
+void ListBuilder::submit() {
+  if (started_->behind) started_->behind(commands_);
+  commands_.submit();
+}
+
+/// Of what was waited for.
+void ListBuilder::addTimes() {
   for (const gpu::StageTime& stage : commands_.stageTimes()) {
-    if (stage.name == "download") continue;
     times_.all += stage.milliseconds;
     if (stage.name == "count") times_.count += stage.milliseconds;
     if (stage.name == "write") times_.write += stage.milliseconds;
@@ -76,154 +134,178 @@ void ListBuilder::recordTotal(const gpu::Buffer& offsets, std::uint32_t listCoun
                  which * sizeof(std::uint32_t), sizeof(std::uint32_t));
 }
 
-void ListBuilder::buildByBisection(const Request& request, const Record& record, DeviceLists& lists,
-                                   const Finish& finish) {
+/// The search alone: the host takes memory for what it finds.
+void ListBuilder::submitBisection(const gpu::Submission& after) {
+  const std::uint32_t listCount = started_->request.listCount();
+  DeviceLists& lists = *started_->lists;
   BandTargets targets;
   targets.thresholds = thresholds_.address();
   targets.capacities = capacities_.address();
   targets.offsets = lists.offsets.address();
   targets.status = status_.address();
   commands_.begin();
+  commands_.waitFor(after);
   commands_.mark("count");
-  record(commands_, targets, false);
-  scan_.record(commands_, capacities_, lists.offsets, request.listCount());
-  recordTotal(lists.offsets, request.listCount(), segmentTotal);
-  end({});
-  scan_.requireNoOverflow();
-  lists.count = totals_.mappedAs<std::uint32_t>()[segmentTotal];
-
-  lists.segments.reserve(device_, lists.count * segmentBytes(request.code), MemoryKind::DeviceLocal);
-  targets.segments = lists.segments.address();
-  commands_.begin();
-  commands_.mark("write");
-  if (lists.count > 0) record(commands_, targets, true);
-  end(finish);
+  started_->record(commands_, targets, false);
+  scan_.record(commands_, capacities_, lists.offsets, listCount);
+  recordTotal(lists.offsets, listCount, segmentTotal);
+  commands_.submit();
 }
 
-/// All steps in one submission: the memory for pre-segments and supersegments is that of the frame before,
-/// and where it's too small the steps that need it do nothing. Then they're submitted again, with memory for
-/// what was counted, and for a quarter more.
-void ListBuilder::buildByMerging(const Request& request, const Record& record, DeviceLists& lists,
-                                 const Finish& finish) {
-  const std::uint32_t listCount = request.listCount();
-  const std::uint64_t words = (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t);
-  const std::uint64_t countedWords =
-      std::uint64_t{request.countedWidth()} * request.countedRows() * sizeof(std::uint32_t);
-  preSegmentOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
-  written_.reserve(device_, words, MemoryKind::DeviceLocal);
-  countedTolerances_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
-  countedPreSegments_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
-  left_.reserve(device_, words, MemoryKind::DeviceLocal);
-  preSegments_.reserve(device_, 0, MemoryKind::DeviceLocal);
-  lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
-  const bool quotas = request.agreed || request.runsOnly;
-  if (quotas) quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
+void ListBuilder::finishBisection() {
+  const Request& request = started_->request;
+  DeviceLists& lists = *started_->lists;
+  commands_.wait();
+  addTimes();
+  scan_.requireNoOverflow();
+  lists.count = totals_.mappedAs<std::uint32_t>()[segmentTotal];
+  lists.segments.reserve(device_, lists.count * segmentBytes(request.code), MemoryKind::DeviceLocal);
+  BandTargets targets;
+  targets.thresholds = thresholds_.address();
+  targets.capacities = capacities_.address();
+  targets.offsets = lists.offsets.address();
+  targets.segments = lists.segments.address();
+  targets.status = status_.address();
+  commands_.begin();
+  commands_.mark("write");
+  if (lists.count > 0) started_->record(commands_, targets, true);
+  commands_.barrier();
+  submit();
+  commands_.wait();
+  addTimes();
+}
 
-  const auto takeRuns = [&] {
+/// Tolerances and capacities of all lists.
+void ListBuilder::recordSearch() {
+  const Request& request = started_->request;
+  if (request.runsOnly) {
     commands_.fill(thresholds_, std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max()));
     commands_.fill(capacities_, expectedRuns_);
     commands_.fill(quotas_, expectedRuns_ << 16U);
-  };
-  const auto search = [&] {
-    if (request.runsOnly) return takeRuns();
-    shared::InterpolateConstants constants{};
-    constants.countedTolerances = countedTolerances_.address();
-    constants.countedPreSegments = countedPreSegments_.address();
-    constants.tolerances = thresholds_.address();
-    constants.capacities = capacities_.address();
-    constants.width = request.width;
-    constants.rows = request.rows;
-    constants.countedWidth = request.countedWidth();
-    constants.countedRows = request.countedRows();
-    constants.strideShift = static_cast<std::uint32_t>(std::countr_zero(request.countedStride));
-    commands_.mark("count");
-    if (request.agreed) {
-      constants.countedTolerances = request.agreed->tolerances;
-      constants.countedPreSegments = request.agreed->preSegments;
-      constants.countedQuotas = request.agreed->quotas;
-      constants.quotas = quotas_.address();
-      constants.budget = request.agreed->budget;
-    } else {
-      BandTargets targets;
-      targets.thresholds = countedTolerances_.address();
-      targets.capacities = countedPreSegments_.address();
-      targets.status = status_.address();
-      targets.guard = preSegmentsFit_.address();
-      record(commands_, targets, false);
-      commands_.barrier();
-    }
-    interpolate_.record(commands_, constants);
-  };
-  const auto write = [&] {
+    return;
+  }
+  shared::InterpolateConstants constants{};
+  constants.countedTolerances = countedTolerances_.address();
+  constants.countedPreSegments = countedPreSegments_.address();
+  constants.tolerances = thresholds_.address();
+  constants.capacities = capacities_.address();
+  constants.width = request.width;
+  constants.rows = request.rows;
+  constants.countedWidth = request.countedWidth();
+  constants.countedRows = request.countedRows();
+  constants.strideShift = static_cast<std::uint32_t>(std::countr_zero(request.countedStride));
+  commands_.mark("count");
+  if (request.agreed) {
+    constants.countedTolerances = request.agreed->tolerances;
+    constants.countedPreSegments = request.agreed->preSegments;
+    constants.countedQuotas = request.agreed->quotas;
+    constants.quotas = quotas_.address();
+    constants.budget = request.agreed->budget;
+  } else {
     BandTargets targets;
-    targets.thresholds = thresholds_.address();
-    targets.capacities = capacities_.address();
-    targets.offsets = preSegmentOffsets_.address();
-    targets.preSegments = preSegments_.address();
-    targets.written = written_.address();
-    targets.left = left_.address();
-    targets.quotas = quotas ? quotas_.address() : 0;
+    targets.thresholds = countedTolerances_.address();
+    targets.capacities = countedPreSegments_.address();
     targets.status = status_.address();
     targets.guard = preSegmentsFit_.address();
-    scan_.record(commands_, capacities_, preSegmentOffsets_, listCount, preSegmentsFit_,
-                 preSegments_.size() / sizeof(shared::StoredPreSegment));
-    commands_.mark("write");
-    record(commands_, targets, true);
-    scan_.record(commands_, left_, lists.offsets, listCount, segmentsFit_,
-                 lists.segments.size() / segmentBytes(request.code), &preSegmentsFit_);
-    recordTotal(preSegmentOffsets_, listCount, preSegmentTotal);
-    recordTotal(lists.offsets, listCount, segmentTotal);
-  };
-  const auto reduce = [&] {
-    shared::ReduceConstants constants{};
-    constants.preSegments = preSegments_.address();
-    constants.preSegmentOffsets = preSegmentOffsets_.address();
-    constants.written = written_.address();
-    constants.left = left_.address();
-    constants.offsets = lists.offsets.address();
-    constants.segments = lists.segments.address();
-    constants.fitting = request.fitting;
-    constants.fittingOffsets = request.fittingOffsets;
-    constants.guard = segmentsFit_.address();
-    constants.step = static_cast<float>(request.sampleStep);
-    constants.listCount = listCount;
-    constants.form = storedForm(request.code);
-    commands_.mark("reduce");
-    reduce_.record(commands_, constants, request.maxPerList);
-  };
-
-  enum class From { Search, Write, Reduce };
-  for (std::optional<From> from = From::Search; from;) {
-    commands_.begin();
-    if (*from == From::Search) search();
-    if (*from != From::Reduce) write();
-    if (*from == From::Reduce) commands_.fill(segmentsFit_, 1);
+    started_->record(commands_, targets, false);
     commands_.barrier();
-    reduce();
-    end({});
-    const auto totals = totals_.mappedAs<std::uint32_t>();
-    auto& tooLong = status_.mappedAs<std::uint32_t>()[0];
-    const std::uint64_t preSegmentBytes = totals[preSegmentTotal] * sizeof(shared::StoredPreSegment);
-    const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(request.code);
-    if (preSegments_.size() < preSegmentBytes) {
-      preSegments_.reserve(device_, preSegmentBytes + preSegmentBytes / 4, MemoryKind::DeviceLocal);
-      from = From::Write;
-    } else if (quotas && tooLong != 0 && *from != From::Reduce) {
-      // Lists that weren't counted may have more runs than was expected. They've said how many.
-      tooLong = 0;
-      if (request.runsOnly) expectedRuns_ = manyRuns;
-      from = From::Write;
-    } else if (scan_.requireNoOverflow(); lists.segments.size() < listBytes) {
-      lists.segments.reserve(device_, listBytes + listBytes / 4, MemoryKind::DeviceLocal);
-      from = From::Reduce;
-    } else {
-      from.reset();
-    }
-    lists.count = totals[segmentTotal];
   }
-  if (!finish) return;
+  interpolate_.record(commands_, constants);
+}
+
+/// Pre-segments, and how many supersegments are to be left of them.
+void ListBuilder::recordWrite() {
+  const Request& request = started_->request;
+  const std::uint32_t listCount = request.listCount();
+  DeviceLists& lists = *started_->lists;
+  BandTargets targets;
+  targets.thresholds = thresholds_.address();
+  targets.capacities = capacities_.address();
+  targets.offsets = preSegmentOffsets_.address();
+  targets.preSegments = preSegments_.address();
+  targets.written = written_.address();
+  targets.left = left_.address();
+  targets.quotas = hasQuotas() ? quotas_.address() : 0;
+  targets.status = status_.address();
+  targets.guard = preSegmentsFit_.address();
+  scan_.record(commands_, capacities_, preSegmentOffsets_, listCount, preSegmentsFit_,
+               preSegments_.size() / sizeof(shared::StoredPreSegment));
+  commands_.mark("write");
+  started_->record(commands_, targets, true);
+  scan_.record(commands_, left_, lists.offsets, listCount, segmentsFit_,
+               lists.segments.size() / segmentBytes(request.code), &preSegmentsFit_);
+  recordTotal(preSegmentOffsets_, listCount, preSegmentTotal);
+  recordTotal(lists.offsets, listCount, segmentTotal);
+}
+
+void ListBuilder::recordReduce() {
+  const Request& request = started_->request;
+  const DeviceLists& lists = *started_->lists;
+  shared::ReduceConstants constants{};
+  constants.preSegments = preSegments_.address();
+  constants.preSegmentOffsets = preSegmentOffsets_.address();
+  constants.written = written_.address();
+  constants.left = left_.address();
+  constants.offsets = lists.offsets.address();
+  constants.segments = lists.segments.address();
+  constants.fitting = request.fitting;
+  constants.fittingOffsets = request.fittingOffsets;
+  constants.guard = segmentsFit_.address();
+  constants.step = static_cast<float>(request.sampleStep);
+  constants.listCount = request.listCount();
+  constants.form = storedForm(request.code);
+  commands_.mark("reduce");
+  reduce_.record(commands_, constants, request.maxPerList);
+}
+
+/// All steps in one submission: the memory for pre-segments and supersegments is that of the frame before,
+/// and where it's too small the steps that need it do nothing.
+void ListBuilder::submitMerging(From from, const gpu::Submission& after) {
   commands_.begin();
-  end(finish);
+  commands_.waitFor(after);
+  if (from == From::Search) recordSearch();
+  if (from != From::Reduce) recordWrite();
+  if (from == From::Reduce) commands_.fill(segmentsFit_, 1);
+  commands_.barrier();
+  recordReduce();
+  commands_.barrier();
+  submit();
+}
+
+/// Where memory is taken for what was counted, and a quarter more, steps are submitted again.
+std::optional<ListBuilder::From> ListBuilder::againFrom(From from) {
+  const Request& request = started_->request;
+  DeviceLists& lists = *started_->lists;
+  const auto totals = totals_.mappedAs<std::uint32_t>();
+  auto& tooLong = status_.mappedAs<std::uint32_t>()[0];
+  const std::uint64_t preSegmentBytes = totals[preSegmentTotal] * sizeof(shared::StoredPreSegment);
+  const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(request.code);
+  if (preSegments_.size() < preSegmentBytes) {
+    preSegments_.reserve(device_, preSegmentBytes + preSegmentBytes / 4, MemoryKind::DeviceLocal);
+    return From::Write;
+  }
+  if (hasQuotas() && tooLong != 0 && from != From::Reduce) {
+    // Lists that weren't counted may have more runs than was expected. They've said how many.
+    tooLong = 0;
+    if (request.runsOnly) expectedRuns_ = manyRuns;
+    return From::Write;
+  }
+  scan_.requireNoOverflow();
+  if (lists.segments.size() < listBytes) {
+    lists.segments.reserve(device_, listBytes + listBytes / 4, MemoryKind::DeviceLocal);
+    return From::Reduce;
+  }
+  return std::nullopt;
+}
+
+void ListBuilder::finishMerging() {
+  for (std::optional<From> from = From::Search; from;) {
+    commands_.wait();
+    addTimes();
+    from = againFrom(*from);
+    started_->lists->count = totals_.mappedAs<std::uint32_t>()[segmentTotal];
+    if (from) submitMerging(*from, {});
+  }
 }
 
 }  // namespace vdi::detail

@@ -96,22 +96,56 @@ class ListBuilder {
     }
   };
 
-  /// Recorded behind the last step, when the lists' counts are known.
-  using Finish = std::function<void(gpu::Commands&)>;
-  /// Runs all steps, and waits for them: `lists` are what was written, compact or full as the code says.
-  /// Throws Error{OutOfMemory} when the supersegments don't fit, Error{DeviceFailure} if a list's written
-  /// count isn't its stored count.
-  void build(const Request& request, const Record& record, DeviceLists& lists, const Finish& finish = {});
+  /// Recorded behind the last step, for the device: the host doesn't know the lists' counts then. Recorded
+  /// anew where steps are; what it did before then counts for nothing.
+  using Behind = std::function<void(gpu::Commands&)>;
+  /// Submits the steps and returns. `lists`, what `record` and `behind` refer to, and what the request names
+  /// must stay until `finish`. `after`: what the lists' memory is still used by.
+  void start(const Request& request, Record record, DeviceLists& lists, Behind behind = {},
+             const gpu::Submission& after = {});
+  /// Waits. Where the memory of the frame before was too small, steps are submitted again. `lists` are then
+  /// what was written, compact or full as the code says. Throws Error{OutOfMemory} when the supersegments
+  /// don't fit, Error{DeviceFailure} if a list's written count isn't its stored count.
+  void finish();
+  /// The same for lists that are all empty.
+  void startEmpty(std::uint32_t listCount, DeviceLists& lists, const Behind& behind = {});
+  /// Start, and finish.
+  void build(const Request& request, const Record& record, DeviceLists& lists) {
+    start(request, record, lists);
+    finish();
+  }
+  /// The last thing that was submitted.
+  gpu::Submission last() const { return commands_.last(); }
+  /// Waits, and drops what was started: after an error.
+  void drop();
 
-  /// Of the last build, without downloads.
+  /// Of the last build that was finished.
   const ListTimes& times() const { return times_; }
 
  private:
-  void buildByBisection(const Request& request, const Record& record, DeviceLists& lists,
-                        const Finish& finish);
-  void buildByMerging(const Request& request, const Record& record, DeviceLists& lists, const Finish& finish);
+  /// The step that merging is submitted from.
+  enum class From { Search, Write, Reduce };
+  /// What was started.
+  struct Started {
+    Request request;
+    Record record;
+    Behind behind;
+    DeviceLists* lists = nullptr;
+    bool empty = false;
+  };
+  void reserve();
+  void submitMerging(From from, const gpu::Submission& after);
+  void recordSearch();
+  void recordWrite();
+  void recordReduce();
+  void finishMerging();
+  std::optional<From> againFrom(From from);
+  void submitBisection(const gpu::Submission& after);
+  void finishBisection();
+  bool hasQuotas() const { return started_->request.agreed || started_->request.runsOnly; }
   void recordTotal(const gpu::Buffer& offsets, std::uint32_t listCount, std::size_t which);
-  void end(const Finish& finish);
+  void submit();
+  void addTimes();
 
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
@@ -136,6 +170,7 @@ class ListBuilder {
   static constexpr std::uint32_t fewRuns = 3;
   static constexpr std::uint32_t manyRuns = 8;
   std::uint32_t expectedRuns_ = fewRuns;
+  std::optional<Started> started_;
   ListTimes times_;
 };
 

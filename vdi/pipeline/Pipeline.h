@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -34,16 +35,48 @@ struct RankReport {
   double compositeSeconds = 0.0;
   double compositeDeviceSeconds = 0.0;  // of these, the device's work, and the copying of what was received
   double gatherSeconds = 0.0;
+  double outputSeconds = 0.0;  // of write, instead of the gather: downloading, encoding and writing
   std::uint64_t blocks = 0;
   std::uint64_t volumeBytes = 0;
   std::uint64_t subSupersegments = 0;
   std::uint64_t bytesSent = 0;
-  std::uint64_t deviceBytes = 0;  // device memory held
+  std::uint64_t bytesWritten = 0;   // of write: into the file, by this rank
+  std::uint64_t deviceBytes = 0;    // device memory held
+  std::uint64_t hostPeakBytes = 0;  // the most host memory that the process has had, shared one included
+};
+
+/// A file that VdiGenerator::write has made.
+struct WrittenVdi {
+  std::uint64_t supersegments = 0;
+  std::uint64_t bytes = 0;
+};
+
+/// What a VDI's file says of the simulation.
+struct TimeStamp {
+  double time = 0.0;
+  std::uint64_t step = 0;
 };
 
 /// Called on every rank with the share done, 0 .. 1; returns false to ask for an abort, which all ranks then
 /// obey together at the next stage (Error{Cancelled}).
 using Progress = std::function<bool(double)>;
+
+/// A VDI that's being made (VdiGenerator::start). Movable. One that's never finished costs nothing but the
+/// memory of its lists, until the second one after it is started.
+class VdiFrame {
+ public:
+  ~VdiFrame();
+  VdiFrame(VdiFrame&&) noexcept;
+  VdiFrame& operator=(VdiFrame&&) noexcept;
+  VdiFrame(const VdiFrame&) = delete;
+  VdiFrame& operator=(const VdiFrame&) = delete;
+
+ private:
+  friend class VdiGenerator;
+  struct State;
+  explicit VdiFrame(std::shared_ptr<State> state);
+  std::shared_ptr<State> state_;
+};
 
 /// Makes VDIs of distributed volumes. Collective throughout: every rank of the communicator makes one, with
 /// its own device, and calls the same functions in the same order. When a call throws, it throws on every
@@ -80,12 +113,42 @@ class VdiGenerator {
   std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
                               const GenerateSettings& settings, const Progress& progress = {});
 
+  /// The same in two parts, so that frames overlap. When `start` returns, this rank's lists are made, and the
+  /// blocks, camera and function aren't needed any more: setBlocks and advance may follow. The VDI is still
+  /// being composited and gathered, by the device and its copy engines. `finish` waits for it. To start the
+  /// next frame before finishing the last one hides that time:
+  ///
+  ///     VdiFrame last = generator.start(...);
+  ///     while (more) {
+  ///       VdiFrame next = generator.start(...);
+  ///       use(generator.finish(std::move(last)));
+  ///       last = std::move(next);
+  ///     }
+  ///
+  /// All in the calling thread: MPI needs no more than MPI_THREAD_FUNNELED. Frames are finished in any order,
+  /// the same on all ranks, or never. Two are under way at most: a third `start` waits for the first one.
+  /// When a `start` throws beyond its parameters, frames that aren't done fail with the same error.
+  VdiFrame start(const Camera& camera, const TransferFunction& transferFunction,
+                 const GenerateSettings& settings, const Progress& progress = {});
+  /// The VDI on rank 0, nullopt on the others.
+  std::optional<Vdi> finish(VdiFrame frame);
+
+  /// The same VDI as a file (io/VdiFile.h). Each rank encodes its own lists and writes them there: none ever
+  /// has the whole VDI, and a rank's host memory is bounded by its own lists. Ranks whose host doesn't have
+  /// the folder send what they've encoded to rank 0, which holds a chunk of it at a time. The file is the one
+  /// that io::writeVdi writes of what generate makes, byte by byte; as there, nobody sees half of it, and the
+  /// old one stays if any rank fails. `path` and `stamp` are rank 0's, whatever the others pass. Throws
+  /// Error{Io} on the rank that can't write, with the path as context. The result is equal on all ranks.
+  WrittenVdi write(const std::filesystem::path& path, const Camera& camera,
+                   const TransferFunction& transferFunction, const GenerateSettings& settings,
+                   const TimeStamp& stamp = {}, const Progress& progress = {});
+
   /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0.
-  /// supersegments and algorithm of the settings are ignored.
+  /// supersegments, algorithm and margin of the settings are ignored.
   std::optional<Image> renderVolume(const Camera& camera, const TransferFunction& transferFunction,
                                     const GenerateSettings& settings, const Progress& progress = {});
 
-  /// Of the last generate or renderVolume: all ranks' on rank 0, empty on the others.
+  /// Of the last generate, finish or renderVolume: all ranks' on rank 0, empty on the others.
   const std::vector<RankReport>& reports() const;
   const gpu::Device& device() const;
   const comm::Communicator& communicator() const;
@@ -108,6 +171,13 @@ class VdiRenderer {
   /// Copies; `vdi` isn't needed afterwards. Upload and set-up go on on the device while this returns, the
   /// next render waits for them there (VDIs of up to 128 MiB; larger ones wait for all but their last part).
   void setVdi(const Vdi& vdi);
+  /// Double buffering: the same into buffers of its own, while renders go on with the VDI that is shown. On
+  /// any one thread; not beside setVdi, showPrepared or another of this. Returns when the VDI is on the
+  /// device. Takes memory for a second VDI, which stays for the next one. Throws Error{OutOfMemory} where
+  /// there's none; what is shown stays.
+  void prepareVdi(const Vdi& vdi);
+  /// Shows what was prepared, at once. Returns whether there was anything.
+  bool showPrepared();
   /// Rays end at an opacity of 1 - 1/512, along V_O's of 1 - 1/1024: what's behind changes a colour of 8 bits
   /// by half a step at most. Throws Error{InvalidArgument} before the first setVdi, and for what View
   /// rejects.
@@ -130,7 +200,12 @@ class VdiRenderer {
   std::unique_ptr<State> state_;
 };
 
-/// The VDI seen from V_O: each list composited front to back, on the host. Equals DVR.
+/// Fewer lists: about one in `factor` of each row and of each column, as they are. Views of it take less time
+/// on a CPU, and are as rough as pictures with that many fewer pixels. On the host.
+Vdi thinned(const Vdi& vdi, int factor);
+
+/// The VDI's picture, seen from V_O: each list but the margin's composited front to back, on the host. Equals
+/// DVR.
 Image flatten(const Vdi& vdi);
 
 }  // namespace vdi

@@ -1,6 +1,8 @@
 #include "vdi/pipeline/RayCaster.h"
 
 #include <algorithm>
+#include <cassert>
+#include <cstdlib>
 #include <ranges>
 
 namespace vdi::detail {
@@ -11,7 +13,7 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
       volume_(device_),
       pass_(device_),
-      builder_(device_),
+      builders_{ListBuilder(device_), ListBuilder(device_)},
       commands_(device_),
       quotaPass_(device_),
       histogram_(device_) {}
@@ -40,14 +42,25 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   return params;
 }
 
-/// The whole picture at once where memory allows; on a CPU device in eighths, so that progress shows and an
-/// abort is heard. A multiple of shared::countedStride, or all.
-std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytesPerPixel) const {
+/// One band on a GPU: the last rays of each one take a millisecond that nothing else fills, which is more
+/// than the next band hides. Eight on a CPU device, so that progress shows and an abort is heard. VDI_BANDS
+/// is for tests and measurements.
+std::uint32_t RayCaster::bandsWanted() const {
+  constexpr std::uint32_t ofCpu = 8;
+  constexpr std::uint32_t ofGpu = 1;
+  if (const char* value = std::getenv("VDI_BANDS"); value != nullptr && std::atoi(value) > 0)
+    return static_cast<std::uint32_t>(std::atoi(value));
+  return device_->isCpu() ? ofCpu : ofGpu;
+}
+
+/// What memory allows, and at most a share of the picture. A multiple of shared::countedStride, or all.
+std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytesPerPixel,
+                                     std::uint32_t bands) const {
   const auto height = static_cast<std::uint64_t>(request.view.height());
   const std::uint64_t rowBytes = static_cast<std::uint64_t>(request.view.width()) * bytesPerPixel;
   const std::uint64_t room = std::max<std::uint64_t>(device_->limits().memoryBytes / 8, rowBytes);
   std::uint64_t rows = std::min(height, room / rowBytes);
-  if (device_->isCpu()) rows = std::min(rows, std::max<std::uint64_t>((height + 7) / 8, 1));
+  rows = std::min(rows, std::max<std::uint64_t>((height + bands - 1) / bands, 1));
   rows = (rows + shared::countedStride - 1) / shared::countedStride * shared::countedStride;
   return static_cast<std::uint32_t>(std::min(height, rows));
 }
@@ -70,6 +83,8 @@ float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) 
 RayCaster::Cast RayCaster::begin(const Request& request) {
   Cast cast;
   times_ = {};
+  assert(started_ == finished_);
+  started_ = finished_ = 0;  // frames of one band take one builder's memory
   cast.height = static_cast<std::uint32_t>(request.view.height());
   cast.cutAtGaps = request.cutAtGaps;
   cast.nothingThere = volume_.empty() || request.lattice.count == 0;
@@ -86,7 +101,8 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
   build.maxPerList = {request.runsOnly ? 1 : maxCount, !request.cutAtGaps};
   build.sampleStep = request.lattice.step;
   build.code = request.code;
-  cast.rowsPerBand = rowsPerBand(request, ListBuilder::bytesPerList(maxCount, build.algorithm));
+  cast.rowsPerBand =
+      rowsPerBand(request, ListBuilder::bytesPerList(maxCount, build.algorithm), bandsWanted());
   cast.params.countedStride = build.countedStride;
   cast.params.countedSamples =
       build.countedStride > 1
@@ -187,35 +203,30 @@ std::vector<std::uint32_t> RayCaster::agreedWeights(const Cast& cast) {
   return result;
 }
 
-void RayCaster::makeEmpty(std::uint32_t listCount, DeviceLists& lists, const ListBuilder::Finish& finish) {
-  lists.offsets.reserve(device_, (std::uint64_t{listCount} + 1) * sizeof(std::uint32_t),
-                        gpu::MemoryKind::DeviceLocal);
-  lists.segments.reserve(device_, 0, gpu::MemoryKind::DeviceLocal);
-  lists.listCount = listCount;
-  lists.count = 0;
-  commands_.begin();
-  commands_.fill(lists.offsets, 0);
-  if (finish) finish(commands_);
-  commands_.submitAndWait();
-}
-
-void RayCaster::makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists,
-                         const ListBuilder::Finish& finish) {
+void RayCaster::startBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists,
+                          const ListBuilder::Behind& behind, const gpu::Submission& after) {
+  assert(started_ - finished_ < bandsAtOnce);
+  ListBuilder& builder = builders_[started_ % bandsAtOnce];
   ListBuilder::Request build = cast.build;
   build.rows = lastRow - firstRow;
   build.rowBehind = lastRow < cast.height;
-  if (cast.nothingThere) return makeEmpty(build.listCount(), lists, finish);
-  shared::CastParams& params = cast.params;
-  params.countedWidth = build.countedWidth();
+  if (cast.nothingThere) {
+    builder.startEmpty(build.listCount(), lists, behind);
+    ++started_;
+    return;
+  }
   if (cast.agreed) {
     const std::uint64_t first =
         std::uint64_t{firstRow / build.countedStride} * build.countedWidth() * sizeof(std::uint32_t);
     build.agreed = {agreedTolerances_.address() + first, agreedPreSegments_.address() + first,
                     agreedQuotas_.address() + first, build.maxPerList.supersegments};
   }
-  const auto record = [&](gpu::Commands& commands, const BandTargets& targets, bool write) {
+  const auto record = [this, &cast, build, firstRow, lastRow](gpu::Commands& commands,
+                                                              const BandTargets& targets, bool write) {
     // The shader counts lists from the picture's first; the targets hold just this band's.
     const std::uint64_t skipped = std::uint64_t{firstRow} * build.width * sizeof(std::uint32_t);
+    gpu::shared::CastParams params = cast.params;
+    params.countedWidth = build.countedWidth();
     params.thresholds = targets.thresholds - skipped;
     params.capacities = targets.capacities - skipped;
     params.offsets = targets.offsets - skipped;
@@ -234,8 +245,21 @@ void RayCaster::makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastR
     pass_.record(commands, params, write ? Work::Write : Work::Count, build.algorithm,
                  {build.width, firstRow, lastRow, build.countedStride, cast.cutAtGaps, params.form});
   };
-  builder_.build(build, record, lists, finish);
-  times_ += builder_.times();
+  builder.start(build, record, lists, behind, after);
+  ++started_;
+}
+
+void RayCaster::finishBand() {
+  assert(finished_ < started_);
+  ListBuilder& builder = builders_[finished_++ % bandsAtOnce];
+  builder.finish();
+  times_ += builder.times();
+}
+
+void RayCaster::drop() {
+  for (ListBuilder& builder : builders_) builder.drop();
+  commands_.drop();
+  finished_ = started_;
 }
 
 void RayCaster::render(const Request& request, const Progress& progress, HostPool& pool, Image& image) {
@@ -248,7 +272,7 @@ void RayCaster::render(const Request& request, const Progress& progress, HostPoo
     return;
   }
   shared::CastParams params = prepare(request);
-  const std::uint32_t band = rowsPerBand(request, sizeof(glm::vec4) + sizeof(float));
+  const std::uint32_t band = rowsPerBand(request, sizeof(glm::vec4) + sizeof(float), bandsWanted());
   for (std::uint32_t row = 0; row < height; row += band) {
     const std::uint32_t end = std::min(height, row + band);
     const std::uint64_t first = std::uint64_t{row} * width;

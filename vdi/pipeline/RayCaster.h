@@ -2,6 +2,8 @@
 // interface.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -70,9 +72,20 @@ class RayCaster {
   /// After that: how many supersegments all ranks together will have in each stretch of shared::countedStride
   /// rows.
   std::vector<std::uint32_t> agreedWeights(const Cast& cast);
-  /// Rows [firstRow, lastRow), which begin at a multiple of shared::countedStride.
-  void makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists,
-                const ListBuilder::Finish& finish = {});
+  /// Rows [firstRow, lastRow), which begin at a multiple of shared::countedStride. Goes on on the device when
+  /// this returns; up to bandsAtOnce may be started before the first one is finished. `cast`, `lists` and
+  /// what `behind` refers to must stay until then. `behind`, `after`: see ListBuilder.
+  void startBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists,
+                 const ListBuilder::Behind& behind = {}, const gpu::Submission& after = {});
+  /// Waits for the first one of those that were started.
+  void finishBand();
+  void makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists) {
+    startBand(cast, firstRow, lastRow, lists);
+    finishBand();
+  }
+  static constexpr std::size_t bandsAtOnce = 2;
+  /// Waits for what was started, and drops it: after an error.
+  void drop();
   /// DVR: all pixels of `image`, which is as large as the view and has its memory from `pool`.
   void render(const Request& request, const Progress& progress, HostPool& pool, Image& image);
   /// Of the last frame, without transfers. Of a picture: `all`.
@@ -81,13 +94,15 @@ class RayCaster {
  private:
   gpu::shared::CastParams prepare(const Request& request);
   float levelOfNeed(gpu::shared::CastParams params, const Request& request);
-  std::uint32_t rowsPerBand(const Request& request, std::uint64_t bytesPerPixel) const;
-  void makeEmpty(std::uint32_t listCount, DeviceLists& lists, const ListBuilder::Finish& finish);
+  std::uint32_t bandsWanted() const;
+  std::uint32_t rowsPerBand(const Request& request, std::uint64_t bytesPerPixel, std::uint32_t bands) const;
 
   std::shared_ptr<gpu::Device> device_;
   gpu::VolumeStore volume_;
   gpu::CastPass pass_;
-  ListBuilder builder_;
+  std::array<ListBuilder, bandsAtOnce> builders_;  // taken in turns
+  std::size_t started_ = 0;                        // bands
+  std::size_t finished_ = 0;
   gpu::Commands commands_;
   gpu::QuotaPass quotaPass_;
   gpu::Buffer levels_;

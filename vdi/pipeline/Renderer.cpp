@@ -1,9 +1,12 @@
 // VdiRenderer and flatten: what a viewer does with a VDI.
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstring>
+#include <glm/trigonometric.hpp>
 #include <mutex>
 #include <utility>
+#include <vector>
 
 #include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
@@ -19,6 +22,24 @@ namespace vdi {
 
 using gpu::MemoryKind;
 
+namespace {
+
+/// A VDI on the device.
+struct Uploaded {
+  gpu::Buffer segments;
+  gpu::Buffer heads;
+  gpu::Buffer tileDepthMasks;
+  std::unique_ptr<View> original;  // none until there's a VDI
+  float nearest = 0.0F;
+  float farthest = 0.0F;
+  float binScale = 0.0F;
+};
+
+/// Whether an upload has the device to itself, or renders go on beside it.
+enum class UploadKind { Alone, Beside };
+
+}  // namespace
+
 struct VdiRenderer::State {
   explicit State(std::shared_ptr<gpu::Device> theDevice)
       : device(std::move(theDevice)), commands(device), pass(device), expand(device), uploads(device) {}
@@ -29,14 +50,9 @@ struct VdiRenderer::State {
   gpu::ExpandPass expand;
   gpu::Buffer staging;
   gpu::Buffer offsets;
-  gpu::Buffer segments;
-  gpu::Buffer heads;
-  gpu::Buffer tileDepthMasks;
   detail::PictureBuffers picture;
-  std::unique_ptr<View> original;  // none until there's a VDI
-  float nearest = 0.0F;
-  float farthest = 0.0F;
-  float binScale = 0.0F;
+  Uploaded shown;
+  Uploaded prepared;
   double milliseconds = 0.0;
 
   gpu::Buffer ends;  // of rays; none until they're asked for
@@ -46,8 +62,11 @@ struct VdiRenderer::State {
   void render(const View& view, std::span<const float> rayEnds, Reconstruction reconstruction,
               std::uint32_t form);
 
-  /// What fits staging is on its way while the caller goes on; more waits for the part before.
-  static constexpr std::uint64_t stagingBytes = std::uint64_t{128} << 20;
+  /// What fits is on its way while the caller goes on; more waits for the part before.
+  static constexpr std::uint64_t aloneBytes = std::uint64_t{128} << 20;
+  /// A render waits for the part that's on its way.
+  static constexpr std::uint64_t besideBytes = std::uint64_t{2} << 20;
+  std::uint64_t stagingBytes = 0;  // of the staging buffer that are used
   std::uint64_t stagingUsed = 0;
   /// Of setVdi, which doesn't wait for the last of them. Behind the buffers, for its end waits for what uses
   /// them.
@@ -57,13 +76,13 @@ struct VdiRenderer::State {
   template <typename T, typename Use>
   void inParts(const HostVector<T>& values, Use use) {
     for (std::size_t first = 0; first < values.size();) {
-      if (stagingUsed + sizeof(T) > staging.size()) {
+      if (stagingUsed + sizeof(T) > stagingBytes) {
         uploads.submitAndWait();
         uploads.begin();
         stagingUsed = 0;
       }
       const std::size_t count =
-          std::min<std::size_t>((staging.size() - stagingUsed) / sizeof(T), values.size() - first);
+          std::min<std::size_t>((stagingBytes - stagingUsed) / sizeof(T), values.size() - first);
       std::memcpy(staging.mapped().data() + stagingUsed, values.data() + first, count * sizeof(T));
       use(stagingUsed, first, count);
       constexpr std::uint64_t alignment = 16;
@@ -73,15 +92,19 @@ struct VdiRenderer::State {
   }
 
   template <typename Segment>
-  void upload(const ListsOf<Segment>& lists, const DepthCode& code, const glm::ivec2& size) {
+  void upload(const ListsOf<Segment>& lists, const DepthCode& code, const glm::ivec2& size, Uploaded& target,
+              UploadKind kind) {
     uploads.wait();  // for the last one, which may still use the buffers
     offsets.reserve(device, lists.offsets.size() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
-    segments.reserve(device, lists.segments.size() * sizeof(shared::RenderSegment), MemoryKind::DeviceLocal);
-    heads.reserve(device, lists.listCount() * sizeof(shared::ListHead), MemoryKind::DeviceLocal);
-    tileDepthMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint64_t), MemoryKind::DeviceLocal);
+    target.segments.reserve(device, lists.segments.size() * sizeof(shared::RenderSegment),
+                            MemoryKind::DeviceLocal);
+    target.heads.reserve(device, lists.listCount() * sizeof(shared::ListHead), MemoryKind::DeviceLocal);
+    target.tileDepthMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint64_t),
+                                  MemoryKind::DeviceLocal);
     const std::uint64_t bytes =
         (lists.offsets.size() + 4) * sizeof(std::uint32_t) + lists.segments.size() * sizeof(Segment);
-    staging.reserve(device, std::min(bytes, stagingBytes), MemoryKind::Upload);
+    stagingBytes = std::min(bytes, kind == UploadKind::Alone ? aloneBytes : besideBytes);
+    staging.reserve(device, stagingBytes, MemoryKind::Upload);
     stagingUsed = 0;
     uploads.begin();
     inParts(lists.offsets, [&](std::uint64_t at, std::size_t first, std::size_t count) {
@@ -89,11 +112,11 @@ struct VdiRenderer::State {
     });
     shared::ExpandConstants constants{};
     constants.offsets = offsets.address();
-    constants.segments = segments.address();
-    constants.heads = heads.address();
-    constants.tileDepthMasks = tileDepthMasks.address();
-    constants.nearest = nearest;
-    constants.binScale = binScale;
+    constants.segments = target.segments.address();
+    constants.heads = target.heads.address();
+    constants.tileDepthMasks = target.tileDepthMasks.address();
+    constants.nearest = target.nearest;
+    constants.binScale = target.binScale;
     constants.lists = size;
     constants.form = detail::storedForm(code);
     constants.mode = shared::expandModeSegments;
@@ -109,8 +132,14 @@ struct VdiRenderer::State {
       constants.mode = mode;
       expand.record(uploads, constants);
     }
-    uploads.submit();
+    if (kind == UploadKind::Alone) {
+      uploads.submit();
+    } else {
+      uploads.submitAndWait();
+    }
   }
+
+  void upload(const Vdi& vdi, Uploaded& target, UploadKind kind);
 };
 
 namespace {
@@ -160,37 +189,61 @@ VdiRenderer::VdiRenderer(std::shared_ptr<gpu::Device> device)
 
 VdiRenderer::~VdiRenderer() = default;
 
-void VdiRenderer::setVdi(const Vdi& vdi) {
-  State& s = *state_;
-  s.original.reset();
+void VdiRenderer::State::upload(const Vdi& vdi, Uploaded& target, UploadKind kind) {
+  target.original.reset();
   const DepthRange depths =
       std::visit([&](const auto& lists) { return depthsOf(lists, vdi.depthCode); }, vdi.lists);
-  s.nearest = depths.nearest;
-  s.farthest = depths.farthest;
+  target.nearest = depths.nearest;
+  target.farthest = depths.farthest;
   // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
-  if (!vdi.camera.parallelProjection) s.nearest = std::max(s.nearest, s.farthest * 1e-6F);
-  s.binScale = s.farthest > s.nearest ? shared::renderBins / (s.farthest - s.nearest) : 0.0F;
-  std::visit([&](const auto& lists) { s.upload(lists, vdi.depthCode, {vdi.width, vdi.height}); }, vdi.lists);
-  s.original = std::make_unique<View>(vdi.view());
+  if (!vdi.camera.parallelProjection) target.nearest = std::max(target.nearest, target.farthest * 1e-6F);
+  target.binScale =
+      target.farthest > target.nearest ? shared::renderBins / (target.farthest - target.nearest) : 0.0F;
+  std::visit(
+      [&](const auto& lists) {
+        upload(lists, vdi.depthCode, {vdi.width, vdi.height}, target, kind);
+      },
+      vdi.lists);
+  target.original = std::make_unique<View>(vdi.view());
+}
+
+void VdiRenderer::setVdi(const Vdi& vdi) {
+  state_->upload(vdi, state_->shown, UploadKind::Alone);
+}
+
+void VdiRenderer::prepareVdi(const Vdi& vdi) {
+  try {
+    state_->upload(vdi, state_->prepared, UploadKind::Beside);
+  } catch (...) {
+    state_->prepared = {};
+    throw;
+  }
+}
+
+bool VdiRenderer::showPrepared() {
+  if (!state_->prepared.original) return false;
+  std::swap(state_->shown, state_->prepared);
+  state_->prepared.original.reset();
+  return true;
 }
 
 void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds,
                                 Reconstruction reconstruction, std::uint32_t form) {
-  if (!original) throw Error(ErrorCode::InvalidArgument, "there is no VDI to render yet");
+  if (!shown.original) throw Error(ErrorCode::InvalidArgument, "there is no VDI to render yet");
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(view.width()) * static_cast<std::uint64_t>(view.height());
   assert(rayEnds.empty() || rayEnds.size() == pixels);
   picture.reserve(device, pixels,
                   form == shared::renderPictureFloats ? sizeof(glm::vec4) : sizeof(glm::u8vec4));
-  shared::RenderParams params = gpu::renderGeometry(*original, view);
-  params.heads = heads.address();
-  params.segments = segments.address();
-  params.tileDepthMasks = tileDepthMasks.address();
-  params.binScale = binScale;
+  shared::RenderParams params = gpu::renderGeometry(*shown.original, view);
+  params.heads = shown.heads.address();
+  params.segments = shown.segments.address();
+  params.tileDepthMasks = shown.tileDepthMasks.address();
+  params.binScale = shown.binScale;
   params.colors = picture.colors();
   params.depths = picture.depths();
-  params.nearest = nearest;
-  params.farthest = farthest;
+  params.nearest = shown.nearest;
+  params.farthest = shown.farthest;
   if (!rayEnds.empty()) {
     endsStaging.reserve(device, rayEnds.size_bytes(), MemoryKind::Upload);
     ends.reserve(device, rayEnds.size_bytes(), MemoryKind::DeviceLocal);
@@ -204,7 +257,7 @@ void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds
     commands.copy(endsStaging, 0, ends, 0, rayEnds.size_bytes());
     commands.barrier();
   }
-  pass.record(commands, params, gpu::renderRays(*original, view), reconstruction, form);
+  pass.record(commands, params, gpu::renderRays(*shown.original, view), reconstruction, form);
   picture.recordDownload(commands);
   commands.submitAndWait();
   milliseconds = commands.stageTimes().front().milliseconds;
@@ -240,13 +293,18 @@ double VdiRenderer::renderMilliseconds() const {
 namespace {
 
 /// `value`: a supersegment as floats.
+/// Of the lists' columns and rows, those from `margin` on.
 template <typename Segment, typename Value>
-void flattenLists(const ListsOf<Segment>& lists, Value value, Image& image) {
+void flattenLists(const ListsOf<Segment>& lists, int listsWide, const glm::ivec2& margin, Value value,
+                  Image& image) {
   constexpr float opaque = 0.999999F;
   constexpr std::size_t minimum = 4096;  // lists
   inParallel(image.pixelCount(), minimum, [&](std::size_t first, std::size_t last) {
+    const auto width = static_cast<std::size_t>(image.width);
     for (std::size_t i = first; i < last; ++i) {
-      const std::span<const Segment> list = lists.list(i);
+      const std::size_t column = i % width + static_cast<std::size_t>(margin.x);
+      const std::size_t row = i / width + static_cast<std::size_t>(margin.y);
+      const std::span<const Segment> list = lists.list(row * static_cast<std::size_t>(listsWide) + column);
       glm::vec4 sum(0.0F);
       for (auto segment = list.begin(); segment != list.end() && sum.a < opaque; ++segment) {
         const Supersegment& s = value(*segment);
@@ -260,16 +318,82 @@ void flattenLists(const ListsOf<Segment>& lists, Value value, Image& image) {
 
 }  // namespace
 
+namespace {
+
+/// `columns`, `rows`: of the lists that are taken, in [0, size), or -1: an empty one.
+template <typename Segment>
+ListsOf<Segment> taken(const ListsOf<Segment>& lists, int width, const std::vector<int>& columns,
+                       const std::vector<int>& rows) {
+  ListsOf<Segment> few;
+  few.offsets.assign(1, 0);
+  few.offsets.reserve(columns.size() * rows.size() + 1);
+  for (const int row : rows) {
+    for (const int column : columns) {
+      if (row >= 0 && column >= 0) {
+        const std::span<const Segment> list =
+            lists.list(static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                       static_cast<std::size_t>(column));
+        few.segments.insert(few.segments.end(), list.begin(), list.end());
+      }
+      few.offsets.push_back(static_cast<std::uint32_t>(few.segments.size()));
+    }
+  }
+  return few;
+}
+
+/// Which of `many` lists along an axis is at the centre of each of `few`, which cover `share` as much of it.
+std::vector<int> placesOf(int few, int many, double share) {
+  std::vector<int> places(static_cast<std::size_t>(few));
+  for (int i = 0; i < few; ++i) {
+    const double at = 0.5 + ((i + 0.5) / few - 0.5) * share;
+    const int place = static_cast<int>(std::floor(at * many));
+    places[static_cast<std::size_t>(i)] = place >= 0 && place < many ? place : -1;
+  }
+  return places;
+}
+
+}  // namespace
+
+Vdi thinned(const Vdi& vdi, int factor) {
+  assert(factor >= 1);
+  Vdi few;
+  few.camera = vdi.camera;
+  // As high as all lists.
+  const double halfHeight = vdi.view().halfHeight();
+  if (vdi.camera.parallelProjection) {
+    few.camera.parallelScale = halfHeight;
+  } else {
+    few.camera.viewAngle = glm::degrees(2.0 * std::atan(halfHeight));
+  }
+  few.width = (vdi.width + factor - 1) / factor;
+  few.height = (vdi.height + factor - 1) / factor;
+  few.budget = vdi.budget;
+  few.bounds = vdi.bounds;
+  few.sampleStep = vdi.sampleStep;
+  few.time = vdi.time;
+  few.timeStep = vdi.timeStep;
+  few.depthCode = vdi.depthCode;
+  // Pixels are squares: what the width is then differs by rounding.
+  const double share =
+      (static_cast<double>(few.width) * vdi.height) / (static_cast<double>(few.height) * vdi.width);
+  const std::vector<int> columns = placesOf(few.width, vdi.width, share);
+  const std::vector<int> rows = placesOf(few.height, vdi.height, 1.0);
+  std::visit([&](const auto& lists) { few.lists = taken(lists, vdi.width, columns, rows); }, vdi.lists);
+  return few;
+}
+
 Image flatten(const Vdi& vdi) {
-  Image image{vdi.width, vdi.height, {}, {}};
+  const glm::ivec2 size = vdi.pictureSize();
+  Image image{size.x, size.y, {}, {}};
   image.rgba.resize(image.pixelCount());
   image.depth.resize(image.pixelCount());
   if (const auto* compact = std::get_if<CompactLists>(&vdi.lists)) {
     flattenLists(
-        *compact, [&](const CompactSupersegment& s) { return expanded(s, vdi.depthCode); }, image);
+        *compact, vdi.width, vdi.margin,
+        [&](const CompactSupersegment& s) { return expanded(s, vdi.depthCode); }, image);
   } else {
     flattenLists(
-        std::get<SupersegmentLists>(vdi.lists),
+        std::get<SupersegmentLists>(vdi.lists), vdi.width, vdi.margin,
         [](const Supersegment& s) -> const Supersegment& { return s; }, image);
   }
   return image;

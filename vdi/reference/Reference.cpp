@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "vdi/core/Margin.h"
 #include "vdi/reference/Accumulator.h"
 
 namespace vdi::reference {
@@ -128,7 +129,7 @@ double interpolate(const Block& block, const glm::dvec3& world) {
 Frame::Frame(const Scene& theScene, const Camera& camera, const TransferFunction& transferFunction,
              const GenerateSettings& theSettings)
     : scene(theScene),
-      view(camera, theSettings.width, theSettings.height),
+      view(viewWithMargin(theScene, camera, theSettings)),
       lattice(depthLattice(theScene, view, theSettings.samplesPerVoxel)),
       table(bake(transferFunction)),
       settings(theSettings),

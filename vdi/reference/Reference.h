@@ -29,7 +29,7 @@ struct Frame {
   bool slabs = true;  // samplesAreSlabs
   SlabTable slabTable;
 
-  /// Throws as depthLattice, bake and View do.
+  /// `view` has the settings' margin, for pictures too. Throws as depthLattice, bake and View do.
   Frame(const Scene& scene, const Camera& camera, const TransferFunction& transferFunction,
         const GenerateSettings& settings);
 };

@@ -1,0 +1,41 @@
+// A folder for tests on several ranks.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/io/Samples.h"
+#include "vdi/comm/Communicator.h"
+
+namespace vdi::test {
+
+/// The root's temporary folder, known to all ranks: making it is collective. It goes when all ranks are done
+/// with it.
+class SharedFolder {
+ public:
+  explicit SharedFolder(const comm::Communicator& comm) : comm_(comm) {
+    std::string name;
+    if (comm.rank() == 0) {
+      own_.emplace();
+      name = own_->path().string();
+    }
+    const auto* begin = reinterpret_cast<const std::byte*>(name.data());
+    const std::vector<std::byte> bytes = comm.broadcast({begin, begin + name.size()}, 0);
+    path_ = std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  }
+  ~SharedFolder() { comm_.barrier(); }
+  SharedFolder(const SharedFolder&) = delete;
+  SharedFolder& operator=(const SharedFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+  std::size_t fileCount() const { return own_->fileCount(); }  // the root's to ask
+
+ private:
+  const comm::Communicator& comm_;
+  std::optional<TemporaryFolder> own_;
+  std::filesystem::path path_;
+};
+
+}  // namespace vdi::test

@@ -1,0 +1,366 @@
+#include "vdi/pipeline/VdiWriter.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstring>
+#include <exception>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "vdi/core/Error.h"
+
+namespace vdi::detail {
+
+namespace {
+
+/// What a rank says of a part of a chunk that it has.
+struct PartNote {
+  std::uint64_t firstList;
+  std::uint64_t listCount;
+  std::uint64_t supersegmentCount;
+};
+
+/// And of a chunk that it has encoded.
+struct ChunkNote {
+  std::uint64_t index;
+  io::ChunkEntry entry;
+};
+static_assert(std::is_trivially_copyable_v<PartNote> && std::is_trivially_copyable_v<ChunkNote>);
+
+template <typename Note>
+struct NoteOf {
+  int rank;
+  Note note;
+};
+
+/// Collective: all ranks' notes, on all ranks, in rank order.
+template <typename Note>
+std::vector<NoteOf<Note>> shareNotes(const comm::Communicator& comm, std::span<const Note> mine) {
+  const comm::Gathered all = comm.allGather(std::as_bytes(mine), sizeof(Note));
+  std::vector<NoteOf<Note>> notes;
+  for (int r = 0; r < comm.size(); ++r) {
+    const std::span<const std::byte> bytes = all.of(r);
+    for (std::size_t at = 0; at < bytes.size(); at += sizeof(Note)) {
+      notes.push_back({r, {}});
+      std::memcpy(&notes.back().note, bytes.data() + at, sizeof(Note));
+    }
+  }
+  return notes;
+}
+
+[[noreturn]] void failCoverage(std::uint64_t list) {
+  throw Error(ErrorCode::InvalidArgument,
+              fmt::format("the lists from {} on are nobody's, or of several ranks", list));
+}
+
+}  // namespace
+
+template <typename Segment>
+VdiWriter<Segment>::VdiWriter(const comm::Communicator& comm, int root, const std::filesystem::path& path,
+                              Vdi header, WrittenBy writtenBy)
+    : comm_(comm),
+      root_(root),
+      path_(path),
+      header_(std::move(header)),
+      writtenBy_(writtenBy),
+      listCount_(static_cast<std::uint64_t>(header_.width) * static_cast<std::uint64_t>(header_.height)),
+      writtenEnd_(io::headBytes(listCount_)) {
+  header_.lists = ListsOf<Segment>();
+  comm_.together([&] {
+    if (isRoot()) file_ = std::make_unique<io::OutputFile>(path);
+  });
+}
+
+/// Of the chunk that a list is in: the first list behind it.
+template <typename Segment>
+std::uint64_t VdiWriter<Segment>::chunkEnd(std::uint64_t list) const {
+  return std::min((list / io::listsPerChunk + 1) * io::listsPerChunk, listCount_);
+}
+
+template <typename Segment>
+void VdiWriter<Segment>::add(std::uint64_t firstList, const ListsOf<Segment>& lists) {
+  const std::size_t count = lists.listCount();
+  assert(firstList + count <= listCount_);
+  for (std::size_t i = 0; i < count;) {
+    const std::uint64_t list = firstList + i;
+    const std::uint64_t end = firstList + count;
+    const bool whole = list % io::listsPerChunk == 0 && end >= chunkEnd(list);
+    std::uint64_t until = std::min(chunkEnd(list), end);
+    if (whole) until = end == listCount_ ? end : end / io::listsPerChunk * io::listsPerChunk;
+    const std::size_t last = i + (until - list);
+    if (whole) {
+      encode(lists, i, last, list);
+    } else {
+      addToPart(list, lists, i, last);
+    }
+    i = last;
+  }
+}
+
+template <typename Segment>
+void VdiWriter<Segment>::append(Part& part, const ListsOf<Segment>& lists, std::size_t first,
+                                std::size_t last) const {
+  const auto offsets = std::span(lists.offsets).subspan(first, last - first + 1);
+  const auto before = static_cast<std::uint32_t>(part.lists.segments.size());
+  for (std::size_t i = 1; i < offsets.size(); ++i) {
+    part.lists.offsets.push_back(before + (offsets[i] - offsets[0]));
+  }
+  const auto segments = std::span(lists.segments).subspan(offsets.front(), offsets.back() - offsets.front());
+  part.lists.segments.insert(part.lists.segments.end(), segments.begin(), segments.end());
+}
+
+/// Of one chunk. Bands that end in the middle of it make it whole one after the other.
+template <typename Segment>
+void VdiWriter<Segment>::addToPart(std::uint64_t firstList, const ListsOf<Segment>& lists, std::size_t first,
+                                   std::size_t last) {
+  const bool goesOn =
+      !parts_.empty() && parts_.back().end() == firstList && firstList % io::listsPerChunk != 0;
+  if (!goesOn) parts_.push_back({firstList, {}});
+  Part& part = parts_.back();
+  append(part, lists, first, last);
+  if (part.firstList % io::listsPerChunk != 0 || part.end() != chunkEnd(part.firstList)) return;
+  const Part whole = std::move(part);
+  parts_.pop_back();
+  encode(whole.lists, 0, whole.lists.listCount(), whole.firstList);
+}
+
+template <typename Segment>
+void VdiWriter<Segment>::encode(const ListsOf<Segment>& lists, std::size_t first, std::size_t last,
+                                std::uint64_t firstList) {
+  std::uint64_t index = firstList / io::listsPerChunk;
+  io::encodeChunks(lists, first, last, firstList, header_.budget, header_.depthCode,
+                   [&](io::EncodedChunk chunk) { keep(index++, std::move(chunk)); });
+}
+
+/// Where a chunk lies is known once all chunks before it are encoded.
+template <typename Segment>
+void VdiWriter<Segment>::keep(std::uint64_t index, io::EncodedChunk chunk) {
+  if (file_ && file_->takesOffsets() && index == firstChunks_) {
+    file_->write(writtenEnd_, chunk.bytes);
+    ++firstChunks_;
+    writtenEnd_ += chunk.bytes.size();
+    bytesWritten_ += chunk.bytes.size();
+    chunk.bytes = {};
+  }
+  chunks_.push_back({index, chunk.entry, std::move(chunk.bytes)});
+}
+
+/// Collective: chunks that several ranks have lists of are encoded by who has the first one.
+template <typename Segment>
+void VdiWriter<Segment>::joinParts() {
+  std::vector<PartNote> mine;
+  for (const Part& part : parts_) {
+    mine.push_back({part.firstList, part.lists.listCount(), part.lists.segments.size()});
+  }
+  std::vector<NoteOf<PartNote>> notes = shareNotes<PartNote>(comm_, mine);
+  std::stable_sort(notes.begin(), notes.end(),
+                   [](const auto& a, const auto& b) { return a.note.firstList < b.note.firstList; });
+  std::sort(parts_.begin(), parts_.end(),
+            [](const Part& a, const Part& b) { return a.firstList < b.firstList; });
+
+  // In the order of the lists; the first part of a chunk says who gets the others.
+  std::vector<int> to(notes.size());
+  std::uint64_t expected = 0;
+  for (std::size_t i = 0; i < notes.size(); ++i) {
+    const PartNote& note = notes[i].note;
+    const bool begins = note.firstList % io::listsPerChunk == 0;
+    const bool chunkIsWhole = i == 0 || expected == chunkEnd(notes[i - 1].note.firstList);
+    if (begins != chunkIsWhole || (!begins && note.firstList != expected)) failCoverage(expected);
+    to[i] = begins ? notes[i].rank : to[i - 1];
+    expected = note.firstList + note.listCount;
+  }
+  if (!notes.empty() && expected != chunkEnd(notes.back().note.firstList)) failCoverage(expected);
+
+  std::vector<Part> received;
+  comm_.together([&] {
+    for (std::size_t i = 0; i < notes.size(); ++i) {
+      if (to[i] != comm_.rank() || notes[i].rank == comm_.rank()) continue;
+      received.push_back({notes[i].note.firstList, {}});
+      received.back().lists.offsets.resize(notes[i].note.listCount + 1);
+      received.back().lists.segments.resize(notes[i].note.supersegmentCount);
+    }
+  });
+  comm::Messages messages(comm_);
+  auto nextReceived = received.begin();
+  auto nextOwn = parts_.begin();
+  for (std::size_t i = 0; i < notes.size(); ++i) {
+    const bool own = notes[i].rank == comm_.rank();
+    if (own && to[i] != comm_.rank()) {
+      messages.send(to[i], std::as_bytes(std::span(nextOwn->lists.offsets)));
+      messages.send(to[i], std::as_bytes(std::span(nextOwn->lists.segments)));
+      bytesSent_ += nextOwn->lists.offsets.size() * sizeof(std::uint32_t) +
+                    nextOwn->lists.segments.size() * sizeof(Segment);
+    } else if (!own && to[i] == comm_.rank()) {
+      messages.receive(notes[i].rank, std::as_writable_bytes(std::span(nextReceived->lists.offsets)));
+      messages.receive(notes[i].rank, std::as_writable_bytes(std::span(nextReceived->lists.segments)));
+      ++nextReceived;
+    }
+    if (own) ++nextOwn;
+  }
+  messages.wait();
+
+  comm_.together([&] {
+    nextReceived = received.begin();
+    nextOwn = parts_.begin();
+    Part whole;
+    for (std::size_t i = 0; i < notes.size(); ++i) {
+      const bool own = notes[i].rank == comm_.rank();
+      if (to[i] == comm_.rank()) {
+        if (notes[i].note.firstList % io::listsPerChunk == 0) whole = {notes[i].note.firstList, {}};
+        const Part& part = own ? *nextOwn : *nextReceived++;
+        append(whole, part.lists, 0, part.lists.listCount());
+        if (whole.end() == chunkEnd(whole.firstList))
+          encode(whole.lists, 0, whole.lists.listCount(), whole.firstList);
+      }
+      if (own) ++nextOwn;
+    }
+    parts_.clear();
+  });
+}
+
+/// Collective.
+template <typename Segment>
+typename VdiWriter<Segment>::Table VdiWriter<Segment>::shareTable() const {
+  std::vector<ChunkNote> mine;
+  for (const Chunk& chunk : chunks_) mine.push_back({chunk.index, chunk.entry});
+  const std::vector<NoteOf<ChunkNote>> notes = shareNotes<ChunkNote>(comm_, mine);
+  Table table;
+  comm_.together([&] {
+    const std::uint64_t count = io::chunksOf(listCount_);
+    constexpr int nobody = -1;
+    table.entries.resize(count);
+    table.owners.assign(count, nobody);
+    for (const auto& [rank, note] : notes) {
+      if (table.owners[note.index] != nobody) failCoverage(note.index * io::listsPerChunk);
+      table.owners[note.index] = rank;
+      table.entries[note.index] = note.entry;
+    }
+    table.offsets.push_back(io::headBytes(listCount_));
+    for (std::uint64_t i = 0; i < count; ++i) {
+      if (table.owners[i] == nobody) failCoverage(i * io::listsPerChunk);
+      table.offsets.push_back(table.offsets.back() + table.entries[i].packedBytes);
+    }
+  });
+  return table;
+}
+
+/// The root's: the file gets its size and its head. Returns what others can open it by; empty where they
+/// needn't, or can't.
+template <typename Segment>
+std::filesystem::path VdiWriter<Segment>::prepareFile(const Table& table) {
+  const std::vector<std::byte> head = io::encodeHead(header_, table.entries);
+  file_->reserve(table.offsets.back());
+  file_->write(0, head);
+  bytesWritten_ += head.size();
+  const bool others =
+      std::any_of(table.owners.begin(), table.owners.end(), [&](int owner) { return owner != root_; });
+  return others && file_->takesOffsets() ? file_->share() : std::filesystem::path();
+}
+
+/// What this rank has, into the root's file.
+template <typename Segment>
+void VdiWriter<Segment>::writeOwn(const Table& table, io::SharedOutput* shared) {
+  for (Chunk& chunk : chunks_) {
+    if (chunk.bytes.empty()) continue;
+    const std::uint64_t offset = table.offsets[chunk.index];
+    if (shared != nullptr) {
+      shared->write(offset, chunk.bytes);
+    } else {
+      file_->write(offset, chunk.bytes);
+    }
+    bytesWritten_ += chunk.bytes.size();
+    chunk.bytes = {};
+  }
+  if (shared != nullptr) shared->finish();
+}
+
+/// Collective: what its owner couldn't write, in the file's order.
+template <typename Segment>
+void VdiWriter<Segment>::writeByRoot(const Table& table, std::span<const std::uint64_t> writesItself) {
+  const auto left = [&](std::size_t i) {
+    return writesItself[static_cast<std::size_t>(table.owners[i])] == 0;
+  };
+  std::vector<std::byte> received;
+  comm_.together([&] {
+    std::sort(chunks_.begin(), chunks_.end(),
+              [](const Chunk& a, const Chunk& b) { return a.index < b.index; });
+    std::uint32_t largest = 0;
+    for (std::size_t i = 0; i < table.owners.size(); ++i) {
+      if (isRoot() && left(i)) largest = std::max(largest, table.entries[i].packedBytes);
+    }
+    received.resize(largest);
+  });
+  // Where the root can't go on it still takes what the others send, or they would wait for ever.
+  std::exception_ptr error;
+  auto own = chunks_.begin();
+  for (std::size_t i = 0; i < table.owners.size(); ++i) {
+    const int owner = table.owners[i];
+    const bool mine = owner == comm_.rank();
+    if (left(i) && (mine || isRoot())) {
+      const std::span<std::byte> bytes =
+          mine ? std::span(own->bytes) : std::span(received).first(table.entries[i].packedBytes);
+      if (owner != root_) {
+        comm::Messages message(comm_);
+        if (mine) {
+          message.send(root_, bytes);
+          bytesSent_ += bytes.size();
+        } else {
+          message.receive(owner, bytes);
+        }
+        message.wait();
+      }
+      if (isRoot() && !error) {
+        try {
+          file_->write(table.offsets[i], bytes);
+          bytesWritten_ += bytes.size();
+        } catch (...) {
+          error = std::current_exception();
+        }
+      }
+      if (mine) own->bytes = {};
+    }
+    if (mine) ++own;
+  }
+  comm_.agree(error);
+}
+
+template <typename Segment>
+WrittenVdi VdiWriter<Segment>::finish() {
+  joinParts();
+  const Table table = shareTable();
+  std::string name;
+  comm_.together([&] {
+    if (isRoot()) name = prepareFile(table).string();
+  });
+  const auto* begin = reinterpret_cast<const std::byte*>(name.data());
+  const std::vector<std::byte> shared = comm_.broadcast({begin, begin + name.size()}, root_);
+  name.assign(reinterpret_cast<const char*>(shared.data()), shared.size());
+
+  std::array<std::uint64_t, 1> writesItself{0};
+  comm_.together([&] {
+    const bool opens = !isRoot() && !name.empty() && !chunks_.empty() && writtenBy_ == WrittenBy::Owner;
+    std::optional<io::SharedOutput> file = opens ? io::SharedOutput::open(name, path_) : std::nullopt;
+    writesItself[0] = file || (isRoot() && file_->takesOffsets()) || chunks_.empty() ? 1 : 0;
+    if (writesItself[0] != 0) writeOwn(table, file ? &*file : nullptr);
+  });
+  const std::vector<std::uint64_t> all = comm_.allGatherWords(writesItself);
+  if (std::count(all.begin(), all.end(), 0U) > 0) writeByRoot(table, all);
+  comm_.together([&] {
+    if (isRoot()) file_->commit();
+  });
+
+  WrittenVdi written;
+  for (const io::ChunkEntry& entry : table.entries) written.supersegments += entry.supersegmentCount;
+  written.bytes = table.offsets.back();
+  return written;
+}
+
+template class VdiWriter<Supersegment>;
+template class VdiWriter<CompactSupersegment>;
+
+}  // namespace vdi::detail

@@ -1,0 +1,96 @@
+// A .vdi file that all ranks write together: each encodes and writes the chunks of its own lists. Not part of
+// the library's interface.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "vdi/comm/Communicator.h"
+#include "vdi/core/Vdi.h"
+#include "vdi/io/Files.h"
+#include "vdi/io/VdiParts.h"
+#include "vdi/pipeline/Pipeline.h"
+
+namespace vdi::detail {
+
+/// Who writes what a rank other than the root has encoded.
+enum class WrittenBy {
+  Owner,  // that rank, where it can open the file; else the root
+  Root    // as on hosts that don't have the file's folder
+};
+
+/// The file is what io::writeVdi makes of the whole VDI, byte by byte, whoever has which lists. It gets its
+/// name when it's whole, and only if all ranks have done their part; else the old file stays
+/// (io::OutputFile). A rank holds its own lists' chunks, the root for others no more than one of them. Throws
+/// on all ranks.
+template <typename Segment>
+class VdiWriter {
+ public:
+  /// Collective. `header`: all but the lists; what it says of size, budget and depth code is equal on all
+  /// ranks, the rest is the root's, as `path` is. `comm` must stay.
+  VdiWriter(const comm::Communicator& comm, int root, const std::filesystem::path& path, Vdi header,
+            WrittenBy writtenBy = WrittenBy::Owner);
+
+  /// Not collective; for Communicator::together. Some of this rank's lists, which are the VDI's from
+  /// `firstList` on. Any ranks may have any of them, each one once. What isn't a whole chunk is copied. The
+  /// file's first chunks are written at once, if the root has them.
+  void add(std::uint64_t firstList, const ListsOf<Segment>& lists);
+
+  /// Collective, when all have added theirs: nothing can be added any more. Equal on all ranks.
+  WrittenVdi finish();
+
+  std::uint64_t bytesSent() const { return bytesSent_; }        // to other ranks
+  std::uint64_t bytesWritten() const { return bytesWritten_; }  // into the file, by this rank
+
+ private:
+  /// Lists that aren't a whole chunk, or not yet.
+  struct Part {
+    std::uint64_t firstList = 0;
+    ListsOf<Segment> lists;
+    std::uint64_t end() const { return firstList + lists.listCount(); }
+  };
+  /// Of this rank.
+  struct Chunk {
+    std::uint64_t index = 0;
+    io::ChunkEntry entry{};
+    std::vector<std::byte> bytes;  // none: it's written
+  };
+  /// What all ranks know of all chunks.
+  struct Table {
+    std::vector<io::ChunkEntry> entries;
+    std::vector<int> owners;
+    std::vector<std::uint64_t> offsets;  // in the file, and its end
+  };
+
+  bool isRoot() const { return comm_.rank() == root_; }
+  std::uint64_t chunkEnd(std::uint64_t list) const;
+  void append(Part& part, const ListsOf<Segment>& lists, std::size_t first, std::size_t last) const;
+  void addToPart(std::uint64_t firstList, const ListsOf<Segment>& lists, std::size_t first, std::size_t last);
+  void encode(const ListsOf<Segment>& lists, std::size_t first, std::size_t last, std::uint64_t firstList);
+  void keep(std::uint64_t index, io::EncodedChunk chunk);
+  void joinParts();
+  Table shareTable() const;
+  std::filesystem::path prepareFile(const Table& table);
+  void writeOwn(const Table& table, io::SharedOutput* shared);
+  void writeByRoot(const Table& table, std::span<const std::uint64_t> writesItself);
+
+  const comm::Communicator& comm_;
+  int root_;
+  std::filesystem::path path_;
+  Vdi header_;
+  WrittenBy writtenBy_;
+  std::uint64_t listCount_;
+  std::unique_ptr<io::OutputFile> file_;  // the root's
+  std::vector<Part> parts_;               // the last one may grow
+  std::vector<Chunk> chunks_;
+  std::uint64_t firstChunks_ = 0;  // of the file, that are written
+  std::uint64_t writtenEnd_;       // of those
+  std::uint64_t bytesSent_ = 0;
+  std::uint64_t bytesWritten_ = 0;
+};
+
+}  // namespace vdi::detail
