@@ -69,6 +69,23 @@ for precision in ("Full", "Compact"):
     searched = picture(vdi_of(wavelet, Algorithm="Bisection", Supersegments=2, Precision=precision))
     worst = np.abs(searched - volume).max()
     check(worst <= 2, "so it is by bisection, in %s precision, off by %d" % (precision.lower(), worst))
+
+# Zoomed in, a margin keeps what lies beyond the picture; the picture stays.
+near = {"CameraViewAngle": 6, "Resolution": [60, 45]}
+cut, kept = vdi_of(wavelet, **near), vdi_of(wavelet, Margin=1, **near)
+check(np.array_equal(picture(kept), picture(cut)), "a margin leaves the picture as it is")
+path = os.path.join(OUTPUT, "margin.vdi")
+simple.SaveData(path, proxy=kept)
+read_again = simple.OpenDataFile(path)
+check(np.array_equal(picture(read_again), picture(cut)), "a VDI with a margin reads back as it was")
+turned = [picture(simple.RenderVDI(Input=source, UseOriginalCamera=1, Azimuth=20))
+          for source in (cut, kept, read_again)]
+check(all(view.shape == (45, 60, 3) for view in turned), "views are of the picture's size by default")
+check(np.array_equal(turned[1], turned[2]), "the margin is in the file")
+black = [np.mean(view.max(axis=2) == 0) for view in turned]
+check(black[0] > 0.01 and black[1] < 0.001, "turned by 20 degrees, %.1f %% are missing without, %.1f %% with it"
+      % (100 * black[0], 100 * black[1]))
+
 by_need = vdi_of(wavelet, Supersegments=6, Budget="Total", Fill=0.5)
 check(np.abs(picture(by_need) - volume).max() <= 2, "so it is with a total budget")
 equal_share = vdi_of(wavelet, Supersegments=6)

@@ -49,6 +49,32 @@ for step, good in enumerate([True, True, False, False, True]):
     check(picture[60:300].std() > 5, "step {} shows something".format(step))
     check((pvtest.message_in(view) == "") == good, "step {} shows {}".format(step, "no message" if good else "a message"))
 
+# A file that is damaged between two renders: the VDI that has been read stays, until it's read again.
+scene.AnimationTime = reader.TimestepValues[4]
+before = look(view, "sound")
+with open(steps[4], "r+b") as file:
+    file.truncate(os.path.getsize(steps[4]) // 2)
+view.GetActiveCamera().Azimuth(1)
+simple.Render(view)
+view.GetActiveCamera().Azimuth(-1)
+check(pvtest.ssim(look(view, "damaged"), before) > 0.999 and not pvtest.message_in(view), "what has been read is still shown")
+simple.ReloadFiles(reader)
+look(view, "reloaded")
+check(pvtest.message_in(view) != "", "and read again, the damaged file gets a message")
+scene.AnimationTime = reader.TimestepValues[0]
+check(look(view, "after").std() > 5 and not pvtest.message_in(view), "and the next step none")
+
+# A view that is closed while a VDI is loaded for it, whose last frame showed the one before.
+for _ in range(3):
+    other = pvtest.make_view(SIZE, [2.2, 1.9, 2.4], [0.5, 0.5, 0.5])
+    simple.Show(reader, other)
+    simple.Render(other)
+    other.ViewTime = reader.TimestepValues[1]
+    other.SMProxy.Update()
+    other.SMProxy.InteractiveRender()
+    simple.Delete(other)
+check(look(view, "closed").std() > 5, "a view that is closed while a VDI is loaded leaves the other one as it is")
+
 simple.Hide(reader, view)
 check(not pvtest.message_in(view), "what is hidden says nothing")
 empty = simple.OpenDataFile(make("empty.vdi", "--resolution", "64x64", "--position", "9", "9", "9", "--focal-point", "10", "10",

@@ -1,5 +1,5 @@
-"""By mouse, as the guide says it: from a shown volume to a VDI in two clicks, its opacity edited, saved as data and as a
-state, the trace replayed and the state loaded. Leaves a screenshot of each step in VDI_TEST_OUTPUT."""
+"""By mouse, as the guide says it: from a shown volume to a VDI in two clicks, its opacity edited, Auto and its undo, saved as
+data and as a state, the trace replayed and the state loaded. Leaves a screenshot of each step in VDI_TEST_OUTPUT."""
 
 import os
 import subprocess
@@ -42,14 +42,6 @@ def bytes_of(name):
         return file.read()
 
 
-def load_plugin(window):
-    window.menu("Tools", "Manage Plugins...")
-    window.click("VolumetricDepthImages")
-    window.click("Load Selected")
-    wait_for("loaded plugin", lambda: not window.is_enabled("Load Selected"))
-    window.close_dialog("Plugin Manager")
-
-
 def save_data(window, name):
     window.menu("File", "Save Data...")
     window.find("File name:", seconds=10)
@@ -62,11 +54,27 @@ def is_making(window, panel):
     return window.text_that_begins("Making the VDI anew", panel) is not None
 
 
+def auto_and_undo(window, panel):
+    """Auto, the undo of what it did, and the redo."""
+    x, y, width, height = window.view()
+    window.click("Auto", "check box")
+    before = window.values()
+    window.drag((x + width // 2, y + height // 2), (x + width // 2 + 160, y + height // 2))
+    after = wait_for("camera that Auto sets", lambda: window.values() != before and window.values(), 60)
+    wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
+    window.screenshot("8_auto.png")
+    window.click("Undo Regenerate VDI")
+    wait_for("camera from before", lambda: window.values() == before, 120)
+    window.click("Redo Regenerate VDI")
+    wait_for("camera that Auto had set", lambda: window.values() == after, 120)
+    window.click("Auto", "check box")
+
+
 def first_session(window):
     vdi, state = path("first.vdi"), path("state.pvsm")
     window.menu("Tools", "Start Trace")
     window.click("OK", "push button")
-    load_plugin(window)
+    window.load_plugin(os.environ["VDI_PLUGIN"])
     window.menu("Sources", "Alphabetical", "Wavelet")
     window.click("Apply")
     window.choose("Outline", "Volume")
@@ -118,6 +126,7 @@ def first_session(window):
     wait_for("new VDI", lambda: is_making(window, panel), 30)
     wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
     check(window.values() != before, "the button sets the camera")
+    auto_and_undo(window, panel)
 
     window.menu("Tools", "Stop Trace")
     trace = wait_for("trace", lambda: window.text_that_begins("# trace generated"))
@@ -138,28 +147,33 @@ def first_session(window):
     window.type(state)
     window.key("Return")
     wait_for(state, lambda: os.path.exists(state))
+    window.select(1)
+    window.open_by_double_click("first.vdi")  # beside the volume that it was made of
+    window.click("Apply")
+    wait_for("end of Apply", lambda: not window.is_enabled("Apply"), 60)
+    window.wait_for_picture()
+    window.screenshot("11_opened.png")
+    check(any(widget.role == "combo box" and widget.name == "VDI" for widget in window.widgets()),
+          "what is opened is shown as a VDI")
     return vdi, state
 
 
 def second_session(window, state):
     vdi = path("from_state.vdi")
-    window.click("Reset Session", "push button")
-    if window.has("Yes", "push button"):
-        window.click("Yes", "push button")
-    time.sleep(2)
+    window.reset_session()
     window.menu("File", "Load State...")
     window.find("File name:", seconds=10)
     window.type(state)
     window.key("Return")
     time.sleep(20)
-    window.screenshot("11_state.png")
+    window.screenshot("12_state.png")
     window.select(2)
     save_data(window, vdi)
     return vdi
 
 
 with Screen() as screen:
-    with Window(screen, output=OUTPUT) as window:
+    with Window(screen, output=OUTPUT, folder=OUTPUT) as window:
         vdi, state = first_session(window)
         from_state = second_session(window, state)
     replayed = path("replayed.vdi")

@@ -6,14 +6,14 @@
         window.screenshot("wavelet.png")
 
 Widgets are found by the text or tool tip that a screen reader would read (AT-SPI), then clicked where they are. Needs
-xdotool, openbox, Xvfb, ImageMagick, dbus, at-spi2-core and python3-gi; run it by
-`dbus-run-session -- /usr/bin/python3 test.py`.
+xdotool, openbox, Xvfb, ImageMagick, dbus, at-spi2-core and python3-gi.
 """
 
 import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 
@@ -33,21 +33,53 @@ def wait_for(what, action, seconds=SECONDS):
         time.sleep(0.1)
 
 
-class Bus:
-    """The accessibility bus of this session."""
+class Session:
+    """A D-Bus session for one ParaView, in a runtime folder of its own.
+
+    ParaView has to be started before anybody asks for the accessibility bus. Where that bus is there first, Debian's Qt 5.15.8
+    (a11y_root.diff) may register its objects before it is connected, and then never answers."""
 
     def __init__(self):
-        session = Gio.bus_get_sync(Gio.BusType.SESSION)
+        self.folder = tempfile.mkdtemp(prefix="vdi-window-")  # short: sockets have names of at most 108 characters
+        self.environment = dict(os.environ, XDG_RUNTIME_DIR=self.folder, XDG_CACHE_HOME=self.folder,
+                                GSETTINGS_BACKEND="memory")
+        read, write = os.pipe()
+        self.daemon = subprocess.Popen(
+            ["dbus-daemon", "--session", "--nofork", "--nopidfile", "--print-address=%d" % write], pass_fds=[write],
+            env=self.environment, stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL)
+        os.close(write)
+        with os.fdopen(read) as address:
+            self.address = address.readline().strip()
+        assert self.address, "dbus-daemon doesn't start"
+        self.environment["DBUS_SESSION_BUS_ADDRESS"] = self.address
+
+    def end(self):
+        self.daemon.terminate()  # and so the accessibility bus
+        self.daemon.wait()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def accessibility_bus(self):
+        """Starts it where it isn't yet; Qt notices by itself."""
+        flags = Gio.DBusConnectionFlags
+        session = Gio.DBusConnection.new_for_address_sync(
+            self.address, flags.AUTHENTICATION_CLIENT | flags.MESSAGE_BUS_CONNECTION)
         for what in ("IsEnabled", "ScreenReaderEnabled"):
             enabled = GLib.Variant("(ssv)", ("org.a11y.Status", what, GLib.Variant("b", True)))
             session.call_sync("org.a11y.Bus", "/org/a11y/bus", "org.freedesktop.DBus.Properties", "Set", enabled, None, 0,
                               -1)
         address = session.call_sync("org.a11y.Bus", "/org/a11y/bus", "org.a11y.Bus", "GetAddress", None, None, 0, -1)
-        self.address = address.unpack()[0]
+        return Bus(address.unpack()[0])
+
+
+class Bus:
+    """A connection to an accessibility bus."""
+
+    def __init__(self, address):
+        self.address = address
+        flags = Gio.DBusConnectionFlags
         self.bus = Gio.DBusConnection.new_for_address_sync(
-            self.address, Gio.DBusConnectionFlags.AUTHENTICATION_CLIENT | Gio.DBusConnectionFlags.MESSAGE_BUS_CONNECTION)
-        # Programs ask for the registry once, when they start.
-        self.call("org.a11y.atspi.Registry", "/org/a11y/atspi/accessible/root", "org.a11y.atspi.Accessible", "GetChildren")
+            address, flags.AUTHENTICATION_CLIENT | flags.MESSAGE_BUS_CONNECTION)
 
     def call(self, name, path, interface, method, arguments=None):
         return self.bus.call_sync(name, path, interface, method, arguments, None, 0, 120000).unpack()
@@ -72,7 +104,7 @@ class Widget:
     SHOWING, ENABLED = 25, 8  # bits of its state
 
     def __init__(self, bus, program, path="/org/a11y/atspi/accessible/root"):
-        self.bus, self.program, self.path = bus, program, path
+        self.bus, self.program, self.path, self.known_role = bus, program, path, None
 
     def _ask(self, interface, method, arguments=None):
         return self.bus.call(self.program, self.path, interface, method, arguments)
@@ -91,7 +123,9 @@ class Widget:
 
     @property
     def role(self):
-        return self._ask("org.a11y.atspi.Accessible", "GetRoleName")[0]
+        if self.known_role is None:
+            self.known_role = self._ask("org.a11y.atspi.Accessible", "GetRoleName")[0]
+        return self.known_role
 
     @property
     def text(self):
@@ -124,10 +158,8 @@ class Screen:
         os.close(write)
         with os.fdopen(read) as number:
             os.environ["DISPLAY"] = ":" + number.readline().strip()
-        self.bus = Bus()
-        # Where Qt looks first; asking the session's bus instead, it often comes too late to notice that it's wanted.
-        subprocess.run(["xprop", "-root", "-f", "AT_SPI_BUS", "8s", "-set", "AT_SPI_BUS", self.bus.address], check=True)
-        self.manager = subprocess.Popen(["openbox", "--sm-disable"], stderr=subprocess.DEVNULL)
+        self.manager = subprocess.Popen(["openbox", "--sm-disable"], stdout=subprocess.DEVNULL,
+                                        stderr=subprocess.DEVNULL)
         return self
 
     def __exit__(self, *error):
@@ -136,38 +168,39 @@ class Screen:
             process.wait()
 
 
-SKIPPED = 77  # exit status that ctest counts as skipped, and names
-
-
 class Window:
-    """ParaView's main window, without settings of the user's. VDI_PLUGIN_LIST names the list of our plugin."""
+    """ParaView's main window, without settings of the user's and without our plugin."""
 
-    def __init__(self, screen, *arguments, output="."):
-        self.screen, self.arguments, self.output = screen, arguments, output
+    def __init__(self, screen, *arguments, output=".", folder=None):
+        """`output`: the folder of screenshots and of the log; `folder`: that in which ParaView's dialogs begin."""
+        self.middle = None
+        self.screen, self.arguments, self.output, self.folder = screen, arguments, output, folder
 
     def __enter__(self):
         home = os.path.join(self.output, "home")
         shutil.rmtree(home, ignore_errors=True)
         os.makedirs(home)
-        environment = dict(os.environ, HOME=home, QT_ACCESSIBILITY="1", QT_LINUX_ACCESSIBILITY_ALWAYS_ON="1",
-                           LC_ALL="C.UTF-8", PV_PLUGIN_CONFIG_FILE=os.environ.get("VDI_PLUGIN_LIST", ""))
-        for _ in range(40):
-            self.log = open(os.path.join(self.output, "paraview.log"), "w+")
-            self.process = subprocess.Popen(["paraview", "--disable-registry", *self.arguments], env=environment,
-                                            stdout=self.log, stderr=subprocess.STDOUT)
+        self.session = Session()
+        environment = dict(self.session.environment, HOME=home, QT_LINUX_ACCESSIBILITY_ALWAYS_ON="1", LC_ALL="C.UTF-8")
+        environment.pop("PV_PLUGIN_CONFIG_FILE", None)  # ParaView loads at once what is named there
+        self.log = open(os.path.join(self.output, "paraview.log"), "w+")
+        self.process = subprocess.Popen(["paraview", "--disable-registry", *self.arguments], env=environment,
+                                        cwd=self.folder, stdout=self.log, stderr=subprocess.STDOUT)
+        try:
             self.window = wait_for("main window", self._main_window, 120)
-            program = wait_for("ParaView on the bus", lambda: self.screen.bus.program(self.process.pid))
-            self.root = Widget(self.screen.bus, program)
-            try:
-                wait_for("answer of ParaView", self._answers, 1)
-                self.place()
-                return self
-            except AssertionError:  # Qt 5.15 is often on the bus and has nothing to say there, until its end
-                self.__exit__()
-        print("skipped: Qt doesn't answer on the accessibility bus here, in 40 starts of ParaView", flush=True)
-        sys.exit(SKIPPED)
+            self.bus = self.session.accessibility_bus()
+            program = wait_for("ParaView on the bus", lambda: self.bus.program(self.process.pid), 60)
+            self.root = Widget(self.bus, program)
+            wait_for("answer of ParaView", self._answers, 60)
+            self.place()
+        except BaseException:
+            self.__exit__(*sys.exc_info())
+            raise
+        return self
 
     def __exit__(self, *error):
+        if error and error[0] is not None:
+            self.screenshot("failed.png")
         if self.process.poll() is None:
             self.process.terminate()
             try:
@@ -176,6 +209,7 @@ class Window:
                 self.process.kill()
                 self.process.wait()
         self.log.close()
+        self.session.end()
 
     def _main_window(self):
         assert self.process.poll() is None, "ParaView ended by itself: " + self.log_text()[-2000:]
@@ -193,10 +227,14 @@ class Window:
             return log.read()
 
     def place(self):
-        """The main window over all of the screen."""
+        """The main window over all of the screen, with room for the panel of properties."""
         xdotool("windowmove", self.window, "0", "0")
         xdotool("windowsize", self.window, str(self.screen.size[0]), str(self.screen.size[1] - 25))  # and a title
         time.sleep(1)
+        left, top, width, height = self.find("Pipeline Browser", "frame").box
+        self.drag((left + width // 2, top + height + 2), (left + width // 2, top + 120))
+        self.drag((left + width + 4, top + 300), (left + 340, top + 300))
+        time.sleep(0.5)
 
     # What is there
 
@@ -210,17 +248,20 @@ class Window:
             try:
                 if node is not None and not hidden and not child.has(Widget.SHOWING):
                     continue
+                # Nothing to be clicked, and there are many of them.
+                closed = not hidden and (child.role == "combo box" or child.role == "frame" and child.box[0] < -100)
             except GLib.Error:
                 continue
             yield child
-            yield from self.widgets(child, hidden)
+            if not closed:
+                yield from self.widgets(child, hidden)
 
-    def find(self, name, role=None, seconds=None):
-        """The visible widget of that text, or of that tool tip's first line."""
+    def find(self, name, role=None, seconds=None, within=None):
+        """The visible widget of that text, or of that tool tip's first line; `within`: in that widget, a dialog for example."""
         def look():
-            for widget in self.widgets():
+            for widget in self.widgets(within):
                 try:
-                    if role is not None and widget.role != role:
+                    if role not in (None, widget.role):
                         continue
                     if widget.name.split("\n")[0] == name or widget.tip.split("\n")[0] == name:
                         return widget
@@ -278,6 +319,20 @@ class Window:
         xdotool("click", "--repeat", str(times), "--delay", "60", str(button))
         time.sleep(0.3)
 
+    def open_by_double_click(self, name):
+        """Of the folder in which ParaView was started."""
+        self.menu("File", "Open...")
+        self.find("Files of type:")
+        self.click(self.find(name), times=2)
+        wait_for("end of the dialog", lambda: not self.has("Files of type:"))
+
+    def enter(self, label, value):
+        """In the panel's field beside that label."""
+        left, top, width, height = self.find(label, "label").box
+        self.click((left + 250, top + height // 2), times=3)
+        self.type(str(value))
+        self.key("Tab")
+
     def drag(self, start, end, button=1, steps=20, seconds=0.6, release=True):
         """From one point of the screen to another; with `release` False the button stays down."""
         xdotool("mousemove", str(start[0]), str(start[1]), "mousedown", str(button))
@@ -316,6 +371,46 @@ class Window:
         x, y, width, height = submenu.box
         return x + width + 40, y + height // 2 + height * names.index(name)
 
+    def open_file(self, path):
+        """File ▸ Open; what is shown of it waits for Apply."""
+        self.menu("File", "Open...")
+        self.find("Files of type:", seconds=10)
+        self.type(path)
+        self.key("Return")
+        wait_for("end of the dialog", lambda: not self.has("Files of type:"))
+
+    def load_plugin(self, path, picture=None):
+        """By Load New, on the server first where there is one; `picture`: the name of a screenshot of the dialog after that."""
+        name = os.path.splitext(os.path.basename(path))[0]
+        if not self.has("Plugin Manager", "dialog"):  # ParaView opens it where a server lacks the plugin
+            self.menu("Tools", "Manage Plugins...")
+        self.find("Plugin Manager", "dialog")
+        for side in ("Remote Plugins", "Local Plugins"):
+            if not self.has(side, "panel"):
+                continue
+
+            def is_loaded():
+                texts = list(self.widgets(self.find(side, "panel")))
+                rows = {widget.box[1] for widget in texts if widget.name == name}
+                return any(widget.name == "Loaded" and widget.box[1] in rows for widget in texts)
+
+            if is_loaded():
+                continue
+            self.click(self.find("Load New ...", within=self.find(side, "panel")))
+            self.find("Files of type:")
+            self.type(path)
+            self.key("Return")
+            wait_for("loaded plugin", is_loaded, 60)
+        if picture:
+            self.screenshot(picture)
+        self.close_dialog("Plugin Manager")
+
+    def reset_session(self):
+        self.click("Reset Session", "push button")
+        if self.has("Yes", "push button"):
+            self.click("Yes", "push button")
+        time.sleep(2)
+
     def choose(self, shown, item):
         """In the combo box, of a toolbar if there are several, that shows `shown`."""
         boxes = [widget for widget in self.widgets() if widget.role == "combo box" and widget.name == shown]
@@ -335,6 +430,26 @@ class Window:
             xdotool("windowactivate", "--sync", window, "key", "alt+F4")
         time.sleep(0.5)
 
+    def pixels(self):
+        """Of the middle of the view: bytes of red, green and blue."""
+        if self.middle is None:
+            left, top, width, height = self.view()
+            self.middle = "%dx%d+%d+%d" % (width // 2, height // 2, left + width // 4, top + height // 4)
+        return subprocess.run(["import", "-window", "root", "-crop", self.middle, "-depth", "8", "rgb:-"], check=True,
+                              capture_output=True).stdout
+
+    def wait_for_picture(self, seconds=60):
+        """Until something is seen in the middle of the view, and the same for more than a second in which the window is idle:
+        after a drag it draws the picture at rest, and doesn't answer."""
+        seen = []
+
+        def rests():
+            self.root.children()
+            seen.append(self.pixels())
+            return len(set(seen[-1])) > 30 and seen[-4:] == seen[-1:] * 4
+
+        wait_for("picture that rests", lambda: time.sleep(0.4) or rests(), seconds)
+
     def screenshot(self, name):
         path = os.path.join(self.output, name)
         subprocess.run(["import", "-window", "root", path], check=True)
@@ -353,9 +468,10 @@ class Pulse:
 
     def __init__(self, window):
         self.pid, self.longest, self.stop = window.process.pid, 0.0, threading.Event()
+        self.address = window.bus.address
 
     def __enter__(self):
-        bus = Bus()  # of its own, beside what the test asks
+        bus = Bus(self.address)  # of its own, beside what the test asks
         self.root = Widget(bus, bus.program(self.pid))
         self.thread = threading.Thread(target=self._ask)
         self.thread.start()
@@ -368,7 +484,7 @@ class Pulse:
     def _ask(self):
         while not self.stop.is_set():
             begin = time.monotonic()
-            self.root.role
+            self.root.name
             self.longest = max(self.longest, time.monotonic() - begin)
             time.sleep(0.01)
 

@@ -15,6 +15,7 @@
 #include <span>
 #include <vector>
 
+#include "VDIRanges.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -82,6 +83,7 @@ vdi::ListsOf<Segment> listsFrom(vtkUnsignedIntArray* offsets, Array* segments) {
 void setPicture(vtkImageData* image, const vdi::ImageBytes& picture) {
   image->SetDimensions(picture.width, picture.height, 1);
   vdi::copyInParallel(std::as_bytes(picture.rgba), addColors(image, picture.rgba.size()));
+  rememberRanges(image->GetPointData()->GetScalars());
   addDepth(image, picture.depth);
 }
 
@@ -98,23 +100,39 @@ void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth) 
       *out++ = vdi::toByte(pixel.a);
     }
   });
+  rememberRanges(image->GetPointData()->GetScalars());
   if (withDepth) addDepth(image, picture.depth);
 }
 
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
-  setPicture(image, vdi::flatten(vdi), false);
+  setVdi(image, vdi, vdi::flatten(vdi));
+}
+
+void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat) {
+  setPicture(image, flat, false);
   vtkNew<vtkUnsignedIntArray> counts;
   counts->SetName("SupersegmentCount");
   const auto& offsets = vdi.offsets();
-  counts->SetNumberOfTuples(static_cast<vtkIdType>(vdi.listCount()));
-  for (std::size_t i = 0; i < vdi.listCount(); ++i)
-    counts->SetValue(static_cast<vtkIdType>(i), offsets[i + 1] - offsets[i]);
+  const glm::ivec2 picture = vdi.pictureSize();
+  counts->SetNumberOfTuples(vtkIdType{picture.x} * picture.y);
+  vtkIdType pixel = 0;
+  for (int y = vdi.margin.y; y < vdi.margin.y + picture.y; ++y) {
+    const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(vdi.width);
+    for (int x = vdi.margin.x; x < vdi.margin.x + picture.x; ++x) {
+      const std::size_t list = row + static_cast<std::size_t>(x);
+      counts->SetValue(pixel++, offsets[list + 1] - offsets[list]);
+    }
+  }
   image->GetPointData()->AddArray(counts);
+  rememberRanges(counts);
 
   vtkFieldData* fields = image->GetFieldData();
   unsigned int* size = addField<vtkUnsignedIntArray>(fields, "VDI.size", 1, 2);
   size[0] = static_cast<unsigned int>(vdi.width);
   size[1] = static_cast<unsigned int>(vdi.height);
+  unsigned int* margin = addField<vtkUnsignedIntArray>(fields, "VDI.margin", 1, 2);
+  margin[0] = static_cast<unsigned int>(vdi.margin.x);
+  margin[1] = static_cast<unsigned int>(vdi.margin.y);
   std::copy(offsets.begin(), offsets.end(),
             addField<vtkUnsignedIntArray>(fields, "VDI.offsets", 1, static_cast<vtkIdType>(offsets.size())));
   const auto count = static_cast<vtkIdType>(vdi.supersegmentCount());
@@ -145,6 +163,9 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
   parameters[1] = vdi.sampleStep;
   parameters[2] = vdi.time;
   parameters[3] = static_cast<double>(vdi.timeStep);
+  for (const char* name : {"VDI.offsets", "VDI.codes", "VDI.supersegments"}) {
+    if (vtkDataArray* array = fields->GetArray(name)) rememberRanges(array);
+  }
 }
 
 bool hasVdi(vtkImageData* image) {
@@ -153,8 +174,11 @@ bool hasVdi(vtkImageData* image) {
 
 bool getVdi(vtkDataObject* data, vdi::Vdi& vdi) {
   auto* image = vtkImageData::SafeDownCast(data);
-  if (image == nullptr || !hasVdi(image)) return false;
-  vtkFieldData* fields = image->GetFieldData();
+  return image != nullptr && getVdi(image->GetFieldData(), vdi);
+}
+
+bool getVdi(vtkFieldData* fields, vdi::Vdi& vdi) {
+  if (fields->GetAbstractArray("VDI.offsets") == nullptr) return false;
   auto* offsets = field<vtkUnsignedIntArray>(fields, "VDI.offsets", 1, -1);
   const double* camera = field<vtkDoubleArray>(fields, "VDI.camera", 1, 12)->GetPointer(0);
   const double* bounds = field<vtkDoubleArray>(fields, "VDI.bounds", 1, 6)->GetPointer(0);
@@ -162,6 +186,8 @@ bool getVdi(vtkDataObject* data, vdi::Vdi& vdi) {
   const unsigned int* size = field<vtkUnsignedIntArray>(fields, "VDI.size", 1, 2)->GetPointer(0);
   vdi.width = static_cast<int>(size[0]);
   vdi.height = static_cast<int>(size[1]);
+  const unsigned int* margin = field<vtkUnsignedIntArray>(fields, "VDI.margin", 1, 2)->GetPointer(0);
+  vdi.margin = glm::ivec2(static_cast<int>(margin[0]), static_cast<int>(margin[1]));
   for (int axis = 0; axis < 3; ++axis) {
     vdi.camera.position[axis] = camera[axis];
     vdi.camera.focalPoint[axis] = camera[3 + axis];

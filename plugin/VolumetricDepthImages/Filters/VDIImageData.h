@@ -1,17 +1,19 @@
 // A VDI as standard VTK data: an image with the flat picture, and the VDI beside it in field data. Writers,
 // extractors, Live and pipelines then work as with any image.
-//   point data  RGBA               unsigned char [h][w][4], straight colour (VTK blends with alpha), row 0 at
-//   the bottom
+//   point data  RGBA               unsigned char [h][w], 4 components, straight colour (VTK blends with
+//                                  alpha), row 0 at the bottom; w, h: the picture's
 //               SupersegmentCount  unsigned int [h][w]
 //               Depth              float [h][w], of RenderVDI only
-//   field data  VDI.size           unsigned int [2]: w, h; a pipeline may crop the image
-//               VDI.offsets        unsigned int [w*h + 1]
+//   field data  VDI.size           unsigned int [2]: columns and rows of lists, the margin's included
+//               VDI.margin         unsigned int [2]: vdi::Vdi::margin
+//               VDI.offsets        unsigned int [lists + 1]
 //               VDI.supersegments  full precision: float [n][6]: front, back, red, green, blue, opacity
 //               VDI.codes          compact: unsigned int [n][2], vdi::CompactSupersegment
 //               VDI.depthCode      compact: float [2], vdi::DepthCode
 //               VDI.camera         double [12]: position, focal point, view-up, view angle, parallel
-//               projection, scale VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ... VDI.parameters
-//               double [4]: N_S, sample step, time, time step
+//                                  projection, scale
+//               VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ...
+//               VDI.parameters     double [4]: N_S, sample step, time, time step
 #ifndef VDIImageData_h
 #define VDIImageData_h
 
@@ -21,6 +23,7 @@
 #include "vdi/core/Vdi.h"
 
 class vtkDataObject;
+class vtkFieldData;
 class vtkImageData;
 
 namespace pv {
@@ -31,11 +34,15 @@ void setPicture(vtkImageData* image, const vdi::ImageBytes& picture);
 void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth);
 /// The flat picture of the VDI and the VDI itself.
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi);
+/// The same, of a flat picture that's there already (vdi::flatten).
+void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat);
 /// Whether the image carries one, sound or not.
 bool hasVdi(vtkImageData* image);
 /// False if the data object carries no VDI (what a rank other than the root has). Throws vdi::Error{Format}
 /// for one that isn't sound.
 bool getVdi(vtkDataObject* data, vdi::Vdi& vdi);
+/// The same of an image's field data. From any thread: makes no VTK object.
+bool getVdi(vtkFieldData* fields, vdi::Vdi& vdi);
 
 }  // namespace pv
 

@@ -5,6 +5,8 @@
 #include <vtkMPICommunicator.h>
 #include <vtkMultiProcessController.h>
 
+#include <mutex>
+
 #include "VDICollective.h"
 #include "vdi/core/Error.h"
 
@@ -25,14 +27,33 @@ void enterCollective(vtkMultiProcessController* controller, const std::string& o
   if (!entry.refusal.empty()) throw vdi::Error(vdi::ErrorCode::RemoteRank, entry.refusal);
 }
 
+namespace {
+
+struct Existing {
+  std::mutex mutex;
+  std::weak_ptr<vdi::gpu::Device> device;
+};
+
+Existing& existing() {
+  static Existing shared;
+  return shared;
+}
+
+}  // namespace
+
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank) {
-  static std::weak_ptr<vdi::gpu::Device> existing;
-  std::shared_ptr<vdi::gpu::Device> device = existing.lock();
+  const std::scoped_lock lock(existing().mutex);
+  std::shared_ptr<vdi::gpu::Device> device = existing().device.lock();
   if (!device) {
     device = vdi::gpu::Device::create(vdi::gpu::requestFromEnvironment(localRank));
-    existing = device;
+    existing().device = device;
   }
   return device;
+}
+
+void forgetDevice() {
+  const std::scoped_lock lock(existing().mutex);
+  existing().device.reset();
 }
 
 }  // namespace pv

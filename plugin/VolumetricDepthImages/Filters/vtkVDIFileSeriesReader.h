@@ -3,7 +3,8 @@
  * @brief reads .vdi files as the time steps of one series
  *
  * A step's time is the one in its file. Where two files have the same time, as those of one data set from
- * several viewpoints have, the steps are counted instead, from 0.
+ * several viewpoints have, the steps are counted instead, from 0. Who goes from step to step finds the next
+ * one read already.
  */
 #ifndef vtkVDIFileSeriesReader_h
 #define vtkVDIFileSeriesReader_h
@@ -22,10 +23,14 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
   ~vtkVDIFileSeriesReader() override = default;
 
   int RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
+  int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
 
  private:
   vtkVDIFileSeriesReader(const vtkVDIFileSeriesReader&) = delete;
   void operator=(const vtkVDIFileSeriesReader&) = delete;
+
+  vtkIdType LastIndex = -1;  // of the file that was read last
+  vtkIdType LastStep = 0;    // to it from the one before, in [0, count)
 };
 
 #endif

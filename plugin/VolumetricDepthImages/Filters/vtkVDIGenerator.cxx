@@ -109,6 +109,7 @@ void vtkVDIGenerator::SetReport(const char* text) {
 void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Resolution: " << this->Resolution[0] << " x " << this->Resolution[1] << "\n"
+     << indent << "Margin: " << this->Margin << "\n"
      << indent << "Supersegments: " << this->Supersegments << "\n"
      << indent << "SamplingRate: " << this->SamplingRate << "\n"
      << indent << "Algorithm: " << this->Algorithm << "\n"
@@ -278,6 +279,14 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
       this->KeepEarlier(earlier, output);
       return 1;
     }
+    const bool isAlone = this->Controller == nullptr || this->Controller->GetNumberOfProcesses() == 1;
+    if (error.code() == vdi::ErrorCode::DeviceFailure && isAlone) {
+      // A lost device stays lost: the next frame gets a new one. Ranks would have to agree on that.
+      this->DropPreparation();
+      this->Internal->Generator.reset();
+      this->Internal->Shown.reset();
+      pv::forgetDevice();
+    }
     vtkErrorMacro(<< error.what());
     return 0;
   } catch (const std::exception& error) {
@@ -421,6 +430,7 @@ vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame() {
   const auto [width, height] = this->PictureSize();
   settings.width = width;
   settings.height = height;
+  settings.margin = this->Margin;
   settings.supersegments = static_cast<std::uint32_t>(std::max(this->Supersegments, 0));
   settings.samplesPerVoxel = this->SamplingRate;
   settings.algorithm = static_cast<vdi::Algorithm>(this->Algorithm);

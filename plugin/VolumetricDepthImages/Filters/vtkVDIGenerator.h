@@ -54,8 +54,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   /// Component of a multi-component array; -1: magnitude.
   vtkSetMacro(Component, int);
-  /// Lists of the VDI: columns and rows. 0 0 (default): 1280 x 720.
+  /// Lists of the VDI's picture: columns and rows. 0 0 (default): 1280 x 720.
   vtkSetVector2Macro(Resolution, int);
+  /// Share of the picture for which there are lists beyond each of its edges, as far as there's something to
+  /// see: vdi::GenerateSettings::margin.
+  vtkSetClampMacro(Margin, double, 0.0, 4.0);
+  vtkGetMacro(Margin, double);
   /// N_S, the most supersegments in a list.
   vtkSetMacro(Supersegments, int);
   /// Samples per voxel.
@@ -158,6 +162,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   double ScalarOpacityUnitDistance = 0.0;
   int Component = 0;
   int Resolution[2] = {0, 0};
+  double Margin = 0.0;
   int Supersegments = 25;
   double SamplingRate = 1.0;
   int Algorithm = 1;

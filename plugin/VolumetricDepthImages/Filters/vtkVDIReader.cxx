@@ -7,9 +7,18 @@
 #include <vtkObjectFactory.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <future>
+#include <optional>
+#include <system_error>
+#include <utility>
+
 #include "VDIImageData.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/VdiFile.h"
+#include "vdi/pipeline/Pipeline.h"
 #include "vtkVDIImageData.h"
 
 vtkStandardNewMacro(vtkVDIReader);
@@ -21,10 +30,62 @@ bool isRoot() {
   return controller == nullptr || controller->GetLocalProcessId() == 0;
 }
 
+/// What tells that a file isn't what it was.
+struct FileState {
+  std::filesystem::file_time_type written;
+  std::uintmax_t bytes = 0;
+
+  bool operator==(const FileState&) const = default;
+};
+
+std::optional<FileState> stateOf(const std::string& name) {
+  std::error_code error;
+  FileState state;
+  state.written = std::filesystem::last_write_time(name, error);
+  if (!error) state.bytes = std::filesystem::file_size(name, error);
+  return error ? std::nullopt : std::optional(state);
+}
+
 }  // namespace
+
+struct vtkVDIReader::Contents {
+  vdi::Vdi Vdi;
+  vdi::Image Flat;
+
+  explicit Contents(const std::string& name) : Vdi(vdi::io::readVdi(name)), Flat(vdi::flatten(this->Vdi)) {}
+};
+
+struct vtkVDIReader::Ahead {
+  std::string Name;
+  std::optional<FileState> State;  // before it's read
+  std::future<Contents> Job;
+};
 
 vtkVDIReader::vtkVDIReader() {
   this->SetNumberOfInputPorts(0);
+}
+
+void vtkVDIReader::Prefetch(const std::string& name) {
+  if (!isRoot() || (this->Next && this->Next->Name == name)) return;
+  this->Next = std::make_unique<Ahead>();
+  this->Next->Name = name;
+  this->Next->State = stateOf(name);
+  this->Next->Job = std::async(std::launch::async, [name] { return Contents(name); });
+}
+
+vtkVDIReader::Contents vtkVDIReader::Read() {
+  if (this->FileName == nullptr) throw vdi::Error(vdi::ErrorCode::Io, "no file name was given");
+  const std::string name = this->FileName;
+  if (this->Next && this->Next->Name == name) {
+    const std::unique_ptr<Ahead> ahead = std::move(this->Next);
+    if (ahead->State && ahead->State == stateOf(name)) {
+      try {
+        return ahead->Job.get();
+      } catch (const std::exception&) {  // what's wrong is said by whoever was asked for it
+      }
+    }
+  }
+  return Contents(name);
 }
 
 vtkVDIReader::~vtkVDIReader() {
@@ -64,8 +125,8 @@ int vtkVDIReader::RequestInformation(vtkInformation*, vtkInformationVector**, vt
       const double range[2] = {file.header.time, file.header.time};
       info->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), range, 1);
       info->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
-      extent[1] = file.header.width - 1;
-      extent[3] = file.header.height - 1;
+      extent[1] = file.header.pictureSize().x - 1;
+      extent[3] = file.header.pictureSize().y - 1;
       extent[5] = 0;
     } catch (const vdi::Error& error) {
       vtkErrorMacro(<< error.what());
@@ -84,9 +145,9 @@ int vtkVDIReader::RequestData(vtkInformation*, vtkInformationVector**, vtkInform
   output->Initialize();
   if (!isRoot()) return 1;
   try {
-    const vdi::Vdi vdi = vdi::io::readVdi(this->FileName);
-    pv::setVdi(output, vdi);
-    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), vdi.time);
+    const Contents contents = this->Read();
+    pv::setVdi(output, contents.Vdi, contents.Flat);
+    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), contents.Vdi.time);
   } catch (const std::exception& error) {
     output->Initialize();
     vtkErrorMacro(<< error.what());

@@ -11,6 +11,9 @@
 
 #include <vtkImageAlgorithm.h>
 
+#include <memory>
+#include <string>
+
 #include "vtkVolumetricDepthImagesModule.h"
 
 class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
@@ -25,6 +28,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
   /// 1 if the file starts as a .vdi file does.
   int CanReadFile(const char* name);
 
+  /// Reads that file on another thread, so that it's there when it's asked for next, unless it has changed by
+  /// then. One at a time: the one before is dropped. On rank 0; elsewhere there's nothing to read.
+  void Prefetch(const std::string& name);
+
  protected:
   vtkVDIReader();
   ~vtkVDIReader() override;
@@ -38,7 +45,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
   vtkVDIReader(const vtkVDIReader&) = delete;
   void operator=(const vtkVDIReader&) = delete;
 
+  struct Contents;
+  struct Ahead;
+  Contents Read();
+
   char* FileName = nullptr;
+  std::unique_ptr<Ahead> Next;
 };
 
 #endif

@@ -100,6 +100,15 @@ int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs,
   }
   try {
     this->Render(vtkDataObject::GetData(inputs[0]), output);
+  } catch (const vdi::Error& error) {
+    if (error.code() == vdi::ErrorCode::DeviceFailure) {  // a lost device stays lost
+      this->Internal->Renderer.reset();
+      this->Internal->Uploaded = nullptr;
+      pv::forgetDevice();
+    }
+    output->Initialize();
+    vtkErrorMacro(<< error.what());
+    return 0;
   } catch (const std::exception& error) {
     output->Initialize();
     vtkErrorMacro(<< error.what());
@@ -133,8 +142,8 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
     internal.UploadedTime = input->GetMTime();
     internal.Original = vdi.camera;
     internal.Bounds = vdi.bounds;
-    internal.Width = vdi.width;
-    internal.Height = vdi.height;
+    internal.Width = vdi.pictureSize().x;
+    internal.Height = vdi.pictureSize().y;
   }
   const vdi::Camera camera = this->Viewpoint();
   const bool own = this->Resolution[0] <= 0 || this->Resolution[1] <= 0;

@@ -1,6 +1,13 @@
 #include "pqVDIRegenerateWidget.h"
 
 #include <pqActiveObjects.h>
+#include <pqCoreUtilities.h>
+#include <pqUndoStack.h>
+#include <vtkCommand.h>
+#include <vtkSMProperty.h>
+#include <vtkSMPropertyHelper.h>
+#include <vtkSMTrace.h>
+#include <QCheckBox>
 #include <QLabel>
 #include <QPushButton>
 #include <QVBoxLayout>
@@ -9,7 +16,7 @@
 #include "vtkSMVDIGeneratorProxy.h"
 
 pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget* parent)
-    : pqPropertyWidget(proxy, parent), Line(new QLabel(this)) {
+    : pqPropertyWidget(proxy, parent), Line(new QLabel(this)), Auto(new QCheckBox(tr("Auto"), this)) {
   this->setShowLabel(false);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
@@ -23,6 +30,14 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
   this->Line->hide();
   layout->addWidget(this->Line);
   this->connect(button, &QPushButton::clicked, this, &pqVDIRegenerateWidget::regenerate);
+  this->Auto->setObjectName("Auto");
+  this->Auto->setToolTip(tr(
+      "Makes the VDI anew by itself, once the view's camera rests more than Auto Angle away from where the "
+      "VDI was made"));
+  layout->addWidget(this->Auto);
+  this->connect(this->Auto, &QCheckBox::clicked, this, &pqVDIRegenerateWidget::setAuto);
+  pqCoreUtilities::connect(proxy->GetProperty("Auto"), vtkCommand::ModifiedEvent, this, SLOT(showAuto()));
+  this->showAuto();
   if (auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(proxy)))
     this->connect(regenerator, &pqVDIRegenerator::progress, this, &pqVDIRegenerateWidget::showProgress);
 }
@@ -35,6 +50,20 @@ void pqVDIRegenerateWidget::regenerate() {
   const QString why = regenerator->regenerate(pqActiveObjects::instance().activeView());
   this->Line->setText(why);
   this->Line->setVisible(!why.isEmpty());
+}
+
+void pqVDIRegenerateWidget::setAuto(bool on) {
+  BEGIN_UNDO_SET(tr("Auto"));
+  {
+    SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this->proxy());
+    vtkSMPropertyHelper(this->proxy(), "Auto").Set(on ? 1 : 0);
+    this->proxy()->UpdateVTKObjects();
+  }
+  END_UNDO_SET();
+}
+
+void pqVDIRegenerateWidget::showAuto() {
+  this->Auto->setChecked(vtkSMPropertyHelper(this->proxy(), "Auto").GetAsInt() != 0);
 }
 
 void pqVDIRegenerateWidget::showProgress(int percent) {

@@ -80,15 +80,14 @@ void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
   }
 }
 
-bool boundsOf(vtkPolyData* piece, double bounds[6]) {
-  auto* array = vtkDoubleArray::SafeDownCast(piece->GetFieldData()->GetAbstractArray(boundsName));
+bool boundsOf(vtkFieldData* fields, double bounds[6]) {
+  auto* array = vtkDoubleArray::SafeDownCast(fields->GetAbstractArray(boundsName));
   if (array == nullptr || array->GetNumberOfValues() != 6) return false;
   std::copy_n(array->GetPointer(0), 6, bounds);
   return bounds[0] <= bounds[1] && bounds[2] <= bounds[3] && bounds[4] <= bounds[5];
 }
 
-std::optional<vdi::Vdi> unpackVdi(vtkDataObject* piece) {
-  vtkFieldData* fields = piece->GetFieldData();
+std::optional<vdi::Vdi> unpackVdi(vtkFieldData* fields) {
   if (auto* problem = vtkStringArray::SafeDownCast(fields->GetAbstractArray(problemName)))
     throw vdi::Error(vdi::ErrorCode::InvalidArgument, problem->GetValue(0));
   if (auto* file = vtkUnsignedCharArray::SafeDownCast(fields->GetAbstractArray(fileName))) {
@@ -96,10 +95,8 @@ std::optional<vdi::Vdi> unpackVdi(vtkDataObject* piece) {
                                                static_cast<std::size_t>(file->GetNumberOfValues()));
     return vdi::io::decode(std::as_bytes(bytes));
   }
-  vtkNew<vtkImageData> image;
-  image->SetFieldData(fields);
   vdi::Vdi vdi;
-  if (!getVdi(image, vdi)) return std::nullopt;
+  if (!getVdi(fields, vdi)) return std::nullopt;
   return vdi;
 }
 

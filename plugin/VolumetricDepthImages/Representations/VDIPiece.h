@@ -12,6 +12,7 @@
 #include "vdi/core/Vdi.h"
 
 class vtkDataObject;
+class vtkFieldData;
 class vtkPolyData;
 
 namespace pv {
@@ -22,11 +23,11 @@ void packNothing(vtkPolyData* piece);
 void packProblem(const std::string& text, vtkPolyData* piece);
 /// Makes `piece` the VDI of `data`, or a problem. `crosses`: it leaves the process.
 void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece);
-/// World bounds as VTK has them, where the piece has a VDI with a scene in it.
-bool boundsOf(vtkPolyData* piece, double bounds[6]);
-/// nullopt where it's another rank's VDI, or none. Throws vdi::Error for one that isn't sound, and for a
-/// problem.
-std::optional<vdi::Vdi> unpackVdi(vtkDataObject* piece);
+/// World bounds as VTK has them, of a piece's field data, where it has a VDI with a scene in it.
+bool boundsOf(vtkFieldData* fields, double bounds[6]);
+/// Of a piece's field data; from any thread. nullopt where it's another rank's VDI, or none. Throws
+/// vdi::Error for one that isn't sound, and for a problem.
+std::optional<vdi::Vdi> unpackVdi(vtkFieldData* fields);
 
 }  // namespace pv
 

@@ -14,7 +14,6 @@
 #include <vtkOpenGLRenderWindow.h>
 #include <vtkOpenGLShaderCache.h>
 #include <vtkOpenGLState.h>
-#include <vtkPolyData.h>
 #include <vtkRenderer.h>
 #include <vtkShaderProgram.h>
 #include <vtkTextActor.h>
@@ -23,13 +22,15 @@
 #include <vtk_glew.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <optional>
 #include <sstream>
+#include <string_view>
 #include <vector>
 
-#include "VDIPiece.h"
+#include "VDIBuffers.h"
 #include "VDISession.h"
 #include "VDIView.h"
 #include "vdi/core/Error.h"
@@ -121,16 +122,47 @@ void readDepths(vtkOpenGLRenderWindow* window, const Viewport& port, std::vector
   glBindFramebuffer(GL_READ_FRAMEBUFFER, static_cast<GLuint>(read));
 }
 
+bool drawsOnCpu() {
+  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  return name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
+}
+
 }  // namespace
 
+/// How long an interactive frame takes: what it takes anyway, and by the pixel of the VDI's picture.
+class vtkVDIProp::Pace {
+ public:
+  void Measure(double seconds, double renderSeconds, double pixels) {
+    this->Blend(this->Anyway, seconds - renderSeconds);
+    this->Blend(this->PerPixel, renderSeconds / pixels);
+  }
+  /// For `rate` frames a second. Half of the time is for the VDI at least.
+  std::optional<double> Pixels(double rate) const {
+    if (!this->PerPixel) return std::nullopt;
+    return std::max(1.0 / rate - this->Anyway.value_or(0.0), 0.5 / rate) / *this->PerPixel;
+  }
+  /// A guess from a frame that wasn't interactive.
+  void Guess(double renderSeconds, double pixels) {
+    if (!this->PerPixel) this->PerPixel = renderSeconds / pixels;
+  }
+
+ private:
+  static void Blend(std::optional<double>& mean, double value) {
+    mean = mean ? 0.5 * (*mean + value) : value;
+  }
+  std::optional<double> Anyway;
+  std::optional<double> PerPixel;
+};
+
 struct vtkVDIProp::Internals {
-  std::unique_ptr<vdi::VdiRenderer> Renderer;  // none until there's a VDI, and after a failure
+  pv::VDIBuffers Buffers;
   vtkSmartPointer<vtkDataObject> Piece;
   vtkMTimeType PieceTime = 0;
-  bool HasVdi = false;
-  vtkMTimeType FailedTime = 0;  // of the piece that has failed to render before
-  bool HasFailed = false;       // to render this piece
-  double Bounds[6] = {1.0, -1.0, 1.0, -1.0, 1.0, -1.0};
+  bool IsInteractive = false;
+  bool IsRecovering = false;       // until a frame has been drawn on the new device
+  vtkMTimeType FailedTime = 0;     // of the piece that has failed to be drawn
+  glm::ivec2 FailedSize{0};        // in a viewport of that size
+  std::array<double, 6> Bounds{};  // as long as GetBounds' result is used
 
   bool IsPeeled = false;  // volumes are, in this frame
 
@@ -145,11 +177,36 @@ struct vtkVDIProp::Internals {
   std::vector<float> Window;  // depth buffer
   std::vector<float> Ends;
 
-  /// Of a frame's work: what it takes however many pixels it has is small.
-  std::optional<double> SecondsPerPixel;
+  Pace Whole;              // of the VDI with all its lists
+  Pace Thin;               // and with few of them
   double Reduction = 1.0;  // pixels of the viewport on a pixel's side, in interactive frames
+  bool WasSmooth = false;  // the renderer's edges were to be smoothed, and aren't in this frame
 
   int Width = 400;  // of the viewport, pixels
+
+  struct Form {
+    glm::ivec2 size;  // of the VDI's picture
+    bool isThin;      // of few lists
+  };
+  Form InteractiveForm(const glm::ivec2& port, double rate) {
+    const double all = static_cast<double>(port.x) * port.y;
+    Form form{port, false};
+    double pixels = this->Whole.Pixels(rate).value_or(0.0);
+    const auto fewLists =
+        this->Buffers.thinRenderer() != nullptr ? static_cast<double>(this->Buffers.thinLists()) : 0.0;
+    if (pixels < std::min(all, 2.0 * fewLists)) {
+      // The lists between would hardly be seen.
+      form.isThin = true;
+      pixels = this->Thin.Pixels(rate).value_or(fewLists);
+    }
+    constexpr double coarsest = 12.0;  // beyond that, nothing is recognised
+    const double wanted = std::sqrt(std::clamp(all / std::max(pixels, 1.0), 1.0, coarsest * coarsest));
+    // What changes from frame to frame would flicker.
+    const double ratio = wanted / this->Reduction;
+    if (ratio < 0.8 || ratio > 1.25 || wanted == 1.0) this->Reduction = wanted;
+    form.size = glm::max(glm::ivec2(glm::ceil(glm::dvec2(port) / this->Reduction)), 1);
+    return form;
+  }
 
   void ShowMessage(bool isVisible) {
     constexpr int letter = 9;  // pixels
@@ -205,44 +262,75 @@ void vtkVDIProp::Say(const std::string& text) {
   vtkErrorMacro(<< text);
 }
 
-void vtkVDIProp::SetPiece(vtkDataObject* piece) {
+void vtkVDIProp::Prepare(vtkDataObject* piece, bool isInteractive) {
   Internals& internal = *this->Internal;
+  internal.IsInteractive = isInteractive;
   const vtkMTimeType time = piece != nullptr ? piece->GetMTime() : 0;
-  if (piece == internal.Piece && time == internal.PieceTime) return;
-  internal.Piece = piece;
-  internal.PieceTime = time;
-  internal.HasVdi = false;
-  internal.HasFailed = false;
-  std::fill_n(internal.Bounds, 6, 0.0);
-  this->Modified();
-  this->Say({});
-  if (piece == nullptr) return;
+  if (piece != internal.Piece || time != internal.PieceTime) {
+    internal.Piece = piece;
+    internal.PieceTime = time;
+    this->Modified();
+    if (piece != nullptr) {
+      internal.Buffers.load(piece);
+    } else {
+      internal.Buffers.clear();
+      this->Say({});
+    }
+  }
+  this->Take(!isInteractive);
+}
+
+void vtkVDIProp::Take(bool waits) {
   try {
-    const std::optional<vdi::Vdi> vdi = pv::unpackVdi(piece);
-    if (!vdi) return;
-    if (auto* data = vtkPolyData::SafeDownCast(piece)) pv::boundsOf(data, internal.Bounds);
-    if (vdi->supersegmentCount() == 0)
-      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                       "This VDI is empty: its viewpoint saw nothing of its scene.");
-    if (!internal.Renderer) internal.Renderer = std::make_unique<vdi::VdiRenderer>(pv::sharedDevice(0));
-    internal.Renderer->setVdi(*vdi);
-    internal.HasVdi = true;
+    if (this->Internal->Buffers.take(waits)) this->Say({});
   } catch (const vdi::Error& error) {
-    internal.Renderer.reset();
-    const bool lacksDevice = error.code() == vdi::ErrorCode::DeviceUnavailable;
-    this->Say((lacksDevice
-                   ? "To show a VDI, this computer needs a Vulkan driver; Mesa's lavapipe (Debian's package "
-                     "mesa-vulkan-drivers) needs no GPU. Found: "
-                   : "") +
-              std::string(error.what()));
+    if (!this->Recover(error)) this->Fail(error);
   } catch (const std::exception& error) {
-    internal.Renderer.reset();
-    this->Say(error.what());
+    this->Fail(error);
   }
 }
 
+/// Where the device was lost: shows the VDI on a new one, and returns true. A lost device stays lost.
+bool vtkVDIProp::Recover(const vdi::Error& error) {
+  Internals& internal = *this->Internal;
+  if (error.code() != vdi::ErrorCode::DeviceFailure || internal.IsRecovering || internal.Piece == nullptr)
+    return false;
+  internal.IsRecovering = true;
+  vtkWarningMacro(<< error.what() << "; trying a new device");
+  pv::forgetDevice();
+  internal.Buffers.clear();
+  internal.Buffers.load(internal.Piece);
+  this->Take(/*waits*/ true);
+  return internal.Buffers.hasVdi();
+}
+
+void vtkVDIProp::Fail(const std::exception& error) {
+  std::string help;
+  if (const auto* own = dynamic_cast<const vdi::Error*>(&error)) {
+    switch (own->code()) {
+      case vdi::ErrorCode::DeviceUnavailable:
+        help =
+            "To show a VDI, this computer needs a Vulkan driver; Mesa's lavapipe (Debian's package "
+            "mesa-vulkan-drivers) needs no GPU. Found: ";
+        break;
+      case vdi::ErrorCode::DeviceFailure:
+        pv::forgetDevice();  // what comes next gets a new one
+        [[fallthrough]];
+      case vdi::ErrorCode::OutOfMemory:
+        help = "The VDI can't be shown: ";
+        break;
+      default:  // says it all
+        break;
+    }
+  }
+  this->Say(help + error.what());
+}
+
 double* vtkVDIProp::GetBounds() {
-  return this->Internal->HasVdi ? this->Internal->Bounds : nullptr;
+  Internals& internal = *this->Internal;
+  if (!internal.Buffers.hasVdi()) return nullptr;
+  internal.Bounds = internal.Buffers.bounds();
+  return internal.Bounds.data();
 }
 
 void vtkVDIProp::ReleaseGraphicsResources(vtkWindow* window) {
@@ -252,7 +340,23 @@ void vtkVDIProp::ReleaseGraphicsResources(vtkWindow* window) {
   this->Superclass::ReleaseGraphicsResources(window);
 }
 
+int vtkVDIProp::RenderOpaqueGeometry(vtkViewport* viewport) {
+  // Edges are smoothed next, before volumes. On a CPU that takes five times as long as all else of a frame.
+  auto* renderer = vtkRenderer::SafeDownCast(viewport);
+  if (renderer == nullptr || !this->Internal->IsInteractive || !renderer->GetUseFXAA() || !drawsOnCpu())
+    return 0;
+  renderer->SetUseFXAA(false);
+  this->Internal->WasSmooth = true;
+  return 0;
+}
+
+void vtkVDIProp::SmoothAgain(vtkRenderer* renderer) {
+  if (this->Internal->WasSmooth && renderer != nullptr) renderer->SetUseFXAA(true);
+  this->Internal->WasSmooth = false;
+}
+
 int vtkVDIProp::RenderVolumetricGeometry(vtkViewport* viewport) {
+  this->SmoothAgain(vtkRenderer::SafeDownCast(viewport));
   // Depth peeling draws layer by layer, with shaders that it changes.
   vtkInformation* keys = this->GetPropertyKeys();
   this->Internal->IsPeeled = keys != nullptr && keys->Has(vtkOpenGLRenderPass::RenderPasses());
@@ -260,6 +364,7 @@ int vtkVDIProp::RenderVolumetricGeometry(vtkViewport* viewport) {
 }
 
 int vtkVDIProp::RenderOverlay(vtkViewport* viewport) {
+  this->SmoothAgain(vtkRenderer::SafeDownCast(viewport));
   if (!this->Internal->IsPeeled) return 0;
   this->Internal->IsPeeled = false;
   return this->DrawIn(viewport);
@@ -276,20 +381,25 @@ int vtkVDIProp::DrawIn(vtkViewport* viewport) {
     internal.ShowMessage(this->GetVisibility() != 0);
   }
   if (this->MarksDepth) this->MarkDepth(window);
-  if (!internal.HasVdi || internal.HasFailed || !internal.Obstacle.empty()) return 0;
+  if (!internal.Buffers.hasVdi() || !internal.Obstacle.empty()) return 0;
   try {
-    this->Draw(renderer, window);
-  } catch (const std::exception& error) {
-    internal.HasFailed = true;
-    internal.Renderer.reset();  // a lost device stays lost
-    if (internal.FailedTime != internal.PieceTime) {
-      internal.FailedTime = internal.PieceTime;
-      internal.Piece = nullptr;  // once more with the next frame
+    try {
+      this->Draw(renderer, window);
+    } catch (const vdi::Error& error) {
+      if (!this->Recover(error)) throw;
+      this->Draw(renderer, window);
     }
-    this->Say(error.what());
+    internal.IsRecovering = false;
+    return 1;
+  } catch (const std::exception& error) {
+    internal.Buffers.clear();
+    this->Fail(error);
+    if (internal.FailedTime != internal.PieceTime || internal.FailedSize != port.size)
+      internal.Piece = nullptr;  // once more with the next frame
+    internal.FailedTime = internal.PieceTime;
+    internal.FailedSize = port.size;
     return 0;
   }
-  return 1;
 }
 
 void vtkVDIProp::MarkDepth(vtkOpenGLRenderWindow* window) {
@@ -316,17 +426,9 @@ void vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   const Viewport port = viewportOf(renderer);
   if (port.size.x < 1 || port.size.y < 1) return;
   const Clock::time_point start = Clock::now();
-  const double windowPixels = static_cast<double>(port.size.x) * port.size.y;
-  const bool isInteractive = window->GetDesiredUpdateRate() >= 1.0;
-  double reduction = 1.0;
-  if (isInteractive && internal.SecondsPerPixel) {
-    reduction = std::sqrt(std::max(1.0, *internal.SecondsPerPixel * windowPixels * this->FrameRate));
-    // What changes from frame to frame would flicker.
-    const double ratio = reduction / internal.Reduction;
-    if (ratio > 0.8 && ratio < 1.25) reduction = internal.Reduction;
-    internal.Reduction = reduction;
-  }
-  const glm::ivec2 size = glm::max(glm::ivec2(glm::ceil(glm::dvec2(port.size) / reduction)), 1);
+  const auto [size, isThin] = internal.IsInteractive ? internal.InteractiveForm(port.size, this->FrameRate)
+                                                     : Internals::Form{port.size, false};
+  vdi::VdiRenderer& views = isThin ? *internal.Buffers.thinRenderer() : internal.Buffers.renderer();
 
   const pv::ViewMatrices matrices = matricesOf(renderer);
   readDepths(window, port, internal.Window);
@@ -335,9 +437,11 @@ void vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   internal.Ends.resize(hasObjects ? static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) : 0);
   if (hasObjects) pv::depthsOf(matrices, internal.Window, port.size, size, internal.Ends);
 
+  const Clock::time_point renderStart = Clock::now();
   const vdi::ImageBytes picture =
-      internal.Renderer->renderBytes(matrices.view(size.x, size.y), internal.Ends, vdi::Alpha::Premultiplied,
-                                     static_cast<vdi::Reconstruction>(this->Reconstruction));
+      views.renderBytes(matrices.view(size.x, size.y), internal.Ends, vdi::Alpha::Premultiplied,
+                        static_cast<vdi::Reconstruction>(this->Reconstruction));
+  const double renderSeconds = secondsSince(renderStart);
 
   vtkOpenGLState* state = window->GetState();
   vtkOpenGLState::ScopedglEnableDisable blends(state, GL_BLEND);
@@ -368,7 +472,11 @@ void vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   texture->Deactivate();
   vtkOpenGLCheckErrorMacro("failed to draw the VDI");
 
-  const double measured = secondsSince(start) / (static_cast<double>(size.x) * size.y);
-  internal.SecondsPerPixel =
-      internal.SecondsPerPixel ? 0.5 * (*internal.SecondsPerPixel + measured) : measured;
+  const double pixels = static_cast<double>(size.x) * size.y;
+  Pace& pace = isThin ? internal.Thin : internal.Whole;
+  if (internal.IsInteractive) {
+    pace.Measure(secondsSince(start), renderSeconds, pixels);
+  } else {
+    pace.Guess(renderSeconds, pixels);
+  }
 }

@@ -4,8 +4,8 @@
  *
  * Drawn with the volumes: after all opaque geometry, which hides what lies behind it, and blended over it.
  * Where volumes are peeled together with translucent geometry, after that, too.
- * While the window is interactive (vtkRenderWindow::GetDesiredUpdateRate of 1 and more), it has as few pixels
- * as it takes to be drawn FrameRate times a second.
+ * While it's interactive, it has as few pixels as it takes to be drawn FrameRate times a second; and a VDI
+ * that comes is loaded beside the frames, which go on showing the one before.
  *
  * What goes wrong is said in the view (MessageActor) and, once, as an error; the rest of the picture is
  * drawn.
@@ -15,6 +15,7 @@
 
 #include <vtkProp.h>
 
+#include <exception>
 #include <memory>
 #include <string>
 
@@ -25,15 +26,20 @@ class vtkOpenGLRenderWindow;
 class vtkRenderer;
 class vtkTextActor;
 
+namespace vdi {
+class Error;
+}
+
 class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp {
  public:
   static vtkVDIProp* New();
   vtkTypeMacro(vtkVDIProp, vtkProp);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  /// What pv::packVdi made, or nullptr. Its VDI is on its way to the device when this returns. The same again
-  /// costs nothing.
-  void SetPiece(vtkDataObject* piece);
+  /// For the frames to come: `piece` is what pv::packVdi made, or nullptr. If they aren't interactive, its
+  /// VDI is on the device when this returns; else that or the last one before is shown. The same again costs
+  /// nothing.
+  void Prepare(vtkDataObject* piece, bool isInteractive);
   /// Says `text` in place of the VDI, which isn't drawn while there's a text.
   void SetObstacle(const std::string& text);
   /// Says why there's nothing to see; in a renderer of the same size that draws after this prop's.
@@ -52,6 +58,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
 
   void SetVisibility(vtkTypeBool visible) override;
   double* GetBounds() override;
+  int RenderOpaqueGeometry(vtkViewport* viewport) override;
   int RenderVolumetricGeometry(vtkViewport* viewport) override;
   int RenderOverlay(vtkViewport* viewport) override;
   void ReleaseGraphicsResources(vtkWindow* window) override;
@@ -64,10 +71,15 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   vtkVDIProp(const vtkVDIProp&) = delete;
   void operator=(const vtkVDIProp&) = delete;
 
+  class Pace;
   struct Internals;
   int DrawIn(vtkViewport* viewport);
   void Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
   void MarkDepth(vtkOpenGLRenderWindow* window);
+  void Take(bool waits);
+  bool Recover(const vdi::Error& error);
+  void Fail(const std::exception& error);
+  void SmoothAgain(vtkRenderer* renderer);
   void Say(const std::string& text);
 
   std::unique_ptr<Internals> Internal;

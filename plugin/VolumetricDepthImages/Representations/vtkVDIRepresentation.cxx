@@ -1,6 +1,7 @@
 #include "vtkVDIRepresentation.h"
 
 #include <vtkAlgorithmOutput.h>
+#include <vtkCommand.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
 #include <vtkMPIMoveData.h>
@@ -11,6 +12,8 @@
 #include <vtkPVView.h>
 #include <vtkPolyData.h>
 #include <vtkProcessModule.h>
+#include <vtkRenderWindow.h>
+#include <vtkRenderWindowInteractor.h>
 #include <vtkRenderer.h>
 #include <vtkTextActor.h>
 #include <vtkVolume.h>
@@ -74,7 +77,9 @@ vtkVDIRepresentation::vtkVDIRepresentation() {
   pv::packNothing(this->Piece);
 }
 
-vtkVDIRepresentation::~vtkVDIRepresentation() = default;
+vtkVDIRepresentation::~vtkVDIRepresentation() {
+  this->ForgetInteractor();
+}
 
 void vtkVDIRepresentation::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);
@@ -132,7 +137,8 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
     vtkPVRenderView::SetDeliverToClientAndRenderingProcesses(in, this, /*deliver_to_client*/ true,
                                                              /*gather_before_delivery*/ false);
     double bounds[6];
-    if (pv::boundsOf(this->Piece, bounds)) vtkPVRenderView::SetGeometryBounds(in, this, bounds);
+    if (pv::boundsOf(this->Piece->GetFieldData(), bounds))
+      vtkPVRenderView::SetGeometryBounds(in, this, bounds);
     // Objects are drawn where the VDI is, all of them.
     if (hasServer()) vtkPVRenderView::SetRequiresDistributedRendering(in, this, false);
     if (drawsOnRanks()) vtkPVRenderView::SetForceDataDistributionMode(in, vtkMPIMoveData::COLLECT);
@@ -146,9 +152,52 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
               "of representation Volume."
             : "");
     vtkAlgorithmOutput* port = vtkPVRenderView::GetPieceProducer(in, this);
-    if (port != nullptr) this->Prop->SetPiece(port->GetProducer()->GetOutputDataObject(port->GetIndex()));
+    if (port != nullptr && view != nullptr) {
+      this->Prop->Prepare(port->GetProducer()->GetOutputDataObject(port->GetIndex()),
+                          this->IsInteractive(view));
+    }
   }
   return 1;
+}
+
+/// Whether the next frame may be rough and late: one of those while the camera moves. Time steps that come
+/// then ask for still ones.
+bool vtkVDIRepresentation::IsInteractive(vtkPVRenderView* view) {
+  vtkRenderWindowInteractor* interactor = view->GetInteractor();
+  if (interactor != this->Interactor) {
+    this->ForgetInteractor();
+    this->Interactor = interactor;
+    if (interactor != nullptr) {
+      constexpr float first = 1.0F;  // others draw the still frame when they hear of the end
+      this->Observers = {
+          interactor->AddObserver(vtkCommand::StartInteractionEvent, this, &vtkVDIRepresentation::Drag),
+          interactor->AddObserver(vtkCommand::EndInteractionEvent, this, &vtkVDIRepresentation::Drop, first)};
+    }
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (view->GetRenderWindow()->GetDesiredUpdateRate() >= 1.0) {
+    this->LastInteractive = now;
+    return true;
+  }
+  // Who holds the camera without moving it gets the frame in full.
+  constexpr std::chrono::seconds rest{2};
+  return this->IsDragged && now - this->LastInteractive < rest;
+}
+
+void vtkVDIRepresentation::Drag() {
+  this->IsDragged = true;
+}
+
+void vtkVDIRepresentation::Drop() {
+  this->IsDragged = false;
+}
+
+void vtkVDIRepresentation::ForgetInteractor() {
+  if (this->Interactor != nullptr) {
+    for (const unsigned long observer : this->Observers) this->Interactor->RemoveObserver(observer);
+  }
+  this->Interactor = nullptr;
+  this->IsDragged = false;
 }
 
 bool vtkVDIRepresentation::AddToView(vtkView* view) {
@@ -162,6 +211,7 @@ bool vtkVDIRepresentation::AddToView(vtkView* view) {
 bool vtkVDIRepresentation::RemoveFromView(vtkView* view) {
   auto* renderView = vtkPVRenderView::SafeDownCast(view);
   if (renderView == nullptr) return false;
+  this->ForgetInteractor();
   renderView->GetRenderer()->RemoveViewProp(this->Prop);
   renderView->GetNonCompositedRenderer()->RemoveViewProp(this->Prop->GetMessageActor());
   return this->Superclass::RemoveFromView(view);

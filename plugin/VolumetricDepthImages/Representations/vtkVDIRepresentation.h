@@ -12,10 +12,16 @@
 
 #include <vtkNew.h>
 #include <vtkPVDataRepresentation.h>
+#include <vtkWeakPointer.h>
+
+#include <array>
+#include <chrono>
 
 #include "vtkVolumetricDepthImagesRepresentationsModule.h"
 
+class vtkPVRenderView;
 class vtkPolyData;
+class vtkRenderWindowInteractor;
 class vtkVDIProp;
 
 class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : public vtkPVDataRepresentation {
@@ -44,9 +50,19 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   vtkVDIRepresentation(const vtkVDIRepresentation&) = delete;
   void operator=(const vtkVDIRepresentation&) = delete;
 
+  bool IsInteractive(vtkPVRenderView* view);
+  void Drag();
+  void Drop();
+  void ForgetInteractor();
+
   vtkNew<vtkPolyData> Piece;  // pv::packVdi
   bool HasPacked = false;     // in the update that's going on
   vtkNew<vtkVDIProp> Prop;
+
+  vtkWeakPointer<vtkRenderWindowInteractor> Interactor;  // the view's, observed
+  std::array<unsigned long, 2> Observers{};
+  bool IsDragged = false;  // the camera is, by mouse
+  std::chrono::steady_clock::time_point LastInteractive;
 };
 
 #endif

@@ -1,6 +1,6 @@
-"""Runs inside the real ParaView (--script, which sets no __file__): loads the plugin, prepares the view, and from then on notes
-what the view shows after each drag of the mouse: mouse_view.png, and mouse_camera.json with the camera. What is done with the
-window is in mouse.sh."""
+"""Runs inside the real ParaView (--script, which sets no __file__): loads the plugin, prepares the view, and from
+then on notes what the view shows after each drag of the mouse: view.png, and camera.json with the camera. What is done with
+the window is in orbit.py."""
 
 import json
 import os
@@ -36,9 +36,9 @@ def use():
 
     def note(*_):
         camera = view.GetActiveCamera()
-        simple.SaveScreenshot(os.path.join(OUTPUT, "mouse_view.png"), view, ImageResolution=view.ViewSize)
+        simple.SaveScreenshot(os.path.join(OUTPUT, "view.png"), view, ImageResolution=view.ViewSize)
         shown = [simple.GetRepresentation(source, view) for source in simple.GetSources().values()]
-        leave("mouse_camera.json", json.dumps({
+        leave("camera.json", json.dumps({
             "size": list(view.ViewSize), "position": camera.GetPosition(), "focal-point": camera.GetFocalPoint(),
             "view-up": camera.GetViewUp(), "view-angle": camera.GetViewAngle(), "mode": view.InteractionMode.GetData(),
             "interactive frames": sum(rate >= 1 for rate in frames),
@@ -52,6 +52,6 @@ def use():
 
 try:
     use()
-    leave("mouse.ready", "ok")
+    leave("ready", "ok")
 except Exception:
-    leave("mouse.ready", traceback.format_exc())
+    leave("ready", traceback.format_exc())

@@ -1,27 +1,27 @@
-"""What mouse.py noted of the view, against the tool's picture for the view's camera; and the window against what was noted.
-Argument: a picture of the whole screen."""
+"""What orbit_notes.py noted of the view, against the tool's picture for the view's camera; and the window against what was
+noted. Argument: a picture of the whole screen."""
 
 import json
 import os
 import subprocess
 import sys
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, os.environ["VDI_TEST_SOURCE"])
 
 import numpy as np  # noqa: E402
 import pvtest  # noqa: E402
 from pvtest import check  # noqa: E402
 
-with open(os.path.join(pvtest.OUTPUT, "mouse_camera.json")) as file:
+with open(os.path.join(pvtest.OUTPUT, "camera.json")) as file:
     note = json.load(file)
 print(note)
-expected_path = os.path.join(pvtest.OUTPUT, "mouse_expected.png")
-command = [os.environ["VDI_TOOL"], "render", os.path.join(pvtest.OUTPUT, "mouse_input.vdi"), "-o", expected_path,
+expected_path = os.path.join(pvtest.OUTPUT, "expected.png")
+command = [os.environ["VDI_TOOL"], "render", os.path.join(pvtest.OUTPUT, "input.vdi"), "-o", expected_path,
            "--resolution", "{}x{}".format(*note["size"]), "--view-angle", str(note["view-angle"])]
 for name in ("position", "focal-point", "view-up"):
     command += ["--" + name] + [repr(value) for value in note[name]]
 subprocess.run(command, check=True)
-seen = pvtest.read_png(os.path.join(pvtest.OUTPUT, "mouse_view.png"))
+seen = pvtest.read_png(os.path.join(pvtest.OUTPUT, "view.png"))
 expected = pvtest.read_png(expected_path)
 likeness = pvtest.ssim(seen, expected)
 print("the view after the drag, against the tool's picture: SSIM {:.4f}".format(likeness))

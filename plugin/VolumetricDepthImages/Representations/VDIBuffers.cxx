@@ -1,0 +1,123 @@
+#include "VDIBuffers.h"
+
+#include <vtkDataObject.h>
+#include <vtkFieldData.h>
+
+#include <chrono>
+#include <utility>
+
+#include "VDIPiece.h"
+#include "VDISession.h"
+#include "vdi/core/Error.h"
+
+namespace pv {
+
+namespace {
+
+/// Across a VDI with few lists. Rough pictures on a CPU are hardly larger.
+constexpr int thinWidth = 160;
+
+}  // namespace
+
+VDIBuffers::~VDIBuffers() {
+  this->clear();
+}
+
+void VDIBuffers::clear() {
+  if (job_.valid()) job_.wait();
+  job_ = {};
+  loading_ = nullptr;
+  waiting_ = nullptr;
+  renderers_ = std::make_shared<Renderers>();
+  hasVdi_ = false;
+}
+
+void VDIBuffers::load(vtkDataObject* piece) {
+  // What makes the piece fills the same object again with the next VDI, but not its arrays.
+  waiting_ = vtkSmartPointer<vtkFieldData>::New();
+  waiting_->ShallowCopy(piece->GetFieldData());
+  if (!job_.valid()) this->startNext();
+}
+
+void VDIBuffers::startNext() {
+  loading_ = std::exchange(waiting_, nullptr);
+  if (loading_ == nullptr) return;
+  vtkFieldData* const fields = loading_;
+  job_ =
+      std::async(std::launch::async, [fields, renderers = renderers_] { return loaded(fields, *renderers); });
+}
+
+VDIBuffers::Loaded VDIBuffers::loaded(vtkFieldData* fields, Renderers& renderers) {
+  Loaded result;
+  std::optional<vdi::Vdi> vdi = pv::unpackVdi(fields);
+  if (!vdi) return result;
+  if (vdi->supersegmentCount() == 0)
+    throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                     "This VDI is empty: its viewpoint saw nothing of its scene.");
+  result.hasVdi = true;
+  pv::boundsOf(fields, result.bounds.data());
+  if (!renderers.whole) {
+    const std::shared_ptr<vdi::gpu::Device> device = pv::sharedDevice(0);
+    renderers.whole = std::make_unique<vdi::VdiRenderer>(device);
+    if (device->isCpu()) renderers.thin = std::make_unique<vdi::VdiRenderer>(device);
+  }
+  const int factor = vdi->width / thinWidth;
+  if (renderers.thin && factor > 1) {
+    const vdi::Vdi thin = vdi::thinned(*vdi, factor);
+    if (thin.supersegmentCount() > 0) {
+      renderers.thin->prepareVdi(thin);
+      result.thinLists = thin.listCount();
+    }
+  }
+  try {
+    renderers.whole->prepareVdi(*vdi);
+  } catch (const vdi::Error& error) {
+    if (error.code() != vdi::ErrorCode::OutOfMemory) throw;
+    result.tooLarge = std::move(vdi);
+  }
+  return result;
+}
+
+void VDIBuffers::takeOne() {
+  try {
+    const Loaded result = job_.get();
+    hasVdi_ = result.hasVdi;
+    bounds_ = result.bounds;
+    thinLists_ = result.thinLists;
+    if (result.tooLarge) {
+      renderers_->whole->setVdi(*result.tooLarge);
+    } else if (hasVdi_) {
+      renderers_->whole->showPrepared();
+    }
+    if (thinLists_ > 0) renderers_->thin->showPrepared();
+  } catch (const vdi::Error& error) {
+    hasVdi_ = false;
+    const bool isSound =
+        error.code() == vdi::ErrorCode::Format || error.code() == vdi::ErrorCode::InvalidArgument;
+    if (!isSound) renderers_ = std::make_shared<Renderers>();
+    this->startNext();
+    throw;
+  } catch (...) {
+    hasVdi_ = false;
+    this->startNext();
+    throw;
+  }
+  this->startNext();
+}
+
+bool VDIBuffers::take(bool waits) {
+  bool hasTaken = false;
+  while (job_.valid()) {
+    if (!waits && job_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) break;
+    const bool isNewest = waiting_ == nullptr;
+    try {
+      this->takeOne();
+    } catch (...) {
+      if (isNewest) throw;  // nobody asks for that one any more
+    }
+    hasTaken = true;
+  }
+  return hasTaken;
+}
+
+}  // namespace pv

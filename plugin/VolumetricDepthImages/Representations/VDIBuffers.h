@@ -1,0 +1,77 @@
+// A VDI on the device, in two buffers: one is shown while the next one is loaded beside it.
+#ifndef VDIBuffers_h
+#define VDIBuffers_h
+
+#include <vtkSmartPointer.h>
+
+#include <array>
+#include <cstddef>
+#include <future>
+#include <memory>
+#include <optional>
+
+#include "vdi/core/Vdi.h"
+#include "vdi/pipeline/Pipeline.h"
+
+class vtkDataObject;
+class vtkFieldData;
+
+namespace pv {
+
+/// Of one thread, that of the views; makes others to load.
+class VDIBuffers {
+ public:
+  VDIBuffers() = default;
+  ~VDIBuffers();  // waits for what is being loaded, as clear does
+  VDIBuffers(const VDIBuffers&) = delete;
+  VDIBuffers& operator=(const VDIBuffers&) = delete;
+  VDIBuffers(VDIBuffers&&) = delete;
+  VDIBuffers& operator=(VDIBuffers&&) = delete;
+
+  /// Starts to load the VDI of a piece (VDIPiece.h). While an earlier one is being loaded the piece waits, in
+  /// the place of one that waits already.
+  void load(vtkDataObject* piece);
+  /// Shows what has been loaded since, and starts what waits; returns whether there was anything. `waits`:
+  /// for the newest piece. Throws vdi::Error for a VDI that isn't sound or has nothing in it, for a problem,
+  /// and where the device doesn't do it; then nothing is shown.
+  bool take(bool waits);
+  /// Shows nothing and gives the device back.
+  void clear();
+
+  bool hasVdi() const { return hasVdi_; }
+  /// World bounds as VTK has them.
+  const std::array<double, 6>& bounds() const { return bounds_; }
+  /// There's a VDI.
+  vdi::VdiRenderer& renderer() { return *renderers_->whole; }
+  /// The same VDI with fewer lists, for rough pictures; nullptr where the device is no CPU, or there are few
+  /// anyway.
+  vdi::VdiRenderer* thinRenderer() { return thinLists_ > 0 ? renderers_->thin.get() : nullptr; }
+  std::size_t thinLists() const { return thinLists_; }
+
+ private:
+  struct Renderers {
+    std::unique_ptr<vdi::VdiRenderer> whole;
+    std::unique_ptr<vdi::VdiRenderer> thin;
+  };
+  struct Loaded {
+    bool hasVdi = false;
+    std::array<double, 6> bounds{};
+    std::size_t thinLists = 0;
+    std::optional<vdi::Vdi> tooLarge;  // for a second buffer
+  };
+  static Loaded loaded(vtkFieldData* fields, Renderers& renderers);
+  void startNext();
+  void takeOne();
+
+  std::shared_ptr<Renderers> renderers_ = std::make_shared<Renderers>();
+  bool hasVdi_ = false;
+  std::array<double, 6> bounds_{};
+  std::size_t thinLists_ = 0;
+  std::future<Loaded> job_;
+  vtkSmartPointer<vtkFieldData> loading_;  // the job's; goes on this thread
+  vtkSmartPointer<vtkFieldData> waiting_;
+};
+
+}  // namespace pv
+
+#endif

@@ -1,0 +1,35 @@
+/* Loaded before a program (LD_PRELOAD): when there's a file VDI_TEST_LOSE_DEVICE, removes it, and the Vulkan
+ * device that is waited for next is lost. A folder of that name stays: all devices are. */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <unistd.h>
+#include <vulkan/vulkan.h>
+
+enum { most = 64 };
+static VkDevice lost[most];
+static int lost_count = 0;
+
+VKAPI_ATTR VkResult VKAPI_CALL vkWaitSemaphores(VkDevice device, const VkSemaphoreWaitInfo* info,
+                                                uint64_t timeout) {
+  const PFN_vkWaitSemaphores wait = (PFN_vkWaitSemaphores)dlsym(RTLD_NEXT, "vkWaitSemaphores");
+  const VkResult result = wait(device, info, timeout);
+  const char* name = getenv("VDI_TEST_LOSE_DEVICE");
+  if (name != NULL && access(name, F_OK) == 0) {
+    unlink(name);
+    if (lost_count < most) lost[lost_count++] = device;
+  }
+  for (int i = 0; i < lost_count; ++i) {
+    if (lost[i] == device) return VK_ERROR_DEVICE_LOST;
+  }
+  return result;
+}
+
+/* A new device may get the address of one that has gone. */
+VKAPI_ATTR void VKAPI_CALL vkDestroyDevice(VkDevice device, const VkAllocationCallbacks* allocator) {
+  const PFN_vkDestroyDevice destroy = (PFN_vkDestroyDevice)dlsym(RTLD_NEXT, "vkDestroyDevice");
+  for (int i = 0; i < lost_count; ++i) {
+    if (lost[i] == device) lost[i] = VK_NULL_HANDLE;
+  }
+  destroy(device, allocator);
+}

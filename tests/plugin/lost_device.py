@@ -1,0 +1,85 @@
+"""A Vulkan device that is lost while a VDI is orbited (lose_device.c): a new one takes its place, and the frame shows the VDI.
+Where that is lost as well there is a message, until there is something new to show."""
+
+import os
+import subprocess
+
+import pvtest
+from paraview import simple
+from pvtest import check
+
+SIZE, CENTER = [320, 240], [0.5, 0.5, 0.5]
+LOSE = os.environ["VDI_TEST_LOSE_DEVICE"]
+
+
+def make(name, *options):
+    path = os.path.join(pvtest.OUTPUT, name)
+    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "24x24x24",
+                    "--resolution", "200x150", "-o", path] + list(options), check=True, stdout=subprocess.DEVNULL)
+    return path
+
+
+def look(view):
+    path = os.path.join(pvtest.OUTPUT, "lost_device.png")
+    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
+    return pvtest.read_png(path)
+
+
+def orbit(view, frames=5):
+    for _ in range(frames):
+        view.GetActiveCamera().Azimuth(3)
+        view.SMProxy.InteractiveRender()
+
+
+if os.path.isdir(LOSE):
+    os.rmdir(LOSE)
+reader = simple.OpenDataFile([make("lost_{}.vdi".format(seed), "--seed", str(seed)) for seed in (1, 2)])
+view = pvtest.make_view(SIZE, [2.2, 1.9, 2.4], CENTER)
+simple.Show(reader, view)
+simple.Render(view)
+before = look(view)
+check(before.std() > 20, "the VDI is shown")
+
+open(LOSE, "w").close()
+after = look(view)
+check(not os.path.exists(LOSE), "a device is lost in a frame at rest")
+check(pvtest.ssim(before, after) > 0.999 and not pvtest.message_in(view), "and that very frame shows the VDI, on a new device")
+
+camera = list(view.CameraPosition)
+orbit(view)
+open(LOSE, "w").close()
+orbit(view)
+check(not os.path.exists(LOSE) and not pvtest.message_in(view), "a device is lost while orbiting, and there is no message")
+view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = camera, CENTER, [0, 1, 0]
+check(pvtest.ssim(before, look(view)) > 0.999, "and the VDI is still there")
+
+open(LOSE, "w").close()
+view.ViewTime = reader.TimestepValues[1]
+simple.Render(view)
+view.ViewTime = reader.TimestepValues[0]
+check(pvtest.ssim(before, look(view)) > 0.999, "a device that is lost while a time step is loaded doesn't lose the step")
+
+os.mkdir(LOSE)
+view.ViewTime = reader.TimestepValues[1]
+simple.Render(view)
+orbit(view)
+check("lost" in pvtest.message_in(view).lower(), "where every device is lost, the view says so")
+check(look(view).std() > 5, "and shows that")
+os.rmdir(LOSE)
+view.ViewTime = reader.TimestepValues[0]
+view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = camera, CENTER, [0, 1, 0]
+check(pvtest.ssim(before, look(view)) > 0.999 and not pvtest.message_in(view), "the next time step is shown on a new device")
+
+# A filter that makes VDIs in the same process.
+simple.Hide(reader, view)
+wavelet = simple.Wavelet(WholeExtent=[-7, 8] * 3)
+wavelet.UpdatePipeline()
+pvtest.set_colors("RTData", 37, 277)
+image = pvtest.vdi_filter(wavelet, view, "POINTS", "RTData", 3, CameraPosition=[30, 30, 40], CameraFocalPoint=[0, 0, 0])
+simple.Show(image, view)
+view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = [30, 30, 40], [0, 0, 0], [0, 1, 0]
+made = look(view)
+open(LOSE, "w").close()
+again = look(view)
+check(made.std() > 20 and pvtest.ssim(made, again) > 0.999, "the output of a filter is shown again on a new device")
+pvtest.finish()
