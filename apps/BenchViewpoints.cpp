@@ -81,7 +81,7 @@ std::vector<Camera> turnedCameras(const Camera& camera, double degrees) {
 }
 
 /// What views are compared with.
-struct Truth {
+struct ViewTruth {
   Camera camera;
   io::Picture picture;                // by volume rendering at the rate of --truth-rate
   std::vector<std::uint8_t> opacity;  // [height][width], row 0 at the bottom
@@ -90,7 +90,7 @@ struct Truth {
 /// Kinds of viewpoints: all around, or turned a little.
 struct Views {
   std::string name;
-  std::vector<Truth> truths;
+  std::vector<ViewTruth> truths;
 };
 
 /// Of all viewpoints of a kind.
@@ -191,12 +191,12 @@ class ViewpointSuite {
     });
   }
 
-  Truth truthOf(const Camera& camera) {
+  ViewTruth truthOf(const Camera& camera) {
     GenerateSettings converged = makeSettings(options_.quality);
     converged.samplesPerVoxel = options_.truthRate;
     converged.terminationOpacity = pictureTermination;
     const std::optional<Image> image = generator_.renderVolume(camera, function_, converged);
-    Truth truth;
+    ViewTruth truth;
     truth.camera = camera;
     if (!image) return truth;
     truth.picture = io::toPicture(*image);
@@ -273,7 +273,7 @@ class ViewpointSuite {
   Trueness truenessOf(const Made& made, const Views& views, bool blends) {
     Trueness trueness;
     const Box& bounds = generator_.scene().bounds;
-    for (const Truth& truth : views.truths) {
+    for (const ViewTruth& truth : views.truths) {
       const Shares shares = blends ? blendOf(made.cameras, truth.camera, bounds)
                                    : nearestOf(made.cameras, truth.camera, bounds);
       const glm::ivec2 size{truth.picture.width, truth.picture.height};

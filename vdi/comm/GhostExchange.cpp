@@ -224,10 +224,10 @@ std::vector<Block> partsOf(const std::vector<OwnParts>& parts, std::vector<Block
   return result;
 }
 
-class Exchange {
+class LayerExchange {
  public:
-  Exchange(const Communicator& comm, const BlockDirectory& directory, const std::vector<OwnParts>& parts,
-           std::vector<Block>& blocks)
+  LayerExchange(const Communicator& comm, const BlockDirectory& directory, const std::vector<OwnParts>& parts,
+                std::vector<Block>& blocks)
       : comm_(comm),
         directory_(directory),
         blocks_(blocks),
@@ -644,7 +644,7 @@ std::vector<Block> exchangeGhosts(const Communicator& comm, std::vector<Block> b
   makeTypesOne(comm, blocks);
   const BlockDirectory directory(comm, blocks, true);
   const std::vector<OwnParts> parts = settleOverlaps(comm, directory);
-  Exchange(comm, directory, parts, blocks).run();
+  LayerExchange(comm, directory, parts, blocks).run();
   return partsOf(parts, std::move(blocks));
 }
 

@@ -12,8 +12,6 @@ namespace vdi {
 
 namespace {
 
-constexpr int maxViewportSide = 32768;
-
 bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
@@ -91,10 +89,10 @@ Camera Camera::framing(const Box& bounds, const glm::dvec3& direction, const glm
 }
 
 View::View(const Camera& camera, int width, int height) : camera_(camera), width_(width), height_(height) {
-  if (width < 1 || height < 1 || width > maxViewportSide || height > maxViewportSide) {
+  if (width < 1 || height < 1 || width > View::maxSide || height > View::maxSide) {
     throw Error(ErrorCode::InvalidArgument,
-                fmt::format("the viewport must be 1 to {} pixels wide and high, it is {} x {}",
-                            maxViewportSide, width, height));
+                fmt::format("the viewport must be 1 to {} pixels wide and high, it is {} x {}", View::maxSide,
+                            width, height));
   }
   validateCamera(camera);
   forward_ = glm::normalize(camera.focalPoint - camera.position);

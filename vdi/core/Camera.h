@@ -50,7 +50,8 @@ struct ImagePlane {
 /// pixels and rays.
 class View {
  public:
-  /// Throws Error{InvalidArgument} for a viewport outside 1 .. 32768, a view angle outside (0, 180), a
+  static constexpr int maxSide = 32768;  // of a viewport, in pixels
+  /// Throws Error{InvalidArgument} for a viewport outside 1 .. maxSide, a view angle outside (0, 180), a
   /// parallel scale <= 0, values that aren't finite, or a position equal to the focal point. A view-up
   /// parallel to the view direction is replaced by the axis most orthogonal to it, one of zero by (0, 1, 0).
   /// Square pixels; the vertical extent is the camera's, as in VTK.

@@ -4,7 +4,10 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
+#include <string_view>
 
+#include "vdi/core/Camera.h"
 #include "vdi/core/EnumNames.h"
 #include "vdi/core/Error.h"
 
@@ -26,13 +29,14 @@ Algorithm algorithmFromString(const std::string& name) {
 }
 
 void validate(const GenerateSettings& settings) {
-  const auto require = [](bool good, const char* field, auto value, const char* range) {
+  const auto require = [](bool good, const char* field, auto value, std::string_view range) {
     if (!good)
       throw Error(ErrorCode::InvalidArgument,
                   fmt::format("{} must lie in {}, it is {}", field, range, value));
   };
-  require(settings.width >= 1 && settings.width <= 32768, "width", settings.width, "[1, 32768]");
-  require(settings.height >= 1 && settings.height <= 32768, "height", settings.height, "[1, 32768]");
+  const std::string sides = fmt::format("[1, {}]", View::maxSide);
+  require(settings.width >= 1 && settings.width <= View::maxSide, "width", settings.width, sides);
+  require(settings.height >= 1 && settings.height <= View::maxSide, "height", settings.height, sides);
   require(settings.margin >= 0.0 && settings.margin <= maxMargin, "margin", settings.margin, "[0, 4]");
   require(settings.supersegments >= 1 && settings.supersegments <= maxSupersegments, "supersegments",
           settings.supersegments, "[1, 1024]");

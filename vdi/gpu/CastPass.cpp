@@ -13,7 +13,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo castInfo() {
   ComputePipelineInfo info;
   info.shader = "cast";
   info.pushConstantBytes = sizeof(shared::CastConstants);
@@ -24,7 +24,7 @@ ComputePipelineInfo pipelineInfo() {
 }
 
 ComputePipelineInfo sharingPipelineInfo() {
-  ComputePipelineInfo info = pipelineInfo();
+  ComputePipelineInfo info = castInfo();
   info.wholeSubgroups = true;
   return info;
 }
@@ -71,7 +71,7 @@ CastPass::CastPass(const std::shared_ptr<Device>& device)
       lanesPerRay_(device->runsGpuPrograms() ? std::clamp(device->limits().subgroupSize, 1U, maxLanesPerRay)
                                              : 1),
       sampler_(device),
-      pipelines_(device, pipelineInfo()),
+      pipelines_(device, castInfo()),
       lanePipelines_(pipelines_, sharingPipelineInfo()) {}
 
 ComputePipeline& CastPass::pipelineFor(const Program& program) {

@@ -9,7 +9,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo cellsInfo() {
   ComputePipelineInfo info;
   info.shader = "cells";
   info.pushConstantBytes = sizeof(shared::CellsConstants);
@@ -20,7 +20,7 @@ ComputePipelineInfo pipelineInfo() {
 }  // namespace
 
 CellsPass::CellsPass(std::shared_ptr<Device> device)
-    : sampler_(device), pipelines_(std::move(device), pipelineInfo()) {}
+    : sampler_(device), pipelines_(std::move(device), cellsInfo()) {}
 
 void CellsPass::record(Commands& commands, const shared::CellsConstants& constants,
                        std::span<const SampledImage> pages, std::uint64_t pagesVersion) {

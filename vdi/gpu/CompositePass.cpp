@@ -4,7 +4,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo compositeInfo() {
   ComputePipelineInfo info;
   info.shader = "composite";
   info.pushConstantBytes = sizeof(shared::CompositeConstants);
@@ -15,7 +15,7 @@ ComputePipelineInfo pipelineInfo() {
 }  // namespace
 
 CompositePass::CompositePass(std::shared_ptr<Device> device)
-    : pipelines_(std::move(device), pipelineInfo()) {}
+    : pipelines_(std::move(device), compositeInfo()) {}
 
 void CompositePass::record(Commands& commands, const shared::CompositeParams& params, Work work,
                            Algorithm algorithm) {

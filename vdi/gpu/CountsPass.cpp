@@ -4,7 +4,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo countsInfo() {
   ComputePipelineInfo info;
   info.shader = "counts";
   info.pushConstantBytes = sizeof(shared::CountsConstants);
@@ -13,7 +13,7 @@ ComputePipelineInfo pipelineInfo() {
 
 }  // namespace
 
-CountsPass::CountsPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
+CountsPass::CountsPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), countsInfo()) {}
 
 void CountsPass::record(Commands& commands, const shared::CountsConstants& constants) const {
   if (constants.words > 0) commands.dispatchMany(pipeline_, constants, constants.words, shared::countsGroup);

@@ -4,7 +4,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo expandInfo() {
   ComputePipelineInfo info;
   info.shader = "expand";
   info.pushConstantBytes = sizeof(shared::ExpandConstants);
@@ -30,7 +30,7 @@ std::uint64_t tileCount(const glm::ivec2& lists) {
   return tilesOf(lists, shared::renderTile) + tilesOf(lists, shared::renderLargeTile);
 }
 
-ExpandPass::ExpandPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), pipelineInfo()) {}
+ExpandPass::ExpandPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), expandInfo()) {}
 
 void ExpandPass::record(Commands& commands, const shared::ExpandConstants& constants) {
   const std::uint64_t count = invocations(constants);

@@ -4,7 +4,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo interleaveInfo() {
   ComputePipelineInfo info;
   info.shader = "interleave";
   info.pushConstantBytes = sizeof(shared::InterleaveConstants);
@@ -14,7 +14,7 @@ ComputePipelineInfo pipelineInfo() {
 }  // namespace
 
 InterleavePass::InterleavePass(std::shared_ptr<Device> device)
-    : pipelines_(std::move(device), pipelineInfo()) {}
+    : pipelines_(std::move(device), interleaveInfo()) {}
 
 void InterleavePass::record(Commands& commands, const shared::InterleaveConstants& constants) {
   commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants,

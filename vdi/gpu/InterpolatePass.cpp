@@ -4,7 +4,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo interpolateInfo() {
   ComputePipelineInfo info;
   info.shader = "interpolate";
   info.pushConstantBytes = sizeof(shared::InterpolateConstants);
@@ -14,7 +14,7 @@ ComputePipelineInfo pipelineInfo() {
 }  // namespace
 
 InterpolatePass::InterpolatePass(std::shared_ptr<Device> device)
-    : pipelines_(std::move(device), pipelineInfo()) {}
+    : pipelines_(std::move(device), interpolateInfo()) {}
 
 void InterpolatePass::record(Commands& commands, const shared::InterpolateConstants& constants) {
   commands.dispatch(pipelines_.with({constants.quotas != 0 ? 1U : 0U}), constants,

@@ -65,7 +65,7 @@ class QueueFamilies {
   std::array<std::uint32_t, 2> families_;
 };
 
-const char* nameOf(MemoryKind kind) {
+const char* kindName(MemoryKind kind) {
   switch (kind) {
     case MemoryKind::DeviceLocal:
       return "device-local";
@@ -142,7 +142,7 @@ Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind k
                                                 buffer_};
     address_ = vkGetBufferDeviceAddress(device_->vulkan().handle(), &addressInfo);
     device_->vulkan().setName(VK_OBJECT_TYPE_BUFFER, buffer_,
-                              fmt::format("{} buffer of {} bytes", nameOf(kind), size_));
+                              fmt::format("{} buffer of {} bytes", kindName(kind), size_));
     if (kind != MemoryKind::DeviceLocal) {
       void* data = nullptr;
       check(vkMapMemory(device_->vulkan().handle(), memory_, 0, VK_WHOLE_SIZE, 0, &data), "vkMapMemory");

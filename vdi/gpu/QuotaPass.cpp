@@ -4,7 +4,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo quotaInfo() {
   ComputePipelineInfo info;
   info.shader = "quota";
   info.pushConstantBytes = sizeof(shared::QuotaConstants);
@@ -13,7 +13,7 @@ ComputePipelineInfo pipelineInfo() {
 
 }  // namespace
 
-QuotaPass::QuotaPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), pipelineInfo()) {}
+QuotaPass::QuotaPass(std::shared_ptr<Device> device) : pipeline_(std::move(device), quotaInfo()) {}
 
 void QuotaPass::record(Commands& commands, const shared::QuotaConstants& constants) const {
   commands.dispatch(pipeline_, constants, groupsFor(constants.width, shared::quotaGroup), constants.rows);

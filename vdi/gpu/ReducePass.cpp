@@ -10,7 +10,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo(std::string_view shader) {
+ComputePipelineInfo reduceInfo(std::string_view shader) {
   ComputePipelineInfo info;
   info.shader = shader;
   info.pushConstantBytes = sizeof(shared::ReduceConstants);
@@ -18,7 +18,7 @@ ComputePipelineInfo pipelineInfo(std::string_view shader) {
 }
 
 ComputePipelineInfo subgroupInfo() {
-  ComputePipelineInfo info = pipelineInfo("reduce_subgroup");
+  ComputePipelineInfo info = reduceInfo("reduce_subgroup");
   info.wholeSubgroups = true;
   return info;
 }
@@ -44,10 +44,10 @@ ReducePass::ReducePass(const std::shared_ptr<Device>& device)
 ReducePass::ReducePass(std::shared_ptr<Device> device, Subgroups subgroups)
     : device_(std::move(device)),
       subgroups_(subgroups),
-      find_(device_, pipelineInfo("long_lists")),
+      find_(device_, reduceInfo("long_lists")),
       subgroup_(device_, subgroupInfo()),
-      alone_(device_, pipelineInfo("reduce")),
-      store_(device_, pipelineInfo("store")),
+      alone_(device_, reduceInfo("reduce")),
+      store_(device_, reduceInfo("store")),
       longListCount_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal) {}
 
 void ReducePass::record(Commands& commands, shared::ReduceConstants constants, const MaxPerList& maxPerList) {

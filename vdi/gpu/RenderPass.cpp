@@ -12,7 +12,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo(std::string_view shader) {
+ComputePipelineInfo renderInfo(std::string_view shader) {
   ComputePipelineInfo info;
   info.shader = shader;
   info.pushConstantBytes = sizeof(shared::RenderRays);
@@ -47,7 +47,7 @@ Course courseOf(const shared::RenderParams& params, const shared::RenderRays& ra
 }
 
 ComputePipelineInfo renderInfo(std::uint32_t lanes) {
-  ComputePipelineInfo info = pipelineInfo("render");
+  ComputePipelineInfo info = renderInfo("render");
   info.wholeSubgroups = lanes > 1;
   return info;
 }
@@ -85,7 +85,7 @@ shared::RenderRays renderRays(const View& original, const View& view) {
 RenderPass::RenderPass(const std::shared_ptr<Device>& device)
     : device_(device),
       lanesPerRay_(lanesPerRayFor(*device)),
-      cull_(device, pipelineInfo("cull")),
+      cull_(device, renderInfo("cull")),
       render_(cull_, renderInfo(lanesPerRay_)),
       queue_(device, sizeof(shared::TileQueue), MemoryKind::DeviceLocal) {
   const shared::TileQueue empty{{0, 1, 1}, 0, 0, {}};

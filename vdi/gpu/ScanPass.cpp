@@ -10,7 +10,7 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo pipelineInfo() {
+ComputePipelineInfo scanInfo() {
   ComputePipelineInfo info;
   info.shader = "scan";
   info.pushConstantBytes = sizeof(shared::ScanConstants);
@@ -23,7 +23,7 @@ constexpr std::uint32_t perGroup = shared::scanGroup * shared::scanPerThread;
 
 ScanPass::ScanPass(std::shared_ptr<Device> device)
     : device_(std::move(device)),
-      pipelines_(device_, pipelineInfo()),
+      pipelines_(device_, scanInfo()),
       overflow_(device_, sizeof(std::uint32_t), MemoryKind::Readback) {}
 
 void ScanPass::recordBoth(Commands& commands, shared::ScanConstants constants, ComputePipeline& pipeline) {

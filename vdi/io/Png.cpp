@@ -7,7 +7,9 @@
 #include <array>
 #include <cassert>
 #include <span>
+#include <string_view>
 
+#include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
 
@@ -45,8 +47,6 @@ Picture pictureOf(const Pixels& image, ByteOf byteOf) {
   }
   return picture;
 }
-
-constexpr std::uint32_t largestSide = 32768;  // as View
 
 /// As the first chunk of a sound PNG has it.
 std::uint64_t bitsPerPixel(std::span<const std::byte> png) {
@@ -86,7 +86,7 @@ void writePng(const std::filesystem::path& path, const Picture& picture) {
 
 Picture readPng(const std::filesystem::path& path) {
   const InputFile file(path);
-  const auto require = [&](bool good, const char* why) {
+  const auto require = [&](bool good, std::string_view why) {
     if (!good) throw Error(ErrorCode::Format, fmt::format("not a sound PNG: {}", why), path.string());
   };
   // Before the memory for another file's bytes is taken.
@@ -102,8 +102,8 @@ Picture readPng(const std::filesystem::path& path) {
   constexpr std::uint64_t maxPerByte = 1032;
   require(std::uint64_t{image->width} * image->height * bitsPerPixel(bytes) <= bytes.size() * maxPerByte * 8,
           "its header says that it's larger than its bytes can hold");
-  require(image->width <= largestSide && image->height <= largestSide,
-          "it's more than 32768 pixels wide or high");
+  require(image->width <= View::maxSide && image->height <= View::maxSide,
+          fmt::format("it's more than {} pixels wide or high", View::maxSide));
   image->format = PNG_FORMAT_RGB;
   Picture picture{static_cast<int>(image->width), static_cast<int>(image->height), {}};
   picture.rgb.resize(std::size_t{3} * image->width * image->height);

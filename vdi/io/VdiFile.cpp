@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/io/Files.h"
@@ -29,7 +30,6 @@ constexpr std::uint32_t marginVersion = 2;  // written only where there is one
 static_assert(static_cast<int>(Precision::Full) == 0 && static_cast<int>(Precision::Compact) == 1);
 constexpr std::uint32_t flagParallel = 1;
 constexpr std::uint32_t knownFlags = flagParallel;
-constexpr std::uint32_t largestSide = 32768;  // as View
 
 /// docs/format.md has the table.
 struct Header {
@@ -201,7 +201,7 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   const bool hasMargin = header.marginX != 0 || header.marginY != 0;
   if ((header.flags & ~knownFlags) != 0 || (hasMargin && header.version == plainVersion))
     fail("it uses flags that this program doesn't know");
-  const auto goodSide = [](std::uint32_t side) { return side >= 1 && side <= largestSide; };
+  const auto goodSide = [](std::uint32_t side) { return side >= 1 && side <= View::maxSide; };
   if (!goodSide(header.width) || !goodSide(header.height) || header.listsPerChunk == 0) {
     fail(fmt::format("{} x {} lists in chunks of {}", header.width, header.height, header.listsPerChunk));
   }

@@ -8,11 +8,7 @@ namespace vdi::detail {
 using gpu::MemoryKind;
 namespace shared = gpu::shared;
 
-namespace {
-
-constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
-
-}  // namespace
+namespace {}  // namespace
 
 Compositor::Compositor(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),

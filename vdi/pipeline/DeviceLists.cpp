@@ -9,12 +9,6 @@
 
 namespace vdi::detail {
 
-namespace {
-
-constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
-
-}  // namespace
-
 template <typename Segment>
 ListDownload<Segment>::ListDownload(ListsOf<Segment>& lists, HostPool& pool, DownloadMemory& memory,
                                     std::uint64_t listCount, std::uint64_t expected)

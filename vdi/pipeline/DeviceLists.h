@@ -14,6 +14,8 @@
 
 namespace vdi::detail {
 
+constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
+
 /// Compact lists as in ListsOf, in device memory that's used again by the next ones.
 struct DeviceLists {
   gpu::Buffer offsets;   // u32 [listCount + 1], exclusive prefix sum

@@ -11,8 +11,6 @@ namespace {
 
 static_assert(comm::Ownership::granularity == shared::countsPerWord);
 
-constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
-
 /// Supersegments begin at a multiple of that, as shaders want them.
 constexpr std::uint64_t segmentAlignment = 64;
 

@@ -1,0 +1,194 @@
+#include "vdi/pipeline/BandMaker.h"
+
+#include "vdi/pipeline/Stages.h"
+
+namespace vdi::detail {
+
+BandMaker::BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
+                     comm::Transport transport)
+    : comm_(comm), caster_(device), compositor_(device), levelSum_(comm, transport), accesses_(device) {
+  for (Slot& slot : slots_) slot.distributor = std::make_unique<Distributor>(device, comm, transport);
+}
+
+void BandMaker::drop() noexcept {
+  caster_.drop();
+  for (Slot& slot : slots_) slot.distributor->drop();
+  compositor_.drop();
+}
+
+void BandMaker::noteTimes(RankReport& report) const {
+  report.generateDeviceSeconds = 1e-3 * caster_.times().all;
+  report.countSeconds = 1e-3 * caster_.times().count;
+  report.writeSeconds = 1e-3 * caster_.times().write;
+}
+
+void BandMaker::makeAlone(const RayCaster::Request& request, const Progress& progress, const AloneSink& sink,
+                          RankReport& report) {
+  Stopwatch watch;
+  cancellable(comm_, progress, 0.95, [&](const RayCaster::Progress& advanced) {
+    RayCaster::Cast cast = caster_.begin(request);
+    const Bands all{cast.height, cast.rowsPerBand};
+    const auto firstList = [&](std::size_t band) {
+      return std::uint64_t{all.first(band)} * cast.build.width;
+    };
+    const auto start = [&](std::size_t band) {
+      Slot& slot = slotOf(band);
+      ListBuilder::Behind behind;
+      if (sink.behind)
+        behind = [&sink, &slot, first = firstList(band)](gpu::Commands& commands) {
+          sink.behind(commands, slot.lists, first);
+        };
+      caster_.startBand(cast, all.first(band), all.last(band), slot.lists, behind, slot.usedBy);
+    };
+    start(0);
+    for (std::size_t band = 0; band < all.count(); ++band) {
+      if (band + 1 < all.count()) start(band + 1);
+      caster_.finishBand();
+      Slot& slot = slotOf(band);
+      report.subSupersegments += slot.lists.count;
+      report.generateSeconds += watch.lap();
+      slot.usedBy = sink.take(slot.lists, firstList(band));
+      watch.lap();  // the sink's own time
+      if (!advanced(all.doneWith(band))) return caster_.drop();
+    }
+    freeSlots(all.count());
+  });
+  noteTimes(report);
+}
+
+/// Collective: one tolerance for what all ranks have in a list.
+void BandMaker::agreeOnLists(RayCaster::Cast& cast) {
+  if (!cast.agreed) return;
+  const comm::Exchange::Place own = levelSum_.begin(RayCaster::levelBytes(cast));
+  comm_.together([&] {
+    accesses_.tidy();
+    caster_.countLevels(cast, accesses_.of(own.memory), own.at);
+  });
+  std::vector<RayCaster::LevelSum> sum;
+  for (const comm::ByteSum::Stretch& stretch : levelSum_.add()) {
+    sum.push_back({&accesses_.of(stretch.place.memory), stretch.place.at, stretch.first, stretch.bytes});
+  }
+  comm_.together([&] { caster_.agree(cast, sum); });
+}
+
+/// Who owns which of a band's lists: the same on all ranks. `weights`: what ranks agreed on, of the whole
+/// picture; none if they didn't.
+comm::Ownership BandMaker::ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
+                                       std::span<const std::uint32_t> weights) const {
+  const std::uint64_t width = cast.build.width;
+  const std::uint64_t lists = width * (all.last(band) - all.first(band));
+  if (weights.empty()) return comm::Ownership::equal(lists, comm_.size());
+  const std::uint32_t stride = cast.build.countedStride;
+  const std::size_t first = all.first(band) / stride;
+  const std::size_t last = (all.last(band) + stride - 1) / stride;
+  return comm::Ownership::balanced(lists, comm_.size(), weights.subspan(first, last - first), width * stride);
+}
+
+void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& progress,
+                          const std::function<void(std::size_t band)>& compose, const OwnedSink& sink,
+                          RankReport& report) {
+  Stopwatch watch;
+  RayCaster::Cast cast;
+  comm_.together([&] { cast = caster_.begin(request); });
+  std::array<double, 1> rows{static_cast<double>(cast.rowsPerBand)};
+  comm_.allReduceMin(rows);  // all ranks' bands are the same
+  const Bands all{cast.height, static_cast<std::uint32_t>(rows[0])};
+  agreeOnLists(cast);
+  std::vector<std::uint32_t> weights;
+  merged_.resize(all.count());
+  const auto start = [&](std::size_t band) {
+    Slot& slot = slotOf(band);
+    slot.owned = ownershipOf(cast, all, band, weights);
+    merged_[band].firstList =
+        std::uint64_t{all.first(band)} * cast.build.width + slot.owned.of(comm_.rank()).first;
+    const auto behind = [&slot](gpu::Commands& commands) {
+      slot.distributor->recordPack(commands, slot.lists, slot.owned);
+    };
+    caster_.startBand(cast, all.first(band), all.last(band), slot.lists, behind, slot.usedBy);
+  };
+  comm_.together([&] {
+    if (cast.agreed) weights = caster_.agreedWeights(cast);
+    start(0);
+  });
+  sink.started();
+  for (std::size_t band = 0; band < all.count(); ++band) {
+    Slot& slot = slotOf(band);
+    cancellable(comm_, progress, 0.8, [&](const RayCaster::Progress& advanced) {
+      if (band + 1 < all.count()) start(band + 1);
+      caster_.finishBand();
+      advanced(all.doneWith(band));
+    });
+    report.subSupersegments += slot.lists.count;
+    report.generateSeconds += watch.lap();
+    slot.parts = slot.distributor->distribute(slot.lists, slot.owned, segmentBytes(request.code));
+    report.bytesSent += slot.distributor->bytesSent();
+    report.distributeSeconds += watch.lap();
+    if (band > 0) sink.pass(band - 1);
+    comm_.together([&] {
+      compositor_.interleave(slot.parts, request.code, merged_[band].interleaved);
+      compose(band);
+      slot.usedBy = compositor_.last();
+    });
+    report.compositeSeconds += watch.lap();
+  }
+  freeSlots(all.count());
+  noteTimes(report);
+}
+
+/// Collective, with a total budget: how many supersegments a list gets, the bands together tell.
+float BandMaker::levelOfAll(const GenerateSettings& settings, const Compositor::Request& request) {
+  SupersegmentHistogram histogram;
+  comm_.together([&] {
+    for (const MergedBand& band : merged_) histogram += compositor_.histogram(band.interleaved, request);
+  });
+  comm_.allReduceSum(histogram.supersegments);
+  comm_.allReduceSum(std::span(&histogram.equally, 1));
+  return histogram.levelFor(settings.fill);
+}
+
+void BandMaker::makeComposited(const RayCaster::Request& request, const Progress& progress,
+                               std::vector<OwnedLists>& owned, const OwnedSink& sink, RankReport& report) {
+  const GenerateSettings& settings = request.settings;
+  Compositor::Request composite{settings.supersegments, maxPerList(settings.supersegments, settings.budget),
+                                request.lattice.step,   settings.algorithm,
+                                request.code,           -1.0F};
+  const auto compose = [&](std::size_t band) {
+    owned.resize(merged_.size());
+    owned[band].firstList = merged_[band].firstList;
+    compositor_.composite(merged_[band].interleaved, composite, owned[band].lists);
+  };
+  if (settings.budget == Budget::List) return makeOwned(request, progress, compose, sink, report);
+  const auto nothing = [](std::size_t) {};
+  makeOwned(request, progress, nothing, {sink.started, nothing}, report);
+  Stopwatch watch;
+  composite.level = levelOfAll(settings, composite);
+  for (std::size_t band = 0; band < merged_.size(); ++band) {
+    if (band > 0) sink.pass(band - 1);
+    comm_.together([&] { compose(band); });
+  }
+  report.compositeSeconds += watch.lap();
+}
+
+void BandMaker::makeFlat(const RayCaster::Request& request, const Progress& progress,
+                         std::vector<FlatBand>& flat, const OwnedSink& sink, RankReport& report) {
+  const auto flatten = [&](std::size_t band) {
+    flat.resize(merged_.size());
+    FlatBand& own = flat[band];
+    own.firstPixel = merged_[band].firstList;
+    own.pixelCount = merged_[band].interleaved.listCount;
+    compositor_.flatten(merged_[band].interleaved, {}, own.colors, own.depths);
+    own.flattened = compositor_.last();
+  };
+  makeOwned(request, progress, flatten, sink, report);
+}
+
+void BandMaker::render(const RayCaster::Request& request, const Progress& progress, HostPool& pool,
+                       Image& image, RankReport& report) {
+  Stopwatch watch;
+  cancellable(comm_, progress, 0.95,
+              [&](const RayCaster::Progress& advanced) { caster_.render(request, advanced, pool, image); });
+  report.generateSeconds = watch.lap();
+  noteTimes(report);
+}
+
+}  // namespace vdi::detail

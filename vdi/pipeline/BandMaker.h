@@ -1,0 +1,131 @@
+// Lists of a frame, band after band: cast, distribute and composite, and who waits for whom. Not part of the
+// library's interface.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "vdi/comm/ByteSum.h"
+#include "vdi/comm/Communicator.h"
+#include "vdi/comm/Exchange.h"
+#include "vdi/comm/Ownership.h"
+#include "vdi/pipeline/Compositor.h"
+#include "vdi/pipeline/Distributor.h"
+#include "vdi/pipeline/GatheredLists.h"
+#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/RayCaster.h"
+
+namespace vdi::detail {
+
+class BandMaker {
+ public:
+  /// `comm` must outlive it.
+  BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
+            comm::Transport transport);
+
+  RayCaster& caster() { return caster_; }
+  Compositor& compositor() { return compositor_; }
+
+  /// What becomes of a band that one rank makes alone.
+  struct AloneSink {
+    /// Behind the steps that make it; none if empty. `firstList`: of the picture's, that the band begins
+    /// with.
+    std::function<void(gpu::Commands& commands, const DeviceLists& lists, std::uint64_t firstList)> behind;
+    /// When it's there. The result is what uses the lists' memory then.
+    std::function<gpu::Submission(const DeviceLists& lists, std::uint64_t firstList)> take;
+  };
+  /// With one rank. While the sink takes a band, the device makes the next one.
+  void makeAlone(const RayCaster::Request& request, const Progress& progress, const AloneSink& sink,
+                 RankReport& report);
+
+  /// What becomes of a band of the lists that this rank owns.
+  struct OwnedSink {
+    /// Collective: the first band is being made.
+    std::function<void()> started;
+    /// Collective: waits for a composited band (Compositor::finish), and sends it on. The device makes the
+    /// band behind meanwhile. Not called for the last band.
+    std::function<void(std::size_t band)> pass;
+  };
+  /// Collective: bands of the VDI's lists, on the devices of those who own them.
+  void makeComposited(const RayCaster::Request& request, const Progress& progress,
+                      std::vector<OwnedLists>& owned, const OwnedSink& sink, RankReport& report);
+
+  /// A band of the picture that this rank owns, without lists.
+  struct FlatBand {
+    std::uint64_t firstPixel = 0;
+    std::uint32_t pixelCount = 0;
+    gpu::Buffer colors;         // [pixelCount] glm::vec4
+    gpu::Buffer depths;         // [pixelCount] float
+    gpu::Submission flattened;  // which writes these two
+  };
+  /// Collective: the same for a picture, of runs alone. The limit case of the paper's section 5.3: one
+  /// supersegment a run, composited in order of depth.
+  void makeFlat(const RayCaster::Request& request, const Progress& progress, std::vector<FlatBand>& flat,
+                const OwnedSink& sink, RankReport& report);
+
+  /// The picture of one rank's volume: RayCaster::render.
+  void render(const RayCaster::Request& request, const Progress& progress, HostPool& pool, Image& image,
+              RankReport& report);
+
+  /// No frame is under way: the next one takes the same memory as the last that was made so.
+  void restart() { firstSlot_ = 0; }
+  /// Waits for what was started, and drops it: after an error.
+  void drop() noexcept;
+
+ private:
+  /// What a band of this rank's own lists needs until it's passed on; bands take them in turns.
+  struct Slot {
+    DeviceLists lists;
+    comm::Ownership owned = comm::Ownership::equal(0, 1);
+    std::unique_ptr<Distributor> distributor;
+    Distributed parts;
+    gpu::Submission usedBy;  // the lists' memory
+  };
+  Slot& slotOf(std::size_t band) { return slots_[(firstSlot_ + band) % slots_.size()]; }
+  /// The next frame's first band isn't made where this one's last band still is.
+  void freeSlots(std::size_t bands) { firstSlot_ = (firstSlot_ + bands) % slots_.size(); }
+
+  /// Bands of a picture: as many rows each, but for the last one.
+  struct Bands {
+    std::uint32_t height = 0;
+    std::uint32_t rows = 1;
+    std::size_t count() const { return (height + rows - 1) / rows; }
+    std::uint32_t first(std::size_t band) const { return static_cast<std::uint32_t>(band) * rows; }
+    std::uint32_t last(std::size_t band) const { return std::min(height, first(band) + rows); }
+    double doneWith(std::size_t band) const { return static_cast<double>(last(band)) / height; }
+  };
+  /// Where this rank's lists of a band begin in the picture, and all ranks' supersegments of them.
+  struct MergedBand {
+    std::uint64_t firstList = 0;
+    Compositor::Interleaved interleaved;
+  };
+
+  void agreeOnLists(RayCaster::Cast& cast);
+  comm::Ownership ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
+                              std::span<const std::uint32_t> weights) const;
+  /// Collective: this rank's lists, band after band, to those who own them, where they're merged by depth.
+  /// While a band is on its way, the device makes the next one. `compose`: submits what's made of a merged
+  /// band; not collective.
+  void makeOwned(const RayCaster::Request& request, const Progress& progress,
+                 const std::function<void(std::size_t band)>& compose, const OwnedSink& sink,
+                 RankReport& report);
+  float levelOfAll(const GenerateSettings& settings, const Compositor::Request& request);
+  void noteTimes(RankReport& report) const;
+
+  const comm::Communicator& comm_;
+  RayCaster caster_;
+  Compositor compositor_;
+  comm::ByteSum levelSum_;
+  HostAccesses accesses_;  // to the memory of levelSum_
+  std::array<Slot, RayCaster::bandsAtOnce> slots_;
+  std::size_t firstSlot_ = 0;  // of the frame that's made
+  std::vector<MergedBand> merged_;
+};
+
+}  // namespace vdi::detail

@@ -1,0 +1,108 @@
+#include "vdi/pipeline/TimeSteps.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <utility>
+
+#include "vdi/comm/GhostExchange.h"
+#include "vdi/comm/GlobalScene.h"
+#include "vdi/core/Error.h"
+#include "vdi/pipeline/Stages.h"
+
+namespace vdi::detail {
+
+namespace {
+
+/// Collective. Where no rank has anything but zeros and values that are lost, nothing would be seen.
+void requireUsableValues(const comm::Communicator& comm, std::span<const Block> blocks) {
+  const ValueSizes own = valueSizesOf(blocks);
+  std::array<std::uint64_t, 2> any{own.usable ? 1U : 0U, own.tooSmall ? 1U : 0U};
+  comm.allReduceMax(any);
+  if (any[0] != 0 || any[1] == 0) return;
+  throw Error(
+      ErrorCode::InvalidArgument,
+      fmt::format("all values are 0 or smaller than {} (f32) or {} (f64) in size, too small to be told "
+                  "apart; other units help",
+                  limitsOf(ScalarType::F32).minimum, limitsOf(ScalarType::F64).minimum));
+}
+
+}  // namespace
+
+TimeSteps::Step TimeSteps::send(std::vector<Block> blocks, bool fillGhosts,
+                                void (gpu::VolumeStore::*way)(std::span<const Block>, const Scene&)) {
+  Stopwatch watch;
+  Step step;
+  comm_.together([&] { validate(blocks); });
+  requireUsableValues(comm_, blocks);
+  for (const Block& block : blocks) {
+    step.bytes += block.byteCount();
+    step.doubles = step.doubles || block.type == ScalarType::F64;
+  }
+  step.blocks = blocks.size();
+  blocks = fillGhosts ? comm::exchangeGhosts(comm_, std::move(blocks))
+                      : comm::settleOwnership(comm_, std::move(blocks));
+  step.scene = comm::globalScene(comm_, localScene(blocks));
+  comm_.together([&] { (volume_.*way)(blocks, step.scene); });
+  step.uploadSeconds = watch.lap();
+  return step;
+}
+
+void TimeSteps::show(const Step& step) {
+  shown_ = step;
+  const ScalarRange& own = volume_.valueRange();
+  std::array<double, 2> minimum{own.min, -own.max};
+  comm_.allReduceMin(minimum);
+  range_ = {minimum[0], -minimum[1]};
+}
+
+void TimeSteps::dropNext() {
+  next_.reset();
+  volume_.dropNext();
+}
+
+void TimeSteps::setBlocks(std::vector<Block> blocks, bool fillGhosts) {
+  dropNext();
+  shown_ = {};  // where a rank fails, nobody shows anything
+  range_ = {};
+  show(send(std::move(blocks), fillGhosts, &gpu::VolumeStore::setBlocks));
+}
+
+void TimeSteps::setNextBlocks(std::vector<Block> blocks, bool fillGhosts) {
+  dropNext();
+  try {
+    next_ = send(std::move(blocks), fillGhosts, &gpu::VolumeStore::setNextBlocks);
+  } catch (...) {
+    dropNext();  // a rank that hasn't failed may have sent its own
+    throw;
+  }
+}
+
+void TimeSteps::advance() {
+  Stopwatch watch;
+  const std::optional<Step> next = std::exchange(next_, std::nullopt);
+  if (!next) throw Error(ErrorCode::InvalidArgument, "no next blocks were set");
+  comm_.together([&] { volume_.awaitNext(); });
+  volume_.showNext();
+  show(*next);
+  shown_.uploadSeconds += watch.lap();
+}
+
+void TimeSteps::requireSpans(const TransferTable& table) const {
+  // Of f64 there are floats on the device that say where in the block's range a value lies.
+  constexpr double maxCount = 1e33;
+  const double span = range_.max - range_.min;
+  if (!shown_.doubles || !(span > maxCount * (table.max - table.min))) return;
+  throw Error(ErrorCode::InvalidArgument,
+              fmt::format("the values are from {} to {}, the transfer function's from {} to {}: more than a "
+                          "factor of {}; missing values as NaN rather than a large number help",
+                          range_.min, range_.max, table.min, table.max, maxCount));
+}
+
+void TimeSteps::report(RankReport& report) {
+  report.uploadSeconds = std::exchange(shown_.uploadSeconds, 0.0);
+  report.blocks = shown_.blocks;
+  report.volumeBytes = shown_.bytes;
+}
+
+}  // namespace vdi::detail
