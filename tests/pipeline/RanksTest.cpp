@@ -67,7 +67,7 @@ const Case cases[] = {
 
 }  // namespace
 
-TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
+TEST_CASE("the flat image and DVR of N ranks equal the DVR of one", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const bool root = world.rank() == 0;
   // One of each for all cases: shapes, types and cameras change under them as they do under a user's.
@@ -201,7 +201,7 @@ TEST_CASE("ways between ranks: shared memory, messages, staging memory: the same
   unsetenv("VDI_TRANSPORT");
 }
 
-TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of one rank") {
+TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of one rank", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("turbulence", {49, 49, 49}, {16, 16, 16}, Layout::Random,
                                           Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
@@ -261,7 +261,7 @@ TEST_CASE("a large picture in bands, most of which are empty: the picture of one
   CHECK(largestDifference(*volume, *truth) < 1.0F);
 }
 
-TEST_CASE("tiny pictures: more ranks than rows and pixels") {
+TEST_CASE("tiny pictures: more ranks than rows and pixels", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
                                           Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
@@ -279,7 +279,7 @@ TEST_CASE("tiny pictures: more ranks than rows and pixels") {
   }
 }
 
-TEST_CASE("a rank that fails takes nobody down, and the next frame works") {
+TEST_CASE("a rank that fails takes nobody down, and the next frame works", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
                                           Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
