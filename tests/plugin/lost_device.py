@@ -82,4 +82,10 @@ made = look(view)
 open(LOSE, "w").close()
 again = look(view)
 check(made.std() > 20 and pvtest.ssim(made, again) > 0.999, "the output of a filter is shown again on a new device")
+# And one that is lost while it makes them.
+open(LOSE, "w").close()
+image.SamplingRate = 1.5
+finer = look(view)
+check(not os.path.exists(LOSE) and not pvtest.message_in(view), "a device that is lost in a filter leaves no message")
+check(pvtest.ssim(made, finer) > 0.95, "and the filter's next VDI is shown, made on a new device")
 pvtest.finish()

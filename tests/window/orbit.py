@@ -25,19 +25,19 @@ def read(name):
         return file.read()
 
 
-def compare(window, name, start, end):
-    """After a drag from start to end."""
+def compare(window, name, start, end, what="orbited"):
+    """After a drag from start to end. `what`: what it is that's seen, for orbit_compare.py."""
     if read("camera.json"):
         os.remove(os.path.join(OUTPUT, "camera.json"))
     window.drag(start, end, steps=30, seconds=1.5)
     wait_for("end of the drag", lambda: read("camera.json"), 60)
     time.sleep(3)  # the still picture
     picture = window.screenshot(name)
-    subprocess.run(["pvpython", os.path.join(HERE, "orbit_compare.py"), picture], check=True, timeout=200)
+    subprocess.run(["pvpython", os.path.join(HERE, "orbit_compare.py"), picture, what], check=True, timeout=200)
 
 
 subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "32x32x32", "--resolution", "160x160",
-                "--supersegments", "12", "-o", os.path.join(OUTPUT, "input.vdi")], check=True, stdout=subprocess.DEVNULL)
+                "--supersegments", "12", "--azimuth", "40", "-o", os.path.join(OUTPUT, "input.vdi")], check=True, stdout=subprocess.DEVNULL)
 with Screen(1100, 760) as screen, Window(screen, "--script=" + os.path.join(HERE, "orbit_notes.py"), output=OUTPUT) as window:
     said = wait_for("end of the script", lambda: read("ready"), 100)
     assert said == "ok", said
@@ -46,5 +46,6 @@ with Screen(1100, 760) as screen, Window(screen, "--script=" + os.path.join(HERE
     window.wait_for_picture()
     left, top, width, height = window.view()
     middle = (left + width // 2, top + height // 2)
+    compare(window, "opened.png", middle, middle, "opened")
     compare(window, "orbited.png", middle, (middle[0] + 180, middle[1] + 60))
     compare(window, "orbited_back.png", middle, (middle[0] - 90, middle[1] - 180))

@@ -2,6 +2,7 @@
 data and as a state, the trace replayed and the state loaded. Leaves a screenshot of each step in VDI_TEST_OUTPUT."""
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -10,7 +11,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from window import Pulse, Screen, Window, wait_for  # noqa: E402
 
 OUTPUT = os.path.join(os.environ["VDI_TEST_OUTPUT"], "panel")
-os.makedirs(OUTPUT, exist_ok=True)
+shutil.rmtree(OUTPUT, ignore_errors=True)  # what another run left makes the lists of files longer
+os.makedirs(OUTPUT)
 ANSWER_SECONDS = 1.0  # the longest that the window may take to answer while a colour is edited
 LOAD = """
 from paraview import simple
@@ -31,10 +33,7 @@ def check(good, what):
 
 
 def path(name):
-    full = os.path.join(OUTPUT, name)
-    if os.path.exists(full):
-        os.remove(full)
-    return full
+    return os.path.join(OUTPUT, name)
 
 
 def bytes_of(name):

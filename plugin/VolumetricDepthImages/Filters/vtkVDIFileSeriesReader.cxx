@@ -2,6 +2,8 @@
 
 #include <vtkObjectFactory.h>
 
+#include <algorithm>
+#include <array>
 #include <set>
 
 #include "vdi/core/Error.h"
@@ -10,13 +12,36 @@
 
 vtkStandardNewMacro(vtkVDIFileSeriesReader);
 
+namespace {
+
+std::array<double, 12> numbersOf(const vdi::Camera& camera) {
+  const auto& [position, focalPoint, viewUp, viewAngle, parallelProjection, parallelScale] = camera;
+  return {position.x,
+          position.y,
+          position.z,
+          focalPoint.x,
+          focalPoint.y,
+          focalPoint.z,
+          viewUp.x,
+          viewUp.y,
+          viewUp.z,
+          viewAngle,
+          parallelProjection ? 1.0 : 0.0,
+          parallelScale};
+}
+
+}  // namespace
+
 int vtkVDIFileSeriesReader::RequestInformation(vtkInformation* request, vtkInformationVector** inputs,
                                                vtkInformationVector* outputs) {
   std::set<double> times;
   bool differ = true;
+  std::ranges::fill(this->Viewpoint, 0.0);
   for (unsigned int i = 0; differ && i < this->GetNumberOfFileNames(); ++i) {
     try {
-      differ = times.insert(vdi::io::readVdiInfo(this->GetFileName(i)).header.time).second;
+      const vdi::Vdi header = vdi::io::readVdiInfo(this->GetFileName(i)).header;
+      if (times.empty()) std::ranges::copy(numbersOf(header.camera), this->Viewpoint);
+      differ = times.insert(header.time).second;
     } catch (const vdi::Error&) {
       differ = false;  // a file that can't be read; the reader says so when it's its turn
     }

@@ -18,6 +18,11 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
   static vtkVDIFileSeriesReader* New();
   vtkTypeMacro(vtkVDIFileSeriesReader, vtkFileSeriesReader);
 
+  /// Where the first file that can be read was made from, after UpdateInformation: position, focal point,
+  /// view-up, view angle, whether the projection is parallel, and parallel scale, as vtkCamera has them.
+  /// Zeros if none can be read.
+  vtkGetVectorMacro(Viewpoint, double, 12);
+
  protected:
   vtkVDIFileSeriesReader() = default;
   ~vtkVDIFileSeriesReader() override = default;
@@ -29,6 +34,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
   vtkVDIFileSeriesReader(const vtkVDIFileSeriesReader&) = delete;
   void operator=(const vtkVDIFileSeriesReader&) = delete;
 
+  double Viewpoint[12] = {};
   vtkIdType LastIndex = -1;  // of the file that was read last
   vtkIdType LastStep = 0;    // to it from the one before, in [0, count)
 };

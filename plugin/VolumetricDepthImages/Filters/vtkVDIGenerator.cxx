@@ -270,7 +270,14 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   this->Internal->Failed = true;
   this->Internal->Executed = this->CurrentMTime();
   try {
-    this->Generate(input, time, output);
+    try {
+      this->Generate(input, time, output);
+    } catch (const vdi::Error& error) {
+      if (!this->ForgetLostDevice(error)) throw;
+      vtkWarningMacro(<< error.what() << "; trying a new device");
+      output->Initialize();
+      this->Generate(input, time, output);
+    }
   } catch (const vdi::Error& error) {
     output->Initialize();
     if (error.code() == vdi::ErrorCode::Cancelled) {
@@ -279,14 +286,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
       this->KeepEarlier(earlier, output);
       return 1;
     }
-    const bool isAlone = this->Controller == nullptr || this->Controller->GetNumberOfProcesses() == 1;
-    if (error.code() == vdi::ErrorCode::DeviceFailure && isAlone) {
-      // A lost device stays lost: the next frame gets a new one. Ranks would have to agree on that.
-      this->DropPreparation();
-      this->Internal->Generator.reset();
-      this->Internal->Shown.reset();
-      pv::forgetDevice();
-    }
+    this->ForgetLostDevice(error);
     vtkErrorMacro(<< error.what());
     return 0;
   } catch (const std::exception& error) {
@@ -296,6 +296,18 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   }
   this->Internal->Failed = false;
   return 1;
+}
+
+/// A lost device stays lost: what comes next gets a new one. Ranks would have to agree on that. Returns whether
+/// the error was such a loss, and this rank is the only one.
+bool vtkVDIGenerator::ForgetLostDevice(const vdi::Error& error) {
+  const bool isAlone = this->Controller == nullptr || this->Controller->GetNumberOfProcesses() == 1;
+  if (error.code() != vdi::ErrorCode::DeviceFailure || !isAlone) return false;
+  this->DropPreparation();
+  this->Internal->Generator.reset();
+  this->Internal->Shown.reset();
+  pv::forgetDevice();
+  return true;
 }
 
 /// What an abort leaves on rank 0: the picture that was there, or one that shows nothing.

@@ -1,11 +1,63 @@
 #include "pqVDIBehavior.h"
 
+#include <pqActiveObjects.h>
 #include <pqApplicationCore.h>
+#include <pqCoreUtilities.h>
+#include <pqDataRepresentation.h>
 #include <pqPipelineSource.h>
+#include <pqPropertiesPanel.h>
 #include <pqServerManagerModel.h>
+#include <pqUndoStack.h>
+#include <pqView.h>
+#include <vtkSMPropertyHelper.h>
+#include <vtkSMRenderViewProxy.h>
+#include <QTimer>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
 
 #include "pqVDIRegenerator.h"
 #include "vtkSMVDIGeneratorProxy.h"
+
+namespace {
+
+/// Whether the view shows the source, and nothing else.
+bool showsOnly(pqView* view, pqPipelineSource* source) {
+  bool shown = false;
+  for (pqRepresentation* each : view->getRepresentations()) {
+    auto* data = qobject_cast<pqDataRepresentation*>(each);
+    if (data == nullptr || !data->isVisible()) continue;
+    if (data->getInput() != source) return false;
+    shown = true;
+  }
+  return shown;
+}
+
+/// A VDI is truest from its viewpoint, and may be seen from there alone: ParaView's own choice is to look
+/// along z.
+void lookFromViewpoint(pqPipelineSource* source) {
+  pqView* view = pqActiveObjects::instance().activeView();
+  auto* proxy = view != nullptr ? vtkSMRenderViewProxy::SafeDownCast(view->getViewProxy()) : nullptr;
+  if (proxy == nullptr || !showsOnly(view, source)) return;
+  source->getProxy()->UpdatePropertyInformation(source->getProxy()->GetProperty("Viewpoint"));
+  std::array<double, 12> numbers{};
+  vtkSMPropertyHelper(source->getProxy(), "Viewpoint")
+      .Get(numbers.data(), static_cast<unsigned int>(numbers.size()));
+  if (std::equal(numbers.begin(), numbers.begin() + 3, numbers.begin() + 3)) return;  // no VDI could be read
+  BEGIN_UNDO_EXCLUDE();
+  vtkSMPropertyHelper(proxy, "CameraPosition").Set(numbers.data(), 3);
+  vtkSMPropertyHelper(proxy, "CameraFocalPoint").Set(&numbers[3], 3);
+  vtkSMPropertyHelper(proxy, "CameraViewUp").Set(&numbers[6], 3);
+  vtkSMPropertyHelper(proxy, "CameraViewAngle").Set(numbers[9]);
+  vtkSMPropertyHelper(proxy, "CameraParallelProjection").Set(numbers[10] != 0.0 ? 1 : 0);
+  vtkSMPropertyHelper(proxy, "CameraParallelScale").Set(numbers[11]);
+  proxy->UpdateVTKObjects();
+  END_UNDO_EXCLUDE();
+  view->render();
+}
+
+}  // namespace
 
 void pqVDIBehavior::startup() {
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
@@ -21,4 +73,21 @@ void pqVDIBehavior::shutdown() {
 
 void pqVDIBehavior::sourceAdded(pqPipelineSource* source) {
   if (vtkSMVDIGeneratorProxy::SafeDownCast(source->getProxy()) != nullptr) new pqVDIRegenerator(source);
+  if (std::string_view(source->getProxy()->GetXMLName()) != "VDIReader" ||
+      pqApplicationCore::instance()->isLoadingState())
+    return;  // a state has its camera
+  // Only what's applied by hand: scripts set their cameras. The panels may be younger than this.
+  QWidget* window = pqCoreUtilities::mainWidget();
+  if (window == nullptr) return;
+  for (pqPropertiesPanel* panel : window->findChildren<pqPropertiesPanel*>()) {
+    this->connect(panel, SIGNAL(applied(pqProxy*)), this, SLOT(applied(pqProxy*)), Qt::UniqueConnection);
+  }
+  this->Opened.append(source);
+}
+
+void pqVDIBehavior::applied(pqProxy* proxy) {
+  auto* source = qobject_cast<pqPipelineSource*>(proxy);
+  if (source == nullptr || this->Opened.removeAll(source) == 0) return;
+  // Behind what ParaView does then: it shows the source and resets the camera.
+  QTimer::singleShot(0, source, [source] { lookFromViewpoint(source); });
 }

@@ -1,10 +1,14 @@
-// Started with the plugin: gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator.
+// Started with the plugin: gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator, and looks at
+// what the user has opened from where it was made.
 #ifndef pqVDIBehavior_h
 #define pqVDIBehavior_h
 
+#include <QList>
 #include <QObject>
+#include <QPointer>
 
 class pqPipelineSource;
+class pqProxy;
 
 class pqVDIBehavior : public QObject {
   Q_OBJECT
@@ -15,6 +19,9 @@ class pqVDIBehavior : public QObject {
 
  private:
   Q_SLOT void sourceAdded(pqPipelineSource* source);
+  Q_SLOT void applied(pqProxy* proxy);
+
+  QList<QPointer<pqPipelineSource>> Opened;  // readers that haven't been applied yet
 };
 
 #endif
