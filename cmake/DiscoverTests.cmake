@@ -1,8 +1,8 @@
 # Writes OUTPUT, a file for ctest with a test for each case of the Catch2 program PROGRAM: "NAME: case". Where there are RANKS
 # it's a test for each number of them, "NAME_np3", of all cases: to start many processes with a device each takes longer than
-# most cases. With SOME_RANKS as many start only the cases of the tag [ranks]; the others are "NAME_np3_rest", whose label is
-# long too. They're started by LAUNCHER (mpiexec ... -n). Each test gets TIMEOUT, LABELS and ENVIRONMENT. Catch2's own
-# catch_discover_tests knows neither several launchers nor lists as properties.
+# most cases. With SOME_RANKS as many it has only the cases of the tag [ranks]; the others are "NAME_np3_rest", whose label is
+# long too. So is that of all cases with LONG_RANKS as many. They're started by LAUNCHER (mpiexec ... -n). Each test gets
+# TIMEOUT, LABELS and ENVIRONMENT. Catch2's own catch_discover_tests knows neither several launchers nor lists as properties.
 execute_process(
   COMMAND ${CMAKE_COMMAND} -E env ASAN_OPTIONS=detect_leaks=0 "${PROGRAM}" --list-test-names-only
   OUTPUT_VARIABLE cases
@@ -29,11 +29,16 @@ foreach(ranks IN LISTS RANKS)
 endforeach()
 foreach(ranks IN LISTS SOME_RANKS)
   add("[==[${NAME}_np${ranks}]==]" "${launcher} ${ranks} [==[${PROGRAM}]==] [ranks] --warn NoTests")
-  set(labels ${LABELS})
-  list(APPEND LABELS long)
-  add("[==[${NAME}_np${ranks}_rest]==]" "${launcher} ${ranks} [==[${PROGRAM}]==] ~[ranks] --warn NoTests")
-  set(LABELS ${labels})
 endforeach()
+set(labels ${LABELS})
+list(APPEND LABELS long)
+foreach(ranks IN LISTS SOME_RANKS)
+  add("[==[${NAME}_np${ranks}_rest]==]" "${launcher} ${ranks} [==[${PROGRAM}]==] ~[ranks] --warn NoTests")
+endforeach()
+foreach(ranks IN LISTS LONG_RANKS)
+  add("[==[${NAME}_np${ranks}]==]" "${launcher} ${ranks} [==[${PROGRAM}]==] --warn NoTests")
+endforeach()
+set(LABELS ${labels})
 if(RANKS)
   set(cases "")
 endif()

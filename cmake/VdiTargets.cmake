@@ -24,11 +24,11 @@ endfunction()
 set(VDI_TEST_ENVIRONMENT OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
                          OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_vader_single_copy_mechanism=none)
 
-# vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [SOME_RANKS 2 8] [TIMEOUT seconds] [LABELS ...]): program
+# vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [SOME_RANKS 2] [LONG_RANKS 5] [TIMEOUT seconds] [LABELS ...]): program
 # test_<name> with Catch2's main (or tests/MpiMain.cpp when RANKS is given), and a ctest for each of its cases or rank
 # counts, as cmake/DiscoverTests.cmake says. Every one has a time limit.
 function(vdi_add_catch_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;SOME_RANKS;LABELS;ENVIRONMENT")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;SOME_RANKS;LONG_RANKS;LABELS;ENVIRONMENT")
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -39,13 +39,16 @@ function(vdi_add_catch_test name)
     target_link_libraries(test_${name} PRIVATE vdi_test_main ${arg_LINK})
   endif()
   vdi_target_options(test_${name})
+  if("core" IN_LIST arg_LABELS)
+    add_dependencies(core_tests test_${name})
+  endif()
   set(tests "${CMAKE_CURRENT_BINARY_DIR}/${name}_tests.cmake")
   add_custom_command(
     TARGET test_${name}
     POST_BUILD
     COMMAND
       ${CMAKE_COMMAND} -D "NAME=${name}" -D "PROGRAM=$<TARGET_FILE:test_${name}>" -D "RANKS=${arg_RANKS}" -D
-      "SOME_RANKS=${arg_SOME_RANKS}" -D
+      "SOME_RANKS=${arg_SOME_RANKS}" -D "LONG_RANKS=${arg_LONG_RANKS}" -D
       "LAUNCHER=${MPIEXEC_EXECUTABLE};--oversubscribe;${MPIEXEC_NUMPROC_FLAG}" -D "TIMEOUT=${arg_TIMEOUT}" -D
       "LABELS=${arg_LABELS}" -D "ENVIRONMENT=${VDI_TEST_ENVIRONMENT};${arg_ENVIRONMENT}" -D "OUTPUT=${tests}" -P
       "${CMAKE_SOURCE_DIR}/cmake/DiscoverTests.cmake"

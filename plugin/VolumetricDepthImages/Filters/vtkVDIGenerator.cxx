@@ -298,8 +298,8 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   return 1;
 }
 
-/// A lost device stays lost: what comes next gets a new one. Ranks would have to agree on that. Returns whether
-/// the error was such a loss, and this rank is the only one.
+/// A lost device stays lost: what comes next gets a new one. Ranks would have to agree on that. Returns
+/// whether the error was such a loss, and this rank is the only one.
 bool vtkVDIGenerator::ForgetLostDevice(const vdi::Error& error) {
   const bool isAlone = this->Controller == nullptr || this->Controller->GetNumberOfProcesses() == 1;
   if (error.code() != vdi::ErrorCode::DeviceFailure || !isAlone) return false;
