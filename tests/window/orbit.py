@@ -37,7 +37,8 @@ def compare(window, name, start, end, what="orbited"):
 
 
 subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "32x32x32", "--resolution", "160x160",
-                "--supersegments", "12", "--azimuth", "40", "-o", os.path.join(OUTPUT, "input.vdi")], check=True, stdout=subprocess.DEVNULL)
+                "--supersegments", "12", "--azimuth", "40", "-o", os.path.join(OUTPUT, "input.vdi")],
+               check=True, stdout=subprocess.DEVNULL)
 with Screen(1100, 760) as screen, Window(screen, "--script=" + os.path.join(HERE, "orbit_notes.py"), output=OUTPUT) as window:
     said = wait_for("end of the script", lambda: read("ready"), 100)
     assert said == "ok", said
