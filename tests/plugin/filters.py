@@ -55,7 +55,9 @@ path = os.path.join(OUTPUT, "wavelet.vdi")
 simple.SaveData(path, proxy=image)
 read = simple.OpenDataFile(path)
 check(np.array_equal(picture(read), flat), "a saved VDI reads back as it was")
-check(np.allclose(read.Viewpoint[:6], list(POSITION) + list(FOCAL_POINT)), "and says where it was made from")
+read.SMProxy.UpdatePropertyInformation()
+viewpoint = [read.SMProxy.GetProperty("Viewpoint").GetElement(i) for i in range(12)]
+check(np.allclose(viewpoint[:6], list(POSITION) + list(FOCAL_POINT)), "and says where it was made from")
 for source in (image, read):
     rendered = with_camera(simple.RenderVDI(Input=source))
     worst = np.abs(picture(rendered).astype(int) - flat).max()
