@@ -1,8 +1,10 @@
-# Writes OUTPUT, a file for ctest with a test for each case of the Catch2 program PROGRAM: "NAME: case". Where there are RANKS
-# it's a test for each number of them, "NAME_np3", of all cases: to start many processes with a device each takes longer than
-# most cases. With SOME_RANKS as many it has only the cases of the tag [ranks]; the others are "NAME_np3_rest", whose label is
-# long too. So is that of all cases with LONG_RANKS as many. They're started by LAUNCHER (mpiexec ... -n). Each test gets
-# TIMEOUT, LABELS and ENVIRONMENT. Catch2's own catch_discover_tests knows neither several launchers nor lists as properties.
+# Writes OUTPUT, a file for ctest with a test for each case of the Catch2 program PROGRAM: "NAME:
+# case". Where there are RANKS it's a test for each number of them, "NAME_np3", of all cases: to
+# start many processes with a device each takes longer than most cases. With SOME_RANKS as many it
+# has only the cases of the tag [ranks]; the others are "NAME_np3_rest", whose label is long too. So
+# is that of all cases with LONG_RANKS as many. They're started by LAUNCHER (mpiexec ... -n). Each
+# test gets TIMEOUT, LABELS and ENVIRONMENT. Catch2's own catch_discover_tests knows neither several
+# launchers nor lists as properties.
 execute_process(
   COMMAND ${CMAKE_COMMAND} -E env ASAN_OPTIONS=detect_leaks=0 "${PROGRAM}" --list-test-names-only
   OUTPUT_VARIABLE cases

@@ -24,9 +24,10 @@ endfunction()
 set(VDI_TEST_ENVIRONMENT OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
                          OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_vader_single_copy_mechanism=none)
 
-# vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [SOME_RANKS 2] [LONG_RANKS 5] [TIMEOUT seconds] [LABELS ...]): program
-# test_<name> with Catch2's main (or tests/MpiMain.cpp when RANKS is given), and a ctest for each of its cases or rank
-# counts, as cmake/DiscoverTests.cmake says. Every one has a time limit.
+# vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [SOME_RANKS 2] [LONG_RANKS 5] [TIMEOUT
+# seconds] [LABELS ...]): program test_<name> with Catch2's main (or tests/MpiMain.cpp when RANKS is
+# given), and a ctest for each of its cases or rank counts, as cmake/DiscoverTests.cmake says. Every
+# one has a time limit.
 function(vdi_add_catch_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;SOME_RANKS;LONG_RANKS;LABELS;ENVIRONMENT")
   if(NOT arg_TIMEOUT)

@@ -1,5 +1,6 @@
-"""What orbit_notes.py noted of the view, against the tool's picture for the view's camera; and the window against what was
-noted. Arguments: a picture of the whole screen; "opened", if the camera is to be the one that the VDI was made from."""
+"""What orbit_notes.py noted of the view, against the tool's picture for the view's camera; and the
+window against what was noted. Arguments: a picture of the whole screen; "opened", if the camera
+is to be the one that the VDI was made from."""
 
 import json
 import os
