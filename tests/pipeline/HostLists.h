@@ -75,7 +75,7 @@ ListsOf<Segment> composite(const std::shared_ptr<gpu::Device>& device, detail::C
                            const std::vector<ListsOf<Segment>>& subLists,
                            const detail::Compositor::Request& request) {
   const HostSubLists parts(device, subLists);
-  detail::Compositor::Interleaved merged;
+  detail::DeviceLists merged;
   compositor.interleave(parts.parts(), request.code, merged);
   detail::DeviceLists lists;
   compositor.composite(merged, request, lists);

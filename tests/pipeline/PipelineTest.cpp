@@ -611,7 +611,7 @@ TEST_CASE("merging and compositing on the device equal the reference") {
       test::composite(device(), compositor, subLists, {6, 6, frame.lattice.step, algorithm, {}});
   CHECK(listsThatDiffer(result, expected) <= expected.listCount() / 50);
   // The flat picture of what was merged, by the device and by the host, is that of what was composited.
-  detail::Compositor::Interleaved merged;
+  detail::DeviceLists merged;
   const test::HostSubLists parts(device(), subLists);
   compositor.interleave(parts.parts(), {}, merged);
   gpu::Buffer colors;
@@ -758,7 +758,7 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   detail::Compositor compositor(device());
   detail::Compositor::Request request{
       5, maxPerList(5, Budget::Total), frame.lattice.step, Algorithm::Merge, {}};
-  detail::Compositor::Interleaved merged;
+  detail::DeviceLists merged;
   const test::HostSubLists parts(device(), subLists);
   compositor.interleave(parts.parts(), {}, merged);
   request.level = compositor.histogram(merged, request).levelFor(fill);

@@ -201,6 +201,47 @@ TEST_CASE("ways between ranks: shared memory, messages, staging memory: the same
   unsetenv("VDI_TRANSPORT");
 }
 
+TEST_CASE("schedules: direct send and rounds give the same VDI and picture", "[ranks]") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::U8, world.rank(), world.size());
+  GenerateSettings settings = test::smallSettings(61, 45, 6);
+  settings.budget = GENERATE(Budget::List, Budget::Total);
+  if (settings.budget == Budget::Total && world.size() > 3) return;  // it takes long enough
+  const TransferFunction function = test::threeHues(80.0);
+  std::optional<Vdi> expected;
+  std::optional<Image> picture;
+  using Way = std::pair<const char*, const char*>;
+  for (const auto& [schedule, transport] : {Way{"direct", "shared"}, Way{"rounds:2", "shared"},
+                                            Way{"rounds:2", "mpi"}, Way{"rounds:3", "shared"}}) {
+    INFO(schedule << ", " << transport << ", budget " << toString(settings.budget));
+    setenv("VDI_SCHEDULE", schedule, 1);
+    setenv("VDI_TRANSPORT", transport, 1);
+    setenv("VDI_BANDS", settings.budget == Budget::List ? "3" : "1", 1);
+    VdiGenerator generator(device(), comm::Communicator::world());
+    unsetenv("VDI_SCHEDULE");
+    unsetenv("VDI_TRANSPORT");
+    generator.setBlocks(decomposed.mine);
+    VdiFrame first = generator.start(test::oblique(), function, settings);
+    VdiFrame second = generator.start(test::oblique(), function, settings);
+    generator.finish(std::move(first));
+    const auto vdi = generator.finish(std::move(second));
+    const auto image = generator.renderVolume(test::oblique(), function, settings);
+    unsetenv("VDI_BANDS");
+    if (world.rank() != 0) continue;
+    if (!expected) expected = *vdi;
+    if (!picture) picture = *image;
+    CHECK(*vdi == *expected);
+    CHECK(image->rgba == picture->rgba);
+    CHECK(image->depth == picture->depth);
+  }
+  for (const char* wrong : {"rounds", "rounds:1", "rounds:2x", "carrier"}) {
+    setenv("VDI_SCHEDULE", wrong, 1);
+    CHECK_THROWS_AS(VdiGenerator(device(), comm::Communicator::world()), Error);
+  }
+  unsetenv("VDI_SCHEDULE");
+}
+
 TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of one rank", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("turbulence", {49, 49, 49}, {16, 16, 16}, Layout::Random,

@@ -311,6 +311,19 @@ std::vector<std::uint64_t> Communicator::allToAllWords(std::span<const std::uint
   return from;
 }
 
+std::vector<std::uint64_t> Communicator::exchangeWords(std::span<const std::uint64_t> wordsTo, std::size_t n,
+                                                       const Partners& partners) const {
+  assert(wordsTo.size() == partners.to.size() * n);
+  std::vector<std::uint64_t> from(partners.from.size() * n);
+  Messages messages(*this);
+  for (std::size_t i = 0; i < partners.from.size(); ++i)
+    messages.receive(partners.from[i], std::as_writable_bytes(std::span(from).subspan(i * n, n)));
+  for (std::size_t i = 0; i < partners.to.size(); ++i)
+    messages.send(partners.to[i], std::as_bytes(wordsTo.subspan(i * n, n)));
+  messages.wait();
+  return from;
+}
+
 namespace {
 
 /// What the work threw; nothing if it didn't.

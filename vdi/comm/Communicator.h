@@ -22,6 +22,12 @@ struct Gathered {
   }
 };
 
+/// Whom a rank sends something, and from whom it gets something.
+struct Partners {
+  std::vector<int> to;
+  std::vector<int> from;
+};
+
 /// RAII over a duplicate of an MPI communicator, or over no MPI at all (one rank). Movable, not copyable. All
 /// functions marked collective must be called by every rank in the same order. MPI errors become
 /// Error{Communication}.
@@ -77,6 +83,10 @@ class Communicator {
   std::vector<std::uint64_t> allGatherWords(std::span<const std::uint64_t> words) const;
   /// wordsTo: [size][n], n words for each rank; the result has [size][n], n from each.
   std::vector<std::uint64_t> allToAllWords(std::span<const std::uint64_t> wordsTo) const;
+  /// The same between some ranks: wordsTo is [partners.to.size()][n], the result [partners.from.size()][n].
+  /// Each rank that's named names this one. Those who have no partners needn't call it.
+  std::vector<std::uint64_t> exchangeWords(std::span<const std::uint64_t> wordsTo, std::size_t n,
+                                           const Partners& partners) const;
 
   /// Collective: nobody leaves alone. With no error on any rank it returns. Otherwise every rank throws: a
   /// rank with an error rethrows its own, the others throw Error{RemoteRank} with the lowest failing rank's

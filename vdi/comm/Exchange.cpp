@@ -55,10 +55,9 @@ bool Exchange::sharesMemoryWith(int rank) const {
 
 Exchange::Place Exchange::outbox(std::uint64_t bytes) {
   if (transport_ == Transport::Shared && comm_.size() > 1) {
-    const std::vector<std::uint64_t> wanted = comm_.allGatherWords(std::array{aligned(bytes)});
-    const bool grows = parts_.empty() || !std::equal(wanted.begin(), wanted.end(), parts_.begin(),
-                                                     [](auto a, auto b) { return a <= b; });
-    if (grows) shareNewWindow(wanted);
+    const bool grows = comm_.anyTogether(
+        [&] { return parts_.empty() || parts_[static_cast<std::size_t>(comm_.rank())] < aligned(bytes); });
+    if (grows) shareNewWindow(comm_.allGatherWords(std::array{aligned(bytes)}));
     if (window_) return outbox_;
   }
   comm_.together([&] {
@@ -112,33 +111,61 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   if (!window_) outbox_.at = 0;
 }
 
+void Exchange::putHeader(const Outgoing& piece, std::span<std::uint64_t> header) const {
+  const std::array<std::uint64_t, headerWords> words{outbox_.at + piece.at, piece.bytes, piece.note[0],
+                                                     piece.note[1]};
+  std::copy(words.begin(), words.end(), header.begin());
+}
+
 std::vector<Exchange::Incoming> Exchange::send(std::span<const Outgoing> pieces) {
-  constexpr std::size_t headerWords = 4;
-  const auto ranks = static_cast<std::size_t>(comm_.size());
-  std::vector<std::uint64_t> headers(ranks * headerWords, 0);
+  std::vector<std::uint64_t> headers(static_cast<std::size_t>(comm_.size()) * headerWords, 0);
   for (const Outgoing& piece : pieces) {
     assert(piece.to != comm_.rank() && piece.to < comm_.size());
-    const std::uint64_t header[]{outbox_.at + piece.at, piece.bytes, piece.note[0], piece.note[1]};
-    std::copy(
-        std::begin(header), std::end(header),
-        headers.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(piece.to) * headerWords));
+    putHeader(piece,
+              std::span(headers).subspan(static_cast<std::size_t>(piece.to) * headerWords, headerWords));
   }
   // Who has a header has what it speaks of, where memory is shared: it's sent when that has been written.
   const std::vector<std::uint64_t> from = comm_.allToAllWords(headers);
   std::vector<Incoming> incoming;
-  std::uint64_t messageBytes = 0;
-  for (std::size_t r = 0; r < ranks; ++r) {
-    const std::uint64_t* header = &from[r * headerWords];
-    if (header[1] == 0) continue;
-    Incoming piece{static_cast<int>(r), {window_, header[0]}, header[1], {header[2], header[3]}};
-    if (!sharesMemoryWith(piece.from)) {
-      piece.place = {nullptr, messageBytes};
-      messageBytes += aligned(piece.bytes);
-    }
-    incoming.push_back(std::move(piece));
+  for (int r = 0; r < comm_.size(); ++r)
+    addIncoming(r, &from[static_cast<std::size_t>(r) * headerWords], incoming);
+  return receive(pieces, std::move(incoming));
+}
+
+std::vector<Exchange::Incoming> Exchange::send(std::span<const Outgoing> pieces, const Partners& partners) {
+  std::vector<std::uint64_t> headers(partners.to.size() * headerWords, 0);
+  for (const Outgoing& piece : pieces) {
+    const auto partner = std::find(partners.to.begin(), partners.to.end(), piece.to);
+    assert(partner != partners.to.end());
+    const auto index = static_cast<std::size_t>(partner - partners.to.begin());
+    putHeader(piece, std::span(headers).subspan(index * headerWords, headerWords));
   }
+  const std::vector<std::uint64_t> from = comm_.exchangeWords(headers, headerWords, partners);
+  std::vector<Incoming> incoming;
+  for (std::size_t i = 0; i < partners.from.size(); ++i)
+    addIncoming(partners.from[i], &from[i * headerWords], incoming);
+  return receive(pieces, std::move(incoming));
+}
+
+/// What a header speaks of, where that can be read as it lies.
+void Exchange::addIncoming(int from, const std::uint64_t* header, std::vector<Incoming>& incoming) const {
+  if (header[1] == 0) return;
+  const bool shared = sharesMemoryWith(from);
+  incoming.push_back(
+      {from, {shared ? window_ : nullptr, shared ? header[0] : 0}, header[1], {header[2], header[3]}});
+}
+
+/// The messages of those with whom no memory is shared.
+std::vector<Exchange::Incoming> Exchange::receive(std::span<const Outgoing> pieces,
+                                                  std::vector<Incoming> incoming) {
   if (!messages_) return incoming;
   comm_.together([&] {
+    std::uint64_t messageBytes = 0;
+    for (Incoming& piece : incoming) {
+      if (piece.place.memory) continue;
+      piece.place.at = messageBytes;
+      messageBytes += aligned(piece.bytes);
+    }
     if (messageBytes > 0 && (!inbox_ || inbox_->bytes().size() < messageBytes)) {
       inbox_.reset();
       inbox_ = HostMemory::anonymous(messageBytes + messageBytes / 2);

@@ -35,7 +35,8 @@ class Exchange {
     std::uint64_t at = 0;
   };
   /// Collective. Where this rank is to put what it sends, `bytes` of it at least: the same as last time where
-  /// that's large enough. What was received before is gone. All ranks throw if one is out of memory.
+  /// that's large enough. What was received before is gone, on all ranks. All ranks throw if one is out of
+  /// memory.
   Place outbox(std::uint64_t bytes);
 
   using Note = std::array<std::uint64_t, 2>;  // whatever the receiver should know
@@ -55,12 +56,19 @@ class Exchange {
   /// rank order; it stays until the next outbox. Ranks that have nothing for each other exchange a header
   /// alone.
   std::vector<Incoming> send(std::span<const Outgoing> pieces);
+  /// The same among partners: pieces go to some of `partners.to`, who expect one from this rank and get a
+  /// header at least. `partners.from` is in rank order. Ranks that aren't partners exchange nothing.
+  std::vector<Incoming> send(std::span<const Outgoing> pieces, const Partners& partners);
 
   /// Whether what that rank sends is read where it wrote it.
   bool sharesMemoryWith(int rank) const;
 
  private:
+  static constexpr std::size_t headerWords = 4;
   void shareNewWindow(std::span<const std::uint64_t> sizes);
+  void putHeader(const Outgoing& piece, std::span<std::uint64_t> header) const;
+  void addIncoming(int from, const std::uint64_t* header, std::vector<Incoming>& incoming) const;
+  std::vector<Incoming> receive(std::span<const Outgoing> pieces, std::vector<Incoming> incoming);
 
   const Communicator& comm_;
   Transport transport_;

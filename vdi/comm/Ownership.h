@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "vdi/comm/Schedule.h"
+
 namespace vdi::comm {
 
 /// Lists [first, last) belong to one rank.
@@ -15,29 +17,31 @@ struct ListRange {
   bool operator==(const ListRange&) const = default;
 };
 
-/// Contiguous ranges of lists, in rank order. They begin at multiples of `granularity` lists.
+/// Contiguous ranges of lists, one for each rank: the shares of Schedule. They begin at multiples of
+/// `granularity` lists.
 class Ownership {
  public:
   /// Lists whose counts travel in one word.
   static constexpr std::uint64_t granularity = 4;
 
-  /// As many lists for each, but for granularity; none for surplus ranks.
+  /// As many lists in each, but for granularity; none in surplus shares.
   static Ownership equal(std::uint64_t listCount, int ranks);
-  /// As much work for each, as far as contiguous ranges allow. `weights[i]`: work in the i-th stretch of
+  /// As much work in each, as far as contiguous ranges allow. `weights[i]`: work in the i-th stretch of
   /// `listsPerWeight` lists (the last one may be shorter), spread evenly over it. A list is some work of its
   /// own, so that ranks share what's empty too. Every rank that passes the same gets the same.
   static Ownership balanced(std::uint64_t listCount, int ranks, std::span<const std::uint32_t> weights,
                             std::uint64_t listsPerWeight);
 
   int ranks() const { return static_cast<int>(boundaries_.size()) - 1; }
-  ListRange of(int rank) const {
-    const auto r = static_cast<std::size_t>(rank);
-    return {boundaries_[r], boundaries_[r + 1]};
+  ListRange of(int share) const { return of({share, share + 1}); }
+  ListRange of(const Schedule::Shares& shares) const {
+    return {boundaries_[static_cast<std::size_t>(shares.first)],
+            boundaries_[static_cast<std::size_t>(shares.last)]};
   }
   bool operator==(const Ownership&) const = default;
 
  private:
-  std::vector<std::uint64_t> boundaries_;  // rank r owns [boundaries_[r], boundaries_[r + 1])
+  std::vector<std::uint64_t> boundaries_;  // share i is [boundaries_[i], boundaries_[i + 1])
 };
 
 }  // namespace vdi::comm

@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Parallel.h"
 
 namespace vdi {
 
@@ -94,24 +96,33 @@ Kernel gaussian() {
   return kernel;
 }
 
-/// The Gaussian is separable: columns first, a row of results at a time.
+/// Of one row of windows. The Gaussian is separable: columns first.
+double rowOfSsims(const Channel& channel, const Kernel& kernel, int y, std::vector<Moments>& columns) {
+  for (std::size_t x = 0; x < columns.size(); ++x) {
+    Moments m;
+    for (std::size_t i = 0; i < kernel.size(); ++i)
+      m.add(kernel[i], channel.at(static_cast<int>(x), y - radius + static_cast<int>(i)));
+    columns[x] = m;
+  }
+  double sum = 0.0;
+  for (std::size_t first = 0; first + kernel.size() <= columns.size(); ++first) {
+    Moments m;
+    for (std::size_t i = 0; i < kernel.size(); ++i) m.add(kernel[i], columns[first + i]);
+    sum += m.ssim();
+  }
+  return sum;
+}
+
 double windowedSsim(const Channel& channel, int width, int height) {
   const Kernel kernel = gaussian();
-  std::vector<Moments> columns(static_cast<std::size_t>(width));
-  double sum = 0.0;
-  for (int y = radius; y < height - radius; ++y) {
-    for (int x = 0; x < width; ++x) {
-      Moments m;
-      for (std::size_t i = 0; i < kernel.size(); ++i)
-        m.add(kernel[i], channel.at(x, y - radius + static_cast<int>(i)));
-      columns[static_cast<std::size_t>(x)] = m;
-    }
-    for (std::size_t first = 0; first + kernel.size() <= columns.size(); ++first) {
-      Moments m;
-      for (std::size_t i = 0; i < kernel.size(); ++i) m.add(kernel[i], columns[first + i]);
-      sum += m.ssim();
-    }
-  }
+  std::vector<double> rows(static_cast<std::size_t>(height - 2 * radius));
+  constexpr std::size_t rowsAtLeast = 4;
+  inParallel(rows.size(), rowsAtLeast, [&](std::size_t first, std::size_t last) {
+    std::vector<Moments> columns(static_cast<std::size_t>(width));
+    for (std::size_t i = first; i < last; ++i)
+      rows[i] = rowOfSsims(channel, kernel, static_cast<int>(i) + radius, columns);
+  });
+  const double sum = std::accumulate(rows.begin(), rows.end(), 0.0);  // the same with any number of threads
   return sum / (static_cast<double>(width - 2 * radius) * (height - 2 * radius));
 }
 

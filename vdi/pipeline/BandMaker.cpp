@@ -5,8 +5,15 @@
 namespace vdi::detail {
 
 BandMaker::BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
-                     comm::Transport transport)
-    : comm_(comm), caster_(device), compositor_(device), levelSum_(comm, transport), accesses_(device) {
+                     comm::Transport transport, const comm::Schedule& schedule)
+    : comm_(comm),
+      share_(schedule.positionOf(comm.rank())),
+      caster_(device),
+      compositor_(device),
+      levelSum_(comm, transport),
+      accesses_(device) {
+  for (int index = 0; index < schedule.roundCount(); ++index)
+    rounds_.push_back(schedule.round(index, comm.rank()));
   for (Slot& slot : slots_) slot.distributor = std::make_unique<Distributor>(device, comm, transport);
 }
 
@@ -84,6 +91,25 @@ comm::Ownership BandMaker::ownershipOf(const RayCaster::Cast& cast, const Bands&
   return comm::Ownership::balanced(lists, comm_.size(), weights.subspan(first, last - first), width * stride);
 }
 
+/// Collective: all rounds of the schedule but the first. What came is merged before it's sent on.
+void BandMaker::distributeAgain(Slot& slot, const DepthCode& code, RankReport& report) {
+  Stopwatch watch;
+  for (std::size_t i = 1; i < rounds_.size(); ++i) {
+    DeviceLists& partial = partial_[i % partial_.size()];
+    comm_.together([&] {
+      compositor_.interleave(slot.parts, code, partial, [&](gpu::Commands& commands) {
+        commands.barrier();
+        slot.distributor->recordPack(commands, partial, slot.owned, rounds_[i]);
+      });
+      compositor_.finish();
+    });
+    report.compositeSeconds += watch.lap();
+    slot.parts = slot.distributor->distribute(partial, slot.owned, rounds_[i], segmentBytes(code));
+    report.bytesSent += slot.distributor->bytesSent();
+    report.distributeSeconds += watch.lap();
+  }
+}
+
 void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& progress,
                           const std::function<void(std::size_t band)>& compose, const OwnedSink& sink,
                           RankReport& report) {
@@ -99,10 +125,9 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
   const auto start = [&](std::size_t band) {
     Slot& slot = slotOf(band);
     slot.owned = ownershipOf(cast, all, band, weights);
-    merged_[band].firstList =
-        std::uint64_t{all.first(band)} * cast.build.width + slot.owned.of(comm_.rank()).first;
-    const auto behind = [&slot](gpu::Commands& commands) {
-      slot.distributor->recordPack(commands, slot.lists, slot.owned);
+    merged_[band].firstList = std::uint64_t{all.first(band)} * cast.build.width + slot.owned.of(share_).first;
+    const auto behind = [this, &slot](gpu::Commands& commands) {
+      slot.distributor->recordPack(commands, slot.lists, slot.owned, rounds_.front());
     };
     caster_.startBand(cast, all.first(band), all.last(band), slot.lists, behind, slot.usedBy);
   };
@@ -120,10 +145,14 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
     });
     report.subSupersegments += slot.lists.count;
     report.generateSeconds += watch.lap();
-    slot.parts = slot.distributor->distribute(slot.lists, slot.owned, segmentBytes(request.code));
+    slot.parts =
+        slot.distributor->distribute(slot.lists, slot.owned, rounds_.front(), segmentBytes(request.code));
     report.bytesSent += slot.distributor->bytesSent();
     report.distributeSeconds += watch.lap();
     if (band > 0) sink.pass(band - 1);
+    report.compositeSeconds += watch.lap();
+    distributeAgain(slot, request.code, report);
+    watch.lap();
     comm_.together([&] {
       compositor_.interleave(slot.parts, request.code, merged_[band].interleaved);
       compose(band);

@@ -15,6 +15,7 @@
 #include "vdi/comm/Communicator.h"
 #include "vdi/comm/Exchange.h"
 #include "vdi/comm/Ownership.h"
+#include "vdi/comm/Schedule.h"
 #include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Distributor.h"
 #include "vdi/pipeline/GatheredLists.h"
@@ -27,7 +28,7 @@ class BandMaker {
  public:
   /// `comm` must outlive it.
   BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
-            comm::Transport transport);
+            comm::Transport transport, const comm::Schedule& schedule);
 
   RayCaster& caster() { return caster_; }
   Compositor& compositor() { return compositor_; }
@@ -82,7 +83,7 @@ class BandMaker {
   /// What a band of this rank's own lists needs until it's passed on; bands take them in turns.
   struct Slot {
     DeviceLists lists;
-    comm::Ownership owned = comm::Ownership::equal(0, 1);
+    comm::Ownership owned = comm::Ownership::equal(0, 1);  // shares of the schedule
     std::unique_ptr<Distributor> distributor;
     Distributed parts;
     gpu::Submission usedBy;  // the lists' memory
@@ -103,10 +104,11 @@ class BandMaker {
   /// Where this rank's lists of a band begin in the picture, and all ranks' supersegments of them.
   struct MergedBand {
     std::uint64_t firstList = 0;
-    Compositor::Interleaved interleaved;
+    DeviceLists interleaved;
   };
 
   void agreeOnLists(RayCaster::Cast& cast);
+  void distributeAgain(Slot& slot, const DepthCode& code, RankReport& report);
   comm::Ownership ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
                               std::span<const std::uint32_t> weights) const;
   /// Collective: this rank's lists, band after band, to those who own them, where they're merged by depth.
@@ -119,6 +121,8 @@ class BandMaker {
   void noteTimes(RankReport& report) const;
 
   const comm::Communicator& comm_;
+  std::vector<comm::Schedule::Round> rounds_;  // this rank's
+  int share_ = 0;                              // that it has in the end
   RayCaster caster_;
   Compositor compositor_;
   comm::ByteSum levelSum_;
@@ -126,6 +130,7 @@ class BandMaker {
   std::array<Slot, RayCaster::bandsAtOnce> slots_;
   std::size_t firstSlot_ = 0;  // of the frame that's made
   std::vector<MergedBand> merged_;
+  std::array<DeviceLists, 2> partial_;  // merged in all rounds but the last, in turns
 };
 
 }  // namespace vdi::detail

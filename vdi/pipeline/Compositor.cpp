@@ -8,8 +8,6 @@ namespace vdi::detail {
 using gpu::MemoryKind;
 namespace shared = gpu::shared;
 
-namespace {}  // namespace
-
 Compositor::Compositor(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
       transfers_(device_, gpu::QueueKind::Transfer),
@@ -96,7 +94,8 @@ void Compositor::receive(const Distributed& parts) {
   transfers_.submit();
 }
 
-void Compositor::interleave(const Distributed& parts, const DepthCode& code, Interleaved& interleaved) {
+void Compositor::interleave(const Distributed& parts, const DepthCode& code, DeviceLists& interleaved,
+                            const ListBuilder::Behind& behind) {
   finish();
   const std::uint32_t lists = parts.listCount;
   const std::uint64_t ranks = parts.subLists.size();
@@ -104,7 +103,7 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Int
   const std::uint64_t rowLength = rowWords * shared::countsPerWord;
   const std::uint64_t rows = ranks * rowLength;
   interleaved.listCount = lists;
-  interleaved.total = parts.total;
+  interleaved.count = parts.total;
   interleaved.offsets.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
   interleaved.segments.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
   subCounts_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
@@ -150,8 +149,10 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Int
   scan_.record(commands_, interleavedCounts_, interleaved.offsets, lists);
   constants.mode = shared::interleaveModeWrite;
   if (lists > 0) interleavePass_.record(commands_, constants);
+  if (behind) behind(commands_);
   commands_.submit();
   last_ = commands_.last();
+  interleaved.written = last_;
   merging_ = true;
   receivedFrom_.clear();
   for (const SubLists& sub : parts.subLists) {
@@ -159,7 +160,7 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Int
   }
 }
 
-void Compositor::apply(const Interleaved& interleaved, const Request& request) {
+void Compositor::apply(const DeviceLists& interleaved, const Request& request) {
   settings_.step = static_cast<float>(request.sampleStep);
   settings_.budget = request.budget;
   settings_.maxPerList = request.maxPerList;
@@ -170,7 +171,7 @@ void Compositor::apply(const Interleaved& interleaved, const Request& request) {
   settings_.listCount = interleaved.listCount;
 }
 
-SupersegmentHistogram Compositor::histogram(const Interleaved& interleaved, const Request& request) {
+SupersegmentHistogram Compositor::histogram(const DeviceLists& interleaved, const Request& request) {
   finish();
   if (interleaved.listCount == 0) return {};
   apply(interleaved, request);
@@ -183,7 +184,7 @@ SupersegmentHistogram Compositor::histogram(const Interleaved& interleaved, cons
   return histogram;
 }
 
-void Compositor::composite(const Interleaved& interleaved, const Request& request, DeviceLists& lists) {
+void Compositor::composite(const DeviceLists& interleaved, const Request& request, DeviceLists& lists) {
   lists.offsets.reserve(device_, (std::uint64_t{interleaved.listCount} + 1) * wordBytes,
                         MemoryKind::DeviceLocal);
   lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
@@ -221,7 +222,7 @@ void Compositor::composite(const Interleaved& interleaved, const Request& reques
   last_ = builder_.last();
 }
 
-void Compositor::flatten(const Interleaved& interleaved, const DepthCode& code, gpu::Buffer& colors,
+void Compositor::flatten(const DeviceLists& interleaved, const DepthCode& code, gpu::Buffer& colors,
                          gpu::Buffer& depths) {
   colors.reserve(device_, interleaved.listCount * sizeof(glm::vec4), MemoryKind::DeviceLocal);
   depths.reserve(device_, interleaved.listCount * sizeof(float), MemoryKind::DeviceLocal);

@@ -28,25 +28,20 @@ class Compositor {
     float level = -1.0F;  // of all owners' histogram together, with Budget::Total
   };
 
-  /// All ranks' supersegments of some lists, each list's in order of depth; on the device.
-  struct Interleaved {
-    gpu::Buffer segments;
-    gpu::Buffer offsets;  // [listCount + 1]
-    std::uint32_t listCount = 0;
-    std::uint64_t total = 0;
-  };
-  /// Goes on on the device when this returns: `parts` must stay until `finish`. What came is copied by the
-  /// transfer queue, beside what the device computes.
-  void interleave(const Distributed& parts, const DepthCode& code, Interleaved& interleaved);
+  /// Puts all ranks' supersegments of some lists in order of depth. Goes on on the device when this returns:
+  /// `parts` and `interleaved` must stay until `finish`. What came is copied by the transfer queue, beside
+  /// what the device computes. `behind`: steps that follow.
+  void interleave(const Distributed& parts, const DepthCode& code, DeviceLists& interleaved,
+                  const ListBuilder::Behind& behind = {});
 
   /// What these lists need. Waits for what was started.
-  SupersegmentHistogram histogram(const Interleaved& interleaved, const Request& request);
+  SupersegmentHistogram histogram(const DeviceLists& interleaved, const Request& request);
   /// Makes lists of at most `maxPerList` supersegments. Goes on on the device when this returns;
   /// `interleaved` and `lists` must stay until `finish`.
-  void composite(const Interleaved& interleaved, const Request& request, DeviceLists& lists);
+  void composite(const DeviceLists& interleaved, const Request& request, DeviceLists& lists);
   /// The flat picture: each list's supersegments composited, as [listCount] glm::vec4 and [listCount] float.
   /// Goes on on the device likewise.
-  void flatten(const Interleaved& interleaved, const DepthCode& code, gpu::Buffer& colors,
+  void flatten(const DeviceLists& interleaved, const DepthCode& code, gpu::Buffer& colors,
                gpu::Buffer& depths);
   /// Waits for what was started; then `lists` are complete. Throws what ListBuilder::finish throws.
   void finish();
@@ -59,7 +54,7 @@ class Compositor {
   double takeMilliseconds();
 
  private:
-  void apply(const Interleaved& interleaved, const Request& request);
+  void apply(const DeviceLists& interleaved, const Request& request);
   void receive(const Distributed& parts);
   void wait();
   void noteTimes();

@@ -27,6 +27,36 @@ std::uint64_t packedAt(std::uint64_t list, bool wide) {
   return wide ? list * wordBytes : list / shared::countsPerWord * wordBytes;
 }
 
+constexpr int keptHere = -1;
+
+/// Of the lists that a rank holds, those that it keeps or sends to one other rank.
+struct Stretch {
+  int to = keptHere;
+  comm::ListRange lists;
+  std::uint64_t firstSegment = 0;
+  std::uint64_t segments = 0;
+};
+
+/// They cover the lists that are held, in their order.
+std::vector<Stretch> stretchesOf(const comm::Ownership& owned, const comm::Schedule::Round& round) {
+  const std::uint64_t first = owned.of(round.held).first;
+  std::vector<Stretch> stretches;
+  const auto add = [&](int to, const comm::Schedule::Shares& shares) {
+    const comm::ListRange lists = owned.of(shares);
+    stretches.push_back({to, {lists.first - first, lists.last - first}, 0, 0});
+  };
+  bool keptAdded = false;
+  for (const comm::Schedule::Sent& sent : round.sent) {
+    if (!keptAdded && sent.shares.first > round.kept.first) {
+      add(keptHere, round.kept);
+      keptAdded = true;
+    }
+    add(sent.to, sent.shares);
+  }
+  if (!keptAdded) add(keptHere, round.kept);
+  return stretches;
+}
+
 }  // namespace
 
 HostAccess& HostAccesses::of(const std::shared_ptr<HostMemory>& memory) {
@@ -63,16 +93,16 @@ void Distributor::recordCounts(gpu::Commands& commands, const DeviceLists& lists
   counts_.record(commands, constants);
 }
 
-/// All lists' counts to packed_, and where each rank's supersegments begin to boundaryOffsets_.
-void Distributor::recordPack(gpu::Commands& commands, const DeviceLists& lists,
-                             const comm::Ownership& owned) {
-  const auto ranks = static_cast<std::uint64_t>(owned.ranks());
-  boundaryOffsets_.reserve(device_, (ranks + 1) * wordBytes, MemoryKind::Readback);
+/// All lists' counts to packed_, and where each stretch's supersegments begin to boundaryOffsets_.
+void Distributor::recordPack(gpu::Commands& commands, const DeviceLists& lists, const comm::Ownership& owned,
+                             const comm::Schedule::Round& round) {
+  const std::vector<Stretch> stretches = stretchesOf(owned, round);
+  boundaryOffsets_.reserve(device_, (stretches.size() + 1) * wordBytes, MemoryKind::Readback);
   tooLarge_.mappedAs<std::uint32_t>()[0] = 0;
   recordCounts(commands, lists, false);
-  for (std::uint64_t r = 0; r <= ranks; ++r) {
-    const std::uint64_t list = r < ranks ? owned.of(static_cast<int>(r)).first : lists.listCount;
-    commands.copy(lists.offsets, list * wordBytes, boundaryOffsets_, r * wordBytes, wordBytes);
+  for (std::size_t i = 0; i <= stretches.size(); ++i) {
+    const std::uint64_t list = i < stretches.size() ? stretches[i].lists.first : lists.listCount;
+    commands.copy(lists.offsets, list * wordBytes, boundaryOffsets_, i * wordBytes, wordBytes);
   }
 }
 
@@ -84,27 +114,36 @@ void Distributor::packWide(const DeviceLists& lists) {
 }
 
 Distributed Distributor::distribute(const DeviceLists& lists, const comm::Ownership& owned,
-                                    std::uint64_t segmentBytes) {
-  const int ranks = owned.ranks();
+                                    const comm::Schedule::Round& round, std::uint64_t segmentBytes) {
   bytesSent_ = 0;
-  // What each rank gets of this one's, and where that lies in the outbox.
-  std::vector<comm::Exchange::Outgoing> pieces;
-  std::uint64_t outboxBytes = 0;
-  const auto firstSegment = [&](int rank) {
-    return std::uint64_t{boundaryOffsets_.mappedAs<std::uint32_t>()[static_cast<std::size_t>(rank)]};
-  };
-  const auto segmentsOf = [&](int rank) { return firstSegment(rank + 1) - firstSegment(rank); };
   wide_ = tooLarge_.mappedAs<std::uint32_t>()[0] != 0;
-  for (int r = 0; r < ranks; ++r) {
-    if (r == comm_.rank() || segmentsOf(r) == 0) continue;
+  // What others get, and where that lies in the outbox.
+  std::vector<comm::Exchange::Outgoing> pieces;
+  std::vector<Stretch> sent;  // of each piece
+  Stretch kept;
+  std::uint64_t outboxBytes = 0;
+  const std::span<const std::uint32_t> boundaries = boundaryOffsets_.mappedAs<std::uint32_t>();
+  comm::Partners partners{{}, round.sources};
+  std::size_t index = 0;
+  for (Stretch stretch : stretchesOf(owned, round)) {
+    stretch.firstSegment = boundaries[index];
+    stretch.segments = boundaries[index + 1] - boundaries[index];
+    ++index;
+    if (stretch.to == keptHere) {
+      kept = stretch;
+      continue;
+    }
+    partners.to.push_back(stretch.to);
+    if (stretch.segments == 0) continue;
     comm::Exchange::Outgoing piece;
-    piece.to = r;
+    piece.to = stretch.to;
     piece.at = outboxBytes;
-    piece.bytes = aligned(packedBytes(owned.of(r).count(), wide_)) + segmentsOf(r) * segmentBytes;
-    piece.note = {segmentsOf(r), wide_ ? 1U : 0U};
+    piece.bytes = aligned(packedBytes(stretch.lists.count(), wide_)) + stretch.segments * segmentBytes;
+    piece.note = {stretch.segments, wide_ ? 1U : 0U};
     outboxBytes += aligned(piece.bytes);
     bytesSent_ += piece.bytes;
     pieces.push_back(piece);
+    sent.push_back(stretch);
   }
   const comm::Exchange::Place outbox = exchange_.outbox(outboxBytes);
   comm_.together([&] {
@@ -115,30 +154,32 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
     transfers_.begin();
     transfers_.waitFor(lists.written);
     if (wide_) transfers_.waitFor(commands_);
-    for (const comm::Exchange::Outgoing& piece : pieces) {
-      const comm::ListRange range = owned.of(piece.to);
-      const std::uint64_t at = outbox.at + piece.at;
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      const comm::ListRange range = sent[i].lists;
+      const std::uint64_t at = outbox.at + pieces[i].at;
       const std::uint64_t countBytes = packedBytes(range.count(), wide_);
       access.recordWrite(transfers_, packed_, packedAt(range.first, wide_), at, countBytes);
-      access.recordWrite(transfers_, lists.segments, firstSegment(piece.to) * segmentBytes,
-                         at + aligned(countBytes), segmentsOf(piece.to) * segmentBytes);
+      access.recordWrite(transfers_, lists.segments, sent[i].firstSegment * segmentBytes,
+                         at + aligned(countBytes), sent[i].segments * segmentBytes);
     }
     transfers_.submitAndWait();
     access.finish();
   });
-  const std::vector<comm::Exchange::Incoming> incoming = exchange_.send(pieces);
+  // Words to all are one call of MPI; to a few they're messages.
+  const bool toAll = static_cast<int>(partners.to.size()) == comm_.size() - 1;
+  const std::vector<comm::Exchange::Incoming> incoming =
+      toAll ? exchange_.send(pieces) : exchange_.send(pieces, partners);
 
   Distributed result;
-  const comm::ListRange mine = owned.of(comm_.rank());
   result.ownCounts = &packed_;
   result.ownSegments = &lists.segments;
   result.ownWritten = wide_ ? commands_.last() : lists.written;
-  result.listCount = static_cast<std::uint32_t>(mine.count());
+  result.listCount = static_cast<std::uint32_t>(kept.lists.count());
   result.segmentBytes = segmentBytes;
   const auto addOwn = [&] {
-    if (segmentsOf(comm_.rank()) == 0) return;
-    result.subLists.push_back({nullptr, packedAt(mine.first, wide_), wide_,
-                               firstSegment(comm_.rank()) * segmentBytes, segmentsOf(comm_.rank())});
+    if (kept.segments == 0) return;
+    result.subLists.push_back(
+        {nullptr, packedAt(kept.lists.first, wide_), wide_, kept.firstSegment * segmentBytes, kept.segments});
   };
   comm_.together([&] {
     bool ownAdded = false;
@@ -149,7 +190,8 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
       }
       const bool wide = piece.note[1] != 0;
       result.subLists.push_back({&accesses_.of(piece.place.memory), piece.place.at, wide,
-                                 piece.place.at + aligned(packedBytes(mine.count(), wide)), piece.note[0]});
+                                 piece.place.at + aligned(packedBytes(kept.lists.count(), wide)),
+                                 piece.note[0]});
     }
     if (!ownAdded) addOwn();
   });

@@ -8,6 +8,7 @@
 
 #include "vdi/comm/Exchange.h"
 #include "vdi/comm/Ownership.h"
+#include "vdi/comm/Schedule.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/CountsPass.h"
 #include "vdi/gpu/Device.h"
@@ -38,8 +39,8 @@ struct SubLists {
   std::uint64_t count = 0;       // supersegments
 };
 
-/// What the owner of lists has of them, by rank; ranks that have none are left out. It stays until the next
-/// distribution, or until the lists are made that were distributed.
+/// What a rank has of the lists that it keeps, by sender; ranks that have none are left out. It stays until
+/// the next distribution, or until the lists are made that were distributed.
 struct Distributed {
   std::vector<SubLists> subLists;
   const gpu::Buffer* ownCounts = nullptr;
@@ -54,13 +55,16 @@ class Distributor {
  public:
   Distributor(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm, comm::Transport transport);
 
-  /// Behind the steps that make `lists`: what the host and other ranks need to know of them. `owned`: who
-  /// gets which of them. What was distributed before must have been composited.
-  void recordPack(gpu::Commands& commands, const DeviceLists& lists, const comm::Ownership& owned);
-  /// Collective, when that's done. `lists`: all of a band, on every rank. What's sent goes by way of the
-  /// transfer queue: the device may make other lists meanwhile. What came stays until a distribution after
-  /// the next one of this object or another.
-  Distributed distribute(const DeviceLists& lists, const comm::Ownership& owned, std::uint64_t segmentBytes);
+  /// Behind the steps that make `lists`, which the rank holds before `round`: what the host and other ranks
+  /// need to know of them. `owned`: which lists shares are. What was distributed before must have been
+  /// composited.
+  void recordPack(gpu::Commands& commands, const DeviceLists& lists, const comm::Ownership& owned,
+                  const comm::Schedule::Round& round);
+  /// Collective, when that's done. What's sent goes by way of the transfer queue: the device may make other
+  /// lists meanwhile. What came stays until a distribution after the next one of this object or another, and
+  /// in several rounds until the next one of this object.
+  Distributed distribute(const DeviceLists& lists, const comm::Ownership& owned,
+                         const comm::Schedule::Round& round, std::uint64_t segmentBytes);
   /// Waits for what was submitted: after an error.
   void drop() { transfers_.drop(); }
 
@@ -79,7 +83,7 @@ class Distributor {
   gpu::CountsPass counts_;
   gpu::Buffer packed_;
   gpu::Buffer tooLarge_;
-  gpu::Buffer boundaryOffsets_;  // of the supersegments, where each rank's begin, [ranks + 1]
+  gpu::Buffer boundaryOffsets_;  // of the supersegments, where each stretch begins, [stretches + 1]
   bool wide_ = false;
   std::uint64_t bytesSent_ = 0;
 };

@@ -38,7 +38,10 @@ struct VdiGenerator::State {
       const bool shares = comm.size() > 1 && transport == comm::Transport::Shared;
       using Visible = detail::HostPool::Visible;
       pool = std::make_shared<detail::HostPool>(device, shares ? Visible::ToHost : Visible::ToProcess);
-      bands = std::make_unique<detail::BandMaker>(device, comm, transport);
+      std::vector<int> hosts;
+      for (int r = 0; r < comm.size(); ++r) hosts.push_back(comm.hostLeader(r));
+      const comm::Schedule schedule = comm::Schedule::fromEnvironment(hosts);
+      bands = std::make_unique<detail::BandMaker>(device, comm, transport, schedule);
       steps = std::make_unique<detail::TimeSteps>(comm, bands->caster().volume());
       frames = std::make_unique<detail::Frames>(device, comm, transport, root);
       bandDownload = std::make_unique<detail::BandDownload>(device);
