@@ -131,6 +131,7 @@ The table of suite ranks has the wall clock of the slowest rank for each stage, 
 JSON has, beside what the table has:
   frame_ms, volume_rendering_ms  a whole VDI and a whole picture: wall on the root's host, all ranks ready to
                                  result there
+  shown_ms                       a VDI and its picture, likewise: on one rank its lists stay on the device
   vdis_per_second                VDIs one behind the other on an orbit (--frames), wall on the root's host
   generate_ms, distribute_ms, composite_ms, gather_ms
                                  device time of the first, wall of the others; slowest rank

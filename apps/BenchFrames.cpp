@@ -106,8 +106,28 @@ double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInp
   return 1e3 * frames / milliseconds;
 }
 
-FrameFigures measureFrames(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int repeats,
-                           int orbitFrames) {
+Spread measureShown(VdiGenerator& generator, const std::shared_ptr<gpu::Device>& device, ClockRaiser& clock,
+                    const FrameInput& input, int repeats) {
+  const comm::Communicator& comm = generator.communicator();
+  std::optional<VdiRenderer> renderer;
+  comm.together([&] {
+    if (comm.rank() == 0) renderer.emplace(device);
+  });
+  return repeated(repeats, [&] {
+    clock.run();
+    return readyMs(comm, [&] {
+      generator.show(renderer ? &*renderer : nullptr, input.camera, input.function, input.settings);
+      comm.together([&] {
+        if (!renderer) return;
+        renderer->renderBytes(input.camera, input.settings.width, input.settings.height,
+                              Alpha::Premultiplied);
+      });
+    });
+  });
+}
+
+FrameFigures measureFrames(VdiGenerator& generator, const std::shared_ptr<gpu::Device>& device,
+                           ClockRaiser& clock, const FrameInput& input, int repeats, int orbitFrames) {
   const comm::Communicator& comm = generator.communicator();
   const Spread pictures = repeated(repeats, [&] {
     clock.run();
@@ -123,6 +143,7 @@ FrameFigures measureFrames(VdiGenerator& generator, ClockRaiser& clock, const Fr
   });
   FrameFigures figures = log.figures(static_cast<std::size_t>(repeats));
   figures.volumeRendering = pictures;
+  figures.shown = measureShown(generator, device, clock, input, repeats);
   if (orbitFrames > 0) {
     figures.orbitFrames = orbitFrames;
     figures.vdisPerSecond = vdisPerSecond(generator, clock, input, orbitFrames);
@@ -142,8 +163,8 @@ std::string stageLines(const FrameFigures& figures) {
                            : fmt::format("{:>16}{:>10}\n", "-", "-");
     }
   }
-  text += fmt::format("  whole frame {:.3f} ms, volume rendering {:.3f} ms", figures.wall.median,
-                      figures.volumeRendering.median);
+  text += fmt::format("  whole frame {:.3f} ms, shown {:.3f} ms, volume rendering {:.3f} ms",
+                      figures.wall.median, figures.shown.median, figures.volumeRendering.median);
   if (figures.vdisPerSecond)
     text += fmt::format("; {:.2f} VDIs/s over {} frames", *figures.vdisPerSecond, figures.orbitFrames);
   if (figures.ranks > 1) {
@@ -171,6 +192,7 @@ void addFigures(json& row, const FrameFigures& figures) {
   row["ranks"] = figures.ranks;
   row["frame_ms"] = figures.wall.median;
   row["frame_spread_ms"] = figures.wall.width();
+  row["shown_ms"] = figures.shown.median;
   row["volume_rendering_ms"] = figures.volumeRendering.median;
   row["vdis_per_second"] = figures.vdisPerSecond ? json(*figures.vdisPerSecond) : json(nullptr);
   row["orbit_frames"] = figures.orbitFrames;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -42,6 +43,7 @@ struct FrameFigures {
   std::uint64_t subSupersegments = 0;  // of all ranks, in the last frame
   std::uint64_t bytesSent = 0;         // likewise
   Spread volumeRendering;              // a picture by renderVolume; ms as `wall`
+  Spread shown;                        // a VDI, and its picture on the root's host; likewise
   std::optional<double> vdisPerSecond;
   int orbitFrames = 0;  // that were made for vdisPerSecond
 
@@ -86,10 +88,15 @@ struct FrameInput {
 /// input's camera. Collective; other ranks' figures mean nothing.
 double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int frames);
 
+/// From a camera to a picture of a VDI on the root's host (VdiGenerator::show), repeated after one that
+/// doesn't count: milliseconds. The root's renderer is on `device`, the generator's. Collective.
+Spread measureShown(VdiGenerator& generator, const std::shared_ptr<gpu::Device>& device, ClockRaiser& clock,
+                    const FrameInput& input, int repeats);
+
 /// Repeated frames and pictures, after one of each that doesn't count, and vdisPerSecond if `orbitFrames`
-/// isn't 0. Collective.
-FrameFigures measureFrames(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int repeats,
-                           int orbitFrames);
+/// isn't 0; and measureShown. Collective.
+FrameFigures measureFrames(VdiGenerator& generator, const std::shared_ptr<gpu::Device>& device,
+                           ClockRaiser& clock, const FrameInput& input, int repeats, int orbitFrames);
 
 /// Lines for a table: every stage, if there are several ranks, and the whole frame. With a line end each.
 std::string stageLines(const FrameFigures& figures);

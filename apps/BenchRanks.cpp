@@ -166,7 +166,7 @@ class RankSuite {
       for (const std::uint32_t supersegments : options_.supersegments) {
         input.settings = benchSettings(options_, algorithm, supersegments);
         const FrameFigures figures =
-            measureFrames(generator, clock_, input, options_.repeats, options_.frames);
+            measureFrames(generator, device_, clock_, input, options_.repeats, options_.frames);
         if (comm.rank() == 0) addRow(setup, input.settings, uploadMs, figures, rivalFigures);
       }
     }

@@ -217,10 +217,11 @@ class Bench {
     made.figures.writeMs = spreadOf(lastOf(writes)).median;
     made.figures.frames = log.figures(static_cast<std::size_t>(options_.repeats));
     made.figures.frames.volumeRendering = spreadOf(lastOf(volumes));
+    const FrameInput input{shot.camera, shot.function, settings_};
+    made.figures.frames.shown = measureShown(generator_, device_, clock_, input, options_.repeats);
     if (options_.frames > 0) {
       made.figures.frames.orbitFrames = options_.frames;
-      made.figures.frames.vdisPerSecond =
-          vdisPerSecond(generator_, clock_, {shot.camera, shot.function, settings_}, options_.frames);
+      made.figures.frames.vdisPerSecond = vdisPerSecond(generator_, clock_, input, options_.frames);
     }
     world_.together([&] {
       if (!root()) return;

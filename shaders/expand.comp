@@ -19,13 +19,47 @@ void expandSegment(uint i) {
       RenderSegment(segment.front, segment.back, density, packedSegmentColor(segment.color / opacityOf(segment.opticalDepth)));
 }
 
+shared uint groupNearest;
+shared uint groupFarthest;
+
+// Lists are in order of depth: their ends tell.
+void addDepths(uint list, bool hasList) {
+  if (gl_LocalInvocationIndex == 0u) {
+    groupNearest = push.depthRange.at[0];
+    groupFarthest = push.depthRange.at[1];
+  }
+  barrier();
+  uint first = hasList ? push.offsets.at[list] : 0u;
+  uint end = hasList ? push.offsets.at[list + 1u] : 0u;
+  if (first < end) {
+    atomicMin(groupNearest, floatBitsToUint(push.segments.at[first].front));
+    atomicMax(groupFarthest, floatBitsToUint(push.segments.at[end - 1u].back));
+  }
+  barrier();
+  if (gl_LocalInvocationIndex != 0u) return;
+  // Most workgroups have nothing new to tell.
+  if (groupNearest < push.depthRange.at[0]) atomicMin(push.depthRange.at[0], groupNearest);
+  if (groupFarthest > push.depthRange.at[1]) atomicMax(push.depthRange.at[1], groupFarthest);
+}
+
+// In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
+void findBins() {
+  float nearest = uintBitsToFloat(push.depthRange.at[0]);
+  float farthest = uintBitsToFloat(push.depthRange.at[1]);
+  if (push.perspective != 0u) nearest = max(nearest, farthest * 1e-6);
+  push.depthRange.at[0] = floatBitsToUint(nearest);
+  push.depthRange.at[2] = floatBitsToUint(farthest > nearest ? float(renderBins) / (farthest - nearest) : 0.0);
+}
+
 void maskList(uint list) {
+  float nearest = uintBitsToFloat(push.depthRange.at[0]);
+  float binScale = uintBitsToFloat(push.depthRange.at[2]);
   uint64_t mask = 0ul;
   uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];
   for (uint i = first; i < end; ++i) {
     RenderSegment segment = push.segments.at[i];
-    mask |= maskOf(segment.front, segment.back, push.nearest, push.binScale);
+    mask |= maskOf(segment.front, segment.back, nearest, binScale);
   }
   push.heads.at[list] = ListHead(first, end - first, mask);
 }
@@ -55,6 +89,10 @@ void main() {
   uint i = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * expandGroup;
   if (push.mode == expandModeSegments) {
     if (i < push.count) expandSegment(i);
+  } else if (push.mode == expandModeDepths) {
+    addDepths(i, i < uint(push.lists.x) * uint(push.lists.y));
+  } else if (push.mode == expandModeBins) {
+    if (i == 0u) findBins();
   } else if (push.mode == expandModeMasks) {
     uint listCount = uint(push.lists.x) * uint(push.lists.y);
     if (i < listCount) maskList(i);

@@ -19,10 +19,12 @@ VDI_CONST uint renderPictureFloats = 0;
 VDI_CONST uint renderPictureBytes = 1;
 VDI_CONST uint renderPictureStraightBytes = 2;
 VDI_CONST uint expandGroup = 64;
-VDI_CONST uint expandModeSegments = 0;  // one invocation a supersegment
-VDI_CONST uint expandModeMasks = 1;     // one a list
-VDI_CONST uint expandModeTiles = 2;     // one a tile
-VDI_CONST uint expandModeLargeTiles = 3;  // one a large tile
+VDI_CONST uint expandModeSegments = 0;    // one invocation a supersegment
+VDI_CONST uint expandModeDepths = 1;      // one a list
+VDI_CONST uint expandModeBins = 2;        // one
+VDI_CONST uint expandModeMasks = 3;       // one a list
+VDI_CONST uint expandModeTiles = 4;       // one a tile
+VDI_CONST uint expandModeLargeTiles = 5;  // one a large tile
 VDI_CONST int renderTileShift = 3;
 VDI_CONST int renderTile = 1 << renderTileShift;  // lists per side of a tile
 VDI_CONST int renderLargeTile = 64;               // a multiple of that
@@ -35,6 +37,13 @@ struct RenderSegment {
   float back;
   float density;  // optical depth per depth, along its list
   uint color;     // straight; render_segment.glsl
+};
+
+// Of all supersegments.
+struct DepthRange {
+  float nearest;   // > 0 in perspective; infinity where there's nothing
+  float farthest;  // 0 where there's nothing
+  float binScale;  // bins per unit of depth, 0 without a range
 };
 
 // What a ray asks of each list that it crosses: its supersegments in the compact array, and its mask.
@@ -75,11 +84,11 @@ struct ExpandConstants {
   VDI_ADDRESS(RenderSegmentArray) segments;  // all
   VDI_ADDRESS(ListHeads) heads;              // [lists]
   VDI_ADDRESS(MaskArray) tileDepthMasks;     // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
+  VDI_ADDRESS(UintArray) depthRange;         // a DepthRange; depths aren't negative, so bits compare as they do
   uint mode;
-  uint first;  // supersegment that `from` starts with
-  uint count;  // supersegments of `from`
-  float nearest;
-  float binScale;  // bins per unit of depth
+  uint first;        // supersegment that `from` starts with
+  uint count;        // supersegments of `from`
+  uint perspective;  // projection of V_O
   ivec2 lists;
   StoredForm form;
 };

@@ -41,7 +41,7 @@ device = row["stages"]["generate"]["device_ms"]
 assert row["generate_ms"] == device["slowest"] >= device["mean"] > 0, row
 assert row["stages"]["composite"]["device_ms"]["slowest"] > 0, row
 assert row["sub_supersegments"] >= row["supersegment_count"] > 0, row
-assert row["bytes_sent"] > 0 and row["volume_rendering_ms"] > 0, row
+assert row["bytes_sent"] > 0 and row["volume_rendering_ms"] > 0 and row["shown_ms"] > 0, row
 assert row["orbit_frames"] == 2 and row["vdis_per_second"] > 0, row
 alone, = json.load(open("one.json"))["rows"]
 assert alone["ranks"] == 1 and alone["bytes_sent"] == 0, alone

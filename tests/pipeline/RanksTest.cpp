@@ -130,7 +130,11 @@ TEST_CASE("a margin on N ranks: the lists of one rank, and its picture") {
   settings.margin = 0.5;
   many.setBlocks(decomposed.mine);
   std::optional<Vdi> vdi = many.generate(camera, test::threeHues(0.8), settings);
+  VdiRenderer renderer(device());
+  many.show(root ? &renderer : nullptr, camera, test::threeHues(0.8), settings);
   if (root) {
+    const Image shown = renderer.render(camera, settings.width, settings.height);
+    CHECK(largestDifference(shown, flatten(*vdi)) < 1.0F);
     one.setBlocks(whole.mine);
     Vdi alone = *one.generate(camera, test::threeHues(0.8), settings);
     CHECK(vdi->margin == glm::ivec2(16, 12));
@@ -142,6 +146,8 @@ TEST_CASE("a margin on N ranks: the lists of one rank, and its picture") {
   }
   settings.margin = world.rank() == 1 ? 0.25 : 0.5;
   if (world.size() > 1) CHECK_THROWS_AS(many.generate(camera, test::threeHues(0.8), settings), Error);
+  settings.margin = 0.5;
+  CHECK_THROWS_AS(many.show(nullptr, camera, test::threeHues(0.8), settings), Error);
 }
 
 TEST_CASE(

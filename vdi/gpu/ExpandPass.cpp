@@ -18,6 +18,7 @@ std::uint64_t tilesOf(const glm::ivec2& lists, int size) {
 
 std::uint64_t invocations(const shared::ExpandConstants& constants) {
   if (constants.mode == shared::expandModeSegments) return constants.count;
+  if (constants.mode == shared::expandModeBins) return 1;
   if (constants.mode == shared::expandModeTiles) return tilesOf(constants.lists, shared::renderTile);
   if (constants.mode == shared::expandModeLargeTiles)
     return tilesOf(constants.lists, shared::renderLargeTile);

@@ -18,6 +18,7 @@
 #include "vdi/pipeline/Stages.h"
 #include "vdi/pipeline/Tails.h"
 #include "vdi/pipeline/TimeSteps.h"
+#include "vdi/pipeline/VdiLoader.h"
 #include "vdi/pipeline/VdiWriter.h"
 
 namespace vdi {
@@ -373,6 +374,40 @@ WrittenVdi VdiGenerator::write(const std::filesystem::path& path, const Camera& 
   s.reports = s.gatherReports(s.mine);
   if (progress) progress(1.0);
   return written;
+}
+
+void VdiGenerator::show(VdiRenderer* renderer, const Camera& camera, const TransferFunction& transferFunction,
+                        const GenerateSettings& settings, const Progress& progress) {
+  State& s = *state_;
+  s.comm.together([&] {
+    if (s.comm.rank() == root && renderer == nullptr)
+      throw Error(ErrorCode::InvalidArgument, "there is no renderer to show a VDI");
+  });
+  if (s.comm.size() > 1 || renderer->device() != s.device.get()) {
+    const std::optional<Vdi> vdi = generate(camera, transferFunction, settings, progress);
+    s.comm.together([&] {
+      if (vdi) renderer->setVdi(*vdi);
+    });
+    return;
+  }
+  const auto prepared = s.prepare(camera, transferFunction, settings);
+  s.completeAll();
+  const Vdi header = s.headerOf(*prepared, camera, settings);
+  s.frame([&] {
+    try {
+      detail::VdiLoader& loader = renderer->loadShown(header);
+      const auto add = [&](const detail::DeviceLists& lists, std::uint64_t firstList) {
+        return loader.add(lists, firstList);
+      };
+      s.bands->makeAlone(s.requestOf(*prepared, settings, header.depthCode), progress, {{}, add}, s.mine);
+      loader.finish();
+    } catch (...) {
+      renderer->showNothing();
+      throw;
+    }
+  });
+  s.reports = s.gatherReports(s.mine);
+  if (progress) progress(1.0);
 }
 
 VdiFrame::VdiFrame(std::shared_ptr<State> state) : state_(std::move(state)) {}

@@ -24,6 +24,10 @@
 
 namespace vdi {
 
+namespace detail {
+class VdiLoader;
+}
+
 /// Wall-clock seconds and bytes of one rank in the last frame.
 struct RankReport {
   double uploadSeconds = 0.0;          // of setBlocks, or setNextBlocks and advance, since the last frame
@@ -77,6 +81,8 @@ class VdiFrame {
   explicit VdiFrame(std::shared_ptr<State> state);
   std::shared_ptr<State> state_;
 };
+
+class VdiRenderer;
 
 /// Makes VDIs of distributed volumes. Collective throughout: every rank of the communicator makes one, with
 /// its own device, and calls the same functions in the same order. When a call throws, it throws on every
@@ -143,6 +149,13 @@ class VdiGenerator {
                    const TransferFunction& transferFunction, const GenerateSettings& settings,
                    const TimeStamp& stamp = {}, const Progress& progress = {});
 
+  /// The same VDI straight to a renderer, rank 0's; the others' are ignored and may be null. With one rank
+  /// whose device the renderer has, lists stay on that device: nothing of the VDI comes to the host.
+  /// Otherwise it's generate and setVdi. Returns when the lists are made; the next render waits for the rest.
+  /// Throws Error{InvalidArgument} if rank 0 has no renderer. After a throw the renderer may have no VDI.
+  void show(VdiRenderer* renderer, const Camera& camera, const TransferFunction& transferFunction,
+            const GenerateSettings& settings, const Progress& progress = {});
+
   /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0.
   /// supersegments, algorithm and margin of the settings are ignored.
   std::optional<Image> renderVolume(const Camera& camera, const TransferFunction& transferFunction,
@@ -196,6 +209,10 @@ class VdiRenderer {
   double renderMilliseconds() const;  // device time of the last render
 
  private:
+  friend class VdiGenerator;
+  const gpu::Device* device() const;
+  detail::VdiLoader& loadShown(const Vdi& header);
+  void showNothing();
   struct State;
   std::unique_ptr<State> state_;
 };

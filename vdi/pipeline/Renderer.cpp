@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstring>
 #include <glm/trigonometric.hpp>
 #include <mutex>
 #include <utility>
@@ -11,213 +10,80 @@
 #include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/gpu/Commands.h"
-#include "vdi/gpu/ExpandPass.h"
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/RenderPass.h"
-#include "vdi/pipeline/ListBuilder.h"
 #include "vdi/pipeline/PictureBuffers.h"
 #include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiLoader.h"
 
 namespace vdi {
 
 using gpu::MemoryKind;
 
-namespace {
-
-/// A VDI on the device.
-struct Uploaded {
-  gpu::Buffer segments;
-  gpu::Buffer heads;
-  gpu::Buffer tileDepthMasks;
-  std::unique_ptr<View> original;  // none until there's a VDI
-  float nearest = 0.0F;
-  float farthest = 0.0F;
-  float binScale = 0.0F;
-};
-
-/// Whether an upload has the device to itself, or renders go on beside it.
-enum class UploadKind { Alone, Beside };
-
-}  // namespace
-
 struct VdiRenderer::State {
   explicit State(std::shared_ptr<gpu::Device> theDevice)
-      : device(std::move(theDevice)), commands(device), pass(device), expand(device), uploads(device) {}
+      : device(std::move(theDevice)), commands(device), pass(device), loader(device) {}
 
   std::shared_ptr<gpu::Device> device;
   gpu::Commands commands;
   gpu::RenderPass pass;
-  gpu::ExpandPass expand;
-  gpu::Buffer staging;
-  gpu::Buffer offsets;
   detail::PictureBuffers picture;
-  Uploaded shown;
-  Uploaded prepared;
+  detail::LoadedVdi shown;
+  detail::LoadedVdi prepared;
   double milliseconds = 0.0;
-
   gpu::Buffer ends;  // of rays; none until they're asked for
   gpu::Buffer endsStaging;
+  /// Behind what it loads, for its end waits for what uses that.
+  detail::VdiLoader loader;
+  /// `shown` may still be on its way: a render waits for it, or who uses the loader next.
+  bool loading = false;
+  std::mutex loadingMutex;
 
+  void waitForShown() {
+    const std::scoped_lock lock(loadingMutex);
+    if (std::exchange(loading, false)) loader.wait();
+  }
   /// Into `picture`. `form`: shared::renderPicture...
   void render(const View& view, std::span<const float> rayEnds, Reconstruction reconstruction,
               std::uint32_t form);
-
-  /// What fits is on its way while the caller goes on; more waits for the part before.
-  static constexpr std::uint64_t aloneBytes = std::uint64_t{128} << 20;
-  /// A render waits for the part that's on its way.
-  static constexpr std::uint64_t besideBytes = std::uint64_t{2} << 20;
-  std::uint64_t stagingBytes = 0;  // of the staging buffer that are used
-  std::uint64_t stagingUsed = 0;
-  /// Of setVdi, which doesn't wait for the last of them. Behind the buffers, for its end waits for what uses
-  /// them.
-  gpu::Commands uploads;
-
-  /// Calls use(at, first, count) for parts of `values` that lie in staging, `at` bytes into it.
-  template <typename T, typename Use>
-  void inParts(const HostVector<T>& values, Use use) {
-    for (std::size_t first = 0; first < values.size();) {
-      if (stagingUsed + sizeof(T) > stagingBytes) {
-        uploads.submitAndWait();
-        uploads.begin();
-        stagingUsed = 0;
-      }
-      const std::size_t count =
-          std::min<std::size_t>((stagingBytes - stagingUsed) / sizeof(T), values.size() - first);
-      std::memcpy(staging.mapped().data() + stagingUsed, values.data() + first, count * sizeof(T));
-      use(stagingUsed, first, count);
-      constexpr std::uint64_t alignment = 16;
-      stagingUsed += (count * sizeof(T) + alignment - 1) / alignment * alignment;
-      first += count;
-    }
-  }
-
-  template <typename Segment>
-  void upload(const ListsOf<Segment>& lists, const DepthCode& code, const glm::ivec2& size, Uploaded& target,
-              UploadKind kind) {
-    uploads.wait();  // for the last one, which may still use the buffers
-    offsets.reserve(device, lists.offsets.size() * sizeof(std::uint32_t), MemoryKind::DeviceLocal);
-    target.segments.reserve(device, lists.segments.size() * sizeof(shared::RenderSegment),
-                            MemoryKind::DeviceLocal);
-    target.heads.reserve(device, lists.listCount() * sizeof(shared::ListHead), MemoryKind::DeviceLocal);
-    target.tileDepthMasks.reserve(device, gpu::tileCount(size) * sizeof(std::uint64_t),
-                                  MemoryKind::DeviceLocal);
-    const std::uint64_t bytes =
-        (lists.offsets.size() + 4) * sizeof(std::uint32_t) + lists.segments.size() * sizeof(Segment);
-    stagingBytes = std::min(bytes, kind == UploadKind::Alone ? aloneBytes : besideBytes);
-    staging.reserve(device, stagingBytes, MemoryKind::Upload);
-    stagingUsed = 0;
-    uploads.begin();
-    inParts(lists.offsets, [&](std::uint64_t at, std::size_t first, std::size_t count) {
-      uploads.copy(staging, at, offsets, first * sizeof(std::uint32_t), count * sizeof(std::uint32_t));
-    });
-    shared::ExpandConstants constants{};
-    constants.offsets = offsets.address();
-    constants.segments = target.segments.address();
-    constants.heads = target.heads.address();
-    constants.tileDepthMasks = target.tileDepthMasks.address();
-    constants.nearest = target.nearest;
-    constants.binScale = target.binScale;
-    constants.lists = size;
-    constants.form = detail::storedForm(code);
-    constants.mode = shared::expandModeSegments;
-    inParts(lists.segments, [&](std::uint64_t at, std::size_t first, std::size_t count) {
-      constants.from = staging.address() + at;
-      constants.first = static_cast<std::uint32_t>(first);
-      constants.count = static_cast<std::uint32_t>(count);
-      expand.record(uploads, constants);
-    });
-    for (const std::uint32_t mode :
-         {shared::expandModeMasks, shared::expandModeTiles, shared::expandModeLargeTiles}) {
-      uploads.barrier();
-      constants.mode = mode;
-      expand.record(uploads, constants);
-    }
-    if (kind == UploadKind::Alone) {
-      uploads.submit();
-    } else {
-      uploads.submitAndWait();
-    }
-  }
-
-  void upload(const Vdi& vdi, Uploaded& target, UploadKind kind);
 };
-
-namespace {
-
-struct DepthRange {
-  float nearest = Image::noDepth;
-  float farthest = 0.0F;
-};
-
-float frontOf(const Supersegment& segment, const DepthCode&) {
-  return segment.front;
-}
-float backOf(const Supersegment& segment, const DepthCode&) {
-  return segment.back;
-}
-float frontOf(const CompactSupersegment& segment, const DepthCode& code) {
-  return code.depthOf(segment.front());
-}
-float backOf(const CompactSupersegment& segment, const DepthCode& code) {
-  return code.depthOf(segment.back());
-}
-
-template <typename Segment>
-DepthRange depthsOf(const ListsOf<Segment>& lists, const DepthCode& code) {
-  DepthRange all;
-  std::mutex mutex;
-  constexpr std::size_t minimum = 1U << 16;  // lists
-  inParallel(lists.listCount(), minimum, [&](std::size_t first, std::size_t last) {
-    DepthRange own;
-    for (std::size_t i = first; i < last; ++i) {
-      const std::span<const Segment> list = lists.list(i);
-      if (list.empty()) continue;
-      own.nearest = std::min(own.nearest, frontOf(list.front(), code));
-      own.farthest = std::max(own.farthest, backOf(list.back(), code));
-    }
-    const std::scoped_lock lock(mutex);
-    all.nearest = std::min(all.nearest, own.nearest);
-    all.farthest = std::max(all.farthest, own.farthest);
-  });
-  return all;
-}
-
-}  // namespace
 
 VdiRenderer::VdiRenderer(std::shared_ptr<gpu::Device> device)
     : state_(std::make_unique<State>(std::move(device))) {}
 
 VdiRenderer::~VdiRenderer() = default;
 
-void VdiRenderer::State::upload(const Vdi& vdi, Uploaded& target, UploadKind kind) {
-  target.original.reset();
-  const DepthRange depths =
-      std::visit([&](const auto& lists) { return depthsOf(lists, vdi.depthCode); }, vdi.lists);
-  target.nearest = depths.nearest;
-  target.farthest = depths.farthest;
-  // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
-  if (!vdi.camera.parallelProjection) target.nearest = std::max(target.nearest, target.farthest * 1e-6F);
-  target.binScale =
-      target.farthest > target.nearest ? shared::renderBins / (target.farthest - target.nearest) : 0.0F;
-  std::visit(
-      [&](const auto& lists) {
-        upload(lists, vdi.depthCode, {vdi.width, vdi.height}, target, kind);
-      },
-      vdi.lists);
-  target.original = std::make_unique<View>(vdi.view());
-}
-
 void VdiRenderer::setVdi(const Vdi& vdi) {
-  state_->upload(vdi, state_->shown, UploadKind::Alone);
+  state_->waitForShown();
+  state_->loader.load(vdi, state_->shown, detail::VdiLoader::Kind::Alone);
+  state_->loading = true;
 }
 
 void VdiRenderer::prepareVdi(const Vdi& vdi) {
+  state_->waitForShown();
   try {
-    state_->upload(vdi, state_->prepared, UploadKind::Beside);
+    state_->loader.load(vdi, state_->prepared, detail::VdiLoader::Kind::Beside);
   } catch (...) {
     state_->prepared = {};
     throw;
   }
+}
+
+detail::VdiLoader& VdiRenderer::loadShown(const Vdi& header) {
+  state_->waitForShown();
+  state_->loader.begin(header, state_->shown);
+  state_->loading = true;
+  return state_->loader;
+}
+
+void VdiRenderer::showNothing() {
+  state_->loader.drop();
+  state_->loading = false;
+  state_->shown.original.reset();
+}
+
+const gpu::Device* VdiRenderer::device() const {
+  return state_->device.get();
 }
 
 bool VdiRenderer::showPrepared() {
@@ -235,15 +101,17 @@ void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds
   assert(rayEnds.empty() || rayEnds.size() == pixels);
   picture.reserve(device, pixels,
                   form == shared::renderPictureFloats ? sizeof(glm::vec4) : sizeof(glm::u8vec4));
+  waitForShown();
+  const shared::DepthRange depths = shown.depths();
   shared::RenderParams params = gpu::renderGeometry(*shown.original, view);
   params.heads = shown.heads.address();
   params.segments = shown.segments.address();
   params.tileDepthMasks = shown.tileDepthMasks.address();
-  params.binScale = shown.binScale;
+  params.binScale = depths.binScale;
   params.colors = picture.colors();
   params.depths = picture.depths();
-  params.nearest = shown.nearest;
-  params.farthest = shown.farthest;
+  params.nearest = depths.nearest;
+  params.farthest = depths.farthest;
   if (!rayEnds.empty()) {
     endsStaging.reserve(device, rayEnds.size_bytes(), MemoryKind::Upload);
     ends.reserve(device, rayEnds.size_bytes(), MemoryKind::DeviceLocal);
@@ -251,7 +119,7 @@ void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds
     params.ends = ends.address();
     params.hasEnds = 1;
   }
-  commands.begin();  // behind setVdi's uploads
+  commands.begin();
   commands.mark("render");
   if (!rayEnds.empty()) {
     commands.copy(endsStaging, 0, ends, 0, rayEnds.size_bytes());

@@ -1,0 +1,165 @@
+#include "vdi/pipeline/VdiLoader.h"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <utility>
+#include <variant>
+
+#include "vdi/core/Error.h"
+#include "vdi/pipeline/ListBuilder.h"
+
+namespace vdi::detail {
+
+using gpu::MemoryKind;
+namespace shared = gpu::shared;
+
+namespace {
+
+/// What fits is on its way while the caller goes on; more waits for the part before.
+constexpr std::uint64_t aloneBytes = std::uint64_t{128} << 20;
+/// A render waits for the part that's on its way.
+constexpr std::uint64_t besideBytes = std::uint64_t{2} << 20;
+
+}  // namespace
+
+VdiLoader::VdiLoader(std::shared_ptr<gpu::Device> device)
+    : device_(std::move(device)), expand_(device_), scan_(device_), commands_(device_) {}
+
+/// Calls use(at, first, count) for parts of `values` that lie in staging, `at` bytes into it.
+template <typename T, typename Use>
+void VdiLoader::inParts(const HostVector<T>& values, Use use) {
+  for (std::size_t first = 0; first < values.size();) {
+    if (stagingUsed_ + sizeof(T) > stagingBytes_) {
+      commands_.submitAndWait();
+      commands_.begin();
+      stagingUsed_ = 0;
+    }
+    const std::size_t count =
+        std::min<std::size_t>((stagingBytes_ - stagingUsed_) / sizeof(T), values.size() - first);
+    std::memcpy(staging_.mapped().data() + stagingUsed_, values.data() + first, count * sizeof(T));
+    use(stagingUsed_, first, count);
+    constexpr std::uint64_t alignment = 16;
+    stagingUsed_ += (count * sizeof(T) + alignment - 1) / alignment * alignment;
+    first += count;
+  }
+}
+
+/// All that doesn't depend on how many supersegments there are.
+void VdiLoader::start(const Vdi& header, LoadedVdi& target) {
+  commands_.wait();  // for the last one, which may still use the buffers
+  outgrown_ = {};
+  target.original.reset();
+  target_ = &target;
+  const glm::ivec2 size{header.width, header.height};
+  listCount_ = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y);
+  added_ = 0;
+  offsets_.reserve(device_, (listCount_ + 1) * wordBytes, MemoryKind::DeviceLocal);
+  target.heads.reserve(device_, listCount_ * sizeof(shared::ListHead), MemoryKind::DeviceLocal);
+  target.tileDepthMasks.reserve(device_, gpu::tileCount(size) * sizeof(std::uint64_t),
+                                MemoryKind::DeviceLocal);
+  target.depthRange.reserve(device_, sizeof(shared::DepthRange), MemoryKind::DeviceLocal);
+  target.depthRangeReadback.reserve(device_, sizeof(shared::DepthRange), MemoryKind::Readback);
+  constants_ = {};
+  constants_.offsets = offsets_.address();
+  constants_.heads = target.heads.address();
+  constants_.tileDepthMasks = target.tileDepthMasks.address();
+  constants_.depthRange = target.depthRange.address();
+  constants_.lists = size;
+  constants_.form = storedForm(header.depthCode);
+  constants_.perspective = header.camera.parallelProjection ? 0U : 1U;
+}
+
+/// Recorded commands follow, in which `count` supersegments are added to those that are there.
+void VdiLoader::reserveSegments(std::uint64_t count) {
+  const std::uint64_t bytes = (added_ + count) * sizeof(shared::RenderSegment);
+  gpu::Buffer& segments = target_->segments;
+  if (segments && bytes > segments.size() && added_ > 0) {
+    outgrown_ = std::exchange(segments, {});  // what used it before has been waited for
+    segments.reserve(device_, bytes + bytes / 2, MemoryKind::DeviceLocal);
+    commands_.copy(outgrown_, 0, segments, 0, added_ * sizeof(shared::RenderSegment));
+    commands_.barrier();
+  } else {
+    segments.reserve(device_, bytes, MemoryKind::DeviceLocal);
+  }
+  constants_.segments = segments.address();
+}
+
+/// When all supersegments are there.
+void VdiLoader::recordMasks() {
+  const shared::DepthRange nothing{std::numeric_limits<float>::infinity(), 0.0F, 0.0F};
+  commands_.update(target_->depthRange, std::as_bytes(std::span(&nothing, 1)));
+  for (const std::uint32_t mode : {shared::expandModeDepths, shared::expandModeBins, shared::expandModeMasks,
+                                   shared::expandModeTiles, shared::expandModeLargeTiles}) {
+    commands_.barrier();
+    constants_.mode = mode;
+    expand_.record(commands_, constants_);
+  }
+  commands_.copy(target_->depthRange, 0, target_->depthRangeReadback, 0, sizeof(shared::DepthRange));
+}
+
+template <typename Segment>
+void VdiLoader::loadLists(const ListsOf<Segment>& lists, Kind kind) {
+  const std::uint64_t bytes =
+      (lists.offsets.size() + 4) * sizeof(std::uint32_t) + lists.segments.size() * sizeof(Segment);
+  stagingBytes_ = std::min(bytes, kind == Kind::Alone ? aloneBytes : besideBytes);
+  staging_.reserve(device_, stagingBytes_, MemoryKind::Upload);
+  stagingUsed_ = 0;
+  commands_.begin();
+  reserveSegments(lists.segments.size());
+  inParts(lists.offsets, [&](std::uint64_t at, std::size_t first, std::size_t count) {
+    commands_.copy(staging_, at, offsets_, first * wordBytes, count * wordBytes);
+  });
+  constants_.mode = shared::expandModeSegments;
+  inParts(lists.segments, [&](std::uint64_t at, std::size_t first, std::size_t count) {
+    constants_.from = staging_.address() + at;
+    constants_.first = static_cast<std::uint32_t>(first);
+    constants_.count = static_cast<std::uint32_t>(count);
+    expand_.record(commands_, constants_);
+  });
+  commands_.barrier();
+  recordMasks();
+  commands_.submit();
+  if (kind == Kind::Beside) commands_.wait();
+}
+
+void VdiLoader::load(const Vdi& vdi, LoadedVdi& target, Kind kind) {
+  start(vdi, target);
+  std::visit([&](const auto& lists) { loadLists(lists, kind); }, vdi.lists);
+  target.original = std::make_unique<View>(vdi.view());
+}
+
+void VdiLoader::begin(const Vdi& header, LoadedVdi& target) {
+  start(header, target);
+  target.original = std::make_unique<View>(header.view());
+}
+
+gpu::Submission VdiLoader::add(const DeviceLists& band, std::uint64_t firstList) {
+  if (added_ + band.count > std::numeric_limits<std::uint32_t>::max())
+    throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI");
+  commands_.begin();
+  commands_.waitFor(band.written);
+  reserveSegments(band.count);
+  const std::uint64_t words = std::uint64_t{band.listCount} + 1;
+  commands_.copy(band.offsets, 0, offsets_, firstList * wordBytes, words * wordBytes);
+  if (added_ > 0) {
+    scan_.recordRebase(commands_, offsets_, firstList, static_cast<std::uint32_t>(words),
+                       static_cast<std::uint32_t>(added_));
+  }
+  constants_.mode = shared::expandModeSegments;
+  constants_.from = band.segments.address();
+  constants_.first = static_cast<std::uint32_t>(added_);
+  constants_.count = static_cast<std::uint32_t>(band.count);
+  if (band.count > 0) expand_.record(commands_, constants_);
+  commands_.submit();
+  added_ += band.count;
+  return commands_.last();
+}
+
+void VdiLoader::finish() {
+  commands_.begin();
+  recordMasks();
+  commands_.submit();
+}
+
+}  // namespace vdi::detail
