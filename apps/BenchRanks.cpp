@@ -204,6 +204,7 @@ class RankSuite {
              {"scaling", setup.scaling},
              {"layout", setup.layout},
              {"size", {setup.size.x, setup.size.y, setup.size.z}},
+             {"copies", options_.decomposition.copies},
              {"blocks", {setup.blocks.x, setup.blocks.y, setup.blocks.z}},
              {"upload_ms", uploadMs},
              {"generate_ms", generate.device->slowest},

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <future>
 #include <numbers>
 #include <optional>
 #include <random>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -86,6 +88,18 @@ struct ViewTruth {
   io::Picture picture;                // by volume rendering at the rate of --truth-rate
   std::vector<std::uint8_t> opacity;  // [height][width], row 0 at the bottom
 };
+
+double ssimOf(const ViewTruth& truth, const glm::ivec2& size, std::span<const glm::u8vec4> pixels) {
+  const io::Picture picture = io::toPicture(ImageBytes{size.x, size.y, pixels, {}});
+  return compare(picture.rgb, truth.picture.rgb, size.x, size.y, 3).ssim;
+}
+
+double missingOf(const ViewTruth& truth, std::span<const glm::u8vec4> pixels) {
+  std::size_t missing = 0;
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    missing += truth.opacity[i] >= visible && pixels[i].a == 0 ? 1U : 0U;
+  return static_cast<double>(missing) / static_cast<double>(pixels.size());
+}
 
 /// Kinds of viewpoints: all around, or turned a little.
 struct Views {
@@ -270,21 +284,28 @@ class ViewpointSuite {
     return bytes;
   }
 
+  /// While the host compares a view, the device renders the next one: a GPU's clock falls when it waits.
   Trueness truenessOf(const Made& made, const Views& views, bool blends) {
     Trueness trueness;
     const Box& bounds = generator_.scene().bounds;
+    std::future<std::pair<double, double>> last;
+    const auto note = [&] {
+      if (!last.valid()) return;
+      const auto [ssim, missing] = last.get();
+      trueness.ssims.push_back(ssim);
+      trueness.missing.push_back(missing);
+    };
     for (const ViewTruth& truth : views.truths) {
       const Shares shares = blends ? blendOf(made.cameras, truth.camera, bounds)
                                    : nearestOf(made.cameras, truth.camera, bounds);
       const glm::ivec2 size{truth.picture.width, truth.picture.height};
-      const std::vector<glm::u8vec4> pixels = seen(made, truth.camera, shares, size);
-      const io::Picture picture = io::toPicture(ImageBytes{size.x, size.y, pixels, {}});
-      trueness.ssims.push_back(compare(picture.rgb, truth.picture.rgb, size.x, size.y, 3).ssim);
-      std::size_t missing = 0;
-      for (std::size_t i = 0; i < pixels.size(); ++i)
-        missing += truth.opacity[i] >= visible && pixels[i].a == 0 ? 1U : 0U;
-      trueness.missing.push_back(static_cast<double>(missing) / static_cast<double>(pixels.size()));
+      std::vector<glm::u8vec4> pixels = seen(made, truth.camera, shares, size);
+      note();
+      last = std::async(std::launch::async, [&truth, size, pixels = std::move(pixels)] {
+        return std::pair(ssimOf(truth, size, pixels), missingOf(truth, pixels));
+      });
     }
+    note();
     return trueness;
   }
 

@@ -27,7 +27,7 @@ DeviceField::DeviceField(std::shared_ptr<gpu::Device> device, const std::string&
       field_(static_cast<std::uint32_t>(fieldIndex(name))),
       seed_(seed) {}
 
-Block DeviceField::makeBlock(const Lattice& lattice, const Part& part, double top) {
+std::shared_ptr<std::byte[]> DeviceField::makeValues(const Lattice& lattice, const Part& part, double top) {
   const std::size_t layer = static_cast<std::size_t>(part.dims.x) * static_cast<std::size_t>(part.dims.y);
   const std::shared_ptr<std::byte[]> data(
       new std::byte[layer * static_cast<std::size_t>(part.dims.z) * sizeOf(lattice.type)]);
@@ -60,7 +60,7 @@ Block DeviceField::makeBlock(const Lattice& lattice, const Part& part, double to
         storeValue(lattice.type, data.get(), place + j, top * static_cast<double>(values[first + j]));
     });
   }
-  return blockOf(lattice, part, data);
+  return data;
 }
 
 }  // namespace vdi::apps

@@ -19,10 +19,10 @@ class DeviceField {
   /// Throws Error{InvalidArgument} that lists the names there are.
   DeviceField(std::shared_ptr<gpu::Device> device, const std::string& name, std::uint32_t seed);
 
-  /// A block for a part, with its own copy of the values, which are `top` times the field's. They're
+  /// A part's values, `top` times the field's, of the lattice's type. They're
   /// deterministic on a device; another one, and makeField, which works in double precision, may give others
   /// in the sixth digit. The lattice's spacing must be the same on all axes, its origin 0.
-  Block makeBlock(const Lattice& lattice, const Part& part, double top);
+  std::shared_ptr<std::byte[]> makeValues(const Lattice& lattice, const Part& part, double top);
 
  private:
   std::shared_ptr<gpu::Device> device_;

@@ -1,6 +1,9 @@
 #include "apps/Source.h"
 
+#include <algorithm>
+#include <array>
 #include <charconv>
+#include <map>
 #include <string_view>
 
 #include "apps/DeviceField.h"
@@ -94,6 +97,13 @@ void addDecompositionOptions(CLI::App& command, DecompositionOptions& options) {
       ->type_name("XxYxZ")
       ->capture_default_str()
       ->group(decompositionGroup);
+  command
+      .add_option("--copies", options.copies,
+                  "of a field, side by side along each axis, each of --size and in --blocks; they share the "
+                  "host's memory, so that a volume may be larger than that. Takes cell data")
+      ->type_name("XxYxZ")
+      ->capture_default_str()
+      ->group(decompositionGroup);
   command.add_option("--type", options.type, "scalar type of a field: u8, i8, u16, i16, u32, i32, f32, f64")
       ->type_name("TYPE")
       ->capture_default_str()
@@ -140,22 +150,44 @@ std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOpti
   return blocks;
 }
 
+namespace {
+
+/// The longest axis has length 1.
+glm::dvec3 spacingOf(const Lattice& lattice) {
+  const int longest = std::max({lattice.size.x, lattice.size.y, lattice.size.z});
+  return glm::dvec3(1.0 / std::max(lattice.joint == Joint::Cells ? longest : longest - 1, 1));
+}
+
+}  // namespace
+
 std::vector<Block> fieldBlocks(const std::string& name, const DecompositionOptions& options,
                                const std::shared_ptr<gpu::Device>& device, int rank, int ranks) {
   Lattice lattice;
   lattice.size = vectorOf(parseSizes(options.size, 3));
   lattice.type = scalarTypeFromString(options.type);
   if (!options.joint.empty()) lattice.joint = jointOf(options.joint);
-  const int longest = std::max({lattice.size.x, lattice.size.y, lattice.size.z});
-  const bool cells = lattice.joint == Joint::Cells;
-  const double spacing = 1.0 / std::max(cells ? longest : longest - 1, 1);
-  lattice.spacing = glm::dvec3(spacing);
+  const glm::ivec3 copies = vectorOf(parseSizes(options.copies, 3));
+  if (copies != glm::ivec3(1)) {
+    if (options.joint.empty()) lattice.joint = Joint::Cells;
+    if (lattice.joint != Joint::Cells)
+      throw Error(ErrorCode::InvalidArgument, "copies take cell data, --joint cells", "--copies");
+  }
+  lattice.spacing = spacingOf(lattice);
+  Lattice all = lattice;
+  all.size = lattice.size * copies;
+  all.spacing = spacingOf(all);
   DeviceField field(device, name, options.seed);
   const double top = topOf(lattice.type);
   std::vector<Block> blocks;
-  for (const Part& part : decompose(lattice.size, vectorOf(parseSizes(options.blocks, 3)),
+  std::map<std::array<int, 3>, std::shared_ptr<std::byte[]>> made;  // by the first value in the field
+  for (const Part& part : decompose(all.size, vectorOf(parseSizes(options.blocks, 3)) * copies,
                                     layoutFromString(options.layout), lattice.joint, ranks, options.seed)) {
-    if (part.owner == rank) blocks.push_back(field.makeBlock(lattice, part, top));
+    if (part.owner != rank) continue;
+    Part own = part;
+    own.first = part.first % lattice.size;
+    std::shared_ptr<std::byte[]>& values = made[{own.first.x, own.first.y, own.first.z}];
+    if (!values) values = field.makeValues(lattice, own, top);
+    blocks.push_back(blockOf(all, part, values));
   }
   return blocks;
 }

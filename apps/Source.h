@@ -22,6 +22,7 @@ namespace vdi::apps {
 /// How a volume is cut and dealt.
 struct DecompositionOptions {
   std::string size = "96x96x96";
+  std::string copies = "1x1x1";
   std::string type = "f32";
   std::uint32_t seed = 1;
   std::string blocks = "2x2x2";
@@ -30,7 +31,8 @@ struct DecompositionOptions {
 };
 void addDecompositionOptions(CLI::App& command, DecompositionOptions& options);
 
-/// The blocks of a procedural field that `rank` of `ranks` holds, made by its device. Throws Error.
+/// The blocks of a procedural field that `rank` of `ranks` holds, made by its device. Copies of the field
+/// share memory. Throws Error.
 std::vector<Block> fieldBlocks(const std::string& field, const DecompositionOptions& options,
                                const std::shared_ptr<gpu::Device>& device, int rank, int ranks);
 /// The blocks of a raw volume; size and type are the sidecar's. Throws Error.

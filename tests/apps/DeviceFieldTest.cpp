@@ -21,7 +21,7 @@ double differing(const std::string& name, const Lattice& lattice, const Part& pa
   const Block expected = makeBlock(lattice, part, [&](const glm::ivec3& index) {
     return top * field((glm::dvec3(index) + shift) * lattice.spacing);
   });
-  const Block made = DeviceField(device(), name, 5).makeBlock(lattice, part, top);
+  const Block made = blockOf(lattice, part, DeviceField(device(), name, 5).makeValues(lattice, part, top));
   CHECK(made.dims == expected.dims);
   CHECK(made.origin == expected.origin);
   const int count = part.dims.x * part.dims.y * part.dims.z;

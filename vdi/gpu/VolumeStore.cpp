@@ -98,6 +98,17 @@ void VolumeStore::dropNext() {
   }
 }
 
+std::uint64_t VolumeStore::texelBytesHeld() const {
+  std::uint64_t bytes = 0;
+  for (const Step& step : steps_) {
+    for (const SampledImage& page : step.pages) {
+      const glm::u64vec3 extent(page.extent());
+      bytes += extent.x * extent.y * extent.z * texelBytes(page.format());
+    }
+  }
+  return bytes;
+}
+
 /// All but the values: pages, macrocells and bricks, and the upload begun.
 void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& scene) {
   validate(blocks);

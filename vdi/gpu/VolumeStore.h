@@ -71,6 +71,8 @@ class VolumeStore {
   /// Macrocells, for the bricks' firstCell: 1 where the table makes anything visible.
   VkDeviceAddress cells() const { return shown().visibleBuffer.address(); }
   std::span<const SampledImage> pages() const { return shown().pages; }
+  /// What the values take, those of a next step included.
+  std::uint64_t texelBytesHeld() const;
   /// Which pages they are: descriptor sets that name others must be written again.
   std::uint64_t pagesVersion() const { return shown().pagesVersion; }
   /// Likewise of slabs.

@@ -58,7 +58,10 @@ std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytes
                                      std::uint32_t bands) const {
   const auto height = static_cast<std::uint64_t>(request.view.height());
   const std::uint64_t rowBytes = static_cast<std::uint64_t>(request.view.width()) * bytesPerPixel;
-  const std::uint64_t room = std::max<std::uint64_t>(device_->limits().memoryBytes / 8, rowBytes);
+  // Volumes beyond half the device leave less: lists, what they're merged from, and other frames share that.
+  const std::uint64_t memory = device_->limits().memoryBytes;
+  const std::uint64_t left = memory - std::min(memory, volume_.texelBytesHeld());
+  const std::uint64_t room = std::max(std::min(memory / 8, left / 4), rowBytes);
   std::uint64_t rows = std::min(height, room / rowBytes);
   rows = std::min(rows, std::max<std::uint64_t>((height + bands - 1) / bands, 1));
   rows = (rows + shared::countedStride - 1) / shared::countedStride * shared::countedStride;
