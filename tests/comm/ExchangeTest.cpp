@@ -135,7 +135,11 @@ TEST_CASE("memory that ranks share: opened by name, and gone when nobody has it"
 TEST_CASE("sums of bytes end at 255") {
   const Communicator world = Communicator::world();
   const Transport transport = GENERATE(Transport::Shared, Transport::Mpi);
-  comm::ByteSum sum(world, transport);
+  const std::vector<int> hosts(static_cast<std::size_t>(world.size()), 0);
+  const int radix = GENERATE(2, 3, 100);
+  const auto schedule =
+      radix < 100 ? comm::Schedule::rounds(hosts, radix) : comm::Schedule::direct(world.size());
+  comm::ByteSum sum(world, transport, schedule);
   for (const std::size_t size : {std::size_t{1}, std::size_t{1000}, std::size_t{70001}, std::size_t{300}}) {
     INFO(size << " bytes");
     const auto valueOf = [](int rank, std::size_t i) {

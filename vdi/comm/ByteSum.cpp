@@ -17,17 +17,25 @@ void addTo(std::span<std::byte> sum, std::span<const std::byte> other) {
   }
 }
 
+std::span<std::byte> bytesAt(const Exchange::Place& place, std::uint64_t first, std::uint64_t count) {
+  return place.memory->bytes().subspan(place.at + first, count);
+}
+
 }  // namespace
 
-ByteSum::ByteSum(const Communicator& comm, Transport transport)
-    : comm_(comm), scatter_(comm, transport), gather_(comm, transport) {}
+ByteSum::ByteSum(const Communicator& comm, Transport transport, const Schedule& schedule)
+    : comm_(comm),
+      rounds_(schedule.roundsOf(comm.rank())),
+      scatter_(comm, transport),
+      gather_(comm, transport) {}
 
-ByteSum::Stretch ByteSum::stretchOf(int rank) const {
+ByteSum::Bytes ByteSum::bytesOf(const Schedule::Shares& shares) const {
   constexpr std::uint64_t alignment = 256;
   const auto ranks = static_cast<std::uint64_t>(comm_.size());
   const std::uint64_t share = (bytes_ / ranks + alignment) / alignment * alignment;
-  const std::uint64_t first = std::min(share * static_cast<std::uint64_t>(rank), bytes_);
-  return {{}, first, std::min(share, bytes_ - first)};
+  const std::uint64_t first = std::min(share * static_cast<std::uint64_t>(shares.first), bytes_);
+  const std::uint64_t last = std::min(share * static_cast<std::uint64_t>(shares.last), bytes_);
+  return {first, last - first};
 }
 
 Exchange::Place ByteSum::begin(std::uint64_t bytes) {
@@ -36,31 +44,51 @@ Exchange::Place ByteSum::begin(std::uint64_t bytes) {
   return own_;
 }
 
-std::vector<ByteSum::Stretch> ByteSum::add() {
+/// What a rank sends away isn't changed any more: only what it keeps is.
+void ByteSum::addUp(const Schedule::Round& round) {
+  Partners partners{{}, round.sources};
   std::vector<Exchange::Outgoing> pieces;
-  for (int r = 0; r < comm_.size(); ++r) {
-    const Stretch stretch = stretchOf(r);
-    if (r != comm_.rank() && stretch.bytes > 0) pieces.push_back({r, stretch.first, stretch.bytes, {}});
+  for (const Schedule::Sent& sent : round.sent) {
+    const Bytes bytes = bytesOf(sent.shares);
+    partners.to.push_back(sent.to);
+    if (bytes.count > 0) pieces.push_back({sent.to, bytes.first, bytes.count, {}});
   }
-  const std::vector<Exchange::Incoming> others = scatter_.send(pieces);
-  const Stretch mine = stretchOf(comm_.rank());
-  const Exchange::Place result = gather_.outbox(mine.bytes);
-  const std::span<std::byte> sum = result.memory->bytes().subspan(result.at, mine.bytes);
-  const std::span<std::byte> own = own_.memory->bytes().subspan(own_.at + mine.first, mine.bytes);
-  std::copy(own.begin(), own.end(), sum.begin());
-  for (const Exchange::Incoming& piece : others) {
-    addTo(sum, piece.place.memory->bytes().subspan(piece.place.at, piece.bytes));
+  const Bytes kept = bytesOf(round.kept);
+  for (const Exchange::Incoming& piece : scatter_.send(pieces, partners))
+    addTo(bytesAt(own_, kept.first, kept.count), bytesAt(piece.place, 0, piece.bytes));
+}
+
+/// To those whose bytes were added up in this round go the sums; the others' sums come.
+std::vector<Exchange::Incoming> ByteSum::sendBack(const Schedule::Round& round) {
+  Partners partners{round.sources, {}};
+  for (const Schedule::Sent& sent : round.sent) partners.from.push_back(sent.to);
+  std::sort(partners.from.begin(), partners.from.end());
+  const Bytes kept = bytesOf(round.kept);
+  std::vector<Exchange::Outgoing> pieces;
+  for (const int rank : round.sources) {
+    if (kept.count > 0) pieces.push_back({rank, kept.first - held_.first, kept.count, {kept.first, 0}});
   }
-  pieces.clear();
-  for (int r = 0; r < comm_.size(); ++r) {
-    if (r != comm_.rank() && mine.bytes > 0) pieces.push_back({r, 0, mine.bytes, {}});
+  return gather_.send(pieces, partners);
+}
+
+std::vector<ByteSum::Stretch> ByteSum::add() {
+  if (rounds_.empty()) return {{own_, 0, bytes_}};
+  for (const Schedule::Round& round : rounds_) addUp(round);
+  held_ = bytesOf(rounds_.front().kept);
+  sums_ = gather_.outbox(held_.count);
+  const Bytes mine = bytesOf(rounds_.back().kept);
+  const std::span<std::byte> own = bytesAt(own_, mine.first, mine.count);
+  std::copy(own.begin(), own.end(), bytesAt(sums_, mine.first - held_.first, mine.count).begin());
+  for (std::size_t i = rounds_.size() - 1; i > 0; --i) {
+    for (const Exchange::Incoming& piece : sendBack(rounds_[i])) {
+      const std::span<std::byte> sum = bytesAt(piece.place, 0, piece.bytes);
+      std::copy(sum.begin(), sum.end(), bytesAt(sums_, piece.note[0] - held_.first, piece.bytes).begin());
+    }
   }
-  const std::vector<Exchange::Incoming> sums = gather_.send(pieces);
   std::vector<Stretch> stretches;
-  if (mine.bytes > 0) stretches.push_back({result, mine.first, mine.bytes});
-  for (const Exchange::Incoming& piece : sums) {
-    stretches.push_back({piece.place, stretchOf(piece.from).first, piece.bytes});
-  }
+  if (held_.count > 0) stretches.push_back({sums_, held_.first, held_.count});
+  for (const Exchange::Incoming& piece : sendBack(rounds_.front()))
+    stretches.push_back({piece.place, piece.note[0], piece.bytes});
   return stretches;
 }
 

@@ -192,4 +192,10 @@ Schedule::Round Schedule::round(int index, int rank) const {
   return round;
 }
 
+std::vector<Schedule::Round> Schedule::roundsOf(int rank) const {
+  std::vector<Round> rounds;
+  for (int index = 0; index < roundCount(); ++index) rounds.push_back(round(index, rank));
+  return rounds;
+}
+
 }  // namespace vdi::comm

@@ -16,10 +16,10 @@ class Schedule {
  public:
   /// One round: each rank sends each other one its share. Rank r gets share r.
   static Schedule direct(int ranks);
-  /// Rounds in groups of at most `radix` ranks, or twice that where sizes don't divide: some log R messages
-  /// a rank instead of R. Ranks of one host come first: until each of them holds other shares than the rest,
-  /// nothing goes to another host that has as many ranks. `hosts[r]`: equal for ranks of one host. `radix` is
-  /// at least 2.
+  /// Rounds in which a rank sends to fewer than `radix` others, and hears from fewer than twice as many: some
+  /// log R messages a rank instead of R. Ranks of one host come first: until each of them holds other shares
+  /// than the rest, nothing goes to another host that has as many ranks. `hosts[r]`: equal for ranks of one
+  /// host. `radix` is at least 2.
   static Schedule rounds(std::span<const int> hosts, int radix);
   /// VDI_SCHEDULE is "direct" or "rounds:K", K being a radix from 2 to 1024; direct where it isn't set.
   /// Throws Error{InvalidArgument} that says so. `hosts` as above.
@@ -50,6 +50,7 @@ class Schedule {
     std::vector<int> sources;  // who sends to this rank, in order of rank
   };
   Round round(int index, int rank) const;
+  std::vector<Round> roundsOf(int rank) const;
 
  private:
   Schedule() = default;

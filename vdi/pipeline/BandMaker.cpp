@@ -7,13 +7,12 @@ namespace vdi::detail {
 BandMaker::BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
                      comm::Transport transport, const comm::Schedule& schedule)
     : comm_(comm),
+      rounds_(schedule.roundsOf(comm.rank())),
       share_(schedule.positionOf(comm.rank())),
       caster_(device),
       compositor_(device),
-      levelSum_(comm, transport),
+      levelSum_(comm, transport, schedule),
       accesses_(device) {
-  for (int index = 0; index < schedule.roundCount(); ++index)
-    rounds_.push_back(schedule.round(index, comm.rank()));
   for (Slot& slot : slots_) slot.distributor = std::make_unique<Distributor>(device, comm, transport);
 }
 

@@ -165,10 +165,7 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
     transfers_.submitAndWait();
     access.finish();
   });
-  // Words to all are one call of MPI; to a few they're messages.
-  const bool toAll = static_cast<int>(partners.to.size()) == comm_.size() - 1;
-  const std::vector<comm::Exchange::Incoming> incoming =
-      toAll ? exchange_.send(pieces) : exchange_.send(pieces, partners);
+  const std::vector<comm::Exchange::Incoming> incoming = exchange_.send(pieces, partners);
 
   Distributed result;
   result.ownCounts = &packed_;
