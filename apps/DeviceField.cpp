@@ -1,6 +1,8 @@
 #include "apps/DeviceField.h"
 
 #include <algorithm>
+#include <array>
+#include <map>
 
 #include "apps/Fields.h"
 #include "shaders/shared/field.h"
@@ -61,6 +63,21 @@ std::shared_ptr<std::byte[]> DeviceField::makeValues(const Lattice& lattice, con
     });
   }
   return data;
+}
+
+std::vector<Block> DeviceField::makeBlocks(const Lattice& one, const Lattice& all,
+                                           std::span<const Part> parts, double top) {
+  std::vector<Block> blocks;
+  std::map<std::array<int, 6>, std::shared_ptr<std::byte[]>> made;  // by place and size in `one`
+  for (const Part& part : parts) {
+    Part own = part;
+    own.first = part.first % one.size;
+    std::shared_ptr<std::byte[]>& values =
+        made[{own.first.x, own.first.y, own.first.z, own.dims.x, own.dims.y, own.dims.z}];
+    if (!values) values = makeValues(one, own, top);
+    blocks.push_back(blockOf(all, part, values));
+  }
+  return blocks;
 }
 
 }  // namespace vdi::apps

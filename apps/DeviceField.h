@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,9 @@ class DeviceField {
   /// deterministic on a device; another one, and makeField, which works in double precision, may give others
   /// in the sixth digit. The lattice's spacing must be the same on all axes, its origin 0.
   std::shared_ptr<std::byte[]> makeValues(const Lattice& lattice, const Part& part, double top);
+  /// Blocks for parts of `all`, which is copies of `one` side by side; they share values.
+  std::vector<Block> makeBlocks(const Lattice& one, const Lattice& all, std::span<const Part> parts,
+                                double top);
 
  private:
   std::shared_ptr<gpu::Device> device_;

@@ -1,9 +1,7 @@
 #include "apps/Source.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
-#include <map>
 #include <string_view>
 
 #include "apps/DeviceField.h"
@@ -176,20 +174,10 @@ std::vector<Block> fieldBlocks(const std::string& name, const DecompositionOptio
   Lattice all = lattice;
   all.size = lattice.size * copies;
   all.spacing = spacingOf(all);
-  DeviceField field(device, name, options.seed);
-  const double top = topOf(lattice.type);
-  std::vector<Block> blocks;
-  std::map<std::array<int, 3>, std::shared_ptr<std::byte[]>> made;  // by the first value in the field
-  for (const Part& part : decompose(all.size, vectorOf(parseSizes(options.blocks, 3)) * copies,
-                                    layoutFromString(options.layout), lattice.joint, ranks, options.seed)) {
-    if (part.owner != rank) continue;
-    Part own = part;
-    own.first = part.first % lattice.size;
-    std::shared_ptr<std::byte[]>& values = made[{own.first.x, own.first.y, own.first.z}];
-    if (!values) values = field.makeValues(lattice, own, top);
-    blocks.push_back(blockOf(all, part, values));
-  }
-  return blocks;
+  std::vector<Part> parts = decompose(all.size, vectorOf(parseSizes(options.blocks, 3)) * copies,
+                                      layoutFromString(options.layout), lattice.joint, ranks, options.seed);
+  std::erase_if(parts, [rank](const Part& part) { return part.owner != rank; });
+  return DeviceField(device, name, options.seed).makeBlocks(lattice, all, parts, topOf(lattice.type));
 }
 
 void addCameraOptions(CLI::App& command, CameraOptions& options, const std::string& otherwise) {

@@ -1,10 +1,13 @@
 // Fields made by a device against those of apps/Fields.h.
 #include <catch2/catch.hpp>
+#include <cstring>
+#include <set>
 
 #include "apps/DeviceField.h"
 #include "apps/Fields.h"
 #include "tests/Devices.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Scene.h"
 
 using namespace vdi;
 using namespace vdi::apps;
@@ -61,6 +64,32 @@ TEST_CASE("a field of a large lattice is made in parts") {
   lattice.spacing = glm::dvec3(1.0 / 2047.0);
   lattice.type = ScalarType::U8;
   CHECK(differing<std::uint8_t>("ramp", lattice, {{0, 0, 0}, lattice.size, 0}, 255.0, 1.0) == 0.0);
+}
+
+TEST_CASE("copies of a field are side by side and share memory") {
+  Lattice one;
+  one.size = {12, 8, 10};
+  one.spacing = glm::dvec3(1.0 / 12.0);
+  one.type = ScalarType::U8;
+  one.joint = Joint::Cells;
+  Lattice all = one;
+  all.size = one.size * glm::ivec3(2, 1, 3);
+  const auto parts = [](const Lattice& lattice, const glm::ivec3& blocks) {
+    return decompose(lattice.size, blocks, Layout::OnOneRank, Joint::Cells, 1, 1);
+  };
+  DeviceField field(device(), "mixing", 1);
+  const std::vector<Block> copies = field.makeBlocks(one, all, parts(all, {4, 1, 3}), 255.0);
+  const std::vector<Block> expected = field.makeBlocks(one, one, parts(one, {2, 1, 1}), 255.0);
+  REQUIRE(copies.size() == 12);
+  REQUIRE(expected.size() == 2);
+  CHECK(localScene(copies).bounds == Box{{0.0, 0.0, 0.0}, {2.0, 8.0 / 12.0, 30.0 / 12.0}});
+  std::set<const void*> values;
+  for (std::size_t i = 0; i < copies.size(); ++i) {
+    values.insert(copies[i].data);
+    REQUIRE(copies[i].dims == glm::ivec3(6, 8, 10));
+    CHECK(std::memcmp(copies[i].data, expected[i % 2].data, copies[i].byteCount()) == 0);
+  }
+  CHECK(values.size() == 2);
 }
 
 TEST_CASE("a field that isn't there is an error that lists those that are") {
