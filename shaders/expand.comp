@@ -15,7 +15,7 @@ layout(push_constant, scalar) uniform Push { ExpandConstants push; };
 void expandSegment(uint i) {
   OpticalSegment segment = loadSegment(push.from, i, push.form);
   float density = segment.opticalDepth / (segment.back - segment.front);
-  push.segments.at[push.first + i] =
+  push.segments.at[i] =
       RenderSegment(segment.front, segment.back, density, packedSegmentColor(segment.color / opacityOf(segment.opticalDepth)));
 }
 
@@ -32,8 +32,8 @@ void addDepths(uint list, bool hasList) {
   uint first = hasList ? push.offsets.at[list] : 0u;
   uint end = hasList ? push.offsets.at[list + 1u] : 0u;
   if (first < end) {
-    atomicMin(groupNearest, floatBitsToUint(push.segments.at[first].front));
-    atomicMax(groupFarthest, floatBitsToUint(push.segments.at[end - 1u].back));
+    atomicMin(groupNearest, floatBitsToUint(renderSegmentsFrom(push.segments, first).at[0].front));
+    atomicMax(groupFarthest, floatBitsToUint(renderSegmentsFrom(push.segments, end - 1u).at[0].back));
   }
   barrier();
   if (gl_LocalInvocationIndex != 0u) return;
@@ -57,8 +57,9 @@ void maskList(uint list) {
   uint64_t mask = 0ul;
   uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];
-  for (uint i = first; i < end; ++i) {
-    RenderSegment segment = push.segments.at[i];
+  RenderSegmentArray segments = renderSegmentsFrom(push.segments, first);
+  for (uint i = 0u; i < end - first; ++i) {
+    RenderSegment segment = segments.at[i];
     mask |= maskOf(segment.front, segment.back, nearest, binScale);
   }
   push.heads.at[list] = ListHead(first, end - first, mask);

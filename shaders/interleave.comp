@@ -22,7 +22,7 @@ void countList(uint list) {
 // Comparable within a list: codes, if it has such.
 vec2 depthsOf(uint i) {
   if (compactForm) return vec2(depthCodes(CompactArray(push.received).at[i]));
-  Segment segment = push.received.at[i];
+  Segment segment = segmentsFrom(push.received, i).at[0];
   return vec2(segment.front, segment.back);
 }
 
@@ -33,7 +33,7 @@ void copySegment(uint i, uint slot) {
   if (compactForm) {
     CompactArray(push.interleaved).at[slot] = CompactArray(push.received).at[i];
   } else {
-    push.interleaved.at[slot] = push.received.at[i];
+    segmentsFrom(push.interleaved, slot).at[0] = segmentsFrom(push.received, i).at[0];
   }
 }
 

@@ -75,15 +75,17 @@ void meet(inout Seen seen, uvec4 segment, vec2 depths, Part part) {
 Intersection intersectionOf(Seen seen)
     { return Intersection(vec4(seen.light * segmentColorUnit, 1.0 - seen.transmittance), seen.entered); }
 
+RenderSegmentWords listSegments;  // of the list that's looked at
+
 // The i-th of several supersegments from a slot on, where `more` follow in the list; the last one again beyond them.
 uvec4 segmentFrom(uint slot, int i, int more, int step) {
-  return params.segments.at[slot + uint(i == 0 ? 0 : min(i, more) * step)];
+  return listSegments.at[slot + uint(i == 0 ? 0 : min(i, more) * step)];
 }
 
 // Where an intersection is in a list: at segmentsAtOnce supersegments.
 struct Cursor {
   int place;  // of the first of them, counted as the ray meets them
-  uint slot;  // and in the compact array
+  uint slot;  // and in the list
   uvec4 segments[maxSegmentsAtOnce];
 };
 
@@ -101,10 +103,11 @@ Cursor cursorAt(int place, uint slot, int last, int step) {
 // the ray meets them; lists are alike there.
 Intersection intersectList(uint list, Part part, inout int hint) {
   ListHead head = params.heads.at[list];
+  listSegments = segmentWordsFrom(params.segments, head.first);
   int last = int(head.count) - 1;
   int place = min(hint, last);
   int step = rayAscends ? 1 : -1;
-  Cursor at = cursorAt(place, head.first + uint(rayAscends ? place : last - place), last, step);
+  Cursor at = cursorAt(place, uint(rayAscends ? place : last - place), last, step);
   while (at.place > 0 && metDepths(at.segments[0]).x > part.low) {
     int back = segmentsAtOnce == 1 ? 1 : min(at.place, segmentsAtOnce);
     at = cursorAt(at.place - back, at.slot - uint(back * step), last, step);
@@ -131,9 +134,10 @@ Intersection intersectList(uint list, Part part, inout int hint) {
 Intersection intersectWholeList(uint list, Part part) {
   const int atOnce = 4;
   ListHead head = params.heads.at[list];
+  listSegments = segmentWordsFrom(params.segments, head.first);
   int last = int(head.count) - 1;
   int step = rayAscends ? 1 : -1;
-  uint slot = head.first + uint(rayAscends ? 0 : last);
+  uint slot = uint(rayAscends ? 0 : last);
   Seen seen = nothingYet;
   for (int place = 0; place <= last && seen.transmittance > 1.0 - opaque; place += atOnce) {
     uvec4 several[atOnce];

@@ -37,7 +37,7 @@ float initialTolerance;
 uint preSegmentRoom;     // of those that don't begin a run, where there are several ranks
 uint preSegmentRuns;     // pre-segments that begin a run; counted where there are several ranks
 uint preSegmentSlots;    // of all
-uint preSegmentBase;  // where the list's pre-segments are
+PreSegmentArray ownPreSegments;  // the list's
 uint preSegmentsBegun;
 bool preSegmentOpen;
 vec4 preSegmentFirst;
@@ -52,8 +52,7 @@ bool preSegmentCut;  // the next pre-segment starts a run
 void closePreSegment() {
   uint slot = preSegmentsBegun - 1u;
   if (preSegmentOpen && slot < preSegmentSlots) {
-    params.preSegments.at[preSegmentBase + slot] = storedPreSegment(preSegmentSpan, beforePreSegment, preSegmentLight,
-        preSegmentStartsRun);
+    ownPreSegments.at[slot] = storedPreSegment(preSegmentSpan, beforePreSegment, preSegmentLight, preSegmentStartsRun);
   }
   preSegmentOpen = false;
 }
@@ -246,7 +245,7 @@ float toleranceOfLevel(uint level) {
 
 // Where the list's pre-segments are, and how many there may be. Returns how many supersegments they may become, but for runs.
 uint roomOfList() {
-  preSegmentBase = params.offsets.at[listIndex];
+  ownPreSegments = preSegmentsFrom(params.preSegments, params.offsets.at[listIndex]);
   preSegmentSlots = params.capacities.at[listIndex];
   preSegmentRoom = preSegmentSlots;
 #ifdef SEVERAL_RANKS

@@ -19,7 +19,7 @@ struct PreSegment {
 };
 
 // The list's pre-segments, one after the other; the next one is on its way while one is used.
-uint base;
+PreSegmentArray preSegments;
 uint preSegmentCount;
 uint nextRead;
 StoredPreSegment preSegmentAhead;
@@ -27,12 +27,12 @@ StoredPreSegment preSegmentAhead;
 void beginReading(uint count) {
   preSegmentCount = count;
   nextRead = 1u;
-  preSegmentAhead = push.preSegments.at[base];
+  preSegmentAhead = preSegments.at[0];
 }
 
 PreSegment readPreSegment() {
   StoredPreSegment preSegment = preSegmentAhead;
-  if (nextRead < preSegmentCount) preSegmentAhead = push.preSegments.at[base + nextRead];
+  if (nextRead < preSegmentCount) preSegmentAhead = preSegments.at[nextRead];
   ++nextRead;
   return PreSegment(preSegment, appearanceOf(preSegment, push.step));
 }
@@ -87,7 +87,7 @@ uint mergeOnce(uint count, uint excess, float limit) {
       a.stored = merged(a.stored, a.appearance, b.stored, b.appearance);
       --excess;
     }
-    push.preSegments.at[base + left++] = a.stored;
+    preSegments.at[left++] = a.stored;
     previous = merges ? next : cost;
     addCost(previous);
     i += merges ? 2u : 1u;
@@ -112,7 +112,7 @@ void main() {
   uint count = push.written.at[list];
   uint maxCount = push.left.at[list];
   if (count <= maxCount || count <= push.subgroupCapacity) return;
-  base = push.preSegmentOffsets.at[list];
+  preSegments = preSegmentsFrom(push.preSegments, push.preSegmentOffsets.at[list]);
   sumCosts(count);
   while (count > maxCount) {
     if (costsFinite == 0.0) break;  // just cuts are left; there are no more of them than may be

@@ -37,11 +37,11 @@ void store(uint i, StoredPreSegment preSegment, vec4 appearance) {
 }
 
 // From the device's memory; returns how many of them must not be merged with the one before. `ahead`: the invocation's first one.
-uint loadList(uint base, uint count, StoredPreSegment ahead) {
+uint loadList(PreSegmentArray preSegments, uint count, StoredPreSegment ahead) {
   uint cuts = 0u;
   for (uint i = own; i < count; i += subgroupSize) {
     StoredPreSegment preSegment = ahead;
-    if (i >= subgroupSize) preSegment = push.preSegments.at[base + i];
+    if (i >= subgroupSize) preSegment = preSegments.at[i];
     store(i, preSegment, appearanceOf(preSegment, push.step));
     if (i > 0u && isCut(preSegment)) ++cuts;
   }
@@ -49,8 +49,8 @@ uint loadList(uint base, uint count, StoredPreSegment ahead) {
   return subgroupAdd(cuts);
 }
 
-void storeList(uint base, uint count) {
-  for (uint i = own; i < count; i += subgroupSize) push.preSegments.at[base + i] = load(i);
+void storeList(PreSegmentArray preSegments, uint count) {
+  for (uint i = own; i < count; i += subgroupSize) preSegments.at[i] = load(i);
   subgroupBarrier();
 }
 
@@ -129,14 +129,15 @@ void mergeCheapest(uint count, uint maxCount, uint cuts) {
 }
 
 struct ListOfPreSegments {
-  uint first;
+  PreSegmentArray preSegments;
   uint count;
   uint maxCount;  // that may be left
 };
 
 ListOfPreSegments listAt(uint place) {
   uint list = push.longLists.at[place];
-  return ListOfPreSegments(push.preSegmentOffsets.at[list], push.written.at[list], push.left.at[list]);
+  return ListOfPreSegments(preSegmentsFrom(push.preSegments, push.preSegmentOffsets.at[list]), push.written.at[list],
+      push.left.at[list]);
 }
 
 void main() {
@@ -147,13 +148,13 @@ void main() {
   uint step = gl_NumWorkGroups.x;
   ListOfPreSegments ahead = listAt(place);
   StoredPreSegment preSegmentAhead;
-  if (own < ahead.count) preSegmentAhead = push.preSegments.at[ahead.first + own];
+  if (own < ahead.count) preSegmentAhead = ahead.preSegments.at[own];
   for (; place < longListCount; place += step) {
     ListOfPreSegments list = ahead;
     if (place + step < longListCount) ahead = listAt(place + step);
-    uint cuts = loadList(list.first, list.count, preSegmentAhead);
-    if (own < ahead.count) preSegmentAhead = push.preSegments.at[ahead.first + own];
+    uint cuts = loadList(list.preSegments, list.count, preSegmentAhead);
+    if (own < ahead.count) preSegmentAhead = ahead.preSegments.at[own];
     mergeCheapest(list.count, list.maxCount, cuts);
-    storeList(list.first, list.maxCount);
+    storeList(list.preSegments, list.maxCount);
   }
 }

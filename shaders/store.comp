@@ -30,7 +30,7 @@ void copyFitting(uint from, uint slot, uint count) {
     if (compactForm) {
       storeCode(CompactArray(push.segments), behindReach(CompactArray(push.fitting).at[from + i]), slot + i, i, count);
     } else {
-      push.segments.at[slot + i] = push.fitting.at[from + i];
+      segmentsFrom(push.segments, slot + i).at[0] = segmentsFrom(push.fitting, from + i).at[0];
     }
   }
 }
@@ -45,13 +45,13 @@ void main() {
     copyFitting(push.fittingOffsets.at[list], push.offsets.at[list], count);
     return;
   }
-  uint first = push.preSegmentOffsets.at[list];
+  PreSegmentArray preSegments = preSegmentsFrom(push.preSegments, push.preSegmentOffsets.at[list]);
   uint slot = push.offsets.at[list];
   beginStoring();
-  StoredPreSegment ahead = push.preSegments.at[first];
+  StoredPreSegment ahead = preSegments.at[0];
   for (uint i = 0u; i < count; ++i) {
     StoredPreSegment preSegment = ahead;
-    if (i + 1u < count) ahead = push.preSegments.at[first + i + 1u];
+    if (i + 1u < count) ahead = preSegments.at[i + 1u];
     vec4 light = lightOf(preSegment);
     OpticalSegment segment = OpticalSegment(preSegment.span.x, preSegment.span.y, light.rgb, light.a);
     if (compactForm) {

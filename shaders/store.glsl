@@ -43,7 +43,7 @@ OpticalSegment loadSegment(SegmentArray segments, uint i, StoredForm form) {
     float opticalDepth = codedOpticalDepth(packed);
     return OpticalSegment(depths.x, depths.y, codedColor(packed) * opacityOf(opticalDepth), opticalDepth);
   }
-  Segment s = segments.at[i];
+  Segment s = segmentsFrom(segments, i).at[0];
   return OpticalSegment(s.front, s.back, vec3(s.red, s.green, s.blue), opticalDepthOf(s.opacity));
 }
 
@@ -95,7 +95,7 @@ void storeSegment(SegmentArray segments, uint slot, OpticalSegment segment, Stor
   if (compactForm) {
     CompactArray(segments).at[slot] = compacted(segment, form);
   } else {
-    segments.at[slot] = Segment(segment.front, segment.back, segment.color.r, segment.color.g, segment.color.b,
+    segmentsFrom(segments, slot).at[0] = Segment(segment.front, segment.back, segment.color.r, segment.color.g, segment.color.b,
         opacityOf(segment.opticalDepth));
   }
 }

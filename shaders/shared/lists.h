@@ -56,6 +56,11 @@ layout(buffer_reference, scalar, buffer_reference_align = 32) buffer FourCompact
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray { float at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4Array { vec4 at[]; };
+
+// Arrays may take more than 4 GiB, and where an index goes beyond them a driver may compute its place in 32 bits: lists of
+// an H200 came out wrong there. So a list's elements are counted from its first one.
+PreSegmentArray preSegmentsFrom(PreSegmentArray all, uint first) { return PreSegmentArray(uint64_t(all) + 32ul * first); }
+SegmentArray segmentsFrom(SegmentArray all, uint first) { return SegmentArray(uint64_t(all) + 24ul * first); }
 #endif
 
 #endif

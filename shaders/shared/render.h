@@ -68,6 +68,13 @@ VDI_SHARED_END
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer RenderSegmentArray { RenderSegment at[]; };
 // RenderSegments as render.comp reads them: at once; TableArray in cast.h says why.
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer RenderSegmentWords { uvec4 at[]; };
+// As those of lists.h.
+RenderSegmentArray renderSegmentsFrom(RenderSegmentArray all, uint first) {
+  return RenderSegmentArray(uint64_t(all) + 16ul * first);
+}
+RenderSegmentWords segmentWordsFrom(RenderSegmentWords all, uint first) {
+  return RenderSegmentWords(uint64_t(all) + 16ul * first);
+}
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ListHeads { ListHead at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer TileQueueAddress { TileQueue at; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer MaskArray { uint64_t at[]; };
@@ -81,12 +88,11 @@ VDI_SHARED_BEGIN
 struct ExpandConstants {
   VDI_ADDRESS(UintArray) offsets;            // [lists + 1]
   VDI_ADDRESS(SegmentArray) from;            // compact array, as stored: a part of the supersegments
-  VDI_ADDRESS(RenderSegmentArray) segments;  // all
+  VDI_ADDRESS(RenderSegmentArray) segments;  // all; expandModeSegments: those that come from `from`
   VDI_ADDRESS(ListHeads) heads;              // [lists]
   VDI_ADDRESS(MaskArray) tileDepthMasks;     // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
   VDI_ADDRESS(UintArray) depthRange;         // a DepthRange; depths aren't negative, so bits compare as they do
   uint mode;
-  uint first;        // supersegment that `from` starts with
   uint count;        // supersegments of `from`
   uint perspective;  // projection of V_O
   ivec2 lists;

@@ -67,6 +67,7 @@ void VdiLoader::start(const Vdi& header, LoadedVdi& target) {
   constants_.depthRange = target.depthRange.address();
   constants_.lists = size;
   constants_.form = storedForm(header.depthCode);
+  segmentBytes_ = segmentBytes(header.depthCode);
   constants_.perspective = header.camera.parallelProjection ? 0U : 1U;
 }
 
@@ -83,6 +84,16 @@ void VdiLoader::reserveSegments(std::uint64_t count) {
     segments.reserve(device_, bytes, MemoryKind::DeviceLocal);
   }
   constants_.segments = segments.address();
+}
+
+/// Supersegments [first, first + count) of all.
+void VdiLoader::recordSegments(VkDeviceAddress from, std::uint64_t first, std::uint64_t count) {
+  shared::ExpandConstants constants = constants_;
+  constants.mode = shared::expandModeSegments;
+  constants.from = from;
+  constants.segments += first * sizeof(shared::RenderSegment);
+  constants.count = static_cast<std::uint32_t>(count);
+  expand_.record(commands_, constants);
 }
 
 /// When all supersegments are there.
@@ -110,12 +121,8 @@ void VdiLoader::loadLists(const ListsOf<Segment>& lists, Kind kind) {
   inParts(lists.offsets, [&](std::uint64_t at, std::size_t first, std::size_t count) {
     commands_.copy(staging_, at, offsets_, first * wordBytes, count * wordBytes);
   });
-  constants_.mode = shared::expandModeSegments;
   inParts(lists.segments, [&](std::uint64_t at, std::size_t first, std::size_t count) {
-    constants_.from = staging_.address() + at;
-    constants_.first = static_cast<std::uint32_t>(first);
-    constants_.count = static_cast<std::uint32_t>(count);
-    expand_.record(commands_, constants_);
+    recordSegments(staging_.address() + at, first, count);
   });
   commands_.barrier();
   recordMasks();
@@ -146,11 +153,12 @@ gpu::Submission VdiLoader::add(const DeviceLists& band, std::uint64_t firstList)
     scan_.recordRebase(commands_, offsets_, firstList, static_cast<std::uint32_t>(words),
                        static_cast<std::uint32_t>(added_));
   }
-  constants_.mode = shared::expandModeSegments;
-  constants_.from = band.segments.address();
-  constants_.first = static_cast<std::uint32_t>(added_);
-  constants_.count = static_cast<std::uint32_t>(band.count);
-  if (band.count > 0) expand_.record(commands_, constants_);
+  // As many at a time as lie within 4 GiB (shared/lists.h).
+  constexpr std::uint64_t atOnce = std::uint64_t{1} << 26;
+  for (std::uint64_t first = 0; first < band.count; first += atOnce) {
+    recordSegments(band.segments.address() + first * segmentBytes_, added_ + first,
+                   std::min(atOnce, band.count - first));
+  }
   commands_.submit();
   added_ += band.count;
   return commands_.last();

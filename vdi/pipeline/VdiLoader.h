@@ -53,6 +53,7 @@ class VdiLoader {
  private:
   void start(const Vdi& header, LoadedVdi& target);
   void reserveSegments(std::uint64_t count);
+  void recordSegments(VkDeviceAddress from, std::uint64_t first, std::uint64_t count);
   void recordMasks();
   template <typename Segment>
   void loadLists(const ListsOf<Segment>& lists, Kind kind);
@@ -70,7 +71,8 @@ class VdiLoader {
   LoadedVdi* target_ = nullptr;
   gpu::shared::ExpandConstants constants_{};
   std::uint64_t listCount_ = 0;
-  std::uint64_t added_ = 0;  // supersegments of bands
+  std::uint64_t segmentBytes_ = 0;  // of one
+  std::uint64_t added_ = 0;         // supersegments of bands
   /// Behind the buffers, for its end waits for what uses them.
   gpu::Commands commands_;
 };
