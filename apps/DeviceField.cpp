@@ -31,7 +31,7 @@ DeviceField::DeviceField(std::shared_ptr<gpu::Device> device, const std::string&
 
 std::shared_ptr<std::byte[]> DeviceField::makeValues(const Lattice& lattice, const Part& part, double top) {
   const std::size_t layer = static_cast<std::size_t>(part.dims.x) * static_cast<std::size_t>(part.dims.y);
-  const std::shared_ptr<std::byte[]> data(
+  std::shared_ptr<std::byte[]> data(
       new std::byte[layer * static_cast<std::size_t>(part.dims.z) * sizeOf(lattice.type)]);
   constexpr std::size_t atOnce = std::size_t{16} << 20;
   const int slab = std::min(static_cast<int>(std::max<std::size_t>(atOnce / layer, 1)), part.dims.z);

@@ -194,6 +194,10 @@ int Communicator::hostLeader(int rank) const {
   return state_->hostLeaders[static_cast<std::size_t>(rank)];
 }
 
+std::span<const int> Communicator::hostLeaders() const {
+  return state_->hostLeaders;
+}
+
 void Communicator::barrier() const {
   if (!state_->serial()) check(MPI_Barrier(state_->comm()), "MPI_Barrier");
 }

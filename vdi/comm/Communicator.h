@@ -53,6 +53,7 @@ class Communicator {
   int localRank() const;  // rank among those that share this node's memory
   /// The lowest rank of those that share memory with `rank`: ranks of one host have the same.
   int hostLeader(int rank) const;
+  std::span<const int> hostLeaders() const;  // of all ranks
 
   void barrier() const;  // collective
 

@@ -99,6 +99,7 @@ Schedule Schedule::rounds(std::span<const int> hosts, int radix) {
   std::vector<int> byPlace{0, placeCount};
   const auto asPositions = [&](const std::vector<int>& boundaries) {
     std::vector<int> positions;
+    positions.reserve(boundaries.size());
     for (const int place : boundaries) positions.push_back(placeBegins[at(place)]);
     return positions;
   };
@@ -194,6 +195,7 @@ Schedule::Round Schedule::round(int index, int rank) const {
 
 std::vector<Schedule::Round> Schedule::roundsOf(int rank) const {
   std::vector<Round> rounds;
+  rounds.reserve(at(roundCount()));
   for (int index = 0; index < roundCount(); ++index) rounds.push_back(round(index, rank));
   return rounds;
 }

@@ -39,9 +39,7 @@ struct VdiGenerator::State {
       const bool shares = comm.size() > 1 && transport == comm::Transport::Shared;
       using Visible = detail::HostPool::Visible;
       pool = std::make_shared<detail::HostPool>(device, shares ? Visible::ToHost : Visible::ToProcess);
-      std::vector<int> hosts;
-      for (int r = 0; r < comm.size(); ++r) hosts.push_back(comm.hostLeader(r));
-      const comm::Schedule schedule = comm::Schedule::fromEnvironment(hosts);
+      const comm::Schedule schedule = comm::Schedule::fromEnvironment(comm.hostLeaders());
       bands = std::make_unique<detail::BandMaker>(device, comm, transport, schedule);
       steps = std::make_unique<detail::TimeSteps>(comm, bands->caster().volume());
       frames = std::make_unique<detail::Frames>(device, comm, transport, root);
