@@ -67,6 +67,9 @@ bool Device::runsGpuPrograms() const {
 const DeviceLimits& Device::limits() const {
   return state_->candidate.limits;
 }
+bool Device::isLost() const {
+  return state_->vulkan.isLost();
+}
 std::uint64_t Device::allocatedBytes() const {
   return static_cast<std::uint64_t>(state_->allocated.load());
 }

@@ -37,6 +37,8 @@ class Device {
   /// Whether programs are chosen that do more work to wait less: true for GPUs. The results are the same.
   bool runsGpuPrograms() const;
   const DeviceLimits& limits() const;
+  /// Whether its work has failed with a loss. It stays lost: another one must be created.
+  bool isLost() const;
 
   /// Bytes of device memory that Buffers and Images of this device hold now.
   std::uint64_t allocatedBytes() const;

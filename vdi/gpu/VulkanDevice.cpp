@@ -129,6 +129,11 @@ std::uint32_t VulkanDevice::memoryTypesOfHostPointer(const void* pages) const {
   return result == VK_SUCCESS ? properties.memoryTypeBits : 0;
 }
 
+void VulkanDevice::checkForLoss(VkResult result, const char* call) const {
+  if (result == VK_ERROR_DEVICE_LOST) lost_ = true;
+  check(result, call);
+}
+
 std::uint64_t VulkanDevice::submit(QueueKind kind, std::span<const VkSemaphoreSubmitInfo> waits,
                                    VkCommandBuffer commands) {
   const VkCommandBufferSubmitInfo buffer{VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO, nullptr, commands, 0};
@@ -146,7 +151,7 @@ std::uint64_t VulkanDevice::submit(QueueKind kind, std::span<const VkSemaphoreSu
                            &buffer,
                            1,
                            &done};
-  check(vkQueueSubmit2(target.handle, 1, &info, VK_NULL_HANDLE), "vkQueueSubmit2");
+  checkForLoss(vkQueueSubmit2(target.handle, 1, &info, VK_NULL_HANDLE), "vkQueueSubmit2");
   return ++target.submissions;
 }
 
@@ -170,7 +175,7 @@ void VulkanDevice::endLabel(VkCommandBuffer commands) const {
 void VulkanDevice::wait(QueueKind kind, std::uint64_t submissions) const {
   const VkSemaphore done = queue(kind).done;
   const VkSemaphoreWaitInfo info{VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO, nullptr, 0, 1, &done, &submissions};
-  check(vkWaitSemaphores(device_, &info, UINT64_MAX), "vkWaitSemaphores");
+  checkForLoss(vkWaitSemaphores(device_, &info, UINT64_MAX), "vkWaitSemaphores");
 }
 
 }  // namespace vdi::gpu

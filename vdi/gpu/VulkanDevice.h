@@ -4,6 +4,7 @@
 #include <vulkan/vulkan.h>
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <optional>
@@ -49,6 +50,8 @@ class VulkanDevice {
                        VkCommandBuffer commands);
   /// Waits for that many. Throws Error{DeviceFailure} on device loss.
   void wait(QueueKind kind, std::uint64_t submissions) const;
+  /// Whether a submission or a wait has found it lost: it stays so.
+  bool isLost() const { return lost_; }
   /// For `waits` of submit.
   VkSemaphore submissionsDone(QueueKind kind) const { return queue(kind).done; }
 
@@ -75,11 +78,13 @@ class VulkanDevice {
   void setUp();
   void release() noexcept;
   void setNameOf(VkObjectType type, std::uint64_t handle, const std::string& name) const;
+  void checkForLoss(VkResult result, const char* call) const;
 
   std::string name_;
   VkDevice device_ = VK_NULL_HANDLE;
   std::array<Queue, 2> queues_;  // by kind
   std::mutex queueMutex_;
+  mutable std::atomic<bool> lost_ = false;
   VkPipelineCache cache_ = VK_NULL_HANDLE;
   VkPhysicalDeviceMemoryProperties memory_{};
   PFN_vkGetMemoryHostPointerPropertiesEXT hostPointerProperties_ = nullptr;

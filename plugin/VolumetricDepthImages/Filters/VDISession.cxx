@@ -44,16 +44,11 @@ Existing& existing() {
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank) {
   const std::scoped_lock lock(existing().mutex);
   std::shared_ptr<vdi::gpu::Device> device = existing().device.lock();
-  if (!device) {
+  if (!device || device->isLost()) {
     device = vdi::gpu::Device::create(vdi::gpu::requestFromEnvironment(localRank));
     existing().device = device;
   }
   return device;
-}
-
-void forgetDevice() {
-  const std::scoped_lock lock(existing().mutex);
-  existing().device.reset();
 }
 
 }  // namespace pv

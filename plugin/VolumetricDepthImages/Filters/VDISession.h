@@ -20,11 +20,9 @@ vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller);
 /// won't enter (VDICollective.h).
 void enterCollective(vtkMultiProcessController* controller, const std::string& operation);
 
-/// The process's device, made at the first call and kept while anybody holds it. From any thread. Throws
-/// vdi::Error{DeviceUnavailable}.
+/// The process's device, made at the first call and kept while anybody holds it. Where that is lost, a new
+/// one. From any thread. Throws vdi::Error{DeviceUnavailable}.
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank);
-/// A lost device stays lost: the next sharedDevice makes a new one, though somebody still holds this.
-void forgetDevice();
 
 }  // namespace pv
 

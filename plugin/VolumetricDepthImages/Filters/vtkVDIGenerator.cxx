@@ -273,7 +273,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     try {
       this->Generate(input, time, output);
     } catch (const vdi::Error& error) {
-      if (!this->ForgetLostDevice(error)) throw;
+      if (!this->DropLostDevice(error)) throw;
       vtkWarningMacro(<< error.what() << "; trying a new device");
       output->Initialize();
       this->Generate(input, time, output);
@@ -286,7 +286,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
       this->KeepEarlier(earlier, output);
       return 1;
     }
-    this->ForgetLostDevice(error);
+    this->DropLostDevice(error);
     vtkErrorMacro(<< error.what());
     return 0;
   } catch (const std::exception& error) {
@@ -298,15 +298,17 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   return 1;
 }
 
-/// A lost device stays lost: what comes next gets a new one. Ranks would have to agree on that. Returns
-/// whether the error was such a loss, and this rank is the only one.
-bool vtkVDIGenerator::ForgetLostDevice(const vdi::Error& error) {
-  const bool isAlone = this->Controller == nullptr || this->Controller->GetNumberOfProcesses() == 1;
-  if (error.code() != vdi::ErrorCode::DeviceFailure || !isAlone) return false;
+/// Whether `error` is that a rank has lost its device: the generators are given up then, and new ones get
+/// devices that aren't lost. Collective where there's a generator, for then all ranks have failed together.
+bool vtkVDIGenerator::DropLostDevice(const vdi::Error& error) {
+  const bool maybe =
+      error.code() == vdi::ErrorCode::DeviceFailure || error.code() == vdi::ErrorCode::RemoteRank;
+  if (!maybe || !this->Internal->Generator) return false;
+  const vdi::VdiGenerator& generator = *this->Internal->Generator;
+  if (!generator.communicator().anyTogether([&] { return generator.device().isLost(); })) return false;
   this->DropPreparation();
   this->Internal->Generator.reset();
   this->Internal->Shown.reset();
-  pv::forgetDevice();
   return true;
 }
 

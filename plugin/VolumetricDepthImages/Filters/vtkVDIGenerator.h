@@ -153,7 +153,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void DropPreparation();
   bool TakePreparation(vtkDataObject* input, double time, vtkImageData* output);
   void KeepEarlier(vtkImageData* earlier, vtkImageData* output);
-  bool ForgetLostDevice(const vdi::Error& error);
+  bool DropLostDevice(const vdi::Error& error);
   std::array<int, 2> PictureSize() const;
   void SetReport(const char* text);
 

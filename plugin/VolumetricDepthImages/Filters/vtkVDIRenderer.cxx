@@ -104,7 +104,6 @@ int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs,
     if (error.code() == vdi::ErrorCode::DeviceFailure) {  // a lost device stays lost
       this->Internal->Renderer.reset();
       this->Internal->Uploaded = nullptr;
-      pv::forgetDevice();
     }
     output->Initialize();
     vtkErrorMacro(<< error.what());

@@ -297,7 +297,6 @@ bool vtkVDIProp::Recover(const vdi::Error& error) {
     return false;
   internal.IsRecovering = true;
   vtkWarningMacro(<< error.what() << "; trying a new device");
-  pv::forgetDevice();
   internal.Buffers.clear();
   internal.Buffers.load(internal.Piece);
   this->Take(/*waits*/ true);
@@ -314,8 +313,6 @@ void vtkVDIProp::Fail(const std::exception& error) {
             "mesa-vulkan-drivers) needs no GPU. Found: ";
         break;
       case vdi::ErrorCode::DeviceFailure:
-        pv::forgetDevice();  // what comes next gets a new one
-        [[fallthrough]];
       case vdi::ErrorCode::OutOfMemory:
         help = "The VDI can't be shown: ";
         break;
