@@ -146,6 +146,7 @@ gpu::Submission VdiLoader::add(const DeviceLists& band, std::uint64_t firstList)
     throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI");
   commands_.begin();
   commands_.waitFor(band.written);
+  outgrown_ = {};  // begin has waited for what used it
   reserveSegments(band.count);
   const std::uint64_t words = std::uint64_t{band.listCount} + 1;
   commands_.copy(band.offsets, 0, offsets_, firstList * wordBytes, words * wordBytes);
@@ -166,6 +167,7 @@ gpu::Submission VdiLoader::add(const DeviceLists& band, std::uint64_t firstList)
 
 void VdiLoader::finish() {
   commands_.begin();
+  outgrown_ = {};
   recordMasks();
   commands_.submit();
 }
