@@ -213,7 +213,7 @@ TEST_CASE("schedules: direct send and rounds give the same VDI and picture", "[r
                                           Joint::SharedPoints, ScalarType::U8, world.rank(), world.size());
   GenerateSettings settings = test::smallSettings(61, 45, 6);
   settings.budget = GENERATE(Budget::List, Budget::Total);
-  if (settings.budget == Budget::Total && world.size() > 3) return;  // it takes long enough
+  if (settings.budget == Budget::Total && world.size() > 2) return;  // it takes long enough
   const TransferFunction function = test::threeHues(80.0);
   std::optional<Vdi> expected;
   std::optional<Image> picture;

@@ -47,42 +47,37 @@ TEST_CASE("a VDI that is shown from the device's lists is the one that goes by w
   const auto other = gpu::Device::create(gpu::requestFromEnvironment(0));
   VdiRenderer renderer(device());
   VdiRenderer elsewhere(other);
-  for (const char* bands : {"1", "5"}) {
+  using Way = std::pair<const char*, Precision>;
+  for (const auto& [bands, precision] : {Way{"1", Precision::Full}, Way{"5", Precision::Compact}}) {
     setenv("VDI_BANDS", bands, 1);
     VdiGenerator generator(device(), comm::Communicator::serial());
     generator.setBlocks(decomposed.mine);
-    for (const Precision precision : {Precision::Compact, Precision::Full}) {
-      INFO(bands << " bands, " << toString(precision));
-      GenerateSettings settings = test::smallSettings(90, 70, 8);
-      settings.precision = precision;
-      // The second frame has more supersegments than the first one had room for.
-      for (const double density : {0.2, 20.0, 1.0}) {
-        const TransferFunction function = test::threeHues(density);
-        const Vdi vdi = *generator.generate(test::oblique(), function, settings);
-        generator.show(&renderer, test::oblique(), function, settings);
-        // The generator's memory is used again before the renderer is.
-        generator.generate(test::oblique().azimuth(90.0), test::threeHues(3.0), settings);
-        generator.show(&elsewhere, test::oblique(), function, settings);
-        for (const double angle : {0.0, 25.0}) {
-          const Camera camera = test::oblique().azimuth(angle);
-          const Image expected = viewOf(vdi, camera);
-          for (VdiRenderer* const shows : {&renderer, &elsewhere}) {
-            const Image image = shows->render(camera, expected.width, expected.height);
-            CHECK(image.rgba == expected.rgba);
-            CHECK(image.depth == expected.depth);
-          }
-        }
+    INFO(bands << " bands, " << toString(precision));
+    GenerateSettings settings = test::smallSettings(90, 70, 8);
+    settings.precision = precision;
+    // The second frame has more supersegments than the first one had room for.
+    for (const double density : {0.2, 20.0}) {
+      const TransferFunction function = test::threeHues(density);
+      const Vdi vdi = *generator.generate(test::oblique(), function, settings);
+      generator.show(&renderer, test::oblique(), function, settings);
+      // The generator's memory is used again before the renderer is.
+      generator.generate(test::oblique().azimuth(90.0), test::threeHues(3.0), settings);
+      generator.show(&elsewhere, test::oblique(), function, settings);
+      const Camera camera = test::oblique().azimuth(25.0);
+      const Image expected = viewOf(vdi, camera);
+      for (VdiRenderer* const shows : {&renderer, &elsewhere}) {
+        const Image image = shows->render(camera, expected.width, expected.height);
+        CHECK(image.rgba == expected.rgba);
+        CHECK(image.depth == expected.depth);
       }
-      const Progress stop = [](double) { return false; };
-      CHECK_THROWS_AS(generator.show(&renderer, test::oblique(), test::threeHues(1.0), settings, stop),
-                      Error);
-      CHECK_THROWS_AS(renderer.render(test::oblique(), 90, 70), Error);  // nothing is shown
-      CHECK_THROWS_AS(generator.show(nullptr, test::oblique(), test::threeHues(1.0), settings), Error);
-      generator.setBlocks({});
-      generator.show(&renderer, test::oblique(), test::threeHues(1.0), settings);
-      CHECK(renderer.render(test::oblique(), 9, 7).rgba[31] == glm::vec4(0.0F));
-      generator.setBlocks(decomposed.mine);
     }
+    const Progress stop = [](double) { return false; };
+    CHECK_THROWS_AS(generator.show(&renderer, test::oblique(), test::threeHues(1.0), settings, stop), Error);
+    CHECK_THROWS_AS(renderer.render(test::oblique(), 90, 70), Error);  // nothing is shown
+    CHECK_THROWS_AS(generator.show(nullptr, test::oblique(), test::threeHues(1.0), settings), Error);
+    generator.setBlocks({});
+    generator.show(&renderer, test::oblique(), test::threeHues(1.0), settings);
+    CHECK(renderer.render(test::oblique(), 9, 7).rgba[31] == glm::vec4(0.0F));
     unsetenv("VDI_BANDS");
   }
 }
