@@ -20,9 +20,9 @@ class DeviceField {
   /// Throws Error{InvalidArgument} that lists the names there are.
   DeviceField(std::shared_ptr<gpu::Device> device, const std::string& name, std::uint32_t seed);
 
-  /// A part's values, `top` times the field's, of the lattice's type. They're
-  /// deterministic on a device; another one, and makeField, which works in double precision, may give others
-  /// in the sixth digit. The lattice's spacing must be the same on all axes, its origin 0.
+  /// A part's values, `top` times the field's, of the lattice's type. They're deterministic on a device;
+  /// another one, and makeField, which works in double precision, may give others in the sixth digit. The
+  /// lattice's spacing must be the same on all axes, its origin 0.
   std::shared_ptr<std::byte[]> makeValues(const Lattice& lattice, const Part& part, double top);
   /// Blocks for parts of `all`, which is copies of `one` side by side; they share values.
   std::vector<Block> makeBlocks(const Lattice& one, const Lattice& all, std::span<const Part> parts,

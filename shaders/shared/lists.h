@@ -40,6 +40,7 @@ struct StoredForm {
 
 #ifdef __cplusplus
 inline uint isCompact(const StoredForm& form) { return form.depthStep > 0.0F ? 1 : 0; }
+static_assert(sizeof(StoredPreSegment) == 32 && sizeof(Segment) == 24);  // as preSegmentsFrom and segmentsFrom count
 #endif
 
 VDI_SHARED_END
@@ -57,8 +58,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { 
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray { float at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4Array { vec4 at[]; };
 
-// Arrays may take more than 4 GiB, and where an index goes beyond them a driver may compute its place in 32 bits: lists of
-// an H200 came out wrong there. So a list's elements are counted from its first one.
+// Arrays may take more than 4 GiB. Where an index goes beyond them, a driver may compute its place in
+// 32 bits: lists of an H200 came out wrong there. So a list's elements are counted from its first one.
 PreSegmentArray preSegmentsFrom(PreSegmentArray all, uint first) { return PreSegmentArray(uint64_t(all) + 32ul * first); }
 SegmentArray segmentsFrom(SegmentArray all, uint first) { return SegmentArray(uint64_t(all) + 24ul * first); }
 #endif

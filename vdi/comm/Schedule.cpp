@@ -46,18 +46,7 @@ int partsFor(int size, int radix) {
 
 Schedule Schedule::direct(int ranks) {
   assert(ranks >= 1);
-  Schedule schedule;
-  schedule.rankAt_.resize(at(ranks));
-  std::iota(schedule.rankAt_.begin(), schedule.rankAt_.end(), 0);
-  schedule.positionOf_ = schedule.rankAt_;
-  schedule.hostAt_.assign(at(ranks), 0);
-  schedule.hostPositions_ = {schedule.rankAt_};
-  schedule.stretches_ = {{0, ranks}};
-  if (ranks == 1) return schedule;
-  std::vector<int> single(at(ranks + 1));
-  std::iota(single.begin(), single.end(), 0);
-  schedule.stretches_.push_back(std::move(single));
-  return schedule;
+  return rounds(std::vector<int>(at(ranks), 0), std::max(ranks, 2));
 }
 
 Schedule Schedule::rounds(std::span<const int> hosts, int radix) {
@@ -160,8 +149,7 @@ int Schedule::receiverOf(int position, const Shares& kept, const Shares& sent) c
   const int host = hostAt_[at(position)];
   const Shares here = ofHost(host, sent);
   if (here.count() == 0) return sent.first + (position - kept.first) % sent.count();
-  const Shares own = ofHost(host, kept);
-  const int index = ofHost(host, {kept.first, position}).last - own.first;
+  const int index = ofHost(host, {kept.first, position}).count();
   return hostPositions_[at(host)][at(here.first + index % here.count())];
 }
 

@@ -1,7 +1,5 @@
 #include "vdi/pipeline/BandMaker.h"
 
-#include "vdi/pipeline/Stages.h"
-
 namespace vdi::detail {
 
 BandMaker::BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
@@ -90,9 +88,16 @@ comm::Ownership BandMaker::ownershipOf(const RayCaster::Cast& cast, const Bands&
   return comm::Ownership::balanced(lists, comm_.size(), weights.subspan(first, last - first), width * stride);
 }
 
+/// Collective: `lists`, which the rank holds before the round, to those who keep them.
+void BandMaker::distribute(Slot& slot, const DeviceLists& lists, const comm::Schedule::Round& round,
+                           const DepthCode& code, Stopwatch& watch, RankReport& report) {
+  slot.parts = slot.distributor->distribute(lists, slot.owned, round, segmentBytes(code));
+  report.bytesSent += slot.distributor->bytesSent();
+  report.distributeSeconds += watch.lap();
+}
+
 /// Collective: all rounds of the schedule but the first. What came is merged before it's sent on.
-void BandMaker::distributeAgain(Slot& slot, const DepthCode& code, RankReport& report) {
-  Stopwatch watch;
+void BandMaker::distributeAgain(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report) {
   for (std::size_t i = 1; i < rounds_.size(); ++i) {
     DeviceLists& partial = partial_[i % partial_.size()];
     comm_.together([&] {
@@ -103,9 +108,7 @@ void BandMaker::distributeAgain(Slot& slot, const DepthCode& code, RankReport& r
       compositor_.finish();
     });
     report.compositeSeconds += watch.lap();
-    slot.parts = slot.distributor->distribute(partial, slot.owned, rounds_[i], segmentBytes(code));
-    report.bytesSent += slot.distributor->bytesSent();
-    report.distributeSeconds += watch.lap();
+    distribute(slot, partial, rounds_[i], code, watch, report);
   }
 }
 
@@ -144,14 +147,9 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
     });
     report.subSupersegments += slot.lists.count;
     report.generateSeconds += watch.lap();
-    slot.parts =
-        slot.distributor->distribute(slot.lists, slot.owned, rounds_.front(), segmentBytes(request.code));
-    report.bytesSent += slot.distributor->bytesSent();
-    report.distributeSeconds += watch.lap();
+    distribute(slot, slot.lists, rounds_.front(), request.code, watch, report);
     if (band > 0) sink.pass(band - 1);
-    report.compositeSeconds += watch.lap();
-    distributeAgain(slot, request.code, report);
-    watch.lap();
+    distributeAgain(slot, request.code, watch, report);
     comm_.together([&] {
       compositor_.interleave(slot.parts, request.code, merged_[band].interleaved);
       compose(band);

@@ -21,6 +21,7 @@
 #include "vdi/pipeline/GatheredLists.h"
 #include "vdi/pipeline/Pipeline.h"
 #include "vdi/pipeline/RayCaster.h"
+#include "vdi/pipeline/Stages.h"
 
 namespace vdi::detail {
 
@@ -108,7 +109,9 @@ class BandMaker {
   };
 
   void agreeOnLists(RayCaster::Cast& cast);
-  void distributeAgain(Slot& slot, const DepthCode& code, RankReport& report);
+  void distribute(Slot& slot, const DeviceLists& lists, const comm::Schedule::Round& round,
+                  const DepthCode& code, Stopwatch& watch, RankReport& report);
+  void distributeAgain(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report);
   comm::Ownership ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
                               std::span<const std::uint32_t> weights) const;
   /// Collective: this rank's lists, band after band, to those who own them, where they're merged by depth.

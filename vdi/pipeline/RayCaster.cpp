@@ -64,10 +64,9 @@ std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytes
   const std::uint64_t room = std::max(std::min(memory / 8, left / 4), rowBytes);
   // A list is an invocation, or more, in workgroups of 64: as many as every device allows.
   constexpr std::uint64_t maxLists = std::uint64_t{64} * 65535;
-  const std::uint64_t most =
-      std::max<std::uint64_t>(maxLists / static_cast<std::uint64_t>(request.view.width()), 1);
-  std::uint64_t rows =
-      std::min({height, room / rowBytes, most / shared::countedStride * shared::countedStride});
+  const std::uint64_t stride = shared::countedStride;
+  const std::uint64_t most = maxLists / static_cast<std::uint64_t>(request.view.width()) / stride * stride;
+  std::uint64_t rows = std::min({height, room / rowBytes, most});
   rows = std::min(rows, std::max<std::uint64_t>((height + bands - 1) / bands, 1));
   rows = (rows + shared::countedStride - 1) / shared::countedStride * shared::countedStride;
   return static_cast<std::uint32_t>(std::min(height, rows));
