@@ -44,6 +44,8 @@ struct Ray {
 struct ImagePlane {
   glm::dvec2 low{-1.0};
   glm::dvec2 high{1.0};
+
+  bool operator==(const ImagePlane&) const = default;
 };
 
 /// A camera with a viewport of width x height pixels: the orthonormal view basis and the mapping between

@@ -18,6 +18,7 @@
 #include <string_view>
 
 #include "pqVDIRegenerator.h"
+#include "pqVDIStillFrames.h"
 #include "vtkSMVDIGeneratorProxy.h"
 
 namespace {
@@ -60,6 +61,7 @@ void lookFromViewpoint(pqPipelineSource* source) {
 }  // namespace
 
 void pqVDIBehavior::startup() {
+  new pqVDIStillFrames(this);
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::sourceAdded, this, &pqVDIBehavior::sourceAdded);
   for (pqPipelineSource* source : model->findItems<pqPipelineSource*>()) this->sourceAdded(source);

@@ -1,5 +1,5 @@
-// Started with the plugin: gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator, and looks at
-// what the user has opened from where it was made.
+// Started with the plugin: gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator, has still
+// frames deferred, and looks at what the user has opened from where it was made.
 #ifndef pqVDIBehavior_h
 #define pqVDIBehavior_h
 

@@ -14,6 +14,8 @@ namespace pv {
 
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 /// Across a VDI with few lists. Rough pictures on a CPU are hardly larger.
 constexpr int thinWidth = 160;
 
@@ -28,6 +30,7 @@ void VDIBuffers::clear() {
   job_ = {};
   loading_ = nullptr;
   waiting_ = nullptr;
+  still_.drop();
   renderers_ = std::make_shared<Renderers>();
   hasVdi_ = false;
 }
@@ -79,6 +82,7 @@ VDIBuffers::Loaded VDIBuffers::loaded(vtkFieldData* fields, Renderers& renderers
 }
 
 void VDIBuffers::takeOne() {
+  still_.drop();
   try {
     const Loaded result = job_.get();
     hasVdi_ = result.hasVdi;
@@ -105,10 +109,15 @@ void VDIBuffers::takeOne() {
   this->startNext();
 }
 
-bool VDIBuffers::take(bool waits) {
+bool VDIBuffers::hasLoaded() const {
+  return job_.valid() && job_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
+
+bool VDIBuffers::take(Clock::duration wait) {
+  const Clock::time_point end = Clock::now() + wait;
   bool hasTaken = false;
   while (job_.valid()) {
-    if (!waits && job_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) break;
+    if (job_.wait_until(end) != std::future_status::ready) break;
     const bool isNewest = waiting_ == nullptr;
     try {
       this->takeOne();

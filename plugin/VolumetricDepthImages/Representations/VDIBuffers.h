@@ -5,11 +5,13 @@
 #include <vtkSmartPointer.h>
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <future>
 #include <memory>
 #include <optional>
 
+#include "VDIStill.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/pipeline/Pipeline.h"
 
@@ -31,10 +33,13 @@ class VDIBuffers {
   /// Starts to load the VDI of a piece (VDIPiece.h). While an earlier one is being loaded the piece waits, in
   /// the place of one that waits already.
   void load(vtkDataObject* piece);
-  /// Shows what has been loaded since, and starts what waits; returns whether there was anything. `waits`:
-  /// for the newest piece. Throws vdi::Error for a VDI that isn't sound or has nothing in it, for a problem,
-  /// and where the device doesn't do it; then nothing is shown.
-  bool take(bool waits);
+  /// Shows what has been loaded since, and starts what waits; returns whether there was anything. Waits for
+  /// the newest piece as long as that; beyond, the last one is shown. Throws vdi::Error for a VDI that isn't
+  /// sound or has nothing in it, for a problem, and where the device doesn't do it; then nothing is shown.
+  bool take(std::chrono::steady_clock::duration wait);
+  /// Whether something newer than what is shown is on its way, and whether `take` would show it at once.
+  bool isLoading() const { return job_.valid(); }
+  bool hasLoaded() const;
   /// Shows nothing and gives the device back.
   void clear();
 
@@ -47,6 +52,9 @@ class VDIBuffers {
   /// anyway.
   vdi::VdiRenderer* thinRenderer() { return thinLists_ > 0 ? renderers_->thin.get() : nullptr; }
   std::size_t thinLists() const { return thinLists_; }
+  bool isOnCpu() const { return renderers_->thin != nullptr; }
+  /// The picture of that VDI that is made beside the frames: goes with the VDI. Who renders drops it first.
+  VDIStill& still() { return still_; }
 
  private:
   struct Renderers {
@@ -70,6 +78,7 @@ class VDIBuffers {
   std::future<Loaded> job_;
   vtkSmartPointer<vtkFieldData> loading_;  // the job's; goes on this thread
   vtkSmartPointer<vtkFieldData> waiting_;
+  VDIStill still_;  // behind the renderers that it uses
 };
 
 }  // namespace pv

@@ -36,8 +36,16 @@ vdi::View ViewMatrices::view(int width, int height) const {
   return {camera_, width, height, plane_};
 }
 
+vdi::View ViewMatrices::rows(const glm::ivec2& size, int first, int count) const {
+  const double height = (plane_.high.y - plane_.low.y) / size.y;  // of a pixel
+  vdi::ImagePlane plane = plane_;
+  plane.low.y = plane_.low.y + height * first;
+  plane.high.y = plane_.low.y + height * (first + count);
+  return {camera_, size.x, count, plane};
+}
+
 float ViewMatrices::depthOf(float window) const {
-  if (window >= backgroundDepth) return std::numeric_limits<float>::infinity();
+  if (!isObject(window)) return std::numeric_limits<float>::infinity();
   const double clip = 2.0 * window - 1.0;
   // z of clip coordinates is depthOffset - depthScale * depth; by perspective it's divided by depth.
   const double depth =

@@ -26,12 +26,15 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <sstream>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "VDIBuffers.h"
 #include "VDISession.h"
+#include "VDIStill.h"
 #include "VDIView.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -45,6 +48,10 @@ using Clock = std::chrono::steady_clock;
 double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
+
+/// For a VDI that's being loaded.
+constexpr std::chrono::milliseconds shortWait{30};
+constexpr std::chrono::hours untilDone{24 * 365};
 
 constexpr const char* pictureShader = R"(//VTK::System::Dec
 //VTK::Output::Dec
@@ -141,6 +148,10 @@ class vtkVDIProp::Pace {
     if (!this->PerPixel) return std::nullopt;
     return std::max(1.0 / rate - this->Anyway.value_or(0.0), 0.5 / rate) / *this->PerPixel;
   }
+  std::optional<double> Seconds(double pixels) const {
+    if (!this->PerPixel) return std::nullopt;
+    return pixels * *this->PerPixel;
+  }
   /// A guess from a frame that wasn't interactive.
   void Guess(double renderSeconds, double pixels) {
     if (!this->PerPixel) this->PerPixel = renderSeconds / pixels;
@@ -154,11 +165,18 @@ class vtkVDIProp::Pace {
   std::optional<double> PerPixel;
 };
 
+/// How a picture of the VDI is made.
+struct vtkVDIProp::Form {
+  glm::ivec2 size;
+  bool isThin;  // of few lists
+};
+
 struct vtkVDIProp::Internals {
   pv::VDIBuffers Buffers;
   vtkSmartPointer<vtkDataObject> Piece;
   vtkMTimeType PieceTime = 0;
-  bool IsInteractive = false;
+  Frame NextFrame = Frame::Whole;
+  bool IsBehind = false;           // the window is
   bool IsRecovering = false;       // until a frame has been drawn on the new device
   vtkMTimeType FailedTime = 0;     // of the piece that has failed to be drawn
   glm::ivec2 FailedSize{0};        // in a viewport of that size
@@ -184,10 +202,13 @@ struct vtkVDIProp::Internals {
 
   int Width = 400;  // of the viewport, pixels
 
-  struct Form {
-    glm::ivec2 size;  // of the VDI's picture
-    bool isThin;      // of few lists
-  };
+  /// Whether the next frame leaves what takes long to a later one.
+  bool DefersIn(vtkRenderWindow* window, const glm::ivec2& port) {
+    constexpr double longTime = 0.05;  // seconds
+    if (this->NextFrame != Frame::Deferred || window->GetStereoRender() != 0) return false;
+    return this->Whole.Seconds(static_cast<double>(port.x) * port.y)
+               .value_or(this->Buffers.isOnCpu() ? 2.0 * longTime : 0.0) > longTime;
+  }
   Form InteractiveForm(const glm::ivec2& port, double rate) {
     const double all = static_cast<double>(port.x) * port.y;
     Form form{port, false};
@@ -241,6 +262,7 @@ void vtkVDIProp::PrintSelf(ostream& os, vtkIndent indent) {
 
 void vtkVDIProp::SetVisibility(vtkTypeBool visible) {
   this->Superclass::SetVisibility(visible);
+  if (visible == 0) this->Internal->IsBehind = false;
   this->Internal->ShowMessage(visible != 0);
 }
 
@@ -262,9 +284,9 @@ void vtkVDIProp::Say(const std::string& text) {
   vtkErrorMacro(<< text);
 }
 
-void vtkVDIProp::Prepare(vtkDataObject* piece, bool isInteractive) {
+void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
   Internals& internal = *this->Internal;
-  internal.IsInteractive = isInteractive;
+  internal.NextFrame = frame;
   const vtkMTimeType time = piece != nullptr ? piece->GetMTime() : 0;
   if (piece != internal.Piece || time != internal.PieceTime) {
     internal.Piece = piece;
@@ -277,12 +299,25 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, bool isInteractive) {
       this->Say({});
     }
   }
-  this->Take(!isInteractive);
+  if (frame == Frame::Interactive) {
+    this->Take(std::chrono::seconds(0));
+  } else {
+    this->Take(frame == Frame::Deferred && internal.Buffers.hasVdi() ? shortWait : untilDone);
+  }
 }
 
-void vtkVDIProp::Take(bool waits) {
+bool vtkVDIProp::IsBehind() const {
+  return this->Internal->IsBehind;
+}
+
+bool vtkVDIProp::HasMore() const {
+  pv::VDIBuffers& buffers = this->Internal->Buffers;
+  return this->IsBehind() && (buffers.isLoading() ? buffers.hasLoaded() : !buffers.still().isBeingMade());
+}
+
+void vtkVDIProp::Take(Clock::duration wait) {
   try {
-    if (this->Internal->Buffers.take(waits)) this->Say({});
+    if (this->Internal->Buffers.take(wait)) this->Say({});
   } catch (const vdi::Error& error) {
     if (!this->Recover(error)) this->Fail(error);
   } catch (const std::exception& error) {
@@ -299,7 +334,7 @@ bool vtkVDIProp::Recover(const vdi::Error& error) {
   vtkWarningMacro(<< error.what() << "; trying a new device");
   internal.Buffers.clear();
   internal.Buffers.load(internal.Piece);
-  this->Take(/*waits*/ true);
+  this->Take(untilDone);
   return internal.Buffers.hasVdi();
 }
 
@@ -340,10 +375,14 @@ void vtkVDIProp::ReleaseGraphicsResources(vtkWindow* window) {
 int vtkVDIProp::RenderOpaqueGeometry(vtkViewport* viewport) {
   // Edges are smoothed next, before volumes. On a CPU that takes five times as long as all else of a frame.
   auto* renderer = vtkRenderer::SafeDownCast(viewport);
-  if (renderer == nullptr || !this->Internal->IsInteractive || !renderer->GetUseFXAA() || !drawsOnCpu())
-    return 0;
+  if (renderer == nullptr || !renderer->GetUseFXAA() || !drawsOnCpu()) return 0;
+  Internals& internal = *this->Internal;
+  const bool isRough = internal.DefersIn(renderer->GetRenderWindow(), viewportOf(renderer).size)
+                           ? !internal.Buffers.still().isDone()
+                           : internal.NextFrame == Frame::Interactive;
+  if (!isRough) return 0;
   renderer->SetUseFXAA(false);
-  this->Internal->WasSmooth = true;
+  internal.WasSmooth = true;
   return 0;
 }
 
@@ -369,6 +408,8 @@ int vtkVDIProp::RenderOverlay(vtkViewport* viewport) {
 
 int vtkVDIProp::DrawIn(vtkViewport* viewport) {
   Internals& internal = *this->Internal;
+  // A picture of the window that's taken meanwhile doesn't show in it.
+  if (internal.NextFrame != Frame::Whole) internal.IsBehind = false;
   auto* renderer = vtkRenderer::SafeDownCast(viewport);
   auto* window = renderer ? vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()) : nullptr;
   if (window == nullptr || renderer->GetSelector() != nullptr) return 0;
@@ -422,24 +463,87 @@ void vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   Internals& internal = *this->Internal;
   const Viewport port = viewportOf(renderer);
   if (port.size.x < 1 || port.size.y < 1) return;
-  const Clock::time_point start = Clock::now();
-  const auto [size, isThin] = internal.IsInteractive ? internal.InteractiveForm(port.size, this->FrameRate)
-                                                     : Internals::Form{port.size, false};
-  vdi::VdiRenderer& views = isThin ? *internal.Buffers.thinRenderer() : internal.Buffers.renderer();
-
   const pv::ViewMatrices matrices = matricesOf(renderer);
   readDepths(window, port, internal.Window);
-  const bool hasObjects = std::any_of(internal.Window.begin(), internal.Window.end(),
-                                      [](float z) { return z < pv::backgroundDepth; });
-  internal.Ends.resize(hasObjects ? static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) : 0);
-  if (hasObjects) pv::depthsOf(matrices, internal.Window, port.size, size, internal.Ends);
+  if (internal.DefersIn(window, port.size)) {
+    this->DrawDeferred(window, {matrices, port.size, static_cast<vdi::Reconstruction>(this->Reconstruction),
+                                internal.Window});
+    return;
+  }
+  internal.Buffers.still().drop();
+  const Form form = internal.NextFrame == Frame::Interactive
+                        ? internal.InteractiveForm(port.size, this->FrameRate)
+                        : Form{port.size, false};
+  this->DrawNow(window, matrices, port.size, form);
+}
 
+void vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view) {
+  Internals& internal = *this->Internal;
+  pv::VDIStill& still = internal.Buffers.still();
+  if (still.isOf(view) && still.isDone()) {
+    this->ShowPicture(window, view.size, still.picture());
+    internal.Whole.Guess(still.seconds(), static_cast<double>(view.window.size()));
+    internal.IsBehind = internal.Buffers.isLoading();
+    return;
+  }
+  if (still.isOf(view) && internal.Texture->GetHandle() != 0) {
+    this->ShowTexture(window);  // the rough one
+    internal.IsBehind = true;
+    return;
+  }
+  // Where no frame is as the one before, what is made beside them is never right.
+  const bool isUseless = still.isDone() && !still.isSeen();
+  still.drop();
+  if (isUseless) {
+    this->DrawNow(window, view.matrices, view.size, {view.size, false});
+    return;
+  }
+  this->DrawNow(window, view.matrices, view.size, internal.InteractiveForm(view.size, this->FrameRate));
+  if (!internal.Buffers.isLoading()) still.start(internal.Buffers.renderer(), std::move(view));
+  internal.IsBehind = true;
+}
+
+void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& matrices,
+                         const glm::ivec2& portSize, const Form& form) {
+  Internals& internal = *this->Internal;
+  const Clock::time_point start = Clock::now();
+  const glm::ivec2& size = form.size;
+  const bool hasObjects = std::any_of(internal.Window.begin(), internal.Window.end(), pv::isObject);
+  internal.Ends.resize(hasObjects ? static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) : 0);
+  if (hasObjects) pv::depthsOf(matrices, internal.Window, portSize, size, internal.Ends);
+
+  vdi::VdiRenderer& views = form.isThin ? *internal.Buffers.thinRenderer() : internal.Buffers.renderer();
   const Clock::time_point renderStart = Clock::now();
   const vdi::ImageBytes picture =
       views.renderBytes(matrices.view(size.x, size.y), internal.Ends, vdi::Alpha::Premultiplied,
                         static_cast<vdi::Reconstruction>(this->Reconstruction));
   const double renderSeconds = secondsSince(renderStart);
+  this->ShowPicture(window, size, picture.rgba);
 
+  const double pixels = static_cast<double>(size.x) * size.y;
+  Pace& pace = form.isThin ? internal.Thin : internal.Whole;
+  if (internal.NextFrame == Frame::Whole) {
+    pace.Guess(renderSeconds, pixels);
+  } else {
+    pace.Measure(secondsSince(start), renderSeconds, pixels);
+  }
+}
+
+void vtkVDIProp::ShowPicture(vtkOpenGLRenderWindow* window, const glm::ivec2& size,
+                             std::span<const glm::u8vec4> picture) {
+  vtkTextureObject* texture = this->Internal->Texture;
+  texture->SetContext(window);
+  texture->SetMinificationFilter(vtkTextureObject::Linear);
+  texture->SetMagnificationFilter(vtkTextureObject::Linear);
+  texture->SetWrapS(vtkTextureObject::ClampToEdge);
+  texture->SetWrapT(vtkTextureObject::ClampToEdge);
+  // VTK's call takes a pointer to what it only reads.
+  texture->Create2DFromRaw(static_cast<unsigned int>(size.x), static_cast<unsigned int>(size.y), 4,
+                           VTK_UNSIGNED_CHAR, const_cast<glm::u8vec4*>(picture.data()));
+  this->ShowTexture(window);
+}
+
+void vtkVDIProp::ShowTexture(vtkOpenGLRenderWindow* window) {
   vtkOpenGLState* state = window->GetState();
   vtkOpenGLState::ScopedglEnableDisable blends(state, GL_BLEND);
   vtkOpenGLState::ScopedglEnableDisable testsDepth(state, GL_DEPTH_TEST);
@@ -449,31 +553,16 @@ void vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   state->vtkglDisable(GL_DEPTH_TEST);
   state->vtkglDepthMask(GL_FALSE);
   state->vtkglBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  vtkTextureObject* texture = internal.Texture;
-  texture->SetContext(window);
-  texture->SetMinificationFilter(vtkTextureObject::Linear);
-  texture->SetMagnificationFilter(vtkTextureObject::Linear);
-  texture->SetWrapS(vtkTextureObject::ClampToEdge);
-  texture->SetWrapT(vtkTextureObject::ClampToEdge);
-  // VTK's call takes a pointer to what it only reads.
-  texture->Create2DFromRaw(static_cast<unsigned int>(size.x), static_cast<unsigned int>(size.y), 4,
-                           VTK_UNSIGNED_CHAR, const_cast<glm::u8vec4*>(picture.rgba.data()));
-  if (!internal.Quad) {
-    internal.Quad = std::make_unique<vtkOpenGLQuadHelper>(window, nullptr, pictureShader, "");
+  std::unique_ptr<vtkOpenGLQuadHelper>& quad = this->Internal->Quad;
+  if (!quad) {
+    quad = std::make_unique<vtkOpenGLQuadHelper>(window, nullptr, pictureShader, "");
   } else {
-    window->GetShaderCache()->ReadyShaderProgram(internal.Quad->Program);
+    window->GetShaderCache()->ReadyShaderProgram(quad->Program);
   }
+  vtkTextureObject* texture = this->Internal->Texture;
   texture->Activate();
-  internal.Quad->Program->SetUniformi("picture", texture->GetTextureUnit());
-  internal.Quad->Render();
+  quad->Program->SetUniformi("picture", texture->GetTextureUnit());
+  quad->Render();
   texture->Deactivate();
   vtkOpenGLCheckErrorMacro("failed to draw the VDI");
-
-  const double pixels = static_cast<double>(size.x) * size.y;
-  Pace& pace = isThin ? internal.Thin : internal.Whole;
-  if (internal.IsInteractive) {
-    pace.Measure(secondsSince(start), renderSeconds, pixels);
-  } else {
-    pace.Guess(renderSeconds, pixels);
-  }
 }

@@ -5,7 +5,8 @@
  * Drawn with the volumes: after all opaque geometry, which hides what lies behind it, and blended over it.
  * Where volumes are peeled together with translucent geometry, after that, too.
  * While it's interactive, it has as few pixels as it takes to be drawn FrameRate times a second; and a VDI
- * that comes is loaded beside the frames, which go on showing the one before.
+ * that comes is loaded beside the frames, which go on showing the one before. The same holds for deferred
+ * frames, beside which the picture in full is made.
  *
  * What goes wrong is said in the view (MessageActor) and, once, as an error; the rest of the picture is
  * drawn.
@@ -15,8 +16,11 @@
 
 #include <vtkProp.h>
 
+#include <chrono>
 #include <exception>
+#include <glm/fwd.hpp>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "vtkVolumetricDepthImagesRepresentationsModule.h"
@@ -29,6 +33,10 @@ class vtkTextActor;
 namespace vdi {
 class Error;
 }
+namespace pv {
+class ViewMatrices;
+struct StillView;
+}  // namespace pv
 
 class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp {
  public:
@@ -36,10 +44,18 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   vtkTypeMacro(vtkVDIProp, vtkProp);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  /// For the frames to come: `piece` is what pv::packVdi made, or nullptr. If they aren't interactive, its
-  /// VDI is on the device when this returns; else that or the last one before is shown. The same again costs
+  enum class Frame {
+    Interactive,  // may be rough and show the VDI before
+    Deferred,     // likewise, and another one is asked for as soon as HasMore; where it's quick, it's whole
+    Whole,
+  };
+  /// For the frames to come: `piece` is what pv::packVdi made, or nullptr. If they're to be whole, its VDI is
+  /// on the device when this returns; else that or the last one before is shown. The same again costs
   /// nothing.
-  void Prepare(vtkDataObject* piece, bool isInteractive);
+  void Prepare(vtkDataObject* piece, Frame frame);
+  /// Whether the last frame was deferred and lacks something that is being made, and whether that is there.
+  bool IsBehind() const;
+  bool HasMore() const;
   /// Says `text` in place of the VDI, which isn't drawn while there's a text.
   void SetObstacle(const std::string& text);
   /// Says why there's nothing to see; in a renderer of the same size that draws after this prop's.
@@ -72,11 +88,18 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   void operator=(const vtkVDIProp&) = delete;
 
   class Pace;
+  struct Form;
   struct Internals;
   int DrawIn(vtkViewport* viewport);
   void Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
+  void DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view);
+  void DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& matrices, const glm::ivec2& portSize,
+               const Form& form);
+  void ShowPicture(vtkOpenGLRenderWindow* window, const glm::ivec2& size,
+                   std::span<const glm::u8vec4> picture);
+  void ShowTexture(vtkOpenGLRenderWindow* window);
   void MarkDepth(vtkOpenGLRenderWindow* window);
-  void Take(bool waits);
+  void Take(std::chrono::steady_clock::duration wait);
   bool Recover(const vdi::Error& error);
   void Fail(const std::exception& error);
   void SmoothAgain(vtkRenderer* renderer);

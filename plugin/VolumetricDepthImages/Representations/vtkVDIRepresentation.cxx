@@ -153,11 +153,23 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
             : "");
     vtkAlgorithmOutput* port = vtkPVRenderView::GetPieceProducer(in, this);
     if (port != nullptr && view != nullptr) {
-      this->Prop->Prepare(port->GetProducer()->GetOutputDataObject(port->GetIndex()),
-                          this->IsInteractive(view));
+      this->Prop->Prepare(port->GetProducer()->GetOutputDataObject(port->GetIndex()), this->FrameOf(view));
     }
   }
   return 1;
+}
+
+bool vtkVDIRepresentation::DefersStillFrames = false;
+
+void vtkVDIRepresentation::SetDefersStillFrames(bool defers) {
+  DefersStillFrames = defers;
+}
+
+vtkVDIProp::Frame vtkVDIRepresentation::FrameOf(vtkPVRenderView* view) {
+  if (this->IsInteractive(view)) return vtkVDIProp::Frame::Interactive;
+  // Who takes pictures of a window does without swapping its buffers.
+  const bool isCaptured = view->GetRenderWindow()->GetSwapBuffers() == 0;
+  return DefersStillFrames && !isCaptured ? vtkVDIProp::Frame::Deferred : vtkVDIProp::Frame::Whole;
 }
 
 /// Whether the next frame may be rough and late: one of those while the camera moves. Time steps that come

@@ -17,12 +17,12 @@
 #include <array>
 #include <chrono>
 
+#include "vtkVDIProp.h"
 #include "vtkVolumetricDepthImagesRepresentationsModule.h"
 
 class vtkPVRenderView;
 class vtkPolyData;
 class vtkRenderWindowInteractor;
-class vtkVDIProp;
 
 class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : public vtkPVDataRepresentation {
  public:
@@ -32,6 +32,10 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
 
   int ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in, vtkInformation* out) override;
   void SetVisibility(bool visible) override;
+
+  /// Of this process: whether still frames of windows are deferred (vtkVDIProp::Frame), for somebody renders
+  /// again as soon as there's more. Pictures that are taken of a window are whole. Default off.
+  static void SetDefersStillFrames(bool defers);
 
   /// As vtkVDIProp has them.
   void SetReconstruction(int reconstruction);
@@ -50,13 +54,15 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   vtkVDIRepresentation(const vtkVDIRepresentation&) = delete;
   void operator=(const vtkVDIRepresentation&) = delete;
 
+  vtkVDIProp::Frame FrameOf(vtkPVRenderView* view);
   bool IsInteractive(vtkPVRenderView* view);
   void Drag();
   void Drop();
   void ForgetInteractor();
 
   vtkNew<vtkPolyData> Piece;  // pv::packVdi
-  bool HasPacked = false;     // in the update that's going on
+  static bool DefersStillFrames;
+  bool HasPacked = false;  // in the update that's going on
   vtkNew<vtkVDIProp> Prop;
 
   vtkWeakPointer<vtkRenderWindowInteractor> Interactor;  // the view's, observed

@@ -1,0 +1,83 @@
+#include "pqVDIStillFrames.h"
+
+#include <pqApplicationCore.h>
+#include <pqServerManagerModel.h>
+#include <pqView.h>
+#include <vtkPVRenderView.h>
+#include <vtkPropCollection.h>
+#include <vtkRenderer.h>
+#include <vtkSMViewProxy.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "vtkVDIProp.h"
+#include "vtkVDIRepresentation.h"
+
+namespace {
+
+constexpr int lookMilliseconds = 30;
+
+/// Those that the last frame has shown, or was to show.
+std::vector<vtkVDIProp*> vdisOf(pqView* view) {
+  std::vector<vtkVDIProp*> vdis;
+  auto* drawn = vtkPVRenderView::SafeDownCast(view->getViewProxy()->GetClientSideView());
+  if (drawn == nullptr) return vdis;
+  vtkPropCollection* props = drawn->GetRenderer()->GetViewProps();
+  vtkCollectionSimpleIterator at;
+  props->InitTraversal(at);
+  while (vtkProp* prop = props->GetNextProp(at)) {
+    if (auto* vdi = vtkVDIProp::SafeDownCast(prop)) vdis.push_back(vdi);
+  }
+  return vdis;
+}
+
+bool isBehind(pqView* view) {
+  const std::vector<vtkVDIProp*> vdis = vdisOf(view);
+  return std::any_of(vdis.begin(), vdis.end(), [](const vtkVDIProp* vdi) { return vdi->IsBehind(); });
+}
+
+bool hasMore(pqView* view) {
+  const std::vector<vtkVDIProp*> vdis = vdisOf(view);
+  return std::any_of(vdis.begin(), vdis.end(), [](const vtkVDIProp* vdi) { return vdi->HasMore(); });
+}
+
+}  // namespace
+
+pqVDIStillFrames::pqVDIStillFrames(QObject* parent) : QObject(parent) {
+  this->Looking.setInterval(lookMilliseconds);
+  this->connect(&this->Looking, &QTimer::timeout, this, &pqVDIStillFrames::look);
+  pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
+  this->connect(model, &pqServerManagerModel::viewAdded, this, &pqVDIStillFrames::viewAdded);
+  for (pqView* view : model->findItems<pqView*>()) this->viewAdded(view);
+  vtkVDIRepresentation::SetDefersStillFrames(true);
+}
+
+pqVDIStillFrames::~pqVDIStillFrames() {
+  vtkVDIRepresentation::SetDefersStillFrames(false);
+}
+
+void pqVDIStillFrames::viewAdded(pqView* view) {
+  this->connect(view, &pqView::endRender, this, &pqVDIStillFrames::rendered);
+}
+
+void pqVDIStillFrames::rendered() {
+  auto* view = qobject_cast<pqView*>(this->sender());
+  if (view == nullptr) return;
+  this->Behind.removeAll(view);
+  if (!isBehind(view)) return;
+  this->Behind.append(view);
+  this->Looking.start();
+}
+
+void pqVDIStillFrames::look() {
+  const QList<QPointer<pqView>> views = this->Behind;
+  for (const QPointer<pqView>& view : views) {
+    if (view != nullptr && isBehind(view)) {
+      if (hasMore(view)) view->forceRender();
+    } else {
+      this->Behind.removeAll(view);
+    }
+  }
+  if (this->Behind.isEmpty()) this->Looking.stop();
+}

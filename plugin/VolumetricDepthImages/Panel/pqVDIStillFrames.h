@@ -1,0 +1,30 @@
+// Still frames in ParaView's window don't wait for VDIs (vtkVDIProp::Frame). This renders again when there is
+// more to show.
+#ifndef pqVDIStillFrames_h
+#define pqVDIStillFrames_h
+
+#include <QList>
+#include <QObject>
+#include <QPointer>
+#include <QTimer>
+
+class pqView;
+
+class pqVDIStillFrames : public QObject {
+  Q_OBJECT
+
+ public:
+  /// Of all views there are and will be, until it goes.
+  explicit pqVDIStillFrames(QObject* parent);
+  ~pqVDIStillFrames() override;
+
+ private:
+  Q_SLOT void viewAdded(pqView* view);
+  Q_SLOT void rendered();
+  Q_SLOT void look();
+
+  QTimer Looking;
+  QList<QPointer<pqView>> Behind;
+};
+
+#endif
