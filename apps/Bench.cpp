@@ -1,5 +1,6 @@
 // vdi bench: how long each stage takes and how true the result is.
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <cmath>
 #include <ctime>

@@ -1,6 +1,7 @@
 #include "apps/BenchRow.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <cmath>
 

@@ -1,6 +1,7 @@
 #include "apps/BenchViewpoints.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>

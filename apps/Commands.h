@@ -2,10 +2,13 @@
 // the job, which runs once the whole command line has been understood.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 
 #include "vdi/comm/Communicator.h"
+
+namespace CLI {
+class App;
+}
 
 namespace vdi::apps {
 

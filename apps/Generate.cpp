@@ -1,5 +1,6 @@
 // vdi generate: a volume to a .vdi file, under mpirun too.
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <cmath>

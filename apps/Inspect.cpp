@@ -1,5 +1,6 @@
 // vdi compare and info: what's in files that are there.
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -1,5 +1,6 @@
 // vdi render: a VDI from new viewpoints, as PNG.
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <filesystem>
 #include <set>

@@ -1,5 +1,6 @@
 #include "apps/Source.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <string_view>

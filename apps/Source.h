@@ -1,7 +1,6 @@
 // Options that say which volume, view and settings: what several subcommands have in common.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -16,6 +15,10 @@
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/gpu/Device.h"
+
+namespace CLI {
+class App;
+}
 
 namespace vdi::apps {
 
