@@ -11,6 +11,7 @@ float rayEnter;          // depth where the ray enters these, and leaves them
 float rayLeave;
 float rayBegin;  // the same as places
 float rayEnd;
+float rayMiddle;  // how far behind a sample's begin it is decided whose it is: 0.5, but for rays that graze the scene
 
 #include "slab.glsl"
 
@@ -33,7 +34,9 @@ vec3 positionAt(float place) {
   return position;
 }
 
-vec3 samplePosition(uint k) { return positionAt(float(k) + 0.5); }
+float middleOf(uint k) { return float(k) + rayMiddle; }
+
+vec3 samplePosition(uint k) { return positionAt(middleOf(k)); }
 
 bool contains(vec3 lo, vec3 hi, vec3 p) { return all(greaterThanEqual(p, lo)) && all(lessThan(p, hi)); }
 
@@ -61,20 +64,30 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
 // The scene's bounds seldom lie half-way between two samples. The outermost samples stand for what's really there: the first
 // one's interval starts where the ray enters, the last one's ends where it leaves. That follows from the ray and the scene
 // alone, so it's the same on every rank; without it the faces of a filled box show the sample lattice as stripes.
+// Where a ray leaves the bounds before it has come to the middle of any sample, what's between is one sample, and the middle of
+// that says whose it is. Without it the edges of a filled box are jagged.
 void setUpScene() {
+  rayMiddle = 0.5;
   rayScene = samplesIn(params.sceneLo, params.sceneHi);
   bvec3 across = equal(rayDirection, vec3(0.0));
   float far = float(params.sampleCount) * params.step;
-  vec3 a = (params.sceneLo - rayStart) / rayDirection;
-  vec3 b = (params.sceneHi - rayStart) / rayDirection;
+  precise vec3 a = (params.sceneLo - rayStart) / rayDirection;
+  precise vec3 b = (params.sceneHi - rayStart) / rayDirection;
   vec3 enters = mix(min(a, b), vec3(0.0), across);
   vec3 leaves = mix(max(a, b), vec3(far), across);
   float enter = max(max(enters.x, enters.y), max(enters.z, 0.0));
   float leave = min(min(leaves.x, leaves.y), min(leaves.z, far));
+  bool grazes = rayScene.x >= rayScene.y && enter < leave;
+  if (grazes) {
+    precise float middle = 0.5 * (enter + leave) / params.step;
+    uint k = min(uint(middle), params.sampleCount - 1u);
+    rayMiddle = middle - float(k);
+    rayScene = contains(params.sceneLo, params.sceneHi, samplePosition(k)) ? uvec2(k, k + 1u) : uvec2(0u);
+  }
   float first = (float(rayScene.x) + 0.5) * params.step;
   float last = (float(rayScene.y) - 0.5) * params.step;
-  rayEnter = params.first + clamp(enter, first - params.step, first);
-  rayLeave = params.first + clamp(leave, last, last + params.step);
+  rayEnter = params.first + (grazes ? enter : clamp(enter, first - params.step, first));
+  rayLeave = params.first + (grazes ? leave : clamp(leave, last, last + params.step));
   rayLeave = max(rayLeave, rayEnter + 0.001 * params.step);
   rayBegin = (rayEnter - params.first) / params.step;
   rayEnd = (rayLeave - params.first) / params.step;
@@ -105,7 +118,7 @@ float tablePosition(Brick brick, float place) {
 }
 
 vec3 placeAmongCells(Brick brick, uint k) {
-  return max(coordinateOf(brick, float(k) + 0.5) * brick.cellScale + brick.cellOffset, vec3(0.0));
+  return max(coordinateOf(brick, middleOf(k)) * brick.cellScale + brick.cellOffset, vec3(0.0));
 }
 
 uvec3 cellAround(Brick brick, vec3 place) { return min(uvec3(place), brick.cellDims - 1u); }
@@ -139,9 +152,9 @@ float backOf(uint k) {
 // aren't slabs, both are its middle.
 float beginOf(uint k) {
   float place = mix(mix(float(k), rayBegin, k == rayScene.x), rayEnd, k == rayScene.y);
-  return mix(float(k) + 0.5, place, params.slabs != 0u);
+  return mix(middleOf(k), place, params.slabs != 0u);
 }
-float endOf(uint k) { return mix(float(k) + 0.5, beginOf(k + 1u), params.slabs != 0u); }
+float endOf(uint k) { return mix(middleOf(k), beginOf(k + 1u), params.slabs != 0u); }
 
 // What a ray is for, interval by interval; they leave no gaps within a brick.
 void useSample(float front, float back, Sample it);

@@ -15,10 +15,13 @@ struct SceneRay {
   glm::vec3 start;  // relative to the scene's centre, at the front of the sample lattice
   glm::vec3 direction;
   float step;
+  /// How far behind a sample's begin it is decided whose it is: its middle, but for rays that graze the scene.
+  float middle = 0.5F;
 
-  /// `place` counts samples: k is where sample k begins, k + 0.5 its middle.
+  /// `place` counts samples: k is where sample k begins.
   glm::vec3 at(float place) const { return start + place * step * direction; }
-  glm::vec3 sample(std::uint32_t k) const { return at(static_cast<float>(k) + 0.5F); }
+  float middleOf(std::uint32_t k) const { return static_cast<float>(k) + middle; }
+  glm::vec3 sample(std::uint32_t k) const { return at(middleOf(k)); }
 };
 
 SceneRay rayOf(const Frame& frame, int x, int y) {
@@ -73,15 +76,17 @@ SampleRange samplesIn(const OwnedBox& box, const SceneRay& ray, std::uint32_t co
 }
 
 /// The scene's bounds seldom lie half-way between two samples: the first sample's interval starts where the
-/// ray enters them, the last one's ends where it leaves. Depends on ray and scene alone, so it's the same on
-/// every rank.
+/// ray enters them, the last one's ends where it leaves. Where a ray leaves them before it has come to the
+/// middle of any sample, what's between is one sample, and the middle of that says whose it is. Depends on
+/// ray and scene alone, so it's the same on every rank.
 struct SceneStretch {
   SampleRange samples;
   float enter = 0.0F;  // depth
   float leave = 0.0F;
 };
 
-SceneStretch sceneStretch(const Frame& frame, const SceneRay& ray) {
+/// Moves the middles of the ray's samples where it grazes the bounds.
+SceneStretch sceneStretch(const Frame& frame, SceneRay& ray) {
   OwnedBox box;
   for (int axis = 0; axis < 3; ++axis) {
     box.lo[axis] = snapToScene(frame.scene, frame.scene.bounds.lo[axis], axis);
@@ -98,11 +103,18 @@ SceneStretch sceneStretch(const Frame& frame, const SceneRay& ray) {
   }
   SceneStretch stretch;
   stretch.samples = samplesIn(box, ray, frame.lattice.count);
+  const bool grazes = stretch.samples.first >= stretch.samples.last && enter < leave;
+  if (grazes) {
+    const float middle = 0.5F * (enter + leave) / ray.step;
+    const std::uint32_t k = std::min(static_cast<std::uint32_t>(middle), frame.lattice.count - 1);
+    ray.middle = middle - static_cast<float>(k);
+    stretch.samples = box.contains(ray.sample(k)) ? SampleRange{k, k + 1} : SampleRange{};
+  }
   const float first = (static_cast<float>(stretch.samples.first) + 0.5F) * ray.step;
   const float last = (static_cast<float>(stretch.samples.last) - 0.5F) * ray.step;
   const auto front = static_cast<float>(frame.lattice.first);
-  stretch.enter = front + std::clamp(enter, first - ray.step, first);
-  stretch.leave = front + std::clamp(leave, last, last + ray.step);
+  stretch.enter = front + (grazes ? enter : std::clamp(enter, first - ray.step, first));
+  stretch.leave = front + (grazes ? leave : std::clamp(leave, last, last + ray.step));
   stretch.leave = std::max(stretch.leave, stretch.enter + 0.001F * ray.step);
   return stretch;
 }
@@ -144,7 +156,8 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
     SampleRange range;
     const Block* block;
   };
-  const SceneRay ray = rayOf(frame, x, y);
+  SceneRay ray = rayOf(frame, x, y);
+  const SceneStretch scene = sceneStretch(frame, ray);
   std::vector<Piece> pieces;
   for (const Block& block : blocks) {
     if (block.owned.empty()) continue;
@@ -154,7 +167,6 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
   std::sort(pieces.begin(), pieces.end(),
             [](const Piece& a, const Piece& b) { return a.range.first < b.range.first; });
 
-  const SceneStretch scene = sceneStretch(frame, ray);
   const float slabsPerDepth =
       glm::length(ray.direction) / static_cast<float>(frame.table.unitDistance) / frame.slabTable.length;
   const float enough = terminationOpticalDepth(frame.settings);
@@ -170,7 +182,7 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
       const glm::dvec3 world = glm::dvec3(ray.at(place)) + frame.scene.bounds.center();
       return frame.table.positionOf(interpolate(block, world));
     };
-    const double middle = positionAt(static_cast<float>(k) + 0.5F);
+    const double middle = positionAt(ray.middleOf(k));
     if (!frame.slabs) return frame.slabTable.between(middle, middle);
     return frame.slabTable.between(positionAt(placeOf(k)), positionAt(placeOf(k + 1)));
   };
