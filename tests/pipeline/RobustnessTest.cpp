@@ -46,6 +46,22 @@ ErrorCode codeOf(const std::function<void()>& call) {
 
 }  // namespace
 
+TEST_CASE("a box filled with one value: its picture doesn't depend on where samples lie") {
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  std::vector<Block> blocks;
+  blocks.push_back(cube(5, 0.25, [](const glm::ivec3&) { return 0.6F; }));
+  generator.setBlocks(std::move(blocks));
+  GenerateSettings settings = test::smallSettings(120, 90);
+  const auto coarse = generator.renderVolume(test::oblique(), test::threeHues(1.0), settings);
+  settings.samplesPerVoxel = 16.0;
+  const auto fine = generator.renderVolume(test::oblique(), test::threeHues(1.0), settings);
+  CHECK(highestOpacity(*coarse) > 0.9F);
+  float worst = 0.0F;
+  for (std::size_t i = 0; i < coarse->pixelCount(); ++i)
+    worst = std::max(worst, std::abs(coarse->rgba[i].a - fine->rgba[i].a));
+  CHECK(worst < 1.0F / 255.0F);
+}
+
 TEST_CASE("NaN and infinite scalars are transparent, the rest is shown") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
