@@ -15,7 +15,8 @@ struct SceneRay {
   glm::vec3 start;  // relative to the scene's centre, at the front of the sample lattice
   glm::vec3 direction;
   float step;
-  /// How far behind a sample's begin it is decided whose it is: its middle, but for rays that graze the scene.
+  /// How far behind a sample's begin it is decided whose it is: its middle, but for rays that graze the
+  /// scene.
   float middle = 0.5F;
 
   /// `place` counts samples: k is where sample k begins.
