@@ -16,7 +16,7 @@
 
 namespace {
 
-constexpr int lookMilliseconds = 30;
+constexpr int watchMilliseconds = 30;
 
 /// Those that the last frame has shown, or was to show.
 std::vector<vtkVDIProp*> vdisOf(pqView* view) {
@@ -45,7 +45,7 @@ bool hasMore(pqView* view) {
 }  // namespace
 
 pqVDIStillFrames::pqVDIStillFrames(QObject* parent) : QObject(parent) {
-  this->Looking.setInterval(lookMilliseconds);
+  this->Looking.setInterval(watchMilliseconds);
   this->connect(&this->Looking, &QTimer::timeout, this, &pqVDIStillFrames::look);
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::viewAdded, this, &pqVDIStillFrames::viewAdded);
