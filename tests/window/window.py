@@ -439,14 +439,14 @@ class Window:
                               capture_output=True).stdout
 
     def wait_for_picture(self, seconds=60):
-        """Until something is seen in the middle of the view, and the same for more than a second in which the window is idle:
-        after a drag it draws the picture at rest, and doesn't answer."""
+        """Until something is seen in the middle of the view, and the same for more than two seconds in which the window
+        answers: after a drag there is a rough picture first, and the one in full when it's made."""
         seen = []
 
         def rests():
             self.root.children()
             seen.append(self.pixels())
-            return len(set(seen[-1])) > 30 and seen[-4:] == seen[-1:] * 4
+            return len(set(seen[-1])) > 30 and seen[-7:] == seen[-1:] * 7
 
         wait_for("picture that rests", lambda: time.sleep(0.4) or rests(), seconds)
 
