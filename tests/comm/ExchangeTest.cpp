@@ -1,7 +1,12 @@
 // What ranks send each other, through shared memory and by messages, on any number of ranks.
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
 
 #include "vdi/comm/ByteSum.h"
 #include "vdi/comm/Exchange.h"
@@ -28,14 +33,55 @@ std::uint64_t bytesOf(int from, int to, int round) {
                    : static_cast<std::uint64_t>(kind) * 1000 * static_cast<std::uint64_t>(1 + round * round);
 }
 
+enum class Trouble { None, NoRoom, NotOpened };
+
+/// While it lives, this process can't make files, or can't open any.
+class Limit {
+ public:
+  explicit Limit(__rlimit_resource kind) : kind_(kind) {
+    getrlimit(kind, &before_);
+    rlimit none = before_;
+    none.rlim_cur = 0;
+    if (kind == RLIMIT_NOFILE) {  // those that are open stay usable
+      const int next = dup(STDIN_FILENO);
+      none.rlim_cur = static_cast<rlim_t>(next);
+      close(next);
+    }
+    setrlimit(kind, &none);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+  }
+  ~Limit() {
+    setrlimit(kind_, &before_);
+    (void)std::signal(SIGXFSZ, handler_);
+  }
+  Limit(const Limit&) = delete;
+  Limit& operator=(const Limit&) = delete;
+
+ private:
+  __rlimit_resource kind_;
+  rlimit before_{};
+  void (*handler_)(int) = nullptr;
+};
+
 }  // namespace
 
 TEST_CASE("every rank receives what every rank has for it, round after round") {
-  const Communicator world = Communicator::world();
   const Transport transport = GENERATE(Transport::Shared, Transport::Mpi);
-  INFO((transport == Transport::Shared ? "shared" : "mpi"));
+  const char* ranksPerHost = GENERATE("0", "2");
+  const auto trouble = GENERATE(Trouble::None, Trouble::NoRoom, Trouble::NotOpened);
+  INFO((transport == Transport::Shared ? "shared" : "mpi") << ", ranks a host: " << ranksPerHost);
+  setenv("VDI_RANKS_PER_HOST", ranksPerHost, 1);
+  const Communicator world = Communicator::world();
+  unsetenv("VDI_RANKS_PER_HOST");
+  const int last = world.size() - 1;
+  // The trouble is the last host's alone: its leader has no room, or one of its ranks can't open what it
+  // makes.
+  const int inTrouble = trouble == Trouble::NoRoom ? world.hostLeader(last) : last;
   Exchange exchange(world, transport);
   for (const int round : {0, 1, 7, 2, 3}) {
+    std::optional<Limit> limit;
+    if (round == 7 && world.rank() == inTrouble && trouble != Trouble::None)
+      limit.emplace(trouble == Trouble::NoRoom ? RLIMIT_FSIZE : RLIMIT_NOFILE);
     std::vector<Exchange::Outgoing> pieces;
     std::uint64_t total = 0;
     for (int to = 0; to < world.size(); ++to) {
@@ -44,6 +90,7 @@ TEST_CASE("every rank receives what every rank has for it, round after round") {
       total += pieces.back().bytes + 5;
     }
     const Exchange::Place outbox = exchange.outbox(total);
+    limit.reset();
     REQUIRE(outbox.memory->bytes().size() >= outbox.at + total);
     for (const Exchange::Outgoing& piece : pieces) {
       for (std::size_t i = 0; i < piece.bytes; ++i) {
@@ -67,7 +114,10 @@ TEST_CASE("every rank receives what every rank has for it, round after round") {
       CHECK(same);
     }
     CHECK(next == incoming.size());
-    if (world.size() > 1) CHECK(exchange.sharesMemoryWith(0) == (transport == Transport::Shared));
+    const int leader = world.hostLeader(world.rank());
+    const bool failed = round == 7 && trouble != Trouble::None && leader == world.hostLeader(last);
+    if (world.size() > 1 && (round == 0 || round == 7))
+      CHECK(exchange.sharesMemoryWith(leader) == (transport == Transport::Shared && !failed));
     world.barrier();  // before anybody writes the next round's
   }
 }
@@ -111,12 +161,17 @@ TEST_CASE("partners alone exchange: a ring, round after round") {
 }
 
 TEST_CASE("the transport that the environment asks for") {
-  setenv("VDI_TRANSPORT", "mpi", 1);
-  CHECK(comm::transportFromEnvironment() == Transport::Mpi);
-  setenv("VDI_TRANSPORT", "pigeon", 1);
-  CHECK_THROWS_AS(comm::transportFromEnvironment(), Error);
-  unsetenv("VDI_TRANSPORT");
-  CHECK(comm::transportFromEnvironment() == Transport::Shared);
+  CHECK(comm::transportFromText("mpi") == Transport::Mpi);
+  CHECK(comm::transportFromText("") == Transport::Shared);
+  CHECK_THROWS_AS(comm::transportFromText("pigeon"), Error);
+}
+
+TEST_CASE("an environment variable is rank 0's on all ranks") {
+  const Communicator world = Communicator::world();
+  setenv("VDI_TEST_VARIABLE", world.rank() == 0 ? "first" : "other", 1);
+  CHECK(world.environment("VDI_TEST_VARIABLE") == "first");
+  unsetenv("VDI_TEST_VARIABLE");
+  CHECK(world.environment("VDI_TEST_VARIABLE").empty());
 }
 
 TEST_CASE("memory that ranks share: opened by name, and gone when nobody has it") {

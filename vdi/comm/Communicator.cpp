@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <cstdlib>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -91,6 +93,13 @@ Text describe(const std::exception_ptr& error) {
   return text;
 }
 
+/// Which of several hosts a rank of this one is taken to be on.
+int hostOf(int localRank) {
+  const char* ranks = std::getenv("VDI_RANKS_PER_HOST");
+  const int each = ranks == nullptr ? 0 : std::atoi(ranks);
+  return each > 0 ? localRank / each : 0;
+}
+
 /// Frees a communicator, unless MPI has gone already.
 class OwnedComm {
  public:
@@ -163,8 +172,10 @@ Communicator Communicator::fromMpi(int fortranHandle) {
   check(MPI_Comm_split_type(state->comm(), MPI_COMM_TYPE_SHARED, state->rank, MPI_INFO_NULL, node.out()),
         "MPI_Comm_split_type");
   check(MPI_Comm_rank(node.handle(), &state->localRank), "MPI_Comm_rank");
+  OwnedComm part;
+  check(MPI_Comm_split(node.handle(), hostOf(state->localRank), state->rank, part.out()), "MPI_Comm_split");
   int leader = state->rank;
-  check(MPI_Bcast(&leader, 1, MPI_INT, 0, node.handle()), "MPI_Bcast");
+  check(MPI_Bcast(&leader, 1, MPI_INT, 0, part.handle()), "MPI_Bcast");
   state->hostLeaders.resize(static_cast<std::size_t>(state->size));
   check(MPI_Allgather(&leader, 1, MPI_INT, state->hostLeaders.data(), 1, MPI_INT, state->comm()),
         "MPI_Allgather");
@@ -196,6 +207,16 @@ int Communicator::hostLeader(int rank) const {
 
 std::span<const int> Communicator::hostLeaders() const {
   return state_->hostLeaders;
+}
+
+std::string Communicator::environment(const char* name) const {
+  std::vector<std::byte> bytes;
+  if (const char* value = rank() == 0 ? std::getenv(name) : nullptr; value != nullptr) {
+    const auto text = std::as_bytes(std::span(value, std::strlen(value)));
+    bytes.assign(text.begin(), text.end());
+  }
+  bytes = broadcast(std::move(bytes), 0);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 void Communicator::barrier() const {
@@ -400,12 +421,13 @@ void Communicator::requireEqual(std::span<const Fingerprint> fingerprints) const
   std::vector<std::uint64_t> extremes;
   for (const Fingerprint& print : fingerprints) extremes.insert(extremes.end(), {print.value, ~print.value});
   allReduceMax(extremes);
+  std::vector<const char*> different;
   for (std::size_t i = 0; i < fingerprints.size(); ++i) {
-    if (extremes[2 * i] != ~extremes[2 * i + 1]) {
-      throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("the ranks were given different values: {}", fingerprints[i].what));
-    }
+    if (extremes[2 * i] != ~extremes[2 * i + 1]) different.push_back(fingerprints[i].what);
   }
+  if (different.empty()) return;
+  throw Error(ErrorCode::InvalidArgument,
+              fmt::format("the ranks were given different values: {}", fmt::join(different, ", ")));
 }
 
 /// The MPI requests of messages that are under way.

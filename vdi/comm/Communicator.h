@@ -36,7 +36,8 @@ class Communicator {
   /// One rank, never touches MPI.
   static Communicator serial();
   /// Duplicates the communicator (collective). `fortranHandle` = MPI_Comm_c2f(comm). Throws
-  /// Error{Communication} when MPI isn't initialised, Error{InvalidArgument} for MPI_COMM_NULL.
+  /// Error{Communication} when MPI isn't initialised, Error{InvalidArgument} for MPI_COMM_NULL. With
+  /// VDI_RANKS_PER_HOST=K, for tests, each K ranks of a host count as a host of their own.
   static Communicator fromMpi(int fortranHandle);
   /// MPI_COMM_WORLD if MPI is initialised and not finalised, else serial(). For programs of ours; never for a
   /// plugin.
@@ -54,6 +55,9 @@ class Communicator {
   /// The lowest rank of those that share memory with `rank`: ranks of one host have the same.
   int hostLeader(int rank) const;
   std::span<const int> hostLeaders() const;  // of all ranks
+  /// Collective: rank 0's environment variable, empty where that isn't set. What other ranks have doesn't
+  /// count: mpirun may not pass variables on to other hosts.
+  std::string environment(const char* name) const;
 
   void barrier() const;  // collective
 
@@ -106,7 +110,7 @@ class Communicator {
     std::uint64_t value;
     const char* what;
   };
-  /// The same of several at once.
+  /// The same of several at once: the error names all that differ.
   void requireEqual(std::span<const Fingerprint> fingerprints) const;
 
  private:

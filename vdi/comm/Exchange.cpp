@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cstdlib>
 #include <cstring>
 #include <numeric>
 #include <string>
@@ -38,11 +37,9 @@ std::string nameOf(std::span<const std::uint64_t> words) {
 
 }  // namespace
 
-Transport transportFromEnvironment() {
-  const char* value = std::getenv("VDI_TRANSPORT");
-  if (value == nullptr || std::strcmp(value, "") == 0 || std::strcmp(value, "shared") == 0)
-    return Transport::Shared;
-  if (std::strcmp(value, "mpi") == 0) return Transport::Mpi;
+Transport transportFromText(std::string_view value) {
+  if (value.empty() || value == "shared") return Transport::Shared;
+  if (value == "mpi") return Transport::Mpi;
   throw Error(ErrorCode::InvalidArgument,
               fmt::format("VDI_TRANSPORT is '{}'; there are: shared, mpi", value));
 }
@@ -58,9 +55,11 @@ Exchange::Place Exchange::outbox(std::uint64_t bytes) {
     const bool grows = comm_.anyTogether(
         [&] { return parts_.empty() || parts_[static_cast<std::size_t>(comm_.rank())] < aligned(bytes); });
     if (grows) shareNewWindow(comm_.allGatherWords(std::array{aligned(bytes)}));
-    if (window_) return outbox_;
+    if (everyHostShares_) return outbox_;
   }
+  // All ranks come here if any does: hosts differ in what room they have.
   comm_.together([&] {
+    if (window_) return;
     if (!outbox_.memory || outbox_.memory->bytes().size() < bytes) {
       outbox_ = {};
       outbox_.memory = HostMemory::anonymous(bytes + bytes / 2);
@@ -69,21 +68,38 @@ Exchange::Place Exchange::outbox(std::uint64_t bytes) {
   return outbox_;
 }
 
-/// Of each host one, whose leader makes it. Where that fails the host has none.
+/// What the host's leader made. False where that can't be.
+bool Exchange::openWindow(const std::string& name, std::uint64_t bytes) {
+  if (name.empty()) return false;
+  if (window_) return true;
+  try {
+    window_ = HostMemory::open(name, bytes);
+  } catch (const Error&) {  // another file system there, for example
+    return false;
+  }
+  return true;
+}
+
+/// Of each host one, whose leader makes it. Where that fails the host has none. An error leaves all ranks
+/// without any, until the next outbox.
 void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   const int leader = comm_.hostLeader(comm_.rank());
   window_.reset();
   outbox_ = {};
-  parts_.assign(sizes.begin(), sizes.end());
+  parts_.clear();
+  everyHostShares_ = false;
+  messages_ = true;
   // A half more, so that slow growth doesn't make a new one every frame; and as much as others have, for what
   // one rank sends in this frame another one may send in the next.
-  const std::uint64_t mean = std::accumulate(parts_.begin(), parts_.end(), std::uint64_t{0}) / parts_.size();
-  for (std::uint64_t& part : parts_) part = aligned(std::max(part + part / 2, 2 * mean));
+  std::vector<std::uint64_t> parts(sizes.begin(), sizes.end());
+  const std::uint64_t mean = std::accumulate(parts.begin(), parts.end(), std::uint64_t{0}) / parts.size();
+  for (std::uint64_t& part : parts) part = aligned(std::max(part + part / 2, 2 * mean));
   std::uint64_t total = 0;
+  std::uint64_t own = 0;
   for (int r = 0; r < comm_.size(); ++r) {
     if (comm_.hostLeader(r) != leader) continue;
-    if (r == comm_.rank()) outbox_.at = total;
-    total += parts_[static_cast<std::size_t>(r)];
+    if (r == comm_.rank()) own = total;
+    total += parts[static_cast<std::size_t>(r)];
   }
   std::string name;
   if (comm_.rank() == leader) {
@@ -95,20 +111,27 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   }
   const std::vector<std::uint64_t> names = comm_.allGatherWords(wordsOf(name));
   const std::size_t words = NameWords().size();
-  messages_ = false;
-  for (int r = 0; r < comm_.size(); ++r) {
-    const int other = comm_.hostLeader(r);
-    if (other != leader ||
-        nameOf(std::span(names).subspan(static_cast<std::size_t>(other) * words, words)).empty())
-      messages_ = true;
-  }
   name = nameOf(std::span(names).subspan(static_cast<std::size_t>(leader) * words, words));
-  comm_.together([&] {
-    if (comm_.rank() != leader && !name.empty()) window_ = HostMemory::open(name, total);
-  });
-  if (window_) window_->unlink();  // all have it
-  outbox_.memory = window_;
-  if (!window_) outbox_.at = 0;
+  const std::vector<std::uint64_t> opened =
+      comm_.gatherTogether([&] { return openWindow(name, total) ? 1U : 0U; });
+  if (window_) window_->unlink();  // all have tried
+  everyHostShares_ = std::ranges::all_of(opened, [](std::uint64_t has) { return has != 0; });
+  bool hostShares = true;
+  bool oneHost = true;
+  for (int r = 0; r < comm_.size(); ++r) {
+    if (comm_.hostLeader(r) != leader) {
+      oneHost = false;
+    } else if (opened[static_cast<std::size_t>(r)] == 0) {
+      hostShares = false;
+    }
+  }
+  messages_ = !oneHost || !everyHostShares_;
+  if (hostShares) {
+    outbox_ = {window_, own};
+  } else {
+    window_.reset();
+  }
+  parts_ = std::move(parts);
 }
 
 void Exchange::putHeader(const Outgoing& piece, std::span<std::uint64_t> header) const {

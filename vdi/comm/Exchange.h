@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "vdi/comm/Communicator.h"
@@ -17,13 +18,14 @@ enum class Transport {
   Shared,  // they lie in memory that all of them see: nothing is copied
   Mpi      // as between hosts
 };
-/// VDI_TRANSPORT is "shared" or "mpi"; shared where it isn't set. Throws Error{InvalidArgument} that lists
-/// the names there are.
-Transport transportFromEnvironment();
+/// `value`, what VDI_TRANSPORT is: "shared" or "mpi"; shared if it's empty. Throws Error{InvalidArgument}
+/// that lists the names there are.
+Transport transportFromText(std::string_view value);
 
 /// Direct send between the ranks of a communicator, through memory that devices can import. Between ranks of
 /// one host the receiver reads where the sender wrote; between hosts messages go from the sender's memory to
-/// the receiver's. A host without room for shared memory sends messages too.
+/// the receiver's. A host without room for shared memory sends messages too, and so does one whose ranks
+/// can't open each other's.
 class Exchange {
  public:
   /// Not collective. `comm` must stay.
@@ -67,6 +69,7 @@ class Exchange {
  private:
   static constexpr std::size_t headerWords = 4;
   void shareNewWindow(std::span<const std::uint64_t> sizes);
+  bool openWindow(const std::string& name, std::uint64_t bytes);
   void putHeader(const Outgoing& piece, std::span<std::uint64_t> header) const;
   void addIncoming(int from, const std::uint64_t* header, std::vector<Incoming>& incoming) const;
   std::vector<Incoming> receive(std::span<const Outgoing> pieces, std::vector<Incoming> incoming);
@@ -74,10 +77,13 @@ class Exchange {
   const Communicator& comm_;
   Transport transport_;
   Place outbox_;
-  std::shared_ptr<HostMemory> window_;  // of this host's ranks: their outboxes side by side
-  std::vector<std::uint64_t> parts_;    // sizes of these in the window
-  bool messages_ = true;                // some pair of ranks has no window in common
-  std::shared_ptr<HostMemory> inbox_;   // of messages
+  std::shared_ptr<HostMemory>
+      window_;  // of this host's ranks: their outboxes side by side; all have it, or none
+  std::vector<std::uint64_t>
+      parts_;                     // sizes of all ranks' outboxes in such windows; empty: there are none yet
+  bool everyHostShares_ = false;  // each host's ranks have a window
+  bool messages_ = true;          // some pair of ranks has no window in common
+  std::shared_ptr<HostMemory> inbox_;  // of messages
 };
 
 }  // namespace vdi::comm

@@ -6,10 +6,8 @@
 #include <cassert>
 #include <charconv>
 #include <cstddef>
-#include <cstdlib>
 #include <map>
 #include <numeric>
-#include <string_view>
 
 #include "vdi/core/Error.h"
 
@@ -111,9 +109,7 @@ Schedule Schedule::rounds(std::span<const int> hosts, int radix) {
   return schedule;
 }
 
-Schedule Schedule::fromEnvironment(std::span<const int> hosts) {
-  const char* const set = std::getenv("VDI_SCHEDULE");
-  const std::string_view value = set == nullptr ? "" : set;
+Schedule Schedule::fromText(std::string_view value, std::span<const int> hosts) {
   if (value.empty() || value == "direct") return direct(static_cast<int>(hosts.size()));
   constexpr std::string_view prefix = "rounds:";
   constexpr int largestRadix = 1024;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <span>
+#include <string_view>
 #include <vector>
 
 namespace vdi::comm {
@@ -21,9 +22,9 @@ class Schedule {
   /// than the rest, nothing goes to another host that has as many ranks. `hosts[r]`: equal for ranks of one
   /// host. `radix` is at least 2.
   static Schedule rounds(std::span<const int> hosts, int radix);
-  /// VDI_SCHEDULE is "direct" or "rounds:K", K being a radix from 2 to 1024; direct where it isn't set.
-  /// Throws Error{InvalidArgument} that says so. `hosts` as above.
-  static Schedule fromEnvironment(std::span<const int> hosts);
+  /// `value`, what VDI_SCHEDULE is: "direct" or "rounds:K", K being a radix from 2 to 1024; direct if it's
+  /// empty. Throws Error{InvalidArgument} that says so. `hosts` as above.
+  static Schedule fromText(std::string_view value, std::span<const int> hosts);
 
   int ranks() const { return static_cast<int>(rankAt_.size()); }
   int roundCount() const { return static_cast<int>(stretches_.size()) - 1; }

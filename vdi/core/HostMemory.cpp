@@ -74,7 +74,8 @@ std::shared_ptr<HostMemory> HostMemory::shared(std::uint64_t bytes) {
   if (file.descriptor() < 0) throwNoRoom(size, "shared", errno);
   memory->name_ = name;
   memory->linked_ = true;
-  const int error = posix_fallocate(file.descriptor(), 0, static_cast<off_t>(size));
+  int error = EINTR;  // a signal may come between
+  while (error == EINTR) error = posix_fallocate(file.descriptor(), 0, static_cast<off_t>(size));
   if (error != 0) throwNoRoom(size, "shared", error);
   memory->bytes_ = map(size, MAP_SHARED, file.descriptor(), "shared");
   return memory;

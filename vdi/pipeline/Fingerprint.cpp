@@ -2,11 +2,8 @@
 
 #include <xxhash.h>
 
-#include <array>
-#include <cstddef>
-#include <cstring>
+#include <span>
 #include <type_traits>
-#include <vector>
 
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
@@ -16,67 +13,59 @@ namespace vdi::detail {
 
 namespace {
 
-/// Of the bytes of plain values, in the order that they're added in.
-class Fingerprint {
- public:
-  template <typename T>
-  void add(const T& value) {
-    static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
-    std::array<std::byte, sizeof(T)> own{};
-    std::memcpy(own.data(), &value, sizeof(T));
-    for (const std::byte byte : own) bytes_.push_back(byte);
-  }
-  void add(const glm::dvec3& v) {
-    for (int axis = 0; axis < 3; ++axis) add(v[axis]);
-  }
-  std::uint64_t value() const { return XXH3_64bits(bytes_.data(), bytes_.size()); }
+/// Of the bytes of plain values.
+template <typename T>
+std::uint64_t hashOf(std::span<const T> values) {
+  static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
+  return XXH3_64bits(values.data(), values.size_bytes());
+}
 
- private:
-  std::vector<std::byte> bytes_;
-};
+template <typename T>
+std::uint64_t hashOf(const T& value) {
+  return hashOf(std::span<const T>(&value, 1));
+}
+
+std::uint64_t hashOf(const glm::dvec3& v) {
+  return hashOf(std::span<const double>(&v.x, 3));
+}
+
+std::uint64_t hashOf(const std::vector<ColorNode>& nodes) {
+  std::vector<double> values;
+  for (const ColorNode& node : nodes)
+    values.insert(values.end(), {node.x, node.color.x, node.color.y, node.color.z});
+  return hashOf(std::span<const double>(values));
+}
+
+std::uint64_t hashOf(const std::vector<OpacityNode>& nodes) {
+  std::vector<double> values;
+  for (const OpacityNode& node : nodes) values.insert(values.end(), {node.x, node.opacity});
+  return hashOf(std::span<const double>(values));
+}
 
 }  // namespace
 
-std::uint64_t fingerprintOf(const Camera& camera) {
-  Fingerprint print;
-  print.add(camera.position);
-  print.add(camera.focalPoint);
-  print.add(camera.viewUp);
-  print.add(camera.viewAngle);
-  print.add(camera.parallelProjection);
-  print.add(camera.parallelScale);
-  return print.value();
-}
-
-std::uint64_t fingerprintOf(const TransferFunction& function) {
-  Fingerprint print;
-  print.add(function.colors.size());
-  for (const ColorNode& node : function.colors) {
-    print.add(node.x);
-    print.add(node.color);
-  }
-  print.add(function.opacities.size());
-  for (const OpacityNode& node : function.opacities) {
-    print.add(node.x);
-    print.add(node.opacity);
-  }
-  print.add(function.unitDistance);
-  return print.value();
-}
-
-std::uint64_t fingerprintOf(const GenerateSettings& settings) {
-  Fingerprint print;
-  print.add(settings.width);
-  print.add(settings.height);
-  print.add(settings.margin);
-  print.add(settings.supersegments);
-  print.add(settings.budget);
-  print.add(settings.fill);
-  print.add(settings.samplesPerVoxel);
-  print.add(settings.algorithm);
-  print.add(settings.precision);
-  print.add(settings.terminationOpacity);
-  return print.value();
+std::vector<comm::Communicator::Fingerprint> fingerprintsOf(const Camera& camera,
+                                                            const TransferFunction& function,
+                                                            const GenerateSettings& settings) {
+  return {{hashOf(camera.position), "camera position"},
+          {hashOf(camera.focalPoint), "camera focal point"},
+          {hashOf(camera.viewUp), "camera view-up"},
+          {hashOf(camera.viewAngle), "camera view angle"},
+          {hashOf(camera.parallelProjection), "camera parallel projection"},
+          {hashOf(camera.parallelScale), "camera parallel scale"},
+          {hashOf(function.colors), "transfer function's colours"},
+          {hashOf(function.opacities), "transfer function's opacities"},
+          {hashOf(function.unitDistance), "scalar opacity unit distance"},
+          {hashOf(settings.width), "width"},
+          {hashOf(settings.height), "height"},
+          {hashOf(settings.margin), "margin"},
+          {hashOf(settings.supersegments), "supersegments"},
+          {hashOf(settings.budget), "budget"},
+          {hashOf(settings.fill), "fill"},
+          {hashOf(settings.samplesPerVoxel), "sampling rate"},
+          {hashOf(settings.algorithm), "algorithm"},
+          {hashOf(settings.precision), "precision"},
+          {hashOf(settings.terminationOpacity), "termination opacity"}};
 }
 
 }  // namespace vdi::detail

@@ -1,7 +1,9 @@
 // What ranks compare to see that they were given the same. Not part of the library's interface.
 #pragma once
 
-#include <cstdint>
+#include <vector>
+
+#include "vdi/comm/Communicator.h"
 
 namespace vdi {
 struct Camera;
@@ -11,9 +13,10 @@ struct TransferFunction;
 
 namespace vdi::detail {
 
-/// Equal for equal values on every rank, and different otherwise but by a chance of 2^-64.
-std::uint64_t fingerprintOf(const Camera& camera);
-std::uint64_t fingerprintOf(const TransferFunction& function);
-std::uint64_t fingerprintOf(const GenerateSettings& settings);
+/// For Communicator::requireEqual, one for each value that a user sets. Equal for equal values on every rank,
+/// and different otherwise but by a chance of 2^-64.
+std::vector<comm::Communicator::Fingerprint> fingerprintsOf(const Camera& camera,
+                                                            const TransferFunction& function,
+                                                            const GenerateSettings& settings);
 
 }  // namespace vdi::detail

@@ -34,12 +34,14 @@ struct VdiFrame::State : detail::Frame {};
 struct VdiGenerator::State {
   State(std::shared_ptr<gpu::Device> theDevice, comm::Communicator theComm)
       : device(std::move(theDevice)), comm(std::move(theComm)) {
+    const std::string ways = comm.environment("VDI_TRANSPORT");
+    const std::string rounds = comm.environment("VDI_SCHEDULE");
     comm.together([&] {
-      const comm::Transport transport = comm::transportFromEnvironment();
+      const comm::Transport transport = comm::transportFromText(ways);
       const bool shares = comm.size() > 1 && transport == comm::Transport::Shared;
       using Visible = detail::HostPool::Visible;
       pool = std::make_shared<detail::HostPool>(device, shares ? Visible::ToHost : Visible::ToProcess);
-      const comm::Schedule schedule = comm::Schedule::fromEnvironment(comm.hostLeaders());
+      const comm::Schedule schedule = comm::Schedule::fromText(rounds, comm.hostLeaders());
       bands = std::make_unique<detail::BandMaker>(device, comm, transport, schedule);
       steps = std::make_unique<detail::TimeSteps>(comm, bands->caster().volume());
       frames = std::make_unique<detail::Frames>(device, comm, transport, root);
@@ -64,7 +66,7 @@ struct VdiGenerator::State {
   std::unique_ptr<detail::BandDownload> bandDownload;  // of what goes into a file
   std::vector<detail::BandMaker::FlatBand> flat;
   /// Settings and size of the last one.
-  std::optional<std::tuple<std::uint64_t, int, int>> lastKind;
+  std::optional<std::tuple<GenerateSettings, int, int>> lastKind;
   detail::Expectation expected;
   RankReport mine;
   std::vector<RankReport> reports;
@@ -78,6 +80,7 @@ struct VdiGenerator::State {
 
   std::unique_ptr<Prepared> prepare(const Camera& camera, const TransferFunction& function,
                                     const GenerateSettings& settings) {
+    comm.requireEqual(detail::fingerprintsOf(camera, function, settings));
     std::unique_ptr<Prepared> prepared;
     comm.together([&] {
       validate(settings);
@@ -86,13 +89,6 @@ struct VdiGenerator::State {
           Prepared{view, depthLattice(steps->scene(), view, settings.samplesPerVoxel), bake(function)});
       steps->requireSpans(prepared->table);
     });
-    const std::array prints{
-        comm::Communicator::Fingerprint{detail::fingerprintOf(camera), "camera"},
-        comm::Communicator::Fingerprint{detail::fingerprintOf(function), "transfer function"},
-        comm::Communicator::Fingerprint{
-            detail::fingerprintOf(settings),
-            "resolution, margin, supersegments, budget, sampling rate, algorithm or precision"}};
-    comm.requireEqual(prints);
     mine = {};
     steps->report(mine);
     return prepared;
@@ -326,8 +322,7 @@ VdiFrame VdiGenerator::start(const Camera& camera, const TransferFunction& trans
   State& s = *state_;
   const auto prepared = s.prepare(camera, transferFunction, settings);
   // Memory that a frame uses isn't replaced: one of another size waits for it.
-  const auto kind =
-      std::tuple(detail::fingerprintOf(settings), prepared->view.width(), prepared->view.height());
+  const std::tuple kind(settings, prepared->view.width(), prepared->view.height());
   if (s.lastKind != kind) s.completeAll();
   detail::Flight& flight = s.freeFlight();
   s.lastKind = kind;
