@@ -457,6 +457,34 @@ TEST_CASE("frames that nobody fetches, and frames under way when a rank fails") 
   }
 }
 
+TEST_CASE("a frame that's stopped late leaves nothing in the memory of the next one") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
+  request.importsHostMemory = false;  // what's staged must go, too
+  const auto copying = gpu::Device::create(request);
+  const TransferFunction function = test::threeHues(80.0);
+  const GenerateSettings settings = test::smallSettings(61, 45, 6);
+  Camera beside = test::oblique();
+  beside.viewAngle *= 1.3;
+  setenv("VDI_BANDS", "4", 1);
+  FirstMade made;
+  for (const bool stopped : {false, true, true}) {
+    VdiGenerator generator(copying, comm::Communicator::world());
+    generator.setBlocks(decomposed.mine);
+    const auto late = [&](double done) { return done < 0.6 || world.rank() != 1; };
+    if (stopped && world.size() > 1) {
+      CHECK(codeOf([&] { generator.generate(beside, function, settings, late); }) == ErrorCode::Cancelled);
+      CHECK(codeOf([&] { generator.renderVolume(beside, function, settings, late); }) ==
+            ErrorCode::Cancelled);
+    }
+    const auto vdi = generator.generate(test::oblique(), function, settings);
+    made.check(vdi, generator.renderVolume(test::oblique(), function, settings));
+  }
+  unsetenv("VDI_BANDS");
+}
+
 TEST_CASE("the next step, while this one is shown: all ranks advance, or none does") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposedOf = [&](const char* field) {

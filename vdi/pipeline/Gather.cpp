@@ -5,6 +5,8 @@
 #include <cstring>
 #include <functional>
 
+#include "vdi/core/Error.h"
+
 namespace vdi::detail {
 
 namespace {
@@ -76,8 +78,13 @@ void Gather::open(std::span<const std::byte> described) {
   for (const ArrayHeader& header : headers) {
     if (header.bytes == 0) continue;  // not an array
     Array array{nullptr, header.at, header.bytes, nullptr};
-    if (here && header.memory.front() != '\0')
-      array.access = &opened_->of(header.memory.data(), header.memoryBytes);
+    if (here && header.memory.front() != '\0') {
+      try {
+        array.access = &opened_->of(header.memory.data(), header.memoryBytes);
+      } catch (const Error& error) {  // another file system there, for example: messages
+        if (error.code() != ErrorCode::Communication) throw;
+      }
+    }
     arrays_.push_back(array);
   }
 }
@@ -121,6 +128,10 @@ void Gather::send(std::span<const Piece> pieces, const gpu::Submission& after) {
 
 void Gather::drop() {
   for (const std::unique_ptr<gpu::Commands>& transfer : transfers_) transfer->drop();
+  for (const Array& array : arrays_) {
+    if (array.access != nullptr) array.access->drop();
+  }
+  if (outbox_) outbox_->drop();
   transfersUsed_ = 0;
   messages_.clear();
   arrays_.clear();

@@ -228,8 +228,8 @@ struct VdiGenerator::State {
   }
 
   /// Collective: the picture of all ranks' volumes, on the root.
-  Image renderTogether(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress) {
-    Image image;
+  void renderTogether(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress,
+                      Image& image) {
     detail::Gather& gather = *frames->flights.front().gather;
     comm.together([&] {
       if (comm.rank() == root) image = imageIn(settings);
@@ -256,14 +256,13 @@ struct VdiGenerator::State {
     gather.finish();
     mine.bytesSent += gather.bytesSent();
     mine.gatherSeconds = watch.lap();
-    return image;
   }
 
   /// The same with one rank.
-  Image renderAlone(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress) {
-    Image image = imageIn(settings);
+  void renderAlone(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress,
+                   Image& image) {
+    image = imageIn(settings);
     bands->render(requestOf(prepared, settings, {}), progress, *pool, image, mine);
-    return image;
   }
 
   /// Of the settings' size, not cleared.
@@ -416,9 +415,13 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   settings.margin = 0.0;
   const auto prepared = s.prepare(camera, transferFunction, settings);
   s.completeAll();
-  Image image = s.frame([&] {
-    return s.comm.size() > 1 ? s.renderTogether(*prepared, settings, progress)
-                             : s.renderAlone(*prepared, settings, progress);
+  Image image;  // which devices may still write to when `frame` handles an error
+  s.frame([&] {
+    if (s.comm.size() > 1) {
+      s.renderTogether(*prepared, settings, progress, image);
+    } else {
+      s.renderAlone(*prepared, settings, progress, image);
+    }
   });
   s.reports = s.gatherReports(s.mine);
   if (progress) progress(1.0);

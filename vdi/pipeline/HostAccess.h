@@ -32,6 +32,8 @@ class HostAccess {
                   std::uint64_t bytes);
   /// To be called when the commands are done.
   void finish();
+  /// Or this, if what they brought isn't wanted: after an error. Whatever else it has recorded must be done.
+  void drop() { staged_.clear(); }
 
  private:
   struct Staged {
