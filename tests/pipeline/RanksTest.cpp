@@ -263,6 +263,38 @@ TEST_CASE("schedules: direct send and rounds give the same VDI and picture", "[r
   unsetenv("VDI_SCHEDULE");
 }
 
+TEST_CASE("lists of more than 255 supersegments: all ways and schedules, and the picture of one rank") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::U8, world.rank(), world.size());
+  constexpr std::uint32_t budget = 1024;  // so many that each sample is a supersegment
+  GenerateSettings settings = test::smallSettings(9, 7, budget);
+  settings.samplesPerVoxel = 32.0;
+  const TransferFunction function = test::threeHues(80.0);
+  FirstMade made;
+  using Way = std::pair<const char*, const char*>;
+  for (const auto& [schedule, transport] :
+       {Way{"direct", "shared"}, Way{"rounds:2", "shared"}, Way{"direct", "mpi"}}) {
+    INFO(schedule << ", " << transport);
+    if (world.rank() == 0) setenv("VDI_SCHEDULE", schedule, 1);
+    if (world.rank() == 0) setenv("VDI_TRANSPORT", transport, 1);
+    VdiGenerator generator(device(), comm::Communicator::world());
+    unsetenv("VDI_SCHEDULE");
+    unsetenv("VDI_TRANSPORT");
+    generator.setBlocks(decomposed.mine);
+    const auto vdi = generator.generate(test::oblique(), function, settings);
+    if (vdi) {
+      std::uint32_t longest = 0;
+      const auto& offsets = vdi->offsets();
+      for (std::size_t i = 0; i + 1 < offsets.size(); ++i)
+        longest = std::max(longest, offsets[i + 1] - offsets[i]);
+      CHECK(longest > 255 * static_cast<std::uint32_t>(world.size()));  // some rank's part is beyond a byte
+      CHECK(longest <= budget);
+    }
+    made.check(vdi, generator.renderVolume(test::oblique(), function, settings));
+  }
+}
+
 TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of one rank", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("turbulence", {49, 49, 49}, {16, 16, 16}, Layout::Random,
