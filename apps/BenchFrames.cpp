@@ -38,6 +38,21 @@ json toJson(const RankTimes& times) {
   return {{"slowest", times.slowest}, {"mean", times.mean}};
 }
 
+json toJson(const StageTimes& stage) {
+  return {{"wall_ms", toJson(stage.wall)},
+          {"device_ms", stage.device ? toJson(*stage.device) : json(nullptr)}};
+}
+
+void addStageLines(std::string& text, const char* of, const std::array<StageTimes, frameStages>& stages) {
+  for (std::size_t i = 0; i < frameStages; ++i) {
+    const StageTimes& stage = stages[i];
+    text += fmt::format("  {:<20}{:>6.3f}{:>10.3f}", fmt::format("{}{}", of, sources[i].name),
+                        stage.wall.slowest, stage.wall.mean);
+    text += stage.device ? fmt::format("{:>16.3f}{:>10.3f}\n", stage.device->slowest, stage.device->mean)
+                         : fmt::format("{:>16}{:>10}\n", "-", "-");
+  }
+}
+
 }  // namespace
 
 void FrameLog::add(double wallMs, const std::vector<RankReport>& reports) {
@@ -130,9 +145,13 @@ Spread measureShown(VdiGenerator& generator, const std::shared_ptr<gpu::Device>&
 FrameFigures measureFrames(VdiGenerator& generator, const std::shared_ptr<gpu::Device>& device,
                            ClockRaiser& clock, const FrameInput& input, int repeats, int orbitFrames) {
   const comm::Communicator& comm = generator.communicator();
+  FrameLog pictureLog;
   const Spread pictures = repeated(repeats, [&] {
     clock.run();
-    return readyMs(comm, [&] { generator.renderVolume(input.camera, input.function, input.settings); });
+    const double milliseconds =
+        readyMs(comm, [&] { generator.renderVolume(input.camera, input.function, input.settings); });
+    pictureLog.add(milliseconds, generator.reports());
+    return milliseconds;
   });
   FrameLog log;
   repeated(repeats, [&] {
@@ -144,6 +163,7 @@ FrameFigures measureFrames(VdiGenerator& generator, const std::shared_ptr<gpu::D
   });
   FrameFigures figures = log.figures(static_cast<std::size_t>(repeats));
   figures.volumeRendering = pictures;
+  figures.pictureStages = pictureLog.figures(static_cast<std::size_t>(repeats)).stages;
   figures.shown = measureShown(generator, device, clock, input, repeats);
   if (orbitFrames > 0) {
     figures.orbitFrames = orbitFrames;
@@ -157,12 +177,8 @@ std::string stageLines(const FrameFigures& figures) {
   if (figures.ranks > 1) {
     text += fmt::format("  {:<12}{:>14}{:>10}{:>16}{:>10}\n", "stage", "wall: slowest", "mean",
                         "device: slowest", "mean");
-    for (std::size_t i = 0; i < frameStages; ++i) {
-      const StageTimes& stage = figures.stages[i];
-      text += fmt::format("  {:<12}{:>14.3f}{:>10.3f}", sources[i].name, stage.wall.slowest, stage.wall.mean);
-      text += stage.device ? fmt::format("{:>16.3f}{:>10.3f}\n", stage.device->slowest, stage.device->mean)
-                           : fmt::format("{:>16}{:>10}\n", "-", "-");
-    }
+    addStageLines(text, "", figures.stages);
+    addStageLines(text, "picture: ", figures.pictureStages);
   }
   text += fmt::format("  whole frame {:.3f} ms, shown {:.3f} ms, volume rendering {:.3f} ms",
                       figures.wall.median, figures.shown.median, figures.volumeRendering.median);
@@ -200,6 +216,7 @@ void addFigures(json& row, const FrameFigures& figures) {
   row["sub_supersegments"] = figures.subSupersegments;
   row["bytes_sent"] = figures.bytesSent;
   json stages = json::object();
+  json pictureStages = json::object();
   for (std::size_t i = 0; i < frameStages; ++i) {
     const StageTimes& stage = figures.stages[i];
     const bool ran = several || i == static_cast<std::size_t>(FrameStage::Generate);
@@ -207,10 +224,11 @@ void addFigures(json& row, const FrameFigures& figures) {
     if (i != static_cast<std::size_t>(FrameStage::Generate))
       row[std::string(sources[i].name) + "_ms"] = ran ? json(stage.wall.slowest) : json(nullptr);
     if (!ran) continue;
-    stages[sources[i].name] = {{"wall_ms", toJson(stage.wall)},
-                               {"device_ms", stage.device ? toJson(*stage.device) : json(nullptr)}};
+    stages[sources[i].name] = toJson(stage);
+    pictureStages[sources[i].name] = toJson(figures.pictureStages[i]);
   }
   row["stages"] = std::move(stages);
+  row["picture_stages"] = std::move(pictureStages);
 }
 
 }  // namespace vdi::apps

@@ -40,10 +40,11 @@ struct FrameFigures {
   int ranks = 1;
   Spread wall;  // ms on the root's host, from all ranks ready to the VDI there
   std::array<StageTimes, frameStages> stages;
-  std::uint64_t subSupersegments = 0;  // of all ranks, in the last frame
-  std::uint64_t bytesSent = 0;         // likewise
-  Spread volumeRendering;              // a picture by renderVolume; ms as `wall`
-  Spread shown;                        // a VDI, and its picture on the root's host; likewise
+  std::uint64_t subSupersegments = 0;                 // of all ranks, in the last frame
+  std::uint64_t bytesSent = 0;                        // likewise
+  Spread volumeRendering;                             // a picture by renderVolume; ms as `wall`
+  std::array<StageTimes, frameStages> pictureStages;  // of these
+  Spread shown;                                       // a VDI, and its picture on the root's host; likewise
   std::optional<double> vdisPerSecond;
   int orbitFrames = 0;  // that were made for vdisPerSecond
 
