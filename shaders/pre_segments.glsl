@@ -262,6 +262,7 @@ uint roomOfList() {
 void askForRoom() {
   atomicAdd(params.status.at[0], 1u);
 #ifdef SEVERAL_RANKS
+  atomicMax(params.status.at[1], preSegmentsRuns);
   params.capacities.at[listIndex] = preSegmentRoom + preSegmentsRuns;
   params.quotas.at[listIndex] = (params.quotas.at[listIndex] & 0xffffu) | preSegmentsRuns << 16;
 #endif

@@ -244,8 +244,8 @@ struct VdiGenerator::State {
           detail::Gather::Piece{&own.colors, 0, own.firstPixel * colorBytes, own.pixelCount * colorBytes},
           detail::Gather::Piece{&own.depths, 1, own.firstPixel * depthBytes, own.pixelCount * depthBytes}};
       comm.together([&] {
+        gather.send(pieces, own.flattened);  // how much that is doesn't depend on what was composited
         bands->compositor().finish();
-        gather.send(pieces, own.flattened);
       });
     };
     bands->makeFlat(requestOf(prepared, settings, {}, true), progress, flat, {[] {}, send}, mine);

@@ -14,13 +14,23 @@ namespace vdi::detail {
 using gpu::MemoryKind;
 namespace shared = gpu::shared;
 
+namespace {
+
+/// Places in CastParams::status.
+constexpr std::size_t wrongLists = 0;
+constexpr std::size_t mostRuns = 1;
+constexpr std::size_t statusWords = 2;
+
+}  // namespace
+
 ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
       commands_(device_),
       scan_(device_),
       interpolate_(device_),
       reduce_(device_),
-      status_(device_, sizeof(std::uint32_t), MemoryKind::Readback),
+      status_(device_, statusWords * sizeof(std::uint32_t), MemoryKind::DeviceLocal),
+      statusReadback_(device_, statusWords * sizeof(std::uint32_t), MemoryKind::Readback),
       preSegmentsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
       segmentsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
       totals_(device_, 2 * sizeof(std::uint32_t), MemoryKind::Readback) {}
@@ -44,7 +54,6 @@ void ListBuilder::reserve() {
   capacities_.reserve(device_, words, MemoryKind::DeviceLocal);
   lists.offsets.reserve(device_, words, MemoryKind::DeviceLocal);
   lists.listCount = request.listCount();
-  status_.mappedAs<std::uint32_t>()[0] = 0;
   times_ = {};
   if (request.algorithm == Algorithm::Bisection) return;
   const std::uint64_t countedWords =
@@ -78,9 +87,9 @@ void ListBuilder::startEmpty(std::uint32_t listCount, DeviceLists& lists, const 
                         MemoryKind::DeviceLocal);
   lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
   lists.listCount = listCount;
-  status_.mappedAs<std::uint32_t>()[0] = 0;
   times_ = {};
   commands_.begin();
+  commands_.fill(status_, 0);
   commands_.fill(lists.offsets, 0);
   commands_.barrier();
   submit();
@@ -98,7 +107,7 @@ void ListBuilder::finish() {
   }
   started_->lists->written = commands_.last();
   started_.reset();
-  if (const std::uint32_t wrong = status_.mappedAs<std::uint32_t>()[0]; wrong != 0) {
+  if (const std::uint32_t wrong = statusReadback_.mappedAs<std::uint32_t>()[wrongLists]; wrong != 0) {
     throw Error(ErrorCode::DeviceFailure,
                 fmt::format("{} lists were written with another count than was stored", wrong),
                 device_->name());
@@ -110,8 +119,9 @@ void ListBuilder::drop() {
   started_.reset();
 }
 
-/// With what comes behind the steps.
+/// With what comes behind the steps, and what they found wrong.
 void ListBuilder::submit() {
+  commands_.copy(status_, 0, statusReadback_, 0, statusReadback_.size());
   if (started_->behind) started_->behind(commands_);
   commands_.submit();
 }
@@ -167,6 +177,8 @@ void ListBuilder::finishBisection() {
   targets.segments = lists.segments.address();
   targets.status = status_.address();
   commands_.begin();
+  commands_.fill(status_, 0);
+  commands_.barrier();
   commands_.mark("write");
   if (lists.count > 0) started_->record(commands_, targets, true);
   commands_.barrier();
@@ -263,6 +275,10 @@ void ListBuilder::recordReduce() {
 void ListBuilder::submitMerging(From from, const gpu::Submission& after) {
   commands_.begin();
   commands_.waitFor(after);
+  if (from != From::Reduce) {
+    commands_.fill(status_, 0);
+    commands_.barrier();
+  }
   if (from == From::Search) recordSearch();
   if (from != From::Reduce) recordWrite();
   if (from == From::Reduce) commands_.fill(segmentsFit_, 1);
@@ -272,22 +288,31 @@ void ListBuilder::submitMerging(From from, const gpu::Submission& after) {
   submit();
 }
 
+/// Of each list of the next pictures, when one has had so many: as many and some more, as far as there's
+/// memory.
+std::uint32_t ListBuilder::runsToExpect(std::uint32_t most) const {
+  constexpr std::uint64_t atLeast = 8;
+  const std::uint64_t perRun =
+      std::uint64_t{started_->request.listCount()} * sizeof(shared::StoredPreSegment);
+  const std::uint64_t room = device_->limits().memoryBytes / 16 / perRun;
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(most + most / 4, std::max(room, atLeast)));
+}
+
 /// Where memory is taken for what was counted, and a quarter more, steps are submitted again.
 std::optional<ListBuilder::From> ListBuilder::againFrom(From from) {
   const Request& request = started_->request;
   DeviceLists& lists = *started_->lists;
   const auto totals = totals_.mappedAs<std::uint32_t>();
-  auto& tooLong = status_.mappedAs<std::uint32_t>()[0];
+  const auto status = statusReadback_.mappedAs<std::uint32_t>();
   const std::uint64_t preSegmentBytes = totals[preSegmentTotal] * sizeof(shared::StoredPreSegment);
   const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(request.code);
   if (preSegments_.size() < preSegmentBytes) {
     preSegments_.reserve(device_, preSegmentBytes + preSegmentBytes / 4, MemoryKind::DeviceLocal);
     return From::Write;
   }
-  if (hasQuotas() && tooLong != 0 && from != From::Reduce) {
+  if (hasQuotas() && status[wrongLists] != 0 && from != From::Reduce) {
     // Lists that weren't counted may have more runs than was expected. They've said how many.
-    tooLong = 0;
-    if (request.runsOnly) expectedRuns_ = manyRuns;
+    if (request.runsOnly) expectedRuns_ = std::max(expectedRuns_, runsToExpect(status[mostRuns]));
     return From::Write;
   }
   scan_.requireNoOverflow();

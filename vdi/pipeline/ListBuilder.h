@@ -144,6 +144,7 @@ class ListBuilder {
   void finishBisection();
   bool hasQuotas() const { return started_->request.agreed || started_->request.runsOnly; }
   void recordTotal(const gpu::Buffer& offsets, std::uint32_t listCount, std::size_t which);
+  std::uint32_t runsToExpect(std::uint32_t most) const;
   void submit();
   void addTimes();
 
@@ -161,14 +162,13 @@ class ListBuilder {
   gpu::Buffer left_;
   gpu::Buffer countedTolerances_;
   gpu::Buffer countedPreSegments_;
-  gpu::Buffer status_;
+  gpu::Buffer status_;  // as CastParams has it
+  gpu::Buffer statusReadback_;
   gpu::Buffer preSegmentsFit_;  // guards: shaders/shared/scan.h
   gpu::Buffer segmentsFit_;
   gpu::Buffer totals_;  // of pre-segments, and of supersegments
-  /// Of a picture's lists: most have no more. Once some had, there's room for as many as bytesPerList speaks
-  /// of.
+  /// Of a picture's lists: there's room for as many. Once some had more, there's room for these.
   static constexpr std::uint32_t fewRuns = 3;
-  static constexpr std::uint32_t manyRuns = 8;
   std::uint32_t expectedRuns_ = fewRuns;
   std::optional<Started> started_;
   ListTimes times_;
