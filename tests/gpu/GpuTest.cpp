@@ -103,6 +103,24 @@ TEST_CASE("validation messages name the object that's wrong") {
   CHECK_THAT(own->validationMessages(), Catch::Contains("readback buffer of 64 bytes"));
 }
 
+TEST_CASE("a device compiles a shader once for each specialisation, whichever thread asks") {
+  ComputePipelineInfo info;
+  info.shader = "store";
+  info.pushConstantBytes = sizeof(shared::ReduceConstants);
+  const auto own = Device::create(requestFromEnvironment(0));
+  const auto handleOf = [&](std::uint32_t compact) {
+    ComputePipelineInfo special = info;
+    special.specialization = {0, 0, compact, 0};
+    return ComputePipeline(own, special).handle();  // stays when its user goes
+  };
+  std::array<VkPipeline, 4> handles{};
+  std::vector<std::thread> threads;
+  for (VkPipeline& handle : handles) threads.emplace_back([&handleOf, &handle] { handle = handleOf(0); });
+  for (std::thread& thread : threads) thread.join();
+  for (const VkPipeline handle : handles) CHECK(handle == handles[0]);
+  CHECK(handleOf(1) != handles[0]);
+}
+
 TEST_CASE("prefix sums equal the host's at awkward sizes") {
   std::mt19937 generator(3);
   ScanPass scan(device());

@@ -38,7 +38,7 @@ wavelet = simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8])
 nothing = filter_of(simple.TrivialProducer(registrationName="gird"))
 for attempt in ("first", "second", "third"):
     check(errors_of(nothing), "rank %d: an input without data fails the %s time" % (rank, attempt))
-image = filter_of(wavelet, "RTDate")  # one for all, since each makes pipelines for the device anew
+image = filter_of(wavelet, "RTDate")
 for attempt in ("first", "second"):
     check("no array 'RTDate'" in errors_of(image), "rank %d: a missing array fails the %s time" % (rank, attempt))
 image.SelectInputScalars = ["POINTS", "RTData"]

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "vdi/gpu/CompiledPipeline.h"
 #include "vdi/gpu/Memory.h"
 
 namespace vdi::gpu {
@@ -33,6 +34,16 @@ struct ComputePipelineInfo {
   std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
 };
 
+/// What's at set 0, binding by binding.
+struct DescriptorBinding {
+  std::uint32_t binding;
+  VkDescriptorType type;
+  std::uint32_t count;
+};
+std::vector<DescriptorBinding> descriptorBindings(const ComputePipelineInfo& info);
+
+/// Those of equal info share what's compiled, if that's a shader of the library; images and uniforms are each
+/// one's own.
 class ComputePipeline {
  public:
   ComputePipeline(std::shared_ptr<Device> device, const ComputePipelineInfo& info);
@@ -50,25 +61,22 @@ class ComputePipeline {
   /// Likewise, a buffer of uniformBytes.
   void bindUniforms(const Buffer& buffer);
 
-  VkPipeline handle() const { return pipeline_; }
-  VkPipelineLayout layout() const { return layout_; }
+  VkPipeline handle() const { return compiled_->handle(); }
+  VkPipelineLayout layout() const { return compiled_->layout(); }
   VkDescriptorSet descriptorSet() const { return set_; }  // VK_NULL_HANDLE without any
 
  private:
-  void makeDescriptorSet();
+  void makeDescriptorSet(const ComputePipelineInfo& info);
   void bind(std::uint32_t binding, std::span<const SampledImage* const> images, const Sampler& sampler);
-  void makePipeline(const ComputePipelineInfo& info);
   void release() noexcept;
 
   std::shared_ptr<Device> device_;
+  std::shared_ptr<const CompiledPipeline> compiled_;
   std::uint32_t imageCount_ = 0;
   std::uint32_t uniformBytes_ = 0;
   bool hasPlane_ = false;
-  VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
   VkDescriptorPool pool_ = VK_NULL_HANDLE;
   VkDescriptorSet set_ = VK_NULL_HANDLE;
-  VkPipelineLayout layout_ = VK_NULL_HANDLE;
-  VkPipeline pipeline_ = VK_NULL_HANDLE;
 };
 
 }  // namespace vdi::gpu

@@ -100,6 +100,7 @@ void VulkanDevice::release() noexcept {
   for (const Queue& queue : queues_) {
     if (queue.done != VK_NULL_HANDLE) vkDestroySemaphore(device_, queue.done, nullptr);
   }
+  compiled_.clear();
   if (cache_ != VK_NULL_HANDLE) vkDestroyPipelineCache(device_, cache_, nullptr);
   vkDestroyDevice(device_, nullptr);
 }

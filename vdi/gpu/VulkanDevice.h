@@ -11,6 +11,8 @@
 #include <span>
 #include <string>
 
+#include "vdi/gpu/CompiledPipeline.h"
+
 namespace vdi::gpu {
 
 struct DeviceCandidate;
@@ -34,6 +36,7 @@ class VulkanDevice {
   VkDevice handle() const { return device_; }
   std::uint32_t queueFamily(QueueKind kind) const { return queue(kind).family; }
   VkPipelineCache pipelineCache() const { return cache_; }
+  CompiledPipelines& compiledPipelines() { return compiled_; }
 
   /// Index of the first memory type that `typeBits` allows and that has `wanted`, if there's one; by Vulkan's
   /// order that's the one with the fewest other properties.
@@ -86,6 +89,7 @@ class VulkanDevice {
   std::mutex queueMutex_;
   mutable std::atomic<bool> lost_ = false;
   VkPipelineCache cache_ = VK_NULL_HANDLE;
+  CompiledPipelines compiled_;
   VkPhysicalDeviceMemoryProperties memory_{};
   PFN_vkGetMemoryHostPointerPropertiesEXT hostPointerProperties_ = nullptr;
   struct {
