@@ -136,7 +136,8 @@ JSON has, beside what the table has:
   vdis_per_second                VDIs one behind the other on an orbit (--frames), wall on the root's host
   generate_ms, distribute_ms, composite_ms, gather_ms
                                  device time of the first, wall of the others; slowest rank
-  stages                         all of them: wall_ms and device_ms, slowest rank and mean
+  stages, picture_stages         all of them, of a VDI and of a picture by volume rendering: wall_ms and
+                                 device_ms, slowest rank and mean
   sub_supersegments, bytes_sent  of all ranks, in one frame
   dvr_frame_ms, generate_frame_ms, render_frame_ms
                                  sums of the slowest rank's stages, transfers included
