@@ -98,6 +98,11 @@ FrameFigures FrameLog::figures(std::size_t repeats) const {
   return figures;
 }
 
+void FrameFigures::takePictures(const FrameFigures& pictures) {
+  volumeRendering = pictures.wall;
+  pictureStages = pictures.stages;
+}
+
 double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int frames) {
   assert(frames >= 1);
   constexpr int orbit = 20;
@@ -146,7 +151,7 @@ FrameFigures measureFrames(VdiGenerator& generator, const std::shared_ptr<gpu::D
                            ClockRaiser& clock, const FrameInput& input, int repeats, int orbitFrames) {
   const comm::Communicator& comm = generator.communicator();
   FrameLog pictureLog;
-  const Spread pictures = repeated(repeats, [&] {
+  repeated(repeats, [&] {
     clock.run();
     const double milliseconds =
         readyMs(comm, [&] { generator.renderVolume(input.camera, input.function, input.settings); });
@@ -162,8 +167,7 @@ FrameFigures measureFrames(VdiGenerator& generator, const std::shared_ptr<gpu::D
     return milliseconds;
   });
   FrameFigures figures = log.figures(static_cast<std::size_t>(repeats));
-  figures.volumeRendering = pictures;
-  figures.pictureStages = pictureLog.figures(static_cast<std::size_t>(repeats)).stages;
+  figures.takePictures(pictureLog.figures(static_cast<std::size_t>(repeats)));
   figures.shown = measureShown(generator, device, clock, input, repeats);
   if (orbitFrames > 0) {
     figures.orbitFrames = orbitFrames;

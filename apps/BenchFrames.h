@@ -48,6 +48,8 @@ struct FrameFigures {
   std::optional<double> vdisPerSecond;
   int orbitFrames = 0;  // that were made for vdisPerSecond
 
+  /// What a log of pictures by renderVolume has.
+  void takePictures(const FrameFigures& pictures);
   const StageTimes& stage(FrameStage which) const { return stages[static_cast<std::size_t>(which)]; }
 };
 

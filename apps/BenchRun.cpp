@@ -190,15 +190,16 @@ class Bench {
   Made make(const Shot& shot) {
     Made made;
     FrameLog log;
-    std::vector<double> volumes;
+    FrameLog pictureLog;
     std::vector<double> frames;
     std::vector<double> ratios;
     std::vector<double> counts;
     std::vector<double> writes;
     made.figures.device = repeated(options_.repeats, [&] {
       clock_.run();
-      volumes.push_back(
-          readyMs(world_, [&] { generator_.renderVolume(shot.camera, shot.function, settings_); }));
+      const double pictureMs =
+          readyMs(world_, [&] { generator_.renderVolume(shot.camera, shot.function, settings_); });
+      pictureLog.add(pictureMs, generator_.reports());
       const double volumeMs = deviceMs();
       made.vdi.reset();
       clock_.run();
@@ -216,7 +217,7 @@ class Bench {
     made.figures.countMs = spreadOf(lastOf(counts)).median;
     made.figures.writeMs = spreadOf(lastOf(writes)).median;
     made.figures.frames = log.figures(static_cast<std::size_t>(options_.repeats));
-    made.figures.frames.volumeRendering = spreadOf(lastOf(volumes));
+    made.figures.frames.takePictures(pictureLog.figures(static_cast<std::size_t>(options_.repeats)));
     const FrameInput input{shot.camera, shot.function, settings_};
     made.figures.frames.shown = measureShown(generator_, device_, clock_, input, options_.repeats);
     if (options_.frames > 0) {

@@ -35,6 +35,8 @@ for name in ("generate", "distribute", "composite", "gather"):
     assert wall["slowest"] >= wall["mean"] > 0, (name, wall)
     assert row["frame_ms"] > 0.5 * wall["mean"], row
     assert name in table and f"{wall['slowest']:.3f}" in table, (name, table)
+    picture = row["picture_stages"][name]["wall_ms"]
+    assert picture["slowest"] >= picture["mean"] > 0 and row["volume_rendering_ms"] > 0.5 * picture["mean"], row
     if name != "generate":
         assert row[name + "_ms"] == wall["slowest"], row
 device = row["stages"]["generate"]["device_ms"]
