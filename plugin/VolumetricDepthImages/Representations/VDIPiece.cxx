@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstring>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "VDIImageData.h"
@@ -32,6 +33,13 @@ void packFile(vtkImageData* image, vtkFieldData* fields) {
   vdi::Vdi vdi;
   getVdi(image, vdi);
   const std::vector<std::byte> bytes = vdi::io::encode(vdi);
+  // ParaView's messages have sizes of 32 bits, and some words of their own.
+  constexpr std::size_t most = (std::size_t{1} << 31U) - (std::size_t{1} << 20U);
+  if (bytes.size() > most)
+    throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                     "This VDI takes " + std::to_string(bytes.size() >> 20U) +
+                         " MiB as a file: more than the 2 GiB that ParaView sends to its client. Make one of "
+                         "a lower resolution or of fewer supersegments.");
   vtkNew<vtkUnsignedCharArray> array;
   array->SetName(fileName);
   array->SetNumberOfTuples(static_cast<vtkIdType>(bytes.size()));
