@@ -13,6 +13,7 @@ from paraview import simple  # noqa: E402
 from pvtest import check  # noqa: E402
 
 SIZE, CAMERA, CENTER = [480, 360], [2.2, 1.9, 2.4], [0.5, 0.5, 0.5]
+LOG = os.path.join(pvtest.OUTPUT, "client_server.log")
 
 
 def free_port():
@@ -37,9 +38,11 @@ class Session:
         self.relay = subprocess.Popen(["python3", os.path.join(here, "relay.py"), str(port)], stdin=subprocess.PIPE,
                                       stdout=subprocess.PIPE, text=True)
         relayed = self.relay.stdout.readline().strip()
-        self.server = subprocess.Popen([os.environ["MPIEXEC"], "--oversubscribe", "-n", "2", os.environ["PVSERVER"],
-                                        "--reverse-connection", "--client-host=127.0.0.1", "--server-port=" + relayed],
-                                       env=clean_environment(), stdin=subprocess.DEVNULL)
+        with open(LOG, "w") as log:
+            self.server = subprocess.Popen([os.environ["MPIEXEC"], "--oversubscribe", "-n", "2", os.environ["PVSERVER"],
+                                            "--reverse-connection", "--client-host=127.0.0.1", "--server-port=" + relayed],
+                                           env=clean_environment(), stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+            os.dup2(log.fileno(), 2)  # what this process says, too
         simple.ReverseConnect(str(port))
         simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=True, ns=simple.__dict__)
         return self
@@ -124,13 +127,33 @@ with Session() as session:
     # A volume is drawn on the server's ranks: the view says why the VDI isn't, and shows it when the volume is gone.
     view = pvtest.make_view(SIZE, CAMERA, CENTER)
     image = generated(view)
-    volume = simple.Show(image.Input, view)
-    volume.SetRepresentationType("Volume")
     simple.Show(image, view)
     simple.Render(view)
-    check("beside a volume" in pvtest.message_in(view), "beside a volume of the server there is a message")
-    simple.Hide(image.Input, view)
-    picture = screenshot(view, "client_server_volume_hidden.png")
-    check(pvtest.message_in(view) == "" and picture.std() > 20, "and without it the VDI again")
+    view.CameraPosition, view.CameraFocalPoint = CAMERA, CENTER
+    alone = screenshot(view, "client_server_no_volume.png")
+    simple.Hide(image, view)
+    for order in ("volume first", "VDI first"):
+        view = pvtest.make_view(SIZE, CAMERA, CENTER)
+        for what in order.split()[0], "both":
+            if what in ("volume", "both"):
+                simple.Show(image.Input, view).SetRepresentationType("Volume")
+            if what in ("VDI", "both"):
+                simple.Show(image, view)
+            simple.Render(view)
+            view.CameraPosition, view.CameraFocalPoint = CAMERA, CENTER
+        picture = screenshot(view, "client_server_{}.png".format(order.replace(" ", "_")))
+        check("beside a volume" in pvtest.message_in(view), order + ": beside a volume of the server there is a message")
+        simple.Hide(image, view)
+        volume = screenshot(view, "client_server_volume.png")
+        check(volume.std() > 20 and pvtest.ssim(picture[:120], volume[:120]) > 0.95, order + ": the volume is seen")
+        simple.Show(image, view)
+        simple.Hide(image.Input, view)
+        picture = screenshot(view, "client_server_volume_hidden.png")
+        check(pvtest.message_in(view) == "" and pvtest.ssim(picture, alone) > 0.99, order + ": and without it the VDI again")
+
+with open(LOG) as log:
+    said = log.read()
+print(said)
+check("Conflicting" not in said, "nobody warns of requests that conflict")
 
 pvtest.finish()

@@ -57,11 +57,7 @@ bool drawsOnRanks() {
          module->GetNumberOfLocalPartitions() > 1;
 }
 
-/// Whether the view draws where the VDI isn't. Volumes insist on that; on ranks without a client they are
-/// wrong when all data are on the first one.
-bool drawsVolumesOnRanks(vtkPVRenderView* view) {
-  if (hasServer()) return view->GetUseDistributedRenderingForRender();
-  if (!drawsOnRanks()) return false;
+bool showsVolumes(vtkPVRenderView* view) {
   vtkVolumeCollection* volumes = view->GetRenderer()->GetVolumes();
   vtkCollectionSimpleIterator at;
   volumes->InitTraversal(at);
@@ -69,6 +65,18 @@ bool drawsVolumesOnRanks(vtkPVRenderView* view) {
     if (volume->GetVisibility() != 0) return true;
   }
   return false;
+}
+
+/// Whether the view draws where the VDI isn't. Volumes insist on that; on ranks without a client they are
+/// wrong when all data are on the first one.
+bool drawsVolumesOnRanks(vtkPVRenderView* view) {
+  return hasServer() ? view->GetUseDistributedRenderingForRender() : drawsOnRanks() && showsVolumes(view);
+}
+
+/// Whether to ask that the view is drawn at the client. Who asks first gets it, and a volume that doesn't
+/// isn't seen at all.
+bool wantsClient(vtkPVRenderView* view) {
+  return hasServer() && view != nullptr && !showsVolumes(view);
 }
 
 }  // namespace
@@ -140,10 +148,10 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
     if (pv::boundsOf(this->Piece->GetFieldData(), bounds))
       vtkPVRenderView::SetGeometryBounds(in, this, bounds);
     // Objects are drawn where the VDI is, all of them.
-    if (hasServer()) vtkPVRenderView::SetRequiresDistributedRendering(in, this, false);
+    if (wantsClient(view)) vtkPVRenderView::SetRequiresDistributedRendering(in, this, false);
     if (drawsOnRanks()) vtkPVRenderView::SetForceDataDistributionMode(in, vtkMPIMoveData::COLLECT);
   } else if (request == vtkPVView::REQUEST_UPDATE_LOD()) {
-    if (hasServer()) vtkPVRenderView::SetRequiresDistributedRenderingLOD(in, this, false);
+    if (wantsClient(view)) vtkPVRenderView::SetRequiresDistributedRenderingLOD(in, this, false);
   } else if (request == vtkPVView::REQUEST_RENDER()) {
     this->Prop->SetMarksDepth(drawsOnRanks());
     this->Prop->SetObstacle(
