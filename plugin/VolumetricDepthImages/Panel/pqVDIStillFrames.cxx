@@ -18,10 +18,14 @@ namespace {
 
 constexpr int watchMilliseconds = 30;
 
+vtkPVRenderView* renderViewOf(pqView* view) {
+  return vtkPVRenderView::SafeDownCast(view->getViewProxy()->GetClientSideView());
+}
+
 /// Those that the last frame has shown, or was to show.
 std::vector<vtkVDIProp*> vdisOf(pqView* view) {
   std::vector<vtkVDIProp*> vdis;
-  auto* drawn = vtkPVRenderView::SafeDownCast(view->getViewProxy()->GetClientSideView());
+  vtkPVRenderView* drawn = renderViewOf(view);
   if (drawn == nullptr) return vdis;
   vtkPropCollection* props = drawn->GetRenderer()->GetViewProps();
   vtkCollectionSimpleIterator at;
@@ -50,15 +54,21 @@ pqVDIStillFrames::pqVDIStillFrames(QObject* parent) : QObject(parent) {
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::viewAdded, this, &pqVDIStillFrames::viewAdded);
   for (pqView* view : model->findItems<pqView*>()) this->viewAdded(view);
-  vtkVDIRepresentation::SetDefersStillFrames(true);
 }
 
 pqVDIStillFrames::~pqVDIStillFrames() {
-  vtkVDIRepresentation::SetDefersStillFrames(false);
+  vtkVDIRepresentation::DeferNoStillFrames();
 }
 
 void pqVDIStillFrames::viewAdded(pqView* view) {
+  this->connect(view, &pqView::beginRender, this, &pqVDIStillFrames::begins);
   this->connect(view, &pqView::endRender, this, &pqVDIStillFrames::rendered);
+}
+
+void pqVDIStillFrames::begins() {
+  auto* view = qobject_cast<pqView*>(this->sender());
+  vtkPVRenderView* drawn = view != nullptr ? renderViewOf(view) : nullptr;
+  if (drawn != nullptr) vtkVDIRepresentation::DeferStillFrames(drawn);
 }
 
 void pqVDIStillFrames::rendered() {

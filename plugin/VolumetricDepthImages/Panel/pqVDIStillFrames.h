@@ -14,12 +14,14 @@ class pqVDIStillFrames : public QObject {
   Q_OBJECT
 
  public:
-  /// Of all views there are and will be, until it goes.
+  /// Of all render views there are and will be, until it goes. Not of the views in a comparative view, which
+  /// render without telling: these wait.
   explicit pqVDIStillFrames(QObject* parent);
   ~pqVDIStillFrames() override;
 
  private:
   Q_SLOT void viewAdded(pqView* view);
+  Q_SLOT void begins();
   Q_SLOT void rendered();
   Q_SLOT void look();
 

@@ -19,6 +19,9 @@
 #include <vtkVolume.h>
 #include <vtkVolumeCollection.h>
 
+#include <algorithm>
+#include <vector>
+
 #include "VDIPiece.h"
 #include "vtkVDIProp.h"
 
@@ -77,6 +80,16 @@ bool drawsVolumesOnRanks(vtkPVRenderView* view) {
 /// isn't seen at all.
 bool wantsClient(vtkPVRenderView* view) {
   return hasServer() && view != nullptr && !showsVolumes(view);
+}
+
+std::vector<vtkWeakPointer<vtkPVRenderView>>& deferringViews() {
+  static std::vector<vtkWeakPointer<vtkPVRenderView>> views;
+  return views;
+}
+
+bool defersStillFrames(vtkPVRenderView* view) {
+  const std::vector<vtkWeakPointer<vtkPVRenderView>>& views = deferringViews();
+  return std::find(views.begin(), views.end(), view) != views.end();
 }
 
 }  // namespace
@@ -167,17 +180,21 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
   return 1;
 }
 
-bool vtkVDIRepresentation::DefersStillFrames = false;
+void vtkVDIRepresentation::DeferStillFrames(vtkPVRenderView* view) {
+  if (defersStillFrames(view)) return;
+  std::erase(deferringViews(), nullptr);  // those that have gone
+  deferringViews().emplace_back(view);
+}
 
-void vtkVDIRepresentation::SetDefersStillFrames(bool defers) {
-  DefersStillFrames = defers;
+void vtkVDIRepresentation::DeferNoStillFrames() {
+  deferringViews().clear();
 }
 
 vtkVDIProp::Frame vtkVDIRepresentation::FrameOf(vtkPVRenderView* view) {
   if (this->IsInteractive(view)) return vtkVDIProp::Frame::Interactive;
   // Who takes pictures of a window does without swapping its buffers.
   const bool isCaptured = view->GetRenderWindow()->GetSwapBuffers() == 0;
-  return DefersStillFrames && !isCaptured ? vtkVDIProp::Frame::Deferred : vtkVDIProp::Frame::Whole;
+  return defersStillFrames(view) && !isCaptured ? vtkVDIProp::Frame::Deferred : vtkVDIProp::Frame::Whole;
 }
 
 /// Whether the next frame may be rough and late: one of those while the camera moves. Time steps that come

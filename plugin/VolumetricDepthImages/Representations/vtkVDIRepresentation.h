@@ -33,9 +33,11 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   int ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in, vtkInformation* out) override;
   void SetVisibility(bool visible) override;
 
-  /// Of this process: whether still frames of windows are deferred (vtkVDIProp::Frame), for somebody renders
-  /// again as soon as there's more. Pictures that are taken of a window are whole. Default off.
-  static void SetDefersStillFrames(bool defers);
+  /// From now on still frames of that view's window are deferred (vtkVDIProp::Frame), for somebody renders it
+  /// again as soon as there's more. Pictures that are taken of a window are whole.
+  static void DeferStillFrames(vtkPVRenderView* view);
+  /// Of no view any more.
+  static void DeferNoStillFrames();
 
   /// As vtkVDIProp has them.
   void SetReconstruction(int reconstruction);
@@ -61,8 +63,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   void ForgetInteractor();
 
   vtkNew<vtkPolyData> Piece;  // pv::packVdi
-  static bool DefersStillFrames;
-  bool HasPacked = false;  // in the update that's going on
+  bool HasPacked = false;     // in the update that's going on
   vtkNew<vtkVDIProp> Prop;
 
   vtkWeakPointer<vtkRenderWindowInteractor> Interactor;  // the view's, observed
