@@ -304,6 +304,9 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
   } else {
     this->Take(frame == Frame::Deferred && internal.Buffers.hasVdi() ? shortWait : untilDone);
   }
+  // Whatever is drawn, or isn't as where the camera looks away. A picture of the window that's taken
+  // meanwhile doesn't show in it.
+  if (frame != Frame::Whole) internal.IsBehind = frame == Frame::Deferred && internal.Buffers.isLoading();
 }
 
 bool vtkVDIProp::IsBehind() const {
@@ -408,8 +411,6 @@ int vtkVDIProp::RenderOverlay(vtkViewport* viewport) {
 
 int vtkVDIProp::DrawIn(vtkViewport* viewport) {
   Internals& internal = *this->Internal;
-  // A picture of the window that's taken meanwhile doesn't show in it.
-  if (internal.NextFrame != Frame::Whole) internal.IsBehind = false;
   auto* renderer = vtkRenderer::SafeDownCast(viewport);
   auto* window = renderer ? vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()) : nullptr;
   if (window == nullptr || renderer->GetSelector() != nullptr) return 0;
@@ -483,7 +484,6 @@ void vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view)
   if (still.isOf(view) && still.isDone()) {
     this->ShowPicture(window, view.size, still.picture());
     internal.Whole.Guess(still.seconds(), static_cast<double>(view.window.size()));
-    internal.IsBehind = internal.Buffers.isLoading();
     return;
   }
   if (still.isOf(view) && internal.Texture->GetHandle() != 0) {
