@@ -177,9 +177,11 @@ struct vtkVDIProp::Internals {
   vtkMTimeType PieceTime = 0;
   Frame NextFrame = Frame::Whole;
   bool IsBehind = false;           // the window is
-  bool IsRecovering = false;       // until a frame has been drawn on the new device
+  bool IsRecovering = false;       // until a frame has been drawn on the new device as it's to be
   vtkMTimeType FailedTime = 0;     // of the piece that has failed to be drawn
   glm::ivec2 FailedSize{0};        // in a viewport of that size
+  vtkMTimeType RoughTime = 0;      // of the piece whose picture in full loses every device
+  glm::ivec2 RoughSize{0};         // in a viewport of that size
   std::array<double, 6> Bounds{};  // as long as GetBounds' result is used
 
   bool IsPeeled = false;  // volumes are, in this frame
@@ -422,13 +424,14 @@ int vtkVDIProp::DrawIn(vtkViewport* viewport) {
   if (this->MarksDepth) this->MarkDepth(window);
   if (!internal.Buffers.hasVdi() || !internal.Obstacle.empty()) return 0;
   try {
+    bool isFinal = false;
     try {
-      this->Draw(renderer, window);
+      isFinal = this->Draw(renderer, window);
     } catch (const vdi::Error& error) {
       if (!this->Recover(error)) throw;
-      this->Draw(renderer, window);
+      isFinal = this->Draw(renderer, window);
     }
-    internal.IsRecovering = false;
+    if (isFinal) internal.IsRecovering = false;
     return 1;
   } catch (const std::exception& error) {
     internal.Buffers.clear();
@@ -460,47 +463,75 @@ void vtkVDIProp::MarkDepth(vtkOpenGLRenderWindow* window) {
   quad->Render();
 }
 
-void vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
+/// Returns whether that's what this frame is to show in the end.
+bool vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   Internals& internal = *this->Internal;
   const Viewport port = viewportOf(renderer);
-  if (port.size.x < 1 || port.size.y < 1) return;
+  if (port.size.x < 1 || port.size.y < 1) return true;
   const pv::ViewMatrices matrices = matricesOf(renderer);
   readDepths(window, port, internal.Window);
   if (internal.DefersIn(window, port.size)) {
-    this->DrawDeferred(window, {matrices, port.size, static_cast<vdi::Reconstruction>(this->Reconstruction),
-                                internal.Window});
-    return;
+    return this->DrawDeferred(
+        window,
+        {matrices, port.size, static_cast<vdi::Reconstruction>(this->Reconstruction), internal.Window});
   }
   internal.Buffers.still().drop();
   const Form form = internal.NextFrame == Frame::Interactive
                         ? internal.InteractiveForm(port.size, this->FrameRate)
                         : Form{port.size, false};
   this->DrawNow(window, matrices, port.size, form);
+  return true;
 }
 
-void vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view) {
+bool vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view) {
   Internals& internal = *this->Internal;
   pv::VDIStill& still = internal.Buffers.still();
+  if (internal.RoughTime == internal.PieceTime && internal.RoughSize == view.size) {
+    this->DrawNow(window, view.matrices, view.size, internal.InteractiveForm(view.size, this->FrameRate));
+    return true;
+  }
   if (still.isOf(view) && still.isDone()) {
-    this->ShowPicture(window, view.size, still.picture());
+    std::span<const glm::u8vec4> picture;
+    try {
+      picture = still.picture();
+    } catch (const vdi::Error& error) {
+      if (error.code() != vdi::ErrorCode::DeviceFailure || !internal.IsRecovering) throw;
+      this->StayRough(window, view, error);
+      return true;
+    }
+    this->ShowPicture(window, view.size, picture);
     internal.Whole.Guess(still.seconds(), static_cast<double>(view.window.size()));
-    return;
+    return true;
   }
   if (still.isOf(view) && internal.Texture->GetHandle() != 0) {
     this->ShowTexture(window);  // the rough one
     internal.IsBehind = true;
-    return;
+    return false;
   }
   // Where no frame is as the one before, what is made beside them is never right.
   const bool isUseless = still.isDone() && !still.isSeen();
   still.drop();
   if (isUseless) {
     this->DrawNow(window, view.matrices, view.size, {view.size, false});
-    return;
+    return true;
   }
   this->DrawNow(window, view.matrices, view.size, internal.InteractiveForm(view.size, this->FrameRate));
   if (!internal.Buffers.isLoading()) still.start(internal.Buffers.renderer(), std::move(view));
   internal.IsBehind = true;
+  return false;
+}
+
+/// Where the picture in full has lost two devices in a row: on and on it would lose them.
+void vtkVDIProp::StayRough(vtkOpenGLRenderWindow* window, const pv::StillView& view,
+                           const vdi::Error& error) {
+  Internals& internal = *this->Internal;
+  internal.IsRecovering = false;
+  if (!this->Recover(error)) throw vdi::Error(error);
+  internal.RoughTime = internal.PieceTime;
+  internal.RoughSize = view.size;
+  this->DrawNow(window, view.matrices, view.size, internal.InteractiveForm(view.size, this->FrameRate));
+  this->Say(std::string("The VDI is shown with few pixels, for its picture in full can't be made: ") +
+            error.what());
 }
 
 void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& matrices,

@@ -91,8 +91,9 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   struct Form;
   struct Internals;
   int DrawIn(vtkViewport* viewport);
-  void Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
-  void DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view);
+  bool Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
+  bool DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view);
+  void StayRough(vtkOpenGLRenderWindow* window, const pv::StillView& view, const vdi::Error& error);
   void DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& matrices, const glm::ivec2& portSize,
                const Form& form);
   void ShowPicture(vtkOpenGLRenderWindow* window, const glm::ivec2& size,
