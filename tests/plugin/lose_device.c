@@ -1,5 +1,8 @@
 /* Loaded before a program (LD_PRELOAD): when there's a file VDI_TEST_LOSE_DEVICE, removes it, and the Vulkan
- * device that is waited for next is lost. A folder of that name stays: all devices are. */
+ * device that is waited for next is lost. A folder of that name stays: all devices are.
+ * While there's a file VDI_TEST_LOSE_STILLS, a device is lost when a thread waits for the tenth time that
+ * isn't the program's first one: those that make pictures in full do, strip by strip, and those that load
+ * VDIs don't. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdlib.h>
@@ -9,6 +12,7 @@
 enum { most = 64 };
 static VkDevice lost[most];
 static int lost_count = 0;
+static __thread int waits = 0;
 
 VKAPI_ATTR VkResult VKAPI_CALL vkWaitSemaphores(VkDevice device, const VkSemaphoreWaitInfo* info,
                                                 uint64_t timeout) {
@@ -19,6 +23,10 @@ VKAPI_ATTR VkResult VKAPI_CALL vkWaitSemaphores(VkDevice device, const VkSemapho
     unlink(name);
     if (lost_count < most) lost[lost_count++] = device;
   }
+  const char* stills = getenv("VDI_TEST_LOSE_STILLS");
+  if (stills != NULL && gettid() != getpid() && ++waits >= 10 && access(stills, F_OK) == 0 &&
+      lost_count < most)
+    lost[lost_count++] = device;
   for (int i = 0; i < lost_count; ++i) {
     if (lost[i] == device) return VK_ERROR_DEVICE_LOST;
   }

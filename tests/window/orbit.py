@@ -1,6 +1,8 @@
 """By mouse: opens a .vdi file, presses Apply, drags to orbit; what is seen is compared with the tool's picture for the same
-camera (orbit_compare.py). orbit_notes.py runs inside ParaView. Needs VDI_PLUGIN, VDI_TOOL and VDI_TEST_OUTPUT."""
+camera (orbit_compare.py). Then without the mouse (orbit_inside.py): what comes late shows by itself. orbit_notes.py runs inside
+ParaView. Needs VDI_PLUGIN, VDI_TOOL, VDI_LOSE_DEVICE and VDI_TEST_OUTPUT."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -36,9 +38,64 @@ def compare(window, name, start, end, what="orbited"):
     subprocess.run(["pvpython", os.path.join(HERE, "orbit_compare.py"), picture, what], check=True, timeout=200)
 
 
-subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "32x32x32", "--resolution", "160x160",
-                "--supersegments", "12", "--azimuth", "40", "-o", os.path.join(OUTPUT, "input.vdi")],
-               check=True, stdout=subprocess.DEVNULL)
+def generate(name, *options):
+    path = os.path.join(OUTPUT, name)
+    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "32x32x32", "-o", path]
+                   + list(options), check=True, stdout=subprocess.DEVNULL)
+    return path
+
+
+def inside(call):
+    """What a call of orbit_inside.py returns."""
+    if read("done") is not None:
+        os.remove(os.path.join(OUTPUT, "done"))
+    path = os.path.join(OUTPUT, "do")
+    with open(path + ".new", "w") as file:
+        file.write(call)
+    os.replace(path + ".new", path)
+    result = json.loads(wait_for("end of " + call, lambda: read("done"), 60))
+    assert not str(result).startswith("Traceback"), result
+    return result
+
+
+def steps():
+    """Small frames are quick, but a large VDI isn't loaded so soon."""
+    files = [generate("small.vdi", "--resolution", "160x120"),
+             generate("large.vdi", "--resolution", "1280x960", "--supersegments", "20", "--seed", "2")]
+    size = [120, 90]
+    inside("be_small({})".format(size))
+    time.sleep(1)
+    seen_size, contrast, are_same = inside("show_steps({!r})".format(files))
+    assert seen_size == size and contrast > 10 and not are_same, (seen_size, contrast, are_same)
+    for step in (0, 1, 0, 1):
+        inside("go_to({})".format(step))
+        wait_for("picture of step {} without the mouse".format(step), lambda: inside("sees({})".format(step)), 30)
+
+
+def comparative():
+    inside("show_comparative()")
+    time.sleep(2)
+    count, contrast, whole = inside("comparative_is_whole()")
+    assert count == 4 and contrast > 10 and all(whole), "comparative views show rough pictures: %s" % whole
+    inside("close_comparative()")
+
+
+def lost_stills():
+    """A device that is lost by each picture in full: there's an end to it."""
+    inside("show_and_lose({!r}, {!r})".format(generate("lost.vdi", "--resolution", "480x360"), LOSE_STILLS))
+    wait_for("word of the rough picture", lambda: "with few pixels" in inside("what_is_said()")[0], 60)
+    time.sleep(1)
+    frames = inside("what_is_said()")[2]
+    time.sleep(2)
+    said, contrast, later = inside("what_is_said()")
+    assert later == frames, "the window renders on and on: %d frames, then %d" % (frames, later)
+    assert contrast > 10 and "with few pixels" in said, said
+    os.remove(LOSE_STILLS)
+
+
+generate("input.vdi", "--resolution", "160x160", "--supersegments", "12", "--azimuth", "40")
+LOSE_STILLS = os.environ["VDI_TEST_LOSE_STILLS"] = os.path.join(OUTPUT, "lose_stills")
+os.environ["LD_PRELOAD"] = os.environ["VDI_LOSE_DEVICE"]
 with Screen(1100, 760) as screen, Window(screen, "--script=" + os.path.join(HERE, "orbit_notes.py"), output=OUTPUT) as window:
     said = wait_for("end of the script", lambda: read("ready"), 100)
     assert said == "ok", said
@@ -50,3 +107,6 @@ with Screen(1100, 760) as screen, Window(screen, "--script=" + os.path.join(HERE
     compare(window, "opened.png", middle, middle, "opened")
     compare(window, "orbited.png", middle, (middle[0] + 180, middle[1] + 60))
     compare(window, "orbited_back.png", middle, (middle[0] - 90, middle[1] - 180))
+    steps()
+    comparative()
+    lost_stills()

@@ -1,13 +1,13 @@
 """Runs inside the real ParaView (--script, which sets no __file__): loads the plugin, prepares the view, and from
-then on notes what the view shows after each drag of the mouse: view.png, and camera.json with the camera. What is done with
-the window is in orbit.py."""
+then on notes what the view shows after each drag of the mouse: view.png, and camera.json with the camera; and calls what it's
+asked to in between (orbit_inside.py). What is done with the window is in orbit.py."""
 
 import json
 import os
 import sys
 import traceback
 
-sys.path.insert(0, os.environ["VDI_TEST_SOURCE"])
+sys.path[:0] = [os.environ["VDI_TEST_SOURCE"], os.path.join(os.path.dirname(os.environ["VDI_TEST_SOURCE"]), "window")]
 OUTPUT = os.environ["VDI_TEST_OUTPUT"]
 
 
@@ -45,6 +45,22 @@ def use():
             "representations": [each.Representation.GetData() for each in shown if each and each.Visibility]}))
         frames.clear()
 
+    def obey(*_):
+        """The file "do" has an expression, "done" gets what comes of it."""
+        path = os.path.join(OUTPUT, "do")
+        if not os.path.exists(path):
+            return
+        with open(path) as file:
+            wanted = file.read()
+        os.remove(path)
+        try:
+            import orbit_inside
+            leave("done", json.dumps(eval(wanted, vars(orbit_inside))))
+        except Exception:
+            leave("done", json.dumps(traceback.format_exc()))
+
+    view.GetInteractor().AddObserver("TimerEvent", obey)
+    view.GetInteractor().CreateRepeatingTimer(100)
     window.AddObserver("EndEvent", count)
     view.GetInteractor().AddObserver("EndInteractionEvent", note)
     return pvtest.failures
