@@ -143,6 +143,19 @@ def message_in(view):
     return " ".join(text for text in texts if "VDI" in text).replace("\n", " ")
 
 
+def message_boxes(view):
+    """Lowest and highest row of what message_in gives, for each VDI that says something."""
+    renderer = view.GetClientSideObject().GetNonCompositedRenderer()
+    boxes = []
+    for actor in renderer.GetViewProps():
+        if actor.IsA("vtkTextActor") and actor.GetVisibility() and "VDI" in actor.GetInput():
+            box = [0, 0, 0, 0]
+            actor.GetBoundingBox(renderer, box)
+            middle = actor.GetPositionCoordinate().GetComputedViewportValue(renderer)[1]
+            boxes.append([middle + box[2], middle + box[3]])
+    return boxes
+
+
 def read_png(path):
     reader = vtkPNGReader()
     reader.SetFileName(path)

@@ -33,6 +33,7 @@ void VDIBuffers::clear() {
   still_.drop();
   renderers_ = std::make_shared<Renderers>();
   hasVdi_ = false;
+  isEmpty_ = false;
 }
 
 void VDIBuffers::load(vtkDataObject* piece) {
@@ -54,9 +55,8 @@ VDIBuffers::Loaded VDIBuffers::loaded(vtkFieldData* fields, Renderers& renderers
   Loaded result;
   std::optional<vdi::Vdi> vdi = pv::unpackVdi(fields);
   if (!vdi) return result;
-  if (vdi->supersegmentCount() == 0)
-    throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                     "This VDI is empty: its viewpoint saw nothing of its scene.");
+  result.isEmpty = vdi->supersegmentCount() == 0;
+  if (result.isEmpty) return result;
   result.hasVdi = true;
   pv::boundsOf(fields, result.bounds.data());
   if (!renderers.whole) {
@@ -83,9 +83,11 @@ VDIBuffers::Loaded VDIBuffers::loaded(vtkFieldData* fields, Renderers& renderers
 
 void VDIBuffers::takeOne() {
   still_.drop();
+  isEmpty_ = false;
   try {
     const Loaded result = job_.get();
     hasVdi_ = result.hasVdi;
+    isEmpty_ = result.isEmpty;
     bounds_ = result.bounds;
     thinLists_ = result.thinLists;
     if (result.tooLarge) {

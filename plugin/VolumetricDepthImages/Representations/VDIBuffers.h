@@ -35,7 +35,7 @@ class VDIBuffers {
   void load(vtkDataObject* piece);
   /// Shows what has been loaded since, and starts what waits; returns whether there was anything. Waits for
   /// the newest piece as long as that; beyond, the last one is shown. Throws vdi::Error for a VDI that isn't
-  /// sound or has nothing in it, for a problem, and where the device doesn't do it; then nothing is shown.
+  /// sound, for a problem, and where the device doesn't do it; then nothing is shown.
   bool take(std::chrono::steady_clock::duration wait);
   /// Whether something newer than what is shown is on its way, and whether `take` would show it at once.
   bool isLoading() const { return job_.valid(); }
@@ -44,6 +44,8 @@ class VDIBuffers {
   void clear();
 
   bool hasVdi() const { return hasVdi_; }
+  /// There's a VDI that shows nothing, in place of one.
+  bool isEmpty() const { return isEmpty_; }
   /// World bounds as VTK has them.
   const std::array<double, 6>& bounds() const { return bounds_; }
   /// There's a VDI.
@@ -63,6 +65,7 @@ class VDIBuffers {
   };
   struct Loaded {
     bool hasVdi = false;
+    bool isEmpty = false;
     std::array<double, 6> bounds{};
     std::size_t thinLists = 0;
     std::optional<vdi::Vdi> tooLarge;  // for a second buffer
@@ -73,6 +76,7 @@ class VDIBuffers {
 
   std::shared_ptr<Renderers> renderers_ = std::make_shared<Renderers>();
   bool hasVdi_ = false;
+  bool isEmpty_ = false;
   std::array<double, 6> bounds_{};
   std::size_t thinLists_ = 0;
   std::future<Loaded> job_;

@@ -16,8 +16,6 @@
 #include <vtkOpenGLState.h>
 #include <vtkRenderer.h>
 #include <vtkShaderProgram.h>
-#include <vtkTextActor.h>
-#include <vtkTextProperty.h>
 #include <vtkTextureObject.h>
 #include <vtk_glew.h>
 
@@ -27,12 +25,12 @@
 #include <cmath>
 #include <optional>
 #include <span>
-#include <sstream>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "VDIBuffers.h"
+#include "VDIMessage.h"
 #include "VDISession.h"
 #include "VDIStill.h"
 #include "VDIView.h"
@@ -69,20 +67,6 @@ void main() {
   gl_FragDepth = 1.0 - 4.0 / 16777216.0;
 }
 )";
-
-/// In lines of at most `columns`, broken at blanks.
-std::string wrapped(const std::string& text, std::size_t columns) {
-  std::string lines;
-  std::size_t column = 0;
-  std::istringstream words(text);
-  for (std::string word; words >> word;) {
-    const bool fits = column + 1 + word.size() <= columns;
-    if (column > 0) lines += fits ? ' ' : '\n';
-    column = (column > 0 && fits ? column + 1 : 0) + word.size();
-    lines += word;
-  }
-  return lines;
-}
 
 /// A renderer's part of its window, in pixels.
 struct Viewport {
@@ -186,10 +170,11 @@ struct vtkVDIProp::Internals {
 
   bool IsPeeled = false;  // volumes are, in this frame
 
-  vtkNew<vtkTextActor> Message;
+  vtkNew<vtkVDIMessage> Message;
   std::string Obstacle;
   std::string Problem;
-  std::string Said;  // as an error
+  std::string Notice;  // nothing is wrong
+  std::string Said;    // as an error
 
   vtkNew<vtkTextureObject> Texture;
   std::unique_ptr<vtkOpenGLQuadHelper> Quad;
@@ -201,8 +186,6 @@ struct vtkVDIProp::Internals {
   Pace Thin;               // and with few of them
   double Reduction = 1.0;  // pixels of the viewport on a pixel's side, in interactive frames
   bool WasSmooth = false;  // the renderer's edges were to be smoothed, and aren't in this frame
-
-  int Width = 400;  // of the viewport, pixels
 
   /// Whether the next frame leaves what takes long to a later one.
   bool DefersIn(vtkRenderWindow* window, const glm::ivec2& port) {
@@ -232,26 +215,12 @@ struct vtkVDIProp::Internals {
   }
 
   void ShowMessage(bool isVisible) {
-    constexpr int letter = 9;  // pixels
-    const std::string& text = this->Obstacle.empty() ? this->Problem : this->Obstacle;
-    const auto columns = static_cast<std::size_t>(std::max(this->Width / letter, 20));
-    this->Message->SetInput(wrapped(text, columns).c_str());
-    this->Message->SetVisibility(isVisible && !text.empty());
+    const std::string& problem = this->Obstacle.empty() ? this->Problem : this->Obstacle;
+    this->Message->Show(isVisible ? (problem.empty() ? this->Notice : problem) : std::string());
   }
 };
 
-vtkVDIProp::vtkVDIProp() : Internal(new Internals) {
-  vtkTextActor* message = this->Internal->Message;
-  message->SetTextScaleModeToNone();
-  message->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
-  message->SetPosition(0.03, 0.5);
-  message->GetTextProperty()->SetFontSize(16);
-  message->GetTextProperty()->SetVerticalJustificationToCentered();
-  message->GetTextProperty()->SetBackgroundColor(0.1, 0.1, 0.1);
-  message->GetTextProperty()->SetBackgroundOpacity(0.8);
-  message->SetPickable(false);
-  message->SetVisibility(false);
-}
+vtkVDIProp::vtkVDIProp() : Internal(new Internals) {}
 
 vtkVDIProp::~vtkVDIProp() = default;
 
@@ -306,6 +275,12 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
   } else {
     this->Take(frame == Frame::Deferred && internal.Buffers.hasVdi() ? shortWait : untilDone);
   }
+  internal.Notice =
+      internal.Buffers.isEmpty() && !this->IsCaptured
+          ? "This VDI shows nothing: from its viewpoint nothing of its scene is seen, or all of it "
+            "is transparent."
+          : "";
+  internal.ShowMessage(this->GetVisibility() != 0);
   // Whatever is drawn, or isn't as where the camera looks away. A picture of the window that's taken
   // meanwhile doesn't show in it.
   if (frame != Frame::Whole) internal.IsBehind = frame == Frame::Deferred && internal.Buffers.isLoading();
@@ -417,10 +392,6 @@ int vtkVDIProp::DrawIn(vtkViewport* viewport) {
   auto* window = renderer ? vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()) : nullptr;
   if (window == nullptr || renderer->GetSelector() != nullptr) return 0;
   const Viewport port = viewportOf(renderer);
-  if (port.size.x != internal.Width) {
-    internal.Width = port.size.x;
-    internal.ShowMessage(this->GetVisibility() != 0);
-  }
   if (this->MarksDepth) this->MarkDepth(window);
   if (!internal.Buffers.hasVdi() || !internal.Obstacle.empty()) return 0;
   try {

@@ -71,6 +71,9 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// Of the VDI's part in interactive frames, per second.
   vtkSetClampMacro(FrameRate, double, 1.0, 1000.0);
   vtkGetMacro(FrameRate, double);
+  /// Whether the frames to come are for a picture that is taken. What shows nothing as it should says so in
+  /// others only. Default off.
+  vtkSetMacro(IsCaptured, bool);
 
   void SetVisibility(vtkTypeBool visible) override;
   double* GetBounds() override;
@@ -110,6 +113,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   bool MarksDepth = false;
   int Reconstruction = 1;
   double FrameRate = 30.0;
+  bool IsCaptured = false;
 };
 
 #endif

@@ -87,6 +87,11 @@ std::vector<vtkWeakPointer<vtkPVRenderView>>& deferringViews() {
   return views;
 }
 
+/// Who takes pictures of a window does without swapping its buffers.
+bool isCaptured(vtkPVRenderView* view) {
+  return view->GetRenderWindow()->GetSwapBuffers() == 0;
+}
+
 bool defersStillFrames(vtkPVRenderView* view) {
   const std::vector<vtkWeakPointer<vtkPVRenderView>>& views = deferringViews();
   return std::find(views.begin(), views.end(), view) != views.end();
@@ -174,6 +179,7 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
             : "");
     vtkAlgorithmOutput* port = vtkPVRenderView::GetPieceProducer(in, this);
     if (port != nullptr && view != nullptr) {
+      this->Prop->SetIsCaptured(isCaptured(view));
       this->Prop->Prepare(port->GetProducer()->GetOutputDataObject(port->GetIndex()), this->FrameOf(view));
     }
   }
@@ -192,9 +198,8 @@ void vtkVDIRepresentation::DeferNoStillFrames() {
 
 vtkVDIProp::Frame vtkVDIRepresentation::FrameOf(vtkPVRenderView* view) {
   if (this->IsInteractive(view)) return vtkVDIProp::Frame::Interactive;
-  // Who takes pictures of a window does without swapping its buffers.
-  const bool isCaptured = view->GetRenderWindow()->GetSwapBuffers() == 0;
-  return defersStillFrames(view) && !isCaptured ? vtkVDIProp::Frame::Deferred : vtkVDIProp::Frame::Whole;
+  return defersStillFrames(view) && !isCaptured(view) ? vtkVDIProp::Frame::Deferred
+                                                      : vtkVDIProp::Frame::Whole;
 }
 
 /// Whether the next frame may be rough and late: one of those while the camera moves. Time steps that come

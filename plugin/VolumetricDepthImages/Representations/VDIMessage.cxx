@@ -1,0 +1,91 @@
+#include "VDIMessage.h"
+
+#include <vtkObjectFactory.h>
+#include <vtkPropCollection.h>
+#include <vtkRenderer.h>
+#include <vtkTextProperty.h>
+#include <vtkWindow.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <sstream>
+
+vtkStandardNewMacro(vtkVDIMessage);
+
+namespace {
+
+// In pixels, of fontSize points at 72 dots per inch.
+constexpr int fontSize = 16;
+constexpr double letterWidth = 9.0;
+constexpr double lineHeight = 18.0;
+constexpr double gap = 12.0;
+
+/// In lines of at most `columns`, broken at blanks.
+std::string wrapped(const std::string& text, std::size_t columns) {
+  std::string lines;
+  std::size_t column = 0;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    const bool fits = column + 1 + word.size() <= columns;
+    if (column > 0) lines += fits ? ' ' : '\n';
+    column = (column > 0 && fits ? column + 1 : 0) + word.size();
+    lines += word;
+  }
+  return lines;
+}
+
+}  // namespace
+
+vtkVDIMessage::vtkVDIMessage() {
+  this->SetTextScaleModeToNone();
+  this->GetPositionCoordinate()->SetCoordinateSystemToNormalizedViewport();
+  this->SetPosition(0.03, 0.5);
+  this->GetTextProperty()->SetFontSize(fontSize);
+  this->GetTextProperty()->SetVerticalJustificationToCentered();
+  this->GetTextProperty()->SetBackgroundColor(0.1, 0.1, 0.1);
+  this->GetTextProperty()->SetBackgroundOpacity(0.8);
+  this->SetPickable(false);
+  this->SetVisibility(false);
+}
+
+void vtkVDIMessage::Show(const std::string& text) {
+  if (text != this->Text) this->SetInput(text.c_str());
+  this->Text = text;
+  this->SetVisibility(!text.empty());
+}
+
+int vtkVDIMessage::RenderOpaqueGeometry(vtkViewport* viewport) {
+  this->Place(viewport);
+  return this->Superclass::RenderOpaqueGeometry(viewport);
+}
+
+void vtkVDIMessage::Place(vtkViewport* viewport) {
+  auto* renderer = vtkRenderer::SafeDownCast(viewport);
+  if (renderer == nullptr) return;
+  int width = 0;
+  int height = 0;
+  renderer->GetTiledSize(&width, &height);
+  if (width < 1 || height < 1) return;
+  const double scale = renderer->GetVTKWindow()->GetDPI() / 72.0;
+  const auto columns = static_cast<std::size_t>(std::max(width / (letterWidth * scale), 20.0));
+  double above = 0.0;  // pixels
+  double own = 0.0;
+  double all = 0.0;
+  vtkPropCollection* props = renderer->GetViewProps();
+  vtkCollectionSimpleIterator at;
+  props->InitTraversal(at);
+  while (vtkProp* prop = props->GetNextProp(at)) {
+    auto* message = vtkVDIMessage::SafeDownCast(prop);
+    if (message == nullptr || message->GetVisibility() == 0) continue;
+    const std::string text = wrapped(message->Text, columns);
+    const auto lines = 1 + std::count(text.begin(), text.end(), '\n');
+    const double itsHeight = (lineHeight * static_cast<double>(lines) + gap) * scale;
+    if (message == this) {
+      above = all;
+      own = itsHeight;
+      this->SetInput(text.c_str());
+    }
+    all += itsHeight;
+  }
+  this->SetPosition(0.03, 0.5 + (0.5 * all - above - 0.5 * own) / height);
+}
