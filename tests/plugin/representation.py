@@ -62,6 +62,12 @@ def volume_beside_vdi():
             check(display.Representation == "VDI", "Show alone shows the filter's output as a VDI")
             check(not display.ColorArrayName[1], "and not coloured by an array")
         pictures[shown, "alone"] = screenshot(view, shown + "_alone", CAMERA)
+        if shown == "vdi":
+            display.Opacity = 0.5
+            half = screenshot(view, "half", CAMERA)
+            off = np.abs(2 * half.astype(int) - pictures[shown, "alone"])
+            check(off.max() <= 2, "Opacity 0.5 shows the VDI half as opaque")
+            display.Opacity = 1
         for thing, what in ((sphere, "sphere"), (plane, "plane")):
             simple.Show(thing, view)
             pictures[shown, what] = screenshot(view, "{}_{}".format(shown, what), CAMERA)

@@ -55,7 +55,8 @@ constexpr const char* pictureShader = R"(//VTK::System::Dec
 //VTK::Output::Dec
 in vec2 texCoord;
 uniform sampler2D picture;
-void main() { gl_FragData[0] = texture(picture, texCoord); }
+uniform float opacity;
+void main() { gl_FragData[0] = opacity * texture(picture, texCoord); }
 )";
 
 /// At the far plane, but for a few steps of a depth buffer of 24 bits: as far as anybody sees, background.
@@ -228,6 +229,7 @@ void vtkVDIProp::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Reconstruction: " << this->Reconstruction << "\n"
      << indent << "FrameRate: " << this->FrameRate << "\n"
+     << indent << "Opacity: " << this->Opacity << "\n"
      << indent << "Problem: " << this->Internal->Problem << "\n";
 }
 
@@ -564,6 +566,7 @@ void vtkVDIProp::ShowTexture(vtkOpenGLRenderWindow* window) {
   vtkTextureObject* texture = this->Internal->Texture;
   texture->Activate();
   quad->Program->SetUniformi("picture", texture->GetTextureUnit());
+  quad->Program->SetUniformf("opacity", static_cast<float>(this->Opacity));
   quad->Render();
   texture->Deactivate();
   vtkOpenGLCheckErrorMacro("failed to draw the VDI");

@@ -71,6 +71,9 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// Of the VDI's part in interactive frames, per second.
   vtkSetClampMacro(FrameRate, double, 1.0, 1000.0);
   vtkGetMacro(FrameRate, double);
+  /// Of its picture as a whole, beside that of the VDI. Default 1.
+  vtkSetClampMacro(Opacity, double, 0.0, 1.0);
+  vtkGetMacro(Opacity, double);
   /// Whether the frames to come are for a picture that is taken. What shows nothing as it should says so in
   /// others only. Default off.
   vtkSetMacro(IsCaptured, bool);
@@ -113,6 +116,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   bool MarksDepth = false;
   int Reconstruction = 1;
   double FrameRate = 30.0;
+  double Opacity = 1.0;
   bool IsCaptured = false;
 };
 

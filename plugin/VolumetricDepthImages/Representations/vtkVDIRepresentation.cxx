@@ -120,6 +120,10 @@ void vtkVDIRepresentation::SetFrameRate(double rate) {
   this->Prop->SetFrameRate(rate);
 }
 
+void vtkVDIRepresentation::SetOpacity(double opacity) {
+  this->Prop->SetOpacity(opacity);
+}
+
 void vtkVDIRepresentation::SetVisibility(bool visible) {
   this->Superclass::SetVisibility(visible);
   this->Prop->SetVisibility(visible);

@@ -42,6 +42,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   /// As vtkVDIProp has them.
   void SetReconstruction(int reconstruction);
   void SetFrameRate(double rate);
+  void SetOpacity(double opacity);
 
  protected:
   vtkVDIRepresentation();
