@@ -460,6 +460,7 @@ bool vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view)
   Internals& internal = *this->Internal;
   pv::VDIStill& still = internal.Buffers.still();
   if (internal.RoughTime == internal.PieceTime && internal.RoughSize == view.size) {
+    still.drop();  // of another size
     this->DrawNow(window, view.matrices, view.size, internal.InteractiveForm(view.size, this->FrameRate));
     return true;
   }
