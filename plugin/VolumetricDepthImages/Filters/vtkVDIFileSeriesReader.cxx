@@ -1,16 +1,42 @@
 #include "vtkVDIFileSeriesReader.h"
 
+#include <vtkMultiProcessController.h>
 #include <vtkObjectFactory.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <optional>
 #include <set>
+#include <string>
+#include <utility>
 
+#include "VDIFileState.h"
+#include "VDISession.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/VdiFile.h"
 #include "vtkVDIReader.h"
 
 vtkStandardNewMacro(vtkVDIFileSeriesReader);
+
+/// What the series needs of a file's header; numbers only, for it travels as such.
+struct vtkVDIFileSeriesReader::Header {
+  double IsKnown = 0.0;
+  double Time = 0.0;
+  double Width = 0.0;
+  double Height = 0.0;
+  double Viewpoint[12] = {};
+};
+
+struct vtkVDIFileSeriesReader::Known {
+  struct File {
+    std::optional<pv::FileState> State;
+    Header Last;
+  };
+  std::map<std::string, File> Files;
+};
 
 namespace {
 
@@ -30,23 +56,96 @@ std::array<double, 12> numbersOf(const vdi::Camera& camera) {
           parallelScale};
 }
 
+/// The time at `index` on the line through two of the times that are known: the ones around it, or else the
+/// nearest two. With one known time they are 1 apart.
+double timeBetween(const std::map<std::size_t, double>& known, std::size_t index) {
+  auto right = known.lower_bound(index);
+  if (right != known.end() && right->first == index) return right->second;
+  if (right == known.end()) --right;
+  if (right == known.begin() && known.size() > 1) ++right;
+  const double at = static_cast<double>(index) - static_cast<double>(right->first);
+  if (right == known.begin()) return right->second + at;
+  const auto left = std::prev(right);
+  const double slope = (right->second - left->second) / static_cast<double>(right->first - left->first);
+  return right->second + at * slope;
+}
+
 }  // namespace
+
+vtkVDIFileSeriesReader::vtkVDIFileSeriesReader() : Headers(new Known) {}
+
+vtkVDIFileSeriesReader::~vtkVDIFileSeriesReader() = default;
+
+/// A file that hasn't changed isn't opened again, and one that can't be read any more keeps what it had.
+std::vector<vtkVDIFileSeriesReader::Header> vtkVDIFileSeriesReader::ReadHeaders() {
+  std::vector<Header> headers(this->GetNumberOfFileNames());
+  for (std::size_t i = 0; i < headers.size(); ++i) {
+    const std::string name = this->GetFileName(static_cast<unsigned int>(i));
+    const std::optional<pv::FileState> state = pv::stateOf(name);
+    Known::File& file = this->Headers->Files[name];
+    if (state && state != file.State) {
+      try {
+        const vdi::Vdi header = vdi::io::readVdiInfo(name).header;
+        file.Last = {.IsKnown = 1.0,
+                     .Time = header.time,
+                     .Width = static_cast<double>(header.pictureSize().x),
+                     .Height = static_cast<double>(header.pictureSize().y)};
+        std::ranges::copy(numbersOf(header.camera), file.Last.Viewpoint);
+        file.State = state;
+      } catch (const vdi::Error&) {  // the reader says so when it's its turn
+        file.State.reset();
+      }
+    }
+    headers[i] = file.Last;
+  }
+  return headers;
+}
+
+void vtkVDIFileSeriesReader::ShareHeaders(std::vector<Header>& headers) {
+  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
+  if (controller == nullptr || controller->GetNumberOfProcesses() == 1) return;
+  pv::enterCollective(controller, "times of a VDIReader");
+  auto count = static_cast<vtkIdType>(headers.size());
+  controller->Broadcast(&count, 1, 0);
+  static_assert(sizeof(Header) == 16 * sizeof(double));
+  headers.resize(static_cast<std::size_t>(count));
+  if (count > 0) controller->Broadcast(&headers[0].IsKnown, 16 * count, 0);
+}
 
 int vtkVDIFileSeriesReader::RequestInformation(vtkInformation* request, vtkInformationVector** inputs,
                                                vtkInformationVector* outputs) {
-  std::set<double> times;
-  bool differ = true;
-  std::ranges::fill(this->Viewpoint, 0.0);
-  for (unsigned int i = 0; differ && i < this->GetNumberOfFileNames(); ++i) {
-    try {
-      const vdi::Vdi header = vdi::io::readVdiInfo(this->GetFileName(i)).header;
-      if (times.empty()) std::ranges::copy(numbersOf(header.camera), this->Viewpoint);
-      differ = times.insert(header.time).second;
-    } catch (const vdi::Error&) {
-      differ = false;  // a file that can't be read; the reader says so when it's its turn
-    }
+  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
+  const bool root = controller == nullptr || controller->GetLocalProcessId() == 0;
+  std::vector<Header> headers;
+  try {
+    if (root) headers = this->ReadHeaders();
+    this->ShareHeaders(headers);
+  } catch (const vdi::Error& error) {
+    vtkErrorMacro(<< error.what());
+    return 0;
   }
-  this->IgnoreReaderTime = !differ;
+  std::map<std::size_t, double> known;
+  const Header* first = nullptr;
+  for (std::size_t i = 0; i < headers.size(); ++i) {
+    if (headers[i].IsKnown == 0.0) continue;
+    known.emplace(i, headers[i].Time);
+    if (first == nullptr) first = &headers[i];
+  }
+  std::ranges::fill(this->Viewpoint, 0.0);
+  if (first != nullptr) std::ranges::copy(first->Viewpoint, this->Viewpoint);
+
+  std::set<double> times;
+  std::map<std::string, vtkVDIReader::Announced> series;
+  const std::size_t count = std::min<std::size_t>(headers.size(), this->GetNumberOfFileNames());
+  for (std::size_t i = 0; i < count && first != nullptr; ++i) {
+    const Header& shape = headers[i].IsKnown != 0.0 ? headers[i] : *first;
+    const double time = timeBetween(known, i);
+    times.insert(time);
+    series[this->GetFileName(static_cast<unsigned int>(i))] = {
+        .Time = time, .Width = static_cast<int>(shape.Width), .Height = static_cast<int>(shape.Height)};
+  }
+  this->IgnoreReaderTime = times.size() != headers.size();
+  if (auto* reader = vtkVDIReader::SafeDownCast(this->Reader)) reader->SetSeries(std::move(series));
   return this->Superclass::RequestInformation(request, inputs, outputs);
 }
 
@@ -64,5 +163,6 @@ int vtkVDIFileSeriesReader::RequestData(vtkInformation* request, vtkInformationV
     this->LastStep = step;
   }
   this->LastIndex = index;
-  return result;
+  // The reader has said why. A failure would make the pipeline repeat that in many lines.
+  return count > 1 ? 1 : result;
 }

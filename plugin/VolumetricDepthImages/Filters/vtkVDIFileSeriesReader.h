@@ -3,13 +3,18 @@
  * @brief reads .vdi files as the time steps of one series
  *
  * A step's time is the one in its file. Where two files have the same time, as those of one data set from
- * several viewpoints have, the steps are counted instead, from 0. Who goes from step to step finds the next
- * one read already.
+ * several viewpoints have, the steps are counted instead, from 0. A file that can't be read costs its own
+ * step: it has the time that it had when it could be, or one between its neighbours'. Who goes from step to
+ * step finds the next one read already. Information is collective: rank 0 reads the headers, all have their
+ * times.
  */
 #ifndef vtkVDIFileSeriesReader_h
 #define vtkVDIFileSeriesReader_h
 
 #include <vtkFileSeriesReader.h>
+
+#include <memory>
+#include <vector>
 
 #include "vtkVolumetricDepthImagesModule.h"
 
@@ -24,8 +29,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
   vtkGetVectorMacro(Viewpoint, double, 12);
 
  protected:
-  vtkVDIFileSeriesReader() = default;
-  ~vtkVDIFileSeriesReader() override = default;
+  vtkVDIFileSeriesReader();
+  ~vtkVDIFileSeriesReader() override;
 
   int RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
   int RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector*) override;
@@ -34,6 +39,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
   vtkVDIFileSeriesReader(const vtkVDIFileSeriesReader&) = delete;
   void operator=(const vtkVDIFileSeriesReader&) = delete;
 
+  struct Header;
+  struct Known;
+  std::vector<Header> ReadHeaders();
+  void ShareHeaders(std::vector<Header>& headers);
+
+  std::unique_ptr<Known> Headers;  // of rank 0's files, from earlier
   double Viewpoint[12] = {};
   vtkIdType LastIndex = -1;  // of the file that was read last
   vtkIdType LastStep = 0;    // to it from the one before, in [0, count)

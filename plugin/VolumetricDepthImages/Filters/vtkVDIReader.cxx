@@ -7,15 +7,14 @@
 #include <vtkObjectFactory.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
-#include <cstdint>
 #include <exception>
-#include <filesystem>
 #include <future>
 #include <optional>
-#include <system_error>
 #include <utility>
 
+#include "VDIFileState.h"
 #include "VDIImageData.h"
+#include "VDIRetire.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -30,22 +29,6 @@ bool isRoot() {
   return controller == nullptr || controller->GetLocalProcessId() == 0;
 }
 
-/// What tells that a file isn't what it was.
-struct FileState {
-  std::filesystem::file_time_type written;
-  std::uintmax_t bytes = 0;
-
-  bool operator==(const FileState&) const = default;
-};
-
-std::optional<FileState> stateOf(const std::string& name) {
-  std::error_code error;
-  FileState state;
-  state.written = std::filesystem::last_write_time(name, error);
-  if (!error) state.bytes = std::filesystem::file_size(name, error);
-  return error ? std::nullopt : std::optional(state);
-}
-
 }  // namespace
 
 struct vtkVDIReader::Contents {
@@ -57,7 +40,7 @@ struct vtkVDIReader::Contents {
 
 struct vtkVDIReader::Ahead {
   std::string Name;
-  std::optional<FileState> State;  // before it's read
+  std::optional<pv::FileState> State;  // before it's read
   std::future<Contents> Job;
 };
 
@@ -67,9 +50,10 @@ vtkVDIReader::vtkVDIReader() {
 
 void vtkVDIReader::Prefetch(const std::string& name) {
   if (!isRoot() || (this->Next && this->Next->Name == name)) return;
+  if (this->Next) pv::retire(std::move(this->Next));
   this->Next = std::make_unique<Ahead>();
   this->Next->Name = name;
-  this->Next->State = stateOf(name);
+  this->Next->State = pv::stateOf(name);
   this->Next->Job = std::async(std::launch::async, [name] { return Contents(name); });
 }
 
@@ -77,8 +61,10 @@ vtkVDIReader::Contents vtkVDIReader::Read() {
   if (this->FileName == nullptr) throw vdi::Error(vdi::ErrorCode::Io, "no file name was given");
   const std::string name = this->FileName;
   if (this->Next && this->Next->Name == name) {
-    const std::unique_ptr<Ahead> ahead = std::move(this->Next);
-    if (ahead->State && ahead->State == stateOf(name)) {
+    std::unique_ptr<Ahead> ahead = std::move(this->Next);
+    if (!ahead->State || ahead->State != pv::stateOf(name)) {
+      pv::retire(std::move(ahead));
+    } else {
       try {
         return ahead->Job.get();
       } catch (const std::exception&) {  // what's wrong is said by whoever was asked for it
@@ -90,6 +76,7 @@ vtkVDIReader::Contents vtkVDIReader::Read() {
 
 vtkVDIReader::~vtkVDIReader() {
   this->vtkVDIReader::SetFileName(nullptr);
+  if (this->Next) pv::retire(std::move(this->Next));
 }
 
 void vtkVDIReader::PrintSelf(ostream& os, vtkIndent indent) {
@@ -118,20 +105,30 @@ vtkTypeBool vtkVDIReader::ProcessRequest(vtkInformation* request, vtkInformation
 int vtkVDIReader::RequestInformation(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) {
   vtkInformation* info = outputs->GetInformationObject(0);
   int extent[6] = {0, -1, 0, -1, 0, -1};
-  if (isRoot()) {
+  std::optional<Announced> announced;
+  if (this->FileName != nullptr) {
+    const auto found = this->Series.find(this->FileName);
+    if (found != this->Series.end()) announced = found->second;
+  }
+  if (!announced && isRoot()) {
     try {
       if (this->FileName == nullptr) throw vdi::Error(vdi::ErrorCode::Io, "no file name was given");
-      const vdi::io::VdiFileInfo file = vdi::io::readVdiInfo(this->FileName);
-      const double range[2] = {file.header.time, file.header.time};
-      info->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), range, 1);
-      info->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
-      extent[1] = file.header.pictureSize().x - 1;
-      extent[3] = file.header.pictureSize().y - 1;
-      extent[5] = 0;
+      const vdi::Vdi header = vdi::io::readVdiInfo(this->FileName).header;
+      announced = {.Time = header.time, .Width = header.pictureSize().x, .Height = header.pictureSize().y};
     } catch (const vdi::Error& error) {
       vtkErrorMacro(<< error.what());
       return 0;
     }
+  }
+  if (announced) {
+    const double range[2] = {announced->Time, announced->Time};
+    info->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), range, 1);
+    info->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
+  }
+  if (isRoot()) {
+    extent[1] = announced->Width - 1;
+    extent[3] = announced->Height - 1;
+    extent[5] = 0;
   }
   info->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent, 6);
   info->Set(vtkDataObject::SPACING(), 1.0, 1.0, 1.0);

@@ -11,8 +11,10 @@
 
 #include <vtkImageAlgorithm.h>
 
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "vtkVolumetricDepthImagesModule.h"
 
@@ -29,8 +31,17 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
   int CanReadFile(const char* name);
 
   /// Reads that file on another thread, so that it's there when it's asked for next, unless it has changed by
-  /// then. One at a time: the one before is dropped. On rank 0; elsewhere there's nothing to read.
+  /// then. One at a time: the one before is dropped, without waiting for it. On rank 0; elsewhere there's
+  /// nothing to read.
   void Prefetch(const std::string& name);
+
+  struct Announced {
+    double Time = 0.0;
+    int Width = 0;
+    int Height = 0;
+  };
+  /// What's known of files by their names, so that they needn't be there to be announced, nor on all ranks.
+  void SetSeries(std::map<std::string, Announced> series) { this->Series = std::move(series); }
 
  protected:
   vtkVDIReader();
@@ -51,6 +62,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
 
   char* FileName = nullptr;
   std::unique_ptr<Ahead> Next;
+  std::map<std::string, Announced> Series;
 };
 
 #endif
