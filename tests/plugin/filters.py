@@ -1,5 +1,6 @@
 """The filters, reader, writer and extractor as a script's author uses them, and what bad input gets."""
 
+import json
 import os
 import sys
 
@@ -136,6 +137,61 @@ simple.SaveData(second, proxy=vdi_of(wavelet, Supersegments=3))
 series = simple.VDIReader(FileNames=[os.path.join(OUTPUT, "series_0.vdi"), second])
 series.UpdatePipelineInformation()
 check(len(series.TimestepValues) == 2, "a series of files is a series of time steps")
+check(not image.GetDataInformation().DataInformation.GetHasTime(), "data without a time give a VDI without one")
+
+# Times are the files', whatever can be read of them.
+timed = simple.TrivialProducer()
+TIMES = [2.0, 4.5, 5.0, 7.0]
+names = [os.path.join(OUTPUT, "timed_%d.vdi" % step) for step in range(4)]
+pictures = []
+for step, step_time in enumerate(TIMES):
+    data = vtkImageData()
+    data.DeepCopy(wavelet.GetClientSideObject().GetOutputDataObject(0))
+    data.GetInformation().Set(data.DATA_TIME_STEP(), step_time)
+    timed.GetClientSideObject().SetOutput(data)
+    timed.MarkModified(timed.SMProxy)
+    vdi = vdi_of(timed, CameraPosition=[60, 45 - 20 * step, 75])
+    pictures.append(picture(vdi))
+    simple.SaveData(names[step], proxy=vdi)
+with open(os.path.join(OUTPUT, "timed.vdi.series"), "w") as listing:
+    json.dump({"file-series-version": "1.0",
+               "files": [{"name": "timed_%d.vdi" % step, "time": 10.0 * step} for step in range(4)]}, listing)
+
+
+def times_of(proxy):
+    proxy.UpdatePipelineInformation()
+    return list(proxy.TimestepValues)
+
+
+def shown_at(proxy, at):
+    proxy.UpdatePipeline(at)
+    data = proxy.GetClientSideObject().GetOutputDataObject(0)
+    if data.GetNumberOfPoints() == 0:
+        return None
+    rgba = vtk_to_numpy(data.GetPointData().GetArray("RGBA")).reshape(90, 120, 4).astype(float)
+    return np.flipud(np.rint(rgba[..., :3] * rgba[..., 3:] / 255)).astype(np.uint8)
+
+
+listed = simple.OpenDataFile(listing.name)
+check(times_of(listed) == [0, 10, 20, 30], "a .vdi.series file has the times that it says %s" % times_of(listed))
+check(all(np.array_equal(shown_at(listed, 10.0 * step), pictures[step]) for step in (3, 0, 2)), "and the pictures")
+opened = simple.VDIReader(FileNames=names)
+check(times_of(opened) == TIMES, "a series has its files' times")
+check(np.array_equal(shown_at(opened, 4.5), pictures[1]), "and their pictures")
+os.remove(names[1])
+opened.MarkModified(opened.SMProxy)
+check(times_of(opened) == TIMES, "a file that goes leaves its time")
+later = simple.VDIReader(FileNames=names)
+check(times_of(later) == [2, 3.5, 5, 7], "one that was never there gets a time between %s" % times_of(later))
+for what, proxy, missing in (("that goes", opened, 4.5), ("that was never there", later, 3.5)):
+    check(np.array_equal(shown_at(proxy, 5.0), pictures[2]), "the others are shown with one " + what)
+    said = errors_of(lambda: proxy.UpdatePipeline(missing))
+    check(len(said) == 1, "a file %s is one error, %d" % (what, len(said)))
+    check(shown_at(proxy, missing) is None and np.array_equal(shown_at(proxy, 7.0), pictures[3]), "and only that step is lost")
+os.remove(names[0])
+first_lost = simple.VDIReader(FileNames=names[:1] + names[2:])
+check(times_of(first_lost) == [3, 5, 7], "so it is where the first file isn't there %s" % times_of(first_lost))
+check(np.array_equal(shown_at(first_lost, 5.0), pictures[2]), "whose others are shown")
 
 
 # Values are uploaded when they're new, and only then.

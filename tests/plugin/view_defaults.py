@@ -55,7 +55,7 @@ simple.ResetSession()
 smtrace.start_trace()
 source, view, representation = session()
 image = simple.VolumetricDepthImage(registrationName="vdi", Input=source)
-check(list(image.SelectInputScalars) == ["POINTS", "twice"], "a new filter has the array that colours the volume")
+check(list(image.SelectInputScalars) == ["POINTS", "twice"], "a new filter has the array that is active")
 image.UpdatePipeline()
 check(taken(image)[:2] == [POSITION, [1, 0, -1]] and image.CameraViewAngle == 25
       and np.allclose(image.CameraViewUp, view.GetActiveCamera().GetViewUp()), "the first update takes the view's camera")
@@ -77,6 +77,20 @@ kept.UpdatePipeline()
 check(list(kept.CameraPosition) == [0, 60, 1] and list(kept.Resolution) == [64, 48]
       and list(kept.SelectInputScalars) == ["POINTS", "RTData"], "what a script has set stays")
 
+# Comparative views, by their first one.
+comparing = simple.CreateView("ComparativeRenderView")
+simple.Show(source, comparing).SetRepresentationType("Volume")
+simple.Render(comparing)
+comparing.CameraPosition, comparing.CameraFocalPoint = [0, 20, 70], [0, 1, 0]
+simple.SetActiveView(comparing)
+compared = simple.VolumetricDepthImage(Input=source)
+compared.UpdatePipeline()
+check(list(compared.CameraPosition) == [0, 20, 70], "the camera is taken from a comparative view %s"
+      % list(compared.CameraPosition))
+simple.Delete(compared)
+simple.Delete(comparing)
+simple.SetActiveView(view)
+
 state_file = os.path.join(OUTPUT, "view_defaults.pvsm")
 simple.Delete(kept)
 simple.SaveState(state_file)
@@ -90,22 +104,67 @@ for what, load in (("trace", lambda: exec(trace, {})), ("state", lambda: simple.
     check(not different, "with the same values %s" % different)
     check(np.abs(picture(again).astype(int) - first).max() <= 1, "and the same picture")
 
+
+
+def percent_of(proxy):
+    proxy.SMProxy.UpdatePropertyInformation()
+    return proxy.GetProperty("Preparation").GetData()
+
+
+def held_of(proxy):
+    proxy.SMProxy.UpdatePropertyInformation()
+    return proxy.GetProperty("Held").GetData()
+
+
 # Edits count at once in scripts; a window holds the filter.
 again.SMProxy.InvokeCommand("Hold")
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0, 0.5, 0]
 check(np.abs(picture(again).astype(int) - first).max() <= 1, "while it is held, the filter keeps what it has")
 again.SMProxy.InvokeCommand("Prepare")
-percent = 0
-while 0 <= percent < 100:
-    again.SMProxy.UpdatePropertyInformation()
-    percent = again.GetProperty("Preparation").GetData()
-check(percent == 100, "what is prepared gets there")
+while 0 <= percent_of(again) < 100:
+    pass
+check(percent_of(again) == 100, "what is prepared gets there")
 check(np.abs(picture(again).astype(int) - first).max() <= 1, "and waits for the release")
 again.SMProxy.InvokeCommand("Release")
 again.SMProxy.MarkDirty(again.SMProxy)
 check(picture(again).max() == 0, "which takes it")
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 1, 0.5, 0]
 check(picture(again).max() > 60, "after it edits count at once again")
+again.SMProxy.InvokeCommand("Prepare")
+check(percent_of(again) == -1, "what is there already isn't prepared")
+
+# Who writes a file wants what is set now, not what the window shows.
+again.SMProxy.InvokeCommand("Hold")
+simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0.5, 0.5, 0]
+written = os.path.join(OUTPUT, "view_defaults.vdi")
+for what in ("while edits rest", "while a VDI is made"):
+    simple.SaveData(written, proxy=again)
+    check(held_of(again) == 0, "writing ends the hold " + what)
+    image_now = picture(simple.OpenDataFile(written))
+    simple.SetActiveSource(again.Input)
+    fresh = simple.VolumetricDepthImage(Input=again.Input, SelectInputScalars=["POINTS", "twice"])
+    fresh.SMProxy.Copy(again.SMProxy)
+    fresh.LookupTable = again.LookupTable
+    check(np.array_equal(image_now, picture(fresh)), "a file is of the colours that are set " + what)
+    again.SMProxy.InvokeCommand("Hold")
+    simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0.7, 0.5, 0]
+    again.SMProxy.InvokeCommand("Prepare")
+again.SMProxy.InvokeCommand("Release")
+
+# An edit gives up what the one before began, and doesn't wait for that.
+again.Supersegments, again.Resolution, again.SamplingRate = 40, [1200, 900], 4
+simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0.4, 0.5, 0]
+again.SMProxy.InvokeCommand("Prepare")
+check(0 <= percent_of(again) < 100, "a large one takes a while")
+again.SMProxy.InvokeCommand("Hold")
+while 0 <= percent_of(again) < 100:
+    pass
+check(percent_of(again) == -1, "it ends once another edit holds the filter")
+again.SMProxy.InvokeCommand("Release")
+again.Supersegments, again.Resolution, again.SamplingRate = 25, SIZE, 1
+picture(again)
+
+simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0.3, 0.5, 0]
 again.SMProxy.InvokeCommand("Prepare")
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0, 0.5, 0]
 check(picture(again).max() == 0, "what was prepared of older points isn't taken")

@@ -9,6 +9,7 @@
 #include <vtkPVArrayInformation.h>
 #include <vtkPVDataInformation.h>
 #include <vtkProcessModule.h>
+#include <vtkSMComparativeViewProxy.h>
 #include <vtkSMInputProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
@@ -20,6 +21,7 @@
 #include <vtkSMTransferFunctionManager.h>
 #include <vtkSMTransferFunctionPresets.h>
 #include <vtkSMTransferFunctionProxy.h>
+#include <vtkScalarsToColors.h>
 #include <vtkSmartPointer.h>
 #include <vtk_jsoncpp.h>
 
@@ -162,12 +164,17 @@ void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
   this->ChooseLookupTable(time);
 }
 
-vtkSMRenderViewProxy* vtkSMVDIGeneratorProxy::ActiveView() {
-  vtkSMProxySelectionModel* active = this->GetSessionProxyManager()->GetSelectionModel("ActiveView");
-  return active != nullptr ? vtkSMRenderViewProxy::SafeDownCast(active->GetCurrentProxy()) : nullptr;
+vtkSMRenderViewProxy* vtkSMVDIGeneratorProxy::RenderViewOf(vtkSMProxy* view) {
+  auto* comparative = vtkSMComparativeViewProxy::SafeDownCast(view);
+  return vtkSMRenderViewProxy::SafeDownCast(comparative != nullptr ? comparative->GetRootView() : view);
 }
 
-vtkSMProxy* vtkSMVDIGeneratorProxy::RepresentationIn(vtkSMRenderViewProxy* view) {
+vtkSMViewProxy* vtkSMVDIGeneratorProxy::ActiveView() {
+  vtkSMProxySelectionModel* active = this->GetSessionProxyManager()->GetSelectionModel("ActiveView");
+  return active != nullptr ? vtkSMViewProxy::SafeDownCast(active->GetCurrentProxy()) : nullptr;
+}
+
+vtkSMProxy* vtkSMVDIGeneratorProxy::RepresentationIn(vtkSMViewProxy* view) {
   vtkSMPropertyHelper input(this, "Input");
   auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
   if (view == nullptr || source == nullptr) return nullptr;
@@ -182,14 +189,34 @@ void vtkSMVDIGeneratorProxy::TakeArrayFromView() {
   const std::string name = colored.GetInputArrayNameToProcess() ? colored.GetInputArrayNameToProcess() : "";
   if (name.empty() || (association != vtkDataObject::POINT && association != vtkDataObject::CELL)) return;
   vtkSMPropertyHelper(this, "SelectInputScalars").SetInputArrayToProcess(association, name.c_str());
+  // A map that hasn't been told otherwise colours vectors by their magnitude.
+  vtkSMProxy* map = vtkSMPropertyHelper(shown, "LookupTable", true).GetAsProxy();
+  if (map == nullptr || this->ComponentsOf(name, association) < 2) return;
+  const bool byComponent = vtkSMPropertyHelper(map, "VectorMode").GetAsInt() == vtkScalarsToColors::COMPONENT;
+  vtkSMPropertyHelper(this, "Component")
+      .Set(byComponent ? vtkSMPropertyHelper(map, "VectorComponent").GetAsInt() : -1);
+}
+
+int vtkSMVDIGeneratorProxy::ComponentsOf(const std::string& name, int association) {
+  const vtkSMPropertyHelper input(this, "Input");
+  auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
+  if (source == nullptr) return 0;
+  vtkPVArrayInformation* array =
+      source->GetDataInformation(input.GetOutputPort())->GetArrayInformation(name.c_str(), association);
+  return array != nullptr ? array->GetNumberOfComponents() : 0;
+}
+
+void vtkSMVDIGeneratorProxy::Forget() {
+  this->Taken = false;
+  this->Chosen.clear();
 }
 
 void vtkSMVDIGeneratorProxy::TakeFromView() {
   if (this->Taken) return;
   this->Taken = true;
-  vtkSMRenderViewProxy* view = this->ActiveView();
+  vtkSMProxy* shown = this->RepresentationIn(this->ActiveView());
+  vtkSMRenderViewProxy* view = RenderViewOf(this->ActiveView());
   if (view == nullptr) return;
-  vtkSMProxy* shown = this->RepresentationIn(view);
   const bool placed = isPlaced(view);
   if (shown == nullptr && !placed) return;
   vtkSMPropertyHelper unit(this, "ScalarOpacityUnitDistance");
@@ -218,7 +245,7 @@ void vtkSMVDIGeneratorProxy::SetCamera(vtkSMProxy* proxy, vtkSMRenderViewProxy* 
 }
 
 std::string vtkSMVDIGeneratorProxy::WhyNot(vtkSMViewProxy* view) {
-  auto* renderView = vtkSMRenderViewProxy::SafeDownCast(view);
+  vtkSMRenderViewProxy* renderView = RenderViewOf(view);
   if (renderView == nullptr)
     return "The active view has no camera. Click into a 3-D view (Render View) first.";
   constexpr int planar = 1;  // vtkPVRenderView::INTERACTION_MODE_2D
@@ -252,7 +279,7 @@ double vtkSMVDIGeneratorProxy::DegreesFrom(vtkSMRenderViewProxy* view) {
 
 std::string vtkSMVDIGeneratorProxy::SetViewpoint(vtkSMViewProxy* view) {
   if (std::string why = WhyNot(view); !why.empty()) return why;
-  auto* renderView = vtkSMRenderViewProxy::SafeDownCast(view);
+  vtkSMRenderViewProxy* renderView = RenderViewOf(view);
   const std::array<int, 2> size = resolutionOf(renderView);
   const vdi::Camera camera = cameraOf(renderView->GetActiveCamera());
   try {
@@ -262,7 +289,6 @@ std::string vtkSMVDIGeneratorProxy::SetViewpoint(vtkSMViewProxy* view) {
   } catch (const vdi::Error& error) {
     return error.what();
   }
-  this->Taken = true;
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the view's camera");
   SetCamera(this, renderView);
   vtkSMPropertyHelper(this, "Resolution").Set(size.data(), 2);
@@ -276,8 +302,18 @@ void vtkSMVDIGeneratorProxy::PrepareUpstream(vtkSMProxy* proxy, std::optional<do
     vtkSMProxy* producer = proxy->GetProducerProxy(i);
     if (vtkSMSourceProxy::SafeDownCast(producer) == nullptr) continue;  // not maps and the like
     PrepareUpstream(producer, time);
-    if (auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(producer)) generator->TakeWhatIsNotSet(time);
+    if (auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(producer)) {
+      generator->TakeWhatIsNotSet(time);
+      generator->ReleaseNow();
+    }
   }
+}
+
+void vtkSMVDIGeneratorProxy::ReleaseNow() {
+  this->UpdatePropertyInformation(this->GetProperty("Held"));
+  if (vtkSMPropertyHelper(this, "Held").GetAsInt() == 0) return;
+  this->InvokeCommand("Release");
+  this->MarkDirty(this);
 }
 
 void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time) {

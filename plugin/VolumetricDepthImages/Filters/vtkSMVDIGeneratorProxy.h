@@ -39,10 +39,15 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
 
   int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
 
-  /// The array by which the active view colours the input, at creation
-  /// (vtkSMVDIGeneratorInitializationHelper).
+  /// The array by which the active view colours the input, with its component. For who makes the proxy by
+  /// hand: ParaView has given it a default by then, which can't be told from what a script has set.
   void TakeArrayFromView();
 
+  /// Lets the next update be the first once more, for whoever takes that back.
+  void Forget();
+
+  /// The view, or a comparative view's root view; null if that is no render view.
+  static vtkSMRenderViewProxy* RenderViewOf(vtkSMProxy* view);
   /// Sets the camera properties of `proxy`, one with a viewpoint (VolumetricDepthImage, RenderVDI), to the
   /// camera of `view`, for UpdateVTKObjects to send.
   static void SetCamera(vtkSMProxy* proxy, vtkSMRenderViewProxy* view);
@@ -54,8 +59,11 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// By how many degrees the view sees the middle of the input from elsewhere than the camera that's set.
   double DegreesFrom(vtkSMRenderViewProxy* view);
 
+  /// Ends that the filter is held (vtkVDIGenerator::Hold), for whoever needs the VDI of the maps and
+  /// properties as they are.
+  void ReleaseNow();
   /// For proxies behind it that are updated without it: writers, extractors, RenderVDI. Lets all generators
-  /// upstream of `proxy` take what isn't set. Collective where each rank has a client.
+  /// upstream of `proxy` take what isn't set, and releases them. Collective where each rank has a client.
   static void PrepareUpstream(vtkSMProxy* proxy, std::optional<double> time);
 
  protected:
@@ -68,10 +76,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
 
   void TakeWhatIsNotSet(std::optional<double> time);
   void TakeFromView();
-  vtkSMRenderViewProxy* ActiveView();
+  vtkSMViewProxy* ActiveView();
   vdi::Box InputBounds();
   /// How the view shows the input; null if it never has.
-  vtkSMProxy* RepresentationIn(vtkSMRenderViewProxy* view);
+  vtkSMProxy* RepresentationIn(vtkSMViewProxy* view);
+  /// Of the input's array; 0 if it isn't there.
+  int ComponentsOf(const std::string& name, int association);
   /// `time`: that of the update which is to come, if it has one.
   void ChooseLookupTable(std::optional<double> time);
   /// By which the active view colours the input by that array; null if it doesn't.

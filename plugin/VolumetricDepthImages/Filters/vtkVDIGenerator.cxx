@@ -21,6 +21,7 @@
 #include <array>
 #include <atomic>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -32,6 +33,7 @@
 #include "VDIArrays.h"
 #include "VDIBlocks.h"
 #include "VDIImageData.h"
+#include "VDIRetire.h"
 #include "VDISession.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -44,7 +46,7 @@ struct vtkVDIGenerator::Origin {
   std::vector<std::uint64_t> Input;  // pv::identityOf
   /// When what makes the input was modified: in situ, arrays are overwritten in place.
   vtkMTimeType Upstream = 0;
-  double Time = 0.0;
+  std::optional<double> Time;  // none: the data have none
   pv::ArrayChoice Choice;
   bool FillGhosts = true;
   bool operator==(const Origin&) const = default;
@@ -95,6 +97,8 @@ vtkVDIGenerator::vtkVDIGenerator()
 
 vtkVDIGenerator::~vtkVDIGenerator() {
   this->SetReport(nullptr);
+  // The thread hears late that it's unwanted, once a band.
+  if (this->GivesUpPreparation()) pv::retire(std::move(this->Internal));
 }
 
 void vtkVDIGenerator::SetReport(const char* text) {
@@ -238,6 +242,15 @@ void findRanges(vtkFieldData* fields) {
   }
 }
 
+/// As the input's: data without a time stay so.
+void setTime(vtkImageData* output, std::optional<double> time) {
+  if (time) {
+    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), *time);
+  } else {
+    output->GetInformation()->Remove(vtkDataObject::DATA_TIME_STEP());
+  }
+}
+
 std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
   std::string text =
       "rank  blocks  volume MiB  upload s  generate s  distribute s  composite s  gather s  sent MiB  device "
@@ -263,7 +276,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   vtkNew<vtkImageData> earlier;
   earlier->ShallowCopy(output);
   output->Initialize();
-  double time = 0.0;
+  std::optional<double> time;
   if (input != nullptr && input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP())) {
     time = input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
   }
@@ -295,6 +308,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     return 0;
   }
   this->Internal->Failed = false;
+  this->Internal->Executed = this->CurrentMTime();  // a map's table has been built
   return 1;
 }
 
@@ -327,7 +341,7 @@ void vtkVDIGenerator::KeepEarlier(vtkImageData* earlier, vtkImageData* output) {
   }
 }
 
-vtkVDIGenerator::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input, double time) {
+vtkVDIGenerator::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input, std::optional<double> time) {
   Origin origin;
   if (vtkInformation* array = this->GetInputArrayInformation(0)) {
     if (array->Has(vtkDataObject::FIELD_NAME())) origin.Choice.name = array->Get(vtkDataObject::FIELD_NAME());
@@ -346,7 +360,7 @@ vtkVDIGenerator::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input, double t
 }
 
 /// Only where something changed: another camera or transfer function needs no upload.
-void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, double time) {
+void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, std::optional<double> time) {
   vdi::VdiGenerator& generator = *this->Internal->Generator;
   const vdi::comm::Communicator& comm = generator.communicator();
   Origin origin;
@@ -459,10 +473,15 @@ vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame() {
 
 void vtkVDIGenerator::Hold() {
   this->Internal->Held = true;
+  this->GivesUpPreparation();
 }
 
 void vtkVDIGenerator::Release() {
   this->Internal->Held = false;
+}
+
+int vtkVDIGenerator::GetHeld() {
+  return this->Internal->Held ? 1 : 0;
 }
 
 int vtkVDIGenerator::GetPreparation() {
@@ -472,6 +491,14 @@ int vtkVDIGenerator::GetPreparation() {
   return std::clamp(static_cast<int>(100.0 * preparing->Share), 0, 99);
 }
 
+/// Tells the thread that it's unwanted. False where nothing is under way.
+bool vtkVDIGenerator::GivesUpPreparation() {
+  const auto& preparing = this->Internal->Preparing;
+  if (!preparing || preparing->Done) return false;
+  preparing->Unwanted = true;
+  return true;
+}
+
 void vtkVDIGenerator::DropPreparation() {
   this->Internal->Preparing.reset();
 }
@@ -479,7 +506,8 @@ void vtkVDIGenerator::DropPreparation() {
 void vtkVDIGenerator::Prepare() {
   Internals& internal = *this->Internal;
   this->DropPreparation();
-  if (!internal.Generator || internal.Generator->communicator().size() != 1 || !internal.Shown ||
+  const bool isMade = !internal.Failed && internal.Executed == this->CurrentMTime();
+  if (isMade || !internal.Generator || internal.Generator->communicator().size() != 1 || !internal.Shown ||
       this->PictureOnly)
     return;
   auto preparation = std::make_unique<Internals::Preparation>();
@@ -499,7 +527,7 @@ void vtkVDIGenerator::Prepare() {
                 own.Share = done;
                 return !own.Unwanted;
               });
-          vdi->time = internal.Shown->Time;
+          vdi->time = internal.Shown->Time.value_or(0.0);
           vdi->timeStep = static_cast<std::uint64_t>(step);
           pv::setVdi(own.Output, *vdi);
           findRanges(own.Output->GetPointData());
@@ -513,23 +541,35 @@ void vtkVDIGenerator::Prepare() {
   internal.Preparing = std::move(preparation);
 }
 
-/// Makes sure that no thread uses the generator. True if `output` is what one has made of just this.
-bool vtkVDIGenerator::TakePreparation(vtkDataObject* input, double time, vtkImageData* output) {
+/// Makes sure that no thread uses the generator. True if `output` is what one has made of just this, for
+/// which an update that can't wait for its turn, a writer's, waits here.
+bool vtkVDIGenerator::TakePreparation(vtkDataObject* input, std::optional<double> time,
+                                      vtkImageData* output) {
   Internals& internal = *this->Internal;
-  const bool ready = internal.Preparing && internal.Preparing->Done && internal.Preparing->Good &&
-                     internal.Preparing->Time == internal.Executed &&
-                     internal.Shown == this->OriginOf(input, time);
+  const auto& preparing = internal.Preparing;
+  const bool isOfThis = preparing && !preparing->Unwanted && preparing->Time == internal.Executed &&
+                        internal.Shown == this->OriginOf(input, time);
+  while (isOfThis && !preparing->Done) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    this->UpdateProgress(preparing->Share);
+    if (this->CheckAbort()) preparing->Unwanted = true;
+  }
+  if (isOfThis && preparing->Unwanted && !preparing->Good) {
+    this->DropPreparation();
+    throw vdi::Error(vdi::ErrorCode::Cancelled, "it was aborted");
+  }
+  const bool ready = isOfThis && preparing->Good;
   if (ready) {
     output->ShallowCopy(internal.Preparing->Output);
     const vdi::VdiGenerator& generator = *internal.Generator;
     this->SetReport(reportOf(generator.reports(), generator.device().name()).c_str());
-    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+    setTime(output, time);
   }
   this->DropPreparation();
   return ready;
 }
 
-void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* output) {
+void vtkVDIGenerator::Generate(vtkDataObject* input, std::optional<double> time, vtkImageData* output) {
   this->Enter();
   if (!this->Internal->Generator) {
     vdi::comm::Communicator comm = pv::communicatorOf(this->Controller);
@@ -563,9 +603,9 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, double time, vtkImageData* 
     std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
     takeReport();
     if (!vdi) return;
-    vdi->time = time;
+    vdi->time = time.value_or(0.0);
     vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));
     pv::setVdi(output, *vdi);
   }
-  output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), time);
+  setTime(output, time);
 }

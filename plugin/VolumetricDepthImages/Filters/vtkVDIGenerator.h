@@ -16,6 +16,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 
 #include "vtkVolumetricDepthImagesModule.h"
 
@@ -110,16 +111,20 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   ///@{
   /**
    * How a window gets a new VDI without waiting for it. After Hold, changed maps and properties don't make
-   * the output out of date, until Release; another input still does. Prepare starts to make the VDI of the
-   * properties and maps as they are now, in a thread of its own, and returns; what it began before is given
-   * up. The update after Release takes that VDI if nothing has changed since, and makes one otherwise.
+   * the output out of date, until Release; another input still does. What Prepare has begun is given up: once
+   * GetPreparation says that it has ended, another Prepare waits for nothing. Prepare starts to make the VDI
+   * of the properties and maps as they are now, in a thread of its own, unless the output is that already.
+   * The update after Release takes that VDI, or waits for it, if nothing has changed since, and makes one
+   * otherwise.
    */
   void Hold();
   void Prepare();
   void Release();
+  int GetHeld();
   ///@}
   /// Of what Prepare has begun, in percent; 100 when it's there. -1: nothing is prepared, because nothing was
-  /// begun, it went wrong, or it can't be: before the first update, with PictureOnly and on several ranks.
+  /// begun, it was given up or went wrong, or it can't be: before the first update, with PictureOnly and on
+  /// several ranks.
   int GetPreparation();
 
   vtkMTimeType GetMTime() override;
@@ -142,16 +147,17 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   struct Internals;
   struct Origin;
   struct Frame;
-  void Generate(vtkDataObject* input, double time, vtkImageData* output);
+  void Generate(vtkDataObject* input, std::optional<double> time, vtkImageData* output);
   void Enter();
-  void ShowBlocks(vtkDataObject* input, double time);
+  void ShowBlocks(vtkDataObject* input, std::optional<double> time);
   vdi::ScalarRange StandInRange();
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
   Frame CurrentFrame();
   vtkMTimeType CurrentMTime();
-  Origin OriginOf(vtkDataObject* input, double time);
+  Origin OriginOf(vtkDataObject* input, std::optional<double> time);
+  bool GivesUpPreparation();
   void DropPreparation();
-  bool TakePreparation(vtkDataObject* input, double time, vtkImageData* output);
+  bool TakePreparation(vtkDataObject* input, std::optional<double> time, vtkImageData* output);
   void KeepEarlier(vtkImageData* earlier, vtkImageData* output);
   bool DropLostDevice(const vdi::Error& error);
   std::array<int, 2> PictureSize() const;

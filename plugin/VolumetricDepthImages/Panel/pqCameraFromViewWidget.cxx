@@ -44,7 +44,7 @@ void pqCameraFromViewWidget::copyCamera() {
   BEGIN_UNDO_SET(tr("Use the view's camera"));
   {
     SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this->proxy()).arg("comment", "the view's camera");
-    vtkSMVDIGeneratorProxy::SetCamera(this->proxy(), vtkSMRenderViewProxy::SafeDownCast(from));
+    vtkSMVDIGeneratorProxy::SetCamera(this->proxy(), vtkSMVDIGeneratorProxy::RenderViewOf(from));
     vtkSMPropertyHelper(this->proxy(), "UseOriginalCamera").Set(0);
     this->proxy()->UpdateVTKObjects();
   }

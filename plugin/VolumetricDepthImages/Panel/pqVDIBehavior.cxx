@@ -4,13 +4,18 @@
 #include <pqApplicationCore.h>
 #include <pqCoreUtilities.h>
 #include <pqDataRepresentation.h>
+#include <pqObjectBuilder.h>
 #include <pqPipelineSource.h>
+#include <pqPluginManager.h>
 #include <pqPropertiesPanel.h>
+#include <pqServer.h>
 #include <pqServerManagerModel.h>
 #include <pqUndoStack.h>
 #include <pqView.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMRenderViewProxy.h>
+#include <vtkSMSessionProxyManager.h>
+#include <vtkSMTrace.h>
 #include <QTimer>
 
 #include <algorithm>
@@ -65,12 +70,50 @@ void pqVDIBehavior::startup() {
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::sourceAdded, this, &pqVDIBehavior::sourceAdded);
   for (pqPipelineSource* source : model->findItems<pqPipelineSource*>()) this->sourceAdded(source);
+  this->connect(pqApplicationCore::instance()->getObjectBuilder(), &pqObjectBuilder::filterCreated, this,
+                &pqVDIBehavior::filterCreated);
+  // Queued: behind those who load plugins for a new server.
+  this->connect(model, &pqServerManagerModel::serverAdded, this, &pqVDIBehavior::lookAtServers,
+                Qt::QueuedConnection);
+  this->connect(pqApplicationCore::instance()->getPluginManager(), &pqPluginManager::pluginsUpdated, this,
+                &pqVDIBehavior::lookAtServers, Qt::QueuedConnection);
+  this->lookAtServers();
+}
+
+/// By hand, from the menu.
+void pqVDIBehavior::filterCreated(pqPipelineSource* source) {
+  auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(source->getProxy());
+  if (generator == nullptr) return;
+  SM_SCOPED_TRACE(PropertiesModified).arg("proxy", generator).arg("comment", "what the view shows");
+  generator->TakeArrayFromView();
+  generator->UpdateVTKObjects();
+}
+
+void pqVDIBehavior::lookAtServers() {
+  pqApplicationCore* core = pqApplicationCore::instance();
+  if (core == nullptr) return;
+  this->Lacking.removeAll(nullptr);
+  for (pqServer* server : core->getServerManagerModel()->findItems<pqServer*>()) {
+    const bool has =
+        !server->isRemote() || server->proxyManager()->HasDefinition("filters", "VolumetricDepthImage");
+    if (has) {
+      this->Lacking.removeAll(server);
+    } else if (!this->Lacking.contains(server)) {
+      this->Lacking.append(server);
+      qWarning(
+          "The server lacks the plugin VolumetricDepthImages: load it below Remote Plugins in Tools > Manage "
+          "Plugins.");
+    }
+  }
 }
 
 void pqVDIBehavior::shutdown() {
   // What it made belongs to the sources.
-  if (pqApplicationCore* core = pqApplicationCore::instance())
-    this->disconnect(core->getServerManagerModel());
+  if (pqApplicationCore* core = pqApplicationCore::instance()) {
+    core->getServerManagerModel()->disconnect(this);
+    core->getPluginManager()->disconnect(this);
+    core->getObjectBuilder()->disconnect(this);
+  }
 }
 
 void pqVDIBehavior::sourceAdded(pqPipelineSource* source) {

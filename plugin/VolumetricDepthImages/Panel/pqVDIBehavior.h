@@ -1,5 +1,6 @@
 // Started with the plugin: gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator, has still
-// frames deferred, and looks at what the user has opened from where it was made.
+// frames deferred, looks at what the user has opened from where it was made, and tells of servers that lack
+// the plugin.
 #ifndef pqVDIBehavior_h
 #define pqVDIBehavior_h
 
@@ -9,6 +10,7 @@
 
 class pqPipelineSource;
 class pqProxy;
+class pqServer;
 
 class pqVDIBehavior : public QObject {
   Q_OBJECT
@@ -19,9 +21,12 @@ class pqVDIBehavior : public QObject {
 
  private:
   Q_SLOT void sourceAdded(pqPipelineSource* source);
+  Q_SLOT void filterCreated(pqPipelineSource* source);
   Q_SLOT void applied(pqProxy* proxy);
+  Q_SLOT void lookAtServers();
 
   QList<QPointer<pqPipelineSource>> Opened;  // readers that haven't been applied yet
+  QList<QPointer<pqServer>> Lacking;         // servers that lack the plugin, of which was told
 };
 
 #endif

@@ -11,6 +11,7 @@
 #include <pqView.h>
 #include <vtkCamera.h>
 #include <vtkCommand.h>
+#include <vtkRenderWindow.h>
 #include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMRenderViewProxy.h>
@@ -56,6 +57,10 @@ pqVDIRegenerator::pqVDIRegenerator(pqPipelineSource* source) : QObject(source), 
                              SLOT(watchMaps()));
   }
   this->watchMaps();
+  this->connect(source, &pqProxy::modifiedStateChanged, this, &pqVDIRegenerator::stateChanged);
+  pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
+  this->connect(model, &pqServerManagerModel::viewAdded, this, &pqVDIRegenerator::viewAdded);
+  for (pqView* view : model->findItems<pqView*>()) this->viewAdded(view);
 }
 
 pqVDIRegenerator::~pqVDIRegenerator() {
@@ -93,17 +98,43 @@ void pqVDIRegenerator::watchMaps() {
 
 bool pqVDIRegenerator::isShown() const {
   const QList<pqView*> views = this->Source->getViews();
-  return std::any_of(views.begin(), views.end(), [this](pqView* view) {
-    const QList<pqOutputPort*> ports = this->Source->getOutputPorts();
-    return std::any_of(ports.begin(), ports.end(), [view](pqOutputPort* port) {
-      pqDataRepresentation* shown = port->getRepresentation(view);
-      return shown != nullptr && shown->isVisible();
-    });
+  return std::any_of(views.begin(), views.end(), [this](pqView* view) { return this->isShownIn(view); });
+}
+
+bool pqVDIRegenerator::isShownIn(pqView* view) const {
+  const QList<pqOutputPort*> ports = this->Source->getOutputPorts();
+  return std::any_of(ports.begin(), ports.end(), [view](pqOutputPort* port) {
+    pqDataRepresentation* shown = port->getRepresentation(view);
+    return shown != nullptr && shown->isVisible();
   });
 }
 
+/// The first Apply has been undone: the next one is the first again.
+void pqVDIRegenerator::stateChanged() {
+  if (this->Source->modifiedState() == pqProxy::UNINITIALIZED) this->generator()->Forget();
+}
+
+void pqVDIRegenerator::viewAdded(pqView* view) {
+  this->connect(view, &pqView::beginRender, this, &pqVDIRegenerator::beginRender);
+}
+
+/// Screenshots and frames of animations wait for the VDI that's being made.
+void pqVDIRegenerator::beginRender() {
+  auto* view = qobject_cast<pqView*>(this->sender());
+  if (this->Now == State::Idle || view == nullptr || !this->isShownIn(view)) return;
+  vtkRenderWindow* window = view->getViewProxy()->GetRenderWindow();
+  // Who takes pictures of a window does without swapping its buffers.
+  if (window != nullptr && window->GetSwapBuffers() == 0) this->generator()->ReleaseNow();
+}
+
+int pqVDIRegenerator::preparation() {
+  vtkSMProperty* property = this->generator()->GetProperty("Preparation");
+  this->generator()->UpdatePropertyInformation(property);
+  return vtkSMPropertyHelper(property).GetAsInt();
+}
+
 void pqVDIRegenerator::hold(int restMilliseconds) {
-  if (this->Now == State::Idle) this->generator()->InvokeCommand("Hold");
+  this->generator()->InvokeCommand("Hold");
   this->Now = State::Waiting;
   this->Rest = restMilliseconds;
   this->Resting.start();
@@ -122,14 +153,14 @@ void pqVDIRegenerator::look() {
   }
   if (this->Now == State::Waiting) {
     if (this->Resting.elapsed() < this->Rest) return;
+    // What an earlier edit began has been given up, but takes a moment to end.
+    if (const int earlier = this->preparation(); earlier >= 0 && earlier < 100) return;
     this->generator()->InvokeCommand("Prepare");
     this->Now = State::Preparing;
     Q_EMIT this->progress(0);
     return;
   }
-  vtkSMProperty* preparation = this->generator()->GetProperty("Preparation");
-  this->generator()->UpdatePropertyInformation(preparation);
-  const int percent = vtkSMPropertyHelper(preparation).GetAsInt();
+  const int percent = this->preparation();
   if (percent >= 0 && percent < 100) {
     Q_EMIT this->progress(percent);
     return;
@@ -163,8 +194,9 @@ void pqVDIRegenerator::lookAtViews() {
       this->Source->modifiedState() == pqProxy::UNINITIALIZED)
     return;
   pqView* view = pqActiveObjects::instance().activeView();
-  auto* proxy = view != nullptr ? vtkSMRenderViewProxy::SafeDownCast(view->getViewProxy()) : nullptr;
-  if (proxy == nullptr || !this->Source->getViews().contains(view) || !this->isShown()) return;
+  if (view == nullptr || !this->isShownIn(view)) return;
+  vtkSMRenderViewProxy* proxy = vtkSMVDIGeneratorProxy::RenderViewOf(view->getViewProxy());
+  if (proxy == nullptr) return;
   const std::array<double, 10> camera = numbersOf(proxy->GetActiveCamera());
   const bool moves = camera != this->LastCamera || QApplication::mouseButtons() != Qt::NoButton;
   if (moves) this->Tried = false;

@@ -41,11 +41,16 @@ class pqVDIRegenerator : public QObject {
   Q_SLOT void mapChanged();
   Q_SLOT void look();
   Q_SLOT void lookAtViews();
+  Q_SLOT void stateChanged();
+  Q_SLOT void viewAdded(pqView* view);
+  Q_SLOT void beginRender();
 
   enum class State { Idle, Waiting, Preparing };
 
   vtkSMVDIGeneratorProxy* generator() const;
   bool isShown() const;
+  bool isShownIn(pqView* view) const;
+  int preparation();
   void hold(int restMilliseconds);
   void finish();
   void forgetMaps();
