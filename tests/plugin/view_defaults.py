@@ -83,7 +83,7 @@ simple.Show(source, comparing).SetRepresentationType("Volume")
 simple.Render(comparing)
 comparing.CameraPosition, comparing.CameraFocalPoint = [0, 20, 70], [0, 1, 0]
 simple.SetActiveView(comparing)
-compared = simple.VolumetricDepthImage(Input=source)
+compared = simple.VolumetricDepthImage(Input=source, SelectInputScalars=["POINTS", "twice"])
 compared.UpdatePipeline()
 check(list(compared.CameraPosition) == [0, 20, 70], "the camera is taken from a comparative view %s"
       % list(compared.CameraPosition))

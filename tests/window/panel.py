@@ -100,6 +100,19 @@ def first_session(window):
     check(any(value.startswith("1.73205") for value in values), "the unit distance is the volume's")
     check(any(value.isdigit() and abs(int(value) - width) < 8 for value in values), "the width is the view's")
 
+    window.click("Undo Apply")
+    wait_for("state from before", lambda: window.is_enabled("Apply"))
+    check(window.values() != values, "the first Apply is undone")
+    window.click("Apply")
+    wait_for("VDI", lambda: not window.is_enabled("Apply"), 120)
+    time.sleep(1)
+    window.screenshot("4_applied_again.png")
+    check(window.values() == values, "and another one takes the same")
+
+    window.enter("Sampling Rate", 4)  # so that it takes a while
+    window.click("Apply")
+    wait_for("VDI", lambda: not window.is_enabled("Apply"), 120)
+
     window.click("Edit Color Map and Opacity")
     time.sleep(1)
     editor = window.find("Color Map and Opacity of the VDI", "dialog").box
@@ -108,13 +121,17 @@ def first_session(window):
     right, top = editor[0] + editor[2] - 56, editor[1] + 199
     with Pulse(window) as pulse:
         window.drag((right, top), (right, top + 90), steps=30, seconds=1.5)
-        window.screenshot("6_dragged.png")
         wait_for("new VDI", lambda: is_making(window, panel), 30)
         window.screenshot("7_making.png")
-        wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
-        time.sleep(1)
+        window.drag((right, top + 90), (right, top + 60), steps=15)
+        wait_for("newer VDI", lambda: is_making(window, panel), 30)
+    save_data(window, path("making.vdi"))
+    wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
+    time.sleep(1)
+    save_data(window, path("made.vdi"))
+    check(bytes_of(path("making.vdi")) == bytes_of(path("made.vdi")), "Save Data waits for the VDI that is being made")
     window.screenshot("8_edited.png")
-    print("a colour edit: the window took at most %.3f s to answer" % pulse.longest, flush=True)
+    print("two colour edits, the second while the first was made: the window took at most %.3f s to answer" % pulse.longest, flush=True)
     check(pulse.longest <= ANSWER_SECONDS, "an edit doesn't freeze the window")
     window.select(0)  # nothing is shown of that
     check(not window.has("Color Map and Opacity of the VDI", "dialog"), "the editor closes where nothing is shown")
@@ -174,10 +191,25 @@ def second_session(window, state):
     return vdi
 
 
+def delete_while_making(window):
+    panel = window.find("Properties", "frame")
+    x, y, width, height = window.view()
+    window.drag((x + width // 2, y + height // 2), (x + width // 2 - 90, y + height // 2 + 30))
+    window.click("Regenerate From This View")
+    wait_for("new VDI", lambda: is_making(window, panel), 30)
+    with Pulse(window) as pulse:
+        window.click("Delete", "push button")
+        time.sleep(1)
+    window.screenshot("13_deleted.png")
+    print("Delete while a VDI is made: the window took at most %.3f s to answer" % pulse.longest, flush=True)
+    check(pulse.longest <= ANSWER_SECONDS, "Delete doesn't freeze the window")
+
+
 with Screen() as screen:
     with Window(screen, output=OUTPUT, folder=OUTPUT) as window:
         vdi, state = first_session(window)
         from_state = second_session(window, state)
+        delete_while_making(window)
     replayed = path("replayed.vdi")
     subprocess.run(["pvbatch", os.path.join(OUTPUT, "trace.py")], check=True, timeout=200,
                    env=dict(os.environ, VDI_REPLAYED=replayed, PV_PLUGIN_CONFIG_FILE=os.environ["VDI_PLUGIN_LIST"]))
