@@ -12,9 +12,13 @@
 #include <pqServerManagerModel.h>
 #include <pqUndoStack.h>
 #include <pqView.h>
+#include <vtkOutputWindow.h>
+#include <vtkPVPluginsInformation.h>
+#include <vtkSMPluginManager.h>
 #include <vtkSMPropertyHelper.h>
+#include <vtkSMProxyManager.h>
 #include <vtkSMRenderViewProxy.h>
-#include <vtkSMSessionProxyManager.h>
+#include <vtkSMSession.h>
 #include <vtkSMTrace.h>
 #include <QTimer>
 
@@ -63,6 +67,17 @@ void lookFromViewpoint(pqPipelineSource* source) {
   view->render();
 }
 
+bool isLoadedOn(pqServer* server) {
+  vtkPVPluginsInformation* plugins =
+      vtkSMProxyManager::GetProxyManager()->GetPluginManager()->GetRemoteInformation(server->session());
+  if (plugins == nullptr) return true;  // not known yet
+  for (unsigned int i = 0; i < plugins->GetNumberOfPlugins(); ++i) {
+    if (std::string_view(plugins->GetPluginName(i)) == "VolumetricDepthImages" && plugins->GetPluginLoaded(i))
+      return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 void pqVDIBehavior::startup() {
@@ -94,15 +109,13 @@ void pqVDIBehavior::lookAtServers() {
   if (core == nullptr) return;
   this->Lacking.removeAll(nullptr);
   for (pqServer* server : core->getServerManagerModel()->findItems<pqServer*>()) {
-    const bool has =
-        !server->isRemote() || server->proxyManager()->HasDefinition("filters", "VolumetricDepthImage");
-    if (has) {
+    if (!server->isRemote() || isLoadedOn(server)) {
       this->Lacking.removeAll(server);
     } else if (!this->Lacking.contains(server)) {
       this->Lacking.append(server);
-      qWarning(
+      vtkOutputWindowDisplayWarningText(
           "The server lacks the plugin VolumetricDepthImages: load it below Remote Plugins in Tools > Manage "
-          "Plugins.");
+          "Plugins.\n");
     }
   }
 }
