@@ -105,7 +105,6 @@ for what, load in (("trace", lambda: exec(trace, {})), ("state", lambda: simple.
     check(np.abs(picture(again).astype(int) - first).max() <= 1, "and the same picture")
 
 
-
 def percent_of(proxy):
     proxy.SMProxy.UpdatePropertyInformation()
     return proxy.GetProperty("Preparation").GetData()
