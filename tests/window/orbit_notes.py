@@ -63,6 +63,8 @@ def use():
     view.GetInteractor().CreateRepeatingTimer(100)
     window.AddObserver("EndEvent", count)
     view.GetInteractor().AddObserver("EndInteractionEvent", note)
+    # Python would take what only VTK's objects know of for garbage, and call what is left of it.
+    pvtest.kept = [view, window, view.GetInteractor(), count, note, obey]
     return pvtest.failures
 
 
