@@ -1,10 +1,7 @@
 #include "vdi/gpu/CompiledPipeline.h"
 
-#include <span>
+#include <utility>
 
-#include "vdi/gpu/ComputePipeline.h"
-#include "vdi/gpu/Device.h"
-#include "vdi/gpu/VulkanDevice.h"
 #include "vdi/gpu/VulkanResult.h"
 
 namespace vdi::gpu {
@@ -14,8 +11,7 @@ namespace {
 /// Exists just while the pipeline is made.
 class ShaderModule {
  public:
-  ShaderModule(const Device& device, std::span<const std::uint32_t> code)
-      : device_(device.vulkan().handle()) {
+  ShaderModule(VkDevice device, std::span<const std::uint32_t> code) : device_(device) {
     const VkShaderModuleCreateInfo info{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO, nullptr, 0,
                                         code.size_bytes(), code.data()};
     check(vkCreateShaderModule(device_, &info, nullptr, &module_), "vkCreateShaderModule");
@@ -32,11 +28,20 @@ class ShaderModule {
 
 }  // namespace
 
-CompiledPipeline::CompiledPipeline(const Device& device, const ComputePipelineInfo& info)
-    : device_(device.vulkan().handle()) {
+std::vector<DescriptorBinding> descriptorBindings(const ComputePipelineInfo& info) {
+  std::vector<DescriptorBinding> bindings;
+  if (info.imageCount > 0)
+    bindings.push_back({descriptorImages, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, info.imageCount});
+  if (info.hasPlane) bindings.push_back({descriptorPlane, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 1});
+  if (info.uniformBytes > 0) bindings.push_back({descriptorUniforms, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1});
+  return bindings;
+}
+
+CompiledPipeline::CompiledPipeline(const PipelineTarget& target, const ComputePipelineInfo& info)
+    : device_(target.device) {
   try {
     makeSetLayout(info);
-    makePipeline(device, info);
+    makePipeline(target, info);
   } catch (...) {
     release();
     throw;
@@ -59,7 +64,7 @@ void CompiledPipeline::makeSetLayout(const ComputePipelineInfo& info) {
         "vkCreateDescriptorSetLayout");
 }
 
-void CompiledPipeline::makePipeline(const Device& device, const ComputePipelineInfo& info) {
+void CompiledPipeline::makePipeline(const PipelineTarget& target, const ComputePipelineInfo& info) {
   const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, info.pushConstantBytes};
   const VkPipelineLayoutCreateInfo layoutInfo{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
                                               nullptr,
@@ -76,10 +81,10 @@ void CompiledPipeline::makePipeline(const Device& device, const ComputePipelineI
   const VkSpecializationInfo specialization{static_cast<std::uint32_t>(entries.size()), entries.data(),
                                             info.specialization.size() * sizeof(std::uint32_t),
                                             info.specialization.data()};
-  const ShaderModule module(device, info.code.empty() ? shaderCode(info.shader) : info.code);
+  const ShaderModule module(device_, info.code.empty() ? shaderCode(info.shader) : info.code);
   const VkPipelineShaderStageRequiredSubgroupSizeCreateInfo subgroups{
       VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_REQUIRED_SUBGROUP_SIZE_CREATE_INFO, nullptr,
-      device.limits().subgroupSize};
+      target.subgroupSize};
   const VkPipelineShaderStageCreateFlags whole = VK_PIPELINE_SHADER_STAGE_CREATE_REQUIRE_FULL_SUBGROUPS_BIT;
   const VkComputePipelineCreateInfo pipelineInfo{
       VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
@@ -91,12 +96,8 @@ void CompiledPipeline::makePipeline(const Device& device, const ComputePipelineI
       layout_,
       VK_NULL_HANDLE,
       -1};
-  check(vkCreateComputePipelines(device_, device.vulkan().pipelineCache(), 1, &pipelineInfo, nullptr,
-                                 &pipeline_),
+  check(vkCreateComputePipelines(device_, target.cache, 1, &pipelineInfo, nullptr, &pipeline_),
         "vkCreateComputePipelines");
-  const std::string name(info.code.empty() ? info.shader : "a shader without a name");
-  device.vulkan().setName(VK_OBJECT_TYPE_PIPELINE, pipeline_, name);
-  device.vulkan().setName(VK_OBJECT_TYPE_PIPELINE_LAYOUT, layout_, "layout of " + name);
 }
 
 void CompiledPipeline::release() noexcept {
@@ -105,8 +106,9 @@ void CompiledPipeline::release() noexcept {
   if (setLayout_ != VK_NULL_HANDLE) vkDestroyDescriptorSetLayout(device_, setLayout_, nullptr);
 }
 
-std::shared_ptr<const CompiledPipeline> CompiledPipelines::of(const Device& device,
-                                                              const ComputePipelineInfo& info) {
+std::shared_ptr<const CompiledPipeline> CompiledPipelines::of(const PipelineTarget& target,
+                                                              const ComputePipelineInfo& info,
+                                                              const Made& made) {
   Key key{std::string(info.shader), info.pushConstantBytes, info.imageCount,
           info.uniformBytes > 0,    info.hasPlane,          info.wholeSubgroups,
           info.specialization};
@@ -116,7 +118,8 @@ std::shared_ptr<const CompiledPipeline> CompiledPipelines::of(const Device& devi
   }
   // Not under the lock: another thread may need one that's there. Where two compile the same, the first one
   // that's done counts.
-  auto compiled = std::make_shared<const CompiledPipeline>(device, info);
+  auto compiled = std::make_shared<const CompiledPipeline>(target, info);
+  made(*compiled);
   const std::lock_guard lock(mutex_);
   return pipelines_.try_emplace(std::move(key), std::move(compiled)).first->second;
 }

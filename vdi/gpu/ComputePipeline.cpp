@@ -13,25 +13,12 @@ namespace vdi::gpu {
 namespace {
 
 constexpr std::uint32_t guaranteedPushConstantBytes = 128;
-constexpr std::uint32_t imageBinding = 0;
-constexpr std::uint32_t uniformBinding = 1;
-constexpr std::uint32_t planeBinding = 2;
 
 }  // namespace
 
-std::vector<DescriptorBinding> descriptorBindings(const ComputePipelineInfo& info) {
-  std::vector<DescriptorBinding> bindings;
-  if (info.imageCount > 0)
-    bindings.push_back({imageBinding, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, info.imageCount});
-  if (info.hasPlane) bindings.push_back({planeBinding, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 1});
-  if (info.uniformBytes > 0) bindings.push_back({uniformBinding, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1});
-  return bindings;
-}
-
 ComputePipeline::ComputePipeline(std::shared_ptr<Device> device, const ComputePipelineInfo& info)
     : device_(std::move(device)),
-      compiled_(info.code.empty() ? device_->vulkan().compiledPipelines().of(*device_, info)
-                                  : std::make_shared<const CompiledPipeline>(*device_, info)),
+      compiled_(device_->vulkan().compiled(info, device_->limits().subgroupSize)),
       imageCount_(info.imageCount),
       uniformBytes_(info.uniformBytes),
       hasPlane_(info.hasPlane) {
@@ -67,13 +54,13 @@ void ComputePipeline::makeDescriptorSet(const ComputePipelineInfo& info) {
 
 void ComputePipeline::bindImages(std::span<const SampledImage* const> images, const Sampler& sampler) {
   assert(images.size() == imageCount_);
-  bind(imageBinding, images, sampler);
+  bind(descriptorImages, images, sampler);
 }
 
 void ComputePipeline::bindPlane(const SampledImage& image, const Sampler& sampler) {
   assert(hasPlane_);
   const SampledImage* const images[] = {&image};
-  bind(planeBinding, images, sampler);
+  bind(descriptorPlane, images, sampler);
 }
 
 void ComputePipeline::bind(std::uint32_t binding, std::span<const SampledImage* const> images,
@@ -96,9 +83,16 @@ void ComputePipeline::bind(std::uint32_t binding, std::span<const SampledImage* 
 
 void ComputePipeline::bindUniforms(const Buffer& buffer) {
   const VkDescriptorBufferInfo info{buffer.handle(), 0, uniformBytes_};
-  const VkWriteDescriptorSet write{
-      VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET, nullptr, set_,  uniformBinding, 0, 1,
-      VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,      nullptr, &info, nullptr};
+  const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
+                                   nullptr,
+                                   set_,
+                                   descriptorUniforms,
+                                   0,
+                                   1,
+                                   VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
+                                   nullptr,
+                                   &info,
+                                   nullptr};
   vkUpdateDescriptorSets(device_->vulkan().handle(), 1, &write, 0, nullptr);
 }
 

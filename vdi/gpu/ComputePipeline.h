@@ -8,8 +8,6 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string_view>
-#include <vector>
 
 #include "vdi/gpu/CompiledPipeline.h"
 #include "vdi/gpu/Memory.h"
@@ -17,30 +15,6 @@
 namespace vdi::gpu {
 
 class Device;
-
-/// SPIR-V of `shaders/<name>.comp`, compiled at build time and embedded in the library; asserts that the name
-/// exists.
-std::span<const std::uint32_t> shaderCode(std::string_view name);
-
-struct ComputePipelineInfo {
-  std::string_view shader;  // name without ".comp", for shaderCode
-  std::span<const std::uint32_t>
-      code;  // SPIR-V that's used instead when it isn't empty; just while constructing
-  std::uint32_t pushConstantBytes = 0;  // at most 128
-  std::uint32_t imageCount = 0;         // size of the sampler3D array at set 0, binding 0
-  std::uint32_t uniformBytes = 0;       // of the uniform block at set 0, binding 1; 0: none
-  bool hasPlane = false;                // a sampler2D at set 0, binding 2
-  bool wholeSubgroups = false;          // of DeviceLimits::subgroupSize, of which the workgroup is a multiple
-  std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
-};
-
-/// What's at set 0, binding by binding.
-struct DescriptorBinding {
-  std::uint32_t binding;
-  VkDescriptorType type;
-  std::uint32_t count;
-};
-std::vector<DescriptorBinding> descriptorBindings(const ComputePipelineInfo& info);
 
 /// Those of equal info share what's compiled, if that's a shader of the library; images and uniforms are each
 /// one's own.

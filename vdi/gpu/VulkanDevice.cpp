@@ -105,6 +105,21 @@ void VulkanDevice::release() noexcept {
   vkDestroyDevice(device_, nullptr);
 }
 
+std::shared_ptr<const CompiledPipeline> VulkanDevice::compiled(const ComputePipelineInfo& info,
+                                                               std::uint32_t subgroupSize) {
+  const PipelineTarget target{device_, cache_, subgroupSize};
+  const bool isOurs = info.code.empty();
+  const auto name = [&](const CompiledPipeline& pipeline) {
+    const std::string text(isOurs ? info.shader : "a shader without a name");
+    setName(VK_OBJECT_TYPE_PIPELINE, pipeline.handle(), text);
+    setName(VK_OBJECT_TYPE_PIPELINE_LAYOUT, pipeline.layout(), "layout of " + text);
+  };
+  if (isOurs) return compiled_.of(target, info, name);
+  auto pipeline = std::make_shared<const CompiledPipeline>(target, info);
+  name(*pipeline);
+  return pipeline;
+}
+
 std::optional<std::uint32_t> VulkanDevice::findMemoryType(std::uint32_t typeBits,
                                                           VkMemoryPropertyFlags wanted) const {
   for (std::uint32_t i = 0; i < memory_.memoryTypeCount; ++i) {

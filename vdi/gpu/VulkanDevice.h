@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -35,8 +36,9 @@ class VulkanDevice {
 
   VkDevice handle() const { return device_; }
   std::uint32_t queueFamily(QueueKind kind) const { return queue(kind).family; }
-  VkPipelineCache pipelineCache() const { return cache_; }
-  CompiledPipelines& compiledPipelines() { return compiled_; }
+  /// Compiled once for all who ask for it, if it's a shader of the library. From any thread.
+  std::shared_ptr<const CompiledPipeline> compiled(const ComputePipelineInfo& info,
+                                                   std::uint32_t subgroupSize);
 
   /// Index of the first memory type that `typeBits` allows and that has `wanted`, if there's one; by Vulkan's
   /// order that's the one with the fewest other properties.
