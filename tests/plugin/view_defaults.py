@@ -87,6 +87,7 @@ compared = simple.VolumetricDepthImage(Input=source, SelectInputScalars=["POINTS
 compared.UpdatePipeline()
 check(list(compared.CameraPosition) == [0, 20, 70], "the camera is taken from a comparative view %s"
       % list(compared.CameraPosition))
+check(simple.Show(compared, comparing).Representation == "VDI", "comparative views show VDIs as such")
 simple.Delete(compared)
 simple.Delete(comparing)
 simple.SetActiveView(view)
