@@ -50,9 +50,9 @@ class Session:
     def __exit__(self, *_):
         simple.Disconnect()
         try:
-            self.server.wait(20)
+            self.server.wait(5)  # mpirun doesn't always see that its ranks have ended
         except subprocess.TimeoutExpired:
-            self.server.kill()
+            self.server.terminate()
         self.relay.kill()
 
     def bytes(self):
