@@ -1,7 +1,6 @@
 """What orbit.py asks for inside ParaView (orbit_notes.py), without the mouse: each call returns at once, and what comes of it
 shows in the window by itself."""
 
-
 import numpy as np
 import pvtest
 from paraview import simple
