@@ -29,7 +29,7 @@ void searchOrWriteList(bool write) {
   float known = write ? params.thresholds.at[listIndex] : 0.0;
   SearchResult result = searchList(write, known, params.budget);
   if (write) {
-    if (result.count != params.capacities.at[listIndex]) atomicAdd(params.status.at[0], 1u);
+    if (result.count != params.capacities.at[listIndex]) atomicAdd(params.status.at[statusWrongLists], 1u);
   } else {
     params.thresholds.at[listIndex] = result.sensitivity;
     params.capacities.at[listIndex] = result.count;

@@ -260,9 +260,9 @@ uint roomOfList() {
 
 // The list has more runs than its neighbours that were counted: it's written again, in a room for these.
 void askForRoom() {
-  atomicAdd(params.status.at[0], 1u);
+  atomicAdd(params.status.at[statusWrongLists], 1u);
 #ifdef SEVERAL_RANKS
-  atomicMax(params.status.at[1], preSegmentsRuns);
+  atomicMax(params.status.at[statusMostRuns], preSegmentsRuns);
   params.capacities.at[listIndex] = preSegmentRoom + preSegmentsRuns;
   params.quotas.at[listIndex] = (params.quotas.at[listIndex] & 0xffffu) | preSegmentsRuns << 16;
 #endif

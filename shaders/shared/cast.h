@@ -38,8 +38,7 @@ struct CastParams {
   VDI_ADDRESS(UintArray) left;               // [h][w]: how many are to be left of them
   VDI_ADDRESS(Vec4Array) colors;             // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;            // [h][w]
-  VDI_ADDRESS(UintArray) status;             // [2]: lists whose written count differs from the stored one, and
-                                             // with several ranks the most runs of any of these
+  VDI_ADDRESS(UintArray) status;             // [statusWords]
   VDI_ADDRESS(UintArray) histogram;          // [histogramLevels + 1][2]
   VDI_ADDRESS(UintArray) levels;             // [rows][countedWidth][countedLevelWords]
   VDI_ADDRESS(UintArray) quotas;             // [h][w]; with other ranks: as in InterpolateConstants

@@ -12,6 +12,12 @@ VDI_CONST uint countedLevelWords = 3;
 VDI_CONST uint countedTolerance = 1;  // place of the finest tolerance's
 VDI_CONST uint countedRuns = 9;
 
+// What writing says of lists whose written count differs from the stored one, as words: how many there are, and with several
+// ranks the most runs of any of them.
+VDI_CONST uint statusWrongLists = 0;
+VDI_CONST uint statusMostRuns = 1;
+VDI_CONST uint statusWords = 2;
+
 // Supersegment of core/Vdi.h.
 struct Segment {
   float front;

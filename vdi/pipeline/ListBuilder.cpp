@@ -14,23 +14,14 @@ namespace vdi::detail {
 using gpu::MemoryKind;
 namespace shared = gpu::shared;
 
-namespace {
-
-/// Places in CastParams::status.
-constexpr std::size_t wrongLists = 0;
-constexpr std::size_t mostRuns = 1;
-constexpr std::size_t statusWords = 2;
-
-}  // namespace
-
 ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
       commands_(device_),
       scan_(device_),
       interpolate_(device_),
       reduce_(device_),
-      status_(device_, statusWords * sizeof(std::uint32_t), MemoryKind::DeviceLocal),
-      statusReadback_(device_, statusWords * sizeof(std::uint32_t), MemoryKind::Readback),
+      status_(device_, shared::statusWords * sizeof(std::uint32_t), MemoryKind::DeviceLocal),
+      statusReadback_(device_, shared::statusWords * sizeof(std::uint32_t), MemoryKind::Readback),
       preSegmentsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
       segmentsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
       totals_(device_, 2 * sizeof(std::uint32_t), MemoryKind::Readback) {}
@@ -107,7 +98,8 @@ void ListBuilder::finish() {
   }
   started_->lists->written = commands_.last();
   started_.reset();
-  if (const std::uint32_t wrong = statusReadback_.mappedAs<std::uint32_t>()[wrongLists]; wrong != 0) {
+  if (const std::uint32_t wrong = statusReadback_.mappedAs<std::uint32_t>()[shared::statusWrongLists];
+      wrong != 0) {
     throw Error(ErrorCode::DeviceFailure,
                 fmt::format("{} lists were written with another count than was stored", wrong),
                 device_->name());
@@ -310,9 +302,10 @@ std::optional<ListBuilder::From> ListBuilder::againFrom(From from) {
     preSegments_.reserve(device_, preSegmentBytes + preSegmentBytes / 4, MemoryKind::DeviceLocal);
     return From::Write;
   }
-  if (hasQuotas() && status[wrongLists] != 0 && from != From::Reduce) {
+  if (hasQuotas() && status[shared::statusWrongLists] != 0 && from != From::Reduce) {
     // Lists that weren't counted may have more runs than was expected. They've said how many.
-    if (request.runsOnly) expectedRuns_ = std::max(expectedRuns_, runsToExpect(status[mostRuns]));
+    if (request.runsOnly)
+      expectedRuns_ = std::max(expectedRuns_, runsToExpect(status[shared::statusMostRuns]));
     return From::Write;
   }
   scan_.requireNoOverflow();
