@@ -1,11 +1,15 @@
 // N ranks against one: the decomposition must not show.
+#include <atomic>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
+#include <thread>
 
 #include "tests/Scenes.h"
+#include "vdi/comm/Funnel.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/Pipeline.h"
 
@@ -515,6 +519,36 @@ TEST_CASE("a frame that's stopped late leaves nothing in the memory of the next 
     made.check(vdi, generator.renderVolume(test::oblique(), function, settings));
   }
   unsetenv("VDI_BANDS");
+}
+
+TEST_CASE("a frame of threads that may not call MPI: the same, also after one that was stopped") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random,
+                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const TransferFunction function = test::threeHues(80.0);
+  const GenerateSettings settings = test::smallSettings(61, 45, 6);
+  VdiGenerator generator(device(), comm::Communicator::world());
+  generator.setBlocks(decomposed.mine);
+  const auto expected = generator.generate(test::oblique(), function, settings);
+  for (const bool stopped : {false, true, false}) {
+    comm::Funnel funnel;
+    std::atomic<bool> done{false};
+    ErrorCode code = ErrorCode::Io;
+    std::optional<Vdi> vdi;
+    std::jthread thread([&] {
+      const comm::Funnel::Entry entry(funnel);
+      code = codeOf([&] {
+        vdi = generator.generate(test::oblique(), function, settings,
+                                 [&](double share) { return !stopped || share < 0.5 || world.rank() != 0; });
+      });
+      done = true;
+    });
+    while (!done) funnel.serve(std::chrono::milliseconds(5));
+    thread.join();
+    CHECK(code == (stopped ? ErrorCode::Cancelled : ErrorCode::Io));
+    CHECK(vdi.has_value() == (!stopped && world.rank() == 0));
+    if (vdi) CHECK(*vdi == *expected);
+  }
 }
 
 TEST_CASE("the next step, while this one is shown: all ranks advance, or none does") {

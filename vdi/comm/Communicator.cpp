@@ -1,7 +1,6 @@
 #include "vdi/comm/Communicator.h"
 
 #include <fmt/format.h>
-#include <mpi.h>
 
 #include <algorithm>
 #include <array>
@@ -14,28 +13,27 @@
 #include <string_view>
 #include <utility>
 
+#include "vdi/comm/Operation.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::comm {
 
 namespace {
 
-void check(int result, const char* call) {
-  if (result == MPI_SUCCESS) return;
-  std::array<char, MPI_MAX_ERROR_STRING> text{};
-  int length = 0;
-  MPI_Error_string(result, text.data(), &length);
-  throw Error(ErrorCode::Communication, fmt::format("{} failed: {}", call, text.data()));
-}
-
 /// Elements of `bytes` bytes as one MPI datatype, so that counts stay below 2^31 where byte counts don't.
 class ElementType {
  public:
   explicit ElementType(std::size_t bytes) {
-    check(MPI_Type_contiguous(static_cast<int>(bytes), MPI_BYTE, &type_), "MPI_Type_contiguous");
-    check(MPI_Type_commit(&type_), "MPI_Type_commit");
+    callHere("MPI_Type_contiguous",
+             [&] { return MPI_Type_contiguous(static_cast<int>(bytes), MPI_BYTE, &type_); });
+    callHere("MPI_Type_commit", [&] { return MPI_Type_commit(&type_); });
   }
-  ~ElementType() { MPI_Type_free(&type_); }
+  ~ElementType() {
+    callHere("MPI_Type_free", [&] {
+      MPI_Type_free(&type_);
+      return MPI_SUCCESS;
+    });
+  }
   ElementType(const ElementType&) = delete;
   ElementType& operator=(const ElementType&) = delete;
   MPI_Datatype handle() const { return type_; }
@@ -135,15 +133,15 @@ struct Communicator::State {
   void allReduce(std::span<T> values, MPI_Datatype type, MPI_Op operation) const {
     assert(values.size() <= maxElements);
     if (serial()) return;
-    check(
-        MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), type, operation, comm()),
-        "MPI_Allreduce");
+    call("MPI_Allreduce", MPI_Allreduce, MPI_Iallreduce, MPI_IN_PLACE, values.data(),
+         static_cast<int>(values.size()), type, operation, comm());
   }
 
   /// Every rank's value, on every rank.
   std::vector<std::uint64_t> allGatherSize(std::uint64_t mine) const {
     std::vector<std::uint64_t> sizes(static_cast<std::size_t>(size));
-    check(MPI_Allgather(&mine, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, comm()), "MPI_Allgather");
+    call("MPI_Allgather", MPI_Allgather, MPI_Iallgather, &mine, 1, MPI_UINT64_T, sizes.data(), 1,
+         MPI_UINT64_T, comm());
     return sizes;
   }
 };
@@ -220,7 +218,7 @@ std::string Communicator::environment(const char* name) const {
 }
 
 void Communicator::barrier() const {
-  if (!state_->serial()) check(MPI_Barrier(state_->comm()), "MPI_Barrier");
+  if (!state_->serial()) call("MPI_Barrier", MPI_Barrier, MPI_Ibarrier, state_->comm());
 }
 
 void Communicator::allReduceMin(std::span<double> values) const {
@@ -246,12 +244,12 @@ std::vector<std::byte> Communicator::broadcast(std::vector<std::byte> bytes, int
   assert(root >= 0 && root < size());
   if (state_->serial()) return bytes;
   std::uint64_t size = bytes.size();
-  check(MPI_Bcast(&size, 1, MPI_UINT64_T, root, state_->comm()), "MPI_Bcast");
+  call("MPI_Bcast", MPI_Bcast, MPI_Ibcast, &size, 1, MPI_UINT64_T, root, state_->comm());
   together([&] { bytes.resize(size); });
   constexpr std::uint64_t chunk = 1ULL << 30;
   for (std::uint64_t done = 0; done < size; done += chunk) {
     const auto part = static_cast<int>(std::min(chunk, size - done));
-    check(MPI_Bcast(bytes.data() + done, part, MPI_BYTE, root, state_->comm()), "MPI_Bcast");
+    call("MPI_Bcast", MPI_Bcast, MPI_Ibcast, bytes.data() + done, part, MPI_BYTE, root, state_->comm());
   }
   return bytes;
 }
@@ -268,9 +266,9 @@ Gathered Communicator::allGather(std::span<const std::byte> bytes, std::size_t e
     type.emplace(elementBytes);
     result = emptyGathered(layout, elementBytes);
   });
-  check(MPI_Allgatherv(bytes.data(), static_cast<int>(mine), type->handle(), result.bytes.data(),
-                       layout.counts.data(), layout.starts.data(), type->handle(), state_->comm()),
-        "MPI_Allgatherv");
+  call("MPI_Allgatherv", MPI_Allgatherv, MPI_Iallgatherv, bytes.data(), static_cast<int>(mine),
+       type->handle(), result.bytes.data(), layout.counts.data(), layout.starts.data(), type->handle(),
+       state_->comm());
   return result;
 }
 
@@ -287,9 +285,8 @@ Gathered Communicator::gather(std::span<const std::byte> bytes, std::size_t elem
     type.emplace(elementBytes);
     if (rank() == root) result = emptyGathered(layout, elementBytes);
   });
-  check(MPI_Gatherv(bytes.data(), static_cast<int>(mine), type->handle(), result.bytes.data(),
-                    layout.counts.data(), layout.starts.data(), type->handle(), root, state_->comm()),
-        "MPI_Gatherv");
+  call("MPI_Gatherv", MPI_Gatherv, MPI_Igatherv, bytes.data(), static_cast<int>(mine), type->handle(),
+       result.bytes.data(), layout.counts.data(), layout.starts.data(), type->handle(), root, state_->comm());
   return result;
 }
 
@@ -299,8 +296,8 @@ Gathered Communicator::allToAll(std::span<const std::byte> bytes, std::span<cons
   assert(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}) * elementBytes == bytes.size());
   if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
   std::vector<std::uint64_t> incoming(counts.size());
-  check(MPI_Alltoall(counts.data(), 1, MPI_UINT64_T, incoming.data(), 1, MPI_UINT64_T, state_->comm()),
-        "MPI_Alltoall");
+  call("MPI_Alltoall", MPI_Alltoall, MPI_Ialltoall, counts.data(), 1, MPI_UINT64_T, incoming.data(), 1,
+       MPI_UINT64_T, state_->comm());
   const Layout out(counts);
   const Layout in(incoming);
   std::optional<ElementType> type;
@@ -311,9 +308,9 @@ Gathered Communicator::allToAll(std::span<const std::byte> bytes, std::span<cons
     type.emplace(elementBytes);
     result = emptyGathered(in, elementBytes);
   });
-  check(MPI_Alltoallv(bytes.data(), out.counts.data(), out.starts.data(), type->handle(), result.bytes.data(),
-                      in.counts.data(), in.starts.data(), type->handle(), state_->comm()),
-        "MPI_Alltoallv");
+  call("MPI_Alltoallv", MPI_Alltoallv, MPI_Ialltoallv, bytes.data(), out.counts.data(), out.starts.data(),
+       type->handle(), result.bytes.data(), in.counts.data(), in.starts.data(), type->handle(),
+       state_->comm());
   return result;
 }
 
@@ -321,8 +318,8 @@ std::vector<std::uint64_t> Communicator::allGatherWords(std::span<const std::uin
   if (state_->serial()) return {words.begin(), words.end()};
   std::vector<std::uint64_t> all(words.size() * static_cast<std::size_t>(size()));
   const auto count = static_cast<int>(words.size());
-  check(MPI_Allgather(words.data(), count, MPI_UINT64_T, all.data(), count, MPI_UINT64_T, state_->comm()),
-        "MPI_Allgather");
+  call("MPI_Allgather", MPI_Allgather, MPI_Iallgather, words.data(), count, MPI_UINT64_T, all.data(), count,
+       MPI_UINT64_T, state_->comm());
   return all;
 }
 
@@ -331,8 +328,8 @@ std::vector<std::uint64_t> Communicator::allToAllWords(std::span<const std::uint
   if (state_->serial()) return {wordsTo.begin(), wordsTo.end()};
   std::vector<std::uint64_t> from(wordsTo.size());
   const auto count = static_cast<int>(wordsTo.size() / static_cast<std::size_t>(size()));
-  check(MPI_Alltoall(wordsTo.data(), count, MPI_UINT64_T, from.data(), count, MPI_UINT64_T, state_->comm()),
-        "MPI_Alltoall");
+  call("MPI_Alltoall", MPI_Alltoall, MPI_Ialltoall, wordsTo.data(), count, MPI_UINT64_T, from.data(), count,
+       MPI_UINT64_T, state_->comm());
   return from;
 }
 
@@ -370,15 +367,16 @@ void Communicator::agree(const std::exception_ptr& mine) const {
     return;
   }
   int firstFailing = mine ? rank() : size();
-  check(MPI_Allreduce(MPI_IN_PLACE, &firstFailing, 1, MPI_INT, MPI_MIN, state_->comm()), "MPI_Allreduce");
+  call("MPI_Allreduce", MPI_Allreduce, MPI_Iallreduce, MPI_IN_PLACE, &firstFailing, 1, MPI_INT, MPI_MIN,
+       state_->comm());
   if (firstFailing < size()) failTogether(mine, firstFailing);
 }
 
 void Communicator::failTogether(const std::exception_ptr& mine, int firstFailing) const {
   Text text{};
   if (rank() == firstFailing) text = describe(mine);
-  check(MPI_Bcast(text.data(), static_cast<int>(text.size()), MPI_CHAR, firstFailing, state_->comm()),
-        "MPI_Bcast");
+  call("MPI_Bcast", MPI_Bcast, MPI_Ibcast, text.data(), static_cast<int>(text.size()), MPI_CHAR, firstFailing,
+       state_->comm());
   if (mine) std::rethrow_exception(mine);
   throw Error(ErrorCode::RemoteRank, fmt::format("rank {} failed: {}", firstFailing, text.data()));
 }
@@ -392,7 +390,8 @@ bool Communicator::anyTogether(const std::function<bool()>& work) const {
   bool mine = false;
   const std::exception_ptr error = errorOf([&] { mine = work(); });
   std::array<int, 2> least{error ? rank() : size(), mine ? 0 : 1};
-  check(MPI_Allreduce(MPI_IN_PLACE, least.data(), 2, MPI_INT, MPI_MIN, state_->comm()), "MPI_Allreduce");
+  call("MPI_Allreduce", MPI_Allreduce, MPI_Iallreduce, MPI_IN_PLACE, least.data(), 2, MPI_INT, MPI_MIN,
+       state_->comm());
   if (least[0] < size()) failTogether(error, least[0]);
   return least[1] == 0;
 }
@@ -449,8 +448,9 @@ Messages::Messages(const Communicator& comm) : state_(std::make_unique<State>(St
 
 Messages::~Messages() {
   // Memory that a message is on its way to or from must stay: an exception may come by here.
-  if (!state_->requests.empty()) {
-    MPI_Waitall(static_cast<int>(state_->requests.size()), state_->requests.data(), MPI_STATUSES_IGNORE);
+  try {
+    waitForAll(state_->requests);
+  } catch (const Error&) {  // as little can be done as about the exception that's under way
   }
 }
 
@@ -458,9 +458,10 @@ void Messages::send(int to, std::span<const std::byte> bytes) {
   for (std::uint64_t done = 0; done < bytes.size(); done += largestMessage) {
     const auto count = static_cast<int>(std::min<std::uint64_t>(largestMessage, bytes.size() - done));
     state_->requests.push_back(MPI_REQUEST_NULL);
-    check(MPI_Isend(bytes.data() + done, count, MPI_BYTE, to, messageTag, state_->handle(),
-                    &state_->requests.back()),
-          "MPI_Isend");
+    callHere("MPI_Isend", [&] {
+      return MPI_Isend(bytes.data() + done, count, MPI_BYTE, to, messageTag, state_->handle(),
+                       &state_->requests.back());
+    });
   }
 }
 
@@ -468,17 +469,15 @@ void Messages::receive(int from, std::span<std::byte> bytes) {
   for (std::uint64_t done = 0; done < bytes.size(); done += largestMessage) {
     const auto count = static_cast<int>(std::min<std::uint64_t>(largestMessage, bytes.size() - done));
     state_->requests.push_back(MPI_REQUEST_NULL);
-    check(MPI_Irecv(bytes.data() + done, count, MPI_BYTE, from, messageTag, state_->handle(),
-                    &state_->requests.back()),
-          "MPI_Irecv");
+    callHere("MPI_Irecv", [&] {
+      return MPI_Irecv(bytes.data() + done, count, MPI_BYTE, from, messageTag, state_->handle(),
+                       &state_->requests.back());
+    });
   }
 }
 
 void Messages::wait() {
-  std::vector<MPI_Request> requests = std::move(state_->requests);
-  state_->requests.clear();
-  if (requests.empty()) return;  // there may be no MPI
-  check(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
+  waitForAll(state_->requests);
 }
 
 }  // namespace vdi::comm
