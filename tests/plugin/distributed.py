@@ -38,4 +38,45 @@ for association in ("POINTS", "CELLS"):
     else:
         worst = np.abs(live.astype(int) - read_png(os.path.join(OUTPUT, path))).max()
         check(worst <= 1, "%s: the ranks' picture is that of one rank, worst channel off by %d" % (association, worst))
+
+
+def prepare(image):
+    """As the window does: the ranks get on while they're asked to."""
+    image.SMProxy.InvokeCommand("Prepare")
+    percent = image.GetProperty("Preparation")
+    for _ in range(100000):
+        image.SMProxy.InvokeCommand("ServePreparation")
+        image.SMProxy.UpdatePropertyInformation(percent.SMProperty)
+        if not 0 <= percent.GetData() < 100:
+            break
+    return percent.GetData()
+
+
+# What is made beside the window, by all ranks together.
+image = vdi_of_wavelet("POINTS")
+first = picture(image)
+image.SMProxy.InvokeCommand("Hold")
+image.ScalarOpacityFunction = simple.CreatePiecewiseFunction(Points=[37, 0, 0.5, 0, 277, 0.2, 0.5, 0])
+image.UpdatePipeline()
+check(np.abs(picture(image).astype(int) - first).max() <= 1, "while it is held, the filter keeps what it has")
+check(prepare(image) == 100, "what is prepared gets there")
+image.SMProxy.InvokeCommand("Release")
+image.SMProxy.MarkDirty(image.SMProxy)
+taken = picture(image)
+check(np.abs(taken.astype(int) - first).max() > 30, "which shows the other opacity")
+image.SamplingRate = 2
+picture(image)
+image.SamplingRate = 1
+check(np.array_equal(picture(image), taken), "as an update without a preparation does")
+# One that's given up, and one whose filter goes before it is there.
+image.Supersegments, image.Resolution, image.SamplingRate = 40, [400, 300], 4
+image.SMProxy.InvokeCommand("Prepare")
+image.SMProxy.InvokeCommand("Hold")
+image.SMProxy.InvokeCommand("Release")
+image.SMProxy.MarkDirty(image.SMProxy)
+check(picture(image).shape == (300, 400, 3), "what was given up is made by the update")
+image.SamplingRate = 3
+image.SMProxy.InvokeCommand("Prepare")
+simple.Delete(image)
+check(picture(vdi_of_wavelet("POINTS")).max() > 60, "after a filter that went while it made a VDI, there's another one")
 finish()

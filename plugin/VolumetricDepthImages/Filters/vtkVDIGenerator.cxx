@@ -33,6 +33,7 @@
 #include "VDIArrays.h"
 #include "VDIBlocks.h"
 #include "VDIImageData.h"
+#include "VDIPreparation.h"
 #include "VDIRetire.h"
 #include "VDISession.h"
 #include "vdi/core/Error.h"
@@ -60,19 +61,6 @@ struct vtkVDIGenerator::Frame {
 };
 
 struct vtkVDIGenerator::Internals {
-  /// A VDI that a thread makes of the generator's blocks; who has one keeps off the generator.
-  struct Preparation {
-    vtkMTimeType Time = 0;  // of the maps and properties that it's made of
-    std::atomic<double> Share{0.0};
-    std::atomic<bool> Unwanted{false};
-    std::atomic<bool> Done{false};
-    vtkNew<vtkImageData> Output;  // the thread's until Done
-    bool Good = false;            // likewise
-    std::jthread Worker;          // last: joined before the rest goes
-
-    ~Preparation() { Unwanted = true; }
-  };
-
   std::unique_ptr<vdi::VdiGenerator> Generator;  // none until the first update
   std::uint64_t Identity = 0;                    // of the generator: the same on all ranks, and no other's
   std::optional<Origin> Shown;                   // by the generator
@@ -86,7 +74,7 @@ struct vtkVDIGenerator::Internals {
   /// would flicker.
   std::optional<vdi::ScalarRange> FirstRange;
   pv::ArrayChoice FirstChoice;
-  std::unique_ptr<Preparation> Preparing;  // last: its thread uses the generator
+  std::unique_ptr<pv::Preparation> Preparing;  // last: its thread uses the generator; who has one keeps off
 };
 
 vtkVDIGenerator::vtkVDIGenerator()
@@ -97,8 +85,9 @@ vtkVDIGenerator::vtkVDIGenerator()
 
 vtkVDIGenerator::~vtkVDIGenerator() {
   this->SetReport(nullptr);
-  // The thread hears late that it's unwanted, once a band.
-  if (this->GivesUpPreparation()) pv::retire(std::move(this->Internal));
+  // Who deletes the filter waits for the thread only where others' MPI does.
+  if (this->GivesUpPreparation() && !this->Internal->Preparing->hasRanks())
+    pv::retire(std::move(this->Internal));
 }
 
 void vtkVDIGenerator::SetReport(const char* text) {
@@ -486,19 +475,24 @@ int vtkVDIGenerator::GetHeld() {
 
 int vtkVDIGenerator::GetPreparation() {
   const auto& preparing = this->Internal->Preparing;
-  if (!preparing) return -1;
-  if (preparing->Done) return preparing->Good ? 100 : -1;
-  return std::clamp(static_cast<int>(100.0 * preparing->Share), 0, 99);
+  return preparing ? preparing->percent() : -1;
+}
+
+void vtkVDIGenerator::ServePreparation() {
+  const auto& preparing = this->Internal->Preparing;
+  constexpr std::chrono::milliseconds most{15};  // the window waits for that
+  if (preparing && preparing->hasRanks() && !preparing->isDone()) preparing->serve(most);
 }
 
 /// Tells the thread that it's unwanted. False where nothing is under way.
 bool vtkVDIGenerator::GivesUpPreparation() {
   const auto& preparing = this->Internal->Preparing;
-  if (!preparing || preparing->Done) return false;
-  preparing->Unwanted = true;
+  if (!preparing || preparing->isDone()) return false;
+  preparing->giveUp();
   return true;
 }
 
+/// Collective.
 void vtkVDIGenerator::DropPreparation() {
   this->Internal->Preparing.reset();
 }
@@ -507,66 +501,63 @@ void vtkVDIGenerator::Prepare() {
   Internals& internal = *this->Internal;
   this->DropPreparation();
   const bool isMade = !internal.Failed && internal.Executed == this->CurrentMTime();
-  if (isMade || !internal.Generator || internal.Generator->communicator().size() != 1 || !internal.Shown ||
-      this->PictureOnly)
-    return;
-  auto preparation = std::make_unique<Internals::Preparation>();
+  bool can = !isMade && internal.Generator && internal.Shown && !this->PictureOnly;
   Frame frame;
   try {
-    frame = this->CurrentFrame();
+    if (can) frame = this->CurrentFrame();
   } catch (const vdi::Error&) {
-    return;  // said by the update that comes instead
+    can = false;  // said by the update that comes instead
   }
-  preparation->Time = this->CurrentMTime();
-  preparation->Worker = std::jthread(
-      [&internal, &own = *preparation, frame = std::move(frame), step = std::max(this->TimeStep, 0)] {
-        try {
-          vdi::VdiGenerator& generator = *internal.Generator;
-          std::optional<vdi::Vdi> vdi =
-              generator.generate(frame.Camera, frame.Function, frame.Settings, [&own](double done) {
-                own.Share = done;
-                return !own.Unwanted;
-              });
-          vdi->time = internal.Shown->Time.value_or(0.0);
-          vdi->timeStep = static_cast<std::uint64_t>(step);
-          pv::setVdi(own.Output, *vdi);
-          findRanges(own.Output->GetPointData());
-          findRanges(own.Output->GetFieldData());
-          own.Good = true;
-        } catch (const std::exception&) {
-          own.Good = false;  // likewise: the update tries again, and says why if it can't either
-        }
-        own.Done = true;
+  if (!pv::onAllRanks(this->Controller, can)) return;
+  internal.Preparing = std::make_unique<pv::Preparation>(
+      this->Controller, this->CurrentMTime(),
+      [&internal, frame = std::move(frame), step = std::max(this->TimeStep, 0)](const vdi::Progress& progress,
+                                                                                vtkImageData* output) {
+        std::optional<vdi::Vdi> vdi =
+            internal.Generator->generate(frame.Camera, frame.Function, frame.Settings, progress);
+        if (!vdi) return;  // another rank has it
+        vdi->time = internal.Shown->Time.value_or(0.0);
+        vdi->timeStep = static_cast<std::uint64_t>(step);
+        pv::setVdi(output, *vdi);
+        findRanges(output->GetPointData());
+        findRanges(output->GetFieldData());
       });
-  internal.Preparing = std::move(preparation);
 }
 
 /// Makes sure that no thread uses the generator. True if `output` is what one has made of just this, for
-/// which an update that can't wait for its turn, a writer's, waits here.
+/// which an update that can't wait for its turn, a writer's, waits here. Collective.
 bool vtkVDIGenerator::TakePreparation(vtkDataObject* input, std::optional<double> time,
                                       vtkImageData* output) {
   Internals& internal = *this->Internal;
   const auto& preparing = internal.Preparing;
-  const bool isOfThis = preparing && !preparing->Unwanted && preparing->Time == internal.Executed &&
+  if (!preparing) return false;
+  const bool isOfThis = !preparing->isGivenUp() && preparing->time() == internal.Executed &&
                         internal.Shown == this->OriginOf(input, time);
-  while (isOfThis && !preparing->Done) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    this->UpdateProgress(preparing->Share);
-    if (this->CheckAbort()) preparing->Unwanted = true;
+  if (!pv::onAllRanks(this->Controller, isOfThis)) {
+    this->DropPreparation();
+    return false;
   }
-  if (isOfThis && preparing->Unwanted && !preparing->Good) {
+  const pv::Preparation::End end = preparing->wait([&] {
+    this->UpdateProgress(preparing->share());
+    if (this->CheckAbort()) preparing->giveUp();
+  });
+  if (end == pv::Preparation::End::GivenUp) {
     this->DropPreparation();
     throw vdi::Error(vdi::ErrorCode::Cancelled, "it was aborted");
   }
-  const bool ready = isOfThis && preparing->Good;
-  if (ready) {
-    output->ShallowCopy(internal.Preparing->Output);
-    const vdi::VdiGenerator& generator = *internal.Generator;
-    this->SetReport(reportOf(generator.reports(), generator.device().name()).c_str());
-    setTime(output, time);
+  if (end == pv::Preparation::End::Good) {
+    output->ShallowCopy(preparing->output());
+    this->TakeReport();
+    if (output->GetNumberOfPoints() > 0) setTime(output, time);
   }
   this->DropPreparation();
-  return ready;
+  return end == pv::Preparation::End::Good;
+}
+
+void vtkVDIGenerator::TakeReport() {
+  const vdi::VdiGenerator& generator = *this->Internal->Generator;
+  this->SetReport(
+      generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
 }
 
 void vtkVDIGenerator::Generate(vtkDataObject* input, std::optional<double> time, vtkImageData* output) {
@@ -591,17 +582,13 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, std::optional<double> time,
     this->UpdateProgress(0.1 + 0.9 * done);
     return !this->CheckAbort();
   };
-  const auto takeReport = [&] {
-    this->SetReport(
-        generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
-  };
   if (this->PictureOnly) {
     std::optional<vdi::Image> picture = generator.renderVolume(camera, function, settings, progress);
-    takeReport();
+    this->TakeReport();
     if (picture) pv::setPicture(output, *picture, true);
   } else {
     std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
-    takeReport();
+    this->TakeReport();
     if (!vdi) return;
     vdi->time = time.value_or(0.0);
     vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));

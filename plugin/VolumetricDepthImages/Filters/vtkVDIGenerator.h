@@ -114,17 +114,18 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
    * the output out of date, until Release; another input still does. What Prepare has begun is given up: once
    * GetPreparation says that it has ended, another Prepare waits for nothing. Prepare starts to make the VDI
    * of the properties and maps as they are now, in a thread of its own, unless the output is that already.
-   * The update after Release takes that VDI, or waits for it, if nothing has changed since, and makes one
-   * otherwise.
+   * On several ranks it gets on while somebody calls ServePreparation again and again, which takes some
+   * milliseconds, on all of them. The update after Release takes that VDI, or waits for it, if nothing has
+   * changed since, and makes one otherwise. Collective, but for Hold and Release.
    */
   void Hold();
   void Prepare();
+  void ServePreparation();
   void Release();
   int GetHeld();
   ///@}
   /// Of what Prepare has begun, in percent; 100 when it's there. -1: nothing is prepared, because nothing was
-  /// begun, it was given up or went wrong, or it can't be: before the first update, with PictureOnly and on
-  /// several ranks.
+  /// begun, it was given up or went wrong, or it can't be: before the first update, and with PictureOnly.
   int GetPreparation();
 
   vtkMTimeType GetMTime() override;
@@ -158,6 +159,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   bool GivesUpPreparation();
   void DropPreparation();
   bool TakePreparation(vtkDataObject* input, std::optional<double> time, vtkImageData* output);
+  void TakeReport();
   void KeepEarlier(vtkImageData* earlier, vtkImageData* output);
   bool DropLostDevice(const vdi::Error& error);
   std::array<int, 2> PictureSize() const;

@@ -128,6 +128,7 @@ void pqVDIRegenerator::beginRender() {
 }
 
 int pqVDIRegenerator::preparation() {
+  this->generator()->InvokeCommand("ServePreparation");
   vtkSMProperty* property = this->generator()->GetProperty("Preparation");
   this->generator()->UpdatePropertyInformation(property);
   return vtkSMPropertyHelper(property).GetAsInt();

@@ -2,8 +2,7 @@
 // opacity function was edited, from a view's camera, and by itself where the filter's Auto is on.
 //
 // While a map is being edited the filter is held: it shows what it has. Once the edit has rested and no mouse
-// button is down, a thread makes the new VDI, which takes the old one's place when it's there. Where that
-// can't be (several ranks), the next rendering makes it, as with any filter of ParaView.
+// button is down, a thread makes the new VDI, which takes the old one's place when it's there.
 #ifndef pqVDIRegenerator_h
 #define pqVDIRegenerator_h
 

@@ -1,0 +1,74 @@
+// A VDI that a thread makes beside ParaView's own work, on one rank or on several together.
+#ifndef VDIPreparation_h
+#define VDIPreparation_h
+
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkType.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include "vdi/comm/Funnel.h"
+#include "vdi/pipeline/Pipeline.h"
+
+class vtkMultiProcessController;
+
+namespace pv {
+
+/// On several ranks all functions that say so are collective: ParaView's servers have MPI for one thread
+/// alone, which carries out what the others ask for, and only while it's in `serve` or one of these.
+class Preparation {
+ public:
+  /// Makes the VDI and leaves it in `output`. It obeys `progress`, and throws when it can't.
+  using Make = std::function<void(const vdi::Progress& progress, vtkImageData* output)>;
+
+  /// Collective: starts the thread. `controller` has the ranks; null or of one rank: there are no others.
+  /// `time`: of the maps and properties that it's made of, on this rank.
+  Preparation(vtkMultiProcessController* controller, vtkMTimeType time, Make make);
+  /// Collective: gives it up, and waits for the thread.
+  ~Preparation();
+  Preparation(const Preparation&) = delete;
+  Preparation& operator=(const Preparation&) = delete;
+  Preparation(Preparation&&) = delete;
+  Preparation& operator=(Preparation&&) = delete;
+
+  vtkMTimeType time() const { return Time; }
+  bool hasRanks() const;
+  /// Whether this rank's thread has nothing left to do.
+  bool isDone() const { return Done; }
+  /// Percent of it; 100 when it's there, -1 when it was given up or went wrong.
+  int percent() const;
+  /// The thread hears late that it's unwanted, once a band. One rank's word is enough.
+  void giveUp() { Unwanted = true; }
+  bool isGivenUp() const { return Unwanted; }
+  /// Of several ranks: carries on what they do together. Doesn't wait for other ranks.
+  void serve(std::chrono::milliseconds most) { Funnel.serve(most); }
+
+  enum class End { Good, GivenUp, Failed };
+  /// Collective: waits for the end, which is the same for all ranks. Calls `whileWaiting` now and then.
+  End wait(const std::function<void()>& whileWaiting);
+  /// After a good end.
+  vtkImageData* output() { return Output; }
+  double share() const { return Share; }
+
+ private:
+  vtkMultiProcessController* Controller;
+  vtkMTimeType Time;
+  std::atomic<double> Share{0.0};
+  std::atomic<bool> Unwanted{false};
+  std::atomic<bool> Done{false};
+  vtkNew<vtkImageData> Output;  // the thread's until Done
+  bool Good = false;            // likewise
+  vdi::comm::Funnel Funnel;
+  std::jthread Worker;  // last: joined before the rest goes
+};
+
+/// Collective: whether it's true on all ranks of the controller; null: there's this one.
+bool onAllRanks(vtkMultiProcessController* controller, bool here);
+
+}  // namespace pv
+
+#endif
