@@ -11,6 +11,7 @@ xdotool, openbox, Xvfb, ImageMagick, dbus, at-spi2-core and python3-gi.
 
 import os
 import shutil
+import socket
 import subprocess
 import sys
 import tempfile
@@ -166,6 +167,28 @@ class Screen:
         for process in (self.manager, self.server):
             process.terminate()
             process.wait()
+
+
+class Server:
+    """pvserver on some ranks, which waits for a client at `port`."""
+
+    def __init__(self, ranks, log):
+        self.ranks, self.log = ranks, log
+
+    def __enter__(self):
+        with socket.socket() as free:
+            free.bind(("localhost", 0))
+            self.port = free.getsockname()[1]
+        environment = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
+        with open(self.log, "w") as log:
+            self.process = subprocess.Popen(["mpirun", "--oversubscribe", "-np", str(self.ranks), "pvserver",
+                                             "--server-port=%d" % self.port], env=environment, stdin=subprocess.DEVNULL,
+                                            stdout=log, stderr=log)
+        return self
+
+    def __exit__(self, *error):
+        self.process.terminate()
+        self.process.wait()
 
 
 class Window:
@@ -404,6 +427,24 @@ class Window:
         if picture:
             self.screenshot(picture)
         self.close_dialog("Plugin Manager")
+
+    def connect(self, name, port, picture=None):
+        """To a server of this computer, entered in the dialog; `picture`: the name of a screenshot of what is entered. ParaView
+        opens the plugin manager then if its plugins aren't the server's."""
+        self.menu("File", "Connect...")
+        self.click("Add Server")
+        dialog = self.find("Edit Server Configuration", "dialog")
+        fields = [self.find(label, "label", within=dialog) for label in ("Name", "Port")]
+        for field, value in zip(fields, (name, str(port))):
+            left, top, _, height = field.box
+            self.click((left + 150, top + height // 2), times=3)
+            self.type(value)
+        if picture:
+            self.screenshot(picture)
+        self.click("Configure")
+        self.click("Save")
+        dialog = self.find("Choose Server Configuration", "dialog")
+        self.click(self.find("Connect", "push button", within=dialog))
 
     def reset_session(self):
         self.click("Reset Session", "push button")
