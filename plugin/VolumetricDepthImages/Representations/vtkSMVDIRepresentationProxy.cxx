@@ -12,3 +12,8 @@ bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
     this->SetScalarColoring(nullptr, vtkDataObject::POINT);
   return this->Superclass::SetRepresentationType(type);
 }
+
+void vtkSMVDIRepresentationProxy::SetPropertyModifiedFlag(const char* name, int flag) {
+  // The superclass connects the selection.
+  this->vtkSMRepresentationProxy::SetPropertyModifiedFlag(name, flag);  // NOLINT(bugprone-parent-virtual-call)
+}
