@@ -55,6 +55,12 @@ def prepare(image):
 # What is made beside the window, by all ranks together.
 image = vdi_of_wavelet("POINTS")
 first = picture(image)
+report = image.GetProperty("Report")
+image.SMProxy.UpdatePropertyInformation(report.SMProperty)
+before = report.GetData()
+simple.SaveData(os.path.join(OUTPUT, "distributed_again.vdi"), proxy=image)
+image.SMProxy.UpdatePropertyInformation(report.SMProperty)
+check("generate" in before and report.GetData() == before, "saving what is there doesn't make it anew")
 image.SMProxy.InvokeCommand("Hold")
 image.ScalarOpacityFunction = simple.CreatePiecewiseFunction(Points=[37, 0, 0.5, 0, 277, 0.2, 0.5, 0])
 image.UpdatePipeline()

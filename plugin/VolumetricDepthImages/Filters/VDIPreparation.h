@@ -36,6 +36,7 @@ class Preparation {
   Preparation& operator=(Preparation&&) = delete;
 
   vtkMTimeType time() const { return Time; }
+  void setTime(vtkMTimeType time) { Time = time; }
   bool hasRanks() const;
   /// Whether this rank's thread has nothing left to do.
   bool isDone() const { return Done; }

@@ -68,6 +68,7 @@ struct vtkVDIGenerator::Internals {
   /// empty output isn't what was asked for, would try again alone.
   bool Failed = false;
   bool Held = false;
+  vtkNew<vtkImageData> Made;  // the last output: VTK empties it before it asks for another one
   vtkMTimeType Executed = 0;  // CurrentMTime of the last frame
   double VoxelVolume = 0.0;   // of the smallest voxel of all ranks; 0 without any
   /// Of the map that stands in for none: the first frame's range, kept while the array is the same, or films
@@ -88,6 +89,10 @@ vtkVDIGenerator::~vtkVDIGenerator() {
   // Who deletes the filter waits for the thread only where others' MPI does.
   if (this->GivesUpPreparation() && !this->Internal->Preparing->hasRanks())
     pv::retire(std::move(this->Internal));
+}
+
+bool vtkVDIGenerator::IsRoot() const {
+  return this->Controller == nullptr || this->Controller->GetLocalProcessId() == 0;
 }
 
 void vtkVDIGenerator::SetReport(const char* text) {
@@ -167,7 +172,7 @@ int vtkVDIGenerator::RequestInformation(vtkInformation*, vtkInformationVector**,
                                         vtkInformationVector* outputs) {
   // The other ranks' pictures are empty; announcing that keeps the pipeline from asking them for more again
   // and again.
-  const bool root = this->Controller == nullptr || this->Controller->GetLocalProcessId() == 0;
+  const bool root = this->IsRoot();
   const auto [width, height] = this->PictureSize();
   const int extent[6] = {0, root ? width - 1 : -1, 0, root ? height - 1 : -1, 0, root ? 0 : -1};
   vtkInformation* info = outputs->GetInformationObject(0);
@@ -262,30 +267,44 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
                                  vtkInformationVector* outputs) {
   vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
   vtkImageData* output = vtkImageData::GetData(outputs);
-  vtkNew<vtkImageData> earlier;
-  earlier->ShallowCopy(output);
   output->Initialize();
   std::optional<double> time;
   if (input != nullptr && input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP())) {
     time = input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
   }
-  this->Internal->Failed = true;
-  this->Internal->Executed = this->CurrentMTime();
+  Internals& internal = *this->Internal;
+  const bool isOfThis = internal.Shown == this->OriginOf(input, time);
+  if (!isOfThis) internal.Made->Initialize();  // no need to have two in memory
+  // Who asks for other pieces of it, a writer on several ranks, gets what is there.
+  const bool isMade = isOfThis && !internal.Failed &&
+                      (internal.Held || internal.Executed == this->CurrentMTime()) &&
+                      (internal.Made->GetNumberOfPoints() > 0 || !this->IsRoot());
+  const vtkMTimeType executed = std::exchange(internal.Executed, this->CurrentMTime());
+  internal.Failed = true;
   try {
     try {
+      this->Enter();
+      if (pv::onAllRanks(this->Controller, isMade)) {
+        output->ShallowCopy(internal.Made);
+        setTime(output, time);
+        internal.Executed = executed;
+        internal.Failed = false;
+        return 1;
+      }
       this->Generate(input, time, output);
     } catch (const vdi::Error& error) {
       if (!this->DropLostDevice(error)) throw;
       vtkWarningMacro(<< error.what() << "; trying a new device");
       output->Initialize();
+      this->Enter();
       this->Generate(input, time, output);
     }
   } catch (const vdi::Error& error) {
     output->Initialize();
     if (error.code() == vdi::ErrorCode::Cancelled) {
       // As ParaView's filters: it's not tried again until something changes.
-      this->Internal->Failed = false;
-      this->KeepEarlier(earlier, output);
+      internal.Failed = false;
+      this->KeepEarlier(output);
       return 1;
     }
     this->DropLostDevice(error);
@@ -296,8 +315,9 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     vtkErrorMacro(<< error.what());
     return 0;
   }
-  this->Internal->Failed = false;
-  this->Internal->Executed = this->CurrentMTime();  // a map's table has been built
+  internal.Made->ShallowCopy(output);
+  internal.Failed = false;
+  internal.Executed = this->CurrentMTime();  // a map's table has been built
   return 1;
 }
 
@@ -316,13 +336,13 @@ bool vtkVDIGenerator::DropLostDevice(const vdi::Error& error) {
 }
 
 /// What an abort leaves on rank 0: the picture that was there, or one that shows nothing.
-void vtkVDIGenerator::KeepEarlier(vtkImageData* earlier, vtkImageData* output) {
-  if (this->Controller != nullptr && this->Controller->GetLocalProcessId() != 0) return;
+void vtkVDIGenerator::KeepEarlier(vtkImageData* output) {
+  if (!this->IsRoot()) return;
   const auto [width, height] = this->PictureSize();
   int size[3];
-  earlier->GetDimensions(size);
+  this->Internal->Made->GetDimensions(size);
   if (size[0] == width && size[1] == height) {
-    output->ShallowCopy(earlier);
+    output->ShallowCopy(this->Internal->Made);
   } else {
     vdi::Image nothing{.width = width, .height = height, .rgba = {}, .depth = {}};
     nothing.rgba.resize(nothing.pixelCount());
@@ -466,7 +486,14 @@ void vtkVDIGenerator::Hold() {
 }
 
 void vtkVDIGenerator::Release() {
-  this->Internal->Held = false;
+  Internals& internal = *this->Internal;
+  internal.Held = false;
+  const vtkMTimeType time = this->CurrentMTime();
+  if (internal.Executed == time) return;
+  // An output that was asked for meanwhile, and stayed as it was, is younger than what was modified.
+  this->Modified();
+  if (internal.Preparing && internal.Preparing->time() == time)
+    internal.Preparing->setTime(this->CurrentMTime());
 }
 
 int vtkVDIGenerator::GetHeld() {
@@ -561,7 +588,6 @@ void vtkVDIGenerator::TakeReport() {
 }
 
 void vtkVDIGenerator::Generate(vtkDataObject* input, std::optional<double> time, vtkImageData* output) {
-  this->Enter();
   if (!this->Internal->Generator) {
     vdi::comm::Communicator comm = pv::communicatorOf(this->Controller);
     std::shared_ptr<vdi::gpu::Device> device;

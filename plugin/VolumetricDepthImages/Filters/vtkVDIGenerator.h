@@ -149,6 +149,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   struct Origin;
   struct Frame;
   void Generate(vtkDataObject* input, std::optional<double> time, vtkImageData* output);
+  bool IsRoot() const;
   void Enter();
   void ShowBlocks(vtkDataObject* input, std::optional<double> time);
   vdi::ScalarRange StandInRange();
@@ -160,7 +161,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void DropPreparation();
   bool TakePreparation(vtkDataObject* input, std::optional<double> time, vtkImageData* output);
   void TakeReport();
-  void KeepEarlier(vtkImageData* earlier, vtkImageData* output);
+  void KeepEarlier(vtkImageData* output);
   bool DropLostDevice(const vdi::Error& error);
   std::array<int, 2> PictureSize() const;
   void SetReport(const char* text);
