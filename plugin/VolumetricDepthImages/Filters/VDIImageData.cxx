@@ -12,12 +12,14 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 #include <span>
 #include <vector>
 
 #include "VDIRanges.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
+#include "vdi/io/VdiFile.h"
 #include "vdi/pipeline/Pipeline.h"
 
 namespace pv {
@@ -166,6 +168,14 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat) {
   for (const char* name : {"VDI.offsets", "VDI.codes", "VDI.supersegments"}) {
     if (vtkDataArray* array = fields->GetArray(name)) rememberRanges(array);
   }
+}
+
+vtkSmartPointer<vtkUnsignedCharArray> fileOf(const vdi::Vdi& vdi) {
+  const std::vector<std::byte> bytes = vdi::io::encode(vdi);
+  auto file = vtkSmartPointer<vtkUnsignedCharArray>::New();
+  file->SetNumberOfTuples(static_cast<vtkIdType>(bytes.size()));
+  std::memcpy(file->GetPointer(0), bytes.data(), bytes.size());
+  return file;
 }
 
 bool hasVdi(vtkImageData* image) {

@@ -17,6 +17,8 @@
 #ifndef VDIImageData_h
 #define VDIImageData_h
 
+#include <vtkSmartPointer.h>
+
 #include <string>
 
 #include "vdi/core/Image.h"
@@ -25,6 +27,7 @@
 class vtkDataObject;
 class vtkFieldData;
 class vtkImageData;
+class vtkUnsignedCharArray;
 
 namespace pv {
 
@@ -36,6 +39,8 @@ void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth);
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi);
 /// The same, of a flat picture that's there already (vdi::flatten).
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat);
+/// The bytes of its .vdi file. From any thread.
+vtkSmartPointer<vtkUnsignedCharArray> fileOf(const vdi::Vdi& vdi);
 /// Whether the image carries one, sound or not.
 bool hasVdi(vtkImageData* image);
 /// False if the data object carries no VDI (what a rank other than the root has). Throws vdi::Error{Format}

@@ -2,7 +2,6 @@
 #ifndef VDIPreparation_h
 #define VDIPreparation_h
 
-#include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkType.h>
 
@@ -13,6 +12,7 @@
 
 #include "vdi/comm/Funnel.h"
 #include "vdi/pipeline/Pipeline.h"
+#include "vtkVDIImageData.h"
 
 class vtkMultiProcessController;
 
@@ -23,7 +23,7 @@ namespace pv {
 class Preparation {
  public:
   /// Makes the VDI and leaves it in `output`. It obeys `progress`, and throws when it can't.
-  using Make = std::function<void(const vdi::Progress& progress, vtkImageData* output)>;
+  using Make = std::function<void(const vdi::Progress& progress, vtkVDIImageData* output)>;
 
   /// Collective: starts the thread. `controller` has the ranks; null or of one rank: there are no others.
   /// `time`: of the maps and properties that it's made of, on this rank.
@@ -52,7 +52,7 @@ class Preparation {
   /// Collective: waits for the end, which is the same for all ranks. Calls `whileWaiting` now and then.
   End wait(const std::function<void()>& whileWaiting);
   /// After a good end.
-  vtkImageData* output() { return Output; }
+  vtkVDIImageData* output() { return Output; }
   double share() const { return Share; }
 
  private:
@@ -61,8 +61,8 @@ class Preparation {
   std::atomic<double> Share{0.0};
   std::atomic<bool> Unwanted{false};
   std::atomic<bool> Done{false};
-  vtkNew<vtkImageData> Output;  // the thread's until Done
-  bool Good = false;            // likewise
+  vtkNew<vtkVDIImageData> Output;  // the thread's until Done
+  bool Good = false;               // likewise
   vdi::comm::Funnel Funnel;
   std::jthread Worker;  // last: joined before the rest goes
 };

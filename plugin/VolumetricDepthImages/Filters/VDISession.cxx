@@ -4,6 +4,7 @@
 #include <vtkMPI.h>
 #include <vtkMPICommunicator.h>
 #include <vtkMultiProcessController.h>
+#include <vtkProcessModule.h>
 
 #include <mutex>
 
@@ -18,6 +19,17 @@ vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller) {
   if (communicator == nullptr || controller->GetNumberOfProcesses() == 1)
     return vdi::comm::Communicator::serial();
   return vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(*communicator->GetMPIComm()->GetHandle()));
+}
+
+bool isServer() {
+  switch (vtkProcessModule::GetProcessType()) {
+    case vtkProcessModule::PROCESS_SERVER:
+    case vtkProcessModule::PROCESS_DATA_SERVER:
+    case vtkProcessModule::PROCESS_RENDER_SERVER:
+      return true;
+    default:
+      return false;
+  }
 }
 
 void enterCollective(vtkMultiProcessController* controller, const std::string& operation) {

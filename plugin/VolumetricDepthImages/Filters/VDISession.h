@@ -16,6 +16,9 @@ namespace pv {
 /// alone when there's none.
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller);
 
+/// Whether this process is a server's: what it makes is shown in another one.
+bool isServer();
+
 /// To be called on all ranks before a collective operation: throws vdi::Error{RemoteRank} where another rank
 /// won't enter (VDICollective.h).
 void enterCollective(vtkMultiProcessController* controller, const std::string& operation);

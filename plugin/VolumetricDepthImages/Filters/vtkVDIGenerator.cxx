@@ -68,9 +68,9 @@ struct vtkVDIGenerator::Internals {
   /// empty output isn't what was asked for, would try again alone.
   bool Failed = false;
   bool Held = false;
-  vtkNew<vtkImageData> Made;  // the last output: VTK empties it before it asks for another one
-  vtkMTimeType Executed = 0;  // CurrentMTime of the last frame
-  double VoxelVolume = 0.0;   // of the smallest voxel of all ranks; 0 without any
+  vtkNew<vtkVDIImageData> Made;  // the last output: VTK empties it before it asks for another one
+  vtkMTimeType Executed = 0;     // CurrentMTime of the last frame
+  double VoxelVolume = 0.0;      // of the smallest voxel of all ranks; 0 without any
   /// Of the map that stands in for none: the first frame's range, kept while the array is the same, or films
   /// would flicker.
   std::optional<vdi::ScalarRange> FirstRange;
@@ -539,7 +539,7 @@ void vtkVDIGenerator::Prepare() {
   internal.Preparing = std::make_unique<pv::Preparation>(
       this->Controller, this->CurrentMTime(),
       [&internal, frame = std::move(frame), step = std::max(this->TimeStep, 0)](const vdi::Progress& progress,
-                                                                                vtkImageData* output) {
+                                                                                vtkVDIImageData* output) {
         std::optional<vdi::Vdi> vdi =
             internal.Generator->generate(frame.Camera, frame.Function, frame.Settings, progress);
         if (!vdi) return;  // another rank has it
@@ -548,6 +548,7 @@ void vtkVDIGenerator::Prepare() {
         pv::setVdi(output, *vdi);
         findRanges(output->GetPointData());
         findRanges(output->GetFieldData());
+        if (pv::isServer()) output->SetFile(pv::fileOf(*vdi));
       });
 }
 

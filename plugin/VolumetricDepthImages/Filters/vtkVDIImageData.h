@@ -9,9 +9,12 @@
 #define vtkVDIImageData_h
 
 #include <vtkImageData.h>
+#include <vtkSmartPointer.h>
+#include <vtkUnsignedCharArray.h>
 
 #include "vtkVolumetricDepthImagesModule.h"
 
+class vtkAbstractArray;
 class vtkInformationVector;
 
 class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIImageData : public vtkImageData {
@@ -21,6 +24,18 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIImageData : public vtkImageData {
 
   /// Those of vtkImageData where there's no VDI with a scene in it.
   void ComputeBounds() override;
+
+  ///@{
+  /**
+   * The bytes of the .vdi file of what the image carries, made ahead for who sends it to another process.
+   * Null where there are none, or once the image carries another VDI. Copies of the image share them.
+   */
+  void SetFile(vtkUnsignedCharArray* file);
+  vtkUnsignedCharArray* GetFile();
+  ///@}
+
+  void ShallowCopy(vtkDataObject* source) override;
+  void DeepCopy(vtkDataObject* source) override;
 
   /// For vtkDemandDrivenPipeline::REQUEST_DATA_OBJECT: makes one the first output.
   static void MakeOutput(vtkInformationVector* outputs);
@@ -32,6 +47,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIImageData : public vtkImageData {
  private:
   vtkVDIImageData(const vtkVDIImageData&) = delete;
   void operator=(const vtkVDIImageData&) = delete;
+
+  void TakeFile(vtkDataObject* source);
+  vtkAbstractArray* Offsets();
+
+  vtkSmartPointer<vtkUnsignedCharArray> File;
+  vtkSmartPointer<vtkAbstractArray> FileIsOf;  // the VDI's offsets
 };
 
 #endif

@@ -7,19 +7,19 @@
 #include <vtkNew.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+#include <vtkSmartPointer.h>
 #include <vtkStringArray.h>
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
 #include <cstddef>
-#include <cstring>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "VDIImageData.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/VdiFile.h"
+#include "vtkVDIImageData.h"
 
 namespace pv {
 
@@ -30,21 +30,23 @@ constexpr const char* problemName = "VDI.problem";
 constexpr const char* boundsName = "VDI.bounds";
 
 void packFile(vtkImageData* image, vtkFieldData* fields) {
-  vdi::Vdi vdi;
-  getVdi(image, vdi);
-  const std::vector<std::byte> bytes = vdi::io::encode(vdi);
+  auto* made = vtkVDIImageData::SafeDownCast(image);
+  vtkSmartPointer<vtkUnsignedCharArray> file = made != nullptr ? made->GetFile() : nullptr;
+  if (file == nullptr) {
+    vdi::Vdi vdi;
+    getVdi(image, vdi);
+    file = fileOf(vdi);
+  }
+  const auto bytes = static_cast<std::size_t>(file->GetNumberOfValues());
   // ParaView's messages have sizes of 32 bits, and some words of their own.
   constexpr std::size_t most = (std::size_t{1} << 31U) - (std::size_t{1} << 20U);
-  if (bytes.size() > most)
+  if (bytes > most)
     throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                     "This VDI takes " + std::to_string(bytes.size() >> 20U) +
+                     "This VDI takes " + std::to_string(bytes >> 20U) +
                          " MiB as a file: more than the 2 GiB that ParaView sends to its client. Make one of "
                          "a lower resolution or of fewer supersegments.");
-  vtkNew<vtkUnsignedCharArray> array;
-  array->SetName(fileName);
-  array->SetNumberOfTuples(static_cast<vtkIdType>(bytes.size()));
-  std::memcpy(array->GetPointer(0), bytes.data(), bytes.size());
-  fields->AddArray(array);
+  file->SetName(fileName);
+  fields->AddArray(file);
   fields->AddArray(image->GetFieldData()->GetAbstractArray(boundsName));
 }
 

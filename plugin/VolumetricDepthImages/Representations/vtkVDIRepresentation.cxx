@@ -23,23 +23,12 @@
 #include <vector>
 
 #include "VDIPiece.h"
+#include "VDISession.h"
 #include "vtkVDIProp.h"
 
 vtkStandardNewMacro(vtkVDIRepresentation);
 
 namespace {
-
-/// Whether the data are in another process than the one that shows pictures.
-bool isDataElsewhere() {
-  switch (vtkProcessModule::GetProcessType()) {
-    case vtkProcessModule::PROCESS_SERVER:
-    case vtkProcessModule::PROCESS_DATA_SERVER:
-    case vtkProcessModule::PROCESS_RENDER_SERVER:
-      return true;
-    default:
-      return false;
-  }
-}
 
 bool isRoot() {
   vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
@@ -48,7 +37,7 @@ bool isRoot() {
 
 /// Whether there are a client and a server, which both can draw; the same on both.
 bool hasServer() {
-  if (isDataElsewhere()) return true;
+  if (pv::isServer()) return true;
   auto* session = vtkPVSession::SafeDownCast(vtkProcessModule::GetProcessModule()->GetSession());
   return session != nullptr && session->GetController(vtkPVSession::RENDER_SERVER_ROOT) != nullptr;
 }
@@ -140,7 +129,7 @@ int vtkVDIRepresentation::RequestData(vtkInformation* request, vtkInformationVec
                                       vtkInformationVector* outputs) {
   const bool hasInput = inputs[0]->GetNumberOfInformationObjects() > 0;
   if (hasInput && isRoot()) {
-    pv::packVdi(vtkDataObject::GetData(inputs[0]), isDataElsewhere(), this->Piece);
+    pv::packVdi(vtkDataObject::GetData(inputs[0]), pv::isServer(), this->Piece);
   } else {
     pv::packNothing(this->Piece);  // clients have no input, other ranks no VDI
   }
