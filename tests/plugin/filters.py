@@ -245,6 +245,17 @@ amr = simple.HierarchicalFractal(Dimensions=8, TwoDimensional=0, Asymetric=0)
 fractal = vdi_of(amr, ("CELLS", "Fractal Volume Fraction"), CameraPosition=[8, 6, 9], CameraFocalPoint=[0, 0, 0])
 check(picture(fractal).max() > 60, "an AMR data set of " + amr.GetClientSideObject().GetOutputDataObject(0).GetClassName())
 
+# An abort leaves what was there.
+aborted = vdi_of(wavelet)
+kept = picture(aborted)
+algorithm = aborted.GetClientSideObject()
+observer = algorithm.AddObserver("ProgressEvent", lambda *_: algorithm.SetAbortExecute(1))
+aborted.CameraPosition = [50, 60, 75]
+check(np.array_equal(picture(aborted), kept), "an abort leaves the picture that was there")
+algorithm.RemoveObserver(observer)
+aborted.CameraPosition = [50, 60, 76]
+check(not np.array_equal(picture(aborted), kept), "and what is asked for next is made")
+
 # Bad input: an error, not a crash, and the next thing works.
 check(errors_of(lambda: vdi_of(simple.Tetrahedralize(Input=wavelet)).UpdatePipeline()), "an unstructured grid is refused")
 check(errors_of(lambda: vdi_of(wavelet, CameraViewAngle=0).UpdatePipeline()), "a camera without an angle of view is refused")
