@@ -249,10 +249,11 @@ check(picture(fractal).max() > 60, "an AMR data set of " + amr.GetClientSideObje
 aborted = vdi_of(wavelet)
 kept = picture(aborted)
 algorithm = aborted.GetClientSideObject()
-observer = algorithm.AddObserver("ProgressEvent", lambda *_: algorithm.SetAbortExecute(1))
+observer = algorithm.AddObserver("ProgressEvent", lambda *_: algorithm.SetAbortExecuteAndUpdateTime())
 aborted.CameraPosition = [50, 60, 75]
 check(np.array_equal(picture(aborted), kept), "an abort leaves the picture that was there")
 algorithm.RemoveObserver(observer)
+algorithm.SetAbortExecute(0)
 aborted.CameraPosition = [50, 60, 76]
 check(not np.array_equal(picture(aborted), kept), "and what is asked for next is made")
 

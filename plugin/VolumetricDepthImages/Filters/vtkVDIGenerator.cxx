@@ -304,6 +304,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     if (error.code() == vdi::ErrorCode::Cancelled) {
       // As ParaView's filters: it's not tried again until something changes.
       internal.Failed = false;
+      this->SetAbortOutput(false);  // or the executive empties the output
       this->KeepEarlier(output);
       return 1;
     }
