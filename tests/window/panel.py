@@ -71,31 +71,33 @@ def is_making(window, panel):
     return window.text_that_begins("Making the VDI anew", panel) is not None
 
 
-def click_until(window, name, holds):
-    """A window that is busy may lose a click."""
-    for _ in range(3):
-        window.click(name)
-        end = time.monotonic() + 60
-        while time.monotonic() < end:
-            if holds():
-                return
-            time.sleep(0.5)
-    check(False, "%s does what it says" % name)
+def check_rests_at(window, values, what):
+    """The panel has these values after a while, and keeps them."""
+    wait_for("values after " + what, lambda: window.values() == values, 60)
+    window.wait_for_picture()
+    check(window.values() == values, "Auto leaves the VDI as it is after " + what)
 
 
-def auto_and_undo(window, panel):
-    """Auto, the undo of what it did, and the redo."""
+def auto_and_undo(window):
+    """Auto, the undo of what it did, and the redo: these stay until the camera moves again."""
     x, y, width, height = window.view()
+    middle = (x + width // 2, y + height // 2)
     window.click("Auto", "check box")
     before = window.values()
-    window.drag((x + width // 2, y + height // 2), (x + width // 2 + 160, y + height // 2))
-    after = wait_for("camera that Auto sets", lambda: window.values() != before and window.values(), 60)
-    wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
+    window.drag(middle, (middle[0] + 160, middle[1]))
+    window.find("Undo Regenerate VDI", seconds=60)
+    window.drag(middle, (middle[0] + 20, middle[1]), steps=5, seconds=0.2)  # while the VDI is made
+    window.key("ctrl+z")
+    check_rests_at(window, before, "an undo while it is made")
+    # Auto looks at the camera four times a second, so at least once while the button is down.
+    window.click("Redo Regenerate VDI", seconds=0.6)
+    after = wait_for("camera that Auto had set", lambda: window.values() != before and window.values(), 60)
     window.wait_for_picture()
     window.screenshot("8_auto.png")
-    click_until(window, "Undo Regenerate VDI", lambda: window.values() == before)
-    window.wait_for_picture()
-    click_until(window, "Redo Regenerate VDI", lambda: window.values() == after)
+    window.click("Undo Regenerate VDI", seconds=0.6)
+    check_rests_at(window, before, "an undo")
+    window.click("Redo Regenerate VDI", seconds=0.6)
+    check_rests_at(window, after, "a redo")
     window.click("Auto", "check box")
 
 
@@ -174,7 +176,7 @@ def first_session(window):
     wait_for("new VDI", lambda: is_making(window, panel), 30)
     wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
     check(window.values() != before, "the button sets the camera")
-    auto_and_undo(window, panel)
+    auto_and_undo(window)
 
     window.menu("Tools", "Stop Trace")
     trace = wait_for("trace", lambda: window.text_that_begins("# trace generated"))

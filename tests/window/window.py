@@ -334,12 +334,17 @@ class Window:
 
     # What a person does
 
-    def click(self, target, role=None, button=1, times=1):
-        """`target`: a name as for find, a widget, or a point (x, y) of the screen."""
+    def click(self, target, role=None, button=1, times=1, seconds=0):
+        """`target`: a name as for find, a widget, or a point (x, y) of the screen; `seconds`: how long the button is down."""
         x, y = self._point(target, role)
         xdotool("mousemove", str(x), str(y))
         time.sleep(0.1)
-        xdotool("click", "--repeat", str(times), "--delay", "60", str(button))
+        if seconds:
+            xdotool("mousedown", str(button))
+            time.sleep(seconds)
+            self.release(button)
+        else:
+            xdotool("click", "--repeat", str(times), "--delay", "60", str(button))
         time.sleep(0.3)
 
     def open_by_double_click(self, name):

@@ -57,6 +57,14 @@ pqVDIRegenerator::pqVDIRegenerator(pqPipelineSource* source) : QObject(source), 
                              SLOT(watchMaps()));
   }
   this->watchMaps();
+  for (const char* name : {"Auto", "AutoAngle"}) {
+    pqCoreUtilities::connect(source->getProxy()->GetProperty(name), vtkCommand::ModifiedEvent, this,
+                             SLOT(autoChanged()));
+  }
+  if (pqUndoStack* undo = pqApplicationCore::instance()->getUndoStack()) {
+    this->connect(undo, &pqUndoStack::undone, this, &pqVDIRegenerator::leaveToUser);
+    this->connect(undo, &pqUndoStack::redone, this, &pqVDIRegenerator::leaveToUser);
+  }
   this->connect(source, &pqProxy::modifiedStateChanged, this, &pqVDIRegenerator::stateChanged);
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::viewAdded, this, &pqVDIRegenerator::viewAdded);
@@ -189,20 +197,38 @@ QString pqVDIRegenerator::regenerate(pqView* view) {
   return QString::fromStdString(why);
 }
 
+vtkSMRenderViewProxy* pqVDIRegenerator::followedView() const {
+  pqView* view = pqActiveObjects::instance().activeView();
+  if (view == nullptr || !this->isShownIn(view)) return nullptr;
+  return vtkSMVDIGeneratorProxy::RenderViewOf(view->getViewProxy());
+}
+
+void pqVDIRegenerator::autoChanged() {
+  this->Tried = false;
+}
+
+/// An undo has a say in where the VDI is made from, until the camera moves again.
+void pqVDIRegenerator::leaveToUser() {
+  vtkSMRenderViewProxy* view = this->followedView();
+  if (view == nullptr) return;
+  this->LastCamera = numbersOf(view->GetActiveCamera());
+  this->Tried = true;
+}
+
 void pqVDIRegenerator::lookAtViews() {
   vtkSMVDIGeneratorProxy* own = this->generator();
   if (vtkSMPropertyHelper(own, "Auto").GetAsInt() == 0 || this->Now != State::Idle ||
       this->Source->modifiedState() == pqProxy::UNINITIALIZED)
     return;
-  pqView* view = pqActiveObjects::instance().activeView();
-  if (view == nullptr || !this->isShownIn(view)) return;
-  vtkSMRenderViewProxy* proxy = vtkSMVDIGeneratorProxy::RenderViewOf(view->getViewProxy());
-  if (proxy == nullptr) return;
-  const std::array<double, 10> camera = numbersOf(proxy->GetActiveCamera());
-  const bool moves = camera != this->LastCamera || QApplication::mouseButtons() != Qt::NoButton;
-  if (moves) this->Tried = false;
+  vtkSMRenderViewProxy* view = this->followedView();
+  if (view == nullptr) return;
+  const std::array<double, 10> camera = numbersOf(view->GetActiveCamera());
+  const bool moves = camera != this->LastCamera;
   this->LastCamera = camera;
-  if (moves || this->Tried) return;
+  if (moves) this->Tried = false;
+  // A button may be down for something else than the camera, Undo for example.
+  if (moves || this->Tried || QApplication::mouseButtons() != Qt::NoButton) return;
   this->Tried = true;
-  if (own->DegreesFrom(proxy) > vtkSMPropertyHelper(own, "AutoAngle").GetAsDouble()) this->regenerate(view);
+  if (own->DegreesFrom(view) > vtkSMPropertyHelper(own, "AutoAngle").GetAsDouble())
+    this->regenerate(pqActiveObjects::instance().activeView());
 }

@@ -16,6 +16,7 @@
 
 class pqPipelineSource;
 class pqView;
+class vtkSMRenderViewProxy;
 class vtkSMVDIGeneratorProxy;
 
 class pqVDIRegenerator : public QObject {
@@ -40,6 +41,8 @@ class pqVDIRegenerator : public QObject {
   Q_SLOT void mapChanged();
   Q_SLOT void look();
   Q_SLOT void lookAtViews();
+  Q_SLOT void autoChanged();
+  Q_SLOT void leaveToUser();
   Q_SLOT void stateChanged();
   Q_SLOT void viewAdded(pqView* view);
   Q_SLOT void beginRender();
@@ -49,6 +52,8 @@ class pqVDIRegenerator : public QObject {
   vtkSMVDIGeneratorProxy* generator() const;
   bool isShown() const;
   bool isShownIn(pqView* view) const;
+  /// The one that Auto looks at: the active view, if it shows the VDI. Null if there's none.
+  vtkSMRenderViewProxy* followedView() const;
   int preparation();
   void hold(int restMilliseconds);
   void finish();
@@ -61,7 +66,7 @@ class pqVDIRegenerator : public QObject {
   QElapsedTimer Resting;  // since the last edit
   qint64 Rest = 0;        // milliseconds that it has to
   std::array<double, 10> LastCamera{};
-  bool Tried = false;  // to make a VDI from where the camera rests
+  bool Tried = false;  // to make a VDI from where the camera rests, or it's left to the user
   struct Watched;
   std::vector<Watched> Maps;
 };
