@@ -2,13 +2,13 @@
 nothing. relay.py counts what goes over the socket."""
 
 import os
-import socket
 import subprocess
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 import pvtest  # noqa: E402
+import server  # noqa: E402
 from paraview import simple  # noqa: E402
 from pvtest import check  # noqa: E402
 
@@ -16,34 +16,19 @@ SIZE, CAMERA, CENTER = [480, 360], [2.2, 1.9, 2.4], [0.5, 0.5, 0.5]
 LOG = os.path.join(pvtest.OUTPUT, "client_server.log")
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-def clean_environment():
-    """Without what this process's own MPI has put there, which a new mpirun would take for its own."""
-    ours = ("OMPI_ALLOW", "OMPI_MCA_rmaps_base", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl_vader")
-    return {name: value for name, value in os.environ.items()
-            if not name.startswith(("OMPI_", "PMIX_", "ORTE_")) or name.startswith(ours)}
-
-
 class Session:
     """A server that has connected to this client, by way of a relay."""
 
     def __enter__(self):
         here = os.path.dirname(os.path.abspath(__file__))
-        port = free_port()
-        self.relay = subprocess.Popen(["python3", os.path.join(here, "relay.py"), str(port)], stdin=subprocess.PIPE,
+        port = server.free_port()
+        self.relay = subprocess.Popen(["python3", os.path.join(here, "relay.py"), port], stdin=subprocess.PIPE,
                                       stdout=subprocess.PIPE, text=True)
         relayed = self.relay.stdout.readline().strip()
         with open(LOG, "w") as log:
-            self.server = subprocess.Popen([os.environ["MPIEXEC"], "--oversubscribe", "-n", "2", os.environ["PVSERVER"],
-                                            "--reverse-connection", "--client-host=127.0.0.1", "--server-port=" + relayed],
-                                           env=clean_environment(), stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+            self.server = server.start_reverse(relayed, ranks=2, stdout=log, stderr=log)
             os.dup2(log.fileno(), 2)  # what this process says, too
-        simple.ReverseConnect(str(port))
+        simple.ReverseConnect(port)
         simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=True, ns=simple.__dict__)
         return self
 

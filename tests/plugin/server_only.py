@@ -2,16 +2,15 @@
 their representation had a part that this client can't make."""
 
 import os
-import socket
-import subprocess
+import sys
 
 from paraview import simple
 
-with socket.socket() as probe:
-    probe.bind(("127.0.0.1", 0))
-    port = str(probe.getsockname()[1])
-server = subprocess.Popen([os.environ["PVSERVER"], "--reverse-connection", "--client-host=127.0.0.1", "--server-port=" + port],
-                          env=dict(os.environ, PV_PLUGIN_CONFIG_FILE=os.environ["VDI_PLUGIN_LIST"]), stdin=subprocess.DEVNULL)
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import server  # noqa: E402
+
+port = server.free_port()
+pvserver = server.start_reverse(port, env=server.clean_environment(PV_PLUGIN_CONFIG_FILE=os.environ["VDI_PLUGIN_LIST"]))
 try:
     simple.ReverseConnect(port)
     assert hasattr(simple.servermanager.filters, "VolumetricDepthImage"), "the server has the plugin"
@@ -20,6 +19,6 @@ try:
     simple.Render(view)
     assert view.GetRenderWindow().GetSize()[0] > 0
 finally:
-    server.terminate()
-    server.wait(20)
+    pvserver.terminate()
+    pvserver.wait(20)
 print("the wavelet was shown")

@@ -1,0 +1,31 @@
+"""What tests with a pvserver share. Loads no plugin."""
+
+import os
+import socket
+import subprocess
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return str(probe.getsockname()[1])
+
+
+def clean_environment(**more):
+    """Without what this process's own MPI has put there, which a new mpirun would take for its own."""
+    ours = ("OMPI_ALLOW", "OMPI_MCA_rmaps_base", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl_vader")
+    kept = {name: value for name, value in os.environ.items()
+            if not name.startswith(("OMPI_", "PMIX_", "ORTE_")) or name.startswith(ours)}
+    return dict(kept, **more)
+
+
+def start(*arguments, ranks=1, **options):
+    """A pvserver, with `options` of subprocess.Popen."""
+    launcher = [os.environ["MPIEXEC"], "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    options.setdefault("env", clean_environment())
+    return subprocess.Popen(launcher + [os.environ["PVSERVER"], *arguments], stdin=subprocess.DEVNULL, **options)
+
+
+def start_reverse(port, **options):
+    """One that connects to a client, which is the one to listen."""
+    return start("--reverse-connection", "--client-host=127.0.0.1", "--server-port=" + port, **options)
