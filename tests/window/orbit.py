@@ -93,6 +93,28 @@ def lost_stills():
     os.remove(LOSE_STILLS)
 
 
+def screenshots_while_made():
+    inside("show_made()")
+    for peak, prepares in ((0.2, False), (0.7, True)):
+        held, differs = inside("edit_and_capture({}, {})".format(peak, prepares))
+        assert held and differs, "a screenshot shows the VDI from before an edit: {}, {}".format(held, differs)
+        wait_for("end of making the VDI", lambda: not inside("is_held()"), 60)
+        assert inside("captures_the_same()"), "a screenshot that is taken while a VDI is made isn't the one after that"
+
+
+def two_views():
+    """Auto follows the active view, and makes one VDI each time."""
+    inside("show_in_two_views()")
+    made = 0
+    for view in (0, 1, 0):
+        inside("activate({})".format(view))
+        made += 1
+        wait_for("VDI from view {}".format(view), lambda: inside("makings_from({})".format(view)), 60)
+        time.sleep(1)  # Auto looks four times a second
+        assert inside("makings_from({})".format(view)) == made, "VDIs are made again and again"
+    inside("close_second_view()")
+
+
 generate("input.vdi", "--resolution", "160x160", "--supersegments", "12", "--azimuth", "40")
 LOSE_STILLS = os.environ["VDI_TEST_LOSE_STILLS"] = os.path.join(OUTPUT, "lose_stills")
 os.environ["LD_PRELOAD"] = os.environ["VDI_LOSE_DEVICE"]
@@ -109,4 +131,6 @@ with Screen(1100, 760) as screen, Window(screen, "--script=" + os.path.join(HERE
     compare(window, "orbited_back.png", middle, (middle[0] - 90, middle[1] - 180))
     steps()
     comparative()
+    screenshots_while_made()
+    two_views()
     lost_stills()

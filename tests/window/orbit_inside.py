@@ -127,3 +127,85 @@ def what_is_said():
     picture = pixels(shown["view"].GetRenderWindow())
     pvtest.write_png("said.png", picture)
     return [pvtest.message_in(shown["view"]), float(picture.std()), shown["frames"]]
+
+
+def show_made():
+    """A VDI that is made here, in place of what is shown."""
+    view = shown["view"]
+    for source in simple.GetSources().values():
+        simple.Hide(source, view)
+    wavelet = simple.Wavelet()
+    wavelet.UpdatePipeline()
+    shown["vdi"] = image = simple.VolumetricDepthImage(Input=wavelet, Resolution=[160, 120])
+    simple.Show(image, view)
+    simple.Render(view)
+    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = [45, 30, 60], [0, 0, 0], [0, 1, 0]
+    simple.Render(view)
+
+
+def is_held():
+    """Whether a VDI is being made beside the window, or is about to be."""
+    proxy = shown["vdi"].SMProxy
+    proxy.UpdatePropertyInformation()
+    return proxy.GetProperty("Held").GetElement(0) == 1
+
+
+def screenshot(name):
+    simple.SaveScreenshot(pvtest.os.path.join(pvtest.OUTPUT, name), shown["view"])
+    return pvtest.read_png(pvtest.os.path.join(pvtest.OUTPUT, name))
+
+
+def edit_and_capture(peak, prepares):
+    """A screenshot at once after an edit of the opacity, or when the VDI is being made. Whether the window was held until then,
+    and whether the picture differs from the one before the edit."""
+    before = screenshot("before_edit.png")
+    pvtest.set_colors("RTData", 40, 270, peak)
+    if prepares:
+        shown["vdi"].SMProxy.InvokeCommand("Prepare")
+    held = is_held()
+    shown["captured"] = screenshot("after_edit.png")
+    return [held, not same(before, shown["captured"])]
+
+
+def captures_the_same():
+    return same(screenshot("later.png"), shown["captured"])
+
+
+def show_in_two_views():
+    """Of one layout, 90 degrees apart, and each of them that from where the VDI was made. With Auto."""
+    first, image = shown["view"], shown["vdi"]
+    layout = simple.GetLayout(first)
+    layout.SplitHorizontal(layout.GetViewLocation(first), 0.5)
+    second = simple.CreateView("RenderView")
+    simple.AssignViewToLayout(second, layout, 2)
+    simple.Show(image, second)
+    shown["views"], shown["makings"] = [first, second], 0
+    for view, position in zip(shown["views"], ([0, 0, 80], [80, 0, 0])):
+        simple.Render(view)
+        view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = position, [0, 0, 0], [0, 1, 0]
+        simple.Render(view)
+    image.CameraPosition, image.CameraFocalPoint = [-50, 60, -50], [0, 0, 0]
+    simple.Render(first)
+    image.GetClientSideObject().AddObserver("EndEvent", lambda *_: shown.update(makings=shown["makings"] + 1))
+    image.Auto = 1
+    image.UpdateVTKObjects()
+
+
+def activate(index):
+    simple.SetActiveView(shown["views"][index])
+
+
+def makings_from(index):
+    """How often the VDI has been made, if it's from that view by now; 0 otherwise."""
+    wanted = shown["views"][index].GetActiveCamera().GetPosition()
+    made = shown["vdi"].CameraPosition
+    return 0 if is_held() or max(abs(a - b) for a, b in zip(wanted, made)) > 1e-6 else shown["makings"]
+
+
+def close_second_view():
+    """And delete what is made."""
+    simple.Delete(shown.pop("vdi"))
+    second, layout = shown["views"][1], simple.GetLayout(shown["view"])
+    cell = layout.GetViewLocation(second)
+    simple.Delete(second)
+    layout.Collapse(cell)
