@@ -18,10 +18,10 @@ FOLDER = os.path.join(pvtest.OUTPUT, "steps")
 KINDS, COUNT = 4, 20
 
 
-def make(kind):
+def make(kind, resolution="640x360", azimuth="0"):
     path = os.path.join(FOLDER, "kind_{}.vdi".format(kind))
     subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--seed", str(kind + 1), "--size", "32x32x32",
-                    "--resolution", "640x360", "-o", path], check=True, stdout=subprocess.DEVNULL)
+                    "--resolution", resolution, "--azimuth", azimuth, "-o", path], check=True, stdout=subprocess.DEVNULL)
     return path
 
 
@@ -61,6 +61,39 @@ def frame(view):
     return time.perf_counter() - start
 
 
+def picture_alone(path):
+    """What a file looks like, by a reader and a view of its own."""
+    alone = simple.OpenDataFile(path)
+    view = make_view()
+    simple.Show(alone, view)
+    simple.Render(view)
+    picture = screenshot(view, "expected")
+    simple.Delete(view)
+    simple.Delete(alone)
+    return picture
+
+
+def read_ahead(step):
+    """Steps before it, behind which its file is being read."""
+    for before in range(step - 3, step):
+        view.ViewTime = times[before]
+        view.SMProxy.Update()
+
+
+def said_by(action):
+    """What is written to stderr meanwhile."""
+    path, own = os.path.join(FOLDER, "said"), os.dup(2)
+    with open(path, "w") as file:
+        os.dup2(file.fileno(), 2)
+    try:
+        action()
+    finally:
+        os.dup2(own, 2)
+        os.close(own)
+    with open(path) as file:
+        return file.read()
+
+
 def ms(seconds):
     return "{:.0f} ms".format(1e3 * seconds)
 
@@ -73,16 +106,7 @@ for step in range(COUNT):
     files.append(os.path.join(FOLDER, "step_{:02d}.vdi".format(step)))
     shutil.copy(kinds[step % KINDS], files[-1])
 
-# What each kind looks like, by a reader and a view of its own.
-expected = []
-for kind in kinds:
-    alone = simple.OpenDataFile(kind)
-    view = make_view()
-    simple.Show(alone, view)
-    simple.Render(view)
-    expected.append(screenshot(view, "expected"))
-    simple.Delete(view)
-    simple.Delete(alone)
+expected = [picture_alone(kind) for kind in kinds]
 check(all(not same(expected[kind], expected[kind - 1]) and expected[kind].std() > 20 for kind in range(KINDS)),
       "the steps look different")
 
@@ -141,13 +165,27 @@ simple.SaveAnimation(os.path.join(FOLDER, "animation.png"), view, ImageResolutio
 pictures = [pvtest.read_png(os.path.join(FOLDER, "animation.{:04d}.png".format(step))) for step in range(5)]
 check(all(same(pictures[step], expected[step % KINDS]) for step in range(5)), "each picture of an animation shows its step")
 
-# A file that changes after it has been read ahead.
-for step in (4, 5, 6):
-    view.ViewTime = times[step]
-    view.SMProxy.Update()
+# Files that change after they have been read ahead, or meanwhile.
+read_ahead(7)
 shutil.copy(kinds[0], files[7])
 view.ViewTime = times[7]
 check(same(screenshot(view, "changed"), expected[0]), "a file that has changed is read again")
+other = make(KINDS, "300x400", "70")
+other_expected = picture_alone(other)
+check(all(not same(other_expected, picture) for picture in expected), "a file of another size and viewpoint looks different")
+read_ahead(11)
+os.replace(shutil.copy(other, os.path.join(FOLDER, "new.vdi")), files[11])
+view.ViewTime = times[11]
+check(same(screenshot(view, "replaced"), other_expected), "one that is replaced by another size and viewpoint, too")
+read_ahead(15)
+os.truncate(files[15], os.path.getsize(files[15]) // 2)
+view.ViewTime = times[15]
+lines = said_by(lambda: screenshot(view, "truncated"))
+check("what makes it has failed" in pvtest.message_in(view), "one that isn't whole any more isn't shown, and the view says so")
+check(lines.count("not a sound .vdi file") == 1, "and one line says why")
+shutil.copy(kinds[15 % KINDS], files[15])
+simple.ReloadFiles(reader)
+check(same(screenshot(view, "whole"), expected[15 % KINDS]) and not pvtest.message_in(view), "until it is whole and read again")
 
 # By mouse: a step asks for a frame at rest, which doesn't hold up who is moving the camera.
 interactor = vtkGenericRenderWindowInteractor()

@@ -145,9 +145,12 @@ int vtkVDIReader::RequestData(vtkInformation*, vtkInformationVector**, vtkInform
     const Contents contents = this->Read();
     pv::setVdi(output, contents.Vdi, contents.Flat);
     output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), contents.Vdi.time);
+    this->Said.clear();
   } catch (const std::exception& error) {
     output->Initialize();
-    vtkErrorMacro(<< error.what());
+    // The pipeline asks again and again for what it doesn't get.
+    if (this->Said != error.what()) vtkErrorMacro(<< error.what());
+    this->Said = error.what();
     return 0;
   }
   return 1;

@@ -63,6 +63,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
   char* FileName = nullptr;
   std::unique_ptr<Ahead> Next;
   std::map<std::string, Announced> Series;
+  std::string Said;  // of what went wrong last
 };
 
 #endif
