@@ -71,6 +71,20 @@ def is_making(window, panel):
     return window.text_that_begins("Making the VDI anew", panel) is not None
 
 
+def regenerate_before_apply(window):
+    """The button sets the camera for the first Apply; undone here, so that Apply takes it by itself."""
+    unset = window.values()
+    window.click("Regenerate From This View")
+    values = wait_for("camera of the view", lambda: window.values() != unset and window.values())
+    width = window.view()[2]
+    check(any(value.isdigit() and abs(int(value) - width) < 8 for value in values),
+          "Regenerate From This View before the first Apply takes the view's size")
+    check(window.is_enabled("Apply"), "and leaves the VDI to Apply")
+    window.screenshot("3_regenerated.png")
+    window.click("Undo Regenerate VDI")
+    wait_for("panel as it was", lambda: window.values() == unset)
+
+
 def check_rests_at(window, values, what):
     """The panel has these values after a while, and keeps them."""
     wait_for("values after " + what, lambda: window.values() == values, 60)
@@ -122,6 +136,7 @@ def first_session(window):
     window.key("Escape", "Escape")
     window.menu("Filters", "Volumetric Depth Images", "Volumetric Depth Image")
     window.screenshot("3_filter.png")
+    regenerate_before_apply(window)
     window.click("Apply")
     wait_for("VDI", lambda: not window.is_enabled("Apply"), 120)
     time.sleep(1)
