@@ -7,6 +7,8 @@
 #include <vtkPropCollection.h>
 #include <vtkRenderer.h>
 #include <vtkSMViewProxy.h>
+#include <QApplication>
+#include <QEvent>
 
 #include <algorithm>
 #include <vector>
@@ -54,6 +56,24 @@ pqVDIStillFrames::pqVDIStillFrames(QObject* parent) : QObject(parent) {
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::viewAdded, this, &pqVDIStillFrames::viewAdded);
   for (pqView* view : model->findItems<pqView*>()) this->viewAdded(view);
+  QApplication::instance()->installEventFilter(this);
+}
+
+/// On few cores a picture in full would take from the window what it needs for a click.
+bool pqVDIStillFrames::eventFilter(QObject* watched, QEvent* event) {
+  switch (event->type()) {
+    case QEvent::MouseButtonPress:
+    case QEvent::MouseButtonRelease:
+    case QEvent::KeyPress:
+      for (const QPointer<pqView>& view : this->Behind) {
+        if (view == nullptr) continue;
+        for (vtkVDIProp* vdi : vdisOf(view)) vdi->Rest();
+      }
+      break;
+    default:
+      break;
+  }
+  return QObject::eventFilter(watched, event);
 }
 
 pqVDIStillFrames::~pqVDIStillFrames() {

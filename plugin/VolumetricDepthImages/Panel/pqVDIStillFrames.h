@@ -18,6 +18,7 @@ class pqVDIStillFrames : public QObject {
   /// render without telling: these wait.
   explicit pqVDIStillFrames(QObject* parent);
   ~pqVDIStillFrames() override;
+  bool eventFilter(QObject* watched, QEvent* event) override;
 
  private:
   Q_SLOT void viewAdded(pqView* view);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <thread>
 #include <utility>
 
 namespace pv {
@@ -17,6 +18,9 @@ double secondsSince(Clock::time_point start) {
 
 /// What a thread that wants to use the renderer may wait for.
 constexpr double stripSeconds = 0.03;
+/// How long a picture leaves the processor to others, and how often it looks whether that's over.
+constexpr std::chrono::milliseconds restTime{500};
+constexpr std::chrono::milliseconds restStep{5};
 /// Of rows: the renderer takes tiles of so many.
 constexpr int tileRows = 8;
 
@@ -26,11 +30,12 @@ void VDIStill::start(vdi::VdiRenderer& renderer, StillView view) {
   this->drop();
   view_ = std::move(view);
   has_ = true;
+  restEnd_ = Clock::time_point{};
   job_ = std::async(std::launch::async, [this, &renderer] { this->make(renderer); });
 }
 
 void VDIStill::make(vdi::VdiRenderer& renderer) {
-  const Clock::time_point start = Clock::now();
+  Clock::time_point start = Clock::now();  // as if it hadn't rested
   const auto width = static_cast<std::size_t>(view_.size.x);
   const bool hasObjects = std::any_of(view_.window.begin(), view_.window.end(), isObject);
   std::vector<float> ends(hasObjects ? view_.window.size() : 0);
@@ -38,6 +43,12 @@ void VDIStill::make(vdi::VdiRenderer& renderer) {
   pixels_.resize(view_.window.size());
   int rows = tileRows;
   for (int row = 0; row < view_.size.y && !isDropped_;) {
+    if (Clock::now() < restEnd_.load()) {
+      const Clock::time_point restStart = Clock::now();
+      std::this_thread::sleep_for(restStep);
+      start += Clock::now() - restStart;
+      continue;
+    }
     rows = std::min(rows, view_.size.y - row);
     const Clock::time_point stripStart = Clock::now();
     const std::size_t first = width * static_cast<std::size_t>(row);
@@ -71,6 +82,10 @@ std::span<const glm::u8vec4> VDIStill::picture() {
     }
   }
   return pixels_;
+}
+
+void VDIStill::rest() {
+  if (this->isBeingMade()) restEnd_ = Clock::now() + restTime;
 }
 
 void VDIStill::drop() {

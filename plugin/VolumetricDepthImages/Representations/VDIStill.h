@@ -3,6 +3,7 @@
 #define VDIStill_h
 
 #include <atomic>
+#include <chrono>
 #include <future>
 #include <glm/glm.hpp>
 #include <span>
@@ -46,6 +47,8 @@ class VDIStill {
   std::span<const glm::u8vec4> picture();
   double seconds() const { return seconds_; }
   void drop();
+  /// Leaves the processor to the window for half a second, where it's being made.
+  void rest();
 
  private:
   void make(vdi::VdiRenderer& renderer);
@@ -56,6 +59,7 @@ class VDIStill {
   std::vector<glm::u8vec4> pixels_;
   double seconds_ = 0.0;
   std::atomic<bool> isDropped_{false};
+  std::atomic<std::chrono::steady_clock::time_point> restEnd_{};
   std::future<void> job_;
 };
 

@@ -297,6 +297,10 @@ bool vtkVDIProp::HasMore() const {
   return this->IsBehind() && (buffers.isLoading() ? buffers.hasLoaded() : !buffers.still().isBeingMade());
 }
 
+void vtkVDIProp::Rest() {
+  this->Internal->Buffers.still().rest();
+}
+
 void vtkVDIProp::Take(Clock::duration wait) {
   try {
     if (this->Internal->Buffers.take(wait)) this->Say({});

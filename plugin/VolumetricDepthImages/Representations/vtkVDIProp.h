@@ -56,6 +56,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// Whether the last frame was deferred and lacks something that is being made, and whether that is there.
   bool IsBehind() const;
   bool HasMore() const;
+  /// Lets what is made beside the frames leave the processor to the window for a moment.
+  void Rest();
   /// Says `text` in place of the VDI, which isn't drawn while there's a text.
   void SetObstacle(const std::string& text);
   /// Says why there's nothing to see; in a renderer of the same size that draws after this prop's.
