@@ -50,7 +50,7 @@ void render(const RenderOptions& options) {
   std::set<ViewpointIssue> warned;
   for (const double azimuth : options.azimuths) {
     const Camera camera = turned(start, azimuth, options.elevation);
-    const auto issue = viewpointIssue(vdi.bounds, vdi.camera, View(camera, size[0], size[1]));
+    const auto issue = viewpointIssue(vdi.bounds, vdi.view(), View(camera, size[0], size[1]));
     if (issue && warned.insert(*issue).second)
       fmt::print(stderr, "vdi: warning, at {} degrees: {}\n", azimuth, describe(*issue));
     const std::filesystem::path path = pictureOf(options, azimuth);

@@ -196,7 +196,7 @@ TEST_CASE("viewpoints from which a VDI shows nothing true are told from others")
   Camera original;
   original.position = {0.0, 0.0, 10.0};
   const auto issueFrom = [&](const Camera& camera) {
-    return viewpointIssue(bounds, original, View(camera, 64, 48));
+    return viewpointIssue(bounds, View(original, 64, 48), View(camera, 64, 48));
   };
   CHECK_FALSE(issueFrom(original));
   for (const double degrees : {-58.0, 30.0, 58.0}) CHECK_FALSE(issueFrom(original.azimuth(degrees)));
@@ -219,7 +219,40 @@ TEST_CASE("viewpoints from which a VDI shows nothing true are told from others")
     CHECK(issueFrom(camera) != ViewpointIssue::Inside);  // made there
     original.position = {0.0, 0.0, 10.0};
   }
-  CHECK_FALSE(viewpointIssue({}, original, View(original, 64, 48)));
+  const View whole(original, 64, 48);
+  CHECK_FALSE(viewpointIssue({}, whole, whole));
+  original.parallelProjection = false;
+  const auto issueInPart = [&](double left, double right) {
+    return viewpointIssue(bounds, whole, View(original, 64, 48, ImagePlane{{left, -0.1}, {right, 0.1}}));
+  };
+  CHECK_FALSE(issueInPart(-0.3, -0.1));
+  CHECK(issueInPart(-0.3, -0.2) == ViewpointIssue::SeesNothing);
+}
+
+TEST_CASE("what a VDI that is zoomed in lacks is nothing to be seen") {
+  const Box bounds{glm::dvec3(-1.0), glm::dvec3(1.0)};
+  for (const bool parallel : {false, true}) {
+    Camera left;
+    left.position = {-0.8, 0.0, 10.0};
+    left.focalPoint = {-0.8, 0.0, 0.0};
+    left.viewAngle = 2.0;
+    left.parallelProjection = parallel;
+    left.parallelScale = 0.17;
+    Camera right = left;
+    right.position.x = right.focalPoint.x = 0.8;
+    const View seen(right, 64, 48);
+    CHECK(viewpointIssue(bounds, View(left, 64, 48), seen) == ViewpointIssue::SeesNothing);
+    CHECK_FALSE(viewpointIssue(bounds, View::withMargin(left, 64, 48, {300, 0}), seen));
+    right.viewAngle = 20.0;
+    right.parallelScale = 2.0;
+    CHECK_FALSE(viewpointIssue(bounds, View(left, 64, 48), View(right, 64, 48)));
+    right.position = {0.5, 0.0, 0.0};
+    right.focalPoint = {1.0, 0.0, 0.0};
+    CHECK(viewpointIssue(bounds, View(left, 64, 48), View(right, 64, 48)) == ViewpointIssue::SeesNothing);
+  }
+}
+
+TEST_CASE("what is said of viewpoints") {
   for (const auto issue : {ViewpointIssue::Inside, ViewpointIssue::SeesNothing, ViewpointIssue::FarBeside})
     CHECK_FALSE(describe(issue).empty());
 }

@@ -78,6 +78,8 @@ class View {
   /// Half the height of the image plane: at depth 1 (perspective) or anywhere (parallel), in world units.
   double halfHeight() const { return halfHeight_; }
   double halfWidth() const { return halfWidth_; }
+  /// View-space x and y of the image plane's middle, likewise: 0 but for planes that are set.
+  const glm::dvec2& middle() const { return middle_; }
 
   double depthOf(const glm::dvec3& world) const { return glm::dot(world - camera_.position, forward_); }
   glm::dvec3 toView(const glm::dvec3& world) const;

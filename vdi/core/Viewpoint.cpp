@@ -5,31 +5,59 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <numbers>
 
 namespace vdi {
 
 namespace {
 
+using Corners = std::array<glm::dvec3, 8>;
+
+Corners cornersOf(const Box& bounds) {
+  Corners corners;
+  for (std::size_t corner = 0; corner < corners.size(); ++corner) {
+    corners[corner] = {(corner & 1U) != 0 ? bounds.hi.x : bounds.lo.x,
+                       (corner & 2U) != 0 ? bounds.hi.y : bounds.lo.y,
+                       (corner & 4U) != 0 ? bounds.hi.z : bounds.lo.z};
+  }
+  return corners;
+}
+
+/// Of what lies in the view's picture, at the depths that the scene has there.
+Corners cornersOf(const View& view, const Corners& scene) {
+  double near = std::numeric_limits<double>::infinity();
+  double far = 0.0;
+  for (const glm::dvec3& corner : scene) {
+    const double depth = std::max(view.depthOf(corner), 0.0);
+    near = std::min(near, depth);
+    far = std::max(far, depth);
+  }
+  Corners corners;
+  for (std::size_t corner = 0; corner < corners.size(); ++corner) {
+    const Ray ray =
+        view.rayThrough((corner & 1U) != 0 ? view.width() : 0, (corner & 2U) != 0 ? view.height() : 0);
+    corners[corner] = ray.origin + ((corner & 4U) != 0 ? far : near) * ray.direction;
+  }
+  return corners;
+}
+
 /// Whether all corners lie on the outer side of one of the planes that bound what the view shows.
-bool outside(const Box& bounds, const View& view) {
+bool areOutside(const Corners& corners, const View& view) {
   // How many corners are left of, right of, below, above and behind the picture.
-  std::array<int, 5> beyond{};
-  constexpr int corners = 8;
-  for (int corner = 0; corner < corners; ++corner) {
-    const glm::dvec3 p = view.toView({(corner & 1) != 0 ? bounds.hi.x : bounds.lo.x,
-                                      (corner & 2) != 0 ? bounds.hi.y : bounds.lo.y,
-                                      (corner & 4) != 0 ? bounds.hi.z : bounds.lo.z});
+  std::array<std::size_t, 5> beyond{};
+  for (const glm::dvec3& corner : corners) {
+    const glm::dvec3 p = view.toView(corner);
     const double depth = view.parallel() ? 1.0 : p.z;
+    const glm::dvec2 middle = view.middle() * depth;
     const double width = view.halfWidth() * depth;
     const double height = view.halfHeight() * depth;
-    const std::array<bool, 5> sides{p.x<-width, p.x> width, p.y<-height, p.y> height, p.z <= 0.0};
+    const std::array<bool, 5> sides{p.x<middle.x - width, p.x> middle.x + width,
+                                    p.y<middle.y - height, p.y> middle.y + height, p.z <= 0.0};
     for (std::size_t side = 0; side < sides.size(); ++side) beyond[side] += sides[side] ? 1 : 0;
   }
-  for (const int count : beyond) {
-    if (count == corners) return true;
-  }
-  return false;
+  return std::ranges::find(beyond, corners.size()) != beyond.end();
 }
 
 /// From the camera to `point`, or along the axis if it projects in parallel; unit.
@@ -42,17 +70,20 @@ glm::dvec3 directionTo(const glm::dvec3& point, const Camera& camera) {
 
 }  // namespace
 
-std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const Camera& original, const View& view) {
+std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const View& original, const View& view) {
   if (bounds.empty()) return std::nullopt;
+  const Corners scene = cornersOf(bounds);
+  if (areOutside(scene, view) || areOutside(cornersOf(original, scene), view))
+    return ViewpointIssue::SeesNothing;
   const glm::dvec3& eye = view.camera().position;
   const auto within = [&](int axis) { return bounds.lo[axis] < eye[axis] && eye[axis] < bounds.hi[axis]; };
-  const bool elsewhere = eye != original.position;
+  const bool elsewhere = eye != original.camera().position;
   if (elsewhere && within(0) && within(1) && within(2)) return ViewpointIssue::Inside;
-  if (outside(bounds, view)) return ViewpointIssue::SeesNothing;
   const double depth = view.parallel() ? 1.0 : view.toView(bounds.center()).z;
   const double diameter = glm::length(bounds.size()) / (2.0 * view.halfHeight() * depth) * view.height();
   if (depth > 0.0 && diameter < farAwayPixels) return ViewpointIssue::FarAway;
-  if (degreesBetween(bounds, original, view.camera()) > farBesideDegrees) return ViewpointIssue::FarBeside;
+  if (degreesBetween(bounds, original.camera(), view.camera()) > farBesideDegrees)
+    return ViewpointIssue::FarBeside;
   return std::nullopt;
 }
 
@@ -67,7 +98,7 @@ std::string describe(ViewpointIssue issue) {
     case ViewpointIssue::Inside:
       return "the viewpoint is inside the VDI's scene; move it outside, what is behind it isn't seen";
     case ViewpointIssue::SeesNothing:
-      return "the viewpoint doesn't see the VDI's scene, which lies behind the camera or beside the picture";
+      return "the viewpoint doesn't see the VDI, which lies behind the camera or beside the picture";
     case ViewpointIssue::FarAway:
       return "the viewpoint is so far away that the VDI's scene is a dot; move it nearer";
     case ViewpointIssue::FarBeside:

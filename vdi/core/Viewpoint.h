@@ -11,8 +11,8 @@ namespace vdi {
 
 /// What's to be said of a viewpoint of a VDI.
 enum class ViewpointIssue {
+  SeesNothing,  // the scene, or what V_O saw of it, is outside of the picture
   Inside,       // the camera is inside the scene, and isn't V_O: what's behind it is missing
-  SeesNothing,  // the scene is outside of the picture
   FarAway,      // the scene is smaller in the picture than farAwayPixels
   FarBeside     // more than farBesideDegrees from where the VDI was made: lists are seen from their sides
 };
@@ -24,9 +24,9 @@ constexpr double farBesideDegrees = 60.0;
 constexpr double farAwayPixels = 4.0;
 
 /// The first that applies, in that order; nullopt where nothing does, and for an empty scene. `bounds` are
-/// Vdi::bounds and `original` Vdi::camera. A cheap test of the scene's box: where it says nothing, the
-/// picture may still be empty.
-std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const Camera& original, const View& view);
+/// Vdi::bounds and `original` Vdi::view. A cheap test of boxes: where it says nothing, the picture may still
+/// be empty.
+std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const View& original, const View& view);
 
 /// By how many degrees the directions differ in which `original` and `camera` see the scene's centre.
 double degreesBetween(const Box& bounds, const Camera& original, const Camera& camera);

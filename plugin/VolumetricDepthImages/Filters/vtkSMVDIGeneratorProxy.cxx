@@ -283,7 +283,8 @@ std::string vtkSMVDIGeneratorProxy::SetViewpoint(vtkSMViewProxy* view) {
   const std::array<int, 2> size = resolutionOf(renderView);
   const vdi::Camera camera = cameraOf(renderView->GetActiveCamera());
   try {
-    const auto issue = vdi::viewpointIssue(this->InputBounds(), camera, vdi::View(camera, size[0], size[1]));
+    const vdi::View seen(camera, size[0], size[1]);
+    const auto issue = vdi::viewpointIssue(this->InputBounds(), seen, seen);
     if (issue == vdi::ViewpointIssue::SeesNothing)
       return "This view doesn't see the volume, which lies behind its camera or beside its picture.";
   } catch (const vdi::Error& error) {

@@ -23,8 +23,8 @@ struct vtkVDIRenderer::Internals {
   std::unique_ptr<vdi::VdiRenderer> Renderer;  // none until there's a VDI
   vtkDataObject* Uploaded = nullptr;           // whose VDI the renderer has; compared, never followed
   vtkMTimeType UploadedTime = 0;
-  vtkDataObject* Other = nullptr;  // the input without a VDI of which was told; compared, never followed
-  vdi::Camera Original;
+  vtkDataObject* Other = nullptr;     // the input without a VDI of which was told; compared, never followed
+  std::optional<vdi::View> Original;  // its viewpoint, of all lists
   vdi::Box Bounds;
   std::optional<vdi::ViewpointIssue> Warned;  // of the last picture
   int Width = 0;
@@ -139,7 +139,7 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
     internal.Renderer->setVdi(vdi);
     internal.Uploaded = input;
     internal.UploadedTime = input->GetMTime();
-    internal.Original = vdi.camera;
+    internal.Original = vdi.view();
     internal.Bounds = vdi.bounds;
     internal.Width = vdi.pictureSize().x;
     internal.Height = vdi.pictureSize().y;
@@ -155,7 +155,7 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
 }
 
 vdi::Camera vtkVDIRenderer::Viewpoint() const {
-  const vdi::Camera& original = this->Internal->Original;
+  const vdi::Camera& original = this->Internal->Original->camera();
   const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
   const vdi::Camera own{vector(this->CameraPosition),   vector(this->CameraFocalPoint),
                         vector(this->CameraViewUp),     this->CameraViewAngle,
@@ -167,7 +167,7 @@ vdi::Camera vtkVDIRenderer::Viewpoint() const {
 void vtkVDIRenderer::WarnOf(const vdi::Camera& camera, int width, int height) {
   Internals& internal = *this->Internal;
   const auto issue =
-      vdi::viewpointIssue(internal.Bounds, internal.Original, vdi::View(camera, width, height));
+      vdi::viewpointIssue(internal.Bounds, *internal.Original, vdi::View(camera, width, height));
   if (issue && issue != internal.Warned) vtkWarningMacro(<< describe(*issue));
   internal.Warned = issue;
 }
