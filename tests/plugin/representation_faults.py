@@ -1,13 +1,16 @@
 """The representation VDI where there is nothing to show: a series whose steps differ and of which one is damaged and one
-missing, an empty VDI, data that are no VDI. What is wrong is said in the view, and the next good frame is shown."""
+missing, an empty VDI, data that are no VDI; and viewpoints that show nothing of a VDI, or nothing true. What is wrong is said
+in the view, and the next good frame is shown."""
 
 import os
 import shutil
 import subprocess
 
+import numpy as np
 import pvtest
 from paraview import simple
 from pvtest import check
+from vtkmodules.vtkCommonCore import vtkCollection
 
 SIZE = [480, 360]
 FOLDER = os.path.join(pvtest.OUTPUT, "faults")
@@ -99,6 +102,73 @@ look(view, "no_vdi")
 simple.Hide(empty, view)
 simple.Hide(picture, view)
 check(not pvtest.message_in(view), "what is hidden says nothing")
+
+# Viewpoints.
+scene.AnimationTime = reader.TimestepValues[0]
+simple.Show(reader, view)
+
+
+def said_from(position, focal_point=(0.5, 0.5, 0.5), scale=None, render=simple.Render):
+    view.CameraPosition, view.CameraFocalPoint = list(position), list(focal_point)
+    view.CameraParallelProjection, view.CameraParallelScale = int(scale is not None), scale or 1
+    render(view)
+    return pvtest.message_in(view)
+
+
+AWAY, OUT, SMALL = [4, 4, 4], "out of sight: press Reset Camera", "too small to be seen"
+for scale in (None, 1):
+    kind = ", in parallel projection" if scale else ""
+    for position in ([2.2, 1.9, 2.4], [-1.2, -0.9, -1.4], [0.5, 0.5, 3], [3, 0.5, 0.5]):
+        check(said_from(position, scale=scale) == "", "nothing is said from {}{}".format(position, kind))
+    check(OUT in said_from([2.2, 1.9, 2.4], AWAY, scale), "a view that looks away says so" + kind)
+    check(OUT in said_from([2.2, 9, 2.4], [0.5, 9, 0.5], scale), "and one that looks past the VDI" + kind)
+    check(said_from([2.2, 1.9, 2.4], scale=scale) == "", "and nothing when it looks there again" + kind)
+    check(said_from([0.7, 0.5, 0.4], scale=scale) == "From inside, this VDI is rough: press Reset Camera.",
+          "a view from inside says so" + kind)
+    low, high = pvtest.message_boxes(view)[0]
+    check(0.9 * SIZE[1] < low < high < SIZE[1], "at its upper edge" + kind)
+check(SMALL in said_from([2000, 2000, 2000]), "and one from too far away")
+check(SMALL in said_from([3, 3, 3], scale=1000), "and one of a wide parallel scale")
+check(OUT in said_from([2.2, 1.9, 2.4], AWAY, render=lambda _: view.SMProxy.InteractiveRender()), "interactive frames say it")
+check(look(view, "away").std() < 1, "pictures that are taken don't")
+ball = simple.Sphere(Center=AWAY)
+simple.Show(ball, view)
+check(said_from([2.2, 1.9, 2.4], AWAY) == "", "nothing is said where another object is seen")
+ball.Center, ball.Radius = [1.35, 1.2, 1.45], 0.6
+check(said_from([2.2, 1.9, 2.4]) == "", "or hides the VDI")
+behind = look(view, "behind")
+simple.Hide(reader, view)
+check((look(view, "nothing_behind") == behind).all(), "which it does")
+simple.Show(reader, view)
+check(OUT in said_from([2.2, 1.9, 2.4], AWAY), "and it is where that isn't seen either")
+simple.Delete(ball)
+picture.PictureOnly = 0
+picture.CameraPosition, picture.CameraFocalPoint = [40, 30, 50], [0, 0, 0]
+simple.Show(picture, view)
+check(said_from([2.2, 1.9, 2.4]) == "From inside, this VDI is rough: press Regenerate From This View.",
+      "the filter's VDI tells of its button, beside another one's")
+check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1, "what is to be said of two VDIs is said once")
+check(said_from([40, 30, 50], [0, 0, 0]) == "", "and not where one of them is seen")
+picture.CameraPosition, picture.CameraFocalPoint = [2.2, 1.9, 2.4], [0.5, 0.5, 0.5]
+check(said_from([2.2, 1.9, 2.4]) == "", "a VDI that was made inside is true from there")
+picture.CameraPosition, picture.CameraFocalPoint, picture.CameraViewAngle = [0, 0, 60], [-6, 0, 0], 6
+simple.Hide(reader, view)
+check(said_from([0, 0, 60], [0, 0, 0]) == "", "a part of the scene is seen")
+view.CameraViewAngle = 6
+check(OUT in said_from([0, 0, 60], [6, 0, 0]), "and nothing is where the VDI lacks what is in sight")
+comparative = simple.CreateView("ComparativeRenderView")
+simple.Show(reader, comparative)
+simple.Render(comparative)
+comparative.CameraPosition, comparative.CameraFocalPoint = [2.2, 1.9, 2.4], AWAY
+simple.Render(comparative)
+views = vtkCollection()
+comparative.SMProxy.GetViews(views)
+said = [pvtest.message_in(views.GetItemAsObject(index)) for index in range(views.GetNumberOfItems())]
+check(len(said) > 1 and all(OUT in each for each in said), "each of comparative views says it")
+simple.Delete(comparative)
+simple.Hide(picture, view)
+view.CameraViewAngle = 30
+said_from([2.2, 1.9, 2.4])
 
 # Views that come and go, with more than one of them on a VDI.
 scene.AnimationTime = reader.TimestepValues[0]

@@ -77,7 +77,8 @@ std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const View& orig
     return ViewpointIssue::SeesNothing;
   const glm::dvec3& eye = view.camera().position;
   const auto within = [&](int axis) { return bounds.lo[axis] < eye[axis] && eye[axis] < bounds.hi[axis]; };
-  const bool elsewhere = eye != original.camera().position;
+  const double rounding = 1e-6 * glm::length(bounds.size());
+  const bool elsewhere = glm::distance(eye, original.camera().position) > rounding;
   if (elsewhere && within(0) && within(1) && within(2)) return ViewpointIssue::Inside;
   const double depth = view.parallel() ? 1.0 : view.toView(bounds.center()).z;
   const double diameter = glm::length(bounds.size()) / (2.0 * view.halfHeight() * depth) * view.height();

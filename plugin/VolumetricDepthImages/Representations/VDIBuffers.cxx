@@ -59,6 +59,7 @@ VDIBuffers::Loaded VDIBuffers::loaded(vtkFieldData* fields, Renderers& renderers
   if (result.isEmpty) return result;
   result.hasVdi = true;
   pv::boundsOf(fields, result.bounds.data());
+  result.viewpoint = vdi->view();
   if (!renderers.whole) {
     const std::shared_ptr<vdi::gpu::Device> device = pv::sharedDevice(0);
     renderers.whole = std::make_unique<vdi::VdiRenderer>(device);
@@ -89,6 +90,7 @@ void VDIBuffers::takeOne() {
     hasVdi_ = result.hasVdi;
     isEmpty_ = result.isEmpty;
     bounds_ = result.bounds;
+    viewpoint_ = result.viewpoint;
     thinLists_ = result.thinLists;
     if (result.tooLarge) {
       renderers_->whole->setVdi(*result.tooLarge);

@@ -48,6 +48,8 @@ class VDIBuffers {
   bool isEmpty() const { return isEmpty_; }
   /// World bounds as VTK has them.
   const std::array<double, 6>& bounds() const { return bounds_; }
+  /// Of all lists, where there's a VDI.
+  const std::optional<vdi::View>& viewpoint() const { return viewpoint_; }
   /// There's a VDI.
   vdi::VdiRenderer& renderer() { return *renderers_->whole; }
   /// The same VDI with fewer lists, for rough pictures; nullptr where the device is no CPU, or there are few
@@ -67,6 +69,7 @@ class VDIBuffers {
     bool hasVdi = false;
     bool isEmpty = false;
     std::array<double, 6> bounds{};
+    std::optional<vdi::View> viewpoint;
     std::size_t thinLists = 0;
     std::optional<vdi::Vdi> tooLarge;  // for a second buffer
   };
@@ -78,6 +81,7 @@ class VDIBuffers {
   bool hasVdi_ = false;
   bool isEmpty_ = false;
   std::array<double, 6> bounds_{};
+  std::optional<vdi::View> viewpoint_;
   std::size_t thinLists_ = 0;
   std::future<Loaded> job_;
   vtkSmartPointer<vtkFieldData> loading_;  // the job's; goes on this thread

@@ -48,18 +48,19 @@ vtkVDIMessage::vtkVDIMessage() {
   this->SetVisibility(false);
 }
 
-void vtkVDIMessage::Show(const std::string& text) {
+void vtkVDIMessage::Show(const std::string& text, Place place) {
+  this->At = place;
   if (text != this->Text) this->SetInput(text.c_str());
   this->Text = text;
   this->SetVisibility(!text.empty());
 }
 
 int vtkVDIMessage::RenderOpaqueGeometry(vtkViewport* viewport) {
-  this->Place(viewport);
+  this->PutIn(viewport);
   return this->Superclass::RenderOpaqueGeometry(viewport);
 }
 
-void vtkVDIMessage::Place(vtkViewport* viewport) {
+void vtkVDIMessage::PutIn(vtkViewport* viewport) {
   auto* renderer = vtkRenderer::SafeDownCast(viewport);
   if (renderer == nullptr) return;
   int width = 0;
@@ -76,7 +77,7 @@ void vtkVDIMessage::Place(vtkViewport* viewport) {
   props->InitTraversal(at);
   while (vtkProp* prop = props->GetNextProp(at)) {
     auto* message = vtkVDIMessage::SafeDownCast(prop);
-    if (message == nullptr || message->GetVisibility() == 0) continue;
+    if (message == nullptr || message->GetVisibility() == 0 || message->At != this->At) continue;
     const std::string text = wrapped(message->Text, columns);
     const auto lines = 1 + std::count(text.begin(), text.end(), '\n');
     const double itsHeight = (lineHeight * static_cast<double>(lines) + gap) * scale;
@@ -87,5 +88,6 @@ void vtkVDIMessage::Place(vtkViewport* viewport) {
     }
     all += itsHeight;
   }
-  this->SetPosition(0.03, 0.5 + (0.5 * all - above - 0.5 * own) / height);
+  const double highest = this->At == Place::Middle ? 0.5 * (height + all) : height - 0.5 * gap * scale;
+  this->SetPosition(0.03, (highest - above - 0.5 * own) / height);
 }

@@ -6,15 +6,19 @@
 
 #include <string>
 
-/// A text in the middle of a view's height, in lines that fit its width. Several of them in a renderer stand
-/// below each other.
+/// A text in a view, in lines that fit its width. Several of them at a place of a renderer stand below each
+/// other.
 class vtkVDIMessage : public vtkTextActor {
  public:
   static vtkVDIMessage* New();
   vtkTypeMacro(vtkVDIMessage, vtkTextActor);
 
+  enum class Place {
+    Middle,  // of the height: in place of a picture
+    Top      // over a picture
+  };
   /// Shown when it's not empty.
-  void Show(const std::string& text);
+  void Show(const std::string& text, Place place);
   int RenderOpaqueGeometry(vtkViewport* viewport) override;
 
  protected:
@@ -25,9 +29,10 @@ class vtkVDIMessage : public vtkTextActor {
   vtkVDIMessage(const vtkVDIMessage&) = delete;
   void operator=(const vtkVDIMessage&) = delete;
 
-  void Place(vtkViewport* viewport);
+  void PutIn(vtkViewport* viewport);
 
   std::string Text;
+  Place At = Place::Middle;
 };
 
 #endif

@@ -27,6 +27,7 @@ namespace {
 
 constexpr const char* fileName = "VDI.file";
 constexpr const char* problemName = "VDI.problem";
+constexpr const char* filterName = "VDI.filter";
 constexpr const char* boundsName = "VDI.bounds";
 
 void packFile(vtkImageData* image, vtkFieldData* fields) {
@@ -88,6 +89,17 @@ void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
   } catch (const std::exception& error) {
     packProblem(error.what(), piece);
   }
+}
+
+void markFiltered(vtkPolyData* piece) {
+  vtkNew<vtkStringArray> array;
+  array->SetName(filterName);
+  array->InsertNextValue("");
+  piece->GetFieldData()->AddArray(array);
+}
+
+bool isFiltered(vtkFieldData* fields) {
+  return fields->GetAbstractArray(filterName) != nullptr;
 }
 
 bool boundsOf(vtkFieldData* fields, double bounds[6]) {

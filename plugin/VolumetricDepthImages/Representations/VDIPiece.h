@@ -2,7 +2,8 @@
 // vtkPolyData with one point, for without points nothing is sent:
 //   within a process  the arrays of the VDI's image (VDIImageData.h), shared with it
 //   between two       VDI.file: unsigned char [n], a .vdi file
-// and VDI.problem: a string, instead of either where there's no VDI to show.
+// and VDI.problem: a string, instead of either where there's no VDI to show;
+//     VDI.filter: an empty string, where the pipeline has the filter that has made it.
 #ifndef VDIPiece_h
 #define VDIPiece_h
 
@@ -23,6 +24,9 @@ void packNothing(vtkPolyData* piece);
 void packProblem(const std::string& text, vtkPolyData* piece);
 /// Makes `piece` the VDI of `data`, or a problem. `crosses`: it leaves the process.
 void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece);
+/// Says, and tells of a piece's field data, that the VDI can be made anew: by a filter of the pipeline.
+void markFiltered(vtkPolyData* piece);
+bool isFiltered(vtkFieldData* fields);
 /// World bounds as VTK has them, of a piece's field data, where it has a VDI with a scene in it.
 bool boundsOf(vtkFieldData* fields, double bounds[6]);
 /// Of a piece's field data; from any thread. nullopt where it's another rank's VDI, or none. Throws

@@ -1,7 +1,9 @@
 #include "vtkVDIProp.h"
 
+#include <vtkDataObject.h>
 #include <vtkInformation.h>
 #include <vtkInformationObjectBaseVectorKey.h>
+#include <vtkMath.h>
 #include <vtkMatrix3x3.h>
 #include <vtkMatrix4x4.h>
 #include <vtkNew.h>
@@ -14,6 +16,7 @@
 #include <vtkOpenGLRenderWindow.h>
 #include <vtkOpenGLShaderCache.h>
 #include <vtkOpenGLState.h>
+#include <vtkPropCollection.h>
 #include <vtkRenderer.h>
 #include <vtkShaderProgram.h>
 #include <vtkTextureObject.h>
@@ -31,10 +34,14 @@
 
 #include "VDIBuffers.h"
 #include "VDIMessage.h"
+#include "VDIPiece.h"
 #include "VDISession.h"
 #include "VDIStill.h"
 #include "VDIView.h"
+#include "vdi/core/Box.h"
+#include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Viewpoint.h"
 #include "vdi/pipeline/Pipeline.h"
 
 vtkStandardNewMacro(vtkVDIProp);
@@ -114,6 +121,11 @@ void readDepths(vtkOpenGLRenderWindow* window, const Viewport& port, std::vector
   glBindFramebuffer(GL_READ_FRAMEBUFFER, static_cast<GLuint>(read));
 }
 
+/// Of bounds as VTK has them.
+vdi::Box boxOf(const double* bounds) {
+  return {{bounds[0], bounds[2], bounds[4]}, {bounds[1], bounds[3], bounds[5]}};
+}
+
 bool drawsOnCpu() {
   const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
   return name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
@@ -175,7 +187,8 @@ struct vtkVDIProp::Internals {
   std::string Obstacle;
   std::string Problem;
   std::string Notice;  // nothing is wrong
-  std::string Said;    // as an error
+  vtkVDIMessage::Place NoticePlace = vtkVDIMessage::Place::Middle;
+  std::string Said;  // as an error
 
   vtkNew<vtkTextureObject> Texture;
   std::unique_ptr<vtkOpenGLQuadHelper> Quad;
@@ -217,7 +230,9 @@ struct vtkVDIProp::Internals {
 
   void ShowMessage(bool isVisible) {
     const std::string& problem = this->Obstacle.empty() ? this->Problem : this->Obstacle;
-    this->Message->Show(isVisible ? (problem.empty() ? this->Notice : problem) : std::string());
+    const std::string& text = problem.empty() ? this->Notice : problem;
+    this->Message->Show(isVisible ? text : std::string(),
+                        problem.empty() ? this->NoticePlace : vtkVDIMessage::Place::Middle);
   }
 };
 
@@ -277,15 +292,98 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
   } else {
     this->Take(frame == Frame::Deferred && internal.Buffers.hasVdi() ? shortWait : untilDone);
   }
-  internal.Notice =
-      internal.Buffers.isEmpty() && !this->IsCaptured
-          ? "This VDI shows nothing: from its viewpoint nothing of its scene is seen, or all of it "
-            "is transparent."
-          : "";
-  internal.ShowMessage(this->GetVisibility() != 0);
   // Whatever is drawn, or isn't as where the camera looks away. A picture of the window that's taken
   // meanwhile doesn't show in it.
   if (frame != Frame::Whole) internal.IsBehind = frame == Frame::Deferred && internal.Buffers.isLoading();
+}
+
+void vtkVDIProp::LookAround(vtkObject* renderer, unsigned long, void*) {
+  Internals& internal = *this->Internal;
+  auto* own = vtkRenderer::SafeDownCast(renderer);
+  if (own == nullptr || own->GetSelector() != nullptr || this->GetVisibility() == 0) return;
+  internal.Notice.clear();
+  if (!this->IsCaptured) this->NoteViewpoint(own);
+  internal.ShowMessage(true);
+}
+
+/// What's to be said of the VDI's viewpoint, or of the view's. That the view is turned far isn't: a VDI with
+/// all of its scene looks right from all around. Nor that there are cut edges, which are seen.
+void vtkVDIProp::NoteViewpoint(vtkRenderer* renderer) {
+  Internals& internal = *this->Internal;
+  internal.NoticePlace = vtkVDIMessage::Place::Middle;
+  if (internal.Buffers.isEmpty()) {
+    internal.Notice =
+        "This VDI shows nothing: from its viewpoint nothing of its scene is seen, or all of it is "
+        "transparent.";
+    return;
+  }
+  const glm::ivec2 size = viewportOf(renderer).size;
+  if (size.x < 1 || size.y < 1 || this->Opacity == 0.0) return;
+  std::optional<vdi::View> view;
+  try {
+    view = matricesOf(renderer).view(size.x, size.y);
+  } catch (const vdi::Error&) {
+    return;  // drawing says it
+  }
+  const std::optional<vdi::ViewpointIssue> issue = this->IssueIn(*view);
+  if (!issue || !this->IsFirst(renderer, *view, *issue)) return;
+  switch (*issue) {
+    case vdi::ViewpointIssue::SeesNothing:
+      if (this->IsBlank(renderer, *view)) internal.Notice = "The VDI is out of sight: press Reset Camera.";
+      break;
+    case vdi::ViewpointIssue::FarAway:
+      if (this->IsBlank(renderer, *view))
+        internal.Notice = "The VDI is too small to be seen from here: press Reset Camera.";
+      break;
+    case vdi::ViewpointIssue::Inside:
+      internal.NoticePlace = vtkVDIMessage::Place::Top;
+      internal.Notice = pv::isFiltered(internal.Piece->GetFieldData())
+                            ? "From inside, this VDI is rough: press Regenerate From This View."
+                            : "From inside, this VDI is rough: press Reset Camera.";
+      break;
+    case vdi::ViewpointIssue::FarBeside:
+      break;
+  }
+}
+
+std::optional<vdi::ViewpointIssue> vtkVDIProp::IssueIn(const vdi::View& view) const {
+  const pv::VDIBuffers& buffers = this->Internal->Buffers;
+  if (!buffers.hasVdi() || this->Internal->Piece == nullptr) return std::nullopt;
+  return vdi::viewpointIssue(boxOf(buffers.bounds().data()), *buffers.viewpoint(), view);
+}
+
+/// Whether nothing else is seen in the view.
+bool vtkVDIProp::IsBlank(vtkRenderer* renderer, const vdi::View& view) const {
+  vtkPropCollection* props = renderer->GetViewProps();
+  vtkCollectionSimpleIterator at;
+  props->InitTraversal(at);
+  while (vtkProp* prop = props->GetNextProp(at)) {
+    if (prop == this || prop->GetVisibility() == 0 || !prop->GetUseBounds()) continue;
+    std::optional<vdi::ViewpointIssue> issue;
+    if (auto* other = vtkVDIProp::SafeDownCast(prop)) {
+      if (!other->Internal->Buffers.hasVdi()) continue;
+      issue = other->IssueIn(view);
+    } else {
+      const double* bounds = prop->GetBounds();
+      if (bounds == nullptr || vtkMath::AreBoundsInitialized(bounds) == 0) continue;
+      issue = vdi::viewpointIssue(boxOf(bounds), view, view);
+    }
+    if (issue != vdi::ViewpointIssue::SeesNothing && issue != vdi::ViewpointIssue::FarAway) return false;
+  }
+  return true;
+}
+
+/// Whether no VDI before this one has the same to say.
+bool vtkVDIProp::IsFirst(vtkRenderer* renderer, const vdi::View& view, vdi::ViewpointIssue issue) const {
+  vtkPropCollection* props = renderer->GetViewProps();
+  vtkCollectionSimpleIterator at;
+  props->InitTraversal(at);
+  while (vtkProp* prop = props->GetNextProp(at)) {
+    if (prop == this) return true;
+    auto* other = vtkVDIProp::SafeDownCast(prop);
+    if (other != nullptr && other->GetVisibility() != 0 && other->IssueIn(view) == issue) return false;
+  }
+  return true;
 }
 
 bool vtkVDIProp::IsBehind() const {

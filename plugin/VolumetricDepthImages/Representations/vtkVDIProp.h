@@ -20,6 +20,7 @@
 #include <exception>
 #include <glm/fwd.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -32,7 +33,9 @@ class vtkTextActor;
 
 namespace vdi {
 class Error;
-}
+class View;
+enum class ViewpointIssue;
+}  // namespace vdi
 namespace pv {
 class ViewMatrices;
 struct StillView;
@@ -62,6 +65,9 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   void SetObstacle(const std::string& text);
   /// Says why there's nothing to see; in a renderer of the same size that draws after this prop's.
   vtkTextActor* GetMessageActor();
+  /// For an observer of StartEvent of the renderer that has this prop: props that it doesn't see aren't
+  /// drawn.
+  void LookAround(vtkObject* renderer, unsigned long event, void* data);
 
   /// Whether pixels in front of which nothing opaque was drawn get a depth just short of the background's.
   /// IceT, compositing by depth, drops them otherwise, colour and all. Default off.
@@ -76,8 +82,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// Of its picture as a whole, beside that of the VDI. Default 1.
   vtkSetClampMacro(Opacity, double, 0.0, 1.0);
   vtkGetMacro(Opacity, double);
-  /// Whether the frames to come are for a picture that is taken. What shows nothing as it should says so in
-  /// others only. Default off.
+  /// Whether the frames to come are for a picture that is taken. Where nothing is wrong but the viewpoint, of
+  /// the VDI or of the view, others alone say so. Default off.
   vtkSetMacro(IsCaptured, bool);
 
   void SetVisibility(vtkTypeBool visible) override;
@@ -98,6 +104,10 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   class Pace;
   struct Form;
   struct Internals;
+  std::optional<vdi::ViewpointIssue> IssueIn(const vdi::View& view) const;
+  bool IsBlank(vtkRenderer* renderer, const vdi::View& view) const;
+  bool IsFirst(vtkRenderer* renderer, const vdi::View& view, vdi::ViewpointIssue issue) const;
+  void NoteViewpoint(vtkRenderer* renderer);
   int DrawIn(vtkViewport* viewport);
   bool Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
   bool DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view);

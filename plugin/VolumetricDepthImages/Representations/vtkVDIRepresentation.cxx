@@ -24,6 +24,7 @@
 
 #include "VDIPiece.h"
 #include "VDISession.h"
+#include "vtkVDIGenerator.h"
 #include "vtkVDIProp.h"
 
 vtkStandardNewMacro(vtkVDIRepresentation);
@@ -47,6 +48,15 @@ bool drawsOnRanks() {
   vtkProcessModule* module = vtkProcessModule::GetProcessModule();
   return vtkProcessModule::GetProcessType() == vtkProcessModule::PROCESS_BATCH &&
          module->GetNumberOfLocalPartitions() > 1;
+}
+
+/// Whether the filter is upstream, which can make the VDI anew.
+bool comesOfGenerator(vtkAlgorithm* from) {
+  while (from != nullptr && vtkVDIGenerator::SafeDownCast(from) == nullptr) {
+    const bool hasInput = from->GetNumberOfInputPorts() > 0 && from->GetNumberOfInputConnections(0) > 0;
+    from = hasInput ? from->GetInputAlgorithm(0, 0) : nullptr;
+  }
+  return from != nullptr;
 }
 
 bool showsVolumes(vtkPVRenderView* view) {
@@ -130,6 +140,7 @@ int vtkVDIRepresentation::RequestData(vtkInformation* request, vtkInformationVec
   const bool hasInput = inputs[0]->GetNumberOfInformationObjects() > 0;
   if (hasInput && isRoot()) {
     pv::packVdi(vtkDataObject::GetData(inputs[0]), pv::isServer(), this->Piece);
+    if (comesOfGenerator(this)) pv::markFiltered(this->Piece);
   } else {
     pv::packNothing(this->Piece);  // clients have no input, other ranks no VDI
   }
@@ -238,6 +249,9 @@ void vtkVDIRepresentation::ForgetInteractor() {
 bool vtkVDIRepresentation::AddToView(vtkView* view) {
   auto* renderView = vtkPVRenderView::SafeDownCast(view);
   if (renderView == nullptr) return false;
+  vtkVDIProp* prop = this->Prop;
+  this->StartObserver =
+      renderView->GetRenderer()->AddObserver(vtkCommand::StartEvent, prop, &vtkVDIProp::LookAround);
   renderView->GetRenderer()->AddViewProp(this->Prop);
   renderView->GetNonCompositedRenderer()->AddViewProp(this->Prop->GetMessageActor());
   return this->Superclass::AddToView(view);
@@ -247,6 +261,7 @@ bool vtkVDIRepresentation::RemoveFromView(vtkView* view) {
   auto* renderView = vtkPVRenderView::SafeDownCast(view);
   if (renderView == nullptr) return false;
   this->ForgetInteractor();
+  renderView->GetRenderer()->RemoveObserver(this->StartObserver);
   renderView->GetRenderer()->RemoveViewProp(this->Prop);
   renderView->GetNonCompositedRenderer()->RemoveViewProp(this->Prop->GetMessageActor());
   return this->Superclass::RemoveFromView(view);

@@ -69,7 +69,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
 
   vtkWeakPointer<vtkRenderWindowInteractor> Interactor;  // the view's, observed
   std::array<unsigned long, 2> Observers{};
-  bool IsDragged = false;  // the camera is, by mouse
+  unsigned long StartObserver = 0;  // of the view's renderer
+  bool IsDragged = false;           // the camera is, by mouse
   std::chrono::steady_clock::time_point LastInteractive;
 };
 
