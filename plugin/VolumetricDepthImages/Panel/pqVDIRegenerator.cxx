@@ -11,7 +11,6 @@
 #include <pqView.h>
 #include <vtkCamera.h>
 #include <vtkCommand.h>
-#include <vtkRenderWindow.h>
 #include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMRenderViewProxy.h>
@@ -22,6 +21,7 @@
 #include <string>
 
 #include "vtkSMVDIGeneratorProxy.h"
+#include "vtkVDIRepresentation.h"
 
 namespace {
 
@@ -131,8 +131,7 @@ void pqVDIRegenerator::beginRender() {
   auto* view = qobject_cast<pqView*>(this->sender());
   if (this->Now == State::Idle || view == nullptr || !this->isShownIn(view)) return;
   vtkRenderWindow* window = view->getViewProxy()->GetRenderWindow();
-  // Who takes pictures of a window does without swapping its buffers.
-  if (window != nullptr && window->GetSwapBuffers() == 0) this->generator()->ReleaseNow();
+  if (window != nullptr && vtkVDIRepresentation::IsCaptured(window)) this->generator()->ReleaseNow();
 }
 
 int pqVDIRegenerator::preparation() {

@@ -86,11 +86,6 @@ std::vector<vtkWeakPointer<vtkPVRenderView>>& deferringViews() {
   return views;
 }
 
-/// Who takes pictures of a window does without swapping its buffers.
-bool isCaptured(vtkPVRenderView* view) {
-  return view->GetRenderWindow()->GetSwapBuffers() == 0;
-}
-
 bool defersStillFrames(vtkPVRenderView* view) {
   const std::vector<vtkWeakPointer<vtkPVRenderView>>& views = deferringViews();
   return std::find(views.begin(), views.end(), view) != views.end();
@@ -183,11 +178,16 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
             : "");
     vtkAlgorithmOutput* port = vtkPVRenderView::GetPieceProducer(in, this);
     if (port != nullptr && view != nullptr) {
-      this->Prop->SetIsCaptured(isCaptured(view));
+      this->Prop->SetIsCaptured(IsCaptured(view->GetRenderWindow()));
       this->Prop->Prepare(port->GetProducer()->GetOutputDataObject(port->GetIndex()), this->FrameOf(view));
     }
   }
   return 1;
+}
+
+bool vtkVDIRepresentation::IsCaptured(vtkRenderWindow* window) {
+  // Who takes pictures of a window does without swapping its buffers.
+  return window->GetSwapBuffers() == 0;
 }
 
 void vtkVDIRepresentation::DeferStillFrames(vtkPVRenderView* view) {
@@ -202,8 +202,8 @@ void vtkVDIRepresentation::DeferNoStillFrames() {
 
 vtkVDIProp::Frame vtkVDIRepresentation::FrameOf(vtkPVRenderView* view) {
   if (this->IsInteractive(view)) return vtkVDIProp::Frame::Interactive;
-  return defersStillFrames(view) && !isCaptured(view) ? vtkVDIProp::Frame::Deferred
-                                                      : vtkVDIProp::Frame::Whole;
+  return defersStillFrames(view) && !IsCaptured(view->GetRenderWindow()) ? vtkVDIProp::Frame::Deferred
+                                                                         : vtkVDIProp::Frame::Whole;
 }
 
 /// Whether the next frame may be rough and late: one of those while the camera moves. Time steps that come

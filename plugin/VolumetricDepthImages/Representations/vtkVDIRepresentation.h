@@ -22,6 +22,7 @@
 
 class vtkPVRenderView;
 class vtkPolyData;
+class vtkRenderWindow;
 class vtkRenderWindowInteractor;
 
 class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : public vtkPVDataRepresentation {
@@ -33,6 +34,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   int ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in, vtkInformation* out) override;
   void SetVisibility(bool visible) override;
 
+  /// Whether what is rendered next is for a picture that somebody takes of the window, and no frame of it.
+  static bool IsCaptured(vtkRenderWindow* window);
   /// From now on still frames of that view's window are deferred (vtkVDIProp::Frame), for somebody renders it
   /// again as soon as there's more. Pictures that are taken of a window are whole.
   static void DeferStillFrames(vtkPVRenderView* view);
