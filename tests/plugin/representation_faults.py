@@ -10,7 +10,7 @@ import numpy as np
 import pvtest
 from paraview import simple
 from pvtest import check
-from vtkmodules.vtkCommonCore import vtkCollection
+from vtkmodules.vtkCommonCore import vtkCollection, vtkOutputWindow
 
 SIZE = [480, 360]
 FOLDER = os.path.join(pvtest.OUTPUT, "faults")
@@ -179,4 +179,8 @@ for _ in range(3):
     simple.Delete(other)
 simple.Show(reader, view)
 check(look(view, "again").std() > 5, "and the first one still does")
+errors = []
+observer = vtkOutputWindow.GetInstance().AddObserver("ErrorEvent", lambda *_: errors.append(1))
+check(OUT in said_from([2.2, 1.9, 2.4], AWAY) and not errors, "what is said after that is drawn without an error")
+vtkOutputWindow.GetInstance().RemoveObserver(observer)
 pvtest.finish()

@@ -50,6 +50,7 @@ vtkVDIMessage::vtkVDIMessage() {
 
 void vtkVDIMessage::Show(const std::string& text, Place place) {
   this->At = place;
+  this->IsNew = this->IsNew || text != this->Text || this->GetVisibility() == 0;
   if (text != this->Text) this->SetInput(text.c_str());
   this->Text = text;
   this->SetVisibility(!text.empty());
@@ -67,6 +68,9 @@ void vtkVDIMessage::PutIn(vtkViewport* viewport) {
   int height = 0;
   renderer->GetTiledSize(&width, &height);
   if (width < 1 || height < 1) return;
+  // VTK 9.1 goes on using the shaders of what was drawn before, which go when another view is closed.
+  if (this->IsNew) this->ReleaseGraphicsResources(renderer->GetVTKWindow());
+  this->IsNew = false;
   const double scale = renderer->GetVTKWindow()->GetDPI() / 72.0;
   const auto columns = static_cast<std::size_t>(std::max(width / (letterWidth * scale), 20.0));
   double above = 0.0;  // pixels

@@ -33,6 +33,7 @@ class vtkVDIMessage : public vtkTextActor {
 
   std::string Text;
   Place At = Place::Middle;
+  bool IsNew = false;  // since it was drawn
 };
 
 #endif
