@@ -103,6 +103,14 @@ with Session() as session:
         check(likeness > 0.99, "a VDI that is {} on the server is shown as without one".format(what))
         shown = bytes_of_orbit(session, view)
         check(pvtest.ssim(screenshot(view, "client_server_turned.png"), turned) > 0.99, "orbiting turns it")
+        place = list(view.CameraPosition)
+        view.CameraPosition = [0.6, 0.5, 0.4]
+        simple.Render(view)
+        said, help_said = pvtest.message_in(view), "Regenerate From This View" if what == "made" else "Reset Camera"
+        check(said == "From inside, this VDI is rough: press {}.".format(help_said), "from inside it says what helps")
+        view.CameraPosition = place
+        simple.Render(view)
+        check(pvtest.message_in(view) == "", "and nothing from outside")
         simple.Hide(view.Representations[0].Input, view)
         simple.Render(view)
         hidden = bytes_of_orbit(session, view)
