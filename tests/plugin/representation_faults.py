@@ -6,7 +6,6 @@ import os
 import shutil
 import subprocess
 
-import numpy as np
 import pvtest
 from paraview import simple
 from pvtest import check
