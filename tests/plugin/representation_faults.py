@@ -141,12 +141,21 @@ check((look(view, "nothing_behind") == behind).all(), "which it does")
 simple.Show(reader, view)
 check(OUT in said_from([2.2, 1.9, 2.4], AWAY), "and it is where that isn't seen either")
 simple.Delete(ball)
+plane = simple.Plane()
+simple.Show(plane, view)
+check(OUT in said_from([2.2, 1.9, 2.4], AWAY), "of a flat object likewise")
+check(said_from([0, 0, -3], [0, 0, -1]) == "" and said_from([-0.4, -0.4, -0.5], [-0.5, -0.5, 0]) == "", "which may be seen")
+simple.Delete(plane)
 picture.PictureOnly = 0
 picture.CameraPosition, picture.CameraFocalPoint = [40, 30, 50], [0, 0, 0]
 simple.Show(picture, view)
 check(said_from([2.2, 1.9, 2.4]) == "From inside, this VDI is rough: press Regenerate From This View.",
       "the filter's VDI tells of its button, beside another one's")
 check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1, "what is to be said of two VDIs is said once")
+display = simple.GetDisplayProperties(reader, view)
+display.Opacity = 0
+check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1, "and of one, where the other one is transparent")
+display.Opacity = 1
 check(said_from([40, 30, 50], [0, 0, 0]) == "", "and not where one of them is seen")
 picture.CameraPosition, picture.CameraFocalPoint = [2.2, 1.9, 2.4], [0.5, 0.5, 0.5]
 check(said_from([2.2, 1.9, 2.4]) == "", "a VDI that was made inside is true from there")

@@ -26,6 +26,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -318,7 +319,7 @@ void vtkVDIProp::NoteViewpoint(vtkRenderer* renderer) {
     return;
   }
   const glm::ivec2 size = viewportOf(renderer).size;
-  if (size.x < 1 || size.y < 1 || this->Opacity == 0.0) return;
+  if (size.x < 1 || size.y < 1) return;
   std::optional<vdi::View> view;
   try {
     view = matricesOf(renderer).view(size.x, size.y);
@@ -346,14 +347,20 @@ void vtkVDIProp::NoteViewpoint(vtkRenderer* renderer) {
   }
 }
 
-std::optional<vdi::ViewpointIssue> vtkVDIProp::IssueIn(const vdi::View& view) const {
+/// Where it's in sight, and to be seen.
+bool vtkVDIProp::IsShown() {
+  return this->GetVisibility() != 0 && this->Opacity > 0.0 && this->Internal->Buffers.hasVdi() &&
+         this->Internal->Piece != nullptr;
+}
+
+std::optional<vdi::ViewpointIssue> vtkVDIProp::IssueIn(const vdi::View& view) {
   const pv::VDIBuffers& buffers = this->Internal->Buffers;
-  if (!buffers.hasVdi() || this->Internal->Piece == nullptr) return std::nullopt;
+  if (!this->IsShown()) return std::nullopt;
   return vdi::viewpointIssue(boxOf(buffers.bounds().data()), *buffers.viewpoint(), view);
 }
 
 /// Whether nothing else is seen in the view.
-bool vtkVDIProp::IsBlank(vtkRenderer* renderer, const vdi::View& view) const {
+bool vtkVDIProp::IsBlank(vtkRenderer* renderer, const vdi::View& view) {
   vtkPropCollection* props = renderer->GetViewProps();
   vtkCollectionSimpleIterator at;
   props->InitTraversal(at);
@@ -361,12 +368,18 @@ bool vtkVDIProp::IsBlank(vtkRenderer* renderer, const vdi::View& view) const {
     if (prop == this || prop->GetVisibility() == 0 || !prop->GetUseBounds()) continue;
     std::optional<vdi::ViewpointIssue> issue;
     if (auto* other = vtkVDIProp::SafeDownCast(prop)) {
-      if (!other->Internal->Buffers.hasVdi()) continue;
+      if (!other->IsShown()) continue;
       issue = other->IssueIn(view);
     } else {
       const double* bounds = prop->GetBounds();
       if (bounds == nullptr || vtkMath::AreBoundsInitialized(bounds) == 0) continue;
-      issue = vdi::viewpointIssue(boxOf(bounds), view, view);
+      vdi::Box box = boxOf(bounds);
+      constexpr double beyond = std::numeric_limits<double>::max();
+      for (int axis = 0; axis < 3; ++axis) {  // flat ones aren't empty
+        box.lo[axis] = std::nextafter(box.lo[axis], -beyond);
+        box.hi[axis] = std::nextafter(box.hi[axis], beyond);
+      }
+      issue = vdi::viewpointIssue(box, view, view);
     }
     if (issue != vdi::ViewpointIssue::SeesNothing && issue != vdi::ViewpointIssue::FarAway) return false;
   }
@@ -374,14 +387,14 @@ bool vtkVDIProp::IsBlank(vtkRenderer* renderer, const vdi::View& view) const {
 }
 
 /// Whether no VDI before this one has the same to say.
-bool vtkVDIProp::IsFirst(vtkRenderer* renderer, const vdi::View& view, vdi::ViewpointIssue issue) const {
+bool vtkVDIProp::IsFirst(vtkRenderer* renderer, const vdi::View& view, vdi::ViewpointIssue issue) {
   vtkPropCollection* props = renderer->GetViewProps();
   vtkCollectionSimpleIterator at;
   props->InitTraversal(at);
   while (vtkProp* prop = props->GetNextProp(at)) {
     if (prop == this) return true;
     auto* other = vtkVDIProp::SafeDownCast(prop);
-    if (other != nullptr && other->GetVisibility() != 0 && other->IssueIn(view) == issue) return false;
+    if (other != nullptr && other->IssueIn(view) == issue) return false;
   }
   return true;
 }

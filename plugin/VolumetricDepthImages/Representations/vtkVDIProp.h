@@ -104,9 +104,10 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   class Pace;
   struct Form;
   struct Internals;
-  std::optional<vdi::ViewpointIssue> IssueIn(const vdi::View& view) const;
-  bool IsBlank(vtkRenderer* renderer, const vdi::View& view) const;
-  bool IsFirst(vtkRenderer* renderer, const vdi::View& view, vdi::ViewpointIssue issue) const;
+  bool IsShown();
+  std::optional<vdi::ViewpointIssue> IssueIn(const vdi::View& view);
+  bool IsBlank(vtkRenderer* renderer, const vdi::View& view);
+  bool IsFirst(vtkRenderer* renderer, const vdi::View& view, vdi::ViewpointIssue issue);
   void NoteViewpoint(vtkRenderer* renderer);
   int DrawIn(vtkViewport* viewport);
   bool Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
