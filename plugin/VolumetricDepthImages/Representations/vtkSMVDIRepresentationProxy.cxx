@@ -15,6 +15,6 @@ bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
 
 void vtkSMVDIRepresentationProxy::SetPropertyModifiedFlag(const char* name, int flag) {
   // The superclass connects the selection.
-  this->vtkSMRepresentationProxy::SetPropertyModifiedFlag(name,
-                                                          flag);  // NOLINT(bugprone-parent-virtual-call)
+  // NOLINTNEXTLINE(bugprone-parent-virtual-call)
+  this->vtkSMRepresentationProxy::SetPropertyModifiedFlag(name, flag);
 }
