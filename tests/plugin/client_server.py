@@ -97,7 +97,11 @@ check(expected.std() > 20 and pvtest.ssim(expected, turned) < 0.95, "the picture
 
 with Session() as session:
     for make, what in ((generated, "made"), (lambda view: simple.OpenDataFile(path), "read")):
+        before = session.bytes()
         view, seen = show(make, "client_server_{}.png".format(what))
+        sent, size = session.bytes() - before, os.path.getsize(path)
+        print("showing a VDI {} on the server sends {} bytes; its file has {}".format(what, sent, size))
+        check(sent < 1.4 * size, "a VDI crosses once, as its file")
         likeness = pvtest.ssim(seen, expected)
         print("a VDI {} on the server: SSIM {:.4f} to the same without a server".format(what, likeness))
         check(likeness > 0.99, "a VDI that is {} on the server is shown as without one".format(what))
