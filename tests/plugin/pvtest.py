@@ -100,12 +100,14 @@ def paraview_volume(source, view, association, name, unit_distance):
     representation.ScalarOpacityUnitDistance = unit_distance
     representation.Shade = 0
     simple.HideScalarBarIfNotNeeded(simple.GetColorTransferFunction(name), view)
-    path = os.path.join(OUTPUT, "paraview_volume.png")
+    path = os.path.join(OUTPUT, "paraview_volume_{}.png".format(os.getpid()))  # tests run side by side
     simple.Render(view)  # the first picture of a view moves its camera
     view.CameraPosition, view.CameraFocalPoint, view.CameraParallelScale = position, focal_point, scale
     simple.Render(view)
     simple.SaveScreenshot(path, view, ImageResolution=view.ViewSize)
-    return read_png(path)
+    seen = read_png(path)
+    os.remove(path)
+    return seen
 
 
 def vdi_filter(source, view, association, name, unit_distance, **properties):
