@@ -19,14 +19,12 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -273,7 +271,8 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     time = input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
   }
   Internals& internal = *this->Internal;
-  const bool isOfThis = internal.Shown == this->OriginOf(input, time);
+  const Origin origin = this->OriginOf(input, time);
+  const bool isOfThis = internal.Shown == origin;
   if (!isOfThis) internal.Made->Initialize();  // no need to have two in memory
   // Who asks for other pieces of it, a writer on several ranks, gets what is there.
   const bool isMade = isOfThis && !internal.Failed &&
@@ -291,13 +290,13 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
         internal.Failed = false;
         return 1;
       }
-      this->Generate(input, time, output);
+      this->Generate(input, origin, output);
     } catch (const vdi::Error& error) {
       if (!this->DropLostDevice(error)) throw;
       vtkWarningMacro(<< error.what() << "; trying a new device");
       output->Initialize();
       this->Enter();
-      this->Generate(input, time, output);
+      this->Generate(input, origin, output);
     }
   } catch (const vdi::Error& error) {
     output->Initialize();
@@ -370,14 +369,10 @@ vtkVDIGenerator::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input, std::opt
 }
 
 /// Only where something changed: another camera or transfer function needs no upload.
-void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, std::optional<double> time) {
+void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const Origin& origin) {
   vdi::VdiGenerator& generator = *this->Internal->Generator;
   const vdi::comm::Communicator& comm = generator.communicator();
-  Origin origin;
-  comm.together([&] {
-    origin = this->OriginOf(input, time);
-    requireInput(input);
-  });
+  comm.together([&] { requireInput(input); });
   // What the ranks do next depends on these; the generator compares the rest.
   comm.requireEqual(std::hash<std::string>()(origin.Choice.name), "SelectInputScalars, the array");
   comm.requireEqual(origin.Choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells");
@@ -555,13 +550,12 @@ void vtkVDIGenerator::Prepare() {
 
 /// Makes sure that no thread uses the generator. True if `output` is what one has made of just this, for
 /// which an update that can't wait for its turn, a writer's, waits here. Collective.
-bool vtkVDIGenerator::TakePreparation(vtkDataObject* input, std::optional<double> time,
-                                      vtkImageData* output) {
+bool vtkVDIGenerator::TakePreparation(const Origin& origin, vtkImageData* output) {
   Internals& internal = *this->Internal;
   const auto& preparing = internal.Preparing;
   if (!preparing) return false;
-  const bool isOfThis = !preparing->isGivenUp() && preparing->time() == internal.Executed &&
-                        internal.Shown == this->OriginOf(input, time);
+  const bool isOfThis =
+      !preparing->isGivenUp() && preparing->time() == internal.Executed && internal.Shown == origin;
   if (!pv::onAllRanks(this->Controller, isOfThis)) {
     this->DropPreparation();
     return false;
@@ -577,7 +571,7 @@ bool vtkVDIGenerator::TakePreparation(vtkDataObject* input, std::optional<double
   if (end == pv::Preparation::End::Good) {
     output->ShallowCopy(preparing->output());
     this->TakeReport();
-    if (output->GetNumberOfPoints() > 0) setTime(output, time);
+    if (output->GetNumberOfPoints() > 0) setTime(output, origin.Time);
   }
   this->DropPreparation();
   return end == pv::Preparation::End::Good;
@@ -589,7 +583,7 @@ void vtkVDIGenerator::TakeReport() {
       generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
 }
 
-void vtkVDIGenerator::Generate(vtkDataObject* input, std::optional<double> time, vtkImageData* output) {
+void vtkVDIGenerator::Generate(vtkDataObject* input, const Origin& origin, vtkImageData* output) {
   if (!this->Internal->Generator) {
     vdi::comm::Communicator comm = pv::communicatorOf(this->Controller);
     std::shared_ptr<vdi::gpu::Device> device;
@@ -602,8 +596,8 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, std::optional<double> time,
     this->Internal->Identity = rootsAddress[0];
   }
   vdi::VdiGenerator& generator = *this->Internal->Generator;
-  if (this->TakePreparation(input, time, output)) return;
-  this->ShowBlocks(input, time);
+  if (this->TakePreparation(origin, output)) return;
+  this->ShowBlocks(input, origin);
   this->UpdateProgress(0.1);
   const auto [camera, function, settings] = this->CurrentFrame();
   const auto progress = [this](double done) {
@@ -618,9 +612,9 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, std::optional<double> time,
     std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
     this->TakeReport();
     if (!vdi) return;
-    vdi->time = time.value_or(0.0);
+    vdi->time = origin.Time.value_or(0.0);
     vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));
     pv::setVdi(output, *vdi);
   }
-  setTime(output, time);
+  setTime(output, origin.Time);
 }

@@ -148,10 +148,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   struct Internals;
   struct Origin;
   struct Frame;
-  void Generate(vtkDataObject* input, std::optional<double> time, vtkImageData* output);
+  void Generate(vtkDataObject* input, const Origin& origin, vtkImageData* output);
   bool IsRoot() const;
   void Enter();
-  void ShowBlocks(vtkDataObject* input, std::optional<double> time);
+  void ShowBlocks(vtkDataObject* input, const Origin& origin);
   vdi::ScalarRange StandInRange();
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
   Frame CurrentFrame();
@@ -159,7 +159,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   Origin OriginOf(vtkDataObject* input, std::optional<double> time);
   bool GivesUpPreparation();
   void DropPreparation();
-  bool TakePreparation(vtkDataObject* input, std::optional<double> time, vtkImageData* output);
+  bool TakePreparation(const Origin& origin, vtkImageData* output);
   void TakeReport();
   void KeepEarlier(vtkImageData* output);
   bool DropLostDevice(const vdi::Error& error);
