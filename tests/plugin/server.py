@@ -21,9 +21,10 @@ def clean_environment(**more):
 
 def start(*arguments, ranks=1, **options):
     """A pvserver, with `options` of subprocess.Popen."""
-    launcher = [os.environ["MPIEXEC"], "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    mpiexec, pvserver = os.environ.get("MPIEXEC", "mpirun"), os.environ.get("PVSERVER", "pvserver")
+    launcher = [mpiexec, "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
     options.setdefault("env", clean_environment())
-    return subprocess.Popen(launcher + [os.environ["PVSERVER"], *arguments], stdin=subprocess.DEVNULL, **options)
+    return subprocess.Popen(launcher + [pvserver, *arguments], stdin=subprocess.DEVNULL, **options)
 
 
 def start_reverse(port, **options):

@@ -1,7 +1,6 @@
 """By mouse, as the guide says it: from a shown volume to a VDI in two clicks, its opacity edited, Auto and its undo, saved as
 data and as a state, the trace replayed and the state loaded. Leaves a screenshot of each step in VDI_TEST_OUTPUT."""
 
-import json
 import os
 import shutil
 import subprocess
@@ -9,7 +8,7 @@ import sys
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from window import Pulse, Screen, Window, wait_for  # noqa: E402
+from window import COLOR_EDITOR, Pulse, Screen, Window, check, failures, ssim, wait_for  # noqa: E402
 
 OUTPUT = os.path.join(os.environ["VDI_TEST_OUTPUT"], "panel")
 shutil.rmtree(OUTPUT, ignore_errors=True)  # what another run left makes the lists of files longer
@@ -27,13 +26,6 @@ import os
 from paraview.simple import FindSource, SaveData
 SaveData(os.environ["VDI_REPLAYED"], proxy=FindSource("VolumetricDepthImage1"))
 """
-failures = []
-
-
-def check(good, what):
-    print(("ok      " if good else "FAILED  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def path(name):
@@ -45,14 +37,6 @@ def bytes_of(name):
         return file.read()
 
 
-def save_data(window, name):
-    window.menu("File", "Save Data...")
-    window.find("File name:", seconds=10)
-    window.type(name)
-    window.key("Return")
-    wait_for(name, lambda: os.path.exists(name), 60)
-
-
 def middle_of_view(window, name):
     """A picture of it, once it rests; without the colour legend, which only the volume has."""
     window.wait_for_picture()
@@ -61,14 +45,9 @@ def middle_of_view(window, name):
 
 
 def check_like_volume(volume, vdi):
-    said = subprocess.run([os.environ["VDI_TOOL"], "compare", "--json", volume, vdi], check=True, capture_output=True)
-    similar = json.loads(said.stdout)["ssim"]
+    similar = ssim(volume, vdi)
     print("the VDI after the first Apply, against the volume before: SSIM %.4f" % similar, flush=True)
     check(similar >= 0.99, "the first Apply shows what the volume showed")
-
-
-def is_making(window, panel):
-    return window.text_that_begins("Making the VDI anew", panel) is not None
 
 
 def regenerate_before_apply(window):
@@ -146,8 +125,7 @@ def first_session(window):
     window.menu("Filters", "Volumetric Depth Images", "Volumetric Depth Image")
     window.screenshot("3_filter.png")
     regenerate_before_apply(window)
-    window.click("Apply")
-    wait_for("VDI", lambda: not window.is_enabled("Apply"), 120)
+    window.apply()
     time.sleep(1)
     window.screenshot("4_applied.png")
     check_like_volume(volume, middle_of_view(window, "vdi_middle.png"))
@@ -158,38 +136,34 @@ def first_session(window):
     window.click("Undo Apply")
     wait_for("state from before", lambda: window.is_enabled("Apply"))
     check(window.values() != values, "the first Apply is undone")
-    window.click("Apply")
-    wait_for("VDI", lambda: not window.is_enabled("Apply"), 120)
+    window.apply()
     time.sleep(1)
     window.screenshot("4_applied_again.png")
     check(window.values() == values, "and another one takes the same")
 
     window.enter("Sampling Rate", 4)  # so that it takes a while
-    window.click("Apply")
-    wait_for("VDI", lambda: not window.is_enabled("Apply"), 120)
+    window.apply()
 
-    window.click("Edit Color Map and Opacity")
+    right, top = window.edit_colors()
     time.sleep(1)
-    editor = window.find("Color Map and Opacity of the VDI", "dialog").box
     window.screenshot("5_colors.png")
     panel = window.find("Properties", "frame")
-    right, top = editor[0] + editor[2] - 56, editor[1] + 199
     with Pulse(window) as pulse:
         window.drag((right, top), (right, top + 90), steps=30, seconds=1.5)
-        wait_for("new VDI", lambda: is_making(window, panel), 30)
+        wait_for("new VDI", lambda: window.is_making(panel), 30)
         window.screenshot("7_making.png")
         window.drag((right, top + 90), (right, top + 60), steps=15)
-        wait_for("newer VDI", lambda: is_making(window, panel), 30)
-    save_data(window, path("making.vdi"))
-    wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
+        wait_for("newer VDI", lambda: window.is_making(panel), 30)
+    window.save("Save Data...", path("making.vdi"))
+    wait_for("end of making the VDI", lambda: not window.is_making(panel), 120)
     time.sleep(1)
-    save_data(window, path("made.vdi"))
+    window.save("Save Data...", path("made.vdi"))
     check(bytes_of(path("making.vdi")) == bytes_of(path("made.vdi")), "Save Data waits for the VDI that is being made")
     window.screenshot("8_edited.png")
     print("two colour edits, one while a VDI is made: the window took at most %.3f s to answer" % pulse.longest, flush=True)
     check(pulse.longest <= ANSWER_SECONDS, "an edit doesn't freeze the window")
     window.select(0)  # nothing is shown of that
-    check(not window.has("Color Map and Opacity of the VDI", "dialog"), "the editor closes where nothing is shown")
+    check(not window.has(COLOR_EDITOR, "dialog"), "the editor closes where nothing is shown")
     window.select(2)
     panel = window.find("Properties", "frame")
 
@@ -197,8 +171,8 @@ def first_session(window):
     time.sleep(1)
     before = window.values()
     window.click("Regenerate From This View")
-    wait_for("new VDI", lambda: is_making(window, panel), 30)
-    wait_for("end of making the VDI", lambda: not is_making(window, panel), 120)
+    wait_for("new VDI", lambda: window.is_making(panel), 30)
+    wait_for("end of making the VDI", lambda: not window.is_making(panel), 120)
     check(window.values() != before, "the button sets the camera")
     auto_and_undo(window)
 
@@ -211,20 +185,15 @@ def first_session(window):
     for name in ("CameraPosition", "Resolution", "ScalarOpacityUnitDistance"):
         check("volumetricDepthImage1.%s = " % name in trace, "the trace has " + name)
 
-    save_data(window, vdi)
+    window.save("Save Data...", vdi)
     time.sleep(1)
     window.screenshot("10_saved.png")
     check(not window.has("Configure Writer", "dialog") and not window.has("OK", "push button"),
           "Save Data asks nothing twice")
-    window.menu("File", "Save State...")
-    window.find("File name:", seconds=10)
-    window.type(state)
-    window.key("Return")
-    wait_for(state, lambda: os.path.exists(state))
+    window.save("Save State...", state)
     window.select(1)
     window.open_by_double_click("first.vdi")  # beside the volume that it was made of
-    window.click("Apply")
-    wait_for("end of Apply", lambda: not window.is_enabled("Apply"), 60)
+    window.apply(60)
     window.wait_for_picture()
     window.screenshot("11_opened.png")
     check(any(widget.role == "combo box" and widget.name == "VDI" for widget in window.widgets()),
@@ -245,7 +214,7 @@ def second_session(window, state):
     time.sleep(20)
     window.screenshot("12_state.png")
     window.select(2)
-    save_data(window, vdi)
+    window.save("Save Data...", vdi)
     return vdi
 
 
@@ -258,7 +227,7 @@ def delete_while_making(window):
     window.drag((x + width // 2, y + height // 2), (x + width // 2 - 90, y + height // 2 + 30))
     window.wait_for_picture()
     window.click("Regenerate From This View")
-    wait_for("new VDI", lambda: is_making(window, panel), 30)
+    wait_for("new VDI", lambda: window.is_making(panel), 30)
     delete(window, window.find("Delete", "push button"), "a VDI")
     window.screenshot("13_deleted.png")
 

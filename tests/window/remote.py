@@ -9,7 +9,7 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import seen  # noqa: E402
-from window import Pulse, Screen, Server, Window, wait_for  # noqa: E402
+from window import COLOR_EDITOR, Pulse, Screen, Server, Window, check, failures, wait_for  # noqa: E402
 
 OUTPUT = os.path.join(os.environ["VDI_TEST_OUTPUT"], "server")
 shutil.rmtree(OUTPUT, ignore_errors=True)
@@ -17,30 +17,10 @@ os.makedirs(OUTPUT)
 # An edit kept the window from answering for 10 to 20 s before the server's ranks made VDIs beside their other
 # work.
 ANSWER_SECONDS = 1.0
-failures = []
-
-
-def check(good, what):
-    print(("ok      " if good else "FAILED  ") + what, flush=True)
-    if not good:
-        failures.append(what)
 
 
 def path(name):
     return os.path.join(OUTPUT, name)
-
-
-def save(window, item, name):
-    window.menu("File", item)
-    window.find("Files of type:")
-    window.type(path(name))
-    window.key("Return")
-    wait_for(name, lambda: os.path.exists(path(name)), 120)
-
-
-def apply(window):
-    window.click("Apply")
-    wait_for("end of Apply", lambda: not window.is_enabled("Apply"), 200)
 
 
 def black_background(window):
@@ -49,17 +29,10 @@ def black_background(window):
     window.key(*["Down"] * 6, "Return")  # Black Background: its menu tells nobody of itself
 
 
-def orbit(window, right, down):
-    left, top, width, height = window.view()
-    middle = (left + width // 2, top + height // 2)
-    window.drag(middle, (middle[0] + right, middle[1] + down))
-    window.wait_for_picture(120)
-
-
 def check_view(window, vdi, name):
     """`name`: of the step, a screenshot of which is left."""
     picture = window.screenshot(name + ".png")
-    save(window, "Save State...", name + ".pvsm")
+    window.save("Save State...", path(name + ".pvsm"))
     similar = seen.likeness(picture, window.view(), path(vdi), path(name + ".pvsm"), path(name))
     print("%s: SSIM %.4f to the tool's picture" % (name, similar), flush=True)
     check(similar > 0.99, name + ": the view shows what the tool renders for its camera")
@@ -67,21 +40,14 @@ def check_view(window, vdi, name):
 
 def edit_opacity(window):
     panel = window.find("Properties", "frame")
-
-    def is_making():
-        return window.text_that_begins("Making the VDI anew", panel) is not None
-
-    window.click("Edit Color Map and Opacity")
-    title = "Color Map and Opacity of the VDI"
-    left, top, width, _ = window.find(title, "dialog").box
-    point = (left + width - 56, top + 199)  # the last one of the opacity
+    point = window.edit_colors()
     time.sleep(1)
     with Pulse(window) as pulse:
         window.drag(point, (point[0], point[1] + 60), steps=15, seconds=1)
-        wait_for("new VDI", is_making, 60)
+        wait_for("new VDI", lambda: window.is_making(panel), 60)
         window.screenshot("3_making.png")
-        wait_for("end of making the VDI", lambda: not is_making(), 200)
-    window.close_dialog(title)
+        wait_for("end of making the VDI", lambda: not window.is_making(panel), 200)
+    window.close_dialog(COLOR_EDITOR)
     window.wait_for_picture(120)
     print("a colour edit with two ranks: the window took at most %.3f s to answer" % pulse.longest, flush=True)
     check(pulse.longest <= ANSWER_SECONDS, "an edit doesn't freeze the window")
@@ -89,27 +55,18 @@ def edit_opacity(window):
 
 def with_server(screen):
     with Server(2, path("server.log")) as server, Window(screen, output=OUTPUT, folder=OUTPUT) as window:
-        window.load_plugin(os.environ["VDI_PLUGIN"])
-        window.connect("two ranks", server.port)
-        window.find("Plugin Manager", "dialog", 60)  # ParaView opens it by itself
-        window.load_plugin(os.environ["VDI_PLUGIN"])
-        if window.has("Output Messages", "frame"):  # one says that this ParaView keeps no list of servers
-            window.click(window.find("Close", within=window.find("Output Messages", "frame")))
+        window.connect("two ranks", server.port, os.environ["VDI_PLUGIN"])
         black_background(window)
-        window.menu("Sources", "Alphabetical", "Wavelet")
-        apply(window)
-        window.choose("Outline", "Volume")
-        window.click("Yes", "push button")
-        window.wait_for_picture(120)
-        orbit(window, 60, -40)
+        window.show_wavelet()
+        window.orbit(60, -40)
         window.screenshot("1_volume.png")
         window.menu("Filters", "Volumetric Depth Images", "Volumetric Depth Image")
-        apply(window)
+        window.apply(200)
         window.wait_for_picture(120)
         window.screenshot("2_applied.png")
         edit_opacity(window)
-        orbit(window, -60, -20)
-        save(window, "Save Data...", "first.vdi")
+        window.orbit(-60, -20)
+        window.save("Save Data...", path("first.vdi"))
         check_view(window, "first.vdi", "4_orbited")
 
 
@@ -118,10 +75,10 @@ def reopened(screen):
         window.load_plugin(os.environ["VDI_PLUGIN"])
         black_background(window)
         window.open_by_double_click("first.vdi")
-        apply(window)
+        window.apply(200)
         window.wait_for_picture()
         check_view(window, "first.vdi", "5_opened")
-        orbit(window, 80, 30)
+        window.orbit(80, 30)
         check_view(window, "first.vdi", "6_orbited_again")
 
 

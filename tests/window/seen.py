@@ -7,7 +7,7 @@ import xml.etree.ElementTree
 
 import numpy as np
 import skimage.io
-from skimage.metrics import structural_similarity
+from window import ssim
 
 
 def view_in(state):
@@ -45,7 +45,6 @@ def likeness(screenshot, box, vdi, state, kept):
     places = [(row, column) for row in range(top - 8, top + 9) for column in range(left - 8, left + 9)]
     row, column = min(places, key=lambda place: np.abs(middle_of(screen, *place)[::4, ::4] - inner[::4, ::4]).mean())
     seen = middle_of(screen, row, column)
-    both = np.rint(np.concatenate([seen, inner], axis=1)).astype(np.uint8)
-    skimage.io.imsave(kept + "_both.png", both, check_contrast=False)
-    return structural_similarity(seen, inner, channel_axis=2, gaussian_weights=True, sigma=1.5,
-                                 use_sample_covariance=False, data_range=255)
+    for picture, name in ((seen, "_seen.png"), (inner, "_expected.png")):
+        skimage.io.imsave(kept + name, np.rint(picture).astype(np.uint8), check_contrast=False)
+    return ssim(kept + "_seen.png", kept + "_expected.png")

@@ -9,9 +9,9 @@ Widgets are found by the text or tool tip that a screen reader would read (AT-SP
 xdotool, openbox, Xvfb, ImageMagick, dbus, at-spi2-core and python3-gi.
 """
 
+import json
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
@@ -20,7 +20,11 @@ import time
 
 from gi.repository import Gio, GLib
 
+sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "plugin"))
+import server  # noqa: E402
+
 SECONDS = 20.0  # that a widget may take to show up
+COLOR_EDITOR = "Color Map and Opacity of the VDI"  # its title
 
 
 def wait_for(what, action, seconds=SECONDS):
@@ -32,6 +36,21 @@ def wait_for(what, action, seconds=SECONDS):
             return result
         assert time.monotonic() < end, "there is no %s after %g seconds" % (what, seconds)
         time.sleep(0.1)
+
+
+failures = []
+
+
+def check(good, what):
+    print(("ok      " if good else "FAILED  ") + what, flush=True)
+    if not good:
+        failures.append(what)
+
+
+def ssim(one, other):
+    """Of two PNG files, by the tool."""
+    said = subprocess.run([os.environ["VDI_TOOL"], "compare", "--json", one, other], check=True, capture_output=True)
+    return json.loads(said.stdout)["ssim"]
 
 
 class Session:
@@ -176,14 +195,11 @@ class Server:
         self.ranks, self.log = ranks, log
 
     def __enter__(self):
-        with socket.socket() as free:
-            free.bind(("localhost", 0))
-            self.port = free.getsockname()[1]
-        environment = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
+        self.port = server.free_port()
+        environment = server.clean_environment(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
         with open(self.log, "w") as log:
-            self.process = subprocess.Popen(["mpirun", "--oversubscribe", "-np", str(self.ranks), "pvserver",
-                                             "--server-port=%d" % self.port], env=environment, stdin=subprocess.DEVNULL,
-                                            stdout=log, stderr=log)
+            self.process = server.start("--server-port=" + self.port, ranks=self.ranks, env=environment, stdout=log,
+                                        stderr=log)
         return self
 
     def __exit__(self, *error):
@@ -347,6 +363,49 @@ class Window:
             xdotool("click", "--repeat", str(times), "--delay", "60", str(button))
         time.sleep(0.3)
 
+    def apply(self, seconds=120):
+        self.click("Apply")
+        wait_for("end of Apply", lambda: not self.is_enabled("Apply"), seconds)
+
+    def show_wavelet(self):
+        """As a volume."""
+        self.menu("Sources", "Alphabetical", "Wavelet")
+        self.apply()
+        self.choose("Outline", "Volume")
+        self.click("Yes", "push button")
+        self.wait_for_picture(120)
+
+    def orbit(self, right, down):
+        """From the middle of the view by so many pixels, and until the picture in full is there."""
+        left, top, width, height = self.view()
+        middle = (left + width // 2, top + height // 2)
+        before = self.pixels()
+        self.drag(middle, (middle[0] + right, middle[1] + down), steps=12, seconds=1)
+        wait_for("picture from elsewhere", lambda: self.pixels() != before)
+        self.wait_for_picture(120)
+
+    def edit_colors(self):
+        """Opens the editor of the VDI's colour map; the point of the screen where the last one of the opacity is."""
+        self.click("Edit Color Map and Opacity")
+        left, top, width, _ = self.find(COLOR_EDITOR, "dialog").box
+        return left + width - 56, top + 199
+
+    def is_making(self, panel):
+        """Whether the panel says that the VDI is made anew. Looked for there alone: a small one is soon made."""
+        return self.text_that_begins("Making the VDI anew", panel) is not None
+
+    def save(self, item, name, picture=None):
+        """By that item of File; `name`: a path, or without a server of the folder in which ParaView was started. `picture`: the
+        name of a screenshot of the dialog."""
+        self.menu("File", item)
+        self.find("Files of type:")
+        self.type(name)
+        if picture:
+            self.screenshot(picture)
+        self.key("Return")
+        path = os.path.join(self.folder or "", name)
+        wait_for(path, lambda: os.path.exists(path), 120)
+
     def open_by_double_click(self, name):
         """Of the folder in which ParaView was started."""
         self.menu("File", "Open...")
@@ -433,14 +492,15 @@ class Window:
             self.screenshot(picture)
         self.close_dialog("Plugin Manager")
 
-    def connect(self, name, port, picture=None):
-        """To a server of this computer, entered in the dialog; `picture`: the name of a screenshot of what is entered. ParaView
-        opens the plugin manager then if its plugins aren't the server's."""
+    def connect(self, name, port, plugin, picture=None):
+        """To a server of this computer, entered in the dialog, with the plugin on both sides; `picture`: the name of a
+        screenshot of what is entered."""
+        self.load_plugin(plugin)
         self.menu("File", "Connect...")
         self.click("Add Server")
         dialog = self.find("Edit Server Configuration", "dialog")
         fields = [self.find(label, "label", within=dialog) for label in ("Name", "Port")]
-        for field, value in zip(fields, (name, str(port))):
+        for field, value in zip(fields, (name, port)):
             left, top, _, height = field.box
             self.click((left + 150, top + height // 2), times=3)
             self.type(value)
@@ -450,6 +510,10 @@ class Window:
         self.click("Save")
         dialog = self.find("Choose Server Configuration", "dialog")
         self.click(self.find("Connect", "push button", within=dialog))
+        self.find("Plugin Manager", "dialog", 60)  # ParaView opens it by itself
+        self.load_plugin(plugin)
+        if self.has("Output Messages", "frame"):  # one says that this ParaView keeps no list of servers
+            self.click(self.find("Close", within=self.find("Output Messages", "frame")))
 
     def reset_session(self):
         self.click("Reset Session", "push button")
