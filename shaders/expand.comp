@@ -22,7 +22,7 @@ void expandSegment(uint i) {
 shared uint groupNearest;
 shared uint groupFarthest;
 
-// Lists are in order of depth: their ends tell.
+// Lists are in order of depth: their ends tell. Depths are at least 0, but 0 may be -0, whose bits are above all others.
 void addDepths(uint list, bool hasList) {
   if (gl_LocalInvocationIndex == 0u) {
     groupNearest = push.depthRange.at[0];
@@ -32,8 +32,8 @@ void addDepths(uint list, bool hasList) {
   uint first = hasList ? push.offsets.at[list] : 0u;
   uint end = hasList ? push.offsets.at[list + 1u] : 0u;
   if (first < end) {
-    atomicMin(groupNearest, floatBitsToUint(renderSegmentsFrom(push.segments, first).at[0].front));
-    atomicMax(groupFarthest, floatBitsToUint(renderSegmentsFrom(push.segments, end - 1u).at[0].back));
+    atomicMin(groupNearest, floatBitsToUint(abs(renderSegmentsFrom(push.segments, first).at[0].front)));
+    atomicMax(groupFarthest, floatBitsToUint(abs(renderSegmentsFrom(push.segments, end - 1u).at[0].back)));
   }
   barrier();
   if (gl_LocalInvocationIndex != 0u) return;

@@ -43,7 +43,7 @@ DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPe
     nearest = std::min(nearest, view.depthOf(point));
     farthest = std::max(farthest, view.depthOf(point));
   }
-  lattice.first = std::max(nearest, 0.0);
+  lattice.first = nearest > 0.0 ? nearest : 0.0;  // never -0, which shaders would take for large by its bits
   lattice.step = scene.minSpacing / samplesPerVoxel;
   if (farthest <= lattice.first) return lattice;
   const double samples = std::ceil((farthest - lattice.first) / lattice.step);

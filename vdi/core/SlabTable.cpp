@@ -66,11 +66,12 @@ glm::dvec4 integrate(const Integral& integral, double front, double back, double
   return sum;
 }
 
-/// Rounding leaves no colour brighter than white.
+/// No colour is brighter than white, after rounding to half floats as well.
 glm::u16vec4 texelOf(const glm::dvec4& slab) {
   const glm::u16vec4 half = toHalf(glm::vec4(slab));
-  // Half floats that aren't negative are in the order of their bits.
-  return glm::min(half, glm::u16vec4(half.a));
+  // Compared as numbers: by its bits, -0 is above all of them. A falling slab of a channel that is 0 has it.
+  const glm::vec4 rounded = fromHalf(half);
+  return toHalf(glm::max(glm::min(rounded, glm::vec4(rounded.a)), glm::vec4(0.0F)));
 }
 
 }  // namespace
