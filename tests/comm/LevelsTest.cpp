@@ -323,12 +323,11 @@ TEST_CASE("blocks of one level that overlap are refused on all ranks, with both 
   CHECK_THAT(text, Catch::Contains(second));
 }
 
-TEST_CASE("the caller's ghost layers stay beside blocks of the same level, masked values go") {
+TEST_CASE("a neighbour's values replace the caller's ghost layers, which stay at the domain's edge") {
   const Communicator world = Communicator::world();
   const double own = 7.0;
-  const auto whole = [&](const glm::dvec3& p) {
-    return p.x > 1.0 ? own : linear(p);
-  };  // its ghosts are known
+  // Ghost layers that a code never fills, such as the edges of a star stencil's.
+  const auto whole = [&](const glm::dvec3& p) { return p.x > 1.0 ? own : linear(p); };
   Block left = blockIn(Kind::Cells, {glm::dvec3(0.0), {1.25, 1.0, 1.0}}, {10, 8, 8}, ScalarType::F64, whole);
   left.owned = cube(0.0, 1.0);
   const auto cells = GENERATE(8, 4, 16);
@@ -343,10 +342,39 @@ TEST_CASE("the caller's ghost layers stay beside blocks of the same level, maske
   if (world.rank() != 0) return;
   const Block& block = after.front();
   CHECK(block.data == left.data);
-  CHECK(block.extended() == block.stored());
-  const bool stays = !masked && cells == 8;
-  CHECK(valueAt(block, 8, 4, 4) ==
-        Approx(stays ? own : linear(left.origin + glm::dvec3(8, 4, 4) * left.spacing)));
+  CHECK(block.extended().hi.x == block.stored().hi.x);
+  CHECK(valueAt(block, 8, 4, 4) == Approx(linear(left.origin + glm::dvec3(8, 4, 4) * left.spacing)));
+}
+
+TEST_CASE("the caller's ghost layers at the domain's edge are used as they are") {
+  const Communicator world = Communicator::world();
+  const auto field = [](const glm::dvec3& p) { return p.x > 1.0 ? 7.0 : linear(p); };
+  Block block = blockIn(Kind::Cells, {glm::dvec3(0.0), {1.25, 1.0, 1.0}}, {10, 8, 8}, ScalarType::F64, field);
+  block.owned = cube(0.0, 1.0);
+  const std::vector<Block> after =
+      comm::exchangeGhosts(world, world.rank() == 0 ? std::vector{block} : std::vector<Block>{});
+  if (world.rank() != 0) return;
+  CHECK(after.front().extended() == block.stored());
+  CHECK(valueAt(after.front(), 8, 4, 4) == 7.0);
+}
+
+TEST_CASE("cells of two levels are continued to the domain's faces, without overshooting") {
+  const Communicator world = Communicator::world();
+  // Along x the field is linear, along y it has an edge beside the outermost cells.
+  const auto field = [](const glm::dvec3& p) { return p.x + (p.y > 0.25 ? 10.0 : 0.0); };
+  std::vector<Block> mine;
+  if (world.rank() == 0)
+    mine.push_back(blockIn(Kind::Cells, cube(0.0, 1.0), glm::ivec3(4), ScalarType::F64, field));
+  if (world.rank() == world.size() - 1)
+    mine.push_back(
+        blockIn(Kind::Cells, {{1.0, 0.0, 0.0}, {2.0, 1.0, 1.0}}, glm::ivec3(8), ScalarType::F64, field));
+  const std::vector<Block> after = comm::exchangeGhosts(world, mine);
+  if (world.rank() != 0) return;
+  const Block& block = after.front();
+  REQUIRE(block.extended().contains({-1, -1, 2}));
+  CHECK(valueAt(block, -1, 2, 2) == Approx(-0.125 + 10.0));
+  CHECK(valueAt(block, 2, -1, 2) == Approx(0.625));
+  CHECK(valueAt(block, -1, -1, 2) == Approx(-0.125));
 }
 
 TEST_CASE("masked values that nobody else has are those of the nearest own ones") {

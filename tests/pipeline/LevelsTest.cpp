@@ -7,11 +7,14 @@
 
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
+#include "tests/pipeline/PictureDifference.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/Pipeline.h"
 
 using namespace vdi;
 using test::device;
+using test::Difference;
+using test::differenceOf;
 
 namespace {
 
@@ -113,28 +116,6 @@ std::vector<Block> overEachOther(bool cells, const Field& field, int ratio) {
     all.push_back(blockIn(cells, middle, finest, field));
   }
   return all;
-}
-
-struct Difference {
-  double worst = 0.0;       // of 255
-  double wrongShare = 0.0;  // of the object's pixels: off by more than 16
-};
-
-Difference differenceOf(const Image& image, const Image& truth) {
-  Difference difference;
-  std::size_t seen = 0;
-  std::size_t wrong = 0;
-  for (std::size_t i = 0; i < image.rgba.size(); ++i) {
-    double off = 0.0;
-    for (int c = 0; c < 4; ++c)
-      off = std::max(off, 255.0 * std::abs(static_cast<double>(image.rgba[i][c]) - truth.rgba[i][c]));
-    difference.worst = std::max(difference.worst, off);
-    seen += truth.rgba[i].a > 0.03F ? 1 : 0;
-    wrong += off > 16.0 ? 1 : 0;
-  }
-  REQUIRE(seen > image.rgba.size() / 10);
-  difference.wrongShare = static_cast<double>(wrong) / static_cast<double>(seen);
-  return difference;
 }
 
 GenerateSettings settings() {

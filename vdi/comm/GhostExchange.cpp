@@ -12,6 +12,7 @@
 #include <tuple>
 #include <utility>
 
+#include "vdi/comm/BeyondDomain.h"
 #include "vdi/comm/BlockDirectory.h"
 #include "vdi/core/Scene.h"
 
@@ -107,7 +108,7 @@ struct Request {
 struct Wanted {
   IndexBox box;
   bool keep = false;                    // the caller's: they stay where nobody knows better
-  bool asked = false;                   // somebody has some of them
+  std::vector<IndexBox> asked;          // parts that other blocks have; they may overlap
   std::size_t copies = 0;               // how many come as they are
   std::shared_ptr<std::byte[]> values;  // of the block's type
   std::vector<double> sums;             // where some are means or interpolated
@@ -123,7 +124,8 @@ struct Grid {
   std::vector<Box> finer;       // that were taken off these
   std::vector<IndexBox> given;  // its own values
   std::vector<Wanted> wanted;
-  IndexBox asked;  // around all values that somebody has
+  IndexBox asked;               // around all values that other blocks have
+  std::vector<OpenPatch> open;  // where values are continued beyond the domain's faces
 };
 
 /// Trilinear interpolation in a block's values near some place.
@@ -255,6 +257,7 @@ class LayerExchange {
         if (rounds[round] != 0) exchangeValues(static_cast<std::int32_t>(round));
       }
     }
+    comm_.together([&] { continueBeyondDomain(); });
     for (std::size_t i = directory_.firstMine(); i < directory_.lastMine(); ++i) {
       const BlockEntry& entry = directory_.entries()[i];
       Block& block = blocks_[static_cast<std::size_t>(entry.block)];
@@ -401,7 +404,6 @@ class LayerExchange {
     const double ratio = donor.valueVolume() / grid.volume;
     const bool finer = ratio < 0.99;
     const bool coarser = ratio > 1.0 / 0.99;
-    if (wanted.keep && !finer && !coarser) return;
     Request request{donor.grid,        exactRound,         0,    glm::ivec3(0), wanted.box, glm::ivec3(1),
                     grid.block.origin, grid.block.spacing, where};
     if (grid.cells && finer) {
@@ -413,7 +415,7 @@ class LayerExchange {
     const bool coincides = findShift(request, donor);
     request.copied = coincides && request.parts == glm::ivec3(1) ? 1 : 0;
     if (!coincides) request.round = coarser ? firstCoarserRound + levelNumber(donor) : interpolatedRound;
-    wanted.asked = true;
+    wanted.asked.push_back(request.box);
     grid.asked.include(request.box);
     if (request.copied != 0) {
       wanted.copies += request.box.count();
@@ -448,10 +450,14 @@ class LayerExchange {
     const IndexBox stored = grid.block.stored();
     IndexBox all = stored;
     all.include(grid.asked);
+    const bool continued = continuesBeyondDomain(grid);
+    if (continued) {
+      for (const Wanted& wanted : grid.wanted) all.include(wanted.box);
+    }
     grid.block.extra = {-all.lo, all.hi - stored.hi};
     auto patches = std::make_shared<std::vector<Patch>>();
     for (Wanted& wanted : grid.wanted) {
-      if (wanted.keep && !wanted.asked) continue;
+      if (wanted.keep && wanted.asked.empty()) continue;
       const IndexBox box = wanted.box.intersection(all);
       if (box.empty()) continue;
       wanted.values = std::shared_ptr<std::byte[]>(new std::byte[box.count() * sizeOf(grid.block.type)]);
@@ -462,10 +468,31 @@ class LayerExchange {
           wanted.weights.assign(box.count(), 0.0);
         }
       }
-      if (wanted.copies != box.count()) fillWithOwn(grid, wanted);
+      if (wanted.copies != box.count()) {
+        fillWithOwn(grid, wanted);
+        if (continued && box.intersection(stored).empty()) addOpen(grid, wanted);
+      }
       patches->push_back({box, std::shared_ptr<const void>(wanted.values, wanted.values.get())});
     }
     if (!patches->empty()) grid.block.patches = std::move(patches);
+  }
+
+  /// Cells of several levels end at different distances from the domain's faces. On one level the
+  /// outermost values go on to the faces, as in ParaView's own volume rendering.
+  bool continuesBeyondDomain(const Grid& grid) const { return grid.cells && levels_.size() > 1; }
+
+  static void addOpen(Grid& grid, const Wanted& wanted) {
+    std::vector<IndexBox> open{wanted.box};
+    for (const IndexBox& asked : wanted.asked) subtract(open, asked);
+    if (!open.empty()) grid.open.push_back({wanted.box, wanted.values.get(), std::move(open)});
+  }
+
+  /// Other levels interpolate in these values, and they follow from values that arrive, so this
+  /// happens before each round and after the last one.
+  void continueBeyondDomain() {
+    for (const Grid& grid : grids_) {
+      if (!grid.open.empty()) comm::continueBeyondDomain(grid.block, grid.open);
+    }
   }
 
   /// Stored values where these are to stay, else those of the nearest value that's the grid's own.
@@ -514,6 +541,7 @@ class LayerExchange {
     std::vector<std::byte> bytes;
     std::vector<std::uint64_t> counts;
     comm_.together([&] {
+      continueBeyondDomain();
       for (int rank = 0; rank < comm_.size(); ++rank) {
         const std::size_t before = bytes.size();
         const std::span<const std::byte> requests = incoming_.of(rank);

@@ -35,12 +35,16 @@ std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> 
 /// - for cell data, the mean over a finer neighbour's values in the volume that it stands for;
 /// - else interpolated trilinearly in the neighbour's values, for which those beside its own box are
 ///   found first.
-/// Integers are rounded. Where nobody owns a place, a neighbour's ghost value counts, if it has no
-/// masked ones, else the nearest own value. Sides with no neighbour at all get no layer.
+/// Integers are rounded. Where no block owns a place, a neighbour's ghost value counts, if that
+/// neighbour has no masked values. Else the nearest own value goes on. Sides without any neighbour
+/// get no layer.
 ///
-/// Stored values that aren't the block's own. The caller's ghost layers stay where a neighbour of the
-/// same level or nobody owns the place. Those under finer blocks, those at places that coarser ones own
-/// and `masked` ones are replaced, where they would be interpolated with the block's own.
+/// Cells of several levels. Where no block has a value, the block's own values are continued
+/// (BeyondDomain.h), so that all levels show the same field at the domain's faces.
+///
+/// Stored values that aren't the block's own. The caller's ghost layers count only where no block
+/// owns the place. Elsewhere the owner's values replace them, where they would be interpolated with
+/// the block's own. `masked` values are replaced likewise.
 ///
 /// Scalar types that differ. All blocks become f32, or f64 if one of them is u32, i32 or f64. Then
 /// blocks of other types are copies.
