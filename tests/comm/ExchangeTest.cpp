@@ -122,44 +122,6 @@ TEST_CASE("every rank receives what every rank has for it, round after round") {
   }
 }
 
-TEST_CASE("partners alone exchange: a ring, round after round") {
-  const Communicator world = Communicator::world();
-  const Transport transport = GENERATE(Transport::Shared, Transport::Mpi);
-  Exchange exchange(world, transport);
-  const int right = (world.rank() + 1) % world.size();
-  const int left = (world.rank() + world.size() - 1) % world.size();
-  comm::Partners partners;
-  if (world.size() > 1) partners = {{right}, {left}};
-  for (const int round : {0, 1, 2}) {
-    // Every third rank has nothing for its partner.
-    const auto bytesFrom = [&](int rank) {
-      return (rank + round) % 3 == 2 ? std::uint64_t{0} : static_cast<std::uint64_t>(1000 * (rank + 1));
-    };
-    std::vector<Exchange::Outgoing> pieces;
-    const std::uint64_t bytes = bytesFrom(world.rank());
-    if (world.size() > 1 && bytes > 0) pieces.push_back({right, 0, bytes, {bytes + 1, 4}});
-    const Exchange::Place outbox = exchange.outbox(bytes);
-    for (std::size_t i = 0; i < bytes; ++i)
-      outbox.memory->bytes()[outbox.at + i] = valueOf(world.rank(), right, i, round);
-    const std::vector<Exchange::Incoming> incoming = exchange.send(pieces, partners);
-    if (world.size() == 1 || bytesFrom(left) == 0) {
-      CHECK(incoming.empty());
-    } else {
-      REQUIRE(incoming.size() == 1);
-      CHECK(incoming[0].from == left);
-      REQUIRE(incoming[0].bytes == bytesFrom(left));
-      CHECK(incoming[0].note == Exchange::Note{bytesFrom(left) + 1, 4});
-      bool same = true;
-      for (std::size_t i = 0; i < incoming[0].bytes; ++i) {
-        same = same && incoming[0].place.memory->bytes()[incoming[0].place.at + i] ==
-                           valueOf(left, world.rank(), i, round);
-      }
-      CHECK(same);
-    }
-    world.barrier();
-  }
-}
-
 TEST_CASE("the transport that the environment asks for") {
   CHECK(comm::transportFromText("mpi") == Transport::Mpi);
   CHECK(comm::transportFromText("") == Transport::Shared);
@@ -190,11 +152,7 @@ TEST_CASE("memory that ranks share: opened by name, and gone when nobody has it"
 TEST_CASE("sums of bytes end at 255") {
   const Communicator world = Communicator::world();
   const Transport transport = GENERATE(Transport::Shared, Transport::Mpi);
-  const std::vector<int> hosts(static_cast<std::size_t>(world.size()), 0);
-  const int radix = GENERATE(2, 3, 100);
-  const auto schedule =
-      radix < 100 ? comm::Schedule::rounds(hosts, radix) : comm::Schedule::direct(world.size());
-  comm::ByteSum sum(world, transport, schedule);
+  comm::ByteSum sum(world, transport);
   for (const std::size_t size : {std::size_t{1}, std::size_t{1000}, std::size_t{70001}, std::size_t{300}}) {
     INFO(size << " bytes");
     const auto valueOf = [](int rank, std::size_t i) {

@@ -232,42 +232,7 @@ TEST_CASE("ways between ranks: shared memory, messages, both, staging memory: th
   unsetenv("VDI_TRANSPORT");
 }
 
-TEST_CASE("schedules: direct send and rounds give the same VDI and picture", "[ranks]") {
-  const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
-                                          Joint::SharedPoints, ScalarType::U8, world.rank(), world.size());
-  GenerateSettings settings = test::smallSettings(61, 45, 6);
-  settings.budget = GENERATE(Budget::List, Budget::Total);
-  if (settings.budget == Budget::Total && world.size() > 2) return;  // it takes long enough
-  const TransferFunction function = test::threeHues(80.0);
-  FirstMade made;
-  using Way = std::pair<const char*, const char*>;
-  for (const auto& [schedule, transport] : {Way{"direct", "shared"}, Way{"rounds:2", "shared"},
-                                            Way{"rounds:2", "mpi"}, Way{"rounds:3", "shared"}}) {
-    INFO(schedule << ", " << transport << ", budget " << toString(settings.budget));
-    if (world.rank() == 0) setenv("VDI_SCHEDULE", schedule, 1);
-    if (world.rank() == 0) setenv("VDI_TRANSPORT", transport, 1);
-    setenv("VDI_BANDS", settings.budget == Budget::List ? "3" : "1", 1);
-    VdiGenerator generator(device(), comm::Communicator::world());
-    unsetenv("VDI_SCHEDULE");
-    unsetenv("VDI_TRANSPORT");
-    generator.setBlocks(decomposed.mine);
-    VdiFrame first = generator.start(test::oblique(), function, settings);
-    VdiFrame second = generator.start(test::oblique(), function, settings);
-    generator.finish(std::move(first));
-    const auto vdi = generator.finish(std::move(second));
-    const auto image = generator.renderVolume(test::oblique(), function, settings);
-    unsetenv("VDI_BANDS");
-    made.check(vdi, image);
-  }
-  for (const char* wrong : {"rounds", "rounds:1", "rounds:2x", "carrier"}) {
-    setenv("VDI_SCHEDULE", wrong, 1);
-    CHECK_THROWS_AS(VdiGenerator(device(), comm::Communicator::world()), Error);
-  }
-  unsetenv("VDI_SCHEDULE");
-}
-
-TEST_CASE("lists of more than 255 supersegments: all ways and schedules, and the picture of one rank") {
+TEST_CASE("lists of more than 255 supersegments: both ways, and the picture of one rank") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
                                           Joint::SharedPoints, ScalarType::U8, world.rank(), world.size());
@@ -276,14 +241,10 @@ TEST_CASE("lists of more than 255 supersegments: all ways and schedules, and the
   settings.samplesPerVoxel = 32.0;
   const TransferFunction function = test::threeHues(80.0);
   FirstMade made;
-  using Way = std::pair<const char*, const char*>;
-  for (const auto& [schedule, transport] :
-       {Way{"direct", "shared"}, Way{"rounds:2", "shared"}, Way{"direct", "mpi"}}) {
-    INFO(schedule << ", " << transport);
-    if (world.rank() == 0) setenv("VDI_SCHEDULE", schedule, 1);
+  for (const char* transport : {"shared", "mpi"}) {
+    INFO(transport);
     if (world.rank() == 0) setenv("VDI_TRANSPORT", transport, 1);
     VdiGenerator generator(device(), comm::Communicator::world());
-    unsetenv("VDI_SCHEDULE");
     unsetenv("VDI_TRANSPORT");
     generator.setBlocks(decomposed.mine);
     const auto vdi = generator.generate(test::oblique(), function, settings);

@@ -203,10 +203,6 @@ int Communicator::hostLeader(int rank) const {
   return state_->hostLeaders[static_cast<std::size_t>(rank)];
 }
 
-std::span<const int> Communicator::hostLeaders() const {
-  return state_->hostLeaders;
-}
-
 std::string Communicator::environment(const char* name) const {
   std::vector<std::byte> bytes;
   if (const char* value = rank() == 0 ? std::getenv(name) : nullptr; value != nullptr) {
@@ -330,19 +326,6 @@ std::vector<std::uint64_t> Communicator::allToAllWords(std::span<const std::uint
   const auto count = static_cast<int>(wordsTo.size() / static_cast<std::size_t>(size()));
   call("MPI_Alltoall", MPI_Alltoall, MPI_Ialltoall, wordsTo.data(), count, MPI_UINT64_T, from.data(), count,
        MPI_UINT64_T, state_->comm());
-  return from;
-}
-
-std::vector<std::uint64_t> Communicator::exchangeWords(std::span<const std::uint64_t> wordsTo, std::size_t n,
-                                                       const Partners& partners) const {
-  assert(wordsTo.size() == partners.to.size() * n);
-  std::vector<std::uint64_t> from(partners.from.size() * n);
-  Messages messages(*this);
-  for (std::size_t i = 0; i < partners.from.size(); ++i)
-    messages.receive(partners.from[i], std::as_writable_bytes(std::span(from).subspan(i * n, n)));
-  for (std::size_t i = 0; i < partners.to.size(); ++i)
-    messages.send(partners.to[i], std::as_bytes(wordsTo.subspan(i * n, n)));
-  messages.wait();
   return from;
 }
 

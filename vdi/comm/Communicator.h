@@ -22,12 +22,6 @@ struct Gathered {
   }
 };
 
-/// Whom a rank sends something, and from whom it gets something.
-struct Partners {
-  std::vector<int> to;
-  std::vector<int> from;
-};
-
 /// RAII over a duplicate of an MPI communicator, or over no MPI at all (one rank). Movable, not copyable. All
 /// functions marked collective must be called by every rank in the same order. MPI errors become
 /// Error{Communication}.
@@ -54,7 +48,6 @@ class Communicator {
   int localRank() const;  // rank among those that share this node's memory
   /// The lowest rank of those that share memory with `rank`: ranks of one host have the same.
   int hostLeader(int rank) const;
-  std::span<const int> hostLeaders() const;  // of all ranks
   /// Collective: rank 0's environment variable, empty where that isn't set. What other ranks have doesn't
   /// count: mpirun may not pass variables on to other hosts.
   std::string environment(const char* name) const;
@@ -88,10 +81,6 @@ class Communicator {
   std::vector<std::uint64_t> allGatherWords(std::span<const std::uint64_t> words) const;
   /// wordsTo: [size][n], n words for each rank; the result has [size][n], n from each.
   std::vector<std::uint64_t> allToAllWords(std::span<const std::uint64_t> wordsTo) const;
-  /// The same between some ranks: wordsTo is [partners.to.size()][n], the result [partners.from.size()][n].
-  /// Each rank that's named names this one. Those who have no partners needn't call it.
-  std::vector<std::uint64_t> exchangeWords(std::span<const std::uint64_t> wordsTo, std::size_t n,
-                                           const Partners& partners) const;
 
   /// Collective: nobody leaves alone. With no error on any rank it returns. Otherwise every rank throws: a
   /// rank with an error rethrows its own, the others throw Error{RemoteRank} with the lowest failing rank's

@@ -155,24 +155,6 @@ std::vector<Exchange::Incoming> Exchange::send(std::span<const Outgoing> pieces)
   return receive(pieces, std::move(incoming));
 }
 
-std::vector<Exchange::Incoming> Exchange::send(std::span<const Outgoing> pieces, const Partners& partners) {
-  // Words to all are one call of MPI, to a few they're messages.
-  const auto others = static_cast<std::size_t>(comm_.size() - 1);
-  if (partners.to.size() == others && partners.from.size() == others) return send(pieces);
-  std::vector<std::uint64_t> headers(partners.to.size() * headerWords, 0);
-  for (const Outgoing& piece : pieces) {
-    const auto partner = std::find(partners.to.begin(), partners.to.end(), piece.to);
-    assert(partner != partners.to.end());
-    const auto index = static_cast<std::size_t>(partner - partners.to.begin());
-    putHeader(piece, std::span(headers).subspan(index * headerWords, headerWords));
-  }
-  const std::vector<std::uint64_t> from = comm_.exchangeWords(headers, headerWords, partners);
-  std::vector<Incoming> incoming;
-  for (std::size_t i = 0; i < partners.from.size(); ++i)
-    addIncoming(partners.from[i], &from[i * headerWords], incoming);
-  return receive(pieces, std::move(incoming));
-}
-
 /// What a header speaks of, where that can be read as it lies.
 void Exchange::addIncoming(int from, const std::uint64_t* header, std::vector<Incoming>& incoming) const {
   if (header[1] == 0) return;

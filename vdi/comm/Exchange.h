@@ -58,10 +58,6 @@ class Exchange {
   /// rank order; it stays until the next outbox. Ranks that have nothing for each other exchange a header
   /// alone.
   std::vector<Incoming> send(std::span<const Outgoing> pieces);
-  /// The same among partners: pieces go to some of `partners.to`, who expect one from this rank and get a
-  /// header at least. `partners.from` is in rank order. Ranks that aren't partners exchange nothing. Either
-  /// all ranks exchange with all others, or none does both ways.
-  std::vector<Incoming> send(std::span<const Outgoing> pieces, const Partners& partners);
 
   /// Whether what that rank sends is read where it wrote it.
   bool sharesMemoryWith(int rank) const;

@@ -5,8 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "vdi/comm/Schedule.h"
-
 namespace vdi::comm {
 
 /// Lists [first, last) belong to one rank.
@@ -17,8 +15,8 @@ struct ListRange {
   bool operator==(const ListRange&) const = default;
 };
 
-/// Contiguous ranges of lists, one for each rank: the shares of Schedule. They begin at multiples of
-/// `granularity` lists.
+/// Contiguous ranges of lists, the shares: rank r owns share r. They begin at multiples of `granularity`
+/// lists.
 class Ownership {
  public:
   /// Lists whose counts travel in one word.
@@ -33,10 +31,8 @@ class Ownership {
                             std::uint64_t listsPerWeight);
 
   int ranks() const { return static_cast<int>(boundaries_.size()) - 1; }
-  ListRange of(int share) const { return of({share, share + 1}); }
-  ListRange of(const Schedule::Shares& shares) const {
-    return {boundaries_[static_cast<std::size_t>(shares.first)],
-            boundaries_[static_cast<std::size_t>(shares.last)]};
+  ListRange of(int rank) const {
+    return {boundaries_[static_cast<std::size_t>(rank)], boundaries_[static_cast<std::size_t>(rank) + 1]};
   }
   bool operator==(const Ownership&) const = default;
 

@@ -3,14 +3,8 @@
 namespace vdi::detail {
 
 BandMaker::BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
-                     comm::Transport transport, const comm::Schedule& schedule)
-    : comm_(comm),
-      rounds_(schedule.roundsOf(comm.rank())),
-      share_(schedule.positionOf(comm.rank())),
-      caster_(device),
-      compositor_(device),
-      levelSum_(comm, transport, schedule),
-      accesses_(device) {
+                     comm::Transport transport)
+    : comm_(comm), caster_(device), compositor_(device), levelSum_(comm, transport), accesses_(device) {
   for (Slot& slot : slots_) slot.distributor = std::make_unique<Distributor>(device, comm, transport);
 }
 
@@ -88,28 +82,11 @@ comm::Ownership BandMaker::ownershipOf(const RayCaster::Cast& cast, const Bands&
   return comm::Ownership::balanced(lists, comm_.size(), weights.subspan(first, last - first), width * stride);
 }
 
-/// Collective: `lists`, which the rank holds before the round, to those who keep them.
-void BandMaker::distribute(Slot& slot, const DeviceLists& lists, const comm::Schedule::Round& round,
-                           const DepthCode& code, Stopwatch& watch, RankReport& report) {
-  slot.parts = slot.distributor->distribute(lists, slot.owned, round, segmentBytes(code));
+/// Collective: this rank's lists, to the ranks that own them.
+void BandMaker::distribute(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report) {
+  slot.parts = slot.distributor->distribute(slot.lists, slot.owned, segmentBytes(code));
   report.bytesSent += slot.distributor->bytesSent();
   report.distributeSeconds += watch.lap();
-}
-
-/// Collective: all rounds of the schedule but the first. What came is merged before it's sent on.
-void BandMaker::distributeAgain(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report) {
-  for (std::size_t i = 1; i < rounds_.size(); ++i) {
-    DeviceLists& partial = partial_[i % partial_.size()];
-    comm_.together([&] {
-      compositor_.interleave(slot.parts, code, partial, [&](gpu::Commands& commands) {
-        commands.barrier();
-        slot.distributor->recordPack(commands, partial, slot.owned, rounds_[i]);
-      });
-      compositor_.finish();
-    });
-    report.compositeSeconds += watch.lap();
-    distribute(slot, partial, rounds_[i], code, watch, report);
-  }
 }
 
 void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& progress,
@@ -127,9 +104,10 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
   const auto start = [&](std::size_t band) {
     Slot& slot = slotOf(band);
     slot.owned = ownershipOf(cast, all, band, weights);
-    merged_[band].firstList = std::uint64_t{all.first(band)} * cast.build.width + slot.owned.of(share_).first;
+    merged_[band].firstList =
+        std::uint64_t{all.first(band)} * cast.build.width + slot.owned.of(comm_.rank()).first;
     const auto behind = [this, &slot](gpu::Commands& commands) {
-      slot.distributor->recordPack(commands, slot.lists, slot.owned, rounds_.front());
+      slot.distributor->recordPack(commands, slot.lists, slot.owned);
     };
     caster_.startBand(cast, all.first(band), all.last(band), slot.lists, behind, slot.usedBy);
   };
@@ -147,9 +125,8 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
     });
     report.subSupersegments += slot.lists.count;
     report.generateSeconds += watch.lap();
-    distribute(slot, slot.lists, rounds_.front(), request.code, watch, report);
+    distribute(slot, request.code, watch, report);
     if (band > 0) sink.pass(band - 1);
-    distributeAgain(slot, request.code, watch, report);
     comm_.together([&] {
       compositor_.interleave(slot.parts, request.code, merged_[band].interleaved);
       compose(band);

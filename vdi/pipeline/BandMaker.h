@@ -15,7 +15,6 @@
 #include "vdi/comm/Communicator.h"
 #include "vdi/comm/Exchange.h"
 #include "vdi/comm/Ownership.h"
-#include "vdi/comm/Schedule.h"
 #include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Distributor.h"
 #include "vdi/pipeline/GatheredLists.h"
@@ -29,7 +28,7 @@ class BandMaker {
  public:
   /// `comm` must outlive it.
   BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
-            comm::Transport transport, const comm::Schedule& schedule);
+            comm::Transport transport);
 
   RayCaster& caster() { return caster_; }
   Compositor& compositor() { return compositor_; }
@@ -84,7 +83,7 @@ class BandMaker {
   /// What a band of this rank's own lists needs until it's passed on; bands take them in turns.
   struct Slot {
     DeviceLists lists;
-    comm::Ownership owned = comm::Ownership::equal(0, 1);  // shares of the schedule
+    comm::Ownership owned = comm::Ownership::equal(0, 1);
     std::unique_ptr<Distributor> distributor;
     Distributed parts;
     gpu::Submission usedBy;  // the lists' memory
@@ -109,9 +108,7 @@ class BandMaker {
   };
 
   void agreeOnLists(RayCaster::Cast& cast);
-  void distribute(Slot& slot, const DeviceLists& lists, const comm::Schedule::Round& round,
-                  const DepthCode& code, Stopwatch& watch, RankReport& report);
-  void distributeAgain(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report);
+  void distribute(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report);
   comm::Ownership ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
                               std::span<const std::uint32_t> weights) const;
   /// Collective: this rank's lists, band after band, to those who own them, where they're merged by depth.
@@ -124,8 +121,6 @@ class BandMaker {
   void noteTimes(RankReport& report) const;
 
   const comm::Communicator& comm_;
-  std::vector<comm::Schedule::Round> rounds_;  // this rank's
-  int share_ = 0;                              // that it has in the end
   RayCaster caster_;
   Compositor compositor_;
   comm::ByteSum levelSum_;
@@ -133,7 +128,6 @@ class BandMaker {
   std::array<Slot, RayCaster::bandsAtOnce> slots_;
   std::size_t firstSlot_ = 0;  // of the frame that's made
   std::vector<MergedBand> merged_;
-  std::array<DeviceLists, 2> partial_;  // merged in all rounds but the last, in turns
 };
 
 }  // namespace vdi::detail

@@ -27,35 +27,12 @@ std::uint64_t packedAt(std::uint64_t list, bool wide) {
   return wide ? list * wordBytes : list / shared::countsPerWord * wordBytes;
 }
 
-constexpr int keptHere = -1;
-
-/// Of the lists that a rank holds, those that it keeps or sends to one other rank.
+/// One rank's share of a band's lists, and this rank's supersegments of it.
 struct Stretch {
-  int to = keptHere;
   comm::ListRange lists;
   std::uint64_t firstSegment = 0;
   std::uint64_t segments = 0;
 };
-
-/// They cover the lists that are held, in their order.
-std::vector<Stretch> stretchesOf(const comm::Ownership& owned, const comm::Schedule::Round& round) {
-  const std::uint64_t first = owned.of(round.held).first;
-  std::vector<Stretch> stretches;
-  const auto add = [&](int to, const comm::Schedule::Shares& shares) {
-    const comm::ListRange lists = owned.of(shares);
-    stretches.push_back({to, {lists.first - first, lists.last - first}, 0, 0});
-  };
-  bool keptAdded = false;
-  for (const comm::Schedule::Sent& sent : round.sent) {
-    if (!keptAdded && sent.shares.first > round.kept.first) {
-      add(keptHere, round.kept);
-      keptAdded = true;
-    }
-    add(sent.to, sent.shares);
-  }
-  if (!keptAdded) add(keptHere, round.kept);
-  return stretches;
-}
 
 }  // namespace
 
@@ -93,16 +70,16 @@ void Distributor::recordCounts(gpu::Commands& commands, const DeviceLists& lists
   counts_.record(commands, constants);
 }
 
-/// All lists' counts to packed_, and where each stretch's supersegments begin to boundaryOffsets_.
-void Distributor::recordPack(gpu::Commands& commands, const DeviceLists& lists, const comm::Ownership& owned,
-                             const comm::Schedule::Round& round) {
-  const std::vector<Stretch> stretches = stretchesOf(owned, round);
-  boundaryOffsets_.reserve(device_, (stretches.size() + 1) * wordBytes, MemoryKind::Readback);
+/// All lists' counts to packed_, and where each rank's supersegments begin to boundaryOffsets_.
+void Distributor::recordPack(gpu::Commands& commands, const DeviceLists& lists,
+                             const comm::Ownership& owned) {
+  const auto ranks = static_cast<std::size_t>(comm_.size());
+  boundaryOffsets_.reserve(device_, (ranks + 1) * wordBytes, MemoryKind::Readback);
   tooLarge_.mappedAs<std::uint32_t>()[0] = 0;
   recordCounts(commands, lists, false);
-  for (std::size_t i = 0; i <= stretches.size(); ++i) {
-    const std::uint64_t list = i < stretches.size() ? stretches[i].lists.first : lists.listCount;
-    commands.copy(lists.offsets, list * wordBytes, boundaryOffsets_, i * wordBytes, wordBytes);
+  for (std::size_t rank = 0; rank <= ranks; ++rank) {
+    const std::uint64_t list = rank < ranks ? owned.of(static_cast<int>(rank)).first : lists.listCount;
+    commands.copy(lists.offsets, list * wordBytes, boundaryOffsets_, rank * wordBytes, wordBytes);
   }
 }
 
@@ -114,7 +91,7 @@ void Distributor::packWide(const DeviceLists& lists) {
 }
 
 Distributed Distributor::distribute(const DeviceLists& lists, const comm::Ownership& owned,
-                                    const comm::Schedule::Round& round, std::uint64_t segmentBytes) {
+                                    std::uint64_t segmentBytes) {
   bytesSent_ = 0;
   wide_ = tooLarge_.mappedAs<std::uint32_t>()[0] != 0;
   // What others get, and where that lies in the outbox.
@@ -123,20 +100,16 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
   Stretch kept;
   std::uint64_t outboxBytes = 0;
   const std::span<const std::uint32_t> boundaries = boundaryOffsets_.mappedAs<std::uint32_t>();
-  comm::Partners partners{{}, round.sources};
-  std::size_t index = 0;
-  for (Stretch stretch : stretchesOf(owned, round)) {
-    stretch.firstSegment = boundaries[index];
-    stretch.segments = boundaries[index + 1] - boundaries[index];
-    ++index;
-    if (stretch.to == keptHere) {
+  for (int rank = 0; rank < comm_.size(); ++rank) {
+    const auto index = static_cast<std::size_t>(rank);
+    const Stretch stretch{owned.of(rank), boundaries[index], boundaries[index + 1] - boundaries[index]};
+    if (rank == comm_.rank()) {
       kept = stretch;
       continue;
     }
-    partners.to.push_back(stretch.to);
     if (stretch.segments == 0) continue;
     comm::Exchange::Outgoing piece;
-    piece.to = stretch.to;
+    piece.to = rank;
     piece.at = outboxBytes;
     piece.bytes = aligned(packedBytes(stretch.lists.count(), wide_)) + stretch.segments * segmentBytes;
     piece.note = {stretch.segments, wide_ ? 1U : 0U};
@@ -165,7 +138,7 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
     transfers_.submitAndWait();
     access.finish();
   });
-  const std::vector<comm::Exchange::Incoming> incoming = exchange_.send(pieces, partners);
+  const std::vector<comm::Exchange::Incoming> incoming = exchange_.send(pieces);
 
   Distributed result;
   result.ownCounts = &packed_;

@@ -8,7 +8,6 @@
 
 #include "vdi/comm/Exchange.h"
 #include "vdi/comm/Ownership.h"
-#include "vdi/comm/Schedule.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/CountsPass.h"
 #include "vdi/gpu/Device.h"
@@ -55,16 +54,12 @@ class Distributor {
  public:
   Distributor(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm, comm::Transport transport);
 
-  /// Behind the steps that make `lists`, which the rank holds before `round`: what the host and other ranks
-  /// need to know of them. `owned`: which lists shares are. What was distributed before must have been
-  /// composited.
-  void recordPack(gpu::Commands& commands, const DeviceLists& lists, const comm::Ownership& owned,
-                  const comm::Schedule::Round& round);
-  /// Collective, when that's done. What's sent goes by way of the transfer queue: the device may make other
-  /// lists meanwhile. What came stays until a distribution after the next one of this object or another, and
-  /// in several rounds until the next one of this object.
-  Distributed distribute(const DeviceLists& lists, const comm::Ownership& owned,
-                         const comm::Schedule::Round& round, std::uint64_t segmentBytes);
+  /// Behind the steps that make `lists`, the rank's part of all lists of a band: packs what the host and
+  /// other ranks need to know of them. The compositor must be done with what was distributed before.
+  void recordPack(gpu::Commands& commands, const DeviceLists& lists, const comm::Ownership& owned);
+  /// Collective, when the packing is done. Lists travel by the transfer queue, so the device may make other
+  /// lists meanwhile. What came stays until a distribution after the next one of this object or another.
+  Distributed distribute(const DeviceLists& lists, const comm::Ownership& owned, std::uint64_t segmentBytes);
   /// Waits for what was submitted: after an error.
   void drop() { transfers_.drop(); }
 

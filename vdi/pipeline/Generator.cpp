@@ -35,14 +35,12 @@ struct VdiGenerator::State {
   State(std::shared_ptr<gpu::Device> theDevice, comm::Communicator theComm)
       : device(std::move(theDevice)), comm(std::move(theComm)) {
     const std::string ways = comm.environment("VDI_TRANSPORT");
-    const std::string rounds = comm.environment("VDI_SCHEDULE");
     comm.together([&] {
       const comm::Transport transport = comm::transportFromText(ways);
       const bool shares = comm.size() > 1 && transport == comm::Transport::Shared;
       using Visible = detail::HostPool::Visible;
       pool = std::make_shared<detail::HostPool>(device, shares ? Visible::ToHost : Visible::ToProcess);
-      const comm::Schedule schedule = comm::Schedule::fromText(rounds, comm.hostLeaders());
-      bands = std::make_unique<detail::BandMaker>(device, comm, transport, schedule);
+      bands = std::make_unique<detail::BandMaker>(device, comm, transport);
       steps = std::make_unique<detail::TimeSteps>(comm, bands->caster().volume());
       frames = std::make_unique<detail::Frames>(device, comm, transport, root);
       bandDownload = std::make_unique<detail::BandDownload>(device);
