@@ -254,6 +254,43 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene) {
   return chosenCamera(options.camera, camera);
 }
 
+namespace {
+
+void addShadingOptions(CLI::App& command, QualityOptions& options) {
+  command
+      .add_flag(
+          "--shade", options.shade,
+          "light the volume by its gradient, from the viewpoint; the VDI keeps that light when it's turned")
+      ->group(qualityGroup);
+  command
+      .add_option("--ambient", options.ambient,
+                  "with --shade: share of the colour that shows without light, 0 to 1")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command
+      .add_option("--diffuse", options.diffuse, "with --shade: share of the light that's reflected, 0 to 1")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command
+      .add_option("--lights", options.lights,
+                  "with --shade: kit, ParaView's five lights; headlight, one that shines along each ray")
+      ->check(CLI::IsMember({"kit", "headlight"}))
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group(qualityGroup);
+}
+
+Shading makeShading(const QualityOptions& options) {
+  Shading shading;
+  shading.on = options.shade;
+  shading.ambient = options.ambient;
+  shading.diffuse = options.diffuse;
+  if (options.lights == "headlight") shading.lights = {Light{}};
+  return shading;
+}
+
+}  // namespace
+
 void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse use) {
   std::string presets;
   for (const PresetInfo& info : transferFunctionPresets())
@@ -308,6 +345,7 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
           "other viewpoints; 1: never")
       ->capture_default_str()
       ->group(qualityGroup);
+  addShadingOptions(command, options);
   command.add_option("--sampling-rate", options.samplesPerVoxel, "samples per voxel, 1/64 to 64")
       ->capture_default_str()
       ->group(qualityGroup);
@@ -350,6 +388,7 @@ GenerateSettings makeSettings(const QualityOptions& options) {
   settings.algorithm = algorithmFromString(options.algorithm);
   settings.precision = precisionFromString(options.precision);
   settings.terminationOpacity = options.terminationOpacity;
+  settings.shading = makeShading(options);
   validate(settings);
   return settings;
 }

@@ -76,6 +76,10 @@ struct QualityOptions {
   std::string algorithm = "merge";
   std::string precision = "compact";
   double terminationOpacity = GenerateSettings().terminationOpacity;
+  bool shade = false;
+  double ambient = Shading().ambient;
+  double diffuse = Shading().diffuse;
+  std::string lights = "kit";
   std::string transferFunction = "three-hues";  // a preset or a file
   std::optional<double> unitDistance;
 };

@@ -121,6 +121,8 @@ vec3 placeAmongCells(Brick brick, uint k) {
   return max(coordinateOf(brick, middleOf(k)) * brick.cellScale + brick.cellOffset, vec3(0.0));
 }
 
+#include "shading.glsl"
+
 uvec3 cellAround(Brick brick, vec3 place) { return min(uvec3(place), brick.cellDims - 1u); }
 
 bool showsAnything(Brick brick, uvec3 cell) {
@@ -197,7 +199,7 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
         vec2 span = spanOf(here ? emptyFirst : k, k);
         vec4 slab = slabOf(between[i], mix(ends[i + 1u], ends[i], params.slabs != 0u), ends[i + 1u]);
         Sample it = sampleOf(mix(slab, vec4(0.0), bvec4(here)), span.y - span.x);
-        useSample(span.x, span.y, it);
+        useSample(span.x, span.y, lit(brick, k, it));
         rayOpticalDepth += it.opticalDepth;
         if (rayOpticalDepth >= params.enough) return false;
       }

@@ -31,7 +31,7 @@ bool castLanes(Brick brick, uint begin, uint end) {
       vec2 span = spanOf(own, own);
       float front = tablePosition(brick, beginOf(own));
       float back = tablePosition(brick, endOf(own));
-      mine = sampleOf(slabOf(slabTexel(front, back), front, back), span.y - span.x);
+      mine = lit(brick, own, sampleOf(slabOf(slabTexel(front, back), front, back), span.y - span.x));
     }
     uint visible = lanesWhere(mine.opticalDepth > 0.0);
     looking = visible == 0u;

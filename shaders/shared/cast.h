@@ -22,6 +22,9 @@ VDI_CONST uint castProgramCountPreSegments = 2;  // by merging: tolerances and c
 VDI_CONST uint castProgramWritePreSegments = 3;
 VDI_CONST uint castProgramHistogram = 4;    // for the total budget: what lists need
 VDI_CONST uint castProgramCountLevels = 5;  // by merging, with other ranks: counts at all tolerances (quota.h)
+VDI_CONST uint castMaxLights = 8;
+// Differences between two values that are smaller than this share of them are taken for rounding (core/Shading.h).
+VDI_CONST float leastGradient = 1.0e-6f;
 VDI_CONST uint castModeSearch = 0;          // sensitivities and counts
 VDI_CONST uint castModeWrite = 1;           // supersegments
 
@@ -81,6 +84,13 @@ struct CastParams {
   uint maxPerList;
   float level;      // of the histogram; negative: equal budgets
   uint levelShift;  // of levels
+  // Where colours are shaded (core/Shading.h): towards each light in world space, zero for one at the eye; its colour, times
+  // diffuse.
+  vec3 lightDirections[castMaxLights];
+  vec3 lightColors[castMaxLights];
+  uint lightCount;
+  float ambient;
+  uint shaded;  // 1: they are; a constant of the program
 };
 
 struct CastConstants {

@@ -56,7 +56,11 @@ TEST_CASE("fingerprints name the parameter that differs") {
       {"sampling rate", [](Parameters& p) { p.settings.samplesPerVoxel = 2.0; }},
       {"algorithm", [](Parameters& p) { p.settings.algorithm = Algorithm::Bisection; }},
       {"precision", [](Parameters& p) { p.settings.precision = Precision::Full; }},
-      {"termination opacity", [](Parameters& p) { p.settings.terminationOpacity = 0.5; }}};
+      {"termination opacity", [](Parameters& p) { p.settings.terminationOpacity = 0.5; }},
+      {"shade", [](Parameters& p) { p.settings.shading.on = true; }},
+      {"ambient", [](Parameters& p) { p.settings.shading.ambient = 0.5; }},
+      {"diffuse", [](Parameters& p) { p.settings.shading.diffuse = 0.5; }},
+      {"lights", [](Parameters& p) { p.settings.shading.lights[2].color.g = 0.5; }}};
   const Parameters given;
   CHECK(different(given, Parameters(given)).empty());
   CHECK(changes.size() == detail::fingerprintsOf(given.camera, given.function, given.settings).size());

@@ -119,6 +119,39 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one", "[ranks]") {
   }
 }
 
+TEST_CASE("shaded: the picture and VDI of N ranks are those of one", "[ranks]") {
+  const comm::Communicator world = comm::Communicator::world();
+  const bool root = world.rank() == 0;
+  VdiGenerator one(device(), comm::Communicator::serial());
+  VdiGenerator many(device(), comm::Communicator::world());
+  for (const Case& c : cases) {
+    const auto decomposed = test::decompose("turbulence", {34, 30, 37}, c.blocks, c.layout, c.joint, c.type,
+                                            world.rank(), world.size());
+    many.setBlocks(decomposed.mine);
+    const auto whole =
+        test::decompose("turbulence", {34, 30, 37}, {1, 1, 1}, Layout::OnOneRank, c.joint, c.type, 0, 1);
+    if (root) one.setBlocks(whole.mine);
+    const TransferFunction function = test::threeHues(test::topOf(c.type) * 0.8);
+    const Camera camera = test::oblique(c.parallel);
+    // ParaView's lights together make colours brighter than a supersegment can be; with 0.85 they don't.
+    for (const double diffuse : {1.0, 0.85}) {
+      INFO(c.name << ", diffuse " << diffuse);
+      GenerateSettings settings = test::smallSettings();
+      settings.shading.on = true;
+      settings.shading.diffuse = diffuse;
+      const auto volume = many.renderVolume(camera, function, settings);
+      const auto vdi = many.generate(camera, function, settings);
+      if (!root) continue;
+      const auto truth = one.renderVolume(camera, function, settings);
+      REQUIRE(anythingSeen(*truth));
+      CHECK(largestDifference(*volume, *truth) < 1.0F);
+      const auto alone = one.generate(camera, function, settings);
+      CHECK(largestDifference(flatten(*vdi), flatten(*alone)) < 2.0F);
+      if (diffuse < 1.0) CHECK(largestDifference(flatten(*vdi), *truth) < 1.5F);
+    }
+  }
+}
+
 TEST_CASE("a margin on N ranks: the lists of one rank, and its picture") {
   const comm::Communicator world = comm::Communicator::world();
   const bool root = world.rank() == 0;

@@ -91,14 +91,17 @@ def make_view(size, position, focal_point, parallel_scale=None):
     return view
 
 
-def paraview_volume(source, view, association, name, unit_distance):
-    """ParaView's own volume rendering, unshaded, as an array of [rows][columns][3] bytes from the top."""
+def paraview_volume(source, view, association, name, unit_distance, **properties):
+    """ParaView's own volume rendering, unshaded unless `properties` of the representation say otherwise, as an array of
+    [rows][columns][3] bytes from the top."""
     position, focal_point, scale = list(view.CameraPosition), list(view.CameraFocalPoint), view.CameraParallelScale
     representation = simple.Show(source, view)
     representation.SetRepresentationType("Volume")
     simple.ColorBy(representation, (association, name))
     representation.ScalarOpacityUnitDistance = unit_distance
     representation.Shade = 0
+    for key, value in properties.items():
+        setattr(representation, key, value)
     simple.HideScalarBarIfNotNeeded(simple.GetColorTransferFunction(name), view)
     path = os.path.join(OUTPUT, "paraview_volume_{}.png".format(os.getpid()))  # tests run side by side
     simple.Render(view)  # the first picture of a view moves its camera

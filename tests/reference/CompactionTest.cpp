@@ -31,7 +31,7 @@ std::vector<Interval> randomList(std::mt19937& random, int count, float thickest
   return list;
 }
 
-struct Light {
+struct SeenLight {
   float color[3] = {0.0F, 0.0F, 0.0F};
   float transmittance = 1.0F;
   void add(float red, float green, float blue, float opacity) {
@@ -67,8 +67,8 @@ TEST_CASE("V_O sees a list within 1/255, however long, thin or dense; no superse
     const std::vector<Interval> list = randomList(random, 1 + trial % 40, thickest);
     const std::vector<CompactSupersegment> codes = compacted(list, code);
     REQUIRE(codes.size() == list.size());
-    Light expected;
-    Light seen;
+    SeenLight expected;
+    SeenLight seen;
     for (std::size_t i = 0; i < list.size(); ++i) {
       const Supersegment s = expanded(codes[i], code);
       const Interval& own = list[i];

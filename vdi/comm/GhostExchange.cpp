@@ -21,7 +21,7 @@ namespace vdi::comm {
 namespace {
 
 /// Rays need values that far beyond an owned box, in spacings.
-constexpr double reach = slabReach;
+constexpr double reach = valueReach;
 
 /// Of a spacing: more than rounding and latticeTolerance move a face, less than what tells values
 /// apart.

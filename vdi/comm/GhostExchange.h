@@ -21,7 +21,7 @@ namespace vdi::comm {
 std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> blocks);
 
 /// Collective. settleOwnership, and what blocks need of their neighbours' values: all that is
-/// interpolated up to slabReach beyond the owned boxes, edges and corners included: one layer of points,
+/// interpolated up to valueReach beyond the owned boxes, edges and corners included: one layer of points,
 /// two of cells. It comes as
 /// `extra` layers and `patches` of the blocks; what is stored isn't copied. Extra layers and patches
 /// that blocks have already are dropped.

@@ -52,6 +52,7 @@ void validate(const GenerateSettings& settings) {
   }
   require(settings.terminationOpacity > 0.0 && settings.terminationOpacity <= 1.0, "termination opacity",
           settings.terminationOpacity, "(0, 1]");
+  validate(settings.shading);
 }
 
 float terminationOpticalDepth(const GenerateSettings& settings) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "vdi/core/Budget.h"
+#include "vdi/core/Shading.h"
 #include "vdi/core/Supersegment.h"
 
 namespace vdi {
@@ -42,6 +43,7 @@ struct GenerateSettings {
   /// V_O is missing when seen from V_N, hence the default (docs/adr). Pictures need no more than
   /// pictureTermination.
   double terminationOpacity = 1.0;
+  Shading shading{};  // off by default
   bool operator==(const GenerateSettings&) const = default;
 };
 

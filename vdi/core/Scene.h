@@ -39,7 +39,11 @@ struct DepthLattice {
 /// [1/64, 64] or when a ray would need more than 2^24 samples.
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel);
 
-/// How far beyond its owned box a block has values, in its spacings, where it has neighbours.
+/// How far beyond its owned box a block has values, in its spacings, where it has neighbours. Gradients need
+/// that much: a voxel on each side of a sample's middle.
+inline constexpr double valueReach = 1.0;
+
+/// How far beyond it the ends of slabs may lie.
 inline constexpr double slabReach = 0.9;
 
 /// Whether samples are slabs, classified by what lies between their two ends, rather than by the scalar in

@@ -59,6 +59,7 @@ class CastPass {
     std::uint32_t samplesAhead = 1;
     bool cutAtGaps = false;
     bool byNeed = false;
+    bool shaded = false;
   };
   ComputePipeline& pipelineFor(const Program& program);
   /// Which images a pipeline reads.

@@ -38,8 +38,8 @@ struct VolumePiece {
   bool samePlaceAs(const VolumePiece& other) const { return dims == other.dims && format == other.format; }
 };
 
-/// Values of a piece beyond the samples that it serves, where the block was cut: samples look half a voxel
-/// beyond the face.
+/// Values of a piece beyond the samples that it serves, where the block was cut: gradients look a voxel
+/// beyond the face (valueReach).
 constexpr int pieceMargin = 1;
 
 /// Pieces of the block, extra layers included, that fit a page each. They overlap, so that each interpolates

@@ -36,6 +36,15 @@ std::uint64_t hashOf(const std::vector<ColorNode>& nodes) {
   return hashOf(std::span<const double>(values));
 }
 
+std::uint64_t hashOf(const std::vector<Light>& lights) {
+  std::vector<double> values;
+  for (const Light& light : lights) {
+    values.insert(values.end(), {light.direction.x, light.direction.y, light.direction.z, light.color.x,
+                                 light.color.y, light.color.z});
+  }
+  return hashOf(std::span<const double>(values));
+}
+
 std::uint64_t hashOf(const std::vector<OpacityNode>& nodes) {
   std::vector<double> values;
   for (const OpacityNode& node : nodes) values.insert(values.end(), {node.x, node.opacity});
@@ -65,7 +74,11 @@ std::vector<comm::Communicator::Fingerprint> fingerprintsOf(const Camera& camera
           {hashOf(settings.samplesPerVoxel), "sampling rate"},
           {hashOf(settings.algorithm), "algorithm"},
           {hashOf(settings.precision), "precision"},
-          {hashOf(settings.terminationOpacity), "termination opacity"}};
+          {hashOf(settings.terminationOpacity), "termination opacity"},
+          {hashOf(settings.shading.on), "shade"},
+          {hashOf(settings.shading.ambient), "ambient"},
+          {hashOf(settings.shading.diffuse), "diffuse"},
+          {hashOf(settings.shading.lights), "lights"}};
 }
 
 }  // namespace vdi::detail

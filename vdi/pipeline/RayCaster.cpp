@@ -18,6 +18,22 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
       quotaPass_(device_),
       histogram_(device_) {}
 
+namespace {
+
+void setLights(shared::CastParams& params, const Shading& shading, const View& view) {
+  static_assert(maxLights == shared::castMaxLights &&
+                static_cast<float>(leastGradient) == shared::leastGradient);
+  params.shaded = shading.on ? 1U : 0U;
+  params.ambient = static_cast<float>(shading.ambient);
+  params.lightCount = static_cast<std::uint32_t>(shading.lights.size());
+  for (std::size_t i = 0; i < shading.lights.size(); ++i) {
+    params.lightDirections[i] = worldDirection(shading.lights[i], view);
+    params.lightColors[i] = shading.diffuse * shading.lights[i].color;
+  }
+}
+
+}  // namespace
+
 shared::CastParams RayCaster::prepare(const Request& request) {
   volume_.setTable(request.table, slabLength(request.lattice, request.table));
   shared::CastParams params = gpu::castGeometry(request.scene, request.view, request.lattice);
@@ -31,6 +47,7 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.squarePerPosition = static_cast<float>(shared::slabStripStep) / params.lastPosition;
   params.stripRows = static_cast<float>(slabs.stripRows());
   params.slabsPerDepth = static_cast<float>(1.0 / (request.table.unitDistance * slabs.length));
+  setLights(params, request.settings.shading, request.view);
   params.cells = volume_.cells();
   params.nodeCount = volume_.nodeCount();
   params.enough = terminationOpticalDepth(request.settings);

@@ -6,6 +6,7 @@
 
 #include "vdi/core/Margin.h"
 #include "vdi/reference/Accumulator.h"
+#include "vdi/reference/Shading.h"
 
 namespace vdi::reference {
 
@@ -122,23 +123,6 @@ SceneStretch sceneStretch(const Frame& frame, SceneRay& ray) {
 
 }  // namespace
 
-double interpolate(const Block& block, const glm::dvec3& world) {
-  const IndexBox all = block.extended();
-  const glm::dvec3 position =
-      glm::clamp((world - block.origin) / block.spacing, glm::dvec3(all.lo), glm::dvec3(all.hi - 1));
-  const glm::ivec3 base = glm::min(glm::ivec3(glm::floor(position)), glm::max(all.hi - 2, all.lo));
-  const glm::dvec3 share = position - glm::dvec3(base);
-  double sum = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::ivec3 step{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
-    const glm::dvec3 weight = glm::mix(1.0 - share, share, glm::dvec3(step));
-    const double product = weight.x * weight.y * weight.z;
-    const glm::ivec3 at = glm::min(base + step, all.hi - 1);
-    if (product > 0.0) sum += product * valueAt(block, at.x, at.y, at.z);
-  }
-  return sum;
-}
-
 Frame::Frame(const Scene& theScene, const Camera& camera, const TransferFunction& transferFunction,
              const GenerateSettings& theSettings)
     : scene(theScene),
@@ -178,6 +162,10 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
     if (k == scene.samples.last) return (scene.leave - front) / ray.step;
     return static_cast<float>(k);
   };
+  const auto lightOn = [&](std::uint32_t k, const Block& block) {
+    const glm::dvec3 world = glm::dvec3(ray.sample(k)) + frame.scene.bounds.center();
+    return lightAt(frame.settings.shading, frame.view, block, world, ray.direction);
+  };
   const auto slabOf = [&](std::uint32_t k, const Block& block) {
     const auto positionAt = [&](float place) {
       const glm::dvec3 world = glm::dvec3(ray.at(place)) + frame.scene.bounds.center();
@@ -199,7 +187,8 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
           end == scene.samples.last ? scene.leave : static_cast<float>(frame.lattice.frontOf(end));
       const Slab slab = slabOf(k, *piece.block);
       const float opticalDepth = std::min(slab.opticalDepth * slabsPerDepth * (back - front), maxExtinction);
-      const glm::vec3 color = slab.color * opacityOf(opticalDepth);
+      glm::vec3 color = slab.color * opacityOf(opticalDepth);
+      if (frame.settings.shading.on && opticalDepth > 0.0F) color *= lightOn(k, *piece.block);
       samples.push_back({front, back, color.r, color.g, color.b, opticalDepth});
       total += opticalDepth;
       if (total >= enough) return samples;

@@ -15,6 +15,7 @@
 #include "vdi/core/SlabTable.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
+#include "vdi/reference/Interpolation.h"
 #include "vdi/reference/Segmenter.h"
 
 namespace vdi::reference {
@@ -33,9 +34,6 @@ struct Frame {
   Frame(const Scene& scene, const Camera& camera, const TransferFunction& transferFunction,
         const GenerateSettings& settings);
 };
-
-/// Trilinear, among all values that the block has; beyond the outermost ones, clamped to these.
-double interpolate(const Block& block, const glm::dvec3& world);
 
 /// The samples of the ray through the centre of pixel (x, y) that `blocks` own, front to back, transparent
 /// ones included, up to the one with which the ray's opacity reaches the termination opacity.

@@ -32,6 +32,7 @@
 #include <limits>
 #include <vector>
 
+#include "VDILights.h"
 #include "VDISession.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
@@ -223,6 +224,7 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   if (unit.GetAsDouble() == 0.0 && shown != nullptr &&
       shown->GetProperty("ScalarOpacityUnitDistance") != nullptr)
     unit.Set(vtkSMPropertyHelper(shown, "ScalarOpacityUnitDistance").GetAsDouble());
+  pv::takeShading(this, shown, view);
   if (placed && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
                     vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray())
     SetCamera(this, view);
@@ -292,6 +294,7 @@ std::string vtkSMVDIGeneratorProxy::SetViewpoint(vtkSMViewProxy* view) {
   }
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the view's camera");
   SetCamera(this, renderView);
+  pv::takeLights(this, renderView);
   vtkSMPropertyHelper(this, "Resolution").Set(size.data(), 2);
   this->UpdateVTKObjects();
   return {};

@@ -113,6 +113,10 @@ void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
      << indent << "Fill: " << this->Fill << "\n"
      << indent << "Precision: " << this->Precision << "\n"
      << indent << "TerminationOpacity: " << this->TerminationOpacity << "\n"
+     << indent << "Shade: " << this->Shade << "\n"
+     << indent << "Ambient: " << this->Ambient << "\n"
+     << indent << "Diffuse: " << this->Diffuse << "\n"
+     << indent << "Lights: " << this->Lights.size() << "\n"
      << indent << "ScalarOpacityUnitDistance: " << this->ScalarOpacityUnitDistance << "\n";
 }
 
@@ -126,6 +130,28 @@ void vtkVDIGenerator::SetScalarOpacityFunction(vtkPiecewiseFunction* function) {
   if (this->ScalarOpacityFunction == function) return;
   this->ScalarOpacityFunction = function;
   this->Modified();
+}
+
+void vtkVDIGenerator::AddLight(double right, double up, double back, double red, double green, double blue) {
+  this->Lights.push_back({right, up, back, red, green, blue});
+  this->Modified();
+}
+
+void vtkVDIGenerator::RemoveAllLights() {
+  if (this->Lights.empty()) return;
+  this->Lights.clear();
+  this->Modified();
+}
+
+vdi::Shading vtkVDIGenerator::CurrentShading() const {
+  vdi::Shading shading;
+  shading.on = this->Shade;
+  shading.ambient = this->Ambient;
+  shading.diffuse = this->Diffuse;
+  if (!this->Lights.empty()) shading.lights.clear();
+  for (const std::array<double, 6>& light : this->Lights)
+    shading.lights.push_back({{light[0], light[1], light[2]}, {light[3], light[4], light[5]}});
+  return shading;
 }
 
 void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
@@ -470,6 +496,7 @@ vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame() {
   settings.budget = static_cast<vdi::Budget>(this->Budget);
   settings.fill = this->Fill;
   settings.precision = static_cast<vdi::Precision>(this->Precision);
+  settings.shading = this->CurrentShading();
   settings.terminationOpacity = this->PictureOnly
                                     ? std::min(this->TerminationOpacity, vdi::pictureTermination)
                                     : this->TerminationOpacity;

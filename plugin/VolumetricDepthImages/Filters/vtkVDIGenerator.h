@@ -17,6 +17,7 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "vtkVolumetricDepthImagesModule.h"
 
@@ -25,6 +26,7 @@ class Error;
 struct Box;
 struct Camera;
 struct ScalarRange;
+struct Shading;
 }  // namespace vdi
 class vtkMultiProcessController;
 class vtkPiecewiseFunction;
@@ -78,6 +80,21 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   /// A ray ends once it has accumulated this opacity; 1: never.
   vtkSetClampMacro(TerminationOpacity, double, 0.01, 1.0);
   vtkGetMacro(TerminationOpacity, double);
+  ///@{
+  /**
+   * Shading by gradients, as ParaView's volume representation has it: vdi::Shading. Off by default. Lights
+   * move with the viewpoint; none: ParaView's light kit as a new view has it.
+   */
+  vtkSetMacro(Shade, bool);
+  vtkGetMacro(Shade, bool);
+  vtkSetClampMacro(Ambient, double, 0.0, 1.0);
+  vtkGetMacro(Ambient, double);
+  vtkSetClampMacro(Diffuse, double, 0.0, 1.0);
+  vtkGetMacro(Diffuse, double);
+  /// Its direction in the camera's axes and its colour: vdi::Light.
+  void AddLight(double right, double up, double back, double red, double green, double blue);
+  void RemoveAllLights();
+  ///@}
   /// How samples become supersegments, an enumerator of vdi::Algorithm: 1 merge, 0 bisection.
   vtkSetClampMacro(Algorithm, int, 0, 1);
   /// Exchange ghost layers where blocks lack them.
@@ -155,6 +172,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vdi::ScalarRange StandInRange();
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
   Frame CurrentFrame();
+  vdi::Shading CurrentShading() const;
   vtkMTimeType CurrentMTime();
   Origin OriginOf(vtkDataObject* input, std::optional<double> time);
   bool GivesUpPreparation();
@@ -181,6 +199,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   double Fill = 1.0;
   int Precision = 1;
   double TerminationOpacity = 1.0;
+  bool Shade = false;
+  double Ambient = 0.0;
+  double Diffuse = 1.0;
+  std::vector<std::array<double, 6>> Lights;
   bool FillGhosts = true;
   bool PictureOnly = false;
   int TimeStep = 0;

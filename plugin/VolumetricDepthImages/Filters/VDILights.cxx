@@ -1,0 +1,112 @@
+#include "VDILights.h"
+
+#include <vtkCamera.h>
+#include <vtkCollection.h>
+#include <vtkLight.h>
+#include <vtkLightCollection.h>
+#include <vtkRenderer.h>
+#include <vtkSMPropertyHelper.h>
+#include <vtkSMProxy.h>
+#include <vtkSMRenderViewProxy.h>
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "vdi/core/Camera.h"
+#include "vdi/core/Shading.h"
+
+namespace pv {
+
+namespace {
+
+glm::dvec3 vectorOf(const double* v) {
+  return {v[0], v[1], v[2]};
+}
+
+std::vector<vtkLight*> shiningLights(vtkSMRenderViewProxy* view) {
+  std::vector<vtkLight*> lights;
+  vtkLightCollection* all = view->GetRenderer()->GetLights();
+  vtkCollectionSimpleIterator next;
+  all->InitTraversal(next);
+  while (vtkLight* light = all->GetNextLight(next)) {
+    if (light->GetSwitch() != 0) lights.push_back(light);
+  }
+  return lights;
+}
+
+/// VTK's mapper has code of its own for one headlight of full intensity: it shines along each ray.
+bool isPlainHeadlight(const std::vector<vtkLight*>& lights) {
+  return lights.size() == 1 && lights.front()->LightTypeIsHeadlight() != 0 &&
+         lights.front()->GetIntensity() == 1.0;
+}
+
+/// Towards the light, in the camera's axes.
+glm::dvec3 directionOf(vtkLight* light, vtkCamera* camera) {
+  if (light->LightTypeIsHeadlight() != 0) return {0.0, 0.0, 1.0};
+  const glm::dvec3 towards = vectorOf(light->GetPosition()) - vectorOf(light->GetFocalPoint());
+  if (light->LightTypeIsCameraLight() != 0) return towards;
+  const vdi::View view({.position = vectorOf(camera->GetPosition()),
+                        .focalPoint = vectorOf(camera->GetFocalPoint()),
+                        .viewUp = vectorOf(camera->GetViewUp())},
+                       1, 1);
+  return {glm::dot(towards, view.right()), glm::dot(towards, view.up()), -glm::dot(towards, view.forward())};
+}
+
+std::vector<vdi::Light> lightsOf(vtkSMRenderViewProxy* view) {
+  const std::vector<vtkLight*> shining = shiningLights(view);
+  std::vector<vdi::Light> lights;
+  for (vtkLight* light : shining) {
+    const glm::dvec3 color = light->GetIntensity() * vectorOf(light->GetDiffuseColor());
+    const glm::dvec3 direction = directionOf(light, view->GetActiveCamera());
+    const double length = glm::length(direction);
+    lights.push_back({length > 0.0 ? direction / length : glm::dvec3(0.0, 0.0, 1.0), color});
+  }
+  if (isPlainHeadlight(shining)) lights.front().direction = glm::dvec3(0.0);
+  // An empty list stands for the light kit.
+  if (lights.empty()) lights.push_back({glm::dvec3(0.0), glm::dvec3(0.0)});
+  return lights;
+}
+
+/// Whether they're ParaView's light kit as new views have it, in whatever order.
+bool areDefault(const std::vector<vdi::Light>& lights) {
+  const std::vector<vdi::Light> kit = vdi::lightKit();
+  constexpr double tolerance = 1e-4;
+  return lights.size() == kit.size() && std::all_of(kit.begin(), kit.end(), [&](const vdi::Light& one) {
+           return std::any_of(lights.begin(), lights.end(), [&](const vdi::Light& other) {
+             return glm::distance(one.direction, other.direction) < tolerance &&
+                    glm::distance(one.color, other.color) < tolerance;
+           });
+         });
+}
+
+}  // namespace
+
+void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view) {
+  const std::vector<vdi::Light> lights = lightsOf(view);
+  vtkSMPropertyHelper property(filter, "Lights");
+  if (areDefault(lights)) {
+    if (property.GetNumberOfElements() > 0) property.SetNumberOfElements(0);
+    return;
+  }
+  std::vector<double> numbers;
+  for (const vdi::Light& light : lights) {
+    for (const glm::dvec3& v : {light.direction, light.color}) numbers.insert(numbers.end(), {v.x, v.y, v.z});
+  }
+  property.Set(numbers.data(), static_cast<unsigned int>(numbers.size()));
+}
+
+void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* view) {
+  takeLights(filter, view);
+  if (shown == nullptr || shown->GetProperty("Shade") == nullptr || shown->GetProperty("Diffuse") == nullptr)
+    return;
+  const char* kind = vtkSMPropertyHelper(shown, "Representation", true).GetAsString();
+  if (kind == nullptr || std::strcmp(kind, "Volume") != 0) return;
+  if (vtkSMPropertyHelper(shown, "Shade").GetAsInt() == 0) return;
+  vtkSMPropertyHelper(filter, "Shade").Set(1);
+  vtkSMPropertyHelper(filter, "Diffuse").Set(vtkSMPropertyHelper(shown, "Diffuse").GetAsDouble());
+  if (isPlainHeadlight(shiningLights(view)))
+    vtkSMPropertyHelper(filter, "Ambient").Set(vtkSMPropertyHelper(shown, "Ambient").GetAsDouble());
+}
+
+}  // namespace pv

@@ -1,0 +1,55 @@
+// How brightly a sample shines. Twin of vdi/reference/Shading.cpp; vdi/core/Shading.h has the formula.
+//
+// Needs: shared/cast.h; params, rayDirection, texel, coordinateOf.
+
+// Whether colours are shaded: what isn't costs nothing.
+layout(constant_id = 9) const bool shaded = false;
+
+// Zero also where one of the values isn't finite.
+float differenceOf(float ahead, float behind) {
+  float difference = ahead - behind;
+  float least = leastGradient * (abs(ahead) + abs(behind));
+  return abs(difference) > least && abs(difference) <= 3.0e38 ? difference : 0.0;
+}
+
+// Direction of the scalar's gradient at a place of the ray, by central differences over a voxel on each side; zero where there
+// is none. Texels stand for values by a positive scale, which doesn't matter.
+vec3 normalAt(Brick brick, float place) {
+  vec3 middle = positionAt(place) * brick.texelScale + brick.texelOffset;
+  vec3 texels = brick.cellScale * float(cellSide);  // of the page
+  vec3 voxel = 1.0 / texels;
+  vec3 ahead = clamp(middle + voxel, brick.texelLo, brick.texelHi);
+  vec3 behind = clamp(middle - voxel, brick.texelLo, brick.texelHi);
+  vec3 here = clamp(middle, brick.texelLo, brick.texelHi);
+  float x0 = texel(brick.page, vec3(behind.x, here.yz));
+  float x1 = texel(brick.page, vec3(ahead.x, here.yz));
+  float y0 = texel(brick.page, vec3(here.x, behind.y, here.z));
+  float y1 = texel(brick.page, vec3(here.x, ahead.y, here.z));
+  float z0 = texel(brick.page, vec3(here.xy, behind.z));
+  float z1 = texel(brick.page, vec3(here.xy, ahead.z));
+  vec3 differences = vec3(differenceOf(x1, x0), differenceOf(y1, y0), differenceOf(z1, z0));
+  float greatest = max(max(abs(differences.x), abs(differences.y)), abs(differences.z));
+  if (!(greatest > 0.0)) return vec3(0.0);
+  // texels * texelScale is 1 / spacing. The largest component is 1 before lengths are squared: values may be of any size.
+  vec3 gradient = differences / greatest * texels * brick.texelScale;
+  float largest = max(max(abs(gradient.x), abs(gradient.y)), abs(gradient.z));
+  return normalize(gradient / largest);
+}
+
+vec3 lightAt(Brick brick, float place) {
+  vec3 normal = normalAt(brick, place);
+  vec3 toEye = -rayDirection / rayLengthOfDepth;
+  vec3 light = vec3(params.ambient);
+  for (uint i = 0u; i < params.lightCount; ++i) {
+    vec3 direction = params.lightDirections[i];
+    bool atEye = all(equal(direction, vec3(0.0)));
+    light += params.lightColors[i] * abs(dot(normal, mix(direction, toEye, bvec3(atEye))));
+  }
+  return light;
+}
+
+// Sample k in its light.
+Sample lit(Brick brick, uint k, Sample it) {
+  if (shaded && it.opticalDepth > 0.0) it.color *= lightAt(brick, middleOf(k));
+  return it;
+}

@@ -1,0 +1,118 @@
+"""Shaded volumes: our volume rendering and our VDI, seen from its viewpoint, against ParaView's own pictures. And the display
+properties and lights that the first update takes."""
+
+import os
+import sys
+
+import numpy as np
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from pvtest import *  # noqa: E402,F403
+from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
+from vtkmodules.vtkIOImage import vtkNIFTIImageReader  # noqa: E402
+
+BRAINS = "/usr/share/mricron/templates/"
+
+
+def producer_of(values, spacing, as_cells=False):
+    """A source of values [z][y][x] and the place of its middle."""
+    image = vtkImageData()
+    image.SetDimensions(*[n + (1 if as_cells else 0) for n in values.shape[::-1]])
+    image.SetSpacing(*spacing)
+    array = numpy_to_vtk(np.ascontiguousarray(values).ravel(), deep=True)
+    array.SetName("field")
+    (image.GetCellData() if as_cells else image.GetPointData()).SetScalars(array)
+    producer = simple.TrivialProducer()
+    producer.GetClientSideObject().SetOutput(image)
+    producer.UpdatePipeline()
+    return producer, np.array(image.GetBounds()).reshape(3, 2).mean(axis=1)
+
+
+def brain_of(name, coarser):
+    """Values [z][y][x], their largest is 250, and their spacing."""
+    reader = vtkNIFTIImageReader()
+    reader.SetFileName(BRAINS + name)
+    reader.Update()
+    image = reader.GetOutput()
+    values = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(image.GetDimensions()[::-1]).astype(float)
+    values = values[::coarser, ::coarser, ::coarser]
+    return values * 250 / values.max(), [coarser * s for s in image.GetSpacing()]
+
+
+def wavelet():
+    source = simple.Wavelet(WholeExtent=[-20, 20, -20, 20, -20, 20])
+    source.UpdatePipeline()
+    image = source.GetClientSideObject().GetOutputDataObject(0)
+    values = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(41, 41, 41).astype(float)
+    return (values - values.min()) * 250 / (values.max() - values.min())
+
+
+def waves(shape, spacing):
+    z, y, x = np.meshgrid(*[np.arange(n) * s for n, s in zip(shape, spacing[::-1])], indexing="ij")
+    return 125 + 125 * np.sin(0.11 * x + np.sin(0.07 * y)) * np.cos(0.08 * z + 0.05 * x) * np.cos(0.06 * y)
+
+
+if not os.path.exists(BRAINS):
+    print("FAILED  no brain: install the package mricron-data")
+    os._exit(1)
+FLAT = [1.0, 0.7, 3.0]
+# Values, spacing, type, of cells, parallel scale, representation's properties.
+CASES = {
+    "brain_u8": (*brain_of("ch2better.nii.gz", 2), np.uint8, False, None, {}),
+    "brain_f32": (*brain_of("inia19-t1-brain.nii.gz", 2), np.float32, False, None, {"Diffuse": 0.7}),
+    "wavelet_f32": (wavelet(), [1.0] * 3, np.float32, False, 22.0, {}),
+    "flat_f32": (waves((30, 120, 90), FLAT), FLAT, np.float32, False, None, {}),
+    "flat_u16_cells": (waves((30, 120, 90), FLAT), FLAT, np.uint16, True, None, {}),
+}
+for name, (values, spacing, kind, as_cells, parallel_scale, properties) in CASES.items():
+    source, center = producer_of(values.astype(kind), spacing, as_cells)
+    association = "CELLS" if as_cells else "POINTS"
+    set_colors("field", 20, 250, peak=0.6)
+    extent = max(n * s for n, s in zip(values.shape[::-1], spacing))
+    direction = np.array([0.45, 0.36, 0.7]) * 2.4 * extent
+    view = make_view([240, 240], list(center + direction), list(center), parallel_scale)
+    unit = 2 * min(spacing)
+    theirs = paraview_volume(source, view, association, "field", unit, Shade=1, **properties)
+    unshaded = paraview_volume(source, view, association, "field", unit)
+    # What is set by hand, and what the first update takes.
+    volume = picture(vdi_filter(source, view, association, "field", unit, PictureOnly=1, Shade=1, **properties))
+    representation = simple.GetRepresentation(source, view)
+    representation.Shade = 1
+    simple.SetActiveView(view)
+    taking = vdi_filter(source, view, association, "field", unit)
+    vdi = picture(taking)
+    check(taking.Shade == 1 and taking.Diffuse == properties.get("Diffuse", 1.0) and len(taking.Lights) == 0,
+          name + ": the first update takes the volume's shading")
+    check(ssim(theirs, unshaded) < 0.99, name + ": shading shows %.4f" % ssim(theirs, unshaded))
+    for what, ours in (("volume rendering", volume), ("a VDI", vdi)):
+        similar = ssim(ours, theirs)
+        off = np.abs(ours.astype(float) - theirs).mean(axis=(0, 1))
+        check(similar >= 0.99, "%s: SSIM of %s with ParaView's own %.4f, mean differences %s" % (
+            name, what, similar, off.round(2)))
+        check(off.max() < 1.5, "%s: %s has ParaView's colours" % (name, what))
+    write_png("shading_%s.png" % name, np.hstack([vdi, theirs, unshaded]))
+    simple.Delete(view)
+
+# Another view's lights: one headlight, which lets ambient light show too; two lights of colours; none.
+source, center = producer_of(waves((40, 40, 40), [3.0] * 3).astype(np.float32), [3.0] * 3)
+for name in ("headlight", "two_lights", "no_light"):
+    view = make_view([200, 200], list(center + [160, 120, 250]), list(center))
+    view.UseLight = 0
+    if name == "headlight":
+        simple.AddLight(view=view).Coords = "Headlight"
+    if name == "two_lights":
+        first, second = simple.AddLight(view=view), simple.AddLight(view=view)
+        first.Coords, first.Position, first.FocalPoint = "Camera", [1, 2, 0.5], [0, 0, 0]
+        first.DiffuseColor, first.Intensity = [1, 0.4, 0.2], 0.8
+        second.Coords, second.Position, second.FocalPoint = "Scene", [-300, 0, 100], [0, 0, 0]
+        second.DiffuseColor = [0.1, 0.3, 0.6]
+    theirs = paraview_volume(source, view, "POINTS", "field", 6.0, Shade=1, Ambient=0.2, Diffuse=0.6)
+    simple.SetActiveView(view)
+    ours = picture(vdi_filter(source, view, "POINTS", "field", 6.0))
+    off = np.abs(ours.astype(int) - theirs).mean()
+    check(theirs.max() > 60 or name == "no_light", name + ": something is seen")
+    check(off < 1.5 and ssim(ours, theirs) >= 0.99,
+          "%s: SSIM with ParaView's own %.4f, mean difference %.2f" % (name, ssim(ours, theirs), off))
+    write_png("shading_%s.png" % name, np.hstack([ours, theirs]))
+    simple.Delete(view)
+finish()

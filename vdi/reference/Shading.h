@@ -1,0 +1,18 @@
+// Shading on the CPU (vdi/core/Shading.h). Twin of shaders/shading.glsl.
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "vdi/core/Block.h"
+#include "vdi/core/Shading.h"
+
+namespace vdi::reference {
+
+/// Direction of the scalar's gradient at a place: a unit vector, or zero where there's none.
+glm::dvec3 normalAt(const Block& block, const glm::dvec3& world);
+
+/// What a colour there is multiplied by. `rayDirection`: from the eye, of any length.
+glm::vec3 lightAt(const Shading& shading, const View& view, const Block& block, const glm::dvec3& world,
+                  const glm::dvec3& rayDirection);
+
+}  // namespace vdi::reference
