@@ -91,13 +91,17 @@ def make_view(size, position, focal_point, parallel_scale=None):
     return view
 
 
-def paraview_volume(source, view, association, name, unit_distance, **properties):
+def paraview_volume(source, view, association, name, unit_distance, keep_range=False, **properties):
     """ParaView's own volume rendering, unshaded unless `properties` of the representation say otherwise, as an array of
-    [rows][columns][3] bytes from the top."""
+    [rows][columns][3] bytes from the top. Stretches the colour map over the data's range, unless `keep_range`."""
     position, focal_point, scale = list(view.CameraPosition), list(view.CameraFocalPoint), view.CameraParallelScale
+    colors, opacity = simple.GetColorTransferFunction(name), simple.GetOpacityTransferFunction(name)
+    points = list(colors.RGBPoints), list(opacity.Points)
     representation = simple.Show(source, view)
     representation.SetRepresentationType("Volume")
     simple.ColorBy(representation, (association, name))
+    if keep_range:
+        colors.RGBPoints, opacity.Points = points
     representation.ScalarOpacityUnitDistance = unit_distance
     representation.Shade = 0
     for key, value in properties.items():

@@ -39,11 +39,15 @@ def producer_of(values, spacing, as_cells):
     return producer, np.array(image.GetBounds()).reshape(3, 2).mean(axis=1)
 
 
-path = [p for p in glob.glob("/usr/share/mricron/templates/*.nii.gz") if os.path.basename(p) == "ch2better.nii.gz"]
-if not path:
-    print("FAILED  no brain: install the package mricron-data")
-    os._exit(1)
-brain, spacing = read_nifti(path[0])
+def read_brain(name):
+    path = glob.glob("/usr/share/mricron/templates/%s.nii.gz" % name)
+    if not path:
+        print("FAILED  no brain: install the package mricron-data")
+        os._exit(1)
+    return read_nifti(path[0])
+
+
+brain, spacing = read_brain("ch2better")
 brain = brain[::2, ::2, ::2].astype(float)
 brain *= 250.0 / brain.max()
 spacing = [2 * s for s in spacing]
@@ -87,4 +91,23 @@ for name, (nodes, least) in FUNCTIONS.items():
         check(similar >= least, "%s: SSIM of %s at one and eight samples a voxel %.4f" % (name, what, similar))
         write_png("brain_%s_%s.png" % (name, what.split()[-1]), np.hstack([once, fine]))
     simple.Delete(view)
+
+# A colour map without red, of floats: there is none in the picture, either.
+brain, spacing = read_brain("inia19-t1-brain")
+brain = brain.astype(np.float32)
+brain /= brain.max()
+source, center = producer_of(brain, spacing, False)
+colors, opacity = set_colors("brain", 0, 1)
+colors.RGBPoints = [0, 0, 0, 1, 0.5, 0, 0.2, 1, 1, 0, 1, 0.3]
+opacity.Points = [0, 0, 0.5, 0, 0.1, 0, 0.5, 0, 1, 0.5, 0.5, 0]
+extent = 0.9 * np.linalg.norm(np.array(brain.shape[::-1]) * spacing)
+view = make_view([400, 400], list(center + extent * np.array([0.6, 0.5, 1.9])), list(center))
+ours = picture(vdi_filter(source, view, "POINTS", "brain", 1.0))
+theirs = paraview_volume(source, view, "POINTS", "brain", 1.0)
+similar = ssim(ours, theirs)
+check(ours[..., 1:].max() > 100, "no red: the brain is there")
+check(ours[..., 0].max() == 0 and theirs[..., 0].max() == 0, "no red: a mean red of %.4f, ParaView's is %.4f"
+      % (ours[..., 0].mean() / 255, theirs[..., 0].mean() / 255))
+check(similar >= 0.999, "no red: SSIM with ParaView's own volume rendering %.4f" % similar)
+write_png("brain_no_red.png", np.hstack([ours, theirs]))
 finish()

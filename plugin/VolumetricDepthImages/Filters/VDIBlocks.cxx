@@ -5,12 +5,10 @@
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
-#include <vtkDiscretizableColorTransferFunction.h>
 #include <vtkDoubleArray.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
 #include <vtkOverlappingAMR.h>
-#include <vtkPiecewiseFunction.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
@@ -291,8 +289,6 @@ void addIdentity(vtkDataObject* leaf, std::vector<std::uint64_t>& identity) {
   }
 }
 
-constexpr int colorSamples = 1024;
-
 }  // namespace
 
 std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice) {
@@ -325,65 +321,6 @@ std::vector<std::uint64_t> identityOf(vtkDataObject* data) {
     addIdentity(iterator->GetCurrentDataObject(), identity);
   }
   return identity;
-}
-
-vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity,
-                                         double low, double high, double unitDistance) {
-  vdi::TransferFunction function;
-  function.unitDistance = unitDistance;
-  vtkSmartPointer<vtkScalarsToColors> map = colors;
-  if (map == nullptr) {
-    auto coolToWarm = vtkSmartPointer<vtkColorTransferFunction>::New();
-    coolToWarm->SetColorSpaceToDiverging();
-    coolToWarm->AddRGBPoint(low, 0.231373, 0.298039, 0.752941);
-    coolToWarm->AddRGBPoint(0.5 * (low + high), 0.865, 0.865, 0.865);
-    coolToWarm->AddRGBPoint(high, 0.705882, 0.0156863, 0.14902);
-    map = coolToWarm;
-  }
-  if (auto* discretizable = vtkDiscretizableColorTransferFunction::SafeDownCast(map)) {
-    if (opacity == nullptr) opacity = discretizable->GetScalarOpacityFunction();
-    discretizable->Build();
-  }
-  const double* mapRange = map->GetRange();
-  std::vector<double> places;
-  places.reserve(colorSamples);
-  for (int i = 0; i < colorSamples; ++i) {
-    places.push_back(mapRange[0] + (mapRange[1] - mapRange[0]) * i / (colorSamples - 1));
-  }
-  if (auto* nodes = vtkColorTransferFunction::SafeDownCast(map)) {
-    for (int i = 0; i < nodes->GetSize(); ++i) {
-      double node[6];
-      nodes->GetNodeValue(i, node);
-      places.push_back(node[0]);
-    }
-  }
-  std::sort(places.begin(), places.end());
-  places.erase(std::unique(places.begin(), places.end()), places.end());
-  for (const double x : places) {
-    double rgb[3];
-    map->GetColor(x, rgb);
-    function.colors.push_back({x, glm::clamp(glm::dvec3(rgb[0], rgb[1], rgb[2]), 0.0, 1.0)});
-  }
-  if (opacity == nullptr || opacity->GetSize() == 0) {
-    function.opacities = {{mapRange[0], 0.0}, {mapRange[1], 1.0}};
-    return function;
-  }
-  // Between nodes the function may bend (midpoint, sharpness): sixteen samples each.
-  constexpr int between = 16;
-  for (int i = 0; i < opacity->GetSize(); ++i) {
-    double node[4];
-    double next[4];
-    opacity->GetNodeValue(i, node);
-    function.opacities.push_back({node[0], std::clamp(node[1], 0.0, 1.0)});
-    if (i + 1 == opacity->GetSize()) break;
-    opacity->GetNodeValue(i + 1, next);
-    if (node[2] == 0.5 && node[3] == 0.0) continue;  // linear
-    for (int k = 1; k < between; ++k) {
-      const double x = node[0] + (next[0] - node[0]) * k / between;
-      function.opacities.push_back({x, std::clamp(opacity->GetValue(x), 0.0, 1.0)});
-    }
-  }
-  return function;
 }
 
 }  // namespace pv

@@ -1,4 +1,4 @@
-// VTK data sets and colour maps as the library knows them.
+// VTK data sets as the library knows them.
 #ifndef VDIBlocks_h
 #define VDIBlocks_h
 
@@ -7,11 +7,8 @@
 #include <vector>
 
 #include "vdi/core/Block.h"
-#include "vdi/core/TransferFunction.h"
 
 class vtkDataObject;
-class vtkPiecewiseFunction;
-class vtkScalarsToColors;
 
 namespace pv {
 
@@ -34,12 +31,6 @@ std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice)
 /// Numbers that are others whenever blocksOf would give other blocks, by VTK's rule that who changes an array
 /// calls its Modified: places of all images, which arrays they have, and when these were modified.
 std::vector<std::uint64_t> identityOf(vtkDataObject* data);
-
-/// ParaView's colour map and opacity function, sampled densely enough for any colour space. Without a colour
-/// map: "Cool to Warm" over [low, high]; without an opacity function: the colour map's own if it has one,
-/// else a ramp from 0 to 1.
-vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity,
-                                         double low, double high, double unitDistance);
 
 }  // namespace pv
 

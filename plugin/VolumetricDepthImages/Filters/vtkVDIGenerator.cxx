@@ -34,6 +34,7 @@
 #include "VDIPreparation.h"
 #include "VDIRetire.h"
 #include "VDISession.h"
+#include "VDITransferFunctions.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/Pipeline.h"
 #include "vtkVDIImageData.h"
