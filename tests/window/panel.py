@@ -154,7 +154,7 @@ def first_session(window):
         window.screenshot("7_making.png")
         window.drag((right, top + 90), (right, top + 60), steps=15)
         wait_for("newer VDI", lambda: window.is_making(panel), 30)
-    window.save("Save Data...", path("making.vdi"))
+    window.save("Save Data...", path("making"), extension=".vdi")  # what Save Data begins with
     wait_for("end of making the VDI", lambda: not window.is_making(panel), 120)
     time.sleep(1)
     window.save("Save Data...", path("made.vdi"))

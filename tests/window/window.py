@@ -394,16 +394,16 @@ class Window:
         """Whether the panel says that the VDI is made anew. Looked for there alone: a small one is soon made."""
         return self.text_that_begins("Making the VDI anew", panel) is not None
 
-    def save(self, item, name, picture=None):
+    def save(self, item, name, picture=None, extension=""):
         """By that item of File; `name`: a path, or without a server of the folder in which ParaView was started. `picture`: the
-        name of a screenshot of the dialog."""
+        name of a screenshot of the dialog. `extension`: what ParaView is to add to the name."""
         self.menu("File", item)
         self.find("Files of type:")
         self.type(name)
         if picture:
             self.screenshot(picture)
         self.key("Return")
-        path = os.path.join(self.folder or "", name)
+        path = os.path.join(self.folder or "", name) + extension
         wait_for(path, lambda: os.path.exists(path), 120)
 
     def open_by_double_click(self, name):

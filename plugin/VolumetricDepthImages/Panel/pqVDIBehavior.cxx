@@ -27,6 +27,7 @@
 #include <string_view>
 
 #include "pqVDIRegenerator.h"
+#include "pqVDISaveData.h"
 #include "pqVDIStillFrames.h"
 #include "vtkSMVDIGeneratorProxy.h"
 
@@ -82,6 +83,7 @@ bool isLoadedOn(pqServer* server) {
 
 void pqVDIBehavior::startup() {
   new pqVDIStillFrames(this);
+  new pqVDISaveData(this);
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::sourceAdded, this, &pqVDIBehavior::sourceAdded);
   for (pqPipelineSource* source : model->findItems<pqPipelineSource*>()) this->sourceAdded(source);
