@@ -16,6 +16,7 @@
 #include <span>
 #include <vector>
 
+#include "VDIPlace.h"
 #include "VDIRanges.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
@@ -147,19 +148,7 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat) {
     copySegments(std::get<vdi::SupersegmentLists>(vdi.lists).segments,
                  addField<vtkFloatArray>(fields, "VDI.supersegments", 6, count));
   }
-  double* camera = addField<vtkDoubleArray>(fields, "VDI.camera", 1, 12);
-  double* bounds = addField<vtkDoubleArray>(fields, "VDI.bounds", 1, 6);
-  for (int axis = 0; axis < 3; ++axis) {
-    camera[axis] = vdi.camera.position[axis];
-    camera[3 + axis] = vdi.camera.focalPoint[axis];
-    camera[6 + axis] = vdi.camera.viewUp[axis];
-    const std::ptrdiff_t side = std::ptrdiff_t{2} * axis;
-    bounds[side] = vdi.bounds.lo[axis];
-    bounds[side + 1] = vdi.bounds.hi[axis];
-  }
-  camera[9] = vdi.camera.viewAngle;
-  camera[10] = vdi.camera.parallelProjection ? 1.0 : 0.0;
-  camera[11] = vdi.camera.parallelScale;
+  setPlace(fields, vdi.camera, vdi.bounds);
   double* parameters = addField<vtkDoubleArray>(fields, "VDI.parameters", 1, 4);
   parameters[0] = vdi.budget;
   parameters[1] = vdi.sampleStep;

@@ -11,8 +11,8 @@
 //               VDI.codes          compact: unsigned int [n][2], vdi::CompactSupersegment
 //               VDI.depthCode      compact: float [2], vdi::DepthCode
 //               VDI.camera         double [12]: position, focal point, view-up, view angle, parallel
-//                                  projection, scale
-//               VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ...
+//                                  projection, scale; of pictures without a VDI, too (VDIPlace.h)
+//               VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ...; likewise
 //               VDI.parameters     double [4]: N_S, sample step, time, time step
 #ifndef VDIImageData_h
 #define VDIImageData_h

@@ -31,6 +31,7 @@
 #include "VDIArrays.h"
 #include "VDIBlocks.h"
 #include "VDIImageData.h"
+#include "VDIPlace.h"
 #include "VDIPreparation.h"
 #include "VDIRetire.h"
 #include "VDISession.h"
@@ -635,7 +636,10 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const Origin& origin, vtkIm
   if (this->PictureOnly) {
     std::optional<vdi::Image> picture = generator.renderVolume(camera, function, settings, progress);
     this->TakeReport();
-    if (picture) pv::setPicture(output, *picture, true);
+    if (picture) {
+      pv::setPicture(output, *picture, true);
+      pv::setPlace(output->GetFieldData(), camera, generator.scene().bounds);
+    }
   } else {
     std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
     this->TakeReport();

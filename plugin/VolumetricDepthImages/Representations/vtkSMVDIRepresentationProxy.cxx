@@ -3,14 +3,13 @@
 #include <vtkDataObject.h>
 #include <vtkObjectFactory.h>
 
-#include <cstring>
-
 vtkStandardNewMacro(vtkSMVDIRepresentationProxy);
 
 bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
-  if (type != nullptr && std::strcmp(type, "VDI") == 0 && this->GetUsingScalarColoring())
-    this->SetScalarColoring(nullptr, vtkDataObject::POINT);
-  return this->Superclass::SetRepresentationType(type);
+  if (this->GetUsingScalarColoring()) this->SetScalarColoring(nullptr, vtkDataObject::POINT);
+  // The superclass colours slices by an array.
+  // NOLINTNEXTLINE(bugprone-parent-virtual-call)
+  return this->vtkSMRepresentationProxy::SetRepresentationType(type);
 }
 
 void vtkSMVDIRepresentationProxy::SetPropertyModifiedFlag(const char* name, int flag) {

@@ -1,0 +1,34 @@
+/**
+ * @class vtkVDIImageRepresentation
+ * @brief what the output of VolumetricDepthImage and of the reader can be shown as
+ *
+ * That is a VDI, the box of its volume, and its flat picture. ParaView's other representations would show the
+ * pixels of the flat picture, a unit apart, somewhere in the world.
+ */
+#ifndef vtkVDIImageRepresentation_h
+#define vtkVDIImageRepresentation_h
+
+#include <vtkPVCompositeRepresentation.h>
+
+#include "vtkVolumetricDepthImagesRepresentationsModule.h"
+
+class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIImageRepresentation
+    : public vtkPVCompositeRepresentation {
+ public:
+  static vtkVDIImageRepresentation* New();
+  vtkTypeMacro(vtkVDIImageRepresentation, vtkPVCompositeRepresentation);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  /// Takes those of this module only. The XML has others, too: those of its base.
+  void AddRepresentation(const char* key, vtkPVDataRepresentation* representation) override;
+
+ protected:
+  vtkVDIImageRepresentation() = default;
+  ~vtkVDIImageRepresentation() override = default;
+
+ private:
+  vtkVDIImageRepresentation(const vtkVDIImageRepresentation&) = delete;
+  void operator=(const vtkVDIImageRepresentation&) = delete;
+};
+
+#endif
