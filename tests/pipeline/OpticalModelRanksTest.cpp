@@ -1,0 +1,49 @@
+// Pictures of several ranks against the optical model in double precision, which knows neither ranks nor
+// blocks.
+#include <catch2/catch.hpp>
+
+#include "tests/Devices.h"
+#include "tests/pipeline/OpticalBounds.h"
+#include "vdi/pipeline/Pipeline.h"
+
+using namespace vdi;
+using apps::Joint;
+using apps::Layout;
+
+TEST_CASE("optical model: several ranks", "[ranks]") {
+  struct Case {
+    std::size_t stretch;
+    Joint joint;
+    Layout layout;
+    bool parallel;
+  };
+  const comm::Communicator world = comm::Communicator::world();
+  const std::shared_ptr<gpu::Device> device = gpu::Device::create(gpu::requestFromEnvironment(0));
+  VdiGenerator generator(device, comm::Communicator::world());
+  for (const Case& c : {Case{0, Joint::Cells, Layout::Random, false},
+                        Case{6, Joint::SharedPoints, Layout::Interleaved, true}}) {
+    const test::Stretch& stretch = test::stretches[c.stretch];
+    const test::OpticalScene scene =
+        test::opticalScene(stretch, c.joint, {3, 2, 2}, c.layout, world.rank(), world.size());
+    generator.setBlocks(scene.mine);
+    const Camera camera = test::lookingAt(c.parallel);
+    for (const test::NamedFunction& named : test::namedFunctions(stretch)) {
+      Image expected;
+      for (const double rate : {1.0, 8.0}) {
+        INFO(toString(stretch.type) << ", " << named.name << ", rate " << rate);
+        const GenerateSettings settings = test::opticalSettings(rate);
+        if (world.rank() == 0 && expected.rgba.empty())
+          expected =
+              reference::renderExactly(scene.whole, named.function, camera, settings.width, settings.height);
+        const test::Bound bound = test::boundOf(*device, rate, named.steep);
+        const auto volume = generator.renderVolume(camera, named.function, settings);
+        const auto vdi = generator.generate(camera, named.function, settings);
+        if (world.rank() != 0) continue;
+        test::checkPicture(*volume, expected, named, bound);
+        // Each rank's codes are rounded by themselves, and those of what they become once more.
+        test::checkPicture(flatten(*vdi), expected, named,
+                           {bound.largest + 1.0, bound.mean + 0.3, bound.pixels});
+      }
+    }
+  }
+}

@@ -1,0 +1,64 @@
+// Pictures of device, reference and VDIs against the optical model in double precision, with which they share
+// no table, no samples and no code. Errors that all of them have show here.
+#include <catch2/catch.hpp>
+
+#include "tests/Devices.h"
+#include "tests/pipeline/OpticalBounds.h"
+#include "vdi/comm/GhostExchange.h"
+#include "vdi/pipeline/Pipeline.h"
+#include "vdi/reference/Reference.h"
+
+using namespace vdi;
+using apps::Joint;
+using test::Bound;
+using test::checkPicture;
+using test::device;
+
+namespace {
+
+/// All that makes pictures.
+void checkAll(const test::Stretch& stretch, Joint joint, bool parallel, bool someOnly) {
+  const test::OpticalScene scene = test::opticalScene(stretch, joint);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(scene.mine);
+  const std::vector<Block> blocks = comm::exchangeGhosts(comm::Communicator::serial(), scene.mine);
+  const Camera camera = test::lookingAt(parallel);
+  std::size_t number = static_cast<std::size_t>(stretch.type);
+  for (const test::NamedFunction& named : test::namedFunctions(stretch)) {
+    if (someOnly && number++ % 4 != 0) continue;
+    const GenerateSettings size = test::opticalSettings(1.0);
+    const Image expected =
+        reference::renderExactly(scene.whole, named.function, camera, size.width, size.height);
+    REQUIRE(test::mostOpaque(expected) > 0.25F);
+    for (const double rate : {1.0, 8.0}) {
+      INFO(toString(stretch.type) << ", " << named.name << (joint == Joint::Cells ? ", cells" : "")
+                                  << (parallel ? ", parallel" : "") << ", rate " << rate);
+      const Bound bound = test::boundOf(*device(), rate, named.steep);
+      const GenerateSettings settings = test::opticalSettings(rate);
+      checkPicture(*generator.renderVolume(camera, named.function, settings), expected, named, bound);
+      // Codes carry what rounding changes to the next supersegment.
+      checkPicture(flatten(*generator.generate(camera, named.function, settings)), expected, named,
+                   {bound.largest + 0.5, bound.mean + 0.1, bound.pixels});
+      if (rate == 1.0 || !someOnly) {
+        const reference::Frame frame(generator.scene(), camera, named.function, settings);
+        checkPicture(reference::renderVolume(frame, blocks), expected, named, bound);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("optical model: floats of a negative range, each transfer function") {
+  checkAll(test::stretches[6], Joint::SharedPoints, false, false);
+}
+
+TEST_CASE("optical model: all types of scalars") {
+  for (const test::Stretch& stretch : test::stretches) checkAll(stretch, Joint::SharedPoints, false, true);
+}
+
+TEST_CASE("optical model: parallel projection, and data of cells") {
+  checkAll(test::stretches[0], Joint::SharedPoints, true, true);
+  checkAll(test::stretches[3], Joint::Cells, false, true);
+  checkAll(test::stretches[7], Joint::Cells, true, true);
+}
