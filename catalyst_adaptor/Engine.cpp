@@ -1,4 +1,3 @@
-// Written against ParaView 5.11: AddPipeline and ExecutePipelines have other signatures from 5.12 on.
 #include <vtkPython.h>  // before all others
 
 #include "catalyst_adaptor/Engine.h"
@@ -29,6 +28,7 @@
 #include "ScriptGuard.h"
 #include "catalyst_adaptor/Agreement.h"
 #include "plugin/VolumetricDepthImages/Filters/VDICollective.h"
+#include "plugin/VolumetricDepthImages/ParaViewVersions.h"
 
 namespace vdi::catalyst {
 
@@ -219,7 +219,7 @@ struct Engine::State {
 void Engine::State::start() {
   using Helper = vtkInSituInitializationHelper;
   if (!Helper::IsPythonSupported()) throw std::runtime_error("this ParaView was built without Python");
-  Helper::Initialize(static_cast<vtkTypeUInt64>(MPI_Comm_c2f(comm.get())));
+  pv::initializeInSitu<Helper>(static_cast<vtkTypeUInt64>(MPI_Comm_c2f(comm.get())));
   Log::silenceOtherOutput();
   auto* manager = vtkSMProxyManager::GetProxyManager();
   auto* proxies = manager != nullptr ? manager->GetActiveSessionProxyManager() : nullptr;

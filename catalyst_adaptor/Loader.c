@@ -41,12 +41,11 @@ static int load_engine(char message[MESSAGE_SIZE]) {
   const char* reason = engine == NULL ? dlerror() : NULL;
   fesetenv(&traps);
   if (engine != NULL) return 0;
-  snprintf(
-      message, MESSAGE_SIZE,
-      "the engine %s can't be loaded: %s; it needs ParaView 5.11 with Python on every node (Debian 12: "
-      "python3-paraview), its libraries on the loader's path (LD_LIBRARY_PATH), and libvdi_catalyst.so of "
-      "the same version of pv-vdi",
-      path, reason != NULL ? reason : "no reason is known");
+  snprintf(message, MESSAGE_SIZE,
+           "the engine %s can't be loaded: %s; it needs " VDI_PARAVIEW
+           " with Python on every node (Debian: python3-paraview), its libraries on the loader's path "
+           "(LD_LIBRARY_PATH), and libvdi_catalyst.so of the same version of pv-vdi",
+           path, reason != NULL ? reason : "no reason is known");
   return 1;
 }
 

@@ -1,8 +1,10 @@
 # IceT, which composites whole pictures of many ranks: ParaView's, or one that is installed by itself. Defines IceT_FOUND and
 # the target IceT::MPI. ParaView's own target for it asks for all of ParaView.
-find_path(IceT_INCLUDE_DIR IceTMPI.h PATH_SUFFIXES paraview-5.11/vtkicet/src/include)
-find_library(IceT_CORE_LIBRARY NAMES IceTCore vtkIceTCore-pv5.11)
-find_library(IceT_MPI_LIBRARY NAMES IceTMPI vtkIceTMPI-pv5.11)
+set(_icet_suffix "-pv${ParaView_VERSION_MAJOR}.${ParaView_VERSION_MINOR}") # of the ParaView that was found
+find_path(IceT_INCLUDE_DIR IceTMPI.h PATH_SUFFIXES "${VDI_PARAVIEW_NAME}/vtkicet/src/include")
+find_library(IceT_CORE_LIBRARY NAMES IceTCore "vtkIceTCore${_icet_suffix}")
+find_library(IceT_MPI_LIBRARY NAMES IceTMPI "vtkIceTMPI${_icet_suffix}")
+unset(_icet_suffix)
 mark_as_advanced(IceT_INCLUDE_DIR IceT_CORE_LIBRARY IceT_MPI_LIBRARY)
 
 include(FindPackageHandleStandardArgs)

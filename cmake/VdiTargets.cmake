@@ -51,7 +51,8 @@ function(vdi_add_catch_test name)
       ${CMAKE_COMMAND} -D "NAME=${name}" -D "PROGRAM=$<TARGET_FILE:test_${name}>" -D "RANKS=${arg_RANKS}" -D
       "SOME_RANKS=${arg_SOME_RANKS}" -D "LONG_RANKS=${arg_LONG_RANKS}" -D
       "LAUNCHER=${MPIEXEC_EXECUTABLE};--oversubscribe;${MPIEXEC_NUMPROC_FLAG}" -D "TIMEOUT=${arg_TIMEOUT}" -D
-      "LABELS=${arg_LABELS}" -D "ENVIRONMENT=${VDI_TEST_ENVIRONMENT};${arg_ENVIRONMENT}" -D "OUTPUT=${tests}" -P
+      "LABELS=${arg_LABELS}" -D "ENVIRONMENT=${VDI_TEST_ENVIRONMENT};${arg_ENVIRONMENT}" -D "LIST_OPTIONS=${VDI_CATCH_LIST}" -D
+      "NO_TESTS=${VDI_CATCH_NO_TESTS}" -D "OUTPUT=${tests}" -P
       "${CMAKE_SOURCE_DIR}/cmake/DiscoverTests.cmake"
     BYPRODUCTS "${tests}"
     VERBATIM)

@@ -1,9 +1,9 @@
 // Catch2's main for tests that run under mpirun: every rank runs every test case, in the same order. A rank
 // whose test failed makes the whole run fail.
-#define CATCH_CONFIG_RUNNER
 #include <mpi.h>
 
-#include <catch2/catch.hpp>
+#define CATCH_CONFIG_RUNNER
+#include "tests/Catch.h"
 
 int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);

@@ -1,12 +1,12 @@
 // Planes between boxes, against rays: what a ray meets, it must meet in the order that is told.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <limits>
 #include <random>
 #include <span>
 #include <vector>
 
 #include "apps/ConvexRegions.h"
+#include "tests/Catch.h"
 
 using namespace vdi;
 using apps::SeparatingPlanes;

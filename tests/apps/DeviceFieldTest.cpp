@@ -1,10 +1,10 @@
 // Fields made by a device against those of apps/Fields.h.
-#include <catch2/catch.hpp>
 #include <cstring>
 #include <set>
 
 #include "apps/DeviceField.h"
 #include "apps/Fields.h"
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Scene.h"
@@ -93,5 +93,5 @@ TEST_CASE("copies of a field are side by side and share memory") {
 }
 
 TEST_CASE("a field that isn't there is an error that lists those that are") {
-  CHECK_THROWS_WITH(DeviceField(device(), "cheese", 1), Catch::Contains("mixing"));
+  CHECK_THROWS_WITH(DeviceField(device(), "cheese", 1), vdi::test::ContainsSubstring("mixing"));
 }

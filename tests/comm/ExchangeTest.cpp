@@ -2,12 +2,12 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <catch2/catch.hpp>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <optional>
 
+#include "tests/Catch.h"
 #include "vdi/comm/ByteSum.h"
 #include "vdi/comm/Exchange.h"
 #include "vdi/comm/GlobalScene.h"

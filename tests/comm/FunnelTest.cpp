@@ -1,9 +1,9 @@
 // Communication in a thread that may not call MPI: every rank runs every line.
+#include "tests/Catch.h"
 #include "vdi/comm/Funnel.h"
 
 #include <array>
 #include <atomic>
-#include <catch2/catch.hpp>
 #include <chrono>
 #include <cstring>
 #include <exception>

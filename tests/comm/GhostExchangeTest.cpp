@@ -1,8 +1,8 @@
 // Ghost layers: what lies between blocks that share nothing, wherever the neighbours are.
-#include <catch2/catch.hpp>
 #include <span>
 
 #include "apps/Decomposition.h"
+#include "tests/Catch.h"
 #include "vdi/comm/GhostExchange.h"
 
 using namespace vdi;

@@ -1,10 +1,10 @@
 // Who owns which lists: no communication, any number of ranks.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <numeric>
 #include <random>
 #include <vector>
 
+#include "tests/Catch.h"
 #include "vdi/comm/Ownership.h"
 
 using vdi::comm::ListRange;

@@ -5,10 +5,10 @@
 //   peak_signal_noise_ratio(a, b, data_range=255)
 // and NumPy's mean and max of the absolute differences. The picture smaller than the window has no Gaussian
 // weights there but win_size=7, its own size.
+#include "tests/Catch.h"
 #include "vdi/core/ImageMetrics.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <vector>
 

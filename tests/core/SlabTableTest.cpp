@@ -1,6 +1,5 @@
+#include "tests/Catch.h"
 #include "vdi/core/SlabTable.h"
-
-#include <catch2/catch.hpp>
 
 using namespace vdi;
 

@@ -7,11 +7,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <catch2/catch.hpp>
 #include <csignal>
 #include <optional>
 #include <thread>
 
+#include "tests/Catch.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/Files.h"
 

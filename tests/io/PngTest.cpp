@@ -1,10 +1,10 @@
 // PNG files, and pictures from images.
 #include <png.h>
 
-#include <catch2/catch.hpp>
 #include <cstring>
 #include <limits>
 
+#include "tests/Catch.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/Png.h"

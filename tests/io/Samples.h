@@ -5,7 +5,6 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <csignal>
 #include <cstdint>
@@ -13,6 +12,7 @@
 #include <functional>
 #include <string>
 
+#include "tests/Catch.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/reference/Compaction.h"

@@ -6,9 +6,9 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include <catch2/catch.hpp>
 #include <cstring>
 
+#include "tests/Catch.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/ListCodec.h"
 #include "vdi/io/VdiFile.h"

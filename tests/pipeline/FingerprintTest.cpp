@@ -1,9 +1,9 @@
 // What ranks compare: equal for equal parameters; where one differs, that one is named.
-#include <catch2/catch.hpp>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "tests/Catch.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/TransferFunction.h"

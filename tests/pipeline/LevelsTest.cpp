@@ -1,10 +1,10 @@
 // Levels of blocks on any number of ranks against one uniform lattice of points.
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
 #include <functional>
 #include <optional>
 
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "tests/pipeline/PictureDifference.h"
@@ -194,7 +194,8 @@ TEST_CASE("blocks of one level that overlap between ranks: refused on all, and t
     FAIL("nothing was thrown");
   } catch (const Error& error) {
     CHECK(error.code() == ErrorCode::InvalidArgument);
-    CHECK_THAT(error.what(), Catch::Contains("block 0 of rank 0") && Catch::Contains("overlap"));
+    CHECK_THAT(error.what(),
+               vdi::test::ContainsSubstring("block 0 of rank 0") && vdi::test::ContainsSubstring("overlap"));
   }
   CHECK_NOTHROW(many.setBlocks(decomposed({block}, world), fill));
 }

@@ -1,10 +1,10 @@
 // Leaves of an octree, cells without ghost layers on any number of ranks, against the same field as points.
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
 #include <functional>
 #include <random>
 
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "tests/pipeline/PictureDifference.h"

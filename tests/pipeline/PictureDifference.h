@@ -2,9 +2,9 @@
 #pragma once
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 
+#include "tests/Catch.h"
 #include "vdi/core/Image.h"
 
 namespace vdi::test {

@@ -1,12 +1,12 @@
 // Each device pass against the reference, and a VDI against DVR.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <iterator>
 #include <optional>
 
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "tests/pipeline/HostLists.h"

@@ -1,8 +1,8 @@
 // Bad and strange input: a clear error or a right picture.
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 
+#include "tests/Catch.h"
 #include "tests/Scenes.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/Pipeline.h"
@@ -319,7 +319,7 @@ TEST_CASE("what single precision would lose: a right picture or an error") {
     try {
       generator.setBlocks({block});
     } catch (const Error& error) {
-      CHECK_THAT(error.what(), Catch::Contains(word));
+      CHECK_THAT(error.what(), vdi::test::ContainsSubstring(word));
       return error.code() == ErrorCode::InvalidArgument;
     }
     return false;

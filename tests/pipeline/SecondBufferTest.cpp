@@ -1,10 +1,10 @@
 // VdiRenderer's double buffering, and VDIs with fewer lists.
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
 #include <future>
 #include <vector>
 
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "vdi/core/Error.h"

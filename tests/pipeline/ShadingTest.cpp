@@ -2,7 +2,6 @@
 // with them: no table, no lattice of samples, no helper.
 #include <algorithm>
 #include <array>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <cstddef>
 #include <functional>
@@ -11,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "vdi/comm/GhostExchange.h"
@@ -308,7 +308,7 @@ TEST_CASE("shading: what is out of range is refused by name") {
   const auto refused = [](const Shading& shading, const std::string& what) {
     GenerateSettings settings;
     settings.shading = shading;
-    CHECK_THROWS_WITH(validate(settings), Catch::Contains(what));
+    CHECK_THROWS_WITH(validate(settings), vdi::test::ContainsSubstring(what));
   };
   refused({.on = true, .ambient = -0.1}, "ambient");
   refused({.on = true, .diffuse = 1.5}, "diffuse");

@@ -1,11 +1,11 @@
 // Time steps: the next one's blocks get to the device while this one is shown.
 #include <array>
-#include <catch2/catch.hpp>
 #include <cstring>
 #include <limits>
 #include <optional>
 #include <variant>
 
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "vdi/core/Error.h"

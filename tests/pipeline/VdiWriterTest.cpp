@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <catch2/catch.hpp>
 #include <optional>
 #include <string>
 #include <thread>
 #include <type_traits>
 #include <vector>
 
+#include "tests/Catch.h"
 #include "tests/comm/SharedFolder.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/Files.h"

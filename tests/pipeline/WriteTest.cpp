@@ -1,11 +1,11 @@
 // A frame whose lists go into a file from where they are is the frame that's gathered.
 #include <algorithm>
 #include <array>
-#include <catch2/catch.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "tests/comm/SharedFolder.h"

@@ -1,7 +1,7 @@
 // Supersegments in codes: how far they may be from the floats that they stand for.
+#include "tests/Catch.h"
 #include "vdi/reference/Compaction.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
 

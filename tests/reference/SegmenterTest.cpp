@@ -1,7 +1,7 @@
 // How intervals become supersegments, on lists small enough to be followed by hand.
+#include "tests/Catch.h"
 #include "vdi/reference/Segmenter.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
 

@@ -20,7 +20,6 @@
 #include <vtkRenderer.h>
 #include <vtkShaderProgram.h>
 #include <vtkTextureObject.h>
-#include <vtk_glew.h>
 
 #include <algorithm>
 #include <array>
@@ -39,11 +38,14 @@
 #include "VDISession.h"
 #include "VDIStill.h"
 #include "VDIView.h"
+#include "plugin/VolumetricDepthImages/ParaViewVersions.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Viewpoint.h"
 #include "vdi/pipeline/Pipeline.h"
+
+#include VDI_VTK_OPENGL
 
 vtkStandardNewMacro(vtkVDIProp);
 

@@ -1,0 +1,48 @@
+# Finds ParaView, 5.11 to 6.x, and holds what differs between its versions. The C++ half is
+# plugin/VolumetricDepthImages/ParaViewVersions.h. Defines, beside ParaView's own variables:
+#   VDI_PARAVIEW_NAME  the folder's name that its libraries and headers have, for example paraview-5.11
+#   VDI_QT             the Qt that ParaView's window was built with: Qt5 or Qt6
+#   VDI_GL_LOADER      the VTK target through which OpenGL is called
+
+# vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): Debian 13's paraview-dev names vtkmodules/X.so where
+# python3-paraview has X.cpython-313-x86_64-linux-gnu.so. CMake checks that every exported file is there, although nothing here
+# links to these modules, and refuses the package. It makes no such check of a target that it knows as an Apple XCFramework,
+# which this says of each module that is there under its longer name; a module that isn't there at all is still refused.
+function(vdi_pass_over_python_modules folder)
+  file(GLOB lists "${folder}/vtk/VTKPython-targets-*.cmake" "${folder}/ParaViewPython*-targets-*.cmake")
+  foreach(list IN LISTS lists)
+    file(STRINGS "${list}" checks REGEX "_cmake_import_check_files_for_")
+    foreach(check IN LISTS checks)
+      string(REGEX MATCH "_cmake_import_check_files_for_([^ ]+) +\"\\\${_IMPORT_PREFIX}/([^\"]+)[.]so\"" matched "${check}")
+      set(target "${CMAKE_MATCH_1}")
+      set(module "${CMAKE_MATCH_2}")
+      string(REGEX REPLACE "/lib/.*" "" prefix "${folder}")
+      file(GLOB longer "${prefix}/${module}.cpython-*.so")
+      if(matched AND longer AND NOT EXISTS "${prefix}/${module}.so")
+        set("_cmake_import_check_xcframework_for_${target}" "${folder}" PARENT_SCOPE)
+      endif()
+    endforeach()
+  endforeach()
+endfunction()
+
+# A version that nobody has: this looks where ParaView is and reads nothing but its version.
+find_package(ParaView 1000 QUIET CONFIG)
+foreach(config IN LISTS ParaView_CONSIDERED_CONFIGS)
+  get_filename_component(folder "${config}" DIRECTORY)
+  vdi_pass_over_python_modules("${folder}")
+endforeach()
+
+find_package(ParaView REQUIRED CONFIG)
+if(ParaView_VERSION VERSION_LESS 5.11)
+  message(FATAL_ERROR "pv-vdi needs ParaView 5.11 or later; this is ${ParaView_VERSION}, in ${ParaView_DIR}")
+endif()
+
+set(VDI_PARAVIEW_NAME "paraview-${ParaView_VERSION_MAJOR}.${ParaView_VERSION_MINOR}")
+set(VDI_QT "Qt5")
+if(PARAVIEW_QT_MAJOR_VERSION)
+  set(VDI_QT "Qt${PARAVIEW_QT_MAJOR_VERSION}")
+endif()
+set(VDI_GL_LOADER VTK::glew)
+if(TARGET VTK::glad)
+  set(VDI_GL_LOADER VTK::glad)
+endif()
