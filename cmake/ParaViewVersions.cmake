@@ -2,6 +2,7 @@
 # plugin/VolumetricDepthImages/ParaViewVersions.h. Defines, beside ParaView's own variables:
 #   VDI_PARAVIEW_NAME  the folder's name that its libraries and headers have, for example paraview-5.11
 #   VDI_QT             the Qt that ParaView's window was built with: Qt5 or Qt6
+#   VDI_PLUGIN_HELP    whether this ParaView makes the help of a plugin's panel
 #   VDI_GL_LOADER      the VTK target through which OpenGL is called
 
 # vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): Debian 13's paraview-dev names vtkmodules/X.so where
@@ -41,6 +42,10 @@ set(VDI_PARAVIEW_NAME "paraview-${ParaView_VERSION_MAJOR}.${ParaView_VERSION_MIN
 set(VDI_QT "Qt5")
 if(PARAVIEW_QT_MAJOR_VERSION)
   set(VDI_QT "Qt${PARAVIEW_QT_MAJOR_VERSION}")
+endif()
+set(VDI_PLUGIN_HELP ON)
+if(VDI_QT STREQUAL "Qt6" AND ParaView_VERSION VERSION_LESS 6)
+  set(VDI_PLUGIN_HELP OFF)
 endif()
 set(VDI_GL_LOADER VTK::glew)
 if(TARGET VTK::glad)
