@@ -280,6 +280,34 @@ void addShadingOptions(CLI::App& command, QualityOptions& options) {
       ->group(qualityGroup);
 }
 
+void addRegionOptions(CLI::App& command, QualityOptions& options) {
+  command
+      .add_option("--crop", options.crop,
+                  "shows only what's in a box, in world coordinates: lowest and highest x, y and z")
+      ->expected(6)
+      ->type_name("X")
+      ->group(qualityGroup);
+  command
+      .add_option("--clip", options.clip,
+                  "shows only the side of a plane to which its normal points: a point and the normal; up to "
+                  "six planes")
+      ->type_size(6)
+      ->expected(1, static_cast<int>(maxClipPlanes))
+      ->type_name("X Y Z NX NY NZ")
+      ->group(qualityGroup);
+}
+
+Region makeRegion(const QualityOptions& options) {
+  Region region;
+  const std::vector<double>& b = options.crop;
+  if (!b.empty()) region.box = {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
+  for (std::size_t i = 0; i + 6 <= options.clip.size(); i += 6) {
+    const double* p = options.clip.data() + i;
+    region.planes.push_back({{p[0], p[1], p[2]}, {p[3], p[4], p[5]}});
+  }
+  return region;
+}
+
 Shading makeShading(const QualityOptions& options) {
   Shading shading;
   shading.on = options.shade;
@@ -346,6 +374,7 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
       ->capture_default_str()
       ->group(qualityGroup);
   addShadingOptions(command, options);
+  addRegionOptions(command, options);
   command.add_option("--sampling-rate", options.samplesPerVoxel, "samples per voxel, 1/64 to 64")
       ->capture_default_str()
       ->group(qualityGroup);
@@ -389,6 +418,7 @@ GenerateSettings makeSettings(const QualityOptions& options) {
   settings.precision = precisionFromString(options.precision);
   settings.terminationOpacity = options.terminationOpacity;
   settings.shading = makeShading(options);
+  settings.region = makeRegion(options);
   validate(settings);
   return settings;
 }

@@ -80,6 +80,8 @@ struct QualityOptions {
   double ambient = Shading().ambient;
   double diffuse = Shading().diffuse;
   std::string lights = "kit";
+  std::vector<double> crop;                     // 6, or none
+  std::vector<double> clip;                     // 6 for each plane
   std::string transferFunction = "three-hues";  // a preset or a file
   std::optional<double> unitDistance;
 };

@@ -6,7 +6,7 @@ vec3 rayStart;
 vec3 rayDirection;
 float rayLengthOfDepth;  // world length of a unit of depth
 float rayOpticalDepth;   // so far
-uvec2 rayScene;          // samples [x, y) lie in the scene's bounds
+uvec2 rayScene;          // samples [x, y) are shown: they lie in the scene's bounds, or in a region of it
 float rayEnter;          // depth where the ray enters these, and leaves them
 float rayLeave;
 float rayBegin;  // the same as places
@@ -14,6 +14,7 @@ float rayEnd;
 float rayMiddle;  // how far behind a sample's begin it is decided whose it is: 0.5, but for rays that graze the scene
 
 #include "slab.glsl"
+#include "region.glsl"
 
 void setUpRay(uint x, uint y) {
   float u = float(x) + 0.5 - 0.5 * float(params.width);
@@ -61,9 +62,10 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
   return uvec2(first, last);
 }
 
-// The scene's bounds seldom lie half-way between two samples. The outermost samples stand for what's really there: the first
-// one's interval starts where the ray enters, the last one's ends where it leaves. That follows from the ray and the scene
-// alone, so it's the same on every rank; without it the faces of a filled box show the sample lattice as stripes.
+// The bounds of what is shown, the scene's or those of a region in it, seldom lie half-way between two samples. The outermost
+// samples stand for what's really there: the first one's interval starts where the ray enters, the last one's ends where it
+// leaves. That follows from the ray, the scene and the region alone, so it's the same on every rank; without it the faces of a
+// filled box show the sample lattice as stripes.
 // Where a ray leaves the bounds before it has come to the middle of any sample, what's between is one sample, and the middle of
 // that says whose it is. Without it the edges of a filled box are jagged.
 void setUpScene() {
@@ -77,6 +79,12 @@ void setUpScene() {
   vec3 leaves = mix(max(a, b), vec3(far), across);
   float enter = max(max(enters.x, enters.y), max(enters.z, 0.0));
   float leave = min(min(leaves.x, leaves.y), min(leaves.z, far));
+  if (params.clipPlaneCount > 0u) {
+    vec2 part = clipped(vec2(enter, leave));
+    enter = part.x;
+    leave = part.y;
+    rayScene = clippedSamples(rayScene, part);
+  }
   bool grazes = rayScene.x >= rayScene.y && enter < leave;
   if (grazes) {
     precise float middle = 0.5 * (enter + leave) / params.step;
@@ -218,6 +226,7 @@ const uint shortGap = 32u;  // samples
 bool castBrick(uint index) {
   Brick brick = params.bricks.at[index];
   uvec2 range = samplesIn(brick.lo, brick.hi);
+  range = uvec2(max(range.x, rayScene.x), min(range.y, rayScene.y));
   if (lanesPerRay > 1u) return castLanes(brick, range.x, range.y);
   vec3 cellsPerSample = rayDirection * params.step * brick.texelScale * brick.cellScale;
   uint k = range.x;

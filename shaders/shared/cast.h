@@ -23,6 +23,7 @@ VDI_CONST uint castProgramWritePreSegments = 3;
 VDI_CONST uint castProgramHistogram = 4;    // for the total budget: what lists need
 VDI_CONST uint castProgramCountLevels = 5;  // by merging, with other ranks: counts at all tolerances (quota.h)
 VDI_CONST uint castMaxLights = 8;
+VDI_CONST uint castMaxClipPlanes = 6;
 // Differences between two values that are smaller than this share of them are taken for rounding (core/Shading.h).
 VDI_CONST float leastGradient = 1.0e-6f;
 VDI_CONST uint castModeSearch = 0;          // sensitivities and counts
@@ -59,7 +60,7 @@ struct CastParams {
   float coordinateError;  // bound on the rounding error of a position
   vec3 directionUp;
   uint sampleCount;
-  vec3 sceneLo;  // bounds of all ranks' blocks, snapped as the bricks are
+  vec3 sceneLo;  // bounds of what is shown of all ranks' blocks, snapped as the bricks are
   vec3 sceneHi;
   uint budget;
   uint width;
@@ -90,6 +91,8 @@ struct CastParams {
   vec3 lightColors[castMaxLights];
   uint lightCount;
   float ambient;
+  vec4 clipPlanes[castMaxClipPlanes];  // what is shown has dot(xyz, position) >= w
+  uint clipPlaneCount;
   uint shaded;  // 1: they are; a constant of the program
 };
 

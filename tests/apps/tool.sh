@@ -71,6 +71,11 @@ refused 2 "merge" "$vdi" generate --field sphere "${small[@]}" --budget total --
 refused 2 "fill" "$vdi" generate --field sphere "${small[@]}" --fill 0.5 -o x.vdi
 refused 2 "budget" "$vdi" generate --field sphere "${small[@]}" --budget each -o x.vdi
 refused 2 "precision" "$vdi" generate --field sphere "${small[@]}" --precision double -o x.vdi
+works "a lit part of a volume" "$vdi" generate --field mixing "${small[@]}" --shade --lights headlight --crop 0 0.7 0 1 0.1 1 \
+  --clip 0.5 0.5 0.5 -1 0 0 --clip 0 0.1 0 0 1 0 -o lit.vdi
+refused 2 "diffuse" "$vdi" generate --field sphere "${small[@]}" --shade --diffuse 2 -o x.vdi
+refused 2 "cropping box" "$vdi" generate --field sphere "${small[@]}" --crop 1 0 0 1 0 1 -o x.vdi
+refused 2 "normal" "$vdi" generate --field sphere "${small[@]}" --clip 0 0 0 0 0 0 -o x.vdi
 refused 2 "termination" "$vdi" generate --field sphere "${small[@]}" --termination-opacity 0 -o x.vdi
 # Lists beyond the picture's edges: the picture stays, and what turning brings into view is there.
 near=(--field turbulence "${small[@]}" --zoom 4)

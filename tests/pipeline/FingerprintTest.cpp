@@ -60,7 +60,12 @@ TEST_CASE("fingerprints name the parameter that differs") {
       {"shade", [](Parameters& p) { p.settings.shading.on = true; }},
       {"ambient", [](Parameters& p) { p.settings.shading.ambient = 0.5; }},
       {"diffuse", [](Parameters& p) { p.settings.shading.diffuse = 0.5; }},
-      {"lights", [](Parameters& p) { p.settings.shading.lights[2].color.g = 0.5; }}};
+      {"lights", [](Parameters& p) { p.settings.shading.lights[2].color.g = 0.5; }},
+      {"cropping box",
+       [](Parameters& p) {
+         p.settings.region.box = Box{glm::dvec3(0.0), glm::dvec3(1.0)};
+       }},
+      {"clipping planes", [](Parameters& p) { p.settings.region.planes.push_back({}); }}};
   const Parameters given;
   CHECK(different(given, Parameters(given)).empty());
   CHECK(changes.size() == detail::fingerprintsOf(given.camera, given.function, given.settings).size());

@@ -53,6 +53,7 @@ void validate(const GenerateSettings& settings) {
   require(settings.terminationOpacity > 0.0 && settings.terminationOpacity <= 1.0, "termination opacity",
           settings.terminationOpacity, "(0, 1]");
   validate(settings.shading);
+  validate(settings.region);
 }
 
 float terminationOpticalDepth(const GenerateSettings& settings) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "vdi/core/Budget.h"
+#include "vdi/core/Region.h"
 #include "vdi/core/Shading.h"
 #include "vdi/core/Supersegment.h"
 
@@ -44,6 +45,7 @@ struct GenerateSettings {
   /// pictureTermination.
   double terminationOpacity = 1.0;
   Shading shading{};  // off by default
+  Region region{};    // all by default
   bool operator==(const GenerateSettings&) const = default;
 };
 

@@ -2,6 +2,8 @@
 
 #include <xxhash.h>
 
+#include <array>
+#include <optional>
 #include <span>
 #include <type_traits>
 
@@ -45,6 +47,21 @@ std::uint64_t hashOf(const std::vector<Light>& lights) {
   return hashOf(std::span<const double>(values));
 }
 
+std::uint64_t hashOf(const std::optional<Box>& box) {
+  if (!box) return 0;
+  const std::array values{box->lo.x, box->lo.y, box->lo.z, box->hi.x, box->hi.y, box->hi.z};
+  return hashOf(std::span<const double>(values));
+}
+
+std::uint64_t hashOf(const std::vector<ClipPlane>& planes) {
+  std::vector<double> values;
+  for (const ClipPlane& plane : planes) {
+    values.insert(values.end(), {plane.origin.x, plane.origin.y, plane.origin.z, plane.normal.x,
+                                 plane.normal.y, plane.normal.z});
+  }
+  return hashOf(std::span<const double>(values));
+}
+
 std::uint64_t hashOf(const std::vector<OpacityNode>& nodes) {
   std::vector<double> values;
   for (const OpacityNode& node : nodes) values.insert(values.end(), {node.x, node.opacity});
@@ -78,7 +95,9 @@ std::vector<comm::Communicator::Fingerprint> fingerprintsOf(const Camera& camera
           {hashOf(settings.shading.on), "shade"},
           {hashOf(settings.shading.ambient), "ambient"},
           {hashOf(settings.shading.diffuse), "diffuse"},
-          {hashOf(settings.shading.lights), "lights"}};
+          {hashOf(settings.shading.lights), "lights"},
+          {hashOf(settings.region.box), "cropping box"},
+          {hashOf(settings.region.planes), "clipping planes"}};
 }
 
 }  // namespace vdi::detail

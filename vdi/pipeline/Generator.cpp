@@ -219,7 +219,9 @@ struct VdiGenerator::State {
     vdi.height = prepared.view.height();
     vdi.margin = (glm::ivec2(vdi.width, vdi.height) - glm::ivec2(settings.width, settings.height)) / 2;
     vdi.budget = maxPerList(settings.supersegments, settings.budget);
-    vdi.bounds = steps->scene().bounds;
+    // Where nothing is shown, the scene's bounds are still those of something.
+    const Box shown = boundsIn(settings.region, steps->scene().bounds);
+    vdi.bounds = shown.empty() ? steps->scene().bounds : shown;
     vdi.sampleStep = prepared.lattice.step;
     if (settings.precision == Precision::Compact) vdi.depthCode = depthCodeFor(prepared.lattice);
     return vdi;

@@ -32,6 +32,21 @@ void setLights(shared::CastParams& params, const Shading& shading, const View& v
   }
 }
 
+void setRegion(shared::CastParams& params, const Region& region, const Scene& scene) {
+  static_assert(maxClipPlanes == shared::castMaxClipPlanes);
+  const Box shown = boundsIn(region, scene.bounds);
+  for (int axis = 0; axis < 3; ++axis) {
+    params.sceneLo[axis] = snapToScene(scene, shown.lo[axis], axis);
+    params.sceneHi[axis] = snapToScene(scene, shown.hi[axis], axis);
+  }
+  params.clipPlaneCount = static_cast<std::uint32_t>(region.planes.size());
+  for (std::size_t i = 0; i < region.planes.size(); ++i) {
+    const ClipPlane& plane = region.planes[i];
+    const glm::dvec3 normal = glm::normalize(plane.normal);
+    params.clipPlanes[i] = glm::dvec4(normal, glm::dot(normal, plane.origin - scene.bounds.center()));
+  }
+}
+
 }  // namespace
 
 shared::CastParams RayCaster::prepare(const Request& request) {
@@ -47,6 +62,7 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.squarePerPosition = static_cast<float>(shared::slabStripStep) / params.lastPosition;
   params.stripRows = static_cast<float>(slabs.stripRows());
   params.slabsPerDepth = static_cast<float>(1.0 / (request.table.unitDistance * slabs.length));
+  setRegion(params, request.settings.region, request.scene);
   setLights(params, request.settings.shading, request.view);
   params.cells = volume_.cells();
   params.nodeCount = volume_.nodeCount();

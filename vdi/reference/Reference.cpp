@@ -6,6 +6,7 @@
 
 #include "vdi/core/Margin.h"
 #include "vdi/reference/Accumulator.h"
+#include "vdi/reference/Region.h"
 #include "vdi/reference/Shading.h"
 
 namespace vdi::reference {
@@ -77,10 +78,22 @@ SampleRange samplesIn(const OwnedBox& box, const SceneRay& ray, std::uint32_t co
   return range;
 }
 
-/// The scene's bounds seldom lie half-way between two samples: the first sample's interval starts where the
-/// ray enters them, the last one's ends where it leaves. Where a ray leaves them before it has come to the
-/// middle of any sample, what's between is one sample, and the middle of that says whose it is. Depends on
-/// ray and scene alone, so it's the same on every rank.
+/// Those whose middle lies in the part.
+SampleRange clippedSamples(const SampleRange& samples, const RayPart& part, float step, std::uint32_t count) {
+  const auto firstBehind = [&](float depth) {
+    const float place = std::ceil(depth / step - 0.5F);
+    return static_cast<std::uint32_t>(std::clamp(place, 0.0F, static_cast<float>(count)));
+  };
+  const SampleRange inside{std::max(samples.first, firstBehind(part.enter)),
+                           std::min(samples.last, firstBehind(part.leave))};
+  return inside.first < inside.last ? inside : SampleRange{};
+}
+
+/// The bounds of what is shown, the scene's or those of a region in it, seldom lie half-way between two
+/// samples: the first sample's interval starts where the ray enters them, the last one's ends where it
+/// leaves. Where a ray leaves them before it has come to the middle of any sample, what's between is one
+/// sample, and the middle of that says whose it is. Depends on ray and scene alone, so it's the same on every
+/// rank.
 struct SceneStretch {
   SampleRange samples;
   float enter = 0.0F;  // depth
@@ -89,10 +102,12 @@ struct SceneStretch {
 
 /// Moves the middles of the ray's samples where it grazes the bounds.
 SceneStretch sceneStretch(const Frame& frame, SceneRay& ray) {
+  const Region& region = frame.settings.region;
+  const Box shown = boundsIn(region, frame.scene.bounds);
   OwnedBox box;
   for (int axis = 0; axis < 3; ++axis) {
-    box.lo[axis] = snapToScene(frame.scene, frame.scene.bounds.lo[axis], axis);
-    box.hi[axis] = snapToScene(frame.scene, frame.scene.bounds.hi[axis], axis);
+    box.lo[axis] = snapToScene(frame.scene, shown.lo[axis], axis);
+    box.hi[axis] = snapToScene(frame.scene, shown.hi[axis], axis);
   }
   float enter = 0.0F;
   float leave = static_cast<float>(frame.lattice.count) * ray.step;
@@ -105,6 +120,13 @@ SceneStretch sceneStretch(const Frame& frame, SceneRay& ray) {
   }
   SceneStretch stretch;
   stretch.samples = samplesIn(box, ray, frame.lattice.count);
+  if (!region.planes.empty()) {
+    const RayPart part =
+        clipped(region.planes, frame.scene.bounds.center(), ray.start, ray.direction, {enter, leave});
+    enter = part.enter;
+    leave = part.leave;
+    stretch.samples = clippedSamples(stretch.samples, part, ray.step, frame.lattice.count);
+  }
   const bool grazes = stretch.samples.first >= stretch.samples.last && enter < leave;
   if (grazes) {
     const float middle = 0.5F * (enter + leave) / ray.step;
@@ -146,7 +168,8 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
   std::vector<Piece> pieces;
   for (const Block& block : blocks) {
     if (block.owned.empty()) continue;
-    const SampleRange range = samplesIn(ownedBox(frame.scene, block), ray, frame.lattice.count);
+    SampleRange range = samplesIn(ownedBox(frame.scene, block), ray, frame.lattice.count);
+    range = {std::max(range.first, scene.samples.first), std::min(range.last, scene.samples.last)};
     if (range.first < range.last) pieces.push_back({range, &block});
   }
   std::sort(pieces.begin(), pieces.end(),

@@ -32,8 +32,8 @@
 #include <limits>
 #include <vector>
 
-#include "VDILights.h"
 #include "VDISession.h"
+#include "VDIVolumeDisplay.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
@@ -225,6 +225,8 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
       shown->GetProperty("ScalarOpacityUnitDistance") != nullptr)
     unit.Set(vtkSMPropertyHelper(shown, "ScalarOpacityUnitDistance").GetAsDouble());
   pv::takeShading(this, shown, view);
+  pv::takeCropping(this, shown, this->InputBounds());
+  if (const std::string issue = pv::blendModeIssue(shown); !issue.empty()) vtkWarningMacro(<< issue);
   if (placed && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
                     vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray())
     SetCamera(this, view);

@@ -119,6 +119,9 @@ void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
      << indent << "Ambient: " << this->Ambient << "\n"
      << indent << "Diffuse: " << this->Diffuse << "\n"
      << indent << "Lights: " << this->Lights.size() << "\n"
+     << indent << "Cropping: " << this->Cropping << "\n"
+     << indent << "CroppingBox: " << fmt::format("{}", fmt::join(this->CroppingBox, " ")) << "\n"
+     << indent << "ClippingPlanes: " << this->ClippingPlanes.size() << "\n"
      << indent << "ScalarOpacityUnitDistance: " << this->ScalarOpacityUnitDistance << "\n";
 }
 
@@ -143,6 +146,27 @@ void vtkVDIGenerator::RemoveAllLights() {
   if (this->Lights.empty()) return;
   this->Lights.clear();
   this->Modified();
+}
+
+void vtkVDIGenerator::AddClippingPlane(double originX, double originY, double originZ, double normalX,
+                                       double normalY, double normalZ) {
+  this->ClippingPlanes.push_back({originX, originY, originZ, normalX, normalY, normalZ});
+  this->Modified();
+}
+
+void vtkVDIGenerator::RemoveAllClippingPlanes() {
+  if (this->ClippingPlanes.empty()) return;
+  this->ClippingPlanes.clear();
+  this->Modified();
+}
+
+vdi::Region vtkVDIGenerator::CurrentRegion() const {
+  vdi::Region region;
+  const double* b = this->CroppingBox;
+  if (this->Cropping) region.box = {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
+  for (const std::array<double, 6>& plane : this->ClippingPlanes)
+    region.planes.push_back({{plane[0], plane[1], plane[2]}, {plane[3], plane[4], plane[5]}});
+  return region;
 }
 
 vdi::Shading vtkVDIGenerator::CurrentShading() const {
@@ -499,6 +523,7 @@ vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame() {
   settings.fill = this->Fill;
   settings.precision = static_cast<vdi::Precision>(this->Precision);
   settings.shading = this->CurrentShading();
+  settings.region = this->CurrentRegion();
   settings.terminationOpacity = this->PictureOnly
                                     ? std::min(this->TerminationOpacity, vdi::pictureTermination)
                                     : this->TerminationOpacity;

@@ -25,6 +25,7 @@ namespace vdi {
 class Error;
 struct Box;
 struct Camera;
+struct Region;
 struct ScalarRange;
 struct Shading;
 }  // namespace vdi
@@ -94,6 +95,19 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   /// Its direction in the camera's axes and its colour: vdi::Light.
   void AddLight(double right, double up, double back, double red, double green, double blue);
   void RemoveAllLights();
+  ///@}
+  ///@{
+  /**
+   * What is shown of the volume: vdi::Region. With Cropping (default off) what is in the box, in world
+   * coordinates, lowest and highest x, y and z. And the sides of the planes to which their normals point.
+   */
+  vtkSetMacro(Cropping, bool);
+  vtkGetMacro(Cropping, bool);
+  vtkSetVector6Macro(CroppingBox, double);
+  vtkGetVector6Macro(CroppingBox, double);
+  void AddClippingPlane(double originX, double originY, double originZ, double normalX, double normalY,
+                        double normalZ);
+  void RemoveAllClippingPlanes();
   ///@}
   /// How samples become supersegments, an enumerator of vdi::Algorithm: 1 merge, 0 bisection.
   vtkSetClampMacro(Algorithm, int, 0, 1);
@@ -173,6 +187,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
   Frame CurrentFrame();
   vdi::Shading CurrentShading() const;
+  vdi::Region CurrentRegion() const;
   vtkMTimeType CurrentMTime();
   Origin OriginOf(vtkDataObject* input, std::optional<double> time);
   bool GivesUpPreparation();
@@ -203,6 +218,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   double Ambient = 0.0;
   double Diffuse = 1.0;
   std::vector<std::array<double, 6>> Lights;
+  bool Cropping = false;
+  double CroppingBox[6] = {0.0, 1.0, 0.0, 1.0, 0.0, 1.0};
+  std::vector<std::array<double, 6>> ClippingPlanes;
   bool FillGhosts = true;
   bool PictureOnly = false;
   int TimeStep = 0;

@@ -1,7 +1,12 @@
-// Shading as ParaView shows it: what a view's lights and a volume's display properties say.
-#ifndef VDILights_h
-#define VDILights_h
+// What ParaView's display properties of a volume, and the lights of a view, mean for VolumetricDepthImage.
+#ifndef VDIVolumeDisplay_h
+#define VDIVolumeDisplay_h
 
+#include <string>
+
+namespace vdi {
+struct Box;
+}
 class vtkSMProxy;
 class vtkSMRenderViewProxy;
 
@@ -13,6 +18,12 @@ void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* vi
 
 /// Sets Lights of `filter` to the view's, unless these are the default ones and nothing is set.
 void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view);
+
+/// Sets Cropping and CroppingBox where `shown` is shown as a cropped volume of those bounds.
+void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& bounds);
+
+/// What to tell a user whose volume is shown in a way that no VDI can hold; empty where it isn't.
+std::string blendModeIssue(vtkSMProxy* shown);
 
 }  // namespace pv
 

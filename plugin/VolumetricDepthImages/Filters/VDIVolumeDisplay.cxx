@@ -1,4 +1,4 @@
-#include "VDILights.h"
+#include "VDIVolumeDisplay.h"
 
 #include <vtkCamera.h>
 #include <vtkCollection.h>
@@ -10,9 +10,11 @@
 #include <vtkSMRenderViewProxy.h>
 
 #include <algorithm>
-#include <cstring>
+#include <array>
+#include <string>
 #include <vector>
 
+#include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Shading.h"
 
@@ -22,6 +24,18 @@ namespace {
 
 glm::dvec3 vectorOf(const double* v) {
   return {v[0], v[1], v[2]};
+}
+
+/// Whether the representation shows volumes just now, and can say how.
+bool isVolume(vtkSMProxy* shown) {
+  if (shown == nullptr || shown->GetProperty("Representation") == nullptr) return false;
+  const char* kind = vtkSMPropertyHelper(shown, "Representation").GetAsString();
+  return kind != nullptr && std::string(kind) == "Volume";
+}
+
+/// Of a property that some kinds of volumes don't have.
+bool isOn(vtkSMProxy* shown, const char* name) {
+  return shown->GetProperty(name) != nullptr && vtkSMPropertyHelper(shown, name).GetAsInt() != 0;
 }
 
 std::vector<vtkLight*> shiningLights(vtkSMRenderViewProxy* view) {
@@ -98,15 +112,59 @@ void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view) {
 
 void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* view) {
   takeLights(filter, view);
-  if (shown == nullptr || shown->GetProperty("Shade") == nullptr || shown->GetProperty("Diffuse") == nullptr)
-    return;
-  const char* kind = vtkSMPropertyHelper(shown, "Representation", true).GetAsString();
-  if (kind == nullptr || std::strcmp(kind, "Volume") != 0) return;
-  if (vtkSMPropertyHelper(shown, "Shade").GetAsInt() == 0) return;
+  if (!isVolume(shown) || !isOn(shown, "Shade") || shown->GetProperty("Diffuse") == nullptr) return;
   vtkSMPropertyHelper(filter, "Shade").Set(1);
   vtkSMPropertyHelper(filter, "Diffuse").Set(vtkSMPropertyHelper(shown, "Diffuse").GetAsDouble());
   if (isPlainHeadlight(shiningLights(view)))
     vtkSMPropertyHelper(filter, "Ambient").Set(vtkSMPropertyHelper(shown, "Ambient").GetAsDouble());
+}
+
+void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& bounds) {
+  if (!isVolume(shown) || !isOn(shown, "UseCropping") || bounds.empty()) return;
+  const vtkSMPropertyHelper origin(shown, "CroppingOrigin");
+  const vtkSMPropertyHelper scale(shown, "CroppingScale");
+  std::array<double, 6> box{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<unsigned int>(axis);
+    box[2 * i] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * bounds.lo[axis];
+    box[2 * i + 1] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * bounds.hi[axis];
+  }
+  vtkSMPropertyHelper(filter, "Cropping").Set(1);
+  vtkSMPropertyHelper(filter, "CroppingBox").Set(box.data(), 6);
+}
+
+std::string blendModeIssue(vtkSMProxy* shown) {
+  if (!isVolume(shown) || shown->GetProperty("BlendMode") == nullptr) return {};
+  // vtkVolumeMapper::BlendModes.
+  const char* name = nullptr;
+  switch (vtkSMPropertyHelper(shown, "BlendMode").GetAsInt()) {
+    case 0:
+      return {};
+    case 1:
+      name = "maximum intensities";
+      break;
+    case 2:
+      name = "minimum intensities";
+      break;
+    case 3:
+      name = "average intensities";
+      break;
+    case 4:
+      name = "additive intensities";
+      break;
+    case 5:
+      name = "isosurfaces";
+      break;
+    case 6:
+      name = "a slice";
+      break;
+    default:
+      name = "something else than the composited volume";
+  }
+  return std::string("The view shows ") + name +
+         " of this volume (its Blend Mode). A VDI holds a composited volume, so it shows what Blend Mode "
+         "Composite "
+         "shows.";
 }
 
 }  // namespace pv

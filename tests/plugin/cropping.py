@@ -1,0 +1,83 @@
+"""Cropped volumes against ParaView's own, which the first update takes over; clipping planes; blend modes that no VDI holds."""
+
+import os
+import sys
+
+import numpy as np
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from pvtest import *  # noqa: E402,F403
+from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
+from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
+
+# Values are [z][y][x], of cells: VTK puts the faces of what is cropped of point data up to half a voxel elsewhere.
+SHAPE, SPACING, ORIGIN = (50, 70, 60), [1.2, 1.0, 1.5], [-10, 5, 20]
+
+
+def waves_source():
+    z, y, x = np.meshgrid(*[np.arange(n) * s for n, s in zip(SHAPE, SPACING[::-1])], indexing="ij")
+    values = 125 + 125 * np.sin(0.15 * x + np.sin(0.12 * y)) * np.cos(0.11 * z + 0.05 * x) * np.cos(0.09 * y)
+    image = vtkImageData()
+    image.SetDimensions(*[n + 1 for n in SHAPE[::-1]])
+    image.SetSpacing(*SPACING)
+    image.SetOrigin(*ORIGIN)
+    array = numpy_to_vtk(values.astype(np.float32).ravel(), deep=True)
+    array.SetName("field")
+    image.GetCellData().SetScalars(array)
+    producer = simple.TrivialProducer()
+    producer.GetClientSideObject().SetOutput(image)
+    producer.UpdatePipeline()
+    return producer, np.array(image.GetBounds())
+
+
+source, bounds = waves_source()
+center = bounds.reshape(3, 2).mean(axis=1)
+set_colors("field", 20, 250, peak=0.6)
+view = make_view([240, 240], list(center + [70, 60, 130]), list(center))
+SCALE, SHIFT = [0.6, 0.5, 0.7], [10.3, 20.1, 15.7]
+for name, shade in (("unshaded", 0), ("shaded", 1)):
+    theirs = paraview_volume(source, view, "CELLS", "field", 2.0, Shade=shade, UseCropping=1, CroppingOrigin=SHIFT,
+                             CroppingScale=SCALE)
+    simple.SetActiveView(view)
+    image = vdi_filter(source, view, "CELLS", "field", 2.0)
+    ours = picture(image)
+    box = np.array(SHIFT).repeat(2) + bounds * np.array(SCALE).repeat(2)
+    check(image.Cropping == 1 and np.allclose(image.CroppingBox, box), name + ": the first update takes the volume's box")
+    check(image.Shade == shade, name + ": and its shading")
+    off = np.abs(ours.astype(float) - theirs).mean()
+    check(theirs.max() > 100 and ssim(ours, theirs) >= 0.99 and off < 1.5,
+          "%s: SSIM with ParaView's own %.4f, mean difference %.2f" % (name, ssim(ours, theirs), off))
+    vdi_bounds = np.array(image.GetDataInformation().GetBounds())
+    write_png("cropping_%s.png" % name, np.hstack([ours, theirs]))
+
+# The same box by planes.
+representation = simple.GetRepresentation(source, view)
+representation.UseCropping = 0
+simple.SetActiveView(None)
+planes = []
+for axis in range(3):
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        point, normal = [0.0] * 3, [0.0] * 3
+        point[axis], normal[axis] = box[2 * axis + side], sign
+        planes += point + normal
+clipped = picture(vdi_filter(source, view, "CELLS", "field", 2.0, Shade=1, ClippingPlanes=planes))
+check(np.abs(clipped.astype(int) - ours).max() <= 2, "six clipping planes show what the box shows")
+
+# What no VDI holds.
+said = []
+
+
+def note(caller, event, message):
+    said.append(message)
+
+
+note.CallDataType = "string0"
+vtkOutputWindow.GetInstance().AddObserver("WarningEvent", note)
+simple.SetActiveView(view)
+for mode in ("Isosurface", "Slice", "Composite"):
+    representation.BlendMode = mode
+    said.clear()
+    picture(vdi_filter(source, view, "CELLS", "field", 2.0))
+    about = [message for message in said if "Blend Mode" in message]
+    check(len(about) == (0 if mode == "Composite" else 1), "%s: %d messages that a VDI can't show that" % (mode, len(about)))
+finish()
