@@ -16,7 +16,8 @@
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/TransferFunction.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 namespace vdi::apps {
 

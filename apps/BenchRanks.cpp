@@ -13,7 +13,7 @@
 #include "apps/RankGroup.h"
 #include "apps/RawVolume.h"
 #include "vdi/core/Error.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
 
 namespace vdi::apps {
 

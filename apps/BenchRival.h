@@ -18,7 +18,7 @@
 #include "vdi/core/Image.h"
 #include "vdi/core/Scene.h"
 #include "vdi/gpu/Device.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
 
 namespace vdi::apps {
 

@@ -12,7 +12,8 @@
 #include "vdi/core/Error.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 namespace vdi::apps {
 

@@ -14,9 +14,10 @@
 #include "apps/RawVolume.h"
 #include "apps/Source.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Flatten.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
 
 namespace vdi::apps {
 

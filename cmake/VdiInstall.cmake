@@ -14,7 +14,7 @@ function(vdi_install_pkg_config name)
   install(FILES "${CMAKE_BINARY_DIR}/${name}.pc" DESTINATION "${pkgConfigDir}")
 endfunction()
 
-# The library without VTK, with the headers that its facade vdi/pipeline/Pipeline.h includes and those of its files.
+# The library without VTK, with the headers that vdi/pipeline/VdiGenerator.h and VdiRenderer.h include and those of its files.
 install(
   TARGETS vdi
   EXPORT pv-vdi-vdi-targets
@@ -27,7 +27,7 @@ install(
 install(FILES vdi/comm/Communicator.h DESTINATION "${headerDir}/vdi/comm")
 install(FILES vdi/gpu/Device.h vdi/gpu/DeviceLimits.h vdi/gpu/DeviceRequest.h
         DESTINATION "${headerDir}/vdi/gpu")
-install(FILES vdi/pipeline/Pipeline.h DESTINATION "${headerDir}/vdi/pipeline")
+install(FILES vdi/pipeline/Reports.h vdi/pipeline/VdiGenerator.h vdi/pipeline/VdiRenderer.h DESTINATION "${headerDir}/vdi/pipeline")
 install(EXPORT pv-vdi-vdi-targets NAMESPACE pv-vdi:: DESTINATION "${cmakeDir}")
 vdi_install_pkg_config(pv-vdi)
 

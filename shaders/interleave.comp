@@ -126,7 +126,7 @@ void interleaveList(uint list) {
   mergeMany(heads, first, end);
 }
 
-// As flatten in vdi/pipeline/Pipeline.h.
+// As flatten in vdi/core/Flatten.h.
 void flattenList(uint list) {
   uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];

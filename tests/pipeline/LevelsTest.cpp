@@ -9,7 +9,8 @@
 #include "tests/Scenes.h"
 #include "tests/pipeline/PictureDifference.h"
 #include "vdi/core/Error.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/core/Flatten.h"
+#include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
 using test::device;

@@ -8,7 +8,7 @@
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "tests/pipeline/PictureDifference.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
 using test::device;

@@ -4,7 +4,8 @@
 
 #include "tests/Devices.h"
 #include "tests/pipeline/OpticalBounds.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/core/Flatten.h"
+#include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
 using apps::Joint;

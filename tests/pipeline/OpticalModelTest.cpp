@@ -5,7 +5,8 @@
 #include "tests/Devices.h"
 #include "tests/pipeline/OpticalBounds.h"
 #include "vdi/comm/GhostExchange.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/core/Flatten.h"
+#include "vdi/pipeline/VdiGenerator.h"
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;

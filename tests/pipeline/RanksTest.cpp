@@ -11,7 +11,9 @@
 #include "tests/Scenes.h"
 #include "vdi/comm/Funnel.h"
 #include "vdi/core/Error.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/core/Flatten.h"
+#include "vdi/pipeline/VdiGenerator.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 using namespace vdi;
 using apps::Joint;

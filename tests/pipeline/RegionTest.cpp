@@ -11,7 +11,8 @@
 #include "tests/pipeline/Integral.h"
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/core/Flatten.h"
+#include "vdi/pipeline/VdiGenerator.h"
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;

@@ -5,7 +5,9 @@
 #include "tests/Catch.h"
 #include "tests/Scenes.h"
 #include "vdi/core/Error.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/core/Flatten.h"
+#include "vdi/pipeline/VdiGenerator.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 using namespace vdi;
 using apps::Joint;

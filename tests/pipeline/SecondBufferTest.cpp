@@ -9,8 +9,10 @@
 #include "tests/Scenes.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
+#include "vdi/core/Thinning.h"
 #include "vdi/io/Png.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 using namespace vdi;
 using apps::Joint;

@@ -9,7 +9,7 @@
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "vdi/core/Error.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
 using apps::Joint;

@@ -12,7 +12,7 @@
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/VdiFile.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
 using apps::Joint;

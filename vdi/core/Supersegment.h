@@ -66,6 +66,11 @@ struct DepthCode {
   bool operator==(const DepthCode&) const = default;
 };
 
+/// Of the lists that a depth code belongs to.
+inline Precision precisionOf(const DepthCode& code) {
+  return code.step > 0.0F ? Precision::Compact : Precision::Full;
+}
+
 /// The code for what lies on the lattice: step is a part of a sample, so that the lattice's depths have codes
 /// of their own. None (step 0) for a lattice of more samples than fit, 8190.
 DepthCode depthCodeFor(const DepthLattice& lattice);

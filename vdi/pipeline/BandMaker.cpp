@@ -20,7 +20,7 @@ void BandMaker::noteTimes(RankReport& report) const {
   report.writeSeconds = 1e-3 * caster_.times().write;
 }
 
-void BandMaker::makeAlone(const RayCaster::Request& request, const Progress& progress, const AloneSink& sink,
+void BandMaker::makeAlone(const RayCaster::Request& request, const Progress& progress, VdiSink& sink,
                           RankReport& report) {
   Stopwatch watch;
   cancellable(comm_, progress, 0.95, [&](const RayCaster::Progress& advanced) {
@@ -31,11 +31,9 @@ void BandMaker::makeAlone(const RayCaster::Request& request, const Progress& pro
     };
     const auto start = [&](std::size_t band) {
       Slot& slot = slotOf(band);
-      ListBuilder::Behind behind;
-      if (sink.behind)
-        behind = [&sink, &slot, first = firstList(band)](gpu::Commands& commands) {
-          sink.behind(commands, slot.lists, first);
-        };
+      const auto behind = [&sink, &slot, first = firstList(band)](gpu::Commands& commands) {
+        sink.record(commands, slot.lists, first);
+      };
       caster_.startBand(cast, all.first(band), all.last(band), slot.lists, behind, slot.usedBy);
     };
     start(0);
@@ -45,7 +43,8 @@ void BandMaker::makeAlone(const RayCaster::Request& request, const Progress& pro
       Slot& slot = slotOf(band);
       report.subSupersegments += slot.lists.count;
       report.generateSeconds += watch.lap();
-      slot.usedBy = sink.take(slot.lists, firstList(band));
+      slot.usedBy = sink.add(
+          {slot.lists, firstList(band), band + 1 == all.count()}, [] {}, report);
       watch.lap();  // the sink's own time
       if (!advanced(all.doneWith(band))) return caster_.drop();
     }
@@ -90,8 +89,7 @@ void BandMaker::distribute(Slot& slot, const DepthCode& code, Stopwatch& watch, 
 }
 
 void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& progress,
-                          const std::function<void(std::size_t band)>& compose, const OwnedSink& sink,
-                          RankReport& report) {
+                          const OwnedSteps& steps, RankReport& report) {
   Stopwatch watch;
   RayCaster::Cast cast;
   comm_.together([&] { cast = caster_.begin(request); });
@@ -115,7 +113,7 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
     if (cast.agreed) weights = caster_.agreedWeights(cast);
     start(0);
   });
-  sink.started();
+  steps.started();
   for (std::size_t band = 0; band < all.count(); ++band) {
     Slot& slot = slotOf(band);
     cancellable(comm_, progress, 0.8, [&](const RayCaster::Progress& advanced) {
@@ -126,10 +124,13 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
     report.subSupersegments += slot.lists.count;
     report.generateSeconds += watch.lap();
     distribute(slot, request.code, watch, report);
-    if (band > 0) sink.pass(band - 1);
+    if (band > 0) {
+      steps.pass(band - 1);
+      watch.lap();  // the step's own time
+    }
     comm_.together([&] {
       compositor_.interleave(slot.parts, request.code, merged_[band].interleaved);
-      compose(band);
+      steps.compose(band);
       slot.usedBy = compositor_.last();
     });
     report.compositeSeconds += watch.lap();
@@ -149,8 +150,21 @@ float BandMaker::levelOfAll(const GenerateSettings& settings, const Compositor::
   return histogram.levelFor(settings.fill);
 }
 
+void BandMaker::add(const std::vector<OwnedLists>& owned, std::size_t band, VdiSink& sink,
+                    RankReport& report) {
+  const OwnedLists& own = owned[band];
+  sink.add(
+      {own.lists, own.firstList, band + 1 == owned.size()}, [this] { compositor_.finish(); }, report);
+}
+
+void BandMaker::addLast(const std::vector<OwnedLists>& owned, VdiSink& sink, RankReport& report) {
+  add(owned, owned.size() - 1, sink, report);
+  report.compositeDeviceSeconds = 1e-3 * compositor_.takeMilliseconds();
+}
+
 void BandMaker::makeComposited(const RayCaster::Request& request, const Progress& progress,
-                               std::vector<OwnedLists>& owned, const OwnedSink& sink, RankReport& report) {
+                               std::vector<OwnedLists>& owned, const std::function<void()>& started,
+                               VdiSink& sink, RankReport& report) {
   const GenerateSettings& settings = request.settings;
   Compositor::Request composite{settings.supersegments, maxPerList(settings.supersegments, settings.budget),
                                 request.lattice.step,   settings.algorithm,
@@ -160,20 +174,24 @@ void BandMaker::makeComposited(const RayCaster::Request& request, const Progress
     owned[band].firstList = merged_[band].firstList;
     compositor_.composite(merged_[band].interleaved, composite, owned[band].lists);
   };
-  if (settings.budget == Budget::List) return makeOwned(request, progress, compose, sink, report);
+  const auto pass = [&](std::size_t band) { add(owned, band, sink, report); };
+  if (settings.budget == Budget::List) return makeOwned(request, progress, {started, compose, pass}, report);
   const auto nothing = [](std::size_t) {};
-  makeOwned(request, progress, nothing, {sink.started, nothing}, report);
+  makeOwned(request, progress, {started, nothing, nothing}, report);
   Stopwatch watch;
   composite.level = levelOfAll(settings, composite);
   for (std::size_t band = 0; band < merged_.size(); ++band) {
-    if (band > 0) sink.pass(band - 1);
+    report.compositeSeconds += watch.lap();
+    if (band > 0) pass(band - 1);
+    watch.lap();
     comm_.together([&] { compose(band); });
   }
   report.compositeSeconds += watch.lap();
 }
 
 void BandMaker::makeFlat(const RayCaster::Request& request, const Progress& progress,
-                         std::vector<FlatBand>& flat, const OwnedSink& sink, RankReport& report) {
+                         std::vector<FlatBand>& flat, const std::function<void(std::size_t band)>& pass,
+                         RankReport& report) {
   const auto flatten = [&](std::size_t band) {
     flat.resize(merged_.size());
     FlatBand& own = flat[band];
@@ -182,7 +200,7 @@ void BandMaker::makeFlat(const RayCaster::Request& request, const Progress& prog
     compositor_.flatten(merged_[band].interleaved, {}, own.colors, own.depths);
     own.flattened = compositor_.last();
   };
-  makeOwned(request, progress, flatten, sink, report);
+  makeOwned(request, progress, {[] {}, flatten, pass}, report);
 }
 
 void BandMaker::render(const RayCaster::Request& request, const Progress& progress, HostPool& pool,

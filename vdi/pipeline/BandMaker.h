@@ -18,9 +18,9 @@
 #include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Distributor.h"
 #include "vdi/pipeline/GatheredLists.h"
-#include "vdi/pipeline/Pipeline.h"
 #include "vdi/pipeline/RayCaster.h"
 #include "vdi/pipeline/Stages.h"
+#include "vdi/pipeline/VdiSink.h"
 
 namespace vdi::detail {
 
@@ -33,29 +33,18 @@ class BandMaker {
   RayCaster& caster() { return caster_; }
   Compositor& compositor() { return compositor_; }
 
-  /// What becomes of a band that one rank makes alone.
-  struct AloneSink {
-    /// Behind the steps that make it; none if empty. `firstList`: of the picture's, that the band begins
-    /// with.
-    std::function<void(gpu::Commands& commands, const DeviceLists& lists, std::uint64_t firstList)> behind;
-    /// When it's there. The result is what uses the lists' memory then.
-    std::function<gpu::Submission(const DeviceLists& lists, std::uint64_t firstList)> take;
-  };
-  /// With one rank. While the sink takes a band, the device makes the next one.
-  void makeAlone(const RayCaster::Request& request, const Progress& progress, const AloneSink& sink,
+  /// With one rank: makes the bands of a VDI's lists and adds them to the sink.
+  void makeAlone(const RayCaster::Request& request, const Progress& progress, VdiSink& sink,
                  RankReport& report);
 
-  /// What becomes of a band of the lists that this rank owns.
-  struct OwnedSink {
-    /// Collective: the first band is being made.
-    std::function<void()> started;
-    /// Collective: waits for a composited band (Compositor::finish), and sends it on. The device makes the
-    /// band behind meanwhile. Not called for the last band.
-    std::function<void(std::size_t band)> pass;
-  };
-  /// Collective: bands of the VDI's lists, on the devices of those who own them.
+  /// Collective: makes the bands of a VDI's lists on the devices of their owners, and adds all of them to the
+  /// sink except the last one. `started`, collective, is called when the first band is being made. `owned`
+  /// gets this rank's lists of each band.
   void makeComposited(const RayCaster::Request& request, const Progress& progress,
-                      std::vector<OwnedLists>& owned, const OwnedSink& sink, RankReport& report);
+                      std::vector<OwnedLists>& owned, const std::function<void()>& started, VdiSink& sink,
+                      RankReport& report);
+  /// Collective: adds that one.
+  void addLast(const std::vector<OwnedLists>& owned, VdiSink& sink, RankReport& report);
 
   /// A band of the picture that this rank owns, without lists.
   struct FlatBand {
@@ -66,9 +55,10 @@ class BandMaker {
     gpu::Submission flattened;  // which writes these two
   };
   /// Collective: the same for a picture, of runs alone. The limit case of the paper's section 5.3: one
-  /// supersegment a run, composited in order of depth.
+  /// supersegment a run, composited in order of depth. `pass`, collective, waits for a composited band
+  /// (Compositor::finish) and sends it on; it isn't called for the last band.
   void makeFlat(const RayCaster::Request& request, const Progress& progress, std::vector<FlatBand>& flat,
-                const OwnedSink& sink, RankReport& report);
+                const std::function<void(std::size_t band)>& pass, RankReport& report);
 
   /// The picture of one rank's volume: RayCaster::render.
   void render(const RayCaster::Request& request, const Progress& progress, HostPool& pool, Image& image,
@@ -112,11 +102,15 @@ class BandMaker {
   comm::Ownership ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
                               std::span<const std::uint32_t> weights) const;
   /// Collective: this rank's lists, band after band, to those who own them, where they're merged by depth.
-  /// While a band is on its way, the device makes the next one. `compose`: submits what's made of a merged
-  /// band; not collective.
-  void makeOwned(const RayCaster::Request& request, const Progress& progress,
-                 const std::function<void(std::size_t band)>& compose, const OwnedSink& sink,
+  /// While a band is on its way, the device makes the next one.
+  struct OwnedSteps {
+    std::function<void()> started;                  // collective: the first band is being made
+    std::function<void(std::size_t band)> compose;  // submits what's made of a merged band
+    std::function<void(std::size_t band)> pass;     // collective: sends on a band that was composed
+  };
+  void makeOwned(const RayCaster::Request& request, const Progress& progress, const OwnedSteps& steps,
                  RankReport& report);
+  void add(const std::vector<OwnedLists>& owned, std::size_t band, VdiSink& sink, RankReport& report);
   float levelOfAll(const GenerateSettings& settings, const Compositor::Request& request);
   void noteTimes(RankReport& report) const;
 

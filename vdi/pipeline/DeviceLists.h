@@ -27,7 +27,7 @@ struct DeviceLists {
 
 /// Of one supersegment: compact lists have a depth code.
 inline std::uint64_t segmentBytes(const DepthCode& code) {
-  return code.step > 0.0F ? sizeof(CompactSupersegment) : sizeof(Supersegment);
+  return precisionOf(code) == Precision::Compact ? sizeof(CompactSupersegment) : sizeof(Supersegment);
 }
 
 /// Empty lists in memory of that pool.

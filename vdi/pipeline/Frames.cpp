@@ -1,6 +1,7 @@
 #include "vdi/pipeline/Frames.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace vdi::detail {
 
@@ -24,21 +25,20 @@ Flight& Frames::next() {
   return flight;
 }
 
-void Frames::passOn() {
+void Frames::addLastBands() {
   for (const Flight& flight : flights) {
-    if (!flight.underWay() || flight.frame->passed) continue;
-    flight.frame->tail->pass(flight.frame->report);
-    flight.frame->passed = true;
+    if (flight.underWay() && flight.frame->addLastBand) std::exchange(flight.frame->addLastBand, {})();
   }
 }
 
-void Frames::drop() noexcept {
+void Frames::drop(const std::exception_ptr& error) noexcept {
   for (Flight& flight : flights) {
     flight.gather->drop();
     flight.downloads->commands.drop();
     if (!flight.underWay()) continue;
-    flight.frame->tail.reset();
-    flight.frame->error = std::current_exception();
+    flight.frame->sink.reset();
+    flight.frame->addLastBand = {};
+    flight.frame->error = error;
   }
 }
 

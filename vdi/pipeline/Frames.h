@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -12,33 +13,21 @@
 #include "vdi/pipeline/DeviceLists.h"
 #include "vdi/pipeline/Gather.h"
 #include "vdi/pipeline/GatheredLists.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/Reports.h"
+#include "vdi/pipeline/VdiSink.h"
 
 namespace vdi::detail {
 
-/// What's left of a frame when its lists are made.
-class Tail {
- public:
-  Tail() = default;
-  virtual ~Tail() = default;
-  Tail(const Tail&) = delete;
-  Tail& operator=(const Tail&) = delete;
-  Tail(Tail&&) = delete;
-  Tail& operator=(Tail&&) = delete;
-  /// Collective: sends on what was composited last. The next frame may be made then.
-  virtual void pass(RankReport& report) = 0;
-  /// Collective: waits until the VDI has its lists.
-  virtual void finish(Vdi& vdi, RankReport& report) = 0;
-};
-
-/// What VdiFrame is. Its generator has it too, as long as something is to be done.
+/// State of a VdiFrame, shared with its generator until the frame completes.
 struct Frame {
   Vdi vdi;
   RankReport report;
   std::vector<RankReport> reports;
-  std::unique_ptr<Tail> tail;  // none: done, or failed
-  bool passed = false;
-  std::exception_ptr error;
+  /// Where the lists go. None: the frame is done, or it has failed.
+  std::unique_ptr<VdiSink> sink;
+  /// With several ranks, the last band reaches the sink when the next frame is under way, or at the end.
+  std::function<void()> addLastBand;
+  std::exception_ptr error;  // why it failed
 };
 
 /// What a frame needs until it's on the root's host; frames take them in turns.
@@ -47,7 +36,7 @@ struct Flight {
   std::unique_ptr<Gather> gather;
   std::unique_ptr<DownloadMemory> downloads;
   std::shared_ptr<Frame> frame;  // that uses it, or did
-  bool underWay() const { return frame && frame->tail; }
+  bool underWay() const { return frame && frame->sink; }
 };
 
 class Frames {
@@ -62,11 +51,10 @@ class Frames {
   /// The first one that no frame needs any more, so that frames that don't overlap always take the same
   /// memory. If there's none, the older frame's, which is to be completed first.
   Flight& next();
-  /// Collective: those that are under way send on what was composited.
-  void passOn();
-  /// Waits for what was submitted, and drops it. Frames that are under way fail with the exception that's
-  /// being handled.
-  void drop() noexcept;
+  /// Collective: those that are under way hand their last band to their sinks.
+  void addLastBands();
+  /// Waits for what was submitted, and drops it. Frames that are under way fail with `error`.
+  void drop(const std::exception_ptr& error) noexcept;
 
  private:
   std::size_t older_ = 0;  // of the flights, the one that wasn't taken last

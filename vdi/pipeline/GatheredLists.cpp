@@ -42,8 +42,9 @@ void GatheredLists<Segment>::begin(std::uint64_t expected) {
 }
 
 template <typename Segment>
-void GatheredLists<Segment>::send(const OwnedLists& own, std::span<const std::uint64_t> counts, bool last) {
-  Sent sent{&own, total_};
+void GatheredLists<Segment>::send(const DeviceLists& lists, std::uint64_t firstList,
+                                  std::span<const std::uint64_t> counts, bool last) {
+  Sent sent{&lists, firstList, total_};
   for (std::size_t r = 0; r < counts.size(); ++r) {
     if (r == static_cast<std::size_t>(comm_.rank())) sent.firstSegment = total_;
     total_ += counts[r];
@@ -56,7 +57,7 @@ void GatheredLists<Segment>::send(const OwnedLists& own, std::span<const std::ui
 
 template <typename Segment>
 void GatheredLists<Segment>::sendSegments(const Sent& sent) {
-  const DeviceLists& lists = sent.own->lists;
+  const DeviceLists& lists = *sent.lists;
   const Gather::Piece piece{&lists.segments, segmentsArray, sent.firstSegment * sizeof(Segment),
                             lists.count * sizeof(Segment)};
   gather_.send(std::span(&piece, 1), lists.written);
@@ -68,10 +69,10 @@ void GatheredLists<Segment>::sendOffsets() {
   std::vector<Gather::Piece> pieces;
   memory_.commands.begin();
   for (const Sent& sent : sent_) {
-    const DeviceLists& lists = sent.own->lists;
+    const DeviceLists& lists = *sent.lists;
     memory_.scan.recordRebase(memory_.commands, lists.offsets, 0, lists.listCount,
                               static_cast<std::uint32_t>(sent.firstSegment));
-    pieces.push_back({&lists.offsets, offsetsArray, sent.own->firstList * sizeof(std::uint32_t),
+    pieces.push_back({&lists.offsets, offsetsArray, sent.firstList * sizeof(std::uint32_t),
                       lists.listCount * sizeof(std::uint32_t)});
   }
   memory_.commands.submit();

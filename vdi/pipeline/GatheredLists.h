@@ -32,9 +32,11 @@ class GatheredLists {
 
   /// Collective: room on the root for that many supersegments.
   void begin(std::uint64_t expected);
-  /// Not collective: bands in their order, each when it's composited. `counts`: supersegments in it, of all
-  /// ranks; `own` must stay until finish. Behind the last one go all offsets.
-  void send(const OwnedLists& own, std::span<const std::uint64_t> counts, bool last);
+  /// Not collective: bands in their order, each when it's composited. `lists`: the rank's own, from the
+  /// picture's list `firstList` on, which must stay until finish. `counts`: all ranks' supersegments in the
+  /// band. All offsets follow the last band.
+  void send(const DeviceLists& lists, std::uint64_t firstList, std::span<const std::uint64_t> counts,
+            bool last);
   /// Collective: the lists, on the root; elsewhere there are none.
   ListsOf<Segment> finish();
 
@@ -43,7 +45,8 @@ class GatheredLists {
  private:
   /// A band, and its first supersegment among all.
   struct Sent {
-    const OwnedLists* own = nullptr;
+    const DeviceLists* lists = nullptr;
+    std::uint64_t firstList = 0;
     std::uint64_t firstSegment = 0;
   };
   bool isRoot() const { return comm_.rank() == root_; }

@@ -6,7 +6,7 @@
 
 #include "vdi/comm/Communicator.h"
 #include "vdi/core/Error.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/Reports.h"
 
 namespace vdi::detail {
 

@@ -12,7 +12,7 @@
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/gpu/VolumeStore.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/Reports.h"
 
 namespace vdi::detail {
 

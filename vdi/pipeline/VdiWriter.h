@@ -13,7 +13,7 @@
 #include "vdi/core/Vdi.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/VdiParts.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/Reports.h"
 
 namespace vdi::detail {
 

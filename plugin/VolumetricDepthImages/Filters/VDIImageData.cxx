@@ -19,9 +19,9 @@
 #include "VDIPlace.h"
 #include "VDIRanges.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Flatten.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/io/VdiFile.h"
-#include "vdi/pipeline/Pipeline.h"
 
 namespace pv {
 

@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "vdi/comm/Funnel.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/Reports.h"
 #include "vtkVDIImageData.h"
 
 class vtkMultiProcessController;

@@ -37,7 +37,7 @@
 #include "VDISession.h"
 #include "VDITransferFunctions.h"
 #include "vdi/core/Error.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiGenerator.h"
 #include "vtkVDIImageData.h"
 
 vtkStandardNewMacro(vtkVDIGenerator);

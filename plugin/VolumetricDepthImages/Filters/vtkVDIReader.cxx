@@ -16,8 +16,8 @@
 #include "VDIImageData.h"
 #include "VDIRetire.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Flatten.h"
 #include "vdi/io/VdiFile.h"
-#include "vdi/pipeline/Pipeline.h"
 #include "vtkVDIImageData.h"
 
 vtkStandardNewMacro(vtkVDIReader);

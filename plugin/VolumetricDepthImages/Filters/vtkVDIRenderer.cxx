@@ -15,7 +15,7 @@
 #include "VDISession.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Viewpoint.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 vtkStandardNewMacro(vtkVDIRenderer);
 

@@ -9,6 +9,7 @@
 #include "VDIPiece.h"
 #include "VDISession.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Thinning.h"
 
 namespace pv {
 

@@ -13,7 +13,7 @@
 
 #include "VDIStill.h"
 #include "vdi/core/Vdi.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 class vtkDataObject;
 class vtkFieldData;

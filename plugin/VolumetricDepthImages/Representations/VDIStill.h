@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "VDIView.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 namespace pv {
 

@@ -43,7 +43,7 @@
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Viewpoint.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 #include VDI_VTK_OPENGL
 

@@ -1,4 +1,5 @@
-// VdiRenderer and flatten: what a viewer does with a VDI.
+#include "vdi/pipeline/VdiRenderer.h"
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -13,8 +14,8 @@
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/RenderPass.h"
 #include "vdi/pipeline/PictureBuffers.h"
-#include "vdi/pipeline/Pipeline.h"
 #include "vdi/pipeline/VdiLoader.h"
+#include "vdi/pipeline/VdiSink.h"
 
 namespace vdi {
 
@@ -69,21 +70,36 @@ void VdiRenderer::prepareVdi(const Vdi& vdi) {
   }
 }
 
-detail::VdiLoader& VdiRenderer::loadShown(const Vdi& header) {
+namespace {
+
+/// Loads bands of lists where the renderer reads them.
+class LoaderSink final : public detail::VdiSink {
+ public:
+  LoaderSink(detail::VdiLoader& loader, detail::LoadedVdi& target) : loader_(loader), target_(target) {}
+
+  void begin(const Vdi& header) override { loader_.begin(header, target_); }
+  gpu::Submission add(const Band& band, const Wait& wait, RankReport&) override {
+    wait();
+    return loader_.add(band.lists, band.firstList);
+  }
+  void finish(RankReport&) override { loader_.finish(); }
+  void fail() noexcept override {
+    loader_.drop();
+    target_.original.reset();
+  }
+
+ private:
+  detail::VdiLoader& loader_;
+  detail::LoadedVdi& target_;
+};
+
+}  // namespace
+
+std::unique_ptr<detail::VdiSink> VdiRenderer::sinkFor(const gpu::Device& device) {
+  if (&device != state_->device.get()) return nullptr;
   state_->waitForShown();
-  state_->loader.begin(header, state_->shown);
   state_->loading = true;
-  return state_->loader;
-}
-
-void VdiRenderer::showNothing() {
-  state_->loader.drop();
-  state_->loading = false;
-  state_->shown.original.reset();
-}
-
-const gpu::Device* VdiRenderer::device() const {
-  return state_->device.get();
+  return std::make_unique<LoaderSink>(state_->loader, state_->shown);
 }
 
 bool VdiRenderer::showPrepared() {
@@ -156,115 +172,6 @@ ImageBytes VdiRenderer::renderBytes(const View& view, std::span<const float> end
 
 double VdiRenderer::renderMilliseconds() const {
   return state_->milliseconds;
-}
-
-namespace {
-
-/// `value`: a supersegment as floats.
-/// Of the lists' columns and rows, those from `margin` on.
-template <typename Segment, typename Value>
-void flattenLists(const ListsOf<Segment>& lists, int listsWide, const glm::ivec2& margin, Value value,
-                  Image& image) {
-  constexpr float opaque = 0.999999F;
-  constexpr std::size_t minimum = 4096;  // lists
-  inParallel(image.pixelCount(), minimum, [&](std::size_t first, std::size_t last) {
-    const auto width = static_cast<std::size_t>(image.width);
-    for (std::size_t i = first; i < last; ++i) {
-      const std::size_t column = i % width + static_cast<std::size_t>(margin.x);
-      const std::size_t row = i / width + static_cast<std::size_t>(margin.y);
-      const std::span<const Segment> list = lists.list(row * static_cast<std::size_t>(listsWide) + column);
-      glm::vec4 sum(0.0F);
-      for (auto segment = list.begin(); segment != list.end() && sum.a < opaque; ++segment) {
-        const Supersegment& s = value(*segment);
-        sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
-      }
-      image.rgba[i] = sum;
-      image.depth[i] = list.empty() ? Image::noDepth : value(list.front()).front;
-    }
-  });
-}
-
-}  // namespace
-
-namespace {
-
-/// `columns`, `rows`: of the lists that are taken, in [0, size), or -1: an empty one.
-template <typename Segment>
-ListsOf<Segment> taken(const ListsOf<Segment>& lists, int width, const std::vector<int>& columns,
-                       const std::vector<int>& rows) {
-  ListsOf<Segment> few;
-  few.offsets.assign(1, 0);
-  few.offsets.reserve(columns.size() * rows.size() + 1);
-  for (const int row : rows) {
-    for (const int column : columns) {
-      if (row >= 0 && column >= 0) {
-        const std::span<const Segment> list =
-            lists.list(static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
-                       static_cast<std::size_t>(column));
-        few.segments.insert(few.segments.end(), list.begin(), list.end());
-      }
-      few.offsets.push_back(static_cast<std::uint32_t>(few.segments.size()));
-    }
-  }
-  return few;
-}
-
-/// Which of `many` lists along an axis is at the centre of each of `few`, which cover `share` as much of it.
-std::vector<int> placesOf(int few, int many, double share) {
-  std::vector<int> places(static_cast<std::size_t>(few));
-  for (int i = 0; i < few; ++i) {
-    const double at = 0.5 + ((i + 0.5) / few - 0.5) * share;
-    const int place = static_cast<int>(std::floor(at * many));
-    places[static_cast<std::size_t>(i)] = place >= 0 && place < many ? place : -1;
-  }
-  return places;
-}
-
-}  // namespace
-
-Vdi thinned(const Vdi& vdi, int factor) {
-  assert(factor >= 1);
-  Vdi few;
-  few.camera = vdi.camera;
-  // As high as all lists.
-  const double halfHeight = vdi.view().halfHeight();
-  if (vdi.camera.parallelProjection) {
-    few.camera.parallelScale = halfHeight;
-  } else {
-    few.camera.viewAngle = glm::degrees(2.0 * std::atan(halfHeight));
-  }
-  few.width = (vdi.width + factor - 1) / factor;
-  few.height = (vdi.height + factor - 1) / factor;
-  few.budget = vdi.budget;
-  few.bounds = vdi.bounds;
-  few.sampleStep = vdi.sampleStep;
-  few.time = vdi.time;
-  few.timeStep = vdi.timeStep;
-  few.depthCode = vdi.depthCode;
-  // Pixels are squares: what the width is then differs by rounding.
-  const double share =
-      (static_cast<double>(few.width) * vdi.height) / (static_cast<double>(few.height) * vdi.width);
-  const std::vector<int> columns = placesOf(few.width, vdi.width, share);
-  const std::vector<int> rows = placesOf(few.height, vdi.height, 1.0);
-  std::visit([&](const auto& lists) { few.lists = taken(lists, vdi.width, columns, rows); }, vdi.lists);
-  return few;
-}
-
-Image flatten(const Vdi& vdi) {
-  const glm::ivec2 size = vdi.pictureSize();
-  Image image{size.x, size.y, {}, {}};
-  image.rgba.resize(image.pixelCount());
-  image.depth.resize(image.pixelCount());
-  if (const auto* compact = std::get_if<CompactLists>(&vdi.lists)) {
-    flattenLists(
-        *compact, vdi.width, vdi.margin,
-        [&](const CompactSupersegment& s) { return expanded(s, vdi.depthCode); }, image);
-  } else {
-    flattenLists(
-        std::get<SupersegmentLists>(vdi.lists), vdi.width, vdi.margin,
-        [](const Supersegment& s) -> const Supersegment& { return s; }, image);
-  }
-  return image;
 }
 
 }  // namespace vdi

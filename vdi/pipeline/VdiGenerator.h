@@ -1,14 +1,10 @@
-// One frame from end to end: blocks -> sub-VDI -> distribute -> composite -> gather -> VDI (paper, section
-// 5). The only place where gpu, comm and io meet; plugin, adaptor and command line call nothing below it.
+// Makes VDIs of distributed volumes, one frame from end to end: blocks -> sub-VDI -> distribute -> composite
+// -> gather (paper, section 5). VdiRenderer.h shows them.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
-#include <span>
-#include <string>
 #include <vector>
 
 #include "vdi/comm/Communicator.h"
@@ -16,54 +12,15 @@
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Image.h"
-#include "vdi/core/Reconstruction.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/gpu/Device.h"
+#include "vdi/pipeline/Reports.h"
 
 namespace vdi {
 
-namespace detail {
-class VdiLoader;
-}
-
-/// Wall-clock seconds and bytes of one rank in the last frame.
-struct RankReport {
-  double uploadSeconds = 0.0;          // of setBlocks, or setNextBlocks and advance, since the last frame
-  double generateSeconds = 0.0;        // casting and segmenting, transfers included
-  double generateDeviceSeconds = 0.0;  // of these, the device's work without transfers
-  double countSeconds = 0.0;  // of these, the first step: bisection's search or the counting of pre-segments
-  double writeSeconds = 0.0;  // and the second
-  double distributeSeconds = 0.0;
-  double compositeSeconds = 0.0;
-  double compositeDeviceSeconds = 0.0;  // of these, the device's work, and the copying of what was received
-  double gatherSeconds = 0.0;
-  double outputSeconds = 0.0;  // of write, instead of the gather: downloading, encoding and writing
-  std::uint64_t blocks = 0;
-  std::uint64_t volumeBytes = 0;
-  std::uint64_t subSupersegments = 0;
-  std::uint64_t bytesSent = 0;
-  std::uint64_t bytesWritten = 0;   // of write: into the file, by this rank
-  std::uint64_t deviceBytes = 0;    // device memory held
-  std::uint64_t hostPeakBytes = 0;  // the most host memory that the process has had, shared one included
-};
-
-/// A file that VdiGenerator::write has made.
-struct WrittenVdi {
-  std::uint64_t supersegments = 0;
-  std::uint64_t bytes = 0;
-};
-
-/// What a VDI's file says of the simulation.
-struct TimeStamp {
-  double time = 0.0;
-  std::uint64_t step = 0;
-};
-
-/// Called on every rank with the share done, 0 .. 1; returns false to ask for an abort, which all ranks then
-/// obey together at the next stage (Error{Cancelled}).
-using Progress = std::function<bool(double)>;
+class VdiRenderer;
 
 /// A VDI that's being made (VdiGenerator::start). Movable. One that's never finished costs nothing but the
 /// memory of its lists, until the second one after it is started.
@@ -81,8 +38,6 @@ class VdiFrame {
   explicit VdiFrame(std::shared_ptr<State> state);
   std::shared_ptr<State> state_;
 };
-
-class VdiRenderer;
 
 /// Makes VDIs of distributed volumes. Collective throughout: every rank of the communicator makes one, with
 /// its own device, and calls the same functions in the same order. When a call throws, it throws on every
@@ -170,59 +125,5 @@ class VdiGenerator {
   struct State;
   std::unique_ptr<State> state_;
 };
-
-/// Renders a VDI from anywhere, on one device. Not collective.
-class VdiRenderer {
- public:
-  explicit VdiRenderer(std::shared_ptr<gpu::Device> device);
-  ~VdiRenderer();
-  VdiRenderer(const VdiRenderer&) = delete;
-  VdiRenderer& operator=(const VdiRenderer&) = delete;
-  VdiRenderer(VdiRenderer&&) = delete;
-  VdiRenderer& operator=(VdiRenderer&&) = delete;
-
-  /// Copies; `vdi` isn't needed afterwards. Upload and set-up go on on the device while this returns, the
-  /// next render waits for them there (VDIs of up to 128 MiB; larger ones wait for all but their last part).
-  void setVdi(const Vdi& vdi);
-  /// Double buffering: the same into buffers of its own, while renders go on with the VDI that is shown. On
-  /// any one thread; not beside setVdi, showPrepared or another of this. Returns when the VDI is on the
-  /// device. Takes memory for a second VDI, which stays for the next one. Throws Error{OutOfMemory} where
-  /// there's none; what is shown stays.
-  void prepareVdi(const Vdi& vdi);
-  /// Shows what was prepared, at once. Returns whether there was anything.
-  bool showPrepared();
-  /// Rays end at an opacity of 1 - 1/512, along V_O's of 1 - 1/1024: what's behind changes a colour of 8 bits
-  /// by half a step at most. Throws Error{InvalidArgument} before the first setVdi, and for what View
-  /// rejects.
-  Image render(const Camera& camera, int width, int height,
-               Reconstruction reconstruction = Reconstruction::Smooth);
-  /// The same for a screen: 8 instead of 20 bytes a pixel come from the device, which takes longer than
-  /// rendering. Premultiplied, each byte is toByte of what render gives. Valid until the next call.
-  ImageBytes renderBytes(const Camera& camera, int width, int height, Alpha alpha,
-                         Reconstruction reconstruction = Reconstruction::Smooth);
-  /// Either one among other things that are seen. `ends`: [height][width] of the view, the depths at which
-  /// its rays end, at opaque objects; infinity where there's none, empty if there's none at all.
-  Image render(const View& view, std::span<const float> ends,
-               Reconstruction reconstruction = Reconstruction::Smooth);
-  ImageBytes renderBytes(const View& view, std::span<const float> ends, Alpha alpha,
-                         Reconstruction reconstruction = Reconstruction::Smooth);
-  double renderMilliseconds() const;  // device time of the last render
-
- private:
-  friend class VdiGenerator;
-  const gpu::Device* device() const;
-  detail::VdiLoader& loadShown(const Vdi& header);
-  void showNothing();
-  struct State;
-  std::unique_ptr<State> state_;
-};
-
-/// Fewer lists: about one in `factor` of each row and of each column, as they are. Views of it take less time
-/// on a CPU, and are as rough as pictures with that many fewer pixels. On the host.
-Vdi thinned(const Vdi& vdi, int factor);
-
-/// The VDI's picture, seen from V_O: each list but the margin's composited front to back, on the host. Equals
-/// DVR.
-Image flatten(const Vdi& vdi);
 
 }  // namespace vdi

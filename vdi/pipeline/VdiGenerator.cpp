@@ -1,4 +1,6 @@
-// VdiGenerator: which stages a frame takes, and what becomes of it.
+// Which stages a frame takes, and what becomes of it.
+#include "vdi/pipeline/VdiGenerator.h"
+
 #include <sys/resource.h>
 
 #include <array>
@@ -12,14 +14,13 @@
 #include "vdi/core/Margin.h"
 #include "vdi/pipeline/BandDownload.h"
 #include "vdi/pipeline/BandMaker.h"
+#include "vdi/pipeline/FileSink.h"
 #include "vdi/pipeline/Fingerprint.h"
 #include "vdi/pipeline/Frames.h"
-#include "vdi/pipeline/Pipeline.h"
+#include "vdi/pipeline/HostSinks.h"
 #include "vdi/pipeline/Stages.h"
-#include "vdi/pipeline/Tails.h"
 #include "vdi/pipeline/TimeSteps.h"
-#include "vdi/pipeline/VdiLoader.h"
-#include "vdi/pipeline/VdiWriter.h"
+#include "vdi/pipeline/VdiRenderer.h"
 
 namespace vdi {
 
@@ -47,7 +48,8 @@ struct VdiGenerator::State {
     });
   }
   ~State() {
-    drop();          // handles of frames may outlive this
+    // Handles of frames may outlive this.
+    drop(std::make_exception_ptr(Error(ErrorCode::InvalidArgument, "the frame's generator has gone")));
     pool->detach();  // VDIs may outlive this
   }
   State(const State&) = delete;
@@ -98,34 +100,34 @@ struct VdiGenerator::State {
             settings,       comm.size() > 1, runsOnly,         code};
   }
 
-  /// What makes a frame. After an error nothing goes on in memory that the next frame takes: frames that were
-  /// started before and aren't done fail too.
+  /// Runs what makes a frame. After an error, nothing may go on in memory that the next frame takes, so
+  /// frames that were started before and aren't done fail too.
   template <typename Work>
-  auto frame(Work work) {
+  void frame(Work work) {
     try {
-      return work();
+      work();
     } catch (...) {
-      drop();
+      drop(std::current_exception());
       throw;
     }
   }
 
-  void drop() noexcept {
+  void drop(const std::exception_ptr& error) noexcept {
     bands->drop();
-    frames->drop();
+    frames->drop(error);
   }
 
   /// Collective: the frame is done, or has failed, on all ranks.
   void complete(detail::Frame& unfinished) {
-    if (!unfinished.tail) return;
+    if (!unfinished.sink) return;
     try {
       frame([&] {
-        frames->passOn();
-        unfinished.tail->finish(unfinished.vdi, unfinished.report);
+        frames->addLastBands();
+        unfinished.sink->finish(unfinished.report);
         unfinished.reports = gatherReports(unfinished.report);
       });
-      unfinished.tail.reset();
-    } catch (...) {  // for those who ask for this frame
+      unfinished.sink.reset();
+    } catch (...) {  // finish rethrows it for the frame's owner
     }
   }
 
@@ -143,72 +145,49 @@ struct VdiGenerator::State {
     return flight;
   }
 
-  /// Collective: the VDI's lists, on their way to the root. What it is that's sent and stored, Segment says.
-  template <typename Segment>
-  std::unique_ptr<detail::Tail> makeLists(const Prepared& prepared, const GenerateSettings& settings,
-                                          const DepthCode& code, detail::Flight& flight,
-                                          const Progress& progress) {
-    const detail::RayCaster::Request request = requestOf(prepared, settings, code);
-    const std::uint64_t listCount = static_cast<std::uint64_t>(prepared.view.width()) *
-                                    static_cast<std::uint64_t>(prepared.view.height());
+  /// Collective: makes the VDI's lists and hands them to the sink, with several ranks all but the last band.
+  void makeLists(const Prepared& prepared, const GenerateSettings& settings, const Vdi& header,
+                 std::vector<detail::OwnedLists>& owned, detail::VdiSink& sink, const Progress& progress) {
+    const detail::RayCaster::Request request = requestOf(prepared, settings, header.depthCode);
+    sink.begin(header);
     if (comm.size() == 1) {
-      auto tail = std::make_unique<detail::TailAlone<Segment>>(pool, flight, listCount, expected);
-      detail::ListDownload<Segment>& download = tail->download();
-      using Lists = detail::DeviceLists;
-      bands->makeAlone(request, progress,
-                       {[&](gpu::Commands& commands, const Lists& lists, std::uint64_t firstList) {
-                          download.recordOffsets(commands, lists, firstList);
-                        },
-                        [&](const Lists& lists, std::uint64_t) {
-                          detail::Stopwatch watch;
-                          const gpu::Submission sent = download.send(lists);
-                          mine.generateSeconds += watch.lap();
-                          return sent;
-                        }},
-                       mine);
-      return tail;
+      bands->makeAlone(request, progress, sink, mine);
+    } else {
+      bands->makeComposited(
+          request, progress, owned, [this] { frames->addLastBands(); }, sink, mine);
     }
-    auto tail = std::make_unique<detail::TailTogether<Segment>>(comm, root, pool, bands->compositor(), flight,
-                                                                listCount, expected);
-    bands->makeComposited(request, progress, flight.owned,
-                          {[&] { frames->passOn(); }, [&](std::size_t band) { tail->pass(band); }}, mine);
-    return tail;
   }
 
-  /// Collective: a VDI of `header`, in a file.
+  /// Collective: a whole frame, from the parameters to the reports. `make` makes it.
+  template <typename Make>
+  void wholeFrame(const Progress& progress, Make make) {
+    completeAll();
+    frame(make);
+    reports = gatherReports(mine);
+    if (progress) progress(1.0);
+  }
+
+  /// Collective: a whole frame, whose lists go to the sink.
+  void wholeVdi(const Prepared& prepared, const GenerateSettings& settings, const Vdi& header,
+                detail::VdiSink& sink, const Progress& progress) {
+    wholeFrame(progress, [&] {
+      try {
+        std::vector<detail::OwnedLists>& owned = frames->flights.front().owned;
+        makeLists(prepared, settings, header, owned, sink, progress);
+        if (comm.size() > 1) bands->addLast(owned, sink, mine);
+        sink.finish(mine);
+      } catch (...) {
+        sink.fail();
+        throw;
+      }
+    });
+  }
+
+  /// Brings the lists to the root's memory. Segment says what is sent and stored.
   template <typename Segment>
-  WrittenVdi writeFile(const std::filesystem::path& path, const Vdi& header, const Prepared& prepared,
-                       const GenerateSettings& settings, const Progress& progress) {
-    detail::VdiWriter<Segment> writer(comm, root, path, header);
-    const detail::RayCaster::Request request = requestOf(prepared, settings, header.depthCode);
-    // While the host encodes a band, the device makes the next one.
-    const auto add = [&](const detail::DeviceLists& lists, std::uint64_t firstList) {
-      detail::Stopwatch watch;
-      if (lists.listCount > 0) writer.add(firstList, bandDownload->get<Segment>(lists));
-      mine.outputSeconds += watch.lap();
-      return gpu::Submission();
-    };
-    if (comm.size() == 1) {
-      bands->makeAlone(request, progress, {{}, add}, mine);
-    } else {
-      std::vector<detail::OwnedLists>& owned = frames->flights.front().owned;
-      const auto pass = [&](std::size_t band) {
-        comm.together([&] {
-          bands->compositor().finish();
-          add(owned[band].lists, owned[band].firstList);
-        });
-      };
-      bands->makeComposited(request, progress, owned, {[] {}, pass}, mine);
-      mine.compositeSeconds -= mine.outputSeconds;  // of the bands that were added meanwhile
-      pass(owned.size() - 1);
-      mine.compositeDeviceSeconds = 1e-3 * bands->compositor().takeMilliseconds();
-    }
-    detail::Stopwatch watch;
-    const WrittenVdi written = writer.finish();
-    mine.outputSeconds += watch.lap();
-    mine.bytesSent += writer.bytesSent();
-    mine.bytesWritten = writer.bytesWritten();
-    return written;
+  std::unique_ptr<detail::VdiSink> hostSink(detail::Flight& flight, Vdi& vdi) {
+    if (comm.size() == 1) return std::make_unique<detail::DownloadSink<Segment>>(pool, flight, vdi, expected);
+    return std::make_unique<detail::GatherSink<Segment>>(comm, root, pool, flight, vdi, expected);
   }
 
   /// A VDI without its lists.
@@ -243,16 +222,17 @@ struct VdiGenerator::State {
       const std::array pieces{
           detail::Gather::Piece{&own.colors, 0, own.firstPixel * colorBytes, own.pixelCount * colorBytes},
           detail::Gather::Piece{&own.depths, 1, own.firstPixel * depthBytes, own.pixelCount * depthBytes}};
+      detail::Stopwatch watch;
       comm.together([&] {
         gather.send(pieces, own.flattened);  // how much that is doesn't depend on what was composited
         bands->compositor().finish();
       });
+      mine.compositeSeconds += watch.lap();
     };
-    bands->makeFlat(requestOf(prepared, settings, {}, true), progress, flat, {[] {}, send}, mine);
-    detail::Stopwatch watch;
+    bands->makeFlat(requestOf(prepared, settings, {}, true), progress, flat, send, mine);
     send(flat.size() - 1);
     mine.compositeDeviceSeconds = 1e-3 * bands->compositor().takeMilliseconds();
-    mine.compositeSeconds += watch.lap();
+    detail::Stopwatch watch;
     gather.finish();
     mine.bytesSent += gather.bytesSent();
     mine.gatherSeconds = watch.lap();
@@ -328,12 +308,17 @@ VdiFrame VdiGenerator::start(const Camera& camera, const TransferFunction& trans
   const auto frame = std::make_shared<VdiFrame::State>();
   flight.frame = frame;
   frame->vdi = s.headerOf(*prepared, camera, settings);
-  const DepthCode code = frame->vdi.depthCode;
-  frame->tail = s.frame([&] {
-    return code.step > 0.0F ? s.makeLists<CompactSupersegment>(*prepared, settings, code, flight, progress)
-                            : s.makeLists<Supersegment>(*prepared, settings, code, flight, progress);
-  });
+  std::unique_ptr<detail::VdiSink> sink = precisionOf(frame->vdi.depthCode) == Precision::Compact
+                                              ? s.hostSink<CompactSupersegment>(flight, frame->vdi)
+                                              : s.hostSink<Supersegment>(flight, frame->vdi);
+  s.frame([&] { s.makeLists(*prepared, settings, frame->vdi, flight.owned, *sink, progress); });
+  frame->sink = std::move(sink);
   frame->report = s.mine;
+  if (s.comm.size() > 1) {
+    frame->addLastBand = [&s, &flight, made = frame.get()] {
+      s.bands->addLast(flight.owned, *made->sink, made->report);
+    };
+  }
   return VdiFrame(frame);
 }
 
@@ -354,18 +339,16 @@ WrittenVdi VdiGenerator::write(const std::filesystem::path& path, const Camera& 
                                const TimeStamp& stamp, const Progress& progress) {
   State& s = *state_;
   const auto prepared = s.prepare(camera, transferFunction, settings);
-  s.completeAll();
   Vdi header = s.headerOf(*prepared, camera, settings);
   header.time = stamp.time;
   header.timeStep = stamp.step;
-  const WrittenVdi written = s.frame([&] {
-    return header.depthCode.step > 0.0F
-               ? s.writeFile<CompactSupersegment>(path, header, *prepared, settings, progress)
-               : s.writeFile<Supersegment>(path, header, *prepared, settings, progress);
-  });
-  s.reports = s.gatherReports(s.mine);
-  if (progress) progress(1.0);
-  return written;
+  const auto writeWith = [&](auto&& sink) {
+    s.wholeVdi(*prepared, settings, header, sink, progress);
+    return sink.written();
+  };
+  if (precisionOf(header.depthCode) == Precision::Compact)
+    return writeWith(detail::FileSink<CompactSupersegment>(s.comm, root, path, *s.bandDownload));
+  return writeWith(detail::FileSink<Supersegment>(s.comm, root, path, *s.bandDownload));
 }
 
 void VdiGenerator::show(VdiRenderer* renderer, const Camera& camera, const TransferFunction& transferFunction,
@@ -375,31 +358,17 @@ void VdiGenerator::show(VdiRenderer* renderer, const Camera& camera, const Trans
     if (s.comm.rank() == root && renderer == nullptr)
       throw Error(ErrorCode::InvalidArgument, "there is no renderer to show a VDI");
   });
-  if (s.comm.size() > 1 || renderer->device() != s.device.get()) {
-    const std::optional<Vdi> vdi = generate(camera, transferFunction, settings, progress);
-    s.comm.together([&] {
-      if (vdi) renderer->setVdi(*vdi);
-    });
-    return;
-  }
-  const auto prepared = s.prepare(camera, transferFunction, settings);
-  s.completeAll();
-  const Vdi header = s.headerOf(*prepared, camera, settings);
-  s.frame([&] {
-    try {
-      detail::VdiLoader& loader = renderer->loadShown(header);
-      const auto add = [&](const detail::DeviceLists& lists, std::uint64_t firstList) {
-        return loader.add(lists, firstList);
-      };
-      s.bands->makeAlone(s.requestOf(*prepared, settings, header.depthCode), progress, {{}, add}, s.mine);
-      loader.finish();
-    } catch (...) {
-      renderer->showNothing();
-      throw;
+  if (s.comm.size() == 1) {
+    if (const std::unique_ptr<detail::VdiSink> sink = renderer->sinkFor(*s.device)) {
+      const auto prepared = s.prepare(camera, transferFunction, settings);
+      s.wholeVdi(*prepared, settings, s.headerOf(*prepared, camera, settings), *sink, progress);
+      return;
     }
+  }
+  const std::optional<Vdi> vdi = generate(camera, transferFunction, settings, progress);
+  s.comm.together([&] {
+    if (vdi) renderer->setVdi(*vdi);
   });
-  s.reports = s.gatherReports(s.mine);
-  if (progress) progress(1.0);
 }
 
 VdiFrame::VdiFrame(std::shared_ptr<State> state) : state_(std::move(state)) {}
@@ -414,17 +383,14 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   GenerateSettings settings = asked;
   settings.margin = 0.0;
   const auto prepared = s.prepare(camera, transferFunction, settings);
-  s.completeAll();
-  Image image;  // which devices may still write to when `frame` handles an error
-  s.frame([&] {
+  Image image;  // devices may still write to it when `frame` handles an error
+  s.wholeFrame(progress, [&] {
     if (s.comm.size() > 1) {
       s.renderTogether(*prepared, settings, progress, image);
     } else {
       s.renderAlone(*prepared, settings, progress, image);
     }
   });
-  s.reports = s.gatherReports(s.mine);
-  if (progress) progress(1.0);
   if (s.comm.rank() != root) return std::nullopt;
   return image;
 }

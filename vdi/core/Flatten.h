@@ -1,0 +1,12 @@
+// The picture of a VDI from its own viewpoint.
+#pragma once
+
+#include "vdi/core/Image.h"
+#include "vdi/core/Vdi.h"
+
+namespace vdi {
+
+/// The VDI seen from V_O: each list except the margin's, composited front to back, on the host. Equals DVR.
+Image flatten(const Vdi& vdi);
+
+}  // namespace vdi

@@ -1,0 +1,55 @@
+// Where the lists of a VDI go while it is made: to the root's memory (HostSinks.h), into a file (FileSink.h),
+// to a renderer (VdiRenderer.cpp). A new destination is another class of this kind. Not part of the library's
+// interface.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "vdi/core/Vdi.h"
+#include "vdi/gpu/Commands.h"
+#include "vdi/pipeline/DeviceLists.h"
+#include "vdi/pipeline/Reports.h"
+
+namespace vdi::detail {
+
+/// The calls come in this order: begin, add for each band, finish. After an error in any of them, or in what
+/// makes the bands, fail comes instead of the rest. All functions except record and fail are collective: with
+/// several ranks, each has a sink of its own.
+class VdiSink {
+ public:
+  VdiSink() = default;
+  virtual ~VdiSink() = default;
+  VdiSink(const VdiSink&) = delete;
+  VdiSink& operator=(const VdiSink&) = delete;
+  VdiSink(VdiSink&&) = delete;
+  VdiSink& operator=(VdiSink&&) = delete;
+
+  /// `header`: the VDI without its lists. It stays until finish or fail.
+  virtual void begin(const Vdi& header) = 0;
+
+  /// Only with one rank: records commands behind those that make a band. `firstList` is the band's first one
+  /// among the VDI's.
+  virtual void record(gpu::Commands& /*commands*/, const DeviceLists& /*lists*/,
+                      std::uint64_t /*firstList*/) {}
+
+  /// Lists that this rank owns, on its device. With several ranks, they stay until finish.
+  struct Band {
+    const DeviceLists& lists;
+    std::uint64_t firstList = 0;
+    bool last = false;
+  };
+  using Wait = std::function<void()>;
+  /// Bands come in their order. `wait` returns when the band is made; it throws, so call it in
+  /// Communicator::together. Returns the submission that uses the band's memory last, if any. The device
+  /// makes the next band meanwhile. Adds its times to `report`.
+  virtual gpu::Submission add(const Band& band, const Wait& wait, RankReport& report) = 0;
+
+  /// Returns when the VDI is at its destination, or on its way there on the device.
+  virtual void finish(RankReport& report) = 0;
+
+  /// Drops what has arrived.
+  virtual void fail() noexcept {}
+};
+
+}  // namespace vdi::detail
