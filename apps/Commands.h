@@ -19,6 +19,7 @@ struct Job {
 
 void addGenerate(CLI::App& app, Job& job);
 void addRender(CLI::App& app, Job& job);
+void addExport(CLI::App& app, Job& job);
 void addCompare(CLI::App& app, Job& job);
 void addInfo(CLI::App& app, Job& job);
 void addBench(CLI::App& app, Job& job);

@@ -80,6 +80,7 @@ Outcome runTool(int argc, char** argv) {
   vdi::apps::Job job;
   vdi::apps::addGenerate(app, job);
   vdi::apps::addRender(app, job);
+  vdi::apps::addExport(app, job);
   vdi::apps::addCompare(app, job);
   vdi::apps::addInfo(app, job);
   vdi::apps::addBench(app, job);

@@ -1,0 +1,23 @@
+# Puts the page's files together and writes them into OUTPUT as a C++ literal. FOLDER: web/. MODULES: its modules, each after
+# those that it imports, separated by commas. A page that opens from disk can't load modules, so that they become one: imports
+# go, and exports are plain declarations. Names at the top of modules therefore differ.
+cmake_minimum_required(VERSION 3.25)
+string(REPLACE "," ";" modules "${MODULES}")
+set(script "")
+foreach(module IN LISTS modules)
+  file(READ "${FOLDER}/${module}.js" text)
+  string(REGEX REPLACE "import {[^}]*} from \"[^\"]*\";\n" "" text "${text}")
+  string(REGEX REPLACE "(^|\n)export " "\\1" text "${text}")
+  if(text MATCHES "(^|\n)(import|export)[ {]")
+    message(FATAL_ERROR "${module}.js imports or exports in a way that cmake/EmbedPage.cmake doesn't know")
+  endif()
+  if(text MATCHES "</script|<!--")
+    message(FATAL_ERROR "${module}.js would end the page's script")
+  endif()
+  string(APPEND script "${text}\n")
+endforeach()
+file(READ "${FOLDER}/style.css" style)
+file(READ "${FOLDER}/index.html" page)
+string(REPLACE "@STYLE@" "${style}" page "${page}")
+string(REPLACE "@SCRIPT@" "${script}" page "${page}")
+file(WRITE "${OUTPUT}" "inline constexpr char pageTemplate[] = R\"=page=(${page})=page=\";\n")

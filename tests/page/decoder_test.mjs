@@ -1,0 +1,117 @@
+// The page's decoder on sound, damaged and hostile files: it decodes, or throws FormatError. $1: vdi.
+import {execFileSync} from "node:child_process";
+import {mkdtempSync, readFileSync, rmSync} from "node:fs";
+import {tmpdir} from "node:os";
+import {join} from "node:path";
+
+import {FormatError, decodeVdi} from "../../web/format.js";
+import {lz4AnnouncedBytes, lz4Expand} from "../../web/lz4.js";
+import {xxh64} from "../../web/xxh64.js";
+
+const vdi = process.argv[2];
+const folder = mkdtempSync(join(tmpdir(), "vdi-decoder-"));
+let failures = 0;
+const fail = (/** @type {string} */ what) => {
+  console.log(`FAILED  ${what}`);
+  ++failures;
+};
+
+/** Numbers that are the same in each run. */
+let state = 12345;
+const random = (/** @type {number} */ below) => {
+  state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+  return Math.floor(state / 0x100000000 * below);
+};
+
+function testChecksum() {
+  // As xxhsum -H1 prints them.
+  const known = [["", "ef46db3751d8e999"], ["a", "d24ec4f1a98c6e5b"], ["abc", "44bc2cf5ad770999"],
+                 ["Nobody inspects the spammish repetition", "fbcea83c8a378bf1"]];
+  for (const [text, sum] of known) {
+    const {high, low} = xxh64(new TextEncoder().encode(text));
+    const got = high.toString(16).padStart(8, "0") + low.toString(16).padStart(8, "0");
+    if (got !== sum) fail(`xxh64 of "${text}" is ${got}, not ${sum}`);
+  }
+}
+
+function testLz4() {
+  const block = Uint8Array.from([0x12, 97, 1, 0, 0x50, 98, 99, 100, 101, 102]);  // a, six times itself, bcdef
+  const plain = new Uint8Array(12);
+  if (lz4AnnouncedBytes(block) !== 12 || !lz4Expand(block, plain) || String.fromCharCode(...plain) !== "aaaaaaabcdef")
+    fail("an LZ4 block with a match");
+  if (lz4Expand(Uint8Array.from([0x12, 97, 2, 0, 0x50, 98, 99, 100, 101, 102]), plain)) fail("a match before the beginning");
+  if (lz4Expand(block, new Uint8Array(11)) || lz4Expand(block, new Uint8Array(13))) fail("a block of another size");
+  for (let round = 0; round < 20000; ++round) {
+    const noise = Uint8Array.from({length: random(40)}, () => random(256));
+    const announced = lz4AnnouncedBytes(noise);
+    if (announced > 0 && announced < 1e6) lz4Expand(noise, new Uint8Array(announced));
+    lz4Expand(noise, new Uint8Array(random(100)));
+  }
+}
+
+/** Gives a file the checksums that its bytes should have, so that damage gets further. */
+function seal(/** @type {Uint8Array} */ bytes) {
+  const view = new DataView(bytes.buffer);
+  const put = (/** @type {number} */ at, /** @type {number} */ from, /** @type {number} */ to) => {
+    if (to > bytes.length || from > to) return;
+    const {high, low} = xxh64(bytes.subarray(from, to));
+    view.setUint32(at, low, true);
+    view.setUint32(at + 4, high, true);
+  };
+  const chunks = view.getUint32(40, true);
+  const table = 240 + 16 * chunks;
+  if (table > bytes.length) return;
+  for (let c = 0, at = table; c < chunks; ++c) {
+    const packed = view.getUint32(244 + 16 * c, true);
+    put(248 + 16 * c, at, at + packed);
+    at += packed;
+  }
+  put(224, 240, table);
+  put(232, 0, 232);
+}
+
+/** @returns {Promise<string>} "sound", or the message of a FormatError */
+async function outcome(/** @type {Uint8Array} */ bytes) {
+  try {
+    const decoded = await decodeVdi(bytes);
+    const lists = decoded.width * decoded.height;
+    if (decoded.offsets[lists] !== decoded.supersegmentCount) throw new Error("offsets don't end at the supersegments");
+    return "sound";
+  } catch (error) {
+    if (error instanceof FormatError && !error.message.includes("\n")) return error.message;
+    throw error;
+  }
+}
+
+async function testDamage(/** @type {string} */ name, /** @type {Uint8Array} */ sound) {
+  if (await outcome(sound) !== "sound") fail(`${name}: ${await outcome(sound)}`);
+  const seen = new Set();
+  for (let length = 0; length < sound.length; length += 1 + Math.floor(sound.length / 60)) {
+    if (await outcome(sound.slice(0, length)) === "sound") fail(`${name} cut to ${length} bytes is sound`);
+  }
+  if (await outcome(Uint8Array.from([...sound, 0])) === "sound") fail(`${name} with a byte more is sound`);
+  for (let round = 0; round < 1500; ++round) {
+    const bytes = sound.slice();
+    const header = round % 3 === 0;
+    for (let i = 0; i < 1 + round % 4; ++i) bytes[random(header ? 240 : bytes.length)] ^= 1 << random(8);
+    const sealed = round % 2 === 0;
+    if (sealed) seal(bytes);
+    const result = await outcome(bytes);
+    seen.add(result.slice(0, 60));
+    if (!sealed && result === "sound" && bytes.some((byte, i) => byte !== sound[i])) fail(`${name}: a flipped bit isn't seen`);
+  }
+  if (seen.size < 12) fail(`${name}: damage gave only ${[...seen].join("; ")}`);
+}
+
+const small = ["--size", "12x10x8", "--resolution", "24x18", "--supersegments", "4"];
+const kinds = {compact: [], full: ["--precision", "full"], margin: ["--margin", "0.5", "--zoom", "2"]};
+for (const [name, more] of Object.entries(kinds)) {
+  const file = join(folder, `${name}.vdi`);
+  execFileSync(vdi, ["generate", "--field", "turbulence", ...small, ...more, "-o", file], {stdio: "ignore"});
+  await testDamage(name, new Uint8Array(readFileSync(file)));
+}
+testChecksum();
+testLz4();
+rmSync(folder, {recursive: true});
+console.log(failures === 0 ? "all well" : `${failures} failures`);
+process.exit(failures === 0 ? 0 : 1);

@@ -1,0 +1,352 @@
+"""The exported page in Chromium against vdi render, by real input events, and what bad input gets.
+page_test.py VDI CHROMIUM FOLDER: pictures are left in the folder."""
+import base64
+import io
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+from skimage import io as images
+from skimage.metrics import structural_similarity
+
+from browser import Browser
+
+VDI, CHROMIUM, PICTURES = map(os.path.abspath, sys.argv[1:4])
+os.makedirs(PICTURES, exist_ok=True)
+WIDTH, HEIGHT = 192, 108
+failures = []
+
+
+def check(holds, what):
+    if not holds:
+        print("FAILED ", what, flush=True)
+        failures.append(what)
+
+
+def vdi(*words):
+    subprocess.run([VDI, *map(str, words)], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                   timeout=120)
+
+
+def page_of(*files, title=None):
+    page = files[0].replace(".vdi", ".html")
+    vdi("export", *files, "-o", page, *(["--title", title] if title else []))
+    return page
+
+
+def open_page(browser, page, fragment=""):
+    browser.open(f"file://{os.path.abspath(page)}{fragment}")
+
+
+def whole(browser):
+    browser.wait("window.vdiPage && vdiPage.vdi && vdiPage.viewer.isWhole()")
+
+
+def bare(browser):
+    """Only the VDI, on black as in vdi render's pictures."""
+    browser.value("""(() => {
+      document.body.classList.add('bare');
+      for (const [id, value] of [['outline', false], ['background', '#000000']]) {
+        const input = document.getElementById(id);
+        if (id === 'outline') { if (input.checked) input.click(); }
+        else { input.value = value; input.dispatchEvent(new Event('input')); }
+      }
+    })()""")
+    whole(browser)
+
+
+def shown(browser, name=None):
+    whole(browser)
+    browser.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    path = os.path.join(PICTURES, name + ".png") if name else None
+    return images.imread(io.BytesIO(browser.screenshot(path)))[..., :3]
+
+
+def rendered(file, camera, reconstruction="smooth"):
+    """What vdi render makes of it, from the page's camera."""
+    words = {"position": camera["position"], "focal_point": camera["focalPoint"], "view_up": camera["viewUp"]}
+    if camera["parallel"]:
+        words.update(parallel_scale=camera["parallelScale"])
+    else:
+        words.update(view_angle=camera["viewAngle"])
+    with open("camera.json", "w", encoding="utf-8") as text:
+        json.dump(words, text)
+    vdi("render", file, "-o", "expected.png", "--camera", "camera.json", "--resolution", f"{WIDTH}x{HEIGHT}",
+        "--reconstruction", reconstruction)
+    return images.imread("expected.png")[..., :3]
+
+
+def compare(what, got, expected, least=0.995):
+    """SSIM of each channel, of all and over the object's bounding box."""
+    rows, columns = np.nonzero(expected.max(axis=2) > 2)
+    if len(rows) == 0:
+        check(False, f"{what}: nothing to see")
+        return
+    box = np.s_[max(rows.min() - 4, 0):rows.max() + 5, max(columns.min() - 4, 0):columns.max() + 5]
+    values = [structural_similarity(got[part][..., c], expected[part][..., c], data_range=255)
+              for part in (np.s_[:], box) for c in range(3)]
+    most = np.abs(got.astype(int) - expected).max()
+    print(f"{what}: SSIM {min(values[:3]):.4f}, over the object {min(values[3:]):.4f}, largest difference {most}/255",
+          flush=True)
+    check(min(values) >= least and most <= 8, what)
+
+
+def azimuth(camera, degrees):
+    up = np.array(camera["viewUp"]) / np.linalg.norm(camera["viewUp"])
+    focal = np.array(camera["focalPoint"])
+    back = np.array(camera["position"]) - focal
+    angle = math.radians(degrees)
+    turned = math.cos(angle) * back + math.sin(angle) * np.cross(up, back) + (1 - math.cos(angle)) * (up @ back) * up
+    return {**camera, "position": list(focal + turned)}
+
+
+def camera_of(browser):
+    return browser.value("vdiPage.viewer.camera")
+
+
+def test_pictures(browser):
+    common = ["--size", "40x36x32", "--resolution", f"{WIDTH}x{HEIGHT}", "--supersegments", "12"]
+    cases = {"compact": ["--field", "mixing"], "full": ["--field", "coil", "--precision", "full"],
+             "parallel": ["--field", "interface", "--parallel"],
+             "margin": ["--field", "turbulence", "--zoom", "2", "--margin", "0.5"],
+             "surface": ["--field", "turbulence", "--transfer-function", "surface"]}
+    for name, words in cases.items():
+        vdi("generate", *common, *words, "-o", f"{name}.vdi")
+        open_page(browser, page_of(f"{name}.vdi"))
+        whole(browser)
+        bare(browser)
+        start = camera_of(browser)
+        angles = (0, 10, 30, 90)
+        vdi("render", f"{name}.vdi", "-o", f"{name}.png", "--resolution", f"{WIDTH}x{HEIGHT}", "--azimuth", *angles)
+        for degrees in angles:
+            camera = azimuth(start, degrees)
+            browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
+            expected = images.imread(f"{name}_{degrees}deg.png")[..., :3]
+            compare(f"{name}, {degrees} degrees", shown(browser, f"{name}_{degrees}"), expected)
+        if name in ("compact", "parallel"):
+            browser.value("document.getElementById('smooth').click()")
+            compare(f"{name}, constant", shown(browser), rendered(f"{name}.vdi", camera, "constant"))
+        check(not browser.complaints(), f"{name}: {browser.complaints()}")
+
+
+def test_small_textures(browser):
+    """A GPU whose textures are 64 texels wide and high: lists and supersegments take several layers."""
+    script = browser.send("Page.addScriptToEvaluateOnNewDocument", source="""
+      const asked = WebGL2RenderingContext.prototype.getParameter;
+      WebGL2RenderingContext.prototype.getParameter = function(name) {
+        return name === this.MAX_TEXTURE_SIZE ? 64 : asked.call(this, name);
+      };""")["identifier"]
+    open_page(browser, "compact.html")
+    whole(browser)
+    bare(browser)
+    camera = azimuth(camera_of(browser), 30)
+    browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
+    compare("small textures", shown(browser), rendered("compact.vdi", camera))
+    browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
+
+
+def angle_of(browser):
+    return float(browser.value("document.getElementById('angle').textContent").rstrip("°"))
+
+
+def test_hands(browser):
+    open_page(browser, "compact.html")
+    whole(browser)
+    bare(browser)
+    home = camera_of(browser)
+    browser.drag((90, 50), (126, 50))
+    check(45 < angle_of(browser) < 65, f"a third of the height turns by 60 degrees or less, not {angle_of(browser)}")
+    compare("mouse orbit", shown(browser), rendered("compact.vdi", camera_of(browser)))
+    browser.wait("location.hash.includes('camera=')")
+    link = browser.value("location.hash")
+    before = camera_of(browser)
+    browser.mouse("mouseWheel", 90, 50, deltaX=0, deltaY=-300)
+    distance = [np.linalg.norm(np.subtract(c["position"], c["focalPoint"])) for c in (before, camera_of(browser))]
+    check(distance[1] < 0.8 * distance[0], f"the wheel zooms: {distance}")
+    browser.drag((90, 50), (90, 70), button="middle", buttons=4)
+    check(camera_of(browser)["focalPoint"] != before["focalPoint"], "the middle button pans")
+    browser.key("[")
+    check(abs(np.dot(camera_of(browser)["viewUp"], before["viewUp"])) < 0.9999, "a key rolls")
+    compare("zoomed, panned and rolled", shown(browser), rendered("compact.vdi", camera_of(browser)))
+    browser.key("Home")
+    browser.wait("vdiPage.viewer.camera === vdiPage.vdi.camera")
+    compare("as made", shown(browser), rendered("compact.vdi", home))
+    browser.wait("location.hash === ''")
+
+    browser.send("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
+    browser.touch("touchStart", (90, 50))
+    for x in range(92, 120, 3):
+        browser.touch("touchMove", (x, 50))
+    browser.touch("touchEnd")
+    check(20 < angle_of(browser) < 60, f"a finger orbits: {angle_of(browser)}")
+    compare("touch orbit", shown(browser), rendered("compact.vdi", camera_of(browser)))
+    before = camera_of(browser)
+    browser.touch("touchStart", (80, 50), (100, 50))
+    for step in range(1, 11):
+        browser.touch("touchMove", (80 - step, 50), (100 + step, 50))
+    browser.touch("touchEnd")
+    distance = [np.linalg.norm(np.subtract(c["position"], c["focalPoint"])) for c in (before, camera_of(browser))]
+    check(0.3 < distance[1] / distance[0] < 0.7, f"two fingers zoom: {distance}")
+    browser.send("Emulation.setTouchEmulationEnabled", enabled=False)
+
+    open_page(browser, "compact.html", link)
+    whole(browser)
+    check(abs(angle_of(browser) - 58) < 12, f"a link keeps the view: {angle_of(browser)}")
+    for damaged in ("#camera=1,2,3", "#camera=NaN,1,1,1,1,1,1,1,1,1", "#frame=-7&camera=", "#frame=1e9"):
+        open_page(browser, "compact.html", damaged)
+        whole(browser)
+        check(angle_of(browser) == 0, f"{damaged} is ignored")
+
+
+def message_of(browser):
+    return browser.value("document.getElementById('message').hidden ? '' : document.getElementById('message').textContent")
+
+
+def drop_files(browser, *paths):
+    root = browser.send("DOM.getDocument")["root"]["nodeId"]
+    node = browser.send("DOM.querySelector", nodeId=root, selector="#files")["nodeId"]
+    browser.value("document.getElementById('message').hidden = true")
+    browser.send("DOM.setFileInputFiles", nodeId=node, files=[os.path.abspath(path) for path in paths])
+
+
+def test_damage(browser):
+    with open("compact.vdi", "rb") as file:
+        sound = file.read()
+    cases = {"truncated": sound[:len(sound) // 2], "empty": b"", "no_vdi": b"hello" * 100,
+             "flipped": sound[:5000] + bytes([sound[5000] ^ 16]) + sound[5001:],
+             "later": sound[:8] + b"\x09" + sound[9:]}
+    open_page(browser, "compact.html")
+    whole(browser)
+    bare(browser)
+    before = shown(browser)
+    for name, data in cases.items():
+        with open(f"{name}.vdi", "wb") as file:
+            file.write(data)
+        drop_files(browser, f"{name}.vdi")
+        browser.wait("!document.getElementById('message').hidden")
+        message = message_of(browser)
+        check(message.startswith("not a sound .vdi file: ") and "\n" not in message, f"{name}: {message}")
+        browser.value("document.getElementById('message').hidden = true")
+        check(np.array_equal(shown(browser), before), f"{name}: what was shown stays")
+    drop_files(browser, "full.vdi")
+    browser.wait("!vdiPage.vdi.compact")
+    check(message_of(browser) == "", "a sound file can be opened after damaged ones")
+    check(not browser.complaints(), f"damage: {browser.complaints()}")
+
+    with open("compact.html", encoding="utf-8") as file:
+        text = file.read()
+    start = text.index('data-size="')
+    begin = text.index(">", start) + 1
+    end = text.index("</script>", begin)
+    data = text[begin:end]
+    flipped = bytearray(base64.b64decode(data))
+    flipped[len(flipped) // 2] ^= 4
+    damaged = {"cut": text[:begin] + data[:len(data) // 2 // 4 * 4] + text[end:],
+               "letters": text[:begin] + data[:1000] + "!!" + data[1002:] + text[end:],
+               "size": text[:start] + 'data-size="99999999999"' + text[begin - 1:],
+               "flip": text[:begin] + base64.b64encode(flipped).decode() + text[end:]}
+    for name, page in damaged.items():
+        with open("damaged.html", "w", encoding="utf-8") as file:
+            file.write(page)
+        open_page(browser, "damaged.html")
+        browser.wait("!document.getElementById('message').hidden && !message.textContent.startsWith('Reading')")
+        check("damaged" in message_of(browser) or "not a sound" in message_of(browser), f"{name}: {message_of(browser)}")
+        drop_files(browser, "full.vdi")
+        browser.wait("vdiPage.vdi && !vdiPage.vdi.compact")
+
+
+def test_lost_context(browser):
+    open_page(browser, "compact.html")
+    whole(browser)
+    bare(browser)
+    before = shown(browser)
+    browser.value("window.extension = vdiPage.viewer.renderer.gl.getExtension('WEBGL_lose_context'); extension.loseContext()")
+    browser.wait("vdiPage.viewer.isLost")
+    check("lost" in message_of(browser), "a lost context is told of")
+    browser.value("vdiPage.setCamera({...vdiPage.viewer.camera}, false); extension.restoreContext()")
+    browser.wait("!vdiPage.viewer.isLost")
+    check(np.array_equal(shown(browser), before), "the picture comes back")
+    check(message_of(browser) == "", "and the message goes")
+
+    script = browser.send("Page.addScriptToEvaluateOnNewDocument",
+                          source="HTMLCanvasElement.prototype.getContext = () => null;")["identifier"]
+    open_page(browser, "compact.html")
+    browser.wait("!document.getElementById('message').hidden")
+    check("WebGL2" in message_of(browser), f"without WebGL2: {message_of(browser)}")
+    browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
+
+
+def test_series(browser):
+    for i, seed in enumerate((1, 2, 3)):
+        vdi("generate", "--field", "turbulence", "--size", "24x24x24", "--resolution", f"{WIDTH}x{HEIGHT}", "--supersegments",
+            "8", "--seed", seed, "-o", f"step_{i}.vdi")
+    open_page(browser, page_of(*[f"step_{i}.vdi" for i in range(3)], title="<Three> & \"steps\""))
+    whole(browser)
+    check(browser.value("document.title") == "<Three> & \"steps\"", "a title of any letters")
+    bare(browser)
+    browser.value("(() => { const s = document.getElementById('frame'); s.value = 2; s.dispatchEvent(new Event('input')); })()")
+    browser.wait("vdiPage.frame === 2")
+    compare("third frame", shown(browser), rendered("step_2.vdi", camera_of(browser)))
+    browser.wait("location.hash === '#frame=2'")
+    browser.value("document.getElementById('view').focus()")
+    browser.key(" ")
+    browser.wait("vdiPage.frame === 1")
+    browser.key(" ")
+    check(not browser.value("vdiPage.isPlaying"), "the space bar stops a series")
+
+
+def test_looks(browser):
+    """Nothing is cut off, on screens of all kinds; the pictures are for people to look at."""
+    for scheme in ("light", "dark"):
+        browser.send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        for name, size in (("phone", (360, 640)), ("desktop", (1000, 640))):
+            browser.size(*size)
+            open_page(browser, "step_0.html")
+            whole(browser)
+            browser.screenshot(os.path.join(PICTURES, f"{name}_{scheme}.png"))
+            inside = browser.value("""[...document.querySelectorAll('#bar > *, header')].filter((e) => !e.hidden).every((e) => {
+              const box = e.getBoundingClientRect();
+              return box.left >= 0 && box.right <= innerWidth && box.top >= 0 && box.bottom <= innerHeight;
+            })""")
+            check(inside, f"{name}, {scheme}: all is inside of the window")
+            paper = browser.value("vdiPage.viewer.background[0]")
+            check(paper < 0.2 if scheme == "dark" else paper > 0.8, f"{scheme}: the background is {paper}")
+    browser.send("Emulation.setEmulatedMedia", features=[])
+    browser.size(WIDTH, HEIGHT)
+
+
+def test_network(browser):
+    """The page asks for nothing but itself, and allows nothing else."""
+    asked = {event["params"]["request"]["url"] for event in browser.events
+             if event.get("method") == "Network.requestWillBeSent"}
+    beyond = [url for url in asked if not url.startswith(("file://", "blob:", "data:", "about:"))]
+    check(not beyond, f"the page asks for {beyond}")
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        browser = Browser(CHROMIUM)
+        try:
+            browser.size(WIDTH, HEIGHT)
+            for test in (test_pictures, test_small_textures, test_hands, test_damage, test_lost_context, test_series,
+                         test_looks, test_network):
+                start = time.monotonic()
+                try:
+                    test(browser)
+                except (TimeoutError, RuntimeError) as error:
+                    check(False, f"{test.__name__}: {error}")
+                print(f"{test.__name__}: {time.monotonic() - start:.1f} s", flush=True)
+        finally:
+            browser.close()
+            os.chdir("/")
+    print("all well" if not failures else f"{len(failures)} failures")
+    return 1 if failures else 0
+
+
+sys.exit(main())

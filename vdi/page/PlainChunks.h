@@ -1,0 +1,15 @@
+// A .vdi file for a packer that does better than LZ4.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace vdi::page {
+
+/// The same VDI as a .vdi file whose chunks aren't compressed: LZ4 blocks of literals alone, with checksums
+/// of their own. It is larger, and what deflate makes of it is smaller than what it makes of LZ4's output.
+/// Throws Error{Format} for what io::decode refuses.
+std::vector<std::byte> withPlainChunks(std::span<const std::byte> file);
+
+}  // namespace vdi::page

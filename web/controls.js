@@ -1,0 +1,119 @@
+// How a hand moves the camera: mouse, touch and keyboard.
+
+import {orbited, panned, rolled, zoomed} from "./camera.js";
+
+/** @typedef {import("./format.js").Camera} Camera */
+/** @typedef {import("./format.js").Vec3} Vec3 */
+
+const DEGREES_PER_HEIGHT = 180;  // of a drag
+const KEY_DEGREES = 5;
+const KEY_PAN = 0.05;
+const KEY_ZOOM = 1.1;
+
+/**
+ * @typedef {object} Hand what the controls move
+ * @property {() => Camera | undefined} camera
+ * @property {() => Vec3} center that is orbited
+ * @property {(camera: Camera) => void} move
+ */
+
+/** @typedef {{x: number, y: number}} Place in CSS pixels */
+
+/**
+ * What a drag does.
+ * @param {PointerEvent} event
+ * @returns {"orbit" | "pan" | "roll" | "zoom"}
+ */
+function dragOf(event) {
+  if (event.button === 1 || (event.button === 0 && event.shiftKey)) return "pan";
+  if (event.button === 2) return "zoom";
+  return event.ctrlKey || event.altKey ? "roll" : "orbit";
+}
+
+/** @param {HTMLElement} element @param {Hand} hand */
+function addPointers(element, hand) {
+  /** @type {Map<number, Place>} */
+  const pointers = new Map();
+  /** @type {"orbit" | "pan" | "roll" | "zoom"} */
+  let drag = "orbit";
+
+  /** @param {Camera} camera @param {Place} from @param {Place} to */
+  const dragged = (camera, from, to) => {
+    const box = element.getBoundingClientRect();
+    const dx = (to.x - from.x) / box.height, dy = (to.y - from.y) / box.height;
+    if (drag === "pan") return panned(camera, dx, -dy);
+    if (drag === "zoom") return zoomed(camera, Math.exp(-2 * dy));
+    if (drag === "orbit") return orbited(camera, hand.center(), -dx * DEGREES_PER_HEIGHT, dy * DEGREES_PER_HEIGHT);
+    const angle = (/** @type {Place} */ p) => Math.atan2(p.y - box.top - box.height / 2, p.x - box.left - box.width / 2);
+    return rolled(camera, (angle(to) - angle(from)) * 180 / Math.PI);
+  };
+
+  /**
+   * Two fingers: what is between them stays between them.
+   * @param {Camera} camera
+   * @param {Place} fixed
+   * @param {Place} from
+   * @param {Place} to
+   */
+  const pinched = (camera, fixed, from, to) => {
+    const height = element.getBoundingClientRect().height;
+    const before = {x: from.x - fixed.x, y: from.y - fixed.y}, after = {x: to.x - fixed.x, y: to.y - fixed.y};
+    const factor = Math.hypot(after.x, after.y) / Math.max(Math.hypot(before.x, before.y), 1);
+    const angle = Math.atan2(after.y, after.x) - Math.atan2(before.y, before.x);
+    const moved = panned(camera, (to.x - from.x) / 2 / height, -(to.y - from.y) / 2 / height);
+    return rolled(zoomed(moved, Math.min(Math.max(factor, 0.5), 2)), angle * 180 / Math.PI);
+  };
+
+  element.addEventListener("pointerdown", (event) => {
+    element.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
+    drag = dragOf(event);
+  });
+  element.addEventListener("pointermove", (event) => {
+    const from = pointers.get(event.pointerId);
+    const camera = hand.camera();
+    if (!from || !camera) return;
+    const to = {x: event.clientX, y: event.clientY};
+    const other = [...pointers].find(([id]) => id !== event.pointerId);
+    pointers.set(event.pointerId, to);
+    hand.move(other ? pinched(camera, other[1], from, to) : dragged(camera, from, to));
+  });
+  for (const name of /** @type {const} */ (["pointerup", "pointercancel", "lostpointercapture"]))
+    element.addEventListener(name, (event) => pointers.delete(event.pointerId));
+  element.addEventListener("contextmenu", (event) => event.preventDefault());
+}
+
+/** @param {KeyboardEvent} event @param {Camera} camera @param {Vec3} center @returns {Camera | undefined} */
+function keyed(event, camera, center) {
+  const step = event.shiftKey;
+  switch (event.key) {
+    case "ArrowLeft": return step ? panned(camera, -KEY_PAN, 0) : orbited(camera, center, -KEY_DEGREES, 0);
+    case "ArrowRight": return step ? panned(camera, KEY_PAN, 0) : orbited(camera, center, KEY_DEGREES, 0);
+    case "ArrowUp": return step ? panned(camera, 0, KEY_PAN) : orbited(camera, center, 0, KEY_DEGREES);
+    case "ArrowDown": return step ? panned(camera, 0, -KEY_PAN) : orbited(camera, center, 0, -KEY_DEGREES);
+    case "+": case "=": return zoomed(camera, KEY_ZOOM);
+    case "-": case "_": return zoomed(camera, 1 / KEY_ZOOM);
+    case "[": return rolled(camera, KEY_DEGREES);
+    case "]": return rolled(camera, -KEY_DEGREES);
+    default: return undefined;
+  }
+}
+
+/** @param {HTMLElement} element that has the focus and the pointer @param {Hand} hand */
+export function addControls(element, hand) {
+  addPointers(element, hand);
+  element.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    const camera = hand.camera();
+    const lines = event.deltaMode === 0 ? event.deltaY / 100 : event.deltaMode === 1 ? event.deltaY / 3 : event.deltaY;
+    if (camera) hand.move(zoomed(camera, Math.exp(-0.15 * Math.min(Math.max(lines, -5), 5))));
+  }, {passive: false});
+  element.addEventListener("keydown", (event) => {
+    const camera = hand.camera();
+    if (!camera || event.ctrlKey || event.altKey || event.metaKey) return;
+    const next = keyed(event, camera, hand.center());
+    if (!next) return;
+    event.preventDefault();
+    hand.move(next);
+  });
+}

@@ -1,0 +1,84 @@
+// Small helpers for WebGL2.
+
+/** @param {WebGL2RenderingContext} gl @param {number} kind @param {string} source */
+function compile(gl, kind, source) {
+  const shader = gl.createShader(kind);
+  if (!shader) throw new Error("WebGL gave no shader");
+  gl.shaderSource(shader, source);
+  gl.compileShader(shader);
+  return shader;
+}
+
+/**
+ * A program with its uniforms by name. Throws Error for one that doesn't build, unless the context is lost.
+ * @param {WebGL2RenderingContext} gl
+ * @param {string} vertex
+ * @param {string} fragment
+ */
+export function makeProgram(gl, vertex, fragment) {
+  const program = gl.createProgram();
+  if (!program) throw new Error("WebGL gave no program");
+  const shaders = [compile(gl, gl.VERTEX_SHADER, vertex), compile(gl, gl.FRAGMENT_SHADER, fragment)];
+  for (const shader of shaders) gl.attachShader(program, shader);
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+    const logs = [...shaders.map((shader) => gl.getShaderInfoLog(shader)), gl.getProgramInfoLog(program)];
+    throw new Error(`the graphics driver refuses a shader: ${logs.filter(Boolean).join(" ").split("\n")[0]}`);
+  }
+  for (const shader of shaders) gl.deleteShader(shader);
+  /** @type {Map<string, WebGLUniformLocation | null>} */
+  const locations = new Map();
+  const uniform = (/** @type {string} */ name) => {
+    const known = locations.get(name);
+    if (known !== undefined) return known;
+    const location = gl.getUniformLocation(program, name);
+    locations.set(name, location);
+    return location;
+  };
+  return {program, uniform};
+}
+
+/**
+ * How elements of long arrays lie in textures: see Variant in traverse.js.
+ * @param {WebGL2RenderingContext} gl
+ */
+export function tilingOf(gl) {
+  const shift = Math.min(12, Math.floor(Math.log2(gl.getParameter(gl.MAX_TEXTURE_SIZE))));
+  return {rowShift: shift, layerShift: shift};
+}
+
+/**
+ * An array of one, two or four words an element as an integer texture of rows and layers. Throws Error where the GPU
+ * can't hold it.
+ * @param {WebGL2RenderingContext} gl
+ * @param {Uint32Array} words
+ * @param {2 | 4} perElement
+ * @param {{rowShift: number, layerShift: number}} tiling
+ */
+export function makeArrayTexture(gl, words, perElement, tiling) {
+  const width = 1 << tiling.rowShift;
+  const maxHeight = 1 << tiling.layerShift;
+  const rows = Math.max(1, Math.ceil(words.length / perElement / width));
+  const layers = Math.ceil(rows / maxHeight);
+  if (layers > gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS)) throw new Error("the VDI is too large for this GPU's textures");
+  const [internal, format] = perElement === 2 ? [gl.RG32UI, gl.RG_INTEGER] : [gl.RGBA32UI, gl.RGBA_INTEGER];
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
+  gl.getError();
+  gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, internal, width, Math.min(rows, maxHeight), layers);
+  if (gl.getError() === gl.OUT_OF_MEMORY) throw new Error("the GPU has too little memory for this VDI");
+  gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
+  const perRow = width * perElement;
+  for (let row = 0; row * perRow < words.length;) {
+    const whole = Math.floor(words.length / perRow) - row;
+    const some = Math.min(Math.max(whole, 1), maxHeight - (row % maxHeight));
+    const across = whole > 0 ? width : (words.length % perRow) / perElement;
+    const part = words.subarray(row * perRow, row * perRow + some * across * perElement);
+    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, row % maxHeight, Math.floor(row / maxHeight), across, some, 1, format,
+                     gl.UNSIGNED_INT, part);
+    row += some;
+  }
+  return texture;
+}

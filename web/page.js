@@ -1,0 +1,299 @@
+// The page: puts viewer, controls and frames together.
+
+import {drawAxes} from "./axes.js";
+import {between, cameraOfText, cameraText, centerOf, degreesBetween} from "./camera.js";
+import {addControls} from "./controls.js";
+import {showLegend} from "./legend.js";
+import {embeddedSource, filesSource} from "./sources.js";
+import {Viewer} from "./viewer.js";
+
+/** @typedef {import("./format.js").Camera} Camera */
+/** @typedef {import("./format.js").Vdi} Vdi */
+/** @typedef {import("./format.js").Vec3} Vec3 */
+/** @typedef {import("./renderer.js").Color} Color */
+/** @typedef {import("./sources.js").Source} Source */
+
+/** @param {string} id */
+const element = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+/** @param {string} id */
+const input = (id) => /** @type {HTMLInputElement} */ (document.getElementById(id));
+
+/**
+ * One line for the user; none: nothing to say.
+ * @param {string} message
+ */
+function tell(message) {
+  element("message").textContent = message;
+  element("message").hidden = message === "";
+}
+
+/** @param {unknown} error */
+function messageOf(error) {
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** @param {string} hex as of an input of type color @returns {Color} */
+function colorOf(hex) {
+  const n = parseInt(hex.slice(1), 16);
+  return [(n >> 16) / 255, ((n >> 8) & 255) / 255, (n & 255) / 255];
+}
+
+const darkScheme = window.matchMedia("(prefers-color-scheme: dark)");
+const MOTION_MS = 350;
+const FRAMES_PER_SECOND = 10;
+
+/** What follows # in the URL. */
+function fragment() {
+  return new URLSearchParams(location.hash.slice(1));
+}
+
+class Page {
+  constructor() {
+    this.viewer = new Viewer(/** @type {HTMLCanvasElement} */ (element("view")), tell);
+    /** @type {Source | undefined} */
+    this.source = undefined;
+    /** @type {Vdi | undefined} */
+    this.vdi = undefined;
+    this.frame = 0;
+    this.isPlaying = false;
+    /** Counts requests for frames, so that an older one that comes late is dropped. */
+    this.request = 0;
+    this.ownBackground = false;
+    this.viewer.onRest = () => this.keepInUrl();
+    this.connect();
+    this.takeTheme();
+  }
+
+  connect() {
+    const {viewer} = this;
+    addControls(element("view"), {
+      camera: () => viewer.camera,
+      center: () => this.orbitCenter(),
+      move: (camera) => this.setCamera(camera),
+    });
+    element("home").addEventListener("click", () => this.goHome());
+    element("play").addEventListener("click", () => this.play(!this.isPlaying));
+    input("frame").addEventListener("input", () => this.show(input("frame").valueAsNumber));
+    input("outline").addEventListener("change", () => {
+      viewer.outline = input("outline").checked;
+      viewer.refresh();
+    });
+    input("triad").addEventListener("change", () => this.showView());
+    input("smooth").addEventListener("change", () => viewer.setSmooth(input("smooth").checked));
+    input("background").addEventListener("input", () => {
+      this.ownBackground = true;
+      this.takeTheme();
+    });
+    element("screenshot").addEventListener("click", () => this.saveScreenshot());
+    element("open").addEventListener("click", () => input("files").click());
+    input("files").addEventListener("change", () => this.openFiles([...(input("files").files ?? [])]));
+    element("view").addEventListener("keydown", (event) => this.onKey(event));
+    window.addEventListener("resize", () => viewer.redraw());
+    window.addEventListener("hashchange", () => this.takeUrl());
+    darkScheme.addEventListener("change", () => this.takeTheme());
+    document.addEventListener("dragover", (event) => event.preventDefault());
+    document.addEventListener("drop", (event) => {
+      event.preventDefault();
+      this.openFiles([...(event.dataTransfer?.files ?? [])]);
+    });
+  }
+
+  /** @param {KeyboardEvent} event */
+  onKey(event) {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.key === "Home") this.goHome();
+    else if (event.key === " " && this.source && this.source.count > 1) this.play(!this.isPlaying);
+    else if (event.key === "h") document.body.classList.toggle("bare");
+    else return;
+    event.preventDefault();
+  }
+
+  /**
+   * The focal point if it lies in the scene, else the scene's middle.
+   * @returns {Vec3}
+   */
+  orbitCenter() {
+    const {vdi, viewer} = this;
+    if (!vdi || !viewer.camera) return [0, 0, 0];
+    const focal = viewer.camera.focalPoint;
+    const inside = focal.every((f, axis) => f >= vdi.bounds[0][axis] && f <= vdi.bounds[1][axis]);
+    const middle = centerOf(vdi.bounds);
+    return inside || !middle.every(Number.isFinite) ? focal : middle;
+  }
+
+  /** @param {File[]} files */
+  async openFiles(files) {
+    if (files.length > 0) await this.open(filesSource(files));
+  }
+
+  /**
+   * Shows a source's first frame, from where it was made. What was shown before stays if that fails.
+   * @param {Source} source
+   */
+  async open(source) {
+    this.play(false);
+    const wanted = Number(fragment().get("frame") ?? 0);
+    const first = this.source === undefined && wanted > 0 && wanted < source.count ? Math.floor(wanted) : 0;
+    const before = this.source;
+    this.source = source;
+    if (!await this.show(first)) {
+      if (this.source === source) this.source = before;
+      return;
+    }
+    element("series").hidden = source.count < 2;
+    input("frame").max = String(source.count - 1);
+    input("frame").value = String(first);
+    if (before === undefined) this.takeUrl();
+    else if (this.vdi) this.setCamera(this.vdi.camera, false);
+  }
+
+  /** @param {number} frame @returns {Promise<boolean>} whether it is shown */
+  async show(frame) {
+    const {source, viewer} = this;
+    if (!source) return false;
+    const request = ++this.request;
+    try {
+      if (!this.vdi) tell("Reading…");
+      const vdi = await source.load(frame);
+      if (request !== this.request) return false;
+      viewer.setVdi(vdi);
+      this.vdi = vdi;
+      this.frame = frame;
+      if (!viewer.camera || viewer.camera.parallel !== vdi.camera.parallel) this.setCamera(vdi.camera, false);
+      if (!viewer.isLost) tell("");
+      this.showFacts();
+      showLegend(element("legend"), vdi.coloring);
+      this.showView();
+      return true;
+    } catch (error) {
+      const name = source.count > 1 ? `${source.nameOf(frame)}: ` : "";
+      if (request === this.request) tell(name + messageOf(error));
+      return false;
+    }
+  }
+
+  /** @param {boolean} on */
+  play(on) {
+    this.isPlaying = on;
+    element("play").textContent = on ? "Pause" : "Play";
+    element("play").setAttribute("aria-pressed", String(on));
+    if (on) this.playOn();
+  }
+
+  async playOn() {
+    while (this.isPlaying && this.source) {
+      const next = (this.frame + 1) % this.source.count;
+      const pause = new Promise((resolve) => setTimeout(resolve, 1000 / FRAMES_PER_SECOND));
+      if (!await this.show(next)) {
+        this.play(false);
+        return;
+      }
+      input("frame").value = String(next);
+      await pause;
+    }
+  }
+
+  showFacts() {
+    const {vdi, source} = this;
+    if (!vdi || !source) return;
+    const parts = [source.nameOf(this.frame)];
+    if (vdi.timeStep !== 0 || vdi.time !== 0) parts.push(`step ${vdi.timeStep}`, `t = ${Number(vdi.time.toPrecision(6))}`);
+    parts.push(`${vdi.width - 2 * vdi.margin[0]} × ${vdi.height - 2 * vdi.margin[1]}`,
+               `${vdi.supersegmentCount.toLocaleString("en")} supersegments`);
+    element("facts").textContent = parts.filter(Boolean).join(" · ");
+  }
+
+  /** @param {Camera} camera @param {boolean} [moving] */
+  setCamera(camera, moving = true) {
+    this.viewer.setCamera(camera, moving);
+    this.showView();
+  }
+
+  /** What the page says of the view. */
+  showView() {
+    const {vdi, viewer} = this;
+    if (!vdi || !viewer.camera) return;
+    const angle = degreesBetween(centerOf(vdi.bounds), vdi.camera, viewer.camera);
+    element("angle").textContent = Number.isFinite(angle) ? `${Math.round(angle)}°` : "";
+    element("axes").style.display = input("triad").checked ? "" : "none";
+    drawAxes(/** @type {SVGElement} */ (/** @type {unknown} */ (element("axes"))), viewer.camera);
+  }
+
+  goHome() {
+    const {vdi, viewer} = this;
+    if (!vdi || !viewer.camera) return;
+    const from = viewer.camera, to = vdi.camera;
+    const start = performance.now();
+    let last = from;
+    const step = () => {
+      if (viewer.camera !== last) return;  // the hand is back
+      const share = Math.min((performance.now() - start) / MOTION_MS, 1);
+      last = share < 1 ? between(from, to, share * share * (3 - 2 * share)) : to;
+      this.setCamera(last);
+      if (share < 1) requestAnimationFrame(step);
+    };
+    step();
+  }
+
+  takeTheme() {
+    const {viewer} = this;
+    const dark = darkScheme.matches;
+    if (!this.ownBackground) input("background").value = dark ? "#17191d" : "#ffffff";
+    viewer.background = colorOf(input("background").value);
+    const [r, g, b] = viewer.background;
+    const isDark = 0.3 * r + 0.6 * g + 0.1 * b < 0.5;
+    viewer.outlineColor = isDark ? [0.75, 0.77, 0.8] : [0.3, 0.33, 0.38];
+    viewer.refresh();
+  }
+
+  keepInUrl() {
+    const {vdi, viewer} = this;
+    if (!vdi || !viewer.camera || this.isPlaying) return;
+    const parts = [];
+    const camera = cameraText(viewer.camera);
+    if (camera !== cameraText(vdi.camera)) parts.push(`camera=${camera}`);
+    if (this.frame > 0) parts.push(`frame=${this.frame}`);
+    try {
+      history.replaceState(null, "", parts.length > 0 ? `#${parts.join("&")}` : location.pathname + location.search);
+    } catch {
+      // Some browsers allow it a few times a second only; the next view will be kept.
+    }
+  }
+
+  takeUrl() {
+    const {vdi} = this;
+    const text = fragment().get("camera");
+    const camera = vdi && text ? cameraOfText(text, vdi.camera) : vdi?.camera;
+    if (camera) this.setCamera(camera, false);
+  }
+
+  async saveScreenshot() {
+    try {
+      const url = URL.createObjectURL(await this.viewer.screenshot());
+      const link = document.createElement("a");
+      link.href = url;
+      link.download = `${(document.title || "vdi").replace(/[^\w.-]+/g, "_")}.png`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(url), 1000);
+    } catch (error) {
+      tell(messageOf(error));
+    }
+  }
+}
+
+function main() {
+  let page;
+  try {
+    page = new Page();
+  } catch (error) {
+    tell(messageOf(error));
+    return;
+  }
+  Object.assign(window, {vdiPage: page});  // for scripts and tests
+  /** @type {HTMLElement[]} */
+  const frames = [...document.querySelectorAll("script.vdi-frame")].map((frame) => /** @type {HTMLElement} */ (frame));
+  if (frames.length > 0) page.open(embeddedSource(frames));
+  else tell("Open .vdi files, or drop them here.");
+}
+
+main();

@@ -1,0 +1,280 @@
+// Shows a VDI in a canvas. A view has two steps: `drawPicture` shows the VDI into a picture of its own, in strips and at any
+// resolution; `present` puts background, outline and the picture on the canvas.
+
+import {basisOf, clipMatrix, pixelSizeOf, raysOf} from "./camera.js";
+import {makeArrayTexture, makeProgram, tilingOf} from "./gl.js";
+import {expandedSegments, headsOf} from "./heads.js";
+import {WHOLE_PICTURE, traverseShader} from "./traverse.js";
+
+/** @typedef {import("./format.js").Camera} Camera */
+/** @typedef {import("./format.js").Vdi} Vdi */
+/** @typedef {import("./format.js").Vec3} Vec3 */
+/** @typedef {[number, number, number]} Color shares of red, green and blue */
+
+const COPY = `#version 300 es
+precision highp float;
+uniform sampler2D picture;
+uniform vec2 part;        // of the texture that the picture fills
+uniform vec2 canvasSize;
+out vec4 color;
+void main() { color = texture(picture, min(gl_FragCoord.xy / canvasSize * part, part - 0.5 / vec2(textureSize(picture, 0)))); }
+`;
+
+const LINES = `#version 300 es
+uniform mat4 clip;
+in vec3 world;
+void main() {
+  gl_Position = clip * vec4(world, 1.0);
+  gl_Position.z = 0.0;
+}
+`;
+
+const PLAIN = `#version 300 es
+precision highp float;
+uniform vec4 plain;
+out vec4 color;
+void main() { color = plain; }
+`;
+
+/** The 12 edges of a box: corners by bits x, y, z; and the two faces beside each as axis * 2 + side. */
+const EDGES = [0, 1, 2].flatMap((axis) => [0, 1, 2, 3].map((i) => {
+  const [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+  const from = ((i & 1) << u) | ((i >> 1) << v);
+  return {from, to: from | (1 << axis), faces: [2 * u + (i & 1), 2 * v + (i >> 1)]};
+}));
+
+/** @param {[Vec3, Vec3]} bounds @param {number} corner */
+function cornerOf(bounds, corner) {
+  return [0, 1, 2].map((axis) => bounds[(corner >> axis) & 1][axis]);
+}
+
+/**
+ * Edges of the box as ends of lines. In front: those beside a face that is turned to the camera; all in the box is
+ * behind them.
+ * @param {[Vec3, Vec3]} bounds
+ * @param {Camera} camera
+ * @param {boolean} inFront
+ */
+function outlineEnds(bounds, camera, inFront) {
+  const forward = basisOf(camera).forward;
+  const seesFace = (/** @type {number} */ face) => {
+    const axis = face >> 1, sign = (face & 1) === 1 ? 1 : -1;
+    const towards = camera.parallel ? -forward[axis] : camera.position[axis] - bounds[face & 1][axis];
+    return sign * towards > 0;
+  };
+  return EDGES.filter((edge) => edge.faces.some(seesFace) === inFront)
+              .flatMap((edge) => [...cornerOf(bounds, edge.from), ...cornerOf(bounds, edge.to)]);
+}
+
+/**
+ * A VDI's textures, and the program that shows it.
+ * @param {WebGL2RenderingContext} gl
+ * @param {Vdi} vdi
+ * @param {boolean} smooth
+ */
+function load(gl, vdi, smooth) {
+  const tiling = tilingOf(gl);
+  const {heads, tiles, nearest, farthest, binScale} = headsOf(vdi);
+  const segments = vdi.compact ? vdi.words : expandedSegments(vdi);
+  const program = makeProgram(gl, WHOLE_PICTURE, traverseShader({...tiling, compact: vdi.compact, smooth}));
+  const textures = [makeArrayTexture(gl, heads, 4, tiling), makeArrayTexture(gl, segments, vdi.compact ? 2 : 4, tiling),
+                    makeArrayTexture(gl, tiles, 2, tiling)];
+  return {vdi, smooth, program, textures, range: {nearest, farthest, binScale}};
+}
+
+/**
+ * A picture on the GPU, of which a view may fill a part.
+ * @param {WebGL2RenderingContext} gl
+ */
+function makePicture(gl) {
+  const texture = gl.createTexture();
+  const framebuffer = gl.createFramebuffer();
+  const picture = {texture, framebuffer, width: 0, height: 0, part: [0, 0]};
+  return {
+    ...picture,
+    /** @param {number} width @param {number} height at least */
+    resize(width, height) {
+      if (this.width === width && this.height === height) return;
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, width, height, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
+      for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.LINEAR);
+      for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+      [this.width, this.height, this.part] = [width, height, [0, 0]];
+    },
+  };
+}
+
+export class Renderer {
+  /**
+   * Throws Error without WebGL2. The canvas' pixels are as many as its owner sets.
+   * @param {HTMLCanvasElement} canvas
+   */
+  constructor(canvas) {
+    const gl = canvas.getContext("webgl2", {alpha: false, antialias: true, powerPreference: "high-performance"});
+    if (!gl) throw new Error("this browser has no WebGL2, which showing a VDI needs");
+    this.gl = gl;
+    this.canvas = canvas;
+    /** @type {ReturnType<typeof load> | undefined} */
+    this.loaded = undefined;
+    this.restore();
+  }
+
+  /** Makes everything on the GPU, at first and after the context was lost. */
+  restore() {
+    const gl = this.gl;
+    this.copy = makeProgram(gl, WHOLE_PICTURE, COPY);
+    this.lines = makeProgram(gl, LINES, PLAIN);
+    this.ends = gl.createBuffer();
+    this.shown = makePicture(gl);
+    this.next = makePicture(gl);
+    gl.disable(gl.DITHER);
+    const loaded = this.loaded;
+    this.loaded = undefined;
+    if (loaded) this.setVdi(loaded.vdi, loaded.smooth);
+  }
+
+  /**
+   * Throws Error if the GPU can't hold it; the VDI before then stays.
+   * @param {Vdi} vdi
+   * @param {boolean} smooth
+   */
+  setVdi(vdi, smooth) {
+    const before = this.loaded;
+    this.loaded = load(this.gl, vdi, smooth);
+    if (!before) return;
+    for (const texture of before.textures) this.gl.deleteTexture(texture);
+    this.gl.deleteProgram(before.program.program);
+  }
+
+  /**
+   * Draws rows of a picture for a canvas of the present size, from `firstRow` to before `endRow` of its own, from the
+   * bottom. The picture is seen once `finishPicture` was called.
+   * @param {Camera} camera
+   * @param {number} scale canvas pixels to one of the picture, >= 1
+   * @param {number} firstRow
+   * @param {number} endRow
+   */
+  drawPicture(camera, scale, firstRow, endRow) {
+    const {gl, loaded, canvas, next} = this;
+    if (!loaded || !next) return;
+    const {width, height} = this.pictureSize(scale);
+    next.resize(canvas.width, canvas.height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, next.framebuffer);
+    gl.viewport(0, 0, width, height);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(0, firstRow, width, endRow - firstRow);
+    gl.disable(gl.BLEND);
+    gl.useProgram(loaded.program.program);
+    this.setRays(camera, scale);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.SCISSOR_TEST);
+    next.part = [width / canvas.width, height / canvas.height];
+  }
+
+  /** @param {number} scale */
+  pictureSize(scale) {
+    return {width: Math.max(1, Math.ceil(this.canvas.width / scale)), height: Math.max(1, Math.ceil(this.canvas.height / scale))};
+  }
+
+  /**
+   * How many canvas pixels the camera's vertical extent takes: all, or fewer where the canvas is narrower than the VDI's picture,
+   * which stays in view in its whole width.
+   */
+  framedHeight() {
+    const {loaded, canvas} = this;
+    if (!loaded) return canvas.height;
+    const {width, height, margin} = loaded.vdi;
+    return Math.min(canvas.height, canvas.width * (height - 2 * margin[1]) / (width - 2 * margin[0]));
+  }
+
+  /**
+   * Uniforms of the VDI and of a view.
+   * @param {Camera} camera
+   * @param {number} scale
+   */
+  setRays(camera, scale) {
+    const {gl, loaded} = this;
+    if (!loaded) return;
+    const {vdi, range, textures} = loaded;
+    const {uniform} = loaded.program;
+    ["heads", "segments", "tiles"].forEach((name, unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D_ARRAY, textures[unit]);
+      gl.uniform1i(uniform(name), unit);
+    });
+    const {width, height} = this.pictureSize(scale);
+    const rays = raysOf(camera, this.framedHeight(), vdi.camera);
+    gl.uniform2i(uniform("lists"), vdi.width, vdi.height);
+    gl.uniform1i(uniform("parallel"), vdi.camera.parallel ? 1 : 0);
+    gl.uniform1f(uniform("pixelSize"), pixelSizeOf(vdi));
+    gl.uniform1f(uniform("nearest"), range.nearest);
+    gl.uniform1f(uniform("farthest"), range.farthest);
+    gl.uniform1f(uniform("binScale"), range.binScale);
+    gl.uniform2f(uniform("code"), vdi.code.first, vdi.code.step);
+    gl.uniform3fv(uniform("rayOrigin"), [...rays.origin, ...rays.originRight, ...rays.originUp]);
+    gl.uniform3fv(uniform("rayDirection"), [...rays.direction, ...rays.directionRight, ...rays.directionUp]);
+    gl.uniform2f(uniform("pictureSize"), scale * width, scale * height);
+    gl.uniform1f(uniform("pixelScale"), scale);
+  }
+
+  /** What was drawn becomes the picture that `present` shows. */
+  finishPicture() {
+    [this.shown, this.next] = [this.next, this.shown];
+  }
+
+  /**
+   * @param {Camera} camera
+   * @param {Color} background
+   * @param {Color | undefined} outline its colour, if there is to be one
+   */
+  present(camera, background, outline) {
+    const {gl, canvas} = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.disable(gl.BLEND);
+    gl.clearColor(...background, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    if (outline) this.drawOutline(camera, outline, false);
+    this.putPicture();
+    if (outline) this.drawOutline(camera, outline, true);
+  }
+
+  putPicture() {
+    const {gl, shown, copy, canvas} = this;
+    if (!shown || !copy || !this.loaded || shown.part[0] === 0) return;
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.useProgram(copy.program);
+    gl.activeTexture(gl.TEXTURE3);
+    gl.bindTexture(gl.TEXTURE_2D, shown.texture);
+    gl.uniform1i(copy.uniform("picture"), 3);
+    gl.uniform2f(copy.uniform("part"), shown.part[0], shown.part[1]);
+    gl.uniform2f(copy.uniform("canvasSize"), canvas.width, canvas.height);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** @param {Camera} camera @param {Color} color @param {boolean} inFront which part */
+  drawOutline(camera, color, inFront) {
+    const {gl, loaded, lines, ends, canvas} = this;
+    if (!loaded || !lines || !ends) return;
+    const {bounds} = loaded.vdi;
+    if (bounds[0].some((low, axis) => !(low <= bounds[1][axis]))) return;
+    const points = outlineEnds(bounds, camera, inFront);
+    gl.useProgram(lines.program);
+    gl.bindBuffer(gl.ARRAY_BUFFER, ends);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(points), gl.DYNAMIC_DRAW);
+    const attribute = gl.getAttribLocation(lines.program, "world");
+    gl.enableVertexAttribArray(attribute);
+    gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 0, 0);
+    const framed = this.framedHeight();
+    const clip = clipMatrix(camera, [canvas.width / framed, canvas.height / framed]);
+    gl.uniformMatrix4fv(lines.uniform("clip"), false, clip);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    gl.uniform4f(lines.uniform("plain"), ...color, inFront ? 0.7 : 0.4);
+    gl.drawArrays(gl.LINES, 0, points.length / 3);
+    gl.disableVertexAttribArray(attribute);
+  }
+}

@@ -1,0 +1,388 @@
+// The fragment shader that shows a VDI from a new viewpoint. Twin of shaders/render.comp, line.glsl, traverse.glsl and
+// intersect.glsl, whose comments say why: a ray is straight in V_O's picture, which it passes column by column (or row by row).
+// Rays don't share work as invocations of a workgroup do there; each finds its own tiles, the large ones first.
+
+/**
+ * @typedef {object} Variant what a shader is made for
+ * @property {boolean} compact supersegments are codes in two words, else four words (expandedSegments)
+ * @property {boolean} smooth Reconstruction::Smooth, else Constant
+ * @property {number} rowShift textures hold element i at x = i mod 2^rowShift, in row i >> rowShift
+ * @property {number} layerShift and row r in layer r >> layerShift, at y = r mod 2^layerShift
+ */
+
+const COMPACT_SEGMENTS = `
+struct Segment { vec2 depths; float density; vec3 color; };
+
+Segment segmentAt(int i) {
+  uvec2 words = texelFetch(segments, placeOf(i), 0).xy;
+  Segment segment;
+  segment.depths = code.x + vec2(words.x & 0x3fffu, (words.x >> 14) & 0x3fffu) * code.y;
+  uint optical = words.x >> 28 | (words.y >> 24) << 4;
+  float depth = optical == 0u ? exp2(-20.0) : (exp2(float(optical) * (16.0 / 4095.0)) - 1.0) * (1.0 / 16.0);
+  segment.density = depth / (segment.depths.y - segment.depths.x);
+  segment.color = vec3(words.y & 0xffu, (words.y >> 8) & 0xffu, (words.y >> 16) & 0xffu) * (1.0 / 255.0);
+  return segment;
+}
+
+vec2 depthsOf(int i) {
+  uint word = texelFetch(segments, placeOf(i), 0).x;
+  return code.x + vec2(word & 0x3fffu, (word >> 14) & 0x3fffu) * code.y;
+}
+`;
+
+const FULL_SEGMENTS = `
+struct Segment { vec2 depths; float density; vec3 color; };
+
+Segment segmentAt(int i) {
+  uvec4 words = texelFetch(segments, placeOf(i), 0);
+  vec3 color = vec3(words.w & 0x7ffu, (words.w >> 11) & 0x7ffu, words.w >> 22) / vec3(2040.0, 2040.0, 1020.0);
+  return Segment(uintBitsToFloat(words.xy), uintBitsToFloat(words.z), color);
+}
+
+vec2 depthsOf(int i) { return uintBitsToFloat(texelFetch(segments, placeOf(i), 0).xy); }
+`;
+
+const RAYS = `
+const float infinity = 3.0e38;
+const float opaque = 1.0 - 1.0 / 1024.0;
+const float opaqueAcross = 1.0 - 1.0 / 512.0;
+
+struct Ray { vec3 origin; vec3 direction; };
+
+float depthAt(Ray ray, float t) { return ray.origin.z + t * ray.direction.z; }
+float divisorOf(float depth) { return parallel ? 1.0 : depth; }
+
+vec2 pictureAt(Ray ray, float t) {
+  vec3 p = ray.origin + t * ray.direction;
+  return p.xy / (pixelSize * divisorOf(p.z)) + 0.5 * vec2(lists);
+}
+
+void clip(inout vec2 stretch, float value, float slope) {
+  float crossing = -value / slope;
+  if (slope > 0.0) stretch.x = max(stretch.x, crossing);
+  else if (slope < 0.0) stretch.y = min(stretch.y, crossing);
+  else if (value < 0.0) stretch.y = stretch.x;
+}
+
+vec2 insideFrustum(Ray ray) {
+  vec2 stretch = vec2(0.0, infinity);
+  vec2 halfSize = 0.5 * vec2(lists) * pixelSize;
+  vec2 value = halfSize * (parallel ? 1.0 : ray.origin.z);
+  vec2 slope = halfSize * (parallel ? 0.0 : ray.direction.z);
+  clip(stretch, value.x - ray.origin.x, slope.x - ray.direction.x);
+  clip(stretch, value.x + ray.origin.x, slope.x + ray.direction.x);
+  clip(stretch, value.y - ray.origin.y, slope.y - ray.direction.y);
+  clip(stretch, value.y + ray.origin.y, slope.y + ray.direction.y);
+  clip(stretch, ray.origin.z - nearest, ray.direction.z);
+  clip(stretch, farthest - ray.origin.z, -ray.direction.z);
+  return stretch;
+}
+
+// The ray's way through V_O's picture (line.glsl). What it goes from and to is called a column, be it a row.
+struct Line {
+  bool byColumns;
+  float start;
+  float columns;
+  float direction;
+  float row;
+  float rows;
+  float gain;
+  float bend;
+  vec2 depths;  // at the start, and from there to the end; ascending, negative if the ray comes nearer to V_O's eye
+  vec2 bins;
+  int first;
+  int last;
+};
+
+int columnCount(bool byColumns) { return byColumns ? lists.x : lists.y; }
+
+Line lineOf(Ray ray, vec2 stretch) {
+  Line line;
+  vec2 start = pictureAt(ray, stretch.x);
+  vec2 whole = pictureAt(ray, stretch.y) - start;
+  line.byColumns = 1.001 * abs(whole.x) >= abs(whole.y);
+  line.start = line.byColumns ? start.x : start.y;
+  line.row = line.byColumns ? start.y : start.x;
+  float along = line.byColumns ? whole.x : whole.y;
+  line.columns = max(abs(along), 1e-4);
+  line.direction = along < 0.0 ? -1.0 : 1.0;
+  float perColumn = 1.0 / line.columns;
+  line.rows = (line.byColumns ? whole.y : whole.x) * perColumn;
+  vec2 depths = vec2(depthAt(ray, stretch.x), depthAt(ray, stretch.y));
+  float divisors = divisorOf(depths.x) / divisorOf(depths.y);
+  line.gain = divisors * perColumn;
+  line.bend = (divisors - 1.0) * perColumn;
+  float change = depths.y - depths.x;
+  line.depths = change < 0.0 ? vec2(-depths.x, -change) : vec2(depths.x, change);
+  line.bins = vec2(depths.x - nearest, change) * binScale;
+  int maximum = columnCount(line.byColumns) - 1;
+  line.first = clamp(int(floor(line.start)), 0, maximum);
+  line.last = clamp(int(floor(line.start + line.direction * line.columns)), 0, maximum);
+  return line;
+}
+
+float columnsTo(Line line, float along) { return clamp((along - line.start) * line.direction, 0.0, line.columns); }
+float fractionAfter(Line line, float columns) { return columns * line.gain / (1.0 + columns * line.bend); }
+float at(vec2 range, float fraction) { return range.x + fraction * range.y; }
+
+// Whether a mask has a bit between two bins, in any order.
+bool mayMeet(uvec2 mask, vec2 bins) {
+  const float spare = 0.01;
+  int low = int(clamp(min(bins.x, bins.y) - spare, 0.0, 63.0));
+  int high = int(clamp(max(bins.x, bins.y) + spare, 0.0, 63.0));
+  uint lowWord = low > 31 ? 0u : mask.x & (~0u << low) & (high > 30 ? ~0u : (2u << high) - 1u);
+  uint highWord = high < 32 ? 0u : mask.y & (low < 32 ? ~0u : ~0u << (low - 32)) & (~0u >> (63 - high));
+  return (lowWord | highWord) != 0u;
+}
+`;
+
+const INTERSECT = `
+bool ascends;    // the ray meets a list's supersegments in their order; else backwards
+float raySlant;  // how long the ray is for a change of depth; where that says nothing, its whole length
+
+bool changesDepth(Line line) { return line.depths.y > 0.01 * farthest; }
+
+float shorteningAt(vec2 place) {
+  if (parallel) return 1.0;
+  vec2 offset = (place - 0.5 * vec2(lists)) * pixelSize;
+  return inversesqrt(1.0 + dot(offset, offset));
+}
+
+struct Part { float low; float high; float slant; };
+
+Part partOf(Line line, vec2 fractions, float shortening) {
+  Part part = Part(at(line.depths, fractions.x), at(line.depths, fractions.y), raySlant * shortening);
+  if (!changesDepth(line)) {
+    part.high = max(part.high, part.low + 1e-6 * farthest);
+    part.slant *= (fractions.y - fractions.x) / (part.high - part.low);
+  }
+  return part;
+}
+
+vec2 met(vec2 depths) { return ascends ? depths : -depths.yx; }
+
+// What a part of the ray meets of a list of at least one supersegment, premultiplied. 'hint': where the last intersection with
+// a neighbouring list ended, counted as the ray meets them.
+vec4 intersectList(uvec4 head, Part part, inout int hint) {
+  int last = int(head.y) - 1;
+  int step = ascends ? 1 : -1;
+  int begin = int(head.x) + (ascends ? 0 : last);
+  int place = min(hint, last);
+  while (place > 0 && met(depthsOf(begin + place * step)).x > part.low) --place;
+  while (place < last && met(depthsOf(begin + place * step)).y <= part.low) ++place;
+  vec3 light = vec3(0.0);
+  float transmittance = 1.0;
+  for (;; ++place) {
+    Segment segment = segmentAt(begin + place * step);
+    vec2 depths = met(segment.depths);
+    float length = min(depths.y, part.high) - max(depths.x, part.low);
+    if (length > 0.0) {
+      float behind = transmittance * exp2(-length * part.slant * segment.density);
+      light += (transmittance - behind) * segment.color;
+      transmittance = behind;
+    }
+    if (depths.y >= part.high || place >= last || transmittance < 1.0 - opaque) break;
+  }
+  hint = place;
+  return vec4(light, 1.0 - transmittance);
+}
+`;
+
+const TRAVERSE = `
+uvec4 headAt(ivec2 list) { return texelFetch(heads, placeOf(list.y * lists.x + list.x), 0); }
+
+float shareOfNext(float beyond) {
+  const float onCentre = 1.0 / 256.0;
+  return clamp((beyond - onCentre) / (1.0 - 2.0 * onCentre), 0.0, 1.0);
+}
+
+// A ray that stays in about one place of V_O's picture: the four lists around that.
+vec4 alongLists(Ray ray, Line line, vec2 stretch) {
+  vec2 place = 0.5 * (pictureAt(ray, stretch.x) + pictureAt(ray, stretch.y)) - 0.5;
+  vec2 first = floor(place);
+  vec2 share = vec2(shareOfNext(place.x - first.x), shareOfNext(place.y - first.y));
+  vec4 sum = vec4(0.0);
+  for (int i = 0; i < 4; ++i) {
+    ivec2 side = ivec2(i & 1, i >> 1);
+    float weight = (side.x == 0 ? 1.0 - share.x : share.x) * (side.y == 0 ? 1.0 - share.y : share.y);
+    ivec2 pixel = clamp(ivec2(first) + side, ivec2(0), lists - 1);
+    uvec4 head = headAt(pixel);
+    if (!(weight > 0.0) || !mayMeet(head.zw, vec2(line.bins.x, at(line.bins, 1.0)))) continue;
+    int hint = 0;
+    sum += weight * intersectList(head, partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5)), hint);
+  }
+  return sum;
+}
+
+ivec2 listOf(bool byColumns, int column, int row) { return byColumns ? ivec2(column, row) : ivec2(row, column); }
+
+// Of a column that the ray crosses between two numbers of columns from its start.
+vec4 intersectColumn(Line line, int column, vec2 edges, vec2 fractions, inout ivec2 hints) {
+  int maxRow = columnCount(!line.byColumns) - 1;
+  vec2 bins = vec2(at(line.bins, fractions.x), at(line.bins, fractions.y));
+  fractions = vec2(min(fractions.x, fractions.y), max(fractions.x, fractions.y));
+#if SMOOTH
+  float centre = line.row + 0.5 * (edges.x + edges.y) * line.rows - 0.5;
+  float below = floor(centre);
+  float share = shareOfNext(centre - below);
+  ivec2 rows = clamp(int(below) + ivec2(0, 1), ivec2(0), ivec2(maxRow));
+#else
+  vec2 inOut = vec2(min(edges.x, edges.y), max(edges.x, edges.y));
+  ivec2 rows = clamp(ivec2(floor(line.row + inOut * line.rows)), ivec2(0), ivec2(maxRow));
+  rows.x = clamp(rows.x, rows.y - 1, rows.y + 1);  // a diagonal through corners may touch a third one
+  float share = rows.x == rows.y ? 0.0 : 0.5;
+#endif
+  ivec2 list = listOf(line.byColumns, column, rows.x);
+  ivec2 other = listOf(line.byColumns, column, rows.y);
+  uvec4 head = headAt(list);
+  uvec4 otherHead = headAt(other);
+  bool meets = share < 1.0 && mayMeet(head.zw, bins);
+  bool meetsOther = share > 0.0 && mayMeet(otherHead.zw, bins);
+  if (!meets && !meetsOther) return vec4(0.0);
+  float shortening = shorteningAt(vec2(list) + 0.5);
+#if SMOOTH
+  Part part = partOf(line, fractions, shortening);
+  vec4 light = vec4(0.0);
+  if (meets) light = (1.0 - share) * intersectList(head, part, hints.x);
+  if (meetsOther) light += share * intersectList(otherHead, part, hints.y);
+  return light;
+#else
+  float split = fractions.y;
+  if (rows.x != rows.y) {
+    float edge = float(max(rows.x, rows.y));
+    split = fractionAfter(line, clamp((edge - line.row) / line.rows, 0.0, line.columns));
+    split = clamp(split, fractions.x, fractions.y);
+  }
+  vec4 light = vec4(0.0);
+  if (meets) light = intersectList(head, partOf(line, vec2(fractions.x, split), shortening), hints.x);
+  if (meetsOther) {
+    light += (1.0 - light.a) * intersectList(otherHead, partOf(line, vec2(split, fractions.y), shortening), hints.y);
+  }
+  return light;
+#endif
+}
+
+// Whether the ray may meet something between the edges of a column of tiles of 1 << shift lists. Masks of tiles know the lists
+// around them; one row more is for rounding.
+bool meetsTiles(Line line, int tile, int shift) {
+  vec2 edges = vec2(columnsTo(line, float(tile << shift)), columnsTo(line, float((tile + 1) << shift)));
+  vec2 bins = vec2(at(line.bins, fractionAfter(line, edges.x)), at(line.bins, fractionAfter(line, edges.y)));
+  vec2 rows = clamp(line.row + edges * line.rows, vec2(0.0), vec2(columnCount(!line.byColumns) - 1));
+  int row = int(min(rows.x, rows.y)) >> shift;
+  int lastRow = int(max(rows.x, rows.y)) >> shift;
+  ivec2 small = (lists + 7) >> 3;
+  int across = shift == 3 ? small.x : (lists.x + 63) >> 6;
+  int base = shift == 3 ? 0 : small.x * small.y;
+  uvec2 mask = uvec2(0u);
+  for (; row <= lastRow; ++row) {
+    ivec2 place = listOf(line.byColumns, tile, row);
+    mask |= texelFetch(tiles, placeOf(base + place.y * across + place.x), 0).xy;
+  }
+  return mayMeet(mask, bins);
+}
+
+void intersectTile(Line line, int tile, inout ivec2 hints, inout vec4 light) {
+  bool up = line.direction > 0.0;
+  int begin = tile << 3;
+  int first = up ? max(begin, line.first) : min(begin + 7, line.first);
+  int last = up ? min(begin + 7, line.last) : max(begin, line.last);
+  int step = up ? 1 : -1;
+  float edge = columnsTo(line, float(up ? first : first + 1));
+  float fraction = fractionAfter(line, edge);
+  for (int column = first;; column += step) {
+    float nextEdge = columnsTo(line, float(up ? column + 1 : column));
+    float nextFraction = fractionAfter(line, nextEdge);
+    if (nextEdge != edge) {
+      vec4 behind = intersectColumn(line, column, vec2(edge, nextEdge), vec2(fraction, nextFraction), hints);
+      light += (1.0 - light.a) * behind;
+    }
+    if (column == last || light.a >= opaqueAcross) break;
+    edge = nextEdge;
+    fraction = nextFraction;
+  }
+}
+
+vec4 traverse(Line line) {
+  vec4 light = vec4(0.0);
+  ivec2 hints = ivec2(0);
+  int step = line.direction > 0.0 ? 1 : -1;
+  int lastTile = line.last >> 3;
+  int large = -1;
+  bool meetsLarge = false;
+  for (int tile = line.first >> 3;;) {
+    if (tile >> 3 != large) {
+      large = tile >> 3;
+      meetsLarge = meetsTiles(line, large, 6);
+    }
+    if (!meetsLarge) {
+      tile = step > 0 ? (large + 1) << 3 : (large << 3) - 1;
+    } else {
+      if (meetsTiles(line, tile, 3)) intersectTile(line, tile, hints, light);
+      if (light.a >= opaqueAcross) break;
+      tile += step;
+    }
+    if ((lastTile - tile) * step < 0) break;
+  }
+  return light;
+}
+`;
+
+const MAIN = `
+out vec4 picture;  // premultiplied
+
+void main() {
+  vec2 uv = gl_FragCoord.xy * pixelScale - 0.5 * pictureSize;
+  Ray ray = Ray(rayOrigin[0] + uv.x * rayOrigin[1] + uv.y * rayOrigin[2],
+                rayDirection[0] + uv.x * rayDirection[1] + uv.y * rayDirection[2]);
+  picture = vec4(0.0);
+  vec2 stretch = insideFrustum(ray);
+  if (!(stretch.x < stretch.y)) return;
+  Line line = lineOf(ray, stretch);
+  ascends = line.bins.y >= 0.0;
+  raySlant = (stretch.y - stretch.x) * length(ray.direction) / (changesDepth(line) ? line.depths.y : 1.0);
+#if SMOOTH
+  if (line.columns < 1.0) {
+    picture = alongLists(ray, line, stretch);
+    return;
+  }
+#endif
+  picture = traverse(line);
+}
+`;
+
+/** @param {Variant} variant */
+export function traverseShader(variant) {
+  return `#version 300 es
+precision highp float;
+precision highp int;
+precision highp usampler2DArray;
+#define SMOOTH ${variant.smooth ? 1 : 0}
+uniform usampler2DArray heads;
+uniform usampler2DArray segments;
+uniform usampler2DArray tiles;
+uniform ivec2 lists;
+uniform bool parallel;
+uniform float pixelSize;
+uniform float nearest;
+uniform float farthest;
+uniform float binScale;
+uniform vec2 code;             // depth of code c: code.x + c * code.y
+uniform vec3 rayOrigin[3];     // at the picture's middle, and for each pixel to the right and up
+uniform vec3 rayDirection[3];
+uniform vec2 pictureSize;      // in the pixels that rays count
+uniform float pixelScale;      // of these to a fragment
+
+ivec3 placeOf(int i) {
+  int row = i >> ${variant.rowShift};
+  return ivec3(i & ${(1 << variant.rowShift) - 1}, row & ${(1 << variant.layerShift) - 1}, row >> ${variant.layerShift});
+}
+${variant.compact ? COMPACT_SEGMENTS : FULL_SEGMENTS}${RAYS}${INTERSECT}${TRAVERSE}${MAIN}`;
+}
+
+/** One triangle that covers the picture. */
+export const WHOLE_PICTURE = `#version 300 es
+void main() {
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+  gl_Position = vec4(4.0 * corner - 1.0, 0.0, 1.0);
+}
+`;

@@ -1,0 +1,211 @@
+// Decides when what is drawn: while something moves, as many pixels as the frame rate allows; at rest the whole picture, in
+// strips, so that a hand that comes back never waits for it.
+
+import {Renderer} from "./renderer.js";
+
+/** @typedef {import("./format.js").Camera} Camera */
+/** @typedef {import("./format.js").Vdi} Vdi */
+/** @typedef {import("./renderer.js").Color} Color */
+
+const FRAME_MS = 33;       // that a moving picture may take
+const STRIP_MS = 40;       // and a strip of one at rest
+const REST_MS = 150;       // without motion is rest
+const LARGEST_SCALE = 8;
+
+export class Viewer {
+  /**
+   * Throws Error without WebGL2.
+   * @param {HTMLCanvasElement} canvas
+   * @param {(message: string) => void} tell
+   */
+  constructor(canvas, tell) {
+    this.renderer = new Renderer(canvas);
+    this.canvas = canvas;
+    this.tell = tell;
+    /** @type {Camera | undefined} */
+    this.camera = undefined;
+    /** @type {Color} */
+    this.background = [0, 0, 0];
+    /** @type {Color} */
+    this.outlineColor = [0.5, 0.5, 0.5];
+    this.outline = true;
+    this.smooth = true;
+    this.isLost = false;
+    /** Milliseconds for a canvas pixel, as measured. */
+    this.cost = 1e-4;
+    this.movedAt = -Infinity;
+    /**
+     * What the shown picture lacks: all of it, or detail.
+     * @type {"all" | "detail" | "nothing"}
+     */
+    this.missing = "nothing";
+    this.nextRow = 0;
+    /** @type {{sync: WebGLSync, since: number, pixels: number} | undefined} */
+    this.pending = undefined;
+    this.isScheduled = false;
+    /** Called after each picture that is whole. */
+    this.onRest = () => {};
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.isLost = true;
+      this.pending = undefined;
+      tell("The graphics driver has lost the picture; waiting for it to come back.");
+    });
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.isLost = false;
+      try {
+        this.renderer.restore();
+        tell("");
+      } catch (error) {
+        tell(/** @type {Error} */ (error).message);
+      }
+      this.redraw();
+    });
+  }
+
+  /**
+   * Throws Error if the GPU can't hold it.
+   * @param {Vdi} vdi
+   */
+  setVdi(vdi) {
+    this.renderer.setVdi(vdi, this.smooth);
+    this.redraw();
+  }
+
+  /** @param {boolean} smooth */
+  setSmooth(smooth) {
+    this.smooth = smooth;
+    const loaded = this.renderer.loaded;
+    if (loaded) this.setVdi(loaded.vdi);
+  }
+
+  /** @param {Camera} camera @param {boolean} [moving] further ones will follow */
+  setCamera(camera, moving = true) {
+    this.camera = camera;
+    if (moving) this.movedAt = performance.now();
+    this.redraw();
+  }
+
+  /** The picture is out of date. */
+  redraw() {
+    this.missing = "all";
+    this.schedule();
+  }
+
+  /** Only what is around the picture has changed. */
+  refresh() {
+    if (!this.camera || this.isLost) return;
+    this.renderer.present(this.camera, this.background, this.outline ? this.outlineColor : undefined);
+  }
+
+  schedule() {
+    if (this.isScheduled) return;
+    this.isScheduled = true;
+    requestAnimationFrame(() => {
+      this.isScheduled = false;
+      this.step();
+    });
+  }
+
+  /**
+   * Canvas pixels as many as the screen has.
+   * @returns {boolean} whether that changed something
+   */
+  fitCanvas() {
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
+    const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
+    if (this.canvas.width === width && this.canvas.height === height) return false;
+    this.canvas.width = width;
+    this.canvas.height = height;
+    return true;
+  }
+
+  /** Whether the GPU is still at the last picture or strip. Learns what it took. */
+  isBusy() {
+    const {gl} = this.renderer;
+    if (!this.pending) return false;
+    const state = gl.clientWaitSync(this.pending.sync, 0, 0);
+    if (state === gl.TIMEOUT_EXPIRED) return true;
+    const took = performance.now() - this.pending.since;
+    const cost = took / Math.max(this.pending.pixels, 1);
+    this.cost = cost > this.cost ? cost : 0.7 * this.cost + 0.3 * cost;
+    gl.deleteSync(this.pending.sync);
+    this.pending = undefined;
+    return false;
+  }
+
+  /** @param {number} pixels that were just drawn */
+  watch(pixels) {
+    const {gl} = this.renderer;
+    const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    if (sync) this.pending = {sync, since: performance.now(), pixels};
+  }
+
+  step() {
+    if (this.isLost || !this.camera) return;
+    if (this.isBusy()) {
+      setTimeout(() => this.schedule(), 2);
+      return;
+    }
+    if (this.fitCanvas()) this.missing = "all";
+    const isResting = performance.now() - this.movedAt > REST_MS;
+    if (this.missing === "all") this.drawWhole(isResting);
+    else if (this.missing === "detail" && isResting) this.drawStrip();
+    else if (this.missing === "nothing") return;
+    this.schedule();
+  }
+
+  /** @param {boolean} isResting */
+  drawWhole(isResting) {
+    const {renderer, canvas} = this;
+    if (!this.camera) return;
+    const all = canvas.width * canvas.height * this.cost;
+    const scale = all <= FRAME_MS ? 1 : Math.min(Math.ceil(Math.sqrt(all / FRAME_MS) * 4) / 4, LARGEST_SCALE);
+    const {width, height} = renderer.pictureSize(scale);
+    renderer.drawPicture(this.camera, scale, 0, height);
+    renderer.finishPicture();
+    this.refresh();
+    this.watch(width * height);
+    this.nextRow = 0;
+    this.missing = scale > 1 ? "detail" : "nothing";
+    if (scale === 1 && isResting) this.onRest();
+    if (scale === 1 && !isResting) setTimeout(() => this.onRest(), REST_MS);
+  }
+
+  drawStrip() {
+    const {renderer, canvas} = this;
+    if (!this.camera) return;
+    const rows = Math.max(8, Math.floor(STRIP_MS / (this.cost * canvas.width)));
+    const end = Math.min(this.nextRow + rows, canvas.height);
+    renderer.drawPicture(this.camera, 1, this.nextRow, end);
+    this.watch(canvas.width * (end - this.nextRow));
+    this.nextRow = end;
+    if (end < canvas.height) return;
+    renderer.finishPicture();
+    this.refresh();
+    this.missing = "nothing";
+    this.onRest();
+  }
+
+  /** Whether the shown picture is the whole one. */
+  isWhole() {
+    return !this.isLost && this.missing === "nothing" && !this.pending;
+  }
+
+  /**
+   * The canvas as PNG, whole.
+   * @returns {Promise<Blob>}
+   */
+  screenshot() {
+    const {renderer, canvas} = this;
+    if (!this.camera) return Promise.reject(new Error("there is no picture yet"));
+    renderer.drawPicture(this.camera, 1, 0, canvas.height);
+    renderer.finishPicture();
+    this.refresh();
+    return new Promise((resolve, reject) => {
+      canvas.toBlob((blob) => blob ? resolve(blob) : reject(new Error("the browser makes no PNG of the picture")), "image/png");
+    });
+  }
+}
