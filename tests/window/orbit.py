@@ -33,7 +33,7 @@ def compare(window, name, start, end, what="orbited"):
         os.remove(os.path.join(OUTPUT, "camera.json"))
     window.drag(start, end, steps=30, seconds=1.5)
     wait_for("end of the drag", lambda: read("camera.json"), 60)
-    time.sleep(3)  # the still picture
+    window.wait_for_picture()  # in full
     picture = window.screenshot(name)
     subprocess.run(["pvpython", os.path.join(HERE, "orbit_compare.py"), picture, what], check=True, timeout=200)
 
@@ -103,15 +103,25 @@ def screenshots_while_made():
 
 
 def two_views():
-    """Auto follows the active view, and makes one VDI each time."""
+    """Auto follows the view in which it was turned on, whichever is active, and makes one VDI each time."""
     inside("show_in_two_views()")
-    made = 0
-    for view in (0, 1, 0):
-        inside("activate({})".format(view))
-        made += 1
+
+    def wait_for_making(view, made):
         wait_for("VDI from view {}".format(view), lambda: inside("makings_from({})".format(view)), 60)
         time.sleep(1)  # Auto looks four times a second
         assert inside("makings_from({})".format(view)) == made, "VDIs are made again and again"
+
+    inside("activate(0)")
+    inside("turn_auto(1)")
+    wait_for_making(0, 1)
+    inside("activate(1)")
+    time.sleep(1)
+    assert inside("makings_from(0)") == 1, "Auto makes the VDI anew for a view in which it wasn't turned on"
+    inside("move(0, [0, 80, 1])")
+    wait_for_making(0, 2)
+    inside("turn_auto(0)")
+    inside("turn_auto(1)")
+    wait_for_making(1, 3)
     inside("close_second_view()")
 
 

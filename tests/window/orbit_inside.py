@@ -172,7 +172,7 @@ def captures_the_same():
 
 
 def show_in_two_views():
-    """Of one layout, 90 degrees apart, and each of them that from where the VDI was made. With Auto."""
+    """Of one layout, 90 degrees apart, and each of them that from where the VDI was made."""
     first, image = shown["view"], shown["vdi"]
     layout = simple.GetLayout(first)
     layout.SplitHorizontal(layout.GetViewLocation(first), 0.5)
@@ -187,8 +187,17 @@ def show_in_two_views():
     image.CameraPosition, image.CameraFocalPoint = [-50, 60, -50], [0, 0, 0]
     simple.Render(first)
     image.GetClientSideObject().AddObserver("EndEvent", lambda *_: shown.update(makings=shown["makings"] + 1))
-    image.Auto = 1
-    image.UpdateVTKObjects()
+
+
+def turn_auto(on):
+    shown["vdi"].Auto = on
+    shown["vdi"].UpdateVTKObjects()
+
+
+def move(index, position):
+    view = shown["views"][index]
+    view.CameraPosition = position
+    simple.Render(view)
 
 
 def activate(index):

@@ -281,19 +281,25 @@ double vtkSMVDIGeneratorProxy::DegreesFrom(vtkSMRenderViewProxy* view) {
   return vdi::degreesBetween(this->InputBounds(), own, cameraOf(view->GetActiveCamera()));
 }
 
-std::string vtkSMVDIGeneratorProxy::SetViewpoint(vtkSMViewProxy* view) {
+std::string vtkSMVDIGeneratorProxy::WhyNotFrom(vtkSMViewProxy* view) {
   if (std::string why = WhyNot(view); !why.empty()) return why;
   vtkSMRenderViewProxy* renderView = RenderViewOf(view);
   const std::array<int, 2> size = resolutionOf(renderView);
-  const vdi::Camera camera = cameraOf(renderView->GetActiveCamera());
   try {
-    const vdi::View seen(camera, size[0], size[1]);
+    const vdi::View seen(cameraOf(renderView->GetActiveCamera()), size[0], size[1]);
     const auto issue = vdi::viewpointIssue(this->InputBounds(), seen, seen);
     if (issue == vdi::ViewpointIssue::SeesNothing)
       return "This view doesn't see the volume, which lies behind its camera or beside its picture.";
   } catch (const vdi::Error& error) {
     return error.what();
   }
+  return {};
+}
+
+std::string vtkSMVDIGeneratorProxy::SetViewpoint(vtkSMViewProxy* view) {
+  if (std::string why = this->WhyNotFrom(view); !why.empty()) return why;
+  vtkSMRenderViewProxy* renderView = RenderViewOf(view);
+  const std::array<int, 2> size = resolutionOf(renderView);
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the view's camera");
   SetCamera(this, renderView);
   pv::takeLights(this, renderView);

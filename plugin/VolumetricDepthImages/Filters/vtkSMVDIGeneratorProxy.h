@@ -54,6 +54,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   static void SetCamera(vtkSMProxy* proxy, vtkSMRenderViewProxy* view);
   /// Why no viewpoint can be had from the view; empty where one can.
   static std::string WhyNot(vtkSMViewProxy* view);
+  /// Likewise of a viewpoint for this filter's volume, which the view has to see.
+  std::string WhyNotFrom(vtkSMViewProxy* view);
   /// Sets camera and Resolution to the view's, and traces it. The result is empty, or why the view can't be
   /// used; nothing is set then.
   std::string SetViewpoint(vtkSMViewProxy* view);

@@ -29,6 +29,9 @@ pqCameraFromViewWidget::pqCameraFromViewWidget(vtkSMProxy* proxy, vtkSMProperty*
   this->Line->setWordWrap(true);
   this->Line->hide();
   layout->addWidget(this->Line);
+  constexpr int lookMilliseconds = 250;
+  this->Looking.setInterval(lookMilliseconds);
+  this->connect(&this->Looking, &QTimer::timeout, this, &pqCameraFromViewWidget::lookAgain);
   this->connect(button, &QPushButton::clicked, this, &pqCameraFromViewWidget::copyCamera);
 }
 
@@ -40,7 +43,10 @@ void pqCameraFromViewWidget::copyCamera() {
   const std::string why = vtkSMVDIGeneratorProxy::WhyNot(from);
   this->Line->setText(QString::fromStdString(why));
   this->Line->setVisible(!why.empty());
-  if (!why.empty()) return;
+  if (!why.empty()) {
+    this->Looking.start();
+    return;
+  }
   BEGIN_UNDO_SET(tr("Use the view's camera"));
   {
     SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this->proxy()).arg("comment", "the view's camera");
@@ -52,4 +58,13 @@ void pqCameraFromViewWidget::copyCamera() {
   if (auto* source =
           pqApplicationCore::instance()->getServerManagerModel()->findItem<pqPipelineSource*>(this->proxy()))
     source->renderAllViews();
+}
+
+/// The line goes once its reason has: the view is another one, or back in 3-D mode.
+void pqCameraFromViewWidget::lookAgain() {
+  pqView* view = pqActiveObjects::instance().activeView();
+  const std::string why = vtkSMVDIGeneratorProxy::WhyNot(view != nullptr ? view->getViewProxy() : nullptr);
+  if (this->Line->text() == QString::fromStdString(why)) return;
+  this->Looking.stop();
+  this->Line->hide();
 }

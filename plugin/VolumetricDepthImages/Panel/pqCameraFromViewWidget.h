@@ -4,6 +4,7 @@
 #define pqCameraFromViewWidget_h
 
 #include <pqPropertyWidget.h>
+#include <QTimer>
 
 class QLabel;
 
@@ -16,8 +17,10 @@ class pqCameraFromViewWidget : public pqPropertyWidget {
 
  private:
   Q_SLOT void copyCamera();
+  Q_SLOT void lookAgain();
 
   QLabel* Line;
+  QTimer Looking;  // while the line says why it can't be
 };
 
 #endif

@@ -3,17 +3,27 @@
 #include <pqActiveObjects.h>
 #include <pqCoreUtilities.h>
 #include <pqUndoStack.h>
+#include <pqView.h>
 #include <vtkCommand.h>
 #include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMTrace.h>
+#include <vtkSMViewProxy.h>
 #include <QCheckBox>
 #include <QLabel>
 #include <QPushButton>
 #include <QVBoxLayout>
 
+#include <string>
+
 #include "pqVDIRegenerator.h"
 #include "vtkSMVDIGeneratorProxy.h"
+
+namespace {
+
+constexpr int lookMilliseconds = 250;
+
+}  // namespace
 
 pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget* parent)
     : pqPropertyWidget(proxy, parent), Line(new QLabel(this)), Auto(new QCheckBox(tr("Auto"), this)) {
@@ -25,21 +35,28 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
   button->setObjectName("Regenerate");
   button->setToolTip(tr("Makes the VDI anew from the camera of the active view, at its size"));
   layout->addWidget(button);
-  this->Line->setObjectName("RegenerateLine");
-  this->Line->setWordWrap(true);
-  this->Line->hide();
-  layout->addWidget(this->Line);
   this->connect(button, &QPushButton::clicked, this, &pqVDIRegenerateWidget::regenerate);
   this->Auto->setObjectName("Auto");
-  this->Auto->setToolTip(tr(
-      "Makes the VDI anew by itself, once the view's camera rests more than Auto Angle away from where the "
-      "VDI was made"));
+  this->Auto->setToolTip(
+      tr("Makes the VDI anew by itself, once the camera of this view rests more than Auto Angle away from "
+         "where the VDI was made"));
   layout->addWidget(this->Auto);
+  // Below, and with room for a line: what comes and goes moves nothing under the mouse.
+  this->Line->setObjectName("RegenerateLine");
+  this->Line->setWordWrap(true);
+  this->Line->setMinimumHeight(this->Line->fontMetrics().lineSpacing());
+  layout->addWidget(this->Line);
+  this->Looking.setInterval(lookMilliseconds);
+  this->connect(&this->Looking, &QTimer::timeout, this, &pqVDIRegenerateWidget::lookAgain);
   this->connect(this->Auto, &QCheckBox::clicked, this, &pqVDIRegenerateWidget::setAuto);
   pqCoreUtilities::connect(proxy->GetProperty("Auto"), vtkCommand::ModifiedEvent, this, SLOT(showAuto()));
-  this->showAuto();
-  if (auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(proxy)))
+  this->connect(&pqActiveObjects::instance(), &pqActiveObjects::viewChanged, this,
+                &pqVDIRegenerateWidget::showAuto);
+  if (auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(proxy))) {
     this->connect(regenerator, &pqVDIRegenerator::progress, this, &pqVDIRegenerateWidget::showProgress);
+    this->connect(regenerator, &pqVDIRegenerator::autoViewChanged, this, &pqVDIRegenerateWidget::showAuto);
+  }
+  this->showAuto();
 }
 
 pqVDIRegenerateWidget::~pqVDIRegenerateWidget() = default;
@@ -49,7 +66,17 @@ void pqVDIRegenerateWidget::regenerate() {
   if (regenerator == nullptr) return;  // not a filter of the pipeline
   const QString why = regenerator->regenerate(pqActiveObjects::instance().activeView());
   this->Line->setText(why);
-  this->Line->setVisible(!why.isEmpty());
+  if (!why.isEmpty()) this->Looking.start();
+}
+
+/// The line goes once its reason has: the view is another one, back in 3-D mode, or its camera has moved.
+void pqVDIRegenerateWidget::lookAgain() {
+  auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(this->proxy());
+  pqView* view = pqActiveObjects::instance().activeView();
+  const std::string why = generator->WhyNotFrom(view != nullptr ? view->getViewProxy() : nullptr);
+  if (this->Line->text() == QString::fromStdString(why)) return;
+  this->Looking.stop();
+  this->Line->clear();
 }
 
 void pqVDIRegenerateWidget::setAuto(bool on) {
@@ -63,10 +90,15 @@ void pqVDIRegenerateWidget::setAuto(bool on) {
 }
 
 void pqVDIRegenerateWidget::showAuto() {
-  this->Auto->setChecked(vtkSMPropertyHelper(this->proxy(), "Auto").GetAsInt() != 0);
+  const bool on = vtkSMPropertyHelper(this->proxy(), "Auto").GetAsInt() != 0;
+  this->Auto->setChecked(on);
+  auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(this->proxy()));
+  pqView* view = regenerator != nullptr ? regenerator->autoView() : nullptr;
+  const bool elsewhere = on && view != nullptr && view != pqActiveObjects::instance().activeView();
+  this->Auto->setText(elsewhere ? tr("Auto, in %1").arg(view->getSMName()) : tr("Auto"));
 }
 
 void pqVDIRegenerateWidget::showProgress(int percent) {
-  this->Line->setText(tr("Making the VDI anew: %1 %").arg(percent));
-  this->Line->setVisible(percent >= 0);
+  this->Looking.stop();
+  this->Line->setText(percent >= 0 ? tr("Making the VDI anew: %1 %").arg(percent) : QString());
 }

@@ -5,6 +5,7 @@
 #define pqVDIRegenerateWidget_h
 
 #include <pqPropertyWidget.h>
+#include <QTimer>
 
 class QCheckBox;
 class QLabel;
@@ -20,10 +21,12 @@ class pqVDIRegenerateWidget : public pqPropertyWidget {
   Q_SLOT void regenerate();
   Q_SLOT void setAuto(bool on);
   Q_SLOT void showAuto();
+  Q_SLOT void lookAgain();
   Q_SLOT void showProgress(int percent);
 
   QLabel* Line;
   QCheckBox* Auto;
+  QTimer Looking;  // while the line says why it can't be
 };
 
 #endif

@@ -196,14 +196,31 @@ QString pqVDIRegenerator::regenerate(pqView* view) {
   return QString::fromStdString(why);
 }
 
-vtkSMRenderViewProxy* pqVDIRegenerator::followedView() const {
-  pqView* view = pqActiveObjects::instance().activeView();
-  if (view == nullptr || !this->isShownIn(view)) return nullptr;
-  return vtkSMVDIGeneratorProxy::RenderViewOf(view->getViewProxy());
+void pqVDIRegenerator::setAutoView(pqView* view) {
+  if (this->AutoView == view) return;
+  this->AutoView = view;
+  this->Tried = false;
+  Q_EMIT this->autoViewChanged();
 }
 
+vtkSMRenderViewProxy* pqVDIRegenerator::followedView() {
+  if (this->AutoView == nullptr) {
+    pqView* active = pqActiveObjects::instance().activeView();
+    if (active == nullptr || !this->isShownIn(active)) return nullptr;
+    this->setAutoView(active);
+  }
+  if (!this->isShownIn(this->AutoView)) return nullptr;
+  return vtkSMVDIGeneratorProxy::RenderViewOf(this->AutoView->getViewProxy());
+}
+
+/// The view in which Auto is turned on is the one that it belongs to, until it's turned on again.
 void pqVDIRegenerator::autoChanged() {
   this->Tried = false;
+  const bool on = vtkSMPropertyHelper(this->generator(), "Auto").GetAsInt() != 0;
+  if (on && this->IsAuto) return;
+  this->IsAuto = on;
+  pqView* active = pqActiveObjects::instance().activeView();
+  this->setAutoView(on && active != nullptr && this->isShownIn(active) ? active : nullptr);
 }
 
 /// An undo has a say in where the VDI is made from, until the camera moves again.
@@ -229,5 +246,5 @@ void pqVDIRegenerator::lookAtViews() {
   if (moves || this->Tried || QApplication::mouseButtons() != Qt::NoButton) return;
   this->Tried = true;
   if (own->DegreesFrom(view) > vtkSMPropertyHelper(own, "AutoAngle").GetAsDouble())
-    this->regenerate(pqActiveObjects::instance().activeView());
+    this->regenerate(this->AutoView);
 }

@@ -6,6 +6,7 @@
 #ifndef pqVDIRegenerator_h
 #define pqVDIRegenerator_h
 
+#include <pqView.h>
 #include <QElapsedTimer>
 #include <QObject>
 #include <QPointer>
@@ -15,7 +16,6 @@
 #include <vector>
 
 class pqPipelineSource;
-class pqView;
 class vtkSMRenderViewProxy;
 class vtkSMVDIGeneratorProxy;
 
@@ -31,10 +31,14 @@ class pqVDIRegenerator : public QObject {
   QString regenerate(pqView* view);
   /// That of a proxy, null if it's none of a VolumetricDepthImage in the pipeline.
   static pqVDIRegenerator* of(vtkSMVDIGeneratorProxy* proxy);
+  /// The view whose camera Auto follows: the active one when Auto was turned on. Where that one didn't show
+  /// the VDI, or has been closed, it's the first active one that does. Null if there has been none yet.
+  pqView* autoView() const { return this->AutoView; }
 
  Q_SIGNALS:
   /// Percent of the VDI that's being made; -1: none is.
   void progress(int percent);
+  void autoViewChanged();
 
  private:
   Q_SLOT void watchMaps();
@@ -52,8 +56,9 @@ class pqVDIRegenerator : public QObject {
   vtkSMVDIGeneratorProxy* generator() const;
   bool isShown() const;
   bool isShownIn(pqView* view) const;
-  /// The one that Auto looks at: the active view, if it shows the VDI. Null if there's none.
-  vtkSMRenderViewProxy* followedView() const;
+  void setAutoView(pqView* view);
+  /// That of autoView, if it shows the VDI; null otherwise.
+  vtkSMRenderViewProxy* followedView();
   int preparation();
   void hold(int restMilliseconds);
   void finish();
@@ -65,6 +70,8 @@ class pqVDIRegenerator : public QObject {
   QTimer LookingAtViews;  // for Auto
   QElapsedTimer Resting;  // since the last edit
   qint64 Rest = 0;        // milliseconds that it has to
+  bool IsAuto = false;    // as Auto was when it changed last
+  QPointer<pqView> AutoView;
   std::array<double, 10> LastCamera{};
   bool Tried = false;  // to make a VDI from where the camera rests, or it's left to the user
   struct Watched;

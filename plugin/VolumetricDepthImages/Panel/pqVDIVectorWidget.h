@@ -1,0 +1,16 @@
+// Property widget `vdi_vector`: the numbers of a vector below its label, over the whole width of the panel.
+// Beside the label, as ParaView has them, three of them are too narrow for six digits.
+#ifndef pqVDIVectorWidget_h
+#define pqVDIVectorWidget_h
+
+#include <pqPropertyWidget.h>
+
+class pqVDIVectorWidget : public pqPropertyWidget {
+  Q_OBJECT
+
+ public:
+  pqVDIVectorWidget(vtkSMProxy* proxy, vtkSMProperty* property, QWidget* parent = nullptr);
+  ~pqVDIVectorWidget() override;
+};
+
+#endif
