@@ -118,9 +118,15 @@ for association, name, words in (
         ("POINTS", "bell", ["no array 'bell' of points", "'ball'", "of cells: 'layers'"])):
     wrong = filter_of(source, association, name)
     for attempt in ("first", "second"):
-        text = errors_of(wrong)
-        missing = [word for word in words if word not in text]
+        with Messages("ErrorEvent") as texts:
+            wrong.UpdatePipeline(0.0)
+        missing = [word for word in words if word not in "".join(texts)]
         check(not missing, "%s of %s: the %s error says what there is %s" % (name, association, attempt, missing))
+        check(len(texts) == 1, "and it is the only one: %d" % len(texts))
+        check(not errors_of(wrong), "which isn't repeated as long as it stays wrong")
+        wrong.SelectInputScalars = ["POINTS", "ball"]
+        check(not errors_of(wrong), "another array is fine")
+        wrong.SelectInputScalars = [association, name]
 check(not errors_of(filter_of(source, "CELLS", "layers")), "cells where there are cells are fine")
 
 

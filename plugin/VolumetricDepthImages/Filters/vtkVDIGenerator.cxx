@@ -30,6 +30,7 @@
 
 #include "VDIArrays.h"
 #include "VDIBlocks.h"
+#include "VDIFailure.h"
 #include "VDIImageData.h"
 #include "VDIPlace.h"
 #include "VDIPreparation.h"
@@ -67,6 +68,7 @@ struct vtkVDIGenerator::Internals {
   /// The last frame failed. Data counts as newer than any output then: left to the executive, rank 0, whose
   /// empty output isn't what was asked for, would try again alone.
   bool Failed = false;
+  pv::Failure Said;
   bool Held = false;
   vtkNew<vtkVDIImageData> Made;  // the last output: VTK empties it before it asks for another one
   vtkMTimeType Executed = 0;     // CurrentMTime of the last frame
@@ -360,17 +362,22 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
       return 1;
     }
     this->DropLostDevice(error);
-    vtkErrorMacro(<< error.what());
+    this->SayFailure(error);
     return 0;
   } catch (const std::exception& error) {
     output->Initialize();
-    vtkErrorMacro(<< error.what());
+    this->SayFailure(error);
     return 0;
   }
   internal.Made->ShallowCopy(output);
   internal.Failed = false;
+  internal.Said.isOver();
   internal.Executed = this->CurrentMTime();  // a map's table has been built
   return 1;
+}
+
+void vtkVDIGenerator::SayFailure(const std::exception& error) {
+  if (this->Internal->Said.isNew(this, error.what())) vtkErrorMacro(<< error.what());
 }
 
 /// Whether `error` is that a rank has lost its device: the generators are given up then, and new ones get

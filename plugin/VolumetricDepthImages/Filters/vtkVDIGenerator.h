@@ -15,6 +15,7 @@
 #include <vtkSmartPointer.h>
 
 #include <array>
+#include <exception>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -193,6 +194,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   bool GivesUpPreparation();
   void DropPreparation();
   bool TakePreparation(const Origin& origin, vtkImageData* output);
+  void SayFailure(const std::exception& error);
   void TakeReport();
   void KeepEarlier(vtkImageData* output);
   bool DropLostDevice(const vdi::Error& error);

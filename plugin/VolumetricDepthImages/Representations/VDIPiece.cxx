@@ -72,7 +72,7 @@ void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
   packNothing(piece);
   auto* image = vtkImageData::SafeDownCast(data);
   if (image != nullptr && image->GetNumberOfPoints() == 0) {
-    packProblem("There is no VDI to show: what makes it has failed.", piece);
+    packProblem(failedUpstream, piece);
     return;
   }
   if (image == nullptr || image->GetFieldData()->GetAbstractArray("VDI.offsets") == nullptr) {

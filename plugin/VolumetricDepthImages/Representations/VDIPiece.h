@@ -18,6 +18,9 @@ class vtkPolyData;
 
 namespace pv {
 
+/// The problem where the VDI's filter or reader has failed, which says why as an error.
+constexpr const char* failedUpstream = "There is no VDI to show: what makes it has failed.";
+
 /// Makes `piece` nothing, as ranks and clients without a VDI have it.
 void packNothing(vtkPolyData* piece);
 /// Makes `piece` a problem.

@@ -272,7 +272,7 @@ void vtkVDIProp::Say(const std::string& text) {
   this->Internal->ShowMessage(this->GetVisibility() != 0);
   if (text.empty() || text == this->Internal->Said) return;
   this->Internal->Said = text;
-  vtkErrorMacro(<< text);
+  if (text != pv::failedUpstream) vtkErrorMacro(<< text);
 }
 
 void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {

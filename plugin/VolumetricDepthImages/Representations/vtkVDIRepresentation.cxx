@@ -152,7 +152,7 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
   auto* view = vtkPVRenderView::SafeDownCast(in->Get(vtkPVView::VIEW()));
   if (updates && !this->HasPacked && isRoot() && view != nullptr && !view->IsCached(this)) {
     // The input's update has failed. What it was before isn't what is asked for.
-    pv::packProblem("There is no VDI to show: what makes it has failed.", this->Piece);
+    pv::packProblem(pv::failedUpstream, this->Piece);
     view->ClearCache(this);
   }
   if (request == vtkPVView::REQUEST_UPDATE()) {
