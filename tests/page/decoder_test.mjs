@@ -103,12 +103,48 @@ async function testDamage(/** @type {string} */ name, /** @type {Uint8Array} */ 
   if (seen.size < 12) fail(`${name}: damage gave only ${[...seen].join("; ")}`);
 }
 
+const METADATA = {
+  array: {name: "speed ü", association: "points", components: 1, component: 0}, range: [0.5, 11], time: 0, timeStep: 0,
+  transferFunction: {colors: [[0, 0, 0, 1], [6, 0, 1, 0], [12, 1, 0, 0]], opacities: [[0, 0], [12, 1]], unitDistance: 1},
+};
+
+/** The file as version 3, with that text as its metadata. */
+function withMetadata(/** @type {Uint8Array} */ file, /** @type {string} */ json) {
+  const text = new TextEncoder().encode(json);
+  const bytes = new Uint8Array(file.length + 16 + text.length);
+  bytes.set(file);
+  bytes.set(new TextEncoder().encode("JSON"), file.length);
+  bytes.set(text, file.length + 16);
+  const view = new DataView(bytes.buffer);
+  const {high, low} = xxh64(text);
+  view.setUint32(8, 3, true);
+  view.setUint32(file.length + 4, text.length, true);
+  view.setUint32(file.length + 8, low, true);
+  view.setUint32(file.length + 12, high, true);
+  seal(bytes);
+  return bytes;
+}
+
+async function testMetadata(/** @type {Uint8Array} */ file) {
+  const sound = withMetadata(file, JSON.stringify(METADATA));
+  const {coloring} = await decodeVdi(sound);
+  if (coloring?.array.name !== "speed ü" || coloring.transferFunction.colors.length !== 3) fail("metadata");
+  await testDamage("metadata", sound);
+  const bad = ["", "{", "[]", "null", "{}", JSON.stringify({...METADATA, range: [1]}), JSON.stringify({...METADATA, array: 3}),
+               JSON.stringify({...METADATA, transferFunction: {colors: [[1, 2]], opacities: [], unitDistance: 1}})];
+  for (const text of bad) {
+    if (await outcome(withMetadata(file, text)) === "sound") fail(`metadata ${text} are sound`);
+  }
+}
+
 const small = ["--size", "12x10x8", "--resolution", "24x18", "--supersegments", "4"];
 const kinds = {compact: [], full: ["--precision", "full"], margin: ["--margin", "0.5", "--zoom", "2"]};
 for (const [name, more] of Object.entries(kinds)) {
   const file = join(folder, `${name}.vdi`);
   execFileSync(vdi, ["generate", "--field", "turbulence", ...small, ...more, "-o", file], {stdio: "ignore"});
-  await testDamage(name, new Uint8Array(readFileSync(file)));
+  const bytes = new Uint8Array(readFileSync(file));
+  await testDamage(name, bytes);
+  if (name === "compact" && bytes[8] !== 3) await testMetadata(bytes);
 }
 testChecksum();
 testLz4();

@@ -300,6 +300,72 @@ def test_series(browser):
     check(not browser.value("vdiPage.isPlaying"), "the space bar stops a series")
 
 
+def test_legend(browser):
+    """By way of a source of our own, which the viewer takes as any other."""
+    browser.size(600, 400)
+    open_page(browser, "step_0.html")
+    whole(browser)
+    browser.value("""(async () => {
+      const vdi = vdiPage.vdi;
+      const coloring = {array: {name: "velocity <b>", association: "points", components: 3, component: -1}, range: [-1, 12],
+        transferFunction: {colors: [[-2, 0, 0, 1], [5, 1, 1, 0], [5, 0, 1, 0], [12.5, 1, 0, 0]], opacities: [],
+                           unitDistance: 1}};
+      const source = {count: 1, nameOf: () => "live", load: async () => ({...vdi, coloring, timeStep: 7, time: 0.25})};
+      await vdiPage.open(source);
+    })()""")
+    whole(browser)
+    legend = browser.value("document.getElementById('legend').innerText").split()
+    check(legend[:3] == ["velocity", "<b>,", "magnitude"], f"the colour bar's title: {legend}")
+    numbers = set(legend[3:])
+    check({"-2.0", "12.5"} <= numbers <= {"-2.0", "12.5", "0", "5.0", "10.0"}, f"its numbers: {legend}")
+    facts = browser.value("document.getElementById('facts').textContent")
+    check("step 7" in facts and "t = 0.25" in facts, f"step and time: {facts}")
+    picture = images.imread(io.BytesIO(browser.screenshot(os.path.join(PICTURES, "legend.png"))))
+    box = browser.value("(({x, y, width, height}) => [x, y, width, height])"
+                        "(document.querySelector('#legend .bar').getBoundingClientRect())")
+    column = int(box[0] + box[2] / 2)
+    ends = [picture[int(box[1] + share * box[3]), column, :3].astype(int) for share in (0.03, 0.97)]
+    check(ends[0][0] > 200 > 60 > ends[0][2] and ends[1][2] > 200 > 60 > ends[1][0], f"red at the top, blue below: {ends}")
+    drop_files(browser, "full.vdi")
+    browser.wait("!vdiPage.vdi.compact")
+    known = browser.value("vdiPage.vdi.coloring !== undefined")
+    check(browser.value("document.getElementById('legend').hidden") != known, "without metadata there is no bar")
+    browser.size(WIDTH, HEIGHT)
+
+
+def test_frame_time(browser):
+    """Prints the figure; it depends on what else the machine does."""
+    vdi("generate", "--field", "mixing", "--size", "48x48x48", "--resolution", "640x360", "--supersegments", "12",
+        "-o", "large.vdi")
+    browser.size(640, 360)
+    open_page(browser, page_of("large.vdi"))
+    whole(browser)
+    start = camera_of(browser)
+    output = subprocess.run([VDI, "render", "large.vdi", "-o", "large.png", "--azimuth", "10", "30"], check=True, timeout=120,
+                            capture_output=True, text=True).stdout
+    ours = [float(line.split()[1]) for line in output.splitlines()]
+    for degrees, device in zip((10, 30), ours):
+        browser.value(f"vdiPage.setCamera({json.dumps(azimuth(start, degrees))}, false)")
+        whole(browser)
+        page = browser.value("""(() => {
+          const viewer = vdiPage.viewer, gl = viewer.renderer.gl, times = [];
+          for (let i = 0; i < 4; ++i) {
+            const start = performance.now();
+            viewer.renderer.drawPicture(viewer.camera, 1, 0, viewer.canvas.height);
+            gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+            times.push(performance.now() - start);
+          }
+          return Math.min(...times);
+        })()""")
+        print(f"640 x 360 at {degrees} degrees: page {page:.0f} ms, vdi render {device:.0f} ms, {page / device:.1f} times",
+              flush=True)
+    with open("large.vdi", "rb") as file, open("large.html", "rb") as page:
+        ratio = len(page.read()) / len(file.read())
+    print(f"page of one VDI: {ratio:.3f} times the .vdi file", flush=True)
+    check(ratio < 1.5, f"the page takes {ratio} times the .vdi file")
+    browser.size(WIDTH, HEIGHT)
+
+
 def test_looks(browser):
     """Nothing is cut off, on screens of all kinds; the pictures are for people to look at."""
     for scheme in ("light", "dark"):
@@ -335,7 +401,7 @@ def main():
         try:
             browser.size(WIDTH, HEIGHT)
             for test in (test_pictures, test_small_textures, test_hands, test_damage, test_lost_context, test_series,
-                         test_looks, test_network):
+                         test_legend, test_frame_time, test_looks, test_network):
                 start = time.monotonic()
                 try:
                     test(browser)
