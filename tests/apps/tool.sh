@@ -77,6 +77,19 @@ refused 2 "diffuse" "$vdi" generate --field sphere "${small[@]}" --shade --diffu
 refused 2 "cropping box" "$vdi" generate --field sphere "${small[@]}" --crop 1 0 0 1 0 1 -o x.vdi
 refused 2 "normal" "$vdi" generate --field sphere "${small[@]}" --clip 0 0 0 0 0 0 -o x.vdi
 refused 2 "termination" "$vdi" generate --field sphere "${small[@]}" --termination-opacity 0 -o x.vdi
+# A page of VDIs is the same each time; where it can't be made, the file stays as it was.
+works "export" "$vdi" export one.vdi three.vdi -o page.html --title "<Two>"
+grep -q '<title>&lt;Two&gt;</title>' page.html || fail "the page's title isn't escaped"
+[ "$(grep -c 'class="vdi-frame"' page.html)" -eq 2 ] || fail "a page of two VDIs doesn't have two frames"
+works "export again" "$vdi" export one.vdi three.vdi -o again.html --title "<Two>"
+cmp page.html again.html || fail "equal VDIs give different pages"
+head -c 3000 one.vdi >broken.vdi
+refused 1 "not a sound" "$vdi" export one.vdi broken.vdi -o page.html
+refused 1 "No such file" "$vdi" export one.vdi nowhere.vdi -o page.html
+cmp page.html again.html || fail "a page that can't be made replaces the old one"
+refused 1 "No space" "$vdi" export one.vdi -o /dev/full
+refused 2 "write over" "$vdi" export one.vdi -o one.vdi
+refused 2 "required" "$vdi" export -o page.html
 # Lists beyond the picture's edges: the picture stays, and what turning brings into view is there.
 near=(--field turbulence "${small[@]}" --zoom 4)
 works "generate" "$vdi" generate "${near[@]}" -o cut.vdi --flat cut.png
