@@ -47,6 +47,7 @@ float unordered(uint bits) { return uintBitsToFloat((bits >> 31) != 0u ? bits & 
 // Smallest, and largest inverted, of what the workgroup's invocations have found.
 shared uint minimum;
 shared uint minInverted;
+shared uint infinite;  // bit 0: there's a positive one, bit 1: a negative one
 
 // By a workgroup, whose invocations take a row of texels each at a time.
 void measure(CellPiece piece, uint pieceIndex, uint cell) {
@@ -56,10 +57,12 @@ void measure(CellPiece piece, uint pieceIndex, uint cell) {
   ivec3 first = max(ivec3(cellAt * cellSide) - 1, ivec3(0));
   ivec3 last = min(ivec3((cellAt + 1u) * cellSide) + 1, ivec3(piece.dims) - 1);
   const float largest = 3.402823466e38;
+  float infiniteTexel = uintBitsToFloat(infiniteTexelBits);
   vec2 range = vec2(largest, -largest);
   if (gl_LocalInvocationIndex == 0u) {
     minimum = ~0u;
     minInverted = ~0u;
+    infinite = 0u;
   }
   barrier();
   int rows = last.y - first.y + 1;
@@ -68,8 +71,12 @@ void measure(CellPiece piece, uint pieceIndex, uint cell) {
     ivec3 at = ivec3(piece.place) + ivec3(first.x, first.y + row % rows, first.z + row / rows);
     for (int x = first.x; x <= last.x; ++x, ++at.x) {
       float value = texelAt(piece.page, at);
-      // What isn't finite is transparent, and so is what's interpolated with it.
-      if (abs(value) <= largest) range = vec2(min(range.x, value), max(range.y, value));
+      // NaN is transparent, and so is what's interpolated with it.
+      if (abs(value) == infiniteTexel) {
+        atomicOr(infinite, value > 0.0 ? 1u : 2u);
+      } else if (abs(value) <= largest) {
+        range = vec2(min(range.x, value), max(range.y, value));
+      }
     }
   }
   if (range.x <= range.y) {
@@ -79,11 +86,16 @@ void measure(CellPiece piece, uint pieceIndex, uint cell) {
   barrier();
   if (gl_LocalInvocationIndex != 0u) return;
   bool found = minimum != ~0u;
-  push.ranges.at[cell] = found ? vec2(unordered(minimum), unordered(~minInverted)) : vec2(largest, -largest);
+  vec2 all = found ? vec2(unordered(minimum), unordered(~minInverted)) : vec2(largest, -largest);
+  if ((infinite & 1u) != 0u) all = vec2(min(all.x, infiniteTexel), max(all.y, infiniteTexel));
+  if ((infinite & 2u) != 0u) all = vec2(min(all.x, -infiniteTexel), max(all.y, -infiniteTexel));
+  push.ranges.at[cell] = all;
+  uint words = pieceRangeWords * pieceIndex;
   if (found) {
-    atomicMin(push.pieceRanges.at[2u * pieceIndex], minimum);
-    atomicMin(push.pieceRanges.at[2u * pieceIndex + 1u], minInverted);
+    atomicMin(push.pieceRanges.at[words], minimum);
+    atomicMin(push.pieceRanges.at[words + 1u], minInverted);
   }
+  if (infinite != 0u) atomicMin(push.pieceRanges.at[words + 2u], 0u);
 }
 
 void classify(CellPiece piece, uint cell) {

@@ -120,9 +120,11 @@ vec3 coordinateOf(Brick brick, float place) {
   return clamp(positionAt(place) * brick.texelScale + brick.texelOffset, brick.texelLo, brick.texelHi);
 }
 
-// Where in the table it lies.
+// Where in the table it lies. What is infinite, or comes to be here, is far beyond the table; NaN stays NaN.
 float tablePosition(Brick brick, float place) {
-  return (texel(brick.page, coordinateOf(brick, place)) - brick.tableOrigin) * brick.tableScale;
+  const float farPosition = 1.0e30;
+  float position = (texel(brick.page, coordinateOf(brick, place)) - brick.tableOrigin) * brick.tableScale;
+  return mix(position, sign(position) * farPosition, mayBeInfinite && abs(position) > farPosition);
 }
 
 vec3 placeAmongCells(Brick brick, uint k) {

@@ -358,7 +358,8 @@ TEST_CASE("transfer functions are piecewise linear, with steps, constant outside
     CHECK(1.0 - std::exp2(-entry.extinction) == Approx(function.opacityAt(x)).margin(2e-3));
   }
   CHECK(table.lookup(std::numeric_limits<double>::quiet_NaN()).extinction == 0.0F);
-  CHECK(table.lookup(std::numeric_limits<double>::infinity()).extinction == 0.0F);
+  CHECK(table.lookup(std::numeric_limits<double>::infinity()) == table.entries.back());
+  CHECK(table.lookup(-std::numeric_limits<double>::infinity()) == table.entries.front());
   CHECK(table.visible(0.5, 0.6));
   function.opacities = {{0.0, 0.0}, {1.0, 0.0}, {1.0001, 1.0}, {1.0002, 0.0}, {2.0, 0.0}};
   const TransferTable narrow = bake(function);

@@ -75,3 +75,14 @@ TEST_CASE("fingerprints name the parameter that differs") {
     CHECK(different(given, changed) == std::vector<std::string>{name});
   }
 }
+
+TEST_CASE("fingerprints: -0 is 0") {
+  Parameters negative;
+  const Parameters positive = negative;
+  negative.camera.focalPoint = glm::dvec3(-0.0);
+  negative.camera.viewUp.x = -0.0;
+  negative.function.colors[0].x = -0.0;
+  negative.function.opacities[0].x = -0.0;
+  negative.settings.margin = -0.0;
+  CHECK(different(positive, negative).empty());
+}

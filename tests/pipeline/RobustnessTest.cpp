@@ -8,6 +8,7 @@
 #include "vdi/core/Flatten.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vdi/pipeline/VdiRenderer.h"
+#include "vdi/reference/Reference.h"
 
 using namespace vdi;
 using apps::Joint;
@@ -64,7 +65,7 @@ TEST_CASE("a box filled with one value: its picture doesn't depend on where samp
   CHECK(worst < 1.0F / 255.0F);
 }
 
-TEST_CASE("NaN and infinite scalars are transparent, the rest is shown") {
+TEST_CASE("NaN is transparent, infinite scalars are beyond the transfer function's ends, the rest is shown") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
   VdiGenerator generator(device(), comm::Communicator::serial());
@@ -79,9 +80,44 @@ TEST_CASE("NaN and infinite scalars are transparent, the rest is shown") {
   CHECK_NOTHROW(validate(*vdi));
   const Image image = flatten(*vdi);
   CHECK(highestOpacity(image) > 0.9F);
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width / 2 - 2; ++x) {
+  const auto at = [](const Image& picture, double x, double y) {
+    const int column = static_cast<int>(x * picture.width);
+    const int row = static_cast<int>(y * picture.height);
+    return picture.rgba[static_cast<std::size_t>(row * picture.width + column)];
+  };
+  for (int y = 0; y < image.height / 2 - 3; ++y) {
+    for (int x = 0; x < image.width / 2 - 2; ++x)
       CHECK(image.rgba[static_cast<std::size_t>(y * image.width + x)].a == 0.0F);
+  }
+  // threeHues is transparent below a third: what's negatively infinite lets the positively infinite be seen.
+  CHECK(at(image, 0.4, 0.7).a > 0.9F);
+  CHECK(at(image, 0.4, 0.7).r > 4.0F * at(image, 0.4, 0.7).b);
+  // The ends of a function that is visible from end to end, and of one whose colours are far from the values.
+  for (const double scale : {1.0, 1e-20}) {
+    INFO(scale);
+    TransferFunction function{{{0.0, {0, 0, 1}}, {scale, {1, 0, 0}}}, {{0.0, 0.7}, {scale, 0.9}}, 0.05};
+    for (const double rate : {0.25, 1.0, 3.0}) {  // points and slabs
+      INFO(rate);
+      GenerateSettings own = settings;
+      own.samplesPerVoxel = rate;
+      for (const double side : {-1.0, 1.0}) {
+        const Camera camera =
+            Camera::framing({glm::dvec3(0.0), glm::dvec3(1.0)}, {0.0, 0.0, side}, {0.0, 1.0, 0.0});
+        const Image seen = *generator.renderVolume(camera, function, own);
+        const reference::Frame frame(generator.scene(), camera, function, own);
+        const Image expected = reference::renderVolume(frame, {&half, 1});
+        float worst = 0.0F;
+        for (std::size_t i = 0; i < seen.rgba.size(); ++i) {
+          const glm::vec4 apart = glm::abs(seen.rgba[i] - expected.rgba[i]);
+          worst = std::max({worst, apart.r, apart.g, apart.b, apart.a});
+        }
+        CHECK(worst < 2.0F / 255.0F);
+        const double left = side < 0.0 ? 0.4 : 0.6;
+        CHECK(at(seen, left, 0.3).a == 0.0F);  // NaN
+        const glm::vec4 nearer = at(seen, left, 0.7);
+        CHECK(nearer.a > 0.99F);
+        CHECK((side < 0.0 ? nearer.b : nearer.r) > 0.95F);
+      }
     }
   }
 }

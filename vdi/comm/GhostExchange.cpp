@@ -596,21 +596,26 @@ class LayerExchange {
       const auto [y0, y1] = partsAt(1, at.y);
       const auto [z0, z1] = partsAt(2, at.z);
       double sum = 0.0;
+      double infinite = 0.0;
       int finite = 0;
       for (int z = z0; z < z1; ++z) {
         for (int y = y0; y < y1; ++y) {
           for (int x = x0; x < x1; ++x) {
             const double value =
                 sampler.at({request.place(0, at.x, x), request.place(1, at.y, y), request.place(2, at.z, z)});
+            if (std::isinf(value)) infinite += value;
             if (!std::isfinite(value)) continue;
             sum += value;
             ++finite;
           }
         }
       }
-      // What isn't finite has no share in a mean; a mean of nothing else isn't finite either.
+      // What isn't finite has no share in a mean. A mean of nothing else is infinite if all of it that isn't
+      // NaN is so in one direction.
       const int count = (x1 - x0) * (y1 - y0) * (z1 - z0);
-      sum = finite > 0 ? sum * count / finite : std::numeric_limits<double>::quiet_NaN();
+      sum = finite > 0        ? sum * count / finite
+            : infinite != 0.0 ? infinite
+                              : std::numeric_limits<double>::quiet_NaN();
       std::memcpy(to, &sum, sizeof(sum));
       to += sizeof(sum);
     });

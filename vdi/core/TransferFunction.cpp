@@ -120,8 +120,8 @@ TransferTable bake(const TransferFunction& transferFunction) {
 
 double TransferTable::positionOf(double scalar) const {
   assert(entries.size() >= 2 && max > min);
-  if (!std::isfinite(scalar)) return std::numeric_limits<double>::quiet_NaN();
-  return (scalar - min) / (max - min) * static_cast<double>(entries.size() - 1);
+  constexpr double far = 1e30;  // as tablePosition of shaders/raycast.glsl has it
+  return std::clamp((scalar - min) / (max - min) * static_cast<double>(entries.size() - 1), -far, far);
 }
 
 TransferTableEntry TransferTable::at(double position) const {

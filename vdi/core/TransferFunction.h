@@ -60,7 +60,7 @@ struct TransferTable {
   double unitDistance = 1.0;
   std::vector<TransferTableEntry> entries;  // at least 2
 
-  /// Not clamped; NaN for scalars that aren't finite.
+  /// Not clamped, but finite for infinite scalars; NaN for NaN.
   double positionOf(double scalar) const;
   /// The entry there; transparent where the position is NaN.
   TransferTableEntry at(double position) const;

@@ -25,8 +25,9 @@ namespace {
 /// times 0 is NaN.
 constexpr double filterGuard = 2.0 / 256.0;
 
-/// Smallest, and largest with its bits inverted, as cells.comp leaves them.
-using PieceRangeBits = std::array<std::uint32_t, 2>;
+/// Smallest, largest with its bits inverted, and whether there are infinite values, as cells.comp leaves
+/// them.
+using PieceRangeBits = std::array<std::uint32_t, shared::pieceRangeWords>;
 
 float fromOrdered(std::uint32_t bits) {
   return std::bit_cast<float>((bits >> 31U) != 0 ? bits & 0x7FFFFFFFU : ~bits);
@@ -248,6 +249,10 @@ void VolumeStore::finish(Step& step) {
   if (!table_.entries.empty()) placeTable(step);
   runCells(step, true);
   step.range = rangeOf(step);
+  step.infinite = false;
+  if (step.cellCount == 0) return;
+  const auto found = pieceRanges_.mappedAs<PieceRangeBits>();
+  for (std::size_t i = 0; i < step.pieces.size(); ++i) step.infinite = step.infinite || found[i][2] == 0U;
 }
 
 bool VolumeStore::mayBeInfinite() const {
@@ -256,7 +261,7 @@ bool VolumeStore::mayBeInfinite() const {
 }
 
 bool VolumeStore::reachesBeyondTable() const {
-  return valueRange().min < table_.min || valueRange().max > table_.max;
+  return shown().infinite || valueRange().min < table_.min || valueRange().max > table_.max;
 }
 
 /// After cells were measured.
@@ -269,7 +274,7 @@ ScalarRange VolumeStore::rangeOf(const Step& step) const {
       continue;
     }
     const PieceRangeBits& bits = pieceRanges_.mappedAs<PieceRangeBits>()[i];
-    if (bits == PieceRangeBits{~0U, ~0U}) continue;  // nothing is finite
+    if (bits[0] == ~0U && bits[1] == ~0U) continue;  // nothing is finite
     const auto valueOf = [&values](std::uint32_t ordered) {
       const double value = fromOrdered(ordered) * values.scale + values.offset;
       return values.whole ? std::round(value) : value;

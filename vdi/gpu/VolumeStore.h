@@ -58,7 +58,7 @@ class VolumeStore {
   const ScalarRange& valueRange() const { return shown().range; }
   /// Whether there may be values that aren't finite.
   bool mayBeInfinite() const;
-  /// Whether there are values outside of the table's range.
+  /// Whether there are values outside of the table's range, infinite ones among them.
   bool reachesBeyondTable() const;
   bool empty() const { return shown().tree.empty(); }
   std::uint32_t nodeCount() const { return static_cast<std::uint32_t>(shown().tree.size()); }
@@ -96,7 +96,8 @@ class VolumeStore {
     std::vector<shared::KdNode> tree;
     std::vector<shared::CellPiece> cellPieces;  // of pieces; table fields are filled by placeTable
     std::uint32_t cellCount = 0;
-    ScalarRange range;
+    ScalarRange range;      // of finite values
+    bool infinite = false;  // whether there are infinite ones
     Buffer cellPieceBuffer;
     Buffer rangeBuffer;
     Buffer pieceRangeBuffer;

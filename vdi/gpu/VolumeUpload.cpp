@@ -1,10 +1,13 @@
 #include "vdi/gpu/VolumeUpload.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <utility>
 
+#include "shaders/shared/cells.h"
 #include "vdi/core/Parallel.h"
 
 namespace vdi::gpu {
@@ -22,8 +25,25 @@ constexpr std::size_t maxImports = 256;
 /// Fewer take longer to copy values than one takes to pin their pages.
 constexpr std::size_t coresThatCopyFaster = 2;
 
+/// Infinite texels would make NaN of all that's interpolated with them, and of what has weight 0 besides.
+float filterable(float texel) {
+  constexpr auto infinite = std::bit_cast<float>(shared::infiniteTexelBits);
+  return std::isinf(texel) ? std::copysign(infinite, texel) : texel;
+}
+
+bool anyInfinite(std::span<const float> values) {
+  constexpr std::size_t atOnce = 4096;
+  for (std::size_t first = 0; first < values.size(); first += atOnce) {
+    bool found = false;
+    for (const float value : values.subspan(first, std::min(atOnce, values.size() - first)))
+      found |= std::isinf(value);
+    if (found) return true;
+  }
+  return false;
+}
+
 /// `count` values as texels: the unsigned integer formats shift signed values up, the float format is
-/// relative to the block's range except for f32, which is stored as it is.
+/// relative to the block's range except for f32, which is stored as it is, but for infinite values.
 template <typename From, typename To, typename Convert>
 void convertRow(const void* from, std::size_t first, std::size_t count, std::byte* to, Convert convert) {
   const auto* values = static_cast<const From*>(from) + first;
@@ -34,7 +54,7 @@ void convertRow(const void* from, std::size_t first, std::size_t count, std::byt
 void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap& values, std::size_t first,
               std::size_t count, std::byte* to) {
   const auto relative = [&values](auto value) {
-    return static_cast<float>((static_cast<double>(value) - values.offset) / values.scale);
+    return filterable(static_cast<float>((static_cast<double>(value) - values.offset) / values.scale));
   };
   const bool wide = format == VK_FORMAT_R16_UNORM;
   using U8 = std::uint8_t;
@@ -60,8 +80,7 @@ void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap
       return convertRow<std::int16_t, U16>(data, first, count, to,
                                            [](std::int16_t v) { return static_cast<U16>(v + 32768); });
     case ScalarType::F32:
-      std::memcpy(to, static_cast<const float*>(data) + first, count * 4);
-      return;
+      return convertRow<float, float>(data, first, count, to, filterable);
     case ScalarType::U32:
       return convertRow<std::uint32_t, float>(data, first, count, to, relative);
     case ScalarType::I32:
@@ -149,6 +168,9 @@ bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& pa
   const std::uint64_t first = stored.position(part.lo) * bytes;
   const std::uint64_t end = (stored.position(part.hi - 1) + 1) * bytes;
   if (end - first < minImport) return false;
+  if (block.type == ScalarType::F32 &&
+      anyInfinite({static_cast<const float*>(block.data) + first / bytes, (end - first) / bytes}))
+    return false;
   std::optional<ImportedBuffer> source =
       importHostMemory(device_, static_cast<const std::byte*>(block.data) + first, end - first);
   if (!source || source->offset % bytes != 0) return false;

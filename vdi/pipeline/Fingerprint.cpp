@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <type_traits>
+#include <vector>
 
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
@@ -15,11 +16,17 @@ namespace vdi::detail {
 
 namespace {
 
-/// Of the bytes of plain values.
+/// Of the bytes of plain values; -0 is equal to 0.
 template <typename T>
 std::uint64_t hashOf(std::span<const T> values) {
   static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
-  return XXH3_64bits(values.data(), values.size_bytes());
+  if constexpr (std::is_floating_point_v<T>) {
+    std::vector<T> positive(values.begin(), values.end());
+    for (T& value : positive) value += T{0};
+    return XXH3_64bits(positive.data(), values.size_bytes());
+  } else {
+    return XXH3_64bits(values.data(), values.size_bytes());
+  }
 }
 
 template <typename T>
