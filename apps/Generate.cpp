@@ -67,6 +67,7 @@ struct Shot {
   Camera camera;
   TransferFunction function;
   GenerateSettings settings;
+  ScalarArray array;
 };
 
 void printOutcome(const GenerateSettings& settings, std::uint64_t supersegments,
@@ -77,7 +78,8 @@ void printOutcome(const GenerateSettings& settings, std::uint64_t supersegments,
 }
 
 /// With a picture of it, which takes the whole VDI.
-void writeVdiFiles(const Options& options, std::size_t index, Vdi& vdi) {
+void writeVdiFiles(const Options& options, std::size_t index, const Shot& shot, Vdi& vdi) {
+  vdi.coloring->array = shot.array;
   vdi.time = options.timeOf(index);
   vdi.timeStep = options.number(index);
   if (!options.output.empty()) io::writeVdi(options.numbered(options.output, index), vdi);
@@ -90,13 +92,13 @@ void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGener
   if (options.wantsVdi() && options.flat.empty() && !options.output.empty()) {
     const WrittenVdi written =
         generator.write(options.numbered(options.output, index), shot.camera, shot.function, shot.settings,
-                        {options.timeOf(index), options.number(index)});
+                        {options.timeOf(index), options.number(index), shot.array});
     if (world.rank() == 0) printOutcome(shot.settings, written.supersegments, generator);
   } else if (options.wantsVdi()) {
     std::optional<Vdi> vdi = generator.generate(shot.camera, shot.function, shot.settings);
     world.together([&] {
       if (!vdi) return;
-      if (!options.flat.empty()) writeVdiFiles(options, index, *vdi);
+      if (!options.flat.empty()) writeVdiFiles(options, index, shot, *vdi);
       printOutcome(shot.settings, vdi->supersegmentCount(), generator);
     });
   }
@@ -158,6 +160,8 @@ class Series {
     startReading(0);
     generator_.setBlocks(finishReading());
     world_.together([&] {
+      shot.array = options_.raws.empty() ? fieldArray(options_.field, options_.decomposition)
+                                         : rawArray(options_.raws.front());
       shot.camera = makeCamera(options_.view, generator_.scene());
       shot.function = makeTransferFunction(options_.quality, generator_.scene(), generator_.scalarRange());
     });

@@ -46,6 +46,25 @@ void comparePictures(const CompareOptions& options) {
       d.ssim, d.psnrDb, d.meanError, d.maxError, 100.0 * d.wrongShare);
 }
 
+std::string shownOf(const ScalarArray& array) {
+  if (array.name.empty()) return "an array of no name";
+  std::string what = fmt::format("{} of {}", array.name, array.cells ? "cells" : "points");
+  if (array.components > 1)
+    what += array.component < 0 ? ", its magnitude"
+                                : fmt::format(", component {} of {}", array.component, array.components);
+  return what;
+}
+
+void printColoring(const Coloring& coloring) {
+  const auto& [array, range, function] = coloring;
+  fmt::print("  array            {}", shownOf(array));
+  if (range.min <= range.max) fmt::print(", from {:g} to {:g}", range.min, range.max);
+  fmt::print("\n  colours          {} nodes from {:g} to {:g}\n", function.colors.size(),
+             function.colors.front().x, function.colors.back().x);
+  fmt::print("  opacity          {} nodes from {:g} to {:g}, unit distance {:g}\n", function.opacities.size(),
+             function.opacities.front().x, function.opacities.back().x, function.unitDistance);
+}
+
 struct InfoOptions {
   std::vector<std::string> files;
   bool devices = false;
@@ -78,6 +97,7 @@ void printInfo(const InfoOptions& options) {
     fmt::print("  scene            ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g}), sample step {:g}\n",
                v.bounds.lo.x, v.bounds.lo.y, v.bounds.lo.z, v.bounds.hi.x, v.bounds.hi.y, v.bounds.hi.z,
                v.sampleStep);
+    if (v.coloring) printColoring(*v.coloring);
   }
 }
 

@@ -149,6 +149,21 @@ std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOpti
   return blocks;
 }
 
+ScalarArray rawArray(const std::string& sidecar) {
+  ScalarArray array;
+  array.name = std::filesystem::path(sidecar).stem().string();
+  array.cells = readSidecar(sidecar).lattice.joint == Joint::Cells;
+  return array;
+}
+
+ScalarArray fieldArray(const std::string& field, const DecompositionOptions& options) {
+  ScalarArray array;
+  array.name = field;
+  const bool hasCopies = vectorOf(parseSizes(options.copies, 3)) != glm::ivec3(1);
+  array.cells = options.joint.empty() ? hasCopies : jointOf(options.joint) == Joint::Cells;
+  return array;
+}
+
 namespace {
 
 /// The longest axis has length 1.

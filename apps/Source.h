@@ -11,6 +11,7 @@
 #include "apps/Cameras.h"
 #include "apps/Decomposition.h"
 #include "vdi/core/Camera.h"
+#include "vdi/core/Coloring.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
@@ -41,6 +42,10 @@ std::vector<Block> fieldBlocks(const std::string& field, const DecompositionOpti
 /// The blocks of a raw volume; size and type are the sidecar's. Throws Error.
 std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOptions& options, int rank,
                              int ranks);
+/// How a VDI's file names the scalars of such blocks: by the field, or by the sidecar's file without its
+/// ending. Throws Error.
+ScalarArray fieldArray(const std::string& field, const DecompositionOptions& options);
+ScalarArray rawArray(const std::string& sidecar);
 /// "name: description" of each field, for --help.
 std::string fieldsHelp();
 

@@ -53,6 +53,8 @@ refused 1 "No space" "${mpirun[@]}" 2 "$vdi" generate --field sphere "${small[@]
 works "info" "$vdi" info one.vdi
 grep -q "80 x 60" out.txt || fail "info doesn't tell the resolution"
 grep -q "compact precision" out.txt || fail "info doesn't tell the precision"
+grep -q "array .* of \(points\|cells\), from " out.txt || fail "info doesn't tell array and range"
+grep -q "opacity .* nodes from .*, unit distance " out.txt || fail "info doesn't tell the opacity function"
 works "full precision" "$vdi" generate --field turbulence "${small[@]}" --joint cells --precision full -o full.vdi --flat full.png
 works "compare" "$vdi" compare --json one.png full.png
 python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "compact isn't full's picture"

@@ -112,6 +112,22 @@ inline Vdi plausibleVdi(int width, int height, std::uint32_t budget) {
   return vdi;
 }
 
+/// What the colours of a VDI may mean: a name with letters beyond ASCII, a step, numbers of any size.
+inline Coloring sampleColoring() {
+  return {
+      .array = {.name = "vitesse \u00e9lev\u00e9e \"|v|\"", .cells = true, .components = 3, .component = -1},
+      .range = {-1.5e-300, 1.0 / 3.0},
+      .function = {.colors = {{-1e300, {0.0, 0.1, 1.0}}, {0.25, {0.5, 0.5, 0.5}}, {0.25, {1.0, 0.0, 0.0}}},
+                   .opacities = {{-2.0, 0.0}, {7.0 / 3.0, 1.0}},
+                   .unitDistance = 0.1}};
+}
+
+/// The same VDI with that.
+inline Vdi colored(Vdi vdi) {
+  vdi.coloring = sampleColoring();
+  return vdi;
+}
+
 /// The same in codes.
 inline Vdi compact(const Vdi& vdi) {
   Vdi result = vdi;

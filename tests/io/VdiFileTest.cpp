@@ -180,6 +180,98 @@ TEST_CASE("a margin makes version 2, and only a margin does") {
   CHECK_THAT(refusal(bytes, 8, 1U), ContainsSubstring("flags"));
 }
 
+TEST_CASE("metadata make version 3 and lie behind the chunks as JSON, as docs/format.md says") {
+  Vdi vdi = test::colored(test::noisyVdi(9, 7, 4));
+  if (GENERATE(false, true)) vdi.margin = {3, 2};
+  const std::vector<std::byte> bytes = io::encode(vdi);
+  CHECK(at<std::uint32_t>(bytes, 8) == 3);
+  CHECK(at<std::uint32_t>(bytes, 12) == headerBytes);
+  CHECK(at<std::uint16_t>(bytes, 44) == vdi.margin.x);
+  const std::size_t place = headerBytes + 16 * at<std::uint32_t>(bytes, 40) + at<std::uint64_t>(bytes, 56);
+  CHECK(std::memcmp(bytes.data() + place, "JSON", 4) == 0);
+  const auto count = at<std::uint32_t>(bytes, place + 4);
+  REQUIRE(place + 16 + count == bytes.size());
+  CHECK(at<std::uint64_t>(bytes, place + 8) == XXH64(bytes.data() + place + 16, count, 0));
+  const std::string text(reinterpret_cast<const char*>(bytes.data()) + place + 16, count);
+  CHECK(
+      text ==
+      "{\"array\":{\"association\":\"cells\",\"component\":-1,\"components\":3,\"name\":\"vitesse "
+      "\u00e9lev\u00e9e \\\"|v|\\\"\"},\"range\":[-1.5e-300,0.3333333333333333],\"time\":1234.5,"
+      "\"timeStep\":1099511627783,\"transferFunction\":{\"colors\":[[-1e+300,0.0,0.1,1.0],[0.25,0.5,0.5,0.5],"
+      "[0.25,1.0,0.0,0.0]],\"opacities\":[[-2.0,0.0],[2.3333333333333335,1.0]],\"unitDistance\":0.1}}");
+  CHECK(sameBits(io::decode(bytes), vdi));
+  CHECK(io::decodeInfo(bytes).version == 3);
+  CHECK(io::decodeInfo(bytes).header.coloring == vdi.coloring);
+  // The same without metadata, which older programs read.
+  vdi.coloring.reset();
+  CHECK(at<std::uint32_t>(io::encode(vdi), 8) == (vdi.margin.x > 0 ? 2 : 1));
+}
+
+TEST_CASE(
+    "metadata that aren't sound are refused, their checksum being right, and unknown fields are skipped") {
+  const std::vector<std::byte> sound = io::encode(test::colored(test::noisyVdi(4, 4, 3)));
+  const std::size_t place = headerBytes + 16 * at<std::uint32_t>(sound, 40) + at<std::uint64_t>(sound, 56);
+  const auto with = [&](const std::string& text) {
+    std::vector<std::byte> bytes(sound.begin(), sound.begin() + static_cast<std::ptrdiff_t>(place));
+    bytes.resize(place + 16 + text.size());
+    std::memcpy(bytes.data() + place, "JSON", 4);
+    put(bytes, place + 4, static_cast<std::uint32_t>(text.size()));
+    put<std::uint64_t>(bytes, place + 8, XXH64(text.data(), text.size(), 0));
+    std::memcpy(bytes.data() + place + 16, text.data(), text.size());
+    return bytes;
+  };
+  const std::string array = R"("array":{"name":"V","association":"points","components":2,"component":1})";
+  const std::string function =
+      R"("transferFunction":{"colors":[[0,0,0,1]],"opacities":[[0,0],[1,1]],"unitDistance":2})";
+  const Vdi plain = io::decode(with("{" + array + "," + function + R"(,"range":[0,1],"later":[{}]})"));
+  CHECK(plain.coloring->array == ScalarArray{.name = "V", .cells = false, .components = 2, .component = 1});
+  CHECK(io::decode(with("{" + array + "," + function + "}")).coloring->range == ScalarRange());
+  const auto refused = [&](const std::string& text, const std::string& what) {
+    INFO(text);
+    const Error error = test::errorOf([&] { io::decode(with(text)); });
+    CHECK(error.code() == ErrorCode::Format);
+    CHECK_THAT(error.what(), ContainsSubstring(what));
+    CHECK(test::errorOf([&] { io::decodeInfo(with(text)); }).code() == ErrorCode::Format);
+  };
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text = "{" + array + "," + function + R"(,"range":[0,1]})";
+    const std::size_t found = text.find(from);
+    REQUIRE(found != std::string::npos);
+    return text.replace(found, from.size(), to);
+  };
+  refused("", "parse error");
+  refused("{", "parse error");
+  refused("[]", "no JSON object");
+  refused("{" + array + "}", "'transferFunction' is missing");
+  refused(std::string(10000, '['), "parse error");
+  refused(changed("\"V\"", "7"), "'name'");
+  refused(changed("points", "edges"), "association");
+  refused(changed("\"component\":1", "\"component\":2"), "component 2 of 2");
+  refused(changed("\"components\":2", "\"components\":1e99"), "components");
+  refused(changed("\"components\":2", "\"components\":18446744073709551615"), "component");
+  refused(changed("[0,1]}", "[1,0]}"), "range");
+  refused(changed("[0,1]}", "[1e999,0]}"), "metadata");
+  refused(changed("[[0,0,0,1]]", "[]"), "no nodes");
+  refused(changed("[[0,0,0,1]]", "[[0,0,0]]"), "colors");
+  refused(changed("[[0,0,0,1]]", "[[0,0,0,2]]"), "isn't in [0, 1]");
+  refused(changed("[[0,0],[1,1]]", "[[1,0],[0,1]]"), "ascend");
+  refused(changed("\"unitDistance\":2", "\"unitDistance\":0"), "unit distance");
+  refused("{" + array + "," + function + "}" + std::string(1U << 20, ' '), "can't be metadata");
+  CHECK_THAT(refusal(sound, place, 'j'), ContainsSubstring("aren't JSON"));
+  CHECK_THAT(refusal(sound, place + 4, 1U), ContainsSubstring("bytes of metadata"));
+  CHECK_THAT(refusal(sound, place + 8, std::uint64_t{1}), ContainsSubstring("metadata's checksum"));
+  CHECK_THAT(refusal(sound, 8, 1U), ContainsSubstring("header says"));
+  // What such a file would be refused for isn't written.
+  Vdi vdi = test::colored(test::noisyVdi(4, 4, 3));
+  vdi.coloring->function.unitDistance = 0.0;
+  CHECK(test::errorOf([&] { io::encode(vdi); }).code() == ErrorCode::Format);
+  vdi = test::colored(vdi);
+  vdi.coloring->array.name = std::string(1U << 20, 'a');
+  CHECK(test::errorOf([&] { io::encode(vdi); }).code() == ErrorCode::Format);
+  vdi.coloring->array.name = "\xff";
+  CHECK(io::decode(io::encode(vdi)).coloring->array.name == "\uFFFD");
+}
+
 TEST_CASE("a file written by the first version 1 can be read") {
   const std::vector<std::byte> bytes = fromHex(
       "5644492d46494c4501000000f00000000000000000000000030000000200000003000000001000000100000000000000"
@@ -197,7 +289,9 @@ TEST_CASE("a file written by the first version 1 can be read") {
 
 TEST_CASE("later versions, encodings and flags are named in the refusal") {
   const std::vector<std::byte> sound = io::encode(test::noisyVdi(4, 4, 3));
-  CHECK_THAT(refusal(sound, 8, 3U), ContainsSubstring("version 3"));
+  CHECK_THAT(refusal(sound, 8, 0U), ContainsSubstring("version 0"));
+  CHECK_THAT(refusal(sound, 8, 4U), ContainsSubstring("version 4"));
+  CHECK_THAT(refusal(sound, 8, 3U), ContainsSubstring("metadata"));
   CHECK_THAT(refusal(sound, 12, 256U), ContainsSubstring("header"));
   CHECK_THAT(refusal(sound, 16, 7U), ContainsSubstring("encoding 7"));
   CHECK_THAT(refusal(sound, 20, 2U), ContainsSubstring("flags"));

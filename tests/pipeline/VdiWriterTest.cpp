@@ -113,8 +113,9 @@ WrittenVdi writeDealt(const fs::path& path, const Vdi& vdi, const Deal& deal,
 
 std::vector<Vdi> samples() {
   return {
-      test::noisyVdi(97, 131, 5),     // four chunks, the last one shorter
-      test::noisyVdi(128, 64, 3),     // just two
+      test::noisyVdi(97, 131, 5),  // four chunks, the last one shorter
+      test::noisyVdi(128, 64, 3),  // just two
+      test::colored(test::noisyVdi(128, 65, 3)),
       test::plausibleVdi(64, 64, 8),  // just one
       test::noisyVdi(3, 2, 4),        // fewer lists than ranks
       test::noisyVdi(1, 1, 4),        //
@@ -188,7 +189,7 @@ TEST_CASE("a rank writes its own lists, and sends no more than parts of chunks")
 TEST_CASE("a pipe gets the bytes in their order, a device what it takes") {
   const test::SharedFolder folder(world());
   const fs::path pipe = folder.path() / "pipe";
-  const Vdi vdi = test::noisyVdi(97, 131, 5);
+  const Vdi vdi = test::colored(test::noisyVdi(97, 131, 5));
   const Deal deal = dealInBands(vdi.listCount(), world().size(), 2, 1);
   world().together([&] {
     if (isRoot() && ::mkfifo(pipe.c_str(), 0600) != 0) throw Error(ErrorCode::Io, "no pipe");

@@ -61,13 +61,14 @@ TEST_CASE("a frame that all ranks write is the file of the one that the root gat
     Camera camera = test::oblique();
     if (!c.inSight) camera.focalPoint = camera.position + (camera.position - camera.focalPoint);
     std::optional<Vdi> vdi = generator.generate(camera, function, settings);
-    const WrittenVdi written = generator.write(path, camera, function, settings, {2.5, 7});
+    const WrittenVdi written = generator.write(path, camera, function, settings, {2.5, 7, {"V", true, 3, 2}});
     std::array<std::uint64_t, 1> bytes{written.bytes};
     world.allReduceMax(bytes);
     CHECK(bytes[0] == written.bytes);
     if (!root) continue;
     vdi->time = 2.5;
     vdi->timeStep = 7;
+    vdi->coloring->array = {"V", true, 3, 2};
     if (c.width > 2) CHECK((vdi->supersegmentCount() > 0) == c.inSight);
     CHECK(written.supersegments == vdi->supersegmentCount());
     CHECK(io::InputFile(path).readAll() == io::encode(*vdi));

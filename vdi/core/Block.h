@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "vdi/core/Box.h"
+#include "vdi/core/ScalarRange.h"
 
 namespace vdi {
 
@@ -101,13 +102,6 @@ double loadValue(ScalarType type, const void* data, std::size_t index);
 /// The nearest value that the type has, for integers 0 for NaN.
 void storeValue(ScalarType type, void* data, std::size_t index, double value);
 
-/// Smallest and largest finite value; {+inf, -inf} when there's none.
-struct ScalarRange {
-  double min = std::numeric_limits<double>::infinity();
-  double max = -std::numeric_limits<double>::infinity();
-  bool operator==(const ScalarRange&) const = default;
-  void include(const ScalarRange& other);
-};
 ScalarRange finiteRange(const Block& block);  // stored values' and patches', by several threads
 
 /// Values smaller than `minimum` in size are lost where all are so small, larger ones than `maximum`

@@ -63,6 +63,7 @@ Vdi thinned(const Vdi& vdi, int factor) {
   few.sampleStep = vdi.sampleStep;
   few.time = vdi.time;
   few.timeStep = vdi.timeStep;
+  few.coloring = vdi.coloring;
   few.depthCode = vdi.depthCode;
   // Pixels are squares: what the width is then differs by rounding.
   const double share =

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <variant>
 #include <vector>
 
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
+#include "vdi/core/Coloring.h"
 #include "vdi/core/Supersegment.h"
 
 namespace vdi {
@@ -26,6 +28,7 @@ struct Vdi {
   double sampleStep = 0.0;   // depth interval of one sample (DepthLattice::step)
   double time = 0.0;         // simulation time, 0 when unknown
   std::uint64_t timeStep = 0;
+  std::optional<Coloring> coloring;                     // what its colours mean, when that is known
   DepthCode depthCode;                                  // of compact lists; all 0 otherwise
   std::variant<SupersegmentLists, CompactLists> lists;  // width * height lists
 

@@ -9,12 +9,15 @@
 #include <cassert>
 #include <cmath>
 #include <cstring>
+#include <optional>
+#include <utility>
 
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/ListCodec.h"
+#include "vdi/io/Metadata.h"
 #include "vdi/io/VdiParts.h"
 
 namespace vdi::io {
@@ -24,8 +27,10 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "the .vdi file is read as it lies");
 
 constexpr std::array<char, 8> magicText{'V', 'D', 'I', '-', 'F', 'I', 'L', 'E'};
-constexpr std::uint32_t plainVersion = 1;   // no margin
-constexpr std::uint32_t marginVersion = 2;  // written only where there is one
+constexpr std::uint32_t plainVersion = 1;   // neither margin nor metadata
+constexpr std::uint32_t marginVersion = 2;  // a margin; written only where there is one
+constexpr std::uint32_t metadataVersion =
+    3;  // metadata and maybe a margin; written only where there are some
 // Encodings are the numbers of Precision.
 static_assert(static_cast<int>(Precision::Full) == 0 && static_cast<int>(Precision::Compact) == 1);
 constexpr std::uint32_t flagParallel = 1;
@@ -87,6 +92,17 @@ static_assert(offsetof(Header, tableChecksum) == 224);
 static_assert(offsetof(Header, headerChecksum) == 232);
 static_assert(sizeof(Header) == 240);
 
+/// In front of the metadata, which are the file's last part.
+struct MetadataHeader {
+  std::array<char, 4> kind;
+  std::uint32_t bytes;  // of the text that follows
+  std::uint64_t checksum;
+};
+static_assert(offsetof(MetadataHeader, bytes) == 4);
+static_assert(offsetof(MetadataHeader, checksum) == 8);
+static_assert(sizeof(MetadataHeader) == 16);
+constexpr std::array<char, 4> kindJson{'J', 'S', 'O', 'N'};
+
 static_assert(offsetof(ChunkEntry, packedBytes) == 4);
 static_assert(offsetof(ChunkEntry, checksum) == 8);
 static_assert(sizeof(ChunkEntry) == 16);
@@ -132,7 +148,9 @@ std::uint64_t listsOf(const Vdi& vdi) {
 Header headerOf(const Vdi& vdi) {
   Header header{};
   header.magic = magicText;
-  header.version = vdi.margin == glm::ivec2(0) ? plainVersion : marginVersion;
+  header.version = vdi.coloring                  ? metadataVersion
+                   : vdi.margin == glm::ivec2(0) ? plainVersion
+                                                 : marginVersion;
   header.headerBytes = sizeof(Header);
   header.encoding = static_cast<std::uint32_t>(vdi.precision());
   header.flags = vdi.camera.parallelProjection ? flagParallel : 0;
@@ -188,9 +206,9 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   if (start.size() < sizeof(Header)) fail(fmt::format("{} bytes are too few for a header", fileBytes));
   std::memcpy(&header, start.data(), sizeof(Header));
   if (header.magic != magicText) fail("it doesn't start with VDI-FILE");
-  if (header.version != plainVersion && header.version != marginVersion) {
-    fail(fmt::format("it has version {}, this program reads versions {} and {}", header.version, plainVersion,
-                     marginVersion));
+  if (header.version < plainVersion || header.version > metadataVersion) {
+    fail(fmt::format("it has version {}, this program reads versions {} to {}", header.version, plainVersion,
+                     metadataVersion));
   }
   if (header.headerBytes != sizeof(Header)) fail(fmt::format("its header has {} bytes", header.headerBytes));
   if (header.headerChecksum != checksumOf(header)) fail("the header's checksum is wrong");
@@ -213,11 +231,40 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   if (chunks != header.chunkCount) {
     fail(fmt::format("{} chunks, there should be {}", header.chunkCount, chunks));
   }
-  const std::uint64_t metaBytes = sizeof(Header) + chunks * sizeof(ChunkEntry);
-  if (metaBytes > fileBytes || header.dataBytes != fileBytes - metaBytes) {
-    fail(fmt::format("it has {} bytes, its header says {} + {}", fileBytes, metaBytes, header.dataBytes));
+  const std::uint64_t frontBytes = sizeof(Header) + chunks * sizeof(ChunkEntry);
+  const bool hasMetadata = header.version == metadataVersion;
+  const std::uint64_t rest = frontBytes > fileBytes ? 0 : fileBytes - frontBytes;
+  if (frontBytes > fileBytes || header.dataBytes > rest || (!hasMetadata && header.dataBytes != rest)) {
+    fail(fmt::format("it has {} bytes, its header says {} + {}", fileBytes, frontBytes, header.dataBytes));
+  }
+  if (hasMetadata && (rest - header.dataBytes < sizeof(MetadataHeader) ||
+                      rest - header.dataBytes > sizeof(MetadataHeader) + maxMetadataBytes)) {
+    fail(fmt::format("{} bytes behind its chunks can't be metadata", rest - header.dataBytes));
   }
   return header;
+}
+
+/// Of the metadata in the file, or of its end.
+std::uint64_t metadataOffset(const Header& header) {
+  return sizeof(Header) + header.chunkCount * sizeof(ChunkEntry) + header.dataBytes;
+}
+
+/// Of what follows the chunks, to the file's end.
+std::optional<Coloring> parseMetadata(const Header& header, std::span<const std::byte> bytes) {
+  if (header.version != metadataVersion) return std::nullopt;
+  MetadataHeader head{};
+  std::memcpy(&head, bytes.data(), sizeof(MetadataHeader));  // parseHeader has seen that it's there
+  const std::span<const std::byte> text = bytes.subspan(sizeof(MetadataHeader));
+  if (head.kind != kindJson) fail("its metadata aren't JSON");
+  if (head.bytes != text.size()) {
+    fail(fmt::format("there are {} bytes of metadata, they say {}", text.size(), head.bytes));
+  }
+  if (head.checksum != checksumOf(text)) fail("the metadata's checksum is wrong");
+  try {
+    return coloringIn({reinterpret_cast<const char*>(text.data()), text.size()});
+  } catch (const Error& error) {
+    fail(error.what());
+  }
 }
 
 std::uint64_t tableBytesOf(const Header& header) {
@@ -293,10 +340,11 @@ DepthCode decodeChunk(const Chunk& chunk, std::span<const std::byte> packed, Lis
   }
 }
 
-VdiFileInfo infoOf(const Header& header, std::uint64_t fileBytes) {
+VdiFileInfo infoOf(const Header& header, std::optional<Coloring> coloring, std::uint64_t fileBytes) {
   VdiFileInfo info;
   info.version = header.version;
   info.header = vdiOf(header);
+  info.header.coloring = std::move(coloring);
   info.supersegmentCount = header.supersegmentCount;
   info.storedBytes = fileBytes;
   info.expandedBytes =
@@ -376,6 +424,18 @@ std::vector<std::byte> encodeHead(const Vdi& vdi, std::span<const ChunkEntry> ta
   return bytes;
 }
 
+std::vector<std::byte> encodeTail(const Vdi& vdi) {
+  if (!vdi.coloring) return {};
+  const std::string text = metadataText(*vdi.coloring, vdi.time, vdi.timeStep);
+  const auto* first = reinterpret_cast<const std::byte*>(text.data());
+  const MetadataHeader head{kindJson, static_cast<std::uint32_t>(text.size()),
+                            checksumOf(std::span(first, text.size()))};
+  std::vector<std::byte> bytes(sizeof(MetadataHeader));
+  std::memcpy(bytes.data(), &head, sizeof(MetadataHeader));
+  bytes.insert(bytes.end(), first, first + text.size());
+  return bytes;
+}
+
 std::vector<std::byte> encode(const Vdi& vdi) {
   requireSoundHeader(vdi);
   validateShape(vdi);
@@ -393,6 +453,8 @@ std::vector<std::byte> encode(const Vdi& vdi) {
       vdi.lists);
   const std::vector<std::byte> head = encodeHead(vdi, table);
   std::copy(head.begin(), head.end(), bytes.begin());
+  const std::vector<std::byte> tail = encodeTail(vdi);
+  bytes.insert(bytes.end(), tail.begin(), tail.end());
   return bytes;
 }
 
@@ -400,7 +462,8 @@ Vdi decode(std::span<const std::byte> bytes) {
   const Header header = parseHeader(bytes, bytes.size());
   const std::vector<Chunk> chunks = parseTable(header, bytes.subspan(sizeof(Header)));
   Vdi vdi = vdiOf(header);
-  const auto data = bytes.subspan(sizeof(Header) + tableBytesOf(header));
+  vdi.coloring = parseMetadata(header, bytes.subspan(metadataOffset(header)));
+  const auto data = bytes.subspan(sizeof(Header) + tableBytesOf(header), header.dataBytes);
   const auto packedOf = [&](const Chunk& chunk) { return data.subspan(chunk.dataOffset, chunk.packedBytes); };
   for (const Chunk& chunk : chunks) requireSound(chunk, packedOf(chunk), precisionOf(header));
   std::visit(
@@ -421,7 +484,7 @@ Vdi decode(std::span<const std::byte> bytes) {
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes) {
   const Header header = parseHeader(bytes, bytes.size());
   static_cast<void>(parseTable(header, bytes.subspan(sizeof(Header))));
-  return infoOf(header, bytes.size());
+  return infoOf(header, parseMetadata(header, bytes.subspan(metadataOffset(header))), bytes.size());
 }
 
 void writeVdi(const std::filesystem::path& path, const Vdi& vdi) {
@@ -442,7 +505,8 @@ VdiFileInfo readVdiInfo(const std::filesystem::path& path) {
   return withPath(path, [&] {
     const Header header = readHeader(file);
     static_cast<void>(parseTable(header, file.read(sizeof(Header), tableBytesOf(header))));
-    return infoOf(header, file.size());
+    const std::uint64_t end = metadataOffset(header);
+    return infoOf(header, parseMetadata(header, file.read(end, file.size() - end)), file.size());
   });
 }
 

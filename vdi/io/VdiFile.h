@@ -26,7 +26,7 @@ std::vector<std::byte> encode(const Vdi& vdi);
 /// header or chunk table asks for more memory than what the chunks expand to (before that is allocated; they
 /// expand 255 times at most). The result has passed validate(Vdi).
 Vdi decode(std::span<const std::byte> bytes);
-/// Reads header and chunk table only; the rest need not be sound, but must be there.
+/// Reads header, chunk table and metadata only; the rest need not be sound, but must be there.
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes);
 
 /// Written by writeAtomically (Files.h): a reader never sees half a file, and a file that was there stays

@@ -45,5 +45,7 @@ std::uint64_t headBytes(std::uint64_t lists);
 /// Those bytes. `vdi`: of its lists there only has to be which precision they have. `table`: of all chunks.
 /// Throws Error{Format} for what decode would refuse.
 std::vector<std::byte> encodeHead(const Vdi& vdi, std::span<const ChunkEntry> table);
+/// What follows the last chunk, of a VDI whose coloring is known; else nothing. Throws as encodeHead.
+std::vector<std::byte> encodeTail(const Vdi& vdi);
 
 }  // namespace vdi::io

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <functional>
 
+#include "vdi/core/Coloring.h"
+
 namespace vdi {
 
 /// Wall-clock seconds and bytes of one rank in the last frame.
@@ -37,6 +39,7 @@ struct WrittenVdi {
 struct TimeStamp {
   double time = 0.0;
   std::uint64_t step = 0;
+  ScalarArray array = {};  // that the blocks' scalars are of
 };
 
 /// Called on every rank with the share done, 0 .. 1; returns false to ask for an abort, which all ranks then

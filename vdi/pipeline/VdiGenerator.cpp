@@ -76,6 +76,7 @@ struct VdiGenerator::State {
     View view;
     DepthLattice lattice;
     TransferTable table;
+    TransferFunction legend;  // the function, simplified
   };
 
   std::unique_ptr<Prepared> prepare(const Camera& camera, const TransferFunction& function,
@@ -86,7 +87,8 @@ struct VdiGenerator::State {
       validate(settings);
       const View view = viewWithMargin(steps->scene(), camera, settings);
       prepared = std::make_unique<Prepared>(
-          Prepared{view, depthLattice(steps->scene(), view, settings.samplesPerVoxel), bake(function)});
+          Prepared{view, depthLattice(steps->scene(), view, settings.samplesPerVoxel), bake(function),
+                   simplified(function)});
       steps->requireSpans(prepared->table);
     });
     mine = {};
@@ -202,6 +204,9 @@ struct VdiGenerator::State {
     const Box shown = boundsIn(settings.region, steps->scene().bounds);
     vdi.bounds = shown.empty() ? steps->scene().bounds : shown;
     vdi.sampleStep = prepared.lattice.step;
+    Coloring& coloring = vdi.coloring.emplace();
+    coloring.range = steps->scalarRange();
+    coloring.function = prepared.legend;
     if (settings.precision == Precision::Compact) vdi.depthCode = depthCodeFor(prepared.lattice);
     return vdi;
   }
@@ -342,6 +347,7 @@ WrittenVdi VdiGenerator::write(const std::filesystem::path& path, const Camera& 
   Vdi header = s.headerOf(*prepared, camera, settings);
   header.time = stamp.time;
   header.timeStep = stamp.step;
+  header.coloring->array = stamp.array;
   const auto writeWith = [&](auto&& sink) {
     s.wholeVdi(*prepared, settings, header, sink, progress);
     return sink.written();

@@ -68,8 +68,9 @@ class VdiGenerator {
   const Scene& scene() const;              // global
   const ScalarRange& scalarRange() const;  // global, finite values
 
-  /// The VDI on rank 0, nullopt on the others. Camera, transfer function and settings must be equal on all
-  /// ranks (Error{InvalidArgument} on all of them otherwise). A scene that's empty or out of sight gives a
+  /// The VDI on rank 0, nullopt on the others. Its coloring has range and function; the caller, who knows the
+  /// array, adds that. Camera, transfer function and settings must be equal on all ranks
+  /// (Error{InvalidArgument} on all of them otherwise). A scene that's empty or out of sight gives a
   /// VDI with empty lists. Devices write to the VDI's memory; when it goes, the next frame's takes its place.
   std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
                               const GenerateSettings& settings, const Progress& progress = {});

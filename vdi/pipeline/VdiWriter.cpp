@@ -72,7 +72,9 @@ VdiWriter<Segment>::VdiWriter(const comm::Communicator& comm, int root, const st
       writtenEnd_(io::headBytes(listCount_)) {
   header_.lists = ListsOf<Segment>();
   comm_.together([&] {
-    if (isRoot()) file_ = std::make_unique<io::OutputFile>(path);
+    if (!isRoot()) return;
+    file_ = std::make_unique<io::OutputFile>(path);
+    tail_ = io::encodeTail(header_);
   });
 }
 
@@ -254,7 +256,7 @@ typename VdiWriter<Segment>::Table VdiWriter<Segment>::shareTable() const {
 template <typename Segment>
 std::filesystem::path VdiWriter<Segment>::prepareFile(const Table& table) {
   const std::vector<std::byte> head = io::encodeHead(header_, table.entries);
-  file_->reserve(table.offsets.back());
+  file_->reserve(table.offsets.back() + tail_.size());
   file_->write(0, head);
   bytesWritten_ += head.size();
   const bool others =
@@ -350,13 +352,18 @@ WrittenVdi VdiWriter<Segment>::finish() {
   });
   const std::vector<std::uint64_t> all = comm_.allGatherWords(writesItself);
   if (std::count(all.begin(), all.end(), 0U) > 0) writeByRoot(table, all);
+  std::array<std::uint64_t, 1> tailBytes{tail_.size()};
   comm_.together([&] {
-    if (isRoot()) file_->commit();
+    if (!isRoot()) return;
+    file_->write(table.offsets.back(), tail_);
+    bytesWritten_ += tail_.size();
+    file_->commit();
   });
+  comm_.allReduceMax(tailBytes);
 
   WrittenVdi written;
   for (const io::ChunkEntry& entry : table.entries) written.supersegments += entry.supersegmentCount;
-  written.bytes = table.offsets.back();
+  written.bytes = table.offsets.back() + tailBytes[0];
   return written;
 }
 

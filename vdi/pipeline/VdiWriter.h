@@ -85,6 +85,7 @@ class VdiWriter {
   WrittenBy writtenBy_;
   std::uint64_t listCount_;
   std::unique_ptr<io::OutputFile> file_;  // the root's
+  std::vector<std::byte> tail_;           // the root's: what follows the chunks
   std::vector<Part> parts_;               // the last one may grow
   std::vector<Chunk> chunks_;
   std::uint64_t firstChunks_ = 0;  // of the file, that are written

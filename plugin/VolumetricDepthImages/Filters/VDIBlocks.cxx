@@ -306,6 +306,25 @@ std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice)
   return blocks;
 }
 
+int componentsOf(vtkDataObject* data, const ArrayChoice& choice) {
+  const auto componentsIn = [&choice](vtkDataObject* leaf) {
+    auto* image = vtkImageData::SafeDownCast(leaf);
+    if (image == nullptr) return 0;
+    vtkDataSetAttributes* attributes =
+        choice.cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
+    vtkDataArray* array =
+        choice.name.empty() ? attributes->GetScalars() : attributes->GetArray(choice.name.c_str());
+    return array != nullptr ? array->GetNumberOfComponents() : 0;
+  };
+  auto* composite = vtkCompositeDataSet::SafeDownCast(data);
+  if (composite == nullptr) return componentsIn(data);
+  int most = 0;
+  const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+  for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem())
+    most = std::max(most, componentsIn(iterator->GetCurrentDataObject()));
+  return most;
+}
+
 std::vector<std::uint64_t> identityOf(vtkDataObject* data) {
   std::vector<std::uint64_t> identity;
   auto* composite = vtkCompositeDataSet::SafeDownCast(data);

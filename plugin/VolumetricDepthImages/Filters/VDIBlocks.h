@@ -28,6 +28,9 @@ struct ArrayChoice {
 /// rotated image, a missing array, one or a vtkGhostType that's shorter than the image.
 std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice);
 
+/// How many components the array of the choice has in the data set; 0 where there is no such array.
+int componentsOf(vtkDataObject* data, const ArrayChoice& choice);
+
 /// Numbers that are others whenever blocksOf would give other blocks, by VTK's rule that who changes an array
 /// calls its Modified: places of all images, which arrays they have, and when these were modified.
 std::vector<std::uint64_t> identityOf(vtkDataObject* data);

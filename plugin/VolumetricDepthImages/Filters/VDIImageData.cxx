@@ -7,6 +7,7 @@
 #include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkStringArray.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnsignedIntArray.h>
 
@@ -21,6 +22,7 @@
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
 #include "vdi/core/Parallel.h"
+#include "vdi/io/Metadata.h"
 #include "vdi/io/VdiFile.h"
 
 namespace pv {
@@ -154,6 +156,12 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat) {
   parameters[1] = vdi.sampleStep;
   parameters[2] = vdi.time;
   parameters[3] = static_cast<double>(vdi.timeStep);
+  if (vdi.coloring) {
+    vtkNew<vtkStringArray> coloring;
+    coloring->SetName("VDI.coloring");
+    coloring->InsertNextValue(vdi::io::metadataText(*vdi.coloring, vdi.time, vdi.timeStep));
+    fields->AddArray(coloring);
+  }
   for (const char* name : {"VDI.offsets", "VDI.codes", "VDI.supersegments"}) {
     if (vtkDataArray* array = fields->GetArray(name)) rememberRanges(array);
   }
@@ -169,6 +177,16 @@ vtkSmartPointer<vtkUnsignedCharArray> fileOf(const vdi::Vdi& vdi) {
 
 bool hasVdi(vtkImageData* image) {
   return image->GetFieldData()->GetAbstractArray("VDI.offsets") != nullptr;
+}
+
+std::optional<vdi::Coloring> coloringOf(vtkFieldData* fields) {
+  auto* text = vtkStringArray::SafeDownCast(fields->GetAbstractArray("VDI.coloring"));
+  if (text == nullptr || text->GetNumberOfValues() != 1) return std::nullopt;
+  try {
+    return vdi::io::coloringIn(text->GetValue(0));
+  } catch (const vdi::Error&) {
+    return std::nullopt;
+  }
 }
 
 bool getVdi(vtkDataObject* data, vdi::Vdi& vdi) {
@@ -202,6 +220,7 @@ bool getVdi(vtkFieldData* fields, vdi::Vdi& vdi) {
   vdi.sampleStep = parameters[1];
   vdi.time = parameters[2];
   vdi.timeStep = static_cast<std::uint64_t>(parameters[3]);
+  vdi.coloring = coloringOf(fields);
   vdi.depthCode = {};
   if (fields->GetAbstractArray("VDI.codes") != nullptr) {
     vdi.lists =

@@ -14,13 +14,16 @@
 //                                  projection, scale; of pictures without a VDI, too (VDIPlace.h)
 //               VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ...; likewise
 //               VDI.parameters     double [4]: N_S, sample step, time, time step
+//               VDI.coloring       string [1]: vdi::Coloring, as vdi::io::metadataText; absent where unknown
 #ifndef VDIImageData_h
 #define VDIImageData_h
 
 #include <vtkSmartPointer.h>
 
+#include <optional>
 #include <string>
 
+#include "vdi/core/Coloring.h"
 #include "vdi/core/Image.h"
 #include "vdi/core/Vdi.h"
 
@@ -43,6 +46,8 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat);
 vtkSmartPointer<vtkUnsignedCharArray> fileOf(const vdi::Vdi& vdi);
 /// Whether the image carries one, sound or not.
 bool hasVdi(vtkImageData* image);
+/// What the colours of the VDI mean that the field data carry; nothing where that is unknown or not sound.
+std::optional<vdi::Coloring> coloringOf(vtkFieldData* fields);
 /// False if the data object carries no VDI (what a rank other than the root has). Throws vdi::Error{Format}
 /// for one that isn't sound.
 bool getVdi(vtkDataObject* data, vdi::Vdi& vdi);

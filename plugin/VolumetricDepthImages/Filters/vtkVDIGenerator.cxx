@@ -73,6 +73,7 @@ struct vtkVDIGenerator::Internals {
   vtkNew<vtkVDIImageData> Made;  // the last output: VTK empties it before it asks for another one
   vtkMTimeType Executed = 0;     // CurrentMTime of the last frame
   double VoxelVolume = 0.0;      // of the smallest voxel of all ranks; 0 without any
+  vdi::ScalarArray Array;        // of the generator's blocks
   /// Of the map that stands in for none: the first frame's range, kept while the array is the same, or films
   /// would flicker.
   std::optional<vdi::ScalarRange> FirstRange;
@@ -446,15 +447,19 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const Origin& origin) {
     pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.Choice);
     blocks = pv::blocksOf(input, origin.Choice);
   });
-  std::array<std::uint64_t, 1> inverseVolume{
-      0};  // doubles that aren't negative are ordered as their bits are
+  // Doubles that aren't negative are ordered as their bits are.
+  std::array<std::uint64_t, 2> largest{0, static_cast<std::uint64_t>(pv::componentsOf(input, origin.Choice))};
   for (const vdi::Block& block : blocks) {
     const double volume = block.spacing.x * block.spacing.y * block.spacing.z;
-    if (volume > 0.0)
-      inverseVolume[0] = std::max(inverseVolume[0], std::bit_cast<std::uint64_t>(1.0 / volume));
+    if (volume > 0.0) largest[0] = std::max(largest[0], std::bit_cast<std::uint64_t>(1.0 / volume));
   }
-  comm.allReduceMax(inverseVolume);
-  this->Internal->VoxelVolume = inverseVolume[0] > 0 ? 1.0 / std::bit_cast<double>(inverseVolume[0]) : 0.0;
+  comm.allReduceMax(largest);
+  this->Internal->VoxelVolume = largest[0] > 0 ? 1.0 / std::bit_cast<double>(largest[0]) : 0.0;
+  const int components = std::max(static_cast<int>(largest[1]), 1);
+  this->Internal->Array = {.name = origin.Choice.name,
+                           .cells = origin.Choice.cells,
+                           .components = components,
+                           .component = components > 1 ? origin.Choice.component : 0};
   this->UpdateProgress(0.05);
   this->Internal->Shown.reset();
   generator.setBlocks(std::move(blocks), this->FillGhosts);
@@ -602,6 +607,7 @@ void vtkVDIGenerator::Prepare() {
         if (!vdi) return;  // another rank has it
         vdi->time = internal.Shown->Time.value_or(0.0);
         vdi->timeStep = static_cast<std::uint64_t>(step);
+        vdi->coloring->array = internal.Array;
         pv::setVdi(output, *vdi);
         findRanges(output->GetPointData());
         findRanges(output->GetFieldData());
@@ -678,6 +684,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const Origin& origin, vtkIm
     if (!vdi) return;
     vdi->time = origin.Time.value_or(0.0);
     vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));
+    vdi->coloring->array = this->Internal->Array;
     pv::setVdi(output, *vdi);
   }
   setTime(output, origin.Time);

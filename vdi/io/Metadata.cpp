@@ -1,0 +1,148 @@
+#include "vdi/io/Metadata.h"
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "vdi/core/Error.h"
+
+namespace vdi::io {
+
+using nlohmann::json;
+
+namespace {
+
+[[noreturn]] void fail(const std::string& what) {
+  throw Error(ErrorCode::Format, "the metadata aren't sound: " + what);
+}
+
+/// The field of an object; fails where there is none.
+const json& at(const json& object, const char* name) {
+  const auto found = object.find(name);
+  if (found == object.end()) fail(fmt::format("'{}' is missing", name));
+  return *found;
+}
+
+const json& objectAt(const json& object, const char* name) {
+  const json& value = at(object, name);
+  if (!value.is_object()) fail(fmt::format("'{}' is no object", name));
+  return value;
+}
+
+double numberAt(const json& object, const char* name) {
+  const json& value = at(object, name);
+  if (!value.is_number()) fail(fmt::format("'{}' is no number", name));
+  return value.get<double>();
+}
+
+std::string textAt(const json& object, const char* name) {
+  const json& value = at(object, name);
+  if (!value.is_string()) fail(fmt::format("'{}' is no text", name));
+  return value.get<std::string>();
+}
+
+int wholeNumberAt(const json& object, const char* name) {
+  const json& value = at(object, name);
+  constexpr std::int64_t most = std::numeric_limits<int>::max();
+  if (!value.is_number_integer() || value.get<std::int64_t>() < -most || value.get<std::int64_t>() > most)
+    fail(fmt::format("'{}' is no whole number", name));
+  return value.get<int>();
+}
+
+/// Rows of `width` numbers.
+std::vector<std::vector<double>> rowsAt(const json& object, const char* name, std::size_t width) {
+  const json& value = at(object, name);
+  std::vector<std::vector<double>> rows;
+  const auto require = [&](bool good) {
+    if (!good) fail(fmt::format("'{}' is no list of lists of {} numbers", name, width));
+  };
+  require(value.is_array());
+  for (const json& row : value) {
+    require(row.is_array() && row.size() == width);
+    std::vector<double> numbers;
+    for (const json& number : row) {
+      require(number.is_number());
+      numbers.push_back(number.get<double>());
+    }
+    rows.push_back(std::move(numbers));
+  }
+  return rows;
+}
+
+ScalarArray arrayIn(const json& object) {
+  const std::string association = textAt(object, "association");
+  if (association != "points" && association != "cells") fail("'association' is neither points nor cells");
+  return {.name = textAt(object, "name"),
+          .cells = association == "cells",
+          .components = wholeNumberAt(object, "components"),
+          .component = wholeNumberAt(object, "component")};
+}
+
+TransferFunction functionIn(const json& object) {
+  TransferFunction function;
+  for (const std::vector<double>& row : rowsAt(object, "colors", 4))
+    function.colors.push_back({row[0], {row[1], row[2], row[3]}});
+  for (const std::vector<double>& row : rowsAt(object, "opacities", 2))
+    function.opacities.push_back({row[0], row[1]});
+  function.unitDistance = numberAt(object, "unitDistance");
+  return function;
+}
+
+Coloring coloringOf(const json& object) {
+  Coloring coloring{.array = arrayIn(objectAt(object, "array")),
+                    .range = {},
+                    .function = functionIn(objectAt(object, "transferFunction"))};
+  if (object.contains("range")) {
+    const json& range = object.at("range");
+    if (!range.is_array() || range.size() != 2 || !range[0].is_number() || !range[1].is_number() ||
+        range[0].get<double>() > range[1].get<double>())
+      fail("'range' isn't two ascending numbers");
+    coloring.range = {range[0].get<double>(), range[1].get<double>()};
+  }
+  return coloring;
+}
+
+}  // namespace
+
+std::string metadataText(const Coloring& coloring, double time, std::uint64_t timeStep) {
+  validate(coloring);
+  const auto& [array, range, function] = coloring;
+  json colors = json::array();
+  for (const ColorNode& node : function.colors)
+    colors.push_back({node.x, node.color.r, node.color.g, node.color.b});
+  json opacities = json::array();
+  for (const OpacityNode& node : function.opacities) opacities.push_back({node.x, node.opacity});
+  json object{{"array",
+               {{"name", array.name},
+                {"association", array.cells ? "cells" : "points"},
+                {"components", array.components},
+                {"component", array.component}}},
+              {"transferFunction",
+               {{"colors", std::move(colors)},
+                {"opacities", std::move(opacities)},
+                {"unitDistance", function.unitDistance}}},
+              {"time", time},
+              {"timeStep", timeStep}};
+  if (range.min <= range.max) object["range"] = {range.min, range.max};
+  std::string text = object.dump(-1, ' ', false, json::error_handler_t::replace);
+  if (text.size() > maxMetadataBytes) fail(fmt::format("they would take {} bytes", text.size()));
+  return text;
+}
+
+Coloring coloringIn(std::string_view text) {
+  if (text.size() > maxMetadataBytes) fail(fmt::format("they take {} bytes", text.size()));
+  try {
+    const json object = json::parse(text.begin(), text.end());
+    if (!object.is_object()) fail("they are no JSON object");
+    Coloring coloring = coloringOf(object);
+    validate(coloring);
+    return coloring;
+  } catch (const json::exception& error) {
+    fail(error.what());
+  }
+}
+
+}  // namespace vdi::io
