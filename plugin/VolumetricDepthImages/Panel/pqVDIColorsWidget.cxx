@@ -4,12 +4,52 @@
 #include <pqCoreUtilities.h>
 #include <pqDataRepresentation.h>
 #include <pqProxyWidgetDialog.h>
+#include <pqUndoStack.h>
+#include <pqView.h>
 #include <vtkCommand.h>
 #include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
+#include <vtkSMProxy.h>
+#include <vtkSMSessionProxyManager.h>
+#include <vtkSMTrace.h>
+#include <QCheckBox>
 #include <QLabel>
 #include <QPushButton>
+#include <QScreen>
 #include <QVBoxLayout>
+#include <QWindow>
+
+#include <algorithm>
+#include <array>
+
+namespace {
+
+/// To where it hides as little of the active view as the screen allows: left, right, below or above it.
+/// Before it's shown: the window manager gives it a frame like the main window's.
+void moveBesideView(QDialog* dialog) {
+  pqView* active = pqActiveObjects::instance().activeView();
+  const QWidget* widget = active != nullptr ? active->widget() : nullptr;
+  const QWidget* main = pqCoreUtilities::mainWidget();
+  if (widget == nullptr || main == nullptr || main->windowHandle() == nullptr) return;
+  const QRect view(widget->mapToGlobal(QPoint(0, 0)), widget->size());
+  const QRect room = main->windowHandle()->screen()->availableGeometry();
+  const QSize size = dialog->size() + main->frameGeometry().size() - main->size();
+  const auto inside = [&](int x, int y) {
+    return QPoint(std::clamp(x, room.left(), std::max(room.left(), room.right() + 1 - size.width())),
+                  std::clamp(y, room.top(), std::max(room.top(), room.bottom() + 1 - size.height())));
+  };
+  const std::array<QPoint, 4> places{
+      inside(view.left() - size.width(), view.top()), inside(view.right() + 1, view.top()),
+      inside(view.left(), view.bottom() + 1), inside(view.left(), view.top() - size.height())};
+  const auto hidden = [&](const QPoint& place) {
+    const QRect both = view.intersected(QRect(place, size));
+    return both.isEmpty() ? 0 : both.width() * both.height();
+  };
+  dialog->move(*std::min_element(places.begin(), places.end(),
+                                 [&](const QPoint& a, const QPoint& b) { return hidden(a) < hidden(b); }));
+}
+
+}  // namespace
 
 pqVDIColorsWidget::pqVDIColorsWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget* parent)
     : pqPropertyWidget(proxy, parent),
@@ -54,6 +94,30 @@ void pqVDIColorsWidget::closeWhereNothingIsShown() {
   if (pqActiveObjects::instance().activeRepresentation() == nullptr) delete this->Dialog;
 }
 
+void pqVDIColorsWidget::keepMaps(vtkSMProxy* map) {
+  this->Kept.clear();
+  for (vtkSMProxy* each : {map, vtkSMPropertyHelper(map, "ScalarOpacityFunction", true).GetAsProxy(),
+                           vtkSMPropertyHelper(this->proxy(), "ScalarOpacityFunction").GetAsProxy()}) {
+    if (each == nullptr) continue;
+    auto copy = vtkSmartPointer<vtkSMProxy>::Take(
+        each->GetSessionProxyManager()->NewProxy(each->GetXMLGroup(), each->GetXMLName()));
+    if (copy == nullptr) continue;
+    copy->Copy(each);  // of the client's alone: it's never sent
+    this->Kept.emplace_back(each, copy);
+  }
+}
+
+/// Cancel: the editor applies what is done in it at once.
+void pqVDIColorsWidget::restore() {
+  BEGIN_UNDO_SET(tr("Cancel Color Edits"));
+  for (const auto& [map, copy] : this->Kept) {
+    SM_SCOPED_TRACE(PropertiesModified).arg("proxy", map.Get());
+    map->Copy(copy);
+    map->UpdateVTKObjects();
+  }
+  END_UNDO_SET();
+}
+
 void pqVDIColorsWidget::edit() {
   vtkSMProxy* map = vtkSMPropertyHelper(this->proxy(), "LookupTable").GetAsProxy();
   if (map == nullptr) return;  // the button is off then
@@ -67,7 +131,13 @@ void pqVDIColorsWidget::edit() {
     dialog->setApplyChangesImmediately(true);
     dialog->setEnableSearchBar(true);
     dialog->setAttribute(Qt::WA_DeleteOnClose);
+    // A VDI is made of functions of one value.
+    if (auto* planar = dialog->findChild<QCheckBox*>("Use2DTransferFunction")) planar->hide();
+    this->connect(dialog, &QDialog::rejected, this, &pqVDIColorsWidget::restore);
+    this->keepMaps(map);
     this->Dialog = dialog;
+    dialog->adjustSize();
+    moveBesideView(dialog);
   }
   this->Dialog->show();
   this->Dialog->raise();

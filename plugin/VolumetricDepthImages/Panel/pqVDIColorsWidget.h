@@ -4,11 +4,16 @@
 #define pqVDIColorsWidget_h
 
 #include <pqPropertyWidget.h>
+#include <vtkSmartPointer.h>
 #include <QPointer>
+
+#include <utility>
+#include <vector>
 
 class QDialog;
 class QLabel;
 class QPushButton;
+class vtkSMProxy;
 
 class pqVDIColorsWidget : public pqPropertyWidget {
   Q_OBJECT
@@ -21,10 +26,14 @@ class pqVDIColorsWidget : public pqPropertyWidget {
   Q_SLOT void edit();
   Q_SLOT void mapChanged();
   Q_SLOT void closeWhereNothingIsShown();
+  Q_SLOT void restore();
+  void keepMaps(vtkSMProxy* map);
 
   QPushButton* Button;
   QLabel* Line;
   QPointer<QDialog> Dialog;
+  /// Maps that the dialog edits, and copies of them as they were when it was opened.
+  std::vector<std::pair<vtkSmartPointer<vtkSMProxy>, vtkSmartPointer<vtkSMProxy>>> Kept;
 };
 
 #endif

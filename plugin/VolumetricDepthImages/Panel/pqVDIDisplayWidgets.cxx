@@ -1,0 +1,73 @@
+#include "pqVDIDisplayWidgets.h"
+
+#include <pqCoreUtilities.h>
+#include <pqPropertyWidget.h>
+#include <vtkCommand.h>
+#include <vtkSMProperty.h>
+#include <vtkSMPropertyHelper.h>
+#include <vtkSMProxy.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+namespace {
+
+/// Properties of ParaView's representations that a VDI heeds no more.
+constexpr std::array<std::string_view, 26> idle{"Ambient",
+                                                "AmbientColor",
+                                                "Diffuse",
+                                                "DiffuseColor",
+                                                "Interpolation",
+                                                "Luminosity",
+                                                "LineWidth",
+                                                "MapScalars",
+                                                "MultiComponentsMapping",
+                                                "NonlinearSubdivisionLevel",
+                                                "Orientation",
+                                                "Origin",
+                                                "PointSize",
+                                                "Position",
+                                                "RenderLinesAsTubes",
+                                                "RenderPointsAsSpheres",
+                                                "Scale",
+                                                "ShowTexturesOnBackface",
+                                                "Specular",
+                                                "SpecularColor",
+                                                "SpecularPower",
+                                                "Texture",
+                                                "Translation",
+                                                "TransferFunction2D",
+                                                "Use2DTransferFunction",
+                                                "UseNanColorForMissingArrays"};
+
+bool isIdle(pqPropertyWidget* widget) {
+  vtkSMProxy* proxy = widget->proxy();
+  if (proxy == nullptr || proxy->GetXMLName() == nullptr ||
+      std::string_view(proxy->GetXMLName()) != "VDIImageRepresentation")
+    return false;
+  vtkSMProperty* property = widget->property();
+  const char* name = property != nullptr ? proxy->GetPropertyName(property) : nullptr;
+  if (name == nullptr) return widget->objectName().contains("Transform");  // a group's widget
+  return std::find(idle.begin(), idle.end(), name) != idle.end();
+}
+
+}  // namespace
+
+pqVDIHiddenDecorator::pqVDIHiddenDecorator(pqPropertyWidget* parent)
+    : pqPropertyWidgetDecorator(nullptr, parent) {
+  // When it's shown as something else, the panel asks again.
+  pqCoreUtilities::connect(parent->proxy()->GetProperty("Representation"), vtkCommand::ModifiedEvent, this,
+                           SIGNAL(visibilityChanged()));
+}
+
+bool pqVDIHiddenDecorator::canShowWidget(bool) const {
+  return std::string_view(
+             vtkSMPropertyHelper(this->parentWidget()->proxy(), "Representation").GetAsString()) != "VDI";
+}
+
+pqVDIDisplayWidgets::pqVDIDisplayWidgets(QObject* parent) : QObject(parent) {}
+
+void pqVDIDisplayWidgets::createDefaultWidgetDecorators(pqPropertyWidget* widget) {
+  if (isIdle(widget)) new pqVDIHiddenDecorator(widget);
+}
