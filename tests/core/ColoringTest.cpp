@@ -1,10 +1,10 @@
 // What goes into legends: fewer nodes, the same function.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
 #include <limits>
 
+#include "tests/Catch.h"
 #include "vdi/core/Coloring.h"
 #include "vdi/core/Error.h"
 

@@ -60,7 +60,8 @@ def volume_beside_vdi():
             simple.Hide(wavelet, view)
             display = simple.Show(image, view)
             check(display.Representation == "VDI", "Show alone shows the filter's output as a VDI")
-            check(not display.ColorArrayName[1], "and not coloured by an array")
+            check(list(display.ColorArrayName) == ["FIELD", "RTData"] and display.LookupTable == image.LookupTable,
+                  "and has the legend of its array")
         pictures[shown, "alone"] = screenshot(view, shown + "_alone", CAMERA)
         if shown == "vdi":
             display.Opacity = 0.5

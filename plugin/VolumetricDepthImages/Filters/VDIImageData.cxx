@@ -5,6 +5,8 @@
 #include <vtkFieldData.h>
 #include <vtkFloatArray.h>
 #include <vtkImageData.h>
+#include <vtkInformation.h>
+#include <vtkInformationIntegerKey.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkStringArray.h>
@@ -47,6 +49,11 @@ unsigned char* addColors(vtkImageData* image, std::size_t pixels) {
   colors->SetNumberOfTuples(static_cast<vtkIdType>(pixels));
   image->GetPointData()->SetScalars(colors);
   return colors->GetPointer(0);
+}
+
+/// ParaView's lists of arrays don't offer it.
+void hide(vtkAbstractArray* array) {
+  array->GetInformation()->Set(vtkAbstractArray::GUI_HIDE(), 1);
 }
 
 void addDepth(vtkImageData* image, std::span<const float> depths) {
@@ -162,6 +169,9 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat) {
     coloring->InsertNextValue(vdi::io::metadataText(*vdi.coloring, vdi.time, vdi.timeStep));
     fields->AddArray(coloring);
   }
+  hide(image->GetPointData()->GetScalars());
+  hide(counts);
+  for (int i = 0; i < fields->GetNumberOfArrays(); ++i) hide(fields->GetAbstractArray(i));
   for (const char* name : {"VDI.offsets", "VDI.codes", "VDI.supersegments"}) {
     if (vtkDataArray* array = fields->GetArray(name)) rememberRanges(array);
   }

@@ -14,6 +14,7 @@
 //                                  projection, scale; of pictures without a VDI, too (VDIPlace.h)
 //               VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ...; likewise
 //               VDI.parameters     double [4]: N_S, sample step, time, time step
+//               (the array's name) double [n]: some of the values shown (VDIValues.h)
 //               VDI.coloring       string [1]: vdi::Coloring, as vdi::io::metadataText; absent where unknown
 #ifndef VDIImageData_h
 #define VDIImageData_h

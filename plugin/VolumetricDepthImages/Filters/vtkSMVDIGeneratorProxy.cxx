@@ -30,6 +30,8 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "VDISession.h"
@@ -89,6 +91,18 @@ bool WaitsForRange(vtkSMProxy* function, const char* property) {
   function->UpdateVTKObjects();
   return false;
 }
+
+/// A flag is set while this lives.
+class Set {
+ public:
+  explicit Set(bool& flag) : Flag(flag) { this->Flag = true; }
+  ~Set() { this->Flag = false; }
+  Set(const Set&) = delete;
+  Set& operator=(const Set&) = delete;
+
+ private:
+  bool& Flag;
+};
 
 /// Where each rank has a client of its own (pvbatch --symmetric, Catalyst), each knows the range of its own
 /// data only. False where another rank doesn't come along, which the update that follows says.
@@ -154,6 +168,11 @@ void vtkSMVDIGeneratorProxy::UpdatePipeline(double time) {
   this->Superclass::UpdatePipeline(time);
 }
 
+void vtkSMVDIGeneratorProxy::UpdateVTKObjects() {
+  this->Superclass::UpdateVTKObjects();
+  if (this->Taken && !this->Choosing) this->FollowArray();
+}
+
 int vtkSMVDIGeneratorProxy::LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) {
   this->Taken = true;
   return this->Superclass::LoadXMLState(element, locator);
@@ -162,7 +181,55 @@ int vtkSMVDIGeneratorProxy::LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLoc
 void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what the view shows");
   this->TakeFromView();
-  this->ChooseLookupTable(time);
+  const Set choosing(this->Choosing);
+  this->ChooseLookupTable(time, false);
+  this->Shown = this->CurrentSubject();
+}
+
+vtkSMVDIGeneratorProxy::Subject vtkSMVDIGeneratorProxy::CurrentSubject() {
+  const vtkSMPropertyHelper input(this, "Input");
+  const vtkSMPropertyHelper scalars(this, "SelectInputScalars");
+  const char* name = scalars.GetNumberOfElements() > 4 ? scalars.GetAsString(4) : nullptr;
+  Subject subject;
+  subject.Input = input.GetNumberOfElements() > 0 ? input.GetAsProxy() : nullptr;
+  subject.Port = subject.Input != nullptr ? input.GetOutputPort() : 0;
+  subject.Array = name != nullptr ? name : "";
+  subject.Association = scalars.GetNumberOfElements() > 3 ? scalars.GetAsInt(3) : 0;
+  subject.Component = vtkSMPropertyHelper(this, "Component").GetAsInt();
+  return subject;
+}
+
+/// After the first update.
+void vtkSMVDIGeneratorProxy::FollowArray() {
+  const Subject now = this->CurrentSubject();
+  if (!this->Shown) this->Shown = now;  // of a state file
+  if (now == *this->Shown || now.Input == nullptr) return;
+  const Set choosing(this->Choosing);
+  const Subject before = std::exchange(*this->Shown, now);
+  SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what goes with the array");
+  if (now.Input != before.Input || now.Port != before.Port) this->TakeUnitDistance();
+  // A component that the other array doesn't have was meant for the one before.
+  if (now.Array != before.Array && now.Component == before.Component && now.Component > 0 &&
+      now.Component >= this->ComponentsOf(now.Array, now.Association)) {
+    vtkSMPropertyHelper(this, "Component").Set(-1);
+    this->Shown->Component = -1;
+  }
+  if (this->HasMapOf(before.Array)) {
+    vtkSMPropertyHelper(this, "LookupTable").RemoveAllValues();
+    this->Chosen.clear();  // where there is no range yet, the next update chooses
+    this->ChooseLookupTable(std::nullopt, true);
+  }
+  this->Superclass::UpdateVTKObjects();
+}
+
+bool vtkSMVDIGeneratorProxy::HasMapOf(const std::string& name) {
+  const vtkSMPropertyHelper table(this, "LookupTable");
+  vtkSMProxy* map = table.GetNumberOfElements() > 0 ? table.GetAsProxy() : nullptr;
+  if (map == nullptr) return false;
+  if (map == this->ChosenMap) return true;
+  // A state file's.
+  const char* registered = this->GetSessionProxyManager()->GetProxyName("lookup_tables", map);
+  return registered != nullptr && !name.empty() && std::string_view(registered).starts_with(name + ".");
 }
 
 vtkSMRenderViewProxy* vtkSMVDIGeneratorProxy::RenderViewOf(vtkSMProxy* view) {
@@ -220,10 +287,7 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   if (view == nullptr) return;
   const bool placed = isPlaced(view);
   if (shown == nullptr && !placed) return;
-  vtkSMPropertyHelper unit(this, "ScalarOpacityUnitDistance");
-  if (unit.GetAsDouble() == 0.0 && shown != nullptr &&
-      shown->GetProperty("ScalarOpacityUnitDistance") != nullptr)
-    unit.Set(vtkSMPropertyHelper(shown, "ScalarOpacityUnitDistance").GetAsDouble());
+  this->TakeUnitDistance();
   pv::takeShading(this, shown, view);
   pv::takeCropping(this, shown, this->InputBounds());
   if (const std::string issue = pv::blendModeIssue(shown); !issue.empty()) vtkWarningMacro(<< issue);
@@ -236,6 +300,19 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
     resolution.Set(size.data(), 2);
   }
   this->UpdateVTKObjects();
+}
+
+/// That of the volume in the active view; without one, 0, unless somebody has set it.
+void vtkSMVDIGeneratorProxy::TakeUnitDistance() {
+  vtkSMPropertyHelper unit(this, "ScalarOpacityUnitDistance");
+  const double set = unit.GetAsDouble();
+  if (set != 0.0 && this->TakenUnitDistance != set) return;
+  vtkSMProxy* shown = this->RepresentationIn(this->ActiveView());
+  double taken = 0.0;
+  if (shown != nullptr && shown->GetProperty("ScalarOpacityUnitDistance") != nullptr)
+    taken = vtkSMPropertyHelper(shown, "ScalarOpacityUnitDistance").GetAsDouble();
+  unit.Set(taken);
+  this->TakenUnitDistance = taken;
 }
 
 void vtkSMVDIGeneratorProxy::SetCamera(vtkSMProxy* proxy, vtkSMRenderViewProxy* view) {
@@ -328,22 +405,23 @@ void vtkSMVDIGeneratorProxy::ReleaseNow() {
   this->MarkDirty(this);
 }
 
-void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time) {
+void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time, bool anew) {
   vtkSMPropertyHelper table(this, "LookupTable");
   vtkSMPropertyHelper scalars(this, "SelectInputScalars");
   const char* name = scalars.GetNumberOfElements() > 4 ? scalars.GetAsString(4) : nullptr;
-  const bool ours =
-      table.GetNumberOfElements() == 0 || table.GetAsProxy() == nullptr || !this->Chosen.empty();
-  if (!ours || name == nullptr || *name == '\0' || this->Chosen == name) return;
+  const bool isSet = table.GetNumberOfElements() > 0 && table.GetAsProxy() != nullptr;
+  const bool wanted = anew || (!isSet && this->Chosen.empty());
+  if (!wanted || name == nullptr || *name == '\0') return;
   vtkNew<vtkSMTransferFunctionManager> manager;
   vtkSMProxy* map = this->MapInView(name, scalars.GetAsInt(3));
   if (map == nullptr) map = manager->GetColorTransferFunction(name, this->GetSessionProxyManager());
   if (map == nullptr) return;
   vtkSMProxy* opacity = vtkSMPropertyHelper(map, "ScalarOpacityFunction", true).GetAsProxy();
   if (opacity == nullptr) opacity = manager->GetOpacityTransferFunction(name, this->GetSessionProxyManager());
+  const bool another = this->NameComponent(map, name, scalars.GetAsInt(3)) && anew;
   // What nobody has used yet is still on [0, 1]: give it the array's range, as a representation does.
-  const bool mapWaits = WaitsForRange(map, "RGBPoints");
-  const bool opacityWaits = opacity != nullptr && WaitsForRange(opacity, "Points");
+  const bool mapWaits = WaitsForRange(map, "RGBPoints") || another;
+  const bool opacityWaits = opacity != nullptr && (WaitsForRange(opacity, "Points") || another);
   if (mapWaits || opacityWaits) {
     double range[2];
     if (!this->RangeOfScalars(name, scalars.GetAsInt(3), time, range))
@@ -354,6 +432,27 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time) {
   table.Set(map);
   this->UpdateVTKObjects();
   this->Chosen = name;
+  this->ChosenMap = map;
+}
+
+/// Has the map say in legends which component of the array it's for, unless the view shows the input by it:
+/// true if it said something else, and may be given that component's range as ParaView's own choice of a
+/// component gives it.
+bool vtkSMVDIGeneratorProxy::NameComponent(vtkSMProxy* map, const std::string& name, int association) {
+  const int component = vtkSMPropertyHelper(this, "Component").GetAsInt();
+  if (this->ComponentsOf(name, association) < 2 || map->GetProperty("VectorMode") == nullptr) return false;
+  vtkSMPropertyHelper mode(map, "VectorMode");
+  vtkSMPropertyHelper number(map, "VectorComponent");
+  const bool isMagnitude = mode.GetAsInt() != vtkScalarsToColors::COMPONENT;
+  if (component < 0 ? isMagnitude : !isMagnitude && number.GetAsInt() == component) return false;
+  vtkSMProxy* shown = this->RepresentationIn(this->ActiveView());
+  if (this->MapInView(name, association) == map && vtkSMPropertyHelper(shown, "Visibility").GetAsInt() != 0)
+    return false;
+  mode.Set(component < 0 ? vtkScalarsToColors::MAGNITUDE : vtkScalarsToColors::COMPONENT);
+  if (component >= 0) number.Set(component);
+  map->UpdateVTKObjects();
+  return vtkSMPropertyHelper(map, "AutomaticRescaleRangeMode", true).GetAsInt() !=
+         vtkSMTransferFunctionManager::NEVER;
 }
 
 vtkSMProxy* vtkSMVDIGeneratorProxy::MapInView(const std::string& name, int association) {

@@ -13,11 +13,17 @@
  * sets another one, or none after that, is left alone. A map or opacity function that is still as ParaView
  * made it, or holds a preset on [0, 1], gets the range that the array has then, once; control points that
  * somebody has set stay where they are.
+ *
+ * After the first update, another array, component or input takes its own map as soon as it is sent
+ * (UpdateVTKObjects), so that whatever updates the filter next, a view or a writer, finds it. The map of the
+ * array before is replaced, and no other one. Another input brings its unit distance, unless somebody has
+ * set one.
  */
 #ifndef vtkSMVDIGeneratorProxy_h
 #define vtkSMVDIGeneratorProxy_h
 
 #include <vtkSMSourceProxy.h>
+#include <vtkWeakPointer.h>
 
 #include <optional>
 #include <string>
@@ -38,6 +44,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   void UpdatePipeline() override;
   void UpdatePipeline(double time) override;
 
+  void UpdateVTKObjects() override;
   int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
 
   /// The array by which the active view colours the input, with its component. For who makes the proxy by
@@ -85,15 +92,36 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkSMProxy* RepresentationIn(vtkSMViewProxy* view);
   /// Of the input's array; 0 if it isn't there.
   int ComponentsOf(const std::string& name, int association);
-  /// `time`: that of the update which is to come, if it has one.
-  void ChooseLookupTable(std::optional<double> time);
+  /// `time`: that of the update which is to come, if it has one. `anew`: the map that is set was for
+  /// something else.
+  void ChooseLookupTable(std::optional<double> time, bool anew);
+  void FollowArray();
+  void TakeUnitDistance();
+  /// Whether the map that is set is that of the array, and nobody's choice.
+  bool HasMapOf(const std::string& name);
+  bool NameComponent(vtkSMProxy* map, const std::string& name, int association);
   /// By which the active view colours the input by that array; null if it doesn't.
   vtkSMProxy* MapInView(const std::string& name, int association);
   /// Of the input's array, over all ranks; false if there's none.
   bool RangeOfScalars(const char* name, int association, std::optional<double> time, double range[2]);
 
-  bool Taken = false;  // what the view has
-  std::string Chosen;  // the array whose map this proxy has set
+  /// What a map is chosen for.
+  struct Subject {
+    vtkSMProxy* Input = nullptr;  // compared only
+    unsigned int Port = 0;
+    std::string Array;
+    int Association = 0;
+    int Component = -1;
+    bool operator==(const Subject&) const = default;
+  };
+  Subject CurrentSubject();
+
+  bool Taken = false;                       // what the view has
+  bool Choosing = false;                    // in ChooseLookupTable or FollowArray
+  std::string Chosen;                       // the array whose map this proxy has set
+  vtkWeakPointer<vtkSMProxy> ChosenMap;     // that map
+  std::optional<Subject> Shown;             // that the last map was for
+  std::optional<double> TakenUnitDistance;  // from a view
 };
 
 #endif

@@ -1,7 +1,11 @@
 #include "vtkVDIFileSeriesReader.h"
 
+#include <vtkDataObject.h>
+#include <vtkFieldData.h>
+#include <vtkInformationVector.h>
 #include <vtkMultiProcessController.h>
 #include <vtkObjectFactory.h>
+#include <vtkStringArray.h>
 
 #include <algorithm>
 #include <array>
@@ -16,6 +20,7 @@
 #include "VDIFileState.h"
 #include "VDISession.h"
 #include "vdi/core/Error.h"
+#include "vdi/io/Metadata.h"
 #include "vdi/io/VdiFile.h"
 #include "vtkVDIReader.h"
 
@@ -34,6 +39,7 @@ struct vtkVDIFileSeriesReader::Known {
   struct File {
     std::optional<pv::FileState> State;
     Header Last;
+    std::string Coloring;
   };
   std::map<std::string, File> Files;
 };
@@ -91,12 +97,16 @@ std::vector<vtkVDIFileSeriesReader::Header> vtkVDIFileSeriesReader::ReadHeaders(
                      .Width = static_cast<double>(header.pictureSize().x),
                      .Height = static_cast<double>(header.pictureSize().y)};
         std::ranges::copy(numbersOf(header.camera), file.Last.Viewpoint);
+        file.Coloring = header.coloring
+                            ? vdi::io::metadataText(*header.coloring, header.time, header.timeStep)
+                            : std::string();
         file.State = state;
       } catch (const vdi::Error&) {  // the reader says so when it's its turn
         file.State.reset();
       }
     }
     headers[i] = file.Last;
+    if (this->Coloring.empty()) this->Coloring = file.Coloring;
   }
   return headers;
 }
@@ -152,6 +162,10 @@ int vtkVDIFileSeriesReader::RequestInformation(vtkInformation* request, vtkInfor
 int vtkVDIFileSeriesReader::RequestData(vtkInformation* request, vtkInformationVector** inputs,
                                         vtkInformationVector* outputs) {
   const int result = this->Superclass::RequestData(request, inputs, outputs);
+  if (vtkDataObject* output = vtkDataObject::GetData(outputs)) {
+    auto* coloring = vtkStringArray::SafeDownCast(output->GetFieldData()->GetAbstractArray("VDI.coloring"));
+    this->Coloring = coloring != nullptr ? coloring->GetValue(0) : std::string();
+  }
   const vtkIdType index = this->GetFileIndex();
   const auto count = static_cast<vtkIdType>(this->GetNumberOfFileNames());
   auto* reader = vtkVDIReader::SafeDownCast(this->Reader);

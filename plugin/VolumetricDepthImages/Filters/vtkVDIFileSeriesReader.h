@@ -14,6 +14,7 @@
 #include <vtkFileSeriesReader.h>
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "vtkVolumetricDepthImagesModule.h"
@@ -27,6 +28,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
   /// view-up, view angle, whether the projection is parallel, and parallel scale, as vtkCamera has them.
   /// Zeros if none can be read.
   vtkGetVectorMacro(Viewpoint, double, 12);
+
+  /// What the colours of the VDI mean that was read last, or that the first file has: vdi::io::metadataText;
+  /// empty where the file doesn't say. On rank 0.
+  const char* GetColoring() const { return this->Coloring.c_str(); }
 
  protected:
   vtkVDIFileSeriesReader();
@@ -46,6 +51,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
 
   std::unique_ptr<Known> Headers;  // of rank 0's files, from earlier
   double Viewpoint[12] = {};
+  std::string Coloring;
   vtkIdType LastIndex = -1;  // of the file that was read last
   vtkIdType LastStep = 0;    // to it from the one before, in [0, count)
 };

@@ -37,6 +37,7 @@
 #include "VDIRetire.h"
 #include "VDISession.h"
 #include "VDITransferFunctions.h"
+#include "VDIValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vtkVDIImageData.h"
@@ -74,6 +75,7 @@ struct vtkVDIGenerator::Internals {
   vtkMTimeType Executed = 0;     // CurrentMTime of the last frame
   double VoxelVolume = 0.0;      // of the smallest voxel of all ranks; 0 without any
   vdi::ScalarArray Array;        // of the generator's blocks
+  std::vector<double> Values;    // some of theirs; the root's
   /// Of the map that stands in for none: the first frame's range, kept while the array is the same, or films
   /// would flicker.
   std::optional<vdi::ScalarRange> FirstRange;
@@ -462,7 +464,9 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const Origin& origin) {
                            .component = components > 1 ? origin.Choice.component : 0};
   this->UpdateProgress(0.05);
   this->Internal->Shown.reset();
+  const std::vector<vdi::Block> shown = blocks;  // the values are shared
   generator.setBlocks(std::move(blocks), this->FillGhosts);
+  this->Internal->Values = pv::sampleOf(shown, generator.scalarRange(), comm);
   this->Internal->Shown = origin;
   if (this->Internal->FirstRange && !(this->Internal->FirstChoice == origin.Choice))
     this->Internal->FirstRange.reset();
@@ -609,6 +613,7 @@ void vtkVDIGenerator::Prepare() {
         vdi->timeStep = static_cast<std::uint64_t>(step);
         vdi->coloring->array = internal.Array;
         pv::setVdi(output, *vdi);
+        pv::setShownValues(output, internal.Array, internal.Values);
         findRanges(output->GetPointData());
         findRanges(output->GetFieldData());
         if (pv::isServer()) output->SetFile(pv::fileOf(*vdi));
@@ -686,6 +691,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const Origin& origin, vtkIm
     vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));
     vdi->coloring->array = this->Internal->Array;
     pv::setVdi(output, *vdi);
+    pv::setShownValues(output, this->Internal->Array, this->Internal->Values);
   }
   setTime(output, origin.Time);
 }

@@ -58,7 +58,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkGetMacro(ScalarOpacityUnitDistance, double);
   ///@}
 
-  /// Component of a multi-component array; -1: magnitude.
+  /// Component of a multi-component array; -1 (default): magnitude.
   vtkSetMacro(Component, int);
   /// Lists of the VDI's picture: columns and rows. 0 0 (default): 1280 x 720.
   vtkSetVector2Macro(Resolution, int);
@@ -206,7 +206,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkSmartPointer<vtkScalarsToColors> LookupTable;
   vtkSmartPointer<vtkPiecewiseFunction> ScalarOpacityFunction;
   double ScalarOpacityUnitDistance = 0.0;
-  int Component = 0;
+  int Component = -1;
   int Resolution[2] = {0, 0};
   double Margin = 0.0;
   int Supersegments = 25;

@@ -7,6 +7,7 @@
 #include <vtkObjectFactory.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
+#include <array>
 #include <exception>
 #include <future>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "VDIFileState.h"
 #include "VDIImageData.h"
 #include "VDIRetire.h"
+#include "VDIValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
 #include "vdi/io/VdiFile.h"
@@ -144,6 +146,8 @@ int vtkVDIReader::RequestData(vtkInformation*, vtkInformationVector**, vtkInform
   try {
     const Contents contents = this->Read();
     pv::setVdi(output, contents.Vdi, contents.Flat);
+    if (const auto& coloring = contents.Vdi.coloring; coloring && coloring->range.min <= coloring->range.max)
+      pv::setShownValues(output, coloring->array, std::array{coloring->range.min, coloring->range.max});
     output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), contents.Vdi.time);
     this->Said.clear();
   } catch (const std::exception& error) {

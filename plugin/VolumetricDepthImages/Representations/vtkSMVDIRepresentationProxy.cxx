@@ -1,15 +1,188 @@
 #include "vtkSMVDIRepresentationProxy.h"
 
 #include <vtkDataObject.h>
+#include <vtkNew.h>
 #include <vtkObjectFactory.h>
+#include <vtkPVArrayInformation.h>
+#include <vtkPVTemporalDataInformation.h>
+#include <vtkSMCoreUtilities.h>
+#include <vtkSMOutputPort.h>
+#include <vtkSMProperty.h>
+#include <vtkSMPropertyHelper.h>
+#include <vtkSMSessionProxyManager.h>
+#include <vtkSMSourceProxy.h>
+#include <vtkSMTransferFunctionManager.h>
+#include <vtkSMTransferFunctionProxy.h>
+#include <vtkScalarsToColors.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "vdi/core/Error.h"
+#include "vdi/io/Metadata.h"
+#include "vtkSMVDIGeneratorProxy.h"
 
 vtkStandardNewMacro(vtkSMVDIRepresentationProxy);
 
+namespace {
+
+constexpr std::string_view ownType = "VDI";
+
+vtkSMProxy* proxyOf(vtkSMProxy* owner, const char* property) {
+  if (owner == nullptr || owner->GetProperty(property) == nullptr) return nullptr;
+  const vtkSMPropertyHelper helper(owner, property);
+  return helper.GetNumberOfElements() > 0 ? helper.GetAsProxy() : nullptr;
+}
+
+/// Makes the maps those of the file: nodes in RGB, and none that ParaView would move.
+void setMaps(vtkSMProxy* colors, vtkSMProxy* opacities, const vdi::Coloring& coloring) {
+  std::vector<double> points;
+  for (const vdi::ColorNode& node : coloring.function.colors)
+    points.insert(points.end(), {node.x, node.color.r, node.color.g, node.color.b});
+  vtkSMPropertyHelper(colors, "ColorSpace").Set("RGB");
+  vtkSMPropertyHelper(colors, "Discretize").Set(0);
+  vtkSMPropertyHelper(colors, "RGBPoints").Set(points.data(), static_cast<unsigned int>(points.size()));
+  points.clear();
+  constexpr double midpoint = 0.5;
+  for (const vdi::OpacityNode& node : coloring.function.opacities)
+    points.insert(points.end(), {node.x, node.opacity, midpoint, 0.0});
+  vtkSMPropertyHelper(opacities, "Points").Set(points.data(), static_cast<unsigned int>(points.size()));
+  const bool isComponent = coloring.array.components > 1 && coloring.array.component >= 0;
+  vtkSMPropertyHelper(colors, "VectorMode")
+      .Set(isComponent ? vtkScalarsToColors::COMPONENT : vtkScalarsToColors::MAGNITUDE);
+  if (isComponent) vtkSMPropertyHelper(colors, "VectorComponent").Set(coloring.array.component);
+  vtkSMPropertyHelper(colors, "AutomaticRescaleRangeMode").Set(vtkSMTransferFunctionManager::NEVER);
+  vtkSMPropertyHelper(colors, "ScalarOpacityFunction").Set(opacities);
+  for (vtkSMProxy* map : {colors, opacities}) {
+    vtkSMPropertyHelper(map, "ScalarRangeInitialized", true).Set(1);
+    map->UpdateVTKObjects();
+  }
+}
+
+}  // namespace
+
 bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
-  if (this->GetUsingScalarColoring()) this->SetScalarColoring(nullptr, vtkDataObject::POINT);
+  const bool isOwn = type != nullptr && type == ownType;
+  if (this->GetUsingScalarColoring()) this->DropLegend();
   // The superclass colours slices by an array.
   // NOLINTNEXTLINE(bugprone-parent-virtual-call)
-  return this->vtkSMRepresentationProxy::SetRepresentationType(type);
+  const bool result = this->vtkSMRepresentationProxy::SetRepresentationType(type);
+  if (isOwn) this->TakeLegend(nullptr);
+  return result;
+}
+
+void vtkSMVDIRepresentationProxy::ViewUpdated(vtkSMProxy* view) {
+  if (vtkSMPropertyHelper(this, "Representation").GetAsString() == ownType) this->TakeLegend(view);
+  this->Superclass::ViewUpdated(view);
+}
+
+/// Only what is shown as a VDI is coloured by field data of its.
+bool vtkSMVDIRepresentationProxy::HasLegend() {
+  return this->GetUsingScalarColoring() &&
+         vtkSMPropertyHelper(this, "ColorArrayName").GetInputArrayAssociation() == vtkDataObject::FIELD;
+}
+
+void vtkSMVDIRepresentationProxy::DropLegend() {
+  vtkSMPropertyHelper(this, "ColorArrayName").SetInputArrayToProcess(vtkDataObject::POINT, "");
+  vtkSMPropertyHelper(this, "LookupTable").RemoveAllValues();
+  vtkSMPropertyHelper(this, "ScalarOpacityFunction", true).RemoveAllValues();
+  this->UpdateVTKObjects();
+}
+
+vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfInput() {
+  vtkSMProxy* input = proxyOf(this, "Input");
+  if (input == nullptr) return {};
+  if (vtkSMVDIGeneratorProxy::SafeDownCast(input) == nullptr) return this->LegendOfFile(input);
+  const vtkSMPropertyHelper scalars(input, "SelectInputScalars");
+  const char* name = scalars.GetNumberOfElements() > 4 ? scalars.GetAsString(4) : nullptr;
+  vtkSMProxy* colors = proxyOf(input, "LookupTable");
+  if (name == nullptr || *name == '\0' || colors == nullptr) return {};
+  vtkSMProxy* opacities = proxyOf(input, "ScalarOpacityFunction");
+  return {name, colors, opacities != nullptr ? opacities : proxyOf(colors, "ScalarOpacityFunction")};
+}
+
+vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfFile(vtkSMProxy* reader) {
+  vtkSMProperty* property = reader->GetProperty("Coloring");
+  if (property == nullptr || property->GetInformationOnly() == 0) return {};
+  reader->UpdatePropertyInformation(property);
+  const char* said = vtkSMPropertyHelper(property).GetAsString();
+  const std::string text = said != nullptr ? said : "";
+  if (text.empty()) return {};
+  vdi::Coloring coloring;
+  try {
+    coloring = vdi::io::coloringIn(text);
+  } catch (const vdi::Error&) {
+    return {};  // of a server of another version
+  }
+  if (coloring.array.name.empty()) return {};
+  // ParaView's name for the maps of one representation alone.
+  const std::string key = std::string("Separate_") + this->GetGlobalIDAsString() + "_" + coloring.array.name;
+  vtkNew<vtkSMTransferFunctionManager> manager;
+  vtkSMSessionProxyManager* proxies = this->GetSessionProxyManager();
+  vtkSMProxy* colors = manager->GetColorTransferFunction(key.c_str(), proxies);
+  vtkSMProxy* opacities = manager->GetOpacityTransferFunction(key.c_str(), proxies);
+  if (colors == nullptr || opacities == nullptr) return {};
+  vtkSMPropertyHelper(this, "UseSeparateColorMap", true).Set(1);
+  if (text != this->FileColoring) setMaps(colors, opacities, coloring);
+  this->FileColoring = text;
+  return {coloring.array.name, colors, opacities};
+}
+
+/// `view`: where it is shown, if that is known; a legend that's there is replaced by the new map's.
+void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
+  const Legend legend = this->LegendOfInput();
+  if (legend.Colors == nullptr) {
+    if (this->GetUsingScalarColoring()) this->DropLegend();
+    return;
+  }
+  vtkSMPropertyHelper array(this, "ColorArrayName");
+  vtkSMPropertyHelper colors(this, "LookupTable");
+  vtkSMPropertyHelper opacities(this, "ScalarOpacityFunction", true);
+  vtkSMProxy* before = proxyOf(this, "LookupTable");
+  const char* name = array.GetInputArrayNameToProcess();
+  if (before == legend.Colors && proxyOf(this, "ScalarOpacityFunction") == legend.Opacities &&
+      name != nullptr && legend.Array == name && array.GetInputArrayAssociation() == vtkDataObject::FIELD)
+    return;
+  const bool hadBar =
+      view != nullptr && before != nullptr && vtkSMTransferFunctionProxy::IsScalarBarVisible(before, view);
+  array.SetInputArrayToProcess(vtkDataObject::FIELD, legend.Array.c_str());
+  colors.Set(legend.Colors);
+  if (legend.Opacities != nullptr) {
+    opacities.Set(legend.Opacities);
+  } else {
+    opacities.RemoveAllValues();
+  }
+  this->UpdateVTKObjects();
+  if (!hadBar || before == legend.Colors) return;
+  vtkNew<vtkSMTransferFunctionManager> manager;
+  manager->HideScalarBarIfNotNeeded(before, view);
+  this->SetScalarBarVisibility(view, true);
+}
+
+bool vtkSMVDIRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime(const char* arrayname,
+                                                                             int attribute_type) {
+  vtkSMProxy* generator = vtkSMVDIGeneratorProxy::SafeDownCast(proxyOf(this, "Input"));
+  if (generator == nullptr || !this->HasLegend())
+    return this->Superclass::RescaleTransferFunctionToDataRangeOverTime(arrayname, attribute_type);
+  const vtkSMPropertyHelper input(generator, "Input");
+  auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
+  vtkSMOutputPort* port = source != nullptr ? source->GetOutputPort(input.GetOutputPort()) : nullptr;
+  const vtkSMPropertyHelper scalars(generator, "SelectInputScalars");
+  if (port == nullptr || scalars.GetNumberOfElements() < 5) return false;
+  vtkPVArrayInformation* array =
+      port->GetTemporalDataInformation()->GetArrayInformation(scalars.GetAsString(4), scalars.GetAsInt(3));
+  if (array == nullptr) return false;
+  double range[2];
+  const int wanted = vtkSMPropertyHelper(generator, "Component").GetAsInt();
+  const int components = array->GetNumberOfComponents();
+  if (components > 1 && wanted >= components) return false;
+  array->GetComponentFiniteRange(components > 1 ? wanted : 0, range);
+  if (!(range[0] <= range[1])) return false;
+  vtkSMCoreUtilities::AdjustRange(range);
+  vtkSMTransferFunctionProxy::RescaleTransferFunction(proxyOf(this, "LookupTable"), range);
+  vtkSMTransferFunctionProxy::RescaleTransferFunction(proxyOf(this, "ScalarOpacityFunction"), range);
+  return true;
 }
 
 void vtkSMVDIRepresentationProxy::SetPropertyModifiedFlag(const char* name, int flag) {

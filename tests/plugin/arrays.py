@@ -1,0 +1,241 @@
+"""Another array, component or input brings its own colours, at once, whatever updates the filter next."""
+
+import os
+import sys
+
+import numpy as np
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from pvtest import *  # noqa: E402,F403
+
+SIZE = [96, 72]
+
+# x is in [-1, 1] along the first axis; `scale` moves the second ball's values.
+SCRIPT = """
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk
+n = 17
+image = self.GetImageDataOutput()
+image.SetDimensions(n, n, n)
+image.SetSpacing({spacing}, {spacing}, {spacing})
+z, y, x = np.meshgrid(*[np.linspace(-1, 1, n)] * 3, indexing="ij")
+field = 1 - np.sqrt((x * x + y * y + z * z) / 3)
+arrays = dict(a=field * {scale}, temperature=1000 + 1000 * field, flat=np.zeros_like(field) + 5)
+for name, values in arrays.items():
+    array = numpy_to_vtk(values.ravel().copy(), deep=True)
+    array.SetName(name)
+    image.GetPointData().AddArray(array)
+colors = (np.stack([field, 1 - field, x * x], axis=3) * 255).astype(np.uint8)
+vectors = dict(velocity=np.stack([x, 2 * y, -3 * z], axis=3), rgb=colors)
+for name, values in vectors.items():
+    array = numpy_to_vtk(values.reshape(-1, 3).copy(), deep=True)
+    array.SetName(name)
+    image.GetPointData().AddArray(array)
+"""
+
+EXTENT = """
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
+self.GetExecutive().GetOutputInformation(0).Set(Pipeline.WHOLE_EXTENT(), 0, 16, 0, 16, 0, 16)
+"""
+
+
+def source_of(scale=1.0, spacing=1.0):
+    ball = simple.ProgrammableSource(OutputDataSetType="vtkImageData")
+    ball.ScriptRequestInformation = EXTENT
+    ball.Script = SCRIPT.format(scale=scale, spacing=spacing)
+    ball.UpdatePipeline()
+    return ball
+
+
+def range_of(proxy):
+    return [round(x, 4) for x in list(proxy.RGBPoints[0::4])[::len(proxy.RGBPoints) // 4 - 1]]
+
+
+def shown_picture(view):
+    path = os.path.join(OUTPUT, "arrays_{}.png".format(os.getpid()))
+    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
+    seen = read_png(path)
+    os.remove(path)
+    return seen
+
+
+def saved_map(image, name):
+    """What the file says, which Save Data writes."""
+    path = os.path.join(OUTPUT, name)
+    simple.SaveData(path, proxy=image)
+    return simple.OpenDataFile(path)
+
+
+def fresh_picture(ball, name, view, **properties):
+    """Of a filter that has never known another array."""
+    image = vdi_filter(ball, view, "POINTS", name, 0, **properties)
+    seen = picture(image)
+    simple.Delete(image)
+    return seen
+
+
+ball = source_of()
+view = make_view(SIZE, [40, 30, 50], [8, 8, 8])
+first_display = simple.Show(ball, view)
+first_display.SetRepresentationType("Volume")
+simple.ColorBy(first_display, ("POINTS", "a"))
+simple.Render(view)
+view.CameraPosition, view.CameraFocalPoint = [40, 30, 50], [8, 8, 8]
+
+image = simple.VolumetricDepthImage(Input=ball)
+image.SelectInputScalars = ["POINTS", "a"]
+shown = simple.Show(image, view)
+simple.Hide(ball, view)
+simple.Render(view)
+check(image.LookupTable == first_display.LookupTable, "the first array has the view's map")
+
+image.SelectInputScalars = ["POINTS", "temperature"]
+check(image.LookupTable == simple.GetColorTransferFunction("temperature"), "another array takes its own map at once")
+check(range_of(image.LookupTable) == [1000, 2000], "over its range %s" % range_of(image.LookupTable))
+simple.Render(view)
+on_screen = shown_picture(view)
+check(np.unique(on_screen.reshape(-1, 3), axis=0).shape[0] > 50, "it isn't a box of one colour")
+write_png("arrays_temperature.png", on_screen)
+expected = fresh_picture(ball, "temperature", view, ScalarOpacityUnitDistance=image.ScalarOpacityUnitDistance)
+check(np.abs(picture(image).astype(int) - expected).max() <= 1, "it is what a new filter shows")
+check(np.abs(picture(saved_map(image, "arrays.vdi")).astype(int) - expected).max() <= 1, "and what the file holds")
+
+colors, _ = set_colors("temperature", 1200, 1800)
+image.SelectInputScalars = ["POINTS", "a"]
+check(image.LookupTable == first_display.LookupTable, "the first one has its map again")
+image.SelectInputScalars = ["POINTS", "temperature"]
+check(range_of(image.LookupTable) == [1200, 1800], "control points that were set stay")
+
+own = simple.GetColorTransferFunction("own")
+own.RGBPoints = [0, 1, 0, 0, 2000, 0, 1, 0]
+image.LookupTable = own
+image.SelectInputScalars = ["POINTS", "a"]
+check(image.LookupTable == own, "a map that a script has set stays for another array")
+image.LookupTable = None
+image.SelectInputScalars = ["POINTS", "flat"]
+check(image.LookupTable is None, "so does none")
+picture(image)
+check(image.LookupTable is None, "also when it is updated")
+simple.Delete(image)
+
+# Vectors.
+image = simple.VolumetricDepthImage(Input=ball, SelectInputScalars=["POINTS", "velocity"])
+check(image.Component == -1, "by default it is the magnitude")
+picture(image)
+check(range_of(image.LookupTable) == [0, round(14 ** 0.5, 4)], "over the magnitude's range %s" % range_of(image.LookupTable))
+image.Component = 2
+picture(image)
+check(range_of(image.LookupTable) == [-3, 3], "a component has its own range %s" % range_of(image.LookupTable))
+check(image.LookupTable.VectorMode == "Component" and image.LookupTable.VectorComponent == 2, "and the map names it")
+image.Component = -1
+check(image.LookupTable.VectorMode == "Magnitude" and range_of(image.LookupTable)[0] == 0, "as it names the magnitude")
+image.SelectInputScalars = ["POINTS", "rgb"]
+check(range_of(image.LookupTable)[1] > 255, "an RGB array shows its magnitude %s" % range_of(image.LookupTable))
+expected = fresh_picture(ball, "rgb", view, ScalarOpacityUnitDistance=image.ScalarOpacityUnitDistance)
+check(np.abs(picture(image).astype(int) - expected).max() <= 1, "as a new filter does")
+simple.Delete(image)
+
+# Another input.
+other = source_of(scale=10.0, spacing=2.0)
+second = simple.Show(other, view)
+second.SetRepresentationType("Volume")
+simple.ColorBy(second, ("POINTS", "a"), separate=True)
+simple.Render(view)
+simple.Hide(other, view)
+image = simple.VolumetricDepthImage(Input=ball)
+image.SelectInputScalars = ["POINTS", "a"]
+picture(image)
+before = image.ScalarOpacityUnitDistance
+check(before == first_display.ScalarOpacityUnitDistance, "the volume's unit distance was taken")
+image.Input = other
+check(image.LookupTable == second.LookupTable != first_display.LookupTable, "another input brings its map")
+check(image.ScalarOpacityUnitDistance == second.ScalarOpacityUnitDistance != before, "and its unit distance")
+image.ScalarOpacityUnitDistance = 0.75
+image.Input = ball
+check(image.ScalarOpacityUnitDistance == 0.75, "but one that was set stays")
+check(image.LookupTable == first_display.LookupTable, "the map is the first input's again")
+
+# What ParaView's range buttons, its histogram and its legends ask for.
+simple.Hide(ball, view)
+simple.Hide(other, view)
+image.SelectInputScalars = ["POINTS", "temperature"]
+shown = simple.Show(image, view)
+simple.Render(view)
+check(list(shown.ColorArrayName) == ["FIELD", "temperature"] and shown.LookupTable == image.LookupTable, "the VDI has a legend")
+offered = shown.SMProxy.GetProperty("ColorArrayName").GetDomain("array_list")
+names = [offered.GetString(i) for i in range(offered.GetNumberOfStrings())]
+check(names == ["temperature"], "Coloring offers the array, and no internal one %s" % names)
+shown.SetScalarBarVisibility(view, True)
+bar = simple.GetScalarBar(image.LookupTable, view)
+check(bar.Visibility == 1 and bar.Title == "temperature", "the scalar bar says what it shows")
+simple.HideUnusedScalarBars(view)
+check(bar.Visibility == 1, "and stays where the volume is hidden")
+image.LookupTable.RescaleTransferFunction(0, 1)
+shown.RescaleTransferFunctionToDataRange(False, True)
+check(range_of(image.LookupTable) == [1000, 2000], "Rescale to data range %s" % range_of(image.LookupTable))
+table = image.LookupTable.SMProxy.ComputeDataHistogramTable(10)
+bins = np.array([table.GetColumn(1).GetValue(i) for i in range(table.GetNumberOfRows())])
+radius = np.sqrt(sum(a * a for a in np.meshgrid(*[np.linspace(-1, 1, 17)] * 3)) / 3)
+expected = np.histogram(2000 - 1000 * radius, 10, (1000, 2000))[0]
+check(np.abs(bins / bins.sum() - expected / expected.sum()).max() < 0.03, "the histogram is that of the volume %s" % bins)
+image.SelectInputScalars = ["POINTS", "a"]
+simple.Render(view)
+check(shown.LookupTable == image.LookupTable and list(shown.ColorArrayName) == ["FIELD", "a"], "the legend follows the array")
+check(simple.GetScalarBar(image.LookupTable, view).Visibility == 1 and bar.Visibility == 0, "and its bar replaces the other")
+shown.SetRepresentationType("Outline")
+check(not shown.ColorArrayName[1], "shown as something else, it isn't coloured by that")
+image.SelectInputScalars = ["POINTS", "velocity"]
+image.Component = 1
+opened = saved_map(image, "arrays_velocity.vdi")
+path = os.path.join(OUTPUT, "arrays_velocity.vdi")
+simple.Hide(image, view)
+file_shown = simple.Show(opened, view)
+simple.Render(view)
+colors = file_shown.LookupTable
+check(list(file_shown.ColorArrayName) == ["FIELD", "velocity"], "an opened file has the legend of its array")
+check(range_of(colors) == range_of(image.LookupTable) and colors.VectorMode == "Component" and colors.VectorComponent == 1,
+      "with the range and the component %s" % range_of(colors))
+check(colors != image.LookupTable, "in maps of its own")
+file_shown.SetScalarBarVisibility(view, True)
+check(simple.GetScalarBar(colors, view).Title == "velocity", "and a scalar bar")
+simple.Delete(file_shown)
+simple.Delete(opened)
+
+# Over all time steps: of the input, which makes no VDI for that.
+steps = simple.ProgrammableSource(OutputDataSetType="vtkImageData")
+steps.ScriptRequestInformation = EXTENT + """
+information = self.GetExecutive().GetOutputInformation(0)
+information.Set(Pipeline.TIME_STEPS(), [0.0, 1.0, 2.0], 3)
+information.Set(Pipeline.TIME_RANGE(), [0.0, 2.0], 2)
+"""
+steps.Script = """
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
+time = self.GetExecutive().GetOutputInformation(0).Get(Pipeline.UPDATE_TIME_STEP())
+image = self.GetImageDataOutput()
+image.SetDimensions(17, 17, 17)
+array = numpy_to_vtk(np.linspace(-time, 10 + time, 17 ** 3), deep=True)
+array.SetName("grows")
+image.GetPointData().AddArray(array)
+"""
+moving = simple.VolumetricDepthImage(Input=steps, SelectInputScalars=["POINTS", "grows"])
+moving_shown = simple.Show(moving, view)
+simple.Render(view)
+check(range_of(moving.LookupTable) == [0, 10], "the first step's range %s" % range_of(moving.LookupTable))
+moving_shown.RescaleTransferFunctionToDataRangeOverTime()
+check(range_of(moving.LookupTable) == [-2, 12], "over all time steps %s" % range_of(moving.LookupTable))
+simple.Delete(moving_shown)
+simple.Delete(moving)
+image.SelectInputScalars = ["POINTS", "a"]
+
+# After a state file.
+state = os.path.join(OUTPUT, "arrays.pvsm")
+simple.SaveState(state)
+simple.ResetSession()
+simple.LoadState(state)
+again = [each for each in simple.GetSources().values() if each.SMProxy.GetXMLName() == "VolumetricDepthImage"][0]
+picture(again)
+again.SelectInputScalars = ["POINTS", "temperature"]
+check(again.LookupTable == simple.GetColorTransferFunction("temperature"), "a state's filter takes another array's map, too")
+finish()
