@@ -33,6 +33,11 @@ foreach(folder gpu io page pipeline reference)
   forbid(vdi/${folder} "<mpi" "MPI stays inside vdi/comm")
 endforeach()
 
+# Catch2 3 has other headers than 2.
+foreach(folder core reference gpu comm io pipeline apps)
+  forbid(tests/${folder} "<catch2/" "tests/Catch.h suits both versions of Catch2")
+endforeach()
+
 # The facade, and whatever it includes of ours, shows neither Vulkan nor MPI; the data formats show no scenes and blocks.
 function(forbid_behind header regex why)
   set(seen "${header}")

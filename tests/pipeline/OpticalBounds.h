@@ -1,8 +1,7 @@
 // How far pictures may be from the optical model in double precision.
 #pragma once
 
-#include <catch2/catch.hpp>
-
+#include "tests/Catch.h"
 #include "tests/OpticalScenes.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/gpu/Device.h"

@@ -1,7 +1,6 @@
 // Pictures of several ranks against the optical model in double precision, which knows neither ranks nor
 // blocks.
-#include <catch2/catch.hpp>
-
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/pipeline/OpticalBounds.h"
 #include "vdi/core/Flatten.h"

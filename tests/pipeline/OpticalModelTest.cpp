@@ -1,7 +1,6 @@
 // Pictures of device, reference and VDIs against the optical model in double precision, with which they share
 // no table, no samples and no code. Errors that all of them have show here.
-#include <catch2/catch.hpp>
-
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/pipeline/OpticalBounds.h"
 #include "vdi/comm/GhostExchange.h"

@@ -1,11 +1,11 @@
 // Cropping and clipping: the device against the reference, against the volume that is left, and against an
 // integral that shares nothing with them.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <memory>
 #include <vector>
 
+#include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "tests/pipeline/Integral.h"
@@ -177,7 +177,7 @@ TEST_CASE("region: nothing left, and what is refused by name") {
   const auto refused = [](const Region& region, const std::string& what) {
     GenerateSettings settings;
     settings.region = region;
-    CHECK_THROWS_WITH(validate(settings), Catch::Contains(what));
+    CHECK_THROWS_WITH(validate(settings), vdi::test::ContainsSubstring(what));
   };
   Region wrong;
   wrong.box = Box{glm::dvec3(1.0), glm::dvec3(1.0)};

@@ -1,7 +1,7 @@
 // The optical model in double precision: against what can be worked out by hand.
+#include "tests/Catch.h"
 #include "vdi/reference/Exact.h"
 
-#include <catch2/catch.hpp>
 #include <cmath>
 
 using namespace vdi;

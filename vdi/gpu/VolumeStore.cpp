@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include "shaders/shared/slab.h"
+#include "vdi/core/BitCast.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/gpu/KdTree.h"
@@ -30,7 +30,7 @@ constexpr double filterGuard = 2.0 / 256.0;
 using PieceRangeBits = std::array<std::uint32_t, shared::pieceRangeWords>;
 
 float fromOrdered(std::uint32_t bits) {
-  return std::bit_cast<float>((bits >> 31U) != 0 ? bits & 0x7FFFFFFFU : ~bits);
+  return bit_cast<float>((bits >> 31U) != 0 ? bits & 0x7FFFFFFFU : ~bits);
 }
 
 std::uint64_t volumeOf(const glm::uvec3& extent) {

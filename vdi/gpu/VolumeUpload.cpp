@@ -1,13 +1,13 @@
 #include "vdi/gpu/VolumeUpload.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <optional>
 #include <utility>
 
 #include "shaders/shared/cells.h"
+#include "vdi/core/BitCast.h"
 #include "vdi/core/Parallel.h"
 
 namespace vdi::gpu {
@@ -27,7 +27,7 @@ constexpr std::size_t coresThatCopyFaster = 2;
 
 /// Infinite texels would make NaN of all that's interpolated with them, and of what has weight 0 besides.
 float filterable(float texel) {
-  constexpr auto infinite = std::bit_cast<float>(shared::infiniteTexelBits);
+  const auto infinite = bit_cast<float>(shared::infiniteTexelBits);
   return std::isinf(texel) ? std::copysign(infinite, texel) : texel;
 }
 

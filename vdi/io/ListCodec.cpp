@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cassert>
 #include <cstring>
 #include <type_traits>
 
+#include "vdi/core/BitCast.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::io::detail {
@@ -51,17 +51,16 @@ struct FullCoding {
   };
 
   static Fields fieldsOf(const Segment& s) {
-    return {std::bit_cast<std::uint32_t>(s.front),
-            std::bit_cast<std::uint32_t>(s.back),
-            std::bit_cast<std::uint32_t>(s.opacity),
-            {std::bit_cast<std::uint32_t>(s.red), std::bit_cast<std::uint32_t>(s.green),
-             std::bit_cast<std::uint32_t>(s.blue)}};
+    return {
+        bit_cast<std::uint32_t>(s.front),
+        bit_cast<std::uint32_t>(s.back),
+        bit_cast<std::uint32_t>(s.opacity),
+        {bit_cast<std::uint32_t>(s.red), bit_cast<std::uint32_t>(s.green), bit_cast<std::uint32_t>(s.blue)}};
   }
 
   static Segment segmentOf(const Fields& f) {
-    return {std::bit_cast<float>(f.front),    std::bit_cast<float>(f.back),
-            std::bit_cast<float>(f.color[0]), std::bit_cast<float>(f.color[1]),
-            std::bit_cast<float>(f.color[2]), std::bit_cast<float>(f.opacity)};
+    return {bit_cast<float>(f.front),    bit_cast<float>(f.back),     bit_cast<float>(f.color[0]),
+            bit_cast<float>(f.color[1]), bit_cast<float>(f.color[2]), bit_cast<float>(f.opacity)};
   }
 
   /// Premultiplied colours grow with opacity; the bit pattern of a float is close to its logarithm, so a

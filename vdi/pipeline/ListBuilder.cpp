@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "vdi/core/BitCast.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::detail {
@@ -183,7 +184,7 @@ void ListBuilder::finishBisection() {
 void ListBuilder::recordSearch() {
   const Request& request = started_->request;
   if (request.runsOnly) {
-    commands_.fill(thresholds_, std::bit_cast<std::uint32_t>(std::numeric_limits<float>::max()));
+    commands_.fill(thresholds_, bit_cast<std::uint32_t>(std::numeric_limits<float>::max()));
     commands_.fill(capacities_, expectedRuns_);
     commands_.fill(quotas_, expectedRuns_ << 16U);
     return;

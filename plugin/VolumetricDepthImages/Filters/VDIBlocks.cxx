@@ -14,9 +14,9 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
+#include "vdi/core/BitCast.h"
 #include "vdi/core/Error.h"
 
 namespace pv {
@@ -271,7 +271,7 @@ void addIdentity(vtkDataObject* leaf, std::vector<std::uint64_t>& identity) {
     return;
   }
   const auto addPlace = [&identity](const double* values, int count) {
-    for (int i = 0; i < count; ++i) identity.push_back(std::bit_cast<std::uint64_t>(values[i]));
+    for (int i = 0; i < count; ++i) identity.push_back(vdi::bit_cast<std::uint64_t>(values[i]));
   };
   addPlace(image->GetOrigin(), 3);
   addPlace(image->GetSpacing(), 3);

@@ -19,7 +19,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -38,6 +37,7 @@
 #include "VDISession.h"
 #include "VDITransferFunctions.h"
 #include "VDIValues.h"
+#include "vdi/core/BitCast.h"
 #include "vdi/core/Error.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vtkVDIImageData.h"
@@ -453,10 +453,10 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const Origin& origin) {
   std::array<std::uint64_t, 2> largest{0, static_cast<std::uint64_t>(pv::componentsOf(input, origin.Choice))};
   for (const vdi::Block& block : blocks) {
     const double volume = block.spacing.x * block.spacing.y * block.spacing.z;
-    if (volume > 0.0) largest[0] = std::max(largest[0], std::bit_cast<std::uint64_t>(1.0 / volume));
+    if (volume > 0.0) largest[0] = std::max(largest[0], vdi::bit_cast<std::uint64_t>(1.0 / volume));
   }
   comm.allReduceMax(largest);
-  this->Internal->VoxelVolume = largest[0] > 0 ? 1.0 / std::bit_cast<double>(largest[0]) : 0.0;
+  this->Internal->VoxelVolume = largest[0] > 0 ? 1.0 / vdi::bit_cast<double>(largest[0]) : 0.0;
   const int components = std::max(static_cast<int>(largest[1]), 1);
   this->Internal->Array = {.name = origin.Choice.name,
                            .cells = origin.Choice.cells,
