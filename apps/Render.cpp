@@ -26,6 +26,7 @@ struct RenderOptions {
   double elevation = 0.0;
   std::string resolution;
   std::string reconstruction = "smooth";
+  std::vector<double> clip;  // 6 for each plane
 };
 
 /// The picture of one of the azimuths: with several their degrees are added to its name.
@@ -46,6 +47,7 @@ void render(const RenderOptions& options) {
   const Reconstruction reconstruction = reconstructionFromString(options.reconstruction);
   VdiRenderer renderer(gpu::Device::create(gpu::requestFromEnvironment(0)));
   renderer.setVdi(vdi);
+  renderer.setClipPlanes(makeClipPlanes(options.clip));
   const Camera start = chosenCamera(options.camera, vdi.camera);
   std::set<ViewpointIssue> warned;
   for (const double azimuth : options.azimuths) {
@@ -89,6 +91,7 @@ void addRender(CLI::App& app, Job& job) {
       ->capture_default_str()
       ->group("Viewpoint");
   addReconstructionOption(*command, options->reconstruction);
+  addClipOption(*command, options->clip, "Viewpoint");
   command->callback([options, &job] { job = {[options](const comm::Communicator&) { render(*options); }}; });
 }
 

@@ -302,24 +302,14 @@ void addRegionOptions(CLI::App& command, QualityOptions& options) {
       ->expected(6)
       ->type_name("X")
       ->group(qualityGroup);
-  command
-      .add_option("--clip", options.clip,
-                  "shows only the side of a plane to which its normal points: a point and the normal; up to "
-                  "six planes")
-      ->type_size(6)
-      ->expected(1, static_cast<int>(maxClipPlanes))
-      ->type_name("X Y Z NX NY NZ")
-      ->group(qualityGroup);
+  addClipOption(command, options.clip, qualityGroup);
 }
 
 Region makeRegion(const QualityOptions& options) {
   Region region;
   const std::vector<double>& b = options.crop;
   if (!b.empty()) region.box = {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
-  for (std::size_t i = 0; i + 6 <= options.clip.size(); i += 6) {
-    const double* p = options.clip.data() + i;
-    region.planes.push_back({{p[0], p[1], p[2]}, {p[3], p[4], p[5]}});
-  }
+  region.planes = makeClipPlanes(options.clip);
   return region;
 }
 
@@ -333,6 +323,26 @@ Shading makeShading(const QualityOptions& options) {
 }
 
 }  // namespace
+
+void addClipOption(CLI::App& command, std::vector<double>& numbers, const char* group) {
+  command
+      .add_option("--clip", numbers,
+                  "shows only the side of a plane to which its normal points: a point and the normal; up to "
+                  "six planes")
+      ->type_size(6)
+      ->expected(1, static_cast<int>(maxClipPlanes))
+      ->type_name("X Y Z NX NY NZ")
+      ->group(group);
+}
+
+std::vector<ClipPlane> makeClipPlanes(const std::vector<double>& numbers) {
+  std::vector<ClipPlane> planes;
+  for (std::size_t i = 0; i + 6 <= numbers.size(); i += 6) {
+    const double* p = numbers.data() + i;
+    planes.push_back({{p[0], p[1], p[2]}, {p[3], p[4], p[5]}});
+  }
+  return planes;
+}
 
 void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse use) {
   std::string presets;

@@ -99,6 +99,10 @@ GenerateSettings makeSettings(const QualityOptions& options);
 TransferFunction makeTransferFunction(const QualityOptions& options, const Scene& scene,
                                       const ScalarRange& range);
 
+/// Planes that clip a volume or a view of a VDI: six numbers each, a point and the normal.
+void addClipOption(CLI::App& command, std::vector<double>& numbers, const char* group);
+std::vector<ClipPlane> makeClipPlanes(const std::vector<double>& numbers);
+
 /// Of views of a VDI: a name that reconstructionFromString knows.
 void addReconstructionOption(CLI::App& command, std::string& name);
 

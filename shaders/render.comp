@@ -92,6 +92,10 @@ void renderPixels(uint tile) {
   ray = rayAt(vec2(at) + 0.5);
   accumulated = nothing;
   vec2 stretch = insideFrustum();
+  for (uint i = 0u; i < params.clipPlaneCount; ++i) {
+    vec4 plane = params.clipPlanes[i];
+    clip(stretch, dot(plane.xyz, ray.origin) - plane.w, dot(plane.xyz, ray.direction));
+  }
   if (params.hasEnds != 0u && hasPixel) stretch.y = min(stretch.y, params.ends.at[at.y * params.width + at.x]);
   bool meets = hasPixel && stretch.x < stretch.y;
   PictureLine line = pictureLine(stretch);

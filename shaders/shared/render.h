@@ -99,6 +99,8 @@ struct ExpandConstants {
   StoredForm form;
 };
 
+VDI_CONST uint renderMaxClipPlanes = 6;
+
 struct RenderParams {
   VDI_ADDRESS(ListHeads) heads;
   VDI_ADDRESS(RenderSegmentWords) segments;  // compact array
@@ -117,6 +119,8 @@ struct RenderParams {
   ivec2 lists;  // of the VDI: width, height
   float binScale;
   uint hasEnds;
+  uint clipPlaneCount;
+  vec4 clipPlanes[renderMaxClipPlanes];  // in V_O's view space; what is shown has dot(xyz, position) >= w
 };
 
 // Ray of the new view's pixel in V_O's view space, as in CastParams: base + u * right + v * up, t = the new view's depth. All that

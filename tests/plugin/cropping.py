@@ -62,6 +62,10 @@ for axis in range(3):
         planes += point + normal
 clipped = picture(vdi_filter(source, view, "CELLS", "field", 2.0, Shade=1, ClippingPlanes=planes))
 check(np.abs(clipped.astype(int) - ours).max() <= 2, "six clipping planes show what the box shows")
+whole = vdi_filter(source, view, "CELLS", "field", 2.0, Shade=1)
+viewed = picture(simple.RenderVDI(Input=whole, UseOriginalCamera=1, ClippingPlanes=planes))
+check(ssim(viewed, ours) >= 0.97, "and views of the whole VDI show that about too: SSIM %.4f" % ssim(viewed, ours))
+write_png("cropping_viewed.png", np.hstack([viewed, ours]))
 
 # What no VDI holds.
 said = []

@@ -32,6 +32,7 @@ struct VdiRenderer::State {
   detail::LoadedVdi shown;
   detail::LoadedVdi prepared;
   double milliseconds = 0.0;
+  std::vector<ClipPlane> clipPlanes;
   gpu::Buffer ends;  // of rays; none until they're asked for
   gpu::Buffer endsStaging;
   /// Behind what it loads, for its end waits for what uses that.
@@ -109,6 +110,27 @@ bool VdiRenderer::showPrepared() {
   return true;
 }
 
+void VdiRenderer::setClipPlanes(std::vector<ClipPlane> planes) {
+  validate(Region{.box = {}, .planes = planes});
+  state_->clipPlanes = std::move(planes);
+}
+
+namespace {
+
+/// In the view space of the VDI's viewpoint.
+void clipBy(shared::RenderParams& params, std::span<const ClipPlane> planes, const View& original) {
+  static_assert(maxClipPlanes == shared::renderMaxClipPlanes);
+  params.clipPlaneCount = static_cast<std::uint32_t>(planes.size());
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const glm::dvec3 unit = glm::normalize(planes[i].normal);
+    const glm::dvec3 normal(glm::dot(unit, original.right()), glm::dot(unit, original.up()),
+                            glm::dot(unit, original.forward()));
+    params.clipPlanes[i] = glm::dvec4(normal, glm::dot(normal, original.toView(planes[i].origin)));
+  }
+}
+
+}  // namespace
+
 void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds,
                                 Reconstruction reconstruction, std::uint32_t form) {
   if (!shown.original) throw Error(ErrorCode::InvalidArgument, "there is no VDI to render yet");
@@ -128,6 +150,7 @@ void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds
   params.depths = picture.depths();
   params.nearest = depths.nearest;
   params.farthest = depths.farthest;
+  clipBy(params, clipPlanes, *shown.original);
   if (!rayEnds.empty()) {
     endsStaging.reserve(device, rayEnds.size_bytes(), MemoryKind::Upload);
     ends.reserve(device, rayEnds.size_bytes(), MemoryKind::DeviceLocal);

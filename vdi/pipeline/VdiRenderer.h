@@ -3,10 +3,12 @@
 
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "vdi/core/Camera.h"
 #include "vdi/core/Image.h"
 #include "vdi/core/Reconstruction.h"
+#include "vdi/core/Region.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/gpu/Device.h"
 
@@ -36,6 +38,9 @@ class VdiRenderer {
   void prepareVdi(const Vdi& vdi);
   /// Shows what was prepared, at once. Returns whether there was anything.
   bool showPrepared();
+  /// Later renders show the sides of the planes to which their normals point; at first there are none. Throws
+  /// Error{InvalidArgument} for more than maxClipPlanes, and for what validate(Region) refuses.
+  void setClipPlanes(std::vector<ClipPlane> planes);
   /// Rays end at an opacity of 1 - 1/512, along V_O's of 1 - 1/1024: what's behind changes a colour of 8 bits
   /// by half a step at most. Throws Error{InvalidArgument} before the first setVdi, and for what View
   /// rejects.

@@ -11,6 +11,7 @@
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Image.h"
 #include "vdi/core/Reconstruction.h"
+#include "vdi/core/Region.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/SlabTable.h"
 #include "vdi/core/TransferFunction.h"
@@ -61,8 +62,9 @@ SupersegmentLists composite(std::span<const SupersegmentLists> subLists, const G
 
 /// The VDI seen by `view`. Each supersegment fills the part of its pixel's frustum between its two depths;
 /// rays traverse the frusta of V_O's pixels in order, whatever their direction. `ends`: [height][width]
-/// of the view, the depths at which its rays end, say at opaque objects; empty: nowhere.
+/// of the view, the depths at which its rays end, say at opaque objects; empty: nowhere. Of the planes, the
+/// sides that they show are seen.
 Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction,
-             std::span<const float> ends = {});
+             std::span<const float> ends = {}, std::span<const ClipPlane> planes = {});
 
 }  // namespace vdi::reference

@@ -223,7 +223,8 @@ Accumulator traverseSmoothly(const SupersegmentLists& lists, const View& origina
 
 }  // namespace
 
-Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, std::span<const float> ends) {
+Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, std::span<const float> ends,
+             std::span<const ClipPlane> planes) {
   Image image = blankImage(view.width(), view.height());
   assert(ends.empty() || ends.size() == image.pixelCount());
   const SupersegmentLists lists = vdi.expandedLists();
@@ -247,6 +248,10 @@ Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, st
       const auto pixel =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
       Stretch stretch = insideFrustum(ray, original, smallest, farthest);
+      for (const ClipPlane& plane : planes) {
+        const glm::dvec3 normal = glm::normalize(plane.normal);
+        clip(stretch, glm::dot(normal, world.origin - plane.origin), glm::dot(normal, world.direction));
+      }
       if (!ends.empty()) stretch.leave = std::min(stretch.leave, static_cast<double>(ends[pixel]));
       if (stretch.empty()) continue;
       const Accumulator sum = reconstruction == Reconstruction::Smooth

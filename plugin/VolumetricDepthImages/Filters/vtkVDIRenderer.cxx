@@ -35,6 +35,18 @@ vtkVDIRenderer::vtkVDIRenderer() : Internal(new Internals) {}
 
 vtkVDIRenderer::~vtkVDIRenderer() = default;
 
+void vtkVDIRenderer::AddClippingPlane(double originX, double originY, double originZ, double normalX,
+                                      double normalY, double normalZ) {
+  this->ClippingPlanes.push_back({originX, originY, originZ, normalX, normalY, normalZ});
+  this->Modified();
+}
+
+void vtkVDIRenderer::RemoveAllClippingPlanes() {
+  if (this->ClippingPlanes.empty()) return;
+  this->ClippingPlanes.clear();
+  this->Modified();
+}
+
 void vtkVDIRenderer::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Resolution: " << this->Resolution[0] << " x " << this->Resolution[1] << "\n"
@@ -149,6 +161,10 @@ void vtkVDIRenderer::Render(vtkDataObject* input, vtkImageData* output) {
   const int width = own ? internal.Width : this->Resolution[0];
   const int height = own ? internal.Height : this->Resolution[1];
   this->WarnOf(camera, width, height);
+  std::vector<vdi::ClipPlane> planes;
+  for (const std::array<double, 6>& plane : this->ClippingPlanes)
+    planes.push_back({{plane[0], plane[1], plane[2]}, {plane[3], plane[4], plane[5]}});
+  internal.Renderer->setClipPlanes(std::move(planes));
   pv::setPicture(output,
                  internal.Renderer->renderBytes(camera, width, height, vdi::Alpha::Straight,
                                                 static_cast<vdi::Reconstruction>(this->Reconstruction)));

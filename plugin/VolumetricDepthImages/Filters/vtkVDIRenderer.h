@@ -11,7 +11,9 @@
 
 #include <vtkImageAlgorithm.h>
 
+#include <array>
 #include <memory>
+#include <vector>
 
 #include "vtkVolumetricDepthImagesModule.h"
 
@@ -48,6 +50,13 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   /// vdi::Reconstruction: 1 (default) blends neighbouring lists, 0 shows each as it is.
   vtkSetClampMacro(Reconstruction, int, 0, 1);
 
+  ///@{
+  /// What is seen lies on the sides of these planes to which their normals point; at most 6.
+  void AddClippingPlane(double originX, double originY, double originZ, double normalX, double normalY,
+                        double normalZ);
+  void RemoveAllClippingPlanes();
+  ///@}
+
  protected:
   vtkVDIRenderer();
   ~vtkVDIRenderer() override;
@@ -78,6 +87,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   double Azimuth = 0.0;
   int Resolution[2] = {0, 0};
   int Reconstruction = 1;
+  std::vector<std::array<double, 6>> ClippingPlanes;
 };
 
 #endif
