@@ -136,7 +136,7 @@ void pqVDIColorsWidget::edit() {
     this->connect(dialog, &QDialog::rejected, this, &pqVDIColorsWidget::restore);
     this->keepMaps(map);
     this->Dialog = dialog;
-    dialog->adjustSize();
+    dialog->show();  // which gives it its size
     moveBesideView(dialog);
   }
   this->Dialog->show();
