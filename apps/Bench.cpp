@@ -190,6 +190,7 @@ void addBench(CLI::App& app, Job& job) {
       ->group("Volume and ranks");
   addDecompositionOptions(*command, options->decomposition);
   addViewOptions(*command, options->view);
+  options->quality.samplesPerVoxel = 1.0;  // times are of one rate, whatever the transfer function
   addQualityOptions(*command, options->quality, QualityUse::Several);
   command->add_option("--algorithms", options->algorithms, "merge (the default), bisection or both")
       ->type_name("NAME");

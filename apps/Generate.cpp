@@ -74,6 +74,8 @@ void printOutcome(const GenerateSettings& settings, std::uint64_t supersegments,
                   const VdiGenerator& generator) {
   fmt::print("{} x {} lists, {} supersegments, on {}\n", settings.width, settings.height, supersegments,
              generator.device().name());
+  if (!generator.reports().empty())
+    fmt::print("{:g} samples per voxel\n", generator.reports().front().samplesPerVoxel);
   printReport(generator.reports());
 }
 

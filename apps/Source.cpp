@@ -400,7 +400,10 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
       ->group(qualityGroup);
   addShadingOptions(command, options);
   addRegionOptions(command, options);
-  command.add_option("--sampling-rate", options.samplesPerVoxel, "samples per voxel, 1/64 to 64")
+  command
+      .add_option(
+          "--sampling-rate", options.samplesPerVoxel,
+          "samples per voxel, 1/64 to 64; 0: 1, 2 or 4, as the transfer function needs on this volume")
       ->capture_default_str()
       ->group(qualityGroup);
   command

@@ -77,7 +77,7 @@ struct QualityOptions {
   std::uint32_t supersegments = 25;
   std::string budget = "list";
   double fill = 1.0;
-  double samplesPerVoxel = 1.0;
+  double samplesPerVoxel = automaticRate;
   std::string algorithm = "merge";
   std::string precision = "compact";
   double terminationOpacity = GenerateSettings().terminationOpacity;

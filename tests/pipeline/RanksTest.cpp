@@ -121,6 +121,46 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one", "[ranks]") {
   }
 }
 
+TEST_CASE("an automatic sampling rate: the one that the function needs, and the picture of one rank",
+          "[ranks]") {
+  const comm::Communicator world = comm::Communicator::world();
+  VdiGenerator one(device(), comm::Communicator::serial());
+  VdiGenerator many(device(), comm::Communicator::world());
+  const glm::ivec3 size{26, 24, 25};
+  const auto whole = test::decompose("turbulence", size, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
+                                     ScalarType::F32, 0, 1);
+  const auto dealt = test::decompose("turbulence", size, {3, 2, 4}, Layout::Random, Joint::Gap,
+                                     ScalarType::F32, world.rank(), world.size());
+  one.setBlocks(whole.mine);
+  many.setBlocks(dealt.mine);
+  // In other units the same function is steeper: it runs through its hues many times.
+  TransferFunction steep = test::threeHues(1.0);
+  steep.colors.clear();
+  for (int i = 0; i <= 24; ++i)
+    steep.colors.push_back({i / 24.0, glm::dvec3(i % 3 == 0, i % 3 == 1, i % 3 == 2)});
+  GenerateSettings settings = test::smallSettings();
+  const auto rates = [&](const TransferFunction& function) {
+    settings.samplesPerVoxel = automaticRate;
+    const std::optional<Image> expected = one.renderVolume(test::oblique(), function, settings);
+    const double rate = one.reports().front().samplesPerVoxel;
+    const std::optional<Image> together = many.renderVolume(test::oblique(), function, settings);
+    std::optional<Vdi> vdi = many.generate(test::oblique(), function, settings);
+    if (world.rank() == 0) {
+      CHECK(many.reports().front().samplesPerVoxel == rate);
+      CHECK(anythingSeen(*expected));
+      CHECK(largestDifference(*expected, *together) < 2.0F);
+      CHECK(largestDifference(*expected, flatten(*vdi)) < 2.0F);
+    }
+    // The same picture as at that rate.
+    settings.samplesPerVoxel = rate;
+    const std::optional<Image> numbered = one.renderVolume(test::oblique(), function, settings);
+    CHECK(largestDifference(*expected, *numbered) == 0.0F);
+    return rate;
+  };
+  CHECK(rates(steep) > 1.0);
+  CHECK(rates(test::threeHues(1.0, 0.5)) == 1.0);
+}
+
 TEST_CASE("shaded: the picture and VDI of N ranks are those of one", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const bool root = world.rank() == 0;

@@ -40,8 +40,9 @@ void validate(const GenerateSettings& settings) {
   require(settings.margin >= 0.0 && settings.margin <= maxMargin, "margin", settings.margin, "[0, 4]");
   require(settings.supersegments >= 1 && settings.supersegments <= maxSupersegments, "supersegments",
           settings.supersegments, "[1, 1024]");
-  require(settings.samplesPerVoxel >= 1.0 / 64.0 && settings.samplesPerVoxel <= 64.0, "samples per voxel",
-          settings.samplesPerVoxel, "[1/64, 64]");
+  const double rate = settings.samplesPerVoxel;
+  require(rate == automaticRate || (rate >= 1.0 / 64.0 && rate <= 64.0), "samples per voxel", rate,
+          "[1/64, 64], or be 0 for automatic");
   require(settings.fill > 0.0 && settings.fill <= 1.0, "fill", settings.fill, "(0, 1]");
   if (settings.budget == Budget::List && settings.fill != 1.0) {
     throw Error(ErrorCode::InvalidArgument,

@@ -26,6 +26,8 @@ constexpr double pictureTermination = 0.9999;
 
 constexpr double maxMargin = 4.0;
 
+constexpr double automaticRate = 0.0;
+
 struct GenerateSettings {
   int width = 1280;
   int height = 720;
@@ -35,8 +37,9 @@ struct GenerateSettings {
   std::uint32_t supersegments = 25;  // N_S, 1 .. maxSupersegments
   /// Total: N_S is what lists have on average, where they have that many samples; needs Algorithm::Merge.
   Budget budget = Budget::List;
-  double fill = 1.0;             // (0, 1]; with Budget::Total, share of what N_S each would give that's made
-  double samplesPerVoxel = 1.0;  // [1/64, 64]
+  double fill = 1.0;  // (0, 1]; with Budget::Total, share of what N_S each would give that's made
+  /// [1/64, 64]; or automaticRate: 1, 2 or 4, as the transfer function needs on the volume (SamplingRate.h).
+  double samplesPerVoxel = 1.0;
   Algorithm algorithm = Algorithm::Merge;
   /// Rays of more samples than depthCodeFor can number give a VDI of full precision all the same.
   Precision precision = Precision::Compact;

@@ -15,28 +15,6 @@ namespace {
 using gpu::shared::slabSide;
 using gpu::shared::slabStripStep;
 
-/// Of the transfer table, linear between entries and constant outside, from position 0 on.
-class Integral {
- public:
-  explicit Integral(const std::vector<TransferTableEntry>& entries)
-      : entries_(entries), sums_(entries.size()) {
-    for (std::size_t i = 1; i < entries.size(); ++i)
-      sums_[i] = sums_[i - 1] + 0.5 * (glm::dvec4(entries[i - 1].vector()) + glm::dvec4(entries[i].vector()));
-  }
-  glm::dvec4 at(double position) const {
-    const double inside = std::clamp(position, 0.0, static_cast<double>(entries_.size() - 1));
-    const auto below = std::min(static_cast<std::size_t>(inside), entries_.size() - 2);
-    const double share = inside - static_cast<double>(below);
-    const glm::dvec4 a = entries_[below].vector();
-    const glm::dvec4 b = entries_[below + 1].vector();
-    return sums_[below] + share * (a + 0.5 * share * (b - a)) + (position - inside) * glm::mix(a, b, share);
-  }
-
- private:
-  const std::vector<TransferTableEntry>& entries_;
-  std::vector<glm::dvec4> sums_;  // up to each entry
-};
-
 /// Premultiplied colour and opacity of what has that mean entry along `length`.
 glm::dvec4 accumulated(const glm::dvec4& mean, double length) {
   const double depth = std::max(mean.a, 0.0) * length;
@@ -45,26 +23,51 @@ glm::dvec4 accumulated(const glm::dvec4& mean, double length) {
   return glm::max(mean / mean.a, 0.0) * opacity;
 }
 
-/// In parts of equal length, front to back, for in each of them light comes from all places alike; as many as
-/// it takes to tell the transfer function's features apart.
-glm::dvec4 integrate(const Integral& integral, double front, double back, double length) {
+}  // namespace
+
+SlabIntegral::SlabIntegral(const TransferTable& table) : entries_(table.entries), sums_(entries_.size()) {
+  for (std::size_t i = 1; i < entries_.size(); ++i)
+    sums_[i] = sums_[i - 1] + 0.5 * (glm::dvec4(entries_[i - 1].vector()) + glm::dvec4(entries_[i].vector()));
+}
+
+glm::dvec4 SlabIntegral::upTo(double position) const {
+  const double inside = std::clamp(position, 0.0, static_cast<double>(entries_.size() - 1));
+  const auto below = std::min(static_cast<std::size_t>(inside), entries_.size() - 2);
+  const double share = inside - static_cast<double>(below);
+  const glm::dvec4 a = entries_[below].vector();
+  const glm::dvec4 b = entries_[below + 1].vector();
+  return sums_[below] + share * (a + 0.5 * share * (b - a)) + (position - inside) * glm::mix(a, b, share);
+}
+
+glm::dvec4 SlabIntegral::mean(double front, double back, double length) const {
+  return accumulated((upTo(back) - upTo(front)) / (back - front), length);
+}
+
+// In parts of equal length, front to back, for in each of them light comes from all places alike; as many as
+// it takes to tell the transfer function's features apart.
+glm::dvec4 SlabIntegral::between(double front, double back, double length) const {
   constexpr double thin = 0.1;     // optical depth that hides nothing behind it
   constexpr double opaque = 16.0;  // that lets nothing through
   constexpr int maxParts = 64;
+  constexpr double nearlyNothing = 1e-6;  // where the difference of two sums is lost in rounding
   const double span = back - front;
-  const glm::dvec4 start = integral.at(front);
-  const glm::dvec4 mean = (integral.at(back) - start) / span;
-  if (mean.a * length <= thin) return accumulated(mean, length);
+  if (std::abs(span) < nearlyNothing)
+    return mean(front - 0.5 * nearlyNothing, front + 0.5 * nearlyNothing, length);
+  const glm::dvec4 start = upTo(front);
+  const glm::dvec4 whole = (upTo(back) - start) / span;
+  if (whole.a * length <= thin) return accumulated(whole, length);
   const int parts = std::clamp(static_cast<int>(std::abs(span)), 1, maxParts);
   glm::dvec4 sum(0.0);
   glm::dvec4 before = start;
   for (int part = 1; part <= parts && sum.a < 1.0 - std::exp2(-opaque); ++part) {
-    const glm::dvec4 here = integral.at(front + span * part / parts);
+    const glm::dvec4 here = upTo(front + span * part / parts);
     sum += (1.0 - sum.a) * accumulated((here - before) / (span / parts), length / parts);
     before = here;
   }
   return sum;
 }
+
+namespace {
 
 /// No colour is brighter than white, after rounding to half floats as well.
 glm::u16vec4 texelOf(const glm::dvec4& slab) {
@@ -99,7 +102,7 @@ SlabTable makeSlabTable(const TransferTable& transfer, float length) {
   table.length = length;
   table.positions = transfer.entries.size();
   table.texels.resize(table.height() * slabSide);
-  const Integral integral(transfer.entries);
+  const SlabIntegral integral(transfer);
   const auto point = [&](double position) { return accumulated(transfer.at(position).vector(), length); };
   const double last = static_cast<double>(table.positions - 1);
   const auto endOf = [&](double position) {
@@ -113,14 +116,14 @@ SlabTable makeSlabTable(const TransferTable& transfer, float length) {
     if (y < slabSide) {
       const double front = last * static_cast<double>(x) / slabStripStep;
       const double back = last * static_cast<double>(y) / slabStripStep;
-      return x == y ? point(front) : integrate(integral, front, back, length);
+      return x == y ? point(front) : integral.between(front, back, length);
     }
     const std::size_t level = (y - slabSide) / table.stripRows();
     const std::size_t row = (y - slabSide) % table.stripRows();
     const double middle = std::min(static_cast<double>(row * slabStripStep + x), last);
     if (level == 0) return point(middle);
     const double half = 0.5 * std::exp2(static_cast<double>(level));
-    return accumulated((integral.at(middle + half) - integral.at(middle - half)) / (2.0 * half), length);
+    return integral.mean(middle - half, middle + half, length);
   };
   inParallel(table.height(), 16, [&](std::size_t first, std::size_t end) {
     for (std::size_t y = first; y < end; ++y) {

@@ -20,6 +20,23 @@ struct Slab {
   float opticalDepth = 0.0F;
 };
 
+/// Slabs of any length, one at a time, in double precision. Premultiplied colour and opacity; positions may
+/// lie outside the transfer table, and are finite.
+class SlabIntegral {
+ public:
+  explicit SlabIntegral(const TransferTable& table);
+  /// From one position to another along `length` unit distances. What's in front hides what's behind.
+  glm::dvec4 between(double front, double back, double length) const;
+  /// Of the mean between two different positions: nothing is in front of anything else.
+  glm::dvec4 mean(double front, double back, double length) const;
+
+ private:
+  glm::dvec4 upTo(double position) const;  // the transfer table's integral from position 0 on
+
+  std::vector<TransferTableEntry> entries_;
+  std::vector<glm::dvec4> sums_;  // up to each entry
+};
+
 /// A texture of slabs of one length. One filtered look is enough for any slab. Texels are premultiplied
 /// colour and opacity, whose means are right; optical depths of opaque slabs would outshine all others.
 ///

@@ -19,7 +19,8 @@ struct RankReport {
   double compositeSeconds = 0.0;
   double compositeDeviceSeconds = 0.0;  // of these, the device's work, and the copying of what was received
   double gatherSeconds = 0.0;
-  double outputSeconds = 0.0;  // of write, instead of the gather: downloading, encoding and writing
+  double outputSeconds = 0.0;    // of write, instead of the gather: downloading, encoding and writing
+  double samplesPerVoxel = 0.0;  // of the frame: what automaticRate came to
   std::uint64_t blocks = 0;
   std::uint64_t volumeBytes = 0;
   std::uint64_t subSupersegments = 0;

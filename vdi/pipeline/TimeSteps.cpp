@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cstring>
+#include <type_traits>
 #include <utility>
 
 #include "vdi/comm/GhostExchange.h"
@@ -27,6 +30,20 @@ void requireUsableValues(const comm::Communicator& comm, std::span<const Block> 
                   limitsOf(ScalarType::F32).minimum, limitsOf(ScalarType::F64).minimum));
 }
 
+/// Collective: all ranks' probes, by index.
+std::vector<Probe> globalProbes(const comm::Communicator& comm, const Scene& scene,
+                                std::span<const Block> blocks) {
+  static_assert(std::is_trivially_copyable_v<Probe>);
+  std::vector<Probe> own;
+  comm.together([&] { own = probesOf(scene, blocks); });
+  if (comm.size() == 1) return own;
+  const comm::Gathered all = comm.allGather(std::as_bytes(std::span(own)), sizeof(Probe));
+  std::vector<Probe> probes(all.bytes.size() / sizeof(Probe));
+  if (!probes.empty()) std::memcpy(probes.data(), all.bytes.data(), all.bytes.size());
+  std::ranges::sort(probes, {}, &Probe::index);
+  return probes;
+}
+
 }  // namespace
 
 TimeSteps::Step TimeSteps::send(std::vector<Block> blocks, bool fillGhosts,
@@ -43,13 +60,15 @@ TimeSteps::Step TimeSteps::send(std::vector<Block> blocks, bool fillGhosts,
   blocks = fillGhosts ? comm::exchangeGhosts(comm_, std::move(blocks))
                       : comm::settleOwnership(comm_, std::move(blocks));
   step.scene = comm::globalScene(comm_, localScene(blocks));
+  step.probes = globalProbes(comm_, step.scene, blocks);
   comm_.together([&] { (volume_.*way)(blocks, step.scene); });
   step.uploadSeconds = watch.lap();
   return step;
 }
 
-void TimeSteps::show(const Step& step) {
-  shown_ = step;
+void TimeSteps::show(Step step) {
+  shown_ = std::move(step);
+  rate_.reset();
   const ScalarRange& own = volume_.valueRange();
   std::array<double, 2> minimum{own.min, -own.max};
   comm_.allReduceMin(minimum);
@@ -80,12 +99,18 @@ void TimeSteps::setNextBlocks(std::vector<Block> blocks, bool fillGhosts) {
 
 void TimeSteps::advance() {
   Stopwatch watch;
-  const std::optional<Step> next = std::exchange(next_, std::nullopt);
+  std::optional<Step> next = std::exchange(next_, std::nullopt);
   if (!next) throw Error(ErrorCode::InvalidArgument, "no next blocks were set");
   comm_.together([&] { volume_.awaitNext(); });
   volume_.showNext();
-  show(*next);
+  show(std::move(*next));
   shown_.uploadSeconds += watch.lap();
+}
+
+double TimeSteps::samplingRate(const TransferTable& table, const Region& region) {
+  if (!rate_ || rate_->table != table || rate_->region != region)
+    rate_ = Rate{table, region, samplingRateFor(table, shown_.scene, region, shown_.probes)};
+  return rate_->samplesPerVoxel;
 }
 
 void TimeSteps::requireSpans(const TransferTable& table) const {

@@ -9,6 +9,7 @@
 
 #include "vdi/comm/Communicator.h"
 #include "vdi/core/Block.h"
+#include "vdi/core/SamplingRate.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/gpu/VolumeStore.h"
@@ -28,6 +29,8 @@ class TimeSteps {
 
   const Scene& scene() const { return shown_.scene; }        // global
   const ScalarRange& scalarRange() const { return range_; }  // global
+  /// What automaticRate means for that transfer function and region: the same on all ranks. Not collective.
+  double samplingRate(const TransferTable& table, const Region& region);
   /// Throws where floats can't tell values apart that the transfer function does.
   void requireSpans(const TransferTable& table) const;
   /// Of this rank's part. The seconds are told once.
@@ -35,7 +38,8 @@ class TimeSteps {
 
  private:
   struct Step {
-    Scene scene;  // global
+    Scene scene;                // global
+    std::vector<Probe> probes;  // global
     std::uint64_t blocks = 0;
     std::uint64_t bytes = 0;
     double uploadSeconds = 0.0;
@@ -44,13 +48,20 @@ class TimeSteps {
   /// By one of VolumeStore's ways.
   Step send(std::vector<Block> blocks, bool fillGhosts,
             void (gpu::VolumeStore::*way)(std::span<const Block>, const Scene&));
-  void show(const Step& step);
+  void show(Step step);
   void dropNext();
 
   const comm::Communicator& comm_;
   gpu::VolumeStore& volume_;
   Step shown_;
   ScalarRange range_;
+  /// Of the shown step: the last one that was asked for.
+  struct Rate {
+    TransferTable table;
+    Region region;
+    double samplesPerVoxel;
+  };
+  std::optional<Rate> rate_;
   std::optional<Step> next_;
 };
 

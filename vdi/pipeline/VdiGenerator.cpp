@@ -28,6 +28,12 @@ namespace {
 
 constexpr int root = 0;
 
+/// Whether depths of the settings' samples have codes (depthCodeFor).
+bool hasDepthCode(const Scene& scene, const Camera& camera, const GenerateSettings& settings) {
+  const View view = viewWithMargin(scene, camera, settings);
+  return depthCodeFor(depthLattice(scene, view, settings.samplesPerVoxel)).step > 0.0F;
+}
+
 }  // namespace
 
 struct VdiFrame::State : detail::Frame {};
@@ -75,6 +81,7 @@ struct VdiGenerator::State {
   struct Prepared {
     View view;
     DepthLattice lattice;
+    double samplesPerVoxel = 1.0;  // never automaticRate
     TransferTable table;
     TransferFunction legend;  // the function, simplified
   };
@@ -85,13 +92,23 @@ struct VdiGenerator::State {
     std::unique_ptr<Prepared> prepared;
     comm.together([&] {
       validate(settings);
-      const View view = viewWithMargin(steps->scene(), camera, settings);
-      prepared = std::make_unique<Prepared>(
-          Prepared{view, depthLattice(steps->scene(), view, settings.samplesPerVoxel), bake(function),
-                   simplified(function)});
+      const Scene& scene = steps->scene();
+      TransferTable table = bake(function);
+      GenerateSettings own = settings;
+      if (settings.samplesPerVoxel == automaticRate)
+        own.samplesPerVoxel = steps->samplingRate(table, settings.region);
+      // More samples are worth less than the compact form is.
+      while (settings.samplesPerVoxel == automaticRate && own.samplesPerVoxel > 1.0 &&
+             !hasDepthCode(scene, camera, own))
+        own.samplesPerVoxel *= 0.5;
+      const View view = viewWithMargin(scene, camera, own);
+      prepared =
+          std::make_unique<Prepared>(Prepared{view, depthLattice(scene, view, own.samplesPerVoxel),
+                                              own.samplesPerVoxel, std::move(table), simplified(function)});
       steps->requireSpans(prepared->table);
     });
     mine = {};
+    mine.samplesPerVoxel = prepared->samplesPerVoxel;
     steps->report(mine);
     return prepared;
   }

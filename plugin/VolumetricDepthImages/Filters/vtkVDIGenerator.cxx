@@ -313,6 +313,7 @@ std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::str
         r.distributeSeconds, r.compositeSeconds, r.gatherSeconds, static_cast<double>(r.bytesSent) / mib,
         static_cast<double>(r.deviceBytes) / mib);
   }
+  if (!reports.empty()) text += fmt::format("samples per voxel: {:g}\n", reports.front().samplesPerVoxel);
   return text + "device of rank 0: " + device + "\n";
 }
 

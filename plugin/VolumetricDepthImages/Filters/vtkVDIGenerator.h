@@ -210,7 +210,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   int Resolution[2] = {0, 0};
   double Margin = 0.0;
   int Supersegments = 25;
-  double SamplingRate = 1.0;
+  double SamplingRate = 0.0;
   int Algorithm = 1;
   int Budget = 0;
   double Fill = 1.0;

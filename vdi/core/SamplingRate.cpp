@@ -1,0 +1,180 @@
+#include "vdi/core/SamplingRate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <numbers>
+#include <utility>
+
+#include "vdi/core/Parallel.h"
+#include "vdi/core/SlabTable.h"
+
+namespace vdi {
+
+namespace {
+
+constexpr std::size_t probeCount = 8192;
+
+/// What squared errors of a voxel's samples may add up to, by the samples' opacity. With more, the picture's
+/// SSIM to a converged one may fall below 0.997 (docs/adr/steep-functions-get-more-samples.md).
+constexpr double tolerance = 1e-4;
+/// Larger errors of a sample count as this: a few of them don't show in the picture as much as many.
+constexpr double largestError = 0.05;
+
+/// A point of an additive sequence that fills the unit cube evenly (M. Roberts, The Unreasonable
+/// Effectiveness of Quasirandom Sequences, 2018), in five dimensions.
+double coordinateOf(std::size_t index, int dimension) {
+  constexpr double root = 1.1347241384015194;  // of x^6 = x + 1
+  const double place = static_cast<double>(index + 1) / std::pow(root, dimension + 1);
+  return place - std::floor(place);
+}
+
+struct Place {
+  glm::dvec3 center;  // relative to the scene's centre
+  glm::dvec3 step;    // along the ray, as long as a sample at rate 1
+};
+
+Place placeOf(const Scene& scene, std::size_t index) {
+  const glm::dvec3 share{coordinateOf(index, 0), coordinateOf(index, 1), coordinateOf(index, 2)};
+  const double z = 2.0 * coordinateOf(index, 3) - 1.0;
+  const double angle = 2.0 * std::numbers::pi * coordinateOf(index, 4);
+  const double across = std::sqrt(1.0 - z * z);
+  const glm::dvec3 direction{across * std::cos(angle), across * std::sin(angle), z};
+  return {(share - 0.5) * scene.bounds.size(), scene.minSpacing * direction};
+}
+
+double interpolated(const Block& block, const glm::dvec3& world) {
+  const IndexBox all = block.extended();
+  const glm::dvec3 position =
+      glm::clamp((world - block.origin) / block.spacing, glm::dvec3(all.lo), glm::dvec3(all.hi - 1));
+  const glm::ivec3 base = glm::min(glm::ivec3(glm::floor(position)), glm::max(all.hi - 2, all.lo));
+  const glm::dvec3 share = position - glm::dvec3(base);
+  double sum = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::ivec3 side{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
+    const glm::dvec3 weight = glm::mix(1.0 - share, share, glm::dvec3(side));
+    const double product = weight.x * weight.y * weight.z;
+    const glm::ivec3 at = glm::min(base + side, all.hi - 1);
+    if (product > 0.0) sum += product * valueAt(block, at.x, at.y, at.z);
+  }
+  return sum;
+}
+
+/// As samples are owned (snapToScene): each place has one owner, whatever rounding does to faces.
+bool owns(const Scene& scene, const Block& block, const glm::dvec3& center) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto at = static_cast<float>(center[axis]);
+    if (at < snapToScene(scene, block.owned.lo[axis], axis) ||
+        at >= snapToScene(scene, block.owned.hi[axis], axis))
+      return false;
+  }
+  return true;
+}
+
+Probe probeIn(const Scene& scene, const Block& block, std::size_t index, const Place& place) {
+  Probe probe;
+  probe.index = index;
+  for (std::size_t i = 0; i < Probe::offsets.size(); ++i) {
+    const glm::dvec3 world = scene.bounds.center() + place.center + Probe::offsets[i] * place.step;
+    probe.scalars[i] = interpolated(block, world);
+  }
+  return probe;
+}
+
+bool shows(const Region& region, const glm::dvec3& world) {
+  if (region.box) {
+    const glm::bvec3 below = glm::lessThan(world, region.box->lo);
+    const glm::bvec3 above = glm::greaterThanEqual(world, region.box->hi);
+    if (glm::any(below) || glm::any(above)) return false;
+  }
+  return std::ranges::all_of(region.planes, [&](const ClipPlane& plane) {
+    return glm::dot(world - plane.origin, plane.normal) >= 0.0;
+  });
+}
+
+std::vector<Probe> probesIn(const Region& region, const Scene& scene, std::span<const Probe> probes) {
+  std::vector<Probe> shown;
+  shown.reserve(probes.size());
+  for (const Probe& probe : probes) {
+    if (region == Region{} || shows(region, scene.bounds.center() + placeOf(scene, probe.index).center))
+      shown.push_back(probe);
+  }
+  return shown;
+}
+
+/// Of what one slab shows and what its two halves show.
+struct SlabError {
+  double squared = 0.0;
+  double opacity = 0.0;
+};
+
+SlabError errorOf(const SlabIntegral& slabs, const std::array<double, 3>& positions, double length) {
+  const glm::dvec4 whole = slabs.between(positions[0], positions[2], length);
+  glm::dvec4 halves = slabs.between(positions[0], positions[1], 0.5 * length);
+  halves += (1.0 - halves.a) * slabs.between(positions[1], positions[2], 0.5 * length);
+  const glm::dvec4 off = glm::abs(whole - halves);
+  const double largest = std::min(std::max({off.r, off.g, off.b, off.a}), largestError);
+  return {largest * largest, halves.a};
+}
+
+/// At rate 1, or at rate 2 with a slab half as long in the probe's middle.
+bool showsEnough(const TransferTable& table, const SlabIntegral& slabs, double minSpacing,
+                 std::span<const Probe> probes, double rate) {
+  std::vector<SlabError> errors(probes.size());
+  const std::size_t aside = rate < 2.0 ? 2 : 1;
+  const double length = minSpacing / rate / table.unitDistance;
+  inParallel(probes.size(), 256, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const std::array positions{table.positionOf(probes[i].scalars[2 - aside]),
+                                 table.positionOf(probes[i].scalars[2]),
+                                 table.positionOf(probes[i].scalars[2 + aside])};
+      if (std::ranges::any_of(positions, [](double position) { return std::isnan(position); })) continue;
+      errors[i] = errorOf(slabs, positions, length);
+    }
+  });
+  SlabError sum;
+  for (const SlabError& error : errors) {
+    sum.squared += error.squared;
+    sum.opacity += error.opacity;
+  }
+  return rate * sum.squared <= tolerance * sum.opacity;
+}
+
+}  // namespace
+
+std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
+  std::vector<Probe> probes;
+  if (scene.bounds.empty() || !(scene.minSpacing > 0.0)) return probes;
+  std::vector<std::pair<Place, std::size_t>> places;  // by x: a block looks at those between its faces
+  places.reserve(probeCount);
+  for (std::size_t index = 0; index < probeCount; ++index) places.emplace_back(placeOf(scene, index), index);
+  const auto isBefore = [](const auto& a, const auto& b) { return a.first.center.x < b.first.center.x; };
+  std::ranges::sort(places, isBefore);
+  for (const Block& block : blocks) {
+    if (block.owned.empty()) continue;
+    const double spare = 1e-5 * scene.bounds.size().x;  // more than snapping moves a face
+    const auto at = [&](double x) {
+      return std::pair(Place{glm::dvec3(x - scene.bounds.center().x, 0.0, 0.0), {}}, std::size_t{0});
+    };
+    const auto first = std::ranges::lower_bound(places, at(block.owned.lo.x - spare), isBefore);
+    const auto last = std::ranges::upper_bound(places, at(block.owned.hi.x + spare), isBefore);
+    for (auto place = first; place < last; ++place) {
+      if (owns(scene, block, place->first.center))
+        probes.push_back(probeIn(scene, block, place->second, place->first));
+    }
+  }
+  std::ranges::sort(probes, {}, &Probe::index);
+  return probes;
+}
+
+double samplingRateFor(const TransferTable& table, const Scene& scene, const Region& region,
+                       std::span<const Probe> probes) {
+  const SlabIntegral slabs(table);
+  const std::vector<Probe> shown = probesIn(region, scene, probes);
+  for (const double rate : {1.0, 2.0}) {
+    if (showsEnough(table, slabs, scene.minSpacing, shown, rate)) return rate;
+  }
+  return 4.0;
+}
+
+}  // namespace vdi
