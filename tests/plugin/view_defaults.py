@@ -161,7 +161,7 @@ while 0 <= percent_of(again) < 100:
     pass
 check(percent_of(again) == -1, "it ends once another edit holds the filter")
 again.SMProxy.InvokeCommand("Release")
-again.Supersegments, again.Resolution, again.SamplingRate = 25, SIZE, 1
+again.Supersegments, again.Resolution, again.SamplingRate = 25, SIZE, 0
 picture(again)
 
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0.3, 0.5, 0]
