@@ -72,7 +72,7 @@ taken = picture(image)
 check(np.abs(taken.astype(int) - first).max() > 30, "which shows the other opacity")
 image.SamplingRate = 2
 picture(image)
-image.SamplingRate = 1
+image.SamplingRate = 0
 check(np.array_equal(picture(image), taken), "as an update without a preparation does")
 # One that's given up, and one whose filter goes before it is there.
 image.Supersegments, image.Resolution, image.SamplingRate = 40, [400, 300], 4
