@@ -104,6 +104,12 @@ TEST_CASE("sampling rate: values that aren't finite decide nothing") {
   CHECK(rateOf(holes, hues(6, 0.6)) == 1.0);
 }
 
+TEST_CASE("sampling rate: values far beyond the transfer function take no longer than others") {
+  const auto far = whole([](const glm::ivec3& at) { return at.x % 5 == 0 ? -3e38 : 3e38 * ball(at, 12.0); });
+  const double rate = rateOf(far, hues(6, 0.6));
+  CHECK((rate == 1.0 || rate == 2.0 || rate == 4.0));
+}
+
 TEST_CASE("sampling rate: every decomposition has the same probes") {
   const auto value = [](const glm::ivec3& at) { return ball(at, 2.0) + 0.01 * std::sin(at.x * at.y + at.z); };
   const auto all = whole(value);

@@ -125,10 +125,11 @@ bool showsEnough(const TransferTable& table, const SlabIntegral& slabs, double m
   const double length = minSpacing / rate / table.unitDistance;
   inParallel(probes.size(), 256, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
+      const auto isLost = [](double scalar) { return !std::isfinite(scalar); };
+      if (std::ranges::any_of(probes[i].scalars, isLost)) continue;
       const std::array positions{table.positionOf(probes[i].scalars[2 - aside]),
                                  table.positionOf(probes[i].scalars[2]),
                                  table.positionOf(probes[i].scalars[2 + aside])};
-      if (std::ranges::any_of(positions, [](double position) { return std::isnan(position); })) continue;
       errors[i] = errorOf(slabs, positions, length);
     }
   });

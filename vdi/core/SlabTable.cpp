@@ -48,7 +48,7 @@ glm::dvec4 SlabIntegral::mean(double front, double back, double length) const {
 glm::dvec4 SlabIntegral::between(double front, double back, double length) const {
   constexpr double thin = 0.1;     // optical depth that hides nothing behind it
   constexpr double opaque = 16.0;  // that lets nothing through
-  constexpr int maxParts = 64;
+  constexpr double maxParts = 64.0;
   constexpr double nearlyNothing = 1e-6;  // where the difference of two sums is lost in rounding
   const double span = back - front;
   if (std::abs(span) < nearlyNothing)
@@ -56,7 +56,8 @@ glm::dvec4 SlabIntegral::between(double front, double back, double length) const
   const glm::dvec4 start = upTo(front);
   const glm::dvec4 whole = (upTo(back) - start) / span;
   if (whole.a * length <= thin) return accumulated(whole, length);
-  const int parts = std::clamp(static_cast<int>(std::abs(span)), 1, maxParts);
+  const int parts =
+      static_cast<int>(std::clamp(std::abs(span), 1.0, maxParts));  // spans may be beyond any int
   glm::dvec4 sum(0.0);
   glm::dvec4 before = start;
   for (int part = 1; part <= parts && sum.a < 1.0 - std::exp2(-opaque); ++part) {
