@@ -27,7 +27,8 @@ install(
 install(FILES vdi/comm/Communicator.h DESTINATION "${headerDir}/vdi/comm")
 install(FILES vdi/gpu/Device.h vdi/gpu/DeviceLimits.h vdi/gpu/DeviceRequest.h
         DESTINATION "${headerDir}/vdi/gpu")
-install(FILES vdi/pipeline/Reports.h vdi/pipeline/VdiGenerator.h vdi/pipeline/VdiRenderer.h DESTINATION "${headerDir}/vdi/pipeline")
+install(FILES vdi/pipeline/Reports.h vdi/pipeline/VdiGenerator.h vdi/pipeline/VdiRenderer.h
+        DESTINATION "${headerDir}/vdi/pipeline")
 install(EXPORT pv-vdi-vdi-targets NAMESPACE pv-vdi:: DESTINATION "${cmakeDir}")
 vdi_install_pkg_config(pv-vdi)
 

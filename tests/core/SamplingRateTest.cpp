@@ -1,11 +1,11 @@
 #include "vdi/core/SamplingRate.h"
 
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <vector>
+#include "tests/Catch.h"
 
 using namespace vdi;
 

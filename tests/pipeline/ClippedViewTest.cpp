@@ -1,8 +1,8 @@
 // Views of a VDI that planes clip: the device against the reference, and against what needs no planes.
 #include <algorithm>
-#include <catch2/catch.hpp>
 #include <cmath>
 #include <vector>
+#include "tests/Catch.h"
 
 #include "tests/Devices.h"
 #include "tests/Scenes.h"

@@ -193,7 +193,8 @@ TEST_CASE("shaded: the picture and VDI of N ranks are those of one", "[ranks]") 
       REQUIRE(anythingSeen(*truth));
       CHECK(largestDifference(*volume, *truth) < 1.0F);
       const auto alone = one.generate(camera, function, settings);
-      CHECK(largestDifference(flatten(*vdi), flatten(*alone)) < 2.0F);
+      // Colours that are cut off at 1 are rounded once more on each side.
+      CHECK(largestDifference(flatten(*vdi), flatten(*alone)) < (diffuse < 1.0 ? 2.0F : 2.5F));
       if (diffuse < 1.0) CHECK(largestDifference(flatten(*vdi), *truth) < 1.5F);
     }
   }

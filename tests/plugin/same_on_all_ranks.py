@@ -36,11 +36,12 @@ def filter_of(source, name="RTData", **properties):
 
 wavelet = simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8])
 nothing = filter_of(simple.TrivialProducer(registrationName="gird"))
-for attempt in ("first", "second", "third"):
-    check(errors_of(nothing), "rank %d: an input without data fails the %s time" % (rank, attempt))
+check(errors_of(nothing), "rank %d: an input without data is an error" % rank)
+for attempt in ("second", "third"):
+    check(not errors_of(nothing), "rank %d: that isn't said a %s time" % (rank, attempt))
 image = filter_of(wavelet, "RTDate")
-for attempt in ("first", "second"):
-    check("no array 'RTDate'" in errors_of(image), "rank %d: a missing array fails the %s time" % (rank, attempt))
+check("no array 'RTDate'" in errors_of(image), "rank %d: a missing array is an error" % rank)
+check(not errors_of(image), "rank %d: that isn't said twice" % rank)
 image.SelectInputScalars = ["POINTS", "RTData"]
 check(not errors_of(image), "rank %d: mended, it works" % rank)
 

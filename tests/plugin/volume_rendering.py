@@ -150,7 +150,8 @@ for data, make in DATA.items():
             report = image.SMProxy.GetProperty("Report").GetElement(0)
             rate = report.split("samples per voxel: ")[1].split()[0]
             similar, to_theirs = ssim(seen, fine), ssim(seen, theirs)
-            check(similar >= 0.995, "%s %s: SSIM of %s at the default rate, %s, and eight %.4f; to ParaView's %.4f, at eight %.4f"
+            check(similar >= 0.995,
+                  "%s %s: SSIM of %s at the default rate, %s, and eight %.4f; to ParaView's %.4f, at eight %.4f"
                   % (data, name, what, rate, similar, to_theirs, ssim(fine, theirs)))
             write_png("%s_%s_%s.png" % (data, name, what.split()[-1]), np.hstack([seen, fine, theirs]))
         simple.Delete(view)

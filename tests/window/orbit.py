@@ -109,7 +109,8 @@ def two_views():
     def wait_for_making(view, made):
         wait_for("VDI from view {}".format(view), lambda: inside("makings_from({})".format(view)), 60)
         time.sleep(1)  # Auto looks four times a second
-        assert inside("makings_from({})".format(view)) == made, "VDIs are made again and again"
+        makings = inside("makings_from({})".format(view))
+        assert makings == made, "VDIs are made again and again: {} instead of {}".format(makings, made)
 
     inside("activate(0)")
     inside("turn_auto(1)")

@@ -23,9 +23,11 @@ constexpr double largestError = 0.05;
 
 /// A point of an additive sequence that fills the unit cube evenly (M. Roberts, The Unreasonable
 /// Effectiveness of Quasirandom Sequences, 2018), in five dimensions.
-double coordinateOf(std::size_t index, int dimension) {
+double coordinateOf(std::size_t index, std::size_t dimension) {
   constexpr double root = 1.1347241384015194;  // of x^6 = x + 1
-  const double place = static_cast<double>(index + 1) / std::pow(root, dimension + 1);
+  constexpr std::array powers{root, root * root, root * root * root, root * root * root * root,
+                              root * root * root * root * root};
+  const double place = static_cast<double>(index + 1) / powers[dimension];
   return place - std::floor(place);
 }
 
@@ -144,13 +146,18 @@ bool showsEnough(const TransferTable& table, const SlabIntegral& slabs, double m
 }  // namespace
 
 std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
-  std::vector<Probe> probes;
-  if (scene.bounds.empty() || !(scene.minSpacing > 0.0)) return probes;
+  if (scene.bounds.empty() || !(scene.minSpacing > 0.0)) return {};
   std::vector<std::pair<Place, std::size_t>> places;  // by x: a block looks at those between its faces
   places.reserve(probeCount);
   for (std::size_t index = 0; index < probeCount; ++index) places.emplace_back(placeOf(scene, index), index);
   const auto isBefore = [](const auto& a, const auto& b) { return a.first.center.x < b.first.center.x; };
   std::ranges::sort(places, isBefore);
+  struct Owned {
+    const Block* block;
+    std::size_t index;
+    Place place;
+  };
+  std::vector<Owned> owned;
   for (const Block& block : blocks) {
     if (block.owned.empty()) continue;
     const double spare = 1e-5 * scene.bounds.size().x;  // more than snapping moves a face
@@ -160,11 +167,16 @@ std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
     const auto first = std::ranges::lower_bound(places, at(block.owned.lo.x - spare), isBefore);
     const auto last = std::ranges::upper_bound(places, at(block.owned.hi.x + spare), isBefore);
     for (auto place = first; place < last; ++place) {
-      if (owns(scene, block, place->first.center))
-        probes.push_back(probeIn(scene, block, place->second, place->first));
+      if (owns(scene, block, place->first.center)) owned.push_back({&block, place->second, place->first});
     }
   }
-  std::ranges::sort(probes, {}, &Probe::index);
+  std::ranges::sort(owned, {}, &Owned::index);
+  // Each step of a simulation takes this time, whatever rate is asked for.
+  std::vector<Probe> probes(owned.size());
+  inParallel(owned.size(), 256, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i)
+      probes[i] = probeIn(scene, *owned[i].block, owned[i].index, owned[i].place);
+  });
   return probes;
 }
 

@@ -39,6 +39,10 @@ void enterCollective(vtkMultiProcessController* controller, const std::string& o
   if (!entry.refusal.empty()) throw vdi::Error(vdi::ErrorCode::RemoteRank, entry.refusal);
 }
 
+bool isWatched(vtkMultiProcessController* controller) {
+  return controller != nullptr && controller->HasObserver(CollectiveEntry::event) != 0;
+}
+
 namespace {
 
 struct Existing {

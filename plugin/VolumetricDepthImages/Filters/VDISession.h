@@ -22,6 +22,8 @@ bool isServer();
 /// To be called on all ranks before a collective operation: throws vdi::Error{RemoteRank} where another rank
 /// won't enter (VDICollective.h).
 void enterCollective(vtkMultiProcessController* controller, const std::string& operation);
+/// Whether a simulation's adaptor watches over such operations.
+bool isWatched(vtkMultiProcessController* controller);
 
 /// The process's device, made at the first call and kept while anybody holds it. Where that is lost, a new
 /// one. From any thread. Throws vdi::Error{DeviceUnavailable}.

@@ -381,7 +381,9 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
 }
 
 void vtkVDIGenerator::SayFailure(const std::exception& error) {
-  if (this->Internal->Said.isNew(this, error.what())) vtkErrorMacro(<< error.what());
+  // Simulations learn from the message that a step has failed, so each step has one.
+  const bool isNew = this->Internal->Said.isNew(this, error.what());
+  if (isNew || pv::isWatched(this->Controller)) vtkErrorMacro(<< error.what());
 }
 
 /// Whether `error` is that a rank has lost its device: the generators are given up then, and new ones get

@@ -24,8 +24,9 @@
 
 namespace {
 
-/// To where it hides as little of the active view as the screen allows: left, right, below or above it.
-/// Before it's shown: the window manager gives it a frame like the main window's.
+/// To where it hides as little of the active view as the screen allows: left, right, below or above it. It
+/// gets no higher than the space below the view's upper edge, or it would hide the main window's menus and
+/// its own title bar. The window manager gives it a frame like the main window's.
 void moveBesideView(QDialog* dialog) {
   pqView* active = pqActiveObjects::instance().activeView();
   const QWidget* widget = active != nullptr ? active->widget() : nullptr;
@@ -33,7 +34,11 @@ void moveBesideView(QDialog* dialog) {
   if (widget == nullptr || main == nullptr || main->windowHandle() == nullptr) return;
   const QRect view(widget->mapToGlobal(QPoint(0, 0)), widget->size());
   const QRect room = main->windowHandle()->screen()->availableGeometry();
-  const QSize size = dialog->size() + main->frameGeometry().size() - main->size();
+  const QSize frame = main->frameGeometry().size() - main->size();
+  const int most = room.bottom() + 1 - view.top() - frame.height();
+  if (most >= dialog->minimumSizeHint().height())
+    dialog->resize(dialog->width(), std::min(dialog->height(), most));
+  const QSize size = dialog->size() + frame;
   const auto inside = [&](int x, int y) {
     return QPoint(std::clamp(x, room.left(), std::max(room.left(), room.right() + 1 - size.width())),
                   std::clamp(y, room.top(), std::max(room.top(), room.bottom() + 1 - size.height())));

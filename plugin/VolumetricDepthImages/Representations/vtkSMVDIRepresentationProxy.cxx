@@ -74,6 +74,11 @@ bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
 
 void vtkSMVDIRepresentationProxy::ViewUpdated(vtkSMProxy* view) {
   if (vtkSMPropertyHelper(this, "Representation").GetAsString() == ownType) this->TakeLegend(view);
+  // A comparative view copies the representation before its type is set, and links the copies from then on.
+  if (!this->TypeIsLinked) {
+    this->TypeIsLinked = true;
+    this->GetProperty("Representation")->Modified();
+  }
   this->Superclass::ViewUpdated(view);
 }
 

@@ -54,7 +54,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
   void DropLegend();
   bool HasLegend();
 
-  std::string FileColoring;  // that the maps of an opened file were last made of
+  bool TypeIsLinked = false;  // with the copies of a comparative view
+  std::string FileColoring;   // that the maps of an opened file were last made of
 };
 
 #endif
