@@ -186,15 +186,25 @@ def show_in_two_views():
         simple.Render(view)
     image.CameraPosition, image.CameraFocalPoint = [-50, 60, -50], [0, 0, 0]
     simple.Render(first)
-    shown["report"] = image.GetClientSideObject().GetReport()
+    shown["values"] = values_of(image)
     image.GetClientSideObject().AddObserver("EndEvent", lambda *_: count_making())
 
 
+def values_of(image):
+    """Which values its output has: each making makes new ones."""
+    array = image.GetClientSideObject().GetOutputDataObject(0).GetPointData().GetArray(0)
+    return array.__this__ if array else ""
+
+
 def count_making():
-    """An update that finds its VDI made leaves the report as it is."""
-    report = shown["vdi"].GetClientSideObject().GetReport()
-    if report != shown["report"]:
-        shown.update(report=report, makings=shown["makings"] + 1)
+    """An update that finds its VDI made hands out the same values."""
+    values = values_of(shown["vdi"])
+    if values != shown["values"]:
+        shown.update(values=values, makings=shown["makings"] + 1)
+
+
+def forget_makings():
+    shown["makings"] = 0
 
 
 def turn_auto(on):
