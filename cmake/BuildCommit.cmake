@@ -7,7 +7,7 @@ execute_process(
 if(NOT commit)
   set(commit "unknown")
 endif()
-set(text "inline constexpr const char* buildCommit = \"${commit}\";\n")
+set(text "#pragma once\ninline constexpr const char* buildCommit = \"${commit}\";\n")
 set(existing "")
 if(EXISTS "${OUTPUT}")
   file(READ "${OUTPUT}" existing)

@@ -19,7 +19,7 @@ double limitedDifference(double last, double before) {
 }
 
 template <typename Visit>
-void forEachIndex(const IndexBox& box, Visit visit) {
+void visitIndices(const IndexBox& box, Visit visit) {
   for (int z = box.lo.z; z < box.hi.z; ++z) {
     for (int y = box.lo.y; y < box.hi.y; ++y) {
       for (int x = box.lo.x; x < box.hi.x; ++x) visit(glm::ivec3(x, y, z));
@@ -33,7 +33,7 @@ class Continuation {
     for (const OpenPatch& patch : patches) {
       std::vector<bool>& open = open_.emplace_back(patch.box.count(), false);
       for (const IndexBox& box : patch.open)
-        forEachIndex(box, [&](const glm::ivec3& at) { open[patch.box.position(at)] = true; });
+        visitIndices(box, [&](const glm::ivec3& at) { open[patch.box.position(at)] = true; });
     }
   }
 
@@ -42,7 +42,7 @@ class Continuation {
     std::vector<Filled> filled;
     for (std::size_t i = 0; i < patches_.size(); ++i) {
       for (const IndexBox& box : patches_[i].open) {
-        forEachIndex(box, [&](const glm::ivec3& at) {
+        visitIndices(box, [&](const glm::ivec3& at) {
           const std::size_t place = patches_[i].box.position(at);
           if (!open_[i][place]) return;
           if (const std::optional<double> value = continuedAt(at)) filled.push_back({i, place, *value});

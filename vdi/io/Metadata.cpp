@@ -15,32 +15,32 @@ using nlohmann::json;
 
 namespace {
 
-[[noreturn]] void fail(const std::string& what) {
+[[noreturn]] void refuse(const std::string& what) {
   throw Error(ErrorCode::Format, "the metadata aren't sound: " + what);
 }
 
 /// The field of an object; fails where there is none.
 const json& at(const json& object, const char* name) {
   const auto found = object.find(name);
-  if (found == object.end()) fail(fmt::format("'{}' is missing", name));
+  if (found == object.end()) refuse(fmt::format("'{}' is missing", name));
   return *found;
 }
 
 const json& objectAt(const json& object, const char* name) {
   const json& value = at(object, name);
-  if (!value.is_object()) fail(fmt::format("'{}' is no object", name));
+  if (!value.is_object()) refuse(fmt::format("'{}' is no object", name));
   return value;
 }
 
 double numberAt(const json& object, const char* name) {
   const json& value = at(object, name);
-  if (!value.is_number()) fail(fmt::format("'{}' is no number", name));
+  if (!value.is_number()) refuse(fmt::format("'{}' is no number", name));
   return value.get<double>();
 }
 
 std::string textAt(const json& object, const char* name) {
   const json& value = at(object, name);
-  if (!value.is_string()) fail(fmt::format("'{}' is no text", name));
+  if (!value.is_string()) refuse(fmt::format("'{}' is no text", name));
   return value.get<std::string>();
 }
 
@@ -48,7 +48,7 @@ int wholeNumberAt(const json& object, const char* name) {
   const json& value = at(object, name);
   constexpr std::int64_t most = std::numeric_limits<int>::max();
   if (!value.is_number_integer() || value.get<std::int64_t>() < -most || value.get<std::int64_t>() > most)
-    fail(fmt::format("'{}' is no whole number", name));
+    refuse(fmt::format("'{}' is no whole number", name));
   return value.get<int>();
 }
 
@@ -57,7 +57,7 @@ std::vector<std::vector<double>> rowsAt(const json& object, const char* name, st
   const json& value = at(object, name);
   std::vector<std::vector<double>> rows;
   const auto require = [&](bool good) {
-    if (!good) fail(fmt::format("'{}' is no list of lists of {} numbers", name, width));
+    if (!good) refuse(fmt::format("'{}' is no list of lists of {} numbers", name, width));
   };
   require(value.is_array());
   for (const json& row : value) {
@@ -74,7 +74,7 @@ std::vector<std::vector<double>> rowsAt(const json& object, const char* name, st
 
 ScalarArray arrayIn(const json& object) {
   const std::string association = textAt(object, "association");
-  if (association != "points" && association != "cells") fail("'association' is neither points nor cells");
+  if (association != "points" && association != "cells") refuse("'association' is neither points nor cells");
   return {.name = textAt(object, "name"),
           .cells = association == "cells",
           .components = wholeNumberAt(object, "components"),
@@ -99,7 +99,7 @@ Coloring coloringOf(const json& object) {
     const json& range = object.at("range");
     if (!range.is_array() || range.size() != 2 || !range[0].is_number() || !range[1].is_number() ||
         range[0].get<double>() > range[1].get<double>())
-      fail("'range' isn't two ascending numbers");
+      refuse("'range' isn't two ascending numbers");
     coloring.range = {range[0].get<double>(), range[1].get<double>()};
   }
   return coloring;
@@ -128,20 +128,20 @@ std::string metadataText(const Coloring& coloring, double time, std::uint64_t ti
               {"timeStep", timeStep}};
   if (range.min <= range.max) object["range"] = {range.min, range.max};
   std::string text = object.dump(-1, ' ', false, json::error_handler_t::replace);
-  if (text.size() > maxMetadataBytes) fail(fmt::format("they would take {} bytes", text.size()));
+  if (text.size() > maxMetadataBytes) refuse(fmt::format("they would take {} bytes", text.size()));
   return text;
 }
 
 Coloring coloringIn(std::string_view text) {
-  if (text.size() > maxMetadataBytes) fail(fmt::format("they take {} bytes", text.size()));
+  if (text.size() > maxMetadataBytes) refuse(fmt::format("they take {} bytes", text.size()));
   try {
     const json object = json::parse(text.begin(), text.end());
-    if (!object.is_object()) fail("they are no JSON object");
+    if (!object.is_object()) refuse("they are no JSON object");
     Coloring coloring = coloringOf(object);
     validate(coloring);
     return coloring;
   } catch (const json::exception& error) {
-    fail(error.what());
+    refuse(error.what());
   }
 }
 

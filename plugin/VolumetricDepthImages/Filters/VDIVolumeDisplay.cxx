@@ -126,8 +126,9 @@ void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& bounds)
   std::array<double, 6> box{};
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<unsigned int>(axis);
-    box[2 * i] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * bounds.lo[axis];
-    box[2 * i + 1] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * bounds.hi[axis];
+    const std::size_t place = 2 * static_cast<std::size_t>(axis);
+    box[place] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * bounds.lo[axis];
+    box[place + 1] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * bounds.hi[axis];
   }
   vtkSMPropertyHelper(filter, "Cropping").Set(1);
   vtkSMPropertyHelper(filter, "CroppingBox").Set(box.data(), 6);

@@ -21,7 +21,7 @@
 
 namespace {
 
-constexpr int lookMilliseconds = 250;
+constexpr int viewLookMilliseconds = 250;
 
 }  // namespace
 
@@ -46,7 +46,7 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
   this->Line->setWordWrap(true);
   this->Line->setMinimumHeight(this->Line->fontMetrics().lineSpacing());
   layout->addWidget(this->Line);
-  this->Looking.setInterval(lookMilliseconds);
+  this->Looking.setInterval(viewLookMilliseconds);
   this->connect(&this->Looking, &QTimer::timeout, this, &pqVDIRegenerateWidget::lookAgain);
   this->connect(this->Auto, &QCheckBox::clicked, this, &pqVDIRegenerateWidget::setAuto);
   pqCoreUtilities::connect(proxy->GetProperty("Auto"), vtkCommand::ModifiedEvent, this, SLOT(showAuto()));
