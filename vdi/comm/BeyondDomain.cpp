@@ -5,6 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "vdi/comm/Indices.h"
+
 namespace vdi::comm {
 
 namespace {
@@ -18,22 +20,13 @@ double limitedDifference(double last, double before) {
   return std::clamp(next, -bound, 2.0 * bound) * (last > 0.0 ? 1.0 : -1.0);
 }
 
-template <typename Visit>
-void visitIndices(const IndexBox& box, Visit visit) {
-  for (int z = box.lo.z; z < box.hi.z; ++z) {
-    for (int y = box.lo.y; y < box.hi.y; ++y) {
-      for (int x = box.lo.x; x < box.hi.x; ++x) visit(glm::ivec3(x, y, z));
-    }
-  }
-}
-
 class Continuation {
  public:
   Continuation(const Block& block, std::span<const OpenPatch> patches) : block_(block), patches_(patches) {
     for (const OpenPatch& patch : patches) {
       std::vector<bool>& open = open_.emplace_back(patch.box.count(), false);
       for (const IndexBox& box : patch.open)
-        visitIndices(box, [&](const glm::ivec3& at) { open[patch.box.position(at)] = true; });
+        forEachIndex(box, [&](const glm::ivec3& at) { open[patch.box.position(at)] = true; });
     }
   }
 
@@ -42,7 +35,7 @@ class Continuation {
     std::vector<Filled> filled;
     for (std::size_t i = 0; i < patches_.size(); ++i) {
       for (const IndexBox& box : patches_[i].open) {
-        visitIndices(box, [&](const glm::ivec3& at) {
+        forEachIndex(box, [&](const glm::ivec3& at) {
           const std::size_t place = patches_[i].box.position(at);
           if (!open_[i][place]) return;
           if (const std::optional<double> value = continuedAt(at)) filled.push_back({i, place, *value});

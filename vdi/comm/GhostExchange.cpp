@@ -14,6 +14,7 @@
 
 #include "vdi/comm/BeyondDomain.h"
 #include "vdi/comm/BlockDirectory.h"
+#include "vdi/comm/Indices.h"
 #include "vdi/core/Scene.h"
 
 namespace vdi::comm {
@@ -169,20 +170,6 @@ class Sampler {
   const Block& block_;
   std::vector<const Patch*> patches_;
 };
-
-template <typename Visit>
-void forEachRow(const IndexBox& box, Visit visit) {
-  for (int z = box.lo.z; z < box.hi.z; ++z) {
-    for (int y = box.lo.y; y < box.hi.y; ++y) visit(glm::ivec3(box.lo.x, y, z));
-  }
-}
-
-template <typename Visit>
-void forEachIndex(const IndexBox& box, Visit visit) {
-  forEachRow(box, [&](glm::ivec3 at) {
-    for (; at.x < box.hi.x; ++at.x) visit(at);
-  });
-}
 
 /// All blocks of all ranks get the one type that holds all of theirs.
 void makeTypesOne(const Communicator& comm, std::vector<Block>& blocks) {
