@@ -442,18 +442,29 @@ class Window:
         time.sleep(0.2)
 
     def menu(self, *path):
-        """Menu ▸ submenu ▸ item."""
+        """Menu ▸ submenu ▸ item. A dialog that has just closed may still take the focus, at which Qt closes the menus, so
+        the way is walked again as a user would."""
+        for _ in range(2):
+            try:
+                return self._walk_menus(path)
+            except (AssertionError, ValueError) as error:
+                print("%s; the menus are opened again" % error, flush=True)
+                self.key("Escape", "Escape", "Escape")
+        return self._walk_menus(path)
+
+    def _walk_menus(self, path):
         self.click(path[0], "menu item")
         for above, name in zip(path, path[1:]):
             time.sleep(0.3)
             try:
-                self.click(self.find(name, "menu item", 1.5))
+                place = self.find(name, "menu item", 1.5)
             except AssertionError:
-                self.click(self._place_in_submenu(above, name))
+                place = self._place_in_submenu(above, name)
+            self.click(place)
 
     def _place_in_submenu(self, above, name):
         """Of an action that ParaView has in two menus, for which Qt tells the place in the other one."""
-        submenu = self.find(above, "menu item")
+        submenu = self.find(above, "menu item", 5)
         names = [widget.name for widget in self.widgets(submenu, hidden=True) if widget.role == "menu item"]
         x, y, width, height = submenu.box
         return x + width + 40, y + height // 2 + height * names.index(name)
