@@ -131,7 +131,7 @@ PyMethodDef leaveMethod{"leave", leave, METH_O, nullptr};
 /// script_guard.py, installed.
 class Guard {
  public:
-  explicit Guard(Agreement& agreement) {
+  Guard(Agreement& agreement, const std::string& plugin) {
     const vtkPythonScopeGilEnsurer lock;
     constexpr const char* name = "_vdi_guard";
     vtkSmartPyObject code(Py_CompileString(scriptGuard, name, Py_file_input));
@@ -140,7 +140,8 @@ class Guard {
     vtkSmartPyObject function(capsule ? PyCFunction_New(&leaveMethod, capsule) : nullptr);
     vtkSmartPyObject done;
     if (module_ && function)
-      done.TakeReference(PyObject_CallMethod(module_, "install", "O", function.GetPointer()));
+      done.TakeReference(
+          PyObject_CallMethod(module_, "install", "Os", function.GetPointer(), plugin.c_str()));
     if (done) return;
     PyErr_Print();
     throw std::runtime_error("ParaView's Python modules can't be imported; is python3-paraview installed?");
@@ -210,22 +211,23 @@ struct Engine::State {
       controller->RemoveObserver(entry);
     if (vtkInSituInitializationHelper::IsInitialized()) vtkInSituInitializationHelper::Finalize();
   }
-  void start();
+  void start(const std::string& plugin);
   void watchEntries();
   void add(const std::vector<std::string>& scripts);
   std::optional<std::string> result(bool good);
 };
 
-void Engine::State::start() {
+void Engine::State::start(const std::string& plugin) {
   using Helper = vtkInSituInitializationHelper;
   if (!Helper::IsPythonSupported()) throw std::runtime_error("this ParaView was built without Python");
+  vtkLogger::EnableUnsafeSignalHandler = false;  // SIGTERM and the like stay the simulation's
   pv::initializeInSitu<Helper>(static_cast<vtkTypeUInt64>(MPI_Comm_c2f(comm.get())));
   Log::silenceOtherOutput();
   auto* manager = vtkSMProxyManager::GetProxyManager();
   auto* proxies = manager != nullptr ? manager->GetActiveSessionProxyManager() : nullptr;
   if (proxies == nullptr) throw std::runtime_error("ParaView's in situ engine doesn't start");
   vtkPythonInterpreter::Initialize(0);  // 0: signals stay the simulation's
-  guard.emplace(agreement);
+  guard.emplace(agreement, plugin);
   watchEntries();
   producer.TakeReference(vtkSMSourceProxy::SafeDownCast(proxies->NewProxy("sources", "PVTrivialProducer")));
   producer->UpdateVTKObjects();
@@ -260,12 +262,12 @@ std::optional<std::string> Engine::State::result(bool good) {
   return error;
 }
 
-Engine::Engine(int fortranCommunicator) {
+Engine::Engine(int fortranCommunicator, const std::string& plugin) {
   static std::atomic<bool> started = false;  // what's counted is starts in this process, whoever's they are
   if (vtkInSituInitializationHelper::IsInitialized() || started.exchange(true))
     throw std::runtime_error("ParaView's in situ engine starts only once in a process");
   state_ = std::make_unique<State>(fortranCommunicator);
-  state_->start();
+  state_->start(plugin);
 }
 
 void Engine::check(const std::string& script) {

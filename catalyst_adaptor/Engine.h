@@ -13,8 +13,9 @@ namespace vdi::catalyst {
 /// One a process: ParaView can't be started twice. Collective throughout, but for check.
 class Engine {
  public:
-  /// Throws std::runtime_error when the engine was started before or won't start.
-  explicit Engine(int fortranCommunicator);
+  /// Scripts find `plugin`, the path of our plugin, as VDI_PLUGIN in os.environ. Throws std::runtime_error
+  /// when the engine was started before or won't start.
+  Engine(int fortranCommunicator, const std::string& plugin);
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "catalyst_adaptor/EngineFunctions.h"
+#include "catalyst_adaptor/ProcessState.h"
 
 enum { MESSAGE_SIZE = 4096, PATH_SIZE = 2048 };
 
@@ -32,14 +33,10 @@ static int load_engine(char message[MESSAGE_SIZE]) {
     snprintf(message, MESSAGE_SIZE, "the engine can't be found: the path of libvdi_catalyst.so is unknown");
     return 1;
   }
-  /* Simulations may trap floating-point exceptions, which are ordinary in libraries' initialisers. */
-  fenv_t traps;
-  feholdexcept(&traps);
   /* Local: ParaView's symbols and those of the many libraries below it don't mix with the simulation's. */
   void* library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
   engine = library != NULL ? dlsym(library, VDI_CATALYST_ENGINE_SYMBOL) : NULL;
   const char* reason = engine == NULL ? dlerror() : NULL;
-  fesetenv(&traps);
   if (engine != NULL) return 0;
   snprintf(message, MESSAGE_SIZE,
            "the engine %s can't be loaded: %s; it needs " VDI_PARAVIEW
@@ -84,9 +81,14 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
     return VDI_CATALYST_BAD_ARGUMENT;
   }
   char message[MESSAGE_SIZE] = "";
+  int code = VDI_CATALYST_ENGINE;
+  vdi_process_state state;
+  vdi_process_state_save(&state);
   const int failed = load_engine(message);
-  if (failed_anywhere(comm, failed, message) || engine == NULL) return VDI_CATALYST_ENGINE;
-  return engine->initialize(fortran_communicator, script_count, scripts, catalyst);
+  if (!failed_anywhere(comm, failed, message) && engine != NULL)
+    code = engine->initialize(fortran_communicator, script_count, scripts, catalyst);
+  vdi_process_state_restore(&state);
+  return code;
 }
 
 /* Without an engine there are no handles either. */
@@ -94,22 +96,42 @@ static int usable(const vdi_catalyst* catalyst) {
   return engine != NULL && catalyst != NULL;
 }
 
+/* This and the next function run nothing but our own code, which changes no more than that. */
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
-  return usable(catalyst) ? engine->set_blocks(catalyst, count, blocks) : VDI_CATALYST_BAD_ARGUMENT;
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  fenv_t floating_point;
+  feholdexcept(&floating_point);
+  const int code = engine->set_blocks(catalyst, count, blocks);
+  fesetenv(&floating_point);
+  return code;
 }
 
 int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
                            const void* const* data) {
-  return usable(catalyst) ? engine->set_array(catalyst, name, type, association, data)
-                          : VDI_CATALYST_BAD_ARGUMENT;
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  fenv_t floating_point;
+  feholdexcept(&floating_point);
+  const int code = engine->set_array(catalyst, name, type, association, data);
+  fesetenv(&floating_point);
+  return code;
 }
 
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
-  return usable(catalyst) ? engine->execute(catalyst, step, time) : VDI_CATALYST_BAD_ARGUMENT;
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  vdi_process_state state;
+  vdi_process_state_save(&state);
+  const int code = engine->execute(catalyst, step, time);
+  vdi_process_state_restore(&state);
+  return code;
 }
 
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
-  return usable(catalyst) ? engine->finalize(catalyst) : VDI_CATALYST_BAD_ARGUMENT;
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  vdi_process_state state;
+  vdi_process_state_save(&state);
+  const int code = engine->finalize(catalyst);
+  vdi_process_state_restore(&state);
+  return code;
 }
 
 const char* vdi_catalyst_error(const vdi_catalyst* catalyst) {

@@ -24,17 +24,17 @@ std::filesystem::path fileOf(Function* function) {
 
 }  // namespace
 
-void providePlugin() {
-  if (const char* given = std::getenv("VDI_PLUGIN"); given != nullptr && *given != '\0') return;
+std::string pluginFile() {
+  if (const char* given = std::getenv("VDI_PLUGIN"); given != nullptr && *given != '\0') return given;
   // This library lies in a folder of its own beside libvdi_catalyst.so, and plugins lie beside that one.
-  const auto plugin = fileOf(&providePlugin).parent_path().parent_path() / VDI_PLUGIN_FILE;
+  const auto plugin = fileOf(&pluginFile).parent_path().parent_path() / VDI_PLUGIN_FILE;
   std::error_code unreadable;
   if (!std::filesystem::exists(plugin, unreadable)) {
     throw std::runtime_error("there is no ParaView plugin at " + plugin.string() +
                              "; install pv-vdi whole, or set VDI_PLUGIN to the path of its "
                              "VolumetricDepthImages.so");
   }
-  setenv("VDI_PLUGIN", plugin.c_str(), 1);
+  return plugin.string();
 }
 
 void sharePython() {

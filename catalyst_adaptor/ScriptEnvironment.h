@@ -1,11 +1,14 @@
 // What scripts expect of the process that runs them.
 #pragma once
 
+#include <string>
+
 namespace vdi::catalyst {
 
-/// Sets the environment variable VDI_PLUGIN, unless it is set, to the plugin that was built or installed with
-/// this library. Throws std::runtime_error, naming the place looked at, where there is none.
-void providePlugin();
+/// The path of our plugin for ParaView: what the environment variable VDI_PLUGIN names or, unless it is set,
+/// the one that was built or installed with this library. Throws std::runtime_error, naming the place looked
+/// at, where there is none.
+std::string pluginFile();
 
 /// Makes Python's symbols those of the whole process: extension modules don't link libpython, and a library
 /// that was loaded for itself alone keeps it to itself.

@@ -9,6 +9,7 @@
 - what a script that can't be loaded has made by then stays, each time it's tried."""
 
 import ast
+import contextlib
 import importlib
 import os
 import sys
@@ -24,11 +25,36 @@ def end_step():
     disabled.clear()
 
 
+plugin_file = ""
+
+
+@contextlib.contextmanager
+def plugin_named():
+    """Scripts find the plugin as os.environ["VDI_PLUGIN"]. Only this mapping has it, which here is written to past its
+    methods: these would change the environment of the process, which is the simulation's."""
+    variables = os.environ._data
+    name = os.environ.encodekey("VDI_PLUGIN")
+    before = variables.get(name)
+    variables[name] = os.environ.encodevalue(plugin_file)
+    try:
+        yield
+    finally:
+        if before is None:
+            variables.pop(name, None)
+        else:
+            variables[name] = before
+
+
 class ScriptFailed(Exception):
     """Reported already."""
 
 
 def check_script(path):
+    with plugin_named():
+        return what_is_wrong_with(path)
+
+
+def what_is_wrong_with(path):
     """What's wrong with a script, as far as that can be known before it runs; "" if nothing is."""
     if not os.path.exists(path):
         return "the script '%s' isn't there" % path
@@ -83,8 +109,11 @@ def text_of(error, skip):
     return (what + "\n" + "".join(traceback.format_list(frames))).strip()
 
 
-def install(leave):
-    """`leave(failed)`: waits until a part of a script has ended on all ranks; whether it failed on any."""
+def install(leave, plugin):
+    """`leave(failed)`: waits until a part of a script has ended on all ranks; whether it failed on any. `plugin`: the path of
+    our plugin."""
+    global plugin_file
+    plugin_file = plugin
     from paraview.catalyst import v2_internals
     from vtkmodules.vtkCommonCore import vtkLogger
 
@@ -105,7 +134,8 @@ def install(leave):
             try:
                 if before:
                     before(*arguments)
-                result = function(*arguments)
+                with plugin_named():
+                    result = function(*arguments)
                 if after:
                     after(result, *arguments)
             except BaseException as error:

@@ -14,7 +14,6 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <array>
-#include <cfenv>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -100,23 +99,9 @@ int conclude(vdi_catalyst& self, int code, const std::string& text, std::optiona
   return worst;
 }
 
-/// Simulations may trap floating-point exceptions, which are ordinary in Python, VTK and drivers: none while
-/// it lives.
-class NoFloatingPointTraps {
- public:
-  NoFloatingPointTraps() { std::feholdexcept(&before_); }
-  ~NoFloatingPointTraps() { std::fesetenv(&before_); }
-  NoFloatingPointTraps(const NoFloatingPointTraps&) = delete;
-  NoFloatingPointTraps& operator=(const NoFloatingPointTraps&) = delete;
-
- private:
-  std::fenv_t before_{};
-};
-
 /// Runs `work`, which returns nothing or what went wrong; that or an exception becomes `code`.
 template <typename Work>
 int guarded(vdi_catalyst& self, int code, Work work, std::optional<std::int64_t> step = std::nullopt) {
-  const NoFloatingPointTraps noTraps;
   std::optional<std::string> failure;
   try {
     if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
@@ -253,6 +238,7 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
     return VDI_CATALYST_BAD_ARGUMENT;
   MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
   std::vector<std::string> paths;
+  std::string plugin;
   int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(script_count >= 0 && (script_count == 0 || scripts != nullptr), "no scripts given");
     for (int i = 0; i < script_count; ++i) {
@@ -266,14 +252,14 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
     });
   }
   if (code == VDI_CATALYST_OK) {
-    code = guarded(*self, VDI_CATALYST_ENGINE, [] {
-      vdi::catalyst::providePlugin();
+    code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
+      plugin = vdi::catalyst::pluginFile();
       vdi::catalyst::sharePython();
     });
   }
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
-      self->engine = std::make_unique<vdi::catalyst::Engine>(MPI_Comm_c2f(self->comm));
+      self->engine = std::make_unique<vdi::catalyst::Engine>(MPI_Comm_c2f(self->comm), plugin);
       self->grid = vtkSmartPointer<vtkPartitionedDataSet>::New();
     });
   }

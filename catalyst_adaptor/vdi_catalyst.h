@@ -25,6 +25,12 @@
  * enter, or comes with another one, the update fails on all and so does the step. Only in ParaView's own
  * collective filters and views the others wait, as in any MPI program.
  *
+ * The process stays the simulation's. When a call returns, these are as before it: the handlers of signals,
+ * the calling thread's signal mask and floating-point environment (traps, rounding, flags), the locale, the
+ * environment variables, the working directory, the umask and the soft limits of resources. Scripts find the
+ * variables that they have set again at the next step. While a call lasts, a signal finds the simulation's
+ * handler, unless a script sets another one, and SIGPIPE is ignored where it would end the process.
+ *
  * What still ends the process, since ParaView, Python or a library does it without asking: a script's
  * os._exit, os.abort or a crash in a module of its; memory that ParaView itself asks for in vain (Debian's
  * VTK aborts); an X server that goes away while a view is drawn (Xlib exits), and a view that is drawn
@@ -91,12 +97,12 @@ typedef struct vdi_catalyst_block {
 
 typedef struct vdi_catalyst vdi_catalyst;
 
-/* Loads ParaView, sets the environment variable VDI_PLUGIN to our plugin unless it is set, starts the engine
- * on a duplicate of the communicator (its Fortran handle) and adds the scripts, the same on all ranks; they
- * are loaded at the first step. A script that is missing or isn't Python, and a plugin that's missing where
- * it loads one (LoadPlugin at its top level), are VDI_CATALYST_SCRIPT here. Once a process, also where it
- * failed. On failure *catalyst is null, and the other functions, given null, do nothing but return
- * VDI_CATALYST_BAD_ARGUMENT. */
+/* Loads ParaView, starts the engine on a duplicate of the communicator (its Fortran handle) and adds the
+ * scripts, the same on all ranks; they are loaded at the first step. Scripts find the path of our plugin in
+ * os.environ["VDI_PLUGIN"]: what the environment says or, unless it is set, the plugin of this installation.
+ * A script that is missing or isn't Python, and a plugin that's missing where it loads one (LoadPlugin at its
+ * top level), are VDI_CATALYST_SCRIPT here. Once a process, also where it failed. On failure *catalyst is
+ * null, and the other functions, given null, do nothing but return VDI_CATALYST_BAD_ARGUMENT. */
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 

@@ -1,0 +1,260 @@
+// A simulation that has its own settings of the process, and looks after each call of the adaptor whether
+// they are as before: signals, floating point, locale, environment, folder, umask, limits, streams. Argument:
+// a script that changes all it can. Exit status 0 if each call succeeded and nothing had changed.
+#include <dirent.h>
+#include <fcntl.h>
+#include <mpi.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <array>
+#include <cfenv>
+#include <clocale>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <locale>
+#include <map>
+#include <new>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace {
+
+using State = std::map<std::string, std::string>;  // by what it is
+
+constexpr int lastSignal = 64;
+
+volatile std::sig_atomic_t terminations = 0;
+
+void ownHandler(int signal) {
+  if (signal == SIGTERM) terminations = terminations + 1;
+}
+
+template <typename Value>
+std::string textOf(const Value& value) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << value;
+  return text.str();
+}
+
+/// The bits of anything.
+template <typename Value>
+std::string bitsOf(const Value& value) {
+  std::array<unsigned char, sizeof(Value)> bytes{};
+  std::memcpy(bytes.data(), &value, sizeof(Value));
+  std::string text;
+  for (const unsigned char byte : bytes) text += textOf(static_cast<int>(byte)) + " ";
+  return text;
+}
+
+std::string setOf(const sigset_t& signals) {
+  std::string text;
+  for (int signal = 1; signal <= lastSignal; ++signal) {
+    if (sigismember(&signals, signal) == 1) text += textOf(signal) + " ";
+  }
+  return text;
+}
+
+void addSignals(State& state) {
+  for (int signal = 1; signal <= lastSignal; ++signal) {
+    struct sigaction action {};
+    if (sigaction(signal, nullptr, &action) != 0) continue;  // those that threads of libc use
+    state["signal " + textOf(signal)] = textOf(reinterpret_cast<const void*>(action.sa_sigaction)) +
+                                        ", flags " + textOf(action.sa_flags) + ", blocks " +
+                                        setOf(action.sa_mask);
+  }
+  sigset_t blocked;
+  pthread_sigmask(SIG_SETMASK, nullptr, &blocked);
+  state["blocked signals"] = setOf(blocked);
+  stack_t stack{};
+  sigaltstack(nullptr, &stack);
+  state["signal stack"] = textOf(stack.ss_sp) + ", flags " + textOf(stack.ss_flags);
+  for (const int which : {ITIMER_REAL, ITIMER_VIRTUAL, ITIMER_PROF}) {
+    itimerval timer{};
+    getitimer(which, &timer);
+    state["timer " + textOf(which)] = textOf(timer.it_interval.tv_sec) + " " + textOf(timer.it_value.tv_sec);
+  }
+}
+
+void addFloatingPoint(State& state) {
+  state["floating-point traps"] = textOf(fegetexcept());
+  state["rounding"] = textOf(fegetround());
+  state["floating-point flags"] = textOf(std::fetestexcept(FE_ALL_EXCEPT));
+#if defined(__x86_64__)
+  std::fenv_t environment;
+  std::fegetenv(&environment);
+  state["denormal numbers"] = textOf(environment.__mxcsr & 0x8040U);
+#endif
+}
+
+void addLocale(State& state) {
+  state["locale"] = std::setlocale(LC_ALL, nullptr);
+  state["thread's locale"] = textOf(static_cast<const void*>(uselocale(nullptr)));
+  state["C++ locale"] = std::locale().name();
+}
+
+void addEnvironment(State& state) {
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    const std::string text = *variable;
+    const auto sign = text.find('=');
+    state["variable " + text.substr(0, sign)] = text.substr(sign + 1);
+  }
+}
+
+void addFiles(State& state) {
+  state["folder"] = std::filesystem::current_path().string();
+  const mode_t mask = umask(0);
+  umask(mask);
+  state["umask"] = textOf(mask);
+  for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    struct stat status {};
+    fstat(file, &status);
+    state["standard file " + textOf(file)] =
+        textOf(status.st_dev) + " " + textOf(status.st_ino) + ", flags " + textOf(fcntl(file, F_GETFL));
+  }
+}
+
+void addStreams(State& state) {
+  for (const auto& [name, stream] : std::vector<std::pair<std::string, std::ios*>>{
+           {"cout", &std::cout}, {"cerr", &std::cerr}, {"clog", &std::clog}, {"cin", &std::cin}}) {
+    state[name] = textOf(static_cast<const void*>(stream->rdbuf())) + ", flags " + textOf(stream->flags()) +
+                  ", precision " + textOf(stream->precision()) + ", state " + textOf(stream->rdstate());
+  }
+  state["terminate"] = textOf(reinterpret_cast<const void*>(std::get_terminate()));
+  state["new handler"] = textOf(reinterpret_cast<const void*>(std::get_new_handler()));
+}
+
+void addLimits(State& state) {
+  for (int limit = 0; limit < RLIMIT_NLIMITS; ++limit) {
+    rlimit values{};
+    getrlimit(static_cast<__rlimit_resource>(limit), &values);
+    state["limit " + textOf(limit)] = textOf(values.rlim_cur) + " of " + textOf(values.rlim_max);
+  }
+  cpu_set_t cores;
+  sched_getaffinity(0, sizeof cores, &cores);
+  state["cores"] = bitsOf(cores);
+  state["priority"] = textOf(getpriority(PRIO_PROCESS, 0));
+  state["scheduler"] = textOf(sched_getscheduler(0));
+  std::array<char, 17> name{};
+  prctl(PR_GET_NAME, name.data());
+  state["thread's name"] = name.data();
+  int deathSignal = 0;
+  prctl(PR_GET_PDEATHSIG, &deathSignal);
+  state["signal at the parent's end"] = textOf(deathSignal);
+  state["dumpable"] = textOf(prctl(PR_GET_DUMPABLE));
+  state["no new privileges"] = textOf(prctl(PR_GET_NO_NEW_PRIVS, 0, 0, 0, 0));
+}
+
+State stateOfProcess() {
+  State state;
+  addFloatingPoint(state);  // first, before this function's own operations
+  addSignals(state);
+  addLocale(state);
+  addEnvironment(state);
+  addFiles(state);
+  addStreams(state);
+  addLimits(state);
+  return state;
+}
+
+/// What no library would choose, so that whatever is set shows.
+void makeOwnSettings() {
+  for (int signal = 1; signal <= lastSignal; ++signal) {
+    struct sigaction action {};
+    action.sa_handler = &ownHandler;
+    action.sa_flags = SA_RESTART;
+    sigemptyset(&action.sa_mask);
+    sigaddset(&action.sa_mask, SIGWINCH);
+    if (signal != SIGCHLD) sigaction(signal, &action, nullptr);  // fails where it can't be, SIGKILL for one
+  }
+  std::setlocale(LC_ALL, "C");
+  std::setlocale(LC_NUMERIC, "C.UTF-8");  // the only one besides that is everywhere
+  umask(027);
+  setenv("SIMULATION_OWN", "value", 1);
+  unsetenv("VDI_PLUGIN");
+  std::cout.precision(11);
+  std::fesetround(FE_UPWARD);
+  std::feclearexcept(FE_ALL_EXCEPT);
+  std::feraiseexcept(FE_INEXACT);
+  feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
+}
+
+int wrong = 0;
+
+void compare(const char* call, int code, const State& before) {
+  const State now = stateOfProcess();
+  const auto valueIn = [](const State& state, const std::string& what) {
+    const auto found = state.find(what);
+    return found == state.end() ? std::string("(none)") : "'" + found->second + "'";
+  };
+  State both = before;
+  both.insert(now.begin(), now.end());
+  if (code != VDI_CATALYST_OK) {
+    std::fprintf(stderr, "FAILED: %s returned %d\n", call, code);
+    ++wrong;
+  }
+  for (const auto& [what, ignored] : both) {
+    const std::string old = valueIn(before, what);
+    const std::string current = valueIn(now, what);
+    if (old == current) continue;
+    std::fprintf(stderr, "FAILED: %s changed: %s: %s became %s\n", call, what.c_str(), old.c_str(),
+                 current.c_str());
+    ++wrong;
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  MPI_Init(&argc, &argv);
+  if (argc < 2) MPI_Abort(MPI_COMM_WORLD, 2);
+  std::filesystem::current_path("/");
+  makeOwnSettings();
+  const State before = stateOfProcess();
+
+  vdi_catalyst* catalyst = nullptr;
+  const std::array<const char*, 1> scripts{argv[1]};
+  int code = vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, scripts.data(), &catalyst);
+  compare("initialize", code, before);
+  constexpr int n = 8;
+  static std::array<float, n * n * n> values;
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  const vdi_catalyst_block block{
+      {n, n, n}, {0, 0, 0}, {0, 0, 0}, {static_cast<double>(n * rank), 0, 0}, {1, 1, 1}};
+  const std::array<const void*, 1> data{values.data()};
+  compare("set_blocks", vdi_catalyst_set_blocks(catalyst, 1, &block), before);
+  code = vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_CELLS, data.data());
+  compare("set_array", code, before);
+  constexpr int steps = 2;
+  for (int step = 1; step <= steps; ++step) {
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i + 10 * step);
+    std::feclearexcept(FE_ALL_EXCEPT);
+    std::feraiseexcept(FE_INEXACT);
+    compare("execute", vdi_catalyst_execute(catalyst, step, step), before);
+  }
+  compare("finalize", vdi_catalyst_finalize(catalyst), before);
+  if (terminations != steps) {
+    std::fprintf(stderr, "FAILED: of %d signals that the script sent, %d came\n", steps,
+                 static_cast<int>(terminations));
+    ++wrong;
+  }
+  MPI_Finalize();
+  return wrong == 0 ? 0 : 1;
+}
