@@ -22,6 +22,5 @@ void addRender(CLI::App& app, Job& job);
 void addExport(CLI::App& app, Job& job);
 void addCompare(CLI::App& app, Job& job);
 void addInfo(CLI::App& app, Job& job);
-void addBench(CLI::App& app, Job& job);
 
 }  // namespace vdi::apps

@@ -16,8 +16,8 @@ namespace {
 
 constexpr double maxBytes = 9.0e18;  // what file offsets can express
 
-Lattice readLattice(const JsonFile& sidecar) {
-  Lattice lattice;
+synthetic::Lattice readLattice(const JsonFile& sidecar) {
+  synthetic::Lattice lattice;
   lattice.size = sidecar.positives("dims");
   try {
     lattice.type = scalarTypeFromString(sidecar.text("type"));
@@ -31,7 +31,7 @@ Lattice readLattice(const JsonFile& sidecar) {
     if (!(lattice.spacing[axis] > 0.0)) sidecar.fail("each 'spacing' must be > 0");
   }
   const bool cells = sidecar.has("association") && sidecar.choice("association", {"point", "cell"}) == "cell";
-  lattice.joint = cells ? Joint::Cells : Joint::SharedPoints;
+  lattice.joint = cells ? synthetic::Joint::Cells : synthetic::Joint::SharedPoints;
   return lattice;
 }
 
@@ -62,7 +62,7 @@ RawVolume readSidecar(const std::filesystem::path& path) {
   return volume;
 }
 
-Block readPart(const RawVolume& volume, const Part& part) {
+Block readPart(const RawVolume& volume, const synthetic::Part& part) {
   const std::size_t size = sizeOf(volume.lattice.type);
   const auto row = static_cast<std::size_t>(part.dims.x) * size;
   const std::size_t total =
@@ -83,7 +83,7 @@ Block readPart(const RawVolume& volume, const Part& part) {
   if (volume.bigEndian != (std::endian::native == std::endian::big)) {
     for (std::size_t i = 0; i < total; i += size) std::reverse(data.get() + i, data.get() + i + size);
   }
-  return blockOf(volume.lattice, part, data);
+  return synthetic::blockOf(volume.lattice, part, data);
 }
 
 }  // namespace vdi::apps

@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "apps/Decomposition.h"
+#include "vdi/synthetic/Decomposition.h"
 
 namespace vdi::apps {
 
 struct RawVolume {
-  Lattice lattice;             // joint: SharedPoints for point data, Cells for cell data
+  synthetic::Lattice lattice;  // joint: SharedPoints for point data, Cells for cell data
   std::filesystem::path data;  // the raw file
   bool bigEndian = false;
   std::uint64_t skip = 0;  // bytes before the first value
@@ -20,6 +20,6 @@ struct RawVolume {
 RawVolume readSidecar(const std::filesystem::path& path);
 
 /// The values of one part, read from the file; the block owns them. Throws Error{Io}.
-Block readPart(const RawVolume& volume, const Part& part);
+Block readPart(const RawVolume& volume, const synthetic::Part& part);
 
 }  // namespace vdi::apps

@@ -5,21 +5,21 @@
 #include <charconv>
 #include <string_view>
 
-#include "apps/DeviceField.h"
-#include "apps/Fields.h"
 #include "apps/Help.h"
 #include "apps/RawVolume.h"
 #include "apps/TransferFunctions.h"
 #include "vdi/core/Error.h"
+#include "vdi/synthetic/DeviceField.h"
+#include "vdi/synthetic/Fields.h"
 
 namespace vdi::apps {
 
 namespace {
 
-Joint jointOf(const std::string& name) {
-  if (name == "shared") return Joint::SharedPoints;
-  if (name == "gap") return Joint::Gap;
-  if (name == "cells") return Joint::Cells;
+synthetic::Joint jointOf(const std::string& name) {
+  if (name == "shared") return synthetic::Joint::SharedPoints;
+  if (name == "gap") return synthetic::Joint::Gap;
+  if (name == "cells") return synthetic::Joint::Cells;
   throw Error(ErrorCode::InvalidArgument, "no joint '" + name + "'; there are shared, gap and cells");
 }
 
@@ -87,7 +87,8 @@ std::filesystem::path withSuffix(const std::filesystem::path& path, const std::s
 
 std::string fieldsHelp() {
   std::string text;
-  for (const FieldInfo& info : fields()) text += "\n  " + info.name + ": " + info.description;
+  for (const synthetic::FieldInfo& info : synthetic::fields())
+    text += "\n  " + info.name + ": " + info.description;
   return text;
 }
 
@@ -116,7 +117,7 @@ void addDecompositionOptions(CLI::App& command, DecompositionOptions& options) {
       ->group(decompositionGroup);
   command
       .add_option("--layout", options.layout,
-                  "which rank holds which block: " + joined(layoutNames()) +
+                  "which rank holds which block: " + joined(synthetic::layoutNames()) +
                       "; on fewer blocks than ranks some hold nothing")
       ->type_name("LAYOUT")
       ->capture_default_str()
@@ -133,17 +134,17 @@ std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOpti
                              int ranks) {
   RawVolume volume = readSidecar(sidecar);
   if (!options.joint.empty()) {
-    const Joint joint = jointOf(options.joint);
-    if ((joint == Joint::Cells) != (volume.lattice.joint == Joint::Cells)) {
+    const synthetic::Joint joint = jointOf(options.joint);
+    if ((joint == synthetic::Joint::Cells) != (volume.lattice.joint == synthetic::Joint::Cells)) {
       throw Error(ErrorCode::InvalidArgument,
                   "--joint " + options.joint + " doesn't go with the association of " + sidecar);
     }
     volume.lattice.joint = joint;
   }
   std::vector<Block> blocks;
-  for (const Part& part :
-       decompose(volume.lattice.size, vectorOf(parseSizes(options.blocks, 3)),
-                 layoutFromString(options.layout), volume.lattice.joint, ranks, options.seed)) {
+  for (const synthetic::Part& part : synthetic::decompose(
+           volume.lattice.size, vectorOf(parseSizes(options.blocks, 3)),
+           synthetic::layoutFromString(options.layout), volume.lattice.joint, ranks, options.seed)) {
     if (part.owner == rank) blocks.push_back(readPart(volume, part));
   }
   return blocks;
@@ -152,7 +153,7 @@ std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOpti
 ScalarArray rawArray(const std::string& sidecar) {
   ScalarArray array;
   array.name = std::filesystem::path(sidecar).stem().string();
-  array.cells = readSidecar(sidecar).lattice.joint == Joint::Cells;
+  array.cells = readSidecar(sidecar).lattice.joint == synthetic::Joint::Cells;
   return array;
 }
 
@@ -160,40 +161,42 @@ ScalarArray fieldArray(const std::string& field, const DecompositionOptions& opt
   ScalarArray array;
   array.name = field;
   const bool hasCopies = vectorOf(parseSizes(options.copies, 3)) != glm::ivec3(1);
-  array.cells = options.joint.empty() ? hasCopies : jointOf(options.joint) == Joint::Cells;
+  array.cells = options.joint.empty() ? hasCopies : jointOf(options.joint) == synthetic::Joint::Cells;
   return array;
 }
 
 namespace {
 
 /// The longest axis has length 1.
-glm::dvec3 spacingOf(const Lattice& lattice) {
+glm::dvec3 spacingOf(const synthetic::Lattice& lattice) {
   const int longest = std::max({lattice.size.x, lattice.size.y, lattice.size.z});
-  return glm::dvec3(1.0 / std::max(lattice.joint == Joint::Cells ? longest : longest - 1, 1));
+  return glm::dvec3(1.0 / std::max(lattice.joint == synthetic::Joint::Cells ? longest : longest - 1, 1));
 }
 
 }  // namespace
 
 std::vector<Block> fieldBlocks(const std::string& name, const DecompositionOptions& options,
                                const std::shared_ptr<gpu::Device>& device, int rank, int ranks) {
-  Lattice lattice;
+  synthetic::Lattice lattice;
   lattice.size = vectorOf(parseSizes(options.size, 3));
   lattice.type = scalarTypeFromString(options.type);
   if (!options.joint.empty()) lattice.joint = jointOf(options.joint);
   const glm::ivec3 copies = vectorOf(parseSizes(options.copies, 3));
   if (copies != glm::ivec3(1)) {
-    if (options.joint.empty()) lattice.joint = Joint::Cells;
-    if (lattice.joint != Joint::Cells)
+    if (options.joint.empty()) lattice.joint = synthetic::Joint::Cells;
+    if (lattice.joint != synthetic::Joint::Cells)
       throw Error(ErrorCode::InvalidArgument, "copies take cell data, --joint cells", "--copies");
   }
   lattice.spacing = spacingOf(lattice);
-  Lattice all = lattice;
+  synthetic::Lattice all = lattice;
   all.size = lattice.size * copies;
   all.spacing = spacingOf(all);
-  std::vector<Part> parts = decompose(all.size, vectorOf(parseSizes(options.blocks, 3)) * copies,
-                                      layoutFromString(options.layout), lattice.joint, ranks, options.seed);
-  std::erase_if(parts, [rank](const Part& part) { return part.owner != rank; });
-  return DeviceField(device, name, options.seed).makeBlocks(lattice, all, parts, topOf(lattice.type));
+  std::vector<synthetic::Part> parts =
+      synthetic::decompose(all.size, vectorOf(parseSizes(options.blocks, 3)) * copies,
+                           synthetic::layoutFromString(options.layout), lattice.joint, ranks, options.seed);
+  std::erase_if(parts, [rank](const synthetic::Part& part) { return part.owner != rank; });
+  return synthetic::DeviceField(device, name, options.seed)
+      .makeBlocks(lattice, all, parts, topOf(lattice.type));
 }
 
 void addCameraOptions(CLI::App& command, CameraOptions& options, const std::string& otherwise) {

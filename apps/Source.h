@@ -9,13 +9,13 @@
 #include <vector>
 
 #include "apps/Cameras.h"
-#include "apps/Decomposition.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Coloring.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/gpu/Device.h"
+#include "vdi/synthetic/Decomposition.h"
 
 namespace CLI {
 class App;

@@ -21,6 +21,7 @@
 #include "BuildCommit.h"
 #include "apps/Commands.h"
 #include "apps/Help.h"
+#include "bench/Bench.h"
 #include "vdi/core/Error.h"
 
 namespace {
@@ -83,7 +84,7 @@ Outcome runTool(int argc, char** argv) {
   vdi::apps::addExport(app, job);
   vdi::apps::addCompare(app, job);
   vdi::apps::addInfo(app, job);
-  vdi::apps::addBench(app, job);
+  vdi::bench::addBench(app, job);
   try {
     try {
       world.together([&] { app.parse(argc, argv); });

@@ -1,4 +1,4 @@
-// Procedural scalar fields in single precision; twin of apps/Fields.cpp, which describes them.
+// Procedural scalar fields in single precision; twin of vdi/synthetic/Fields.cpp, which describes them.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/field.h"

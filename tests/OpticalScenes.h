@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "apps/Decomposition.h"
 #include "vdi/core/Block.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Image.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/reference/Exact.h"
+#include "vdi/synthetic/Decomposition.h"
 
 namespace vdi::test {
 
@@ -44,19 +44,20 @@ struct OpticalScene {
   reference::ExactVolume whole;
 };
 
-inline OpticalScene opticalScene(const Stretch& stretch, apps::Joint joint,
+inline OpticalScene opticalScene(const Stretch& stretch, synthetic::Joint joint,
                                  const glm::ivec3& blocks = glm::ivec3(1),
-                                 apps::Layout layout = apps::Layout::OnOneRank, int rank = 0, int ranks = 1) {
+                                 synthetic::Layout layout = synthetic::Layout::OnOneRank, int rank = 0,
+                                 int ranks = 1) {
   const glm::ivec3 size{13, 11, 12};
-  const bool cells = joint == apps::Joint::Cells;
+  const bool cells = joint == synthetic::Joint::Cells;
   const double spacing = 1.0 / (13 - (cells ? 0 : 1));
   const auto valueAt = [&](const glm::ivec3& index) {
     return stretch.at(waves((glm::dvec3(index) + (cells ? 0.5 : 0.0)) * spacing));
   };
-  const apps::Lattice lattice{size, glm::dvec3(0.0), glm::dvec3(spacing), stretch.type, joint};
+  const synthetic::Lattice lattice{size, glm::dvec3(0.0), glm::dvec3(spacing), stretch.type, joint};
   OpticalScene scene;
-  for (const apps::Part& part : apps::decompose(size, blocks, layout, joint, ranks, 3)) {
-    if (part.owner == rank) scene.mine.push_back(apps::makeBlock(lattice, part, valueAt));
+  for (const synthetic::Part& part : synthetic::decompose(size, blocks, layout, joint, ranks, 3)) {
+    if (part.owner == rank) scene.mine.push_back(synthetic::makeBlock(lattice, part, valueAt));
   }
   scene.whole = {size,
                  glm::dvec3(cells ? 0.5 * spacing : 0.0),

@@ -3,11 +3,11 @@
 
 #include <vector>
 
-#include "apps/Decomposition.h"
-#include "apps/Fields.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/core/TransferFunction.h"
+#include "vdi/synthetic/Decomposition.h"
+#include "vdi/synthetic/Fields.h"
 
 namespace vdi::test {
 
@@ -18,20 +18,21 @@ inline double topOf(ScalarType type) {
 
 /// The blocks that `rank` of `ranks` holds of a field on a lattice whose longest side is 1.
 struct Decomposed {
-  apps::Lattice lattice;
+  synthetic::Lattice lattice;
   std::vector<Block> mine;
   std::vector<Block> all;
 };
 
 inline Decomposed decompose(const char* field, const glm::ivec3& size, const glm::ivec3& blocks,
-                            apps::Layout layout, apps::Joint joint, ScalarType type, int rank, int ranks) {
+                            synthetic::Layout layout, synthetic::Joint joint, ScalarType type, int rank,
+                            int ranks) {
   Decomposed decomposed;
-  const bool cells = joint == apps::Joint::Cells;
+  const bool cells = joint == synthetic::Joint::Cells;
   const double spacing = 1.0 / (glm::max(size.x, glm::max(size.y, size.z)) - (cells ? 0 : 1));
   decomposed.lattice = {size, glm::dvec3(0.0), glm::dvec3(spacing), type, joint};
-  const apps::Field value = apps::makeField(field, 7);
-  for (const apps::Part& part : apps::decompose(size, blocks, layout, joint, ranks, 3)) {
-    Block block = apps::makeBlock(decomposed.lattice, part, [&](const glm::ivec3& index) {
+  const synthetic::Field value = synthetic::makeField(field, 7);
+  for (const synthetic::Part& part : synthetic::decompose(size, blocks, layout, joint, ranks, 3)) {
+    Block block = synthetic::makeBlock(decomposed.lattice, part, [&](const glm::ivec3& index) {
       return value((glm::dvec3(index) + (cells ? 0.5 : 0.0)) * spacing) * topOf(type);
     });
     decomposed.all.push_back(block);

@@ -10,7 +10,7 @@ VDI_CONST uint fieldGroup = 64;
 struct FieldConstants {
   VDI_ADDRESS(FloatArray) values;  // [size.z][size.y][size.x], in [0, 1]
   uvec3 size;
-  uint field;  // place in fields() of apps/Fields.h
+  uint field;  // place in fields() of vdi/synthetic/Fields.h
   vec3 first;  // lattice index of the first value, and half a one for cells
   float spacing;
   uint seed;

@@ -1,9 +1,9 @@
 // Ghost layers: what lies between blocks that share nothing, wherever the neighbours are.
 #include <span>
 
-#include "apps/Decomposition.h"
 #include "tests/Catch.h"
 #include "vdi/comm/GhostExchange.h"
+#include "vdi/synthetic/Decomposition.h"
 
 using namespace vdi;
 using comm::Communicator;
@@ -15,18 +15,18 @@ double marker(const glm::ivec3& index) {
   return index.x + 20 * index.y + 400 * index.z;
 }
 
-std::vector<Block> decomposed(const apps::Lattice& lattice, const glm::ivec3& blocks, apps::Layout layout,
-                              const Communicator& world) {
+std::vector<Block> decomposed(const synthetic::Lattice& lattice, const glm::ivec3& blocks,
+                              synthetic::Layout layout, const Communicator& world) {
   std::vector<Block> mine;
-  for (const apps::Part& part :
-       apps::decompose(lattice.size, blocks, layout, lattice.joint, world.size(), 11)) {
-    if (part.owner == world.rank()) mine.push_back(apps::makeBlock(lattice, part, marker));
+  for (const synthetic::Part& part :
+       synthetic::decompose(lattice.size, blocks, layout, lattice.joint, world.size(), 11)) {
+    if (part.owner == world.rank()) mine.push_back(synthetic::makeBlock(lattice, part, marker));
   }
   return mine;
 }
 
-glm::ivec3 indexOf(const apps::Lattice& lattice, const glm::dvec3& position) {
-  const double half = lattice.joint == apps::Joint::Cells ? 0.5 : 0.0;
+glm::ivec3 indexOf(const synthetic::Lattice& lattice, const glm::dvec3& position) {
+  const double half = lattice.joint == synthetic::Joint::Cells ? 0.5 : 0.0;
   return glm::ivec3(glm::round((position - lattice.origin) / lattice.spacing - half));
 }
 
@@ -45,13 +45,13 @@ glm::dvec3 placeOf(const Block& block, const glm::ivec3& index) {
 
 /// Every value, those of layers included, is the one that belongs there; layers reach as far as rays need
 /// them, wherever there is a neighbour.
-void checkValues(const apps::Lattice& lattice, const Block& block) {
+void checkValues(const synthetic::Lattice& lattice, const Block& block) {
   int wrong = 0;
   forEachValue(block.extended(), [&](const glm::ivec3& at) {
     if (valueAt(block, at.x, at.y, at.z) != marker(indexOf(lattice, placeOf(block, at)))) ++wrong;
   });
   CHECK(wrong == 0);
-  const bool cells = lattice.joint == apps::Joint::Cells;
+  const bool cells = lattice.joint == synthetic::Joint::Cells;
   const glm::dvec3 end = lattice.origin + glm::dvec3(lattice.size - (cells ? 0 : 1)) * lattice.spacing;
   const glm::dvec3 first = placeOf(block, block.extended().lo);
   const glm::dvec3 last = placeOf(block, block.extended().hi - 1);
@@ -68,10 +68,11 @@ void checkValues(const apps::Lattice& lattice, const Block& block) {
 
 TEST_CASE("blocks of a whole lattice get their neighbours' values, and all of space has one owner") {
   const Communicator world = Communicator::world();
-  const auto joint = GENERATE(apps::Joint::Gap, apps::Joint::Cells, apps::Joint::SharedPoints);
-  const auto layout = GENERATE(apps::Layout::Interleaved, apps::Layout::Random, apps::Layout::OnOneRank);
+  const auto joint = GENERATE(synthetic::Joint::Gap, synthetic::Joint::Cells, synthetic::Joint::SharedPoints);
+  const auto layout =
+      GENERATE(synthetic::Layout::Interleaved, synthetic::Layout::Random, synthetic::Layout::OnOneRank);
   const auto type = GENERATE(ScalarType::U16, ScalarType::F32, ScalarType::F64);
-  const apps::Lattice lattice{{13, 9, 11}, {-3.0, 1e3, 0.1}, {0.1, 2.0, 1.0 / 3.0}, type, joint};
+  const synthetic::Lattice lattice{{13, 9, 11}, {-3.0, 1e3, 0.1}, {0.1, 2.0, 1.0 / 3.0}, type, joint};
   const std::vector<Block> before = decomposed(lattice, {3, 2, 4}, layout, world);
   const std::vector<Block> after = comm::exchangeGhosts(world, before);
   REQUIRE(after.size() == before.size());
@@ -83,7 +84,7 @@ TEST_CASE("blocks of a whole lattice get their neighbours' values, and all of sp
     CHECK(after[i].data == before[i].data);
   }
   const glm::dvec3 extent =
-      glm::dvec3(lattice.size - (joint == apps::Joint::Cells ? 0 : 1)) * lattice.spacing;
+      glm::dvec3(lattice.size - (joint == synthetic::Joint::Cells ? 0 : 1)) * lattice.spacing;
   world.allReduceSum(std::span(&volume, 1));
   CHECK(volume == Approx(extent.x * extent.y * extent.z));
 }

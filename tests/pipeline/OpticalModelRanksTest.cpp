@@ -7,8 +7,8 @@
 #include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
-using apps::Joint;
-using apps::Layout;
+using synthetic::Joint;
+using synthetic::Layout;
 
 TEST_CASE("optical model: several ranks", "[ranks]") {
   struct Case {

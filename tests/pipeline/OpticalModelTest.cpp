@@ -9,7 +9,7 @@
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
-using apps::Joint;
+using synthetic::Joint;
 using test::Bound;
 using test::checkPicture;
 using test::device;

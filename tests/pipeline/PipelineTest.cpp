@@ -24,8 +24,8 @@
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
-using apps::Joint;
-using apps::Layout;
+using synthetic::Joint;
+using synthetic::Layout;
 using test::device;
 
 namespace {
@@ -891,11 +891,11 @@ TEST_CASE("a block that's cut to fit the device's images shows no cut") {
 
 TEST_CASE("blocks of different spacing side by side") {
   // The upper half at twice the resolution.
-  const apps::Field ramp = apps::makeField("ramp", 0);
+  const synthetic::Field ramp = synthetic::makeField("ramp", 0);
   const auto make = [&](const glm::ivec3& dims, double z, double spacing) {
-    const apps::Lattice lattice{
+    const synthetic::Lattice lattice{
         dims, {0.0, 0.0, z}, glm::dvec3(spacing), ScalarType::F32, Joint::SharedPoints};
-    return apps::makeBlock(lattice, {{0, 0, 0}, dims, 0}, [&, lattice](const glm::ivec3& i) {
+    return synthetic::makeBlock(lattice, {{0, 0, 0}, dims, 0}, [&, lattice](const glm::ivec3& i) {
       return ramp(lattice.origin + glm::dvec3(i) * spacing);
     });
   };

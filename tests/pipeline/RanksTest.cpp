@@ -16,8 +16,8 @@
 #include "vdi/pipeline/VdiRenderer.h"
 
 using namespace vdi;
-using apps::Joint;
-using apps::Layout;
+using synthetic::Joint;
+using synthetic::Layout;
 
 namespace {
 

@@ -16,8 +16,8 @@
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
-using apps::Joint;
-using apps::Layout;
+using synthetic::Joint;
+using synthetic::Layout;
 
 namespace {
 

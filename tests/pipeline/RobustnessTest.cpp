@@ -11,8 +11,8 @@
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
-using apps::Joint;
-using apps::Layout;
+using synthetic::Joint;
+using synthetic::Layout;
 
 namespace {
 
@@ -22,9 +22,9 @@ std::shared_ptr<gpu::Device> device() {
 }
 
 Block cube(int n, double spacing, const std::function<float(const glm::ivec3&)>& value) {
-  const apps::Lattice lattice{glm::ivec3(n), glm::dvec3(0.0), glm::dvec3(spacing), ScalarType::F32,
-                              Joint::SharedPoints};
-  return apps::makeBlock(lattice, {{0, 0, 0}, glm::ivec3(n), 0}, value);
+  const synthetic::Lattice lattice{glm::ivec3(n), glm::dvec3(0.0), glm::dvec3(spacing), ScalarType::F32,
+                                   Joint::SharedPoints};
+  return synthetic::makeBlock(lattice, {{0, 0, 0}, glm::ivec3(n), 0}, value);
 }
 
 float highestOpacity(const Image& image) {
@@ -285,9 +285,9 @@ TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's p
 }
 
 TEST_CASE("voxels 50 times as long as wide") {
-  const apps::Lattice lattice{
+  const synthetic::Lattice lattice{
       {40, 40, 5}, glm::dvec3(0.0), {0.01, 0.01, 0.5}, ScalarType::F32, Joint::SharedPoints};
-  const Block block = apps::makeBlock(lattice, {{0, 0, 0}, {40, 40, 5}, 0}, [](const glm::ivec3& i) {
+  const Block block = synthetic::makeBlock(lattice, {{0, 0, 0}, {40, 40, 5}, 0}, [](const glm::ivec3& i) {
     return 0.5F + 0.5F * std::sin(0.3F * static_cast<float>(i.x)) * std::cos(static_cast<float>(i.z));
   });
   VdiGenerator generator(device(), comm::Communicator::serial());
@@ -322,10 +322,10 @@ TEST_CASE("rays of more samples than depth codes can tell apart give a VDI of fu
   settings.samplesPerVoxel = 1.0;
   CHECK(generator.generate(test::oblique(), test::threeHues(1.0), settings)->precision() ==
         Precision::Compact);
-  const apps::Lattice lattice{
+  const synthetic::Lattice lattice{
       {2, 2, 200}, glm::dvec3(0.0), {0.0005, 0.0005, 0.05}, ScalarType::F32, Joint::SharedPoints};
   generator.setBlocks(
-      {apps::makeBlock(lattice, {{0, 0, 0}, {2, 2, 200}, 0}, [](const glm::ivec3&) { return 0.7F; })});
+      {synthetic::makeBlock(lattice, {{0, 0, 0}, {2, 2, 200}, 0}, [](const glm::ivec3&) { return 0.7F; })});
   const Camera along =
       Camera::framing({glm::dvec3(0.0), glm::dvec3(0.0005, 0.0005, 10.0)}, {0.1, 0.2, -1.0}, {0.0, 1.0, 0.0});
   const auto vdi = generator.generate(along, test::threeHues(1.0), settings);
@@ -336,10 +336,10 @@ TEST_CASE("rays of more samples than depth codes can tell apart give a VDI of fu
 TEST_CASE("what single precision would lose: a right picture or an error") {
   VdiGenerator generator(device(), comm::Communicator::serial());
   const auto blockOf = [](ScalarType type, double scale, double spacing = 1.0, double origin = 0.0) {
-    const apps::Lattice lattice{glm::ivec3(8), glm::dvec3(origin), glm::dvec3(spacing), type,
-                                Joint::SharedPoints};
-    return apps::makeBlock(lattice, {{0, 0, 0}, glm::ivec3(8), 0},
-                           [scale](const glm::ivec3& i) { return scale * (1 + i.x) / 8.0; });
+    const synthetic::Lattice lattice{glm::ivec3(8), glm::dvec3(origin), glm::dvec3(spacing), type,
+                                     Joint::SharedPoints};
+    return synthetic::makeBlock(lattice, {{0, 0, 0}, glm::ivec3(8), 0},
+                                [scale](const glm::ivec3& i) { return scale * (1 + i.x) / 8.0; });
   };
   const auto shown = [&](const Block& block, double scale) {
     generator.setBlocks({block});

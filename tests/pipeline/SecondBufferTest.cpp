@@ -15,8 +15,8 @@
 #include "vdi/pipeline/VdiRenderer.h"
 
 using namespace vdi;
-using apps::Joint;
-using apps::Layout;
+using synthetic::Joint;
+using synthetic::Layout;
 using test::device;
 
 namespace {

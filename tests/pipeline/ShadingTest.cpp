@@ -21,8 +21,8 @@
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
-using apps::Joint;
-using apps::Layout;
+using synthetic::Joint;
+using synthetic::Layout;
 using test::integral;
 using test::Lamp;
 using test::Lattice;

@@ -1,0 +1,76 @@
+// Volume rendering composited by IceT, of the same volume, camera and devices: what VDIs are compared with.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bench/ConvexRegions.h"
+#include "bench/Frames.h"
+#include "bench/IcetCompositor.h"
+#include "bench/Timing.h"
+#include "vdi/comm/Communicator.h"
+#include "vdi/core/Block.h"
+#include "vdi/core/Image.h"
+#include "vdi/core/Scene.h"
+#include "vdi/gpu/Device.h"
+#include "vdi/pipeline/VdiGenerator.h"
+
+namespace vdi::bench {
+
+/// Times are ms, medians over the repeats. The root's.
+struct RivalFigures {
+  Spread frame;                 // on the root's host, from all ranks ready to the picture there
+  double renderMs = 0.0;        // of these, the ranks' own pictures; slowest rank
+  double compositeMs = 0.0;     // and IceT; slowest rank
+  std::uint64_t bytesSent = 0;  // by IceT, of all ranks, in one frame
+  /// What it took to make the ranks' volumes convex; none: they were.
+  std::optional<double> redistributeMs;
+  std::uint64_t redistributedBytes = 0;  // of all ranks
+  double maxDifference = 0.0;            // of a channel, from ours, in 1/255
+};
+
+/// Collective throughout. Each rank casts rays through its own blocks into a picture of floats, by a
+/// generator of one rank that takes the samples of the whole scene. IceT blends these in order of visibility.
+/// If planes don't separate the ranks' blocks, these are redistributed first.
+class IcetRival {
+ public:
+  /// `handle`: MPI_Comm_c2f of the communicator's ranks. Throws Error{InvalidArgument} without IceT.
+  IcetRival(std::shared_ptr<gpu::Device> device, comm::Communicator comm, int handle);
+
+  /// This rank's blocks, as `generator` got them, whose scene `scene` is. `repeats` redistributions are
+  /// timed.
+  void setBlocks(const std::vector<Block>& blocks, const Scene& scene, int repeats);
+  /// Gives back the device's memory.
+  void dropBlocks();
+
+  /// `ours`: the root's picture of the same input by VdiGenerator::renderVolume; others' is ignored.
+  RivalFigures measure(ClockRaiser& clock, const FrameInput& input, int repeats,
+                       const std::optional<Image>& ours);
+
+ private:
+  struct Timed {
+    std::span<const glm::vec4> picture;  // the root's
+    double renderMs = 0.0;
+    double compositeMs = 0.0;
+  };
+  std::vector<Block> makeConvex(const std::vector<Block>& blocks, int repeats, double tolerance);
+  Timed draw(const FrameInput& input, const PixelBox& drawn, const std::vector<int>& order);
+
+  comm::Communicator comm_;
+  IcetCompositor compositor_;
+  VdiGenerator own_;  // of this rank alone
+  std::optional<SeparatingPlanes> planes_;
+  Box box_;  // of this rank's blocks
+  std::optional<Image> image_;
+  RivalFigures redistribution_;  // these figures alone
+};
+
+std::string rivalLine(const RivalFigures& figures);
+void addRival(nlohmann::json& row, const RivalFigures& figures);
+
+}  // namespace vdi::bench

@@ -1,0 +1,76 @@
+// What `vdi bench` is asked to measure, and the suites of docs/benchmarks.md.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/Source.h"
+#include "vdi/comm/Communicator.h"
+
+namespace vdi::bench {
+
+struct BenchOptions {
+  std::vector<std::string> raws;
+  std::vector<std::string> fields;
+  apps::DecompositionOptions decomposition;
+  apps::ViewOptions view;
+  apps::QualityOptions quality;
+  std::vector<double> angles{0.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0};
+  std::vector<std::string> algorithms;       // empty: merge, or the suite's
+  std::vector<std::uint32_t> supersegments;  // empty: 25, or the suite's
+  int views = 0;                             // 0: 1, or the suite's
+  int repeats = 5;
+  int frames = 20;  // of the orbit that VDIs per second are counted on; 0: they aren't
+  std::string reconstruction = "smooth";
+  double truthRate = 8.0;  // samples per voxel of the volume rendering that all are compared with
+  std::string suite;       // empty, or a name that suiteNames() has
+  std::string rival;       // empty, or icet
+  std::string output;
+  std::vector<std::string> comparison;
+  // Of the suite `ranks`:
+  std::vector<std::string> scalings{"strong", "weak"};
+  std::vector<std::string> layouts{"slabs", "interleaved", "random"};
+  std::vector<int> rankCounts;  // empty: 1, 2, 4 ... and all
+  std::string sizePerRank;      // of weak scaling; empty: half of deal.size on each axis
+  // Of the suite `viewpoints`:
+  int viewpoints = 100;
+  double turn = 20.0;  // degrees
+  std::vector<double> zooms{1.0, 4.0};
+  std::vector<double> margins{0.0};
+  std::vector<int> sets{1};
+  std::vector<std::string> listResolutions;  // of VDIs' pictures; empty: the views'
+};
+
+struct DataSet {
+  std::string name;
+  std::string field;  // or, if empty:
+  std::string raw;    // sidecar
+  std::string size;
+  std::string type;
+};
+
+const std::vector<std::string>& suiteNames();
+
+/// The suite of fewer and more ranks, which has no data sets of its own.
+inline constexpr const char* ranksSuite = "ranks";
+/// The suite of viewpoints around the scene, which has none either.
+inline constexpr const char* viewpointsSuite = "viewpoints";
+
+/// Fills in what the suite says, or what holds without one, where the options leave it open.
+void applySuite(BenchOptions& options);
+
+/// The suite's (those of them that --fields names), or the raw volumes and fields of the options.
+std::vector<DataSet> dataSets(const BenchOptions& options);
+
+/// What VDIs are made with. Bisection gets the one budget that it knows.
+GenerateSettings benchSettings(const BenchOptions& options, const std::string& algorithm,
+                               std::uint32_t supersegments);
+
+/// Collective: this rank's blocks of the data set. Size and type are the set's where it names them. All ranks
+/// throw if one does.
+std::vector<Block> blocksOf(const DataSet& set, const BenchOptions& options,
+                            const std::shared_ptr<gpu::Device>& device, const comm::Communicator& world);
+
+}  // namespace vdi::bench

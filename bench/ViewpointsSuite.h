@@ -1,0 +1,28 @@
+// The suite `viewpoints` of `vdi bench`: how true VDIs are from viewpoints all around the scene.
+#pragma once
+
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "bench/Suites.h"
+#include "vdi/comm/Communicator.h"
+#include "vdi/core/Camera.h"
+#include "vdi/gpu/Device.h"
+
+namespace vdi::bench {
+
+/// Viewpoints of a set: `original`, and others at its distance around its focal point. 2: front and back;
+/// 4: a tetrahedron's corners; 6: front, back and four sides. Throws Error{InvalidArgument} for other counts.
+std::vector<Camera> camerasOfSet(const Camera& original, int count);
+
+/// What can be known before anything takes time. Throws Error.
+void requireSoundViewpoints(const BenchOptions& options);
+
+/// One row for each data set, zoom, kind of viewpoints, N_S, margin and set; writes a line of `table` as soon
+/// as each is known. Collective over `world`; the root gets the rows. Throws Error.
+std::vector<nlohmann::json> runViewpoints(const BenchOptions& options, const comm::Communicator& world,
+                                          const std::shared_ptr<gpu::Device>& device, std::FILE* table);
+
+}  // namespace vdi::bench

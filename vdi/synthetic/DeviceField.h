@@ -1,0 +1,41 @@
+// The fields of Fields.h, made by a device: in seconds where cores take minutes.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "vdi/gpu/Commands.h"
+#include "vdi/gpu/Device.h"
+#include "vdi/gpu/Memory.h"
+#include "vdi/gpu/PipelineSet.h"
+#include "vdi/synthetic/Decomposition.h"
+
+namespace vdi::synthetic {
+
+class DeviceField {
+ public:
+  /// Throws Error{InvalidArgument} that lists the names there are.
+  DeviceField(std::shared_ptr<gpu::Device> device, const std::string& name, std::uint32_t seed);
+
+  /// A part's values, `top` times the field's, of the lattice's type. They're deterministic on a device;
+  /// another one, and makeField, which works in double precision, may give others in the sixth digit. The
+  /// lattice's spacing must be the same on all axes, its origin 0.
+  std::shared_ptr<std::byte[]> makeValues(const Lattice& lattice, const Part& part, double top);
+  /// Blocks for parts of `all`, which is copies of `one` side by side; they share values.
+  std::vector<Block> makeBlocks(const Lattice& one, const Lattice& all, std::span<const Part> parts,
+                                double top);
+
+ private:
+  std::shared_ptr<gpu::Device> device_;
+  gpu::ComputePipeline pipeline_;
+  gpu::Commands commands_;
+  gpu::Buffer values_;
+  gpu::Buffer readback_;
+  std::uint32_t field_;
+  std::uint32_t seed_;
+};
+
+}  // namespace vdi::synthetic
