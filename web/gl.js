@@ -47,13 +47,16 @@ export function tilingOf(gl) {
   return {rowShift: shift, layerShift: shift};
 }
 
+const UPLOAD_BYTES = 2 << 20;  // at a time
+
 /**
- * An array of one, two or four words an element as an integer texture of rows and layers. Throws Error where the GPU
+ * An array of two or four words an element as an integer texture of rows and layers. Throws Error where the GPU
  * can't hold it.
  * @param {WebGL2RenderingContext} gl
  * @param {Uint32Array} words
  * @param {2 | 4} perElement
  * @param {{rowShift: number, layerShift: number}} tiling
+ * @returns {{texture: WebGLTexture | null, uploads: (() => void)[]}} the texture is complete once all uploads were called
  */
 export function makeArrayTexture(gl, words, perElement, tiling) {
   const width = 1 << tiling.rowShift;
@@ -66,19 +69,29 @@ export function makeArrayTexture(gl, words, perElement, tiling) {
   gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
   gl.getError();
   gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, internal, width, Math.min(rows, maxHeight), layers);
-  if (gl.getError() === gl.OUT_OF_MEMORY) throw new Error("the GPU has too little memory for this VDI");
+  if (gl.getError() === gl.OUT_OF_MEMORY) {
+    gl.deleteTexture(texture);
+    throw new Error("the GPU has too little memory for this VDI");
+  }
   gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
   gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
-  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
   const perRow = width * perElement;
+  const mostRows = Math.max(1, Math.floor(UPLOAD_BYTES / 4 / perRow));
+  /** @type {(() => void)[]} */
+  const uploads = [];
   for (let row = 0; row * perRow < words.length;) {
+    const first = row;
     const whole = Math.floor(words.length / perRow) - row;
-    const some = Math.min(Math.max(whole, 1), maxHeight - (row % maxHeight));
+    const some = Math.min(Math.max(whole, 1), maxHeight - (row % maxHeight), mostRows);
     const across = whole > 0 ? width : (words.length % perRow) / perElement;
-    const part = words.subarray(row * perRow, row * perRow + some * across * perElement);
-    gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, row % maxHeight, Math.floor(row / maxHeight), across, some, 1, format,
-                     gl.UNSIGNED_INT, part);
+    uploads.push(() => {
+      const part = words.subarray(first * perRow, first * perRow + some * across * perElement);
+      gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
+      gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
+      gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, first % maxHeight, Math.floor(first / maxHeight), across, some, 1, format,
+                       gl.UNSIGNED_INT, part);
+    });
     row += some;
   }
-  return texture;
+  return {texture, uploads};
 }

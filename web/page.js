@@ -3,12 +3,15 @@
 import {drawAxes} from "./axes.js";
 import {between, cameraOfText, cameraText, centerOf, degreesBetween} from "./camera.js";
 import {addControls} from "./controls.js";
+import {Decoder, serveDecoding} from "./decoder.js";
 import {showLegend} from "./legend.js";
+import {LivePanel, takeToken} from "./livepanel.js";
 import {embeddedSource, filesSource} from "./sources.js";
 import {Viewer} from "./viewer.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
-/** @typedef {import("./format.js").Vdi} Vdi */
+/** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
+/** @typedef {import("./live.js").Arrived} Arrived */
 /** @typedef {import("./format.js").Vec3} Vec3 */
 /** @typedef {import("./renderer.js").Color} Color */
 /** @typedef {import("./sources.js").Source} Source */
@@ -38,7 +41,6 @@ function colorOf(hex) {
   return [(n >> 16) / 255, ((n >> 8) & 255) / 255, (n & 255) / 255];
 }
 
-const darkScheme = window.matchMedia("(prefers-color-scheme: dark)");
 const MOTION_MS = 350;
 const FRAMES_PER_SECOND = 10;
 
@@ -49,10 +51,14 @@ function fragment() {
 
 class Page {
   constructor() {
+    this.darkScheme = window.matchMedia("(prefers-color-scheme: dark)");
+    this.decoder = new Decoder(document.querySelector("script[type=module]")?.textContent ?? "");
     this.viewer = new Viewer(/** @type {HTMLCanvasElement} */ (element("view")), tell);
     /** @type {Source | undefined} */
     this.source = undefined;
-    /** @type {Vdi | undefined} */
+    /** @type {LivePanel | undefined} */
+    this.live = undefined;
+    /** @type {PreparedVdi | undefined} */
     this.vdi = undefined;
     this.frame = 0;
     this.isPlaying = false;
@@ -74,6 +80,7 @@ class Page {
     element("home").addEventListener("click", () => this.goHome());
     element("play").addEventListener("click", () => this.play(!this.isPlaying));
     input("frame").addEventListener("input", () => this.show(input("frame").valueAsNumber));
+    element("pause").addEventListener("click", () => this.live?.toggle());
     input("outline").addEventListener("change", () => {
       viewer.outline = input("outline").checked;
       viewer.refresh();
@@ -89,8 +96,8 @@ class Page {
     input("files").addEventListener("change", () => this.openFiles([...(input("files").files ?? [])]));
     element("view").addEventListener("keydown", (event) => this.onKey(event));
     window.addEventListener("resize", () => viewer.redraw());
-    window.addEventListener("hashchange", () => this.takeUrl());
-    darkScheme.addEventListener("change", () => this.takeTheme());
+    window.addEventListener("hashchange", () => this.onNewUrl());
+    this.darkScheme.addEventListener("change", () => this.takeTheme());
     document.addEventListener("dragover", (event) => event.preventDefault());
     document.addEventListener("drop", (event) => {
       event.preventDefault();
@@ -102,7 +109,7 @@ class Page {
   onKey(event) {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     if (event.key === "Home") this.goHome();
-    else if (event.key === " " && this.source && this.source.count > 1) this.play(!this.isPlaying);
+    else if (event.key === " " && this.count() > 1) this.play(!this.isPlaying);
     else if (event.key === "h") document.body.classList.toggle("bare");
     else return;
     event.preventDefault();
@@ -123,7 +130,9 @@ class Page {
 
   /** @param {File[]} files */
   async openFiles(files) {
-    if (files.length > 0) await this.open(filesSource(files));
+    if (files.length === 0) return;
+    this.live?.close();
+    await this.open(filesSource(files, this.decoder));
   }
 
   /**
@@ -140,28 +149,81 @@ class Page {
       if (this.source === source) this.source = before;
       return;
     }
-    element("series").hidden = source.count < 2;
-    input("frame").max = String(source.count - 1);
-    input("frame").value = String(first);
+    this.showSeries(first);
     if (before === undefined) this.takeUrl();
     else if (this.vdi) this.setCamera(this.vdi.camera, false);
+  }
+
+  /** How many frames there are to choose from. */
+  count() {
+    return this.source?.count ?? this.live?.count() ?? 0;
+  }
+
+  /** @param {number} frame that the slider stands at */
+  showSeries(frame) {
+    element("series").hidden = this.count() < 2;
+    input("frame").max = String(Math.max(this.count() - 1, 0));
+    input("frame").value = String(frame);
+  }
+
+  /**
+   * Shows what a server sends.
+   * @param {string} token
+   */
+  goLive(token) {
+    this.live = new LivePanel(token, this.decoder, {
+      show: (vdi, level) => this.takeLevel(vdi, level),
+      tell,
+      onSeries: (index) => this.showSeries(index),
+    });
+    const wanted = fragment().get("frame") ?? "";
+    this.live.start(/^\d{1,7}$/.test(wanted) ? Number(wanted) : undefined);
+  }
+
+  /**
+   * Shows a level of a server's frame. The user's camera stays; one who is where the last VDI was made goes to where this
+   * one was made.
+   * @param {PreparedVdi} vdi
+   * @param {Arrived} level
+   */
+  async takeLevel(vdi, level) {
+    const {viewer} = this;
+    const before = this.vdi;
+    const live = this.live;
+    this.source = undefined;
+    if (!await viewer.setVdi(vdi, () => this.live === live && !this.source)) return;
+    this.vdi = vdi;
+    this.frame = level.frame;
+    if (!before) {
+      this.takeUrl();
+      if (!viewer.isLost) tell("");
+    } else if (viewer.camera && cameraText(viewer.camera) === cameraText(before.camera)) {
+      this.setCamera(vdi.camera, false);
+    } else if (viewer.camera && viewer.camera.parallel !== vdi.camera.parallel) {
+      this.setCamera(vdi.camera, false);
+    }
+    this.showFacts([]);
+    showLegend(element("legend"), vdi.coloring);
+    this.showView();
   }
 
   /** @param {number} frame @returns {Promise<boolean>} whether it is shown */
   async show(frame) {
     const {source, viewer} = this;
-    if (!source) return false;
+    if (!source) return this.live ? this.live.show(frame) : false;
     const request = ++this.request;
+    const isWanted = () => request === this.request && source === this.source;
     try {
       if (!this.vdi) tell("Reading…");
       const vdi = await source.load(frame);
-      if (request !== this.request) return false;
-      viewer.setVdi(vdi);
+      if (!isWanted() || !await viewer.setVdi(vdi, isWanted)) return false;
       this.vdi = vdi;
       this.frame = frame;
       if (!viewer.camera || viewer.camera.parallel !== vdi.camera.parallel) this.setCamera(vdi.camera, false);
       if (!viewer.isLost) tell("");
-      this.showFacts();
+      const hasTime = vdi.timeStep !== 0 || vdi.time !== 0;
+      this.showFacts([source.nameOf(frame),
+                      ...hasTime ? [`step ${vdi.timeStep}`, `t = ${Number(vdi.time.toPrecision(6))}`] : []]);
       showLegend(element("legend"), vdi.coloring);
       this.showView();
       return true;
@@ -181,8 +243,8 @@ class Page {
   }
 
   async playOn() {
-    while (this.isPlaying && this.source) {
-      const next = (this.frame + 1) % this.source.count;
+    while (this.isPlaying && this.count() > 0) {
+      const next = (this.frame + 1) % this.count();
       const pause = new Promise((resolve) => setTimeout(resolve, 1000 / FRAMES_PER_SECOND));
       if (!await this.show(next)) {
         this.play(false);
@@ -193,13 +255,12 @@ class Page {
     }
   }
 
-  showFacts() {
-    const {vdi, source} = this;
-    if (!vdi || !source) return;
-    const parts = [source.nameOf(this.frame)];
-    if (vdi.timeStep !== 0 || vdi.time !== 0) parts.push(`step ${vdi.timeStep}`, `t = ${Number(vdi.time.toPrecision(6))}`);
-    parts.push(`${vdi.width - 2 * vdi.margin[0]} × ${vdi.height - 2 * vdi.margin[1]}`,
-               `${vdi.supersegmentCount.toLocaleString("en")} supersegments`);
+  /** @param {string[]} facts that come first */
+  showFacts(facts) {
+    const {vdi} = this;
+    if (!vdi) return;
+    const [width, height] = [vdi.width - 2 * vdi.margin[0], vdi.height - 2 * vdi.margin[1]];
+    const parts = [...facts, `${width} × ${height}`, `${vdi.supersegmentCount.toLocaleString("en")} supersegments`];
     element("facts").textContent = parts.filter(Boolean).join(" · ");
   }
 
@@ -237,7 +298,7 @@ class Page {
 
   takeTheme() {
     const {viewer} = this;
-    const dark = darkScheme.matches;
+    const dark = this.darkScheme.matches;
     if (!this.ownBackground) input("background").value = dark ? "#17191d" : "#ffffff";
     viewer.background = colorOf(input("background").value);
     const [r, g, b] = viewer.background;
@@ -252,12 +313,21 @@ class Page {
     const parts = [];
     const camera = cameraText(viewer.camera);
     if (camera !== cameraText(vdi.camera)) parts.push(`camera=${camera}`);
-    if (this.frame > 0) parts.push(`frame=${this.frame}`);
+    const isChosen = this.source ? this.frame > 0 : this.live?.isChosen();
+    if (isChosen) parts.push(`frame=${this.frame}`);
     try {
-      history.replaceState(null, "", parts.length > 0 ? `#${parts.join("&")}` : location.pathname + location.search);
+      history.replaceState(history.state, "", parts.length > 0 ? `#${parts.join("&")}` : location.pathname + location.search);
     } catch {
       // Some browsers allow it a few times a second only; the next view will be kept.
     }
+  }
+
+  /** The user has gone to another link of this page. */
+  onNewUrl() {
+    const token = takeToken();
+    if (token && this.live) this.live.restart(token);
+    else if (token) this.goLive(token);
+    this.takeUrl();
   }
 
   takeUrl() {
@@ -292,8 +362,12 @@ function main() {
   Object.assign(window, {vdiPage: page});  // for scripts and tests
   /** @type {HTMLElement[]} */
   const frames = [...document.querySelectorAll("script.vdi-frame")].map((frame) => /** @type {HTMLElement} */ (frame));
-  if (frames.length > 0) page.open(embeddedSource(frames));
-  else tell("Open .vdi files, or drop them here.");
+  const token = takeToken();
+  if (frames.length > 0) page.open(embeddedSource(frames, page.decoder));
+  else if (token) page.goLive(token);
+  else if (location.protocol === "file:") tell("Open .vdi files, or drop them here.");
+  else tell("This link has no token. Use the one that the server printed, or open .vdi files.");
 }
 
-main();
+if (typeof document === "undefined") serveDecoding();
+else main();

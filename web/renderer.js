@@ -3,11 +3,10 @@
 
 import {basisOf, clipMatrix, pixelSizeOf, raysOf} from "./camera.js";
 import {makeArrayTexture, makeProgram, tilingOf} from "./gl.js";
-import {expandedSegments, headsOf} from "./heads.js";
 import {WHOLE_PICTURE, traverseShader} from "./traverse.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
-/** @typedef {import("./format.js").Vdi} Vdi */
+/** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 /** @typedef {import("./format.js").Vec3} Vec3 */
 /** @typedef {[number, number, number]} Color shares of red, green and blue */
 
@@ -67,19 +66,25 @@ function outlineEnds(bounds, camera, inFront) {
 }
 
 /**
- * A VDI's textures, and the program that shows it.
+ * A VDI's textures, and what is left to do for them. None while the context is lost.
  * @param {WebGL2RenderingContext} gl
- * @param {Vdi} vdi
- * @param {boolean} smooth
+ * @param {PreparedVdi} vdi
+ * @returns {{vdi: PreparedVdi, textures: (WebGLTexture | null)[], uploads: (() => void)[]}}
  */
-function load(gl, vdi, smooth) {
+function texturesOf(gl, vdi) {
+  if (gl.isContextLost()) return {vdi, textures: [], uploads: []};
   const tiling = tilingOf(gl);
-  const {heads, tiles, nearest, farthest, binScale} = headsOf(vdi);
-  const segments = vdi.compact ? vdi.words : expandedSegments(vdi);
-  const program = makeProgram(gl, WHOLE_PICTURE, traverseShader({...tiling, compact: vdi.compact, smooth}));
-  const textures = [makeArrayTexture(gl, heads, 4, tiling), makeArrayTexture(gl, segments, vdi.compact ? 2 : 4, tiling),
-                    makeArrayTexture(gl, tiles, 2, tiling)];
-  return {vdi, smooth, program, textures, range: {nearest, farthest, binScale}};
+  /** @type {[Uint32Array, 2 | 4][]} */
+  const arrays = [[vdi.heads, 4], [vdi.segments, vdi.compact ? 2 : 4], [vdi.tiles, 2]];
+  /** @type {ReturnType<typeof makeArrayTexture>[]} */
+  const made = [];
+  try {
+    for (const [words, perElement] of arrays) made.push(makeArrayTexture(gl, words, perElement, tiling));
+  } catch (error) {
+    for (const {texture} of made) gl.deleteTexture(texture);
+    throw error;
+  }
+  return {vdi, textures: made.map(({texture}) => texture), uploads: made.flatMap(({uploads}) => uploads)};
 }
 
 /**
@@ -116,36 +121,73 @@ export class Renderer {
     if (!gl) throw new Error("this browser has no WebGL2, which showing a VDI needs");
     this.gl = gl;
     this.canvas = canvas;
-    /** @type {ReturnType<typeof load> | undefined} */
+    /** @type {ReturnType<typeof texturesOf> | undefined} */
     this.loaded = undefined;
+    this.smooth = true;
+    /** How often everything was made anew: what was made before is gone. */
+    this.age = 0;
     this.restore();
   }
 
   /** Makes everything on the GPU, at first and after the context was lost. */
   restore() {
     const gl = this.gl;
+    ++this.age;
+    /** @type {Map<string, ReturnType<typeof makeProgram>>} programs that show VDIs, by variant */
+    this.programs = new Map();
     this.copy = makeProgram(gl, WHOLE_PICTURE, COPY);
     this.lines = makeProgram(gl, LINES, PLAIN);
     this.ends = gl.createBuffer();
     this.shown = makePicture(gl);
     this.next = makePicture(gl);
     gl.disable(gl.DITHER);
-    const loaded = this.loaded;
+    const vdi = this.loaded?.vdi;
     this.loaded = undefined;
-    if (loaded) this.setVdi(loaded.vdi, loaded.smooth);
+    if (!vdi) return;
+    const loaded = texturesOf(gl, vdi);
+    for (const upload of loaded.uploads) upload();
+    this.loaded = loaded;
   }
 
   /**
    * Throws Error if the GPU can't hold it; the VDI before then stays.
-   * @param {Vdi} vdi
-   * @param {boolean} smooth
+   * @param {PreparedVdi} vdi
+   * @param {() => Promise<void> | undefined} pause called between parts of the upload, which waits for what it returns
+   * @param {() => boolean} isWanted asked before it is shown
+   * @returns {Promise<boolean>} whether it is shown
    */
-  setVdi(vdi, smooth) {
-    const before = this.loaded;
-    this.loaded = load(this.gl, vdi, smooth);
-    if (!before) return;
-    for (const texture of before.textures) this.gl.deleteTexture(texture);
-    this.gl.deleteProgram(before.program.program);
+  async setVdi(vdi, pause, isWanted) {
+    const {gl} = this;
+    for (;;) {
+      const age = this.age;
+      const loaded = texturesOf(gl, vdi);
+      for (const upload of loaded.uploads) {
+        if (!isWanted()) break;
+        upload();
+        await pause();
+      }
+      if (!gl.isContextLost()) this.programOf(vdi);  // throws before anything has changed
+      if (age !== this.age) continue;  // the context was lost meanwhile, and these textures with it
+      const wanted = isWanted();
+      const unused = wanted ? this.loaded : loaded;
+      if (wanted) this.loaded = loaded;
+      for (const texture of unused?.textures ?? []) gl.deleteTexture(texture);
+      return wanted;
+    }
+  }
+
+  /**
+   * The program that shows a VDI.
+   * @param {PreparedVdi} vdi
+   */
+  programOf(vdi) {
+    const key = `${vdi.compact} ${this.smooth}`;
+    const known = this.programs?.get(key);
+    if (known) return known;
+    const {gl} = this;
+    const program = makeProgram(gl, WHOLE_PICTURE, traverseShader({...tilingOf(gl), compact: vdi.compact, smooth: this.smooth}));
+    this.programs?.set(key, program);
+    return program;
   }
 
   /**
@@ -166,7 +208,6 @@ export class Renderer {
     gl.enable(gl.SCISSOR_TEST);
     gl.scissor(0, firstRow, width, endRow - firstRow);
     gl.disable(gl.BLEND);
-    gl.useProgram(loaded.program.program);
     this.setRays(camera, scale);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.SCISSOR_TEST);
@@ -197,8 +238,9 @@ export class Renderer {
   setRays(camera, scale) {
     const {gl, loaded} = this;
     if (!loaded) return;
-    const {vdi, range, textures} = loaded;
-    const {uniform} = loaded.program;
+    const {vdi, textures} = loaded;
+    const {program, uniform} = this.programOf(vdi);
+    gl.useProgram(program);
     ["heads", "segments", "tiles"].forEach((name, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D_ARRAY, textures[unit]);
@@ -209,9 +251,9 @@ export class Renderer {
     gl.uniform2i(uniform("lists"), vdi.width, vdi.height);
     gl.uniform1i(uniform("parallel"), vdi.camera.parallel ? 1 : 0);
     gl.uniform1f(uniform("pixelSize"), pixelSizeOf(vdi));
-    gl.uniform1f(uniform("nearest"), range.nearest);
-    gl.uniform1f(uniform("farthest"), range.farthest);
-    gl.uniform1f(uniform("binScale"), range.binScale);
+    gl.uniform1f(uniform("nearest"), vdi.nearest);
+    gl.uniform1f(uniform("farthest"), vdi.farthest);
+    gl.uniform1f(uniform("binScale"), vdi.binScale);
     gl.uniform2f(uniform("code"), vdi.code.first, vdi.code.step);
     gl.uniform3fv(uniform("rayOrigin"), [...rays.origin, ...rays.originRight, ...rays.originUp]);
     gl.uniform3fv(uniform("rayDirection"), [...rays.direction, ...rays.directionRight, ...rays.directionUp]);

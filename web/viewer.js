@@ -1,10 +1,11 @@
 // Decides when what is drawn: while something moves, as many pixels as the frame rate allows; at rest the whole picture, in
 // strips, so that a hand that comes back never waits for it.
 
+import {politely} from "./decoder.js";
 import {Renderer} from "./renderer.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
-/** @typedef {import("./format.js").Vdi} Vdi */
+/** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 /** @typedef {import("./renderer.js").Color} Color */
 
 const FRAME_MS = 33;       // that a moving picture may take
@@ -29,7 +30,6 @@ export class Viewer {
     /** @type {Color} */
     this.outlineColor = [0.5, 0.5, 0.5];
     this.outline = true;
-    this.smooth = true;
     this.isLost = false;
     /** Milliseconds for a canvas pixel, as measured. */
     this.cost = 1e-4;
@@ -65,18 +65,20 @@ export class Viewer {
 
   /**
    * Throws Error if the GPU can't hold it.
-   * @param {Vdi} vdi
+   * @param {PreparedVdi} vdi
+   * @param {() => boolean} isWanted asked before it is shown
+   * @returns {Promise<boolean>} whether it is shown
    */
-  setVdi(vdi) {
-    this.renderer.setVdi(vdi, this.smooth);
-    this.redraw();
+  async setVdi(vdi, isWanted) {
+    const isShown = await this.renderer.setVdi(vdi, politely(), isWanted);
+    if (isShown) this.redraw();
+    return isShown;
   }
 
   /** @param {boolean} smooth */
   setSmooth(smooth) {
-    this.smooth = smooth;
-    const loaded = this.renderer.loaded;
-    if (loaded) this.setVdi(loaded.vdi);
+    this.renderer.smooth = smooth;
+    this.redraw();
   }
 
   /** @param {Camera} camera @param {boolean} [moving] further ones will follow */

@@ -113,12 +113,15 @@ struct Shell {
   std::string after;
 };
 
-Shell shellOf(const std::string& title) {
+/// `connect`: what the page may connect to, in terms of a Content-Security-Policy.
+Shell shellOf(const std::string& title, std::string_view connect) {
   constexpr std::string_view titlePlace = "@TITLE@";
   constexpr std::string_view dataPlace = "@DATA@";
   std::string page(pageTemplate);
   const std::size_t data = page.find(dataPlace);
   Shell shell{page.substr(0, data), page.substr(data + dataPlace.size())};
+  constexpr std::string_view connectPlace = "@CONNECT@";
+  shell.before.replace(shell.before.find(connectPlace), connectPlace.size(), connect);
   const std::string text = escaped(title);
   for (std::size_t at = shell.before.find(titlePlace); at != std::string::npos;
        at = shell.before.find(titlePlace, at + text.size())) {
@@ -167,7 +170,7 @@ std::vector<Frame> framesOf(std::span<const std::filesystem::path> files) {
 
 void writePage(const std::filesystem::path& path, const std::string& title, std::span<const Frame> frames) {
   if (frames.empty()) throw Error(ErrorCode::InvalidArgument, "a page needs at least one VDI");
-  const Shell shell = shellOf(title);
+  const Shell shell = shellOf(title, "'none'");
   Writer writer(path);
   writer.write(shell.before);
   for (const Frame& frame : frames) {
@@ -183,7 +186,7 @@ void writePage(const std::filesystem::path& path, const std::string& title, std:
 }
 
 std::string emptyPage(const std::string& title) {
-  const Shell shell = shellOf(title);
+  const Shell shell = shellOf(title, "'self'");
   return shell.before + shell.after;
 }
 

@@ -26,7 +26,8 @@ std::vector<Frame> framesOf(std::span<const std::filesystem::path> files);
 /// files that can't be read, and for `path`.
 void writePage(const std::filesystem::path& path, const std::string& title, std::span<const Frame> frames);
 
-/// The page without frames, where a user opens or drops files. UTF-8.
+/// The page without frames, UTF-8. From a server, with #token=… in its link, it shows that server's stream;
+/// else a user opens or drops files. It may connect to where it came from, which a page with frames may not.
 std::string emptyPage(const std::string& title);
 
 }  // namespace vdi::page

@@ -1,0 +1,259 @@
+// The page's end of the stream on sound, damaged and hostile messages, without a network. What comes in goes to the
+// decoder of messages, or to a connection over sockets that are objects of this test.
+import {Live, rateOf} from "../../web/live.js";
+import {LevelAssembler, StreamError, extendedSeries, serverMessageOf} from "../../web/messages.js";
+
+let failures = 0;
+const check = (/** @type {boolean} */ holds, /** @type {string} */ what) => {
+  if (holds) return;
+  console.log(`FAILED  ${what}`);
+  ++failures;
+};
+
+/** Numbers that are the same in each run. */
+let state = 2024;
+const random = (/** @type {number} */ below) => {
+  state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+  return Math.floor(state / 0x100000000 * below);
+};
+
+/** @returns {any} what a function gives, or "refused" for a StreamError of one line */
+function outcome(/** @type {() => any} */ act) {
+  try {
+    return act();
+  } catch (error) {
+    if (error instanceof StreamError && !error.message.includes("\n")) return "refused";
+    throw error;
+  }
+}
+
+const level = {type: "level", frame: 7, level: 0, levels: 2, bytes: 700000, width: 640, height: 360, step: 12, time: 0.5, age: 0.25,
+               dropped: 3};
+const welcome = {type: "welcome", version: 1, session: "abc", steer: false, viewers: 2,
+                 series: {times: [0, null, 0.5], steps: [0, 1, 2]}};
+
+function part(frame, index, offset, bytes) {
+  const message = new Uint8Array(16 + bytes.length);
+  const view = new DataView(message.buffer);
+  view.setUint32(0, frame, true);
+  view.setUint32(4, index, true);
+  view.setUint32(8, offset % 0x100000000, true);
+  view.setUint32(12, Math.floor(offset / 0x100000000), true);
+  message.set(bytes, 16);
+  return message.buffer;
+}
+
+function testTexts() {
+  check(serverMessageOf(JSON.stringify(level)).type === "level", "a level");
+  const series = serverMessageOf(JSON.stringify(welcome));
+  check(series.type === "welcome" && series.series?.times[1] === null && series.series.steps.length === 3, "a welcome with a series");
+  check(serverMessageOf(JSON.stringify({...welcome, series: null})).series === null, "a welcome without a series");
+  check(serverMessageOf('{"type":"driver","you":true}').type === "other", "a kind that the page has no use for");
+  const bad = [
+    "", "{", "[]", "null", "1", '"x"', "{}", '{"type":3}', "x".repeat((1 << 20) + 1),
+    {...level, frame: -1}, {...level, frame: 2 ** 32}, {...level, frame: "7"}, {...level, level: 2}, {...level, levels: 1e9},
+    {...level, bytes: 0}, {...level, bytes: 2 ** 40}, {...level, bytes: 1.5}, {...level, bytes: null}, {...level, width: 0},
+    {...level, height: 1e6}, {...level, step: "x"}, {...level, time: {}}, {...level, age: "old"},
+    {...welcome, version: "1"}, {...welcome, session: 3}, {...welcome, series: {times: [1], steps: []}},
+    {...welcome, series: {times: ["x"], steps: [1]}}, {...welcome, series: 5}, {...welcome, series: {times: [1], steps: [-1]}},
+    {type: "state", state: "asleep", viewers: 1}, {type: "error"}, {type: "series", from: 3, times: 1, steps: 1},
+  ];
+  for (const message of bad) {
+    const text = typeof message === "string" ? message : JSON.stringify(message);
+    check(outcome(() => serverMessageOf(text)) === "refused", `${text.slice(0, 100)} is taken`);
+  }
+  const sound = [level, welcome, {type: "state", state: "live", viewers: 1}, {type: "error", cause: "why"}].map((m) => JSON.stringify(m));
+  for (let round = 0; round < 20000; ++round) {
+    const text = [...sound[round % sound.length]];
+    for (let i = 0; i < 1 + round % 3; ++i) {
+      const at = random(text.length);
+      if (random(3) === 0) text.splice(at, 1 + random(5));
+      else text[at] = String.fromCharCode(32 + random(95));
+    }
+    outcome(() => serverMessageOf(text.join("")));
+  }
+  const first = {times: [0, 1], steps: [0, 1]};
+  const more = extendedSeries(first, {type: "series", from: 2, times: [2], steps: [2]});
+  check(more.steps.join() === "0,1,2", "more of a series");
+  for (const from of [0, 1, 3, NaN])
+    check(outcome(() => extendedSeries(first, {type: "series", from, times: [2], steps: [2]})) === "refused", `a series from ${from} on`);
+}
+
+/** Levels in parts of any sizes come out as they were; whatever else comes is refused, and memory stays bounded. */
+function testParts() {
+  for (let round = 0; round < 300; ++round) {
+    const bytes = 1 + random(round < 20 ? 3 << 20 : 5000);
+    const file = Uint8Array.from({length: bytes}, (_, i) => (i * 31 + round) & 255);
+    const assembler = new LevelAssembler();
+    const begin = () => assembler.begin({...level, frame: round, level: 1, bytes});
+    begin();
+    const kind = round % 6;
+    let got;
+    for (let at = 0; at < bytes;) {
+      const end = Math.min(at + 1 + random(262144), bytes);
+      const sound = part(round, 1, at, file.subarray(at, end));
+      if (random(4) === 0) {
+        const damaged = [part(round, 1, at + 1, file.subarray(at, end)), part(round, 0, at, file.subarray(at, end)),
+                         part(round + 1, 1, at, file.subarray(at, end)), new ArrayBuffer(random(17)),
+                         part(round, 1, 2 ** 40 + at, file.subarray(at, end)),
+                         part(round, 1, at, new Uint8Array(bytes - at + 1))][kind];
+        check(outcome(() => assembler.add(damaged)) === "refused", `damage ${kind} is taken`);
+      }
+      got = assembler.add(sound);
+      check(assembler.room.length <= Math.max(2 * end, 1 << 20), "room for more than has come");
+      at = end;
+    }
+    check(got?.length === bytes && got.every((byte, i) => byte === file[i]), `a level of ${bytes} bytes`);
+    check(outcome(() => assembler.add(part(round, 1, 0, file))) === "refused", "a level that comes once more");
+    begin();
+    assembler.add(part(round, 1, 0, file.subarray(0, Math.ceil(bytes / 2))));
+    assembler.begin({...level, bytes});
+    check(assembler.received === 0, "another level's beginning ends one");
+    assembler.drop();
+    check(outcome(() => assembler.add(part(round, 1, 0, file))) === "refused", "a part of no level");
+  }
+  const assembler = new LevelAssembler();
+  assembler.begin({...level, bytes: 1 << 30});
+  check(assembler.room.length <= 1 << 20, "a level that is only announced takes no memory");
+}
+
+/** A socket that records, and gives what it's told to. */
+class FakeSocket {
+  constructor() {
+    /** @type {any[]} */
+    this.sent = [];
+    this.readyState = 1;
+    this.binaryType = "blob";
+    this.onopen = this.onmessage = this.onclose = /** @type {any} */ (null);
+  }
+  send(/** @type {string} */ text) { this.sent.push(JSON.parse(text)); }
+  close() { this.readyState = 3; }
+  open() { this.onopen({}); }
+  text(/** @type {object} */ message) { this.onmessage({data: JSON.stringify(message)}); }
+  bytes(/** @type {ArrayBuffer} */ message) { this.onmessage({data: message}); }
+  end(/** @type {number} */ code) { this.readyState = 3; this.onclose({code}); }
+}
+
+const soon = (milliseconds = 0) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+
+/** A connection whose decoder takes a file's first byte for the VDI. */
+function connection() {
+  /** @type {FakeSocket[]} */
+  const sockets = [];
+  /** @type {number[]} */
+  const shown = [];
+  const live = new Live({
+    token: "secret",
+    open: () => {
+      sockets.push(new FakeSocket());
+      return /** @type {any} */ (sockets[sockets.length - 1]);
+    },
+    decode: async (file) => {
+      await soon(5);
+      if (file[0] === 255) throw new Error("not a sound .vdi file");
+      return /** @type {any} */ (file[0]);
+    },
+    onLevel: (vdi) => void shown.push(/** @type {any} */ (vdi)),
+    onChange: () => {},
+  });
+  live.restart();
+  return {live, sockets, shown};
+}
+
+function sendLevel(/** @type {FakeSocket} */ socket, /** @type {number} */ frame, /** @type {number} */ index, /** @type {number} */ byte) {
+  socket.text({...level, frame, level: index, bytes: 4});
+  socket.bytes(part(frame, index, 0, new Uint8Array([byte, 0, 0, 0])));
+}
+
+async function testConnection() {
+  const {live, sockets, shown} = connection();
+  sockets[0].open();
+  const hello = sockets[0].sent[0];
+  check(hello.type === "hello" && hello.version === 1 && hello.token === "secret" && hello.have === null, "hello");
+  sockets[0].text({...welcome, series: null});
+  check(live.state === "waiting", "welcome without frames");
+  sendLevel(sockets[0], 7, 0, 1);
+  await soon(20);
+  sendLevel(sockets[0], 7, 1, 2);
+  await soon(20);
+  check(shown.join() === "1,2" && live.state === "live", `levels in their order, not ${shown}`);
+  const ends = sockets[0].sent.filter((m) => m.type === "ack");
+  check(ends.length === 2 && ends[1].frame === 7 && ends[1].level === 1 && ends[1].bytes === 4, "acknowledgements of levels' ends");
+
+  // Newest wins: of levels that come while one is decoded, the last.
+  for (let i = 3; i < 9; ++i) sendLevel(sockets[0], 8 + i, 0, i);
+  await soon(60);
+  check(shown.join() === "1,2,3,8", `newest wins: ${shown}`);
+
+  sendLevel(sockets[0], 30, 0, 255);
+  await soon(20);
+  check(live.state === "live" && live.cause !== "" && live.shown?.frame === 16, "a damaged file costs nothing but itself");
+  sendLevel(sockets[0], 31, 1, 9);
+  await soon(20);
+  check(live.cause === "" && live.shown?.frame === 31, "and the next is shown");
+
+  // Acknowledgements of a large level.
+  sockets[0].text({...level, frame: 32, bytes: 3 << 20});
+  for (let at = 0; at < 2 << 20; at += 1 << 18) sockets[0].bytes(part(32, 0, at, new Uint8Array(1 << 18)));
+  const acks = sockets[0].sent.filter((m) => m.type === "ack" && m.frame === 32).map((m) => m.bytes);
+  check(acks.join() === [1, 2, 3, 4].map((i) => i << 19).join(), `an acknowledgement each 512 KiB: ${acks}`);
+
+  // The server goes, comes back as the same, and as another one.
+  sockets[0].end(1006);
+  check(live.state === "lost" && live.retryAt > 0, "a lost connection");
+  await soon(700);
+  check(sockets.length === 2, "it connects again");
+  sockets[1].open();
+  check(sockets[1].sent[0].have === 31 && sockets[1].sent[0].session === "abc", "it says what it has");
+  sockets[1].text({...welcome, session: "other"});
+  check(live.shown === undefined, "another server's frames are counted anew");
+  sockets[1].bytes(part(32, 0, 2 << 20, new Uint8Array(9)));
+  check(live.state === "lost" && sockets[1].readyState === 3, "a part of a level that was lost ends the connection");
+  sockets[1].text({...level, frame: 99});
+  check(live.assembler.level === undefined, "what comes behind the end is nothing");
+  const wait = live.retryAt - performance.now();
+  check(wait > 600 && wait <= 1000, `the second attempt waits for longer: ${wait}`);
+
+  live.restart("new");
+  sockets[2].open();
+  check(sockets[2].sent[0].token === "new", "another token");
+  sockets[2].text({type: "error", cause: "the token is wrong"});
+  sockets[2].end(4401);
+  check(live.state === "refused" && live.cause.includes("token"), "a wrong token");
+  await soon(700);
+  check(sockets.length === 3, "isn't tried again");
+  live.restart();
+  sockets[3].open();
+  sockets[3].text({...welcome, version: 2});
+  check(live.state === "refused" && live.cause.includes("version 2"), "another version");
+  live.restart();
+  sockets[4].text("noise");
+  check(live.state === "lost", "noise");
+  live.close();
+  await soon(1500);
+  check(sockets.length === 5 && live.state === "closed", "what was closed stays closed");
+}
+
+async function testSeries() {
+  const {live, sockets} = connection();
+  live.wanted = 3;
+  sockets[0].open();
+  sockets[0].text(welcome);
+  const wishes = () => sockets[0].sent.filter((m) => m.type !== "hello" && m.type !== "ack").map((m) => m.type + (m.index ?? "")).join();
+  check(wishes() === "", "a frame that isn't there yet isn't asked for");
+  sockets[0].text({type: "series", from: 3, times: [1], steps: [3]});
+  check(wishes() === "show3", "but once it is");
+  live.pause();
+  live.show(1);
+  live.follow();
+  check(wishes() === "show3,pause,resume,show1,resume", `wishes: ${wishes()}`);
+  live.close();
+}
+
+testTexts();
+testParts();
+await testConnection();
+await testSeries();
+check(Math.abs(rateOf(10000, [{at: 8000, bytes: 1000}, {at: 9000, bytes: 3000}, {at: 1000, bytes: 1e9}]) - 2000) < 1, "the rate");
+console.log(failures === 0 ? "all well" : `${failures} failures`);
+process.exit(failures === 0 ? 0 : 1);

@@ -1,0 +1,128 @@
+// Makes VDIs ready for the renderer. A worker does it, so that a user who orbits doesn't wait for it. The worker runs the
+// page's own script, which does nothing else there. Browsers that refuse workers decode in the page, in short steps.
+
+import {decodeVdi} from "./format.js";
+import {expandedSegments, headsOf} from "./heads.js";
+import {unpack} from "./unpack.js";
+
+/** @typedef {import("./format.js").Header} Header */
+/** @typedef {import("./heads.js").Heads} Heads */
+
+/**
+ * A decoded VDI as the renderer takes it.
+ * @typedef {Header & Heads & {code: {first: number, step: number}, segments: Uint32Array}} PreparedVdi
+ */
+
+/**
+ * The bytes of a .vdi file, or what `vdi export` packed into text.
+ * @typedef {{file: Uint8Array} | {packed: string, size: number}} Encoded
+ */
+
+/** @typedef {{id: number, vdi?: PreparedVdi, error?: string}} Answer */
+
+/**
+ * Lets the page do other things each 12 ms.
+ * @returns {() => Promise<void> | undefined}
+ */
+export function politely() {
+  let since = performance.now();
+  return () => {
+    if (performance.now() - since < 12) return undefined;
+    return new Promise((resolve) => setTimeout(() => {
+      since = performance.now();
+      resolve();
+    }, 0));
+  };
+}
+
+/**
+ * @param {Encoded} encoded
+ * @param {() => Promise<void> | undefined} [pause] as of decodeVdi
+ * @returns {Promise<PreparedVdi>}
+ */
+async function prepare(encoded, pause) {
+  try {
+    const bytes = "file" in encoded ? encoded.file : await unpack(encoded.packed, encoded.size);
+    const {offsets, words, ...rest} = await decodeVdi(bytes, pause);
+    const vdi = {...rest, offsets, words};
+    return {...rest, ...headsOf(vdi), segments: vdi.compact ? words : expandedSegments(vdi)};
+  } catch (error) {
+    if (error instanceof RangeError) throw new Error("too little memory for this VDI");
+    throw error;
+  }
+}
+
+/** What the page's script does in a worker. */
+export function serveDecoding() {
+  const scope = /** @type {any} */ (globalThis);  // its type is in a library that excludes the DOM's
+  scope.onmessage = async (/** @type {MessageEvent<{id: number, encoded: Encoded}>} */ {data}) => {
+    try {
+      const vdi = await prepare(data.encoded);
+      scope.postMessage({id: data.id, vdi}, [vdi.heads.buffer, vdi.tiles.buffer, vdi.segments.buffer]);
+    } catch (error) {
+      scope.postMessage({id: data.id, error: error instanceof Error ? error.message : String(error)});
+    }
+  };
+  scope.postMessage({id: -1});  // ready
+}
+
+export class Decoder {
+  /** @param {string} script the page's */
+  constructor(script) {
+    /** @type {Map<number, {resolve: (vdi: PreparedVdi) => void, reject: (error: Error) => void}>} */
+    this.asked = new Map();
+    this.next = 0;
+    /** A worker that answers; none if the browser refuses it. */
+    this.worker = this.start(script);
+  }
+
+  /** @param {string} script @returns {Promise<Worker | undefined>} */
+  async start(script) {
+    const url = URL.createObjectURL(new Blob([script], {type: "text/javascript"}));
+    try {
+      const worker = new Worker(url);
+      return await new Promise((resolve) => {
+        worker.onmessage = ({data}) => data.id < 0 ? resolve(worker) : this.take(data);
+        worker.onerror = () => {
+          resolve(undefined);
+          this.fail(worker);
+        };
+      });
+    } catch {
+      return undefined;
+    } finally {
+      URL.revokeObjectURL(url);
+    }
+  }
+
+  /** @param {Answer} answer */
+  take(answer) {
+    const asked = this.asked.get(answer.id);
+    this.asked.delete(answer.id);
+    if (answer.vdi) asked?.resolve(answer.vdi);
+    else asked?.reject(new Error(answer.error));
+  }
+
+  /** @param {Worker} worker that has ended */
+  fail(worker) {
+    worker.terminate();
+    this.worker = Promise.resolve(undefined);
+    for (const {reject} of this.asked.values()) reject(new Error("the browser ended the decoding of this VDI"));
+    this.asked.clear();
+  }
+
+  /**
+   * Throws Error with one line for the user. A file's bytes are gone afterwards.
+   * @param {Encoded} encoded
+   * @returns {Promise<PreparedVdi>}
+   */
+  async decode(encoded) {
+    const worker = await this.worker;
+    if (!worker) return prepare(encoded, politely());
+    return new Promise((resolve, reject) => {
+      const id = this.next++;
+      this.asked.set(id, {resolve, reject});
+      worker.postMessage({id, encoded}, "file" in encoded ? [encoded.file.buffer] : []);
+    });
+  }
+}

@@ -1,0 +1,308 @@
+// A connection to a server: shows the newest frame that the network and this machine can take, and comes back when it breaks.
+// docs/live.md has the protocol.
+
+import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessageOf} from "./messages.js";
+
+/** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
+/** @typedef {import("./messages.js").Level} Level */
+/** @typedef {import("./messages.js").Series} Series */
+/** @typedef {import("./messages.js").Welcome} Welcome */
+
+/**
+ * What a Live needs of WebSocket.
+ * @typedef {Pick<WebSocket, "binaryType" | "readyState" | "send" | "close" | "onopen" | "onmessage" | "onclose">} Socket
+ */
+
+/**
+ * A level that has come, with the clock's milliseconds when its frame was made.
+ * @typedef {Level & {madeAt: number}} Arrived
+ */
+
+/**
+ * "connecting": no answer yet; "waiting": connected, the simulation has made no frame; "live"; "ended": so is the
+ * simulation; "lost": will connect again; "refused": will not, until `restart`; "closed": by the user.
+ * @typedef {"connecting" | "waiting" | "live" | "ended" | "lost" | "refused" | "closed"} LiveState
+ */
+
+/**
+ * @typedef {object} LiveOptions
+ * @property {() => Socket} open
+ * @property {string} token
+ * @property {(file: Uint8Array) => Promise<PreparedVdi>} decode
+ * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void> | void} onLevel shows it
+ * @property {() => void} onChange of state, cause, series or viewers
+ */
+
+const ACK_BYTES = 512 << 10;
+const FIRST_WAIT_MS = 500;
+const LONGEST_WAIT_MS = 10000;
+const ANSWER_MS = 10000;       // within which a server says welcome
+const RATE_MS = 4000;          // over which the rate is a mean
+const WRONG_TOKEN = 4401;
+const OTHER_VERSION = 4409;
+
+/** @param {number} now @param {{at: number, bytes: number}[]} arrivals @returns {number} bytes a second */
+export function rateOf(now, arrivals) {
+  const some = arrivals.filter(({at}) => now - at < RATE_MS);
+  if (some.length === 0) return 0;
+  const since = Math.max(Math.min(now - some[0].at, RATE_MS), RATE_MS / 4);
+  return 1000 * some.reduce((sum, {bytes}) => sum + bytes, 0) / since;
+}
+
+export class Live {
+  /** @param {LiveOptions} options */
+  constructor(options) {
+    this.options = options;
+    /** @type {LiveState} */
+    this.state = "connecting";
+    /** Why it is lost or refused: one line. */
+    this.cause = "";
+    this.isPaused = false;
+    /** @type {Series | null} */
+    this.series = null;
+    /** @type {number | null} the series' frame that the user wants; null: the newest */
+    this.wanted = null;
+    this.viewers = 0;
+    /** @type {Arrived | undefined} the level that is shown */
+    this.shown = undefined;
+    this.session = "";
+    /** @type {Socket | undefined} */
+    this.socket = undefined;
+    this.assembler = new LevelAssembler();
+    this.acknowledged = 0;
+    this.madeAt = 0;
+    /** @type {{at: number, bytes: number}[]} */
+    this.arrivals = [];
+    /** @type {{level: Arrived, file: Uint8Array, done: () => void} | undefined} the newest that waits for the decoder */
+    this.waiting = undefined;
+    this.isDecoding = false;
+    this.failures = 0;
+    this.retryAt = 0;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this.timer = undefined;
+  }
+
+  /**
+   * Connects, or connects anew.
+   * @param {string} [token] another one than before
+   */
+  restart(token) {
+    if (token !== undefined) this.options.token = token;
+    this.failures = 0;
+    this.connect();
+  }
+
+  /** Ends it; the last frame stays. */
+  close() {
+    this.hangUp();
+    this.change("closed", "");
+  }
+
+  hangUp() {
+    clearTimeout(this.timer);
+    const socket = this.socket;
+    this.socket = undefined;
+    this.assembler.drop();
+    this.waiting = undefined;
+    socket?.close();
+  }
+
+  connect() {
+    this.hangUp();
+    this.change("connecting", this.cause);
+    /** @type {Socket} */
+    let socket;
+    try {
+      socket = this.options.open();
+    } catch (error) {  // a URL that the browser forbids
+      this.refuse(error instanceof Error ? error.message : String(error));
+      return;
+    }
+    this.socket = socket;
+    socket.binaryType = "arraybuffer";
+    const has = this.shown && this.shown.level + 1 === this.shown.levels;
+    socket.onopen = () => this.send({type: "hello", version: STREAM_VERSION, token: this.options.token,
+                                     session: this.session || null, have: has ? this.shown?.frame : null});
+    socket.onmessage = ({data}) => {
+      if (socket === this.socket) this.receive(data);
+    };
+    socket.onclose = ({code}) => {
+      if (socket === this.socket) this.onClose(code);
+    };
+    this.timer = setTimeout(() => this.lose("the server doesn't answer"), ANSWER_MS);
+  }
+
+  /** @param {object} message */
+  send(message) {
+    if (this.socket?.readyState === 1) this.socket.send(JSON.stringify(message));
+  }
+
+  /** @param {LiveState} state @param {string} cause */
+  change(state, cause) {
+    this.state = state;
+    this.cause = cause;
+    this.options.onChange();
+  }
+
+  /** @param {number} code of the WebSocket's end */
+  onClose(code) {
+    if (code === WRONG_TOKEN) this.refuse("the server refuses this link's token; use the link that it printed last");
+    else if (code === OTHER_VERSION) this.refuse(this.cause || "the server speaks another version of the protocol; reload this page");
+    else this.lose(this.cause || "the server doesn't answer");
+  }
+
+  /** @param {string} cause that another attempt won't mend */
+  refuse(cause) {
+    this.hangUp();
+    this.change("refused", cause);
+  }
+
+  /**
+   * Connects again after a while, a longer one each time.
+   * @param {string} cause
+   */
+  lose(cause) {
+    this.hangUp();
+    const longest = Math.min(FIRST_WAIT_MS * 2 ** this.failures, LONGEST_WAIT_MS);
+    const wait = longest * (0.75 + 0.25 * Math.random());  // so that viewers don't all come at once
+    ++this.failures;
+    this.retryAt = performance.now() + wait;
+    this.timer = setTimeout(() => this.connect(), wait);
+    this.change("lost", cause);
+  }
+
+  /** @param {string | ArrayBuffer} data */
+  receive(data) {
+    try {
+      if (typeof data === "string") this.takeText(data);
+      else this.takePart(data);
+    } catch (error) {
+      if (!(error instanceof StreamError)) throw error;
+      this.lose(error.message);
+    }
+  }
+
+  /** @param {string} text */
+  takeText(text) {
+    const message = serverMessageOf(text);
+    if (message.type === "error") {
+      this.cause = message.cause;
+    } else if (message.type === "welcome") {
+      this.takeWelcome(message);
+    } else if (message.type === "series") {
+      const before = this.series?.steps.length ?? 0;
+      this.series = extendedSeries(this.series, message);
+      if (this.wanted !== null && this.wanted >= before) this.askForWanted();
+      this.change(this.state, this.cause);
+    } else if (message.type === "state") {
+      this.viewers = message.viewers;
+      this.change(message.state, "");
+    } else if (message.type === "level") {
+      const {type: _, ...level} = message;
+      this.madeAt = performance.now() - 1000 * level.age;
+      this.acknowledged = 0;
+      this.assembler.begin(level);
+    }
+  }
+
+  /** @param {Welcome} welcome */
+  takeWelcome(welcome) {
+    clearTimeout(this.timer);
+    if (welcome.version !== STREAM_VERSION) {
+      this.refuse(`the server speaks version ${welcome.version} of the protocol, this page version ${STREAM_VERSION}; reload it`);
+      return;
+    }
+    if (welcome.session !== this.session) this.shown = undefined;  // another run counts its frames anew
+    this.session = welcome.session;
+    this.series = welcome.series;
+    this.viewers = welcome.viewers;
+    this.change("waiting", "");
+    this.askForWanted();
+    if (this.isPaused) this.send({type: "pause"});
+  }
+
+  askForWanted() {
+    const known = this.series?.steps.length ?? 0;
+    if (this.wanted !== null && this.wanted < known) this.send({type: "show", index: this.wanted});
+  }
+
+  /** @param {ArrayBuffer} part */
+  takePart(part) {
+    const {assembler} = this;
+    const level = assembler.level;
+    const file = assembler.add(part);
+    this.arrivals = [...this.arrivals.filter(({at}) => performance.now() - at < RATE_MS),
+                     {at: performance.now(), bytes: part.byteLength}];
+    if (!level) return;
+    if (this.state === "waiting" || this.state === "connecting") this.change("live", "");
+    const acknowledge = (/** @type {number} */ bytes) => {
+      this.acknowledged = bytes;
+      this.send({type: "ack", frame: level.frame, level: level.level, bytes});
+    };
+    if (!file) {
+      if (assembler.received - this.acknowledged >= ACK_BYTES) acknowledge(assembler.received);
+      return;
+    }
+    // The end is acknowledged once the decoder has this level, so that a slow machine gets no more than it can show.
+    const socket = this.socket;
+    const done = () => {
+      if (socket === this.socket) acknowledge(level.bytes);
+    };
+    this.waiting?.done();
+    this.waiting = {level: {...level, madeAt: this.madeAt}, file, done};
+    if (!this.isDecoding) this.showWaiting();
+  }
+
+  async showWaiting() {
+    this.isDecoding = true;
+    while (this.waiting) {
+      const {level, file, done} = this.waiting;
+      const session = this.session;
+      this.waiting = undefined;
+      done();
+      try {
+        const vdi = await this.options.decode(file);
+        if (this.state === "closed" || session !== this.session) continue;
+        await this.options.onLevel(vdi, level);
+        this.shown = level;
+        this.failures = 0;
+        this.change(this.state, "");
+      } catch (error) {  // nothing is lost but this level
+        this.change(this.state, error instanceof Error ? error.message : String(error));
+      }
+    }
+    this.isDecoding = false;
+  }
+
+  /** Stays at what is shown. */
+  pause() {
+    this.isPaused = true;
+    this.send({type: "pause"});
+    this.options.onChange();
+  }
+
+  /** Goes on with the newest frames. */
+  follow() {
+    this.isPaused = false;
+    this.wanted = null;
+    this.send({type: "resume"});
+    this.options.onChange();
+  }
+
+  /**
+   * Stays at a frame of the series.
+   * @param {number} index
+   */
+  show(index) {
+    if (this.isPaused) this.send({type: "resume"});
+    this.isPaused = false;
+    this.wanted = index;
+    this.askForWanted();
+    this.options.onChange();
+  }
+
+  /** @returns {number} bytes a second, of the last few seconds */
+  rate() {
+    return rateOf(performance.now(), this.arrivals);
+  }
+}

@@ -1,0 +1,204 @@
+// What the page shows of a connection to a server, and the button that pauses it.
+
+import {Live} from "./live.js";
+import {SUBPROTOCOL} from "./messages.js";
+
+/** @typedef {import("./decoder.js").Decoder} Decoder */
+/** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
+/** @typedef {import("./live.js").Arrived} Arrived */
+
+/**
+ * @typedef {object} LiveView what shows the frames
+ * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void>} show
+ * @property {(message: string) => void} tell
+ * @property {(index: number) => void} onSeries the server has a series, of which it shows that frame
+ */
+
+const PATIENCE_MS = 700;   // of a series that plays, for a frame's finer levels
+const REFRESH_MS = 500;    // of what is said
+const STALE_S = 10;        // a frame of that age is told of in full seconds
+
+/**
+ * Takes the token out of the URL, where a screenshot or somebody behind the user would show it, and keeps it in this tab's
+ * entry of the session's history: so reloading still works. The rest of the fragment stays.
+ * @returns {string} empty if there is none
+ */
+export function takeToken() {
+  const words = new URLSearchParams(location.hash.slice(1));
+  const token = words.get("token") ?? "";
+  const kept = history.state?.token;
+  if (token === "") return typeof kept === "string" ? kept : "";
+  const rest = location.hash.slice(1).split("&").filter((word) => !word.startsWith("token="));
+  const url = rest.length > 0 ? `#${rest.join("&")}` : location.pathname + location.search;
+  history.replaceState({...history.state, token}, "", url);
+  return token;
+}
+
+/** @param {number} seconds */
+function ageText(seconds) {
+  if (seconds < STALE_S) return `${seconds.toFixed(1)} s old`;
+  if (seconds < 120) return `${Math.round(seconds)} s old`;
+  if (seconds < 7200) return `${Math.round(seconds / 60)} min old`;
+  return `${Math.round(seconds / 3600)} h old`;
+}
+
+/**
+ * One line on a connection.
+ * @param {Live} live
+ * @param {number} now milliseconds
+ */
+export function liveText(live, now) {
+  const {shown, state} = live;
+  const words = {connecting: "Connecting", waiting: "Waiting for a frame", live: "Live", ended: "Ended", lost: "Not connected",
+                 refused: "Refused", closed: "Off"};
+  const isOn = state === "live" || state === "waiting" || state === "ended";
+  const isSeries = live.series !== null && state === "ended";
+  const parts = [isOn && live.isPaused ? "Paused" : isSeries ? "Series" : words[state]];
+  if (state === "lost") parts.push(live.cause, `next attempt in ${Math.max(Math.ceil((live.retryAt - now) / 1000), 0)} s`);
+  else if (live.cause) parts.push(live.cause);
+  if (shown) {
+    if (live.series && live.wanted !== null) parts.push(`frame ${shown.frame + 1} of ${live.series.steps.length}`);
+    if (shown.step !== null) parts.push(`step ${shown.step}`);
+    if (shown.time !== null) parts.push(`t = ${Number(shown.time.toPrecision(6))}`);
+    if (!isSeries && live.wanted === null) parts.push(ageText((now - shown.madeAt) / 1000));
+    if (shown.levels > 1) parts.push(shown.level + 1 < shown.levels ? `level ${shown.level + 1} of ${shown.levels}` : "full");
+  }
+  if (isOn && shown) parts.push(`${(live.rate() / 1048576).toFixed(1)} MiB/s`);
+  if (isOn && shown && shown.dropped > 0 && !isSeries) parts.push(`${shown.dropped} left out`);
+  return parts.join(" · ");
+}
+
+/** @param {string} id */
+const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+
+export class LivePanel {
+  /** @param {string} token @param {Decoder} decoder @param {LiveView} view */
+  constructor(token, decoder, view) {
+    this.view = view;
+    const url = new URL("stream", location.href);
+    url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    url.hash = url.search = "";
+    /** @type {((level: Arrived | undefined) => void)[]} told of each level that is shown, and of a lost connection */
+    this.listeners = [];
+    this.live = new Live({
+      token,
+      open: () => new WebSocket(url, SUBPROTOCOL),
+      decode: (file) => decoder.decode({file}),
+      onLevel: async (vdi, level) => {
+        await view.show(vdi, level);
+        for (const listener of [...this.listeners]) listener(level);
+      },
+      onChange: () => this.onChange(),
+    });
+    this.hadSeries = false;
+    this.said = "";
+    window.addEventListener("online", () => this.hurry());
+    document.addEventListener("visibilitychange", () => this.hurry());
+    setInterval(() => this.refresh(), REFRESH_MS);
+  }
+
+  /** @param {number | undefined} index of a series' frame to begin with; none: the newest */
+  start(index) {
+    this.live.wanted = index ?? null;
+    byId("live").hidden = byId("pause").hidden = false;
+    this.live.restart();
+  }
+
+  /** @param {string} token */
+  restart(token) {
+    this.live.restart(token);
+  }
+
+  close() {
+    this.live.close();
+  }
+
+  /** Doesn't wait for the next attempt when there is reason to hope. */
+  hurry() {
+    if (this.live.state === "lost" && document.visibilityState === "visible") this.live.connect();
+  }
+
+  /** What the button says. */
+  label() {
+    const {live} = this;
+    if (["closed", "refused", "lost"].includes(live.state)) return "Connect";
+    return live.isPaused ? "Resume" : live.wanted !== null ? "Newest" : "Pause";
+  }
+
+  /** The button was pressed. */
+  toggle() {
+    const {live} = this;
+    const label = this.label();
+    if (label === "Connect") live.restart();
+    else if (label === "Pause") live.pause();
+    else live.follow();
+  }
+
+  /** How many frames there are to choose from. */
+  count() {
+    return this.live.state === "closed" ? 0 : this.live.series?.steps.length ?? 0;
+  }
+
+  /** The series' frame that is wanted: the newest unless the user wants another. */
+  index() {
+    return this.live.wanted ?? Math.max(this.count() - 1, 0);
+  }
+
+  /** Whether the user wants a certain frame. */
+  isChosen() {
+    return this.live.wanted !== null;
+  }
+
+  /**
+   * Shows a frame of a series.
+   * @param {number} index
+   * @returns {Promise<boolean>} whether it is shown: in full, or as far as it came within PATIENCE_MS
+   */
+  show(index) {
+    const {live} = this;
+    const isFull = (/** @type {Arrived | undefined} */ level) => level?.frame === index && level.level + 1 === level.levels;
+    live.show(index);
+    if (isFull(live.shown)) return Promise.resolve(true);
+    return new Promise((resolve) => {
+      /** @type {ReturnType<typeof setTimeout> | undefined} */
+      let patience;
+      const end = (/** @type {boolean} */ isShown) => {
+        clearTimeout(patience);
+        this.listeners = this.listeners.filter((one) => one !== listener);
+        resolve(isShown);
+      };
+      const listener = (/** @type {Arrived | undefined} */ level) => {
+        if (!level || live.wanted !== index) end(false);
+        else if (isFull(level)) end(true);
+        else if (level.frame === index) patience ??= setTimeout(() => end(true), PATIENCE_MS);
+      };
+      this.listeners.push(listener);
+    });
+  }
+
+  onChange() {
+    const {live} = this;
+    const {state} = live;
+    if (state !== "live" && state !== "ended") for (const listener of [...this.listeners]) listener(undefined);
+    const hasSeries = this.count() > 0;
+    if (hasSeries || this.hadSeries) this.view.onSeries(this.index());
+    this.hadSeries = hasSeries;
+    // What ends it is told over the picture; while attempts go on, the picture isn't covered.
+    this.say(state === "refused" ? live.cause : live.shown || state === "closed" ? "" : liveText(live, performance.now()));
+    this.refresh();
+  }
+
+  /** @param {string} message over the picture; takes back only what was said here */
+  say(message) {
+    if (message !== this.said) this.view.tell(message);
+    this.said = message;
+  }
+
+  refresh() {
+    const {live} = this;
+    byId("live").dataset.state = live.isPaused && live.state === "live" ? "paused" : live.state;
+    byId("livetext").textContent = liveText(live, performance.now());
+    byId("pause").textContent = this.label();
+    byId("pause").hidden = live.state === "ended" && !live.isPaused;
+  }
+}

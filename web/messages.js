@@ -1,0 +1,202 @@
+// What a server sends over a stream: control messages as JSON, and levels of frames in parts. A server may be damaged or hostile:
+// every field is checked, and memory is taken only for bytes that have come. docs/live.md has the protocol.
+
+export const STREAM_VERSION = 1;
+export const SUBPROTOCOL = "pv-vdi.1";
+
+/** What a message isn't. Its message is one line for the user. */
+export class StreamError extends Error {}
+
+/** @param {string} what @returns {never} */
+function refuse(what) {
+  throw new StreamError(`the server's message is damaged: ${what}`);
+}
+
+/**
+ * A level of a frame: one whole .vdi file.
+ * @typedef {object} Level
+ * @property {number} frame
+ * @property {number} level 0 is the coarsest
+ * @property {number} levels of this frame
+ * @property {number} bytes of the file
+ * @property {number} width lists a row
+ * @property {number} height
+ * @property {number | null} step
+ * @property {number | null} time
+ * @property {number} age seconds since the frame was made, when this level's first byte was sent
+ * @property {number} dropped frames that this viewer didn't get
+ */
+
+/**
+ * Frames that the server offers by number, with the simulation's times, which may be unknown, and steps.
+ * @typedef {{times: (number | null)[], steps: number[]}} Series
+ */
+
+/**
+ * @typedef {{type: "welcome", version: number, session: string, series: Series | null, viewers: number, steer: boolean}} Welcome
+ * @typedef {{type: "series", from: number} & Series} SeriesPart more of a series, from that frame on
+ * @typedef {{type: "error", cause: string}} Refusal
+ * @typedef {{type: "state", state: "waiting" | "live" | "ended", viewers: number}} ServerState
+ * @typedef {{type: "level"} & Level} LevelBegin
+ * @typedef {{type: "other"}} Other of a kind that viewers don't need
+ * @typedef {Welcome | SeriesPart | Refusal | ServerState | LevelBegin | Other} ServerMessage
+ */
+
+const MOST_TEXT = 1 << 20;       // characters
+const MOST_FRAMES = 1 << 20;     // of a series
+const MOST_LEVEL_BYTES = 1 << 30;
+const MOST_LEVELS = 16;
+const MOST_LISTS = 32768;        // a side
+const PART_HEADER_BYTES = 16;
+const FIRST_ROOM = 1 << 20;
+
+/** @param {unknown} value @param {number} least @param {number} most */
+function isWhole(value, least, most) {
+  return Number.isInteger(value) && Number(value) >= least && Number(value) <= most;
+}
+
+/** @param {unknown} value @param {number} most characters */
+function textOf(value, most) {
+  if (typeof value !== "string") refuse("a text is missing");
+  return value.slice(0, most);
+}
+
+/** @param {unknown} value @param {string} name @returns {number | null} */
+function numberOrNull(value, name) {
+  if (value === undefined || value === null) return null;
+  if (typeof value !== "number" || !Number.isFinite(value)) refuse(`${name} isn't a number`);
+  return value;
+}
+
+/** @param {unknown} value @returns {number} none counts as no viewer */
+function viewersOf(value) {
+  return isWhole(value, 0, 1e9) ? Number(value) : 0;
+}
+
+/** @param {any} json @returns {Series} */
+function seriesOf(json) {
+  const {times, steps} = json;
+  const areTimes = Array.isArray(times) && times.every((time) => time === null || Number.isFinite(time));
+  const areSteps = Array.isArray(steps) && steps.every((step) => isWhole(step, 0, Number.MAX_VALUE));
+  if (!areTimes || !areSteps || times.length !== steps.length) refuse("its series has no times and steps");
+  return {times, steps};
+}
+
+/**
+ * A series with what follows. Throws StreamError unless it does follow.
+ * @param {Series | null} series
+ * @param {SeriesPart} part
+ * @returns {Series}
+ */
+export function extendedSeries(series, part) {
+  const {times, steps} = series ?? {times: [], steps: []};
+  if (part.from !== steps.length || steps.length + part.steps.length > MOST_FRAMES)
+    refuse(`frames from ${part.from} on of a series of ${steps.length}`);
+  return {times: [...times, ...part.times], steps: [...steps, ...part.steps]};
+}
+
+/** @param {any} json @returns {LevelBegin} */
+function levelOf(json) {
+  const {frame, level, levels, bytes, width, height, age, dropped} = json;
+  if (!isWhole(frame, 0, 0xffffffff)) refuse("a level of no frame");
+  if (!isWhole(levels, 1, MOST_LEVELS) || !isWhole(level, 0, levels - 1)) refuse(`level ${level} of ${levels}`);
+  if (!isWhole(bytes, 1, MOST_LEVEL_BYTES)) refuse(`a level of ${bytes} bytes`);
+  if (!isWhole(width, 1, MOST_LISTS) || !isWhole(height, 1, MOST_LISTS)) refuse(`${width} x ${height} lists`);
+  return {
+    type: "level", frame, level, levels, bytes, width, height,
+    step: numberOrNull(json.step, "a step"), time: numberOrNull(json.time, "a time"),
+    age: Math.max(numberOrNull(age, "an age") ?? 0, 0), dropped: isWhole(dropped, 0, Number.MAX_SAFE_INTEGER) ? dropped : 0,
+  };
+}
+
+/**
+ * Reads a control message. Throws StreamError for one that isn't as the protocol says. Kinds that this page has no use
+ * for are of type "other".
+ * @param {string} text
+ * @returns {ServerMessage}
+ */
+export function serverMessageOf(text) {
+  if (text.length > MOST_TEXT) refuse(`${text.length} characters`);
+  let json;
+  try {
+    json = JSON.parse(text);
+  } catch {
+    refuse("it isn't JSON");
+  }
+  switch (json?.type) {
+    case "welcome":
+      if (!isWhole(json.version, 0, 0xffffffff)) refuse("a welcome without a version");
+      return {type: "welcome", version: json.version, session: textOf(json.session, 200), viewers: viewersOf(json.viewers),
+              series: json.series ? seriesOf(json.series) : null, steer: json.steer === true};
+    case "series":
+      return {type: "series", from: Number(json.from), ...seriesOf(json)};
+    case "error":
+      return {type: "error", cause: textOf(json.cause, 300).replace(/\s+/g, " ")};
+    case "state":
+      if (!["waiting", "live", "ended"].includes(json.state)) refuse("a state that this page doesn't know");
+      return {type: "state", state: json.state, viewers: viewersOf(json.viewers)};
+    case "level":
+      return levelOf(json);
+    default:
+      if (typeof json?.type !== "string") refuse("it has no type");
+      return {type: "other"};
+  }
+}
+
+/**
+ * Puts the parts of levels together. One level is under way at a time; another one's beginning ends it, finished or not.
+ * Room grows with what has come, to twice of it at most.
+ */
+export class LevelAssembler {
+  constructor() {
+    /** @type {Level | undefined} */
+    this.level = undefined;
+    this.received = 0;
+    this.room = new Uint8Array(0);
+  }
+
+  /** @param {Level} level that follows */
+  begin(level) {
+    this.level = level;
+    this.received = 0;
+    this.room = new Uint8Array(Math.min(level.bytes, FIRST_ROOM));
+  }
+
+  /** Forgets what is under way. */
+  drop() {
+    this.level = undefined;
+    this.received = 0;
+    this.room = new Uint8Array(0);
+  }
+
+  /**
+   * Takes a binary message: u32 frame, u32 level, u64 offset, then bytes. Throws StreamError for a part that doesn't
+   * follow the last one of the level that is under way.
+   * @param {ArrayBuffer} message
+   * @returns {Uint8Array | undefined} the level's file, once it is complete
+   */
+  add(message) {
+    const {level} = this;
+    if (message.byteLength <= PART_HEADER_BYTES) refuse("a part without bytes");
+    const view = new DataView(message);
+    const offset = view.getUint32(8, true) + view.getUint32(12, true) * 0x100000000;
+    if (!level) refuse("a part of no level");
+    if (view.getUint32(0, true) !== level.frame || view.getUint32(4, true) !== level.level)
+      refuse("a part of another level than the one that was announced");
+    if (offset !== this.received) refuse(`a part from byte ${offset} on, where ${this.received} bytes had come`);
+    const part = new Uint8Array(message, PART_HEADER_BYTES);
+    const end = this.received + part.length;
+    if (end > level.bytes) refuse(`more than the ${level.bytes} bytes that were announced`);
+    if (end > this.room.length) {
+      const larger = new Uint8Array(Math.min(level.bytes, Math.max(2 * this.room.length, end)));
+      larger.set(this.room.subarray(0, this.received));
+      this.room = larger;
+    }
+    this.room.set(part, this.received);
+    this.received = end;
+    if (end < level.bytes) return undefined;
+    const file = this.room;
+    this.drop();
+    return file;
+  }
+}

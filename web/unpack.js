@@ -1,0 +1,44 @@
+// Unpacks what `vdi export` put into a page: deflate data as base64.
+
+import {FormatError} from "./format.js";
+
+/** @param {string} text base64 @returns {Uint8Array} */
+function bytesOfBase64(text) {
+  let binary;
+  try {
+    binary = atob(text);
+  } catch {
+    throw new FormatError("the data in this page are damaged: they are not base64");
+  }
+  const bytes = new Uint8Array(binary.length);
+  for (let i = 0; i < bytes.length; ++i) bytes[i] = binary.charCodeAt(i);
+  return bytes;
+}
+
+const MOST_INFLATED = 1032;  // bytes that a byte of deflate data stands for
+
+/**
+ * Expands packed data, and never to more than `size` bytes.
+ * @param {string} text
+ * @param {number} size
+ */
+export async function unpack(text, size) {
+  const packed = bytesOfBase64(text);
+  if (typeof DecompressionStream === "undefined")
+    throw new Error("this browser is too old to unpack the data (no DecompressionStream)");
+  if (!(size > 0 && size <= packed.length * MOST_INFLATED))
+    throw new FormatError("the data in this page are damaged: their size is wrong");
+  const bytes = new Uint8Array(size);
+  let at = 0;
+  try {
+    const reader = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw")).getReader();
+    for (let part = await reader.read(); !part.done; part = await reader.read()) {
+      bytes.set(part.value, at);  // throws beyond the end
+      at += part.value.length;
+    }
+  } catch {
+    throw new FormatError("the data in this page are damaged: they don't unpack");
+  }
+  if (at !== size) throw new FormatError("the data in this page are damaged: they end too early");
+  return bytes;
+}
