@@ -19,6 +19,7 @@
 #include <vtkSmartPyObject.h>
 
 #include <atomic>
+#include <cassert>
 #include <cstdio>
 #include <exception>
 #include <regex>
@@ -35,6 +36,8 @@ namespace vdi::catalyst {
 namespace {
 
 constexpr const char* channel = "grid";
+std::atomic<bool> started = false;  // in this process, whether or not it went well
+
 /// Said by Debian's engine at each step; it concerns steering, which isn't used here.
 constexpr const char* harmless = "IOCatalystConduit";
 
@@ -150,11 +153,15 @@ class Guard {
   /// What's wrong with a script, as far as that can be known before it runs; "" if nothing is.
   std::string check(const std::string& script) {
     const vtkPythonScopeGilEnsurer lock;
-    vtkSmartPyObject result(PyObject_CallMethod(module_, "check_script", "s", script.c_str()));
-    const char* text = result ? PyUnicode_AsUTF8(result) : nullptr;
-    if (text != nullptr) return text;
-    PyErr_Clear();
-    return "the script '" + script + "' can't be checked";
+    const vtkSmartPyObject result(PyObject_CallMethod(module_, "check_script", "s", script.c_str()));
+    return textOr("the script '" + script + "' can't be checked", result);
+  }
+
+  /// What keeps our plugin from being loaded; "" if it is.
+  std::string loadPlugin() {
+    const vtkPythonScopeGilEnsurer lock;
+    return textOr("the plugin can't be loaded",
+                  vtkSmartPyObject(PyObject_CallMethod(module_, "load_plugin", nullptr)));
   }
 
   /// After all scripts of a step.
@@ -165,6 +172,13 @@ class Guard {
   }
 
  private:
+  static std::string textOr(const std::string& fallback, PyObject* result) {
+    const char* text = result != nullptr ? PyUnicode_AsUTF8(result) : nullptr;
+    if (text != nullptr) return text;
+    PyErr_Clear();
+    return fallback;
+  }
+
   vtkSmartPyObject module_;
 };
 
@@ -262,16 +276,30 @@ std::optional<std::string> Engine::State::result(bool good) {
   return error;
 }
 
+bool Engine::wasStarted() {
+  return started || vtkInSituInitializationHelper::IsInitialized();
+}
+
 Engine::Engine(int fortranCommunicator, const std::string& plugin) {
-  static std::atomic<bool> started = false;  // what's counted is starts in this process, whoever's they are
-  if (vtkInSituInitializationHelper::IsInitialized() || started.exchange(true))
-    throw std::runtime_error("ParaView's in situ engine starts only once in a process");
+  assert(!wasStarted());
+  started = true;
   state_ = std::make_unique<State>(fortranCommunicator);
   state_->start(plugin);
 }
 
 void Engine::check(const std::string& script) {
   const std::string wrong = state_->guard->check(script);
+  if (!wrong.empty()) throw std::runtime_error(wrong);
+}
+
+bool Engine::runsOn(MPI_Comm comm) const {
+  int result = MPI_UNEQUAL;
+  return MPI_Comm_compare(comm, state_->comm.get(), &result) == MPI_SUCCESS &&
+         (result == MPI_IDENT || result == MPI_CONGRUENT);
+}
+
+void Engine::loadPlugin() {
+  const std::string wrong = state_->guard->loadPlugin();
   if (!wrong.empty()) throw std::runtime_error(wrong);
 }
 

@@ -1,6 +1,8 @@
 // ParaView's in situ engine behind a small interface: the only place that depends on its version.
 #pragma once
 
+#include <mpi.h>
+
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,16 +15,24 @@ namespace vdi::catalyst {
 /// One a process: ParaView can't be started twice. Collective throughout, but for check.
 class Engine {
  public:
+  /// Whether there was one before in this process, or ParaView's engine was started by others.
+  static bool wasStarted();
+
   /// Scripts find `plugin`, the path of our plugin, as VDI_PLUGIN in os.environ. Throws std::runtime_error
-  /// when the engine was started before or won't start.
+  /// if the engine doesn't start. None may have been started before.
   Engine(int fortranCommunicator, const std::string& plugin);
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
+  /// Whether it runs on the ranks of this communicator, in the same order. Not collective.
+  bool runsOn(MPI_Comm comm) const;
+
   /// Throws std::runtime_error with what can be told to be wrong with a script before it runs: a file or a
   /// plugin that's missing, bad syntax.
   void check(const std::string& script);
+  /// Loads our plugin, before scripts run. Throws std::runtime_error if it can't be loaded.
+  void loadPlugin();
   /// To be run at each step, in that order.
   void add(const std::vector<std::string>& scripts);
 

@@ -1,6 +1,7 @@
 // What scripts expect of the process that runs them.
 #pragma once
 
+#include <optional>
 #include <string>
 
 namespace vdi::catalyst {
@@ -13,5 +14,18 @@ std::string pluginFile();
 /// Makes Python's symbols those of the whole process: extension modules don't link libpython, and a library
 /// that was loaded for itself alone keeps it to itself.
 void sharePython();
+
+/// Python's lock, as long as it lives and where Python runs: a simulation in Python that calls through
+/// ctypes.CDLL has released it.
+class PythonLock {
+ public:
+  PythonLock();
+  ~PythonLock();
+  PythonLock(const PythonLock&) = delete;
+  PythonLock& operator=(const PythonLock&) = delete;
+
+ private:
+  std::optional<int> before_;
+};
 
 }  // namespace vdi::catalyst

@@ -93,6 +93,11 @@ def check_plugin(script, argument):
         return ""  # made from what only the script knows
     if not isinstance(plugin, str):
         return ""
+    return what_is_wrong_with_plugin(plugin)
+
+
+def what_is_wrong_with_plugin(plugin):
+    """"" if it can be loaded."""
     if not os.path.isfile(plugin):
         return "the plugin '%s' isn't there" % plugin
     import ctypes
@@ -100,6 +105,20 @@ def check_plugin(script, argument):
         ctypes.CDLL(os.path.abspath(plugin))
     except OSError as error:
         return "the plugin can't be loaded: %s" % error
+    return ""
+
+
+def load_plugin():
+    """Loads our plugin, so that `from paraview.simple import *` has its filters: scripts that ParaView writes by itself load
+    none. "" or what went wrong."""
+    wrong = what_is_wrong_with_plugin(plugin_file)
+    if wrong:
+        return wrong
+    from paraview import simple
+    try:
+        simple.LoadPlugin(plugin_file, remote=False, ns=simple.__dict__)
+    except Exception as error:
+        return "the plugin '%s' can't be loaded: %s" % (plugin_file, error)
     return ""
 
 

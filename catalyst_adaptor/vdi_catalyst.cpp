@@ -228,58 +228,91 @@ int vtkTypeOf(int type) {
   }
 }
 
+/// Started by an initialize that failed later, because of a script for one; the next initialize takes it,
+/// since ParaView starts once in a process. Never deleted: at the process's end MPI is gone, which that
+/// takes.
+vdi::catalyst::Engine*& spareEngine() {
+  static vdi::catalyst::Engine* engine = nullptr;
+  return engine;
+}
+
+/// The spare engine or a new one. All ranks find out whether they can before any of them starts.
+int takeEngine(vdi_catalyst& self) {
+  using vdi::catalyst::Engine;
+  std::string plugin;
+  const int code = guarded(self, VDI_CATALYST_ENGINE, [&] {
+    if (spareEngine() != nullptr ? !spareEngine()->runsOn(self.comm) : Engine::wasStarted()) {
+      throw std::runtime_error(spareEngine() != nullptr
+                                   ? "ParaView was started before in this process, on another communicator"
+                                   : "ParaView's in situ engine starts only once in a process");
+    }
+    plugin = vdi::catalyst::pluginFile();
+    vdi::catalyst::sharePython();
+  });
+  if (code != VDI_CATALYST_OK) return code;
+  return guarded(self, VDI_CATALYST_ENGINE, [&] {
+    self.grid = vtkSmartPointer<vtkPartitionedDataSet>::New();
+    self.engine.reset(std::exchange(spareEngine(), nullptr));
+    if (!self.engine) self.engine = std::make_unique<Engine>(MPI_Comm_c2f(self.comm), plugin);
+  });
+}
+
+std::vector<std::string> pathsOf(int32_t count, const char* const* scripts) {
+  require(count >= 0 && (count == 0 || scripts != nullptr), "no scripts given");
+  std::vector<std::string> paths;
+  for (int i = 0; i < count; ++i) {
+    require(scripts[i] != nullptr, "a script's path is null");
+    paths.emplace_back(scripts[i]);
+  }
+  return paths;
+}
+
+void sayIfNothingIsMade(const vdi_catalyst& self, const std::vector<std::string>& paths) {
+  int rank = 0;
+  MPI_Comm_rank(self.comm, &rank);
+  if (rank == 0 && paths.empty())
+    std::fprintf(stderr, "vdi_catalyst: no scripts were given, so no step will make anything\n");
+}
+
 }  // namespace
 
 int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
                             vdi_catalyst** catalyst) {
+  const vdi::catalyst::PythonLock lock;
   // Loader.c has seen to it that MPI runs, that the handle is a communicator's and that *catalyst is null.
   auto self = std::make_unique<vdi_catalyst>();
   if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
     return VDI_CATALYST_BAD_ARGUMENT;
   MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
   std::vector<std::string> paths;
-  std::string plugin;
-  int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    require(script_count >= 0 && (script_count == 0 || scripts != nullptr), "no scripts given");
-    for (int i = 0; i < script_count; ++i) {
-      require(scripts[i] != nullptr, "a script's path is null");
-      paths.emplace_back(scripts[i]);
-    }
-  });
+  int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { paths = pathsOf(script_count, scripts); });
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
       requireEqual(self->comm, script_count, "the ranks give different numbers of scripts");
     });
   }
-  if (code == VDI_CATALYST_OK) {
-    code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
-      plugin = vdi::catalyst::pluginFile();
-      vdi::catalyst::sharePython();
-    });
-  }
-  if (code == VDI_CATALYST_OK) {
-    code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
-      self->engine = std::make_unique<vdi::catalyst::Engine>(MPI_Comm_c2f(self->comm), plugin);
-      self->grid = vtkSmartPointer<vtkPartitionedDataSet>::New();
-    });
-  }
+  if (code == VDI_CATALYST_OK) code = takeEngine(*self);
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_SCRIPT, [&] {
       for (const std::string& path : paths) self->engine->check(path);
-      self->engine->add(paths);
     });
   }
+  if (code == VDI_CATALYST_OK)
+    code = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine->loadPlugin(); });
+  if (code == VDI_CATALYST_OK) code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { self->engine->add(paths); });
   if (code != VDI_CATALYST_OK) {
-    self->engine.reset();
+    spareEngine() = self->engine.release();
     MPI_Comm_free(&self->comm);
     return code;
   }
+  sayIfNothingIsMade(*self, paths);
   *catalyst = alive() = self.release();
   return VDI_CATALYST_OK;
 }
 
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi::catalyst::PythonLock lock;
   const auto grid = vtkSmartPointer<vtkPartitionedDataSet>::New();
   const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
@@ -304,6 +337,7 @@ int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_cat
 int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
                            const void* const* data) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi::catalyst::PythonLock lock;
   const bool cells = association == VDI_CATALYST_CELLS;
   std::vector<vtkSmartPointer<vtkDataArray>> arrays;
   const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
@@ -336,6 +370,7 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
 
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi::catalyst::PythonLock lock;
   int code = guarded(
       *catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] { requireStep(*catalyst, step); }, step);
   if (code == VDI_CATALYST_OK) {
@@ -357,6 +392,7 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
 
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi::catalyst::PythonLock lock;
   const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(), nullptr));
   int code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { return self->engine->finish(); });
   self->grid = nullptr;

@@ -97,12 +97,16 @@ typedef struct vdi_catalyst_block {
 
 typedef struct vdi_catalyst vdi_catalyst;
 
-/* Loads ParaView, starts the engine on a duplicate of the communicator (its Fortran handle) and adds the
- * scripts, the same on all ranks; they are loaded at the first step. Scripts find the path of our plugin in
- * os.environ["VDI_PLUGIN"]: what the environment says or, unless it is set, the plugin of this installation.
- * A script that is missing or isn't Python, and a plugin that's missing where it loads one (LoadPlugin at its
- * top level), are VDI_CATALYST_SCRIPT here. Once a process, also where it failed. On failure *catalyst is
- * null, and the other functions, given null, do nothing but return VDI_CATALYST_BAD_ARGUMENT. */
+/* Loads ParaView, starts the engine on a duplicate of the communicator (its Fortran handle), loads our plugin
+ * and adds the scripts, the same on all ranks; they are loaded at the first step. Scripts need not load the
+ * plugin: those that ParaView saves work as they are. They find its path in os.environ["VDI_PLUGIN"]: what
+ * the environment says or, unless it is set, the plugin of this installation.
+ *
+ * A script that is missing or isn't Python, and another plugin that's missing where it loads one (LoadPlugin
+ * at its top level), are VDI_CATALYST_SCRIPT here. After a failure *catalyst is null, and the other
+ * functions, given null, do nothing but return VDI_CATALYST_BAD_ARGUMENT. The process may try again on the
+ * same ranks unless ParaView itself didn't start. Once this has succeeded, it can't be called again in the
+ * process. */
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 

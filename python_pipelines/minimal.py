@@ -1,14 +1,12 @@
 """The shortest Catalyst script: a Volumetric Depth Image of the array V at every step, as files vdi_000100.vdi, ..., each with
 its step's number and time inside.
 
-VDI_PLUGIN names the plugin; the adaptor sets it. Copy this file and change array, camera and colours."""
+The adaptor has loaded the plugin before. Copy this file and change array, camera and colours."""
 
 import os
 
 from paraview import catalyst
 from paraview.simple import *  # noqa: F403
-
-LoadPlugin(os.environ["VDI_PLUGIN"], remote=False, ns=globals())
 
 grid = TrivialProducer(registrationName="grid")
 image = VolumetricDepthImage(Input=grid)

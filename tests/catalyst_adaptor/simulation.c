@@ -1,6 +1,7 @@
 /* A simulation in C: one block of 8-bit point data a rank, along x. Arguments: the script, then the code that
  * each step must return, or CODE*STEPS. Exit status 0 if all did and the error's text was there just when it
- * had to be. Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens.
+ * had to be. Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
+ * VDI_TEST_THEN=SCRIPT: initialize with that script succeeds and is finalized.
  * VDI_TEST_GROWTH=KIB: the resident memory grows by less from a quarter of the steps to the last. */
 #include <limits.h>
 #include <mpi.h>
@@ -131,6 +132,12 @@ int main(int argc, char** argv) {
     wrong = expect(rank, "initialize", atoi(initialize),
                    vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, scripts, &catalyst));
     wrong += expect(rank, "the handle of a failed initialize", 1, catalyst == NULL);
+    const char* then[] = {getenv("VDI_TEST_THEN")};
+    if (then[0] != NULL) {
+      wrong += expect(rank, "initialize again", VDI_CATALYST_OK,
+                      vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, then, &catalyst));
+      wrong += expect(rank, "finalize", VDI_CATALYST_OK, vdi_catalyst_finalize(catalyst));
+    }
     MPI_Finalize();
     return wrong == 0 ? 0 : 1;
   }
