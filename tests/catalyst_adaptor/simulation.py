@@ -1,5 +1,5 @@
 """A simulation in Python: numpy's arrays, mpi4py's communicator, one block of cells a rank. Arguments: the library, how ctypes
-loads it (CDLL, which releases Python's lock in a call, or PyDLL), the script. The script is on no other path than that."""
+loads it (CDLL, which releases Python's lock in a call, or PyDLL), the script, the first of the steps up to 2."""
 
 import ctypes
 import os
@@ -42,11 +42,11 @@ beating.start()
 catalyst = ctypes.c_void_p()
 check(library.vdi_catalyst_initialize(MPI.COMM_WORLD.py2f(), 1, (ctypes.c_char_p * 1)(script.encode()),
                                       ctypes.byref(catalyst)), "initialize")
-z, y, x = np.meshgrid(*[np.arange(N) + 0.5] * 3, indexing="ij")
-block = Block((N, N, N), (0, 0, 0), (0, 0, 0), (rank * N, 0, 0), (1, 1, 1))
+z, y, x = np.meshgrid(*[(np.arange(N) + 0.5) / N] * 3, indexing="ij")
+block = Block((N, N, N), (0, 0, 0), (0, 0, 0), (rank, 0, 0), (1 / N, 1 / N, 1 / N))
 check(library.vdi_catalyst_set_blocks(catalyst, 1, ctypes.byref(block)), "set_blocks")
-for step in (1, 2):
-    values = np.ascontiguousarray(step + np.sin(0.3 * (x + rank * N)) * np.cos(0.2 * y) + 0.05 * z)
+for step in range(int(sys.argv[4]), 3):
+    values = np.ascontiguousarray(0.1 * step * (1 + np.sin(9 * (x + rank)) * np.cos(7 * y) * np.cos(5 * z)))
     pointers = (ctypes.c_void_p * 1)(values.ctypes.data)
     check(library.vdi_catalyst_set_array(catalyst, b"V", F64, CELLS, pointers), "set_array")
     check(library.vdi_catalyst_execute(catalyst, ctypes.c_int64(step), ctypes.c_double(0.5 * step)), "execute")
