@@ -152,7 +152,7 @@ class Series {
       : options_(options),
         world_(world),
         device_(std::move(device)),
-        generator_(device_, comm::Communicator::world()) {}
+        generator_(device_, comm::Communicator::world(), generatorOptionsFromEnvironment(world)) {}
 
   /// Throws the error of the first step that can't be read, once all others are written. The first step of
   /// all must be sound: camera and transfer function are made for it.

@@ -22,6 +22,7 @@
 #include "apps/Commands.h"
 #include "apps/Help.h"
 #include "bench/Bench.h"
+#include "vdi/core/Environment.h"
 #include "vdi/core/Error.h"
 
 namespace {
@@ -34,6 +35,16 @@ struct Outcome {
   int status = 0;
   std::string message;  // empty: nothing to say, or another rank says it
 };
+
+/// A line for each environment variable that a user may want.
+std::string environmentHelp() {
+  std::string text;
+  for (const vdi::EnvironmentVariable& variable : vdi::environmentVariables()) {
+    if (variable.forUsers)
+      text += fmt::format("  {:<20} {} ({})\n", variable.name, variable.meaning, variable.values);
+  }
+  return text;
+}
 
 std::string firstLine(std::string_view text) {
   return std::string(text.substr(0, text.find('\n')));
@@ -73,11 +84,10 @@ Outcome runTool(int argc, char** argv) {
   app.formatter(std::make_shared<vdi::apps::HelpFormatter>());  // subcommands inherit it
   app.require_subcommand(1);
   app.set_version_flag("--version", fmt::format("vdi {} ({})", VDI_VERSION, buildCommit));
-  app.footer(
-      "The environment variable VDI_DEVICE chooses the Vulkan device (index or part of its name, see vdi "
-      "info "
-      "--devices);\nVDI_VALIDATION=1 turns the validation layer on. Exit status: 0, 1 for a failure, 2 for a "
-      "command line that makes no sense.");
+  app.footer("Environment variables:\n" + environmentHelp() +
+             "vdi info --devices lists the devices. Exit status: 0, 1 for a failure, 2 for a command line "
+             "that makes "
+             "no sense.");
   vdi::apps::Job job;
   vdi::apps::addGenerate(app, job);
   vdi::apps::addRender(app, job);

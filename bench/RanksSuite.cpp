@@ -120,7 +120,8 @@ class RankSuite {
 
  private:
   void measureOn(const RankGroup& group) {
-    VdiGenerator generator(device_, group.communicator());
+    const comm::Communicator communicator = group.communicator();
+    VdiGenerator generator(device_, group.communicator(), generatorOptionsFromEnvironment(communicator));
     std::optional<IcetRival> rival;
     if (!options_.rival.empty()) rival.emplace(device_, group.communicator(), group.handle());
     for (const DataSet& set : dataSets(options_)) {

@@ -59,7 +59,7 @@ class Bench {
         reconstruction_(reconstructionFromString(options.reconstruction)),
         device_(device),
         clock_(device),
-        generator_(std::move(device), comm::Communicator::world()) {
+        generator_(std::move(device), comm::Communicator::world(), generatorOptionsFromEnvironment(world)) {
     if (options.rival.empty()) return;
     all_.emplace(world, world.size());
     rival_.emplace(device_, all_->communicator(), all_->handle());

@@ -170,7 +170,7 @@ class ViewpointSuite {
         world_(world),
         device_(device),
         reconstruction_(reconstructionFromString(options.reconstruction)),
-        generator_(device, comm::Communicator::world()),
+        generator_(device, comm::Communicator::world(), generatorOptionsFromEnvironment(world)),
         table_(table) {}
 
   std::vector<json> rows() {

@@ -24,10 +24,10 @@ install(
   DESTINATION "${headerDir}/vdi"
   FILES_MATCHING PATTERN "*.h"
   PATTERN ListCodec.h EXCLUDE)
-install(FILES vdi/comm/Communicator.h DESTINATION "${headerDir}/vdi/comm")
+install(FILES vdi/comm/Communicator.h vdi/comm/Transport.h DESTINATION "${headerDir}/vdi/comm")
 install(FILES vdi/gpu/Device.h vdi/gpu/DeviceLimits.h vdi/gpu/DeviceRequest.h
         DESTINATION "${headerDir}/vdi/gpu")
-install(FILES vdi/pipeline/Reports.h vdi/pipeline/VdiGenerator.h vdi/pipeline/VdiRenderer.h
+install(FILES vdi/pipeline/GeneratorOptions.h vdi/pipeline/Reports.h vdi/pipeline/VdiGenerator.h vdi/pipeline/VdiRenderer.h
         DESTINATION "${headerDir}/vdi/pipeline")
 install(EXPORT pv-vdi-vdi-targets NAMESPACE pv-vdi:: DESTINATION "${cmakeDir}")
 vdi_install_pkg_config(pv-vdi)

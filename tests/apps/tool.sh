@@ -271,6 +271,9 @@ refused 2 "nonsense" "$vdi" generate --field nonsense -o x.vdi
 refused 2 "supersegments" "$vdi" generate --field sphere --supersegments 0 -o x.vdi
 refused 2 "0x5" "$vdi" generate --field sphere --resolution 0x5 -o x.vdi
 refused 2 "" "$vdi" frobnicate
+refused 2 "VDI_BANDS is 'many'; it may be a whole number" env VDI_BANDS=many "$vdi" generate --field sphere "${small[@]}" -o x.vdi
+refused 2 "VDI_VALIDATION is 'yes'; it may be 0 or 1" env VDI_VALIDATION=yes "$vdi" generate --field sphere "${small[@]}" \
+  -o x.vdi
 refused 1 "nothing-like-this" env VDI_DEVICE=nothing-like-this "$vdi" generate --field sphere "${small[@]}" -o x.vdi
 refused 1 "no-such-folder" "$vdi" generate --field sphere "${small[@]}" -o no-such-folder/x.vdi
 if [ -e x.vdi ] || [ -e x.png ]; then fail "a refused command left a file"; fi

@@ -130,10 +130,10 @@ TEST_CASE("the transport that the environment asks for") {
 
 TEST_CASE("an environment variable is rank 0's on all ranks") {
   const Communicator world = Communicator::world();
-  setenv("VDI_TEST_VARIABLE", world.rank() == 0 ? "first" : "other", 1);
-  CHECK(world.environment("VDI_TEST_VARIABLE") == "first");
-  unsetenv("VDI_TEST_VARIABLE");
-  CHECK(world.environment("VDI_TEST_VARIABLE").empty());
+  setenv("VDI_DEVICE", world.rank() == 0 ? "first" : "other", 1);
+  CHECK(world.environment("VDI_DEVICE") == "first");
+  unsetenv("VDI_DEVICE");
+  CHECK(world.environment("VDI_DEVICE").empty());
 }
 
 TEST_CASE("memory that ranks share: opened by name, and gone when nobody has it") {

@@ -683,7 +683,7 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
   const detail::RayCaster::Request request{scene,    frame.view, frame.lattice, frame.table,
                                            settings, true,       false,         {}};
   for (std::size_t r = 0; r < ranks; ++r) {
-    casters.push_back(std::make_unique<detail::RayCaster>(own));
+    casters.push_back(std::make_unique<detail::RayCaster>(own, 0));
     casters.back()->volume().setBlocks(blocksOf[r], scene);
     casts.push_back(casters.back()->begin(request));
     const std::uint64_t bytes = detail::RayCaster::levelBytes(casts.back());

@@ -289,16 +289,15 @@ TEST_CASE("ways between ranks: shared memory, messages, both, staging memory: th
   request.importsHostMemory = false;
   const auto copying = gpu::Device::create(request);
   FirstMade first;
-  using Way = std::pair<const char*, const char*>;
-  for (const auto& [transport, ranksPerHost] : {Way{"shared", "0"}, Way{"mpi", "0"}, Way{"shared", "2"}}) {
+  using Way = std::pair<comm::Transport, const char*>;
+  for (const auto& [transport, ranksPerHost] :
+       {Way{comm::Transport::Shared, "0"}, Way{comm::Transport::Mpi, "0"},
+        Way{comm::Transport::Shared, "2"}}) {
     for (const auto& own : {device(), copying}) {
-      INFO(transport << ", ranks a host: " << ranksPerHost
-                     << (own == copying ? ", without imported memory" : ""));
-      // Rank 0's counts; mpirun may not pass it on.
-      if (world.rank() == 0) setenv("VDI_TRANSPORT", transport, 1);
+      INFO((transport == comm::Transport::Shared ? "shared" : "mpi")
+           << ", ranks a host: " << ranksPerHost << (own == copying ? ", without imported memory" : ""));
       setenv("VDI_RANKS_PER_HOST", ranksPerHost, 1);
-      VdiGenerator generator(own, comm::Communicator::world());
-      unsetenv("VDI_TRANSPORT");
+      VdiGenerator generator(own, comm::Communicator::world(), {.transport = transport});
       unsetenv("VDI_RANKS_PER_HOST");
       generator.setBlocks(decomposed.mine);
       for (int frame = 0; frame < 2; ++frame) {  // the second one in the memory of the first one
@@ -308,9 +307,28 @@ TEST_CASE("ways between ranks: shared memory, messages, both, staging memory: th
       }
     }
   }
-  setenv("VDI_TRANSPORT", "pigeon", 1);
-  CHECK_THROWS_AS(VdiGenerator(device(), comm::Communicator::world()), Error);
-  unsetenv("VDI_TRANSPORT");
+}
+
+TEST_CASE("rank 0's environment says how all ranks work, and what makes no sense is refused on all") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto optionsWith = [&](const char* name, const char* value) {
+    if (world.rank() == 0) setenv(name, value, 1);  // mpirun may not pass it on
+    const auto unset = [&] { unsetenv(name); };
+    try {
+      const GeneratorOptions options = generatorOptionsFromEnvironment(world);
+      unset();
+      return options;
+    } catch (...) {
+      unset();
+      throw;
+    }
+  };
+  CHECK(optionsWith("VDI_BANDS", "").bands == 0);
+  CHECK(optionsWith("VDI_BANDS", "3").bands == 3);
+  CHECK(optionsWith("VDI_TRANSPORT", "mpi").transport == comm::Transport::Mpi);
+  for (const char* const bands : {"0", "-1", "3x", "many", "99999999999"})
+    CHECK_THROWS_AS(optionsWith("VDI_BANDS", bands), Error);
+  CHECK_THROWS_AS(optionsWith("VDI_TRANSPORT", "pigeon"), Error);
 }
 
 TEST_CASE("lists of more than 255 supersegments: both ways, and the picture of one rank") {
@@ -322,11 +340,9 @@ TEST_CASE("lists of more than 255 supersegments: both ways, and the picture of o
   settings.samplesPerVoxel = 32.0;
   const TransferFunction function = test::threeHues(80.0);
   FirstMade made;
-  for (const char* transport : {"shared", "mpi"}) {
-    INFO(transport);
-    if (world.rank() == 0) setenv("VDI_TRANSPORT", transport, 1);
-    VdiGenerator generator(device(), comm::Communicator::world());
-    unsetenv("VDI_TRANSPORT");
+  for (const comm::Transport transport : {comm::Transport::Shared, comm::Transport::Mpi}) {
+    INFO((transport == comm::Transport::Shared ? "shared" : "mpi"));
+    VdiGenerator generator(device(), comm::Communicator::world(), {.transport = transport});
     generator.setBlocks(decomposed.mine);
     const auto vdi = generator.generate(test::oblique(), function, settings);
     if (vdi) {
@@ -546,10 +562,9 @@ TEST_CASE("a frame that's stopped late leaves nothing in the memory of the next 
   const GenerateSettings settings = test::smallSettings(61, 45, 6);
   Camera beside = test::oblique();
   beside.viewAngle *= 1.3;
-  setenv("VDI_BANDS", "4", 1);
   FirstMade made;
   for (const bool stopped : {false, true, true}) {
-    VdiGenerator generator(copying, comm::Communicator::world());
+    VdiGenerator generator(copying, comm::Communicator::world(), {.bands = 4});
     generator.setBlocks(decomposed.mine);
     const auto late = [&](double done) { return done < 0.6 || world.rank() != 1; };
     if (stopped && world.size() > 1) {
@@ -560,7 +575,6 @@ TEST_CASE("a frame that's stopped late leaves nothing in the memory of the next 
     const auto vdi = generator.generate(test::oblique(), function, settings);
     made.check(vdi, generator.renderVolume(test::oblique(), function, settings));
   }
-  unsetenv("VDI_BANDS");
 }
 
 TEST_CASE("a frame of threads that may not call MPI: the same, also after one that was stopped") {

@@ -49,10 +49,9 @@ TEST_CASE("a VDI that is shown from the device's lists is the one that goes by w
   const auto other = gpu::Device::create(gpu::requestFromEnvironment(0));
   VdiRenderer renderer(device());
   VdiRenderer elsewhere(other);
-  using Way = std::pair<const char*, Precision>;
-  for (const auto& [bands, precision] : {Way{"1", Precision::Full}, Way{"5", Precision::Compact}}) {
-    setenv("VDI_BANDS", bands, 1);
-    VdiGenerator generator(device(), comm::Communicator::serial());
+  using Way = std::pair<std::uint32_t, Precision>;
+  for (const auto& [bands, precision] : {Way{1U, Precision::Full}, Way{5U, Precision::Compact}}) {
+    VdiGenerator generator(device(), comm::Communicator::serial(), {.bands = bands});
     generator.setBlocks(decomposed.mine);
     INFO(bands << " bands, " << toString(precision));
     GenerateSettings settings = test::smallSettings(90, 70, 8);
@@ -80,7 +79,6 @@ TEST_CASE("a VDI that is shown from the device's lists is the one that goes by w
     generator.setBlocks({});
     generator.show(&renderer, test::oblique(), test::threeHues(1.0), settings);
     CHECK(renderer.render(test::oblique(), 9, 7).rgba[31] == glm::vec4(0.0F));
-    unsetenv("VDI_BANDS");
   }
 }
 

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "vdi/comm/Operation.h"
+#include "vdi/core/Environment.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::comm {
@@ -94,8 +95,7 @@ Text describe(const std::exception_ptr& error) {
 
 /// Which of several hosts a rank of this one is taken to be on.
 int hostOf(int localRank) {
-  const char* ranks = std::getenv("VDI_RANKS_PER_HOST");
-  const int each = ranks == nullptr ? 0 : std::atoi(ranks);
+  const auto each = static_cast<int>(environmentCount("VDI_RANKS_PER_HOST", 0).value_or(0));
   return each > 0 ? localRank / each : 0;
 }
 
@@ -172,13 +172,23 @@ Communicator Communicator::fromMpi(int fortranHandle) {
         "MPI_Comm_split_type");
   check(MPI_Comm_rank(node.handle(), &state->localRank), "MPI_Comm_rank");
   OwnedComm part;
-  check(MPI_Comm_split(node.handle(), hostOf(state->localRank), state->rank, part.out()), "MPI_Comm_split");
+  int host = 0;
+  std::exception_ptr
+      bad;  // told when all ranks can be: a rank that leaves here would leave the others waiting
+  try {
+    host = hostOf(state->localRank);
+  } catch (const Error&) {
+    bad = std::current_exception();
+  }
+  check(MPI_Comm_split(node.handle(), host, state->rank, part.out()), "MPI_Comm_split");
   int leader = state->rank;
   check(MPI_Bcast(&leader, 1, MPI_INT, 0, part.handle()), "MPI_Bcast");
   state->hostLeaders.resize(static_cast<std::size_t>(state->size));
   check(MPI_Allgather(&leader, 1, MPI_INT, state->hostLeaders.data(), 1, MPI_INT, state->comm()),
         "MPI_Allgather");
-  return Communicator(std::move(state));
+  Communicator made(std::move(state));
+  made.agree(bad);
+  return made;
 }
 
 Communicator Communicator::world() {
@@ -206,8 +216,8 @@ int Communicator::hostLeader(int rank) const {
 
 std::string Communicator::environment(const char* name) const {
   std::vector<std::byte> bytes;
-  if (const char* value = rank() == 0 ? std::getenv(name) : nullptr; value != nullptr) {
-    const auto text = std::as_bytes(std::span(value, std::strlen(value)));
+  if (const std::string value = rank() == 0 ? environmentText(name).value_or("") : ""; !value.empty()) {
+    const auto text = std::as_bytes(std::span(value));
     bytes.assign(text.begin(), text.end());
   }
   bytes = broadcast(std::move(bytes), 0);

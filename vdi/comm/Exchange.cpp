@@ -37,13 +37,6 @@ std::string nameOf(std::span<const std::uint64_t> words) {
 
 }  // namespace
 
-Transport transportFromText(std::string_view value) {
-  if (value.empty() || value == "shared") return Transport::Shared;
-  if (value == "mpi") return Transport::Mpi;
-  throw Error(ErrorCode::InvalidArgument,
-              fmt::format("VDI_TRANSPORT is '{}'; there are: shared, mpi", value));
-}
-
 Exchange::Exchange(const Communicator& comm, Transport transport) : comm_(comm), transport_(transport) {}
 
 bool Exchange::sharesMemoryWith(int rank) const {

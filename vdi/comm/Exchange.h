@@ -5,22 +5,13 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "vdi/comm/Communicator.h"
+#include "vdi/comm/Transport.h"
 #include "vdi/core/HostMemory.h"
 
 namespace vdi::comm {
-
-/// How ranks of one host pass bytes on.
-enum class Transport {
-  Shared,  // they lie in memory that all of them see: nothing is copied
-  Mpi      // as between hosts
-};
-/// `value`, what VDI_TRANSPORT is: "shared" or "mpi"; shared if it's empty. Throws Error{InvalidArgument}
-/// that lists the names there are.
-Transport transportFromText(std::string_view value);
 
 /// Direct send between the ranks of a communicator, through memory that devices can import. Between ranks of
 /// one host the receiver reads where the sender wrote; between hosts messages go from the sender's memory to

@@ -3,9 +3,13 @@
 namespace vdi::detail {
 
 BandMaker::BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
-                     comm::Transport transport)
-    : comm_(comm), caster_(device), compositor_(device), levelSum_(comm, transport), accesses_(device) {
-  for (Slot& slot : slots_) slot.distributor = std::make_unique<Distributor>(device, comm, transport);
+                     const GeneratorOptions& options)
+    : comm_(comm),
+      caster_(device, options.bands),
+      compositor_(device),
+      levelSum_(comm, options.transport),
+      accesses_(device) {
+  for (Slot& slot : slots_) slot.distributor = std::make_unique<Distributor>(device, comm, options.transport);
 }
 
 void BandMaker::drop() noexcept {

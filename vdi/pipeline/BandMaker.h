@@ -18,6 +18,7 @@
 #include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Distributor.h"
 #include "vdi/pipeline/GatheredLists.h"
+#include "vdi/pipeline/GeneratorOptions.h"
 #include "vdi/pipeline/RayCaster.h"
 #include "vdi/pipeline/Stages.h"
 #include "vdi/pipeline/VdiSink.h"
@@ -28,7 +29,7 @@ class BandMaker {
  public:
   /// `comm` must outlive it.
   BandMaker(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
-            comm::Transport transport);
+            const GeneratorOptions& options);
 
   RayCaster& caster() { return caster_; }
   Compositor& compositor() { return compositor_; }

@@ -9,8 +9,9 @@ namespace vdi::detail {
 
 namespace shared = gpu::shared;
 
-RayCaster::RayCaster(std::shared_ptr<gpu::Device> device)
+RayCaster::RayCaster(std::shared_ptr<gpu::Device> device, std::uint32_t bands)
     : device_(std::move(device)),
+      bands_(bands),
       volume_(device_),
       pass_(device_),
       builders_{ListBuilder(device_), ListBuilder(device_)},
@@ -76,13 +77,11 @@ shared::CastParams RayCaster::prepare(const Request& request) {
 }
 
 /// One band on a GPU: the last rays of each one take a millisecond that nothing else fills, which is more
-/// than the next band hides. Eight on a CPU device, so that progress shows and an abort is heard. VDI_BANDS
-/// is for tests and measurements.
+/// than the next band hides. Eight on a CPU device, so that progress shows and an abort is heard.
 std::uint32_t RayCaster::bandsWanted() const {
   constexpr std::uint32_t ofCpu = 8;
   constexpr std::uint32_t ofGpu = 1;
-  if (const char* value = std::getenv("VDI_BANDS"); value != nullptr && std::atoi(value) > 0)
-    return static_cast<std::uint32_t>(std::atoi(value));
+  if (bands_ > 0) return bands_;
   return device_->isCpu() ? ofCpu : ofGpu;
 }
 

@@ -27,7 +27,8 @@ namespace vdi::detail {
 
 class RayCaster {
  public:
-  explicit RayCaster(std::shared_ptr<gpu::Device> device);
+  /// `bands`: in which frames are made, if memory allows; 0: as suits the device.
+  RayCaster(std::shared_ptr<gpu::Device> device, std::uint32_t bands);
 
   /// What's cast through: blocks are set there.
   gpu::VolumeStore& volume() { return volume_; }
@@ -98,6 +99,7 @@ class RayCaster {
   std::uint32_t rowsPerBand(const Request& request, std::uint64_t bytesPerPixel, std::uint32_t bands) const;
 
   std::shared_ptr<gpu::Device> device_;
+  std::uint32_t bands_;  // wanted in a frame; 0: as suits the device
   gpu::VolumeStore volume_;
   gpu::CastPass pass_;
   std::array<ListBuilder, bandsAtOnce> builders_;  // taken in turns

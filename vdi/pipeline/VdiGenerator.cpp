@@ -39,15 +39,14 @@ bool hasDepthCode(const Scene& scene, const Camera& camera, const GenerateSettin
 struct VdiFrame::State : detail::Frame {};
 
 struct VdiGenerator::State {
-  State(std::shared_ptr<gpu::Device> theDevice, comm::Communicator theComm)
+  State(std::shared_ptr<gpu::Device> theDevice, comm::Communicator theComm, const GeneratorOptions& options)
       : device(std::move(theDevice)), comm(std::move(theComm)) {
-    const std::string ways = comm.environment("VDI_TRANSPORT");
     comm.together([&] {
-      const comm::Transport transport = comm::transportFromText(ways);
+      const comm::Transport transport = options.transport;
       const bool shares = comm.size() > 1 && transport == comm::Transport::Shared;
       using Visible = detail::HostPool::Visible;
       pool = std::make_shared<detail::HostPool>(device, shares ? Visible::ToHost : Visible::ToProcess);
-      bands = std::make_unique<detail::BandMaker>(device, comm, transport);
+      bands = std::make_unique<detail::BandMaker>(device, comm, options);
       steps = std::make_unique<detail::TimeSteps>(comm, bands->caster().volume());
       frames = std::make_unique<detail::Frames>(device, comm, transport, root);
       bandDownload = std::make_unique<detail::BandDownload>(device);
@@ -294,8 +293,9 @@ struct VdiGenerator::State {
   }
 };
 
-VdiGenerator::VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm)
-    : state_(std::make_unique<State>(std::move(device), std::move(comm))) {}
+VdiGenerator::VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm,
+                           const GeneratorOptions& options)
+    : state_(std::make_unique<State>(std::move(device), std::move(comm), options)) {}
 
 VdiGenerator::~VdiGenerator() = default;
 

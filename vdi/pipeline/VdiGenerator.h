@@ -16,6 +16,7 @@
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/gpu/Device.h"
+#include "vdi/pipeline/GeneratorOptions.h"
 #include "vdi/pipeline/Reports.h"
 
 namespace vdi {
@@ -44,7 +45,8 @@ class VdiFrame {
 /// rank (Communicator::agree), and the object stays usable.
 class VdiGenerator {
  public:
-  VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm);
+  VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm,
+               const GeneratorOptions& options = {});
   ~VdiGenerator();
   VdiGenerator(const VdiGenerator&) = delete;
   VdiGenerator& operator=(const VdiGenerator&) = delete;

@@ -1,6 +1,7 @@
 #include "vtkVDIGenerator.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>  // fmt::join
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
@@ -663,7 +664,9 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const Origin& origin, vtkIm
     vdi::comm::Communicator comm = pv::communicatorOf(this->Controller);
     std::shared_ptr<vdi::gpu::Device> device;
     comm.together([&] { device = pv::sharedDevice(comm.localRank()); });
-    this->Internal->Generator = std::make_unique<vdi::VdiGenerator>(std::move(device), std::move(comm));
+    const vdi::GeneratorOptions options = vdi::generatorOptionsFromEnvironment(comm);
+    this->Internal->Generator =
+        std::make_unique<vdi::VdiGenerator>(std::move(device), std::move(comm), options);
     const auto& own = this->Internal->Generator;
     std::array<std::uint64_t, 1> rootsAddress{
         own->communicator().rank() == 0 ? reinterpret_cast<std::uintptr_t>(own.get()) : 0U};

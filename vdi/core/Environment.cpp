@@ -1,0 +1,79 @@
+#include "vdi/core/Environment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <charconv>
+#include <cstdlib>
+#include <cstring>
+
+#include "vdi/core/Error.h"
+
+namespace vdi {
+
+namespace {
+
+constexpr std::array table{
+    EnvironmentVariable{"VDI_BANDS", "a whole number from 1 on", "In how many bands a frame is made", false},
+    EnvironmentVariable{"VDI_CATALYST_ENGINE", "a file",
+                        "The in situ engine that the Catalyst adaptor loads, instead of the installed one",
+                        true},
+    EnvironmentVariable{"VDI_DEVICE", "an index or a part of a name", "Which Vulkan device is used", true},
+    EnvironmentVariable{"VDI_PLUGIN", "a file",
+                        "The plugin that Catalyst scripts load, instead of the installed one", true},
+    EnvironmentVariable{"VDI_RANKS_PER_HOST", "a whole number from 0 on; 0: as it is",
+                        "How many ranks are taken to be on one host", false},
+    EnvironmentVariable{"VDI_TRANSPORT", "shared or mpi",
+                        "How ranks of one host pass bytes on, by shared memory or by messages", false},
+    EnvironmentVariable{"VDI_VALIDATION", "0 or 1", "Whether the Vulkan validation layer checks all calls",
+                        true},
+};
+
+const EnvironmentVariable& entryOf(const char* name) {
+  const auto* const found = std::find_if(table.begin(), table.end(), [&](const EnvironmentVariable& entry) {
+    return std::strcmp(entry.name, name) == 0;
+  });
+  assert(found != table.end());
+  return *found;
+}
+
+}  // namespace
+
+std::span<const EnvironmentVariable> environmentVariables() {
+  return table;
+}
+
+std::optional<std::string> environmentText(const char* name) {
+  const char* const value = std::getenv(entryOf(name).name);
+  if (value == nullptr || *value == '\0') return std::nullopt;
+  return value;
+}
+
+std::optional<std::uint32_t> environmentCount(const char* name, std::uint32_t least) {
+  return environmentCount(name, least, environmentText(name).value_or(""));
+}
+
+std::optional<std::uint32_t> environmentCount(const char* name, std::uint32_t least, std::string_view text) {
+  if (text.empty()) return std::nullopt;
+  std::uint32_t count = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  if (error != std::errc() || end != text.data() + text.size() || count < least)
+    refuseEnvironment(name, text);
+  return count;
+}
+
+bool environmentFlag(const char* name) {
+  const std::optional<std::string> text = environmentText(name);
+  if (!text || *text == "0") return false;
+  if (*text != "1") refuseEnvironment(name, *text);
+  return true;
+}
+
+void refuseEnvironment(const char* name, std::string_view value) {
+  throw Error(ErrorCode::InvalidArgument,
+              fmt::format("{} is '{}'; it may be {}", name, value, entryOf(name).values));
+}
+
+}  // namespace vdi
