@@ -161,6 +161,15 @@ void addLimits(State& state) {
   state["no new privileges"] = textOf(prctl(PR_GET_NO_NEW_PRIVS, 0, 0, 0, 0));
 }
 
+/// Names that are left if the process is killed, or ends without more.
+void addSharedMemory(State& state) {
+  std::ifstream maps("/proc/self/maps");
+  int names = 0;
+  for (std::string line; std::getline(maps, line);)
+    names += line.find("/dev/shm/pv-vdi") != std::string::npos && line.find("(deleted)") == std::string::npos;
+  state["names of shared memory"] = textOf(names);
+}
+
 State stateOfProcess() {
   State state;
   addFloatingPoint(state);  // first, before this function's own operations
@@ -170,6 +179,7 @@ State stateOfProcess() {
   addFiles(state);
   addStreams(state);
   addLimits(state);
+  addSharedMemory(state);
   return state;
 }
 

@@ -31,6 +31,7 @@ def in_c(name):
 
 def catalyst_execute(info):
     os.kill(os.getpid(), signal.SIGTERM)
+    image.UpdatePipeline(info.time)
     if info.timestep > 1 and (in_c("SCRIPTS_OWN") != b"1" or in_c("SIMULATION_OWN") != b"changed"):
         raise RuntimeError("what the script has set is forgotten")
     os.environ["SCRIPTS_OWN"] = "1"

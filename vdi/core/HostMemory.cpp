@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -9,7 +10,10 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <random>
+#include <string_view>
+#include <system_error>
 
 #include "vdi/core/Error.h"
 
@@ -49,11 +53,28 @@ std::span<std::byte> map(std::uint64_t size, int flags, int descriptor, const ch
   return {static_cast<std::byte*>(pages), size};
 }
 
+/// Where shm_open has its names.
+const std::string folder = "/dev/shm";
+constexpr std::string_view prefix = "/pv-vdi-";
+
+/// Memory of processes that were killed while it had a name. Each process locks its own as long as it lives.
+void removeNamesOfTheDead() {
+  std::error_code unreadable;
+  using Iterator = std::filesystem::directory_iterator;
+  for (Iterator entry(folder, unreadable); !unreadable && entry != Iterator(); entry.increment(unreadable)) {
+    const std::string name = fmt::format("/{}", entry->path().filename().string());
+    if (!name.starts_with(prefix)) continue;
+    const File file(shm_open(name.c_str(), O_RDWR, 0));  // another user's can't be opened
+    if (file.descriptor() >= 0 && flock(file.descriptor(), LOCK_EX | LOCK_NB) == 0) shm_unlink(name.c_str());
+  }
+}
+
 /// That no other process of the host uses, whatever container it's in.
 std::string newName() {
   static std::atomic<std::uint32_t> made{0};
   static const std::uint64_t process = (std::uint64_t{std::random_device()()} << 32) | std::random_device()();
-  return fmt::format("/pv-vdi-{:x}-{}", process, made++);
+  return fmt::format("{}{:x}-{}-{}", prefix, process, getpid(),
+                     made++);  // a forked process has all but the second
 }
 
 }  // namespace
@@ -66,19 +87,35 @@ std::shared_ptr<HostMemory> HostMemory::anonymous(std::uint64_t bytes) {
   return memory;
 }
 
-std::shared_ptr<HostMemory> HostMemory::shared(std::uint64_t bytes) {
+std::shared_ptr<HostMemory> HostMemory::shareable(std::uint64_t bytes) {
   std::shared_ptr<HostMemory> memory(new HostMemory);
   const std::uint64_t size = wholePages(bytes);
-  const std::string name = newName();
-  const File file(shm_open(name.c_str(), O_CREAT | O_EXCL | O_RDWR, S_IRUSR | S_IWUSR));
-  if (file.descriptor() < 0) throwNoRoom(size, "shared", errno);
-  memory->name_ = name;
-  memory->linked_ = true;
+  memory->descriptor_ = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  if (memory->descriptor_ < 0) throwNoRoom(size, "shared", errno);
   int error = EINTR;  // a signal may come between
-  while (error == EINTR) error = posix_fallocate(file.descriptor(), 0, static_cast<off_t>(size));
+  while (error == EINTR) error = posix_fallocate(memory->descriptor_, 0, static_cast<off_t>(size));
   if (error != 0) throwNoRoom(size, "shared", error);
-  memory->bytes_ = map(size, MAP_SHARED, file.descriptor(), "shared");
+  memory->bytes_ = map(size, MAP_SHARED, memory->descriptor_, "shared");
+  memory->name_ = newName();
   return memory;
+}
+
+std::shared_ptr<HostMemory> HostMemory::shared(std::uint64_t bytes) {
+  std::shared_ptr<HostMemory> memory = shareable(bytes);
+  if (!memory->publish()) throwNoRoom(memory->bytes_.size(), "shared", errno);
+  return memory;
+}
+
+bool HostMemory::publish() {
+  if (linked_) return true;
+  if (descriptor_ < 0) return false;
+  static std::atomic<pid_t> remover{0};  // a forked process does it, too
+  if (remover.exchange(getpid()) != getpid()) removeNamesOfTheDead();
+  // Locked before it has a name: who finds it unlocked knows that this process has gone.
+  if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) return false;
+  const std::string self = fmt::format("/proc/self/fd/{}", descriptor_);
+  linked_ = linkat(AT_FDCWD, self.c_str(), AT_FDCWD, (folder + name_).c_str(), AT_SYMLINK_FOLLOW) == 0;
+  return linked_;
 }
 
 std::shared_ptr<HostMemory> HostMemory::open(const std::string& name, std::uint64_t bytes) {
@@ -104,6 +141,8 @@ HostMemory::~HostMemory() {
 void HostMemory::unlink() {
   if (linked_) shm_unlink(name_.c_str());
   linked_ = false;
+  if (descriptor_ >= 0) close(descriptor_);
+  descriptor_ = -1;
 }
 
 }  // namespace vdi

@@ -48,7 +48,8 @@ std::vector<std::byte> Gather::describe(HostPool& pool, std::span<const std::spa
   std::vector<ArrayHeader> headers;
   for (const std::span<std::byte> array : arrays) {
     const HostPool::Place place = pool.placeOf(array.data());
-    const HostMemory& memory = *place.access->memory();
+    HostMemory& memory = *place.access->memory();
+    memory.publish();  // where it can't be, ranks that haven't opened it before send messages
     ArrayHeader header;
     std::copy(memory.name().begin(), memory.name().end(), header.memory.begin());
     header.memoryBytes = memory.bytes().size();
@@ -101,6 +102,9 @@ void Gather::begin(HostPool& pool, std::span<const std::span<std::byte>> arrays)
   comm_.together([&] {
     if (!isRoot) open(described);
   });
+  if (isRoot) {
+    for (const Array& array : arrays_) array.access->memory()->unlink();  // all have opened it, or can't
+  }
 }
 
 gpu::Commands& Gather::nextTransfer() {
@@ -185,9 +189,6 @@ void Gather::finish() {
     if (outboxBytes > 0) outbox_->finish();
   });
   sendMessages();
-  if (comm_.rank() == root_) {
-    for (const Array& array : arrays_) array.access->memory()->unlink();  // those who can have opened it
-  }
   drop();
 }
 

@@ -48,7 +48,7 @@ HostPool::~HostPool() = default;
 std::shared_ptr<HostMemory> HostPool::newMemory(std::uint64_t bytes) const {
   if (visible_ == Visible::ToHost) {
     try {
-      return HostMemory::shared(bytes);
+      return HostMemory::shareable(bytes);
     } catch (const Error&) {  // other ranks send theirs by MPI then
     }
   }
