@@ -20,6 +20,8 @@ struct Job {
 void addGenerate(CLI::App& app, Job& job);
 void addRender(CLI::App& app, Job& job);
 void addExport(CLI::App& app, Job& job);
+void addServe(CLI::App& app, Job& job);
+void addReceive(CLI::App& app, Job& job);
 void addCompare(CLI::App& app, Job& job);
 void addInfo(CLI::App& app, Job& job);
 

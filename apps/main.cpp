@@ -92,6 +92,8 @@ Outcome runTool(int argc, char** argv) {
   vdi::apps::addGenerate(app, job);
   vdi::apps::addRender(app, job);
   vdi::apps::addExport(app, job);
+  vdi::apps::addServe(app, job);
+  vdi::apps::addReceive(app, job);
   vdi::apps::addCompare(app, job);
   vdi::apps::addInfo(app, job);
   vdi::bench::addBench(app, job);

@@ -1,0 +1,75 @@
+#include "apps/FolderWatch.h"
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include "vdi/core/Error.h"
+
+namespace vdi::apps {
+
+namespace {
+
+bool isDigit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+/// The digits at `at`, without zeros in front.
+std::string numberAt(const std::string& text, std::size_t& at) {
+  while (at + 1 < text.size() && text[at] == '0' && isDigit(text[at + 1])) ++at;
+  const std::size_t begin = at;
+  while (at < text.size() && isDigit(text[at])) ++at;
+  return text.substr(begin, at - begin);
+}
+
+}  // namespace
+
+bool comesBefore(const std::string& a, const std::string& b) {
+  std::size_t i = 0;
+  std::size_t j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (isDigit(a[i]) && isDigit(b[j])) {
+      const std::string left = numberAt(a, i);
+      const std::string right = numberAt(b, j);
+      if (left.size() != right.size()) return left.size() < right.size();
+      if (left != right) return left < right;
+    } else {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+    }
+  }
+  if (i < a.size() || j < b.size()) return i == a.size();
+  return a < b;  // "01" and "1"
+}
+
+FolderWatch::FolderWatch(std::filesystem::path folder) : folder_(std::move(folder)) {
+  std::error_code error;
+  const std::filesystem::directory_iterator entries(folder_, error);
+  if (error) throw Error(ErrorCode::Io, "can't read the folder: " + error.message(), folder_.string());
+}
+
+std::vector<std::filesystem::path> FolderWatch::changed() {
+  std::vector<std::filesystem::path> files;
+  std::map<std::filesystem::path, Look> seen;
+  std::error_code error;
+  std::filesystem::directory_iterator entries(folder_, error);
+  for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
+    const std::filesystem::path& file = entries->path();
+    if (file.extension() != ".vdi" || file.filename().string().starts_with('.')) continue;
+    std::error_code gone;  // between two looks
+    const Look look{std::filesystem::file_size(file, gone), std::filesystem::last_write_time(file, gone)};
+    if (gone) continue;
+    const auto before = known_.find(file);
+    if (before == known_.end() || before->second != look) files.push_back(file);
+    seen.emplace(file, look);
+  }
+  if (error) throw Error(ErrorCode::Io, "can't read the folder: " + error.message(), folder_.string());
+  known_ = std::move(seen);
+  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) {
+    return comesBefore(a.filename().string(), b.filename().string());
+  });
+  return files;
+}
+
+}  // namespace vdi::apps

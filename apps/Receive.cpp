@@ -1,0 +1,188 @@
+// vdi receive: a viewer without a window, that keeps or draws what a server sends.
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "apps/Commands.h"
+#include "apps/Help.h"
+#include "apps/OutputFiles.h"
+#include "apps/StreamOptions.h"
+#include "vdi/core/Error.h"
+#include "vdi/io/Files.h"
+#include "vdi/io/Png.h"
+#include "vdi/io/VdiFile.h"
+#include "vdi/pipeline/VdiRenderer.h"
+#include "vdi/stream/Client.h"
+#include "vdi/stream/Token.h"
+
+namespace vdi::apps {
+
+namespace {
+
+struct ReceiveOptions {
+  std::string url;
+  std::string folder;
+  std::string picture;
+  std::uint64_t frames = 0;  // 0: until the server has ended
+  double patience = 30.0;
+  bool isCoarse = false;
+  std::string tokenFile;
+  std::string authority;
+};
+
+/// Keeps and draws what comes.
+class Recorder {
+ public:
+  explicit Recorder(const ReceiveOptions& options) : options_(options) {
+    if (!options.picture.empty()) requireOutputs({{"--render", options.picture}}, {});
+    if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
+  }
+
+  std::uint64_t count() const { return count_; }
+
+  /// A file that isn't sound is told, and counts for nothing.
+  void take(const stream::Received& received) {
+    const stream::Level& level = received.level;
+    std::optional<Vdi> vdi;
+    try {
+      vdi = io::decode(received.file);
+    } catch (const Error& error) {
+      fmt::print(stderr, "vdi: frame {} is damaged: {}\n", level.frame, error.what());
+      return;
+    }
+    const std::string name = fmt::format("vdi_{:06}.vdi", count_);
+    if (!options_.folder.empty())
+      io::writeAtomically(std::filesystem::path(options_.folder) / name, received.file);
+    if (!options_.picture.empty()) draw(*vdi);
+    ++count_;
+    fmt::print(
+        "{}: frame {}, level {} of {}, {} x {} lists, step {}, time {:g}, {} bytes, age {:.3f} s, {} "
+        "dropped\n",
+        options_.folder.empty() ? "received" : name, level.frame, level.level + 1, level.levels, level.width,
+        level.height, level.step, level.time.value_or(0.0), level.bytes, level.age, level.dropped);
+    std::fflush(stdout);
+  }
+
+ private:
+  void draw(const Vdi& vdi) {
+    if (!renderer_) renderer_.emplace(gpu::Device::create(gpu::requestFromEnvironment(0)));
+    renderer_->setVdi(vdi);
+    const glm::ivec2 size = vdi.pictureSize();
+    io::writePng(options_.picture,
+                 io::toPicture(renderer_->renderBytes(vdi.camera, size.x, size.y, Alpha::Premultiplied,
+                                                      Reconstruction::Smooth)));
+  }
+
+  const ReceiveOptions& options_;
+  std::optional<VdiRenderer> renderer_;
+  std::uint64_t count_ = 0;
+};
+
+/// Of a finished series all frames are asked for, one after the other.
+class SeriesWalk {
+ public:
+  /// Whether `received` is to be kept.
+  bool wants(const stream::Received& received) const { return !next_ || received.level.frame == *next_; }
+  bool isDone(const stream::Client::Standing& standing) const {
+    return next_ && standing.series && *next_ >= *standing.series;
+  }
+  /// Asks for the first frame, once there is a finished series.
+  void begin(stream::Client& client, const stream::Client::Standing& standing) {
+    if (next_ || !standing.isConnected || !standing.series || standing.state.phase != stream::Phase::Ended)
+      return;
+    next_ = 0;
+    if (*standing.series > 0) client.show(*next_);
+  }
+  void advance(stream::Client& client, const stream::Client::Standing& standing) {
+    if (!next_) return;
+    ++*next_;
+    if (!isDone(standing)) client.show(*next_);
+  }
+
+ private:
+  std::optional<std::uint32_t> next_;
+};
+
+void requirePatience(const stream::Client::Standing& standing, double patience, std::uint64_t count) {
+  const auto alone = std::chrono::steady_clock::now() - standing.since;
+  if (standing.isConnected || alone < std::chrono::duration<double>(patience)) return;
+  throw Error(ErrorCode::Io, fmt::format("no connection for {:g} s, after {} frames: {}", patience, count,
+                                         standing.trouble.empty() ? "no answer" : standing.trouble));
+}
+
+void receive(const ReceiveOptions& options) {
+  constexpr std::chrono::milliseconds pause{100};
+  stream::ClientOptions connection;
+  connection.url = stream::parseUrl(options.url);
+  if (connection.url.token.empty()) connection.url.token = givenToken(options.tokenFile);
+  if (connection.url.token.empty())
+    throw Error(ErrorCode::InvalidArgument, "the link has no token: see --token-file",
+                connection.url.authority());
+  connection.authority = options.authority;
+  connection.log = [](const std::string& line) { fmt::print(stderr, "vdi: {}\n", line); };
+  Recorder recorder(options);
+  stream::Client client(std::move(connection));
+  SeriesWalk walk;
+  while (options.frames == 0 || recorder.count() < options.frames) {
+    const std::optional<stream::Received> received = client.next(pause);
+    const stream::Client::Standing standing = client.standing();
+    walk.begin(client, standing);
+    if (walk.isDone(standing)) return;
+    if (!received) {
+      const bool hasEnded = standing.state.phase == stream::Phase::Ended && !standing.series;
+      if (hasEnded && !standing.isConnected && options.frames == 0 && recorder.count() > 0) return;
+      requirePatience(standing, options.patience, recorder.count());
+      continue;
+    }
+    if (!walk.wants(*received)) continue;
+    if (!received->missing.empty()) {
+      fmt::print(stderr, "vdi: frame {}: {}\n", received->level.frame, received->missing);
+      walk.advance(client, standing);
+      continue;
+    }
+    const bool isFull = received->level.level + 1 == received->level.levels;
+    if (isFull || options.isCoarse) recorder.take(*received);
+    if (isFull) walk.advance(client, standing);
+  }
+}
+
+}  // namespace
+
+void addReceive(CLI::App& app, Job& job) {
+  CLI::App* command = app.add_subcommand("receive", "Keep or draw the VDIs that a server offers");
+  command->footer(
+      "Example:\n"
+      "  vdi receive 'http://127.0.0.1:8080/#token=...' -o received --frames 10\n"
+      "A lost connection is made again. Of a finished series all frames are received, else the newest ones;\n"
+      "of a server that has more frames than time, some are left out.");
+  const auto options = std::make_shared<ReceiveOptions>();
+  command->add_option("url", options->url, "the link that vdi serve or VDIStream printed")
+      ->type_name("")
+      ->required();
+  command->add_option("-o,--output", options->folder, "folder for vdi_000000.vdi and so on")
+      ->type_name("FOLDER");
+  command->add_option("--render", options->picture, "PNG of the newest frame, from where it was made")
+      ->type_name("FILE");
+  command->add_option("--frames", options->frames, "how many; default: until the server has ended")
+      ->type_name("N")
+      ->check(requirePositive);
+  command->add_flag("--coarse", options->isCoarse, "take coarse levels too, which come first");
+  command->add_option("--patience", options->patience, "seconds without a connection until it gives up")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(requirePositive);
+  addTokenOption(*command, options->tokenFile, "default: the link's");
+  command
+      ->add_option("--authority", options->authority, "PEM file of certificates to trust beside the system's")
+      ->type_name("FILE");
+  command->callback([options, &job] { job = {[options](const comm::Communicator&) { receive(*options); }}; });
+}
+
+}  // namespace vdi::apps

@@ -1,0 +1,53 @@
+#include "apps/StreamOptions.h"
+
+#include <CLI/CLI.hpp>
+
+#include <cmath>
+#include <cstdlib>
+#include <map>
+
+#include "vdi/core/Error.h"
+#include "vdi/stream/Token.h"
+
+namespace vdi::apps {
+
+void addTokenOption(CLI::App& command, std::string& file, const std::string& otherwise) {
+  command
+      .add_option("--token-file", file,
+                  "file whose first line is the token, as VDI_TOKEN in the environment; " + otherwise)
+      ->type_name("FILE");
+}
+
+std::string givenToken(const std::string& file) {
+  if (!file.empty()) return stream::tokenIn(file);
+  const char* const variable = std::getenv("VDI_TOKEN");
+  if (variable == nullptr || *variable == '\0') return {};
+  stream::requireToken(variable, "VDI_TOKEN");
+  return variable;
+}
+
+double bytesPerSecond(const std::string& rate) {
+  constexpr double bits = 1.0 / 8.0;
+  const std::map<std::string, double> units{{"kbit", 1e3 * bits}, {"Mbit", 1e6 * bits}, {"Gbit", 1e9 * bits},
+                                            {"kB", 1e3},          {"MB", 1e6},          {"GB", 1e9}};
+  if (rate.empty()) return 0.0;
+  char* end = nullptr;
+  const double number = std::strtod(rate.c_str(), &end);
+  const auto unit = units.find(end);
+  if (end == rate.c_str() || unit == units.end() || !std::isfinite(number) || number <= 0.0) {
+    throw Error(ErrorCode::InvalidArgument, "a rate is a number > 0 with kbit, Mbit, Gbit, kB, MB or GB",
+                rate);
+  }
+  return number * unit->second;
+}
+
+std::string requireRate(const std::string& text) {
+  try {
+    (void)bytesPerSecond(text);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+}  // namespace vdi::apps

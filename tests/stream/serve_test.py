@@ -1,0 +1,392 @@
+"""`vdi serve` and `vdi receive` as users run them. Argument: vdi."""
+import http.client
+import os
+import pathlib
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+from viewer import Closed, Refused, Viewer
+
+VDI = sys.argv.pop(1)
+PATIENCE = 120  # seconds: far more than anything here takes on a loaded machine
+
+
+class Server:
+    """A running `vdi serve`."""
+
+    def __init__(self, *arguments, environment=None):
+        self.errors = tempfile.TemporaryFile("w+")
+        self.process = subprocess.Popen([VDI, "serve", *map(str, arguments)], stdout=subprocess.PIPE, stderr=self.errors,
+                                        text=True, env={**os.environ, **(environment or {})})
+        ready, _, _ = select.select([self.process.stdout], [], [], PATIENCE)
+        self.link = self.process.stdout.readline().strip() if ready else ""
+        if not self.link:
+            self.kill()
+            raise RuntimeError("vdi serve printed no link: " + self.said())
+        self.address, _, fragment = self.link.partition("#token=")
+        self.token = fragment
+        self.port = int(self.address.rstrip("/").rpartition(":")[2])
+
+    def said(self):
+        self.errors.seek(0)
+        return self.errors.read()
+
+    def end(self, how=signal.SIGTERM):
+        self.process.send_signal(how)
+        self.process.stdout.close()
+        return self.process.wait(PATIENCE)
+
+    def close(self):
+        self.kill()
+        self.errors.close()
+
+    def kill(self):
+        if self.process.poll() is None:
+            self.end(signal.SIGKILL)
+
+    def get(self, path, **headers):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
+        connection.request("GET", path, headers=headers)
+        reply = connection.getresponse()
+        body = reply.read()
+        connection.close()
+        return reply, body
+
+
+def receive(*arguments, environment=None):
+    return subprocess.run([VDI, "receive", *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE,
+                          env={**os.environ, **(environment or {})}, check=False)
+
+
+def until(condition, what):
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError("never came: " + what)
+        time.sleep(0.05)
+
+
+class ServeTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.made = pathlib.Path(tempfile.mkdtemp())
+        for name, size, step in (("small0", "24x24x24", 3), ("small1", "24x24x24", 4)):
+            subprocess.run([VDI, "generate", "--size", size, "--resolution", "48x32", "--supersegments", "6", "--step",
+                            str(step), "--time", str(step / 2), "-o", cls.made / f"{name}.vdi"],
+                           check=True, timeout=PATIENCE, stdout=subprocess.DEVNULL)
+        # Beyond a MiB in memory: two levels.
+        subprocess.run([VDI, "generate", "--size", "24x24x24", "--resolution", "320x240", "--supersegments", "8", "-o",
+                        cls.made / "large.vdi"], check=True, timeout=PATIENCE, stdout=subprocess.DEVNULL)
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.made)
+
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.live = self.folder / "live"
+        self.live.mkdir()
+
+    def serve(self, *arguments, **more):
+        server = Server(*arguments, **more)
+        self.addCleanup(server.close)
+        return server
+
+    def view(self, server, **more):
+        viewer = Viewer(server.port, PATIENCE, **more)
+        self.addCleanup(viewer.close)
+        return viewer
+
+    def appear(self, made, name):
+        """As a simulation's file does: whole at once."""
+        shutil.copy(self.made / f"{made}.vdi", self.live / ".part")
+        os.rename(self.live / ".part", self.live / name)
+
+    def bytes_of(self, made):
+        return (self.made / f"{made}.vdi").read_bytes()
+
+    def test_files_arrive_as_they_are(self):
+        server = self.serve(self.made / "small0.vdi", self.made / "large.vdi", self.made / "small1.vdi")
+        done = receive(server.link, "-o", self.folder / "got", "--render", self.folder / "picture.png")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for index, made in enumerate(("small0", "large", "small1")):
+            self.assertEqual((self.folder / "got" / f"vdi_{index:06}.vdi").read_bytes(), self.bytes_of(made))
+        self.assertTrue((self.folder / "picture.png").read_bytes().startswith(b"\x89PNG"))
+        self.assertEqual(server.end(), 0)
+        self.assertEqual(server.said(), "")
+
+    def test_a_folder_is_followed(self):
+        server = self.serve(self.live)
+        viewer = self.view(server)
+        viewer.hello(server.token)
+        self.assertEqual(viewer.text_message("state")["state"], "waiting")
+        levels = viewer.levels()
+        (self.live / "a.vdi").write_bytes(self.bytes_of("small0")[:5000])
+        (self.live / "notes.txt").write_text("no VDI")
+        until(lambda: "a.vdi" in server.said(), "a line on the half file")
+        self.appear("small1", "b.vdi")
+        announced, data = next(levels)
+        self.assertEqual((announced["step"], announced["time"], announced["frame"]), (4, 2.0, 0))
+        self.assertEqual(data, self.bytes_of("small1"))
+        (self.live / "a.vdi").write_bytes(self.bytes_of("small0"))
+        self.assertEqual(next(levels)[1], self.bytes_of("small0"))
+        self.assertEqual(server.said().count("\n"), 1, server.said())
+        # The folder goes, which is told once, and comes again.
+        shutil.rmtree(self.live)
+        until(lambda: server.said().count("\n") == 2, "a line on the folder")
+        self.live.mkdir()
+        self.appear("large", "c.vdi")
+        announced, data = next(levels)
+        self.assertEqual((announced["level"], announced["levels"]), (0, 2))
+        self.assertEqual((announced["width"], announced["height"]), (107, 80))
+        self.assertEqual(next(levels)[1], self.bytes_of("large"))
+
+    def test_a_series_grows_and_is_shown(self):
+        self.appear("small0", "step2.vdi")
+        self.appear("small1", "step10.vdi")
+        server = self.serve(self.live)
+        until(lambda: server.get("/status", Authorization="Bearer " + server.token)[1].find(b'"live"') > 0, "a frame")
+        viewer = self.view(server)
+        viewer.hello(server.token)
+        welcome = viewer.text_message("welcome")
+        self.assertEqual(welcome["series"], {"times": [1.5, 2.0], "steps": [3, 4]})
+        levels = viewer.levels()
+        self.assertEqual(next(levels)[0]["frame"], 1)
+        viewer.send(type="show", index=0)
+        announced, data = next(levels)
+        self.assertEqual((announced["frame"], data), (0, self.bytes_of("small0")))
+        os.remove(self.live / "step10.vdi")
+        viewer.send(type="show", index=1)
+        self.assertEqual(viewer.text_message("missing")["frame"], 1)
+        self.appear("small1", "step11.vdi")
+        part = viewer.text_message("series")
+        self.assertEqual((part["from"], part["steps"]), (2, [4]))
+        viewer.send(type="resume")
+        self.assertEqual(next(levels)[0]["frame"], 2)
+        viewer.send(type="show", index=9)
+        self.assertEqual(viewer.end(), 4400)
+
+    def test_tokens(self):
+        server = self.serve(self.made / "small0.vdi")
+        self.assertEqual(len(server.token), 64)
+        done = receive(server.address + "#token=" + "0" * 64, "--frames", 1)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("token is wrong", done.stderr)
+        self.assertEqual(receive(server.address, "--frames", 1).returncode, 2)
+        self.assertEqual(server.get("/status")[0].status, 401)
+        self.assertEqual(server.get("/status", Authorization="Bearer " + "0" * 64)[0].status, 401)
+        self.assertEqual(server.get("/status", Authorization="Bearer " + server.token)[0].status, 200)
+        # One that is given is not shown.
+        secret = "a.secret-of-the_user~0"
+        file = self.folder / "token"
+        file.write_text(secret + "\n")
+        for arguments, environment in ((["--token-file", file], None), ([], {"VDI_TOKEN": secret})):
+            given = self.serve(self.made / "small0.vdi", *arguments, environment=environment)
+            self.assertNotIn("token", given.link)
+            done = receive(given.link, "--frames", 1, *arguments, environment=environment)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            given.end()
+            self.assertNotIn(secret, given.said())
+        file.write_text("short\n")
+        done = subprocess.run([VDI, "serve", self.live, "--token-file", file], capture_output=True, text=True,
+                              timeout=PATIENCE, check=False)
+        self.assertEqual(done.returncode, 2)
+        self.assertNotIn("short\n", done.stderr)
+
+    def test_http(self):
+        server = self.serve(self.made / "small0.vdi")
+        reply, body = server.get("/")
+        self.assertEqual(reply.status, 200)
+        self.assertIn(b"<canvas", body)
+        self.assertNotIn(server.token.encode(), body)
+        policy = reply.getheader("Content-Security-Policy")
+        self.assertIn("default-src 'none'", policy)
+        self.assertNotIn("unsafe-inline' 'sha256", policy)
+        self.assertEqual(reply.getheader("Referrer-Policy"), "no-referrer")
+        self.assertEqual(reply.getheader("X-Content-Type-Options"), "nosniff")
+        for path in ("/small0.vdi", "//etc/passwd", "/../small0.vdi", "/%2e%2e/", "/stream", "/index.html", "/?"):
+            self.assertEqual(server.get(path)[0].status, 404, path)
+
+    def test_origins(self):
+        server = self.serve(self.made / "small0.vdi", "--origin", "https://desk.example")
+        for origin in ("https://desk.example", f"http://127.0.0.1:{server.port}"):
+            viewer = self.view(server, origin=origin)
+            viewer.hello(server.token)
+            self.assertEqual(viewer.message()["type"], "welcome")
+        for origin in ("https://other.example", "null", "http://127.0.0.1", f"http://127.0.0.1:{server.port}.example"):
+            with self.assertRaises(Refused, msg=origin):
+                self.view(server, origin=origin)
+        with self.assertRaises(Refused):
+            self.view(server, protocol="pv-vdi.2")
+        with self.assertRaises(Refused):
+            self.view(server, target="/")
+
+    def test_bad_messages(self):
+        server = self.serve(self.made / "small0.vdi")
+        good = {"type": "hello", "version": 1, "token": server.token}
+        cases = [
+            (4409, lambda v: v.hello(server.token, version=2)),
+            (4401, lambda v: v.hello(server.token[:-1])),
+            (4401, lambda v: v.hello("")),
+            (4400, lambda v: v.send(type="pause")),
+            (4400, lambda v: v.send(type="hello", version=1)),
+            (4400, lambda v: v.send_text("[" * 3000)),
+            (4400, lambda v: v.send_text("{")),
+            (4400, lambda v: v.send_text('{"type": 1}')),
+            (4400, lambda v: v.send(**{**good, "version": -1})),
+            (4400, lambda v: v.send_frame(2, b"bytes")),
+            (1009, lambda v: v.send_text(" " * 5000)),
+            (4400, lambda v: (v.hello(server.token), v.hello(server.token))),
+            (4400, lambda v: (v.hello(server.token), v.send(type="dance"))),
+            (4400, lambda v: (v.hello(server.token), v.send(type="ack", frame=0, level=0))),
+        ]
+        for code, talk in cases:
+            viewer = self.view(server)
+            talk(viewer)
+            self.assertEqual(viewer.end(), code)
+        late = self.view(server)  # says nothing
+        self.assertEqual(late.end(), 4408)
+        # Acknowledgements of what wasn't sent, and the same one again, do no harm.
+        viewer = self.view(server)
+        viewer.hello(server.token)
+        for _ in range(100):
+            viewer.send(type="ack", frame=77, level=3, bytes=1 << 40)
+        self.assertEqual(next(viewer.levels())[1], self.bytes_of("small0"))
+        self.assertEqual(server.end(), 0)
+
+    def test_a_stalled_viewer_holds_up_nobody(self):
+        server = self.serve(self.live)
+        stalled = self.view(server)
+        stalled.hello(server.token)
+        gone = self.view(server)
+        gone.hello(server.token)
+        last, seen = {}, {}
+
+        def look(number):
+            viewer = self.view(server)
+            viewer.hello(server.token)
+            for announced, data in viewer.levels():
+                last[number] = (announced["step"], data)
+                seen[number] = announced["frame"]
+                if announced["step"] == 4:
+                    break
+
+        threads = [threading.Thread(target=look, args=(number,)) for number in range(6)]
+        for thread in threads:
+            thread.start()
+        until(lambda: server.get("/status", Authorization="Bearer " + server.token)[1].find(b'"viewers":8') > 0, "8 viewers")
+        for number in range(10):
+            self.appear("large", f"a{number}.vdi")
+            until(lambda number=number: seen.get(0, -1) >= number, f"frame {number}")
+            if number == 3:
+                gone.close()
+        self.appear("small1", "z.vdi")
+        for thread in threads:
+            thread.join(PATIENCE)
+            self.assertFalse(thread.is_alive())
+        self.assertEqual(set(last), set(range(6)))
+        for step, data in last.values():
+            self.assertEqual((step, data), (4, self.bytes_of("small1")))
+        # The stalled one has missed some, and then gets the newest.
+        for announced, data in stalled.levels():
+            if announced["step"] == 4:
+                break
+        self.assertEqual(data, self.bytes_of("small1"))
+        self.assertGreater(announced["dropped"], 0)
+        self.assertEqual(server.end(), 0)
+
+    def test_a_killed_server_is_found_again(self):
+        self.appear("small0", "a.vdi")
+        token = self.folder / "token"
+        token.write_text("t" * 32)
+        server = self.serve(self.live, "--token-file", token)
+        got = self.folder / "got"
+        recorder = subprocess.Popen([VDI, "receive", server.address, "--token-file", token, "-o", got, "--frames", "2",
+                                     "--patience", str(PATIENCE)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                                    text=True)
+        self.addCleanup(recorder.kill)
+        until((got / "vdi_000000.vdi").exists, "the first frame")
+        server.kill()
+        until(lambda: "" != recorder.stderr.readline(), "a line on the lost connection")
+        os.remove(self.live / "a.vdi")
+        self.appear("small1", "b.vdi")
+        again = self.serve(self.live, "--token-file", token, "--port", server.port)
+        self.assertEqual(recorder.wait(PATIENCE), 0)
+        recorder.stderr.close()
+        self.assertEqual((got / "vdi_000001.vdi").read_bytes(), self.bytes_of("small1"))
+        again.end()
+        done = receive(again.address, "--token-file", token, "--patience", "0.5")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("no connection", done.stderr)
+
+    def test_a_viewer_that_comes_back_gets_what_it_lacks(self):
+        server = self.serve(self.made / "large.vdi")
+        viewer = self.view(server)
+        viewer.hello(server.token)
+        session = viewer.text_message("welcome")["session"]
+        levels = viewer.levels()
+        self.assertEqual([next(levels)[0]["level"] for _ in range(2)], [0, 1])
+        viewer.close()
+        back = self.view(server)
+        back.hello(server.token, have=0, session=session)
+        back.text_message("state")
+        back.send(type="show", index=5)
+        with self.assertRaises(Closed):  # nothing came before the end
+            while True:
+                message = back.message()
+                self.assertNotEqual(message["type"], "level")
+        other = self.view(server)
+        other.hello(server.token, have=0, session="another server's")
+        self.assertEqual(other.text_message("level")["frame"], 0)
+
+    def test_connections_are_bounded(self):
+        server = self.serve(self.made / "small0.vdi", "--viewers", 2)
+        viewers = [self.view(server) for _ in range(3)]
+        for viewer in viewers[:2]:
+            viewer.hello(server.token)
+            self.assertEqual(viewer.message()["type"], "welcome")
+        viewers[2].hello(server.token)
+        self.assertEqual(viewers[2].end(), 4503)
+        # Many that say nothing, or little by little: beyond the limit they are closed at once.
+        quiet = []
+        for _ in range(300):
+            connection = socket.create_connection(("127.0.0.1", server.port), PATIENCE)
+            connection.sendall(b"GET / HTTP/1.1\r\nX: ")
+            quiet.append(connection)
+        for connection in quiet:
+            try:
+                while connection.recv(1 << 12):
+                    pass
+            except ConnectionError:
+                pass
+            connection.close()
+        self.assertEqual(server.get("/")[0].status, 200)
+        viewers[0].send(type="pause")
+        viewers[0].send(type="show", index=0)
+        self.assertEqual(server.end(), 0)
+
+    def test_the_port_is_taken(self):
+        server = self.serve(self.made / "small0.vdi")
+        done = subprocess.run([VDI, "serve", self.live, "--port", str(server.port)], capture_output=True, text=True,
+                              timeout=PATIENCE, check=False)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("can't listen", done.stderr)
+        for wrong in ([self.folder / "nothing"], [self.live, "--certificate", "nothing.pem"],
+                      [self.made / "small0.vdi", self.folder / "nothing.vdi"], [self.live, "--rate", "fast"]):
+            done = subprocess.run([VDI, "serve", *map(str, wrong)], capture_output=True, text=True, timeout=PATIENCE,
+                                  check=False)
+            self.assertIn(done.returncode, (1, 2), wrong)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

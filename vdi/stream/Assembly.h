@@ -1,0 +1,42 @@
+// Puts the messages of a server together to whole levels. No network.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "vdi/stream/Protocol.h"
+
+namespace vdi::stream {
+
+/// A whole level, as it came: a .vdi file that hasn't been looked at yet.
+struct Received {
+  Level level;
+  std::vector<std::byte> file;
+  std::string
+      missing;  // why there's no file of a frame that was asked for; of `level` there's the frame alone
+};
+
+/// What comes from one connection, in order. It takes memory for bytes that have come, not for those that are
+/// announced.
+class Assembly {
+ public:
+  /// The next level; what is there of the one before is forgotten. Throws Error{Format} while `level` has
+  /// more than `mostBytes`.
+  void begin(const Level& level, std::uint64_t mostBytes);
+  /// A binary message; gives the level that it completes. Throws Error{Format} for what isn't the next part
+  /// of the level that was begun.
+  std::optional<Received> add(std::span<const std::byte> message);
+  /// Of the level under way.
+  std::optional<Ack> progress() const;
+
+ private:
+  std::optional<Level> level_;
+  std::vector<std::byte> file_;
+};
+
+}  // namespace vdi::stream

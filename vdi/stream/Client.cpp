@@ -1,0 +1,304 @@
+#include "vdi/stream/Client.h"
+
+#include <algorithm>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/ssl/context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <variant>
+
+#include "vdi/core/Error.h"
+#include "vdi/stream/Line.h"
+
+namespace vdi::stream {
+
+namespace {
+
+namespace asio = boost::asio;
+
+constexpr std::chrono::milliseconds firstPause{250};
+constexpr std::chrono::milliseconds longestPause{5000};
+
+}  // namespace
+
+class Client::Impl {
+ public:
+  explicit Impl(ClientOptions options) : options_(std::move(options)) {
+    if (options_.url.isEncrypted) prepareTls();
+    standing_.since = std::chrono::steady_clock::now();
+    asio::post(context_, [this] { connect(); });
+    thread_ = std::thread([this] { run(); });
+  }
+
+  ~Impl() {
+    asio::post(context_, [this] {
+      isEnding_ = true;
+      pause_.cancel();
+      if (line_) line_->close();
+      work_.reset();
+    });
+    thread_.join();
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  std::optional<Received> next(std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, timeout, [this] { return !wholes_.empty() || failure_; });
+    if (!wholes_.empty()) {
+      Whole whole = std::move(wholes_.front());
+      wholes_.pop_front();
+      const Level& level = whole.received.level;
+      const Ack ack{level.frame, level.level, level.bytes};
+      asio::post(context_, [this, ack, connection = whole.connection] {
+        if (connection == connection_) send(ack);
+      });
+      return std::move(whole.received);
+    }
+    if (failure_) throw Error(*failure_);
+    return std::nullopt;
+  }
+
+  Standing standing() const {
+    const std::scoped_lock lock(mutex_);
+    return standing_;
+  }
+
+  void show(std::optional<std::uint32_t> index) {
+    asio::post(context_, [this, index] {
+      shown_ = index;
+      isPaused_ = false;
+      if (index) {
+        send(Show{*index});
+      } else {
+        send(Resume{});
+      }
+    });
+  }
+
+  void pause() {
+    asio::post(context_, [this] {
+      isPaused_ = true;
+      send(Pause{});
+    });
+  }
+
+ private:
+  struct Whole {
+    Received received;
+    std::uint64_t connection;
+  };
+
+  void prepareTls() {
+    tls_.set_default_verify_paths();
+    if (options_.authority.empty()) return;
+    boost::system::error_code error;
+    tls_.load_verify_file(options_.authority.string(), error);
+    if (error)
+      throw Error(ErrorCode::Io, "can't use the certificates: " + error.message(),
+                  options_.authority.string());
+  }
+
+  void run() {
+    for (bool done = false; !done;) {
+      try {
+        context_.run();
+        done = true;
+      } catch (const std::exception& error) {
+        fail(ErrorCode::Communication, error.what());
+      }
+    }
+  }
+
+  template <typename Change>
+  void change(Change change) {
+    const std::scoped_lock lock(mutex_);
+    change();
+    changed_.notify_all();
+  }
+
+  void connect() {
+    if (isEnding_) return;
+    ++connection_;
+    cause_.clear();
+    assembly_ = {};
+    LineEvents events{
+        [this] { sayHello(); }, [this](std::string_view text) { guarded([&] { take(text); }); },
+        [this](std::span<const std::byte> message) { guarded([&] { take(message); }); },
+        [this](std::uint16_t code, const std::string& why, bool isFinal) { lose(code, why, isFinal); }};
+    line_ = options_.url.isEncrypted ? encryptedLine(context_, tls_, options_.url, std::move(events))
+                                     : line(context_, options_.url, std::move(events));
+    line_->start();
+  }
+
+  void sayHello() {
+    isWelcome_ = false;
+    Hello hello;
+    hello.token = options_.url.token;
+    if (!session_.empty() && have_) {
+      hello.session = session_;
+      hello.have = have_;
+    }
+    line_->send(textOf(FromViewer(hello)));
+  }
+
+  void send(const FromViewer& message) {
+    if (line_ && isWelcome_) line_->send(textOf(message));
+  }
+
+  /// What a server sends that makes no sense ends this client.
+  template <typename Work>
+  void guarded(Work work) {
+    try {
+      work();
+    } catch (const Error& error) {
+      fail(error.code(), options_.url.authority() + ": " + error.what());
+      line_->close();
+    }
+  }
+
+  void take(std::string_view text) {
+    const FromServer message = serverMessage(text);
+    std::visit([this](const auto& m) { take(m); }, message);
+  }
+  void take(const Welcome& welcome) {
+    if (welcome.version != protocolVersion)
+      throw Error(ErrorCode::Format, "the server speaks another version");
+    isWelcome_ = true;
+    wait_ = firstPause;
+    if (session_ != welcome.session) have_.reset();
+    session_ = welcome.session;
+    change([&] {
+      standing_.isConnected = true;
+      standing_.since = std::chrono::steady_clock::now();
+      standing_.session = session_;
+      standing_.series = welcome.series ? std::optional(welcome.series->size()) : std::nullopt;
+    });
+    if (shown_) send(Show{*shown_});
+    if (isPaused_) send(Pause{});
+  }
+  void take(const SeriesPart& part) {
+    change([&] { standing_.series = part.from + part.entries.size(); });
+  }
+  void take(const State& state) {
+    change([&] { standing_.state = state; });
+  }
+  void take(const Level& level) {
+    assembly_.begin(level, options_.mostLevelBytes);
+    acknowledged_ = 0;
+  }
+  void take(const Missing& missing) {
+    Received none;
+    none.level.frame = missing.frame;
+    none.missing = missing.cause;
+    change([&] { wholes_.push_back({std::move(none), connection_}); });
+  }
+  void take(const Refusal& refusal) { cause_ = refusal.cause; }
+  static void take(const Unknown&) {}
+  void take(std::span<const std::byte> message) {
+    std::optional<Received> whole = assembly_.add(message);
+    if (whole) {
+      const Level& level = whole->level;
+      if (level.level + 1 == level.levels) have_ = level.frame;
+      change([&] { wholes_.push_back({*std::move(whole), connection_}); });
+      return;
+    }
+    const std::optional<Ack> progress = assembly_.progress();
+    if (progress && progress->bytes - acknowledged_ >= ackBytes) {
+      acknowledged_ = progress->bytes;
+      send(*progress);
+    }
+  }
+
+  void lose(std::uint16_t code, const std::string& why, bool isFinal) {
+    line_.reset();
+    isWelcome_ = false;
+    const std::string trouble = cause_.empty() ? why : cause_;
+    change([&] {
+      if (standing_.isConnected) standing_.since = std::chrono::steady_clock::now();
+      standing_.isConnected = false;
+      standing_.trouble = trouble;
+    });
+    const auto close = static_cast<Close>(code);
+    if (close == Close::WrongToken)
+      fail(ErrorCode::InvalidArgument, options_.url.authority() + ": " + trouble);
+    if (close == Close::OtherVersion || close == Close::BadMessage)
+      fail(ErrorCode::Format, options_.url.authority() + ": " + trouble);
+    if (isFinal) fail(ErrorCode::Io, trouble);
+    if (isEnding_ || hasFailed_) return;
+    if (options_.log && trouble != said_) options_.log(trouble);
+    said_ = trouble;
+    pause_.expires_after(wait_);
+    pause_.async_wait([this](boost::system::error_code error) {
+      if (!error) connect();
+    });
+    wait_ = std::min(2 * wait_, longestPause);
+  }
+
+  /// There is no use in trying again.
+  void fail(ErrorCode code, const std::string& what) {
+    if (std::exchange(hasFailed_, true)) return;
+    change([&] { failure_.emplace(code, what); });
+  }
+
+  const ClientOptions options_;
+
+  mutable std::mutex mutex_;  // for the next four
+  std::condition_variable changed_;
+  std::deque<Whole> wholes_;
+  Standing standing_;
+  std::optional<Error> failure_;
+
+  // The rest belongs to the thread.
+  asio::io_context context_{1};
+  asio::executor_work_guard<asio::io_context::executor_type> work_{context_.get_executor()};
+  asio::steady_timer pause_{context_};
+  asio::ssl::context tls_{asio::ssl::context::tls_client};
+  std::shared_ptr<Line> line_;
+  Assembly assembly_;
+  std::uint64_t connection_ = 0;
+  std::uint64_t acknowledged_ = 0;  // of the level under way
+  std::string session_;
+  std::optional<std::uint32_t> have_;
+  std::optional<std::uint32_t> shown_;
+  std::string cause_;  // that the server gave
+  std::string said_;
+  std::chrono::milliseconds wait_ = firstPause;
+  bool isPaused_ = false;
+  bool isWelcome_ = false;
+  bool isEnding_ = false;
+  bool hasFailed_ = false;
+  std::thread thread_;
+};
+
+Client::Client(ClientOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
+Client::~Client() = default;
+
+std::optional<Received> Client::next(std::chrono::milliseconds timeout) {
+  return impl_->next(timeout);
+}
+
+Client::Standing Client::standing() const {
+  return impl_->standing();
+}
+
+void Client::show(std::uint32_t index) {
+  impl_->show(index);
+}
+
+void Client::pause() {
+  impl_->pause();
+}
+
+void Client::resume() {
+  impl_->show(std::nullopt);
+}
+
+}  // namespace vdi::stream

@@ -1,0 +1,47 @@
+// A VDI as viewers get it: levels, each of which is a whole .vdi file.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "vdi/core/Vdi.h"
+
+namespace vdi::stream {
+
+using Clock = std::chrono::steady_clock;
+
+struct EncodedLevel {
+  std::vector<std::byte> bytes;  // of a .vdi file
+  int width = 0;                 // lists, margin included
+  int height = 0;
+};
+
+/// All viewers of a frame share it, so that nothing in it ever changes.
+struct Frame {
+  std::uint32_t id = 0;
+  std::uint64_t step = 0;
+  double time = 0.0;
+  Clock::time_point made;
+  std::uint32_t levelCount = 1;
+  /// Those that are encoded, the coarsest first: 1 to levelCount of them. The last of levelCount is the VDI.
+  std::vector<std::shared_ptr<const EncodedLevel>> levels;
+};
+using FramePtr = std::shared_ptr<const Frame>;
+
+/// Every third list of each row and of each column: the coarsest level.
+inline constexpr int coarseFactor = 3;
+/// A VDI of fewer bytes in memory has one level.
+inline constexpr std::size_t smallBytes = std::size_t{1} << 20;
+
+/// Encodes a VDI, on all cores. `take` gets the frame when its first level is there and again with each other
+/// one, from the calling thread. `file`: the VDI's own file where that is known, which becomes the last
+/// level. Throws Error{Format} for a VDI that io::decode would refuse, and what `take` throws.
+void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
+                 std::optional<std::vector<std::byte>> file, const std::function<void(FramePtr)>& take);
+
+}  // namespace vdi::stream

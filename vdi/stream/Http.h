@@ -1,0 +1,41 @@
+// What the server answers to plain HTTP, and whom it lets through to the stream. No sockets.
+#pragma once
+
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "vdi/stream/Token.h"
+
+namespace vdi::stream {
+
+using HttpRequest = boost::beast::http::request<boost::beast::http::empty_body>;
+using HttpReply = boost::beast::http::response<boost::beast::http::string_body>;
+
+class Site {
+ public:
+  /// `page`: at /. `status`: gives the JSON at /status.
+  Site(std::string page, const std::string& token, std::vector<std::string> origins,
+       std::function<std::string()> status);
+
+  HttpReply reply(const HttpRequest& request) const;
+  /// Whether a request for a WebSocket at /stream may have one. Otherwise `cause` says why not.
+  bool admits(const HttpRequest& request, std::string& cause) const;
+  /// What a request that isn't admitted gets.
+  static HttpReply refusal(const HttpRequest& request, const std::string& cause);
+
+ private:
+  std::string page_;
+  std::string policy_;  // Content-Security-Policy of the page
+  TokenCheck token_;
+  std::vector<std::string> origins_;
+  std::function<std::string()> status_;
+};
+
+/// The sources of the page's scripts, for script-src: 'sha256-…' of each element's text.
+std::string scriptSources(const std::string& page);
+
+}  // namespace vdi::stream

@@ -1,0 +1,41 @@
+// One connection of a client. Not part of the library's interface.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ssl/context.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "vdi/stream/Sockets.h"
+#include "vdi/stream/Url.h"
+
+namespace vdi::stream {
+
+/// Calls, all on the thread of its io_context. After `ended` none comes.
+struct LineEvents {
+  std::function<void()> opened;
+  std::function<void(std::string_view text)> text;
+  std::function<void(std::span<const std::byte> message)> binary;
+  /// `code`: of WebSocket, 0 without one. `isFinal`: another try would fare alike.
+  std::function<void(std::uint16_t code, const std::string& why, bool isFinal)> ended;
+};
+
+/// Lives until it has ended, and as long as somebody holds it.
+class Line {
+ public:
+  virtual ~Line() = default;
+  virtual void start() = 0;
+  virtual void send(std::string text) = 0;
+  virtual void close() = 0;  // politely, within a second
+};
+
+std::shared_ptr<Line> line(boost::asio::io_context& context, const Url& url, LineEvents events);
+std::shared_ptr<Line> encryptedLine(boost::asio::io_context& context, boost::asio::ssl::context& tls,
+                                    const Url& url, LineEvents events);
+
+}  // namespace vdi::stream

@@ -1,0 +1,88 @@
+// What one viewer gets next. Newer frames take the place of older ones, and a viewer's acknowledgements say
+// how much may be under way to it. Knows time and bytes, but no network.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+
+#include "vdi/stream/Frame.h"
+#include "vdi/stream/Protocol.h"
+
+namespace vdi::stream {
+
+class Outbox {
+ public:
+  /// `mostBytesPerSecond`: 0 for no limit.
+  explicit Outbox(double mostBytesPerSecond) : cap_(mostBytesPerSecond) {}
+
+  /// A frame to show next, or more levels of the one that was offered last. One that was offered before and
+  /// hasn't been begun is dropped.
+  void offer(FramePtr frame, Clock::time_point now);
+  /// The viewer has that frame in full already.
+  void skip(FramePtr frame);
+  /// Until resumed, nothing is begun. A level under way goes on.
+  void pause(bool paused) { isPaused_ = paused; }
+
+  /// A part of a level; at offset 0 the level begins.
+  struct Part {
+    FramePtr frame;
+    std::uint32_t level = 0;
+    std::uint64_t offset = 0;
+    std::span<const std::byte> bytes;  // of the frame; at most chunkBytes
+  };
+  struct Next {
+    std::optional<Part> part;                // to be sent now
+    std::optional<Clock::time_point> retry;  // without a part: when to ask again, if nothing happens before
+  };
+  /// Its part counts as sent.
+  Next next(Clock::time_point now);
+  /// What wasn't sent, or was acknowledged before, changes nothing.
+  void acknowledge(const Ack& ack, Clock::time_point now);
+
+  /// Frames of which the viewer got nothing.
+  std::uint64_t dropped() const { return dropped_; }
+  /// Bytes a second that the viewer takes, as far as acknowledgements and the limit tell; 0: unknown.
+  double rate() const;
+  /// Bytes sent and not acknowledged.
+  std::uint64_t underWay() const { return underWay_; }
+  /// Bytes that may be under way.
+  std::uint64_t window() const;
+
+ private:
+  struct Sent {
+    std::uint32_t frame;
+    std::uint32_t level;
+    std::uint64_t end;  // of the part in its level
+    std::uint64_t bytes;
+    Clock::time_point at;
+    std::uint64_t deliveredBefore;
+  };
+  bool isUnderWay() const;
+  /// Turns to the level to begin now; nothing: there is none, or not before the time in `retry`.
+  bool begin(Clock::time_point now, std::optional<Clock::time_point>& retry);
+  bool isWorthBeginning(std::uint64_t bytes, Clock::time_point now,
+                        std::optional<Clock::time_point>& retry) const;
+  Part take(Clock::time_point now);
+
+  double cap_;
+  double allowance_ = 0.0;  // bytes that the limit lets go now; may be negative
+  std::optional<Clock::time_point> allowedAt_;
+  bool isPaused_ = false;
+
+  FramePtr newest_;  // offered last
+  FramePtr current_;
+  std::uint32_t nextLevel_ = 0;  // of current_: the one to begin; the one before it may be under way
+  std::uint64_t offset_ = 0;     // in the level before nextLevel_
+  std::uint64_t dropped_ = 0;
+  std::optional<Clock::time_point> offeredAt_;
+  double period_ = 0.0;  // seconds between frames; 0: unknown
+
+  std::deque<Sent> sent_;
+  std::uint64_t underWay_ = 0;
+  std::uint64_t delivered_ = 0;
+  std::deque<double> rates_;  // of the last acknowledgements
+};
+
+}  // namespace vdi::stream

@@ -1,0 +1,150 @@
+// The messages between a server of VDIs and its viewers. docs/live.md has the byte map.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace vdi::stream {
+
+inline constexpr int protocolVersion = 1;
+inline constexpr char subprotocol[] = "pv-vdi.1";
+/// The most that a viewer's message may take.
+inline constexpr std::size_t maxViewerText = 4096;
+/// The most that a text message of the server may take.
+inline constexpr std::size_t maxServerText = std::size_t{1} << 20;
+/// Bytes of a level in one binary message, at most; its head comes in front of them.
+inline constexpr std::size_t chunkBytes = std::size_t{256} << 10;
+inline constexpr std::size_t chunkHeadBytes = 16;
+/// A viewer acknowledges at least each of so many bytes.
+inline constexpr std::uint64_t ackBytes = std::uint64_t{512} << 10;
+/// Entries of a series in one message, at most.
+inline constexpr std::size_t seriesEntries = 4096;
+
+/// Why a connection is closed: WebSocket's status codes, of which 4000 to 4999 are for applications.
+enum class Close : std::uint16_t {
+  GoingAway = 1001,
+  BadMessage = 4400,
+  WrongToken = 4401,
+  Late = 4408,
+  OtherVersion = 4409,
+  TooMany = 4503,
+};
+
+// From a viewer.
+
+struct Hello {
+  int version = protocolVersion;
+  std::string token;
+  std::optional<std::string> session;  // of the server whose frames `have` counts
+  std::optional<std::uint32_t> have;   // the newest frame that the viewer has
+  bool operator==(const Hello&) const = default;
+};
+/// `bytes` of a level have come.
+struct Ack {
+  std::uint32_t frame = 0;
+  std::uint32_t level = 0;
+  std::uint64_t bytes = 0;
+  bool operator==(const Ack&) const = default;
+};
+/// Asks for a frame of a series, and for no others.
+struct Show {
+  std::uint32_t index = 0;
+  bool operator==(const Show&) const = default;
+};
+struct Pause {
+  bool operator==(const Pause&) const = default;
+};
+/// Asks for the newest frames again.
+struct Resume {
+  bool operator==(const Resume&) const = default;
+};
+using FromViewer = std::variant<Hello, Ack, Show, Pause, Resume>;
+
+// From the server.
+
+/// The frames of a folder or of a list of files. Both vectors have an entry for each frame.
+struct Series {
+  std::vector<std::optional<double>> times;  // none: not finite
+  std::vector<std::uint64_t> steps;
+  std::size_t size() const { return steps.size(); }
+  bool operator==(const Series&) const = default;
+};
+struct Welcome {
+  int version = protocolVersion;
+  std::string session;
+  bool steer = false;
+  std::optional<Series> series;
+  std::uint32_t viewers = 0;
+  bool operator==(const Welcome&) const = default;
+};
+/// More of a series: its entries from `from` on.
+struct SeriesPart {
+  std::uint32_t from = 0;
+  Series entries;
+  bool operator==(const SeriesPart&) const = default;
+};
+enum class Phase { Waiting, Live, Ended };
+struct State {
+  Phase phase = Phase::Waiting;
+  std::uint32_t viewers = 0;
+  bool operator==(const State&) const = default;
+};
+/// The next binary messages are of this level, until another comes.
+struct Level {
+  std::uint32_t frame = 0;
+  std::uint32_t level = 0;
+  std::uint32_t levels = 1;
+  std::uint64_t bytes = 0;
+  int width = 0;  // lists, margin included
+  int height = 0;
+  std::uint64_t step = 0;
+  std::optional<double> time;  // none: not finite
+  double age = 0.0;            // seconds since the VDI was made
+  std::uint64_t dropped = 0;   // frames of which this viewer got nothing
+  bool operator==(const Level&) const = default;
+};
+/// A frame that the viewer asked for can't be had.
+struct Missing {
+  std::uint32_t frame = 0;
+  std::string cause;
+  bool operator==(const Missing&) const = default;
+};
+/// Comes before the server closes the connection.
+struct Refusal {
+  std::string cause;
+  bool operator==(const Refusal&) const = default;
+};
+/// Of a type that this program doesn't know: a newer server's.
+struct Unknown {
+  bool operator==(const Unknown&) const = default;
+};
+using FromServer = std::variant<Welcome, SeriesPart, State, Level, Missing, Refusal, Unknown>;
+
+std::string textOf(const FromViewer& message);
+std::string textOf(const FromServer& message);
+/// Throw Error{Format}: not one JSON object with the fields that its type needs, of their kinds and within
+/// their bounds; nested more deeply than any message is; from a viewer, of an unknown type. Fields that no
+/// message has are skipped.
+FromViewer viewerMessage(std::string_view text);
+FromServer serverMessage(std::string_view text);
+
+/// A part of a level, which `bytes` refers to.
+struct Chunk {
+  std::uint32_t frame = 0;
+  std::uint32_t level = 0;
+  std::uint64_t offset = 0;
+  std::span<const std::byte> bytes;
+};
+/// What stands in front of its bytes.
+std::array<std::byte, chunkHeadBytes> chunkHead(const Chunk& chunk);
+/// Throws Error{Format} for fewer bytes than a head has, no bytes behind it, or more than chunkBytes.
+Chunk chunkIn(std::span<const std::byte> message);
+
+}  // namespace vdi::stream

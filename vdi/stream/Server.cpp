@@ -1,0 +1,306 @@
+#include "vdi/stream/Server.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/ssl/context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <cassert>
+#include <chrono>
+#include <future>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "vdi/core/Error.h"
+#include "vdi/stream/Connection.h"
+#include "vdi/stream/Http.h"
+#include "vdi/stream/Token.h"
+#include "vdi/stream/Viewer.h"
+
+namespace vdi::stream {
+
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+
+constexpr std::chrono::seconds goodbyePatience{1};
+constexpr std::chrono::milliseconds acceptPause{100};
+
+std::string addressText(const std::string& host, std::uint16_t port) {
+  const bool isV6 = host.find(':') != std::string::npos;
+  return isV6 ? fmt::format("[{}]:{}", host, port) : fmt::format("{}:{}", host, port);
+}
+
+/// What stands in a link for an address that means all of the machine's.
+std::string nameInLinks(const std::string& host) {
+  if (host != "0.0.0.0" && host != "::") return host;
+  constexpr std::size_t longest = 256;
+  std::array<char, longest> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? std::string(name.data()) : host;
+}
+
+const char* nameOf(Phase phase) {
+  if (phase == Phase::Waiting) return "waiting";
+  return phase == Phase::Live ? "live" : "ended";
+}
+
+std::unique_ptr<asio::ssl::context> tlsContext(const ServerOptions& options) {
+  if (options.certificate.empty() && options.key.empty()) return nullptr;
+  if (options.certificate.empty() || options.key.empty())
+    throw Error(ErrorCode::InvalidArgument, "TLS needs a certificate and its key");
+  auto context = std::make_unique<asio::ssl::context>(asio::ssl::context::tls_server);
+  context->set_options(asio::ssl::context::default_workarounds | asio::ssl::context::no_tlsv1 |
+                       asio::ssl::context::no_tlsv1_1);
+  boost::system::error_code error;
+  context->use_certificate_chain_file(options.certificate.string(), error);
+  if (error) throw Error(ErrorCode::Io, "can't use the certificate: " + error.message(), options.certificate);
+  context->use_private_key_file(options.key.string(), asio::ssl::context::pem, error);
+  if (error) throw Error(ErrorCode::Io, "can't use the certificate's key: " + error.message(), options.key);
+  return context;
+}
+
+}  // namespace
+
+class Server::Impl {
+ public:
+  explicit Impl(ServerOptions options)
+      : options_((requireToken(options.token, "token"), std::move(options))),
+        tls_(tlsContext(options_)),
+        hub_({options_.token, options_.mostBytesPerSecond, options_.mostViewers, options_.show}),
+        site_(std::move(options_.page), options_.token, options_.origins, [this] { return statusText(); }),
+        acceptor_(context_),
+        pause_(context_),
+        patience_(context_),
+        work_(asio::make_work_guard(context_)) {
+    if (options_.listens) {
+      listen();
+      accept();
+    }
+    thread_ = std::thread([this] { run(); });
+  }
+
+  ~Impl() {
+    asio::post(context_, [this] { finish(); });
+    thread_.join();
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  std::uint16_t port() const { return port_; }
+  std::string address() const {
+    return fmt::format("{}://{}/", tls_ ? "https" : "http", addressText(nameInLinks(options_.host), port_));
+  }
+  std::string link() const { return address() + "#token=" + options_.token; }
+
+  template <typename Work>
+  void onThread(Work work) {
+    asio::post(context_, std::move(work));
+  }
+  Hub& hub() { return hub_; }
+
+  /// What `question` gives there.
+  template <typename Answer>
+  Answer ask(const std::function<Answer()>& question) {
+    std::promise<Answer> promise;
+    std::future<Answer> answer = promise.get_future();
+    onThread([&] { promise.set_value(question()); });
+    return answer.get();
+  }
+
+  ServerStatus statusNow() const {
+    return {hub_.session(), hub_.phase(), hub_.viewerCount(), hub_.published()};
+  }
+
+  void adopt(int descriptor) {
+    Plain::socket_type socket(context_);
+    boost::system::error_code error;
+    socket.assign(asio::generic::stream_protocol(AF_UNIX, 0), descriptor, error);
+    if (error) throw Error(ErrorCode::Io, "can't serve the descriptor: " + error.message());
+    // A socket can be moved into the handler only if that need not be copied, which post doesn't ask for.
+    onThread(
+        [this, held = std::make_shared<Plain::socket_type>(std::move(socket))] { serve(std::move(*held)); });
+  }
+
+ private:
+  std::string statusText() const {
+    const ServerStatus now = statusNow();
+    return nlohmann::json{{"session", now.session},
+                          {"state", nameOf(now.phase)},
+                          {"viewers", now.viewers},
+                          {"frames", now.frames}}
+        .dump();
+  }
+  void say(const std::string& line) const {
+    if (options_.log) options_.log(line);
+  }
+
+  void listen() {
+    boost::system::error_code error;
+    tcp::resolver resolver(context_);
+    const auto found = resolver.resolve(options_.host, std::to_string(options_.port),
+                                        tcp::resolver::passive | tcp::resolver::address_configured, error);
+    const auto fail = [&] {
+      throw Error(ErrorCode::Io, "can't listen: " + error.message(),
+                  addressText(options_.host, options_.port));
+    };
+    if (error || found.begin() == found.end()) fail();
+    const tcp::endpoint endpoint = found.begin()->endpoint();
+    acceptor_.open(endpoint.protocol(), error);
+    if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error) acceptor_.bind(endpoint, error);
+    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
+    if (error) fail();
+    port_ = acceptor_.local_endpoint().port();
+  }
+
+  void accept() {
+    acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted || !acceptor_.is_open()) return;
+      if (error) {  // too many open files, for example: they may be fewer soon
+        pause_.expires_after(acceptPause);
+        pause_.async_wait([this](boost::system::error_code cancelled) {
+          if (!cancelled) accept();
+        });
+        return;
+      }
+      boost::system::error_code ignored;
+      socket.set_option(tcp::no_delay(true), ignored);
+      serve(std::move(socket));
+      accept();
+    });
+  }
+
+  void serve(Plain::socket_type socket) {
+    if (connections_.size() >= options_.mostConnections || isEnding_) return;  // it's closed
+    const std::uint64_t number = nextNumber_++;
+    const Surroundings surroundings{hub_, site_, [this, number] { leave(number); }};
+    const std::shared_ptr<Connection> made = tls_
+                                                 ? encryptedConnection(std::move(socket), *tls_, surroundings)
+                                                 : connection(std::move(socket), surroundings);
+    connections_.emplace(number, made);
+    made->start();
+  }
+
+  void leave(std::uint64_t number) {
+    connections_.erase(number);
+    if (isEnding_ && connections_.empty()) stop();
+  }
+
+  /// Each connection is told. Those that still are there after a while are cut off.
+  void finish() {
+    isEnding_ = true;
+    boost::system::error_code ignored;
+    acceptor_.close(ignored);
+    pause_.cancel();
+    hub_.setPhase(Phase::Ended);
+    forEach([](Connection& connection) { connection.finish(); });
+    if (connections_.empty()) {
+      stop();
+      return;
+    }
+    patience_.expires_after(goodbyePatience);
+    patience_.async_wait([this](boost::system::error_code) {
+      forEach([](Connection& connection) { connection.cut(); });
+      work_.reset();
+    });
+  }
+
+  template <typename Do>
+  void forEach(Do work) {
+    const auto all = connections_;  // of which some may go
+    for (const auto& [number, weak] : all) {
+      if (const std::shared_ptr<Connection> connection = weak.lock()) work(*connection);
+    }
+  }
+
+  void stop() {
+    patience_.cancel();
+    work_.reset();
+  }
+
+  void run() {
+    for (bool done = false; !done;) {
+      try {
+        context_.run();
+        done = true;
+      } catch (const std::exception& error) {  // of one connection, which is lost
+        say(error.what());
+      }
+    }
+  }
+
+  ServerOptions options_;
+  std::unique_ptr<asio::ssl::context> tls_;
+  Hub hub_;
+  Site site_;
+  std::map<std::uint64_t, std::weak_ptr<Connection>> connections_;
+  std::uint64_t nextNumber_ = 0;
+  bool isEnding_ = false;
+  std::uint16_t port_ = 0;
+  asio::io_context context_{1};  // its handlers hold connections: it goes before what these use
+  tcp::acceptor acceptor_;
+  asio::steady_timer pause_;
+  asio::steady_timer patience_;
+  asio::executor_work_guard<asio::io_context::executor_type> work_;
+  std::thread thread_;
+};
+
+Server::Server(ServerOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
+Server::~Server() = default;
+
+std::uint16_t Server::port() const {
+  return impl_->port();
+}
+
+std::string Server::address() const {
+  return impl_->address();
+}
+
+std::string Server::link() const {
+  return impl_->link();
+}
+
+void Server::publish(FramePtr frame) {
+  impl_->onThread([&hub = impl_->hub(), held = std::move(frame)] { hub.publish(held, Clock::now()); });
+}
+
+void Server::provide(FramePtr frame) {
+  impl_->onThread([&hub = impl_->hub(), held = std::move(frame)] { hub.provide(held, Clock::now()); });
+}
+
+void Server::miss(Missing missing) {
+  impl_->onThread([&hub = impl_->hub(), held = std::move(missing)] { hub.miss(held); });
+}
+
+bool Server::isWanted(std::uint32_t index) const {
+  return impl_->ask<bool>([this, index] { return impl_->hub().isWanted(index); });
+}
+
+void Server::append(Series entries) {
+  impl_->onThread([&hub = impl_->hub(), held = std::move(entries)] { hub.append(held); });
+}
+
+void Server::setPhase(Phase phase) {
+  impl_->onThread([&hub = impl_->hub(), phase] { hub.setPhase(phase); });
+}
+
+void Server::adopt(int descriptor) {
+  impl_->adopt(descriptor);
+}
+
+ServerStatus Server::status() const {
+  return impl_->ask<ServerStatus>([this] { return impl_->statusNow(); });
+}
+
+}  // namespace vdi::stream

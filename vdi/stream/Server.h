@@ -1,0 +1,79 @@
+// Offers frames to any number of viewers, by HTTP and WebSocket on one port. docs/live.md has the protocol.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "vdi/stream/Frame.h"
+#include "vdi/stream/Protocol.h"
+
+namespace vdi::stream {
+
+struct ServerOptions {
+  std::string host = "127.0.0.1";    // whose address the server listens at
+  std::uint16_t port = 0;            // 0: one that is free
+  bool listens = true;               // false: it serves what adopt() gets, and nothing else
+  std::string token;                 // as requireToken says
+  std::string page;                  // HTML, at /
+  std::vector<std::string> origins;  // of other sites' pages that may connect: "https://example.org"
+  double mostBytesPerSecond = 0.0;   // to each viewer; 0: no limit
+  std::uint32_t mostViewers = 64;
+  std::uint32_t mostConnections = 256;  // of any kind, viewers included
+  std::filesystem::path certificate;    // PEM, a chain; empty: no TLS
+  std::filesystem::path key;            // PEM
+  /// A viewer wants that frame of the series; answered by Server::provide or miss. Called on the network's
+  /// thread: it must return at once.
+  std::function<void(std::uint32_t index)> show;
+  /// Gets lines for the operator, without secrets, on the network's thread.
+  std::function<void(const std::string& line)> log;
+};
+
+struct ServerStatus {
+  std::string session;
+  Phase phase = Phase::Waiting;
+  std::uint32_t viewers = 0;
+  std::uint64_t frames = 0;  // published
+};
+
+/// One thread does all that has to do with the network. Functions may be called from any thread, and none of
+/// them waits for a viewer. A frame of which no viewer has need is not kept, but for the newest.
+class Server {
+ public:
+  /// Listens when it returns. Throws Error: Io for an address that can't be had, or a certificate or key that
+  /// can't be read; InvalidArgument for a token that requireToken refuses, or a certificate without a key.
+  explicit Server(ServerOptions options);
+  /// Tells viewers that it ends, and waits for them a second at most.
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  std::uint16_t port() const;
+  /// The page's address, "http://127.0.0.1:8080/", and the same with the token, which is a secret.
+  std::string address() const;
+  std::string link() const;
+
+  /// The newest frame, or more levels of it.
+  void publish(FramePtr frame);
+  /// A frame of the series that a viewer asked for.
+  void provide(FramePtr frame);
+  /// There's no such frame, and why.
+  void miss(Missing missing);
+  /// Whether a viewer still wants that frame of the series.
+  bool isWanted(std::uint32_t index) const;
+  /// The series has these entries behind those that it had.
+  void append(Series entries);
+  void setPhase(Phase phase);
+  /// Serves a connected stream socket, which it owns from now on.
+  void adopt(int descriptor);
+  ServerStatus status() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace vdi::stream

@@ -1,0 +1,231 @@
+// Connection over either transport. Included by the sources that instantiate it, and by no others.
+#pragma once
+
+#include <array>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket/stream.hpp>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+#include "vdi/stream/Connection.h"
+
+namespace vdi::stream {
+
+namespace limits {
+
+// A connection that hasn't said what it wants by then is cut off.
+inline constexpr std::chrono::seconds request{10};
+inline constexpr std::chrono::seconds reply{30};
+inline constexpr std::chrono::seconds hello{5};
+// A viewer that says nothing for that long is asked, and cut off if it doesn't answer.
+inline constexpr std::chrono::seconds silence{60};
+inline constexpr std::uint32_t headBytes = 8192;
+
+}  // namespace limits
+
+template <typename Stream>
+class StreamConnection : public Connection, public std::enable_shared_from_this<StreamConnection<Stream>> {
+ public:
+  template <typename... Arguments>
+  explicit StreamConnection(const Surroundings& surroundings, Arguments&&... arguments)
+      : surroundings_(surroundings),
+        socket_(std::forward<Arguments>(arguments)...),
+        timer_(socket_.get_executor()),
+        helloTimer_(socket_.get_executor()) {}
+  ~StreamConnection() override { surroundings_.leave(); }
+  StreamConnection(const StreamConnection&) = delete;
+  StreamConnection& operator=(const StreamConnection&) = delete;
+
+  void start() override {
+    parser_.header_limit(limits::headBytes);
+    parser_.body_limit(0);
+    transport().expires_after(limits::request);
+    if constexpr (std::is_same_v<Stream, Encrypted>) {
+      socket_.next_layer().async_handshake(boost::asio::ssl::stream_base::server,
+                                           [self = this->shared_from_this()](boost::beast::error_code error) {
+                                             if (!error) self->readRequest();
+                                           });
+    } else {
+      readRequest();
+    }
+  }
+
+  void finish() override {
+    if (viewer_ && viewer_->isWelcome()) {
+      viewer_->refuse(Close::GoingAway, "the server ends");
+    } else {
+      cut();
+    }
+  }
+
+  void cut() override {
+    timer_.cancel();
+    helloTimer_.cancel();
+    transport().close();
+  }
+
+ private:
+  using ErrorCodeOf = boost::beast::error_code;
+
+  Plain& transport() { return boost::beast::get_lowest_layer(socket_); }
+
+  void readRequest() {
+    boost::beast::http::async_read(socket_.next_layer(), buffer_, parser_,
+                                   [self = this->shared_from_this()](ErrorCodeOf error, std::size_t) {
+                                     if (!error) self->answer();
+                                   });
+  }
+
+  void answer() {
+    const HttpRequest& request = parser_.get();
+    if (!boost::beast::websocket::is_upgrade(request) || request.target() != "/stream") {
+      send(surroundings_.site.reply(request));
+      return;
+    }
+    std::string cause;
+    if (!surroundings_.site.admits(request, cause)) {
+      send(Site::refusal(request, cause));
+      return;
+    }
+    upgrade();
+  }
+
+  void send(HttpReply reply) {
+    reply_ = std::move(reply);
+    transport().expires_after(limits::reply);
+    boost::beast::http::async_write(socket_.next_layer(), reply_,
+                                    [self = this->shared_from_this()](ErrorCodeOf error, std::size_t) {
+                                      if (!error) self->hangUp();
+                                    });
+  }
+
+  /// After a reply. Closing at once could cost the peer the end of it.
+  void hangUp() {
+    if constexpr (std::is_same_v<Stream, Encrypted>) {
+      socket_.next_layer().async_shutdown([self = this->shared_from_this()](ErrorCodeOf) { self->cut(); });
+    } else {
+      ErrorCodeOf ignored;
+      transport().socket().shutdown(Plain::socket_type::shutdown_send, ignored);
+      cut();
+    }
+  }
+
+  void upgrade() {
+    namespace websocket = boost::beast::websocket;
+    transport().expires_never();  // the WebSocket has limits of its own
+    socket_.set_option(websocket::stream_base::timeout{limits::request, limits::silence, true});
+    socket_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+      response.set(boost::beast::http::field::sec_websocket_protocol, subprotocol);
+    }));
+    socket_.read_message_max(maxViewerText);
+    socket_.auto_fragment(false);
+    socket_.async_accept(parser_.get(), [self = this->shared_from_this()](ErrorCodeOf error) {
+      if (!error) self->converse();
+    });
+  }
+
+  void converse() {
+    viewer_.emplace(surroundings_.hub, [this] { pump(); });
+    helloTimer_.expires_after(limits::hello);
+    helloTimer_.async_wait([self = this->shared_from_this()](ErrorCodeOf error) {
+      if (!error && !self->viewer_->isWelcome())
+        self->viewer_->refuse(Close::Late, "no \"hello\" came in time");
+    });
+    buffer_.clear();
+    listen();
+  }
+
+  void listen() {
+    socket_.async_read(buffer_, [self = this->shared_from_this()](ErrorCodeOf error, std::size_t) {
+      if (error) {
+        self->end();
+        return;
+      }
+      const auto data = self->buffer_.cdata();
+      if (self->socket_.got_text()) {
+        self->viewer_->receive({static_cast<const char*>(data.data()), data.size()}, Clock::now());
+      } else {
+        self->viewer_->refuse(Close::BadMessage, "a viewer's messages are text");
+      }
+      self->buffer_.consume(data.size());
+      self->pump();
+      self->listen();
+    });
+  }
+
+  /// The viewer is gone. What's still under way on the socket ends with an error, and then this goes.
+  void end() {
+    hasEnded_ = true;
+    cut();
+  }
+
+  /// Sends what there is to send, one message after the other.
+  void pump() {
+    if (isWriting_ || hasEnded_) return;
+    outgoing_ = viewer_->next(Clock::now());
+    std::visit([this](auto& message) { put(message); }, outgoing_);
+  }
+
+  template <typename Buffers>
+  void write(bool isText, const Buffers& buffers) {
+    isWriting_ = true;
+    socket_.text(isText);
+    socket_.async_write(buffers, [self = this->shared_from_this()](ErrorCodeOf error, std::size_t) {
+      self->isWriting_ = false;
+      if (error) {
+        self->end();
+      } else {
+        self->pump();
+      }
+    });
+  }
+
+  void put(const std::string& text) { write(true, boost::asio::buffer(text)); }
+
+  void put(const Viewer::Binary& part) {
+    write(false, std::array{boost::asio::const_buffer(part.head.data(), part.head.size()),
+                            boost::asio::const_buffer(part.bytes.data(), part.bytes.size())});
+  }
+
+  void put(const Viewer::Wait& wait) {
+    if (!wait.until) return;
+    timer_.expires_at(*wait.until);
+    timer_.async_wait([weak = this->weak_from_this()](ErrorCodeOf error) {
+      const auto self = weak.lock();
+      if (!error && self) self->pump();
+    });
+  }
+
+  void put(const Viewer::Farewell& farewell) {
+    constexpr std::size_t longestReason = 123;  // RFC 6455, 5.5.1
+    isWriting_ = true;
+    const boost::beast::websocket::close_reason reason(
+        static_cast<boost::beast::websocket::close_code>(farewell.code),
+        farewell.cause.substr(0, longestReason));
+    socket_.async_close(reason, [self = this->shared_from_this()](ErrorCodeOf) { self->end(); });
+  }
+
+  const Surroundings surroundings_;
+  boost::beast::websocket::stream<Stream> socket_;
+  boost::asio::steady_timer timer_;
+  boost::asio::steady_timer helloTimer_;
+  boost::beast::flat_buffer buffer_;
+  boost::beast::http::request_parser<boost::beast::http::empty_body> parser_;
+  HttpReply reply_;
+  std::optional<Viewer> viewer_;
+  Viewer::Outgoing outgoing_;
+  bool isWriting_ = false;
+  bool hasEnded_ = false;
+};
+
+}  // namespace vdi::stream

@@ -1,0 +1,214 @@
+// Line over either transport. Included by the sources that instantiate it, and by no others.
+#pragma once
+
+#include <openssl/err.h>
+#include <openssl/ssl.h>
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl/error.hpp>
+#include <boost/asio/ssl/host_name_verification.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http/field.hpp>
+#include <boost/beast/websocket/error.hpp>
+#include <boost/beast/websocket/stream.hpp>
+#include <chrono>
+#include <deque>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "vdi/stream/Line.h"
+#include "vdi/stream/Protocol.h"
+
+namespace vdi::stream {
+
+template <typename Stream>
+class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<Stream>> {
+ public:
+  template <typename... Arguments>
+  StreamLine(const Url& url, LineEvents events, boost::asio::io_context& context, Arguments&... arguments)
+      : url_(url),
+        events_(std::move(events)),
+        resolver_(context),
+        patience_(context),
+        socket_(context, arguments...) {}
+
+  void start() override {
+    resolver_.async_resolve(url_.host, std::to_string(url_.port),
+                            [self = this->shared_from_this()](Error error, Resolver::results_type found) {
+                              if (error) return self->fail("can't find " + self->url_.host, error);
+                              for (const auto& entry : found) self->endpoints_.push_back(entry.endpoint());
+                              self->connect(boost::asio::error::host_not_found);
+                            });
+  }
+
+  void send(std::string text) override {
+    if (hasEnded_) return;
+    queue_.push_back(std::move(text));
+    write();
+  }
+
+  void close() override {
+    if (hasEnded_) return;
+    if (!isOpen_) {
+      end(0, "closed", false);
+      return;
+    }
+    patience_.expires_after(std::chrono::seconds(1));
+    patience_.async_wait([self = this->shared_from_this()](Error error) {
+      if (!error) self->end(0, "closed", false);
+    });
+    isClosing_ = true;
+    if (!isWriting_) closeNow();
+  }
+
+ private:
+  using Error = boost::beast::error_code;
+  using Resolver = boost::asio::ip::tcp::resolver;
+  static constexpr bool isEncrypted = std::is_same_v<Stream, Encrypted>;
+
+  Plain& transport() { return boost::beast::get_lowest_layer(socket_); }
+
+  /// To the next of the host's addresses. `last`: why it's not the one before.
+  void connect(Error last) {
+    if (hasEnded_) return;
+    if (endpoints_.empty()) return fail("can't connect to " + url_.authority(), last);
+    const boost::asio::ip::tcp::endpoint endpoint = endpoints_.front();
+    endpoints_.pop_front();
+    transport().expires_after(waiting);
+    transport().async_connect(Plain::endpoint_type(endpoint), [self = this->shared_from_this()](Error error) {
+      if (!error) return self->secure();
+      self->transport().close();
+      self->connect(error);
+    });
+  }
+
+  void secure() {
+    if constexpr (isEncrypted) {
+      Encrypted& tls = socket_.next_layer();
+      SSL_set_tlsext_host_name(tls.native_handle(), url_.host.c_str());
+      tls.set_verify_mode(boost::asio::ssl::verify_peer);
+      tls.set_verify_callback(boost::asio::ssl::host_name_verification(url_.host));
+      tls.async_handshake(
+          boost::asio::ssl::stream_base::client, [self = this->shared_from_this()](Error error) {
+            if (!error) return self->upgrade();
+            const bool isDistrust = ERR_GET_REASON(static_cast<unsigned long>(error.value())) ==
+                                        SSL_R_CERTIFICATE_VERIFY_FAILED &&
+                                    error.category() == boost::asio::error::get_ssl_category();
+            const std::string where = self->url_.authority();
+            if (isDistrust) return self->end(0, "the certificate of " + where + " isn't trusted", true);
+            self->fail("can't encrypt the connection to " + where, error);
+          });
+    } else {
+      upgrade();
+    }
+  }
+
+  void upgrade() {
+    namespace websocket = boost::beast::websocket;
+    transport().expires_never();
+    socket_.set_option(websocket::stream_base::timeout{waiting, silence, true});
+    socket_.set_option(websocket::stream_base::decorator([](websocket::request_type& request) {
+      request.set(boost::beast::http::field::sec_websocket_protocol, subprotocol);
+    }));
+    socket_.read_message_max(maxServerText);
+    socket_.auto_fragment(false);
+    socket_.async_handshake(
+        response_, url_.authority(), "/stream", [self = this->shared_from_this()](Error error) {
+          if (error == websocket::error::upgrade_declined) {
+            // An error of the server's, such as 502 of a proxy, may pass.
+            constexpr int serverErrors = 500;
+            const int status = static_cast<int>(self->response_.result_int());
+            self->end(0,
+                      self->url_.authority() + " has no VDIs to offer: HTTP status " + std::to_string(status),
+                      status < serverErrors);
+          } else if (error) {
+            self->fail("can't talk to " + self->url_.authority(), error);
+          } else if (!self->hasEnded_) {
+            self->isOpen_ = true;
+            self->events_.opened();
+            self->write();
+            self->read();
+          }
+        });
+  }
+
+  void read() {
+    socket_.async_read(buffer_, [self = this->shared_from_this()](Error error, std::size_t) {
+      if (self->hasEnded_) return;
+      if (error) return self->endOfReading(error);
+      const auto data = self->buffer_.cdata();
+      const auto* const bytes = static_cast<const std::byte*>(data.data());
+      if (self->socket_.got_text()) {
+        self->events_.text({reinterpret_cast<const char*>(bytes), data.size()});
+      } else {
+        self->events_.binary({bytes, data.size()});
+      }
+      if (self->hasEnded_) return;
+      self->buffer_.consume(data.size());
+      self->read();
+    });
+  }
+
+  void endOfReading(Error error) {
+    if (error != boost::beast::websocket::error::closed) return fail("the connection is lost", error);
+    const auto& reason = socket_.reason();
+    const std::string why(reason.reason.data(), reason.reason.size());
+    end(reason.code, why.empty() ? "the server closed the connection" : why, false);
+  }
+
+  void write() {
+    if (!isOpen_ || isWriting_ || isClosing_ || queue_.empty()) return;
+    isWriting_ = true;
+    writing_ = std::move(queue_.front());
+    queue_.pop_front();
+    socket_.text(true);
+    socket_.async_write(boost::asio::buffer(writing_),
+                        [self = this->shared_from_this()](Error error, std::size_t) {
+                          self->isWriting_ = false;
+                          if (self->hasEnded_) return;
+                          if (self->isClosing_) return self->closeNow();
+                          if (!error) self->write();  // reading says why it failed
+                        });
+  }
+
+  void closeNow() {
+    isWriting_ = true;
+    socket_.async_close(boost::beast::websocket::close_code::normal,
+                        [self = this->shared_from_this()](Error) { self->end(0, "closed", false); });
+  }
+
+  void fail(const std::string& what, Error error) { end(0, what + ": " + error.message(), false); }
+
+  void end(std::uint16_t code, const std::string& why, bool isFinal) {
+    if (std::exchange(hasEnded_, true)) return;
+    resolver_.cancel();
+    patience_.cancel();
+    transport().close();
+    events_.ended(code, why, isFinal);
+  }
+
+  static constexpr std::chrono::seconds waiting{10};
+  static constexpr std::chrono::seconds silence{60};
+
+  const Url url_;
+  LineEvents events_;
+  Resolver resolver_;
+  boost::asio::steady_timer patience_;
+  std::deque<boost::asio::ip::tcp::endpoint> endpoints_;
+  boost::beast::websocket::stream<Stream> socket_;
+  boost::beast::websocket::response_type response_;
+  boost::beast::flat_buffer buffer_;
+  std::deque<std::string> queue_;
+  std::string writing_;
+  bool isOpen_ = false;
+  bool isWriting_ = false;
+  bool isClosing_ = false;
+  bool hasEnded_ = false;
+};
+
+}  // namespace vdi::stream

@@ -1,0 +1,24 @@
+// Links to servers of VDIs.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace vdi::stream {
+
+struct Url {
+  bool isEncrypted = false;
+  std::string host;  // an IPv6 address without its brackets
+  std::uint16_t port = 0;
+  std::string token;  // empty: the link has none
+
+  /// What stands in an HTTP request's Host, and in messages.
+  std::string authority() const;
+};
+
+/// "http://HOST:PORT/#token=TOKEN", or https. Without a port: 80 or 443. Throws Error{InvalidArgument}, in
+/// whose message the link's fragment doesn't appear.
+Url parseUrl(std::string_view text);
+
+}  // namespace vdi::stream

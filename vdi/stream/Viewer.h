@@ -1,0 +1,121 @@
+// The server's side of the conversation with each viewer, without a network. All of it belongs to one thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "vdi/stream/Frame.h"
+#include "vdi/stream/Outbox.h"
+#include "vdi/stream/Protocol.h"
+#include "vdi/stream/Token.h"
+
+namespace vdi::stream {
+
+class Viewer;
+
+/// What all viewers of a server share.
+class Hub {
+ public:
+  struct Options {
+    std::string token;
+    double mostBytesPerSecond = 0.0;  // to each viewer; 0: no limit
+    std::uint32_t mostViewers = 0;
+    /// A viewer wants that frame of the series: to be answered by provide or miss.
+    std::function<void(std::uint32_t index)> show;
+  };
+  /// A random session. Throws Error{Io} as randomToken.
+  explicit Hub(Options options);
+
+  /// The newest frame, or more levels of it: for all viewers that don't look at an older one. Who waited has
+  /// waited long enough: the phase is Live then.
+  void publish(FramePtr frame, Clock::time_point now);
+  /// A frame of the series, for those that asked for it.
+  void provide(const FramePtr& frame, Clock::time_point now);
+  /// There's no such frame, and why.
+  void miss(const Missing& missing);
+  /// Whether a viewer still waits for that frame of the series, or looks at it.
+  bool isWanted(std::uint32_t index) const;
+  void append(const Series& entries);
+  void setPhase(Phase phase);
+
+  const std::string& session() const { return session_; }
+  Phase phase() const { return phase_; }
+  const FramePtr& newest() const { return newest_; }
+  const std::optional<Series>& series() const { return series_; }
+  std::uint32_t viewerCount() const { return static_cast<std::uint32_t>(viewers_.size()); }
+  std::uint64_t published() const { return published_; }
+  State state() const { return {phase_, viewerCount()}; }
+
+ private:
+  friend class Viewer;
+  void wakeAll();
+
+  Options options_;
+  TokenCheck token_;
+  std::string session_;
+  Phase phase_ = Phase::Waiting;
+  FramePtr newest_;
+  std::optional<Series> series_;
+  std::uint64_t published_ = 0;
+  std::set<Viewer*> viewers_;  // that said hello and were let in
+};
+
+class Viewer {
+ public:
+  /// `wake` is called whenever next() may have something new. The hub outlives the viewer.
+  Viewer(Hub& hub, std::function<void()> wake);
+  ~Viewer();
+  Viewer(const Viewer&) = delete;
+  Viewer& operator=(const Viewer&) = delete;
+
+  /// A text message from it.
+  void receive(std::string_view text, Clock::time_point now);
+  /// It goes once the cause has been told.
+  void refuse(Close code, std::string cause);
+  bool isWelcome() const { return isWelcome_; }
+
+  struct Binary {
+    std::array<std::byte, chunkHeadBytes> head;
+    FramePtr frame;  // keeps the bytes
+    std::span<const std::byte> bytes;
+  };
+  struct Wait {
+    std::optional<Clock::time_point> until;
+  };
+  struct Farewell {
+    Close code;
+    std::string cause;
+  };
+  /// A text message, a binary one, nothing for now, or the end.
+  using Outgoing = std::variant<std::string, Binary, Wait, Farewell>;
+  Outgoing next(Clock::time_point now);
+
+ private:
+  void enter(const Hello& hello, Clock::time_point now);
+  void show(std::uint32_t index);
+  std::optional<std::string> news();
+  std::string announcement(const Outbox::Part& part, Clock::time_point now) const;
+  friend class Hub;
+  void offer(const FramePtr& frame, Clock::time_point now);
+
+  Hub& hub_;
+  std::function<void()> wake_;
+  Outbox outbox_;
+  bool isWelcome_ = false;
+  bool wasWelcomed_ = false;
+  std::size_t seriesSent_ = 0;
+  std::optional<State> stateSent_;
+  std::optional<std::uint32_t> shown_;  // of the series
+  std::optional<Missing> missing_;
+  std::optional<Outbox::Part> announced_;
+  std::optional<Farewell> farewell_;
+  bool isCauseTold_ = false;
+};
+
+}  // namespace vdi::stream
