@@ -1,11 +1,12 @@
-// What a ray asks of a list before it looks at supersegments: where they are, and in which of 64 parts of the VDI's depth range
+// What a ray asks of a list before it looks at supersegments: where they are, and in which of 60 parts of the VDI's depth range
 // there are any. Tiles of 8 x 8 and of 64 x 64 lists have such masks too. Twin of shaders/expand.comp.
 
 /** @typedef {import("./format.js").Vdi} Vdi */
 
 export const TILE = 8;
 export const LARGE_TILE = 64;
-export const BINS = 64;
+export const BINS = 60;
+const WORD_BINS = 30;  // in a word of a mask, so that shaders get their bits without shifts
 
 /**
  * @typedef {object} Heads
@@ -35,9 +36,9 @@ function depthsOf(vdi) {
   };
 }
 
-/** @param {number} bits 0 … 32 @returns {number} a word with so many low bits set */
+/** @param {number} bits @returns {number} a word of a mask with so many low bits set, or all, or none */
 function lowBits(bits) {
-  return bits >= 32 ? -1 : bits <= 0 ? 0 : (1 << bits) - 1;
+  return (1 << Math.min(Math.max(bits, 0), WORD_BINS)) - 1;
 }
 
 /**
@@ -95,7 +96,7 @@ export function headsOf(vdi) {
     for (let s = offsets[i]; s < offsets[i + 1]; ++s) {
       const from = binOf(front(s)), to = binOf(back(s)) + 1;
       low |= lowBits(to) & ~lowBits(from);
-      high |= lowBits(to - 32) & ~lowBits(from - 32);
+      high |= lowBits(to - WORD_BINS) & ~lowBits(from - WORD_BINS);
     }
     heads[4 * i] = offsets[i];
     heads[4 * i + 1] = offsets[i + 1] - offsets[i];

@@ -254,7 +254,7 @@ export class Renderer {
     gl.uniform1f(uniform("nearest"), vdi.nearest);
     gl.uniform1f(uniform("farthest"), vdi.farthest);
     gl.uniform1f(uniform("binScale"), vdi.binScale);
-    gl.uniform2f(uniform("code"), vdi.code.first, vdi.code.step);
+    gl.uniform2f(uniform("code"), vdi.compact ? vdi.code.first : 0, vdi.compact ? vdi.code.step : 1);
     gl.uniform3fv(uniform("rayOrigin"), [...rays.origin, ...rays.originRight, ...rays.originUp]);
     gl.uniform3fv(uniform("rayDirection"), [...rays.direction, ...rays.directionRight, ...rays.directionUp]);
     gl.uniform2f(uniform("pictureSize"), scale * width, scale * height);

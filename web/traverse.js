@@ -11,40 +11,37 @@
  */
 
 const COMPACT_SEGMENTS = `
-struct Segment { vec2 depths; float density; vec3 color; };
+#define Words uvec2
 
-Segment segmentAt(int i) {
-  uvec2 words = texelFetch(segments, placeOf(i), 0).xy;
-  Segment segment;
-  segment.depths = code.x + vec2(words.x & 0x3fffu, (words.x >> 14) & 0x3fffu) * code.y;
-  uint optical = words.x >> 28 | (words.y >> 24) << 4;
-  float depth = optical == 0u ? exp2(-20.0) : (exp2(float(optical) * (16.0 / 4095.0)) - 1.0) * (1.0 / 16.0);
-  segment.density = depth / (segment.depths.y - segment.depths.x);
-  segment.color = vec3(words.y & 0xffu, (words.y >> 8) & 0xffu, (words.y >> 16) & 0xffu) * (1.0 / 255.0);
-  return segment;
+Words wordsAt(int i) { return texelFetch(segments, placeOf(i), 0).xy; }
+
+vec2 depthsOf(Words words) { return vec2(ivec2(words.x & 0x3fffu, (words.x >> 14) & 0x3fffu)); }
+
+float densityOf(Words words) {
+  int optical = int(words.x >> 28 | (words.y >> 24) << 4);
+  float depth = optical == 0 ? exp2(-20.0) : (exp2(float(optical) * (16.0 / 4095.0)) - 1.0) * (1.0 / 16.0);
+  return depth / float(int((words.x >> 14) & 0x3fffu) - int(words.x & 0x3fffu));
 }
 
-vec2 depthsOf(int i) {
-  uint word = texelFetch(segments, placeOf(i), 0).x;
-  return code.x + vec2(word & 0x3fffu, (word >> 14) & 0x3fffu) * code.y;
-}
+vec3 colorOf(Words words) { return vec3(ivec3(words.y & 0xffu, (words.y >> 8) & 0xffu, (words.y >> 16) & 0xffu)); }
+const vec3 colorUnit = vec3(1.0 / 255.0);
 `;
 
 const FULL_SEGMENTS = `
-struct Segment { vec2 depths; float density; vec3 color; };
+#define Words uvec4
 
-Segment segmentAt(int i) {
-  uvec4 words = texelFetch(segments, placeOf(i), 0);
-  vec3 color = vec3(words.w & 0x7ffu, (words.w >> 11) & 0x7ffu, words.w >> 22) / vec3(2040.0, 2040.0, 1020.0);
-  return Segment(uintBitsToFloat(words.xy), uintBitsToFloat(words.z), color);
-}
+Words wordsAt(int i) { return texelFetch(segments, placeOf(i), 0); }
 
-vec2 depthsOf(int i) { return uintBitsToFloat(texelFetch(segments, placeOf(i), 0).xy); }
+vec2 depthsOf(Words words) { return uintBitsToFloat(words.xy); }
+
+float densityOf(Words words) { return uintBitsToFloat(words.z); }
+
+vec3 colorOf(Words words) { return vec3(ivec3(words.w & 0x7ffu, (words.w >> 11) & 0x7ffu, words.w >> 22)); }
+const vec3 colorUnit = vec3(1.0 / 2040.0, 1.0 / 2040.0, 1.0 / 1020.0);
 `;
 
 const RAYS = `
 const float infinity = 3.0e38;
-const float opaque = 1.0 - 1.0 / 1024.0;
 const float opaqueAcross = 1.0 - 1.0 / 512.0;
 
 struct Ray { vec3 origin; vec3 direction; };
@@ -88,7 +85,7 @@ struct Line {
   float rows;
   float gain;
   float bend;
-  vec2 depths;  // at the start, and from there to the end; ascending, negative if the ray comes nearer to V_O's eye
+  vec2 depths;  // in codes: at the start, and from there to the end; ascending, negative if the ray comes nearer to V_O's eye
   vec2 bins;
   int first;
   int last;
@@ -113,7 +110,8 @@ Line lineOf(Ray ray, vec2 stretch) {
   line.gain = divisors * perColumn;
   line.bend = (divisors - 1.0) * perColumn;
   float change = depths.y - depths.x;
-  line.depths = change < 0.0 ? vec2(-depths.x, -change) : vec2(depths.x, change);
+  vec2 units = vec2(depths.x - code.x, change) / code.y;
+  line.depths = change < 0.0 ? -units : units;
   line.bins = vec2(depths.x - nearest, change) * binScale;
   int maximum = columnCount(line.byColumns) - 1;
   line.first = clamp(int(floor(line.start)), 0, maximum);
@@ -125,22 +123,26 @@ float columnsTo(Line line, float along) { return clamp((along - line.start) * li
 float fractionAfter(Line line, float columns) { return columns * line.gain / (1.0 + columns * line.bend); }
 float at(vec2 range, float fraction) { return range.x + fraction * range.y; }
 
-// Whether a mask has a bit between two bins, in any order.
-bool mayMeet(uvec2 mask, vec2 bins) {
+// 2^n for n from 0 to 30. CPUs that run WebGL shift all lanes by one number only.
+ivec4 powersOf2(vec4 n) { return ivec4(intBitsToFloat((ivec4(n) + 127) << 23)); }
+
+// The bits between two bins, in any order.
+uvec2 maskBetween(vec2 bins) {
   const float spare = 0.01;
-  int low = int(clamp(min(bins.x, bins.y) - spare, 0.0, 63.0));
-  int high = int(clamp(max(bins.x, bins.y) + spare, 0.0, 63.0));
-  uint lowWord = low > 31 ? 0u : mask.x & (~0u << low) & (high > 30 ? ~0u : (2u << high) - 1u);
-  uint highWord = high < 32 ? 0u : mask.y & (low < 32 ? ~0u : ~0u << (low - 32)) & (~0u >> (63 - high));
-  return (lowWord | highWord) != 0u;
+  float low = floor(clamp(min(bins.x, bins.y) - spare, 0.0, 59.0));
+  float high = floor(clamp(max(bins.x, bins.y) + spare, 0.0, 59.0)) + 1.0;
+  ivec4 powers = powersOf2(vec4(min(vec2(low, high), 30.0), max(vec2(low, high) - 30.0, 0.0)));
+  return uvec2(powers.yw - powers.xz);
 }
+
+bool sharesBit(uvec2 mask, uvec2 other) { return (mask.x & other.x | mask.y & other.y) != 0u; }
 `;
 
 const INTERSECT = `
 bool ascends;    // the ray meets a list's supersegments in their order; else backwards
 float raySlant;  // how long the ray is for a change of depth; where that says nothing, its whole length
 
-bool changesDepth(Line line) { return line.depths.y > 0.01 * farthest; }
+bool changesDepth(Line line) { return line.depths.y * code.y > 0.01 * farthest; }
 
 float shorteningAt(vec2 place) {
   if (parallel) return 1.0;
@@ -153,38 +155,47 @@ struct Part { float low; float high; float slant; };
 Part partOf(Line line, vec2 fractions, float shortening) {
   Part part = Part(at(line.depths, fractions.x), at(line.depths, fractions.y), raySlant * shortening);
   if (!changesDepth(line)) {
-    part.high = max(part.high, part.low + 1e-6 * farthest);
+    part.high = max(part.high, part.low + 1e-6 * farthest / code.y);
     part.slant *= (fractions.y - fractions.x) / (part.high - part.low);
   }
   return part;
 }
 
-vec2 met(vec2 depths) { return ascends ? depths : -depths.yx; }
+vec2 metDepths(Words words) {
+  vec2 depths = depthsOf(words);
+  return ascends ? depths : -depths.yx;
+}
 
 // What a part of the ray meets of a list of at least one supersegment, premultiplied. 'hint': where the last intersection with
-// a neighbouring list ended, counted as the ray meets them.
+// a neighbouring list ended, counted as the ray meets them. Each supersegment is read once.
 vec4 intersectList(uvec4 head, Part part, inout int hint) {
   int last = int(head.y) - 1;
   int step = ascends ? 1 : -1;
   int begin = int(head.x) + (ascends ? 0 : last);
   int place = min(hint, last);
-  while (place > 0 && met(depthsOf(begin + place * step)).x > part.low) --place;
-  while (place < last && met(depthsOf(begin + place * step)).y <= part.low) ++place;
+  Words words = wordsAt(begin + place * step);
+  vec2 depths = metDepths(words);
+  while (place > 0 && depths.x > part.low) {
+    --place;
+    words = wordsAt(begin + place * step);
+    depths = metDepths(words);
+  }
   vec3 light = vec3(0.0);
   float transmittance = 1.0;
-  for (;; ++place) {
-    Segment segment = segmentAt(begin + place * step);
-    vec2 depths = met(segment.depths);
+  for (;;) {
     float length = min(depths.y, part.high) - max(depths.x, part.low);
     if (length > 0.0) {
-      float behind = transmittance * exp2(-length * part.slant * segment.density);
-      light += (transmittance - behind) * segment.color;
+      float behind = transmittance * exp2(-length * part.slant * densityOf(words));
+      light += (transmittance - behind) * colorOf(words);
       transmittance = behind;
     }
-    if (depths.y >= part.high || place >= last || transmittance < 1.0 - opaque) break;
+    if (depths.y >= part.high || place >= last) break;
+    ++place;
+    words = wordsAt(begin + place * step);
+    depths = metDepths(words);
   }
   hint = place;
-  return vec4(light, 1.0 - transmittance);
+  return vec4(light * colorUnit, 1.0 - transmittance);
 }
 `;
 
@@ -201,13 +212,14 @@ vec4 alongLists(Ray ray, Line line, vec2 stretch) {
   vec2 place = 0.5 * (pictureAt(ray, stretch.x) + pictureAt(ray, stretch.y)) - 0.5;
   vec2 first = floor(place);
   vec2 share = vec2(shareOfNext(place.x - first.x), shareOfNext(place.y - first.y));
+  uvec2 mask = maskBetween(vec2(line.bins.x, at(line.bins, 1.0)));
   vec4 sum = vec4(0.0);
   for (int i = 0; i < 4; ++i) {
     ivec2 side = ivec2(i & 1, i >> 1);
     float weight = (side.x == 0 ? 1.0 - share.x : share.x) * (side.y == 0 ? 1.0 - share.y : share.y);
     ivec2 pixel = clamp(ivec2(first) + side, ivec2(0), lists - 1);
     uvec4 head = headAt(pixel);
-    if (!(weight > 0.0) || !mayMeet(head.zw, vec2(line.bins.x, at(line.bins, 1.0)))) continue;
+    if (!(weight > 0.0) || !sharesBit(head.zw, mask)) continue;
     int hint = 0;
     sum += weight * intersectList(head, partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5)), hint);
   }
@@ -219,7 +231,7 @@ ivec2 listOf(bool byColumns, int column, int row) { return byColumns ? ivec2(col
 // Of a column that the ray crosses between two numbers of columns from its start.
 vec4 intersectColumn(Line line, int column, vec2 edges, vec2 fractions, inout ivec2 hints) {
   int maxRow = columnCount(!line.byColumns) - 1;
-  vec2 bins = vec2(at(line.bins, fractions.x), at(line.bins, fractions.y));
+  uvec2 mask = maskBetween(vec2(at(line.bins, fractions.x), at(line.bins, fractions.y)));
   fractions = vec2(min(fractions.x, fractions.y), max(fractions.x, fractions.y));
 #if SMOOTH
   float centre = line.row + 0.5 * (edges.x + edges.y) * line.rows - 0.5;
@@ -236,8 +248,8 @@ vec4 intersectColumn(Line line, int column, vec2 edges, vec2 fractions, inout iv
   ivec2 other = listOf(line.byColumns, column, rows.y);
   uvec4 head = headAt(list);
   uvec4 otherHead = headAt(other);
-  bool meets = share < 1.0 && mayMeet(head.zw, bins);
-  bool meetsOther = share > 0.0 && mayMeet(otherHead.zw, bins);
+  bool meets = share < 1.0 && sharesBit(head.zw, mask);
+  bool meetsOther = share > 0.0 && sharesBit(otherHead.zw, mask);
   if (!meets && !meetsOther) return vec4(0.0);
   float shortening = shorteningAt(vec2(list) + 0.5);
 #if SMOOTH
@@ -278,7 +290,7 @@ bool meetsTiles(Line line, int tile, int shift) {
     ivec2 place = listOf(line.byColumns, tile, row);
     mask |= texelFetch(tiles, placeOf(base + place.y * across + place.x), 0).xy;
   }
-  return mayMeet(mask, bins);
+  return sharesBit(mask, maskBetween(bins));
 }
 
 void intersectTile(Line line, int tile, inout ivec2 hints, inout vec4 light) {
@@ -339,7 +351,7 @@ void main() {
   if (!(stretch.x < stretch.y)) return;
   Line line = lineOf(ray, stretch);
   ascends = line.bins.y >= 0.0;
-  raySlant = (stretch.y - stretch.x) * length(ray.direction) / (changesDepth(line) ? line.depths.y : 1.0);
+  raySlant = (stretch.y - stretch.x) * length(ray.direction) / (code.y * (changesDepth(line) ? line.depths.y : 1.0));
 #if SMOOTH
   if (line.columns < 1.0) {
     picture = alongLists(ray, line, stretch);
@@ -366,7 +378,7 @@ uniform float pixelSize;
 uniform float nearest;
 uniform float farthest;
 uniform float binScale;
-uniform vec2 code;             // depth of code c: code.x + c * code.y
+uniform vec2 code;             // depth of code c: code.x + c * code.y; 0 and 1 where supersegments have depths
 uniform vec3 rayOrigin[3];     // at the picture's middle, and for each pixel to the right and up
 uniform vec3 rayDirection[3];
 uniform vec2 pictureSize;      // in the pixels that rays count
