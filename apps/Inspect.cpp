@@ -30,9 +30,13 @@ void comparePictures(const CompareOptions& options) {
                                                         a.width, a.height, b.width, b.height));
   }
   const ImageDifference d = compare(a.rgb, b.rgb, a.width, a.height, 3);
+  const double ofObject = objectSsim(a.rgb, b.rgb, a.width, a.height, 3);
+  const PictureBox box = objectBox(a.rgb, b.rgb, a.width, a.height, 3);
   if (options.json) {
     const nlohmann::json out{
         {"ssim", d.ssim},
+        {"object_ssim", ofObject},
+        {"object_box", {box.x, box.y, box.width, box.height}},
         {"psnr_db", std::isfinite(d.psnrDb) ? nlohmann::json(d.psnrDb) : nlohmann::json(nullptr)},
         {"mean_error", d.meanError},
         {"max_error", d.maxError},
@@ -41,9 +45,11 @@ void comparePictures(const CompareOptions& options) {
     return;
   }
   fmt::print(
-      "SSIM         {:.5f}\nPSNR         {:.2f} dB\nmean error   {:.4f} / 255\nlargest error {} / 255\n"
+      "SSIM         {:.5f}\nSSIM, object {:.5f} in {} x {} pixels from ({}, {})\nPSNR         {:.2f} "
+      "dB\nmean error   {:.4f} / 255\nlargest error {} / 255\n"
       "pixels off by more than 16 / 255: {:.3f} %\n",
-      d.ssim, d.psnrDb, d.meanError, d.maxError, 100.0 * d.wrongShare);
+      d.ssim, ofObject, box.width, box.height, box.x, box.y, d.psnrDb, d.meanError, d.maxError,
+      100.0 * d.wrongShare);
 }
 
 std::string shownOf(const ScalarArray& array) {
@@ -106,7 +112,12 @@ void printInfo(const InfoOptions& options) {
 void addCompare(CLI::App& app, Job& job) {
   CLI::App* command =
       app.add_subcommand("compare", "Tell how alike two PNGs are: SSIM, PSNR, mean and largest error");
-  command->footer("JSON has null for the infinite PSNR of equal pictures.");
+  command->footer(
+      "The object's SSIM is that of the part of the picture where either PNG shows something on its "
+      "background,\n"
+      "which is the colour that is most frequent along the edge. JSON has null for the infinite PSNR of "
+      "equal\n"
+      "pictures.");
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("a", options->a, "PNG")->type_name("")->required();
   command->add_option("b", options->b, "PNG")->type_name("")->required();

@@ -104,6 +104,42 @@ TEST_CASE("A pixel is wrong from 17 / 255 on, however many of its channels are")
   CHECK(compare(a, b, 4, 4, 3).wrongShare == 2.0 / 16.0);
 }
 
+TEST_CASE("An empty background doesn't hide what differs in the object") {
+  constexpr int width = 60;
+  constexpr int height = 40;
+  // Expected: scikit-image's on the part of the pictures that has the object and 5 pixels around it.
+  struct Place {
+    int x;
+    int y;
+    double ssim;
+  };
+  const Place place = GENERATE(Place{25, 12, 0.3726988097238462}, Place{0, 0, 0.3126492543730688});
+  const std::uint8_t background = 9;
+  const auto objectOr = [&](int more) {
+    return fill(width, height, 3, [=](int x, int y, int c) {
+      const int u = x - place.x;
+      const int v = y - place.y;
+      const bool inside = u >= 0 && u < 20 && v >= 0 && v < 16;
+      return inside ? (wavy(25 + u, 12 + v, c) + more) % 256 : background;
+    });
+  };
+  const Pixels a = objectOr(0);
+  const Pixels b = objectOr(40);
+  const PictureBox box = objectBox(a, b, width, height, 3);
+  CHECK(box.x == place.x);
+  CHECK(box.y == place.y);
+  CHECK(box.width == 20);
+  CHECK(box.height == 16);
+  CHECK(objectSsim(a, b, width, height, 3) == Approx(place.ssim).margin(tolerance).epsilon(0.0));
+  CHECK(objectSsim(a, a, width, height, 3) == Approx(1.0).margin(tolerance));
+  CHECK(compare(a, b, width, height, 3).ssim > 0.7);
+  // On backgrounds of their own.
+  const Pixels empty(a.size(), 200);
+  CHECK(objectBox(a, empty, width, height, 3).width == 20);
+  CHECK(objectBox(empty, Pixels(a.size(), 10), width, height, 3).width == 0);
+  CHECK(objectSsim(empty, empty, width, height, 3) == 1.0);
+}
+
 TEST_CASE("Pictures of different sizes are refused") {
   const Pixels a(12 * 12, 1);
   const Pixels b(12 * 11, 1);
@@ -111,6 +147,8 @@ TEST_CASE("Pictures of different sizes are refused") {
   CHECK_THROWS_AS(compare(a, a, 12, 11, 1), Error);
   CHECK_THROWS_AS(compare(Pixels{}, Pixels{}, 0, 0, 3), Error);
   CHECK_THROWS_AS(compare(a, a, -12, -12, 1), Error);
+  CHECK_THROWS_AS(objectBox(a, b, 12, 12, 1), Error);
+  CHECK_THROWS_AS(objectSsim(a, a, 12, 11, 1), Error);
 }
 
 }  // namespace vdi

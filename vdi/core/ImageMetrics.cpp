@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <vector>
 
@@ -126,15 +127,127 @@ double windowedSsim(const Channel& channel, int width, int height) {
   return sum / (static_cast<double>(width - 2 * radius) * (height - 2 * radius));
 }
 
-}  // namespace
+double meanSsim(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int height,
+                int channels) {
+  const bool small = width <= 2 * radius || height <= 2 * radius;
+  double sum = 0.0;
+  for (int c = 0; c < channels; ++c) {
+    const Channel channel(a, b, width, channels, c);
+    sum += small ? smallSsim(channel, width, height) : windowedSsim(channel, width, height);
+  }
+  return sum / channels;
+}
 
-ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width,
-                        int height, int channels) {
+/// Bytes of a picture of that size. Throws for pictures that aren't of it.
+std::size_t requireOneSize(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width,
+                           int height, int channels) {
   const auto expected =
       static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * static_cast<std::size_t>(channels);
   if (width < 1 || height < 1 || channels < 1 || a.size() != expected || b.size() != expected) {
     throw Error(ErrorCode::InvalidArgument, "the pictures aren't of one size");
   }
+  return expected;
+}
+
+/// The pixels of one picture.
+class Pixels {
+ public:
+  Pixels(std::span<const std::uint8_t> bytes, int width, int height, int channels)
+      : bytes_(bytes), width_(width), height_(height), channels_(static_cast<std::size_t>(channels)) {}
+  std::span<const std::uint8_t> at(int x, int y) const {
+    const auto pixel =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+    return bytes_.subspan(pixel * channels_, channels_);
+  }
+  /// The most frequent one along the edge.
+  std::vector<std::uint8_t> background() const {
+    std::map<std::vector<std::uint8_t>, int> counts;
+    const auto count = [&](int x, int y) {
+      const auto pixel = at(x, y);
+      ++counts[{pixel.begin(), pixel.end()}];
+    };
+    for (int x = 0; x < width_; ++x) {
+      count(x, 0);
+      count(x, height_ - 1);
+    }
+    for (int y = 0; y < height_; ++y) {
+      count(0, y);
+      count(width_ - 1, y);
+    }
+    return std::max_element(counts.begin(), counts.end(),
+                            [](const auto& one, const auto& other) { return one.second < other.second; })
+        ->first;
+  }
+  bool differs(int x, int y, std::span<const std::uint8_t> from) const {
+    constexpr int most = 2;
+    const auto pixel = at(x, y);
+    for (std::size_t c = 0; c < channels_; ++c) {
+      if (std::abs(static_cast<int>(pixel[c]) - static_cast<int>(from[c])) > most) return true;
+    }
+    return false;
+  }
+
+ private:
+  std::span<const std::uint8_t> bytes_;
+  int width_;
+  int height_;
+  std::size_t channels_;
+};
+
+std::vector<std::uint8_t> partOf(const Pixels& pixels, const PictureBox& box) {
+  std::vector<std::uint8_t> part;
+  for (int y = box.y; y < box.y + box.height; ++y) {
+    for (int x = box.x; x < box.x + box.width; ++x) {
+      const auto pixel = pixels.at(x, y);
+      part.insert(part.end(), pixel.begin(), pixel.end());
+    }
+  }
+  return part;
+}
+
+}  // namespace
+
+PictureBox objectBox(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int height,
+                     int channels) {
+  requireOneSize(a, b, width, height, channels);
+  const std::array<Pixels, 2> pictures{Pixels(a, width, height, channels),
+                                       Pixels(b, width, height, channels)};
+  int left = width;
+  int right = -1;
+  int bottom = height;
+  int top = -1;
+  for (const Pixels& picture : pictures) {
+    const std::vector<std::uint8_t> background = picture.background();
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        if (!picture.differs(x, y, background)) continue;
+        left = std::min(left, x);
+        right = std::max(right, x);
+        bottom = std::min(bottom, y);
+        top = std::max(top, y);
+      }
+    }
+  }
+  if (right < left) return {};
+  return {left, bottom, right - left + 1, top - bottom + 1};
+}
+
+double objectSsim(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int height,
+                  int channels) {
+  const PictureBox object = objectBox(a, b, width, height, channels);
+  if (object.width == 0) return 1.0;
+  PictureBox box;  // with what windows see around their middles
+  box.x = std::max(object.x - radius, 0);
+  box.y = std::max(object.y - radius, 0);
+  box.width = std::min(object.x + object.width + radius, width) - box.x;
+  box.height = std::min(object.y + object.height + radius, height) - box.y;
+  return meanSsim(partOf(Pixels(a, width, height, channels), box),
+                  partOf(Pixels(b, width, height, channels), box), box.width, box.height, channels);
+}
+
+ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width,
+                        int height, int channels) {
+  const std::size_t expected = requireOneSize(a, b, width, height, channels);
   ImageDifference difference;
   double squares = 0.0;
   double absolute = 0.0;
@@ -155,12 +268,7 @@ ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::ui
       mean > 0.0 ? 10.0 * std::log10(255.0 * 255.0 / mean) : std::numeric_limits<double>::infinity();
   difference.meanError = absolute / static_cast<double>(expected);
   difference.wrongShare = static_cast<double>(wrong) / (static_cast<double>(width) * height);
-  const bool small = width <= 2 * radius || height <= 2 * radius;
-  for (int c = 0; c < channels; ++c) {
-    const Channel channel(a, b, width, channels, c);
-    difference.ssim +=
-        (small ? smallSsim(channel, width, height) : windowedSsim(channel, width, height)) / channels;
-  }
+  difference.ssim = meanSsim(a, b, width, height, channels);
   return difference;
 }
 
