@@ -63,6 +63,21 @@ for source in (image, read):
     rendered = with_camera(simple.RenderVDI(Input=source))
     worst = np.abs(picture(rendered).astype(int) - flat).max()
     check(worst <= 2, "RenderVDI from V_O gives the flat picture, off by %d" % worst)
+
+# As a page for browsers: the same VDI is inside.
+page = os.path.join(OUTPUT, "wavelet.html")
+simple.SaveData(page, proxy=image)
+read = simple.OpenDataFile(vdi_in_page(page, os.path.join(OUTPUT, "wavelet_page.vdi")))
+check(np.array_equal(picture(read), flat), "a page has the VDI")
+extractor = simple.CreateExtractor("VDIPage", image, registrationName="page")
+extractor.Writer.FileName = "extracted_{timestep:03d}.html"
+simple.SaveExtracts(ExtractsOutputDirectory=OUTPUT)
+read = simple.OpenDataFile(vdi_in_page(os.path.join(OUTPUT, "extracted_000.html"), os.path.join(OUTPUT, "extracted.vdi")))
+check(np.array_equal(picture(read), flat), "and so has an extracted page")
+simple.Delete(extractor)
+nowhere = os.path.join(OUTPUT, "no", "folder", "x.html")
+check(errors_of(lambda: simple.SaveData(nowhere, proxy=image)), "a page that can't be written is an error")
+
 rendered.Resolution = [64, 64]
 check(picture(rendered).shape == (64, 64, 3), "RenderVDI renders at any resolution")
 volume = picture(vdi_of(wavelet, PictureOnly=1)).astype(int)

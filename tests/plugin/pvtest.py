@@ -3,8 +3,11 @@
 Run by ctest through xvfb-run; VDI_PLUGIN names the plugin, VDI_TEST_OUTPUT a folder for pictures. With several ranks only
 rank 0 runs the test script; sources run on all ranks, inside Programmable Source."""
 
+import base64
 import os
+import re
 import sys
+import zlib
 
 import numpy as np
 from paraview import simple
@@ -53,6 +56,18 @@ for index in mine:
 for number, image in enumerate(blocks):
     output.SetBlock(number, image)
 """
+
+
+def vdi_in_page(page, path):
+    """The .vdi file that is inside a page (docs/adr/the-page-is-one-file.md), written to `path`."""
+    with open(page, encoding="utf-8") as file:
+        found = re.findall(r'<script class="vdi-frame"[^>]* data-size="(\d+)">([^<]*)</script>', file.read())
+    check(len(found) == 1, "a page has one VDI, not %d" % len(found))
+    data = zlib.decompress(base64.b64decode(found[0][1]), wbits=-15)
+    check(len(data) == int(found[0][0]), "it takes as many bytes as the page says")
+    with open(path, "wb") as file:
+        file.write(data)
+    return path
 
 
 def blocks_source(layout, count=4, cells=8, kind="float32", as_cells=False):

@@ -5,11 +5,38 @@
 #include <vtkInformation.h>
 #include <vtkObjectFactory.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
 
 #include "VDIImageData.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/VdiFile.h"
+#include "vdi/page/Page.h"
+
+namespace {
+
+bool isPage(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  return extension == ".html";
+}
+
+void write(const std::filesystem::path& path, const vdi::Vdi& vdi) {
+  if (!isPage(path)) {
+    vdi::io::writeVdi(path, vdi);
+    return;
+  }
+  const std::string name = path.stem().string();
+  const std::vector<vdi::page::Frame> frames{{name, [&vdi] { return vdi::io::encode(vdi); }}};
+  vdi::page::writePage(path, name, frames);
+}
+
+}  // namespace
 
 vtkStandardNewMacro(vtkVDIWriter);
 
@@ -43,7 +70,7 @@ void vtkVDIWriter::WriteData() {
                        "no file name was given, or its pattern has a {field} of no value");
     }
     if (this->TimeStep >= 0) vdi.timeStep = static_cast<std::uint64_t>(this->TimeStep);
-    vdi::io::writeVdi(this->FileName, vdi);
+    write(this->FileName, vdi);
   } catch (const std::exception& error) {
     this->SetErrorCode(vtkErrorCode::CannotOpenFileError);
     vtkErrorMacro(<< error.what());

@@ -1,6 +1,8 @@
 /**
  * @class vtkVDIWriter
- * @brief writes the VDI of its input as a .vdi file
+ * @brief writes the VDI of its input as a .vdi file, or as a page for browsers
+ *
+ * A file name that ends in .html gets a page with the VDI inside (vdi/page/Page.h).
  *
  * Input: the output of vtkVDIGenerator or vtkVDIReader. The rank that has the VDI writes, under a temporary
  * name that is renamed when the file is whole; other ranks do nothing.
