@@ -18,12 +18,14 @@
 #include <vtkSmartPointer.h>
 #include <vtkSmartPyObject.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cassert>
 #include <cstdio>
 #include <exception>
 #include <regex>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "ScriptGuard.h"
@@ -92,12 +94,13 @@ class Pipeline : public vtkInSituPipeline {
   vtkTypeMacro(Pipeline, vtkInSituPipeline);
 
   void setScript(const std::string& script) { script_ = script; }
+  /// Whether its script runs; one that couldn't be loaded starts anew at the next step.
+  bool loaded() const { return python_ != nullptr; }
   /// Of the last step.
   bool failed() const { return failed_; }
 
   bool Execute(int step, double time) override {
     if (!python_) {
-      // A script that couldn't be loaded starts anew at the next step.
       vtkNew<vtkInSituPipelinePython> python;
       python->SetFileName(script_.c_str());
       if (python->Initialize()) python_ = python;
@@ -162,6 +165,14 @@ class Guard {
     const vtkPythonScopeGilEnsurer lock;
     return textOr("the plugin can't be loaded",
                   vtkSmartPyObject(PyObject_CallMethod(module_, "load_plugin", nullptr)));
+  }
+
+  /// Whether one of the scripts, all of them loaded, does anything at that step, or may.
+  bool wants(int step, double time) {
+    const vtkPythonScopeGilEnsurer lock;
+    const vtkSmartPyObject result(PyObject_CallMethod(module_, "wants", "id", step, time));
+    if (!result) PyErr_Clear();
+    return !result || PyObject_IsTrue(result) != 0;
   }
 
   /// After all scripts of a step.
@@ -272,6 +283,9 @@ void Engine::State::add(const std::vector<std::string>& scripts) {
 std::optional<std::string> Engine::State::result(bool good) {
   std::string error = log.takeFirstError();
   if (good && error.empty()) return std::nullopt;
+  constexpr std::string_view noMemory = "std::bad_alloc";
+  if (const auto at = error.find(noMemory); at != std::string::npos)
+    error.replace(at, noMemory.size(), "out of memory on this host");
   if (error.find(Agreement::otherFailed) != std::string::npos) return "";
   return error;
 }
@@ -308,6 +322,13 @@ void Engine::add(const std::vector<std::string>& scripts) {
 }
 
 Engine::~Engine() = default;
+
+bool Engine::wants(int step, double time) const {
+  const auto& pipelines = state_->pipelines;
+  const bool allLoaded =
+      std::ranges::all_of(pipelines, [](const auto& pipeline) { return pipeline->loaded(); });
+  return !allLoaded || (!pipelines.empty() && state_->guard->wants(step, time));
+}
 
 std::optional<std::string> Engine::finish() {
   state_->log.takeFirstError();

@@ -36,6 +36,9 @@ class Engine {
   /// To be run at each step, in that order.
   void add(const std::vector<std::string>& scripts);
 
+  /// Whether a script does anything at this step, or may. Not collective.
+  bool wants(int step, double time) const;
+
   /// Runs every script on `grid`, also those that failed before. nullopt if all went well on this rank, else
   /// what went wrong here; "" where a script was stopped because of another rank. `step` >= 0.
   std::optional<std::string> execute(vtkDataObject* grid, int step, double time);

@@ -14,14 +14,15 @@ typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*set_blocks)(vdi_catalyst*, int32_t, const vdi_catalyst_block*);
   int (*set_array)(vdi_catalyst*, const char*, int32_t, int32_t, const void* const*);
+  int (*wants)(vdi_catalyst*, int64_t, double);
   int (*execute)(vdi_catalyst*, int64_t, double);
   int (*finalize)(vdi_catalyst*);
   const char* (*error)(const vdi_catalyst*);
 } vdi_catalyst_functions;
 
 /* The engine's only symbol. The version is in its name: a library of another version hasn't this symbol. */
-#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_1
-#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_1"
+#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_2
+#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_2"
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 
 #ifdef __cplusplus

@@ -93,7 +93,9 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
 
 /* Without an engine there are no handles either. */
 static int usable(const vdi_catalyst* catalyst) {
-  return engine != NULL && catalyst != NULL;
+  int over = 0;
+  MPI_Finalized(&over);
+  return engine != NULL && catalyst != NULL && !over;
 }
 
 /* This and the next function run nothing but our own code, which changes no more than that. */
@@ -116,6 +118,15 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
   return code;
 }
 
+int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
+  if (!usable(catalyst)) return 0;
+  vdi_process_state state;
+  vdi_process_state_save(&state);
+  const int wants = engine->wants(catalyst, step, time);
+  vdi_process_state_restore(&state);
+  return wants;
+}
+
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   vdi_process_state state;
@@ -126,6 +137,10 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
 }
 
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
+  int over = 0;
+  MPI_Finalized(&over);
+  if (over && engine != NULL && catalyst != NULL)
+    fprintf(stderr, "vdi_catalyst: vdi_catalyst_finalize comes after MPI_Finalize, so nothing is ended\n");
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   vdi_process_state state;
   vdi_process_state_save(&state);

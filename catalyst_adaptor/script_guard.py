@@ -17,6 +17,7 @@ import traceback
 
 
 disabled = []  # extractors, for this step
+modules = []  # of the scripts that are loaded
 
 
 def end_step():
@@ -139,6 +140,7 @@ def install(leave, plugin):
     skip = (__name__, "<string>", v2_internals.__file__, "<frozen importlib", importlib.__file__)
     other_hook = sys.excepthook
     folders = {}  # of extracts, by module
+    owners = {}  # modules' names, by extractors
     loading = {}
 
     def hook(kind, error, trace):
@@ -176,20 +178,39 @@ def install(leave, plugin):
         from paraview.catalyst import importers
         importers._path_finder_instance._registered_files.pop(name, None)
         sys.modules.pop(name, None)
+        modules[:] = [module for module in modules if module.__name__ != name]
         forget_new_proxies(loading.get("proxies"))
 
     def note_folder(result, module):
+        modules.append(module)
+        for group, _, proxy in registered_proxies() - loading.get("proxies", set()):
+            if group == "extractors":
+                owners[proxy] = module.__name__
         folders[module.__name__] = os.environ.get("PARAVIEW_OVERRIDE_EXTRACTS_OUTPUT_DIRECTORY",
                                                   module.options.ExtractsOutputDirectory)
 
     def prepare_extracts(result, module):
-        due = due_extractors()
+        due = leave_out_same_files(due_extractors())
         if due:
             make_folder(folders.get(module.__name__, ""))
         drawn = [extractor for extractor in due if draws(extractor)]
         if leave(not all([has_display(extractor) for extractor in drawn])):
             set_enabled(drawn, False)
             disabled.extend(drawn)
+
+    def leave_out_same_files(due):
+        """All but those that would replace what another one writes in this step: these are told and left out."""
+        writers = {}
+        for extractor in due:
+            folder = folders.get(owners.get(extractor.SMProxy, ""), "")
+            writers.setdefault((folder, extractor.Writer.FileName), []).append(extractor)
+        for (_, name), same in writers.items():
+            if len(same) > 1:
+                vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, "%d extractors write the same file '%s'; the first one "
+                              "does, the others need names of their own" % (len(same), name))
+                set_enabled(same[1:], False)
+                disabled.extend(same[1:])
+        return [extractor for same in writers.values() for extractor in same[:1]]
 
     def has_display(extractor):
         try:
@@ -203,7 +224,8 @@ def install(leave, plugin):
     v2_internals.import_and_validate = guarded(v2_internals.import_and_validate, failed=forget_module)
     v2_internals.do_catalyst_initialize = guarded(v2_internals.do_catalyst_initialize, after=note_folder,
                                                   failed=lambda module: forget_module(module.__name__))
-    v2_internals.do_catalyst_execute = guarded(v2_internals.do_catalyst_execute, after=prepare_extracts)
+    v2_internals.do_catalyst_execute = guarded(v2_internals.do_catalyst_execute, before=lambda module: set_time_step(),
+                                               after=prepare_extracts)
     v2_internals.do_catalyst_finalize = guarded(v2_internals.do_catalyst_finalize)
 
 
@@ -234,13 +256,27 @@ def forget_new_proxies(before):
         manager.UnRegisterProxy(group, name, proxy)
 
 
-def due_extractors():
-    """Those that the engine will call in this step."""
+def set_time_step():
+    """For what a script saves by itself; extractors do it for theirs."""
+    from paraview import servermanager
+    from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
+    for source in servermanager.ProxyManager().GetProxiesInGroup("sources").values():
+        if source.GetXMLName() == "VolumetricDepthImage":
+            source.TimeStep = helper.GetTimeStep()
+
+
+def wants(step, time):
+    """Whether the scripts, all of them loaded, do anything at this step, or may."""
+    return any(hasattr(module, "catalyst_execute") for module in modules) or bool(due_extractors(step, time))
+
+
+def due_extractors(step=None, time=None):
+    """Those that the engine will call in this step, or in another one."""
     from paraview import servermanager
     from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
     controller = servermanager.vtkSMExtractsController()
-    controller.SetTimeStep(helper.GetTimeStep())
-    controller.SetTime(helper.GetTime())
+    controller.SetTimeStep(helper.GetTimeStep() if step is None else step)
+    controller.SetTime(helper.GetTime() if time is None else time)
 
     def due(extractor):
         trigger = extractor.Trigger

@@ -109,6 +109,8 @@ int guarded(vdi_catalyst& self, int code, Work work, std::optional<std::int64_t>
     } else {
       failure = work();
     }
+  } catch (const std::bad_alloc&) {
+    failure = "out of memory on this host";
   } catch (const std::exception& error) {
     failure = error.what();
   } catch (...) {
@@ -194,15 +196,20 @@ void markModified(vtkPartitionedDataSet& grid) {
   grid.Modified();
 }
 
+bool isStep(std::int64_t step) {
+  return step >= 0 && step <= std::numeric_limits<int>::max();
+}
+
 /// ParaView counts steps in an int, and files are named by it: another one would be lost, or replace another
 /// step's.
 void requireStep(const vdi_catalyst& self, std::int64_t step) {
   require(self.haveBlocks, "no blocks were given yet");
-  constexpr std::int64_t maximum = std::numeric_limits<int>::max();
-  if (step >= 0 && step <= maximum) return;
+  if (isStep(step)) return;
+  const std::int64_t maximum = std::numeric_limits<int>::max();
   throw std::invalid_argument(
       "step " + std::to_string(step) + " isn't handed over: ParaView counts steps from 0 to " +
-      std::to_string(maximum) + "; hand over a smaller number, such as a count of these calls");
+      std::to_string(maximum) +
+      "; hand over a smaller number that goes on after a restart, or files of before are replaced");
 }
 
 int vtkTypeOf(int type) {
@@ -366,6 +373,14 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
     attributes->AddArray(arrays[i]);
   }
   return code;
+}
+
+int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
+  if (!usable(catalyst)) return 0;
+  const vdi::catalyst::PythonLock lock;
+  int wants = isStep(step) && catalyst->engine->wants(static_cast<int>(step), time) ? 1 : 0;
+  MPI_Allreduce(MPI_IN_PLACE, &wants, 1, MPI_INT, MPI_MAX, catalyst->comm);
+  return wants;
 }
 
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {

@@ -1,9 +1,10 @@
 ! vdi_catalyst.h for Fortran: compile this file with the simulation and `use vdi_catalyst`. The header has the
 ! documentation; the handle is a type(c_ptr), strings end with c_null_char, arrays of pointers are arrays of c_loc(...).
 module vdi_catalyst
-  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int32_t, c_int64_t, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int32_t, c_int64_t, c_ptr, c_size_t
   implicit none
-  private :: c_char, c_double, c_int, c_int32_t, c_int64_t, c_ptr
+  private :: c_char, c_double, c_f_pointer, c_int, c_int32_t, c_int64_t, c_ptr, c_size_t
+  private :: error_in_c, length_in_c
 
   enum, bind(c)
     enumerator :: vdi_catalyst_ok = 0
@@ -59,6 +60,14 @@ module vdi_catalyst
       integer(c_int) :: code
     end function
 
+    function vdi_catalyst_wants(catalyst, step, time) bind(c) result(wants)
+      import :: c_double, c_int, c_int64_t, c_ptr
+      type(c_ptr), value :: catalyst
+      integer(c_int64_t), value :: step
+      real(c_double), value :: time
+      integer(c_int) :: wants
+    end function
+
     function vdi_catalyst_execute(catalyst, step, time) bind(c) result(code)
       import :: c_double, c_int, c_int64_t, c_ptr
       type(c_ptr), value :: catalyst
@@ -72,5 +81,34 @@ module vdi_catalyst
       type(c_ptr), value :: catalyst
       integer(c_int) :: code
     end function
+
+    function error_in_c(catalyst) bind(c, name="vdi_catalyst_error") result(text)
+      import :: c_ptr
+      type(c_ptr), value :: catalyst
+      type(c_ptr) :: text
+    end function
+
+    function length_in_c(text) bind(c, name="strlen") result(length)
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: text
+      integer(c_size_t) :: length
+    end function
   end interface
+
+contains
+
+  ! A copy, as a Fortran string; of length 0 if there was no error.
+  function vdi_catalyst_error(catalyst) result(text)
+    type(c_ptr), intent(in) :: catalyst
+    character(len=:), allocatable :: text
+    character(kind=c_char), pointer :: bytes(:)
+    type(c_ptr) :: start
+    integer(c_size_t) :: i
+    start = error_in_c(catalyst)
+    call c_f_pointer(start, bytes, [length_in_c(start)])
+    allocate(character(len=size(bytes)) :: text)
+    do i = 1, size(bytes, kind=c_size_t)
+      text(i:i) = bytes(i)
+    end do
+  end function
 end module

@@ -6,7 +6,8 @@
  *     loop {
  *       vdi_catalyst_set_blocks(catalyst, count, blocks);          when the blocks or their pointers change
  *       vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_POINTS, data);
- *       vdi_catalyst_execute(catalyst, step, time);
+ *       if (vdi_catalyst_wants(catalyst, step, time))               or at each step
+ *         vdi_catalyst_execute(catalyst, step, time);
  *     }
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
@@ -119,12 +120,19 @@ VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t cou
 VDI_CATALYST_API int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type,
                                             int32_t association, const void* const* data);
 
+/* Whether a script will do anything at this step: 1 if so or if it can't be told, 0 if not, the same on all
+ * ranks. Then the simulation need neither prepare its values nor call vdi_catalyst_execute. It's 1 where a
+ * script wasn't loaded yet, as before the first step; where one defines catalyst_execute, which runs at each
+ * step; and where the trigger of an extractor is due. 0 for a null or finalized handle and for a step that
+ * vdi_catalyst_execute refuses. */
+VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
+
 /* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX, since
  * ParaView counts and names files so; others are VDI_CATALYST_BAD_ARGUMENT each time. */
 VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* Ends the scripts and the engine and frees `catalyst`; a second call does nothing but return
- * VDI_CATALYST_BAD_ARGUMENT. */
+ * VDI_CATALYST_BAD_ARGUMENT. So does one after MPI_Finalize, as all other functions then, and says so. */
 VDI_CATALYST_API int vdi_catalyst_finalize(vdi_catalyst* catalyst);
 
 /* The text of the last error on this rank; "" if there was none. Valid until the next call. */

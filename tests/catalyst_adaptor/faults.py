@@ -19,9 +19,16 @@ image.SelectInputScalars = ["CELLS" if FAULT == "cells" else "POINTS", "V"]
 image.Resolution = [64, 48]
 extractor = CreateExtractor("VDI", image, registrationName="vdi")
 extractor.Writer.FileName = "vdi_{timestep:06d}.vdi"
+if FAULT == "wants":
+    extractor.Trigger.Frequency = 2
 if FAULT in ("view", "screenshot", "picture"):
     view = CreateView("RenderView")  # no fault: scripts that ParaView exports always do
     Show(grid, view)
+if FAULT == "same file":
+    other = CreateExtractor("VDI", image, registrationName="other")
+    other.Writer.FileName = "vdi_{timestep:06d}.vdi"
+    other.Trigger.UseEndTimeStep = 1
+    other.Trigger.EndTimeStep = 2
 if FAULT == "picture":
     pictures = CreateExtractor("PNG", view, registrationName="png")
     pictures.Trigger.UseEndTimeStep = 1
@@ -62,6 +69,15 @@ def execute(info):
             alpha = [data.GetPointData().GetArray("RGBA").GetComponent(i, 3) for i in range(64 * 48)]
             if max(alpha) == 0 or max(alpha[:64]) > 0 or max(alpha[-64:]) > 0:
                 raise RuntimeError("the picture doesn't show the whole scene")
+    if FAULT == "save":
+        # No fault: the file knows its step.
+        name = os.path.join(OUTPUT, "saved_%d.vdi" % info.timestep)
+        SaveData(name, proxy=image)
+        saved = VDIReader(FileNames=[name])
+        saved.UpdatePipeline()
+        data = saved.GetClientSideObject().GetOutputDataObject(0)
+        if rank == 0 and data.GetFieldData().GetArray("VDI.parameters").GetValue(3) != info.timestep:
+            raise RuntimeError("the file that SaveData wrote has another step")
     if info.timestep > 2:
         if FAULT == "folder":
             make_room()
@@ -82,5 +98,5 @@ def execute(info):
 
 
 # An exported script has none, and is called only where an extractor is due.
-if FAULT != "picture":
+if FAULT not in ("picture", "wants"):
     catalyst_execute = execute

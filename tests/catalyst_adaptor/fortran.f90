@@ -23,7 +23,12 @@ program fortran_simulation
   blocks(1)%origin = [real(rank * n, c_double), 0.0_c_double, 0.0_c_double]
   call require(vdi_catalyst_set_blocks(catalyst, 1, blocks))
   call require(vdi_catalyst_set_array(catalyst, "V" // c_null_char, vdi_catalyst_f64, vdi_catalyst_points, [c_loc(field)]))
+  if (len(vdi_catalyst_error(catalyst)) /= 0) call mpi_abort(mpi_comm_world, 2, error)
+  if (vdi_catalyst_execute(catalyst, -1_c_int64_t, 0.0_c_double) /= vdi_catalyst_bad_argument) &
+    call mpi_abort(mpi_comm_world, 3, error)
+  if (index(vdi_catalyst_error(catalyst), "step -1 isn't") == 0) call mpi_abort(mpi_comm_world, 4, error)
   do step = 1, 2
+    if (vdi_catalyst_wants(catalyst, step, 0.5d0 * step) /= 1) call mpi_abort(mpi_comm_world, 5, error)
     do k = 0, n
       do j = 0, n
         do i = 0, n

@@ -2,6 +2,8 @@
  * each step must return, or CODE*STEPS. Exit status 0 if all did and the error's text was there just when it
  * had to be. Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
  * VDI_TEST_THEN=SCRIPT: initialize with that script succeeds and is finalized.
+ * VDI_TEST_WANTS=1010: what vdi_catalyst_wants says before each step.
+ * VDI_TEST_LATE=1: finalize is called after MPI_Finalize.
  * VDI_TEST_GROWTH=KIB: the resident memory grows by less from a quarter of the steps to the last. */
 #include <limits.h>
 #include <mpi.h>
@@ -98,12 +100,16 @@ static int run_steps(int rank, vdi_catalyst* catalyst, int argc, char** argv) {
   int wrong = 0;
   int total = 0;
   for (int i = 2; i < argc; ++i) total += strchr(argv[i], '*') != NULL ? atoi(strchr(argv[i], '*') + 1) : 1;
+  const char* wanted = getenv("VDI_TEST_WANTS");
   int step = 0;
   long before = 0;
   for (int i = 2; i < argc; ++i) {
     for (int left = strchr(argv[i], '*') != NULL ? atoi(strchr(argv[i], '*') + 1) : 1; left > 0; --left) {
       ++step;
       simulate(rank, step);
+      if (wanted != NULL && wanted[step - 1] != '\0')
+        wrong +=
+            expect(rank, "wants", wanted[step - 1] - '0', vdi_catalyst_wants(catalyst, step, 0.5 * step));
       const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step);
       wrong += expect(rank, "execute", atoi(argv[i]), code);
       const int told = vdi_catalyst_error(catalyst)[0] != '\0';
@@ -162,10 +168,18 @@ int main(int argc, char** argv) {
                   vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_U8, VDI_CATALYST_POINTS, data));
   wrong += bad_steps(rank, catalyst);
   wrong += run_steps(rank, catalyst, argc, argv);
+  if (getenv("VDI_TEST_LATE") != NULL) {
+    MPI_Finalize();
+    wrong += expect(rank, "finalize after MPI_Finalize", VDI_CATALYST_BAD_ARGUMENT,
+                    vdi_catalyst_finalize(catalyst));
+    return wrong == 0 ? 0 : 1;
+  }
+  wrong += expect(rank, "a step that is no int is wanted", 0, vdi_catalyst_wants(catalyst, 3000000000, 0.0));
   wrong += expect(rank, "finalize", VDI_CATALYST_OK, vdi_catalyst_finalize(catalyst));
   wrong += expect(rank, "a second finalize", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_finalize(catalyst));
   wrong +=
       expect(rank, "execute after it", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_execute(catalyst, 1, 0.0));
+  wrong += expect(rank, "a step is wanted after it", 0, vdi_catalyst_wants(catalyst, 1, 0.0));
   wrong += expect(rank, "the error's text after it", 0, vdi_catalyst_error(catalyst)[0] != '\0');
   wrong +=
       expect(rank, "execute without a handle", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_execute(NULL, 1, 0.0));

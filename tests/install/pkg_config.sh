@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Builds the programs of tests/install/project with the compilers alone, asking pkg-config, and runs two of them in a
-# folder of their own. Arguments: the pkgconfig folder, the folder of the libraries, the script, the output folder.
+# folder of their own. Arguments: the pkgconfig folder, the script, the output folder.
 set -euo pipefail
 project=$(dirname "$(realpath "$0")")/project
 export PKG_CONFIG_PATH=$1
-export LD_LIBRARY_PATH=$2
-script=$3
-rm -rf "$4" && mkdir -p "$4" && cd "$4"
+unset LD_LIBRARY_PATH # programs find the libraries by themselves
+script=$2
+rm -rf "$3" && mkdir -p "$3" && cd "$3"
 
 read -ra catalyst <<<"$(pkg-config --cflags --libs pv-vdi-catalyst)"
 read -ra library <<<"$(pkg-config --cflags --libs pv-vdi)"
