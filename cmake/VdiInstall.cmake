@@ -34,6 +34,21 @@ vdi_install_pkg_config(pv-vdi)
 
 install(TARGETS vdi_tool)
 
+# The Python package, where Debian's Python looks; below another prefix, PYTHONPATH names this folder.
+if(TARGET vdi_python)
+  set(pythonDir lib/python3/dist-packages/pv_vdi)
+  install(TARGETS vdi_python LIBRARY DESTINATION "${pythonDir}")
+  install(FILES vdi/python/pv_vdi/__init__.py DESTINATION "${pythonDir}")
+  if(VDI_BUILD_PARAVIEW)
+    install(FILES vdi/python/pv_vdi/catalyst.py DESTINATION "${pythonDir}")
+    # Programs link libvdi_catalyst.so; what runs needs only the file with the version.
+    file(RELATIVE_PATH library "/prefix/${pythonDir}"
+         "/prefix/${CMAKE_INSTALL_LIBDIR}/libvdi_catalyst.so.${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}")
+    file(CONFIGURE OUTPUT _location.py CONTENT "LIBRARY = \"@library@\"\n" @ONLY)
+    install(FILES "${CMAKE_CURRENT_BINARY_DIR}/_location.py" DESTINATION "${pythonDir}")
+  endif()
+endif()
+
 if(VDI_BUILD_PARAVIEW)
   install(
     TARGETS vdi_catalyst

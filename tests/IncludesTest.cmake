@@ -27,6 +27,7 @@ forbid(vdi/page "\"vdi/(reference|gpu|comm|pipeline)/" "page knows core and io a
 forbid(vdi/stream "\"vdi/(reference|gpu|comm|page|pipeline|synthetic)/" "stream knows core and io alone")
 forbid(vdi/pipeline "\"vdi/(reference|page|stream|synthetic)/" "a pipeline knows neither tests nor viewers")
 forbid(vdi/synthetic "\"vdi/(reference|comm|io|page|pipeline)/" "synthetic knows core and gpu alone")
+forbid(vdi/python "\"vdi/(reference|comm|page|synthetic)/" "the Python package reads and renders")
 forbid(vdi "<vtk" "the library is free of VTK")
 forbid(vdi "<IceT" "the library is free of IceT")
 forbid(apps "<vtk" "the tool is free of VTK")

@@ -1,0 +1,47 @@
+"""A simulation in Python: 8 blocks of a field dealt to the ranks, handed over by pv_vdi.catalyst. Argument: the script."""
+
+import os
+import shutil
+import sys
+
+import numpy as np
+from mpi4py import MPI
+
+from pv_vdi.catalyst import BAD_ARGUMENT, SCRIPT, Block, Catalyst, CatalystError
+
+N = 12
+RANK, RANKS = MPI.COMM_WORLD.Get_rank(), MPI.COMM_WORLD.Get_size()
+if RANK == 0:
+    shutil.rmtree(os.environ["VDI_OUTPUT"], ignore_errors=True)
+    os.makedirs(os.environ["VDI_OUTPUT"])
+MPI.COMM_WORLD.Barrier()
+
+
+def expect(error, action, words):
+    try:
+        action()
+    except error as raised:
+        assert words in str(raised), raised
+        return raised
+    raise AssertionError("no %s" % error.__name__)
+
+
+failed = expect(CatalystError, lambda: Catalyst(MPI.COMM_WORLD, ["not-there.py"]), "")
+assert failed.code == SCRIPT, failed.code
+corners = [np.array([i & 1, i >> 1 & 1, i >> 2]) / 2 for i in range(8) if i % RANKS == RANK]
+with Catalyst(MPI.COMM_WORLD, [sys.argv[1]]) as catalyst:
+    catalyst.set_blocks(Block((N, N, N), corner, (0.5 / N,) * 3) for corner in corners)
+    values = [np.empty((N, N, N)) for _ in corners]
+    expect(ValueError, lambda: catalyst.set_array("V", values[1:] + values + values), "blocks")
+    expect(ValueError, lambda: catalyst.set_array("V", [v[1:] for v in values]), "[z][y][x]")
+    expect(ValueError, lambda: catalyst.set_array("V", [v > 0 for v in values]), "bool")
+    expect(CatalystError, lambda: catalyst.execute(-1), "")
+    catalyst.set_array("V", values)
+    for step in (1, 2):
+        for value, corner in zip(values, corners):  # in place: no array is set again
+            z, y, x = np.meshgrid(*[(np.arange(N) + 0.5) * 0.5 / N + start for start in reversed(corner)], indexing="ij")
+            value[...] = 0.1 * step * (1 + np.sin(9 * x) * np.cos(7 * y) * np.cos(5 * z))
+        catalyst.execute(step, 0.5 * step)
+catalyst.close()
+error = expect(CatalystError, lambda: catalyst.execute(3), "")
+assert error.code == BAD_ARGUMENT, error.code

@@ -1,0 +1,140 @@
+"""Hands a simulation's NumPy arrays to ParaView's in situ engine, without a copy.
+
+    from mpi4py import MPI
+    from pv_vdi.catalyst import Block, Catalyst
+
+    with Catalyst(MPI.COMM_WORLD, ["minimal.py"]) as catalyst:
+        catalyst.set_blocks([Block(cells=(64, 64, 64), origin=(rank, 0, 0), spacing=(1 / 64, 1 / 64, 1 / 64))])
+        for step in range(100):
+            ...
+            catalyst.set_array("V", [values])     # values: float64 [z][y][x], of cells
+            catalyst.execute(step, 0.1 * step)
+
+All calls are collective over the communicator. vdi_catalyst.h says more about each.
+"""
+
+import ctypes
+import dataclasses
+import os
+
+import numpy as np
+
+from ._location import LIBRARY
+
+__all__ = ["Block", "Catalyst", "CatalystError"]
+
+BAD_ARGUMENT, ENGINE, SCRIPT = 1, 2, 3  # CatalystError.code
+
+_TYPES = {np.dtype(name): number
+          for number, name in enumerate(["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"])}
+_POINTS, _CELLS = 0, 1
+
+
+class CatalystError(RuntimeError):
+    """A call that failed, on all ranks. `code` is BAD_ARGUMENT, ENGINE or SCRIPT. The next step works again."""
+
+    def __init__(self, code, message):
+        super().__init__(message)
+        self.code = code
+
+
+@dataclasses.dataclass
+class Block:
+    """One block of a uniform lattice; each field has x, y and z. `cells` counts ghost cells too, `origin` is the lower corner
+    of the first cell, ghost or not."""
+
+    cells: tuple
+    origin: tuple = (0.0, 0.0, 0.0)
+    spacing: tuple = (1.0, 1.0, 1.0)
+    ghost_lo: tuple = (0, 0, 0)
+    ghost_hi: tuple = (0, 0, 0)
+
+
+class _Block(ctypes.Structure):
+    _fields_ = [("cells", ctypes.c_int32 * 3), ("ghost_lo", ctypes.c_int32 * 3), ("ghost_hi", ctypes.c_int32 * 3),
+                ("origin", ctypes.c_double * 3), ("spacing", ctypes.c_double * 3)]
+
+
+def _load():
+    library = ctypes.CDLL(os.path.join(os.path.dirname(os.path.abspath(__file__)), LIBRARY))
+    handle, text = ctypes.c_void_p, ctypes.c_char_p
+    library.vdi_catalyst_initialize.argtypes = [ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(text), ctypes.POINTER(handle)]
+    library.vdi_catalyst_set_blocks.argtypes = [handle, ctypes.c_int32, ctypes.POINTER(_Block)]
+    library.vdi_catalyst_set_array.argtypes = [handle, text, ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(ctypes.c_void_p)]
+    library.vdi_catalyst_execute.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
+    library.vdi_catalyst_finalize.argtypes = [handle]
+    library.vdi_catalyst_error.argtypes = [handle]
+    library.vdi_catalyst_error.restype = text
+    return library
+
+
+class Catalyst:
+    """The engine, with its scripts. One can be made in a process; it ends with close() or its `with`."""
+
+    def __init__(self, communicator, scripts):
+        """`communicator`: mpi4py's, or None for a simulation without MPI. `scripts`: paths of Catalyst scripts."""
+        if communicator is None:
+            from mpi4py import MPI  # the engine needs MPI in any case
+            communicator = MPI.COMM_SELF
+        self._library = _load()
+        self._handle = ctypes.c_void_p()
+        self._blocks = []
+        self._kept = {}  # arrays that the engine points to
+        paths = [os.fsencode(script) for script in scripts]
+        self._check(self._library.vdi_catalyst_initialize(
+            communicator.py2f(), len(paths), (ctypes.c_char_p * len(paths))(*paths), ctypes.byref(self._handle)))
+
+    def set_blocks(self, blocks):
+        """This rank's blocks, none included; forgets all arrays."""
+        blocks = list(blocks)
+        made = (_Block * max(len(blocks), 1))(
+            *(_Block(tuple(b.cells), tuple(b.ghost_lo), tuple(b.ghost_hi), tuple(b.origin), tuple(b.spacing)) for b in blocks))
+        self._check(self._library.vdi_catalyst_set_blocks(self._handle, len(blocks), made))
+        self._blocks = blocks
+        self._kept = {}
+
+    def set_array(self, name, arrays, points=False):
+        """The values of one named array: arrays[i], [z][y][x], belongs to block i. They are of cells, or of points, of which a
+        block has one more per axis. They are used where they lie and kept alive: change them in place between steps, or set
+        others. Raises ValueError for a shape that the block doesn't have and for values that don't lie one beside the other."""
+        arrays = list(arrays)
+        if len(arrays) != len(self._blocks):
+            raise ValueError("%d arrays for %d blocks" % (len(arrays), len(self._blocks)))
+        types = {array.dtype for array in arrays} or {np.dtype("float64")}
+        if len(types) > 1 or not types <= set(_TYPES):
+            raise ValueError("the values of '%s' are %s; they may be all of %s" % (
+                name, " and ".join(sorted(map(str, types))), ", ".join(map(str, _TYPES))))
+        for array, block in zip(arrays, self._blocks):
+            shape = tuple(count + bool(points) for count in reversed(block.cells))
+            if array.shape != shape:
+                raise ValueError("an array of '%s' is %s, its block has %s values [z][y][x]" % (name, array.shape, shape))
+            if not array.flags.c_contiguous:
+                raise ValueError("the values of '%s' don't lie one beside the other, x fastest" % name)
+        pointers = (ctypes.c_void_p * max(len(arrays), 1))(*(array.ctypes.data for array in arrays))
+        self._check(self._library.vdi_catalyst_set_array(self._handle, name.encode(), _TYPES[types.pop()],
+                                                         _POINTS if points else _CELLS, pointers))
+        self._kept[name] = arrays
+
+    def execute(self, step, time=0.0):
+        """Runs the scripts on the blocks as they are now. `step` is the same on all ranks."""
+        self._check(self._library.vdi_catalyst_execute(self._handle, step, time))
+
+    def close(self):
+        """Ends the scripts and the engine, before MPI is finalized. A second call does nothing."""
+        if self._handle:
+            handle, self._handle = self._handle, ctypes.c_void_p()
+            self._kept = {}
+            code = self._library.vdi_catalyst_finalize(handle)
+            if code != 0:
+                raise CatalystError(code, "the engine didn't end well")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.close()
+
+    def _check(self, code):
+        if code != 0:
+            text = self._library.vdi_catalyst_error(self._handle) or b"the first rank has said why"
+            raise CatalystError(code, text.decode(errors="replace"))
