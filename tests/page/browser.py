@@ -9,7 +9,7 @@ import time
 
 
 class Browser:
-    """One browser with one page. Chromium's GPU is SwiftShader, which runs on the CPU."""
+    """One browser with one page at first. Chromium's GPU is SwiftShader, which runs on the CPU."""
 
     def __init__(self, program, seconds=60):
         self.seconds = seconds
@@ -33,11 +33,16 @@ class Browser:
         self.buffer = b""
         self.number = 0
         self.events = []
-        target = self.send("Target.createTarget", url="about:blank", browser=True)["targetId"]
         self.session = None
+        self.add_page()
+
+    def add_page(self):
+        """Another one, in a window of its own so that it isn't hidden; calls go to it from now on. Gives its session."""
+        target = self.send("Target.createTarget", url="about:blank", newWindow=True, browser=True)["targetId"]
         self.session = self.send("Target.attachToTarget", targetId=target, flatten=True, browser=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.send(f"{domain}.enable")
+        return self.session
 
     def close(self):
         os.close(self.write_end)

@@ -1,112 +1,15 @@
-"""The exported page in Chromium against vdi render, by real input events, and what bad input gets.
-page_test.py VDI CHROMIUM FOLDER: pictures are left in the folder."""
+"""The exported page in Chromium against vdi render, by real input events, and what bad input gets."""
 import base64
 import io
 import json
-import math
 import os
 import subprocess
-import sys
-import tempfile
-import time
 
 import numpy as np
 from skimage import io as images
-from skimage.metrics import structural_similarity
 
-from browser import Browser
-
-VDI, CHROMIUM, PICTURES = map(os.path.abspath, sys.argv[1:4])
-os.makedirs(PICTURES, exist_ok=True)
-WIDTH, HEIGHT = 192, 108
-failures = []
-
-
-def check(holds, what):
-    if not holds:
-        print("FAILED ", what, flush=True)
-        failures.append(what)
-
-
-def vdi(*words):
-    subprocess.run([VDI, *map(str, words)], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                   timeout=120)
-
-
-def page_of(*files, title=None):
-    page = files[0].replace(".vdi", ".html")
-    vdi("export", *files, "-o", page, *(["--title", title] if title else []))
-    return page
-
-
-def open_page(browser, page, fragment=""):
-    browser.open(f"file://{os.path.abspath(page)}{fragment}")
-
-
-def whole(browser):
-    browser.wait("window.vdiPage && vdiPage.vdi && vdiPage.viewer.isWhole()")
-
-
-def bare(browser):
-    """Only the VDI, on black as in vdi render's pictures."""
-    browser.value("""(() => {
-      document.body.classList.add('bare');
-      for (const [id, value] of [['outline', false], ['background', '#000000']]) {
-        const input = document.getElementById(id);
-        if (id === 'outline') { if (input.checked) input.click(); }
-        else { input.value = value; input.dispatchEvent(new Event('input')); }
-      }
-    })()""")
-    whole(browser)
-
-
-def shown(browser, name=None):
-    whole(browser)
-    browser.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    path = os.path.join(PICTURES, name + ".png") if name else None
-    return images.imread(io.BytesIO(browser.screenshot(path)))[..., :3]
-
-
-def rendered(file, camera, reconstruction="smooth"):
-    """What vdi render makes of it, from the page's camera."""
-    words = {"position": camera["position"], "focal_point": camera["focalPoint"], "view_up": camera["viewUp"]}
-    if camera["parallel"]:
-        words.update(parallel_scale=camera["parallelScale"])
-    else:
-        words.update(view_angle=camera["viewAngle"])
-    with open("camera.json", "w", encoding="utf-8") as text:
-        json.dump(words, text)
-    vdi("render", file, "-o", "expected.png", "--camera", "camera.json", "--resolution", f"{WIDTH}x{HEIGHT}",
-        "--reconstruction", reconstruction)
-    return images.imread("expected.png")[..., :3]
-
-
-def compare(what, got, expected, least=0.995):
-    """SSIM of each channel, of all and over the object's bounding box."""
-    rows, columns = np.nonzero(expected.max(axis=2) > 2)
-    if len(rows) == 0:
-        check(False, f"{what}: nothing to see")
-        return
-    box = np.s_[max(rows.min() - 4, 0):rows.max() + 5, max(columns.min() - 4, 0):columns.max() + 5]
-    values = [structural_similarity(got[part][..., c], expected[part][..., c], data_range=255)
-              for part in (np.s_[:], box) for c in range(3)]
-    most = np.abs(got.astype(int) - expected).max()
-    print(f"{what}: SSIM {min(values[:3]):.4f}, over the object {min(values[3:]):.4f}, largest difference {most}/255",
-          flush=True)
-    check(min(values) >= least and most <= 8, what)
-
-
-def azimuth(camera, degrees):
-    up = np.array(camera["viewUp"]) / np.linalg.norm(camera["viewUp"])
-    focal = np.array(camera["focalPoint"])
-    back = np.array(camera["position"]) - focal
-    angle = math.radians(degrees)
-    turned = math.cos(angle) * back + math.sin(angle) * np.cross(up, back) + (1 - math.cos(angle)) * (up @ back) * up
-    return {**camera, "position": list(focal + turned)}
-
-
-def camera_of(browser):
-    return browser.value("vdiPage.viewer.camera")
+from pagetest import (HEIGHT, PICTURES, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, open_page, page_of,
+                      rendered, run, shown, vdi, whole)
 
 
 def test_pictures(browser):
@@ -201,10 +104,6 @@ def test_hands(browser):
         open_page(browser, "compact.html", damaged)
         whole(browser)
         check(angle_of(browser) == 0, f"{damaged} is ignored")
-
-
-def message_of(browser):
-    return browser.value("document.getElementById('message').hidden ? '' : document.getElementById('message').textContent")
 
 
 def drop_files(browser, *paths):
@@ -394,25 +293,5 @@ def test_network(browser):
     check(not beyond, f"the page asks for {beyond}")
 
 
-def main():
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        browser = Browser(CHROMIUM)
-        try:
-            browser.size(WIDTH, HEIGHT)
-            for test in (test_pictures, test_small_textures, test_hands, test_damage, test_lost_context, test_series,
-                         test_legend, test_frame_time, test_looks, test_network):
-                start = time.monotonic()
-                try:
-                    test(browser)
-                except (TimeoutError, RuntimeError) as error:
-                    check(False, f"{test.__name__}: {error}")
-                print(f"{test.__name__}: {time.monotonic() - start:.1f} s", flush=True)
-        finally:
-            browser.close()
-            os.chdir("/")
-    print("all well" if not failures else f"{len(failures)} failures")
-    return 1 if failures else 0
-
-
-sys.exit(main())
+run(test_pictures, test_small_textures, test_hands, test_damage, test_lost_context, test_series, test_legend, test_frame_time,
+    test_looks, test_network)

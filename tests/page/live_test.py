@@ -1,0 +1,161 @@
+"""A live page in Chromium before a real server: frames that appear, a server that is killed and comes back, wrong tokens,
+several pages, a series. Waits have no upper bound but the test's own; nothing here measures time."""
+import json
+import os
+import signal
+import subprocess
+
+from pagetest import HEIGHT, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, rendered, run, shown, vdi, whole
+
+TOKEN = "a-token-of-this-test-0123456789abcdef"
+SECONDS = 60  # that something may take on a busy machine
+
+
+class Server:
+    """vdi serve, with the token of this test."""
+
+    def __init__(self, *words, port=0):
+        with open("token", "w", encoding="utf-8") as file:
+            file.write(TOKEN)
+        os.chmod("token", 0o600)
+        self.process = subprocess.Popen([VDI, "serve", *words, "--token-file", "token", "--port", str(port)],
+                                        stdout=subprocess.PIPE, text=True)
+        self.address = self.process.stdout.readline().strip()
+        self.link = f"{self.address.split('#')[0]}#token={TOKEN}"
+        self.port = int(self.address.split(":")[2].split("/")[0])
+
+    def end(self, how=signal.SIGTERM):
+        self.process.send_signal(how)
+        self.process.wait(SECONDS)
+        self.process.stdout.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.end(signal.SIGKILL)
+
+
+def make(path, seed, large=True):
+    """A VDI of two levels, or of one."""
+    kind = ["--resolution", f"{WIDTH}x{HEIGHT}", "--supersegments", 24, "--zoom", 1.6] if large else [
+        "--resolution", "96x54", "--supersegments", 4]
+    vdi("generate", "--field", "turbulence", "--size", "32x32x32", *kind, "--seed", seed, "-o", path)
+
+
+def line(browser):
+    return browser.value("document.getElementById('livetext').textContent")
+
+
+def wait_for_frame(browser, frame):
+    browser.wait(f"window.vdiPage && vdiPage.vdi && vdiPage.live.live.shown?.frame === {frame} && "
+                 "vdiPage.live.live.shown.level + 1 === vdiPage.live.live.shown.levels", SECONDS)
+
+
+def test_frames(browser):
+    os.mkdir("run")
+    make("run/step_0.vdi", 1)
+    with Server("run") as server:
+        browser.open(server.link)
+        wait_for_frame(browser, 0)
+        bare(browser)
+        check(TOKEN not in browser.value("location.href"), "the token leaves the address")
+        check(browser.value("vdiPage.live.live.shown.levels") == 2, "a frame of two levels")
+        compare("live, as made", shown(browser, "live"), rendered("run/step_0.vdi", camera_of(browser)))
+        turned = azimuth(camera_of(browser), 25)
+        browser.value(f"vdiPage.setCamera({json.dumps(turned)})")
+        make("run/step_1.vdi", 2)
+        wait_for_frame(browser, 1)
+        check(camera_of(browser)["position"] == turned["position"], "a new frame leaves the view as it is")
+        compare("live, turned", shown(browser, "live_turned"), rendered("run/step_1.vdi", turned))
+
+        browser.send("Page.reload")
+        wait_for_frame(browser, 1)
+        check(line(browser).startswith(("Live", "Series", "Ended")), f"a page that is loaded again is live: {line(browser)}")
+        bare(browser)
+        browser.value(f"vdiPage.setCamera({json.dumps(turned)})")
+
+        browser.value("document.getElementById('pause').click()")
+        check(line(browser).startswith("Paused"), f"a pause: {line(browser)}")
+        make("run/step_2.vdi", 3)
+        browser.value("document.getElementById('pause').click()")
+        wait_for_frame(browser, 2)
+
+        # The server dies in the middle of things, and comes back with one frame more.
+        before = shown(browser)
+        server.end(signal.SIGKILL)
+        browser.wait("vdiPage.live.live.state === 'lost'", SECONDS)
+        check("Not connected" in line(browser) and "attempt" in line(browser), f"a server that is gone: {line(browser)}")
+        check((shown(browser) == before).all(), "the last frame stays")
+        make("run/step_3.vdi", 4)
+        with Server("run", port=server.port):
+            wait_for_frame(browser, 3)
+            compare("live, after a new start", shown(browser), rendered("run/step_3.vdi", turned))
+        # Refused connections are the browser's to tell of; the page itself throws nothing.
+        complaints = [text for text in browser.complaints() if "WebSocket" not in text and "ERR_CONNECTION" not in text]
+        check(not complaints, f"live: {complaints}")
+
+
+def test_tokens(browser):
+    make("small.vdi", 5, large=False)
+    with Server("small.vdi") as server:
+        for link in (server.link.replace("a-token", "b-token"), server.link + "x"):
+            browser.open(link)
+            browser.wait("window.vdiPage && vdiPage.live.live.state === 'refused'", SECONDS)
+            check("token" in message_of(browser), f"a wrong token: {message_of(browser)}")
+            check(browser.value("vdiPage.vdi === undefined"), "shows nothing")
+        browser.open(server.link.split("#")[0])
+        check("token" in message_of(browser), f"no token: {message_of(browser)}")
+        # The right link, into the same tab.
+        browser.value(f"location.hash = 'token={TOKEN}'")
+        wait_for_frame(browser, 0)
+        check(message_of(browser) == "", "the right token after none")
+
+
+def test_pages(browser):
+    """Several at once get the same frames; one that goes away in the middle disturbs none."""
+    os.mkdir("shared")
+    make("shared/step_0.vdi", 6)
+    first = browser.session
+    with Server("shared") as server:
+        sessions = [first] + [browser.add_page() for _ in range(3)]
+        for session in sessions:
+            browser.session = session
+            browser.size(WIDTH, HEIGHT)
+            browser.open(server.link)
+        for session in sessions:
+            browser.session = session
+            wait_for_frame(browser, 0)
+        browser.send("Page.navigate", url="about:blank")
+        make("shared/step_1.vdi", 7)
+        for session in sessions[:3]:
+            browser.session = session
+            wait_for_frame(browser, 1)
+            bare(browser)
+            compare("one of several pages", shown(browser), rendered("shared/step_1.vdi", camera_of(browser)))
+        browser.session = first
+
+
+def test_series(browser):
+    for i in range(3):
+        make(f"part_{i}.vdi", 8 + i, large=False)
+    with Server("part_0.vdi", "part_1.vdi", "part_2.vdi") as server:
+        browser.open(server.link)
+        browser.wait("window.vdiPage && vdiPage.vdi && !document.getElementById('series').hidden", SECONDS)
+        bare(browser)
+        for i in (1, 0, 2):
+            browser.value(f"(() => {{ const s = document.getElementById('frame'); s.value = {i};"
+                          " s.dispatchEvent(new Event('input')); })()")
+            wait_for_frame(browser, i)
+            compare(f"frame {i} of a series", shown(browser), rendered(f"part_{i}.vdi", camera_of(browser)))
+        browser.value("document.getElementById('view').focus()")
+        browser.key(" ")
+        for i in (0, 1, 2):
+            browser.wait(f"vdiPage.frame === {i}", SECONDS)
+        browser.key(" ")
+        check(not browser.value("vdiPage.isPlaying"), "the space bar stops a series")
+        whole(browser)
+
+
+run(test_frames, test_tokens, test_pages, test_series)
