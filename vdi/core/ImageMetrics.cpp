@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "vdi/core/Error.h"
@@ -161,10 +162,10 @@ class Pixels {
   }
   /// The most frequent one along the edge.
   std::vector<std::uint8_t> background() const {
-    std::map<std::vector<std::uint8_t>, int> counts;
+    std::map<std::string, int> counts;  // by a pixel's bytes
     const auto count = [&](int x, int y) {
       const auto pixel = at(x, y);
-      ++counts[{pixel.begin(), pixel.end()}];
+      ++counts[std::string(pixel.begin(), pixel.end())];
     };
     for (int x = 0; x < width_; ++x) {
       count(x, 0);
@@ -174,9 +175,10 @@ class Pixels {
       count(0, y);
       count(width_ - 1, y);
     }
-    return std::max_element(counts.begin(), counts.end(),
-                            [](const auto& one, const auto& other) { return one.second < other.second; })
-        ->first;
+    const auto most = std::max_element(counts.begin(), counts.end(), [](const auto& one, const auto& other) {
+      return one.second < other.second;
+    });
+    return {most->first.begin(), most->first.end()};
   }
   bool differs(int x, int y, std::span<const std::uint8_t> from) const {
     constexpr int most = 2;
