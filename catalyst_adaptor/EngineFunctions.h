@@ -14,6 +14,8 @@ typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*set_blocks)(vdi_catalyst*, int32_t, const vdi_catalyst_block*);
   int (*set_array)(vdi_catalyst*, const char*, int32_t, int32_t, const void* const*);
+  int (*set_array_strided)(vdi_catalyst*, const char*, int32_t, int32_t, int32_t, const void* const*,
+                           const vdi_catalyst_strides*);
   int (*wants)(vdi_catalyst*, int64_t, double);
   int (*execute)(vdi_catalyst*, int64_t, double);
   int (*finalize)(vdi_catalyst*);

@@ -98,7 +98,7 @@ static int usable(const vdi_catalyst* catalyst) {
   return engine != NULL && catalyst != NULL && !over;
 }
 
-/* This and the next function run nothing but our own code, which changes no more than that. */
+/* This and the next two functions run nothing but our own code, which changes no more than that. */
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   fenv_t floating_point;
@@ -114,6 +114,17 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
   fenv_t floating_point;
   feholdexcept(&floating_point);
   const int code = engine->set_array(catalyst, name, type, association, data);
+  fesetenv(&floating_point);
+  return code;
+}
+
+int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
+                                   int32_t association, int32_t components, const void* const* data,
+                                   const vdi_catalyst_strides* strides) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  fenv_t floating_point;
+  feholdexcept(&floating_point);
+  const int code = engine->set_array_strided(catalyst, name, type, association, components, data, strides);
   fesetenv(&floating_point);
   return code;
 }

@@ -19,6 +19,7 @@
 #include <cstdio>
 #include <exception>
 #include <limits>
+#include <map>
 #include <memory>
 #include <new>
 #include <optional>
@@ -30,12 +31,15 @@
 
 #include "catalyst_adaptor/Engine.h"
 #include "catalyst_adaptor/ScriptEnvironment.h"
+#include "catalyst_adaptor/StridedArray.h"
 
 struct vdi_catalyst {
   MPI_Comm comm = MPI_COMM_NULL;  // a duplicate
   std::unique_ptr<vdi::catalyst::Engine> engine;
   bool haveBlocks = false;
   vtkSmartPointer<vtkPartitionedDataSet> grid;  // a partition a block
+  /// By association and name: the arrays that are gathered, of those blocks whose values aren't in order.
+  std::map<std::pair<int, std::string>, std::vector<vdi::catalyst::StridedArray>> gathered;
   std::string error;
   std::string printed;  // so that what fails at every step is told in full once
 };
@@ -230,6 +234,10 @@ int vtkTypeOf(int type) {
       return VTK_FLOAT;
     case VDI_CATALYST_F64:
       return VTK_DOUBLE;
+    case VDI_CATALYST_I64:
+      return VTK_TYPE_INT64;
+    case VDI_CATALYST_U64:
+      return VTK_TYPE_UINT64;
     default:
       throw std::invalid_argument("unknown scalar type");
   }
@@ -279,6 +287,82 @@ void sayIfNothingIsMade(const vdi_catalyst& self, const std::vector<std::string>
   MPI_Comm_rank(self.comm, &rank);
   if (rank == 0 && paths.empty())
     std::fprintf(stderr, "vdi_catalyst: no scripts were given, so no step will make anything\n");
+}
+
+constexpr int maxComponents = 16;
+
+void requireArray(const vdi_catalyst& self, const char* name, int association, const void* const* data) {
+  require(self.haveBlocks, "arrays were given before blocks");
+  require(name != nullptr && *name != '\0', "an array needs a name");
+  require(association == VDI_CATALYST_POINTS || association == VDI_CATALYST_CELLS, "unknown association");
+  const unsigned int count = self.grid->GetNumberOfPartitions();
+  require(count == 0 || data != nullptr, "an array without data");
+  for (unsigned int i = 0; i < count; ++i)
+    require(data[i] != nullptr, "an array without data for one of the blocks");
+}
+
+vtkIdType valuesOf(vtkDataSet& image, int association) {
+  return association == VDI_CATALYST_CELLS ? image.GetNumberOfCells() : image.GetNumberOfPoints();
+}
+
+/// On the simulation's memory or ours, of `count` values.
+vtkSmartPointer<vtkDataArray> newArray(const char* name, int type, int components, const void* data,
+                                       vtkIdType count) {
+  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtkTypeOf(type)));
+  array->SetName(name);
+  array->SetNumberOfComponents(components);
+  // VTK only reads through this pointer; `save` = 1 leaves the memory its owner's.
+  array->SetVoidArray(const_cast<void*>(data), count * components, 1);
+  return array;
+}
+
+vdi::catalyst::StridedValues stridedValues(vtkDataSet& block, int type, int association, int components,
+                                           const void* data, const vdi_catalyst_strides& strides) {
+  vdi::catalyst::StridedValues values;
+  values.first = static_cast<const std::byte*>(data);
+  const int fewer = association == VDI_CATALYST_CELLS ? 1 : 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto at = static_cast<std::size_t>(axis);
+    values.counts[at] = vtkImageData::SafeDownCast(&block)->GetDimensions()[axis] - fewer;
+    values.strides[at] = strides.strides[axis];
+  }
+  values.components = components;
+  values.componentStride = components > 1 ? strides.component_stride : 0;
+  values.scalarBytes = static_cast<std::size_t>(vtkDataArray::GetDataTypeSize(vtkTypeOf(type)));
+  return values;
+}
+
+/// One named array of all blocks, until all ranks have theirs.
+class Arrays {
+ public:
+  void add(vtkSmartPointer<vtkDataArray> array) { arrays_.push_back(std::move(array)); }
+  const void* addGathered(const vdi::catalyst::StridedValues& values) {
+    return gathered_.emplace_back(values).data();
+  }
+  void putInto(vdi_catalyst& self, const char* name, int association) {
+    for (unsigned int i = 0; i < arrays_.size(); ++i) {
+      vtkDataSet* image = self.grid->GetPartition(i);
+      auto* attributes = association == VDI_CATALYST_CELLS
+                             ? static_cast<vtkDataSetAttributes*>(image->GetCellData())
+                             : image->GetPointData();
+      attributes->AddArray(arrays_[i]);
+    }
+    // Last: until now the grid has used what is replaced here.
+    if (gathered_.empty())
+      self.gathered.erase({association, name});
+    else
+      self.gathered[{association, name}] = std::move(gathered_);
+  }
+
+ private:
+  std::vector<vtkSmartPointer<vtkDataArray>> arrays_;
+  std::vector<vdi::catalyst::StridedArray> gathered_;
+};
+
+void gatherAll(vdi_catalyst& self) {
+  for (auto& [key, arrays] : self.gathered) {
+    for (vdi::catalyst::StridedArray& array : arrays) array.gather();
+  }
 }
 
 }  // namespace
@@ -337,6 +421,7 @@ int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_cat
   });
   if (code != VDI_CATALYST_OK) return code;  // all ranks keep the blocks that they have
   catalyst->grid = grid;
+  catalyst->gathered.clear();
   catalyst->haveBlocks = true;
   return code;
 }
@@ -345,33 +430,39 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
                            const void* const* data) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const vdi::catalyst::PythonLock lock;
-  const bool cells = association == VDI_CATALYST_CELLS;
-  std::vector<vtkSmartPointer<vtkDataArray>> arrays;
+  Arrays arrays;
   const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    require(catalyst->haveBlocks, "arrays were given before blocks");
-    require(name != nullptr && *name != '\0', "an array needs a name");
-    require(association == VDI_CATALYST_POINTS || cells, "unknown association");
-    const int vtkType = vtkTypeOf(type);
-    const unsigned int count = catalyst->grid->GetNumberOfPartitions();
-    require(count == 0 || data != nullptr, "an array without data");
-    for (unsigned int i = 0; i < count; ++i) {
-      require(data[i] != nullptr, "an array without data for one of the blocks");
-      vtkDataSet* image = catalyst->grid->GetPartition(i);
-      const auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtkType));
-      array->SetName(name);
-      // VTK only reads through this pointer; `save` = 1 leaves the memory the simulation's.
-      array->SetVoidArray(const_cast<void*>(data[i]),
-                          cells ? image->GetNumberOfCells() : image->GetNumberOfPoints(), 1);
-      arrays.push_back(array);
+    requireArray(*catalyst, name, association, data);
+    for (unsigned int i = 0; i < catalyst->grid->GetNumberOfPartitions(); ++i) {
+      const vtkIdType count = valuesOf(*catalyst->grid->GetPartition(i), association);
+      arrays.add(newArray(name, type, 1, data[i], count));
     }
   });
-  if (code != VDI_CATALYST_OK) return code;
-  for (unsigned int i = 0; i < arrays.size(); ++i) {
-    vtkDataSet* image = catalyst->grid->GetPartition(i);
-    auto* attributes =
-        cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
-    attributes->AddArray(arrays[i]);
-  }
+  if (code == VDI_CATALYST_OK) arrays.putInto(*catalyst, name, association);
+  return code;
+}
+
+int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
+                                   int32_t association, int32_t components, const void* const* data,
+                                   const vdi_catalyst_strides* strides) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi::catalyst::PythonLock lock;
+  Arrays arrays;
+  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    requireArray(*catalyst, name, association, data);
+    require(components >= 1 && components <= maxComponents, "the number of components must be 1 to 16");
+    const unsigned int count = catalyst->grid->GetNumberOfPartitions();
+    require(count == 0 || strides != nullptr, "a strided array without strides");
+    for (unsigned int i = 0; i < count; ++i) {
+      vtkDataSet* image = catalyst->grid->GetPartition(i);
+      const auto values = stridedValues(*image, type, association, components, data[i], strides[i]);
+      require(values.reachable(), "strides that lead beyond the address space");
+      const void* first = data[i];
+      if (!values.inOrder()) first = arrays.addGathered(values);
+      arrays.add(newArray(name, type, components, first, valuesOf(*image, association)));
+    }
+  });
+  if (code == VDI_CATALYST_OK) arrays.putInto(*catalyst, name, association);
   return code;
 }
 
@@ -397,6 +488,8 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   const int result = guarded(
       *catalyst, VDI_CATALYST_SCRIPT,
       [&] {
+        if (!catalyst->gathered.empty() && catalyst->engine->wants(static_cast<int>(step), time))
+          gatherAll(*catalyst);
         markModified(*catalyst->grid);
         return catalyst->engine->execute(catalyst->grid, static_cast<int>(step), time);
       },

@@ -21,6 +21,8 @@ module vdi_catalyst
   integer(c_int32_t), parameter :: vdi_catalyst_i32 = 5
   integer(c_int32_t), parameter :: vdi_catalyst_f32 = 6
   integer(c_int32_t), parameter :: vdi_catalyst_f64 = 7
+  integer(c_int32_t), parameter :: vdi_catalyst_i64 = 8
+  integer(c_int32_t), parameter :: vdi_catalyst_u64 = 9
 
   integer(c_int32_t), parameter :: vdi_catalyst_points = 0
   integer(c_int32_t), parameter :: vdi_catalyst_cells = 1
@@ -31,6 +33,11 @@ module vdi_catalyst
     integer(c_int32_t) :: ghost_hi(3) = 0
     real(c_double) :: origin(3) = 0
     real(c_double) :: spacing(3) = 1
+  end type
+
+  type, bind(c) :: vdi_catalyst_strides
+    integer(c_int64_t) :: strides(3) = 0
+    integer(c_int64_t) :: component_stride = 0
   end type
 
   interface
@@ -57,6 +64,17 @@ module vdi_catalyst
       character(kind=c_char), intent(in) :: name(*)
       integer(c_int32_t), value :: type, association
       type(c_ptr), intent(in) :: values(*)
+      integer(c_int) :: code
+    end function
+
+    function vdi_catalyst_set_array_strided(catalyst, name, type, association, components, values, strides) &
+        bind(c) result(code)
+      import :: c_char, c_int, c_int32_t, c_ptr, vdi_catalyst_strides
+      type(c_ptr), value :: catalyst
+      character(kind=c_char), intent(in) :: name(*)
+      integer(c_int32_t), value :: type, association, components
+      type(c_ptr), intent(in) :: values(*)
+      type(vdi_catalyst_strides), intent(in) :: strides(*)
       integer(c_int) :: code
     end function
 

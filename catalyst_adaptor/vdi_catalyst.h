@@ -70,7 +70,9 @@ enum {
   VDI_CATALYST_U32 = 4,
   VDI_CATALYST_I32 = 5,
   VDI_CATALYST_F32 = 6,
-  VDI_CATALYST_F64 = 7
+  VDI_CATALYST_F64 = 7,
+  VDI_CATALYST_I64 = 8,
+  VDI_CATALYST_U64 = 9
 };
 
 /* Where values lie. */
@@ -119,6 +121,27 @@ VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t cou
  * pointers. */
 VDI_CATALYST_API int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type,
                                             int32_t association, const void* const* data);
+
+/* Where the values of one block lie, in bytes: component c of value (x, y, z) at the block's pointer +
+ * x * strides[0] + y * strides[1] + z * strides[2] + c * component_stride. So the pointer is to the block's
+ * first value, wherever in an allocation that is: layers before it, and what is padded, are never read.
+ * Strides may be 0 or negative, and need not be multiples of the scalar's size. */
+typedef struct vdi_catalyst_strides {
+  int64_t strides[3];
+  int64_t component_stride; /* isn't used for one component */
+} vdi_catalyst_strides;
+
+/* As vdi_catalyst_set_array, for values that lie otherwise: interleaved with others, padded, z fastest, parts
+ * of a larger allocation. strides[i] and data[i] belong to block i. With `components` > 1, from 1 to 16, an
+ * array of vectors: VolumetricDepthImage shows their magnitude. For one component of vectors, pass its first
+ * value's address and components = 1.
+ *
+ * Values that lie as vdi_catalyst_set_array takes them, components side by side, are used where they are.
+ * Others are copied to memory of ours by each vdi_catalyst_execute that a script wants; it is taken here. */
+VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
+                                                    int32_t association, int32_t components,
+                                                    const void* const* data,
+                                                    const vdi_catalyst_strides* strides);
 
 /* Whether a script will do anything at this step: 1 if so or if it can't be told, 0 if not, the same on all
  * ranks. Then the simulation need neither prepare its values nor call vdi_catalyst_execute. It's 1 where a

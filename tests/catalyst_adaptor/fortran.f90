@@ -9,7 +9,8 @@ program fortran_simulation
   integer(c_int64_t) :: step
   type(c_ptr) :: catalyst
   type(vdi_catalyst_block) :: blocks(1)
-  real(c_double), target :: field(0:n, 0:n, 0:n)
+  real(c_double), target :: field(0:n + 2, 0:n, 0:n) ! the first extent is padded
+  type(vdi_catalyst_strides) :: strides(1)
   character(len=1024) :: argument
   character(kind=c_char, len=:), allocatable, target :: script
 
@@ -22,7 +23,9 @@ program fortran_simulation
   blocks(1)%cells = n
   blocks(1)%origin = [real(rank * n, c_double), 0.0_c_double, 0.0_c_double]
   call require(vdi_catalyst_set_blocks(catalyst, 1, blocks))
-  call require(vdi_catalyst_set_array(catalyst, "V" // c_null_char, vdi_catalyst_f64, vdi_catalyst_points, [c_loc(field)]))
+  strides(1)%strides = 8 * [1, n + 3, (n + 3) * (n + 1)]
+  call require(vdi_catalyst_set_array_strided(catalyst, "V" // c_null_char, vdi_catalyst_f64, vdi_catalyst_points, 1, &
+    [c_loc(field)], strides))
   if (len(vdi_catalyst_error(catalyst)) /= 0) call mpi_abort(mpi_comm_world, 2, error)
   if (vdi_catalyst_execute(catalyst, -1_c_int64_t, 0.0_c_double) /= vdi_catalyst_bad_argument) &
     call mpi_abort(mpi_comm_world, 3, error)

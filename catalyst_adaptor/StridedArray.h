@@ -1,0 +1,44 @@
+// Values that the simulation keeps in an order of its own, gathered to where VTK can read them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+namespace vdi::catalyst {
+
+/// The values of one block: component c of value (x, y, z) lies at `first` + x * strides[0] + y * strides[1]
+/// + z * strides[2] + c * componentStride, in bytes. Strides may be 0 or negative.
+struct StridedValues {
+  const std::byte* first = nullptr;
+  std::array<std::int64_t, 3> counts{};  // of values per axis, >= 1
+  std::array<std::int64_t, 3> strides{};
+  int components = 1;
+  std::int64_t componentStride = 0;
+  std::size_t scalarBytes = 1;  // 1, 2, 4 or 8
+
+  std::int64_t scalars() const { return counts[0] * counts[1] * counts[2] * components; }
+  /// Whether they lie as VTK reads them: components side by side, x fastest, no gaps.
+  bool inOrder() const;
+  /// Whether all of them have addresses that can be told from `first` in 63 bits.
+  bool reachable() const;
+};
+
+/// Memory with the values in VTK's order.
+class StridedArray {
+ public:
+  /// Takes the memory. Throws std::runtime_error if there's none. `values` must be reachable.
+  explicit StridedArray(const StridedValues& values);
+
+  /// Copies the values as they are now.
+  void gather();
+  /// [z][y][x][component]; stays where it is as long as this object lives, also when that is moved.
+  void* data() { return memory_.get(); }
+
+ private:
+  StridedValues values_;
+  std::unique_ptr<std::byte[]> memory_;
+};
+
+}  // namespace vdi::catalyst
