@@ -95,6 +95,7 @@ class Page {
     element("open").addEventListener("click", () => input("files").click());
     input("files").addEventListener("change", () => this.openFiles([...(input("files").files ?? [])]));
     element("view").addEventListener("keydown", (event) => this.onKey(event));
+    element("view").addEventListener("pointerdown", () => element("look").removeAttribute("open"));
     window.addEventListener("resize", () => viewer.redraw());
     window.addEventListener("hashchange", () => this.onNewUrl());
     this.darkScheme.addEventListener("change", () => this.takeTheme());

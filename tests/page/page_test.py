@@ -274,11 +274,17 @@ def test_looks(browser):
             open_page(browser, "step_0.html")
             whole(browser)
             browser.screenshot(os.path.join(PICTURES, f"{name}_{scheme}.png"))
-            inside = browser.value("""[...document.querySelectorAll('#bar > *, header')].filter((e) => !e.hidden).every((e) => {
+            browser.value("document.getElementById('look').open = true")
+            browser.screenshot(os.path.join(PICTURES, f"{name}_{scheme}_view.png"))
+            inside = browser.value("""
+              [...document.querySelectorAll('#bar > *, #look > div, header, #axes')].filter((e) => !e.hidden).every((e) => {
               const box = e.getBoundingClientRect();
               return box.left >= 0 && box.right <= innerWidth && box.top >= 0 && box.bottom <= innerHeight;
             })""")
             check(inside, f"{name}, {scheme}: all is inside of the window")
+            below = browser.value("document.getElementById('axes').getBoundingClientRect().bottom - "
+                                  "document.getElementById('bar').getBoundingClientRect().top")
+            check(below <= 0, f"{name}, {scheme}: the axes are above the bar")
             paper = browser.value("vdiPage.viewer.background[0]")
             check(paper < 0.2 if scheme == "dark" else paper > 0.8, f"{scheme}: the background is {paper}")
     browser.send("Emulation.setEmulatedMedia", features=[])
