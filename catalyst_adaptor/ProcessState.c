@@ -93,7 +93,19 @@ static char** difference(char* const* from, char* const* to) {
   return NULL;
 }
 
+static int same(char* const* a, char* const* b) {
+  size_t i = 0;
+  while (a[i] != NULL && b[i] != NULL && strcmp(a[i], b[i]) == 0) ++i;
+  return a[i] == NULL && b[i] == NULL;
+}
+
 static void restore_environment(char** before) {
+  if (before != NULL && same(before, environ)) { /* what's kept has changed nothing, or has gone */
+    free_all(before);
+    free_all(kept);
+    kept = NULL;
+    return;
+  }
   char** changes = before != NULL ? difference(before, environ) : NULL;
   char** back = before != NULL ? difference(environ, before) : NULL;
   if (changes == NULL || back == NULL) complain("for want of memory, the environment");

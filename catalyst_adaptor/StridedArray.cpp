@@ -16,13 +16,19 @@ namespace {
 /// cache are used up before they go.
 constexpr std::int64_t tile = 16;
 
-/// Of the values [x, xEnd) of a row.
+/// Whether a row, and the components of its values, have no gaps.
+bool rowInOrder(const StridedValues& values) {
+  const auto scalar = static_cast<std::int64_t>(values.scalarBytes);
+  return (values.components == 1 || values.componentStride == scalar) &&
+         (values.counts[0] == 1 || values.strides[0] == scalar * values.components);
+}
+
+/// `count` values of a row.
 template <std::size_t scalarBytes>
-void copyRow(const StridedValues& values, std::int64_t x, std::int64_t xEnd, const std::byte* row,
-             std::byte* to) {
-  for (; x < xEnd; ++x) {
+void copyRow(const StridedValues& values, std::int64_t count, const std::byte* from, std::byte* to) {
+  for (std::int64_t x = 0; x < count; ++x) {
     for (int c = 0; c < values.components; ++c) {
-      std::memcpy(to, row + x * values.strides[0] + c * values.componentStride, scalarBytes);
+      std::memcpy(to, from + x * values.strides[0] + c * values.componentStride, scalarBytes);
       to += scalarBytes;
     }
   }
@@ -32,15 +38,24 @@ template <std::size_t scalarBytes>
 void copyAll(const StridedValues& values, std::byte* to) {
   const auto& [nx, ny, nz] = values.counts;
   const std::int64_t valueBytes = static_cast<std::int64_t>(scalarBytes) * values.components;
+  const bool wholeRows = rowInOrder(values);
+  const std::int64_t tileX = wholeRows ? nx : tile;
+  const auto copy = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+    const std::byte* from =
+        values.first + x * values.strides[0] + y * values.strides[1] + z * values.strides[2];
+    std::byte* place = to + ((z * ny + y) * nx + x) * valueBytes;
+    const std::int64_t count = std::min(tileX, nx - x);
+    if (wholeRows) {
+      std::memcpy(place, from, static_cast<std::size_t>(count * valueBytes));
+    } else {
+      copyRow<scalarBytes>(values, count, from, place);
+    }
+  };
   for (std::int64_t firstZ = 0; firstZ < nz; firstZ += tile) {
     for (std::int64_t firstY = 0; firstY < ny; firstY += tile) {
-      for (std::int64_t x = 0; x < nx; x += tile) {
+      for (std::int64_t x = 0; x < nx; x += tileX) {
         for (std::int64_t z = firstZ; z < std::min(firstZ + tile, nz); ++z) {
-          for (std::int64_t y = firstY; y < std::min(firstY + tile, ny); ++y) {
-            copyRow<scalarBytes>(values, x, std::min(x + tile, nx),
-                                 values.first + y * values.strides[1] + z * values.strides[2],
-                                 to + ((z * ny + y) * nx + x) * valueBytes);
-          }
+          for (std::int64_t y = firstY; y < std::min(firstY + tile, ny); ++y) copy(x, y, z);
         }
       }
     }
@@ -50,12 +65,11 @@ void copyAll(const StridedValues& values, std::byte* to) {
 }  // namespace
 
 bool StridedValues::inOrder() const {
-  const auto scalar = static_cast<std::int64_t>(scalarBytes);
-  std::int64_t next = scalar * components;
-  bool in = components == 1 || componentStride == scalar;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
+  std::int64_t next = static_cast<std::int64_t>(scalarBytes) * components;
+  bool in = rowInOrder(*this);
+  for (std::size_t axis = 1; axis < 3; ++axis) {
+    next *= counts[axis - 1];
     in = in && (counts[axis] == 1 || strides[axis] == next);
-    next *= counts[axis];
   }
   return in;
 }

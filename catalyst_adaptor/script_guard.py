@@ -171,7 +171,7 @@ def install(leave, plugin):
 
     def start_loading(path):
         loading.clear()
-        refuse_drawing_without_display()
+        extend_proxies()
         loading["proxies"] = registered_proxies()
 
     def forget_module(name):
@@ -317,8 +317,9 @@ def require_display(what):
                            % (what, os.environ.get("DISPLAY", "not set")))
 
 
-def refuse_drawing_without_display():
-    """Views may be made and filled, as exported scripts do, but not drawn."""
+def extend_proxies():
+    """Without a display, views may be made and filled, as exported scripts do, but not drawn. VolumetricDepthImage has the
+    attribute Report, which ParaView makes of no property that only tells."""
     from paraview import servermanager
     if hasattr(servermanager.Proxy, "_vdi_guarded"):
         return
@@ -327,6 +328,9 @@ def refuse_drawing_without_display():
     drawing = {"StillRender", "InteractiveRender", "WriteImage", "WriteAnimation", "CaptureWindow", "SaveExtracts"}
 
     def __getattr__(self, name):
+        if name == "Report" and self.SMProxy.GetXMLName() == "VolumetricDepthImage":
+            self.SMProxy.UpdatePropertyInformation()
+            return self.SMProxy.GetProperty(name).GetElement(0)
         if name in drawing or (name == "Write" and self.SMProxy.GetXMLGroup() == "exporters"):
             require_display("%s of %s" % (name, self.SMProxy.GetXMLLabel()))
         return attribute_of(self, name)

@@ -104,10 +104,8 @@ def write_png(name, picture):
 
 
 def catalyst_execute(info):
-    image.TimeStep = info.timestep
     image.UpdatePipeline(info.time)
-    image.SMProxy.UpdatePropertyInformation()
-    report = image.SMProxy.GetProperty("Report").GetElement(0)
+    report = image.Report
     rows = []
     similarities = []
     for angle in ANGLES:

@@ -70,9 +70,11 @@ def execute(info):
             if max(alpha) == 0 or max(alpha[:64]) > 0 or max(alpha[-64:]) > 0:
                 raise RuntimeError("the picture doesn't show the whole scene")
     if FAULT == "save":
-        # No fault: the file knows its step.
+        # No fault: the file knows its step, and the filter what it cost.
         name = os.path.join(OUTPUT, "saved_%d.vdi" % info.timestep)
         SaveData(name, proxy=image)
+        if rank == 0 and "generate s" not in image.Report:
+            raise RuntimeError("the report is '%s'" % image.Report)
         saved = VDIReader(FileNames=[name])
         saved.UpdatePipeline()
         data = saved.GetClientSideObject().GetOutputDataObject(0)
