@@ -17,14 +17,14 @@ VDI_CONST uint castGroupX = 8;
 VDI_CONST uint castGroupY = 8;
 VDI_CONST uint castMaxPages = 8;
 VDI_CONST uint castProgramVolume = 0;            // DVR: colours and depths
-VDI_CONST uint castProgramSearch = 1;            // by bisection: one program that does both of the modes
-VDI_CONST uint castProgramCountPreSegments = 2;  // by merging: tolerances and counts
+VDI_CONST uint castProgramSearch = 1;            // bisection: one program for both modes
+VDI_CONST uint castProgramCountPreSegments = 2;  // merging: tolerances and counts
 VDI_CONST uint castProgramWritePreSegments = 3;
-VDI_CONST uint castProgramHistogram = 4;    // for the total budget: what lists need
-VDI_CONST uint castProgramCountLevels = 5;  // by merging, with other ranks: counts at all tolerances (quota.h)
+VDI_CONST uint castProgramHistogram = 4;    // total budget: the histogram of lists
+VDI_CONST uint castProgramCountLevels = 5;  // merging with other ranks: counts at all tolerances (quota.h)
 VDI_CONST uint castMaxLights = 8;
 VDI_CONST uint castMaxClipPlanes = 6;
-// Differences between two values that are smaller than this share of them are taken for rounding (core/Shading.h).
+// A difference between two values below this share of them counts as rounding (core/Shading.h).
 VDI_CONST float leastGradient = 1.0e-6f;
 VDI_CONST uint castModeSearch = 0;          // sensitivities and counts
 VDI_CONST uint castModeWrite = 1;           // supersegments
@@ -32,23 +32,26 @@ VDI_CONST uint castModeWrite = 1;           // supersegments
 struct CastParams {
   VDI_ADDRESS(BrickArray) bricks;
   VDI_ADDRESS(KdNodeArray) nodes;            // node 0 is the root
-  VDI_ADDRESS(CellArray) cells;              // macrocells: 1 where something is visible
-  VDI_ADDRESS(FloatArray) thresholds;        // [h][w]; by merging: tolerances, while counting those of the counted lists
-  VDI_ADDRESS(UintArray) capacities;         // [h][w]; by merging: room for pre-segments, while counting the pre-segments of these
+  VDI_ADDRESS(CellArray) cells;              // macrocells: 1 if something in it is visible
+  // [h][w]; merging: tolerances; while counting, of the counted lists
+  VDI_ADDRESS(FloatArray) thresholds;
+  // [h][w]; merging: room for pre-segments; while counting, their number in the counted lists
+  VDI_ADDRESS(UintArray) capacities;
   VDI_ADDRESS(UintArray) offsets;            // [h][w], exclusive prefix sum of capacities
-  VDI_ADDRESS(SegmentArray) segments;        // compact; by bisection
-  VDI_ADDRESS(PreSegmentArray) preSegments;  // compact; by merging
+  VDI_ADDRESS(SegmentArray) segments;        // compact; bisection
+  VDI_ADDRESS(PreSegmentArray) preSegments;  // compact; merging
   VDI_ADDRESS(UintArray) written;            // [h][w]: pre-segments
-  VDI_ADDRESS(UintArray) left;               // [h][w]: how many are to be left of them
+  VDI_ADDRESS(UintArray) left;               // [h][w]: the number of them to keep
   VDI_ADDRESS(Vec4Array) colors;             // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;            // [h][w]
   VDI_ADDRESS(UintArray) status;             // [statusWords]
   VDI_ADDRESS(UintArray) histogram;          // [histogramLevels + 1][2]
   VDI_ADDRESS(UintArray) levels;             // [rows][countedWidth][countedLevelWords]
   VDI_ADDRESS(UintArray) quotas;             // [h][w]; with other ranks: as in InterpolateConstants
-  VDI_ADDRESS(UintArray) guard;              // [1]: 0 if there's no room for the pre-segments that are to be written
-  // Ray of pixel (x, y): start = startBase + u * startRight + v * startUp, direction likewise, with u = x + 0.5 - w/2 and
-  // v = y + 0.5 - h/2. Start: at the front of the sample lattice, relative to the scene's centre.
+  VDI_ADDRESS(UintArray) guard;              // [1]: 0 if there is no room for the pre-segments to write
+  // The ray of pixel (x, y) has start = startBase + u * startRight + v * startUp, and its direction likewise,
+  // with u = x + 0.5 - w/2 and v = y + 0.5 - h/2. It starts at the front of the sample lattice, relative to
+  // the scene's centre.
   vec3 startBase;
   float step;  // depth between samples
   vec3 startRight;
@@ -60,14 +63,15 @@ struct CastParams {
   float coordinateError;  // bound on the rounding error of a position
   vec3 directionUp;
   uint sampleCount;
-  vec3 sceneLo;  // bounds of what is shown of all ranks' blocks, snapped as the bricks are
+  vec3 sceneLo;  // bounds of the visible part of all ranks' blocks, snapped as the bricks are
   vec3 sceneHi;
   uint budget;
   uint width;
   uint height;
   uint nodeCount;  // 0: no bricks
-  // Of the table of slabs (core/SlabTable.h): what straight colours and optical depths are beyond the transfer table's range;
-  // 1 / columns and rows; steps of its square a position; rows of a strip; its slabs a world length.
+  // The table of slabs (core/SlabTable.h): straight colours and optical depths beyond the transfer table's
+  // range; 1 / columns and 1 / rows; steps of its square per position; rows of a strip; slabs per world
+  // length.
   vec4 slabBelow;
   vec4 slabAbove;
   vec2 perSlabTexels;
@@ -75,30 +79,31 @@ struct CastParams {
   float stripRows;
   float slabsPerDepth;
   float lastPosition;  // of the transfer table
-  uint slabs;      // 1: samples are classified by what lies between their two ends; 0: by their middle
+  // 1: samples are classified by the scalars at their two ends; 0: by the one in their middle
+  uint slabs;
   StoredForm form;  // of segments
-  // While counting pre-segments: every countedStride-th list of every countedStride-th row, from the band's first row on, up to
-  // and including the row behind the band, as [rows][countedWidth].
+  // While counting pre-segments: every countedStride-th list of every countedStride-th row, from the band's
+  // first row to the row after the band, as [rows][countedWidth].
   uint countedStride;
   uint countedWidth;
-  uint countedSamples;  // one sample stands for that many, those of a multiple of it
+  uint countedSamples;  // one sample, at a multiple of this number, stands for that many
   uint maxPerList;
-  float level;      // of the histogram; negative: equal budgets
-  uint levelShift;  // of levels
-  // Where colours are shaded (core/Shading.h): towards each light in world space, zero for one at the eye; its colour, times
-  // diffuse.
+  float level;      // in the histogram; negative: equal budgets
+  uint levelShift;  // for levels
+  // For shading (core/Shading.h): the direction towards each light in world space, zero for one at the eye;
+  // its colour, times diffuse.
   vec3 lightDirections[castMaxLights];
   vec3 lightColors[castMaxLights];
   uint lightCount;
   float ambient;
-  vec4 clipPlanes[castMaxClipPlanes];  // what is shown has dot(xyz, position) >= w
+  vec4 clipPlanes[castMaxClipPlanes];  // the visible side has dot(xyz, position) >= w
   uint clipPlaneCount;
-  uint shaded;  // 1: they are; a constant of the program
+  uint shaded;  // 1: colours are shaded; a constant of the program
 };
 
 struct CastConstants {
   uint mode;
-  uint firstRow;  // of the band of rows that this dispatch covers
+  uint firstRow;  // first row of this dispatch's band
   uint lastRow;
 };
 

@@ -1,4 +1,4 @@
-// Parameters of cells.comp: macrocells, which tell where a rank's blocks hold nothing visible.
+// Parameters of cells.comp: macrocells, which show where a rank's blocks have no visible values.
 #ifndef VDI_SHARED_CELLS_H
 #define VDI_SHARED_CELLS_H
 #include "volume.h"
@@ -9,14 +9,13 @@ VDI_CONST uint cellsGroup = 64;
 VDI_CONST uint cellsModeMeasure = 0;   // texels -> ranges
 VDI_CONST uint cellsModeClassify = 1;  // ranges and transfer table -> visible
 
-// Texels of infinite values are finite, so that filters don't make NaN of them: the second largest
-// float there is.
+// Infinite values become the second largest float as texels, so that filters do not turn them into NaN.
 VDI_CONST uint infiniteTexelBits = 0x7f7ffffeu;
 
 VDI_CONST uint pieceRangeWords = 3u;
 
-// The macrocells of a piece of a texture page: cell c of an axis has the texels [c * cellSide, (c + 1) * cellSide] of the
-// piece, and one more at either end, which a filter may touch when it rounds.
+// The macrocells of a piece of a texture page. Cell c of an axis has the piece's texels [c * cellSide, (c +
+// 1) * cellSide], and one more at either end, which a filter may read because of rounding.
 struct CellPiece {
   uvec3 place;  // in the page, texels
   uint page;
@@ -30,7 +29,9 @@ struct CellPiece {
 VDI_SHARED_END
 
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CellPieceArray { CellPiece at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CellPieceArray {
+  CellPiece at[];
+};
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CellRangeArray { vec2 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer CellArray { uint at[]; };
 #endif
@@ -39,13 +40,16 @@ VDI_SHARED_BEGIN
 
 struct CellsConstants {
   VDI_ADDRESS(CellPieceArray) pieces;  // by firstCell
-  VDI_ADDRESS(CellRangeArray) ranges;  // [cells]: smallest and largest texel but for NaN; upside down if there's none
-  // [pieces][pieceRangeWords]: the same of pieces, but for infinite texels. All bits set beforehand: the smallest, and the
-  // inverted bits of the largest, as bits of floats that are ordered as unsigned numbers (of negative ones all inverted, of
-  // others the sign). Then 0 where there are infinite texels.
+  // [cells]: smallest and largest texel, ignoring NaN; inverted if there is none
+  VDI_ADDRESS(CellRangeArray) ranges;
+  // [pieces][pieceRangeWords]: a piece's smallest texel, and the inverted bits of its largest one, ignoring
+  // NaN and infinite texels. Floats are stored as bits that compare as unsigned numbers: negative ones with
+  // all bits inverted, others with the sign inverted. The third word becomes 0 if there are infinite texels.
+  // All bits are set beforehand.
   VDI_ADDRESS(CellArray) pieceRanges;
   VDI_ADDRESS(CellArray) visible;      // [cells]: 1 or 0
-  VDI_ADDRESS(CellArray) visibleBefore;  // [tableSize + 1]: how many of the table's first entries aren't transparent
+  // [tableSize + 1]: number of visible entries before each entry of the table
+  VDI_ADDRESS(CellArray) visibleBefore;
   uint pieceCount;
   uint cellCount;
   uint tableSize;

@@ -8,33 +8,36 @@ VDI_SHARED_BEGIN
 VDI_CONST uint compositeGroup = 64;
 VDI_CONST uint interleaveModeCount = 0;     // counts[list] = sum over ranks
 VDI_CONST uint interleaveModeWrite = 1;     // writes interleaved
-VDI_CONST uint interleaveModeFlatten = 2;   // writes colors and depths, of merged
-VDI_CONST uint compositeProgramSearch = 0;  // as castProgramSearch and so on
+VDI_CONST uint interleaveModeFlatten = 2;   // writes colors and depths, from interleaved
+VDI_CONST uint compositeProgramSearch = 0;  // like castProgramSearch and the following
 VDI_CONST uint compositeProgramCountPreSegments = 1;
 VDI_CONST uint compositeProgramWritePreSegments = 2;
 VDI_CONST uint compositeProgramHistogram = 3;
 VDI_CONST uint compositeModeSearch = 0;
 VDI_CONST uint compositeModeWrite = 1;
 
-// Where a rank's part of a list has got to.
+// A rank's position in a list.
 struct InterleaveHead {
   uint next;
   uint end;
-  vec2 depths;  // front and back of the next one, comparable within the list
+  vec2 depths;  // front and back of its next supersegment, comparable within the list
 };
 
 VDI_SHARED_END
 
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer InterleaveHeadArray { InterleaveHead at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer InterleaveHeadArray {
+  InterleaveHead at[];
+};
 #endif
 
 VDI_SHARED_BEGIN
 
 struct InterleaveConstants {
-  VDI_ADDRESS(SegmentArray) received;      // one rank's lists behind the other's
-  VDI_ADDRESS(UintArray) subOffsets;       // [ranks][rowLength], and one more: a prefix sum of all of them
-  VDI_ADDRESS(InterleaveHeadArray) heads;  // as many as received, scratch
+  VDI_ADDRESS(SegmentArray) received;      // all ranks' lists, one rank after the other
+  // [ranks][rowLength], and a last entry: prefix sum over all of them
+  VDI_ADDRESS(UintArray) subOffsets;
+  VDI_ADDRESS(InterleaveHeadArray) heads;  // scratch, as many as received
   VDI_ADDRESS(UintArray) counts;           // [lists]
   VDI_ADDRESS(UintArray) offsets;          // [lists + 1]
   VDI_ADDRESS(SegmentArray) interleaved;   // ordered by depth within each list
@@ -44,7 +47,7 @@ struct InterleaveConstants {
   uint rankCount;
   uint rowLength;  // >= listCount
   uint mode;
-  StoredForm form;  // of received and merged
+  StoredForm form;  // of received and interleaved
 };
 
 struct CompositeParams {
@@ -65,7 +68,7 @@ struct CompositeParams {
   uint listCount;
   uint maxPerList;
   float level;  // as in CastParams
-  StoredForm form;  // of merged and segments
+  StoredForm form;  // of interleaved and segments
 };
 
 struct CompositeConstants {

@@ -1,4 +1,4 @@
-// Parameters of counts.comp: how many supersegments lists hold, as ranks tell each other.
+// Parameters of counts.comp: packs lists' counts for exchange between ranks.
 #ifndef VDI_SHARED_COUNTS_H
 #define VDI_SHARED_COUNTS_H
 #include "lists.h"
@@ -6,8 +6,8 @@
 VDI_SHARED_BEGIN
 
 VDI_CONST uint countsGroup = 256;
-VDI_CONST uint countsPerWord = 4;  // lists whose counts are the bytes of a word, the first one lowest
-VDI_CONST uint countsModePack = 0;      // offsets -> packed, and tooLarge if a count has no room in a byte
+VDI_CONST uint countsPerWord = 4;  // lists whose counts share a word, a byte each, the first one lowest
+VDI_CONST uint countsModePack = 0;      // offsets -> packed, and tooLarge if a count does not fit a byte
 VDI_CONST uint countsModePackWide = 1;  // offsets -> packed, a word each
 VDI_CONST uint countsModeUnpack = 2;    // packed, bytes -> counts
 

@@ -10,8 +10,8 @@ VDI_CONST uint fieldGroup = 64;
 struct FieldConstants {
   VDI_ADDRESS(FloatArray) values;  // [size.z][size.y][size.x], in [0, 1]
   uvec3 size;
-  uint field;  // place in fields() of vdi/synthetic/Fields.h
-  vec3 first;  // lattice index of the first value, and half a one for cells
+  uint field;  // index in fields() of vdi/synthetic/Fields.h
+  vec3 first;  // lattice index of the first value; half an index more for cells
   float spacing;
   uint seed;
   uint pad;

@@ -1,5 +1,6 @@
-// Lets one header describe constants and structs to C++ and to GLSL. Layout: scalar (GL_EXT_scalar_block_layout), which is what C++
-// gives to structs of 4-byte members and of 8-byte members at multiples of 8.
+// Lets one header describe constants and structs to C++ and GLSL. GLSL's scalar layout
+// (GL_EXT_scalar_block_layout) equals that of C++ for structs of 4-byte members, and of 8-byte members at
+// multiples of 8.
 #ifndef VDI_SHARED_INTEROP_H
 #define VDI_SHARED_INTEROP_H
 

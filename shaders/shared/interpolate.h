@@ -7,14 +7,17 @@ VDI_SHARED_BEGIN
 
 VDI_CONST uint interpolateGroup = 64;
 
-// A band of lists, of which every stride-th in a row of every stride-th row is counted.
+// A band of lists; every stride-th list of every stride-th row is counted.
 struct InterpolateConstants {
-  VDI_ADDRESS(FloatArray) countedTolerances;  // [countedRows][countedWidth]: the finest that gives few enough pre-segments
-  VDI_ADDRESS(UintArray) countedPreSegments;  // likewise: these
+  // [countedRows][countedWidth]: the finest with few enough pre-segments
+  VDI_ADDRESS(FloatArray) countedTolerances;
+  // [countedRows][countedWidth]: number of pre-segments at that tolerance
+  VDI_ADDRESS(UintArray) countedPreSegments;
   VDI_ADDRESS(FloatArray) tolerances;         // [rows][width]
-  VDI_ADDRESS(UintArray) capacities;          // likewise
-  // With other ranks, else 0: in the low half of a word, how many supersegments this rank may have in the list; in the high
-  // half, how much of the room is for pre-segments that begin runs. And what that is in the counted lists.
+  VDI_ADDRESS(UintArray) capacities;          // [rows][width]
+  // With other ranks, else 0. A word has, in its low half, this rank's quota of supersegments in the list,
+  // and in its high half the part of the room for pre-segments that begin runs. First for the counted lists,
+  // then for all.
   VDI_ADDRESS(UintArray) countedQuotas;
   VDI_ADDRESS(UintArray) quotas;
   uint width;

@@ -1,4 +1,4 @@
-// Supersegments, and the pre-segments that they're merged from.
+// Supersegments, and the pre-segments from which they are merged.
 #ifndef VDI_SHARED_LISTS_H
 #define VDI_SHARED_LISTS_H
 #include "interop.h"
@@ -6,14 +6,14 @@
 
 VDI_SHARED_BEGIN
 
-// What a rank tells the others of a list that it has counted, as bytes of these words, the first one lowest: visible samples,
-// pre-segments at each tolerance, runs. Each is divided by 2^levelShift, rounded up, and 255 at most.
+// A rank's counts of a list, as bytes of these words, the first one lowest: visible samples, pre-segments at
+// each tolerance, runs. Each is divided by 2^levelShift, rounded up, and 255 at most.
 VDI_CONST uint countedLevelWords = 3;
-VDI_CONST uint countedTolerance = 1;  // place of the finest tolerance's
+VDI_CONST uint countedTolerance = 1;  // position of the finest tolerance's count
 VDI_CONST uint countedRuns = 9;
 
-// What writing says of lists whose written count differs from the stored one, as words: how many there are, and with several
-// ranks the most runs of any of them.
+// Words that report lists whose written count differs from the stored one: how many there are, and with
+// several ranks the most runs in any of them.
 VDI_CONST uint statusWrongLists = 0;
 VDI_CONST uint statusMostRuns = 1;
 VDI_CONST uint statusWords = 2;
@@ -28,17 +28,19 @@ struct Segment {
   float opacity;
 };
 
-// A pre-segment in memory: 32 bytes, so that it's a whole piece of a cache line where neighbouring invocations read
-// different lists.
+// A pre-segment in memory. Its 32 bytes are a whole sector of a cache line, because neighbouring invocations
+// read different lists.
 struct StoredPreSegment {
   vec2 span;     // front, back
-  float before;  // transmittance of what's in front of it
+  float before;  // transmittance in front of it
   float unused;
-  vec4 light;    // premultiplied colour over all of it, and optical depth: negative if it must not be merged with the one before it
+  // Premultiplied colour and optical depth of all of it; the latter is negative if it must not merge with the
+  // one before
+  vec4 light;
 };
 
-// How supersegments lie in memory: as CompactSupersegment with this DepthCode of core/Supersegment.h, or, if the step is 0,
-// as Segment. Shaders are specialised to one of the two (store.glsl).
+// Form of supersegments in memory: CompactSupersegment with this DepthCode of core/Supersegment.h, or Segment
+// if the step is 0. Shaders are specialised to one of the two (store.glsl).
 struct StoredForm {
   float depthFirst;
   float depthStep;
@@ -46,13 +48,16 @@ struct StoredForm {
 
 #ifdef __cplusplus
 inline uint isCompact(const StoredForm& form) { return form.depthStep > 0.0F ? 1 : 0; }
-static_assert(sizeof(StoredPreSegment) == 32 && sizeof(Segment) == 24);  // as preSegmentsFrom and segmentsFrom count
+// preSegmentsFrom and segmentsFrom use these sizes.
+static_assert(sizeof(StoredPreSegment) == 32 && sizeof(Segment) == 24);
 #endif
 
 VDI_SHARED_END
 
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer PreSegmentArray { StoredPreSegment at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer PreSegmentArray {
+  StoredPreSegment at[];
+};
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CompactArray { uvec2 at[]; };
 struct FourCompact {
@@ -64,9 +69,11 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { 
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray { float at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4Array { vec4 at[]; };
 
-// Arrays may take more than 4 GiB. Where an index goes beyond them, a driver may compute its place in
-// 32 bits: lists of an H200 came out wrong there. So a list's elements are counted from its first one.
-PreSegmentArray preSegmentsFrom(PreSegmentArray all, uint first) { return PreSegmentArray(uint64_t(all) + 32ul * first); }
+// Arrays may exceed 4 GiB. A driver may compute the position of a large index in 32 bits: an H200 gave wrong
+// lists that way. So indices of a list's elements count from its first one.
+PreSegmentArray preSegmentsFrom(PreSegmentArray all, uint first) {
+  return PreSegmentArray(uint64_t(all) + 32ul * first);
+}
 SegmentArray segmentsFrom(SegmentArray all, uint first) { return SegmentArray(uint64_t(all) + 24ul * first); }
 #endif
 

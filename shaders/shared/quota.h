@@ -1,4 +1,4 @@
-// Parameters of quota.comp: what ranks agree on about lists that they've counted together.
+// Parameters of quota.comp: the ranks' agreement on lists that they have counted together.
 #ifndef VDI_SHARED_QUOTA_H
 #define VDI_SHARED_QUOTA_H
 #include "lists.h"
@@ -8,17 +8,20 @@ VDI_SHARED_BEGIN
 VDI_CONST uint quotaGroup = 64;
 
 struct QuotaConstants {
-  VDI_ADDRESS(UintArray) own;          // [rows][width][countedLevelWords]: what this rank counted
-  VDI_ADDRESS(UintArray) sum;          // likewise: byte by byte what all did, 255 at most
-  VDI_ADDRESS(FloatArray) tolerances;  // [rows][width]: the finest that gives few enough pre-segments in all; 0: there's nothing
+  VDI_ADDRESS(UintArray) own;          // [rows][width][countedLevelWords]: this rank's counts
+  // [rows][width][countedLevelWords]: byte by byte the sum of all ranks', at most 255
+  VDI_ADDRESS(UintArray) sum;
+  // [rows][width]: the finest with few enough pre-segments in all; 0: an empty list
+  VDI_ADDRESS(FloatArray) tolerances;
   VDI_ADDRESS(UintArray) preSegments;  // [rows][width]: this rank's at that tolerance
   VDI_ADDRESS(UintArray) quotas;       // [rows][width]: as in InterpolateConstants
-  VDI_ADDRESS(UintArray) weights;      // [rows]: supersegments that all ranks together will have in a row, added
+  // [rows]: sum of the supersegments that all ranks together will have in a row
+  VDI_ADDRESS(UintArray) weights;
   uint width;
   uint rows;
   uint budget;
   uint levelShift;
-  uint levelCount;  // of tolerances, from countedTolerance on
+  uint levelCount;  // number of tolerances, from countedTolerance on
   uint pad;
 };
 

@@ -1,5 +1,5 @@
-// Constants of how intervals become supersegments, and these become codes: of the reference, which says what they're
-// for (vdi/reference/Segmenter.h, vdi/reference/Compaction.h), and of the shaders.
+// Constants of segmenting and of depth codes, shared by shaders and reference. vdi/reference/Segmenter.h and
+// vdi/reference/Compaction.h explain them.
 #ifndef VDI_SHARED_SEGMENTING_H
 #define VDI_SHARED_SEGMENTING_H
 #include "interop.h"
@@ -21,31 +21,31 @@ VDI_CONST int toleranceLevels = 8;
 VDI_CONST float finestTolerance = 0.002F;
 VDI_CONST float toleranceRatio = 4.0F;
 VDI_CONST float hiddenWeight = 0.15F;
-// Room for pre-segments, in multiples of a list's budget, and what's added to it.
+// Room for pre-segments, in multiples of a list's budget, and what is added to it.
 VDI_CONST uint preSegmentsPerBudget = 2;
 VDI_CONST uint sparePreSegments = 4;
-VDI_CONST uint uncountedSparePreSegments = 8;  // and a quarter of the pre-segments
+VDI_CONST uint uncountedSparePreSegments = 8;  // plus a quarter of the pre-segments
 VDI_CONST uint countedStride = 4;
-// A cumulative histogram: what all lists would hold at each level, then what they would equally; a pair of words each,
-// the low one first. SupersegmentHistogram of core/Budget.h.
+// Cumulative histogram: the supersegments of all lists at each level, then those with equal budgets. Each is
+// a pair of words, the low one first. SupersegmentHistogram of core/Budget.h.
 VDI_CONST uint histogramLevels = 10;
 
 // Codes.
 VDI_CONST float maxDepthCode = 16383.0F;
 VDI_CONST float maxCarriedDepth = 1.0F / 16.0F;
-VDI_CONST float maxDepthChange = 0.25F;  // of the supersegment's own
+VDI_CONST float maxDepthChange = 0.25F;  // share of the supersegment's own
 VDI_CONST float thinnestStep = 0.0002F;  // of opticalDepthOfCode
 VDI_CONST float maxColorChange = 3.0F / 255.0F;
 VDI_CONST float unseen = 1e-6F;
 
 #ifdef __cplusplus
-// Of a list that may hold `maximum` supersegments, where gaps don't require more.
+// The most pre-segments of a list that may hold `maximum` supersegments, unless gaps require more.
 constexpr uint64_t maxPreSegments(uint64_t maximum) {
   const uint64_t preSegments = preSegmentsPerBudget * maximum;
   return preSegments + preSegments / 4 + uncountedSparePreSegments;
 }
-// A ray that's counted for others takes one sample for this many: the more, the longer rays are for their lists' budget,
-// for a device waits for the longest ray.
+// Number of samples for which a counted ray takes one. It grows with the rays' length relative to their
+// lists' budget, because a device waits for the longest ray.
 constexpr uint countedSamplesFor(uint lattice, uint budget) {
   const uint share = lattice / (16 * budget);
   return share < 1 ? 1 : share > 2 ? 2 : share;

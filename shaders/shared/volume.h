@@ -8,10 +8,10 @@ VDI_SHARED_BEGIN
 // Texels per side of a macrocell (cells.comp).
 VDI_CONST uint cellSide = 16;
 
-// The deepest kd-tree over bricks that cast.comp has stack for.
+// The greatest depth of a kd-tree over bricks that fits the stack of cast.comp.
 VDI_CONST int kdMaxDepth = 40;
 
-// A box of samples that one piece of one texture page serves. Positions are relative to the scene's centre, snapped to
+// A box of samples in one piece of one texture page. Positions are relative to the scene's centre, snapped to
 // the scene's lattice (core/Scene.h).
 struct Brick {
   vec3 lo;           // owned, half-open
@@ -21,12 +21,12 @@ struct Brick {
   vec3 texelScale;  // normalised texture coordinate = position * texelScale + texelOffset
   uint page;
   vec3 texelOffset;
-  uint piece;  // of vdi/gpu/VolumeStore; the shaders don't read it
-  vec3 texelLo;  // centre of the outermost texels: coordinates are clamped to these
-  uint firstCell;  // of its piece's macrocells
+  uint piece;  // index in vdi/gpu/VolumeStore; shaders do not read it
+  vec3 texelLo;  // centre of the first texels (lo) and last ones (hi): coordinates are clamped to them
+  uint firstCell;  // first of its piece's macrocells
   vec3 texelHi;
   uint pad0;
-  vec3 cellScale;  // place among the piece's macrocells = texture coordinate * cellScale + cellOffset
+  vec3 cellScale;  // position among the piece's macrocells = texture coordinate * cellScale + cellOffset
   uint pad1;
   vec3 cellOffset;
   uint pad2;
@@ -34,8 +34,8 @@ struct Brick {
   uint pad3;
 };
 
-// Node of a kd-tree over bricks. Inner: samples with p[axis] < split lie in child `first`, the others in `first + 1`.
-// Leaf: axis == 3, bricks [first, first + count); count is 0 or 1.
+// Node of a kd-tree over bricks. Inner node: samples with p[axis] < split lie in child `first`, the others in
+// `first + 1`. Leaf: axis == 3, bricks [first, first + count); count is 0 or 1.
 struct KdNode {
   float split;
   uint axis;

@@ -8,22 +8,22 @@
 
 namespace vdi::comm {
 
-/// Byte by byte, 255 at most. Each rank adds up one share of the bytes, of all ranks, and all ranks get all
-/// sums. Ranks of one host read the sums where they were added up.
+/// Adds byte by byte, up to 255. Each rank adds up all ranks' bytes in its share of them, and all ranks get
+/// all sums. Ranks of one host read the sums in place.
 class ByteSum {
  public:
-  /// Not collective. `comm` must stay.
+  /// Not collective. `comm` must outlive it.
   ByteSum(const Communicator& comm, Transport transport);
 
-  /// Collective: where this rank is to put its bytes, the same number on all ranks.
+  /// Collective: the place for this rank's bytes, which are as many on all ranks.
   Exchange::Place begin(std::uint64_t bytes);
-  /// A stretch of the sum.
+  /// A contiguous part of the sum.
   struct Stretch {
     Exchange::Place place;
-    std::uint64_t first = 0;  // of all bytes
+    std::uint64_t first = 0;  // position among all bytes
     std::uint64_t bytes = 0;
   };
-  /// Collective: the sum, as stretches that cover it. They stay until the next begin.
+  /// Collective: returns the sum, as stretches that cover it. They stay valid until the next begin.
   std::vector<Stretch> add();
 
  private:
@@ -37,7 +37,7 @@ class ByteSum {
   const Communicator& comm_;
   Exchange scatter_;
   Exchange gather_;
-  Exchange::Place own_;  // this rank's bytes, which become sums
+  Exchange::Place own_;  // this rank's bytes, replaced by sums
   std::uint64_t bytes_ = 0;
 };
 

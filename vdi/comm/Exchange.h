@@ -1,4 +1,4 @@
-// What every rank has for every other one gets there (paper, section 5.2: direct send).
+// Sends data from every rank to every other one (paper, section 5.2: direct send).
 #pragma once
 
 #include <array>
@@ -13,29 +13,29 @@
 
 namespace vdi::comm {
 
-/// Direct send between the ranks of a communicator, through memory that devices can import. Between ranks of
-/// one host the receiver reads where the sender wrote; between hosts messages go from the sender's memory to
-/// the receiver's. A host without room for shared memory sends messages too, and so does one whose ranks
-/// can't open each other's.
+/// Direct send between the ranks of a communicator, through memory that devices can import. Within a host the
+/// receiver reads from the sender's memory; between hosts, messages carry data from the sender's memory to
+/// the receiver's. Ranks of a host also use messages if it has too little shared memory, or if they cannot
+/// open each other's.
 class Exchange {
  public:
-  /// Not collective. `comm` must stay.
+  /// Not collective. `comm` must outlive it.
   Exchange(const Communicator& comm, Transport transport);
 
-  /// A place in the host's memory.
+  /// A position in host memory.
   struct Place {
     std::shared_ptr<HostMemory> memory;
     std::uint64_t at = 0;
   };
-  /// Collective. Where this rank is to put what it sends, `bytes` of it at least: the same as last time where
-  /// that's large enough. What was received before is gone, on all ranks. All ranks throw if one is out of
+  /// Collective. Returns the place for this rank's outgoing data, of at least `bytes`; it is the last one if
+  /// that is large enough. Invalidates the received data, on all ranks. All ranks throw if one is out of
   /// memory.
   Place outbox(std::uint64_t bytes);
 
-  using Note = std::array<std::uint64_t, 2>;  // whatever the receiver should know
+  using Note = std::array<std::uint64_t, 2>;  // for the receiver, of any meaning
   struct Outgoing {
     int to = 0;
-    std::uint64_t at = 0;  // bytes from the outbox's place on
+    std::uint64_t at = 0;  // in bytes, relative to the outbox
     std::uint64_t bytes = 0;
     Note note{};
   };
@@ -45,12 +45,12 @@ class Exchange {
     std::uint64_t bytes = 0;
     Note note{};
   };
-  /// Collective: sends to other ranks what's in the outbox, at most one piece to each. Returns what came, in
-  /// rank order; it stays until the next outbox. Ranks that have nothing for each other exchange a header
-  /// alone.
+  /// Collective: sends data in the outbox to other ranks, at most one piece to each. Returns the received
+  /// pieces, in rank order; they stay valid until the next outbox. Ranks without data for each other exchange
+  /// only a header.
   std::vector<Incoming> send(std::span<const Outgoing> pieces);
 
-  /// Whether what that rank sends is read where it wrote it.
+  /// Whether this rank reads that rank's data in place.
   bool sharesMemoryWith(int rank) const;
 
  private:
@@ -70,7 +70,7 @@ class Exchange {
       parts_;                     // sizes of all ranks' outboxes in such windows; empty: there are none yet
   bool everyHostShares_ = false;  // each host's ranks have a window
   bool messages_ = true;          // some pair of ranks has no window in common
-  std::shared_ptr<HostMemory> inbox_;  // of messages
+  std::shared_ptr<HostMemory> inbox_;  // for messages
 };
 
 }  // namespace vdi::comm

@@ -1,5 +1,5 @@
-// Lets a thread take part in what ranks do together although MPI was initialised for another one alone
-// (MPI_THREAD_FUNNELED, or a program that asked for no threads at all, as ParaView's servers do).
+// Lets a second thread take part in collective work although MPI was initialised for one thread only
+// (MPI_THREAD_FUNNELED, or MPI_THREAD_SINGLE, as ParaView's servers do).
 #pragma once
 
 #include <chrono>
@@ -7,21 +7,22 @@
 
 namespace vdi::comm {
 
-/// Carries a thread's calls of MPI to the one that may make them: on each rank a thread works within an
-/// Entry, and the program's own thread serves it now and then. Served operations never block: a rank that
-/// isn't there yet keeps nobody in `serve`, so ranks may serve at different times, and do something else, MPI
-/// too, in between. It needs an MPI that gets on with an operation while its rank is in other calls of MPI,
-/// or serves.
+/// Carries a thread's MPI calls to the one thread that may make them. On each rank, a thread works within an
+/// Entry, and the program's main thread serves it now and then. Served operations never block: `serve`
+/// returns although another rank is late, so ranks may serve at different times, and do other work, including
+/// MPI calls, in between. The MPI library must make progress on an operation while its rank is in other MPI
+/// calls or serves.
 class Funnel {
  public:
   Funnel();
-  ~Funnel();  // no Entry may be left
+  ~Funnel();  // requires that no Entry is left
   Funnel(const Funnel&) = delete;
   Funnel& operator=(const Funnel&) = delete;
   Funnel(Funnel&&) = delete;
   Funnel& operator=(Funnel&&) = delete;
 
-  /// While it's there, operations of Communicators and Messages in this thread wait for somebody who serves.
+  /// As long as it exists, operations of Communicators and Messages in its thread wait for another thread to
+  /// serve them.
   class Entry {
    public:
     explicit Entry(Funnel& funnel);
@@ -35,8 +36,8 @@ class Funnel {
     Funnel* before_;
   };
 
-  /// In the thread that may call MPI. Returns when `most` has passed, or before where the other thread has
-  /// asked for nothing for some milliseconds. To be called again until that thread has ended, on all ranks.
+  /// Call in the thread that may call MPI, repeatedly until the other thread has ended, on all ranks. Returns
+  /// after `most`, or earlier if the other thread has requested nothing for some milliseconds.
   void serve(std::chrono::milliseconds most);
 
  private:

@@ -1,4 +1,4 @@
-// The scene that all ranks' blocks make up.
+// The scene of all ranks' blocks.
 #pragma once
 
 #include "vdi/comm/Communicator.h"

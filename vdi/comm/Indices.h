@@ -1,4 +1,4 @@
-// Walks over the indices of a box, x fastest. Not part of the library's interface.
+// Loops over the indices of a box, x fastest. Not part of the library's interface.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -7,7 +7,7 @@
 
 namespace vdi::comm {
 
-/// `visit(at)` for the first index of each row.
+/// Calls `visit(at)` for the first index of each row.
 template <typename Visit>
 void forEachRow(const IndexBox& box, Visit visit) {
   for (int z = box.lo.z; z < box.hi.z; ++z) {
@@ -15,7 +15,7 @@ void forEachRow(const IndexBox& box, Visit visit) {
   }
 }
 
-/// `visit(at)` for each index.
+/// Calls `visit(at)` for each index.
 template <typename Visit>
 void forEachIndex(const IndexBox& box, Visit visit) {
   forEachRow(box, [&](glm::ivec3 at) {

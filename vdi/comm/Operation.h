@@ -1,4 +1,4 @@
-// How vdi/comm calls MPI: at once, or through the thread's Funnel. Private to vdi/comm.
+// How vdi/comm calls MPI: directly, or through the thread's Funnel. Private to vdi/comm.
 #pragma once
 
 #include <mpi.h>
@@ -11,19 +11,19 @@ namespace vdi::comm {
 /// Throws Error{Communication} for a result other than MPI_SUCCESS.
 void check(int result, const char* call);
 
-/// What a thread within a Funnel asks for.
+/// An MPI operation that a thread within a Funnel requests.
 struct Operation {
-  /// Begins it, by calls that don't wait for other ranks; gives the requests that tell of its end.
+  /// Begins the operation, by calls that do not wait for other ranks, and adds the requests that complete it.
   std::function<int(std::vector<MPI_Request>&)> begin;
 
   /// Whether this thread is within a Funnel.
   static bool isCarried();
-  /// Waits until it has ended, in a thread that's within a Funnel. Throws as check does.
+  /// Waits until the operation has ended; the thread must be within a Funnel. Throws as check does.
   void carry(const char* name) const;
 };
 
-/// A collective: `blocking` with `arguments`, or where the thread has a Funnel `starting`, which takes a
-/// request, too.
+/// Calls a collective: `blocking` with `arguments`, or in a thread with a Funnel `starting`, which also takes
+/// a request.
 template <typename Blocking, typename Starting, typename... Arguments>
 void call(const char* name, Blocking blocking, Starting starting, Arguments... arguments) {
   if (!Operation::isCarried()) return check(blocking(arguments...), name);
@@ -32,14 +32,14 @@ void call(const char* name, Blocking blocking, Starting starting, Arguments... a
   }}.carry(name);
 }
 
-/// What waits for nobody: `function` gives MPI's result.
+/// Calls an operation that waits for no other rank; `function` returns MPI's result.
 template <typename Function>
 void callHere(const char* name, const Function& function) {
   if (!Operation::isCarried()) return check(function(), name);
   Operation{[&](std::vector<MPI_Request>&) { return function(); }}.carry(name);
 }
 
-/// Waits for the end of requests.
+/// Waits until all requests are complete.
 void waitForAll(std::vector<MPI_Request>& requests);
 
 }  // namespace vdi::comm

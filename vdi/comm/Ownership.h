@@ -1,4 +1,4 @@
-// Who composites which lists (paper, section 5.2). Pure arithmetic: no communication.
+// Which rank composites which lists (paper, section 5.2). Pure arithmetic: no communication.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace vdi::comm {
 
-/// Lists [first, last) belong to one rank.
+/// Lists [first, last) of one rank.
 struct ListRange {
   std::uint64_t first = 0;
   std::uint64_t last = 0;
@@ -15,18 +15,18 @@ struct ListRange {
   bool operator==(const ListRange&) const = default;
 };
 
-/// Contiguous ranges of lists, the shares: rank r owns share r. They begin at multiples of `granularity`
+/// Divides lists into contiguous ranges: rank r owns range r. Ranges begin at multiples of `granularity`
 /// lists.
 class Ownership {
  public:
-  /// Lists whose counts travel in one word.
+  /// Number of lists whose counts share one word.
   static constexpr std::uint64_t granularity = 4;
 
-  /// As many lists in each, but for granularity; none in surplus shares.
+  /// Ranges of equal size, up to granularity; surplus ranks get empty ranges.
   static Ownership equal(std::uint64_t listCount, int ranks);
-  /// As much work in each, as far as contiguous ranges allow. `weights[i]`: work in the i-th stretch of
-  /// `listsPerWeight` lists (the last one may be shorter), spread evenly over it. A list is some work of its
-  /// own, so that ranks share what's empty too. Every rank that passes the same gets the same.
+  /// Ranges of equal work, as far as contiguous ranges allow. `weights[i]` is the work in the i-th stretch of
+  /// `listsPerWeight` lists (the last one may be shorter), spread evenly over it. Each list costs a little by
+  /// itself, so that ranks share empty lists too. Equal arguments give equal results on every rank.
   static Ownership balanced(std::uint64_t listCount, int ranks, std::span<const std::uint32_t> weights,
                             std::uint64_t listsPerWeight);
 
@@ -37,7 +37,7 @@ class Ownership {
   bool operator==(const Ownership&) const = default;
 
  private:
-  std::vector<std::uint64_t> boundaries_;  // share i is [boundaries_[i], boundaries_[i + 1])
+  std::vector<std::uint64_t> boundaries_;  // rank i owns [boundaries_[i], boundaries_[i + 1])
 };
 
 }  // namespace vdi::comm

@@ -1,4 +1,4 @@
-// How ranks of one host pass bytes on.
+// How ranks of one host exchange bytes.
 #pragma once
 
 #include <string_view>
@@ -6,12 +6,12 @@
 namespace vdi::comm {
 
 enum class Transport {
-  Shared,  // they lie in memory that all of them see: nothing is copied
-  Mpi      // as between hosts
+  Shared,  // through shared memory, without copying
+  Mpi      // by messages, as between hosts
 };
 
-/// `value`, what VDI_TRANSPORT is: "shared" or "mpi"; shared if it's empty. Throws Error{InvalidArgument}
-/// that lists the names there are.
+/// Parses the value of VDI_TRANSPORT: "shared" or "mpi"; shared if it is empty. Throws Error{InvalidArgument}
+/// that lists the valid names.
 Transport transportFromText(std::string_view value);
 
 }  // namespace vdi::comm

@@ -1,5 +1,5 @@
 #pragma once
-// std::bit_cast, which libstdc++ has from GCC 11 on and ParaView's SDK images (gcc-toolset-10) don't.
+// std::bit_cast, also for libstdc++ before GCC 11, as in ParaView's SDK images (gcc-toolset-10).
 
 #include <version>
 

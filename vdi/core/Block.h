@@ -14,7 +14,7 @@
 
 namespace vdi {
 
-/// The values are part of the .vdi-free raw volume sidecar and of the C API: don't renumber.
+/// The enumerators index the table of names in Block.cpp.
 enum class ScalarType : std::uint32_t {
   U8 = 0,
   I8 = 1,
@@ -28,7 +28,7 @@ enum class ScalarType : std::uint32_t {
 
 std::size_t sizeOf(ScalarType type);
 const char* toString(ScalarType type);  // "u8" ... "f64"
-/// Throws Error{InvalidArgument} for a name that toString doesn't produce.
+/// Throws Error{InvalidArgument} for a name that toString does not produce.
 ScalarType scalarTypeFromString(const std::string& name);
 
 /// Number of layers of stored values beyond the owned ones, per axis and side.
@@ -38,26 +38,24 @@ struct GhostLayers {
   bool operator==(const GhostLayers&) const = default;
 };
 
-/// Values that extend the stored ones or take the place of some.
+/// Values that extend the stored ones or replace some of them.
 struct Patch {
-  IndexBox box;                        // 0 is the first stored value; may be negative, or end beyond dims
+  IndexBox box;  // indices: 0 is the first stored value; may start below it and end beyond dims
   std::shared_ptr<const void> values;  // [size.z][size.y][size.x], x fastest, of the block's scalar type
 };
 
-/// One axis-aligned lattice of scalars. Values are interpolated trilinearly between lattice points
-/// and clamped beyond the outermost ones. `owned` says which samples are this block's: the owned
-/// boxes of all blocks of all ranks must not overlap (touching is fine, they're half-open), unless
-/// their spacings differ: then the finest owns what they share (comm/GhostExchange.h, which sees to
-/// both).
+/// One axis-aligned lattice of scalars. Values are interpolated trilinearly between lattice points and
+/// clamped beyond the outermost ones. `owned` says which samples belong to this block. The owned boxes of all
+/// blocks of all ranks must not overlap (they are half-open, so touching is fine), unless their spacings
+/// differ: then the finest block owns the common part. comm/GhostExchange.h establishes both.
 ///
-/// A block's values are those of the indices [-extra.lo, dims + extra.hi): the stored ones and
-/// layers around them. Patches cover all of these layers, and may lie over stored values too. Where
-/// patches lie over stored values the patch's count, where they lie over each other the last one's.
+/// A block has values at the indices [-extra.lo, dims + extra.hi): the stored ones and the layers around
+/// them. Patches cover all of these layers, and may cover stored values too. A patch overrides the stored
+/// values, and a later patch overrides an earlier one.
 ///
 /// Several blocks may share data, each owning a part of it; then they share extra and patches too.
 ///
-/// Ownership of memory: `data` is read, never copied on the host by the core; `keepAlive`, if set,
-/// is what owns it.
+/// Ownership of memory: the core reads `data` and never copies it on the host. `keepAlive`, if set, owns it.
 struct Block {
   glm::ivec3 dims{0};       // stored values per axis, ghost layers included; each >= 1
   glm::dvec3 origin{0.0};   // world position of value (0, 0, 0); for cell data the centre of that cell
@@ -68,8 +66,8 @@ struct Block {
   std::shared_ptr<const void> keepAlive{};
   GhostLayers extra{};                                  // layers of values beyond the stored ones, >= 0
   std::shared_ptr<const std::vector<Patch>> patches{};  // null: none
-  /// Stored values that mean nothing, such as those of hidden points and refined cells: where
-  /// they'd be interpolated with others, the exchange of ghost layers replaces them. Null: none.
+  /// Stored values without meaning, such as those of hidden points and refined cells. Where interpolation
+  /// would mix them with other values, the exchange of ghost layers replaces them. Null: none.
   std::shared_ptr<const std::vector<IndexBox>> masked{};
 
   IndexBox stored() const { return {glm::ivec3(0), dims}; }
@@ -83,12 +81,12 @@ struct Block {
   }
   std::size_t byteCount() const { return valueCount() * sizeOf(type); }
 
-  /// Point data: `origin` is the position of the first stored point. Owned: from the first to the
-  /// last non-ghost point.
+  /// Point data: `origin` is the position of the first stored point. The block owns the volume from the first
+  /// to the last non-ghost point.
   static Block fromPoints(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
                           ScalarType type, const void* data, const GhostLayers& ghosts = {});
-  /// Cell data: `dims` counts stored cells, `origin` is the lower corner of the first stored cell.
-  /// Owned: all non-ghost cells, whole.
+  /// Cell data: `dims` counts stored cells, `origin` is the lower corner of the first stored cell. The block
+  /// owns all non-ghost cells.
   static Block fromCells(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
                          ScalarType type, const void* data, const GhostLayers& ghosts = {});
 };
@@ -99,31 +97,30 @@ double valueAt(const Block& block, int i, int j, int k);
 
 /// Value number `index` of an array of the type.
 double loadValue(ScalarType type, const void* data, std::size_t index);
-/// The nearest value that the type has, for integers 0 for NaN.
+/// Stores the nearest value that the type can represent; integers take 0 for NaN.
 void storeValue(ScalarType type, void* data, std::size_t index, double value);
 
-ScalarRange finiteRange(const Block& block);  // stored values' and patches', by several threads
+ScalarRange finiteRange(const Block& block);  // of stored values and patches; uses several threads
 
-/// Values smaller than `minimum` in size are lost where all are so small, larger ones than `maximum`
-/// overflow on the way to the device. For f32 and f64; the other types have no such values.
+/// Range of magnitudes that the device can represent. If all values are smaller than `minimum`, they are
+/// lost; values larger than `maximum` overflow. Applies to f32 and f64; the other types have no such values.
 struct ValueLimits {
   double minimum = 0.0;
   double maximum = std::numeric_limits<double>::infinity();
 };
 ValueLimits limitsOf(ScalarType type);
 
-/// Whether there are finite values of usable size, and whether there are some that aren't 0 but too
-/// small. Looks at blocks until it has found a usable value.
+/// Whether some finite value has a usable magnitude, and whether some value is nonzero but too small. The
+/// search stops at the first usable value.
 struct ValueSizes {
   bool usable = false;
   bool tooSmall = false;
 };
 ValueSizes valueSizesOf(std::span<const Block> blocks);
 
-/// Throws Error{InvalidArgument} naming the block's index for: dims < 1, spacing that isn't in
-/// [1e-30, 1e30], an origin or owned box that isn't finite or more than 1e12 spacings away from 0,
-/// where positions can't be told apart well any more, null data. A block with an empty owned box is
-/// legal and owns no sample.
+/// Throws Error{InvalidArgument} naming the block's index for: dims < 1; spacing outside [1e-30, 1e30]; an
+/// origin or owned box that is not finite, or lies more than 1e12 spacings away from 0, where doubles no
+/// longer resolve positions; null data. A block with an empty owned box is legal and owns no sample.
 void validate(std::span<const Block> blocks);
 
 }  // namespace vdi

@@ -1,4 +1,4 @@
-// Axis-aligned boxes in world space and of lattice indices.
+// Axis-aligned boxes, in world space and of lattice indices.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace vdi {
 
-/// Half-open where it says who owns a sample: lo <= p < hi on every axis. The default is empty.
+/// A box in world space. As an owned box it is half-open: lo <= p < hi on every axis. The default is empty.
 struct Box {
   glm::dvec3 lo{std::numeric_limits<double>::infinity()};
   glm::dvec3 hi{-std::numeric_limits<double>::infinity()};
@@ -42,7 +42,7 @@ struct IndexBox {
   bool contains(const glm::ivec3& at) const {
     return glm::all(glm::greaterThanEqual(at, lo)) && glm::all(glm::lessThan(at, hi));
   }
-  /// Of the value at `at` in an array of the box's values, x fastest.
+  /// Position of the value with index `at` in an array of the box's values, x fastest.
   std::size_t position(const glm::ivec3& at) const {
     const auto n = glm::u64vec3(hi - lo);
     const auto i = glm::u64vec3(at - lo);
@@ -57,8 +57,8 @@ struct IndexBox {
   }
 };
 
-/// What `hole` leaves of `box`: disjoint boxes, six at most. Those below and above it in z are
-/// whole slices. For Box and IndexBox.
+/// The part of `box` outside `hole`, as at most six disjoint boxes. Those below and above it in z are whole
+/// slices. Works for Box and IndexBox.
 template <typename AnyBox>
 std::vector<AnyBox> without(const AnyBox& box, const AnyBox& hole) {
   const AnyBox common = box.intersection(hole);
@@ -78,11 +78,11 @@ std::vector<AnyBox> without(const AnyBox& box, const AnyBox& hole) {
   return rest;
 }
 
-/// Disjoint boxes that together are the cells of a lattice of `size` that are `open` (x fastest).
-/// Boxes grow along x, then y, then z, so that open cells that are a box stay one.
+/// Disjoint boxes that cover exactly the `open` cells (x fastest) of a lattice of `size`. Boxes grow along x,
+/// then y, then z, so a box of open cells stays one box.
 std::vector<IndexBox> coverWithBoxes(const glm::ivec3& size, std::vector<bool> open);
 
-/// What `holes` leave of `box`, as few disjoint boxes whose faces are faces of `box` and `holes`.
+/// The part of `box` outside all `holes`, as few disjoint boxes whose faces are faces of `box` and `holes`.
 std::vector<Box> withoutAll(const Box& box, const std::vector<Box>& holes);
 
 }  // namespace vdi

@@ -12,7 +12,7 @@
 
 namespace vdi {
 
-/// The parameters of vtkCamera that shape a picture (vtkCamera.h has the meaning of each).
+/// The parameters of vtkCamera that shape a picture; vtkCamera.h explains each of them.
 struct Camera {
   glm::dvec3 position{0.0, 0.0, 1.0};
   glm::dvec3 focalPoint{0.0, 0.0, 0.0};
@@ -23,10 +23,10 @@ struct Camera {
 
   bool operator==(const Camera&) const = default;
 
-  /// The camera turned by `degrees` about the focal point, around view-up as it is set, of whatever length;
-  /// positive moves the camera to its own right. View-up stays. That is vtkCamera::Azimuth: the distance
-  /// along view-up stays too, and a camera that looks along view-up stays where it is. A view-up of zero is
-  /// taken for (0, 1, 0), as vtkCamera does.
+  /// The camera turned by `degrees` about the focal point, around view-up as it is set, whatever its length;
+  /// positive moves the camera to its own right. View-up stays. As vtkCamera::Azimuth does, this keeps the
+  /// distance along view-up, and a camera that looks along view-up stays in place. Like vtkCamera, it
+  /// replaces a view-up of zero by (0, 1, 0).
   Camera azimuth(double degrees) const;
 
   /// A camera looking along `direction` at the whole of `bounds`, as vtkRenderer::ResetCamera places it.
@@ -39,8 +39,8 @@ struct Ray {
   glm::dvec3 direction;  // world per unit of depth
 };
 
-/// What a picture shows of its image plane: view-space x and y of its lower left and upper right corner, at
-/// depth 1 (perspective) or anywhere (parallel).
+/// The part of the image plane that a picture shows: view-space x and y of its lower left and upper right
+/// corner, at depth 1 (perspective) or anywhere (parallel).
 struct ImagePlane {
   glm::dvec2 low{-1.0};
   glm::dvec2 high{1.0};
@@ -53,17 +53,18 @@ struct ImagePlane {
 class View {
  public:
   static constexpr int maxSide = 32768;  // of a viewport, in pixels
-  /// Throws Error{InvalidArgument} for a viewport outside 1 .. maxSide, a view angle outside (0, 180), a
-  /// parallel scale <= 0, values that aren't finite, or a position equal to the focal point. A view-up
-  /// parallel to the view direction is replaced by the axis most orthogonal to it, one of zero by (0, 1, 0).
-  /// Square pixels; the vertical extent is the camera's, as in VTK.
+  /// Square pixels; the vertical extent is the camera's, as in VTK. A view-up parallel to the view direction
+  /// is replaced by the axis most orthogonal to it, a view-up of zero by (0, 1, 0). Throws
+  /// Error{InvalidArgument} for a viewport outside 1 .. maxSide, a view angle outside (0, 180), a parallel
+  /// scale <= 0, values that are not finite, or a position equal to the focal point.
   View(const Camera& camera, int width, int height);
-  /// A picture of any part of the camera's image plane, beside its middle and with oblong pixels included:
-  /// tiles, stereo. Of the camera, view angle and parallel scale don't count. Throws as the other one, and
-  /// Error{InvalidArgument} for a plane that isn't finite or has no extent.
+  /// A picture of any part of the camera's image plane, off-centre and with oblong pixels if need be, as
+  /// tiles and stereo require. It ignores the camera's view angle and parallel scale. Throws as the first
+  /// constructor, and Error{InvalidArgument} for a plane that is not finite or has no extent.
   View(const Camera& camera, int width, int height, const ImagePlane& plane);
-  /// The first one's picture of width x height pixels, and margin.x more pixels of the same size on its left
-  /// and on its right, margin.y below and above it. Throws as the first one, for all of them.
+  /// The first constructor's picture of width x height pixels, with margin.x more pixels of the same size on
+  /// its left and right, and margin.y below and above. Throws as the first constructor, for the whole
+  /// picture.
   static View withMargin(const Camera& camera, int width, int height, const glm::ivec2& margin);
 
   const Camera& camera() const { return camera_; }
@@ -78,7 +79,7 @@ class View {
   /// Half the height of the image plane: at depth 1 (perspective) or anywhere (parallel), in world units.
   double halfHeight() const { return halfHeight_; }
   double halfWidth() const { return halfWidth_; }
-  /// View-space x and y of the image plane's middle, likewise: 0 but for planes that are set.
+  /// View-space x and y of the image plane's middle, at the same depth: 0 unless a plane was set.
   const glm::dvec2& middle() const { return middle_; }
 
   double depthOf(const glm::dvec3& world) const { return glm::dot(world - camera_.position, forward_); }
@@ -96,7 +97,7 @@ class View {
   glm::dvec3 forward_;
   double halfHeight_;
   double halfWidth_;
-  glm::dvec2 middle_{0.0};  // of the image plane, as ImagePlane has it
+  glm::dvec2 middle_{0.0};  // of the image plane, in the units of ImagePlane
   glm::dvec2 pixelSize_;
 };
 

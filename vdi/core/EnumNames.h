@@ -24,7 +24,8 @@ const char* nameOf(Enum value, const EnumNames<Enum>& names) {
   return "unknown";
 }
 
-/// Throws Error{InvalidArgument} that lists the names there are, in their order. `what`: an algorithm, say.
+/// Throws Error{InvalidArgument} that lists the valid names, in their order. `what` is the kind of thing
+/// named, such as "algorithm".
 template <typename Enum>
 Enum namedValue(const std::string& name, const char* what, const EnumNames<Enum>& names) {
   for (const EnumName<Enum>& known : names) {

@@ -9,15 +9,14 @@
 namespace vdi {
 
 enum class ErrorCode {
-  InvalidArgument,    // a value that the caller passed can't be used: N_S = 0, zero spacing, mismatch between
-                      // ranks
+  InvalidArgument,    // the caller passed an unusable value, such as N_S = 0 or a mismatch between ranks
   DeviceUnavailable,  // no Vulkan device fits; the message lists every device and why it was refused
-  OutOfMemory,        // the device or the host can't hold what was asked for; the message has the figure
+  OutOfMemory,        // the device or the host cannot hold the data; the message has the figure
   DeviceFailure,      // a Vulkan call failed
-  Io,                 // a file can't be opened, read or written
-  Format,             // the bytes of a file or message aren't what the format requires
+  Io,                 // a file cannot be opened, read or written
+  Format,             // the bytes of a file or message violate the format
   Communication,      // an MPI call failed
-  RemoteRank,         // this rank is well, another one failed; the message carries the other rank's text
+  RemoteRank,         // another rank failed, this one did not; the message carries that rank's text
   Cancelled,          // the progress callback asked to stop
 };
 

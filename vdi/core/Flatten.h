@@ -6,7 +6,7 @@
 
 namespace vdi {
 
-/// The VDI seen from V_O: each list except the margin's, composited front to back, on the host. Equals DVR.
+/// The VDI seen from V_O: composites each list of the picture front to back, on the host. Equals DVR.
 Image flatten(const Vdi& vdi);
 
 }  // namespace vdi

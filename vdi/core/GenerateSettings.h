@@ -1,4 +1,4 @@
-// What a user chooses about a VDI besides camera and transfer function.
+// A user's choices for a VDI besides camera and transfer function.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ namespace vdi {
 
 /// How samples become supersegments.
 enum class Algorithm : std::uint32_t {
-  Bisection = 0,  // the paper's: a search for the sensitivity per list (section 2.4)
-  Merge = 1,      // no search: fine pieces first, then the cheapest neighbours are merged until they fit
+  Bisection = 0,  // the paper's: searches each list's sensitivity (section 2.4)
+  Merge = 1,      // no search: starts with fine pieces, then merges the cheapest neighbours until they fit
 };
 
 const char* toString(Algorithm algorithm);  // "bisection", "merge"
-/// Throws Error{InvalidArgument} that lists the names there are.
+/// Throws Error{InvalidArgument} that lists the valid names.
 Algorithm algorithmFromString(const std::string& name);
 
-/// What is behind material of that opacity changes no pixel by 1/255.
+/// Material behind this opacity changes no pixel by 1/255.
 constexpr double pictureTermination = 0.9999;
 
 constexpr double maxMargin = 4.0;
@@ -31,32 +31,33 @@ constexpr double automaticRate = 0.0;
 struct GenerateSettings {
   int width = 1280;
   int height = 720;
-  /// [0, maxMargin]: share of the picture's width that a VDI has lists for beyond its left and right edge,
-  /// and of its height beyond the lower and upper one. No more than there is to see: see marginOf (Margin.h).
+  /// [0, maxMargin]: the share of the picture's width for which the VDI has lists beyond the left and the
+  /// right edge, and of its height beyond the lower and the upper one. marginOf (Margin.h) limits it to the
+  /// visible scene.
   double margin = 0.0;
   std::uint32_t supersegments = 25;  // N_S, 1 .. maxSupersegments
-  /// Total: N_S is what lists have on average, where they have that many samples; needs Algorithm::Merge.
+  /// Total: lists have N_S on average, if they have that many samples; needs Algorithm::Merge.
   Budget budget = Budget::List;
-  double fill = 1.0;  // (0, 1]; with Budget::Total, share of what N_S each would give that's made
+  double fill = 1.0;  // (0, 1]; with Budget::Total, the share to make of what N_S each would give
   /// [1/64, 64]; or automaticRate: 1, 2 or 4, as the transfer function needs on the volume (SamplingRate.h).
   double samplesPerVoxel = 1.0;
   Algorithm algorithm = Algorithm::Merge;
-  /// Rays of more samples than depthCodeFor can number give a VDI of full precision all the same.
+  /// If rays have more samples than depthCodeFor can number, the VDI has full precision all the same.
   Precision precision = Precision::Compact;
-  /// A ray ends once it has accumulated this opacity: (0, 1]; 1 never ends early. What's hidden behind it at
-  /// V_O is missing when seen from V_N, hence the default (docs/adr). Pictures need no more than
-  /// pictureTermination.
+  /// A ray ends once it has accumulated this opacity: (0, 1]; 1 never ends early. Material that such a ray
+  /// leaves out at V_O is missing when seen from V_N, hence the default (docs/adr). Pictures need no more
+  /// than pictureTermination.
   double terminationOpacity = 1.0;
   Shading shading{};  // off by default
-  Region region{};    // all by default
+  Region region{};    // everything by default
   bool operator==(const GenerateSettings&) const = default;
 };
 
 /// Throws Error{InvalidArgument} naming the field, its value and its range.
 void validate(const GenerateSettings& settings);
 
-/// At which a ray ends (-log2 of transmittance): infinite for terminationOpacity 1, though there is material
-/// of that opacity.
+/// The optical depth (-log2 of transmittance) at which a ray ends. It is infinite for a terminationOpacity of
+/// 1, although material of that opacity exists.
 float terminationOpticalDepth(const GenerateSettings& settings);
 
 }  // namespace vdi

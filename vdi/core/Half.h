@@ -1,4 +1,4 @@
-// Half floats, four at a time, as a texture of R16G16B16A16_SFLOAT has them.
+// Half floats, four at a time, in the layout of an R16G16B16A16_SFLOAT texel.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -6,7 +6,7 @@
 
 namespace vdi {
 
-/// Rounded; |v| at most 65504.
+/// Rounds; requires |v| <= 65504.
 inline glm::u16vec4 toHalf(const glm::vec4& v) {
   return {glm::packHalf1x16(v.x), glm::packHalf1x16(v.y), glm::packHalf1x16(v.z), glm::packHalf1x16(v.w)};
 }

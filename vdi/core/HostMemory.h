@@ -1,4 +1,4 @@
-// Pages of the process's memory that others may reach too: devices, and the ranks of the same host.
+// Pages of the process's memory that devices and other ranks of the same host can reach too.
 #pragma once
 
 #include <cstddef>
@@ -9,20 +9,19 @@
 
 namespace vdi {
 
-/// Whole pages, zero at first, that stay where they are until the object goes. Neither copied nor moved:
-/// shared by those who use them.
+/// Whole pages, zero at first, that stay in place as long as the object lives. Its users share it; it can be
+/// neither copied nor moved.
 class HostMemory {
  public:
-  /// Of this process alone. Throws Error{OutOfMemory}.
+  /// Memory of this process alone. Throws Error{OutOfMemory}.
   static std::shared_ptr<HostMemory> anonymous(std::uint64_t bytes);
-  /// What other processes of the host can open by its name (POSIX shared memory), from publish until unlink
-  /// or the end of this object. All of it is there at once: a host with too little room for shared memory
-  /// throws Error{OutOfMemory} here, and doesn't end the process later.
+  /// POSIX shared memory that other processes of the host can open by its name, from publish until unlink or
+  /// the end of this object. All of it is allocated here: a host with too little shared memory throws
+  /// Error{OutOfMemory} now instead of ending the process at a later write.
   static std::shared_ptr<HostMemory> shareable(std::uint64_t bytes);
-  /// shareable, published.
+  /// Shareable memory, already published.
   static std::shared_ptr<HostMemory> shared(std::uint64_t bytes);
-  /// What another process made by shared(). Throws Error{Communication} if there's none of that name and
-  /// size.
+  /// Memory that another process made shareable. Throws Error{Communication} if none has that name and size.
   static std::shared_ptr<HostMemory> open(const std::string& name, std::uint64_t bytes);
 
   ~HostMemory();
@@ -31,22 +30,23 @@ class HostMemory {
   HostMemory(HostMemory&&) = delete;
   HostMemory& operator=(HostMemory&&) = delete;
 
-  std::span<std::byte> bytes() const { return bytes_; }  // at least as many as were asked for
-  /// Of no other memory of this host, ever; empty: others can't open it.
+  std::span<std::byte> bytes() const { return bytes_; }  // at least as many as requested
+  /// Unique on this host for all time; empty if other processes cannot open the memory.
   const std::string& name() const { return name_; }
-  /// Whether others can open it from now on. To be called just before they do, since a process that is killed
-  /// in between leaves the name and the memory behind. The first call in a process removes what dead
-  /// processes have left. False, and nothing is done, after unlink and for memory that isn't shareable.
+  /// Lets other processes open the memory from now on; returns whether they can. Call just before they do,
+  /// since a process that is killed in between leaves the name and the memory behind. The first call in a
+  /// process removes the leftovers of dead processes. Does nothing and returns false after unlink, and for
+  /// memory that is not shareable.
   bool publish();
-  /// Nobody can open it from now on; those who have keep it.
+  /// Nobody can open the memory from now on; processes that have opened it keep it.
   void unlink();
 
  private:
   HostMemory() = default;
   std::span<std::byte> bytes_;
   std::string name_;
-  int descriptor_ = -1;  // of shareable memory, until unlink: locked, which tells that this process lives
-  bool linked_ = false;  // and it's ours to unlink
+  int descriptor_ = -1;  // of shareable memory, until unlink; its lock shows that this process lives
+  bool linked_ = false;  // and this object has to unlink it
 };
 
 }  // namespace vdi

@@ -1,5 +1,5 @@
-// std::vector whose memory may come from elsewhere than the heap: from pages that a device writes to, or that
-// several ranks see.
+// std::vector whose memory need not come from the heap: it may be pages that a device writes to, or that
+// several ranks share.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +12,9 @@
 
 namespace vdi {
 
-/// Takes memory from a resource, which it keeps alive, or from the heap. Elements that are trivially copyable
-/// aren't cleared when a vector grows, for they're about to be overwritten, by a device at best: `resize`
-/// leaves them as the memory was. Copies of a vector are on the heap, moved ones stay where they are.
+/// Allocates from a resource, which it keeps alive, or from the heap. When a vector grows, trivially copyable
+/// elements are not cleared, because the caller is about to overwrite them, ideally by a device: `resize`
+/// leaves the memory as it was. Copies of a vector are on the heap, moved vectors stay in place.
 template <typename T>
 class HostAllocator {
  public:

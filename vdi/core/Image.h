@@ -17,8 +17,9 @@ struct Image {
   int width = 0;
   int height = 0;
   HostVector<glm::vec4> rgba;  // [height][width], premultiplied
-  /// [height][width]: view-space depth of the front of the first sample or supersegment that isn't
-  /// transparent, world units; noDepth where there's none. May be empty when depth wasn't asked for.
+  /// [height][width]: view-space depth of the front of the first sample or supersegment that is not
+  /// transparent, world units; noDepth where every one is transparent. May be empty if no depth was
+  /// requested.
   HostVector<float> depth;
 
   static constexpr float noDepth = std::numeric_limits<float>::infinity();
@@ -28,19 +29,19 @@ struct Image {
   }
 };
 
-/// A picture as screens take it, in memory of its maker. Row 0 is the bottom row.
+/// A picture in the format that screens take, in memory that its producer owns. Row 0 is the bottom row.
 struct ImageBytes {
   int width = 0;
   int height = 0;
   std::span<const glm::u8vec4> rgba;  // [height][width], premultiplied or straight
-  std::span<const float> depth;       // [height][width], as in Image
+  std::span<const float> depth;       // [height][width], with the meaning of Image::depth
 };
 
-/// Whether colours are as bright as they shine (light that's been weighed with alpha), or as they are.
+/// Whether colours are multiplied by their opacity or straight.
 enum class Alpha { Premultiplied, Straight };
 
-/// The nearest 8-bit code of a share in [0, 1], clamped; 0 for what isn't a number. Rounds as std::lround
-/// does, which is a call for each and takes four times as long.
+/// The nearest 8-bit code of a share in [0, 1], clamped; 0 for NaN. Rounds as std::lround, whose call for
+/// each value takes four times as long.
 inline std::uint8_t toByte(float share) {
   if (!(share > 0.0F)) return 0;
   const float code = std::min(share, 1.0F) * 255.0F;

@@ -1,4 +1,4 @@
-// How alike two pictures are.
+// How similar two pictures are.
 #pragma once
 
 #include <cstdint>
@@ -14,12 +14,12 @@ struct ImageDifference {
   double wrongShare = 0.0;  // share of pixels with a channel off by more than 16/255
 };
 
-/// 8-bit interleaved pictures [height][width][channels]. SSIM is Wang et al. 2004 with their Gaussian window
-/// (sigma 1.5, 11 x 11), K1 = 0.01, K2 = 0.03, population covariance, borders of 5 pixels left out: the
-/// figures of scikit-image's structural_similarity(gaussian_weights=True, sigma=1.5,
+/// Compares 8-bit interleaved pictures [height][width][channels]. SSIM is Wang et al. 2004 with their
+/// Gaussian window (sigma 1.5, 11 x 11), K1 = 0.01, K2 = 0.03, population covariance, without the 5 pixels at
+/// the borders: the figures of scikit-image's structural_similarity(gaussian_weights=True, sigma=1.5,
 /// use_sample_covariance=False, data_range=255). Pictures smaller than the window are compared with one
-/// window of their own size, uniform weights. Throws Error{InvalidArgument} for pictures that aren't of one
-/// size.
+/// window of their own size and uniform weights. Throws Error{InvalidArgument} for pictures of different
+/// sizes.
 ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width,
                         int height, int channels);
 

@@ -1,5 +1,5 @@
-// The guard band: lists of a VDI beyond the edges of its picture, so that what lies there is seen when the
-// viewer turns or moves.
+// The guard band: lists of a VDI beyond the edges of its picture, which become visible when the viewer turns
+// or moves.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -10,14 +10,15 @@
 
 namespace vdi {
 
-/// How many lists there are on the left and on the right of the picture (x), below and above it (y): the
-/// settings' share of the picture, rounded up, but no more than
-///   * the scene's box takes in the image plane, so that a scene that is wholly in the picture has no margin;
-///   * what keeps samples slabs where the picture's are (samplesAreSlabs), which the picture would show.
-/// Depends on nothing else: the same on all ranks. Throws as View and depthLattice do.
+/// The number of lists on the left and on the right of the picture (x), below and above it (y): the settings'
+/// share of the picture, rounded up, but no more than
+///   * the extent of the scene's box in the image plane, so that a scene wholly in the picture has no margin;
+///   * the largest for which samples are slabs if the picture's are (samplesAreSlabs); otherwise the picture
+///     would change.
+/// It depends on its arguments alone, so all ranks get the same. Throws as View and depthLattice do.
 glm::ivec2 marginOf(const Scene& scene, const Camera& camera, const GenerateSettings& settings);
 
-/// Of all lists that the settings ask for: the picture's and its margin's.
+/// The view of all lists that the settings ask for: the picture and its margin.
 View viewWithMargin(const Scene& scene, const Camera& camera, const GenerateSettings& settings);
 
 }  // namespace vdi

@@ -11,14 +11,14 @@
 
 namespace vdi {
 
-/// Cores that the calling thread may run on: mpirun may have left it one, where more threads would be in each
-/// other's way.
+/// The number of cores on which the calling thread may run. mpirun may have bound it to one, where more
+/// threads would only slow each other down.
 std::size_t usableCores();
 
-/// Calls work(first, last) for ranges that make up [0, count), from several threads at once where each has at
-/// least `minimum` elements. `minimum` is what takes some 100 us: a thread takes half of that to start.
-/// Returns when all is done; an exception of `work` comes out here. Where no thread can be had, the calling
-/// one does its part.
+/// Calls work(first, last) for ranges that make up [0, count), on several threads at once if each gets at
+/// least `minimum` elements. Choose `minimum` so that it takes some 100 us: starting a thread takes half of
+/// that. Returns when all work is done, and rethrows an exception of `work`. Where no thread can be started,
+/// the calling one does its part.
 template <typename Work>
 void inParallel(std::size_t count, std::size_t minimum, Work work) {
   constexpr std::size_t maxThreads = 16;
@@ -34,15 +34,15 @@ void inParallel(std::size_t count, std::size_t minimum, Work work) {
   for (std::future<void>& other : others) other.get();
 }
 
-/// One core copies about 10 GB/s.
+/// Copies on several threads: one core copies about 10 GB/s.
 inline void copyInParallel(std::span<const std::byte> from, void* to) {
   inParallel(from.size(), std::size_t{1} << 20, [&](std::size_t first, std::size_t last) {
     std::memcpy(static_cast<std::byte*>(to) + first, from.data() + first, last - first);
   });
 }
 
-/// Makes `from` what `to` holds from place `first` on (at most its size), and nothing behind. What was there
-/// is overwritten: memory that's used again isn't cleared before.
+/// Writes `from` into `to` from place `first` on (at most its size), where `to` then ends. Existing elements
+/// are overwritten: reused memory is not cleared before.
 template <typename T, typename Allocator>
 void replaceTail(std::vector<T, Allocator>& to, std::size_t first, std::span<const T> from) {
   static_assert(std::is_trivially_copyable_v<T>);

@@ -5,7 +5,7 @@
 
 namespace vdi {
 
-/// Smallest and largest finite value; {+inf, -inf} when there's none.
+/// Smallest and largest finite value; {+inf, -inf} without any.
 struct ScalarRange {
   double min = std::numeric_limits<double>::infinity();
   double max = -std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-// What all ranks must agree on before rays can be cast: where the data is and where the samples lie.
+// The facts that all ranks must agree on before they cast rays: the data's extent and the samples' positions.
 #pragma once
 
 #include <cstdint>
@@ -10,45 +10,45 @@
 
 namespace vdi {
 
-/// The union over all ranks. `localScene` gives one rank's part, comm::globalScene reduces it.
+/// Extent of the data of all ranks. `localScene` gives one rank's part; comm::globalScene combines them.
 struct Scene {
-  Box bounds;               // union of the owned boxes; empty when no rank holds anything
-  double minSpacing = 0.0;  // smallest spacing of any block and axis; 0 when there's no block
+  Box bounds;               // union of the owned boxes; empty if no rank has a block
+  double minSpacing = 0.0;  // smallest spacing of any block and axis; 0 without blocks
   bool operator==(const Scene&) const = default;
 };
 
 Scene localScene(std::span<const Block> blocks);
 
-/// Coordinate `value` of an owned box rounded to a lattice of 2^-20 of the scene's extent around the scene's
-/// centre, and given relative to that centre in single precision. Two blocks that share a face, computed on
-/// two ranks with other rounding, get the same float: every sample has exactly one owner.
+/// Coordinate `value` of an owned box, relative to the scene's centre in single precision, and rounded to a
+/// lattice of 2^-20 of the scene's extent around it. Two blocks that share a face get the same float even if
+/// two ranks computed it with different rounding, so every sample has exactly one owner.
 float snapToScene(const Scene& scene, double value, int axis);
 
 /// Sample k of every ray covers the depths [first + k * step, first + (k + 1) * step] and is taken at the
 /// middle. The lattice depends on the scene and the camera alone, so any decomposition of the data yields the
 /// same samples.
 struct DepthLattice {
-  double first = 0.0;       // depth, >= 0: nothing at or behind the eye is sampled
+  double first = 0.0;       // depth, >= 0: samples lie in front of the eye
   double step = 0.0;        // depth, > 0 unless count == 0
   std::uint32_t count = 0;  // 0 when no part of the scene lies in front of the camera
 
   double frontOf(std::uint32_t k) const { return first + k * step; }
 };
 
-/// step = scene.minSpacing / samplesPerVoxel. Throws Error{InvalidArgument} when samplesPerVoxel isn't in
+/// step = scene.minSpacing / samplesPerVoxel. Throws Error{InvalidArgument} when samplesPerVoxel is not in
 /// [1/64, 64] or when a ray would need more than 2^24 samples.
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel);
 
-/// How far beyond its owned box a block has values, in its spacings, where it has neighbours. Gradients need
-/// that much: a voxel on each side of a sample's middle.
+/// The distance beyond its owned box, in its spacings, to which a block has values where it has neighbours.
+/// Gradients need that much: a voxel on each side of a sample's middle.
 inline constexpr double valueReach = 1.0;
 
-/// How far beyond it the ends of slabs may lie.
+/// The distance beyond the owned box to which the ends of slabs may reach.
 inline constexpr double slabReach = 0.9;
 
-/// Whether samples are slabs, classified by what lies between their two ends, rather than by the scalar in
-/// their middle. They are unless half a sample is longer than slabReach of the finest voxel: from somewhat
-/// more than half a sample per voxel on.
+/// Whether samples are slabs, classified by the scalars at their two ends instead of the one in their middle.
+/// They are unless half a sample is longer than slabReach of the finest voxel: from slightly more than half a
+/// sample per voxel on.
 bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice);
 
 }  // namespace vdi

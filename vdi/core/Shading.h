@@ -1,5 +1,5 @@
-// Shading: how brightly lights make a volume's samples shine. It is baked into colours where a VDI is made,
-// so a VDI that is turned keeps the light of its viewpoint.
+// Shading: how strongly lights illuminate a volume's samples. It is baked into the colours of a VDI, so a VDI
+// keeps the light of its V_O when it is turned.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@ namespace vdi {
 
 /// A light that is infinitely far away, or at the eye. It moves with the camera.
 struct Light {
-  /// Towards the light, in the camera's axes: right, up, and from the scene to the camera. Of any length.
-  /// Zero: the light is at the eye and shines along each ray.
+  /// Direction towards the light, in the camera's axes: right, up, and from the scene to the camera. Its
+  /// length does not matter. Zero: the light is at the eye and shines along each ray.
   glm::dvec3 direction{0.0};
   glm::dvec3 color{1.0};  // red, green, blue; times intensity; >= 0
   bool operator==(const Light&) const = default;
@@ -21,10 +21,10 @@ struct Light {
 
 inline constexpr std::size_t maxLights = 8;
 
-/// The five lights of ParaView's light kit, as a new view has them.
+/// The five lights of ParaView's light kit, with a new view's settings.
 std::vector<Light> lightKit();
 
-/// As VTK's volume mapper shades with two-sided lighting: the colour of a sample is multiplied by
+/// Shading as VTK's volume mapper does it with two-sided lighting: the colour of a sample is multiplied by
 ///
 ///     ambient + diffuse * (sum over lights of color * |normal . direction|).
 ///
@@ -39,10 +39,10 @@ struct Shading {
   bool operator==(const Shading&) const = default;
 };
 
-/// Differences between two values that are smaller than this share of them are taken for rounding.
+/// A difference between two values below this share of them counts as rounding.
 inline constexpr double leastGradient = 1e-6;
 
-/// Where shading is on: throws Error{InvalidArgument} naming what is out of range.
+/// If shading is on, throws Error{InvalidArgument} that names the value out of range.
 void validate(const Shading& shading);
 
 /// Unit vector in world space; zero for a light at the eye.

@@ -12,18 +12,18 @@ namespace vdi {
 
 struct DepthLattice;
 
-/// How a VDI's supersegments are held, sent between ranks and written to files.
+/// The precision in which a VDI's supersegments are stored, sent between ranks and written to files.
 enum class Precision : std::uint32_t {
   Full = 0,     // Supersegment: 24 bytes of floats
-  Compact = 1,  // CompactSupersegment: 8 bytes; seen from V_O within 1/255 of the floats
+  Compact = 1,  // CompactSupersegment: 8 bytes; from V_O within 1/255 of the floats
 };
 
 const char* toString(Precision precision);  // "full", "compact"
-/// Throws Error{InvalidArgument} that lists the names there are.
+/// Throws Error{InvalidArgument} that lists the valid names.
 Precision precisionFromString(const std::string& name);
 
-/// One depth interval of a list. The colour is premultiplied and accumulated over the whole interval, and so
-/// is the opacity. A part of length l' of an interval of length l has opacity a' = 1 - (1 - a)^(l'/l), colour
+/// One depth interval of a list. Colour (premultiplied) and opacity are accumulated over the whole interval.
+/// A part of length l' of an interval of length l has opacity a' = 1 - (1 - a)^(l'/l), and its colour is
 /// scaled by a'/a.
 struct Supersegment {
   float front = 0.0F;  // view-space depth of V_O, world units
@@ -36,10 +36,9 @@ struct Supersegment {
 };
 static_assert(sizeof(Supersegment) == 24);
 
-/// The same in 8 bytes. Depths are codes of a DepthCode; the colour is straight, 8 bits a channel; the
-/// optical depth has 12 bits, see opticalDepthOfCode. Whoever encodes a list carries what rounding a
-/// supersegment changed over to the next one (reference/Compaction.h), so that errors don't add up along the
-/// list.
+/// A supersegment in 8 bytes. Depths are codes of a DepthCode; the colour is straight, 8 bits a channel; the
+/// optical depth has 12 bits, see opticalDepthOfCode. The encoder of a list carries each supersegment's
+/// rounding error over to the next one (reference/Compaction.h), so errors do not add up along the list.
 struct CompactSupersegment {
   std::uint32_t depths = 0;    // bits 0 - 13 front, 14 - 27 back, 28 - 31 the optical depth's low bits
   std::uint32_t material = 0;  // bits 0 - 7 red, 8 - 15 green, 16 - 23 blue, 24 - 31 its high bits
@@ -61,29 +60,29 @@ static_assert(sizeof(CompactSupersegment) == 8);
 struct DepthCode {
   static constexpr std::uint32_t largest = 16383;
   float first = 0.0F;
-  float step = 0.0F;  // > 0; 0: there is none, as in a VDI of full precision
+  float step = 0.0F;  // > 0; 0: no code, as in a VDI of full precision
   float depthOf(std::uint32_t code) const { return first + static_cast<float>(code) * step; }
   bool operator==(const DepthCode&) const = default;
 };
 
-/// Of the lists that a depth code belongs to.
+/// The precision of lists with this depth code.
 inline Precision precisionOf(const DepthCode& code) {
   return code.step > 0.0F ? Precision::Compact : Precision::Full;
 }
 
-/// The code for what lies on the lattice: step is a part of a sample, so that the lattice's depths have codes
-/// of their own. None (step 0) for a lattice of more samples than fit, 8190.
+/// The code for depths on the lattice. Its step divides a sample, so the lattice's depths have codes of their
+/// own. Its step is 0 (no code) for a lattice of more samples than fit, 8190.
 DepthCode depthCodeFor(const DepthLattice& lattice);
 
-/// Optical depth of codes 0 .. 4095: 2^-20, and from there on (2^(code * 16 / 4095) - 1) / 16, that is, in
-/// steps of 0.00017 where material is thin and of 0.3 % where it's dense, up to 4096.
+/// Optical depth of codes 0 .. 4095: 2^-20 for code 0, then (2^(code * 16 / 4095) - 1) / 16. Steps are
+/// 0.00017 where material is thin and 0.3 % where it is dense, up to 4096.
 float opticalDepthOfCode(std::uint32_t code);
-/// Of what has that optical depth.
+/// Opacity of the optical depth of a code.
 float opacityOfCode(std::uint32_t code);
 
 /// 1 - 2^-opticalDepth, exact for small arguments too.
 float opacityOf(float opticalDepth);
-/// Its inverse, at most maxExtinction (core/TransferFunction.h).
+/// The inverse of opacityOf, at most maxExtinction (core/TransferFunction.h).
 float opticalDepthOf(float opacity);
 
 Supersegment expanded(const CompactSupersegment& segment, const DepthCode& code);

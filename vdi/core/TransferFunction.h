@@ -1,4 +1,4 @@
-// Transfer functions: scalar -> colour and opacity per unit distance, as vtkColorTransferFunction and
+// Transfer functions: scalar -> colour and opacity per unit distance, like vtkColorTransferFunction and
 // vtkPiecewiseFunction with vtkVolumeProperty::ScalarOpacityUnitDistance.
 #pragma once
 
@@ -32,8 +32,8 @@ struct TransferFunction {
   double opacityAt(double x) const;
 };
 
-/// Throws Error{InvalidArgument}: no nodes, nodes out of order, values outside [0, 1] or not finite, unit
-/// distance <= 0.
+/// Throws Error{InvalidArgument} for: no nodes, nodes out of order, values outside [0, 1] or not finite, a
+/// unit distance <= 0.
 void validate(const TransferFunction& transferFunction);
 
 /// One entry of the table that both the reference and the shaders read. `extinction` is -log2(1 - opacity)
@@ -52,26 +52,26 @@ struct TransferTableEntry {
 inline constexpr float maxExtinction = 65504.0F;  // the largest half float
 
 /// The function sampled at `entries.size()` evenly spaced scalars from `min` to `max`, linear in between,
-/// constant outside. A *position* in the table is a scalar in units of entries: 0 is `min`,
-/// entries.size() - 1 is `max`.
+/// constant outside. A *position* in the table is a scalar in units of entries: 0 is `min`, entries.size() -
+/// 1 is `max`.
 struct TransferTable {
   double min = 0.0;
   double max = 1.0;  // > min
   double unitDistance = 1.0;
   std::vector<TransferTableEntry> entries;  // at least 2
 
-  /// Not clamped, but finite for infinite scalars; NaN for NaN.
+  /// Does not clamp, but stays finite for infinite scalars; NaN for NaN.
   double positionOf(double scalar) const;
-  /// The entry there; transparent where the position is NaN.
+  /// The entry at a position; transparent for NaN.
   TransferTableEntry at(double position) const;
   TransferTableEntry lookup(double scalar) const { return at(positionOf(scalar)); }
   bool operator==(const TransferTable&) const = default;
-  /// True if some scalar in [lo, hi] has opacity > 0: what empty-space skipping asks.
+  /// Whether some scalar in [lo, hi] has opacity > 0. Empty-space skipping uses this.
   bool visible(double lo, double hi) const;
 };
 
-/// Size: a power of two from 1024 to 16384, large enough for two entries between neighbouring nodes where
-/// that's possible.
+/// Samples the function. The size is a power of two from 1024 to 16384, large enough for two entries between
+/// neighbouring nodes where possible.
 TransferTable bake(const TransferFunction& transferFunction);
 
 }  // namespace vdi

@@ -1,4 +1,4 @@
-// Whether a VDI has anything true to show from a viewpoint.
+// Whether a VDI can show its scene truthfully from a viewpoint.
 #pragma once
 
 #include <optional>
@@ -9,29 +9,29 @@
 
 namespace vdi {
 
-/// What's to be said of a viewpoint of a VDI.
+/// Why a VDI shows little or nothing from a viewpoint.
 enum class ViewpointIssue {
-  SeesNothing,  // the scene, or what V_O saw of it, is outside of the picture
-  Inside,       // the camera is inside the scene, and isn't V_O: what's behind it is missing
+  SeesNothing,  // the scene, or what V_O saw of it, is outside the picture
+  Inside,       // the camera is inside the scene and is not V_O: the part behind the camera is missing
   FarAway,      // the scene is smaller in the picture than farAwayPixels
-  FarBeside     // more than farBesideDegrees from where the VDI was made: lists are seen from their sides
+  FarBeside     // more than farBesideDegrees from V_O: lists are seen from their sides
 };
 
-/// Between the directions in which the scene's centre is seen from V_O and from the viewpoint.
+/// Angle between the directions in which V_O and the viewpoint see the scene's centre.
 constexpr double farBesideDegrees = 60.0;
 
-/// Of the sphere around the scene: its diameter in the picture.
+/// Diameter, in the picture, of the sphere around the scene.
 constexpr double farAwayPixels = 4.0;
 
-/// The first that applies, in that order; nullopt where nothing does, and for an empty scene. `bounds` are
-/// Vdi::bounds and `original` Vdi::view. A cheap test of boxes: where it says nothing, the picture may still
-/// be empty.
+/// The first issue that applies, in the order above; nullopt if none does, and for an empty scene. `bounds`
+/// are Vdi::bounds and `original` Vdi::view. This is a cheap test of boxes: the picture may be empty even
+/// without an issue.
 std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const View& original, const View& view);
 
-/// By how many degrees the directions differ in which `original` and `camera` see the scene's centre.
+/// The angle, in degrees, between the directions in which `original` and `camera` see the scene's centre.
 double degreesBetween(const Box& bounds, const Camera& original, const Camera& camera);
 
-/// In words for a warning.
+/// The issue in words, for a warning.
 std::string describe(ViewpointIssue issue);
 
 }  // namespace vdi

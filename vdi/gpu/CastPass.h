@@ -22,28 +22,29 @@ namespace vdi::gpu {
 
 class VolumeStore;
 
-/// The part of CastParams that follows from camera and scene; addresses, what concerns the table of slabs,
-/// and list fields are left 0.
+/// The part of CastParams that follows from camera and scene. Addresses, the slab table's fields and list
+/// fields are left 0.
 shared::CastParams castGeometry(const Scene& scene, const View& view, const DepthLattice& lattice);
 
 class CastPass {
  public:
   explicit CastPass(const std::shared_ptr<Device>& device);
 
-  /// What later dispatches read; kept by reference, it must have pages. Pipelines are made when they're first
-  /// recorded.
+  /// Sets the volume that later dispatches read; it must outlive them and have pages. Pipelines are made when
+  /// they are first recorded.
   void bind(const VolumeStore& volume) { volume_ = &volume; }
 
-  /// What a dispatch does: the picture; or what lists need (merging); or what this rank tells others of its
-  /// lists (merging); or the first step of an algorithm (sensitivities or tolerances, and counts), or its
-  /// second one (supersegments or pre-segments).
+  /// The purpose of a dispatch: Volume renders the picture. Histogram counts the demand of lists, and
+  /// CountLevels the counts that this rank shares with others; both are for merging. Count is the first step
+  /// of an algorithm (sensitivities or tolerances, and counts), Write the second one (supersegments or
+  /// pre-segments).
   enum class Work { Volume, Histogram, CountLevels, Count, Write };
   struct Band {
     std::uint32_t width = 0;
     std::uint32_t firstRow = 0;
     std::uint32_t lastRow = 0;        // exclusive
     std::uint32_t countedStride = 1;  // as in CastParams
-    bool cutAtGaps = false;           // supersegments end there
+    bool cutAtGaps = false;           // supersegments end at gaps
     shared::StoredForm form{};        // as in CastParams
   };
   /// No dispatch of this pass may be in flight.
@@ -51,7 +52,7 @@ class CastPass {
               const Band& band);
 
  private:
-  /// What specialises cast.comp, besides the number of pages.
+  /// Specialisation of cast.comp, besides the number of pages.
   struct Program {
     std::uint32_t program = 0;  // shared::castProgram...
     std::uint32_t compact = 0;
@@ -62,7 +63,7 @@ class CastPass {
     bool shaded = false;
   };
   ComputePipeline& pipelineFor(const Program& program);
-  /// Which images a pipeline reads.
+  /// The images that a pipeline reads.
   struct Bound {
     std::uint64_t pages = 0;
     std::uint64_t slabs = 0;
@@ -70,7 +71,7 @@ class CastPass {
   };
 
   std::uint32_t samplesAhead_;
-  std::uint32_t lanesPerRay_;  // where few rays are cast
+  std::uint32_t lanesPerRay_;  // for casting few rays
   Sampler sampler_;
   PipelineSet pipelines_;
   PipelineSet lanePipelines_;

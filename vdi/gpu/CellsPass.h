@@ -1,4 +1,4 @@
-// Dispatches cells.comp: macrocells of the pages' pieces.
+// Dispatches cells.comp: macrocells of the pieces in pages.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ namespace vdi::gpu {
 class CellsPass {
  public:
   explicit CellsPass(std::shared_ptr<Device> device);
-  /// One of the cellsMode's. `pages`: at least one, which the pieces lie in; `pagesVersion` changes when they
-  /// do.
+  /// constants.mode is one of cellsMode.... `pages` are those of the pieces, at least one; `pagesVersion`
+  /// changes when they do.
   void record(Commands& commands, const shared::CellsConstants& constants,
               std::span<const SampledImage> pages, std::uint64_t pagesVersion);
 

@@ -1,4 +1,4 @@
-// One reusable command buffer with its timestamps. begin, record, submit, wait; then begin again.
+// One reusable command buffer with its timestamps: begin, record, submit, wait; then begin again.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -24,12 +24,12 @@ struct StageTime {
   double milliseconds = 0.0;
 };
 
-/// Workgroups of `group` invocations along an axis that has `count` of them.
+/// Number of workgroups of `group` invocations that cover `count` invocations along an axis.
 constexpr std::uint32_t groupsFor(std::uint32_t count, std::uint32_t group) {
   return (count + group - 1) / group;
 }
 
-/// One that was handed to a queue: the how-manieth there. 0: none.
+/// A queue submission by sequence number; 0 means none.
 struct Submission {
   QueueKind kind = QueueKind::Compute;
   std::uint64_t number = 0;
@@ -37,31 +37,31 @@ struct Submission {
 
 class Commands {
  public:
-  /// Those of a transfer queue only copy: no dispatches, clears or marks.
+  /// Commands for a transfer queue only copy: no dispatches, clears or marks.
   explicit Commands(std::shared_ptr<Device> device, QueueKind kind = QueueKind::Compute);
-  ~Commands();  // waits for what was submitted
+  ~Commands();  // waits for the last submission
   Commands(const Commands&) = delete;
   Commands& operator=(const Commands&) = delete;
   Commands(Commands&&) = delete;
   Commands& operator=(Commands&&) = delete;
 
-  /// Waits for the previous submission, then starts anew, behind a barrier: whatever was submitted before, by
-  /// others too, is finished and visible to what's recorded. What was recorded and not submitted is dropped,
-  /// so an exception between begin and submit does no harm.
+  /// Waits for the previous submission, then starts recording after a barrier: all earlier submissions, also
+  /// those of other objects, are finished and visible to the new commands. Drops commands that were recorded
+  /// and not submitted, so an exception between begin and submit does no harm.
   void begin();
-  /// What's recorded waits, on the device, for that submission. For another queue's: begin's barrier reaches
-  /// its own queue only.
+  /// Makes the commands wait, on the device, for that submission. Call it for another queue's submission,
+  /// since begin's barrier reaches only its own queue.
   void waitFor(const Submission& other);
   void waitFor(const Commands& other) { waitFor(other.last()); }
-  /// The last one, done or not.
+  /// The last submission, complete or not.
   Submission last() const { return {kind_, last_}; }
   void submit();
-  /// How often that was done: more than while something was recorded tells that it wasn't dropped.
+  /// Number of calls of submit. If it has grown since a command was recorded, that command was not dropped.
   std::uint64_t submissions() const { return submissions_; }
-  /// Returns when the submission is done, at once when there's none. Throws Error{DeviceFailure} on device
-  /// loss.
+  /// Returns when the last submission is complete, at once if there is none. Throws Error{DeviceFailure} on
+  /// device loss.
   void wait();
-  /// After an error: waits, whatever becomes of the submission. Nothing uses its memory any more.
+  /// For use after an error: waits whatever the outcome. Afterwards the submission no longer uses any memory.
   void drop() noexcept;
   void submitAndWait() {
     submit();
@@ -73,9 +73,9 @@ class Commands {
                 std::uint32_t y = 1, std::uint32_t z = 1) {
     dispatchBytes(pipeline, std::as_bytes(std::span(&constants, 1)), x, y, z);
   }
-  /// Workgroups of `group` invocations for `count` of them, over two axes: every device allows 65535 per
-  /// axis. An invocation's index is gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x *
-  /// group.
+  /// Dispatches workgroups of `group` invocations for `count` of them, over two axes, since devices need not
+  /// allow more than 65535 per axis. An invocation's index is gl_GlobalInvocationID.x +
+  /// gl_GlobalInvocationID.y * gl_NumWorkGroups.x * group.
   template <typename PushConstants>
   void dispatchMany(const ComputePipeline& pipeline, const PushConstants& constants, std::uint64_t count,
                     std::uint32_t group) {
@@ -87,7 +87,7 @@ class Commands {
   }
   void dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
                      std::uint32_t y, std::uint32_t z);
-  /// As many workgroups as the buffer's first three words say when it comes to that.
+  /// Dispatches as many workgroups as the buffer's first three words say at execution time.
   template <typename PushConstants>
   void dispatchIndirect(const ComputePipeline& pipeline, const PushConstants& constants,
                         const Buffer& groups) {
@@ -96,34 +96,34 @@ class Commands {
   void dispatchIndirectBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants,
                              const Buffer& groups);
 
-  /// Everything recorded so far is finished and visible to everything recorded later. What the host wrote
-  /// before submit() is anyway, and so is everything to the host after wait().
+  /// Everything recorded before is finished and visible to everything recorded later. Writes of the host
+  /// before submit() are visible anyway, and so are all results to the host after wait().
   void barrier();
 
   void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
             std::uint64_t bytes);
   void fill(const Buffer& buffer, std::uint32_t word);  // the whole buffer
-  /// Whole words.
+  /// Fills whole words.
   void fill(const Buffer& buffer, std::uint64_t offset, std::uint64_t bytes, std::uint32_t word);
-  /// The buffer's first bytes, by way of the command buffer: whole words, 64 KiB at most.
+  /// Writes the buffer's first bytes, carried by the command buffer: whole words, 64 KiB at most.
   void update(const Buffer& buffer, std::span<const std::byte> bytes);
-  /// Fills a new image with zeros and makes it ready to be sampled: texels that nothing is copied to would
-  /// otherwise hold anything, NaN included, and a NaN spoils its neighbours even with weight 0.
+  /// Fills a new image with zeros and makes it ready to be sampled. Texels without data would otherwise hold
+  /// anything, NaN included, and a NaN spoils its neighbours even with weight 0.
   void clear(const SampledImage& image);
-  /// From ready to be sampled to ready for copyToImage, with its texels as they are.
+  /// Makes an image that is ready to be sampled ready for copyToImage; its texels stay as they are.
   void beginUpload(const SampledImage& image);
-  /// And back.
+  /// Makes the image ready to be sampled again.
   void endUpload(const SampledImage& image);
-  /// Texels, x fastest, from the buffer into a box of the image. `pitch`: texels from row to row and rows
-  /// from slice to slice; 0: tightly packed.
+  /// Copies texels, x fastest, from the buffer into a box of the image. `pitch` is the number of texels from
+  /// row to row and of rows from slice to slice; 0: tightly packed.
   void copyToImage(const Buffer& from, std::uint64_t fromOffset, const SampledImage& to,
                    const glm::uvec3& texelOffset, const glm::uvec3& texelExtent,
                    const glm::uvec2& pitch = glm::uvec2(0));
 
-  /// Marks the start of a named stage on the device's clock; it ends at the next mark, or at submit. Up to 64
-  /// a submission. Debuggers show its commands under that name.
+  /// Marks the start of a named stage on the device's clock; it ends at the next mark, or at submit. At most
+  /// 64 marks per submission. Debuggers show the stage's commands under that name.
   void mark(std::string name);
-  /// Device time of each stage of the last submission that was waited for, in order.
+  /// Device time of each stage of the last completed submission, in order.
   const std::vector<StageTime>& stageTimes() const { return times_; }
 
  private:
@@ -145,7 +145,7 @@ class Commands {
   std::vector<StageTime> times_;
   State state_ = State::Idle;
   std::uint64_t submissions_ = 0;
-  std::uint64_t last_ = 0;  // the last submission's number on its queue
+  std::uint64_t last_ = 0;  // number of the last submission on its queue
 };
 
 }  // namespace vdi::gpu

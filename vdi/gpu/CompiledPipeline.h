@@ -1,5 +1,5 @@
-// Compiled compute shaders, which a device has once for all who run them: to compile one takes longer than
-// most frames.
+// Compiled compute shaders, which all users of a device share, because compiling one takes longer than most
+// frames.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -24,12 +24,12 @@ std::span<const std::uint32_t> shaderCode(std::string_view name);
 struct ComputePipelineInfo {
   std::string_view shader;  // name without ".comp", for shaderCode
   std::span<const std::uint32_t>
-      code;  // SPIR-V that's used instead when it isn't empty; just while constructing
+      code;  // SPIR-V to use instead if it is not empty; needed during construction only
   std::uint32_t pushConstantBytes = 0;  // at most 128
   std::uint32_t imageCount = 0;         // size of the sampler3D array at set 0, binding 0
-  std::uint32_t uniformBytes = 0;       // of the uniform block at set 0, binding 1; 0: none
-  bool hasPlane = false;                // a sampler2D at set 0, binding 2
-  bool wholeSubgroups = false;          // of DeviceLimits::subgroupSize, of which the workgroup is a multiple
+  std::uint32_t uniformBytes = 0;       // size of the uniform block at set 0, binding 1; 0: none
+  bool hasPlane = false;                // whether there is a sampler2D at set 0, binding 2
+  bool wholeSubgroups = false;          // of DeviceLimits::subgroupSize; the workgroup is a multiple of it
   std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
 };
 
@@ -37,7 +37,7 @@ struct ComputePipelineInfo {
 constexpr std::uint32_t descriptorImages = 0;
 constexpr std::uint32_t descriptorUniforms = 1;
 constexpr std::uint32_t descriptorPlane = 2;
-/// What's there, binding by binding.
+/// A binding of the pipeline's descriptor set.
 struct DescriptorBinding {
   std::uint32_t binding;
   VkDescriptorType type;
@@ -45,17 +45,17 @@ struct DescriptorBinding {
 };
 std::vector<DescriptorBinding> descriptorBindings(const ComputePipelineInfo& info);
 
-/// What shaders are compiled for.
+/// The device to compile shaders for.
 struct PipelineTarget {
   VkDevice device = VK_NULL_HANDLE;
   VkPipelineCache cache = VK_NULL_HANDLE;
-  std::uint32_t subgroupSize = 0;  // of pipelines with wholeSubgroups
+  std::uint32_t subgroupSize = 0;  // for pipelines with wholeSubgroups
 };
 
-/// A pipeline, and how its parameters are laid out. Holds nothing that a user of it changes.
+/// A pipeline and its layout. Its users cannot change it.
 class CompiledPipeline {
  public:
-  /// The target's device must live longer. Throws Error if it can't be made.
+  /// The target's device must outlive it. Throws Error if the pipeline cannot be made.
   CompiledPipeline(const PipelineTarget& target, const ComputePipelineInfo& info);
   ~CompiledPipeline();
   CompiledPipeline(const CompiledPipeline&) = delete;
@@ -78,18 +78,18 @@ class CompiledPipeline {
   VkPipeline pipeline_ = VK_NULL_HANDLE;
 };
 
-/// Those of the shaders of this library. From any thread.
+/// The compiled shaders of this library. Thread-safe.
 class CompiledPipelines {
  public:
   using Made = std::function<void(const CompiledPipeline& pipeline)>;
-  /// Compiled when it's first asked for; then `made` is called, before anybody else has it. `target`: the
-  /// same in all calls.
+  /// Returns the pipeline, compiled at the first request; then `made` is called before anybody else gets the
+  /// pipeline. `target` must be the same in all calls.
   std::shared_ptr<const CompiledPipeline> of(const PipelineTarget& target, const ComputePipelineInfo& info,
                                              const Made& made);
   void clear() noexcept { pipelines_.clear(); }
 
  private:
-  /// All of ComputePipelineInfo but the size of uniforms: shader, bytes of push constants, images, whether
+  /// All of ComputePipelineInfo except the size of uniforms: shader, bytes of push constants, images, whether
   /// there are uniforms, plane, whole subgroups, specialisation.
   using Key =
       std::tuple<std::string, std::uint32_t, std::uint32_t, bool, bool, bool, std::vector<std::uint32_t>>;

@@ -1,4 +1,4 @@
-// Dispatches composite.comp: interleaved lists segmented again, to the budget.
+// Dispatches composite.comp: segments interleaved lists again, to the budget.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ namespace vdi::gpu {
 class CompositePass {
  public:
   explicit CompositePass(std::shared_ptr<Device> device);
-  /// What a dispatch does: what lists need (merging); or the first step of the algorithm, or, after a scan,
-  /// its second one.
+  /// The purpose of a dispatch: the histogram of lists (merging), the first step of the algorithm, or, after
+  /// a scan, its second step.
   enum class Work { Histogram, Count, Write };
   void record(Commands& commands, const shared::CompositeParams& params, Work work, Algorithm algorithm);
 

@@ -1,6 +1,6 @@
-// A compute shader ready to be dispatched. Buffers reach shaders as device addresses, inside the push
-// constants or inside the uniforms, if it has more parameters than fit there; so the only descriptors are the
-// uniforms and the sampled 3-D images, in one set that is written when they change.
+// A compute shader ready to be dispatched. Buffers reach shaders as device addresses in the push constants,
+// or in the uniforms if there are too many parameters. So the only descriptors are the uniforms and the
+// sampled images, in one set that is written when they change.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -16,8 +16,8 @@ namespace vdi::gpu {
 
 class Device;
 
-/// Those of equal info share what's compiled, if that's a shader of the library; images and uniforms are each
-/// one's own.
+/// Pipelines of equal info share compiled code if the shader is the library's; each has its own images and
+/// uniforms.
 class ComputePipeline {
  public:
   ComputePipeline(std::shared_ptr<Device> device, const ComputePipelineInfo& info);
@@ -30,14 +30,14 @@ class ComputePipeline {
   /// Writes the descriptor set: exactly imageCount images. Must not be called while a dispatch of this
   /// pipeline is in flight.
   void bindImages(std::span<const SampledImage* const> images, const Sampler& sampler);
-  /// Likewise, of the one 2-D image.
+  /// Writes the descriptor of the one 2-D image, under the same condition.
   void bindPlane(const SampledImage& image, const Sampler& sampler);
-  /// Likewise, a buffer of uniformBytes.
+  /// Writes the descriptor of the uniforms, a buffer of uniformBytes, under the same condition.
   void bindUniforms(const Buffer& buffer);
 
   VkPipeline handle() const { return compiled_->handle(); }
   VkPipelineLayout layout() const { return compiled_->layout(); }
-  VkDescriptorSet descriptorSet() const { return set_; }  // VK_NULL_HANDLE without any
+  VkDescriptorSet descriptorSet() const { return set_; }  // VK_NULL_HANDLE without descriptors
 
  private:
   void makeDescriptorSet(const ComputePipelineInfo& info);

@@ -1,4 +1,4 @@
-// Dispatches counts.comp: how many supersegments lists hold, as ranks tell each other.
+// Dispatches counts.comp: packs lists' counts for exchange between ranks.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// A device of the machine before it's chosen: what it can, and what's missing.
+// A device of the machine before the choice: its properties, and the requirements that it misses.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -20,7 +20,7 @@ struct DeviceCandidate {
   DeviceSummary summary;
 };
 
-/// Asks the device for all of that.
+/// Queries all of these properties.
 DeviceCandidate inspect(VkPhysicalDevice device);
 
 std::vector<DeviceSummary> summariesOf(std::span<const DeviceCandidate> candidates);

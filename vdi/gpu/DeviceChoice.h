@@ -1,4 +1,4 @@
-// Which of a machine's devices to use: the part of Device::create that has nothing to do with Vulkan.
+// The choice among a machine's devices: the part of Device::create that is independent of Vulkan.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace vdi::gpu {
 
-/// The later, the better.
+/// In order of preference, the best last.
 enum class DeviceType { Other, Cpu, Virtual, Integrated, Discrete };
 
 struct DeviceSummary {
@@ -19,15 +19,15 @@ struct DeviceSummary {
   DeviceType type = DeviceType::Other;
   std::string driver;                 // name and version
   std::uint64_t memoryBytes = 0;      // of the largest device-local heap
-  std::vector<std::string> refusals;  // everything that's required and missing; empty: usable
+  std::vector<std::string> refusals;  // all requirements that it misses; empty: usable
 };
 
-/// A line per device: index, name, type, driver, memory, "usable" or why not. One line that says so when
-/// there's no device.
+/// Returns a line per device: index, name, type, driver, memory, "usable" or the reason why it is not.
+/// Without devices, returns one line that says so.
 std::string describeDevices(std::span<const DeviceSummary> devices);
 
-/// Index of the device that the request asks for; see DeviceRequest and Device::create for the rules. Throws
-/// Error{DeviceUnavailable} with describeDevices' text.
+/// Index of the requested device; DeviceRequest and Device::create have the rules. Throws
+/// Error{DeviceUnavailable} with the text of describeDevices.
 std::size_t chooseDevice(std::span<const DeviceSummary> devices, const DeviceRequest& request);
 
 }  // namespace vdi::gpu

@@ -1,4 +1,4 @@
-// Dispatches expand.comp: supersegments as they're stored to what rendering wants.
+// Dispatches expand.comp: converts stored supersegments to the form for rendering.
 #pragma once
 
 #include <memory>
@@ -12,14 +12,15 @@ namespace vdi::gpu {
 class ExpandPass {
  public:
   explicit ExpandPass(std::shared_ptr<Device> device);
-  /// One of the expandMode's: all segments first, in any number of parts; then the masks; then the tiles.
+  /// constants.mode is one of expandMode...: first all segments, in any number of parts; then the masks; then
+  /// the tiles.
   void record(Commands& commands, const shared::ExpandConstants& constants);
 
  private:
   PipelineSet pipelines_;  // by precision
 };
 
-/// Small and large tiles.
+/// Number of small and large tiles together.
 std::uint64_t tileCount(const glm::ivec2& lists);
 
 }  // namespace vdi::gpu

@@ -1,4 +1,4 @@
-// The process's entry to Vulkan: its devices, and what the validation layer says about the one that's opened.
+// The process's access to Vulkan: its devices, and the validation layer's messages about the opened one.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -40,9 +40,9 @@ class MessageLog {
 
 class Instance {
  public:
-  /// A machine without any driver is none without devices. With `validation`, the layer's messages of
-  /// severity warning or error are kept, and objects can have names. Throws Error{DeviceUnavailable} if the
-  /// layer isn't installed or Vulkan can't be had otherwise.
+  /// A machine without any driver counts as one without devices. With `validation`, messages of severity
+  /// warning or error are kept, and objects can have names. Throws Error{DeviceUnavailable} if the layer is
+  /// not installed or Vulkan is unusable for another reason.
   explicit Instance(bool validation);
   ~Instance();
   Instance(const Instance&) = delete;

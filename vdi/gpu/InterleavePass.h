@@ -1,4 +1,4 @@
-// Dispatches interleave.comp: the ranks' sub-supersegments of each list in order of depth.
+// Dispatches interleave.comp: puts the ranks' supersegments of each list in order of depth.
 #pragma once
 
 #include <memory>
@@ -12,8 +12,8 @@ namespace vdi::gpu {
 class InterleavePass {
  public:
   explicit InterleavePass(std::shared_ptr<Device> device);
-  /// constants.mode: interleaveModeCount, then (after a scan) interleaveModeWrite, then interleaveModeFlatten
-  /// for a picture.
+  /// constants.mode is interleaveModeCount, then (after a scan) interleaveModeWrite, then
+  /// interleaveModeFlatten for a picture.
   void record(Commands& commands, const shared::InterleaveConstants& constants);
 
  private:

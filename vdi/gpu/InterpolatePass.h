@@ -1,4 +1,4 @@
-// Dispatches interpolate.comp: what lists may take, from those that were counted.
+// Dispatches interpolate.comp: list tolerances, interpolated from those of the counted lists.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ class InterpolatePass {
   void record(Commands& commands, const shared::InterpolateConstants& constants);
 
  private:
-  PipelineSet pipelines_;  // for one rank, and for one of several
+  PipelineSet pipelines_;  // for one rank, and for one of several ranks
 };
 
 }  // namespace vdi::gpu

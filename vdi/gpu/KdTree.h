@@ -12,8 +12,8 @@ struct KdTree {
   std::vector<shared::Brick> bricks;  // one per leaf; a brick that a plane had to cut appears once per part
 };
 
-/// Splits space by faces of bricks until every leaf holds one brick or none, cutting as few bricks as it can.
-/// Disjoint boxes can always be separated so; throws Error{InvalidArgument} when two overlap.
+/// Splits space by faces of bricks until every leaf holds at most one brick, cutting as few bricks as it can.
+/// Disjoint boxes can always be separated this way; throws Error{InvalidArgument} if two overlap.
 KdTree buildKdTree(std::vector<shared::Brick> bricks);
 
 }  // namespace vdi::gpu

@@ -1,4 +1,4 @@
-// Buffers and 3-D images: RAII, one VkDeviceMemory each (the library makes few and large ones).
+// Buffers and images: RAII, with one VkDeviceMemory each (the library makes few and large ones).
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -17,19 +17,18 @@ class Device;
 enum class MemoryKind {
   DeviceLocal,  // storage and transfer, not mapped
   Upload,       // host-visible and coherent, written by the host in order
-  Readback,     // host-visible, cached where there's such a type; coherent
+  Readback,     // host-visible and coherent, cached if there is such a type
 };
 
-/// Bytes of a texel of the formats that SampledImage is made with: R8_UNORM, R16_UNORM, R32_SFLOAT,
-/// R16G16B16A16_SFLOAT; asserts one of
-/// them.
+/// Bytes of a texel of the formats that SampledImage supports: R8_UNORM, R16_UNORM, R32_SFLOAT,
+/// R16G16B16A16_SFLOAT. Asserts one of them.
 std::uint64_t texelBytes(VkFormat format);
 
 /// A buffer with a device address. Usage: storage, uniforms, transfer source and destination.
 class Buffer {
  public:
   Buffer() = default;
-  /// Size 0 is rounded up to 16 bytes. Throws Error{OutOfMemory} with the MiB asked for, those that this
+  /// Size 0 is rounded up to 16 bytes. Throws Error{OutOfMemory} with the MiB requested, the MiB that this
   /// Device's Buffers and Images hold, and the device's size.
   Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind kind);
   ~Buffer();
@@ -49,10 +48,10 @@ class Buffer {
     return {reinterpret_cast<T*>(mapped_.data()), mapped_.size() / sizeof(T)};
   }
 
-  /// Makes the buffer hold at least `bytes`: keeps it when it's large enough, else replaces it (contents
-  /// lost). The first time it gets just `bytes`; when it grows, a half more where the device has that, so
-  /// that slow growth doesn't reallocate every frame. Returns true if it was replaced. If that throws, the
-  /// buffer is empty. `kind` must not change.
+  /// Makes the buffer hold at least `bytes`: keeps it if it is large enough, else replaces it and loses the
+  /// contents. The first allocation has just `bytes`. A larger one has half as much again if the device has
+  /// that, so that slow growth does not reallocate every frame. Returns true if the buffer was replaced. If
+  /// it throws, the buffer is empty. `kind` must not change.
   bool reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes, MemoryKind kind);
 
  private:
@@ -68,27 +67,27 @@ class Buffer {
   std::span<std::byte> mapped_;
 };
 
-/// Memory of the process as the device sees it: `data` starts `offset` bytes into the buffer, which is for
-/// transfers alone, and takes whole pages.
+/// The process's memory as the device sees it: `data` starts `offset` bytes into the buffer, which only
+/// serves transfers and covers whole pages.
 struct ImportedBuffer {
   Buffer buffer;
   std::uint64_t offset = 0;
 };
-/// Without a copy (VK_EXT_external_memory_host); nothing if the device can't, whatever the reason. The memory
-/// must stay as long as the buffer does.
+/// Imports memory without a copy (VK_EXT_external_memory_host); nullopt if the device cannot do that, for any
+/// reason. The memory must outlive the buffer.
 std::optional<ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& device, const void* data,
                                                std::uint64_t bytes);
 
-/// A 3-D or 2-D image that shaders sample, with one mip level, optimal tiling, and its view, for both kinds
-/// of queues. First Commands::clear, then filled between Commands::beginUpload and endUpload. Usage: sampled,
-/// transfer destination.
+/// A 3-D or 2-D image that shaders sample, with its view: one mip level, optimal tiling, for both kinds of
+/// queues. Call Commands::clear first, then fill it between Commands::beginUpload and endUpload. Usage:
+/// sampled, transfer destination.
 class SampledImage {
  public:
   SampledImage() = default;
-  /// A 3-D one. Throws Error{OutOfMemory} as Buffer does, Error{InvalidArgument} for an extent beyond
+  /// Makes a 3-D image. Throws Error{OutOfMemory} as Buffer does, Error{InvalidArgument} for an extent beyond
   /// maxImageDimension3D. No extent may be 0.
   SampledImage(std::shared_ptr<Device> device, const glm::uvec3& extent, VkFormat format);
-  /// A 2-D one, whose depth is 1. Throws Error{OutOfMemory}.
+  /// Makes a 2-D image, whose depth is 1. Throws Error{OutOfMemory}.
   static SampledImage plane(std::shared_ptr<Device> device, const glm::uvec2& extent, VkFormat format);
   ~SampledImage();
   SampledImage(SampledImage&& other) noexcept;

@@ -15,17 +15,17 @@ namespace vdi::gpu {
 
 class Commands;
 
-/// Pipelines of one shader that differ in specialisation, each made when it's first asked for.
+/// Pipelines of one shader that differ in specialisation, each made at its first use.
 class PipelineSet {
  public:
-  /// `common`: but for the specialisation.
+  /// `common` is the info without the specialisation.
   PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common);
-  /// With the uniforms of another set, which updates them.
+  /// Shares the uniforms of another set, which updates them.
   PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);
   ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
-  /// What the uniforms of all pipelines are for what's recorded next; nothing is recorded where they are that
-  /// already. They're in the device's own memory, where shaders read them as fast as constants: a GPU would
-  /// fetch them from the host's memory again and again.
+  /// Sets the uniforms that all pipelines have for the commands recorded next; records nothing if they have
+  /// these values already. Uniforms are in device-local memory, where shaders read them as fast as constants;
+  /// a GPU would fetch them from host memory again and again.
   template <typename Uniforms>
   void update(Commands& commands, const Uniforms& uniforms) {
     updateBytes(commands, std::as_bytes(std::span(&uniforms, 1)));
@@ -36,10 +36,10 @@ class PipelineSet {
 
   std::shared_ptr<Device> device_;
   ComputePipelineInfo common_;
-  std::shared_ptr<const Buffer> uniforms_;  // of all of them; none: they have no uniforms
-  std::vector<std::byte> updated_;          // what they are since the last update
-  const Commands* updatedBy_ = nullptr;     // where that was recorded
-  std::uint64_t updatedBehind_ = 0;         // and behind how many submissions of it
+  std::shared_ptr<const Buffer> uniforms_;  // shared by all pipelines; null without uniforms
+  std::vector<std::byte> updated_;          // the values of the last update
+  const Commands* updatedBy_ = nullptr;     // the commands that recorded it
+  std::uint64_t updatedBehind_ = 0;         // and their number of submissions at that time
   std::map<std::vector<std::uint32_t>, std::unique_ptr<ComputePipeline>> pipelines_;
 };
 

@@ -1,4 +1,4 @@
-// Dispatches quota.comp: what ranks agree on about lists that they've counted together.
+// Dispatches quota.comp: the ranks' agreement on lists that they have counted together.
 #pragma once
 
 #include <memory>

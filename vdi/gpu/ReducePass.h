@@ -1,5 +1,5 @@
-// Dispatches long_lists.comp, reduce_subgroup.comp, reduce.comp and store.comp: pre-segments merged, and
-// stored as supersegments.
+// Dispatches long_lists.comp, reduce_subgroup.comp, reduce.comp and store.comp: merges pre-segments and
+// stores them as supersegments.
 #pragma once
 
 #include <memory>
@@ -14,19 +14,19 @@ namespace vdi::gpu {
 
 class ReducePass {
  public:
-  /// Whether a subgroup merges a list, where it has room for that, or a single invocation.
+  /// Whether a subgroup merges a list that fits it, or always a single invocation.
   enum class Subgroups { Yes, No };
 
-  /// Subgroups: where the device has DeviceLimits::subgroupSize and runs programs for GPUs.
+  /// The default is Yes if the device has DeviceLimits::subgroupSize and runs programs for GPUs.
   explicit ReducePass(const std::shared_ptr<Device>& device);
   ReducePass(std::shared_ptr<Device> device, Subgroups subgroups);
 
   struct MaxPerList {
     std::uint32_t supersegments = 1;
-    bool always = true;  // or more, where gaps require that
+    bool always = true;  // false: or more, where gaps require that
   };
 
-  /// `constants` without longLists, longListCount and subgroupCapacity.
+  /// `constants` lack longLists, longListCount and subgroupCapacity.
   void record(Commands& commands, shared::ReduceConstants constants, const MaxPerList& maxPerList);
 
  private:
@@ -37,7 +37,7 @@ class ReducePass {
   ComputePipeline find_;
   PipelineSet subgroup_;  // by capacity
   ComputePipeline alone_;
-  PipelineSet store_;  // by precision, and whether lists may fit
+  PipelineSet store_;  // by precision, and whether lists may fit the budget as they are
   Buffer longLists_;
   Buffer longListCount_;
 };

@@ -1,4 +1,4 @@
-// Dispatches cull.comp and render.comp: a VDI seen from a new viewpoint.
+// Dispatches cull.comp and render.comp: renders a VDI from a new viewpoint.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ shared::RenderRays renderRays(const View& original, const View& view);
 class RenderPass {
  public:
   explicit RenderPass(const std::shared_ptr<Device>& device);
-  /// Behind a barrier. `params`: but for the queue. `form`: shared::renderPicture...
+  /// Call after a barrier. `params` lack the queue. `form` is one of shared::renderPicture....
   void record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,
               Reconstruction reconstruction, std::uint32_t form);
 

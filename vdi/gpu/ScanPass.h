@@ -1,5 +1,4 @@
-// Dispatches scan.comp: the prefix sum that says where each list starts in the compact array (paper, section
-// 4).
+// Dispatches scan.comp: the prefix sum that gives each list's start in the compact array (paper, section 4).
 #pragma once
 
 #include <cstdint>
@@ -17,17 +16,17 @@ class ScanPass {
  public:
   explicit ScanPass(std::shared_ptr<Device> device);
 
-  /// prefix[0 .. count] = exclusive prefix sum of values[0 .. count - 1], prefix[count] being the total.
-  /// Records its barriers, also one at the start and one at the end. Nothing that was recorded before may be
-  /// running.
+  /// Computes prefix[0 .. count]: the exclusive prefix sum of values[0 .. count - 1], with the total at
+  /// prefix[count]. Records its barriers, including one at the start and one at the end. No dispatch recorded
+  /// before may be running.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count);
-  /// The same, and whether the total fits: `guard` (a word) becomes 1 if it's `room` at most, and, if it's
-  /// given, the word `before` is 1; else 0. What's dispatched next can look at it, and do nothing, before the
-  /// host has seen the total.
+  /// Also records whether the total fits: `guard` (a word) becomes 1 if the total is at most `room` and the
+  /// word `before`, if given, is 1; else 0. The next dispatches can read it, and do nothing, before the host
+  /// has seen the total.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count,
               const Buffer& guard, std::uint64_t room, const Buffer* before = nullptr);
 
-  /// Adds `base` to prefix[first .. first + count - 1]. Barriers as record.
+  /// Adds `base` to prefix[first .. first + count - 1]. Has the same barriers as record.
   void recordRebase(Commands& commands, const Buffer& prefix, std::uint64_t first, std::uint32_t count,
                     std::uint32_t base);
 
@@ -38,10 +37,10 @@ class ScanPass {
   void recordBoth(Commands& commands, shared::ScanConstants constants, ComputePipeline& pipeline);
 
   std::shared_ptr<Device> device_;
-  PipelineSet pipelines_;  // without guard, with one, with one that looks at another one
+  PipelineSet pipelines_;  // without guard, with one, and with one that depends on another
   Buffer sums_;            // of workgroups
-  /// Those that were too small for a later scan: what was recorded before may still use them. They're a few,
-  /// and small, for each is half as large again as the one before.
+  /// Buffers that were too small for a later scan, kept because recorded commands may use them. They are few
+  /// and small, since each is half as large again as the one before.
   std::vector<Buffer> outgrown_;
   Buffer overflow_;
 };

@@ -1,4 +1,4 @@
-// How blocks become texels: which format, what of a block in which 3-D texture ("page"), and where there.
+// How blocks become texels: the format, and each piece's place in a 3-D texture ("page").
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -14,43 +14,43 @@
 
 namespace vdi::gpu {
 
-/// value = texel * scale + offset: for the normalised formats those of the type, for f32 1 and 0, for all
-/// other types relative to the block's own range.
+/// value = texel * scale + offset. Normalised formats have the type's scale and offset, f32 has 1 and 0, and
+/// all other types are relative to the block's own range.
 struct ValueMap {
   double scale = 1.0;
   double offset = 0.0;
-  bool whole = false;                // values are whole numbers
-  std::optional<ScalarRange> range;  // of finite values, where it had to be found
+  bool whole = false;                // values are integers
+  std::optional<ScalarRange> range;  // of finite values, if it had to be computed
 };
-/// Throws Error{InvalidArgument} for values beyond limitsOf(type).most.
+/// Throws Error{InvalidArgument} for values beyond limitsOf(type).maximum.
 ValueMap valueMapOf(const Block& block);
 
 /// A box of a block's values that fits one page.
 struct VolumePiece {
   const Block* block = nullptr;
-  glm::ivec3 first{0};  // index of its first value in the block; negative in a layer below the stored values
+  glm::ivec3 first{0};  // index of its first value in the block; negative in a layer before the stored values
   glm::uvec3 dims{0};
   VkFormat format = VK_FORMAT_UNDEFINED;
   ValueMap values;
   std::uint32_t page = 0;
   glm::uvec3 place{0};                                                // in the page, texels
-  IndexBox box() const { return {first, first + glm::ivec3(dims)}; }  // of the block's indices
+  IndexBox box() const { return {first, first + glm::ivec3(dims)}; }  // in the block's indices
   bool samePlaceAs(const VolumePiece& other) const { return dims == other.dims && format == other.format; }
 };
 
-/// Values of a piece beyond the samples that it serves, where the block was cut: gradients look a voxel
-/// beyond the face (valueReach).
+/// Values around the samples that a piece serves, where the block was cut: gradients read a voxel beyond the
+/// face (valueReach).
 constexpr int pieceMargin = 1;
 
-/// Pieces of the block, extra layers included, that fit a page each. They overlap, so that each interpolates
-/// by itself.
+/// Cuts the block, extra layers included, into pieces that each fit a page. They overlap, so that each can
+/// interpolate without the others.
 std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block);
 
 struct PageShape {
   glm::uvec3 extent{0};
   VkFormat format = VK_FORMAT_UNDEFINED;
 };
-/// Fills in the pieces' pages and places. Throws Error{OutOfMemory} if that takes too many pages.
+/// Sets the pieces' pages and places. Throws Error{OutOfMemory} if there would be too many pages.
 std::vector<PageShape> placeInPages(const Device& device, std::span<VolumePiece> pieces);
 
 }  // namespace vdi::gpu

@@ -1,4 +1,4 @@
-// Values of blocks to texels on the device.
+// Uploads blocks' values to texels on the device.
 #pragma once
 
 #include <array>
@@ -13,20 +13,21 @@
 
 namespace vdi::gpu {
 
-/// Runs on the device's transfer queue, through two staging buffers: one is filled, by all cores, while the
-/// device copies from the other. A process with one core rather lets the device copy values that are texels
-/// as they are from the block's own memory, where the driver can import that (VK_EXT_external_memory_host).
-/// Values of patches are put among the staged ones, or copied once the block's own are there.
+/// Runs on the device's transfer queue, through two staging buffers: all cores fill one while the device
+/// copies from the other. If values can be texels as they are and the driver can import host memory
+/// (VK_EXT_external_memory_host), a process with one core lets the device copy them from the block's own
+/// memory instead. Values of patches are inserted among the staged ones, or copied after the block's own
+/// values.
 class VolumeUpload {
  public:
   explicit VolumeUpload(std::shared_ptr<Device> device);
 
-  /// What run copies waits on the device for what `before` submitted last. Before each run.
+  /// Call before each run: its copies wait on the device for the last submission of `before`.
   void begin(const Commands& before);
-  /// Copies the pieces to their places in the pages, which stay ready to be sampled. Returns when all is
-  /// there and host data isn't needed any more. May be called by any thread, while others use the device.
+  /// Copies the pieces to their places in the pages, which stay ready to be sampled. Returns when all values
+  /// are there; then host data is not needed any more. Any thread may call it, while others use the device.
   void run(std::span<const VolumePiece> pieces, std::span<const SampledImage> pages);
-  /// What run submitted last: to be waited for by other queues.
+  /// The commands that run submitted last, for other queues to wait for.
   const Commands& last() const { return halves_[current_].commands; }
 
  private:

@@ -1,4 +1,4 @@
-// The opened device as Vulkan's functions see it: what vdi/gpu is made from. gpu::Device is what others see.
+// The opened device with its Vulkan handles, for the rest of vdi/gpu. Others use gpu::Device.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -19,14 +19,14 @@ namespace vdi::gpu {
 struct DeviceCandidate;
 class Instance;
 
-/// What a queue is for. Where the hardware has copy engines, Transfer is theirs: what's submitted there goes
-/// on beside what computes. Elsewhere both are the same queue.
+/// A queue's purpose. On hardware with copy engines, Transfer is their queue: its submissions run beside
+/// computation. Elsewhere both are the same queue.
 enum class QueueKind { Compute, Transfer };
 
 class VulkanDevice {
  public:
-  /// With every feature that the candidate's limits and Device::create promise. The instance must live
-  /// longer. Throws Error{DeviceUnavailable} if the device can't be opened.
+  /// Opens the device with every feature that the candidate's limits and Device::create promise. The instance
+  /// must outlive it. Throws Error{DeviceUnavailable} if the device cannot be opened.
   VulkanDevice(const Instance& instance, const DeviceCandidate& chosen);
   ~VulkanDevice();  // waits until the device is idle
   VulkanDevice(const VulkanDevice&) = delete;
@@ -36,36 +36,36 @@ class VulkanDevice {
 
   VkDevice handle() const { return device_; }
   std::uint32_t queueFamily(QueueKind kind) const { return queue(kind).family; }
-  /// Compiled once for all who ask for it, if it's a shader of the library. From any thread.
+  /// Returns the pipeline, which all its users share if the shader is the library's. Thread-safe.
   std::shared_ptr<const CompiledPipeline> compiled(const ComputePipelineInfo& info,
                                                    std::uint32_t subgroupSize);
 
-  /// Index of the first memory type that `typeBits` allows and that has `wanted`, if there's one; by Vulkan's
-  /// order that's the one with the fewest other properties.
+  /// Index of the first memory type that `typeBits` allows and that has `wanted`; nullopt if there is none.
+  /// By Vulkan's order it is the one with the fewest other properties.
   std::optional<std::uint32_t> findMemoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
-  /// The same; throws Error{OutOfMemory} if there's none.
+  /// findMemoryType that throws Error{OutOfMemory} if there is none.
   std::uint32_t memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
-  /// Memory types as which memory of the process at `pages`, aligned to hostPointerAlignment, can be
-  /// imported; 0: none.
+  /// Bits of the memory types under which the process's memory at `pages`, aligned to hostPointerAlignment,
+  /// can be imported; 0: none.
   std::uint32_t memoryTypesOfHostPointer(const void* pages) const;
 
-  /// Submits to a queue; the result is how many submissions that queue has had, this one included, which is
-  /// what its timeline semaphore reaches when this one is done. From any thread.
+  /// Submits to a queue and returns its number of submissions, including this one. Its timeline semaphore
+  /// reaches that number when this submission is complete. Thread-safe.
   std::uint64_t submit(QueueKind kind, std::span<const VkSemaphoreSubmitInfo> waits,
                        VkCommandBuffer commands);
-  /// Waits for that many. Throws Error{DeviceFailure} on device loss.
+  /// Waits until that many submissions are complete. Throws Error{DeviceFailure} on device loss.
   void wait(QueueKind kind, std::uint64_t submissions) const;
-  /// Whether a submission or a wait has found it lost: it stays so.
+  /// Whether a submission or a wait has found the device lost; it stays so.
   bool isLost() const { return lost_; }
-  /// For `waits` of submit.
+  /// The queue's semaphore, for `waits` of submit.
   VkSemaphore submissionsDone(QueueKind kind) const { return queue(kind).done; }
 
-  /// What validation messages and debuggers call an object. Does nothing unless the instance validates.
+  /// Names an object in validation messages and debuggers. Does nothing unless the instance validates.
   template <typename Handle>
   void setName(VkObjectType type, Handle handle, const std::string& name) const {
     if (names_.set != nullptr) setNameOf(type, reinterpret_cast<std::uint64_t>(handle), name);
   }
-  /// What they call the commands from here on, until endLabel. Likewise.
+  /// Labels the commands from here on, until endLabel. Does nothing unless the instance validates.
   void beginLabel(VkCommandBuffer commands, const std::string& name) const;
   void endLabel(VkCommandBuffer commands) const;
 
@@ -73,8 +73,8 @@ class VulkanDevice {
   struct Queue {
     VkQueue handle = VK_NULL_HANDLE;
     std::uint32_t family = 0;
-    // Timeline: counts submissions that are done. It lives as long as the device because drivers may touch it
-    // a moment longer than the submission takes: Mesa 22.3's queue thread does.
+    // Timeline semaphore that counts completed submissions. It lives as long as the device because drivers
+    // may use it a moment longer than the submission takes: Mesa 22.3's queue thread does.
     VkSemaphore done = VK_NULL_HANDLE;
     std::uint64_t submissions = 0;
   };

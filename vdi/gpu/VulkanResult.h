@@ -1,4 +1,4 @@
-// What Vulkan's functions return, as exceptions.
+// Results of Vulkan's functions as exceptions.
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -7,11 +7,11 @@
 
 namespace vdi::gpu {
 
-/// As Vulkan's C headers spell it.
+/// The name of the result in Vulkan's C headers.
 std::string nameOf(VkResult result);
 
-/// Throws Error: OutOfMemory for the two out-of-memory results, DeviceFailure otherwise; `call` names the
-/// function.
+/// Throws Error for results other than success: OutOfMemory for the two out-of-memory results, else
+/// DeviceFailure. `call` names the function.
 void check(VkResult result, const char* call);
 
 }  // namespace vdi::gpu

@@ -1,4 +1,4 @@
-// Whole files: read with clear errors, written so that no reader sees half of one.
+// Whole files: read with clear errors, and written so that no reader sees half of one.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,9 @@
 
 namespace vdi::io {
 
-/// A regular file open for reading; it never waits for a pipe's writer. Throws Error{Io} with the path as
-/// context: no such file, a folder, pipe or device, no permission, a read that fails or ends early.
+/// A regular file open for reading. Opening a pipe does not wait for its writer. Throws Error{Io} with the
+/// path as context for: no such file; a folder, pipe or device; no permission; a read that fails or ends
+/// early.
 class InputFile {
  public:
   explicit InputFile(std::filesystem::path path);
@@ -21,7 +22,7 @@ class InputFile {
   InputFile& operator=(const InputFile&) = delete;
 
   std::uint64_t size() const { return size_; }
-  /// Fills `to` from `offset` on. Throws if the file ends before.
+  /// Fills `to` from `offset` on. Throws if the file ends earlier.
   void readInto(std::uint64_t offset, std::span<std::byte> to) const;
   /// `count` bytes from `offset`; offset + count <= size().
   std::vector<std::byte> read(std::uint64_t offset, std::uint64_t count) const;
@@ -36,40 +37,41 @@ class InputFile {
 /// Writes the whole file, or leaves `path` as it was. Throws Error{Io} with the path as context and the
 /// system's reason.
 /// - A regular file gets its name when all of it is on the disk: until then, and after an error, `path` has
-///   its old content. File and folder are synchronised, so that a power cut loses neither.
-/// - One that was there keeps its permissions (and its owner, as far as the process may); it must be
+///   its old content. File and folder are synchronised, so a power cut loses neither.
+/// - An existing file keeps its permissions (and its owner, as far as the process may set it); it must be
 ///   writable. A symbolic link stays one: the file that it names is replaced.
-/// - Character devices and pipes are written to as they are; a pipe must have a reader. Folders, block
-/// devices
-///   and sockets are refused.
-/// A killed process leaves nothing where the file system has files without a name (O_TMPFILE). Elsewhere it
-/// may leave `.vdi-<process>-<number>.tmp` in the folder, which can be deleted.
+/// - Character devices and pipes are written directly; a pipe must have a reader. Folders, block devices and
+///   sockets are refused.
+/// A killed process leaves nothing behind on file systems with unnamed files (O_TMPFILE). Elsewhere it may
+/// leave `.vdi-<process>-<number>.tmp` in the folder, which can be deleted.
 void writeAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
-/// writeAtomically in steps, for bytes that aren't all there at once, or that several processes have. All of
-/// it throws as writeAtomically does.
+/// writeAtomically in steps, for bytes that are made piece by piece, or by several processes. All functions
+/// throw as writeAtomically does.
 class OutputFile {
  public:
-  /// Refuses what requireWritable does. Nothing is seen of the file until commit.
+  /// Refuses what requireWritable refuses. The file is invisible until commit.
   explicit OutputFile(const std::filesystem::path& path);
-  ~OutputFile();  // without commit, nothing has happened
+  ~OutputFile();  // without commit, discards the file
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
   OutputFile(OutputFile&&) = delete;
   OutputFile& operator=(OutputFile&&) = delete;
 
-  /// False: a device or pipe, which takes bytes one behind the other.
+  /// False for a device or pipe, which takes bytes only in sequence.
   bool takesOffsets() const;
-  /// Anywhere in the file. Into what takes no offsets: behind what was written before.
+  /// Writes anywhere in the file. Without offsets, appends to the bytes written before.
   void write(std::uint64_t offset, std::span<const std::byte> bytes);
-  /// The file is to have that many bytes: throws if there's no room for them, as far as the file system can
-  /// tell. Before other processes write, for a client of NFS may fill up the page at a file's end with zeros,
-  /// and write them over what others have there. Not less than what was written.
+  /// Sets the file's size, which may not be less than what was written. Throws if there is no room for it, as
+  /// far as the file system can tell. Call before other processes write: an NFS client may fill the page at a
+  /// file's end with zeros and overwrite their bytes with it.
   void reserve(std::uint64_t bytes);
-  /// What other processes can open (SharedOutput) until commit, or until this goes: an absolute path, whose
-  /// last part is random. A process that's killed in between leaves that file. Requires takesOffsets().
+  /// Gives the file a name under which other processes can open it (SharedOutput) until commit, or until this
+  /// object ends: an absolute path whose last part is random. If the process is killed in between, that file
+  /// stays. Requires takesOffsets().
   std::filesystem::path share();
-  /// Once others are finished too. The file gets its name, and this object has no file any more.
+  /// Call when the other processes have finished too. The file gets its final name, and this object has no
+  /// file any more.
   void commit();
 
  private:
@@ -77,10 +79,10 @@ class OutputFile {
   std::unique_ptr<State> state_;
 };
 
-/// Another process's OutputFile, by the name that it shares it under.
+/// Another process's OutputFile, opened by the name under which it is shared.
 class SharedOutput {
  public:
-  /// None: there's no such file here, or none that may be written to, as on a host that doesn't have the
+  /// Returns nullopt if there is no such file here or it may not be written, as on a host that lacks the
   /// folder. Throws Error{Io} for other reasons. Errors have `path` as context.
   static std::optional<SharedOutput> open(const std::filesystem::path& shared,
                                           const std::filesystem::path& path);
@@ -91,7 +93,7 @@ class SharedOutput {
   SharedOutput& operator=(SharedOutput&&) = delete;
 
   void write(std::uint64_t offset, std::span<const std::byte> bytes);
-  /// What was written is on the disk when this returns. Nothing can be written afterwards.
+  /// All written bytes are on the disk when this returns. Nothing can be written afterwards.
   void finish();
 
  private:
@@ -100,9 +102,9 @@ class SharedOutput {
   int descriptor_;
 };
 
-/// What writeAtomically would refuse now, before there's anything to write: throws the same Error{Io}.
-/// Changes nothing. Returns the regular file that would be made or replaced, absolute and with links
-/// followed; an empty path for a device or pipe. Two paths of one result are one file.
+/// Throws the Error{Io} that writeAtomically would throw now, before there is anything to write. Changes
+/// nothing. Returns the regular file that would be made or replaced, absolute and with links followed; an
+/// empty path for a device or pipe. Two paths with the same result are one file.
 std::filesystem::path requireWritable(const std::filesystem::path& path);
 
 }  // namespace vdi::io

@@ -1,4 +1,4 @@
-// 8-bit PNG files, by libpng.
+// 8-bit PNG files, through libpng.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +17,10 @@ struct Picture {
   std::vector<std::uint8_t> rgb;  // [height][width][3]
 };
 
-/// The image over a background, rounded to 8 bits and turned upside down (Image has row 0 at the bottom).
+/// The image over a background, rounded to 8 bits and flipped vertically (Image has row 0 at the bottom).
 Picture toPicture(const Image& image, const glm::vec3& background = glm::vec3(0.0F));
 
-/// The same of premultiplied bytes, over black.
+/// Premultiplied bytes over black, flipped vertically.
 Picture toPicture(const ImageBytes& image);
 
 void writePng(const std::filesystem::path& path, const Picture& picture);  // atomic; throws Error{Io}

@@ -1,4 +1,4 @@
-// The .vdi file. Byte map: docs/format.md, guarded by static_asserts in VdiFile.cpp.
+// The .vdi file. docs/format.md has the byte map; static_asserts in VdiFile.cpp guard it.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace vdi::io {
 
-/// What a reader can know without decompressing the lists.
+/// The part of a file that a reader knows without decompressing the lists.
 struct VdiFileInfo {
   std::uint32_t version = 0;
   Vdi header;  // everything but the lists and their depth code; its precision() is right
@@ -19,22 +19,22 @@ struct VdiFileInfo {
   std::uint64_t expandedBytes = 0;  // offsets and supersegments in memory
 };
 
-/// Lossless in the VDI's precision, LZ4, checksummed. Deterministic: equal VDIs give equal bytes on every
-/// machine (little-endian). Throws Error{Format} for a VDI that decode would refuse.
+/// Encodes a VDI without loss in its precision, with LZ4 and checksums. Deterministic: equal VDIs give equal
+/// bytes on every machine (little-endian). Throws Error{Format} for a VDI that decode would refuse.
 std::vector<std::byte> encode(const Vdi& vdi);
 /// Throws Error{Format} for bytes that are truncated, altered, of another version or encoding, or whose
-/// header or chunk table asks for more memory than what the chunks expand to (before that is allocated; they
+/// header or chunk table asks for more memory than the chunks can expand to (before that is allocated; they
 /// expand 255 times at most). The result has passed validate(Vdi).
 Vdi decode(std::span<const std::byte> bytes);
-/// Reads header, chunk table and metadata only; the rest need not be sound, but must be there.
+/// Reads header, chunk table and metadata only; the lists must be present, but need not be valid.
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes);
 
-/// Written by writeAtomically (Files.h): a reader never sees half a file, and a file that was there stays
-/// when writing fails. Throws Error{Io}, or Error{Format} as encode; both with the path as context.
+/// Writes the file by writeAtomically (Files.h): a reader never sees half a file, and an existing file stays
+/// if writing fails. Throws Error{Io}, or Error{Format} as encode; both with the path as context.
 void writeVdi(const std::filesystem::path& path, const Vdi& vdi);
 /// Throws Error{Io} or Error{Format} with the path as context.
 Vdi readVdi(const std::filesystem::path& path);
-/// The same, without reading the lists.
+/// decodeInfo of a file, without reading the lists.
 VdiFileInfo readVdiInfo(const std::filesystem::path& path);
 
 }  // namespace vdi::io

@@ -1,5 +1,5 @@
-// The parts of a .vdi file, for whoever doesn't have all lists at once (docs/format.md): chunks, and what
-// stands in front of them. io::encode is made of these too, so that a file is the same by whatever way.
+// The parts of a .vdi file, for writers that do not have all lists at once (docs/format.md): chunks, and the
+// bytes before and after them. io::encode uses them too, so both ways make the same file.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +12,13 @@
 
 namespace vdi::io {
 
-/// In a chunk, but for a file's last one.
+/// Lists in each chunk; the last chunk of a file may have fewer.
 inline constexpr std::uint64_t listsPerChunk = 4096;
 constexpr std::uint64_t chunksOf(std::uint64_t lists, std::uint64_t perChunk = listsPerChunk) {
   return (lists + perChunk - 1) / perChunk;
 }
 
-/// What the file's table says of a chunk.
+/// A chunk's entry in the file's table.
 struct ChunkEntry {
   std::uint32_t supersegmentCount;
   std::uint32_t packedBytes;
@@ -30,22 +30,21 @@ struct EncodedChunk {
   std::vector<std::byte> bytes;  // [entry.packedBytes], as they lie in the file
 };
 
-/// Encodes whole chunks, by several threads. `take` gets them in order, from the calling thread; a few are
-/// held at a time. `lists`: some of the VDI's, of which those from `first` on, until before `last`, make up
-/// chunks: there are a multiple of listsPerChunk of them, or they end where the VDI does. `firstList`: the
-/// VDI's number of the first of these, a multiple of listsPerChunk. `code`: of compact lists. Throws
-/// Error{Format} for lists that decode would refuse, Error{Io} for a chunk beyond 2 GiB, and what `take`
-/// throws.
+/// Encodes whole chunks, on several threads. `take` gets them in order, on the calling thread; only a few
+/// exist at a time. `lists` are some of the VDI's. Those in [first, last) are encoded: they are a multiple of
+/// listsPerChunk, or end where the VDI does. `firstList` is the VDI's number of list `first`, a multiple of
+/// listsPerChunk. `code` belongs to compact lists. Throws Error{Format} for lists that decode would refuse,
+/// Error{Io} for a chunk beyond 2 GiB, and any exception of `take`.
 template <typename Segment>
 void encodeChunks(const ListsOf<Segment>& lists, std::size_t first, std::size_t last, std::uint64_t firstList,
                   std::uint32_t budget, const DepthCode& code, const std::function<void(EncodedChunk)>& take);
 
-/// Bytes in front of the first chunk, of a file of that many lists.
+/// Number of bytes before the first chunk, in a file of that many lists.
 std::uint64_t headBytes(std::uint64_t lists);
-/// Those bytes. `vdi`: of its lists there only has to be which precision they have. `table`: of all chunks.
-/// Throws Error{Format} for what decode would refuse.
+/// The bytes before the first chunk. Of the lists of `vdi`, only the precision matters. `table` has all
+/// chunks. Throws Error{Format} for a VDI that decode would refuse.
 std::vector<std::byte> encodeHead(const Vdi& vdi, std::span<const ChunkEntry> table);
-/// What follows the last chunk, of a VDI whose coloring is known; else nothing. Throws as encodeHead.
+/// The bytes after the last chunk, which exist if the VDI has a coloring. Throws as encodeHead.
 std::vector<std::byte> encodeTail(const Vdi& vdi);
 
 }  // namespace vdi::io

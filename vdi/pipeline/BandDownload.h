@@ -1,5 +1,5 @@
-// A band's lists, from the device to the host, for those who take them there one band after the other. Not
-// part of the library's interface.
+// Copies a band's lists from the device to the host, one band after the other. Not part of the library's
+// interface.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,8 @@
 
 namespace vdi::detail {
 
-/// In memory of this process alone, which the next band's lists take when these have gone.
+/// Downloads into memory of this process alone; when a band's lists are gone, the next band reuses their
+/// memory.
 class BandDownload {
  public:
   explicit BandDownload(std::shared_ptr<gpu::Device> device);
@@ -19,8 +20,8 @@ class BandDownload {
   BandDownload(BandDownload&&) = delete;
   BandDownload& operator=(BandDownload&&) = delete;
 
-  /// By the transfer queue, behind what writes them, beside what the device does meanwhile. They're there
-  /// when this returns.
+  /// The transfer queue copies, after the commands that write the lists and beside other work of the device.
+  /// The lists are complete when this returns.
   template <typename Segment>
   ListsOf<Segment> get(const DeviceLists& band);
 

@@ -1,5 +1,5 @@
-// Lists of a frame, band after band: cast, distribute and composite, and who waits for whom. Not part of the
-// library's interface.
+// Makes the lists of a frame, band after band: casts, distributes and composites, and makes each stage wait
+// for the ones before it. Not part of the library's interface.
 #pragma once
 
 #include <algorithm>
@@ -38,52 +38,52 @@ class BandMaker {
   void makeAlone(const RayCaster::Request& request, const Progress& progress, VdiSink& sink,
                  RankReport& report);
 
-  /// Collective: makes the bands of a VDI's lists on the devices of their owners, and adds all of them to the
-  /// sink except the last one. `started`, collective, is called when the first band is being made. `owned`
-  /// gets this rank's lists of each band.
+  /// Collective: makes the bands of a VDI's lists on their owners' devices, and adds all of them but the last
+  /// one to the sink. Calls `started`, which is collective, while the first band is being made. `owned` gets
+  /// this rank's lists of each band.
   void makeComposited(const RayCaster::Request& request, const Progress& progress,
                       std::vector<OwnedLists>& owned, const std::function<void()>& started, VdiSink& sink,
                       RankReport& report);
-  /// Collective: adds that one.
+  /// Collective: adds the last band of makeComposited to the sink.
   void addLast(const std::vector<OwnedLists>& owned, VdiSink& sink, RankReport& report);
 
-  /// A band of the picture that this rank owns, without lists.
+  /// A band of the flat picture, without lists, that this rank owns.
   struct FlatBand {
     std::uint64_t firstPixel = 0;
     std::uint32_t pixelCount = 0;
     gpu::Buffer colors;         // [pixelCount] glm::vec4
     gpu::Buffer depths;         // [pixelCount] float
-    gpu::Submission flattened;  // which writes these two
+    gpu::Submission flattened;  // writes both buffers
   };
-  /// Collective: the same for a picture, of runs alone. The limit case of the paper's section 5.3: one
-  /// supersegment a run, composited in order of depth. `pass`, collective, waits for a composited band
-  /// (Compositor::finish) and sends it on; it isn't called for the last band.
+  /// Collective: makes a flat picture from runs alone. It is the limit case of the paper's section 5.3: one
+  /// supersegment a run, composited in order of depth. `pass`, which is collective, waits for a composited
+  /// band (Compositor::finish) and sends it on; it is not called for the last band.
   void makeFlat(const RayCaster::Request& request, const Progress& progress, std::vector<FlatBand>& flat,
                 const std::function<void(std::size_t band)>& pass, RankReport& report);
 
-  /// The picture of one rank's volume: RayCaster::render.
+  /// Renders one rank's volume to a picture: RayCaster::render.
   void render(const RayCaster::Request& request, const Progress& progress, HostPool& pool, Image& image,
               RankReport& report);
 
-  /// No frame is under way: the next one takes the same memory as the last that was made so.
+  /// Call when no frame is under way: the next frame uses the same memory as the last one after a restart.
   void restart() { firstSlot_ = 0; }
-  /// Waits for what was started, and drops it: after an error.
+  /// Waits for the submitted work and drops it. For use after an error.
   void drop() noexcept;
 
  private:
-  /// What a band of this rank's own lists needs until it's passed on; bands take them in turns.
+  /// Memory for a band of this rank's own lists until it is passed on; bands take slots in turns.
   struct Slot {
     DeviceLists lists;
     comm::Ownership owned = comm::Ownership::equal(0, 1);
     std::unique_ptr<Distributor> distributor;
     Distributed parts;
-    gpu::Submission usedBy;  // the lists' memory
+    gpu::Submission usedBy;  // uses the lists' memory
   };
   Slot& slotOf(std::size_t band) { return slots_[(firstSlot_ + band) % slots_.size()]; }
-  /// The next frame's first band isn't made where this one's last band still is.
+  /// Makes the next frame's first band avoid the memory of this frame's last one.
   void freeSlots(std::size_t bands) { firstSlot_ = (firstSlot_ + bands) % slots_.size(); }
 
-  /// Bands of a picture: as many rows each, but for the last one.
+  /// Bands of a picture: all have the same number of rows, except the last one.
   struct Bands {
     std::uint32_t height = 0;
     std::uint32_t rows = 1;
@@ -92,7 +92,7 @@ class BandMaker {
     std::uint32_t last(std::size_t band) const { return std::min(height, first(band) + rows); }
     double doneWith(std::size_t band) const { return static_cast<double>(last(band)) / height; }
   };
-  /// Where this rank's lists of a band begin in the picture, and all ranks' supersegments of them.
+  /// The position of this rank's lists of a band in the picture, and all ranks' supersegments of them.
   struct MergedBand {
     std::uint64_t firstList = 0;
     DeviceLists interleaved;
@@ -102,12 +102,12 @@ class BandMaker {
   void distribute(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report);
   comm::Ownership ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
                               std::span<const std::uint32_t> weights) const;
-  /// Collective: this rank's lists, band after band, to those who own them, where they're merged by depth.
-  /// While a band is on its way, the device makes the next one.
+  /// Collective: sends this rank's lists, band after band, to their owners, which merge them by depth. The
+  /// device makes the next band while one is on its way.
   struct OwnedSteps {
-    std::function<void()> started;                  // collective: the first band is being made
-    std::function<void(std::size_t band)> compose;  // submits what's made of a merged band
-    std::function<void(std::size_t band)> pass;     // collective: sends on a band that was composed
+    std::function<void()> started;                  // collective; called while the first band is being made
+    std::function<void(std::size_t band)> compose;  // submits the work on a merged band
+    std::function<void(std::size_t band)> pass;     // collective; sends a composed band on
   };
   void makeOwned(const RayCaster::Request& request, const Progress& progress, const OwnedSteps& steps,
                  RankReport& report);
@@ -121,7 +121,7 @@ class BandMaker {
   comm::ByteSum levelSum_;
   HostAccesses accesses_;  // to the memory of levelSum_
   std::array<Slot, RayCaster::bandsAtOnce> slots_;
-  std::size_t firstSlot_ = 0;  // of the frame that's made
+  std::size_t firstSlot_ = 0;  // of the current frame
   std::vector<MergedBand> merged_;
 };
 

@@ -1,5 +1,5 @@
-// The owner's part of compositing, on the device: interleave by depth, segment again (paper, section 5.2).
-// Not part of the library's interface.
+// The owner's part of compositing, on the device: interleaves supersegments by depth and segments them again
+// (paper, section 5.2). Not part of the library's interface.
 #pragma once
 
 #include <cstdint>
@@ -28,29 +28,29 @@ class Compositor {
     float level = -1.0F;  // of all owners' histogram together, with Budget::Total
   };
 
-  /// Puts all ranks' supersegments of some lists in order of depth. Goes on on the device when this returns:
-  /// `parts` and `interleaved` must stay until `finish`. What came is copied by the transfer queue, beside
-  /// what the device computes. `behind`: steps that follow.
+  /// Puts all ranks' supersegments of some lists in order of depth. The device goes on after this returns:
+  /// `parts` and `interleaved` must stay until `finish`. The transfer queue copies the received lists beside
+  /// the device's computation. `behind` records the steps that follow.
   void interleave(const Distributed& parts, const DepthCode& code, DeviceLists& interleaved,
                   const ListBuilder::Behind& behind = {});
 
-  /// What these lists need. Waits for what was started.
+  /// The histogram of these lists. Waits for the submitted work.
   SupersegmentHistogram histogram(const DeviceLists& interleaved, const Request& request);
-  /// Makes lists of at most `maxPerList` supersegments. Goes on on the device when this returns;
-  /// `interleaved` and `lists` must stay until `finish`.
+  /// Makes lists of at most `maxPerList` supersegments. The device goes on after this returns; `interleaved`
+  /// and `lists` must stay until `finish`.
   void composite(const DeviceLists& interleaved, const Request& request, DeviceLists& lists);
-  /// The flat picture: each list's supersegments composited, as [listCount] glm::vec4 and [listCount] float.
-  /// Goes on on the device likewise.
+  /// Composites each list to a pixel of the flat picture, as [listCount] glm::vec4 and [listCount] float. The
+  /// device goes on after this returns.
   void flatten(const DeviceLists& interleaved, const DepthCode& code, gpu::Buffer& colors,
                gpu::Buffer& depths);
-  /// Waits for what was started; then `lists` are complete. Throws what ListBuilder::finish throws.
+  /// Waits for the submitted work; then `lists` are complete. Throws what ListBuilder::finish throws.
   void finish();
-  /// Waits, and drops it: after an error.
+  /// Waits for the submitted work and drops it. For use after an error.
   void drop();
-  /// The last thing that was submitted.
+  /// The latest submission.
   gpu::Submission last() const { return last_; }
 
-  /// Device time of all that has been done since the last call, but for the transfer queue's.
+  /// Device time of all work since the last call, except the transfer queue's.
   double takeMilliseconds();
 
  private:
@@ -58,7 +58,7 @@ class Compositor {
   void receive(const Distributed& parts);
   void wait();
   void noteTimes();
-  std::vector<HostAccess*> receivedFrom_;  // by the merge that goes on
+  std::vector<HostAccess*> receivedFrom_;  // by the merge under way
   bool merging_ = false;
   bool flattening_ = false;
   bool building_ = false;

@@ -1,4 +1,4 @@
-// Lists on a device, and their way to the host. Not part of the library's interface.
+// Lists on a device, and their download to the host. Not part of the library's interface.
 #pragma once
 
 #include <array>
@@ -16,21 +16,21 @@ namespace vdi::detail {
 
 constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
 
-/// Compact lists as in ListsOf, in device memory that's used again by the next ones.
+/// Compact lists as in ListsOf, in device memory that the next ones reuse.
 struct DeviceLists {
   gpu::Buffer offsets;   // u32 [listCount + 1], exclusive prefix sum
   gpu::Buffer segments;  // [count], CompactSupersegments or Supersegments
   std::uint32_t listCount = 0;
   std::uint64_t count = 0;
-  gpu::Submission written;  // what other queues wait for
+  gpu::Submission written;  // other queues wait for this
 };
 
-/// Of one supersegment: compact lists have a depth code.
+/// Bytes of one supersegment: compact lists have a depth code.
 inline std::uint64_t segmentBytes(const DepthCode& code) {
   return precisionOf(code) == Precision::Compact ? sizeof(CompactSupersegment) : sizeof(Supersegment);
 }
 
-/// Empty lists in memory of that pool.
+/// Empty lists whose memory comes from `pool`.
 template <typename Segment>
 ListsOf<Segment> listsIn(const std::shared_ptr<HostPool>& pool) {
   ListsOf<Segment> lists;
@@ -39,7 +39,7 @@ ListsOf<Segment> listsIn(const std::shared_ptr<HostPool>& pool) {
   return lists;
 }
 
-/// What downloads need and keep from frame to frame.
+/// Memory and commands that downloads keep from frame to frame.
 struct DownloadMemory {
   explicit DownloadMemory(const std::shared_ptr<gpu::Device>& theDevice)
       : device(theDevice),
@@ -54,12 +54,14 @@ struct DownloadMemory {
   gpu::Buffer offsets;  // of all bands
 };
 
-/// Lists of a device on their way to the host, band after band, while the device makes the next ones.
-/// Supersegments go as soon as they're there. Offsets go at the end: what they begin with is known then.
+/// Downloads lists to the host, band after band, while the device makes the next ones. Supersegments are sent
+/// as soon as their band is made. Offsets follow at the end, when the first list of each band has its final
+/// offset.
 template <typename Segment>
 class ListDownload {
  public:
-  /// `lists`: of listsIn(pool). `expected`: supersegments that there may be; more take another copy.
+  /// `lists` come from listsIn(pool). `expected` is the number of supersegments to make room for; more of
+  /// them take another copy.
   ListDownload(ListsOf<Segment>& lists, HostPool& pool, DownloadMemory& memory, std::uint64_t listCount,
                std::uint64_t expected);
   ~ListDownload();
@@ -68,17 +70,17 @@ class ListDownload {
   ListDownload(ListDownload&&) = delete;
   ListDownload& operator=(ListDownload&&) = delete;
 
-  /// Behind the steps that make the band: `firstList` is its first one.
+  /// Call after recording the steps that make the band; `firstList` is the band's first list.
   void recordOffsets(gpu::Commands& commands, const DeviceLists& band, std::uint64_t firstList);
-  /// Bands in their order, each when it's there. The result is what uses the band's memory.
+  /// Sends bands in their order, each when it is made. Returns the submission that uses the band's memory.
   gpu::Submission send(const DeviceLists& band);
-  /// Waits until the lists are there.
+  /// Waits until the lists are on the host.
   void finish();
 
  private:
   void makeRoom(std::uint64_t count);
   void downloadOffsets();
-  /// One band is all of the picture.
+  /// Whether one band is the whole picture.
   bool isWhole() const { return bands_.size() == 1 && bands_.front().listCount == listCount_; }
   void waitForTransfers();
 
@@ -91,7 +93,7 @@ class ListDownload {
   HostPool& pool_;
   DownloadMemory& memory_;
   std::uint64_t listCount_;
-  std::uint64_t firstList_ = 0;  // of the band that's next
+  std::uint64_t firstList_ = 0;  // of the next band
   std::vector<Band> bands_;
 };
 

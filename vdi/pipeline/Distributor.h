@@ -1,4 +1,4 @@
-// Each rank's lists to those who own them (paper, section 5.2). Not part of the library's interface.
+// Sends each rank's lists to their owners (paper, section 5.2). Not part of the library's interface.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,12 @@
 
 namespace vdi::detail {
 
-/// Memory of the host that a device has been made known to, as long as somebody else uses it.
+/// Host memory that a device can access, kept as long as anybody else uses it.
 class HostAccesses {
  public:
   explicit HostAccesses(std::shared_ptr<gpu::Device> device) : device_(std::move(device)) {}
   HostAccess& of(const std::shared_ptr<HostMemory>& memory);
-  /// Forgets those that nobody else uses any more.
+  /// Forgets memory that nobody else uses any more.
   void tidy();
 
  private:
@@ -29,22 +29,22 @@ class HostAccesses {
   std::map<const HostMemory*, std::unique_ptr<HostAccess>> accesses_;
 };
 
-/// One rank's part of the lists that the receiver owns: their counts, then their supersegments.
+/// One rank's part of the lists that the receiver owns: counts, then supersegments.
 struct SubLists {
   HostAccess* access = nullptr;  // null: this rank's own, on the device
   std::uint64_t countsAt = 0;    // bytes into the memory, or into Distributed::ownCounts
-  bool wideCounts = false;       // a word each; else a byte
+  bool wideCounts = false;       // a word for each count; else a byte
   std::uint64_t segmentsAt = 0;  // bytes into the memory, or into Distributed::ownSegments
   std::uint64_t count = 0;       // supersegments
 };
 
-/// What a rank has of the lists that it keeps, by sender; ranks that have none are left out. It stays until
-/// the next distribution, or until the lists are made that were distributed.
+/// All ranks' parts of the lists that this rank owns, by sender; ranks without any supersegments are left
+/// out. They stay until the next distribution, or until the lists made from them are complete.
 struct Distributed {
   std::vector<SubLists> subLists;
   const gpu::Buffer* ownCounts = nullptr;
   const gpu::Buffer* ownSegments = nullptr;
-  gpu::Submission ownWritten;  // these
+  gpu::Submission ownWritten;  // writes both buffers
   std::uint32_t listCount = 0;
   std::uint64_t segmentBytes = 0;
   std::uint64_t total = 0;  // supersegments
@@ -54,16 +54,16 @@ class Distributor {
  public:
   Distributor(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm, comm::Transport transport);
 
-  /// Behind the steps that make `lists`, the rank's part of all lists of a band: packs what the host and
-  /// other ranks need to know of them. The compositor must be done with what was distributed before.
+  /// Call after recording the steps that make `lists`, this rank's part of all lists of a band: packs the
+  /// counts that the host and other ranks need. The compositor must be done with the previous distribution.
   void recordPack(gpu::Commands& commands, const DeviceLists& lists, const comm::Ownership& owned);
-  /// Collective, when the packing is done. Lists travel by the transfer queue, so the device may make other
-  /// lists meanwhile. What came stays until a distribution after the next one of this object or another.
+  /// Collective; call when the packing is done. The transfer queue moves the lists, so the device may make
+  /// other lists meanwhile. Received parts stay until the next but one distribution of any Distributor.
   Distributed distribute(const DeviceLists& lists, const comm::Ownership& owned, std::uint64_t segmentBytes);
-  /// Waits for what was submitted: after an error.
+  /// Waits for the submitted work. For use after an error.
   void drop() { transfers_.drop(); }
 
-  std::uint64_t bytesSent() const { return bytesSent_; }  // by the last one, to other ranks
+  std::uint64_t bytesSent() const { return bytesSent_; }  // to other ranks, by the last distribution
 
  private:
   void recordCounts(gpu::Commands& commands, const DeviceLists& lists, bool wide);
@@ -78,7 +78,7 @@ class Distributor {
   gpu::CountsPass counts_;
   gpu::Buffer packed_;
   gpu::Buffer tooLarge_;
-  gpu::Buffer boundaryOffsets_;  // of the supersegments, where each stretch begins, [stretches + 1]
+  gpu::Buffer boundaryOffsets_;  // number of supersegments before each stretch, [stretches + 1]
   bool wide_ = false;
   std::uint64_t bytesSent_ = 0;
 };

@@ -1,4 +1,5 @@
-// The sink that writes a VDI into a file, each rank its own lists. Not part of the library's interface.
+// The sink that writes a VDI into a file; each rank writes its own lists. Not part of the library's
+// interface.
 #pragma once
 
 #include <filesystem>

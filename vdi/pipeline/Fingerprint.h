@@ -1,4 +1,4 @@
-// What ranks compare to see that they were given the same. Not part of the library's interface.
+// Fingerprints by which ranks check that they got the same arguments. Not part of the library's interface.
 #pragma once
 
 #include <vector>
@@ -13,8 +13,8 @@ struct TransferFunction;
 
 namespace vdi::detail {
 
-/// For Communicator::requireEqual, one for each value that a user sets. Equal for equal values on every rank,
-/// and different otherwise but by a chance of 2^-64.
+/// Arguments of Communicator::requireEqual, one for each value that a user sets. Equal values have equal
+/// fingerprints on every rank; different ones have equal fingerprints with a chance of 2^-64.
 std::vector<comm::Communicator::Fingerprint> fingerprintsOf(const Camera& camera,
                                                             const TransferFunction& function,
                                                             const GenerateSettings& settings);

@@ -1,4 +1,4 @@
-// Frames that are under way, and the memory that they take in turns. Not part of the library's interface.
+// Frames under way, and the memory that they take in turns. Not part of the library's interface.
 #pragma once
 
 #include <array>
@@ -23,19 +23,19 @@ struct Frame {
   Vdi vdi;
   RankReport report;
   std::vector<RankReport> reports;
-  /// Where the lists go. None: the frame is done, or it has failed.
+  /// The destination of the lists. Null once the frame is done or has failed.
   std::unique_ptr<VdiSink> sink;
   /// With several ranks, the last band reaches the sink when the next frame is under way, or at the end.
   std::function<void()> addLastBand;
-  std::exception_ptr error;  // why it failed
+  std::exception_ptr error;  // the reason of its failure
 };
 
-/// What a frame needs until it's on the root's host; frames take them in turns.
+/// Resources of a frame until its lists are on the root's host; frames take them in turns.
 struct Flight {
-  std::vector<OwnedLists> owned;  // by band
+  std::vector<OwnedLists> owned;  // one entry a band
   std::unique_ptr<Gather> gather;
   std::unique_ptr<DownloadMemory> downloads;
-  std::shared_ptr<Frame> frame;  // that uses it, or did
+  std::shared_ptr<Frame> frame;  // the frame that uses these resources, or did last
   bool underWay() const { return frame && frame->sink; }
 };
 
@@ -44,20 +44,20 @@ class Frames {
   Frames(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm,
          comm::Transport transport, int root);
 
-  /// Two frames are under way at most.
+  /// At most two frames are under way.
   std::array<Flight, 2> flights;
 
   bool underWay() const;
-  /// The first one that no frame needs any more, so that frames that don't overlap always take the same
-  /// memory. If there's none, the older frame's, which is to be completed first.
+  /// The first flight without a frame under way, so that frames that do not overlap always use the same
+  /// memory. Otherwise the older frame's, which the caller must complete first.
   Flight& next();
-  /// Collective: those that are under way hand their last band to their sinks.
+  /// Collective: hands the last bands of all frames under way to their sinks.
   void addLastBands();
-  /// Waits for what was submitted, and drops it. Frames that are under way fail with `error`.
+  /// Waits for the submitted work and drops it. Frames under way fail with `error`.
   void drop(const std::exception_ptr& error) noexcept;
 
  private:
-  std::size_t older_ = 0;  // of the flights, the one that wasn't taken last
+  std::size_t older_ = 0;  // index of the flight that was not taken last
 };
 
 }  // namespace vdi::detail

@@ -1,4 +1,4 @@
-// What all ranks' devices have, in arrays of the root's host. Not part of the library's interface.
+// Gathers data from all ranks' devices in arrays on the root's host. Not part of the library's interface.
 #pragma once
 
 #include <cstddef>
@@ -17,13 +17,13 @@
 
 namespace vdi::detail {
 
-/// Another rank's memory that this rank's device writes to. A name can be opened just for a while, so what
-/// was opened stays as long as the other rank has it.
+/// Memory of another rank that this rank's device writes to. A name can be opened only for a while, so opened
+/// memory stays as long as the other rank has it.
 class OpenedMemory {
  public:
   explicit OpenedMemory(std::shared_ptr<gpu::Device> device) : device_(std::move(device)) {}
   HostAccess& of(const std::string& name, std::uint64_t bytes);
-  /// Forgets all but these.
+  /// Forgets all memory except these names'.
   void keep(const std::vector<std::string>& names);
 
  private:
@@ -33,42 +33,42 @@ class OpenedMemory {
 
 class Gather {
  public:
-  /// `opened` is shared by all whose arrays come from one pool.
+  /// All gathers whose arrays come from one pool share `opened`.
   Gather(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm, comm::Transport transport,
          int root, std::shared_ptr<OpenedMemory> opened);
 
-  /// `bytes` of a device's buffer go to byte `at` of the array-th array.
+  /// `bytes` of a device's buffer, to be written from byte `at` of array number `array` on.
   struct Piece {
     const gpu::Buffer* from = nullptr;
     std::uint64_t array = 0;
     std::uint64_t at = 0;
     std::uint64_t bytes = 0;
   };
-  /// Collective. `arrays`: on the root, the memory of vectors that have it from `pool`; ignored elsewhere.
-  /// They must stay until finish, or until all ranks have called drop.
+  /// Collective. `arrays` are, on the root, the memory of vectors that come from `pool`; other ranks' are
+  /// ignored. They must stay until finish, or until all ranks have called drop.
   void begin(HostPool& pool, std::span<const std::span<std::byte>> arrays);
-  /// The array's bytes, on any rank.
+  /// The array's size in bytes, on any rank.
   std::uint64_t room(std::size_t array) const { return arrays_[array].bytes; }
-  /// Sends pieces on their way, by the transfer queue, behind `after`, which has written them. All ranks pass
-  /// as many pieces in each call, which don't overlap; a piece may have no bytes. What they're taken from
-  /// must stay until finish.
+  /// Sends pieces by the transfer queue, after the submission `after`, which writes them. All ranks pass the
+  /// same number of pieces in each call; pieces do not overlap, and may be empty. Their buffers must stay
+  /// until finish.
   void send(std::span<const Piece> pieces, const gpu::Submission& after);
-  /// Collective: when it returns, all pieces of all ranks are there.
+  /// Collective: when this returns, all pieces of all ranks have arrived.
   void finish();
-  /// Waits for what's under way, and drops the rest.
+  /// Waits for pieces under way and drops the rest.
   void drop();
 
   std::uint64_t bytesSent() const { return bytesSent_; }  // since begin, to another rank
 
  private:
-  /// Of the root, as this rank's device sees it.
+  /// An array of the root, as this rank's device accesses it.
   struct Array {
-    HostAccess* access = nullptr;  // null: by messages
+    HostAccess* access = nullptr;  // null: sent by messages
     std::uint64_t at = 0;
     std::uint64_t bytes = 0;
     std::byte* data = nullptr;  // on the root
   };
-  /// A piece that was sent, as its message: without bytes if the device has written them.
+  /// A sent piece as a message; it has no bytes if the device wrote them.
   struct Message {
     Piece piece;
     gpu::Submission after;
@@ -86,8 +86,8 @@ class Gather {
   std::size_t transfersUsed_ = 0;
   std::vector<Array> arrays_;
   std::vector<Message> messages_;
-  std::shared_ptr<OpenedMemory> opened_;  // of the root
-  std::unique_ptr<HostAccess> outbox_;    // of messages
+  std::shared_ptr<OpenedMemory> opened_;  // the root's
+  std::unique_ptr<HostAccess> outbox_;    // for messages
   std::uint64_t bytesSent_ = 0;
 };
 

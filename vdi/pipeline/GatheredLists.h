@@ -1,4 +1,4 @@
-// A VDI's lists on their way from their owners to the root. Not part of the library's interface.
+// Sends a VDI's lists from their owners to the root. Not part of the library's interface.
 #pragma once
 
 #include <cstddef>
@@ -17,33 +17,33 @@ namespace vdi::detail {
 
 /// A band's lists that this rank owns.
 struct OwnedLists {
-  std::uint64_t firstList = 0;  // of the picture's
+  std::uint64_t firstList = 0;  // in the picture
   DeviceLists lists;
 };
 
-/// Supersegments are sent as soon as a band is composited, to memory that's as large as what was expected. If
-/// they don't fit, all of them are sent anew at the end.
+/// Sends supersegments as soon as a band is composited, to memory for the expected number. If they do not
+/// fit, all are sent again at the end.
 template <typename Segment>
 class GatheredLists {
  public:
-  /// `gather` and `memory` are this object's until it goes.
+  /// `gather` and `memory` belong to this object as long as it lives.
   GatheredLists(const comm::Communicator& comm, int root, std::shared_ptr<HostPool> pool, Gather& gather,
                 DownloadMemory& memory, std::uint64_t listCount);
 
-  /// Collective: room on the root for that many supersegments.
+  /// Collective: makes room on the root for that many supersegments.
   void begin(std::uint64_t expected);
-  /// Not collective: bands in their order, each when it's composited. `lists`: the rank's own, from the
-  /// picture's list `firstList` on, which must stay until finish. `counts`: all ranks' supersegments in the
-  /// band. All offsets follow the last band.
+  /// Not collective: sends bands in their order, each when it is composited. `lists` are this rank's, from
+  /// the picture's list `firstList` on, and must stay until finish. `counts` are all ranks' supersegments in
+  /// the band. All offsets follow the last band.
   void send(const DeviceLists& lists, std::uint64_t firstList, std::span<const std::uint64_t> counts,
             bool last);
-  /// Collective: the lists, on the root; elsewhere there are none.
+  /// Collective: returns the lists on the root, and no lists elsewhere.
   ListsOf<Segment> finish();
 
-  std::uint64_t total() const { return total_; }  // supersegments of all bands that were sent
+  std::uint64_t total() const { return total_; }  // supersegments of all bands sent so far
 
  private:
-  /// A band, and its first supersegment among all.
+  /// A sent band, and the position of its first supersegment.
   struct Sent {
     const DeviceLists* lists = nullptr;
     std::uint64_t firstList = 0;

@@ -1,4 +1,4 @@
-// Where shaders add up what lists need. Not part of the library's interface.
+// Device memory in which shaders add up a histogram of lists. Not part of the library's interface.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class HistogramBuffer {
 
   /// Records a dispatch that adds to the histogram at this device address ([histogramLevels + 1][2] words).
   using Record = std::function<void(gpu::Commands&, std::uint64_t address)>;
-  /// What the dispatch counted.
+  /// Runs the dispatch and returns its histogram.
   SupersegmentHistogram take(gpu::Commands& commands, const Record& record);
 
  private:

@@ -1,4 +1,5 @@
-// A device's way to pages of the host, and vectors made of such pages. Not part of the library's interface.
+// A device's access to pages of the host, and vectors made of such pages. Not part of the library's
+// interface.
 #pragma once
 
 #include <cstdint>
@@ -16,30 +17,31 @@
 
 namespace vdi::detail {
 
-/// Host memory that a device copies to and from: without a copy by the host where the driver imports it
-/// (VK_EXT_external_memory_host), else by way of staging memory.
+/// Host memory that a device copies to and from. Where the driver imports it (VK_EXT_external_memory_host),
+/// the host copies nothing; elsewhere the data passes through staging memory.
 class HostAccess {
  public:
   HostAccess(std::shared_ptr<gpu::Device> device, std::shared_ptr<HostMemory> memory);
 
   const std::shared_ptr<HostMemory>& memory() const { return memory_; }
 
-  /// From the device to `at` bytes into the memory. It's there once the commands are done and after `finish`.
+  /// Copies from the device to `at` bytes into the memory. Complete once the commands are done and `finish`
+  /// was called.
   void recordWrite(gpu::Commands& commands, const gpu::Buffer& from, std::uint64_t fromOffset,
                    std::uint64_t at, std::uint64_t bytes);
-  /// From `at` bytes into the memory, which must be there already, to the device.
+  /// Copies from `at` bytes into the memory to the device. The data must be there when this is called.
   void recordRead(gpu::Commands& commands, std::uint64_t at, const gpu::Buffer& to, std::uint64_t toOffset,
                   std::uint64_t bytes);
-  /// To be called when the commands are done.
+  /// Call after the commands complete; copies staged data to the host.
   void finish();
-  /// Or this, if what they brought isn't wanted: after an error. Whatever else it has recorded must be done.
+  /// Call instead of `finish` to discard the data after an error. All commands that it recorded must be done.
   void drop() { staged_.clear(); }
 
  private:
   struct Staged {
     gpu::Buffer buffer;
     std::uint64_t at = 0;
-    std::uint64_t bytes = 0;  // 0: of a read, nothing is left to do
+    std::uint64_t bytes = 0;  // 0: belongs to a read, which needs no copy afterwards
   };
   std::shared_ptr<gpu::Device> device_;
   std::shared_ptr<HostMemory> memory_;
@@ -47,14 +49,13 @@ class HostAccess {
   std::vector<Staged> staged_;
 };
 
-/// Where HostVectors that a device fills get their memory from. Blocks that nobody uses any more are used
-/// again: to make pages known to a device takes longer than to fill them. Outlives the device if vectors do.
-/// From any thread.
+/// Memory for HostVectors that a device fills. Freed blocks are reused, because making pages accessible to a
+/// device takes longer than filling them. The pool may outlive the device if vectors do. Thread-safe.
 class HostPool final : public std::pmr::memory_resource {
  public:
   enum class Visible {
     ToProcess,
-    ToHost  // to other ranks of the host too, as far as there's shared memory
+    ToHost  // also to other ranks of the host, where shared memory suffices
   };
   HostPool(std::shared_ptr<gpu::Device> device, Visible visible);
   ~HostPool() override;
@@ -63,16 +64,17 @@ class HostPool final : public std::pmr::memory_resource {
   HostPool(HostPool&&) = delete;
   HostPool& operator=(HostPool&&) = delete;
 
-  /// Where in which memory a vector's data lies that has its memory from here; null: it has not.
+  /// The memory, and the position in it, of a vector's data; null if it does not come from this pool.
   struct Place {
     HostAccess* access = nullptr;
     std::uint64_t at = 0;
   };
   Place placeOf(const void* data);
-  /// Of all memory that vectors have or may get, as other processes open it; not of what they can't.
+  /// Names under which other processes can open the memory that vectors have or may get. Memory without a
+  /// name is left out.
   std::vector<std::string> names();
 
-  /// Lets go of the device. Vectors that are in use stay as they are.
+  /// Releases the device. Vectors in use stay valid.
   void detach() noexcept;
 
  private:
@@ -80,7 +82,7 @@ class HostPool final : public std::pmr::memory_resource {
     std::shared_ptr<HostMemory> memory;
     std::unique_ptr<HostAccess> access;
     bool used = false;
-    std::uint64_t freed = 0;  // when, counted in frees
+    std::uint64_t freed = 0;  // time of the last free, counted in frees
   };
   void* do_allocate(std::size_t bytes, std::size_t alignment) override;
   void do_deallocate(void* data, std::size_t bytes, std::size_t alignment) override;

@@ -14,7 +14,7 @@
 
 namespace vdi::detail {
 
-/// How many supersegments a VDI may have: what the last one had, and some more.
+/// Predicts the number of supersegments of the next VDI: the last one's, and some more.
 class Expectation {
  public:
   std::uint64_t next() const { return last_ + last_ / 8; }
@@ -28,11 +28,11 @@ inline std::uint64_t listCountOf(const Vdi& header) {
   return static_cast<std::uint64_t>(header.width) * static_cast<std::uint64_t>(header.height);
 }
 
-/// With one rank: lists go to the host while the device makes the next ones.
+/// With one rank: downloads lists to the host while the device makes the next ones.
 template <typename Segment>
 class DownloadSink final : public VdiSink {
  public:
-  /// `vdi` gets the lists; it, `flight` and `expected` must outlive the sink.
+  /// `vdi` receives the lists; it, `flight` and `expected` must outlive the sink.
   DownloadSink(std::shared_ptr<HostPool> pool, Flight& flight, Vdi& vdi, Expectation& expected)
       : pool_(std::move(pool)),
         flight_(flight),
@@ -70,11 +70,11 @@ class DownloadSink final : public VdiSink {
   std::optional<ListDownload<Segment>> download_;
 };
 
-/// With several ranks: the owners' lists travel to the root.
+/// With several ranks: sends the owners' lists to the root.
 template <typename Segment>
 class GatherSink final : public VdiSink {
  public:
-  /// `vdi` gets the lists on the root; it, `flight` and `expected` must outlive the sink.
+  /// On the root, `vdi` receives the lists; it, `flight` and `expected` must outlive the sink.
   GatherSink(const comm::Communicator& comm, int root, std::shared_ptr<HostPool> pool, Flight& flight,
              Vdi& vdi, Expectation& expected)
       : comm_(comm), root_(root), pool_(std::move(pool)), flight_(flight), vdi_(vdi), expected_(expected) {}

@@ -1,10 +1,10 @@
-// From intervals to compact lists, on the device, band by band (paper, section 4). What casts
-// rays and what composites share it; not part of the library's interface. vdi/reference/Segmenter.h describes
-// the algorithms.
-//   bisection: search of sensitivities, prefix sum of the counts, write.
-//   merge: count of pre-segments, of all lists or one in countedStride x countedStride; interpolated
-//   tolerance to all lists, prefix sum, write of pre-segments; prefix sum of what's to be left of them,
-//   reduce. merge, with other ranks: the same with counts that all of them agreed on.
+// Makes compact lists from intervals, on the device, band by band (paper, section 4). RayCaster and
+// Compositor share it; not part of the library's interface. vdi/reference/Segmenter.h describes the
+// algorithms.
+//   Bisection: search of sensitivities, prefix sum of the counts, write.
+//   Merge: count of pre-segments, in all lists or one of countedStride x countedStride; interpolation of
+//   tolerances to all lists; prefix sum; write of pre-segments; prefix sum of the numbers to keep; reduction.
+//   Merge with other ranks: the same, with counts that all ranks agreed on.
 #pragma once
 
 #include <cstdint>
@@ -37,10 +37,10 @@ struct BandTargets {
   std::uint64_t guard = 0;
 };
 
-/// What the shaders call the form that lists of that type have in memory.
+/// The shaders' name for the form in which such lists are stored.
 gpu::shared::StoredForm storedForm(const DepthCode& code);
 
-/// Device milliseconds: of all steps, of the algorithm's first one, and of its second one; each with its
+/// Device milliseconds of all steps, of the algorithm's first step, and of its second one, each with its
 /// prefix sum.
 struct ListTimes {
   double all = 0.0;
@@ -58,10 +58,10 @@ class ListBuilder {
  public:
   explicit ListBuilder(std::shared_ptr<gpu::Device> device);
 
-  /// Device bytes that a list of `maxCount` supersegments may take.
+  /// The most device bytes that a list of `maxCount` supersegments takes.
   static std::uint64_t bytesPerList(std::uint32_t maxCount, Algorithm algorithm);
 
-  /// Records the dispatch of the algorithm's first step, or (write) its second one.
+  /// Records the dispatch of the algorithm's first step, or with `write` its second one.
   using Record = std::function<void(gpu::Commands&, const BandTargets&, bool write)>;
 
   struct Request {
@@ -73,8 +73,8 @@ class ListBuilder {
     gpu::ReducePass::MaxPerList maxPerList;
     double sampleStep = 1.0;
     DepthCode code;  // of compact lists
-    /// Merging, with other ranks: what they agreed on about the counted lists (shaders/shared/quota.h), which
-    /// aren't counted again. The first one of them is the band's.
+    /// Merging with other ranks: the agreed values of the counted lists (shaders/shared/quota.h), which are
+    /// not counted again. They begin with the band's first list.
     struct Agreed {
       std::uint64_t tolerances = 0;
       std::uint64_t preSegments = 0;
@@ -82,50 +82,51 @@ class ListBuilder {
       std::uint32_t budget = 1;
     };
     std::optional<Agreed> agreed;
-    /// Merging, with other ranks: one supersegment a run, as a picture needs. Nothing is counted.
+    /// Merging with other ranks: one supersegment a run, as a flat picture needs. Nothing is counted.
     bool runsOnly = false;
-    /// Merging, of lists that were merged by depth: those that fit are these. 0: none are.
+    /// Merging interleaved lists: address of the lists that fit the budget as they are. 0: none.
     std::uint64_t fitting = 0;
     std::uint64_t fittingOffsets = 0;
 
     std::uint32_t listCount() const { return width * rows; }
-    /// Of the lists that are counted: every countedStride-th, the row behind the band's last one included.
+    /// Size of the grid of counted lists: every countedStride-th, including the row after the band's last
+    /// one.
     std::uint32_t countedWidth() const { return (width + countedStride - 1) / countedStride; }
     std::uint32_t countedRows() const {
       return (rows + countedStride - 1) / countedStride + (rowBehind && countedStride > 1 ? 1 : 0);
     }
   };
 
-  /// Recorded behind the last step, for the device: the host doesn't know the lists' counts then. Recorded
-  /// anew where steps are; what it did before then counts for nothing.
+  /// Records device work after the last step, when the host does not know the lists' counts yet. It is
+  /// recorded again with repeated steps; its earlier results must not count.
   using Behind = std::function<void(gpu::Commands&)>;
-  /// Submits the steps and returns. `lists`, what `record` and `behind` refer to, and what the request names
-  /// must stay until `finish`. `after`: what the lists' memory is still used by.
+  /// Submits the steps and returns. `lists`, the data that `record` and `behind` refer to, and the request's
+  /// buffers must stay until `finish`. `after` is the last submission that uses the lists' memory.
   void start(const Request& request, Record record, DeviceLists& lists, Behind behind = {},
              const gpu::Submission& after = {});
-  /// Waits. Where the memory of the frame before was too small, steps are submitted again. `lists` are then
-  /// what was written, compact or full as the code says. Throws Error{OutOfMemory} when the supersegments
-  /// don't fit, Error{DeviceFailure} if a list's written count isn't its stored count.
+  /// Waits. If the memory of the frame before was too small, submits steps again. Then `lists` are complete,
+  /// compact or full as the code says. Throws Error{OutOfMemory} if the supersegments do not fit,
+  /// Error{DeviceFailure} if a list's written count differs from its stored count.
   void finish();
-  /// The same for lists that are all empty.
+  /// Starts lists that are all empty.
   void startEmpty(std::uint32_t listCount, DeviceLists& lists, const Behind& behind = {});
-  /// Start, and finish.
+  /// Starts and finishes.
   void build(const Request& request, const Record& record, DeviceLists& lists) {
     start(request, record, lists);
     finish();
   }
-  /// The last thing that was submitted.
+  /// The latest submission.
   gpu::Submission last() const { return commands_.last(); }
-  /// Waits, and drops what was started: after an error.
+  /// Waits for the submitted work and drops it. For use after an error.
   void drop();
 
-  /// Of the last build that was finished.
+  /// Times of the last finished build.
   const ListTimes& times() const { return times_; }
 
  private:
-  /// The step that merging is submitted from.
+  /// The step from which merging is submitted.
   enum class From { Search, Write, Reduce };
-  /// What was started.
+  /// The work under way.
   struct Started {
     Request request;
     Record record;
@@ -162,12 +163,13 @@ class ListBuilder {
   gpu::Buffer left_;
   gpu::Buffer countedTolerances_;
   gpu::Buffer countedPreSegments_;
-  gpu::Buffer status_;  // as CastParams has it
+  gpu::Buffer status_;  // as in CastParams
   gpu::Buffer statusReadback_;
   gpu::Buffer preSegmentsFit_;  // guards: shaders/shared/scan.h
   gpu::Buffer segmentsFit_;
-  gpu::Buffer totals_;  // of pre-segments, and of supersegments
-  /// Of a picture's lists: there's room for as many. Once some had more, there's room for these.
+  gpu::Buffer totals_;  // of pre-segments, then of supersegments
+  /// Runs per list of a flat picture for which memory is reserved. Once a list has more, `expectedRuns_`
+  /// grows.
   static constexpr std::uint32_t fewRuns = 3;
   std::uint32_t expectedRuns_ = fewRuns;
   std::optional<Started> started_;

@@ -1,4 +1,4 @@
-// One rank's part of a frame on the device: sub-VDI or DVR of its blocks. Not part of the library's
+// One rank's part of a frame on the device: the sub-VDI or DVR of its blocks. Not part of the library's
 // interface.
 #pragma once
 
@@ -27,10 +27,10 @@ namespace vdi::detail {
 
 class RayCaster {
  public:
-  /// `bands`: in which frames are made, if memory allows; 0: as suits the device.
+  /// `bands` is the number per frame, if memory allows; 0 lets the device decide.
   RayCaster(std::shared_ptr<gpu::Device> device, std::uint32_t bands);
 
-  /// What's cast through: blocks are set there.
+  /// The volume to cast through; set its blocks there.
   gpu::VolumeStore& volume() { return volume_; }
 
   struct Request {
@@ -40,29 +40,29 @@ class RayCaster {
     const TransferTable& table;
     const GenerateSettings& settings;
     bool cutAtGaps;
-    bool runsOnly;   // one supersegment a run, no search
+    bool runsOnly;   // one supersegment a run, without a search
     DepthCode code;  // of compact lists
   };
-  /// Called with the share done; returning false ends the work early with what's there.
+  /// Called with the finished share; returning false ends the work early with the present result.
   using Progress = std::function<bool(double)>;
 
-  /// Lists of one frame, one per pixel, which are made band after band.
+  /// Lists of one frame, one per pixel, made band after band.
   struct Cast {
     gpu::shared::CastParams params{};
-    ListBuilder::Request build;  // but for the band's rows
+    ListBuilder::Request build;  // without the band's rows
     bool cutAtGaps = false;
     bool nothingThere = false;
     std::uint32_t height = 0;
-    std::uint32_t rowsPerBand = 1;  // what fits; a multiple of shared::countedStride, or all
+    std::uint32_t rowsPerBand = 1;  // as memory allows; a multiple of shared::countedStride, or all rows
     bool agreed = false;            // with other ranks
   };
   Cast begin(const Request& request);
-  /// Several ranks, merging: what this one has in the lists that are counted, levelBytes of it, is written to
-  /// that place of the host's memory, for all ranks to add up byte by byte (comm::ByteSum).
+  /// Merging with several ranks: writes this rank's counts of the counted lists, levelBytes of them, to a
+  /// place in host memory. All ranks then add them up byte by byte (comm::ByteSum).
   void countLevels(Cast& cast, HostAccess& memory, std::uint64_t at);
   static std::uint64_t levelBytes(const Cast& cast);
-  /// The sum of all ranks' levels, in stretches. From it follow tolerances, and this rank's shares of lists.
-  /// Goes on on the device when this returns; the sum must stay until agreedWeights.
+  /// The sum of all ranks' levels, in stretches, which decides the tolerances and this rank's shares of
+  /// lists. The device goes on after this returns; the sum must stay until agreedWeights.
   struct LevelSum {
     HostAccess* memory = nullptr;
     std::uint64_t at = 0;
@@ -70,26 +70,26 @@ class RayCaster {
     std::uint64_t bytes = 0;
   };
   void agree(Cast& cast, std::span<const LevelSum> sum);
-  /// After that: how many supersegments all ranks together will have in each stretch of shared::countedStride
-  /// rows.
+  /// Call after that: the number of supersegments that all ranks together will have in each stretch of
+  /// shared::countedStride rows.
   std::vector<std::uint32_t> agreedWeights(const Cast& cast);
-  /// Rows [firstRow, lastRow), which begin at a multiple of shared::countedStride. Goes on on the device when
-  /// this returns; up to bandsAtOnce may be started before the first one is finished. `cast`, `lists` and
-  /// what `behind` refers to must stay until then. `behind`, `after`: see ListBuilder.
+  /// Starts rows [firstRow, lastRow), which begin at a multiple of shared::countedStride. The device goes on
+  /// after this returns; up to bandsAtOnce may be started before the first one is finished. `cast`, `lists`
+  /// and the data that `behind` refers to must stay until then. ListBuilder describes `behind` and `after`.
   void startBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists,
                  const ListBuilder::Behind& behind = {}, const gpu::Submission& after = {});
-  /// Waits for the first one of those that were started.
+  /// Waits for the oldest band under way.
   void finishBand();
   void makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists) {
     startBand(cast, firstRow, lastRow, lists);
     finishBand();
   }
   static constexpr std::size_t bandsAtOnce = 2;
-  /// Waits for what was started, and drops it: after an error.
+  /// Waits for the submitted work and drops it. For use after an error.
   void drop();
-  /// DVR: all pixels of `image`, which is as large as the view and has its memory from `pool`.
+  /// DVR: renders all pixels of `image`, which has the view's size and its memory from `pool`.
   void render(const Request& request, const Progress& progress, HostPool& pool, Image& image);
-  /// Of the last frame, without transfers. Of a picture: `all`.
+  /// Times of the last frame, without transfers. A picture sets `all` only.
   const ListTimes& times() const { return times_; }
 
  private:
@@ -99,7 +99,7 @@ class RayCaster {
   std::uint32_t rowsPerBand(const Request& request, std::uint64_t bytesPerPixel, std::uint32_t bands) const;
 
   std::shared_ptr<gpu::Device> device_;
-  std::uint32_t bands_;  // wanted in a frame; 0: as suits the device
+  std::uint32_t bands_;  // requested per frame; 0: as suits the device
   gpu::VolumeStore volume_;
   gpu::CastPass pass_;
   std::array<ListBuilder, bandsAtOnce> builders_;  // taken in turns

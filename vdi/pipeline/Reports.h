@@ -1,4 +1,4 @@
-// What a frame reports, and how its caller follows it.
+// A frame's reports, and its progress.
 #pragma once
 
 #include <cstdint>
@@ -12,39 +12,40 @@ namespace vdi {
 struct RankReport {
   double uploadSeconds = 0.0;          // of setBlocks, or setNextBlocks and advance, since the last frame
   double generateSeconds = 0.0;        // casting and segmenting, transfers included
-  double generateDeviceSeconds = 0.0;  // of these, the device's work without transfers
-  double countSeconds = 0.0;  // of these, the first step: bisection's search or the counting of pre-segments
-  double writeSeconds = 0.0;  // and the second
+  double generateDeviceSeconds = 0.0;  // device work in generateSeconds, without transfers
+  /// device work of the first step: bisection's search or the counting of pre-segments
+  double countSeconds = 0.0;
+  double writeSeconds = 0.0;  // device work of the second step
   double distributeSeconds = 0.0;
   double compositeSeconds = 0.0;
-  double compositeDeviceSeconds = 0.0;  // of these, the device's work, and the copying of what was received
+  double compositeDeviceSeconds = 0.0;  // device work in these, and copying of received lists
   double gatherSeconds = 0.0;
-  double outputSeconds = 0.0;    // of write, instead of the gather: downloading, encoding and writing
-  double samplesPerVoxel = 0.0;  // of the frame: what automaticRate came to
+  double outputSeconds = 0.0;    // of write, in place of the gather: download, encoding and writing
+  double samplesPerVoxel = 0.0;  // of the frame, also with automaticRate
   std::uint64_t blocks = 0;
   std::uint64_t volumeBytes = 0;
   std::uint64_t subSupersegments = 0;
   std::uint64_t bytesSent = 0;
-  std::uint64_t bytesWritten = 0;   // of write: into the file, by this rank
+  std::uint64_t bytesWritten = 0;   // by write, into the file, from this rank
   std::uint64_t deviceBytes = 0;    // device memory held
-  std::uint64_t hostPeakBytes = 0;  // the most host memory that the process has had, shared one included
+  std::uint64_t hostPeakBytes = 0;  // peak host memory of the process, shared memory included
 };
 
-/// A file that VdiGenerator::write has made.
+/// A file written by VdiGenerator::write.
 struct WrittenVdi {
   std::uint64_t supersegments = 0;
   std::uint64_t bytes = 0;
 };
 
-/// What a VDI's file says of the simulation.
+/// The simulation's state that a VDI's file records.
 struct TimeStamp {
   double time = 0.0;
   std::uint64_t step = 0;
-  ScalarArray array = {};  // that the blocks' scalars are of
+  ScalarArray array = {};  // the array that the blocks' scalars come from
 };
 
-/// Called on every rank with the share done, 0 .. 1; returns false to ask for an abort, which all ranks then
-/// obey together at the next stage (Error{Cancelled}).
+/// Called on every rank with the finished share, 0 .. 1; returns false to request an abort, which all ranks
+/// then obey together at the next stage (Error{Cancelled}).
 using Progress = std::function<bool(double)>;
 
 }  // namespace vdi

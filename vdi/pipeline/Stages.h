@@ -1,5 +1,4 @@
-// What all stages of a frame have in common: they're timed and can be stopped. Not part of the library's
-// interface.
+// Timing and cancellation, which all stages of a frame share. Not part of the library's interface.
 #pragma once
 
 #include <chrono>
@@ -10,7 +9,7 @@
 
 namespace vdi::detail {
 
-/// Seconds since it was made or last asked.
+/// Measures seconds since it was made or last read.
 class Stopwatch {
  public:
   double lap() {
@@ -24,8 +23,9 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// Collective: runs a stage that asks for progress, as work(report), report(done) being false when it's to
-/// stop. All ranks throw Cancelled together if any was told to stop. `share`: of the frame, when it's done.
+/// Collective: runs a stage as work(report), where report(done) returns false if the stage must stop. All
+/// ranks throw Cancelled together if any was told to stop. `share` is the part of the frame that is finished
+/// after this stage.
 template <typename Work>
 void cancellable(const comm::Communicator& comm, const Progress& progress, double share, Work work) {
   const bool cancelled = comm.anyTogether([&] {

@@ -1,5 +1,5 @@
-// The volume's time steps on all ranks' devices: one that's shown, and the next one on its way. Not part of
-// the library's interface.
+// The volume's time steps on all ranks' devices: the one shown, and the next one on its way. Not part of the
+// library's interface.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +17,10 @@
 
 namespace vdi::detail {
 
-/// VdiGenerator's setBlocks, setNextBlocks and advance say what these do. Collective, but for what is const.
+/// Implements VdiGenerator's setBlocks, setNextBlocks and advance. Collective, except for const functions.
 class TimeSteps {
  public:
-  /// Both must outlive it.
+  /// `comm` and `volume` must outlive it.
   TimeSteps(const comm::Communicator& comm, gpu::VolumeStore& volume) : comm_(comm), volume_(volume) {}
 
   void setBlocks(std::vector<Block> blocks, bool fillGhosts);
@@ -29,11 +29,12 @@ class TimeSteps {
 
   const Scene& scene() const { return shown_.scene; }        // global
   const ScalarRange& scalarRange() const { return range_; }  // global
-  /// What automaticRate means for that transfer function and region: the same on all ranks. Not collective.
+  /// The rate that automaticRate stands for, with this transfer function and region; equal on all ranks. Not
+  /// collective.
   double samplingRate(const TransferTable& table, const Region& region);
-  /// Throws where floats can't tell values apart that the transfer function does.
+  /// Throws if the transfer function distinguishes values that floats cannot.
   void requireSpans(const TransferTable& table) const;
-  /// Of this rank's part. The seconds are told once.
+  /// Adds this rank's times. Each upload is reported once.
   void report(RankReport& report);
 
  private:
@@ -43,9 +44,9 @@ class TimeSteps {
     std::uint64_t blocks = 0;
     std::uint64_t bytes = 0;
     double uploadSeconds = 0.0;
-    bool doubles = false;  // some of this rank's are f64
+    bool doubles = false;  // some of this rank's blocks are f64
   };
-  /// By one of VolumeStore's ways.
+  /// Sends blocks by setBlocks or setNextBlocks of VolumeStore.
   Step send(std::vector<Block> blocks, bool fillGhosts,
             void (gpu::VolumeStore::*way)(std::span<const Block>, const Scene&));
   void show(Step step);
@@ -55,7 +56,7 @@ class TimeSteps {
   gpu::VolumeStore& volume_;
   Step shown_;
   ScalarRange range_;
-  /// Of the shown step: the last one that was asked for.
+  /// The last sampling rate requested for the shown step.
   struct Rate {
     TransferTable table;
     Region region;

@@ -23,8 +23,8 @@ namespace vdi {
 
 class VdiRenderer;
 
-/// A VDI that's being made (VdiGenerator::start). Movable. One that's never finished costs nothing but the
-/// memory of its lists, until the second one after it is started.
+/// A VDI under way (VdiGenerator::start). Movable. A frame that is never finished only costs the memory of
+/// its lists, until the second start after its own.
 class VdiFrame {
  public:
   ~VdiFrame();
@@ -40,9 +40,9 @@ class VdiFrame {
   std::shared_ptr<State> state_;
 };
 
-/// Makes VDIs of distributed volumes. Collective throughout: every rank of the communicator makes one, with
-/// its own device, and calls the same functions in the same order. When a call throws, it throws on every
-/// rank (Communicator::agree), and the object stays usable.
+/// Makes VDIs of distributed volumes. Every function is collective: each rank of the communicator has a
+/// generator with its own device, and calls the same functions in the same order. When a call throws, it
+/// throws on every rank (Communicator::agree), and the object stays usable.
 class VdiGenerator {
  public:
   VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm,
@@ -53,34 +53,34 @@ class VdiGenerator {
   VdiGenerator(VdiGenerator&&) = delete;
   VdiGenerator& operator=(VdiGenerator&&) = delete;
 
-  /// This rank's blocks, none included; the scalars are copied to the device before it returns. With
-  /// `fillGhosts`, missing layers are exchanged first (comm/GhostExchange.h). Blocks of the same shapes reuse
-  /// the device's memory. After a throw there are none.
+  /// Sets this rank's blocks, which may be none; copies the scalars to the device before it returns.
+  /// `fillGhosts` first exchanges missing layers (comm/GhostExchange.h). Blocks of the same shapes reuse
+  /// device memory. After a throw, no blocks are set.
   void setBlocks(std::vector<Block> blocks, bool fillGhosts = true);
 
-  /// The next time step's blocks: sends them on their way to the device and returns, so that they get there
-  /// while the frame of those that are shown is made. The scalars must stay as they are until advance, or
-  /// until another call of this or of setBlocks, which drops them. Takes memory for a second volume, which
-  /// the next setBlocks gives back. After a throw none are on their way.
+  /// Starts to send the next time step's blocks to the device and returns, so that they arrive while frames
+  /// of the current blocks are made. The scalars must stay unchanged until advance, or until another call of
+  /// this or of setBlocks, which drops them. Takes memory for a second volume, which the next setBlocks gives
+  /// back. After a throw, no blocks are on their way.
   void setNextBlocks(std::vector<Block> blocks, bool fillGhosts = true);
-  /// Shows them, once they're there. Throws what went wrong on their way, and Error{InvalidArgument} if there
-  /// are none; then those stay that were shown.
+  /// Waits for the next blocks and shows them. Throws the error that stopped them, and Error{InvalidArgument}
+  /// if none are on their way; then the current blocks stay.
   void advance();
 
   const Scene& scene() const;              // global
   const ScalarRange& scalarRange() const;  // global, finite values
 
-  /// The VDI on rank 0, nullopt on the others. Its coloring has range and function; the caller, who knows the
-  /// array, adds that. Camera, transfer function and settings must be equal on all ranks
-  /// (Error{InvalidArgument} on all of them otherwise). A scene that's empty or out of sight gives a
-  /// VDI with empty lists. Devices write to the VDI's memory; when it goes, the next frame's takes its place.
+  /// Returns the VDI on rank 0, nullopt on the others. Its coloring has range and function; the caller, who
+  /// knows the array, adds that. Camera, transfer function and settings must be equal on all ranks (otherwise
+  /// all throw Error{InvalidArgument}). A scene that is empty or out of sight gives a VDI with empty lists.
+  /// Devices write to the VDI's memory; once it is freed, the next frame reuses it.
   std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
                               const GenerateSettings& settings, const Progress& progress = {});
 
-  /// The same in two parts, so that frames overlap. When `start` returns, this rank's lists are made, and the
-  /// blocks, camera and function aren't needed any more: setBlocks and advance may follow. The VDI is still
-  /// being composited and gathered, by the device and its copy engines. `finish` waits for it. To start the
-  /// next frame before finishing the last one hides that time:
+  /// generate in two parts, so that frames overlap. When `start` returns, this rank's lists are made, and the
+  /// blocks, camera and function are no longer needed: setBlocks and advance may follow. Devices and copy
+  /// engines still composite and gather the VDI; `finish` waits for it. Starting the next frame before
+  /// finishing the last one hides that time:
   ///
   ///     VdiFrame last = generator.start(...);
   ///     while (more) {
@@ -89,37 +89,39 @@ class VdiGenerator {
   ///       last = std::move(next);
   ///     }
   ///
-  /// All in the calling thread: MPI needs no more than MPI_THREAD_FUNNELED. Frames are finished in any order,
-  /// the same on all ranks, or never. Two are under way at most: a third `start` waits for the first one.
-  /// When a `start` throws beyond its parameters, frames that aren't done fail with the same error.
+  /// All calls come from one thread: MPI needs no more than MPI_THREAD_FUNNELED. Frames may be finished in
+  /// any order, the same on all ranks, or never. At most two are under way: a third `start` waits for the
+  /// first one. When `start` throws for a reason other than its arguments, unfinished frames fail with the
+  /// same error.
   VdiFrame start(const Camera& camera, const TransferFunction& transferFunction,
                  const GenerateSettings& settings, const Progress& progress = {});
-  /// The VDI on rank 0, nullopt on the others.
+  /// Waits for the frame. Returns the VDI on rank 0, nullopt on the others.
   std::optional<Vdi> finish(VdiFrame frame);
 
-  /// The same VDI as a file (io/VdiFile.h). Each rank encodes its own lists and writes them there: none ever
-  /// has the whole VDI, and a rank's host memory is bounded by its own lists. Ranks whose host doesn't have
-  /// the folder send what they've encoded to rank 0, which holds a chunk of it at a time. The file is the one
-  /// that io::writeVdi writes of what generate makes, byte by byte; as there, nobody sees half of it, and the
-  /// old one stays if any rank fails. `path` and `stamp` are rank 0's, whatever the others pass. Throws
-  /// Error{Io} on the rank that can't write, with the path as context. The result is equal on all ranks.
+  /// Writes the VDI of generate to a file (io/VdiFile.h). Each rank encodes and writes its own lists: no rank
+  /// ever has the whole VDI, and a rank's host memory is bounded by its own lists. Ranks whose host lacks the
+  /// folder send their encoded lists to rank 0, which holds one chunk of them at a time. The file equals that
+  /// of io::writeVdi byte by byte. No reader sees half of it, and if any rank fails, the old file stays.
+  /// `path` and `stamp` are rank 0's; other ranks' are ignored. Throws Error{Io} on the rank that cannot
+  /// write, with the path as context. The result is equal on all ranks.
   WrittenVdi write(const std::filesystem::path& path, const Camera& camera,
                    const TransferFunction& transferFunction, const GenerateSettings& settings,
                    const TimeStamp& stamp = {}, const Progress& progress = {});
 
-  /// The same VDI straight to a renderer, rank 0's; the others' are ignored and may be null. With one rank
-  /// whose device the renderer has, lists stay on that device: nothing of the VDI comes to the host.
-  /// Otherwise it's generate and setVdi. Returns when the lists are made; the next render waits for the rest.
-  /// Throws Error{InvalidArgument} if rank 0 has no renderer. After a throw the renderer may have no VDI.
+  /// Hands the VDI of generate to a renderer on rank 0; other ranks' are ignored and may be null. With one
+  /// rank whose device the renderer uses, lists stay on that device: no part of the VDI reaches the host.
+  /// Otherwise it equals generate and setVdi. Returns when the lists are made; the next render waits for the
+  /// rest. Throws Error{InvalidArgument} if rank 0 has no renderer. After a throw the renderer may have no
+  /// VDI.
   void show(VdiRenderer* renderer, const Camera& camera, const TransferFunction& transferFunction,
             const GenerateSettings& settings, const Progress& progress = {});
 
   /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0.
-  /// supersegments, algorithm and margin of the settings are ignored.
+  /// Ignores the settings' supersegments, algorithm and margin.
   std::optional<Image> renderVolume(const Camera& camera, const TransferFunction& transferFunction,
                                     const GenerateSettings& settings, const Progress& progress = {});
 
-  /// Of the last generate, finish or renderVolume: all ranks' on rank 0, empty on the others.
+  /// Reports of the last generate, finish or renderVolume: all ranks' on rank 0, none on the others.
   const std::vector<RankReport>& reports() const;
   const gpu::Device& device() const;
   const comm::Communicator& communicator() const;

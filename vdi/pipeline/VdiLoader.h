@@ -1,5 +1,5 @@
-// A VDI on its way to where views are rendered from: from the host, or from lists that the device has just
-// made. Not part of the library's interface.
+// Loads a VDI into the memory that views are rendered from, from the host or from lists that the device has
+// just made. Not part of the library's interface.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +22,8 @@ struct LoadedVdi {
   gpu::Buffer tileDepthMasks;
   gpu::Buffer depthRange;          // shared::DepthRange
   gpu::Buffer depthRangeReadback;  // the same, for the host
-  std::unique_ptr<View> original;  // none until there's a VDI
-  /// When it's loaded.
+  std::unique_ptr<View> original;  // null until a VDI is loaded
+  /// Call when the VDI is loaded.
   gpu::shared::DepthRange depths() const { return depthRangeReadback.mappedAs<gpu::shared::DepthRange>()[0]; }
 };
 
@@ -31,23 +31,23 @@ class VdiLoader {
  public:
   explicit VdiLoader(std::shared_ptr<gpu::Device> device);
 
-  /// Whether it has the device to itself, or renders go on beside it.
+  /// Whether the loader has the device to itself, or renders go on beside it.
   enum class Kind { Alone, Beside };
-  /// Copies. Alone, it goes on on the device while this returns (VDIs of up to 128 MiB; larger ones wait for
-  /// all but their last part). Beside, it's done then.
+  /// Copies the VDI. Alone, the device goes on after this returns (for VDIs of up to 128 MiB; larger ones
+  /// wait for all but their last part). Beside, the VDI is loaded when this returns.
   void load(const Vdi& vdi, LoadedVdi& target, Kind kind);
 
-  /// The same from the device's lists, band after band: `header` is the VDI without them. `target` must stay
-  /// until it's loaded.
+  /// Starts to load from the device's lists, band after band; `header` is the VDI without lists. `target`
+  /// must stay until the VDI is loaded.
   void begin(const Vdi& header, LoadedVdi& target);
-  /// A band that has been made. The result is what uses its memory.
+  /// Adds a complete band. Returns the submission that uses its memory.
   gpu::Submission add(const DeviceLists& band, std::uint64_t firstList);
-  /// Goes on on the device when this returns.
+  /// Ends the bands. The device goes on after this returns.
   void finish();
 
-  /// Returns when what was loaded last is there.
+  /// Waits until the last VDI is loaded.
   void wait() { commands_.wait(); }
-  /// Waits likewise, and drops it: after an error.
+  /// Waits for the submitted work and drops it. For use after an error.
   void drop() noexcept { commands_.drop(); }
 
  private:
@@ -66,14 +66,14 @@ class VdiLoader {
   gpu::Buffer staging_;
   gpu::Buffer offsets_;
   gpu::Buffer outgrown_;
-  std::uint64_t stagingBytes_ = 0;  // of the staging buffer that are used
+  std::uint64_t stagingBytes_ = 0;  // in use, of the staging buffer
   std::uint64_t stagingUsed_ = 0;
   LoadedVdi* target_ = nullptr;
   gpu::shared::ExpandConstants constants_{};
   std::uint64_t listCount_ = 0;
-  std::uint64_t segmentBytes_ = 0;  // of one
-  std::uint64_t added_ = 0;         // supersegments of bands
-  /// Behind the buffers, for its end waits for what uses them.
+  std::uint64_t segmentBytes_ = 0;  // of one supersegment
+  std::uint64_t added_ = 0;         // supersegments of the bands so far
+  /// Declared after the buffers, because its destructor waits for the commands that use them.
   gpu::Commands commands_;
 };
 

@@ -1,5 +1,5 @@
-// Where the lists of a VDI go while it is made: to the root's memory (HostSinks.h), into a file (FileSink.h),
-// to a renderer (VdiRenderer.cpp). A new destination is another class of this kind. Not part of the library's
+// The destination of a VDI's lists while it is made: the root's memory (HostSinks.h), a file (FileSink.h), a
+// renderer (VdiRenderer.cpp). A new destination is another class of this kind. Not part of the library's
 // interface.
 #pragma once
 
@@ -13,8 +13,8 @@
 
 namespace vdi::detail {
 
-/// The calls come in this order: begin, add for each band, finish. After an error in any of them, or in what
-/// makes the bands, fail comes instead of the rest. All functions except record and fail are collective: with
+/// The calls come in this order: begin, add for each band, finish. After an error in any of them, or in the
+/// making of a band, fail replaces the rest. All functions except record and fail are collective: with
 /// several ranks, each has a sink of its own.
 class VdiSink {
  public:
@@ -25,11 +25,11 @@ class VdiSink {
   VdiSink(VdiSink&&) = delete;
   VdiSink& operator=(VdiSink&&) = delete;
 
-  /// `header`: the VDI without its lists. It stays until finish or fail.
+  /// `header` is the VDI without its lists. It stays until finish or fail.
   virtual void begin(const Vdi& header) = 0;
 
-  /// Only with one rank: records commands behind those that make a band. `firstList` is the band's first one
-  /// among the VDI's.
+  /// Only with one rank: records commands after those that make a band. `firstList` is the position of the
+  /// band's first list in the VDI.
   virtual void record(gpu::Commands& /*commands*/, const DeviceLists& /*lists*/,
                       std::uint64_t /*firstList*/) {}
 
@@ -48,7 +48,7 @@ class VdiSink {
   /// Returns when the VDI is at its destination, or on its way there on the device.
   virtual void finish(RankReport& report) = 0;
 
-  /// Drops what has arrived.
+  /// Drops the lists added so far.
   virtual void fail() noexcept {}
 };
 

@@ -1,4 +1,4 @@
-// A .vdi file that all ranks write together: each encodes and writes the chunks of its own lists. Not part of
+// Writes a .vdi file by all ranks together: each encodes and writes the chunks of its own lists. Not part of
 // the library's interface.
 #pragma once
 
@@ -17,53 +17,53 @@
 
 namespace vdi::detail {
 
-/// Who writes what a rank other than the root has encoded.
+/// The rank that writes what a rank other than the root has encoded.
 enum class WrittenBy {
-  Owner,  // that rank, where it can open the file; else the root
-  Root    // as on hosts that don't have the file's folder
+  Owner,  // the encoding rank, if it can open the file; else the root
+  Root    // as for hosts that lack the file's folder
 };
 
-/// The file is what io::writeVdi makes of the whole VDI, byte by byte, whoever has which lists. It gets its
-/// name when it's whole, and only if all ranks have done their part; else the old file stays
-/// (io::OutputFile). A rank holds its own lists' chunks, the root for others no more than one of them. Throws
-/// on all ranks.
+/// The file equals that of io::writeVdi for the whole VDI byte by byte, whichever ranks have which lists. It
+/// gets its name when it is complete, and only if all ranks have done their part; otherwise the old file
+/// stays (io::OutputFile). A rank holds the chunks of its own lists, and the root at most one more chunk of
+/// other ranks'. Throws on all ranks.
 template <typename Segment>
 class VdiWriter {
  public:
-  /// Collective. `header`: all but the lists; what it says of size, budget and depth code is equal on all
-  /// ranks, the rest is the root's, as `path` is. `comm` must stay.
+  /// Collective. `header` is the VDI without lists; its size, budget and depth code must be equal on all
+  /// ranks, while the rest and `path` are the root's. `comm` must outlive it.
   VdiWriter(const comm::Communicator& comm, int root, const std::filesystem::path& path, Vdi header,
             WrittenBy writtenBy = WrittenBy::Owner);
 
-  /// Not collective; for Communicator::together. Some of this rank's lists, which are the VDI's from
-  /// `firstList` on. Any ranks may have any of them, each one once. What isn't a whole chunk is copied. The
-  /// file's first chunks are written at once, if the root has them.
+  /// Not collective; call within Communicator::together. Adds some of this rank's lists, which are the VDI's
+  /// from `firstList` on. Any rank may add any list, each list once. Incomplete chunks are copied. The file's
+  /// first chunks are written at once if the root has them.
   void add(std::uint64_t firstList, const ListsOf<Segment>& lists);
 
-  /// Collective, when all have added theirs: nothing can be added any more. Equal on all ranks.
+  /// Collective; call when all ranks have added their lists. Equal on all ranks.
   WrittenVdi finish();
 
   std::uint64_t bytesSent() const { return bytesSent_; }        // to other ranks
   std::uint64_t bytesWritten() const { return bytesWritten_; }  // into the file, by this rank
 
  private:
-  /// Lists that aren't a whole chunk, or not yet.
+  /// Lists that are not a whole chunk, or not yet.
   struct Part {
     std::uint64_t firstList = 0;
     ListsOf<Segment> lists;
     std::uint64_t end() const { return firstList + lists.listCount(); }
   };
-  /// Of this rank.
+  /// A chunk that this rank has encoded.
   struct Chunk {
     std::uint64_t index = 0;
     io::ChunkEntry entry{};
-    std::vector<std::byte> bytes;  // none: it's written
+    std::vector<std::byte> bytes;  // empty once written
   };
-  /// What all ranks know of all chunks.
+  /// All chunks, known to all ranks.
   struct Table {
     std::vector<io::ChunkEntry> entries;
     std::vector<int> owners;
-    std::vector<std::uint64_t> offsets;  // in the file, and its end
+    std::vector<std::uint64_t> offsets;  // in the file, then its end
   };
 
   bool isRoot() const { return comm_.rank() == root_; }
@@ -85,11 +85,11 @@ class VdiWriter {
   WrittenBy writtenBy_;
   std::uint64_t listCount_;
   std::unique_ptr<io::OutputFile> file_;  // the root's
-  std::vector<std::byte> tail_;           // the root's: what follows the chunks
+  std::vector<std::byte> tail_;           // the root's: the bytes after the chunks
   std::vector<Part> parts_;               // the last one may grow
   std::vector<Chunk> chunks_;
-  std::uint64_t firstChunks_ = 0;  // of the file, that are written
-  std::uint64_t writtenEnd_;       // of those
+  std::uint64_t firstChunks_ = 0;  // chunks at the file's start that are written
+  std::uint64_t writtenEnd_;       // their end in the file
   std::uint64_t bytesSent_ = 0;
   std::uint64_t bytesWritten_ = 0;
 };

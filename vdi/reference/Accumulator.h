@@ -1,11 +1,11 @@
-// What the reference's ways to make a picture have in common.
+// Accumulation that all of the reference's renderers share.
 #pragma once
 
 #include "vdi/core/Image.h"
 
 namespace vdi::reference {
 
-/// Colour and opacity accumulated front to back, and the depth of what came first.
+/// Colour and opacity accumulated front to back, and the depth of the first visible material.
 class Accumulator {
  public:
   void add(const glm::vec3& color, float opacity, float depth) {

@@ -1,6 +1,6 @@
-// The optical model alone, in double precision: what a picture should be, whatever way there is to make it.
-// It shares nothing with the rest, so that an error which device, reference and VDI have in common shows: no
-// blocks, no lattice of samples, no table of the transfer function, no slabs, no pictures of 8 bits.
+// The optical model alone, in double precision: the right picture, independent of any method. It shares
+// nothing with the rest, so it exposes errors that device, reference and VDI have in common: no blocks, no
+// lattice of samples, no transfer table, no slabs, no 8-bit pictures.
 #pragma once
 
 #include <vector>
@@ -17,7 +17,7 @@ struct ExactVolume {
   glm::ivec3 dims{0};          // values per axis, each >= 1
   glm::dvec3 origin{0.0};      // of the first value, world
   glm::dvec3 spacing{1.0};     // > 0
-  Box bounds;                  // what's seen: from point to point, or whole cells
+  Box bounds;                  // the visible part: from point to point, or whole cells
   std::vector<double> values;  // [dims.z][dims.y][dims.x]
 
   double at(const glm::dvec3& world) const;
@@ -25,12 +25,12 @@ struct ExactVolume {
 
 /// Light and transmittance of a ray: with s its length in world units and t(s) = (1 -
 /// opacity(s))^(s/unitDistance) along it, the integral of colour * -dt. Each of `samples` parts of equal
-/// length has the colour and opacity of its middle. The scalar is infinite or NaN nowhere. Returns
+/// length has the colour and opacity of its middle. The scalar must be finite everywhere. Returns
 /// premultiplied colour and opacity.
 glm::dvec4 integrate(const ExactVolume& volume, const TransferFunction& function, const glm::dvec3& from,
                      const glm::dvec3& to, int samples);
 
-/// The picture of the camera, row 0 at the bottom, without depths: a ray through each pixel's centre, of 64
+/// The picture of the camera, row 0 at the bottom, without depths: a ray through each pixel's centre, with 64
 /// samples for each voxel that it may cross.
 Image renderExactly(const ExactVolume& volume, const TransferFunction& function, const Camera& camera,
                     int width, int height, int samplesPerVoxel = 64);

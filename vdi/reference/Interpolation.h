@@ -7,7 +7,8 @@
 
 namespace vdi::reference {
 
-/// Trilinear, among all values that the block has; beyond the outermost ones, clamped to these.
+/// The trilinear value at a place, among all values of the block; places beyond the outermost values are
+/// clamped to them.
 double interpolate(const Block& block, const glm::dvec3& world);
 
 }  // namespace vdi::reference

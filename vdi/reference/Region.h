@@ -8,14 +8,14 @@
 
 namespace vdi::reference {
 
-/// Of a ray, from one depth to another.
+/// A part of a ray, from one depth to another.
 struct RayPart {
   float enter = 0.0F;
   float leave = 0.0F;
 };
 
-/// The part on the sides of the planes that are shown. `start` and `direction`: as depths are counted from,
-/// relative to `center`, world.
+/// The part of `part` on the shown sides of the planes. `start` is the ray's point at depth 0, relative to
+/// `center` in world space; `direction` is per unit of depth.
 RayPart clipped(std::span<const ClipPlane> planes, const glm::dvec3& center, const glm::vec3& start,
                 const glm::vec3& direction, RayPart part);
 

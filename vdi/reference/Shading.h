@@ -8,10 +8,11 @@
 
 namespace vdi::reference {
 
-/// Direction of the scalar's gradient at a place: a unit vector, or zero where there's none.
+/// Direction of the scalar's gradient at a place: a unit vector, or zero if there is no gradient.
 glm::dvec3 normalAt(const Block& block, const glm::dvec3& world);
 
-/// What a colour there is multiplied by. `rayDirection`: from the eye, of any length.
+/// The factor by which shading multiplies a colour at a place. `rayDirection` points away from the eye and
+/// has any length.
 glm::vec3 lightAt(const Shading& shading, const View& view, const Block& block, const glm::dvec3& world,
                   const glm::dvec3& rayDirection);
 

@@ -1,4 +1,4 @@
-// Cuts a lattice into blocks and deals them to ranks, in ways that simulations do and in ways that hurt.
+// Cuts a lattice into blocks and assigns them to ranks, in ways that simulations use and in harder ones.
 #pragma once
 
 #include <algorithm>
@@ -12,18 +12,18 @@
 
 namespace vdi::synthetic {
 
-/// Who holds which block.
+/// The assignment of blocks to ranks.
 enum class Layout { Slabs, Bricks, Interleaved, Checkerboard, Random, OnOneRank };
-/// "slabs", "bricks", "interleaved", "checkerboard", "random", "one-rank"; throws Error{InvalidArgument} that
-/// lists them.
+/// Accepts "slabs", "bricks", "interleaved", "checkerboard", "random", "one-rank"; throws
+/// Error{InvalidArgument} that lists them.
 Layout layoutFromString(const std::string& name);
 std::vector<std::string> layoutNames();
 
-/// How the values at the cuts are shared.
+/// How blocks share the values at the cuts.
 enum class Joint {
-  SharedPoints,  // point data; neighbours both hold the points of their common face
-  Gap,           // point data; no point twice, so a cell between blocks belongs to nobody
-  Cells,         // cell data; no cell twice
+  SharedPoints,  // point data; both neighbours hold the points of their common face
+  Gap,           // point data; each point is held once, so no block covers a cell between two blocks
+  Cells,         // cell data; each cell is held once
 };
 
 /// Part of a lattice of `size` values (points or cells).
@@ -33,11 +33,12 @@ struct Part {
   int owner;         // rank
 };
 
-/// `blocks` per axis (clamped so that each holds at least two values); deterministic, equal on every rank.
+/// `blocks` is the number per axis, limited so that each block has at least two values. Deterministic, and
+/// equal on every rank.
 std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, Layout layout, Joint joint,
                             int ranks, std::uint32_t seed);
 
-/// The whole lattice that a Part is of.
+/// The whole lattice that Parts divide.
 struct Lattice {
   glm::ivec3 size{0};      // values per axis
   glm::dvec3 origin{0.0};  // lower corner of the domain
@@ -46,15 +47,15 @@ struct Lattice {
   Joint joint = Joint::SharedPoints;
 };
 
-/// A block for a part, with its own copy of the values. `valueAt(index)` gives the value at a lattice index;
-/// integers are rounded. It may be called from several threads at once.
+/// Makes a block for a part, with its own copy of the values. `valueAt(index)` gives the value at a lattice
+/// index, and integers are rounded. Several threads may call it at once.
 template <typename ValueAt>
 Block makeBlock(const Lattice& lattice, const Part& part, ValueAt valueAt);
 
-/// The block that has these values and keeps them.
+/// Makes a block that has these values and keeps them.
 Block blockOf(const Lattice& lattice, const Part& part, const std::shared_ptr<std::byte[]>& data);
 
-/// Calls use(0) .. use(layers - 1), from several threads at once if there are many values in them.
+/// Calls use(0) .. use(layers - 1), on several threads if the layers have many values.
 template <typename Use>
 void layerByLayer(int layers, std::size_t values, Use use) {
   constexpr std::size_t many = std::size_t{1} << 20;

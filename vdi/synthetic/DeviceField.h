@@ -1,4 +1,4 @@
-// The fields of Fields.h, made by a device: in seconds where cores take minutes.
+// The fields of Fields.h, computed by a device in seconds instead of minutes.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +17,14 @@ namespace vdi::synthetic {
 
 class DeviceField {
  public:
-  /// Throws Error{InvalidArgument} that lists the names there are.
+  /// Throws Error{InvalidArgument} that lists the valid names.
   DeviceField(std::shared_ptr<gpu::Device> device, const std::string& name, std::uint32_t seed);
 
-  /// A part's values, `top` times the field's, of the lattice's type. They're deterministic on a device;
-  /// another one, and makeField, which works in double precision, may give others in the sixth digit. The
+  /// A part's values, `top` times the field's, of the lattice's type. They are deterministic on one device.
+  /// Another device, and makeField, which works in double precision, may differ in the sixth digit. The
   /// lattice's spacing must be the same on all axes, its origin 0.
   std::shared_ptr<std::byte[]> makeValues(const Lattice& lattice, const Part& part, double top);
-  /// Blocks for parts of `all`, which is copies of `one` side by side; they share values.
+  /// Blocks for parts of `all`, a lattice of copies of `one` side by side; they share values.
   std::vector<Block> makeBlocks(const Lattice& one, const Lattice& all, std::span<const Part> parts,
                                 double top);
 

@@ -1,5 +1,6 @@
-// Procedural scalar fields: deterministic, defined everywhere, so that every rank fills its blocks by itself.
-// What the tool runs on is made by a device (DeviceField.h, shaders/field.comp); these are their definition.
+// Procedural scalar fields: deterministic and defined everywhere, so that every rank fills its own blocks.
+// The tool runs on fields that a device computes (DeviceField.h, shaders/field.comp); these functions define
+// them.
 #pragma once
 
 #include <cstdint>
@@ -13,17 +14,17 @@ namespace vdi::synthetic {
 /// Scalar in [0, 1] at a point of the unit cube.
 using Field = std::function<double(const glm::dvec3&)>;
 
-/// Names with a line about each.
+/// A field's name and a line about it.
 struct FieldInfo {
   std::string name;
   std::string description;
 };
 const std::vector<FieldInfo>& fields();
 
-/// Of a name among these. Throws Error{InvalidArgument} that lists the names there are.
+/// Index of a field by name. Throws Error{InvalidArgument} that lists the valid names.
 std::size_t fieldIndex(const std::string& name);
 
-/// Throws Error{InvalidArgument} that lists the names there are. `seed` changes the ones with random parts.
+/// Throws Error{InvalidArgument} that lists the valid names. `seed` changes the fields with random parts.
 Field makeField(const std::string& name, std::uint32_t seed);
 
 }  // namespace vdi::synthetic
