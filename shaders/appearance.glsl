@@ -2,14 +2,14 @@
 //
 // Needs: shared/segmenting.h, optical.glsl.
 
-// Premultiplied colour and opacity of `opticalDepth` over `length`, brought to one sample.
+// Premultiplied colour and opacity that `opticalDepth` over `length` has over one sample.
 vec4 appearanceOf(vec3 color, float opticalDepth, float length, float sampleStep) {
   float whole = opacityOf(opticalDepth);
   float part = opacityOf(opticalDepth * sampleStep / length);
   return vec4(whole > 0.0 ? color * (part / whole) : vec3(0.0), part);
 }
 
-// Of what lies behind material of that transmittance.
+// Weight of an interval behind material of that transmittance.
 float weightBehind(float transmittance) { return hiddenWeight + (1.0 - hiddenWeight) * transmittance; }
 
 float differenceOf(vec4 a, vec4 b) {

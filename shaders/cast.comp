@@ -1,5 +1,5 @@
-// Casts one ray per pixel through a rank's blocks: DVR; or the search for each list's sensitivity, and the writing of
-// its supersegments; or the counting of its pre-segments, and the writing of them. Twin of castRay, renderVolume and
+// Casts one ray per pixel through a rank's blocks. It renders DVR; or searches each list's sensitivity and
+// writes its supersegments; or counts its pre-segments and writes them. Twin of castRay, renderVolume and
 // generate in vdi/reference/Reference.cpp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -8,17 +8,17 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 #include "shared/cast.h"
 
-// All along x, as whole subgroups must be: those that share a ray are side by side in one.
+// One-dimensional, so that the invocations that share a ray are adjacent in one subgroup.
 layout(local_size_x = castGroupX * castGroupY) in;
-// What the program is for; the others' code is left out.
+// The program's purpose; the compiler removes the code of the others.
 layout(constant_id = 0) const uint castProgram = castProgramSearch;
 layout(constant_id = 1) const uint pageCount = 1;
-// Invocations side by side that share a ray, where pre-segments are counted: a GPU waits for the longest of few rays.
-// Each takes its share of the samples, and counts for its share of the tolerances.
+// Adjacent invocations that share a ray while pre-segments are counted, because with few rays a GPU waits for
+// the longest. Each takes its share of the samples, and counts for its share of the tolerances.
 layout(constant_id = 4) const uint lanesPerRay = 1;
 uint rayLane = 0u;
-// Constants, for what they take is live all along the ray: whether supersegments must end at gaps; and whether a list gets what it
-// needs (CastParams::level).
+// Constants, because their registers are live along the whole ray: whether supersegments must end at gaps;
+// and whether a list gets the number that it needs (CastParams::level).
 layout(constant_id = 5) const bool cutAtGaps = false;
 layout(constant_id = 6) const bool byNeed = false;
 
@@ -44,13 +44,14 @@ float firstDepth;
 
 #include "raycast.glsl"
 
-// What a sample is for: an interval of a list, or light of a pixel.
+// Uses a sample as an interval of a list, or as light of a pixel.
 void useSample(float front, float back, Sample it) {
   if (volumeOnly) {
     if (it.opacity > 0.0 && accumulated.a == 0.0) firstDepth = front;
     accumulated += (1.0 - accumulated.a) * it.opacity * vec4(it.color, 1.0);
   } else if (countsPreSegments || writesPreSegments) {
-    preSegmentsAdd(front, back, it.color * it.opacity, it.opacity, it.opticalDepth, vec4(it.color, 1.0) * it.overStep);
+    preSegmentsAdd(front, back, it.color * it.opacity, it.opacity, it.opticalDepth,
+                   vec4(it.color, 1.0) * it.overStep);
   } else {
     searchAdd(front, back, it.color * it.opacity, it.opticalDepth);
   }

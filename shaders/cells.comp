@@ -1,5 +1,5 @@
-// Macrocells: the range of values in each, once when blocks arrive; and whether any of these is visible, when blocks or the
-// transfer table change. The rays of cast.comp pass those where nothing is.
+// Computes each macrocell's range of values when blocks arrive, and whether any of these is visible when
+// blocks or the transfer table change. The rays of cast.comp skip macrocells without visible values.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/cast.h"
@@ -44,12 +44,12 @@ uint ordered(float value) {
 
 float unordered(uint bits) { return uintBitsToFloat((bits >> 31) != 0u ? bits & 0x7FFFFFFFu : ~bits); }
 
-// Smallest, and largest inverted, of what the workgroup's invocations have found.
+// Smallest value, and inverted largest one, that the workgroup's invocations have found.
 shared uint minimum;
 shared uint minInverted;
-shared uint infinite;  // bit 0: there's a positive one, bit 1: a negative one
+shared uint infinite;  // bit 0: +infinity occurs, bit 1: -infinity occurs
 
-// By a workgroup, whose invocations take a row of texels each at a time.
+// Measures a cell by a workgroup, whose invocations each take a row of texels at a time.
 void measure(CellPiece piece, uint pieceIndex, uint cell) {
   uint index = cell - piece.firstCell;
   uvec3 cellAt = uvec3(index % piece.cellDims.x, (index / piece.cellDims.x) % piece.cellDims.y,
@@ -71,7 +71,7 @@ void measure(CellPiece piece, uint pieceIndex, uint cell) {
     ivec3 at = ivec3(piece.place) + ivec3(first.x, first.y + row % rows, first.z + row / rows);
     for (int x = first.x; x <= last.x; ++x, ++at.x) {
       float value = texelAt(piece.page, at);
-      // NaN is transparent, and so is what's interpolated with it.
+      // NaN is transparent, and so is anything interpolated with it.
       if (abs(value) == infiniteTexel) {
         atomicOr(infinite, value > 0.0 ? 1u : 2u);
       } else if (abs(value) <= largest) {
@@ -102,9 +102,10 @@ void classify(CellPiece piece, uint cell) {
   vec2 range = push.ranges.at[cell];
   bool visible = false;
   if (range.x <= range.y) {
-    // The table is linear between entries: those at both sides count.
+    // The table is linear between entries, so the entries on both sides count.
     float last = float(push.tableSize - 1u);
-    vec2 places = clamp((range - piece.tableOrigin) * piece.tableScale + vec2(-0.01, 0.01), vec2(0.0), vec2(last));
+    vec2 places =
+        clamp((range - piece.tableOrigin) * piece.tableScale + vec2(-0.01, 0.01), vec2(0.0), vec2(last));
     uint begin = uint(places.x);
     uint end = min(uint(ceil(places.y)) + 1u, push.tableSize);
     visible = push.visibleBefore.at[end] > push.visibleBefore.at[begin];

@@ -1,4 +1,4 @@
-// Segments interleaved lists again, to at most N_S supersegments each: sub-supersegments are samples of varying length.
+// Segments interleaved lists again, to at most N_S supersegments each; their intervals are sub-supersegments.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/composite.h"
@@ -44,7 +44,7 @@ void main() {
     return;
   }
   if (!hasList) return;
-  // A list that fits stays as it is: store.comp takes it from what was merged.
+  // A list that fits stays as it is: store.comp copies it from the interleaved lists.
   uint count = params.interleavedOffsets.at[listIndex + 1u] - params.interleavedOffsets.at[listIndex];
   bool fits = !byNeed && count <= params.budget;
   if (fits && countsPreSegments) {

@@ -1,4 +1,4 @@
-// How many supersegments lists hold, as bytes where that's enough: what ranks tell each other about their lists.
+// Packs lists' counts, as bytes if they fit, for exchange between ranks.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/counts.h"

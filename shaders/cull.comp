@@ -1,14 +1,15 @@
-// Finds the tiles of the new picture whose rays may meet material, for render.comp, and leaves the others blank: most of a
-// picture is. Those with much to look at come first, for a GPU waits for the last. A workgroup looks at the packet of a region.
+// Finds the tiles of the new picture whose rays may meet material, for render.comp, and blanks the others,
+// which are most of a picture. The tiles with the most work come first, because a GPU waits for the last one.
+// A workgroup examines the packet of a region.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/render.h"
 #include "masks.glsl"
 
 layout(local_size_x = renderCullGroup) in;
-// Else as they come: a CPU doesn't wait, but has its caches.
+// Otherwise tiles keep their order: a CPU does not wait for the last one, and benefits from its caches.
 layout(constant_id = 0) const bool busiestFirst = true;
-// What the picture is left in (shared/render.h).
+// Form of the picture's colours (shared/render.h).
 layout(constant_id = 1) const uint pictureForm = renderPictureFloats;
 layout(push_constant, scalar) uniform Push { RenderRays rays; };
 layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
@@ -20,15 +21,16 @@ layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 float minimum(vec4 values) { return min(min(values.x, values.y), min(values.z, values.w)); }
 float maximum(vec4 values) { return max(max(values.x, values.y), max(values.z, values.w)); }
 
-// Keeps the part of `stretch` where value + t * slope >= 0 for any ray of a packet, of whose corners the components
-// are: between them, where a plane is crossed lies between where the corners cross it, if these cross it the same way.
+// Keeps the part of `stretch` where value + t * slope >= 0 for any ray of a packet. The components belong to
+// its corners: if all corners cross a plane the same way, the rays between them cross it between the corners'
+// crossings.
 void clipAny(inout vec2 stretch, vec4 value, vec4 slope) {
   vec4 crossing = -value / slope;
   if (all(greaterThan(slope, vec4(0.0)))) stretch.x = max(stretch.x, minimum(crossing));
   if (all(lessThan(slope, vec4(0.0)))) stretch.y = min(stretch.y, maximum(crossing));
 }
 
-// Where a packet is in V_O's frustum: bounds of its place in the picture, and of its depths. Empty: leave <= enter.
+// Bounds of a packet's positions in V_O's picture, and of its depths. Empty: leave <= enter.
 struct Reach {
   float enter;
   float leave;
@@ -63,8 +65,9 @@ Reach reachOf(RayPacket packet) {
 
   vec4 depthsIn = originZ + stretch.x * directionZ;
   vec4 depthsOut = originZ + stretch.y * directionZ;
-  Reach reach = Reach(stretch.x, stretch.y, vec2(0.0), vec2(params.lists), vec2(params.nearest, params.farthest));
-  // Else anywhere: the picture of what's beside V_O's eye has no bounds.
+  Reach reach =
+      Reach(stretch.x, stretch.y, vec2(0.0), vec2(params.lists), vec2(params.nearest, params.farthest));
+  // Otherwise the bounds stay those of the whole picture: points beside V_O's eye project without bounds.
   const float finite = 1e30;
   if (stretch.y < finite && (parallel || min(minimum(depthsIn), minimum(depthsOut)) > 0.0)) {
     vec4 pixelsIn = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsIn));
@@ -75,13 +78,15 @@ Reach reachOf(RayPacket packet) {
     vec4 yOut = (originY + stretch.y * directionY) * pixelsOut;
     const float spare = 1.0;  // for rounding
     vec2 middle = 0.5 * vec2(params.lists);
-    reach.low = clamp(vec2(min(minimum(xIn), minimum(xOut)), min(minimum(yIn), minimum(yOut))) + middle - spare,
-        reach.low, reach.high);
-    reach.high = clamp(vec2(max(maximum(xIn), maximum(xOut)), max(maximum(yIn), maximum(yOut))) + middle + spare,
-        reach.low, reach.high);
-    reach.depths = clamp(vec2(min(minimum(depthsIn), minimum(depthsOut)), max(maximum(depthsIn), maximum(depthsOut))),
-        params.nearest,
-                         params.farthest);
+    reach.low =
+        clamp(vec2(min(minimum(xIn), minimum(xOut)), min(minimum(yIn), minimum(yOut))) + middle - spare,
+              reach.low, reach.high);
+    reach.high =
+        clamp(vec2(max(maximum(xIn), maximum(xOut)), max(maximum(yIn), maximum(yOut))) + middle + spare,
+              reach.low, reach.high);
+    reach.depths =
+        clamp(vec2(min(minimum(depthsIn), minimum(depthsOut)), max(maximum(depthsIn), maximum(depthsOut))),
+              params.nearest, params.farthest);
   }
   return reach;
 }
@@ -91,7 +96,8 @@ uint countOf(uint64_t mask) {
   return uint(bitCount(words.x) + bitCount(words.y));
 }
 
-// In how many places the packet may meet material: parts of the depth range, tile by tile. Each invocation counts its own.
+// Number of places where the packet may meet material: parts of the depth range, tile by tile. Each
+// invocation counts its own tile.
 uint placesToIntersect(RayPacket packet) {
   Reach reach = reachOf(packet);
   if (!(reach.enter < reach.leave)) return 0u;
@@ -103,7 +109,7 @@ uint placesToIntersect(RayPacket packet) {
   ivec2 tiles = lastTile - firstTile + 1;
   const int few = 16;
   if (tiles.x * tiles.y <= few) {
-    // Rays that stay about where they are: all tiles.
+    // Rays that hardly move in the picture: all tiles.
     if (own >= tiles.x * tiles.y) return 0u;
     ivec2 tile = firstTile + ivec2(own % tiles.x, own / tiles.x);
     return countOf(tileDepthMask(renderTile, tile) & maskBetween(reach.depths.x, reach.depths.y));
@@ -112,12 +118,13 @@ uint placesToIntersect(RayPacket packet) {
   int end = byColumns ? lastTile.x : lastTile.y;
   uint count = 0u;
   for (int tile = (byColumns ? firstTile.x : firstTile.y) + own; tile <= end; tile += int(renderCullGroup)) {
-    count += countOf(packetMask(packet, byColumns, tile, byColumns ? first.x : first.y, byColumns ? last.x : last.y));
+    count += countOf(
+        packetMask(packet, byColumns, tile, byColumns ? first.x : first.y, byColumns ? last.x : last.y));
   }
   return count;
 }
 
-// Twice the logarithm.
+// Twice the logarithm of `count`.
 uint magnitude(uint count) {
   int exponent = findMSB(count);
   return 2u * uint(exponent) + (exponent > 0 ? count >> (exponent - 1) & 1u : 0u);

@@ -1,4 +1,4 @@
-// What render.comp wants of a VDI: supersegments that need no decoding, and masks of where there's material.
+// Prepares a VDI for render.comp: supersegments that need no decoding, and masks of the depths with material.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/render.h"
@@ -15,14 +15,15 @@ layout(push_constant, scalar) uniform Push { ExpandConstants push; };
 void expandSegment(uint i) {
   OpticalSegment segment = loadSegment(push.from, i, push.form);
   float density = segment.opticalDepth / (segment.back - segment.front);
-  push.segments.at[i] =
-      RenderSegment(segment.front, segment.back, density, packedSegmentColor(segment.color / opacityOf(segment.opticalDepth)));
+  push.segments.at[i] = RenderSegment(segment.front, segment.back, density,
+                                      packedSegmentColor(segment.color / opacityOf(segment.opticalDepth)));
 }
 
 shared uint groupNearest;
 shared uint groupFarthest;
 
-// Lists are in order of depth: their ends tell. Depths are at least 0, but 0 may be -0, whose bits are above all others.
+// Lists are in order of depth, so their ends suffice. Depths are at least 0, but 0 may be -0, whose bits
+// exceed all others.
 void addDepths(uint list, bool hasList) {
   if (gl_LocalInvocationIndex == 0u) {
     groupNearest = push.depthRange.at[0];
@@ -37,18 +38,19 @@ void addDepths(uint list, bool hasList) {
   }
   barrier();
   if (gl_LocalInvocationIndex != 0u) return;
-  // Most workgroups have nothing new to tell.
+  // Most workgroups do not extend the range.
   if (groupNearest < push.depthRange.at[0]) atomicMin(push.depthRange.at[0], groupNearest);
   if (groupFarthest > push.depthRange.at[1]) atomicMax(push.depthRange.at[1], groupFarthest);
 }
 
-// In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
+// In perspective, the frusta of V_O's pixels meet in its eye, where no bin can separate them.
 void findBins() {
   float nearest = uintBitsToFloat(push.depthRange.at[0]);
   float farthest = uintBitsToFloat(push.depthRange.at[1]);
   if (push.perspective != 0u) nearest = max(nearest, farthest * 1e-6);
   push.depthRange.at[0] = floatBitsToUint(nearest);
-  push.depthRange.at[2] = floatBitsToUint(farthest > nearest ? float(renderBins) / (farthest - nearest) : 0.0);
+  push.depthRange.at[2] =
+      floatBitsToUint(farthest > nearest ? float(renderBins) / (farthest - nearest) : 0.0);
 }
 
 void maskList(uint list) {
@@ -65,7 +67,7 @@ void maskList(uint list) {
   push.heads.at[list] = ListHead(first, end - first, mask);
 }
 
-// With the lists around it, which smooth reconstruction sees from within the tile.
+// Includes the lists around the tile, which smooth reconstruction uses within the tile.
 void maskTile(ivec2 tile, uint index) {
   uint64_t mask = 0ul;
   ivec2 begin = max(tile * renderTile - 1, ivec2(0));

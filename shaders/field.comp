@@ -64,7 +64,9 @@ float mixing(vec3 p) {
   return clamp(0.5 + 0.5 * tanh(layer) + detail, 0.0, 1.0);
 }
 
-float interfaces(vec3 p) { return clamp(0.5 + 0.5 * tanh(18.0 * (octaves(p * 9.0, 6u, push.seed) - 0.5)), 0.0, 1.0); }
+float interfaces(vec3 p) {
+  return clamp(0.5 + 0.5 * tanh(18.0 * (octaves(p * 9.0, 6u, push.seed) - 0.5)), 0.0, 1.0);
+}
 
 float coil(vec3 p) {
   vec3 q = p - 0.5;
@@ -77,7 +79,8 @@ float coil(vec3 p) {
     float spineZ = 0.3 * sin(6.0 * along);
     float d = length(vec2(r - spineR, q.z - spineZ));
     float wall = exp(-square((d - 0.05) / 0.008));
-    float ribs = 0.5 + 0.5 * cos(2.0 * pi * fract(along * 60.0));  // of small angles, which GPUs are exact for
+    // The angle is small, so GPUs are exact.
+    float ribs = 0.5 + 0.5 * cos(2.0 * pi * fract(along * 60.0));
     best = max(best, max(wall * ribs, exp(-square(d / 0.012))));
   }
   return clamp(best, 0.0, 1.0);

@@ -1,5 +1,6 @@
-// Puts the ranks' sub-supersegments of each list in order of depth. Each rank's are in order already, and no two overlap,
-// so the next one is the one whose front is nearest among the heads of those ranks that have any. Or makes them one colour.
+// Puts the ranks' sub-supersegments of each list in order of depth, or composites them to one colour. Each
+// rank's are in order already, and no two overlap, so the next one is the nearest among the heads of the
+// ranks that have any left.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/composite.h"
@@ -15,18 +16,19 @@ uint subOffset(uint rank, uint list) { return push.subOffsets.at[rank * push.row
 
 void countList(uint list) {
   uint total = 0u;
-  for (uint rank = 0u; rank < push.rankCount; ++rank) total += subOffset(rank, list + 1u) - subOffset(rank, list);
+  for (uint rank = 0u; rank < push.rankCount; ++rank)
+    total += subOffset(rank, list + 1u) - subOffset(rank, list);
   push.counts.at[list] = total;
 }
 
-// Comparable within a list: codes, if it has such.
+// Depths, comparable within a list; codes, if the list has them.
 vec2 depthsOf(uint i) {
   if (compactForm) return vec2(depthCodes(CompactArray(push.received).at[i]));
   Segment segment = segmentsFrom(push.received, i).at[0];
   return vec2(segment.front, segment.back);
 }
 
-// Depths that rounded to one code: what ends first was first.
+// Of two depths that rounded to one code, the one that ends first comes first.
 bool isNearer(vec2 a, vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); }
 
 void copySegment(uint i, uint slot) {
@@ -39,7 +41,7 @@ void copySegment(uint i, uint slot) {
 
 InterleaveHead headOf(uint begin, uint end) { return InterleaveHead(begin, end, depthsOf(begin)); }
 
-// Up to two ranks: their heads, and codes, stay in registers.
+// Merges up to two ranks, whose heads and codes stay in registers.
 void mergeTwo(InterleaveHead a, InterleaveHead b, uint first, uint end) {
   CompactArray received = CompactArray(push.received);
   uvec2 codeOfA = uvec2(0u);
@@ -113,7 +115,7 @@ void interleaveList(uint list) {
     InterleaveHead head = headOf(begin, stop);
     if (heads == 0u) one = head;
     if (heads == 1u) two = head;
-    // There are no more ranks with any than there are supersegments.
+    // No more ranks have supersegments than there are supersegments.
     if (heads >= 2u) push.heads.at[first + heads] = head;
     ++heads;
   }
@@ -126,7 +128,7 @@ void interleaveList(uint list) {
   mergeMany(heads, first, end);
 }
 
-// As flatten in vdi/core/Flatten.h.
+// Twin of flatten in vdi/core/Flatten.h.
 void flattenList(uint list) {
   uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];

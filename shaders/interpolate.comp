@@ -1,5 +1,5 @@
-// How finely each list may be cut into pre-segments, and how many of them there's room for, from the lists that were
-// counted. Twin of interpolatedTolerance in vdi/reference/SegmentByMerging.cpp.
+// Interpolates, from the counted lists, each list's tolerance and its room for pre-segments. Twin of
+// interpolatedTolerance in vdi/reference/SegmentByMerging.cpp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/interpolate.h"
@@ -14,7 +14,7 @@ bool allExact;
 float exponents;
 float countedLists;
 
-// Whether this is one rank of several.
+// Whether this rank is one of several.
 layout(constant_id = 0) const bool together = false;
 
 struct Counted {
@@ -25,11 +25,12 @@ struct Counted {
 
 Counted countedAt(uint x, uint y) {
   uint at = y * push.countedWidth + x;
-  return Counted(push.countedTolerances.at[at], push.countedPreSegments.at[at], together ? push.countedQuotas.at[at] : 0u);
+  return Counted(push.countedTolerances.at[at], push.countedPreSegments.at[at],
+                 together ? push.countedQuotas.at[at] : 0u);
 }
 
 void consider(Counted counted) {
-  // All ranks find the same tolerance: those that have nothing in a list where others have something, too.
+  // All ranks find the same tolerance, including those without material in a list where others have some.
   if (together ? counted.tolerance == 0.0 : counted.preSegments == 0u) return;
   maxQuota = max(maxQuota, counted.quota & 0xffffu);
   maxRuns = max(maxRuns, counted.quota >> 16);
@@ -61,7 +62,7 @@ void main() {
   allExact = true;
   exponents = 0.0;
   countedLists = 0.0;
-  // All are asked for before any is used.
+  // Requests all values before it uses any.
   Counted leftBelow = countedAt(left, below);
   Counted rightBelow = countedAt(right, below);
   Counted leftAbove = countedAt(left, above);
@@ -72,7 +73,7 @@ void main() {
   consider(rightAbove);
   uint room = maxPreSegments + uncountedSparePreSegments + maxPreSegments / 4u;
   if (together) {
-    // Where none of the counted lists has anything of this rank's, this one may have.
+    // A list may have material of this rank even if none of the counted lists around it has.
     uint quota = maxQuota > 0u ? maxQuota : push.budget;
     uint runs = maxRuns + 1u;
     push.quotas.at[list] = quota | runs << 16;

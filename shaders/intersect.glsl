@@ -1,12 +1,12 @@
-// What a part of a ray meets of a list.
+// Intersects a part of a ray with a list.
 //
 // Needs: shared/render.h, render_segment.glsl, line.glsl; params, opaque, segmentsAtOnce, maxSegmentsAtOnce.
 
-bool rayAscends;  // it meets a list's supersegments in their order; else backwards
-// How long the ray is for a change of depth, where that says something; else the length of its whole stretch.
+bool rayAscends;  // whether the ray meets a list's supersegments in their order; else backwards
+// Length of the ray per change of depth, if depth changes enough; else the length of its whole stretch.
 float raySlant;
 
-// Else a column's change of depth may be lost in rounding.
+// Whether a column's change of depth is not lost in rounding.
 bool changesDepth(PictureLine line) { return line.depths.y > 0.01 * params.farthest; }
 
 void beginIntersecting(PictureLine line, vec2 stretch) {
@@ -14,14 +14,14 @@ void beginIntersecting(PictureLine line, vec2 stretch) {
   raySlant = (stretch.y - stretch.x) * length(ray.direction) / (changesDepth(line) ? line.depths.y : 1.0);
 }
 
-// At a place in V_O's picture: depth for a length of the ray that goes through it.
+// Depth per length of the ray that passes through a position in V_O's picture.
 float shorteningAt(vec2 place) {
   if (params.parallel != 0u) return 1.0;
   vec2 offset = (place - 0.5 * vec2(params.lists)) * params.pixelSize;
   return inversesqrt(1.0 + dot(offset, offset));
 }
 
-// What a ray sees of something, and the depth that it's met at first, as PictureLine has depths.
+// What a ray accumulates in an intersection, and the depth where it enters, as depths in PictureLine.
 struct Intersection {
   vec4 light;
   float entered;
@@ -29,20 +29,20 @@ struct Intersection {
 
 const Intersection nothing = Intersection(vec4(0.0), infinity);
 
-// Front and back, as the ray meets them.
+// Depths of a supersegment's two ends in the order in which the ray meets them.
 vec2 metDepths(uvec4 segment) {
   vec2 depths = segmentDepths(segment);
   return rayAscends ? depths : -depths.yx;
 }
 
-// A part of a ray, as a list sees it.
+// A part of a ray, relative to a list.
 struct Part {
   float low;  // depths
   float high;
-  float slant;  // how much longer the ray is between two depths than the list's own
+  float slant;  // length of the ray relative to the list's own, between two depths
 };
 
-// Between two fractions of the line.
+// The part between two fractions of the line.
 Part partOf(PictureLine line, vec2 fractions, float shortening) {
   Part part = Part(at(line.depths, fractions.x), at(line.depths, fractions.y), raySlant * shortening);
   if (!changesDepth(line)) {
@@ -52,7 +52,7 @@ Part partOf(PictureLine line, vec2 fractions, float shortening) {
   return part;
 }
 
-// What a ray has seen of a list so far.
+// The ray's accumulation within a list so far.
 struct Seen {
   vec3 light;  // in units of segmentColorUnit
   float transmittance;
@@ -75,17 +75,18 @@ void meet(inout Seen seen, uvec4 segment, vec2 depths, Part part) {
 Intersection intersectionOf(Seen seen)
     { return Intersection(vec4(seen.light * segmentColorUnit, 1.0 - seen.transmittance), seen.entered); }
 
-RenderSegmentWords listSegments;  // of the list that's looked at
+RenderSegmentWords listSegments;  // of the current list
 
-// The i-th of several supersegments from a slot on, where `more` follow in the list; the last one again beyond them.
+// The i-th of several supersegments from a slot on, of which `more` follow in the list; beyond these, the
+// last one again.
 uvec4 segmentFrom(uint slot, int i, int more, int step) {
   return listSegments.at[slot + uint(i == 0 ? 0 : min(i, more) * step)];
 }
 
-// Where an intersection is in a list: at segmentsAtOnce supersegments.
+// An intersection's position in a list: at segmentsAtOnce supersegments.
 struct Cursor {
-  int place;  // of the first of them, counted as the ray meets them
-  uint slot;  // and in the list
+  int place;  // index of the first of them, in the order in which the ray meets them
+  uint slot;  // its slot in the list
   uvec4 segments[maxSegmentsAtOnce];
 };
 
@@ -99,8 +100,8 @@ Cursor cursorAt(int place, uint slot, int last, int step) {
   return at;
 }
 
-// `list` has at least one supersegment. `hint`: where the last intersection with a neighbouring list ended, counted as
-// the ray meets them; lists are alike there.
+// `list` must have at least one supersegment. `hint` is the index where the last intersection with a
+// neighbouring list ended, in the order in which the ray meets them, because neighbouring lists are similar.
 Intersection intersectList(uint list, Part part, inout int hint) {
   ListHead head = params.heads.at[list];
   listSegments = segmentWordsFrom(params.segments, head.first);
@@ -112,25 +113,27 @@ Intersection intersectList(uint list, Part part, inout int hint) {
     int back = segmentsAtOnce == 1 ? 1 : min(at.place, segmentsAtOnce);
     at = cursorAt(at.place - back, at.slot - uint(back * step), last, step);
   }
-  // Not below, where each takes longer.
+  // Not in the loop below, where each step takes longer.
   while (at.place + segmentsAtOnce <= last && metDepths(at.segments[segmentsAtOnce - 1]).y <= part.low) {
     at = cursorAt(at.place + segmentsAtOnce, at.slot + uint(segmentsAtOnce * step), last, step);
   }
   Seen seen = nothingYet;
   for (;;) {
     [[unroll]] for (int i = 0; i < maxSegmentsAtOnce; ++i) {
-      if (i == 0 || (i < segmentsAtOnce && at.place + i <= last)) meet(seen, at.segments[i], metDepths(at.segments[i]), part);
+      if (i == 0 || (i < segmentsAtOnce && at.place + i <= last))
+        meet(seen, at.segments[i], metDepths(at.segments[i]), part);
     }
     bool isPast = metDepths(at.segments[segmentsAtOnce - 1]).y >= part.high;
     bool isLast = at.place + segmentsAtOnce > last;
-    if (isPast || isLast) break;  // of two names: || of expressions would branch twice
+    if (isPast || isLast) break;  // named, because || of expressions would branch twice
     at = cursorAt(at.place + segmentsAtOnce, at.slot + uint(segmentsAtOnce * step), last, step);
   }
   hint = at.place;
   return intersectionOf(seen);
 }
 
-// The same for a part that's most of a list: memory takes about as long for several supersegments as for one.
+// Intersection with a part that covers most of a list: reading several supersegments takes about as long as
+// one.
 Intersection intersectWholeList(uint list, Part part) {
   const int atOnce = 4;
   ListHead head = params.heads.at[list];

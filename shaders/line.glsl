@@ -1,23 +1,25 @@
-// A ray's way through V_O's picture: straight, from column to column of lists, or from row to row if it crosses more of
-// these. What it goes from and to is called a column here, be it a row, and what lies across, a row. How far it has come is
-// counted in columns from its start, or as a fraction of its stretch.
+// A ray's path through V_O's picture: straight, from column to column of lists, or from row to row if it
+// crosses more of these. Either is called a column here, and the lists along it are its rows. Progress is
+// counted in columns from the start, or as a fraction of the ray's stretch.
 //
 // Needs: view.glsl, packet.glsl; params, ray.
 
 struct PictureLine {
   bool byColumns;
-  float start;      // column
-  float columns;    // from there to its end, > 0
+  float start;      // column where it starts
+  float columns;    // number of columns to its end, > 0
   float direction;  // 1 or -1, from column to column
   float row;        // at the start
-  float rows;       // from one column to the next
-  // Perspective: columns and fractions, which are the same part of t and of depth, aren't proportional.
+  float rows;       // per column
+  // Perspective: the number of columns is not proportional to the fraction, which is linear in t and in
+  // depth.
   float gain;
   float bend;
-  // At the start, and from there to its end. Depths of rays that come nearer to V_O's eye are negative, so that they ascend.
+  // At the start, and the change to the end. Depths of rays that approach V_O's eye are negative, so that
+  // they ascend.
   vec2 depths;
   vec2 bins;  // masks.glsl, not clamped
-  int first;  // column
+  int first;  // first column
   int last;
 };
 
@@ -25,11 +27,11 @@ PictureLine pictureLine(vec2 stretch) {
   PictureLine line;
   vec2 start = pictureAt(ray, stretch.x);
   vec2 whole = pictureAt(ray, stretch.y) - start;
-  line.byColumns = 1.001 * abs(whole.x) >= abs(whole.y);  // diagonals: by columns, whatever rounding does
+  line.byColumns = 1.001 * abs(whole.x) >= abs(whole.y);  // diagonals: by columns, despite rounding
   line.start = line.byColumns ? start.x : start.y;
   line.row = line.byColumns ? start.y : start.x;
   float along = line.byColumns ? whole.x : whole.y;
-  const float minColumns = 1e-4;  // rays that stay where they are get through their column, too
+  const float minColumns = 1e-4;  // so that rays that hardly move pass through their column, too
   line.columns = max(abs(along), minColumns);
   line.direction = along < 0.0 ? -1.0 : 1.0;
   float perColumn = 1.0 / line.columns;
@@ -47,11 +49,13 @@ PictureLine pictureLine(vec2 stretch) {
   return line;
 }
 
-// How many columns from the start to a place along the line, as far as the line goes.
+// Number of columns from the start to a column coordinate, limited to the line.
 float columnsTo(PictureLine line, float along) {
   return clamp((along - line.start) * line.direction, 0.0, line.columns);
 }
 
-float fractionAfter(PictureLine line, float columns) { return columns * line.gain / (1.0 + columns * line.bend); }
+float fractionAfter(PictureLine line, float columns) {
+  return columns * line.gain / (1.0 + columns * line.bend);
+}
 
 float at(vec2 range, float fraction) { return range.x + fraction * range.y; }

@@ -1,4 +1,4 @@
-// One list from intervals to stored supersegments: search in one dispatch, write in a later one.
+// Turns a list's intervals into stored supersegments: searches in one dispatch, and writes in a later one.
 //
 // Needs: params with thresholds, capacities, offsets, segments, form, status; void feedIntervals().
 

@@ -1,5 +1,5 @@
-// Finds the lists whose pre-segments reduce_subgroup.comp is to merge: most are empty or fit, and a workgroup each
-// would be too much for those.
+// Finds the lists whose pre-segments reduce_subgroup.comp must merge. Most lists are empty or fit, and do not
+// justify a workgroup each.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/reduce.h"
@@ -19,7 +19,8 @@ void main() {
   bool waits = count > 0u && count <= push.subgroupCapacity && count > push.left.at[list];
   uint place = waits ? atomicAdd(found, 1u) : 0u;
   barrier();
-  if (gl_LocalInvocationIndex == 0u) firstPlace = found > 0u ? atomicAdd(push.longListCount.at[0], found) : 0u;
+  if (gl_LocalInvocationIndex == 0u)
+    firstPlace = found > 0u ? atomicAdd(push.longListCount.at[0], found) : 0u;
   barrier();
   if (waits) push.longLists.at[firstPlace + place] = list;
 }

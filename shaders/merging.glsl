@@ -1,4 +1,4 @@
-// Two neighbouring pre-segments become one: what that costs, and what comes of it. Twin of vdi/reference/SegmentByMerging.cpp.
+// Merges two neighbouring pre-segments: the cost, and the result. Twin of vdi/reference/SegmentByMerging.cpp.
 //
 // Needs: optical.glsl, appearance.glsl, stored_pre_segment.glsl.
 
@@ -11,12 +11,12 @@ float amountOf(StoredPreSegment preSegment, vec4 appearance) {
   return (preSegment.span.y - preSegment.span.x) * differenceOf(vec4(0.0), appearance);
 }
 
-// Where they are then, and of whom it's the place.
+// Where the merged pre-segment lies: in the place of both, of the first, or of the second one.
 const uint placeOfBoth = 0u;
 const uint placeOfFirst = 1u;
 const uint placeOfSecond = 2u;
 
-// x, y: appearances of a and b.
+// `x` and `y` are the appearances of a and b.
 uint placeOf(StoredPreSegment a, vec4 x, StoredPreSegment b, vec4 y) {
   float lengths = (a.span.y - a.span.x) + (b.span.y - b.span.x);
   if (b.span.x - a.span.y < lengths * 0.9999) return placeOfBoth;
@@ -31,7 +31,7 @@ float costOf(StoredPreSegment a, vec4 x, StoredPreSegment b, vec4 y) {
   float whole = b.span.y - a.span.x;
   float gap = b.span.x - a.span.y;
   float weight = weightBehind(a.before) / whole;
-  // What's last, where there's no gap.
+  // Without a gap, the formula at the end simplifies to this.
   if (!(gap > 0.0)) return 2.0 * weight * first * second * differenceOf(x, y);
   if (placeOf(a, x, b, y) != placeOfBoth) return 2.0 * weight * whole * min(amountOf(a, x), amountOf(b, y));
   vec4 both = first * x + second * y;
@@ -51,13 +51,14 @@ StoredPreSegment merged(StoredPreSegment a, vec4 x, StoredPreSegment b, vec4 y) 
   return a;
 }
 
-// Whether the i-th merger is made in a round; its neighbours cost `previous` and `next`. Of equal costs those at even places are the
-// cheaper ones.
+// Whether the i-th merger is made in a round; `previous` and `next` are its neighbours' costs. Of equal
+// costs, those at even places count as cheaper.
 bool isCheapest(uint i, float previous, float cost, float next, float limit) {
   bool even = (i & 1u) == 0u;
   return cost < unlimited && cost <= limit && (even ? cost <= previous : cost < previous) &&
          (even ? cost <= next : cost < next);
 }
 
-// What a round's mergers may cost: the mean of those that are possible, rounded up, so that that of equal ones isn't below them.
+// The limit for a round's mergers: the mean cost of the possible ones, rounded up so that equal costs do not
+// exceed it.
 float limitOf(float sum, float number) { return sum / number * 1.0001; }

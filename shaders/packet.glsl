@@ -1,14 +1,14 @@
-// Packets: the rays of a rectangle of the new picture's pixels, which are close to each other. What they pass without
-// meeting material is found once for all of them.
+// Packets: the rays of a rectangle of the new picture's pixels, which are close to each other, so that empty
+// space is found once for all of them.
 //
 // Needs: shared/render.h, masks.glsl, view.glsl; params.
 
 struct RayPacket {
-  vec2 first;   // place of the rays of its first column and row
-  vec2 extent;  // from there to the last ones
+  vec2 first;   // position of the rays of its first column and row
+  vec2 extent;  // distance from there to the last ones
 };
 
-// Of the pixels of a square, as far as they're in the picture.
+// The packet of a square of pixels, clipped to the picture.
 RayPacket packetOf(uvec2 corner, uint size) {
   uvec2 last = min(corner + size, uvec2(params.width, params.height)) - 1u;
   return RayPacket(vec2(corner) + 0.5, vec2(last - corner));
@@ -31,12 +31,12 @@ EdgeCrossing edgeCrossing(Ray of, bool byColumns, float edge) {
                       direction - slope * (parallel ? 0.0 : of.direction.z));
 }
 
-// The parts of the depth range that the ray is in between two depths, in any order.
+// Mask of the parts of the depth range between two depths, given in any order.
 uint64_t maskBetween(float a, float b) {
   return maskOf(min(a, b), max(a, b), params.nearest, params.binScale);
 }
 
-// Tiles of both sizes are in one array, the large ones behind.
+// One array has the tiles of both sizes, the large ones last.
 uint64_t tileDepthMask(int size, ivec2 tile) {
   ivec2 tiles = tilesOf(params.lists, size);
   ivec2 smallTiles = tilesOf(params.lists, renderTile);
@@ -44,9 +44,10 @@ uint64_t tileDepthMask(int size, ivec2 tile) {
   return params.tileDepthMasks.at[first + tile.y * tiles.x + tile.x];
 }
 
-// In which parts of the depth range the packet may meet material between two edges of a column of tiles. The picture of a
-// quadrilateral of rays on the plane of an edge is the convex hull of those of its corners, if all of these cross it the same
-// way and in front of V_O's eye; and between two planes rays are straight in V_O's picture.
+// Mask of the parts of the depth range where the packet may meet material between two edges of a column of
+// tiles. A quadrilateral of rays meets the plane of an edge in the convex hull of its corners, if all corners
+// cross the plane the same way and in front of V_O's eye. Between two planes, rays are straight in V_O's
+// picture.
 uint64_t packetMask(RayPacket packet, bool byColumns, int tile, int first, int last) {
   float begin = float(max(tile << renderTileShift, first));
   float end = float(min((tile + 1) << renderTileShift, last + 1));
@@ -69,9 +70,10 @@ uint64_t packetMask(RayPacket packet, bool byColumns, int tile, int first, int l
     depths = vec2(min(depths.x, depth), max(depths.y, depth));
   }
   if (!finite || !(ascends || descends) || !(params.parallel != 0u || depths.x > 0.0)) return ~0ul;
-  const float spare = 0.01;  // rows; masks of tiles know a row more than they hold
+  const float spare = 0.01;  // rows; masks of tiles include one row more on each side
   int rowCount = columnCount(!byColumns);
-  vec2 places = clamp(rows + 0.5 * float(rowCount) + vec2(-spare, spare), vec2(0.0), vec2(float(rowCount - 1)));
+  vec2 places =
+      clamp(rows + 0.5 * float(rowCount) + vec2(-spare, spare), vec2(0.0), vec2(float(rowCount - 1)));
   float spareDepth = 0.05 / params.binScale;
   uint64_t mask = maskBetween(depths.x - spareDepth, depths.y + spareDepth);
   const int maxTiles = 8;

@@ -1,8 +1,8 @@
-// A picture's pixels as they leave the device.
+// Form in which a picture's pixels leave the device.
 //
 // Needs: shared/render.h; params, pictureForm.
 
-// As vdi::toByte does.
+// Rounds as vdi::toByte does.
 uint bytesOf(vec4 shares) {
   vec4 codes = clamp(shares, vec4(0.0), vec4(1.0)) * 255.0;
   uvec4 whole = uvec4(codes);

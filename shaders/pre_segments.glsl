@@ -1,11 +1,11 @@
-// Pre-segments: neighbouring intervals that deviate little from the first of them. Twin of preSegmentsOf in
-// vdi/reference/SegmentByMerging.cpp; reduce.comp merges pre-segments into supersegments. Counting does all tolerances side by
-// side in one pass; writing does one.
+// Pre-segments: runs of neighbouring intervals that deviate little from the first of them. Twin of
+// preSegmentsOf in vdi/reference/SegmentByMerging.cpp; reduce.comp merges pre-segments into supersegments.
+// Counting handles all tolerances side by side in one pass; writing handles one.
 //
-// Needs: optical.glsl, appearance.glsl; params with thresholds, capacities, offsets, preSegments, written, left,
-// status, histogram; where SEVERAL_RANKS is defined, levels, levelShift and quotas too; bool writesPreSegments,
-// cutAtGaps, byNeed, uint lanesPerRay, constants; uint rayLane; void feedIntervals(): feeds every interval of the list
-// to preSegmentsAdd, front to back; uint listIndex.
+// Needs: optical.glsl, appearance.glsl; params with thresholds, capacities, offsets, preSegments, written,
+// left, status, histogram; where SEVERAL_RANKS is defined, levels, levelShift and quotas too; bool
+// writesPreSegments, cutAtGaps, byNeed, uint lanesPerRay, constants; uint rayLane; void feedIntervals():
+// feeds every interval of the list to preSegmentsAdd, front to back; uint listIndex.
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_shuffle : require
@@ -16,13 +16,13 @@ void feedIntervals();
 float preSegmentsBefore;  // transmittance so far
 float preSegmentsReach;
 uint preSegmentsVisible;
-uint preSegmentsAtOnce = 1u;  // samples that an interval stands for
+uint preSegmentsAtOnce = 1u;  // samples per interval
 uint preSegmentsRuns;
 bool preSegmentsRunVisible;
 float preSegmentsPerStep;  // 1 / length of a sample
 
-// What's counted, side by side: one set of pre-segments per tolerance, or, while writing by need, at the two levels of
-// the histogram that the list's number of supersegments is interpolated from.
+// The counts, side by side: of one set of pre-segments per tolerance, or, while writing by need, at the two
+// levels of the histogram between which the list's number of supersegments is interpolated.
 const int countedLevels = !writesPreSegments ? toleranceLevels / int(lanesPerRay) : byNeed ? 2 : 0;
 vec4 countedFirst[toleranceLevels];
 float countedDeviation[toleranceLevels];
@@ -31,28 +31,29 @@ uint countedOpen;  // bit j: a pre-segment of tolerance j is open
 float finestCounted;
 vec2 needTolerances;
 
-// What's written; see ListTolerance in vdi/reference/Segmenter.h.
+// The state of writing; ListTolerance in vdi/reference/Segmenter.h explains it.
 float preSegmentTolerance;
 float initialTolerance;
-uint preSegmentRoom;     // of those that don't begin a run, where there are several ranks
-uint preSegmentRuns;     // pre-segments that begin a run; counted where there are several ranks
-uint preSegmentSlots;    // of all
+uint preSegmentRoom;     // for pre-segments that do not begin a run, if there are several ranks
+uint preSegmentRuns;     // pre-segments that begin a run; counted if there are several ranks
+uint preSegmentSlots;    // for all pre-segments
 PreSegmentArray ownPreSegments;  // the list's
 uint preSegmentsBegun;
 bool preSegmentOpen;
 vec4 preSegmentFirst;
 float preSegmentDeviation;
 vec2 preSegmentSpan;  // front, back
-float beforePreSegment;  // transmittance of what's in front of it
+float beforePreSegment;  // transmittance in front of it
 vec4 preSegmentLight;
 float preSegmentTransmittance;
 bool preSegmentStartsRun;
-bool preSegmentCut;  // the next pre-segment starts a run
+bool preSegmentCut;  // whether the next pre-segment starts a run
 
 void closePreSegment() {
   uint slot = preSegmentsBegun - 1u;
   if (preSegmentOpen && slot < preSegmentSlots) {
-    ownPreSegments.at[slot] = storedPreSegment(preSegmentSpan, beforePreSegment, preSegmentLight, preSegmentStartsRun);
+    ownPreSegments.at[slot] =
+        storedPreSegment(preSegmentSpan, beforePreSegment, preSegmentLight, preSegmentStartsRun);
   }
   preSegmentOpen = false;
 }
@@ -64,8 +65,10 @@ void adaptTolerance() {
   preSegmentTolerance = left == 0u ? unlimited : base * pow(toleranceRatio, float(sparePreSegments - left));
 }
 
-// Nothing but a run's start may open a pre-segment once the room for them is used up.
-bool roomForPreSegment() { return (cutAtGaps && preSegmentCut) || preSegmentsBegun - preSegmentRuns < preSegmentRoom; }
+// Once the room is used up, only the start of a run may open a pre-segment.
+bool roomForPreSegment() {
+  return (cutAtGaps && preSegmentCut) || preSegmentsBegun - preSegmentRuns < preSegmentRoom;
+}
 
 void beginPreSegment(float front, vec4 x) {
   closePreSegment();
@@ -83,8 +86,8 @@ void beginPreSegment(float front, vec4 x) {
 }
 
 void absorb(float back, vec3 color, float opacity, float opticalDepth) {
-  preSegmentLight = vec4(preSegmentLight.rgb + preSegmentTransmittance * color, min(preSegmentLight.a + opticalDepth,
-      maxOpticalDepth));
+  preSegmentLight = vec4(preSegmentLight.rgb + preSegmentTransmittance * color,
+                         min(preSegmentLight.a + opticalDepth, maxOpticalDepth));
   preSegmentSpan.y = back;
   preSegmentTransmittance *= 1.0 - opacity;
   preSegmentOpen = true;
@@ -176,13 +179,13 @@ uint interpolatedCount(uint countBelow, uint countAbove, float rounding) {
   return max(uint(float(countBelow) + share * (float(countAbove) - float(countBelow)) + rounding), 1u);
 }
 
-// What the list would hold at a level of the histogram, if anything; for all invocations that share the ray. Twin of
-// supersegmentsAtLevel.
+// The list's number of supersegments at a level of the histogram, if it has any; for all invocations that
+// share the ray. Twin of supersegmentsAtLevel.
 uint supersegmentsAtLevel(uint level) {
   uint count = level == 0u ? preSegmentsVisible : 1u;
   uint tolerance = clamp(level, 1u, uint(toleranceLevels)) - 1u;
   uint lane = tolerance * lanesPerRay / uint(toleranceLevels);
-  uint from = gl_SubgroupInvocationID - rayLane + lane;  // who counts for it
+  uint from = gl_SubgroupInvocationID - rayLane + lane;  // the lane that counts for it
   [[unroll]] for (int i = 0; i < countedLevels; ++i) {
     uint counted = lanesPerRay == 1u ? countedPreSegments[i] : subgroupShuffle(countedPreSegments[i], from);
     if (level == 1u + lane * uint(countedLevels) + uint(i)) count = counted;
@@ -220,10 +223,11 @@ CountedPreSegments preSegmentsFor(uint budget) {
   return CountedPreSegments(tolerance, count);
 }
 
-// A lane's own is coarser where none of its tolerances gives few enough.
+// A lane's own tolerance is coarser if none of its tolerances fits.
 CountedPreSegments finestOfLanes(CountedPreSegments own) {
   for (uint step = 1u; step < lanesPerRay; step *= 2u) {
-    CountedPreSegments other = CountedPreSegments(subgroupShuffleXor(own.tolerance, step), subgroupShuffleXor(own.count, step));
+    CountedPreSegments other =
+        CountedPreSegments(subgroupShuffleXor(own.tolerance, step), subgroupShuffleXor(own.count, step));
     if (other.tolerance < own.tolerance) own = other;
   }
   return own;
@@ -237,13 +241,14 @@ void countPreSegments() {
   params.capacities.at[listIndex] = counted.count;
 }
 
-// Of a level of the histogram.
+// Tolerance of a level of the histogram.
 float toleranceOfLevel(uint level) {
   if (level == 0u) return -1.0;
   return level + 1u == histogramLevels ? unlimited : finestTolerance * pow(toleranceRatio, float(level - 1u));
 }
 
-// Where the list's pre-segments are, and how many there may be. Returns how many supersegments they may become, but for runs.
+// Sets the position of, and the room for, the list's pre-segments. Returns how many supersegments they may
+// become, apart from runs.
 uint roomOfList() {
   ownPreSegments = preSegmentsFrom(params.preSegments, params.offsets.at[listIndex]);
   preSegmentSlots = params.capacities.at[listIndex];
@@ -258,7 +263,7 @@ uint roomOfList() {
   return params.budget;
 }
 
-// The list has more runs than its neighbours that were counted: it's written again, in a room for these.
+// The list has more runs than the counted lists around it: requests to write it again with room for these.
 void askForRoom() {
   atomicAdd(params.status.at[statusWrongLists], 1u);
 #ifdef SEVERAL_RANKS
@@ -292,12 +297,14 @@ void writePreSegments() {
 }
 
 #ifdef SEVERAL_RANKS
-uint levelByte(uint count) { return min((count + (1u << params.levelShift) - 1u) >> params.levelShift, 255u); }
+uint levelByte(uint count) {
+  return min((count + (1u << params.levelShift) - 1u) >> params.levelShift, 255u);
+}
 
-// Pre-segments at a tolerance, for all invocations that share the ray.
+// Number of pre-segments at a tolerance, for all invocations that share the ray.
 uint preSegmentsAtTolerance(uint tolerance) {
   uint lane = tolerance * lanesPerRay / uint(toleranceLevels);
-  uint from = gl_SubgroupInvocationID - rayLane + lane;  // who counts for it
+  uint from = gl_SubgroupInvocationID - rayLane + lane;  // the lane that counts for it
   uint result = 0u;
   [[unroll]] for (int i = 0; i < countedLevels; ++i) {
     uint counted = lanesPerRay == 1u ? countedPreSegments[i] : subgroupShuffle(countedPreSegments[i], from);
@@ -306,7 +313,7 @@ uint preSegmentsAtTolerance(uint tolerance) {
   return result;
 }
 
-// What other ranks are told of the list.
+// Writes this rank's counts of the list for other ranks.
 void countLevels() {
   feedPreSegments();
   uint words[countedLevelWords];
@@ -326,14 +333,15 @@ void countLevels() {
   }
   words[2] |= levelByte(preSegmentsRuns) << (8u * (countedRuns & 3u));
   if (rayLane != 0u) return;
-  for (uint i = 0u; i < countedLevelWords; ++i) params.levels.at[listIndex * countedLevelWords + i] = words[i];
+  for (uint i = 0u; i < countedLevelWords; ++i)
+    params.levels.at[listIndex * countedLevelWords + i] = words[i];
 }
 #endif
 
-// What a workgroup's lists add to the histogram.
+// Sum over the workgroup's lists, for the histogram.
 shared uint groupHistogram[histogramLevels + 1u];
 
-// For all invocations of a workgroup, those without a list included.
+// All invocations of a workgroup must call this, including those without a list.
 void addToHistogram(bool hasList) {
   uint own = gl_LocalInvocationIndex;
   if (own <= histogramLevels) groupHistogram[own] = 0u;

@@ -1,5 +1,6 @@
-// From what all ranks counted of a list together: the tolerance that fits the sum of their pre-segments, and how many
-// of the list's supersegments this rank may have. Twin of agreedTolerance in vdi/reference/SegmentByMerging.cpp.
+// Finds, from all ranks' counts of a list, the tolerance at which the sum of their pre-segments fits, and
+// this rank's quota of the list's supersegments. Twin of agreedTolerance in
+// vdi/reference/SegmentByMerging.cpp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/quota.h"
@@ -40,7 +41,7 @@ void main() {
   uint quota = 0u;
   if (countOf(sum, 0u) > 0u) {
     uint room = preSegmentsPerBudget * push.budget;
-    // Runs of all ranks may be more than that; each rank then keeps its own.
+    // All ranks' runs may exceed that; each rank then keeps its own.
     tolerance = unlimited;
     uint place = countedRuns;
     if (countOf(sum, 0u) <= push.budget) {

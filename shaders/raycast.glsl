@@ -1,4 +1,4 @@
-// One ray through the kd-tree of bricks, front to back, sample by sample.
+// Casts one ray through the kd-tree of bricks, front to back, sample by sample.
 //
 // Needs: shared/cast.h, optical.glsl; params, pages, pageCount, lanesPerRay, rayLane; useSample (below).
 
@@ -6,12 +6,14 @@ vec3 rayStart;
 vec3 rayDirection;
 float rayLengthOfDepth;  // world length of a unit of depth
 float rayOpticalDepth;   // so far
-uvec2 rayScene;          // samples [x, y) are shown: they lie in the scene's bounds, or in a region of it
-float rayEnter;          // depth where the ray enters these, and leaves them
+uvec2 rayScene;          // samples [x, y) lie in the visible part: the scene's bounds, or a region of it
+float rayEnter;          // depth where the ray enters the visible part, and where it leaves it
 float rayLeave;
 float rayBegin;  // the same as places
 float rayEnd;
-float rayMiddle;  // how far behind a sample's begin it is decided whose it is: 0.5, but for rays that graze the scene
+// Distance from a sample's begin to the point that decides its owner: 0.5, except for rays that graze the
+// scene
+float rayMiddle;
 
 #include "slab.glsl"
 #include "region.glsl"
@@ -27,8 +29,8 @@ void setUpRay(uint x, uint y) {
   rayLengthOfDepth = length(direction);
 }
 
-// A place on the ray counts samples: k is where sample k begins, k + 0.5 its middle. `precise`: every rank and every pass must
-// find the same position for a place, since ownership depends on it.
+// A place on the ray counts samples: k is the begin of sample k, k + 0.5 its middle. `precise`, because every
+// rank and every pass must find the same position for a place, since ownership depends on it.
 vec3 positionAt(float place) {
   precise float depth = place * params.step;
   precise vec3 position = rayStart + depth * rayDirection;
@@ -41,10 +43,12 @@ vec3 samplePosition(uint k) { return positionAt(middleOf(k)); }
 
 bool contains(vec3 lo, vec3 hi, vec3 p) { return all(greaterThanEqual(p, lo)) && all(lessThan(p, hi)); }
 
-// Samples [first, last) of the ray that the box owns: one range, because each coordinate is monotone along the ray.
+// Samples [first, last) of the ray that the box owns. They form one range because each coordinate is monotone
+// along the ray.
 uvec2 samplesIn(vec3 lo, vec3 hi) {
-  // Where the ray is in the box, in units of samples, with room for rounding; then exactly, sample by sample. Vectors are
-  // never indexed by a variable here: lavapipe (Mesa 22.3) mixes up the components when lanes diverge.
+  // First the part of the ray in the box, in units of samples and with a margin for rounding; then exactly,
+  // sample by sample. Vectors are never indexed by a variable here: lavapipe (Mesa 22.3) mixes up the
+  // components when lanes diverge.
   bvec3 across = equal(rayDirection, vec3(0.0));
   vec3 perSample = 1.0 / (rayDirection * params.step);
   vec3 a = (lo - rayStart) * perSample;
@@ -62,12 +66,12 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
   return uvec2(first, last);
 }
 
-// The bounds of what is shown, the scene's or those of a region in it, seldom lie half-way between two samples. The outermost
-// samples stand for what's really there: the first one's interval starts where the ray enters, the last one's ends where it
-// leaves. That follows from the ray, the scene and the region alone, so it's the same on every rank; without it the faces of a
-// filled box show the sample lattice as stripes.
-// Where a ray leaves the bounds before it has come to the middle of any sample, what's between is one sample, and the middle of
-// that says whose it is. Without it the edges of a filled box are jagged.
+// The bounds of the visible part, the scene's or a region's, seldom lie half-way between two samples. The
+// outermost samples stand for what is really there: the first one's interval starts where the ray enters, the
+// last one's ends where it leaves. This depends on the ray, the scene and the region alone, so it is the same
+// on every rank. Without it, the faces of a filled box show the sample lattice as stripes.
+// If a ray leaves the bounds before it reaches the middle of any sample, the part between is one sample, and
+// its middle decides its owner. Without this, the edges of a filled box are jagged.
 void setUpScene() {
   rayMiddle = 0.5;
   rayScene = samplesIn(params.sceneLo, params.sceneHi);
@@ -101,7 +105,7 @@ void setUpScene() {
   rayEnd = (rayLeave - params.first) / params.step;
 }
 
-// Pages beyond pageCount cost nothing: the comparison with a specialisation constant removes them.
+// Pages beyond pageCount cost nothing: comparing with a specialisation constant removes them.
 float texel(uint page, vec3 coordinate) {
   float value = 0.0;
   if (pageCount == 1u || page == 0u) value = textureLod(pages[0], coordinate, 0.0).r;
@@ -115,12 +119,13 @@ float texel(uint page, vec3 coordinate) {
   return value;
 }
 
-// Texture coordinate of a place; beyond the brick's values, the nearest one among them.
+// Texture coordinate of a place; places outside the brick's values are clamped to them.
 vec3 coordinateOf(Brick brick, float place) {
   return clamp(positionAt(place) * brick.texelScale + brick.texelOffset, brick.texelLo, brick.texelHi);
 }
 
-// Where in the table it lies. What is infinite, or comes to be here, is far beyond the table; NaN stays NaN.
+// Position in the transfer table. Infinite values, and those that become infinite here, lie far outside the
+// table; NaN stays NaN.
 float tablePosition(Brick brick, float place) {
   const float farPosition = 1.0e30;
   float position = (texel(brick.page, coordinateOf(brick, place)) - brick.tableOrigin) * brick.tableScale;
@@ -136,10 +141,11 @@ vec3 placeAmongCells(Brick brick, uint k) {
 uvec3 cellAround(Brick brick, vec3 place) { return min(uvec3(place), brick.cellDims - 1u); }
 
 bool showsAnything(Brick brick, uvec3 cell) {
-  return params.cells.at[brick.firstCell + (cell.z * brick.cellDims.y + cell.y) * brick.cellDims.x + cell.x] != 0u;
+  return params.cells.at[brick.firstCell + (cell.z * brick.cellDims.y + cell.y) * brick.cellDims.x +
+                         cell.x] != 0u;
 }
 
-// The macrocell that sample k lies in: whether anything in it is visible, and the first sample behind it.
+// The macrocell of sample k: whether it has anything visible, and the first sample after it.
 struct CellStretch {
   bool visible;
   uint end;
@@ -150,7 +156,7 @@ CellStretch cellAt(Brick brick, uint k, vec3 cellsPerSample) {
   uvec3 cell = cellAround(brick, place);
   vec3 corner = vec3(cell) + vec3(greaterThan(cellsPerSample, vec3(0.0)));
   vec3 samples = mix(abs((corner - place) / cellsPerSample), vec3(1.0e6), equal(cellsPerSample, vec3(0.0)));
-  // Rounding may take a sample for one of the cell before; cells know a texel more than they hold.
+  // Rounding may assign a sample to the cell before; cells include one texel more than their own.
   float ahead = min(min(samples.x, samples.y), min(samples.z, 1.0e6));
   return CellStretch(showsAnything(brick, cell), k + max(1u, uint(ahead + 0.95)));
 }
@@ -160,42 +166,45 @@ float backOf(uint k) {
   return k + 1u == rayScene.y ? rayLeave : params.first + float(k + 1u) * params.step;
 }
 
-// The places that sample k begins and ends at: samples at the scene's faces are shorter or longer than others. Where samples
-// aren't slabs, both are its middle.
+// The places where sample k begins and ends: samples at the scene's faces are shorter or longer than others.
+// If samples are not slabs, both are its middle.
 float beginOf(uint k) {
   float place = mix(mix(float(k), rayBegin, k == rayScene.x), rayEnd, k == rayScene.y);
   return mix(middleOf(k), place, params.slabs != 0u);
 }
 float endOf(uint k) { return mix(middleOf(k), beginOf(k + 1u), params.slabs != 0u); }
 
-// What a ray is for, interval by interval; they leave no gaps within a brick.
+// Uses a ray's intervals one by one; within a brick they leave no gaps.
 void useSample(float front, float back, Sample it);
 
-// Texels that are asked for at a time, and then slabs: waiting for one takes a GPU as long as waiting for all.
-// 1 where samplesAtOnce isn't.
+// Texels requested at a time, and then slabs: for a GPU, waiting for one takes as long as waiting for all.
+// It must be 1 if samplesAtOnce is not.
 layout(constant_id = 3) const uint samplesAhead = 1;
 
-// How many samples are used as one: more while pre-segments are counted (CastParams::countedSamples).
+// Number of samples used as one: more than 1 while pre-segments are counted (CastParams::countedSamples).
 uint samplesAtOnce;
 
-// Of what samples `first` to `last` stand for.
-vec2 spanOf(uint first, uint last) { return vec2(frontOf(first), backOf(min(last + samplesAtOnce, rayScene.y) - 1u)); }
+// The interval that samples `first` to `last` stand for.
+vec2 spanOf(uint first, uint last) {
+  return vec2(frontOf(first), backOf(min(last + samplesAtOnce, rayScene.y) - 1u));
+}
 
-// The first of those that are used, from k on.
+// The first sample to use, from k on.
 uint usedFrom(uint k) { return (k + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce; }
 
-// Samples [emptyBegin, begin) as one transparent one, if there are any, which is the same to whoever uses them; then
-// [begin, end), where samplesAtOnce isn't 1 those that are multiples of it. Returns false once the ray is opaque enough.
+// Uses samples [emptyBegin, begin) as one transparent one, if there are any; the result is the same. Then
+// uses the multiples of samplesAtOnce in [begin, end). Returns false once the ray is opaque enough.
 bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
   uint emptyFirst = usedFrom(emptyBegin);
   uint first = usedFrom(begin);
   bool empty = emptyFirst < first;
-  // A sample begins where the last one ended.
+  // A sample begins where the last one ends.
   bool endsMeet = params.slabs != 0u && samplesAtOnce == 1u;
   float ends[samplesAhead + 1u];  // positions in the transfer table
   vec4 between[samplesAhead];
   bool begun = false;
-  for (uint batch = empty ? first - samplesAtOnce : first; batch < end; batch += samplesAhead * samplesAtOnce) {
+  for (uint batch = empty ? first - samplesAtOnce : first; batch < end;
+       batch += samplesAhead * samplesAtOnce) {
     if (!begun || !endsMeet) ends[0] = tablePosition(brick, beginOf(batch));
     begun = true;
     [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) ends[i + 1u] = tablePosition(brick, endOf(batch + i));
@@ -240,8 +249,8 @@ bool castBrick(uint index) {
       if (stretch.visible) break;
       k = min(stretch.end, range.y);
     }
-    // As far as there are visible cells. Short gaps are no reason to stop: rays that stop at different places wait for
-    // each other.
+    // Continues as long as cells are visible. Short gaps do not stop it, because rays that stop at different
+    // places wait for each other.
     uint end = min(stretch.end, range.y);
     for (uint next = end; next < range.y && next < end + shortGap; next = min(stretch.end, range.y)) {
       stretch = cellAt(brick, next, cellsPerSample);
@@ -255,12 +264,12 @@ bool castBrick(uint index) {
 
 float component(vec3 v, uint axis) { return axis == 0u ? v.x : axis == 1u ? v.y : v.z; }
 
-
 void castRay() {
   rayOpticalDepth = 0.0;
   if (params.nodeCount == 0u || rayScene.x == rayScene.y) return;
-  // Parts of the ray, in units of depth from the lattice's front. They overlap by the rounding error: a brick decides by
-  // itself, exactly, which samples are its own; the order of visits comes from the signs of the direction alone.
+  // Parts of the ray, in units of depth from the lattice's front. They overlap by the rounding error: a brick
+  // itself decides, exactly, which samples it owns, and the order of visits follows from the signs of the
+  // direction alone.
   uint stackNode[kdMaxDepth];
   vec2 stackPart[kdMaxDepth];
   int top = 0;

@@ -1,10 +1,10 @@
-// One brick's part of a ray, by all invocations that share the ray: each takes a sample, and they hand each other those that
-// are visible. A ray then waits for memory once for all of their samples, and the time that a step takes is that of using what's
-// visible.
+// One brick's part of a ray, handled by all invocations that share the ray: each takes a sample, and they
+// exchange the visible ones. A ray then waits for memory once for all of their samples, and a step's time is
+// that of using the visible samples.
 //
 // Needs: raycast.glsl; lanesPerRay, rayLane.
 
-// The ray's invocations where it's true, as bits.
+// Bits of the ray's invocations for which `own` is true.
 uint lanesWhere(bool own) {
   uint lanes = uint(own) << rayLane;
   for (uint step = 1u; step < lanesPerRay; step *= 2u) lanes |= subgroupShuffleXor(lanes, step);
@@ -13,14 +13,14 @@ uint lanesWhere(bool own) {
 
 Sample sampleOfLane(Sample own, uint lane) {
   uint from = gl_SubgroupInvocationID - rayLane + lane;
-  return Sample(subgroupShuffle(own.color, from), subgroupShuffle(own.opticalDepth, from), subgroupShuffle(own.opacity, from),
-                subgroupShuffle(own.overStep, from));
+  return Sample(subgroupShuffle(own.color, from), subgroupShuffle(own.opticalDepth, from),
+                subgroupShuffle(own.opacity, from), subgroupShuffle(own.overStep, from));
 }
 
-// Samples [begin, end), as castSamples; transparent ones next to each other are used as one.
+// Samples [begin, end), as castSamples; adjacent transparent ones are used as one.
 bool castLanes(Brick brick, uint begin, uint end) {
   uint unused = usedFrom(begin);
-  // Cells are asked for until one of them shows something, and again when no sample does.
+  // Cells are read until one of them has something visible, and again when no sample has.
   bool looking = true;
   for (uint batch = unused; batch < end; batch += lanesPerRay * samplesAtOnce) {
     uint own = batch + rayLane * samplesAtOnce;

@@ -1,6 +1,6 @@
-// Merges the pre-segments of lists that have too many, in rounds, until as few are left as the list may hold. Twin of
-// mergeCheapest in vdi/reference/SegmentByMerging.cpp. One invocation a list, which streams through its pre-segments;
-// for devices and lists that reduce_subgroup.comp isn't for.
+// Merges the pre-segments of lists that have too many, in rounds, until they fit. Twin of mergeCheapest in
+// vdi/reference/SegmentByMerging.cpp. One invocation a list, which streams through its pre-segments; for
+// devices and lists that reduce_subgroup.comp does not support.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/reduce.h"
@@ -18,7 +18,7 @@ struct PreSegment {
   vec4 appearance;
 };
 
-// The list's pre-segments, one after the other; the next one is on its way while one is used.
+// The list's pre-segments in sequence; the next one is loading while one is used.
 PreSegmentArray preSegments;
 uint preSegmentCount;
 uint nextRead;
@@ -39,7 +39,7 @@ PreSegment readPreSegment() {
 
 float costOf(PreSegment a, PreSegment b) { return costOf(a.stored, a.appearance, b.stored, b.appearance); }
 
-// Of the mergers that are possible.
+// Over the possible mergers.
 float costSum;
 float costsFinite;
 
@@ -54,7 +54,7 @@ void addCost(float cost) {
   costsFinite += finite ? 1.0 : 0.0;
 }
 
-// Of at least two pre-segments.
+// Requires at least two pre-segments.
 void sumCosts(uint count) {
   beginReading(count);
   beginCosts();
@@ -66,7 +66,8 @@ void sumCosts(uint count) {
   }
 }
 
-// One round, in place, of at least two pre-segments; `excess` of them at most go. Returns how many are left.
+// One round, in place, which requires at least two pre-segments and removes at most `excess`. Returns the
+// number left.
 uint mergeOnce(uint count, uint excess, float limit) {
   uint left = 0u;
   float previous = unlimited;
@@ -115,7 +116,7 @@ void main() {
   preSegments = preSegmentsFrom(push.preSegments, push.preSegmentOffsets.at[list]);
   sumCosts(count);
   while (count > maxCount) {
-    if (costsFinite == 0.0) break;  // just cuts are left; there are no more of them than may be
+    if (costsFinite == 0.0) break;  // only cuts are left, and these do not exceed the limit
     count = mergeOnce(count, count - maxCount, limitOf(costSum, costsFinite));
   }
 }

@@ -1,6 +1,6 @@
-// As reduce.comp, with a subgroup for each list, which is a whole workgroup, whose invocations go through the
-// pre-segments side by side, in shared memory. A GPU is busy with few lists then, and reads and writes them once.
-// Subgroups take one list after the other from those that long_lists.comp found.
+// Like reduce.comp, but with a subgroup, which is a whole workgroup, for each list. Its invocations work on
+// the pre-segments side by side in shared memory, so few lists keep a GPU busy, and it reads and writes them
+// once. Subgroups take one list after the other from those that long_lists.comp found.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
@@ -17,7 +17,7 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 #include "stored_pre_segment.glsl"
 #include "merging.glsl"
 
-// The list's pre-segments. Arrays of what's read together, so that neighbouring invocations read neighbouring banks.
+// The list's pre-segments, in one array per member, so that neighbouring invocations read neighbouring banks.
 shared vec4 lights[capacity];
 shared vec4 appearances[capacity];
 shared vec2 spans[capacity];
@@ -25,7 +25,7 @@ shared float befores[capacity];
 shared float costs[capacity];  // of merging each with the next one; unlimited for the last
 
 const uint subgroupSize = gl_WorkGroupSize.x;
-uint own;  // which of the subgroup
+uint own;  // index of the invocation in the subgroup
 
 StoredPreSegment load(uint i) { return StoredPreSegment(spans[i], befores[i], 0.0, lights[i]); }
 
@@ -36,7 +36,8 @@ void store(uint i, StoredPreSegment preSegment, vec4 appearance) {
   appearances[i] = appearance;
 }
 
-// From the device's memory; returns how many of them must not be merged with the one before. `ahead`: the invocation's first one.
+// Loads the list from device memory; returns how many pre-segments must not merge with the one before.
+// `ahead` is the invocation's first one.
 uint loadList(PreSegmentArray preSegments, uint count, StoredPreSegment ahead) {
   uint cuts = 0u;
   for (uint i = own; i < count; i += subgroupSize) {
@@ -54,7 +55,7 @@ void storeList(PreSegmentArray preSegments, uint count) {
   subgroupBarrier();
 }
 
-// Returns the sum of the invocation's own ones that aren't unlimited.
+// Returns the sum of the invocation's own costs that are not unlimited.
 float findCosts(uint count) {
   float mine = 0.0;
   for (uint i = own; i < count; i += subgroupSize) {
@@ -67,11 +68,11 @@ float findCosts(uint count) {
   return mine;
 }
 
-// One round; `excess` pre-segments at most go, front to back. Returns how many are left; `others`: sum of what the
-// mergers that weren't made would cost, of the invocation's own ones.
+// One round, which removes at most `excess` pre-segments, front to back. Returns the number left. `others` is
+// the sum of the costs of the mergers not made, among the invocation's own.
 uint mergeOnce(uint count, uint excess, float limit, out float others) {
   uint left = 0u;
-  uint absorbed = 0u;  // 1: the first pre-segment of this turn, by the last one of the turn before
+  uint absorbed = 0u;  // 1: the last pre-segment of the turn before absorbs the first one of this turn
   others = 0.0;
   for (uint first = 0u; first < count; first += subgroupSize) {
     uint i = first + own;
@@ -86,14 +87,14 @@ uint mergeOnce(uint count, uint excess, float limit, out float others) {
       cost = costs[i];
       preSegment = load(i);
       appearance = appearances[i];
-      if (cost <= limit && excess > 0u) {  // there's a next one, or its cost were unlimited
+      if (cost <= limit && excess > 0u) {  // a next one exists, else its cost would be unlimited
         chosen = isCheapest(i, i > 0u ? costs[i - 1u] : unlimited, cost, costs[i + 1u], limit);
         next = load(i + 1u);
         nextAppearance = appearances[i + 1u];
       }
     }
-    subgroupBarrier();  // all have read what's written below
-    // Of the chosen ones, the first `excess` merge.
+    subgroupBarrier();  // all have read the values overwritten below
+    // The first `excess` of the chosen ones merge.
     uint mask = subgroupBallot(chosen).x;
     uint before = bitCount(mask & ((1u << own) - 1u));
     if (chosen && before < excess) {
@@ -121,7 +122,7 @@ void mergeCheapest(uint count, uint maxCount, uint cuts) {
   float mine = findCosts(count);
   while (count > maxCount) {
     uint finite = count - 1u - cuts;
-    if (finite == 0u) break;  // just cuts are left; there are no more of them than may be
+    if (finite == 0u) break;  // only cuts are left, and these do not exceed the limit
     float limit = limitOf(subgroupAdd(mine), float(finite));
     count = mergeOnce(count, count - maxCount, limit, mine);
     if (count > maxCount) findCosts(count);
@@ -131,13 +132,13 @@ void mergeCheapest(uint count, uint maxCount, uint cuts) {
 struct ListOfPreSegments {
   PreSegmentArray preSegments;
   uint count;
-  uint maxCount;  // that may be left
+  uint maxCount;  // to be left
 };
 
 ListOfPreSegments listAt(uint place) {
   uint list = push.longLists.at[place];
-  return ListOfPreSegments(preSegmentsFrom(push.preSegments, push.preSegmentOffsets.at[list]), push.written.at[list],
-      push.left.at[list]);
+  return ListOfPreSegments(preSegmentsFrom(push.preSegments, push.preSegmentOffsets.at[list]),
+                           push.written.at[list], push.left.at[list]);
 }
 
 void main() {

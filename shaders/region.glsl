@@ -1,9 +1,9 @@
-// Clipping of a ray by planes. Twin of vdi/reference/Region.cpp; vdi/core/Region.h says what planes do.
+// Clipping of a ray by planes. Twin of vdi/reference/Region.cpp; vdi/core/Region.h describes the planes.
 //
 // Needs: shared/cast.h; params, rayStart, rayDirection.
 
-// The part of [enter, leave], depths from the lattice's front, on the sides of the planes that are shown. Depends on the ray and
-// the planes alone, so it is the same on every rank.
+// The part of [enter, leave], in depths from the lattice's front, on the visible sides of the planes. Depends
+// on the ray and the planes alone, so it is the same on every rank.
 vec2 clipped(vec2 part) {
   for (uint i = 0u; i < params.clipPlaneCount; ++i) {
     vec4 plane = params.clipPlanes[i];
@@ -16,7 +16,7 @@ vec2 clipped(vec2 part) {
   return part;
 }
 
-// Of samples [x, y), those whose middle lies in the part.
+// Those of samples [x, y) whose middle lies in the part.
 uvec2 clippedSamples(uvec2 samples, vec2 part) {
   vec2 places = clamp(ceil(part / params.step - 0.5), vec2(0.0), vec2(params.sampleCount));
   uvec2 inside = uvec2(max(samples.x, uint(places.x)), min(samples.y, uint(places.y)));

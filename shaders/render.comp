@@ -1,6 +1,7 @@
-// Renders a VDI from a new viewpoint, where cull.comp has found tiles of its picture that may show something; twin of
-// vdi/reference/Render.cpp. A ray is straight in V_O's view space, where each list fills the frustum of its pixel, so the ray
-// crosses lists one after the other as a line crosses the cells of a picture.
+// Renders a VDI from a new viewpoint, in the tiles of its picture where cull.comp has found that rays may
+// meet material. Twin of vdi/reference/Render.cpp. A ray is straight in V_O's view space, where each list
+// fills the frustum of its pixel, so the ray crosses lists one after the other as a line crosses the cells of
+// a picture.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -17,20 +18,20 @@ layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
 // Reconstruction::Smooth or Constant.
 layout(constant_id = 0) const bool smoothReconstruction = true;
-// Invocations side by side that share a ray: 1, or 2, which each look at one of the two lists of a column. Few rays meet
-// anything, and a GPU waits for the longest of them.
+// Adjacent invocations that share a ray: 1, or 2, of which each handles one of the two lists of a column. Few
+// rays meet material, and a GPU waits for the longest of them.
 layout(constant_id = 1) const uint lanesPerRay = 1;
 uint rayLane;
-// Supersegments that an intersection reads at a time: where rays are long in their columns, a GPU rather waits for
-// several at once.
+// Supersegments that an intersection reads at a time: if rays are long in their columns, a GPU gains by
+// waiting for several at once.
 layout(constant_id = 3) const int segmentsAtOnce = 1;
 const int maxSegmentsAtOnce = 3;
-// How the pixels of a tile are dealt to invocations (shared/render.h).
+// Assignment of a tile's pixels to invocations (shared/render.h).
 layout(constant_id = 4) const uint pixelOrder = renderOrderSquares;
-// What it's left in (shared/render.h).
+// Form of the picture's colours (shared/render.h).
 layout(constant_id = 5) const uint pictureForm = renderPictureFloats;
 
-// What is behind changes a pixel by a quarter of 1/255 at most, and by a half where a ray goes through many lists.
+// Farther material changes a pixel by a quarter of 1/255 at most, or by a half if the ray crosses many lists.
 const float opaque = 1.0 - 1.0 / 1024.0;
 const float opaqueAcross = 1.0 - 1.0 / 512.0;
 
@@ -50,7 +51,8 @@ vec2 insideFrustum() {
   vec2 stretch = vec2(0.0, uintBitsToFloat(0x7f7fffffu));
   bool parallel = params.parallel != 0u;
   vec2 halfSize = 0.5 * vec2(params.lists) * params.pixelSize;
-  // Not as a loop over the axes: lavapipe (Mesa 22.3) mixes up components of vectors that are indexed by a variable.
+  // Not a loop over the axes: lavapipe (Mesa 22.3) mixes up components of vectors that are indexed by a
+  // variable.
   vec2 value = halfSize * (parallel ? 1.0 : ray.origin.z);
   vec2 slope = halfSize * (parallel ? 0.0 : ray.direction.z);
   clip(stretch, value.x - ray.origin.x, slope.x - ray.direction.x);
@@ -96,7 +98,8 @@ void renderPixels(uint tile) {
     vec4 plane = params.clipPlanes[i];
     clip(stretch, dot(plane.xyz, ray.origin) - plane.w, dot(plane.xyz, ray.direction));
   }
-  if (params.hasEnds != 0u && hasPixel) stretch.y = min(stretch.y, params.ends.at[at.y * params.width + at.x]);
+  if (params.hasEnds != 0u && hasPixel)
+    stretch.y = min(stretch.y, params.ends.at[at.y * params.width + at.x]);
   bool meets = hasPixel && stretch.x < stretch.y;
   PictureLine line = pictureLine(stretch);
   bool along = smoothReconstruction && meets && line.columns < 1.0;
@@ -108,18 +111,20 @@ void renderPixels(uint tile) {
   if (!hasPixel || rayLane != 0u) return;
   bool met = accumulated.light.a > 0.0;
   float fraction = clamp((accumulated.entered - line.depths.x) / max(line.depths.y, 1e-30), 0.0, 1.0);
-  leavePixel(at.y * params.width + at.x, accumulated.light, met ? mix(stretch.x, stretch.y, fraction) : infinity);
+  leavePixel(at.y * params.width + at.x, accumulated.light,
+             met ? mix(stretch.x, stretch.y, fraction) : infinity);
 }
 
-// The i-th of the queue.
+// The i-th tile of the queue.
 uint waitingTile(uint i) {
   uvec2 tiles = pictureTiles();
   uint kind = 0u;
-  for (; kind + 1u < renderKinds && i >= params.queue.at.counts[kind]; ++kind) i -= params.queue.at.counts[kind];
+  for (; kind + 1u < renderKinds && i >= params.queue.at.counts[kind]; ++kind)
+    i -= params.queue.at.counts[kind];
   return params.waiting.at[kind * tiles.x * tiles.y + i];
 }
 
-// For the next view.
+// Prepares the queue for the next view.
 void emptyQueue() {
   params.queue.at.groups.x = 0u;
   params.queue.at.count = 0u;
@@ -133,6 +138,7 @@ void main() {
     renderPixels(waitingTile(i));
     barrier();  // before the tile masks are used again
   }
-  barrier();  // behind all invocations' last look at the queue
-  if (gl_LocalInvocationIndex == 0u && atomicAdd(params.queue.at.finished, 1u) + 1u == gl_NumWorkGroups.x) emptyQueue();
+  barrier();  // after all invocations' last read of the queue
+  if (gl_LocalInvocationIndex == 0u && atomicAdd(params.queue.at.finished, 1u) + 1u == gl_NumWorkGroups.x)
+    emptyQueue();
 }

@@ -2,7 +2,7 @@
 //
 // Needs: shared/render.h, exact.glsl.
 
-// Straight colour in 11, 11 and 10 bits; those of codes, in 8 bits, stay as they are.
+// Straight colour in 11, 11 and 10 bits; multiples of the 8-bit colours of codes, which stay exact.
 const uvec3 maxSegmentColor = uvec3(2040u, 2040u, 1020u);
 
 uint packedSegmentColor(vec3 straight) {
@@ -10,7 +10,7 @@ uint packedSegmentColor(vec3 straight) {
   return codes.r | codes.g << 11 | codes.b << 22;
 }
 
-// In units of segmentColorUnit; green stays where it is.
+// Converts to units of segmentColorUnit; green keeps its shifted position.
 const vec3 segmentColorUnit = 1.0 / (vec3(maxSegmentColor) * vec3(1.0, 2048.0, 1.0));
 
 vec3 segmentColor(uvec4 segment) {

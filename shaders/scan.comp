@@ -1,4 +1,4 @@
-// Exclusive prefix sum of counts: where each list starts in the compact array (paper, section 4).
+// Exclusive prefix sum of counts, which gives each list's start in the compact array (paper, section 4).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/scan.h"
@@ -21,7 +21,8 @@ void sumPart() {
   threadTotals[gl_LocalInvocationIndex] = total;
   barrier();
   for (uint distance = 1u; distance < scanGroup; distance *= 2u) {
-    uint64_t left = gl_LocalInvocationIndex >= distance ? threadTotals[gl_LocalInvocationIndex - distance] : 0ul;
+    uint64_t left =
+        gl_LocalInvocationIndex >= distance ? threadTotals[gl_LocalInvocationIndex - distance] : 0ul;
     barrier();
     threadTotals[gl_LocalInvocationIndex] += left;
     barrier();
@@ -38,7 +39,7 @@ void sumPart() {
   }
 }
 
-// Each workgroup sums up those before it by itself: that takes less time than another level of dispatches.
+// Each workgroup adds up the sums before its own: that is faster than another level of dispatches.
 void addSums() {
   uint64_t total = 0ul;
   for (uint i = gl_LocalInvocationIndex; i < gl_WorkGroupID.x; i += scanGroup) total += push.sums.at[i];
@@ -59,7 +60,7 @@ void addSums() {
     push.guard.at[0] = fits ? 1u : 0u;
   }
   uint first = gl_WorkGroupID.x * scanGroup * scanPerThread + gl_LocalInvocationIndex;
-  // All are asked for before any is written: a GPU would wait for each of them otherwise.
+  // Requests all values before it writes any, because a GPU would otherwise wait for each of them.
   uint values[scanPerThread];
   for (uint i = 0u; i < scanPerThread; ++i) {
     uint at = first + i * scanGroup;

@@ -1,12 +1,12 @@
-// The sensitivity search of vdi/reference/Segmenter.h, and writing with what it found. One function does both, so that
-// the very same instructions count and write.
+// The sensitivity search of vdi/reference/Segmenter.h, and writing with its result. One function does both,
+// so that the very same instructions count and write.
 //
 // Needs: segmenter.glsl; void feedIntervals(): feeds every interval of the list to searchAdd, front to back.
 
 struct SearchState {
   bool writing;
   uint emitted;
-  uint visible;  // intervals that aren't transparent
+  uint visible;  // visible intervals
   uint runs;
   float runReach;
   bool runVisible;
@@ -45,7 +45,7 @@ struct SearchResult {
   uint count;
 };
 
-// With `write`, feeds the list once with `known` and lets emitSegment write; else searches.
+// With `write`, feeds the list once with the sensitivity `known`, and emitSegment writes; else searches.
 SearchResult searchList(bool write, float known, uint budget) {
   search.writing = write;
   float tooFine = smallestSensitivity;
@@ -53,8 +53,8 @@ SearchResult searchList(bool write, float known, uint budget) {
   uint maxCount = budget;
   SearchResult best = SearchResult(largestSensitivity, 0u);
   float sensitivity = write ? known : smallestSensitivity;
-  // Try 0 is the first one, try 1 the one that always fits, the others bisect. One loop, so that there's one copy of
-  // feedIntervals.
+  // Try 0 is the first one, try 1 the one that always fits, and the others bisect. A single loop has only one
+  // copy of feedIntervals.
   for (int i = 0; i < maxTries + 2; ++i) {
     uint count = searchTry(sensitivity);
     if (write) return SearchResult(sensitivity, count);

@@ -1,20 +1,21 @@
-// How intervals become supersegments, for one sensitivity: the exchangeable piece. The algorithm is
-// segmentWithSensitivity of vdi/reference/Segmenter.cpp, as a state machine that's fed interval by interval.
+// Turns intervals into supersegments for one sensitivity: the exchangeable part. This is
+// segmentWithSensitivity of vdi/reference/Segmenter.cpp as a state machine that takes one interval at a time.
 //
-// Needs: optical.glsl, appearance.glsl, store.glsl; bool cutAtGaps, constant; void emitSegment(OpticalSegment segment).
+// Needs: optical.glsl, appearance.glsl, store.glsl; bool cutAtGaps, constant; void emitSegment(OpticalSegment
+// segment).
 
 struct SegmenterState {
   float sensitivity;
   bool open;
   float front;
-  float reach;  // end of the last interval absorbed
-  float back;   // end of the last one that isn't transparent
+  float reach;  // end of the last absorbed interval
+  float back;   // end of the last visible interval
   vec3 color;
   float opticalDepth;
 };
 
 SegmenterState segmenter;
-float segmenterStep;      // depth that both sides of Eq. 1 are normalised to
+float segmenterStep;      // depth to which both sides of Eq. 1 are normalised
 
 void segmenterBegin(float sensitivity) {
   segmenter.sensitivity = sensitivity;
@@ -38,14 +39,16 @@ void segmenterAbsorb(float back, vec3 color, float opticalDepth) {
 
 void segmenterAdd(float front, float back, vec3 color, float opticalDepth) {
   if (segmenter.open) {
-    vec4 mine = appearanceOf(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front, segmenterStep);
+    vec4 mine = appearanceOf(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front,
+                             segmenterStep);
     if (front > segmenter.reach) {
       // The gap is a transparent sample.
       if (cutAtGaps || length(mine) > segmenter.sensitivity) {
         segmenterClose();
       } else {
         segmenter.reach = front;
-        mine = appearanceOf(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front, segmenterStep);
+        mine = appearanceOf(segmenter.color, segmenter.opticalDepth, segmenter.reach - segmenter.front,
+                            segmenterStep);
       }
     }
     if (segmenter.open) {

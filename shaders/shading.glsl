@@ -1,19 +1,19 @@
-// How brightly a sample shines. Twin of vdi/reference/Shading.cpp; vdi/core/Shading.h has the formula.
+// The light on a sample. Twin of vdi/reference/Shading.cpp; vdi/core/Shading.h has the formula.
 //
 // Needs: shared/cast.h; params, rayDirection, texel, coordinateOf.
 
-// Whether colours are shaded: what isn't costs nothing.
+// Whether colours are shaded; without shading its code costs nothing.
 layout(constant_id = 9) const bool shaded = false;
 
-// Zero also where one of the values isn't finite.
+// Zero also if one of the values is not finite.
 float differenceOf(float ahead, float behind) {
   float difference = ahead - behind;
   float least = leastGradient * (abs(ahead) + abs(behind));
   return abs(difference) > least && abs(difference) <= 3.0e38 ? difference : 0.0;
 }
 
-// Direction of the scalar's gradient at a place of the ray, by central differences over a voxel on each side; zero where there
-// is none. Texels stand for values by a positive scale, which doesn't matter.
+// Direction of the scalar's gradient at a place of the ray, by central differences over a voxel on each side;
+// zero if there is no gradient. Texels are values times a positive scale, which does not matter here.
 vec3 normalAt(Brick brick, float place) {
   vec3 middle = positionAt(place) * brick.texelScale + brick.texelOffset;
   vec3 texels = brick.cellScale * float(cellSide);  // of the page
@@ -30,7 +30,8 @@ vec3 normalAt(Brick brick, float place) {
   vec3 differences = vec3(differenceOf(x1, x0), differenceOf(y1, y0), differenceOf(z1, z0));
   float greatest = max(max(abs(differences.x), abs(differences.y)), abs(differences.z));
   if (!(greatest > 0.0)) return vec3(0.0);
-  // texels * texelScale is 1 / spacing. The largest component is 1 before lengths are squared: values may be of any size.
+  // texels * texelScale is 1 / spacing. Divides by the largest component before lengths are squared, because
+  // values may have any magnitude.
   vec3 gradient = differences / greatest * texels * brick.texelScale;
   float largest = max(max(abs(gradient.x), abs(gradient.y)), abs(gradient.z));
   return normalize(gradient / largest);
@@ -48,7 +49,7 @@ vec3 lightAt(Brick brick, float place) {
   return light;
 }
 
-// Sample k in its light.
+// Sample k under its light.
 Sample lit(Brick brick, uint k, Sample it) {
   if (shaded && it.opticalDepth > 0.0) it.color *= lightAt(brick, middleOf(k));
   return it;

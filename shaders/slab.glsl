@@ -1,36 +1,38 @@
-// What a slab, the part of a ray that a sample stands for, shows: one look into the table of slabs. Twin of
-// vdi/core/SlabTable.cpp, whose header says what is where.
+// The material of a slab, the part of a ray that a sample stands for, by one fetch from the table of slabs.
+// Twin of vdi/core/SlabTable.cpp, whose header describes the layout.
 //
 // Needs: shared/cast.h, optical.glsl; params, slabs, rayLengthOfDepth.
 
-// What an interval of a ray comes down to.
+// The material of an interval of a ray.
 struct Sample {
   vec3 color;  // straight
   float opticalDepth;
   float opacity;
-  float overStep;  // opacity of as much of it as is one step long
+  float overStep;  // opacity over the length of one step
 };
 
 const Sample transparentSample = Sample(vec3(0.0), 0.0, 0.0, 0.0);
 
 Sample sampleOf(vec4 colorAndDepth, float length) {
-  float opticalDepth = min(colorAndDepth.a * params.slabsPerDepth * rayLengthOfDepth * length, maxOpticalDepth);
+  float opticalDepth =
+      min(colorAndDepth.a * params.slabsPerDepth * rayLengthOfDepth * length, maxOpticalDepth);
   float opacity = opacityOf(opticalDepth);
   // Nearly all intervals are one sample long.
   float overStep = length == params.step ? opacity : opacityOf(opticalDepth * params.step / length);
   return Sample(colorAndDepth.rgb, opticalDepth, opacity, overStep);
 }
 
-// What needs code of its own, by the blocks' values: are there any that aren't finite, and any beyond the transfer table's range?
+// Properties of the blocks' values that need extra code: whether any are not finite, and whether any lie
+// outside the transfer table's range.
 layout(constant_id = 7) const bool mayBeInfinite = true;
 layout(constant_id = 8) const bool reachesBeyond = true;
 
-// No branches from here on, so that several looks are on their way at a time: mix selects.
+// No branches from here on, so that several fetches are under way at a time: mix selects.
 
 bool isFinite(float value) { return !mayBeInfinite || abs(value) <= 3.0e38; }
 
-// Premultiplied colour and opacity of a slab between two positions in the transfer table, as far as it lies within that. A NaN
-// at one end is taken for what's at the other.
+// Premultiplied colour and opacity of the part of a slab between two positions within the transfer table. A
+// NaN at one end counts as the value at the other.
 vec4 slabTexel(float front, float back) {
   float first = front;
   float last = back;
@@ -50,15 +52,16 @@ vec4 slabTexel(float front, float back) {
   return textureLod(slabs, (mix(square, strip, bvec2(isNear)) + 0.5) * params.perSlabTexels, 0.0);
 }
 
-// Straight colour and optical depth of the whole slab, where `texel` is slabTexel's. A NaN at one end takes half of what's
-// visible at the other.
+// Straight colour and optical depth of the whole slab; `texel` comes from slabTexel. A NaN at one end gives
+// half of the material at the other.
 vec4 slabOf(vec4 texel, float front, float back) {
   const float perLn2 = 1.44269504;
   bool isThin = texel.a < 1e-3;
-  float depth = mix(-log2(1.0 - texel.a), texel.a * (1.0 + 0.5 * texel.a) * perLn2, isThin);  // opticalDepthOf
+  float depth =
+      mix(-log2(1.0 - texel.a), texel.a * (1.0 + 0.5 * texel.a) * perLn2, isThin);  // opticalDepthOf
   vec4 slab = vec4(texel.rgb / max(texel.a, 1.0e-30), min(depth, maxOpticalDepth));
   if (reachesBeyond) {
-    // A part of it may be like the table's ends.
+    // A part of the slab may lie beyond the table's ends.
     float low = min(front, back);
     float high = max(front, back);
     float span = high - low;

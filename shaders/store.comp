@@ -1,5 +1,5 @@
-// Stores what pre-segments are left as supersegments: one invocation a list, for what rounding one leaves over goes to
-// the next.
+// Stores reduced pre-segments as supersegments, one invocation a list, because a supersegment's rounding
+// error is carried to the next one.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/reduce.h"
@@ -15,7 +15,7 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 // Compositing: lists without pre-segments are in ReduceConstants::fitting.
 layout(constant_id = 3) const bool mayFit = false;
 
-// Two ranks may have rounded depths to codes that overlap.
+// Depths that two ranks rounded to codes may overlap.
 uvec2 behindReach(uvec2 code) {
   uvec2 depths = depthCodes(code);
   uint front = min(max(depths.x, storeReach), uint(maxDepthCode) - 1u);
@@ -28,7 +28,8 @@ void copyFitting(uint from, uint slot, uint count) {
   beginStoring();
   for (uint i = 0u; i < count; ++i) {
     if (compactForm) {
-      storeCode(CompactArray(push.segments), behindReach(CompactArray(push.fitting).at[from + i]), slot + i, i, count);
+      storeCode(CompactArray(push.segments), behindReach(CompactArray(push.fitting).at[from + i]), slot + i,
+                i, count);
     } else {
       segmentsFrom(push.segments, slot + i).at[0] = segmentsFrom(push.fitting, from + i).at[0];
     }

@@ -1,9 +1,9 @@
-// Supersegments in memory: 24 bytes of floats, or 8 of codes. Storing codes is the twin of vdi/reference/Compaction.h;
-// loading them, of expanded in vdi/core/Supersegment.cpp.
+// Supersegments in memory: 24 bytes of floats, or 8 of codes. Storing codes is the twin of
+// vdi/reference/Compaction.h, loading them of `expanded` in vdi/core/Supersegment.cpp.
 //
 // Needs: shared/lists.h, exact.glsl, optical.glsl.
 
-// A supersegment whose optical depth doesn't get lost when its opacity rounds to 1.
+// A supersegment that keeps its optical depth even if its opacity rounds to 1.
 struct OpticalSegment {
   float front;
   float back;
@@ -11,7 +11,7 @@ struct OpticalSegment {
   float opticalDepth;
 };
 
-// Which of the two forms; the other one's code is left out.
+// The form to use; the compiler removes the code of the other.
 layout(constant_id = 2) const bool compactForm = false;
 
 float opticalDepthOfCode(uint code) {
@@ -26,9 +26,10 @@ uvec2 depthCodes(uvec2 packed) { return uvec2(packed.x & 0x3fffu, (packed.x >> 1
 
 float codedOpticalDepth(uvec2 packed) { return opticalDepthOfCode(packed.x >> 28 | (packed.y >> 24) << 4); }
 
-// Straight.
+// Straight colour.
 vec3 codedColor(uvec2 packed) {
-  return vec3(exactFloat(packed.y & 0xffu), exactFloat((packed.y >> 8) & 0xffu), exactFloat((packed.y >> 16) & 0xffu)) *
+  return vec3(exactFloat(packed.y & 0xffu), exactFloat((packed.y >> 8) & 0xffu),
+              exactFloat((packed.y >> 16) & 0xffu)) *
          (1.0 / 255.0);
 }
 
@@ -47,10 +48,10 @@ OpticalSegment loadSegment(SegmentArray segments, uint i, StoredForm form) {
   return OpticalSegment(s.front, s.back, vec3(s.red, s.green, s.blue), opticalDepthOf(s.opacity));
 }
 
-// What rounding the list's supersegments so far has left over.
+// Rounding errors of the list's supersegments so far.
 uint storeReach;
 float storeDepth;        // optical depth so far
-float storeStoredDepth;  // of what was stored
+float storeStoredDepth;  // of the stored supersegments
 float storeCarriedDepth;
 vec3 storeCarriedLight;
 
@@ -83,29 +84,31 @@ uvec2 compacted(OpticalSegment segment, StoredForm form) {
   vec3 colorCodes = round(clamp(color, vec3(0.0), vec3(1.0)) * 255.0);
 
   storeCarriedLight += light - seen / 255.0 * colorCodes;
-  storeCarriedDepth = clamp(storeCarriedDepth + segment.opticalDepth - stored, -maxCarriedDepth, maxCarriedDepth);
+  storeCarriedDepth =
+      clamp(storeCarriedDepth + segment.opticalDepth - stored, -maxCarriedDepth, maxCarriedDepth);
   storeDepth += segment.opticalDepth;
   storeStoredDepth += stored;
   uvec3 c = uvec3(colorCodes);
   return uvec2(front | back << 14 | (depth & 0xfu) << 28, c.r | c.g << 8 | c.b << 16 | (depth >> 4) << 24);
 }
 
-// The supersegments of a list one after the other, front to back, after beginStoring.
+// Stores the supersegments of a list one after the other, front to back, after beginStoring.
 void storeSegment(SegmentArray segments, uint slot, OpticalSegment segment, StoredForm form) {
   if (compactForm) {
     CompactArray(segments).at[slot] = compacted(segment, form);
   } else {
-    segmentsFrom(segments, slot).at[0] = Segment(segment.front, segment.back, segment.color.r, segment.color.g, segment.color.b,
-        opacityOf(segment.opticalDepth));
+    segmentsFrom(segments, slot).at[0] =
+        Segment(segment.front, segment.back, segment.color.r, segment.color.g, segment.color.b,
+                opacityOf(segment.opticalDepth));
   }
 }
 
-// The latest codes of a list that aren't in memory yet. Four that fill a piece of a cache line go there together: neighbouring
-// invocations write to different lines, and a GPU takes as long for 8 bytes of one as for 32 (storing takes 0.55 of the time on
-// an H200).
+// The latest codes of a list that are not in memory yet. Four that fill a sector of a cache line are written
+// together: neighbouring invocations write to different lines, and a GPU takes as long for 8 bytes of one as
+// for 32 (on an H200, storing takes 0.55 of the time).
 uvec2 waiting[3];
 
-// To place `at`, the i-th of `count`.
+// Stores the i-th of `count` codes at place `at`.
 void storeCode(CompactArray codes, uvec2 code, uint at, uint i, uint count) {
   uint phase = at & 3u;
   if (phase == 3u && i >= 3u) {

@@ -1,12 +1,12 @@
-// Which parts of V_O's picture the rays of a workgroup have to traverse.
+// Finds the parts of V_O's picture that a workgroup's rays must traverse.
 //
 // Needs: packet.glsl, line.glsl; params.
 
-// Bit t of an axis' tile mask: rays that go along that axis may meet material in columns of tile t.
+// Bit t of an axis' tile mask: rays along that axis may meet material in columns of tile t.
 const int invocations = int(gl_WorkGroupSize.x);
 const int tileBitWords = renderMaxTiles / 32;
 shared uint tileBits[2 * tileBitWords];
-shared int packetFirst[2];  // column, of all rays along that axis
+shared int packetFirst[2];  // first column of all rays along that axis
 shared int packetLast[2];
 
 void findTilesAlong(RayPacket packet, int axis) {
@@ -21,7 +21,7 @@ void findTilesAlong(RayPacket packet, int axis) {
   }
 }
 
-// For all invocations of a workgroup, those whose ray doesn't traverse included.
+// All invocations of a workgroup must call this, including those whose ray does not traverse.
 void findTiles(RayPacket packet, PictureLine line, bool traverses) {
   int own = int(gl_LocalInvocationIndex);
   for (int i = own; i < 2 * tileBitWords; i += invocations) tileBits[i] = 0u;
@@ -41,7 +41,7 @@ void findTiles(RayPacket packet, PictureLine line, bool traverses) {
   barrier();
 }
 
-// The first tile to traverse from `tile` to `last`, in the line's direction; -1 if there's none.
+// The first tile to traverse from `tile` to `last`, in the line's direction; -1 if there is none.
 int nextTile(PictureLine line, int tile, int last) {
   int base = line.byColumns ? 0 : tileBitWords;
   bool up = line.direction > 0.0;

@@ -1,26 +1,29 @@
-// A ray from column to column of V_O's picture. Reconstruction::Smooth blends the two lists of each that are beside the ray;
-// Reconstruction::Constant looks at those that it crosses, one or two of each. Twin of traverseSmoothly and traverseLists in
-// vdi/reference/Render.cpp.
+// Traverses a ray from column to column of V_O's picture. Reconstruction::Smooth blends the two lists of each
+// that are beside the ray; Reconstruction::Constant uses the one or two that the ray crosses. Twin of
+// traverseSmoothly and traverseLists in vdi/reference/Render.cpp.
 //
-// Needs: masks.glsl, tile_mask.glsl, line.glsl, intersect.glsl; params, smoothReconstruction, lanesPerRay, rayLane, accumulate.
+// Needs: masks.glsl, tile_mask.glsl, line.glsl, intersect.glsl; params, smoothReconstruction, lanesPerRay,
+// rayLane, accumulate.
 
 uint listOf(bool byColumns, int column, int row) {
-  return byColumns ? uint(row) * uint(params.lists.x) + uint(column) : uint(column) * uint(params.lists.x) + uint(row);
+  return byColumns ? uint(row) * uint(params.lists.x) + uint(column)
+                   : uint(column) * uint(params.lists.x) + uint(row);
 }
 
-// Of a point between the centres of two neighbouring lists: the other one's share, which is exactly 0 on the first one's
-// centre even where rounding isn't. `beyond`: the first one's centre, in [0, 1).
+// Weight of the second of two neighbouring lists, at a point between their centres; exactly 0 at the first
+// one's centre, despite rounding. `beyond` is the distance from the first one's centre, in [0, 1).
 float shareOfNext(float beyond) {
   const float onCentre = 1.0 / 256.0;
   return clamp((beyond - onCentre) / (1.0 - 2.0 * onCentre), 0.0, 1.0);
 }
 
-// What a ray's two invocations see, of which each has its own, already weighted.
+// Adds what each of a ray's two invocations has seen, already weighted.
 Intersection ofBoth(Intersection own) {
-  return Intersection(own.light + subgroupShuffleXor(own.light, 1u), min(own.entered, subgroupShuffleXor(own.entered, 1u)));
+  return Intersection(own.light + subgroupShuffleXor(own.light, 1u),
+                      min(own.entered, subgroupShuffleXor(own.entered, 1u)));
 }
 
-// A ray that stays in about one place of V_O's picture: the four lists around that.
+// Intersects a ray that stays near one position of V_O's picture with the four lists around it.
 Intersection intersectAlongLists(PictureLine line, vec2 stretch) {
   vec2 place = 0.5 * (pictureAt(ray, stretch.x) + pictureAt(ray, stretch.y)) - 0.5;
   vec2 first = floor(place);
@@ -32,15 +35,18 @@ Intersection intersectAlongLists(PictureLine line, vec2 stretch) {
     float weight = (side.x == 0 ? 1.0 - shareX : shareX) * (side.y == 0 ? 1.0 - shareY : shareY);
     ivec2 pixel = clamp(ivec2(first) + side, ivec2(0), params.lists - 1);
     uint list = listOf(true, pixel.x, pixel.y);
-    if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, vec2(line.bins.x, at(line.bins, 1.0)))) continue;
-    Intersection intersection = intersectWholeList(list, partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5)));
+    if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, vec2(line.bins.x, at(line.bins, 1.0))))
+      continue;
+    Intersection intersection =
+        intersectWholeList(list, partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5)));
     sum.light += weight * intersection.light;
     sum.entered = min(sum.entered, intersection.entered);
   }
   return lanesPerRay == 1u ? sum : ofBoth(sum);
 }
 
-// A column that the ray crosses, and two lists of it: those beside the ray, or those that it enters and leaves the column in.
+// A column that the ray crosses, and two of its lists: those beside the ray, or those where the ray enters
+// and leaves the column.
 struct Column {
   vec2 fractions;
   ivec2 rows;
@@ -48,7 +54,7 @@ struct Column {
   uvec2 lists;
 };
 
-// `edges`: how many columns after its start the line is at either one.
+// `edges` are the line's progress, in columns, at the column's two edges.
 Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
   Column here;
   here.fractions = vec2(min(fractions.x, fractions.y), max(fractions.x, fractions.y));
@@ -61,22 +67,23 @@ Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
   } else {
     vec2 inOut = vec2(min(edges.x, edges.y), max(edges.x, edges.y));
     here.rows = clamp(ivec2(floor(line.row + inOut * line.rows)), ivec2(0), maxRow);
-    // A diagonal through corners may touch a third one: not enough to look at.
+    // A diagonal through corners may touch a third list: too little to intersect.
     here.rows.x = clamp(here.rows.x, here.rows.y - 1, here.rows.y + 1);
     here.share = here.rows.x == here.rows.y ? 0.0 : 0.5;
   }
-  here.lists = uvec2(listOf(line.byColumns, column, here.rows.x), listOf(line.byColumns, column, here.rows.y));
+  here.lists =
+      uvec2(listOf(line.byColumns, column, here.rows.x), listOf(line.byColumns, column, here.rows.y));
   return here;
 }
 
-// Memory takes about as long for several as for one. Half of a tile: a part of it for each of a ray's invocations.
+// Reading several takes about as long as one. Half a tile: each of a ray's invocations takes a part of it.
 const int columnsAtOnce = 4;
-// Bits of what listsToIntersect returns: a column's first and second list.
+// Bits in the result of listsToIntersect: a column's first and second list.
 const uint firstListBit = 1u;
 const uint secondListBit = 1u << renderTile;
 
-// Of the columns of a tile: bits firstListBit and secondListBit, shifted by c, tell whether the ray may meet something
-// in column c's lists. Each of a ray's invocations finds its part.
+// For the columns of a tile: bits firstListBit and secondListBit, shifted by c, tell whether the ray may meet
+// material in column c's lists. Each of a ray's invocations finds its part.
 uint listsToIntersect(PictureLine line, int tile) {
   const int part = renderTile / int(lanesPerRay);
   int maximum = columnCount(line.byColumns) - 1;
@@ -89,13 +96,13 @@ uint listsToIntersect(PictureLine line, int tile) {
       int column = first + begin + i;
       float nextEdge = columnsTo(line, float(column + 1));
       float nextFraction = fractionAfter(line, nextEdge);
-      // Columns beyond the line's ends: memory is read where there's a list, and what's read isn't used.
+      // Columns beyond the line's ends read an existing list, whose data is not used.
       Column here = columnAt(line, min(column, maximum), vec2(edge, nextEdge), vec2(fraction, nextFraction));
       uint64_t firstMask = params.heads.at[here.lists.x].mask;
       uint64_t secondMask = params.heads.at[here.lists.y].mask;
       vec2 bins = vec2(at(line.bins, fraction), at(line.bins, nextFraction));
-      // Products, for && would branch: all masks are to be asked for before the first is waited for. Where the picture ends
-      // within a tile, rounding may let a line that leaves it reach a column that isn't there.
+      // Products, because && would branch: all masks are requested before the first one is awaited. If the
+      // picture ends within a tile, rounding may let a line that leaves it reach a column outside it.
       uint passes = uint(nextEdge != edge) * uint(column <= maximum);
       uint meetsFirst = passes * uint(here.share < 1.0) * uint(mayMeet(firstMask, bins));
       uint meetsSecond = passes * uint(here.share > 0.0) * uint(mayMeet(secondMask, bins));
@@ -108,7 +115,7 @@ uint listsToIntersect(PictureLine line, int tile) {
   return lanesPerRay == 1u ? listBits : listBits | subgroupShuffleXor(listBits, 1u);
 }
 
-// Along the line, at the edges of a tile: between them it's nearly straight.
+// At the edges of a tile; between them, it is nearly linear.
 vec2 shorteningsAt(PictureLine line, int tile) {
   vec2 edges = vec2(tile, tile + 1) * float(renderTile);
   vec2 rows = line.row + line.rows * (edges - line.start) * line.direction;
@@ -125,19 +132,23 @@ Intersection intersectSide(PictureLine line, Column here, float shortening, bool
     split = clamp(split, fractions.x, fractions.y);
     fractions = second ? vec2(split, fractions.y) : vec2(fractions.x, split);
   }
-  Intersection intersection = intersectList(second ? here.lists.y : here.lists.x, partOf(line, fractions, shortening), hint);
+  Intersection intersection =
+      intersectList(second ? here.lists.y : here.lists.x, partOf(line, fractions, shortening), hint);
   if (smoothReconstruction) intersection.light *= second ? here.share : 1.0 - here.share;
   return intersection;
 }
 
-// What the ray meets of a column. `listBits`: firstListBit, secondListBit.
-Intersection intersectColumn(PictureLine line, int column, float shortening, uint listBits, inout ivec2 hints) {
+// Intersects the ray with a column. `listBits` are firstListBit and secondListBit.
+Intersection intersectColumn(PictureLine line, int column, float shortening, uint listBits,
+                             inout ivec2 hints) {
   vec2 edges = vec2(columnsTo(line, float(column)), columnsTo(line, float(column + 1)));
-  Column here = columnAt(line, column, edges, vec2(fractionAfter(line, edges.x), fractionAfter(line, edges.y)));
+  Column here =
+      columnAt(line, column, edges, vec2(fractionAfter(line, edges.x), fractionAfter(line, edges.y)));
   Intersection own = nothing;
   if (lanesPerRay > 1u) {
     bool second = rayLane != 0u;
-    if ((listBits & (second ? secondListBit : firstListBit)) != 0u) own = intersectSide(line, here, shortening, second, hints.x);
+    if ((listBits & (second ? secondListBit : firstListBit)) != 0u)
+      own = intersectSide(line, here, shortening, second, hints.x);
     if (smoothReconstruction) return ofBoth(own);
     // The first list is in front of the second one.
     float transmittance = subgroupShuffleXor(1.0 - own.light.a, 1u);
@@ -153,8 +164,8 @@ Intersection intersectColumn(PictureLine line, int column, float shortening, uin
   return own;
 }
 
-// Tile by tile: first all that there's to look at is found, then looked at, so that rays next to each other do the same at a
-// time.
+// Tile by tile: first finds all lists to intersect, then intersects them, so that neighbouring rays do the
+// same at the same time.
 void traverse(PictureLine line) {
   bool up = line.direction > 0.0;
   int lastTile = line.last >> renderTileShift;

@@ -4,13 +4,13 @@
 
 const float infinity = 1.0 / 0.0;
 
-// V_O's view space, t = the new view's depth.
+// A ray in V_O's view space; t is the new view's depth.
 struct Ray {
   vec3 origin;
   vec3 direction;
 };
 
-// Of a place in the new picture, in pixels from its lower left corner.
+// The ray of a position in the new picture, in pixels from its lower left corner.
 Ray rayAt(vec2 place) {
   vec2 uv = place - 0.5 * vec2(params.width, params.height);
   return Ray(rays.originBase + uv.x * rays.originRight + uv.y * rays.originUp,
@@ -19,14 +19,16 @@ Ray rayAt(vec2 place) {
 
 float depthAt(Ray ray, float t) { return ray.origin.z + t * ray.direction.z; }
 
-// What a view-space place across the picture is divided by to be in the picture: V_O's projection.
+// Divisor of V_O's projection from view space to the picture.
 float divisorOf(float depth) { return params.parallel != 0u ? 1.0 : depth; }
 
-// Of a point of a ray: place in V_O's picture, in lists from its lower left corner.
+// Position in V_O's picture of a point of a ray, in lists from its lower left corner.
 vec2 pictureAt(Ray of, float t) {
   vec3 p = of.origin + t * of.direction;
   return p.xy / (params.pixelSize * divisorOf(p.z)) + 0.5 * vec2(params.lists);
 }
 
-// Of renderPictureTile x renderPictureTile pixels.
-uvec2 pictureTiles() { return (uvec2(params.width, params.height) + renderPictureTile - 1u) / renderPictureTile; }
+// Number of tiles of renderPictureTile x renderPictureTile pixels.
+uvec2 pictureTiles() {
+  return (uvec2(params.width, params.height) + renderPictureTile - 1u) / renderPictureTile;
+}
