@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "vdi/comm/Communicator.h"
+#include "vdi/comm/Operation.h"
 #include "vdi/core/Error.h"
 
 using namespace vdi;
@@ -22,8 +23,8 @@ using namespace std::chrono_literals;
 
 namespace {
 
-/// Runs `work` in a thread within a funnel, which this thread serves. Between that it does `meanwhile` a few
-/// times.
+/// Runs `work` in a thread within a funnel that this thread serves, and calls `meanwhile` a few times in
+/// between.
 void carried(const std::function<void()>& work, const std::function<void(int)>& meanwhile) {
   comm::Funnel funnel;
   std::atomic<bool> done{false};
@@ -46,7 +47,7 @@ void carried(const std::function<void()>& work, const std::function<void(int)>& 
   if (error) std::rethrow_exception(error);
 }
 
-/// What all ranks know after a row of operations of each kind: the same, whoever carries it out.
+/// The results of a sequence of operations of each kind, the same in any thread.
 std::vector<std::uint64_t> told(const Communicator& world) {
   const auto rank = static_cast<std::uint64_t>(world.rank());
   const auto size = static_cast<std::uint64_t>(world.size());
@@ -74,7 +75,7 @@ std::vector<std::uint64_t> told(const Communicator& world) {
   keep(world.allToAllWords(toEach));
   std::vector<std::uint64_t> counts(size, 1);
   keepBytes(world.allToAll(std::as_bytes(std::span(toEach)), counts, sizeof(std::uint64_t)).bytes);
-  // Only the first and the last rank have partners, and much to tell; the others go on at once.
+  // Only the first and the last rank exchange messages, large ones; the others go on at once.
   if (size > 1 && (rank == 0 || rank == size - 1)) {
     const int other = rank == 0 ? world.size() - 1 : 0;
     comm::Messages messages(world);
@@ -93,7 +94,7 @@ std::vector<std::uint64_t> told(const Communicator& world) {
 
 }  // namespace
 
-TEST_CASE("a thread that may not call MPI is told the same, whatever the others do meanwhile") {
+TEST_CASE("a carried thread gets the same results, whatever other threads do meanwhile") {
   const Communicator world = Communicator::world();
   const Communicator others = Communicator::world();
   const std::vector<std::uint64_t> expected = told(world);
@@ -112,7 +113,7 @@ TEST_CASE("a thread that may not call MPI is told the same, whatever the others 
   }
 }
 
-TEST_CASE("in a thread that may not call MPI, too, a rank that fails makes all fail") {
+TEST_CASE("a rank that fails in a carried thread makes all fail") {
   const Communicator world = Communicator::world();
   const int last = world.size() - 1;
   ErrorCode code = ErrorCode::Cancelled;
@@ -128,4 +129,24 @@ TEST_CASE("in a thread that may not call MPI, too, a rank that fails makes all f
     code = error.code();
   }
   CHECK(code == (world.rank() == last ? ErrorCode::Io : ErrorCode::RemoteRank));
+}
+
+TEST_CASE("a carried thread gets the exception of an operation that cannot begin") {
+  const Communicator world = Communicator::world();
+  ErrorCode code = ErrorCode::Cancelled;
+  std::vector<std::uint64_t> heard;
+  const auto work = [&] {
+    const comm::Operation failing{[](std::vector<MPI_Request>&) -> int {
+      throw Error(ErrorCode::OutOfMemory, "no room for a message");
+    }};
+    try {
+      failing.carry("MPI_Isend");
+    } catch (const Error& error) {
+      code = error.code();
+    }
+    heard = told(world);  // the funnel still carries operations
+  };
+  carried(work, [](int) {});
+  CHECK(code == ErrorCode::OutOfMemory);
+  CHECK(heard == told(world));
 }

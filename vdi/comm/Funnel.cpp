@@ -6,6 +6,7 @@
 #include <array>
 #include <cassert>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -20,7 +21,7 @@ namespace {
 
 thread_local Funnel* current = nullptr;
 
-/// How long `serve` waits for the other thread to ask: from one operation of a row to the next it takes less.
+/// The time that `serve` waits for a request. The other thread takes less between operations of a sequence.
 constexpr std::chrono::milliseconds patience{3};
 
 }  // namespace
@@ -29,22 +30,31 @@ struct Funnel::State {
   std::mutex mutex;
   std::condition_variable asked;
   std::condition_variable ended;
-  const Operation* wanted = nullptr;  // the server's until it's null again
+  const Operation* wanted = nullptr;  // belongs to the server until it is null again
   bool begun = false;
   std::vector<MPI_Request> requests;
   int result = MPI_SUCCESS;
+  std::exception_ptr error;  // thrown by begin, for the thread that wants the operation
 
-  /// Of what's wanted: whether it has ended.
+  /// Advances the wanted operation; returns whether it has ended.
   bool advance() {
-    if (!begun) {
-      begun = true;
-      requests.clear();
-      result = wanted->begin(requests);
-    }
-    if (result != MPI_SUCCESS || requests.empty()) return true;
+    if (!begun) begin();
+    if (error || result != MPI_SUCCESS || requests.empty()) return true;
     int done = 0;
     result = MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
     return result != MPI_SUCCESS || done != 0;
+  }
+
+  void begin() {
+    begun = true;
+    requests.clear();
+    result = MPI_SUCCESS;
+    error = nullptr;
+    try {
+      result = wanted->begin(requests);
+    } catch (...) {
+      error = std::current_exception();
+    }
   }
 };
 
@@ -98,6 +108,7 @@ void Operation::carry(const char* name) const {
   state.wanted = this;
   state.asked.notify_one();
   state.ended.wait(lock, [&] { return state.wanted == nullptr; });
+  if (state.error) std::rethrow_exception(std::exchange(state.error, nullptr));
   check(state.result, name);
 }
 
