@@ -28,7 +28,8 @@ glm::vec<3, T> vectorOf(const std::vector<T>& v) {
   return {v[0], v[1], v[2]};
 }
 
-/// What a field's [0, 1] is stretched to: most of an integer type's positive range, 1 for floating point.
+/// The value to which a field's 1 is stretched: most of an integer type's positive range, 1 for floating
+/// point.
 double topOf(ScalarType type) {
   switch (type) {
     case ScalarType::U8:
@@ -258,7 +259,7 @@ void addViewOptions(CLI::App& command, ViewOptions& options) {
 }
 
 Camera makeCamera(const ViewOptions& options, const Scene& scene) {
-  // How far away the whole scene is seen from depends on these; what makes no sense is refused later.
+  // The distance that shows the whole scene depends on these; invalid values are rejected later.
   const double angle = options.camera.viewAngle.value_or(30.0);
   const bool sensible = angle > 0.0 && angle < 180.0;
   Orbit orbit = options.orbit;
@@ -347,32 +348,9 @@ std::vector<ClipPlane> makeClipPlanes(const std::vector<double>& numbers) {
   return planes;
 }
 
-void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse use) {
-  std::string presets;
-  for (const PresetInfo& info : transferFunctionPresets())
-    presets += "\n  " + info.name + ": " + info.description;
-  command.add_option("--resolution", options.resolution, "lists, that is pixels")
-      ->type_name("WxH")
-      ->capture_default_str()
-      ->group(qualityGroup);
-  command
-      .add_option(
-          "--margin", options.margin,
-          "share of the picture, 0 to 4, for which there are lists beyond each of its edges, as far as "
-          "there is something to see: what turning and moving brings into view when it's zoomed in")
-      ->capture_default_str()
-      ->group(qualityGroup);
-  if (use == QualityUse::One) {
-    command.add_option("--supersegments", options.supersegments, "the most in one list (N_S), 1 to 1024")
-        ->capture_default_str()
-        ->group(qualityGroup);
-    command
-        .add_option("--algorithm", options.algorithm,
-                    "how samples become supersegments: merge, without search; bisection, the paper's search")
-        ->type_name("NAME")
-        ->capture_default_str()
-        ->group(qualityGroup);
-  }
+namespace {
+
+void addBudgetOptions(CLI::App& command, QualityOptions& options) {
   command
       .add_option("--budget", options.budget,
                   "who gets supersegments: list, up to N_S each; total, as many in all, but up to twice N_S "
@@ -401,14 +379,12 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
           "other viewpoints; 1: never")
       ->capture_default_str()
       ->group(qualityGroup);
-  addShadingOptions(command, options);
-  addRegionOptions(command, options);
-  command
-      .add_option(
-          "--sampling-rate", options.samplesPerVoxel,
-          "samples per voxel, 1/64 to 64; 0: 1, 2 or 4, as the transfer function needs on this volume")
-      ->capture_default_str()
-      ->group(qualityGroup);
+}
+
+void addTransferFunctionOptions(CLI::App& command, QualityOptions& options) {
+  std::string presets;
+  for (const PresetInfo& info : transferFunctionPresets())
+    presets += "\n  " + info.name + ": " + info.description;
   command
       .add_option("--transfer-function", options.transferFunction,
                   "a JSON file whose name ends in .json (docs/raw-volumes.md), or one of these, stretched "
@@ -424,6 +400,43 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
           "a fiftieth of the scene's diagonal")
       ->check(requirePositive)
       ->group(qualityGroup);
+}
+
+}  // namespace
+
+void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse use) {
+  command.add_option("--resolution", options.resolution, "lists, that is pixels")
+      ->type_name("WxH")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command
+      .add_option(
+          "--margin", options.margin,
+          "share of the picture, 0 to 4, for which there are lists beyond each of its edges, as far as "
+          "there is something to see: what turning and moving brings into view when it's zoomed in")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  if (use == QualityUse::One) {
+    command.add_option("--supersegments", options.supersegments, "the most in one list (N_S), 1 to 1024")
+        ->capture_default_str()
+        ->group(qualityGroup);
+    command
+        .add_option("--algorithm", options.algorithm,
+                    "how samples become supersegments: merge, without search; bisection, the paper's search")
+        ->type_name("NAME")
+        ->capture_default_str()
+        ->group(qualityGroup);
+  }
+  addBudgetOptions(command, options);
+  addShadingOptions(command, options);
+  addRegionOptions(command, options);
+  command
+      .add_option(
+          "--sampling-rate", options.samplesPerVoxel,
+          "samples per voxel, 1/64 to 64; 0: 1, 2 or 4, as the transfer function needs on this volume")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  addTransferFunctionOptions(command, options);
 }
 
 void addReconstructionOption(CLI::App& command, std::string& name) {

@@ -1,4 +1,4 @@
-// vdi bench: how long each stage takes and how true the result is.
+// vdi bench: measures the time of each stage and the accuracy of the result.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -37,7 +37,7 @@ std::string today() {
   return fmt::format("{:04}-{:02}-{:02}", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday);
 }
 
-/// What can be known before anything takes time. Throws Error.
+/// Checks everything that is known before the work starts. Throws Error.
 void requireSound(const BenchOptions& options, int ranks) {
   if (options.repeats < 1) throw Error(ErrorCode::InvalidArgument, "--repeats must be at least 1");
   if (!options.rival.empty() && !IcetCompositor::available()) {
@@ -83,7 +83,7 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
     requireSound(options, world.size());
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
   });
-  // The table must not get between the lines of the JSON.
+  // The table must not mix with the lines of the JSON.
   std::FILE* table = options.output.empty() ? stderr : stdout;
   if (world.rank() == 0) {
     fmt::print(table, "device: {}, ranks: {}, commit: {}; milliseconds, dB, MiB\n", device->name(),
@@ -104,7 +104,7 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
                   {"date", today()},
                   {"ranks", world.size()},
                   {"rows", rows}};
-    // A file's name, which a data set has, may be any bytes.
+    // A data set may have a file's name, which may contain any bytes.
     const std::string text = document.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
     if (options.output.empty()) {
       fmt::print("{}", text);
@@ -172,6 +172,137 @@ void run(BenchOptions options, const comm::Communicator& world) {
   measureAll(options, world);
 }
 
+void addInputOptions(CLI::App& command, BenchOptions& options) {
+  command
+      .add_option("--fields", options.fields,
+                  "procedural fields to run, by default turbulence, mixing "
+                  "and coil:" +
+                      apps::fieldsHelp())
+      ->type_name("NAME")
+      ->group("Volume and ranks");
+  command.add_option("--raw", options.raws, "JSON sidecars of raw volumes to run (docs/raw-volumes.md)")
+      ->type_name("FILE")
+      ->group("Volume and ranks");
+  apps::addDecompositionOptions(command, options.decomposition);
+  apps::addViewOptions(command, options.view);
+  options.quality.samplesPerVoxel = 1.0;  // times refer to one rate, whatever the transfer function
+  apps::addQualityOptions(command, options.quality, apps::QualityUse::Several);
+}
+
+void addMeasuringOptions(CLI::App& command, BenchOptions& options) {
+  command.add_option("--algorithms", options.algorithms, "merge (the default), bisection or both")
+      ->type_name("NAME");
+  command.add_option("--supersegments", options.supersegments, "one or several N_S; default: 25");
+  command.add_option("--views", options.views, "viewpoints of VDIs, evenly around the scene; default: 1")
+      ->check(CLI::Range(1, 360));
+  command.add_option("--angles", options.angles, "degrees from the VDI's viewpoint")
+      ->type_name("DEG")
+      ->capture_default_str();
+  apps::addReconstructionOption(command, options.reconstruction);
+  command.add_option("--repeats", options.repeats, "runs of which the median counts, after one warm-up")
+      ->capture_default_str();
+  command
+      .add_option("--frames", options.frames,
+                  "VDIs made on an orbit of 20 viewpoints, for vdis_per_second; 0: none")
+      ->check(CLI::Range(0, 1000000))
+      ->capture_default_str();
+  command
+      .add_option("--truth-rate", options.truthRate,
+                  "samples per voxel of the volume rendering that pictures are compared with, 1/64 to 64")
+      ->capture_default_str();
+}
+
+void addSuiteOptions(CLI::App& command, BenchOptions& options) {
+  command
+      .add_option(
+          "--suite", options.suite,
+          "data sets, sizes, viewpoints and N_S of docs/benchmarks.md: paper (needs a GPU and 32 GiB), "
+          "small (a minute on a CPU); --fields picks some of it; ranks: whole frames on fewer and more of "
+          "mpirun's ranks, of the volume and picture that the options say; or viewpoints: how true VDIs "
+          "of these are from all around")
+      ->check(CLI::IsMember(suiteNames()));
+  command
+      .add_option(
+          "--rival", options.rival,
+          "icet: beside the VDI, volume rendering of the same volume, camera and devices, composited by "
+          "IceT; under mpirun, on one rank too. Takes the volume's memory twice. See below")
+      ->check(CLI::IsMember({"icet"}));
+}
+
+void addRanksOptions(CLI::App& command, BenchOptions& options) {
+  const char* const ranksGroup = "Suite ranks";
+  command
+      .add_option("--scaling", options.scalings,
+                  "strong: --size is shared by all ranks; weak: each rank has --size-per-rank")
+      ->check(CLI::IsMember({"strong", "weak"}))
+      ->capture_default_str()
+      ->group(ranksGroup);
+  command
+      .add_option("--layouts", options.layouts,
+                  "layouts to run, instead of --layout. Slabs are one block a rank; others cut the fixed "
+                  "volume into --blocks and a growing one into blocks of that size")
+      ->type_name("LAYOUT")
+      ->capture_default_str()
+      ->group(ranksGroup);
+  command
+      .add_option("--rank-counts", options.rankCounts,
+                  "how many of mpirun's ranks to run on; default: 1, 2, 4 and so on, and all")
+      ->type_name("N")
+      ->group(ranksGroup);
+  command
+      .add_option("--size-per-rank", options.sizePerRank,
+                  "values per axis that each rank has in weak scaling; default: half of --size on each axis, "
+                  "so that 8 ranks have the fixed volume")
+      ->type_name("XxYxZ")
+      ->group(ranksGroup);
+}
+
+void addViewpointsOptions(CLI::App& command, BenchOptions& options) {
+  const char* const viewpointsGroup = "Suite viewpoints";
+  command.add_option("--viewpoints", options.viewpoints, "random viewpoints; --seed says which")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str()
+      ->group(viewpointsGroup);
+  command.add_option("--turn", options.turn, "degrees that the other four viewpoints are turned by")
+      ->capture_default_str()
+      ->group(viewpointsGroup);
+  command
+      .add_option(
+          "--zooms", options.zooms,
+          "by how much nearer than the view's camera all viewpoints are; 4: a quarter of the width is "
+          "seen")
+      ->capture_default_str()
+      ->group(viewpointsGroup);
+  command.add_option("--margins", options.margins, "one or several, instead of --margin")
+      ->capture_default_str()
+      ->group(viewpointsGroup);
+  command
+      .add_option(
+          "--list-resolutions", options.listResolutions,
+          "of the VDIs' pictures, one or several; the views are of --resolution, as VDIs are by default")
+      ->type_name("WxH")
+      ->group(viewpointsGroup);
+  command
+      .add_option("--sets", options.sets,
+                  "VDIs in a set: 1, 2 (front and back), 4 (a tetrahedron) or 6 (front, back and sides)")
+      ->capture_default_str()
+      ->group(viewpointsGroup);
+}
+
+void addOutputOptions(CLI::App& command, BenchOptions& options) {
+  command
+      .add_option("--compare", options.comparison,
+                  "two JSON files, before and after: tells what got slower by more than 10 % and the spread, "
+                  "larger by more than 5 %, or less true; exit status 1 if anything did")
+      ->expected(2)
+      ->type_name("FILE FILE");
+  command
+      .add_option("-o,--output", options.output,
+                  "JSON file; default: standard output, and the table goes to standard error")
+      ->check(apps::requireFileName)
+      ->type_name("FILE");
+}
+
 }  // namespace
 
 void addBench(CLI::App& app, apps::Job& job) {
@@ -179,121 +310,12 @@ void addBench(CLI::App& app, apps::Job& job) {
       "bench", "Time every stage on this device and compare a VDI's views with volume rendering");
   command->footer(footer);
   const auto options = std::make_shared<BenchOptions>();
-  command
-      ->add_option("--fields", options->fields,
-                   "procedural fields to run, by default turbulence, mixing "
-                   "and coil:" +
-                       apps::fieldsHelp())
-      ->type_name("NAME")
-      ->group("Volume and ranks");
-  command->add_option("--raw", options->raws, "JSON sidecars of raw volumes to run (docs/raw-volumes.md)")
-      ->type_name("FILE")
-      ->group("Volume and ranks");
-  apps::addDecompositionOptions(*command, options->decomposition);
-  apps::addViewOptions(*command, options->view);
-  options->quality.samplesPerVoxel = 1.0;  // times are of one rate, whatever the transfer function
-  apps::addQualityOptions(*command, options->quality, apps::QualityUse::Several);
-  command->add_option("--algorithms", options->algorithms, "merge (the default), bisection or both")
-      ->type_name("NAME");
-  command->add_option("--supersegments", options->supersegments, "one or several N_S; default: 25");
-  command->add_option("--views", options->views, "viewpoints of VDIs, evenly around the scene; default: 1")
-      ->check(CLI::Range(1, 360));
-  command->add_option("--angles", options->angles, "degrees from the VDI's viewpoint")
-      ->type_name("DEG")
-      ->capture_default_str();
-  apps::addReconstructionOption(*command, options->reconstruction);
-  command->add_option("--repeats", options->repeats, "runs of which the median counts, after one warm-up")
-      ->capture_default_str();
-  command
-      ->add_option("--frames", options->frames,
-                   "VDIs made on an orbit of 20 viewpoints, for vdis_per_second; 0: none")
-      ->check(CLI::Range(0, 1000000))
-      ->capture_default_str();
-  command
-      ->add_option("--truth-rate", options->truthRate,
-                   "samples per voxel of the volume rendering that pictures are compared with, 1/64 to 64")
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--suite", options->suite,
-          "data sets, sizes, viewpoints and N_S of docs/benchmarks.md: paper (needs a GPU and 32 GiB), "
-          "small (a minute on a CPU); --fields picks some of it; ranks: whole frames on fewer and more of "
-          "mpirun's ranks, of the volume and picture that the options say; or viewpoints: how true VDIs "
-          "of these are from all around")
-      ->check(CLI::IsMember(suiteNames()));
-  command
-      ->add_option(
-          "--rival", options->rival,
-          "icet: beside the VDI, volume rendering of the same volume, camera and devices, composited by "
-          "IceT; under mpirun, on one rank too. Takes the volume's memory twice. See below")
-      ->check(CLI::IsMember({"icet"}));
-  const char* const ranksGroup = "Suite ranks";
-  command
-      ->add_option("--scaling", options->scalings,
-                   "strong: --size is shared by all ranks; weak: each rank has --size-per-rank")
-      ->check(CLI::IsMember({"strong", "weak"}))
-      ->capture_default_str()
-      ->group(ranksGroup);
-  command
-      ->add_option("--layouts", options->layouts,
-                   "layouts to run, instead of --layout. Slabs are one block a rank; others cut the fixed "
-                   "volume into --blocks and a growing one into blocks of that size")
-      ->type_name("LAYOUT")
-      ->capture_default_str()
-      ->group(ranksGroup);
-  command
-      ->add_option("--rank-counts", options->rankCounts,
-                   "how many of mpirun's ranks to run on; default: 1, 2, 4 and so on, and all")
-      ->type_name("N")
-      ->group(ranksGroup);
-  command
-      ->add_option(
-          "--size-per-rank", options->sizePerRank,
-          "values per axis that each rank has in weak scaling; default: half of --size on each axis, "
-          "so that 8 ranks have the fixed volume")
-      ->type_name("XxYxZ")
-      ->group(ranksGroup);
-  const char* const viewpointsGroup = "Suite viewpoints";
-  command->add_option("--viewpoints", options->viewpoints, "random viewpoints; --seed says which")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str()
-      ->group(viewpointsGroup);
-  command->add_option("--turn", options->turn, "degrees that the other four viewpoints are turned by")
-      ->capture_default_str()
-      ->group(viewpointsGroup);
-  command
-      ->add_option(
-          "--zooms", options->zooms,
-          "by how much nearer than the view's camera all viewpoints are; 4: a quarter of the width is "
-          "seen")
-      ->capture_default_str()
-      ->group(viewpointsGroup);
-  command->add_option("--margins", options->margins, "one or several, instead of --margin")
-      ->capture_default_str()
-      ->group(viewpointsGroup);
-  command
-      ->add_option(
-          "--list-resolutions", options->listResolutions,
-          "of the VDIs' pictures, one or several; the views are of --resolution, as VDIs are by default")
-      ->type_name("WxH")
-      ->group(viewpointsGroup);
-  command
-      ->add_option("--sets", options->sets,
-                   "VDIs in a set: 1, 2 (front and back), 4 (a tetrahedron) or 6 (front, back and sides)")
-      ->capture_default_str()
-      ->group(viewpointsGroup);
-  command
-      ->add_option(
-          "--compare", options->comparison,
-          "two JSON files, before and after: tells what got slower by more than 10 % and the spread, "
-          "larger by more than 5 %, or less true; exit status 1 if anything did")
-      ->expected(2)
-      ->type_name("FILE FILE");
-  command
-      ->add_option("-o,--output", options->output,
-                   "JSON file; default: standard output, and the table goes to standard error")
-      ->check(apps::requireFileName)
-      ->type_name("FILE");
+  addInputOptions(*command, *options);
+  addMeasuringOptions(*command, *options);
+  addSuiteOptions(*command, *options);
+  addRanksOptions(*command, *options);
+  addViewpointsOptions(*command, *options);
+  addOutputOptions(*command, *options);
   command->callback([options, &job] {
     job = {[options](const comm::Communicator& world) { run(*options, world); }, true};
   });

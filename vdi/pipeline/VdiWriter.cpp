@@ -18,14 +18,14 @@ namespace vdi::detail {
 
 namespace {
 
-/// What a rank says of a part of a chunk that it has.
+/// A rank's note on its part of a chunk.
 struct PartNote {
   std::uint64_t firstList;
   std::uint64_t listCount;
   std::uint64_t supersegmentCount;
 };
 
-/// And of a chunk that it has encoded.
+/// A rank's note on a chunk that it has encoded.
 struct ChunkNote {
   std::uint64_t index;
   io::ChunkEntry entry;
@@ -38,7 +38,7 @@ struct NoteOf {
   Note note;
 };
 
-/// Collective: all ranks' notes, on all ranks, in rank order.
+/// Collective: returns all ranks' notes, in rank order.
 template <typename Note>
 std::vector<NoteOf<Note>> shareNotes(const comm::Communicator& comm, std::span<const Note> mine) {
   const comm::Gathered all = comm.allGather(std::as_bytes(mine), sizeof(Note));
@@ -78,7 +78,7 @@ VdiWriter<Segment>::VdiWriter(const comm::Communicator& comm, int root, const st
   });
 }
 
-/// Of the chunk that a list is in: the first list behind it.
+/// End of the chunk that contains a list.
 template <typename Segment>
 std::uint64_t VdiWriter<Segment>::chunkEnd(std::uint64_t list) const {
   return std::min((list / io::listsPerChunk + 1) * io::listsPerChunk, listCount_);
@@ -116,7 +116,7 @@ void VdiWriter<Segment>::append(Part& part, const ListsOf<Segment>& lists, std::
   part.lists.segments.insert(part.lists.segments.end(), segments.begin(), segments.end());
 }
 
-/// Of one chunk. Bands that end in the middle of it make it whole one after the other.
+/// Adds lists of one chunk. Bands that end within it complete it one after the other.
 template <typename Segment>
 void VdiWriter<Segment>::addToPart(std::uint64_t firstList, const ListsOf<Segment>& lists, std::size_t first,
                                    std::size_t last) {
@@ -139,7 +139,7 @@ void VdiWriter<Segment>::encode(const ListsOf<Segment>& lists, std::size_t first
                    [&](io::EncodedChunk chunk) { keep(index++, std::move(chunk)); });
 }
 
-/// Where a chunk lies is known once all chunks before it are encoded.
+/// A chunk's offset is known once all chunks before it are encoded.
 template <typename Segment>
 void VdiWriter<Segment>::keep(std::uint64_t index, io::EncodedChunk chunk) {
   if (file_ && file_->takesOffsets() && index == firstChunks_) {
@@ -152,9 +152,10 @@ void VdiWriter<Segment>::keep(std::uint64_t index, io::EncodedChunk chunk) {
   chunks_.push_back({index, chunk.entry, std::move(chunk.bytes)});
 }
 
-/// Collective: chunks that several ranks have lists of are encoded by who has the first one.
+/// Collective: returns all ranks' parts in the order of their lists. The rank with a chunk's first part
+/// encodes the chunk.
 template <typename Segment>
-void VdiWriter<Segment>::joinParts() {
+std::vector<typename VdiWriter<Segment>::Route> VdiWriter<Segment>::routeParts() const {
   std::vector<PartNote> mine;
   for (const Part& part : parts_) {
     mine.push_back({part.firstList, part.lists.listCount(), part.lists.segments.size()});
@@ -162,70 +163,85 @@ void VdiWriter<Segment>::joinParts() {
   std::vector<NoteOf<PartNote>> notes = shareNotes<PartNote>(comm_, mine);
   std::stable_sort(notes.begin(), notes.end(),
                    [](const auto& a, const auto& b) { return a.note.firstList < b.note.firstList; });
-  std::sort(parts_.begin(), parts_.end(),
-            [](const Part& a, const Part& b) { return a.firstList < b.firstList; });
-
-  // In the order of the lists; the first part of a chunk says who gets the others.
-  std::vector<int> to(notes.size());
+  std::vector<Route> routes;
   std::uint64_t expected = 0;
-  for (std::size_t i = 0; i < notes.size(); ++i) {
-    const PartNote& note = notes[i].note;
+  for (const auto& [rank, note] : notes) {
     const bool begins = note.firstList % io::listsPerChunk == 0;
-    const bool chunkIsWhole = i == 0 || expected == chunkEnd(notes[i - 1].note.firstList);
+    const bool chunkIsWhole = routes.empty() || expected == chunkEnd(routes.back().firstList);
     if (begins != chunkIsWhole || (!begins && note.firstList != expected)) failCoverage(expected);
-    to[i] = begins ? notes[i].rank : to[i - 1];
+    routes.push_back(
+        {rank, begins ? rank : routes.back().to, note.firstList, note.listCount, note.supersegmentCount});
     expected = note.firstList + note.listCount;
   }
-  if (!notes.empty() && expected != chunkEnd(notes.back().note.firstList)) failCoverage(expected);
+  if (!routes.empty() && expected != chunkEnd(routes.back().firstList)) failCoverage(expected);
+  return routes;
+}
 
+/// Collective: sends this rank's parts, and returns those from other ranks, in the order of their lists.
+template <typename Segment>
+std::vector<typename VdiWriter<Segment>::Part> VdiWriter<Segment>::exchangeParts(
+    std::span<const Route> routes) {
   std::vector<Part> received;
   comm_.together([&] {
-    for (std::size_t i = 0; i < notes.size(); ++i) {
-      if (to[i] != comm_.rank() || notes[i].rank == comm_.rank()) continue;
-      received.push_back({notes[i].note.firstList, {}});
-      received.back().lists.offsets.resize(notes[i].note.listCount + 1);
-      received.back().lists.segments.resize(notes[i].note.supersegmentCount);
+    for (const Route& route : routes) {
+      if (route.to != comm_.rank() || route.from == comm_.rank()) continue;
+      received.push_back({route.firstList, {}});
+      received.back().lists.offsets.resize(route.listCount + 1);
+      received.back().lists.segments.resize(route.supersegmentCount);
     }
   });
   comm::Messages messages(comm_);
   auto nextReceived = received.begin();
   auto nextOwn = parts_.begin();
-  for (std::size_t i = 0; i < notes.size(); ++i) {
-    const bool own = notes[i].rank == comm_.rank();
-    if (own && to[i] != comm_.rank()) {
-      messages.send(to[i], std::as_bytes(std::span(nextOwn->lists.offsets)));
-      messages.send(to[i], std::as_bytes(std::span(nextOwn->lists.segments)));
+  for (const Route& route : routes) {
+    const bool own = route.from == comm_.rank();
+    if (own && route.to != comm_.rank()) {
+      messages.send(route.to, std::as_bytes(std::span(nextOwn->lists.offsets)));
+      messages.send(route.to, std::as_bytes(std::span(nextOwn->lists.segments)));
       bytesSent_ += nextOwn->lists.offsets.size() * sizeof(std::uint32_t) +
                     nextOwn->lists.segments.size() * sizeof(Segment);
-    } else if (!own && to[i] == comm_.rank()) {
-      messages.receive(notes[i].rank, std::as_writable_bytes(std::span(nextReceived->lists.offsets)));
-      messages.receive(notes[i].rank, std::as_writable_bytes(std::span(nextReceived->lists.segments)));
+    } else if (!own && route.to == comm_.rank()) {
+      messages.receive(route.from, std::as_writable_bytes(std::span(nextReceived->lists.offsets)));
+      messages.receive(route.from, std::as_writable_bytes(std::span(nextReceived->lists.segments)));
       ++nextReceived;
     }
     if (own) ++nextOwn;
   }
   messages.wait();
-
-  comm_.together([&] {
-    nextReceived = received.begin();
-    nextOwn = parts_.begin();
-    Part whole;
-    for (std::size_t i = 0; i < notes.size(); ++i) {
-      const bool own = notes[i].rank == comm_.rank();
-      if (to[i] == comm_.rank()) {
-        if (notes[i].note.firstList % io::listsPerChunk == 0) whole = {notes[i].note.firstList, {}};
-        const Part& part = own ? *nextOwn : *nextReceived++;
-        append(whole, part.lists, 0, part.lists.listCount());
-        if (whole.end() == chunkEnd(whole.firstList))
-          encode(whole.lists, 0, whole.lists.listCount(), whole.firstList);
-      }
-      if (own) ++nextOwn;
-    }
-    parts_.clear();
-  });
+  return received;
 }
 
-/// Collective.
+/// Joins and encodes the chunks whose parts come to this rank.
+template <typename Segment>
+void VdiWriter<Segment>::encodeJoined(std::span<const Route> routes, std::span<const Part> received) {
+  auto nextReceived = received.begin();
+  auto nextOwn = parts_.begin();
+  Part whole;
+  for (const Route& route : routes) {
+    const bool own = route.from == comm_.rank();
+    if (route.to == comm_.rank()) {
+      if (route.firstList % io::listsPerChunk == 0) whole = {route.firstList, {}};
+      const Part& part = own ? *nextOwn : *nextReceived++;
+      append(whole, part.lists, 0, part.lists.listCount());
+      if (whole.end() == chunkEnd(whole.firstList))
+        encode(whole.lists, 0, whole.lists.listCount(), whole.firstList);
+    }
+    if (own) ++nextOwn;
+  }
+  parts_.clear();
+}
+
+/// Collective: the rank that has a shared chunk's first list collects and encodes it.
+template <typename Segment>
+void VdiWriter<Segment>::joinParts() {
+  std::sort(parts_.begin(), parts_.end(),
+            [](const Part& a, const Part& b) { return a.firstList < b.firstList; });
+  const std::vector<Route> routes = routeParts();
+  const std::vector<Part> received = exchangeParts(routes);
+  comm_.together([&] { encodeJoined(routes, received); });
+}
+
+/// Collective: returns all ranks' chunks.
 template <typename Segment>
 typename VdiWriter<Segment>::Table VdiWriter<Segment>::shareTable() const {
   std::vector<ChunkNote> mine;
@@ -251,8 +267,8 @@ typename VdiWriter<Segment>::Table VdiWriter<Segment>::shareTable() const {
   return table;
 }
 
-/// The root's: the file gets its size and its head. Returns what others can open it by; empty where they
-/// needn't, or can't.
+/// On the root: sets the file's size and writes its head. Returns the path by which others open it; empty if
+/// they need not or cannot.
 template <typename Segment>
 std::filesystem::path VdiWriter<Segment>::prepareFile(const Table& table) {
   const std::vector<std::byte> head = io::encodeHead(header_, table.entries);
@@ -264,7 +280,7 @@ std::filesystem::path VdiWriter<Segment>::prepareFile(const Table& table) {
   return others && file_->takesOffsets() ? file_->share() : std::filesystem::path();
 }
 
-/// What this rank has, into the root's file.
+/// Writes this rank's chunks into the root's file.
 template <typename Segment>
 void VdiWriter<Segment>::writeOwn(const Table& table, io::SharedOutput* shared) {
   for (Chunk& chunk : chunks_) {
@@ -281,7 +297,7 @@ void VdiWriter<Segment>::writeOwn(const Table& table, io::SharedOutput* shared) 
   if (shared != nullptr) shared->finish();
 }
 
-/// Collective: what its owner couldn't write, in the file's order.
+/// Collective: writes the chunks that their owners could not write, in the file's order.
 template <typename Segment>
 void VdiWriter<Segment>::writeByRoot(const Table& table, std::span<const std::uint64_t> writesItself) {
   const auto left = [&](std::size_t i) {
@@ -297,7 +313,7 @@ void VdiWriter<Segment>::writeByRoot(const Table& table, std::span<const std::ui
     }
     received.resize(largest);
   });
-  // Where the root can't go on it still takes what the others send, or they would wait for ever.
+  // If the root fails, it still receives the others' chunks; otherwise they would wait for ever.
   std::exception_ptr error;
   auto own = chunks_.begin();
   for (std::size_t i = 0; i < table.owners.size(); ++i) {

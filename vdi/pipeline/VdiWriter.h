@@ -53,6 +53,14 @@ class VdiWriter {
     ListsOf<Segment> lists;
     std::uint64_t end() const { return firstList + lists.listCount(); }
   };
+  /// A part of a chunk, and the rank that encodes the chunk.
+  struct Route {
+    int from = 0;
+    int to = 0;
+    std::uint64_t firstList = 0;
+    std::uint64_t listCount = 0;
+    std::uint64_t supersegmentCount = 0;
+  };
   /// A chunk that this rank has encoded.
   struct Chunk {
     std::uint64_t index = 0;
@@ -72,6 +80,9 @@ class VdiWriter {
   void addToPart(std::uint64_t firstList, const ListsOf<Segment>& lists, std::size_t first, std::size_t last);
   void encode(const ListsOf<Segment>& lists, std::size_t first, std::size_t last, std::uint64_t firstList);
   void keep(std::uint64_t index, io::EncodedChunk chunk);
+  std::vector<Route> routeParts() const;
+  std::vector<Part> exchangeParts(std::span<const Route> routes);
+  void encodeJoined(std::span<const Route> routes, std::span<const Part> received);
   void joinParts();
   Table shareTable() const;
   std::filesystem::path prepareFile(const Table& table);
