@@ -29,7 +29,7 @@ Camera readCamera(const std::filesystem::path& path) {
     camera.parallelScale = file.number("parallel_scale");
   }
   try {
-    (void)View(camera, 1, 1);  // checks it
+    (void)View(camera, 1, 1);  // validates the camera
   } catch (const Error& error) {
     file.fail(error.what());
   }
@@ -60,7 +60,7 @@ Camera turned(const Camera& camera, double azimuthDegrees, double elevationDegre
   const glm::dvec3 back = -view.forward() * std::cos(angle) + view.up() * std::sin(angle);
   result.position = result.focalPoint + back * distance;
   const glm::dvec3 up = view.up() * std::cos(angle) + view.forward() * std::sin(angle);
-  // The sine of the angle between view-up and view direction, signed by whether the picture stays upright.
+  // The sine of the angle between view-up and view direction, negative if the picture would turn over.
   if (glm::dot(glm::normalize(result.viewUp), up) < 1e-3) result.viewUp = up;
   return result;
 }

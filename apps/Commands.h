@@ -1,5 +1,5 @@
-// The subcommands of `vdi`. Each adds its options to the program; choosing it on the command line fills in
-// the job, which runs once the whole command line has been understood.
+// The subcommands of `vdi`. Each adds its options to the program. Selecting it on the command line sets the
+// job, which runs after the whole command line is parsed.
 #pragma once
 
 #include <functional>
@@ -14,7 +14,7 @@ namespace vdi::apps {
 
 struct Job {
   std::function<void(const comm::Communicator& world)> run;
-  bool collective = false;  // may run on several ranks, all of which call it
+  bool collective = false;  // may run on several ranks, which all call it
 };
 
 void addGenerate(CLI::App& app, Job& job);

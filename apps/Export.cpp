@@ -1,4 +1,4 @@
-// vdi export: VDIs in one page for any browser.
+// vdi export: puts VDIs into one page for any browser.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -28,7 +28,7 @@ void exportPage(const ExportOptions& options) {
   std::uintmax_t inputBytes = 0;
   for (const std::filesystem::path& file : files) {
     inputs.push_back({"a VDI", file});
-    std::error_code error;  // one that isn't there is told when it's read
+    std::error_code error;  // a missing file is reported when it is read
     const std::uintmax_t bytes = std::filesystem::file_size(file, error);
     if (!error) inputBytes += bytes;
   }

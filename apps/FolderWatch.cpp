@@ -14,7 +14,7 @@ bool isDigit(char c) {
   return c >= '0' && c <= '9';
 }
 
-/// The digits at `at`, without zeros in front.
+/// The digits at `at`, without leading zeros.
 std::string numberAt(const std::string& text, std::size_t& at) {
   while (at + 1 < text.size() && text[at] == '0' && isDigit(text[at + 1])) ++at;
   const std::size_t begin = at;
@@ -57,7 +57,7 @@ std::vector<std::filesystem::path> FolderWatch::changed() {
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
     const std::filesystem::path& file = entries->path();
     if (file.extension() != ".vdi" || file.filename().string().starts_with('.')) continue;
-    std::error_code gone;  // between two looks
+    std::error_code gone;  // the file may vanish between two listings
     const Look look{std::filesystem::file_size(file, gone), std::filesystem::last_write_time(file, gone)};
     if (gone) continue;
     const auto before = known_.find(file);

@@ -1,5 +1,5 @@
-// Which .vdi files of a folder are new, found by looking again and again: that works on network file systems,
-// where nobody is told of what other machines write.
+// Finds new .vdi files in a folder by listing it repeatedly. This works on network file systems, which do not
+// report what other machines write.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@ namespace vdi::apps {
 
 class FolderWatch {
  public:
-  /// Throws Error{Io} for what isn't a folder that can be read.
+  /// Throws Error{Io} for anything but a readable folder.
   explicit FolderWatch(std::filesystem::path folder);
 
-  /// Files named *.vdi that weren't there when this was called last, or have another size or another time
-  /// since. In the order of their names, where numbers count as numbers. What begins with a dot is left out:
-  /// io::writeAtomically may leave such. Throws Error{Io} while the folder can't be read.
+  /// Files named *.vdi that are new since the last call, or have changed their size or time since. They are
+  /// ordered by name, where numbers count as numbers. Names that begin with a dot are skipped:
+  /// io::writeAtomically may leave such files. Throws Error{Io} while the folder cannot be read.
   std::vector<std::filesystem::path> changed();
 
  private:
@@ -30,7 +30,7 @@ class FolderWatch {
   std::map<std::filesystem::path, Look> known_;
 };
 
-/// "b2" before "b10".
+/// Orders "b2" before "b10".
 bool comesBefore(const std::string& a, const std::string& b);
 
 }  // namespace vdi::apps

@@ -14,7 +14,7 @@ namespace vdi::apps {
 
 namespace {
 
-/// When the file was written, on the clock of frames.
+/// The file's time, on the clock of frames.
 stream::Clock::time_point writtenAt(const std::filesystem::path& file) {
   std::error_code error;
   const auto time = std::filesystem::last_write_time(file, error);
@@ -96,14 +96,14 @@ void FrameFiles::look() {
   }
 }
 
-/// What isn't whole yet is found again when it changes.
+/// An incomplete file is found again when it changes.
 void FrameFiles::tell(const std::filesystem::path& file, const std::string& what) {
   std::string& said = told_[file];
   if (said.empty()) options_.log(what + "; it's left out");
   said = what;
 }
 
-/// All of them are in the series. The last one that is whole is shown.
+/// Adds all files to the series, and shows the last one that is complete.
 void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
   stream::Series entries;
   for (const std::filesystem::path& file : files) {
@@ -124,7 +124,7 @@ void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
   }
 }
 
-/// False: the file isn't sound, or gone.
+/// Returns false if the file is bad or gone.
 bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::FramePtr)>& take) {
   const std::filesystem::path& file = series_[index];
   try {

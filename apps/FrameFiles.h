@@ -1,4 +1,4 @@
-// .vdi files as the frames of a server: those of a list, or those that appear in a folder.
+// .vdi files as the frames of a server: the files of a list, or those that appear in a folder.
 #pragma once
 
 #include <chrono>
@@ -23,14 +23,14 @@
 namespace vdi::apps {
 
 /// Reads, checks and encodes files on a thread of its own, and hands them to a server as the frames of one
-/// series. A frame's id is its index there.
+/// series. A frame's id is its index in the series.
 class FrameFiles {
  public:
   struct Options {
     std::vector<std::filesystem::path> files;     // a finished series; or
-    std::filesystem::path folder;                 // whose files are its series, and
-    bool follows = true;                          // that is watched for new ones
-    std::chrono::milliseconds interval{250};      // between two looks at the folder
+    std::filesystem::path folder;                 // whose files are the series, and
+    bool follows = true;                          // which is watched for new files
+    std::chrono::milliseconds interval{250};      // between two listings of the folder
     std::function<void(const std::string&)> log;  // one line, from any thread
   };
   explicit FrameFiles(Options options);
@@ -38,8 +38,8 @@ class FrameFiles {
   FrameFiles(const FrameFiles&) = delete;
   FrameFiles& operator=(const FrameFiles&) = delete;
 
-  /// Begins, once. The server outlives this. Throws Error: Io for a folder or a file that can't be read,
-  /// Format for a file that isn't a VDI; those of a folder are told and left out.
+  /// Starts once. The server must outlive this. Throws Error: Io for a folder or a file that cannot be read,
+  /// Format for a file that is not a VDI; bad files of a folder are logged and skipped.
   void start(stream::Server& server);
   /// For ServerOptions::show.
   void show(std::uint32_t index);
@@ -56,8 +56,8 @@ class FrameFiles {
   stream::Server* server_ = nullptr;
   std::optional<FolderWatch> watch_;
   std::vector<std::filesystem::path> series_;
-  std::list<stream::FramePtr> kept_;  // the last few that were shown
-  /// Files that weren't whole, and what was said of each.
+  std::list<stream::FramePtr> kept_;  // the last few frames shown
+  /// Files that were incomplete, with the message logged for each.
   std::map<std::filesystem::path, std::string> told_;
   std::string folderTrouble_;
 

@@ -1,4 +1,4 @@
-// vdi generate: a volume to a .vdi file, under mpirun too.
+// vdi generate: makes a .vdi file from a volume, also under mpirun.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -24,7 +24,7 @@ namespace vdi::apps {
 namespace {
 
 struct Options {
-  std::vector<std::string> raws;  // sidecars, of time steps; none: a procedural field
+  std::vector<std::string> raws;  // sidecars of time steps; none: a procedural field
   std::string field = "turbulence";
   DecompositionOptions decomposition;
   ViewOptions view;
@@ -40,7 +40,7 @@ struct Options {
   std::size_t steps() const { return std::max<std::size_t>(raws.size(), 1); }
   std::uint64_t number(std::size_t index) const { return step + index; }
   double timeOf(std::size_t index) const { return time + static_cast<double>(index) * interval; }
-  /// Of the index-th step: picture.png of step 7 is picture_0007.png, when there are several.
+  /// The path for the index-th step: with several steps, picture.png of step 7 is picture_0007.png.
   std::filesystem::path numbered(const std::filesystem::path& path, std::size_t index) const {
     return steps() == 1 ? path : withSuffix(path, fmt::format("{:04}", number(index)));
   }
@@ -62,7 +62,7 @@ void printReport(const std::vector<RankReport>& reports) {
   }
 }
 
-/// What's the same in all time steps.
+/// The parameters that all time steps share.
 struct Shot {
   Camera camera;
   TransferFunction function;
@@ -79,7 +79,7 @@ void printOutcome(const GenerateSettings& settings, std::uint64_t supersegments,
   printReport(generator.reports());
 }
 
-/// With a picture of it, which takes the whole VDI.
+/// Also writes a picture of the VDI, which needs the whole VDI on the root.
 void writeVdiFiles(const Options& options, std::size_t index, const Shot& shot, Vdi& vdi) {
   vdi.coloring->array = shot.array;
   vdi.time = options.timeOf(index);
@@ -88,7 +88,7 @@ void writeVdiFiles(const Options& options, std::size_t index, const Shot& shot, 
   io::writePng(options.numbered(options.flat, index), io::toPicture(flatten(vdi)));
 }
 
-/// What the root writes, the others wait for: all ranks fail when it can't.
+/// The others wait for the root's writing: all ranks fail if it fails.
 void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGenerator& generator,
            const comm::Communicator& world) {
   if (options.wantsVdi() && options.flat.empty() && !options.output.empty()) {
@@ -112,7 +112,7 @@ void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGener
   });
 }
 
-/// What can be known before anything takes time. Throws Error.
+/// Checks everything that is known before the work starts. Throws Error.
 void requireSound(const Options& options) {
   const std::size_t last = options.steps() - 1;
   if (options.number(last) < last) {
@@ -123,7 +123,7 @@ void requireSound(const Options& options) {
   }
 }
 
-/// Throws Error if something can't be written, or would be written over something that's read.
+/// Throws Error if an output cannot be written, or would overwrite an input.
 void requireOutputs(const Options& options) {
   std::vector<NamedFile> inputs{{"--camera", options.view.camera.file},
                                 {"--transfer-function", options.quality.transferFunction}};
@@ -131,7 +131,7 @@ void requireOutputs(const Options& options) {
     inputs.push_back({"--raw", sidecar});
     try {
       inputs.push_back({"the raw volume", readSidecar(sidecar).data});
-    } catch (const Error&) {  // which is told when it's this step's turn
+    } catch (const Error&) {  // it is reported when this step's turn comes
     }
   }
   std::vector<NamedFile> outputs;
@@ -145,7 +145,7 @@ void requireOutputs(const Options& options) {
   requireOutputs(outputs, inputs);
 }
 
-/// Makes the VDIs of all time steps that can be read. Collective, as its functions are.
+/// Makes the VDIs of all time steps that can be read. All functions are collective.
 class Series {
  public:
   Series(const Options& options, const comm::Communicator& world, std::shared_ptr<gpu::Device> device)
@@ -154,8 +154,8 @@ class Series {
         device_(std::move(device)),
         generator_(device_, comm::Communicator::world(), generatorOptionsFromEnvironment(world)) {}
 
-  /// Throws the error of the first step that can't be read, once all others are written. The first step of
-  /// all must be sound: camera and transfer function are made for it.
+  /// Throws the error of the first step that cannot be read, after writing all others. The very first step
+  /// must be valid: it determines camera and transfer function.
   void make(const GenerateSettings& settings) {
     Shot shot;
     shot.settings = settings;
@@ -167,7 +167,7 @@ class Series {
       shot.camera = makeCamera(options_.view, generator_.scene());
       shot.function = makeTransferFunction(options_.quality, generator_.scene(), generator_.scalarRange());
     });
-    // While a step's frame is made, the next one's values get to the device, and those behind it are read.
+    // While a step's frame is made, the next one's values travel to the device, and the one after it is read.
     startReading(1);
     for (std::size_t index = 0; index < options_.steps();) {
       std::size_t next = index + 1;
@@ -194,7 +194,7 @@ class Series {
     world_.together([&] { blocks = reading_.get(); });
     return blocks;
   }
-  /// False: the step is bad. Starts to read the one behind it in any case.
+  /// Returns false if the step is bad. Starts to read the step after it in any case.
   bool setNext(std::size_t index) {
     std::exception_ptr bad;
     try {
@@ -202,7 +202,7 @@ class Series {
     } catch (const Error& error) {
       const std::string what = fmt::format("time step {}: {}", options_.number(index), error.what());
       bad = std::make_exception_ptr(Error(error.code(), what));
-    } catch (...) {  // on this rank; Error on the others
+    } catch (...) {  // the read error on this rank; Error on the others
       bad = std::current_exception();
     }
     if (!firstBad_) firstBad_ = bad;
@@ -215,7 +215,7 @@ class Series {
   std::shared_ptr<gpu::Device> device_;
   VdiGenerator generator_;
   std::exception_ptr firstBad_;
-  std::future<std::vector<Block>> reading_;  // waits at its end, so it comes last
+  std::future<std::vector<Block>> reading_;  // waits in its destructor, so it comes last
 };
 
 void generate(const Options& options, const comm::Communicator& world) {

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t nameColumn = 30;
 constexpr std::size_t textWidth = 74;
 
-/// Breaks at blanks; what follows a break is indented as the line itself.
+/// Breaks lines at blanks; continued lines have the indentation of their first line.
 std::string wrapped(const std::string& line) {
   const std::size_t first = line.find_first_not_of(' ');
   const std::string indent(first == std::string::npos ? 0 : first, ' ');

@@ -1,4 +1,4 @@
-// vdi compare and info: what's in files that are there.
+// vdi compare and info: examines existing files.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 

@@ -33,10 +33,11 @@ std::string joined(const std::set<std::string>& names) {
 json readJson(const std::filesystem::path& path) {
   const auto fail = [&](const std::string& what) { throw Error(ErrorCode::Format, what, path.string()); };
   const io::InputFile file(path);
-  constexpr std::uint64_t maxBytes = std::uint64_t{256} << 20;  // a picture or volume given by mistake
+  // guards against a picture or volume given by mistake
+  constexpr std::uint64_t maxBytes = std::uint64_t{256} << 20;
   if (file.size() > maxBytes) fail(fmt::format("{} bytes are too many for JSON", file.size()));
   const std::vector<std::byte> bytes = file.readAll();
-  std::vector<std::set<std::string>> open;  // the names so far of each object that is being read
+  std::vector<std::set<std::string>> open;  // the names so far in each object being read
   const auto noteNames = [&](int, json::parse_event_t event, const json& value) {
     if (event == json::parse_event_t::object_start) open.emplace_back();
     if (event == json::parse_event_t::object_end) open.pop_back();

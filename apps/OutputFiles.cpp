@@ -13,7 +13,7 @@ namespace vdi::apps {
 void requireOutputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs) {
   std::map<std::filesystem::path, std::string> origins;
   for (const NamedFile& input : inputs) {
-    std::error_code error;  // one that isn't there is told when it's read
+    std::error_code error;  // a missing file is reported when it is read
     origins.emplace(std::filesystem::canonical(input.path, error), input.origin);
   }
   for (const NamedFile& output : outputs) {

@@ -1,4 +1,4 @@
-// Checks of what a command will write, made before it computes anything.
+// Checks of a command's outputs, made before it computes anything.
 #pragma once
 
 #include <filesystem>
@@ -7,14 +7,14 @@
 
 namespace vdi::apps {
 
-/// A file and where its name comes from, such as "--flat", for messages.
+/// A file and the origin of its name, such as "--flat", for messages.
 struct NamedFile {
   std::string origin;
   std::filesystem::path path;
 };
 
-/// Throws Error: Io if one of `outputs` can't be written (as io::requireWritable), InvalidArgument if two of
-/// them are one file or one is among `inputs`. Devices and pipes may be written twice.
+/// Throws Error: Io if one of `outputs` cannot be written (as io::requireWritable), InvalidArgument if two of
+/// them are the same file or one is among `inputs`. Devices and pipes may be written twice.
 void requireOutputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs);
 
 }  // namespace vdi::apps

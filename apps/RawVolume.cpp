@@ -14,7 +14,7 @@ namespace vdi::apps {
 
 namespace {
 
-constexpr double maxBytes = 9.0e18;  // what file offsets can express
+constexpr double maxBytes = 9.0e18;  // the limit of file offsets
 
 synthetic::Lattice readLattice(const JsonFile& sidecar) {
   synthetic::Lattice lattice;

@@ -15,11 +15,11 @@ struct RawVolume {
   std::uint64_t skip = 0;  // bytes before the first value
 };
 
-/// Throws Error: Io if a file is missing; Format if the sidecar isn't JSON, lacks a field, has an unknown or
-/// impossible one, or if the raw file's size isn't the one that it asks for.
+/// Throws Error: Io if a file is missing; Format if the sidecar is not JSON, lacks a field, or has an unknown
+/// or impossible one, or if the raw file's size differs from the sidecar's.
 RawVolume readSidecar(const std::filesystem::path& path);
 
-/// The values of one part, read from the file; the block owns them. Throws Error{Io}.
+/// Reads the values of one part from the file; the block owns them. Throws Error{Io}.
 Block readPart(const RawVolume& volume, const synthetic::Part& part);
 
 }  // namespace vdi::apps

@@ -1,4 +1,4 @@
-// vdi receive: a viewer without a window, that keeps or draws what a server sends.
+// vdi receive: a viewer without a window that stores or draws a server's frames.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -37,7 +37,7 @@ struct ReceiveOptions {
   std::string authority;
 };
 
-/// Keeps and draws what comes.
+/// Stores and draws received frames.
 class Recorder {
  public:
   explicit Recorder(const ReceiveOptions& options) : options_(options) {
@@ -47,7 +47,7 @@ class Recorder {
 
   std::uint64_t count() const { return count_; }
 
-  /// A file that isn't sound is told, and counts for nothing.
+  /// A bad file is reported, and does not count.
   void take(const stream::Received& received) {
     const stream::Level& level = received.level;
     std::optional<Vdi> vdi;
@@ -85,15 +85,15 @@ class Recorder {
   std::uint64_t count_ = 0;
 };
 
-/// Of a finished series all frames are asked for, one after the other.
+/// Requests all frames of a finished series, one after the other.
 class SeriesWalk {
  public:
-  /// Whether `received` is to be kept.
+  /// Whether to keep `received`.
   bool wants(const stream::Received& received) const { return !next_ || received.level.frame == *next_; }
   bool isDone(const stream::Client::Standing& standing) const {
     return next_ && standing.series && *next_ >= *standing.series;
   }
-  /// Asks for the first frame, once there is a finished series.
+  /// Requests the first frame, once there is a finished series.
   void begin(stream::Client& client, const stream::Client::Standing& standing) {
     if (next_ || !standing.isConnected || !standing.series || standing.state.phase != stream::Phase::Ended)
       return;

@@ -1,4 +1,4 @@
-// vdi render: a VDI from new viewpoints, as PNG.
+// vdi render: renders a VDI from new viewpoints, as PNG.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -29,7 +29,7 @@ struct RenderOptions {
   std::vector<double> clip;  // 6 for each plane
 };
 
-/// The picture of one of the azimuths: with several their degrees are added to its name.
+/// The path of an azimuth's picture; with several azimuths, the degrees are added to its name.
 std::filesystem::path pictureOf(const RenderOptions& options, double azimuth) {
   if (options.azimuths.size() == 1) return options.output;
   return withSuffix(options.output, fmt::format("{:g}deg", azimuth));

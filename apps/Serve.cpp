@@ -1,4 +1,4 @@
-// vdi serve: VDIs for browsers and other programs, over the network.
+// vdi serve: offers VDIs to browsers and other programs, over the network.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -39,7 +39,7 @@ void say(const std::string& line) {
   fmt::print(stderr, "vdi: {}\n", line);
 }
 
-/// Signals that end a server, which have to be blocked before the first thread starts.
+/// Signals that end a server; they must be blocked before the first thread starts.
 class EndSignals {
  public:
   EndSignals() {
@@ -86,7 +86,7 @@ void serve(const ServeOptions& options) {
   server.log = say;
   stream::Server running(std::move(server));
   files.start(running);
-  // The one place where a token is shown, and only one that nobody knows yet.
+  // The only place that shows a token, and only one that nobody knows yet.
   fmt::print("{}\n", known.empty() ? running.link() : running.address());
   std::fflush(stdout);
   endSignals.wait();

@@ -1,4 +1,4 @@
-// Options that say which volume, view and settings: what several subcommands have in common.
+// Options that several subcommands share: the volume, the view and the settings.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ class App;
 
 namespace vdi::apps {
 
-/// How a volume is cut and dealt.
+/// How a volume is cut into blocks and assigned to ranks.
 struct DecompositionOptions {
   std::string size = "96x96x96";
   std::string copies = "1x1x1";
@@ -39,17 +39,17 @@ void addDecompositionOptions(CLI::App& command, DecompositionOptions& options);
 /// share memory. Throws Error.
 std::vector<Block> fieldBlocks(const std::string& field, const DecompositionOptions& options,
                                const std::shared_ptr<gpu::Device>& device, int rank, int ranks);
-/// The blocks of a raw volume; size and type are the sidecar's. Throws Error.
+/// The blocks of a raw volume, with the sidecar's size and type. Throws Error.
 std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOptions& options, int rank,
                              int ranks);
-/// How a VDI's file names the scalars of such blocks: by the field, or by the sidecar's file without its
-/// ending. Throws Error.
+/// The name of such blocks' scalars in a VDI's file: the field's name, or the sidecar's file name without its
+/// extension. Throws Error.
 ScalarArray fieldArray(const std::string& field, const DecompositionOptions& options);
 ScalarArray rawArray(const std::string& sidecar);
 /// "name: description" of each field, for --help.
 std::string fieldsHelp();
 
-/// A camera given by its properties; what isn't given is taken from a file or another camera.
+/// A camera given by its properties; the others come from a file or another camera.
 struct CameraOptions {
   std::string file;
   std::vector<double> position;    // 3, or none
@@ -90,7 +90,7 @@ struct QualityOptions {
   std::string transferFunction = "three-hues";  // a preset or a file
   std::optional<double> unitDistance;
 };
-/// Several: what the command runs over, supersegments and algorithms, is its own affair.
+/// Several: the command itself chooses the supersegments and algorithms to run.
 enum class QualityUse { One, Several };
 void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse use = QualityUse::One);
 GenerateSettings makeSettings(const QualityOptions& options);
@@ -99,17 +99,18 @@ GenerateSettings makeSettings(const QualityOptions& options);
 TransferFunction makeTransferFunction(const QualityOptions& options, const Scene& scene,
                                       const ScalarRange& range);
 
-/// Planes that clip a volume or a view of a VDI: six numbers each, a point and the normal.
+/// Adds the option for planes that clip a volume or a view of a VDI: six numbers each, a point and the
+/// normal.
 void addClipOption(CLI::App& command, std::vector<double>& numbers, const char* group);
 std::vector<ClipPlane> makeClipPlanes(const std::vector<double>& numbers);
 
-/// Of views of a VDI: a name that reconstructionFromString knows.
+/// Adds the option for views of a VDI: a name that reconstructionFromString knows.
 void addReconstructionOption(CLI::App& command, std::string& name);
 
-/// Of several files of one name: folder/picture.png with the suffix 20deg is folder/picture_20deg.png.
+/// Adds a suffix to a path: folder/picture.png with the suffix 20deg is folder/picture_20deg.png.
 std::filesystem::path withSuffix(const std::filesystem::path& path, const std::string& suffix);
 
-/// "640x360" or "96x96x96"; throws Error{InvalidArgument}.
+/// Parses "640x360" or "96x96x96"; throws Error{InvalidArgument}.
 std::vector<int> parseSizes(const std::string& text, std::size_t count);
 
 }  // namespace vdi::apps

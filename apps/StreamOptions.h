@@ -9,16 +9,16 @@ class App;
 
 namespace vdi::apps {
 
-/// --token-file.
+/// Adds --token-file.
 void addTokenOption(CLI::App& command, std::string& file, const std::string& otherwise);
-/// The token in the file, or in the environment variable VDI_TOKEN; empty: neither. Throws Error as
-/// stream::tokenIn and stream::requireToken.
+/// The token in the file, or in the environment variable VDI_TOKEN; empty if there is neither. Throws Error
+/// as stream::tokenIn and stream::requireToken.
 std::string givenToken(const std::string& file);
 
-/// "100Mbit", "1Gbit", "5MB": bytes a second; 0 for an empty text. Decimal prefixes. Throws
-/// Error{InvalidArgument} for what requireRate refuses.
+/// Bytes a second of "100Mbit", "1Gbit" or "5MB", with decimal prefixes; 0 for an empty text. Throws
+/// Error{InvalidArgument} for texts that requireRate rejects.
 double bytesPerSecond(const std::string& rate);
-/// For CLI11: empty, or why it isn't a rate.
+/// A check for CLI11: empty, or the reason why the text is not a rate.
 std::string requireRate(const std::string& text);
 
 }  // namespace vdi::apps

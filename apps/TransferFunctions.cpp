@@ -7,7 +7,7 @@ namespace vdi::apps {
 
 namespace {
 
-/// Over [0, 1].
+/// A function over [0, 1].
 TransferFunction threeHues() {
   return {{{0.0, {0.10, 0.15, 0.60}}, {0.5, {0.90, 0.85, 0.45}}, {1.0, {0.75, 0.10, 0.10}}},
           {{0.0, 0.0}, {0.33, 0.0}, {0.6, 0.2}, {1.0, 0.9}},
@@ -39,7 +39,7 @@ TransferFunction surface() {
           1.0};
 }
 
-/// What [0, 1] is stretched over.
+/// The range to which [0, 1] is stretched.
 ScalarRange widened(const ScalarRange& range) {
   if (!(range.min <= range.max)) return {0.0, 1.0};
   return range.min < range.max ? range : ScalarRange{range.min, range.min + 1.0};

@@ -30,13 +30,13 @@ namespace {
 constexpr int failed = 1;
 constexpr int badUsage = 2;
 
-/// How this rank ends.
+/// The end of this rank's work.
 struct Outcome {
   int status = 0;
-  std::string message;  // empty: nothing to say, or another rank says it
+  std::string message;  // empty: no error, or another rank reports it
 };
 
-/// A line for each environment variable that a user may want.
+/// Returns a line for each environment variable for users.
 std::string environmentHelp() {
   std::string text;
   for (const vdi::EnvironmentVariable& variable : vdi::environmentVariables()) {
@@ -50,7 +50,7 @@ std::string firstLine(std::string_view text) {
   return std::string(text.substr(0, text.find('\n')));
 }
 
-/// What was printed may still be on its way, to a full disk for example.
+/// Printed text may still be buffered, and fail to reach a full disk, for example.
 void requirePrinted() {
   std::cout.flush();
   if (std::cout && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
@@ -68,7 +68,7 @@ Outcome outcomeOf(const CLI::App& app, const CLI::ParseError& error, bool speaks
   return {badUsage, fmt::format("{} (see '{} --help')", firstLine(error.what()), command)};
 }
 
-/// Ranks that were started with other arguments would wait for each other in different places.
+/// Ranks with different arguments would wait for each other in different places.
 void requireEqualArguments(const vdi::comm::Communicator& world, int argc, char** argv) {
   std::string all;
   for (int i = 1; i < argc; ++i) all += std::string(argv[i]) + '\n';
@@ -81,7 +81,7 @@ Outcome runTool(int argc, char** argv) {
       "Volumetric Depth Images: small, view-dependent pictures with depth that can be seen from new "
       "viewpoints",
       "vdi");
-  app.formatter(std::make_shared<vdi::apps::HelpFormatter>());  // subcommands inherit it
+  app.formatter(std::make_shared<vdi::apps::HelpFormatter>());  // inherited by subcommands
   app.require_subcommand(1);
   app.set_version_flag("--version", fmt::format("vdi {} ({})", VDI_VERSION, buildCommit));
   app.footer("Environment variables:\n" + environmentHelp() +
@@ -125,8 +125,8 @@ void say(const std::string& message) {
   fmt::print(stderr, "vdi: {}\n", message);
 }
 
-/// All ranks end with the worst status, and the lowest one that has a message says it. A rank that failed
-/// while others still work ends them after a while: they may wait for it in a call that it never makes.
+/// All ranks end with the worst status, and the lowest one with a message prints it. A rank that failed while
+/// others still work ends them after a while, because they may wait for it in a call that it never makes.
 int leaveTogether(const Outcome& mine) {
   constexpr auto patience = std::chrono::seconds(20);
   int rank = 0;
@@ -151,16 +151,15 @@ int leaveTogether(const Outcome& mine) {
   return -minimum[1];
 }
 
-/// A standard stream that was closed would be the number of the next file that is opened, and what's printed
-/// would end in it. Each gets a descriptor that can't do what the stream is for, so that printing fails.
+/// The next opened file would get the number of a closed standard stream, and printed text would end up in
+/// it. Each closed stream gets a descriptor that does not support its purpose, so that printing fails.
 void occupyStandardStreams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(stream, F_GETFD) < 0) (void)::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
   }
 }
 
-/// Launchers tell their processes so. Alone, there's no need for MPI, whose start takes seconds on some
-/// machines.
+/// Launchers set these variables. A single process needs no MPI, whose start takes seconds on some machines.
 bool startedByMpi() {
   constexpr std::array signs{"OMPI_COMM_WORLD_SIZE", "PMIX_RANK",    "PMI_RANK",    "PMI_SIZE",
                              "MPI_LOCALNRANKS",      "SLURM_PROCID", "PALS_RANKID", "ALPS_APP_PE"};

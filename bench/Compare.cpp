@@ -32,12 +32,12 @@ std::string keyOf(const json& row) {
     if (row.contains(field)) key.append(key.empty() ? 0 : 1, ' ').append(row[field].dump());
   }
   if (row.contains("margin") && row["margin"] != 0.0) key += " margin " + row["margin"].dump();
-  // One suite has rows of several rank counts. Otherwise files of different counts may be compared.
+  // One suite has rows of several rank counts. Otherwise, files of different counts may be compared.
   if (row.contains("scaling") && row.contains("ranks")) key += " on " + row["ranks"].dump();
   return key;
 }
 
-/// null and missing: nothing to compare.
+/// null or missing: nothing to compare.
 double figure(const json& row, const char* field) {
   return row.contains(field) && row[field].is_number() ? row[field].get<double>() : -1.0;
 }
@@ -81,7 +81,8 @@ int compareBenches(const std::filesystem::path& before, const std::filesystem::p
     if (wasBytes >= 0.0 && isBytes > 1.05 * wasBytes) tell(key, "stored_bytes", wasBytes, isBytes);
     const double wasSsim = figure(found->second, "ssim");
     const double isSsim = figure(row, "ssim");
-    if (figure(found->second, "truth_rate") != figure(row, "truth_rate")) continue;  // other pictures
+    // different reference pictures
+    if (figure(found->second, "truth_rate") != figure(row, "truth_rate")) continue;
     if (wasSsim >= 0.0 && isSsim >= 0.0 && isSsim < wasSsim - 0.002) tell(key, "ssim", wasSsim, isSsim);
   }
   fmt::print(out, "{} rows compared, {} figures got worse{}\n", compared, worse,

@@ -1,5 +1,5 @@
-// Boxes that planes separate, and the order in which a camera sees them. Compositing of whole pictures needs
-// it; VDIs don't.
+// Boxes separated by planes, and their order for a camera. Compositing of whole pictures needs it; VDIs do
+// not.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +16,11 @@ namespace vdi::bench {
 /// Planes that separate boxes one by one.
 class SeparatingPlanes {
  public:
-  /// None: there are boxes that no plane orthogonal to an axis separates without cutting one, by more than
-  /// `tolerance`. Empty boxes are never in the way.
+  /// Returns nullopt if there are boxes that no plane orthogonal to an axis separates without cutting one by
+  /// more than `tolerance`. Empty boxes do not count.
   static std::optional<SeparatingPlanes> between(std::span<const Box> boxes, double tolerance);
 
-  /// Indices of all boxes: no ray of the camera meets a box before one that precedes it here.
+  /// Indices of all boxes, such that no ray of the camera meets a box before an earlier one.
   std::vector<int> frontToBack(const Camera& camera) const;
 
  private:
@@ -36,8 +36,8 @@ class SeparatingPlanes {
   std::vector<Node> nodes_;
 };
 
-/// A box of `size` steps cut into `parts` boxes of nearly equal size, always across the longest axis: a k-d
-/// tree's leaves. Some are empty where there are too few steps.
+/// Cuts a box of `size` steps into `parts` boxes of nearly equal size, always across the longest axis: the
+/// leaves of a k-d tree. Some are empty if there are too few steps.
 std::vector<IndexBox> kdCuts(const glm::ivec3& size, int parts);
 
 }  // namespace vdi::bench

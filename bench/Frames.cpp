@@ -15,10 +15,10 @@ namespace {
 struct StageSource {
   const char* name;
   double RankReport::*wall;
-  double RankReport::*device;  // null: reports don't tell
+  double RankReport::*device;  // null: not reported
 };
 
-/// By FrameStage. A device time that reports come to have is named here, and nowhere else.
+/// By FrameStage. A new device time of the reports is named here, and nowhere else.
 constexpr std::array<StageSource, frameStages> sources{
     {{"generate", &RankReport::generateSeconds, &RankReport::generateDeviceSeconds},
      {"distribute", &RankReport::distributeSeconds, nullptr},
@@ -110,7 +110,7 @@ double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInp
     return generator.start(input.camera.azimuth(360.0 * frame / orbit), input.function, input.settings);
   };
   clock.run();
-  {  // two, for as many have memory at a time
+  {  // two, because memory for two VDIs is in use at a time
     VdiFrame first = start(orbit - 2);
     generator.finish(start(orbit - 1));
     generator.finish(std::move(first));
@@ -224,7 +224,7 @@ void addFigures(json& row, const FrameFigures& figures) {
   for (std::size_t i = 0; i < frameStages; ++i) {
     const StageTimes& stage = figures.stages[i];
     const bool ran = several || i == static_cast<std::size_t>(FrameStage::Generate);
-    // Of generation, generate_ms is the device's time, as it always was: the row has it already.
+    // For generation, generate_ms is the device's time for compatibility: the row has it already.
     if (i != static_cast<std::size_t>(FrameStage::Generate))
       row[std::string(sources[i].name) + "_ms"] = ran ? json(stage.wall.slowest) : json(nullptr);
     if (!ran) continue;

@@ -1,4 +1,4 @@
-// What whole frames take: each stage over all ranks, VDIs per second, and volume rendering of the same scene.
+// Measures whole frames: each stage over all ranks, VDIs per second, and volume rendering of the same scene.
 #pragma once
 
 #include <array>
@@ -29,27 +29,27 @@ struct RankTimes {
 
 struct StageTimes {
   RankTimes wall;
-  std::optional<RankTimes> device;  // without transfers; none: reports don't tell
+  std::optional<RankTimes> device;  // without transfers; none: not reported
 };
 
 /// In the order of a frame.
 enum class FrameStage : std::size_t { Generate, Distribute, Composite, Gather };
 inline constexpr std::size_t frameStages = 4;
 
-/// What making a VDI takes. Medians over the repeats; the root's, others have zeros.
+/// Figures of making a VDI: medians over the repeats, on the root; other ranks have zeros.
 struct FrameFigures {
   int ranks = 1;
-  Spread wall;  // ms on the root's host, from all ranks ready to the VDI there
+  Spread wall;  // ms, on the root's host, from all ranks ready until the VDI is there
   std::array<StageTimes, frameStages> stages;
   std::uint64_t subSupersegments = 0;                 // of all ranks, in the last frame
-  std::uint64_t bytesSent = 0;                        // likewise
-  Spread volumeRendering;                             // a picture by renderVolume; ms as `wall`
+  std::uint64_t bytesSent = 0;                        // of all ranks, in the last frame
+  Spread volumeRendering;                             // a picture by renderVolume; ms, measured as `wall`
   std::array<StageTimes, frameStages> pictureStages;  // of these
-  Spread shown;                                       // a VDI, and its picture on the root's host; likewise
+  Spread shown;  // a VDI, and its picture on the root's host; ms, measured as `wall`
   std::optional<double> vdisPerSecond;
-  int orbitFrames = 0;  // that were made for vdisPerSecond
+  int orbitFrames = 0;  // frames made for vdisPerSecond
 
-  /// What a log of pictures by renderVolume has.
+  /// Takes over the figures from a log of renderVolume's pictures.
   void takePictures(const FrameFigures& pictures);
   const StageTimes& stage(FrameStage which) const { return stages[static_cast<std::size_t>(which)]; }
 };
@@ -64,9 +64,9 @@ double readyMs(const comm::Communicator& comm, Work work) {
 /// Collects the reports of repeated frames.
 class FrameLog {
  public:
-  /// `reports` are VdiGenerator::reports(): where they are empty nothing is noted.
+  /// `reports` are VdiGenerator::reports(); on ranks without reports nothing is noted.
   void add(double wallMs, const std::vector<RankReport>& reports);
-  /// Of the last `repeats` frames that were added.
+  /// Figures of the last `repeats` frames added.
   FrameFigures figures(std::size_t repeats) const;
 
  private:
@@ -80,7 +80,7 @@ class FrameLog {
   std::uint64_t bytesSent_ = 0;
 };
 
-/// What a frame is made with.
+/// The inputs of a frame.
 struct FrameInput {
   Camera camera;
   TransferFunction function;
@@ -88,24 +88,24 @@ struct FrameInput {
 };
 
 /// VDIs per second on the root's host, each started before the last one is finished: `frames` >= 1 of them
-/// after two that don't count, on an orbit of 20 viewpoints around the focal point that begins at the
-/// input's camera. Collective; other ranks' figures mean nothing.
+/// after two warm-up frames, on an orbit of 20 viewpoints around the focal point that begins at the input's
+/// camera. Collective; other ranks' results are meaningless.
 double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int frames);
 
-/// From a camera to a picture of a VDI on the root's host (VdiGenerator::show), repeated after one that
-/// doesn't count: milliseconds. The root's renderer is on `device`, the generator's. Collective.
+/// Milliseconds from a camera to a picture of a VDI on the root's host (VdiGenerator::show), repeated after a
+/// warm-up. The root's renderer uses `device`, the generator's. Collective.
 Spread measureShown(VdiGenerator& generator, const std::shared_ptr<gpu::Device>& device, ClockRaiser& clock,
                     const FrameInput& input, int repeats);
 
-/// Repeated frames and pictures, after one of each that doesn't count, and vdisPerSecond if `orbitFrames`
-/// isn't 0; and measureShown. Collective.
+/// Measures repeated frames and pictures, after a warm-up of each, and vdisPerSecond if `orbitFrames` is not
+/// 0; and measureShown. Collective.
 FrameFigures measureFrames(VdiGenerator& generator, const std::shared_ptr<gpu::Device>& device,
                            ClockRaiser& clock, const FrameInput& input, int repeats, int orbitFrames);
 
-/// Lines for a table: every stage, if there are several ranks, and the whole frame. With a line end each.
+/// Lines for a table, each with a line end: every stage, if there are several ranks, and the whole frame.
 std::string stageLines(const FrameFigures& figures);
 
-/// Adds what VDIs are made with to a row.
+/// Adds a VDI's settings to a row.
 void addSettings(nlohmann::json& row, const GenerateSettings& settings);
 
 /// Adds the figures to a row. null: not measured, or no such stage on one rank.

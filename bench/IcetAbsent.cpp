@@ -1,4 +1,4 @@
-// What stands for IcetCompositor.cpp in a tool without IceT.
+// Replaces IcetCompositor.cpp in a tool without IceT.
 #include "bench/IcetCompositor.h"
 #include "vdi/core/Error.h"
 

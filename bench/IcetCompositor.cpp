@@ -37,7 +37,7 @@ std::span<const glm::vec4> IcetCompositor::composite(const Image& image, const P
                                                      const std::vector<int>& frontToBack) {
   static_assert(sizeof(glm::vec4) == 4 * sizeof(IceTFloat));
   icetSetContext(state_->context);
-  icetDiagnostics(ICET_DIAG_OFF);  // it would print; errors are asked for below
+  icetDiagnostics(ICET_DIAG_OFF);  // it would print; the code below queries errors
   icetResetTiles();
   icetAddTile(0, 0, image.width, image.height, 0);
   icetSetColorFormat(ICET_IMAGE_COLOR_RGBA_FLOAT);

@@ -1,4 +1,4 @@
-// IceT behind an interface of ours: whole pictures of ranks whose volumes are convex become one.
+// Wraps IceT: composites whole pictures of ranks whose volumes are convex.
 #pragma once
 
 #include <cstdint>
@@ -19,23 +19,23 @@ struct PixelBox {
 
 class IcetCompositor {
  public:
-  /// Whether the tool was built with IceT. If it wasn't, no compositor can be made.
+  /// Whether the tool was built with IceT. Without it, no compositor can be made.
   static bool available();
 
-  /// `handle`: MPI_Comm_c2f of the ranks' communicator; a duplicate is taken. Collective. Throws
-  /// Error{InvalidArgument} if there is no IceT.
+  /// `handle` is MPI_Comm_c2f of the ranks' communicator, which is duplicated. Collective. Throws
+  /// Error{InvalidArgument} without IceT.
   explicit IcetCompositor(int handle);
   ~IcetCompositor();
   IcetCompositor(const IcetCompositor&) = delete;
   IcetCompositor& operator=(const IcetCompositor&) = delete;
 
-  /// Blends the ranks' pictures, all of one size, in the order of `frontToBack`, which has every rank once.
-  /// Pixels outside `drawn` are taken for transparent. Returns the whole picture on rank 0, premultiplied,
-  /// row 0 at the bottom, which is valid until the next call; on the others nothing. Collective. Throws
-  /// Error{Communication} for what IceT complains of, on that rank alone.
+  /// Blends the ranks' pictures, all of one size, in the order of `frontToBack`, which contains every rank
+  /// once. Pixels outside `drawn` count as transparent. Returns the whole picture on rank 0, premultiplied,
+  /// row 0 at the bottom, valid until the next call; on other ranks nothing. Collective. Throws
+  /// Error{Communication} for IceT's errors, on that rank alone.
   std::span<const glm::vec4> composite(const Image& image, const PixelBox& drawn,
                                        const std::vector<int>& frontToBack);
-  /// By this rank in the last composite, as IceT counts it.
+  /// Bytes that this rank sent in the last composite, as IceT counts them.
   std::uint64_t bytesSent() const;
 
  private:

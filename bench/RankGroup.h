@@ -1,12 +1,12 @@
-// Some of the ranks that mpirun started, for measurements of fewer ranks.
+// A part of the ranks that mpirun started, for measurements with fewer ranks.
 #pragma once
 
 #include "vdi/comm/Communicator.h"
 
 namespace vdi::bench {
 
-/// The first ranks of MPI_COMM_WORLD, or the one rank that there is without MPI. Making one is collective
-/// over all of `world`, which has MPI_COMM_WORLD's ranks. It goes before MPI is finalised.
+/// The first ranks of MPI_COMM_WORLD, or the single rank without MPI. The constructor is collective over all
+/// of `world`, which has MPI_COMM_WORLD's ranks. Destroy it before MPI is finalised.
 class RankGroup {
  public:
   /// 1 <= size <= world.size(). Throws Error{Communication}.
@@ -16,10 +16,10 @@ class RankGroup {
   RankGroup& operator=(const RankGroup&) = delete;
 
   bool member() const { return member_; }
-  /// Collective over the members, for whom alone it is.
+  /// Collective over the members; only they may call it.
   comm::Communicator communicator() const;
-  /// MPI_Comm_c2f of the members' communicator, which stays the group's. Throws Error{InvalidArgument} where
-  /// MPI doesn't run.
+  /// MPI_Comm_c2f of the members' communicator, which the group owns. Throws Error{InvalidArgument} without
+  /// MPI.
   int handle() const;
 
  private:
@@ -28,8 +28,8 @@ class RankGroup {
   int handle_ = 0;
 };
 
-/// A barrier of all ranks of MPI_COMM_WORLD that sleeps: ranks without work leave the cores to those that are
-/// measured. Returns at once where MPI doesn't run. Throws Error{Communication}.
+/// A sleeping barrier of all ranks of MPI_COMM_WORLD: ranks without work leave the cores to those that are
+/// measured. Returns at once without MPI. Throws Error{Communication}.
 void waitForAll();
 
 }  // namespace vdi::bench

@@ -30,7 +30,7 @@ std::string textOf(const glm::ivec3& sizes) {
   return fmt::format("{}x{}x{}", sizes.x, sizes.y, sizes.z);
 }
 
-/// 1, 2, 4 ... and all of them, or those that were asked for; ascending.
+/// 1, 2, 4 ... and all ranks, or the requested counts; ascending.
 std::vector<int> rankCounts(const BenchOptions& options, int ranks) {
   std::vector<int> counts = options.rankCounts;
   if (!counts.empty()) {
@@ -43,13 +43,13 @@ std::vector<int> rankCounts(const BenchOptions& options, int ranks) {
   return counts;
 }
 
-/// How large the volume is that one rank has in weak scaling.
+/// The size of one rank's volume in weak scaling.
 glm::ivec3 sizePerRank(const BenchOptions& options) {
   if (!options.sizePerRank.empty()) return sizesOf(options.sizePerRank);
   return glm::max(sizesOf(options.decomposition.size) / 2, glm::ivec3(2));
 }
 
-/// What one line is measured on.
+/// The setup of one row.
 struct Setup {
   DataSet set;
   std::string scaling;  // "strong" or "weak"
@@ -59,7 +59,7 @@ struct Setup {
   glm::ivec3 blocks{1};
 };
 
-/// Of weak scaling the blocks are as large as those of the fixed volume, but no less than one for each rank.
+/// In weak scaling, blocks are as large as those of the fixed volume, with at least one for each rank.
 Setup setupOf(const BenchOptions& options, const DataSet& set, const std::string& scaling,
               const std::string& layout, int ranks) {
   Setup setup{set, scaling, layout, ranks};
@@ -86,7 +86,7 @@ std::string tableHead() {
       "gather", "frame", "faster", "VDIs/s", "more", "DVR", "sent", "M subs");
 }
 
-/// One rank's figures of the same volume, layout and settings, which others are ratios of.
+/// One rank's figures of the same volume, layout and settings, for the ratios of other rank counts.
 struct OneRank {
   double frameMs = 0.0;
   std::optional<double> vdisPerSecond;
@@ -98,7 +98,7 @@ class RankSuite {
             std::FILE* table)
       : options_(options), world_(world), device_(std::move(device)), clock_(device_), table_(table) {}
 
-  /// A generator is made once for each count of ranks, so that is what comes first: shaders take seconds to
+  /// A generator is made once for each rank count, so this is the outermost loop: shaders take seconds to
   /// compile on a CPU.
   std::vector<json> rows() {
     if (world_.rank() == 0) fmt::print(table_, "{}\n", tableHead());
@@ -126,9 +126,9 @@ class RankSuite {
     if (!options_.rival.empty()) rival.emplace(device_, group.communicator(), group.handle());
     for (const DataSet& set : dataSets(options_)) {
       for (const std::string& scaling : options_.scalings) {
-        if (scaling == "weak" && set.field.empty()) continue;  // a file can't grow
+        if (scaling == "weak" && set.field.empty()) continue;  // a file cannot grow
         for (const std::string& layout : options_.layouts) {
-          generator.setBlocks({});  // makes room
+          generator.setBlocks({});  // frees memory
           if (rival) rival->dropBlocks();
           measure(setupOf(options_, set, scaling, layout, generator.communicator().size()), generator,
                   rival ? &*rival : nullptr);
@@ -137,7 +137,7 @@ class RankSuite {
     }
   }
 
-  /// `rival`: null, if none was asked for.
+  /// `rival` is null if none was requested.
   void measure(const Setup& setup, VdiGenerator& generator, IcetRival* rival) {
     const comm::Communicator& comm = generator.communicator();
     std::vector<Block> blocks;
@@ -224,7 +224,7 @@ class RankSuite {
   std::shared_ptr<gpu::Device> device_;
   ClockRaiser clock_;
   std::FILE* table_;
-  std::map<std::string, OneRank> oneRank_;  // by all but the ranks
+  std::map<std::string, OneRank> oneRank_;  // by all properties except the ranks
   std::vector<json> rows_;
 };
 

@@ -14,10 +14,10 @@ namespace vdi::bench {
 
 namespace {
 
-/// Of all ranks' blocks.
+/// The lattice of all ranks' blocks.
 synthetic::Lattice commonLattice(const comm::Communicator& comm, const std::vector<Block>& blocks) {
   constexpr double none = -std::numeric_limits<double>::infinity();
-  // Largest values of what is asked for and of its negative.
+  // Maxima of properties and of their negatives.
   enum : std::size_t {
     Origin = 0,
     Last = 3,
@@ -45,7 +45,7 @@ synthetic::Lattice commonLattice(const comm::Communicator& comm, const std::vect
   }
   comm.allReduceMax(maximum);
   synthetic::Lattice lattice;
-  if (maximum[Type] == none) return lattice;  // nobody has anything
+  if (maximum[Type] == none) return lattice;  // no rank has a block
   bool one = maximum[Type] == -maximum[MinusType] && (maximum[Cells] == none || maximum[Points] == none);
   for (std::size_t a = 0; a < 3; ++a)
     one = one && maximum[Spacing + a] + maximum[MinusSpacing + a] <= 1e-6 * maximum[Spacing + a];
@@ -70,7 +70,7 @@ synthetic::Lattice commonLattice(const comm::Communicator& comm, const std::vect
 /// The lattice indices of a block's stored values.
 IndexBox placeOf(const synthetic::Lattice& lattice, const Block& block) {
   const double corner =
-      lattice.joint == synthetic::Joint::Cells ? 0.5 : 0.0;  // which is where lattices of cells begin
+      lattice.joint == synthetic::Joint::Cells ? 0.5 : 0.0;  // lattices of cells begin half a spacing earlier
   const glm::ivec3 first(glm::round((block.origin - lattice.origin) / lattice.spacing - corner));
   return {first, first + block.dims};
 }
@@ -88,7 +88,7 @@ void copyValues(const IndexBox& part, const IndexBox& source, const std::byte* f
   });
 }
 
-/// What messages are made of: more than 2^31 of them never go to one rank, whatever their size.
+/// The unit of messages: a rank never gets more than 2^31 of them, whatever their size.
 constexpr std::size_t granule = 64;
 
 std::size_t padded(std::size_t bytes) {
@@ -102,7 +102,7 @@ Redistributed redistribute(const comm::Communicator& comm, const std::vector<Blo
   const synthetic::Lattice lattice = commonLattice(comm, blocks);
   const std::size_t bytes = sizeOf(lattice.type);
   const bool cells = lattice.joint == synthetic::Joint::Cells;
-  // Points are shared: cells are dealt, as decompose does it.
+  // Points at cuts are shared, so cells are divided, as in decompose.
   const std::vector<IndexBox> cuts = kdCuts(cells ? lattice.size : lattice.size - 1, comm.size());
   const auto valuesOf = [&](int rank) {
     IndexBox box = cuts[static_cast<std::size_t>(rank)];

@@ -1,4 +1,4 @@
-// Moves blocks to ranks that own a box each: what compositing of whole pictures needs first.
+// Moves blocks to ranks that own one box each, which compositing of whole pictures requires.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,14 @@
 namespace vdi::bench {
 
 struct Redistributed {
-  std::vector<Block> blocks;    // this rank's, one or none
+  std::vector<Block> blocks;    // this rank's, at most one
   std::uint64_t bytesSent = 0;  // from this rank to others
 };
 
-/// Cuts the lattice that the blocks of all ranks are parts of at the planes of a k-d tree, one box for each
-/// rank, and sends each rank its values through MPI. Blocks own what Block::fromPoints and fromCells say, and
-/// have values of their own; extra layers, patches and masks of the given ones are left out. Collective.
-/// Throws Error{InvalidArgument} on all ranks for blocks that aren't of one lattice and scalar type.
+/// Cuts the lattice of all ranks' blocks at the planes of a k-d tree, into one box for each rank, and sends
+/// each rank its values through MPI. Blocks own the boxes that Block::fromPoints and fromCells define, and
+/// have their own values; extra layers, patches and masks of the given blocks are dropped. Collective. Throws
+/// Error{InvalidArgument} on all ranks for blocks that do not share one lattice and scalar type.
 Redistributed redistribute(const comm::Communicator& comm, const std::vector<Block>& blocks);
 
 }  // namespace vdi::bench

@@ -23,7 +23,7 @@ Box boxOf(const std::vector<Block>& blocks) {
   return box;
 }
 
-/// Every rank's, on every rank.
+/// Returns every rank's box, on every rank.
 std::vector<Box> boxesOf(const comm::Communicator& comm, const Box& mine) {
   const comm::Gathered all = comm.allGather(std::as_bytes(std::span(&mine, 1)), sizeof(Box));
   std::vector<Box> boxes(static_cast<std::size_t>(comm.size()));
@@ -50,17 +50,16 @@ std::uint64_t sumOf(const comm::Communicator& comm, std::uint64_t value) {
   return sum[0];
 }
 
-/// A generator of one rank takes the scene for what that rank's blocks span, and lays the samples
-/// accordingly. So where the rank's box doesn't reach a corner of the whole scene, a block of one value does,
-/// whose share of the volume is too small for any sample: faces nearer than a thousandth of a spacing would
-/// become one.
+/// A generator of one rank takes the extent of that rank's blocks for the scene, and places samples
+/// accordingly. So if the rank's box does not reach a corner of the whole scene, a block of one value does.
+/// Its volume is too small for any sample; but faces closer than a thousandth of a spacing would become one.
 std::vector<Block> cornerBlocks(const Scene& scene, const Box& mine, ScalarType type) {
   const double thin = 0.004 * scene.minSpacing;
   const std::shared_ptr<std::byte[]> zero(new std::byte[sizeOf(type)]());
   std::vector<Block> corners;
   for (const bool upper : {false, true}) {
     const glm::dvec3 at = upper ? scene.bounds.hi : scene.bounds.lo;
-    // Boxes of redistributed blocks are off by rounding.
+    // Boxes of redistributed blocks differ by rounding.
     const double near = 0.5 * thin;
     if (!mine.empty() && glm::length((upper ? mine.hi : mine.lo) - at) < near) continue;
     Block block = Block::fromPoints(glm::ivec3(1), at, glm::dvec3(scene.minSpacing), type, zero.get());
@@ -71,10 +70,10 @@ std::vector<Block> cornerBlocks(const Scene& scene, const Box& mine, ScalarType 
   return corners;
 }
 
-/// The pixels that a box may show in: all of them if it reaches behind the camera.
+/// The pixels that may show a box: all of them if it reaches behind the camera.
 PixelBox pixelsOf(const Box& box, const FrameInput& input) {
   const glm::ivec2 whole(input.settings.width, input.settings.height);
-  if (box.empty()) return {glm::ivec2(0), glm::ivec2(1)};  // IceT wants one at least
+  if (box.empty()) return {glm::ivec2(0), glm::ivec2(1)};  // IceT requires at least one
   const View view(input.camera, whole.x, whole.y);
   glm::dvec2 minimum(whole);
   glm::dvec2 maximum(0.0);
@@ -102,7 +101,7 @@ IcetRival::IcetRival(std::shared_ptr<gpu::Device> device, comm::Communicator com
 void IcetRival::setBlocks(const std::vector<Block>& blocks, const Scene& scene, int repeats) {
   std::vector<Block> convex = makeConvex(blocks, repeats, 1e-3 * scene.minSpacing);
   box_ = boxOf(convex);
-  std::array<std::uint64_t, 1> type{0};  // of ranks that have something
+  std::array<std::uint64_t, 1> type{0};  // on ranks with blocks
   for (const Block& block : convex) type[0] = static_cast<std::uint64_t>(block.type);
   comm_.allReduceMax(type);
   comm_.together([&] {
@@ -148,7 +147,7 @@ std::vector<Block> IcetRival::makeConvex(const std::vector<Block>& blocks, int r
 IcetRival::Timed IcetRival::draw(const FrameInput& input, const PixelBox& drawn,
                                  const std::vector<int>& order) {
   Timed timed;
-  image_.reset();  // its memory is the next one's
+  image_.reset();  // the next picture reuses its memory
   comm_.together([&] {
     timed.renderMs =
         wallMs([&] { image_ = own_.renderVolume(input.camera, input.function, input.settings); });

@@ -1,4 +1,4 @@
-// Volume rendering composited by IceT, of the same volume, camera and devices: what VDIs are compared with.
+// Volume rendering composited by IceT, of the same volume, camera and devices, for comparison with VDIs.
 #pragma once
 
 #include <cstdint>
@@ -22,33 +22,33 @@
 
 namespace vdi::bench {
 
-/// Times are ms, medians over the repeats. The root's.
+/// Figures on the root; times are ms, medians over the repeats.
 struct RivalFigures {
-  Spread frame;                 // on the root's host, from all ranks ready to the picture there
-  double renderMs = 0.0;        // of these, the ranks' own pictures; slowest rank
-  double compositeMs = 0.0;     // and IceT; slowest rank
+  Spread frame;                 // on the root's host, from all ranks ready until the picture is there
+  double renderMs = 0.0;        // part of the frame: the ranks' own pictures; slowest rank
+  double compositeMs = 0.0;     // part of the frame: IceT; slowest rank
   std::uint64_t bytesSent = 0;  // by IceT, of all ranks, in one frame
-  /// What it took to make the ranks' volumes convex; none: they were.
+  /// Time to make the ranks' volumes convex; none: they already were.
   std::optional<double> redistributeMs;
   std::uint64_t redistributedBytes = 0;  // of all ranks
-  double maxDifference = 0.0;            // of a channel, from ours, in 1/255
+  double maxDifference = 0.0;            // of a channel, from our picture, in 1/255
 };
 
-/// Collective throughout. Each rank casts rays through its own blocks into a picture of floats, by a
-/// generator of one rank that takes the samples of the whole scene. IceT blends these in order of visibility.
-/// If planes don't separate the ranks' blocks, these are redistributed first.
+/// Every function is collective. Each rank casts rays through its own blocks into a picture of floats, by a
+/// generator of one rank that uses the samples of the whole scene. IceT blends these in order of visibility.
+/// If planes do not separate the ranks' blocks, the blocks are redistributed first.
 class IcetRival {
  public:
-  /// `handle`: MPI_Comm_c2f of the communicator's ranks. Throws Error{InvalidArgument} without IceT.
+  /// `handle` is MPI_Comm_c2f of the communicator's ranks. Throws Error{InvalidArgument} without IceT.
   IcetRival(std::shared_ptr<gpu::Device> device, comm::Communicator comm, int handle);
 
-  /// This rank's blocks, as `generator` got them, whose scene `scene` is. `repeats` redistributions are
-  /// timed.
+  /// Sets this rank's blocks, the same as `generator` has; `scene` is the generator's. Times `repeats`
+  /// redistributions.
   void setBlocks(const std::vector<Block>& blocks, const Scene& scene, int repeats);
-  /// Gives back the device's memory.
+  /// Frees the device's memory.
   void dropBlocks();
 
-  /// `ours`: the root's picture of the same input by VdiGenerator::renderVolume; others' is ignored.
+  /// `ours` is the root's picture of the same input by VdiGenerator::renderVolume; other ranks' is ignored.
   RivalFigures measure(ClockRaiser& clock, const FrameInput& input, int repeats,
                        const std::optional<Image>& ours);
 
@@ -63,11 +63,11 @@ class IcetRival {
 
   comm::Communicator comm_;
   IcetCompositor compositor_;
-  VdiGenerator own_;  // of this rank alone
+  VdiGenerator own_;  // for this rank alone
   std::optional<SeparatingPlanes> planes_;
   Box box_;  // of this rank's blocks
   std::optional<Image> image_;
-  RivalFigures redistribution_;  // these figures alone
+  RivalFigures redistribution_;  // the redistribution's figures only
 };
 
 std::string rivalLine(const RivalFigures& figures);

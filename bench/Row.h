@@ -1,4 +1,4 @@
-// One line of what `vdi bench` reports: a view of a VDI, and what making and seeing it took.
+// One row of `vdi bench`: a view of a VDI, with the figures of making and seeing it.
 #pragma once
 
 #include <cstddef>
@@ -15,24 +15,24 @@
 
 namespace vdi::bench {
 
-/// What a data set's values take to get to the device.
+/// Times of bringing a data set's values to the device.
 struct UploadTimes {
   double milliseconds = 0.0;
-  std::optional<double> stepMs;  // a frame beside the next step's upload; none: no room for two volumes
+  std::optional<double> stepMs;  // a frame beside the next step's upload; none: no memory for two volumes
 };
 
-/// Volume rendering at the rate that VDIs are made at.
+/// Volume rendering at the sampling rate of the VDIs.
 struct DvrFigures {
   Spread device;              // ms
   Spread frame;               // ms
-  ImageDifference fromTruth;  // the root's
+  ImageDifference fromTruth;  // on the root
 };
 
-/// What making a VDI took, and how large it is. Only the root has the sizes.
+/// Figures of making a VDI, and its size. Only the root has the sizes.
 struct GenerationFigures {
   Spread device;   // ms
-  Spread frame;    // ms, the stages of the slowest rank
-  Spread overDvr;  // device time over that of volume rendering right before it
+  Spread frame;    // ms, summed over the stages of the slowest rank
+  Spread overDvr;  // device time relative to that of volume rendering right before it
   double countMs = 0.0;
   double writeMs = 0.0;
   FrameFigures frames;
@@ -40,7 +40,7 @@ struct GenerationFigures {
   std::size_t storedBytes = 0;
 };
 
-/// What seeing it took, and how true it is.
+/// Figures of seeing the VDI, and its accuracy.
 struct ViewFigures {
   Spread device;               // ms
   Spread frame;                // ms
@@ -52,14 +52,14 @@ struct BenchRow {
   std::string dataset;
   GenerateSettings settings;
   Reconstruction reconstruction{};
-  double truthRate = 0.0;     // samples per voxel of the volume rendering that both views are compared with
-  double viewDegrees = 0.0;   // of the VDI's viewpoint around the scene
-  double angleDegrees = 0.0;  // of this view from there
+  double truthRate = 0.0;     // samples per voxel of the volume rendering to which both views are compared
+  double viewDegrees = 0.0;   // from the original viewpoint to the VDI's, around the scene
+  double angleDegrees = 0.0;  // from the VDI's viewpoint to this view
   UploadTimes upload;
   DvrFigures dvr;
   GenerationFigures generation;
   ViewFigures view;
-  std::optional<RivalFigures> rival;  // of the VDI's viewpoint
+  std::optional<RivalFigures> rival;  // at the VDI's viewpoint
 };
 
 std::string tableHead();

@@ -19,7 +19,7 @@ namespace vdi::bench {
 
 namespace {
 
-/// Milliseconds of the slowest rank; 0 where there are no reports, that is, not on the root.
+/// Milliseconds of the slowest rank; 0 without reports, as on all ranks but the root.
 template <typename Seconds>
 double slowest(const std::vector<RankReport>& reports, Seconds seconds) {
   double worst = 0.0;
@@ -31,13 +31,13 @@ double frameSeconds(const RankReport& r) {
   return r.generateSeconds + r.distributeSeconds + r.compositeSeconds + r.gatherSeconds;
 }
 
-/// One VDI of a data set and what making it took. Only the root has it.
+/// One VDI of a data set, and the figures of making it. Only the root has it.
 struct Made {
   std::optional<Vdi> vdi;
   GenerationFigures figures;
 };
 
-/// What views of a VDI from one place are compared with. Only the root has the picture.
+/// The reference of a VDI's views from one place. Only the root has the picture.
 struct Truth {
   Camera camera;
   double angle = 0.0;
@@ -49,7 +49,7 @@ ImageDifference differenceOf(const io::Picture& a, const io::Picture& b) {
   return compare(a.rgb, b.rgb, a.width, a.height, 3);
 }
 
-/// Collective, as the generator is: every rank runs the same stages, the root collects the figures.
+/// Collective, like the generator: every rank runs the same stages, and the root collects the figures.
 class Bench {
  public:
   Bench(const BenchOptions& options, const comm::Communicator& world, std::shared_ptr<gpu::Device> device)
@@ -65,7 +65,7 @@ class Bench {
     rival_.emplace(device_, all_->communicator(), all_->handle());
   }
 
-  /// Table lines go to `table`. Empty on all ranks but the root.
+  /// Writes table lines to `table`. Returns no rows except on the root.
   std::vector<BenchRow> rows(std::FILE* table) {
     table_ = table;
     if (root()) fmt::print(table_, "{}\n", tableHead());
@@ -90,7 +90,7 @@ class Bench {
     for (int view = 0; view < options_.views; ++view) measureView(set, 360.0 * view / options_.views);
   }
 
-  /// What a view of the data set that's shown is seen with.
+  /// The parameters of a view of the current data set.
   struct Shot {
     Camera camera;
     TransferFunction function;
@@ -114,7 +114,7 @@ class Bench {
     for (const Block& block : blocks) bytes += block.byteCount();
     std::array<std::uint64_t, 1> full{3 * bytes > device_->limits().memoryBytes ? 1U : 0U};
     world_.allReduceMax(full);
-    if (full[0] != 0) return upload;  // no room for two volumes
+    if (full[0] != 0) return upload;  // no memory for two volumes
     const Shot shot = shotFrom(0.0);
     const GenerateSettings settings =
         benchSettings(options_, options_.algorithms.front(), options_.supersegments.front());
@@ -156,12 +156,12 @@ class Bench {
     if (root()) fmt::print(table_, "{}", rivalLine(*rivalFigures_));
   }
 
-  /// Of the last generation or volume rendering.
+  /// Device time of the last generation or volume rendering.
   double deviceMs() const {
     return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
   }
 
-  /// Without the warm-up's.
+  /// Without the warm-up's values.
   std::vector<double> lastOf(const std::vector<double>& values) const {
     return {values.end() - options_.repeats, values.end()};
   }
@@ -174,7 +174,7 @@ class Bench {
     std::optional<Image> image;
     truth.dvr.device = repeated(options_.repeats, [&] {
       clock_.run();
-      image.reset();  // its memory is the next one's
+      image.reset();  // the next picture reuses its memory
       image = generator_.renderVolume(camera, function, settings_);
       frames.push_back(slowest(generator_.reports(), frameSeconds));
       return deviceMs();
@@ -234,7 +234,7 @@ class Bench {
     return made;
   }
 
-  /// The root's.
+  /// Measures a view, on the root.
   ViewFigures seen(const Truth& truth, const Shot& shot, VdiRenderer& renderer) {
     ViewFigures figures;
     ImageBytes image;
@@ -287,10 +287,10 @@ class Bench {
   std::shared_ptr<gpu::Device> device_;
   ClockRaiser clock_;
   VdiGenerator generator_;
-  std::optional<RankGroup> all_;  // as the rival needs them
+  std::optional<RankGroup> all_;  // for the rival
   std::optional<IcetRival> rival_;
-  std::optional<RivalFigures> rivalFigures_;  // of the viewpoint that's shown
-  UploadTimes upload_;                        // of the data set that's shown
+  std::optional<RivalFigures> rivalFigures_;  // of the current viewpoint
+  UploadTimes upload_;                        // of the current data set
   std::FILE* table_ = nullptr;
   std::vector<BenchRow> rows_;
 };

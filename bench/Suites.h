@@ -1,4 +1,4 @@
-// What `vdi bench` is asked to measure, and the suites of docs/benchmarks.md.
+// Options of `vdi bench`, and the suites of docs/benchmarks.md.
 #pragma once
 
 #include <cstdint>
@@ -22,25 +22,25 @@ struct BenchOptions {
   std::vector<std::uint32_t> supersegments;  // empty: 25, or the suite's
   int views = 0;                             // 0: 1, or the suite's
   int repeats = 5;
-  int frames = 20;  // of the orbit that VDIs per second are counted on; 0: they aren't
+  int frames = 20;  // on the orbit that counts VDIs per second; 0: not measured
   std::string reconstruction = "smooth";
-  double truthRate = 8.0;  // samples per voxel of the volume rendering that all are compared with
+  double truthRate = 8.0;  // samples per voxel of the volume rendering to which all views are compared
   std::string suite;       // empty, or a name that suiteNames() has
   std::string rival;       // empty, or icet
   std::string output;
   std::vector<std::string> comparison;
-  // Of the suite `ranks`:
+  // For the suite `ranks`:
   std::vector<std::string> scalings{"strong", "weak"};
   std::vector<std::string> layouts{"slabs", "interleaved", "random"};
   std::vector<int> rankCounts;  // empty: 1, 2, 4 ... and all
   std::string sizePerRank;      // of weak scaling; empty: half of deal.size on each axis
-  // Of the suite `viewpoints`:
+  // For the suite `viewpoints`:
   int viewpoints = 100;
   double turn = 20.0;  // degrees
   std::vector<double> zooms{1.0, 4.0};
   std::vector<double> margins{0.0};
   std::vector<int> sets{1};
-  std::vector<std::string> listResolutions;  // of VDIs' pictures; empty: the views'
+  std::vector<std::string> listResolutions;  // for VDIs' pictures; empty: the views'
 };
 
 struct DataSet {
@@ -53,23 +53,23 @@ struct DataSet {
 
 const std::vector<std::string>& suiteNames();
 
-/// The suite of fewer and more ranks, which has no data sets of its own.
+/// The suite of different rank counts, which has no data sets of its own.
 inline constexpr const char* ranksSuite = "ranks";
-/// The suite of viewpoints around the scene, which has none either.
+/// The suite of viewpoints around the scene, which has no data sets of its own.
 inline constexpr const char* viewpointsSuite = "viewpoints";
 
-/// Fills in what the suite says, or what holds without one, where the options leave it open.
+/// Completes the options with the suite's values, or with the defaults without a suite.
 void applySuite(BenchOptions& options);
 
-/// The suite's (those of them that --fields names), or the raw volumes and fields of the options.
+/// The suite's data sets (those that --fields names), or the raw volumes and fields of the options.
 std::vector<DataSet> dataSets(const BenchOptions& options);
 
-/// What VDIs are made with. Bisection gets the one budget that it knows.
+/// Settings of a VDI. Bisection gets List, the only budget that it supports.
 GenerateSettings benchSettings(const BenchOptions& options, const std::string& algorithm,
                                std::uint32_t supersegments);
 
-/// Collective: this rank's blocks of the data set. Size and type are the set's where it names them. All ranks
-/// throw if one does.
+/// Collective: this rank's blocks of the data set, with its size and type if it names them. All ranks throw
+/// if one does.
 std::vector<Block> blocksOf(const DataSet& set, const BenchOptions& options,
                             const std::shared_ptr<gpu::Device>& device, const comm::Communicator& world);
 

@@ -1,4 +1,4 @@
-// Times of repeated runs, on a GPU whose clock is up.
+// Times of repeated runs, on a GPU with a raised clock.
 #pragma once
 
 #include <chrono>
@@ -19,10 +19,10 @@ struct Spread {
   double maximum = 0.0;
   double width() const { return maximum - minimum; }
 };
-/// Of one value or more.
+/// Requires at least one value.
 Spread spreadOf(std::vector<double> values);
 
-/// Of the milliseconds that `measure` returns, after a run that doesn't count.
+/// Spread of the milliseconds that `measure` returns, after a warm-up run.
 template <typename Measure>
 Spread repeated(int repeats, Measure measure) {
   measure();
@@ -31,7 +31,7 @@ Spread repeated(int repeats, Measure measure) {
   return spreadOf(times);
 }
 
-/// How long `work()` takes, in milliseconds.
+/// The duration of `work()` in milliseconds.
 template <typename Work>
 double wallMs(Work work) {
   const auto start = std::chrono::steady_clock::now();
@@ -39,8 +39,8 @@ double wallMs(Work work) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// A GPU lowers its clock while the host works, to a fifth of what it has when it's busy, and takes a second
-/// or two to raise it again: gives it something to do before a run that counts. Nothing on a CPU.
+/// A GPU lowers its clock to a fifth while the host works, and takes a second or two to raise it again. This
+/// gives the GPU work before a measured run. Does nothing on a CPU.
 class ClockRaiser {
  public:
   explicit ClockRaiser(const std::shared_ptr<gpu::Device>& device);

@@ -32,21 +32,21 @@ namespace {
 
 using nlohmann::json;
 
-/// DVR of so much opacity is something; less may be rounded away in a picture of bytes.
+/// DVR of this opacity counts as visible; rounding may remove less from an 8-bit picture.
 constexpr std::uint8_t visible = 2;
 
 glm::dvec3 fromFocal(const Camera& camera) {
   return camera.position - camera.focalPoint;
 }
 
-/// The camera at its distance from the focal point in `direction`, which is unit.
+/// The camera at its distance from the focal point in the unit vector `direction`.
 Camera seenFrom(const Camera& camera, const glm::dvec3& direction) {
   Camera moved = camera;
   moved.position = camera.focalPoint + glm::length(fromFocal(camera)) * direction;
   return moved;
 }
 
-/// As the mouse wheel does it: nearer in perspective.
+/// Zooms as the mouse wheel does: in perspective, by moving closer.
 Camera zoomed(const Camera& camera, double zoom) {
   Camera nearer = camera;
   nearer.position = camera.focalPoint + fromFocal(camera) / zoom;
@@ -58,10 +58,10 @@ bool isInside(const Box& box, const glm::dvec3& point) {
   return glm::all(glm::lessThan(box.lo, point)) && glm::all(glm::lessThan(point, box.hi));
 }
 
-/// `count` viewpoints at the camera's distance, evenly distributed over the sphere, none within `bounds`. The
-/// same on every machine.
+/// `count` viewpoints at the camera's distance, evenly distributed over the sphere, none within `bounds`.
+/// They are the same on every machine.
 std::vector<Camera> randomCameras(const Camera& camera, const Box& bounds, int count, std::uint32_t seed) {
-  std::mt19937_64 random(seed);  // whose numbers the standard fixes; of its distributions it doesn't
+  std::mt19937_64 random(seed);  // the standard defines its numbers, unlike those of distributions
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   std::vector<Camera> cameras;
   constexpr int attempts = 1000;
@@ -84,7 +84,7 @@ std::vector<Camera> turnedCameras(const Camera& camera, double degrees) {
           apps::turned(camera, 0.0, degrees), apps::turned(camera, 0.0, -degrees)};
 }
 
-/// What views are compared with.
+/// The reference of views.
 struct ViewTruth {
   Camera camera;
   io::Picture picture;                // by volume rendering at the rate of --truth-rate
@@ -109,13 +109,13 @@ struct Views {
   std::vector<ViewTruth> truths;
 };
 
-/// Of all viewpoints of a kind.
+/// Figures over all viewpoints of a kind.
 struct Trueness {
   std::vector<double> ssims;
-  std::vector<double> missing;  // share of the picture where there is something, and the VDI shows nothing
+  std::vector<double> missing;  // share of the picture that is visible in DVR but not in the VDI
 };
 
-/// Shares of the set's VDIs in a view: index and weight, which add up to 1.
+/// Weights of the set's VDIs in a view, by index; they add up to 1.
 using Shares = std::vector<std::pair<std::size_t, float>>;
 
 Shares nearestOf(const std::vector<Camera>& set, const Camera& view, const Box& bounds) {
@@ -126,8 +126,8 @@ Shares nearestOf(const std::vector<Camera>& set, const Camera& view, const Box& 
   return {{nearest, 1.0F}};
 }
 
-/// By angle: the two nearest, of which the second's share goes to 0 where the third one takes its place. A
-/// view from the very viewpoint of a VDI is that VDI's.
+/// Blends the two VDIs with the smallest angles. The second one's weight goes to 0 where the third one
+/// replaces it. A view from a VDI's own viewpoint is that VDI's.
 Shares blendOf(const std::vector<Camera>& set, const Camera& view, const Box& bounds) {
   std::vector<std::pair<double, std::size_t>> byAngle;
   for (std::size_t i = 0; i < set.size(); ++i) byAngle.emplace_back(degreesBetween(bounds, set[i], view), i);
@@ -143,7 +143,7 @@ Shares blendOf(const std::vector<Camera>& set, const Camera& view, const Box& bo
           {byAngle[1].second, static_cast<float>(weight(1) / sum)}};
 }
 
-/// That VDIs are made with. Throws Error.
+/// Settings of the VDIs. Throws Error.
 std::vector<GenerateSettings> allSettings(const BenchOptions& options) {
   std::vector<std::string> resolutions = options.listResolutions;
   if (resolutions.empty()) resolutions = {options.quality.resolution};
@@ -189,7 +189,7 @@ class ViewpointSuite {
   }
 
  private:
-  /// Of one set of VDIs; only the root has the VDIs.
+  /// One set of VDIs, which only the root has.
   struct Made {
     std::vector<Camera> cameras;
     std::vector<std::unique_ptr<VdiRenderer>> renderers;
@@ -269,7 +269,7 @@ class ViewpointSuite {
     return made;
   }
 
-  /// Premultiplied, of bytes.
+  /// A premultiplied picture of bytes.
   std::vector<glm::u8vec4> seen(const Made& made, const Camera& camera, const Shares& shares,
                                 const glm::ivec2& size) {
     std::vector<glm::vec4> sum;
@@ -286,7 +286,7 @@ class ViewpointSuite {
     return bytes;
   }
 
-  /// While the host compares a view, the device renders the next one: a GPU's clock falls when it waits.
+  /// While the host compares a view, the device renders the next one, because an idle GPU lowers its clock.
   Trueness truenessOf(const Made& made, const Views& views, bool blends) {
     Trueness trueness;
     const Box& bounds = generator_.scene().bounds;
@@ -356,7 +356,7 @@ class ViewpointSuite {
   std::shared_ptr<gpu::Device> device_;
   Reconstruction reconstruction_;
   VdiGenerator generator_;
-  TransferFunction function_;  // for the data set that's shown
+  TransferFunction function_;  // for the current data set
   std::FILE* table_;
   std::vector<json> rows_;
 };

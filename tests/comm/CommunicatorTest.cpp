@@ -1,4 +1,4 @@
-// The communicator, on any number of ranks: every rank runs every line.
+// The communicator on any number of ranks, of which every one runs every line.
 #include <mpi.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -22,7 +22,7 @@ using comm::Communicator;
 
 namespace {
 
-/// An element that says where it's from, where it's bound and what it is.
+/// An element that identifies its sender, its receiver and itself.
 struct Parcel {
   std::int32_t from;
   std::int32_t to;
@@ -30,7 +30,7 @@ struct Parcel {
   bool operator==(const Parcel&) const = default;
 };
 
-/// How many parcels go from one rank to another: awkward, none for some pairs.
+/// The number of parcels from one rank to another: irregular, and 0 for some pairs.
 std::uint64_t parcelCount(int from, int to) {
   return static_cast<std::uint64_t>((from * 7 + to * 3) % 5);
 }
@@ -47,7 +47,7 @@ std::vector<T> valuesOf(std::span<const std::byte> bytes) {
   return values;
 }
 
-/// What `call` throws; code Cancelled and an empty text when it throws nothing.
+/// The exception of `call`; code Cancelled and an empty text if it throws none.
 struct Thrown {
   ErrorCode code = ErrorCode::Cancelled;
   std::string text;
@@ -64,7 +64,7 @@ Thrown thrownBy(const std::function<void()>& call) {
   return {};
 }
 
-/// Address space that nothing backs: a span as long as a test needs, never touched.
+/// Address space without memory: a span of any length that a test needs, but must not touch.
 class Unbacked {
  public:
   explicit Unbacked(std::size_t bytes)
@@ -126,7 +126,7 @@ TEST_CASE("a part of the ranks makes a communicator of its own; it can be moved"
   MPI_Comm half = MPI_COMM_NULL;
   MPI_Comm_split(MPI_COMM_WORLD, rank % 2, -rank, &half);
   Communicator first = Communicator::fromMpi(MPI_Comm_c2f(half));
-  MPI_Comm_free(&half);  // ours is a duplicate
+  MPI_Comm_free(&half);  // the communicator has a duplicate
   Communicator mine = Communicator::serial();
   mine = std::move(first);
   std::vector<double> sum{1.0, static_cast<double>(rank % 2)};
@@ -152,7 +152,7 @@ TEST_CASE("reductions, element by element") {
   std::vector<std::uint64_t> big{1ULL << 60, static_cast<std::uint64_t>(world.rank())};
   world.allReduceMax(big);
   CHECK(big == std::vector<std::uint64_t>{1ULL << 60, static_cast<std::uint64_t>(last)});
-  std::vector<std::uint64_t> count{(1ULL << 53) + 1};  // no double holds this
+  std::vector<std::uint64_t> count{(1ULL << 53) + 1};  // no double represents this
   world.allReduceSum(count);
   CHECK(count[0] == ((1ULL << 53) + 1) * static_cast<std::uint64_t>(world.size()));
   world.allReduceSum(std::span<double>());
@@ -219,7 +219,7 @@ TEST_CASE("one rank throws: all do, and say which and why") {
   CHECK_NOTHROW(world.together([] {}));
 }
 
-TEST_CASE("several ranks throw: each its own, the others hear of the lowest") {
+TEST_CASE("several ranks throw: each its own error, the others the lowest rank's") {
   const Communicator world = Communicator::world();
   const bool bad = world.rank() % 2 == 1;
   const Thrown thrown = thrownBy([&] {
@@ -237,7 +237,7 @@ TEST_CASE("several ranks throw: each its own, the others hear of the lowest") {
   }
 }
 
-TEST_CASE("what isn't an exception, and a text longer than a message, arrive too") {
+TEST_CASE("other thrown objects, and texts longer than a message, arrive too") {
   const Communicator world = Communicator::world();
   const int last = world.size() - 1;
   const auto failing = [&](const std::function<void()>& how) {
@@ -278,7 +278,7 @@ TEST_CASE("requireEqual: every rank throws if one differs") {
 
 TEST_CASE("more elements than MPI counts: every rank throws, nothing is sent") {
   const Communicator world = Communicator::world();
-  if (world.size() == 1) return;  // one rank alone sends nothing through MPI
+  if (world.size() == 1) return;  // a single rank sends nothing through MPI
   constexpr std::uint64_t tooMany = 1ULL << 31;
   const bool sender = world.rank() == 1;
   const Unbacked memory(sender ? tooMany : 1);
@@ -289,7 +289,7 @@ TEST_CASE("more elements than MPI counts: every rank throws, nothing is sent") {
     CHECK(thrown.code == (concerned ? ErrorCode::Communication : ErrorCode::RemoteRank));
     CHECK(thrown.text.find("elements for one rank") != std::string::npos);
   };
-  // Sender and receiver both see it; the ranks that neither send nor receive so much are told.
+  // Sender and receiver both notice; ranks that neither send nor receive that much are told.
   check(thrownBy([&] { world.allToAll(bytes, counts, 1); }), sender || world.rank() == 0);
   check(thrownBy([&] { world.gather(bytes, 1, 0); }), true);
   check(thrownBy([&] { world.allGather(bytes, 1); }), true);
@@ -336,7 +336,7 @@ TEST_CASE("a rank without enough memory makes all fail, and all go on") {
 }
 #endif
 
-// Hidden: takes 5 GiB. Run with the argument [large] on 2 ranks.
+// Hidden, because it takes 5 GiB. Run it with the argument [large] on 2 ranks.
 TEST_CASE("more than 2 GiB between two ranks", "[.][large]") {
   const Communicator world = Communicator::world();
   using Element = std::array<std::uint64_t, 3>;

@@ -1,4 +1,4 @@
-// What ranks send each other, through shared memory and by messages, on any number of ranks.
+// Exchange between ranks, through shared memory and by messages, on any number of ranks.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -26,7 +26,7 @@ std::byte valueOf(int from, int to, std::size_t i, int round) {
                                 251);
 }
 
-/// Some pairs have nothing for each other, and sizes change from round to round.
+/// Some pairs exchange nothing, and sizes change from round to round.
 std::uint64_t bytesOf(int from, int to, int round) {
   const int kind = (from * 5 + to * 3 + round) % 4;
   return kind == 0 ? 0
@@ -35,14 +35,14 @@ std::uint64_t bytesOf(int from, int to, int round) {
 
 enum class Trouble { None, NoRoom, NotOpened };
 
-/// While it lives, this process can't make files, or can't open any.
+/// As long as it lives, this process cannot create files, or cannot open any.
 class Limit {
  public:
   explicit Limit(__rlimit_resource kind) : kind_(kind) {
     getrlimit(kind, &before_);
     rlimit none = before_;
     none.rlim_cur = 0;
-    if (kind == RLIMIT_NOFILE) {  // those that are open stay usable
+    if (kind == RLIMIT_NOFILE) {  // open ones stay usable
       const int next = dup(STDIN_FILENO);
       none.rlim_cur = static_cast<rlim_t>(next);
       close(next);
@@ -65,7 +65,7 @@ class Limit {
 
 }  // namespace
 
-TEST_CASE("every rank receives what every rank has for it, round after round") {
+TEST_CASE("every rank receives every rank's data for it, round after round") {
   const Transport transport = GENERATE(Transport::Shared, Transport::Mpi);
   const char* ranksPerHost = GENERATE("0", "2");
   const auto trouble = GENERATE(Trouble::None, Trouble::NoRoom, Trouble::NotOpened);
@@ -74,8 +74,8 @@ TEST_CASE("every rank receives what every rank has for it, round after round") {
   const Communicator world = Communicator::world();
   unsetenv("VDI_RANKS_PER_HOST");
   const int last = world.size() - 1;
-  // The trouble is the last host's alone: its leader has no room, or one of its ranks can't open what it
-  // makes.
+  // Only the last host has trouble: its leader has no room, or one of its ranks cannot open the leader's
+  // memory.
   const int inTrouble = trouble == Trouble::NoRoom ? world.hostLeader(last) : last;
   Exchange exchange(world, transport);
   for (const int round : {0, 1, 7, 2, 3}) {
@@ -118,7 +118,7 @@ TEST_CASE("every rank receives what every rank has for it, round after round") {
     const bool failed = round == 7 && trouble != Trouble::None && leader == world.hostLeader(last);
     if (world.size() > 1 && (round == 0 || round == 7))
       CHECK(exchange.sharesMemoryWith(leader) == (transport == Transport::Shared && !failed));
-    world.barrier();  // before anybody writes the next round's
+    world.barrier();  // before any rank writes in the next round
   }
 }
 
@@ -128,7 +128,7 @@ TEST_CASE("the transport that the environment asks for") {
   CHECK_THROWS_AS(comm::transportFromText("pigeon"), Error);
 }
 
-TEST_CASE("an environment variable is rank 0's on all ranks") {
+TEST_CASE("an environment variable has rank 0's value on all ranks") {
   const Communicator world = Communicator::world();
   setenv("VDI_DEVICE", world.rank() == 0 ? "first" : "other", 1);
   CHECK(world.environment("VDI_DEVICE") == "first");
@@ -136,7 +136,7 @@ TEST_CASE("an environment variable is rank 0's on all ranks") {
   CHECK(world.environment("VDI_DEVICE").empty());
 }
 
-TEST_CASE("memory that ranks share: opened by name, and gone when nobody has it") {
+TEST_CASE("shared memory is opened by name, and gone when nobody holds it") {
   const Communicator world = Communicator::world();
   const auto memory = HostMemory::shared(1000);
   REQUIRE(!memory->name().empty());
@@ -149,7 +149,7 @@ TEST_CASE("memory that ranks share: opened by name, and gone when nobody has it"
   CHECK(HostMemory::shared(1000)->name() != memory->name());
 }
 
-TEST_CASE("sums of bytes end at 255") {
+TEST_CASE("sums of bytes saturate at 255") {
   const Communicator world = Communicator::world();
   const Transport transport = GENERATE(Transport::Shared, Transport::Mpi);
   comm::ByteSum sum(world, transport);
@@ -180,10 +180,10 @@ TEST_CASE("sums of bytes end at 255") {
   }
 }
 
-TEST_CASE("the global scene is the union of what the ranks hold") {
+TEST_CASE("the global scene is the union of the ranks' scenes") {
   const Communicator world = Communicator::world();
   const int last = world.size() - 1;
-  Scene local;  // rank 0 holds nothing, unless it's alone
+  Scene local;  // rank 0 has nothing, unless it is the only rank
   if (world.rank() > 0 || last == 0) {
     const double r = world.rank();
     local.bounds = {{r, -r, 5.0}, {r + 1.0, 1.0, 6.0 + r}};

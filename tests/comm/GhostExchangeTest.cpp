@@ -1,4 +1,4 @@
-// Ghost layers: what lies between blocks that share nothing, wherever the neighbours are.
+// Ghost layers: the values between disjoint blocks, wherever the neighbours are.
 #include <span>
 
 #include "tests/Catch.h"
@@ -43,8 +43,8 @@ glm::dvec3 placeOf(const Block& block, const glm::ivec3& index) {
   return block.origin + glm::dvec3(index) * block.spacing;
 }
 
-/// Every value, those of layers included, is the one that belongs there; layers reach as far as rays need
-/// them, wherever there is a neighbour.
+/// Checks that every value, layers included, is the right one, and that layers reach as far as rays need them
+/// wherever there is a neighbour.
 void checkValues(const synthetic::Lattice& lattice, const Block& block) {
   int wrong = 0;
   forEachValue(block.extended(), [&](const glm::ivec3& at) {
@@ -76,7 +76,7 @@ TEST_CASE("blocks of a whole lattice get their neighbours' values, and all of sp
   const std::vector<Block> before = decomposed(lattice, {3, 2, 4}, layout, world);
   const std::vector<Block> after = comm::exchangeGhosts(world, before);
   REQUIRE(after.size() == before.size());
-  double volume = 0.0;  // owned here, then by all
+  double volume = 0.0;  // owned by this rank, then by all
   for (std::size_t i = 0; i < after.size(); ++i) {
     checkValues(lattice, after[i]);
     const glm::dvec3 size = after[i].owned.size();
@@ -109,7 +109,7 @@ TEST_CASE("a missing corner is filled with the nearest own value") {
   const Block& block = after.front();
   REQUIRE(block.extended() == IndexBox{glm::ivec3(0), {5, 5, 3}});
   CHECK(valueAt(block, 3, 1, 1) == 7.0);
-  CHECK(valueAt(block, 4, 1, 1) == 7.0);  // rays look slabReach beyond: two layers of cells
+  CHECK(valueAt(block, 4, 1, 1) == 7.0);  // rays reach slabReach beyond: two layers of cells
   CHECK(valueAt(block, 1, 3, 1) == 7.0);
   CHECK(valueAt(block, 3, 3, 1) == 5.0);
   CHECK(block.owned.hi == glm::dvec3(3.0));

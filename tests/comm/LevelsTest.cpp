@@ -1,5 +1,5 @@
-// Blocks of different levels, lattices and types side by side and over each other: a linear field must stay
-// linear wherever rays look, and each place must have one owner.
+// Blocks of different levels, lattices and types, side by side and overlapping: a linear field must stay
+// linear everywhere, and each place must have one owner.
 #include <chrono>
 #include <cmath>
 #include <functional>
@@ -46,7 +46,7 @@ Block blockIn(Kind kind, const Box& box, const glm::ivec3& cells, ScalarType typ
   return block;
 }
 
-/// Each rank's share.
+/// This rank's share of the blocks.
 std::vector<Block> decomposed(const std::vector<Block>& all, const Communicator& world) {
   std::vector<Block> mine;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -56,8 +56,8 @@ std::vector<Block> decomposed(const std::vector<Block>& all, const Communicator&
   return mine;
 }
 
-/// The largest error of what's interpolated in any block of any rank, in its owned box and up to half a
-/// spacing beyond, as far as that's in `where`.
+/// The largest interpolation error in any block of any rank, in its owned box and up to half a spacing
+/// beyond, within `where`.
 double worstError(const Communicator& world, const std::vector<Block>& blocks, const Box& where,
                   const Field& field = linear) {
   std::mt19937 generator(5);
@@ -78,7 +78,7 @@ double worstError(const Communicator& world, const std::vector<Block>& blocks, c
   return worst;
 }
 
-/// How many random places of the domain haven't just one owner.
+/// The number of random places of the domain that do not have exactly one owner.
 int placesWithoutOneOwner(const Communicator& world, const std::vector<Block>& blocks, const Box& domain) {
   std::mt19937 generator(7);
   std::uniform_real_distribution<double> share(0.0, 1.0);
@@ -106,7 +106,7 @@ Box shrunk(const Box& box, double by) {
   return {box.lo + by, box.hi - by};
 }
 
-/// Cubes of side 1, 3 x 3 x 3 of them, with that many cells a side, by turns.
+/// 3 x 3 x 3 cubes of side 1, with `cells` cells a side in turns.
 std::vector<Block> cubes(Kind kind, const std::vector<int>& cells) {
   std::vector<Block> all;
   for (int i = 0; i < 27; ++i) {
@@ -135,8 +135,7 @@ TEST_CASE("three levels side by side: a linear field has no seams") {
   const Communicator world = Communicator::world();
   const Kind kind = GENERATE(Kind::Points, Kind::Cells);
   const std::vector<Block> after = comm::exchangeGhosts(world, decomposed(cubes(kind, {4, 8, 16}), world));
-  // In the outermost half of a coarse cell there's nothing to interpolate with, and a finer cell may look
-  // there.
+  // The outermost half of a coarse cell has no neighbours to interpolate with, and a finer cell may read it.
   const Box inner = shrunk(cube(0.0, 3.0), kind == Kind::Cells ? 0.25 : 0.0);
   CHECK(worstError(world, after, inner) < rounding);
   CHECK(placesWithoutOneOwner(world, after, cube(0.0, 3.0)) == 0);
@@ -162,25 +161,25 @@ TEST_CASE("three levels side by side: a curved field is off by what the coarsest
     const double coarsest = worstError(world, cubesOf({4}), inner, curved);
     INFO((kind == Kind::Cells ? "cells: " : "points: ") << levels << ", the coarsest " << coarsest);
     CHECK(coarsest > 0.01);
-    // A mean of cells differs from the value in their middle by as much as interpolation may.
+    // A mean of cells differs from the value in their middle by as much as interpolation may err.
     CHECK(levels < (kind == Kind::Cells ? 1.5 : 1.05) * coarsest);
   }
 }
 
-TEST_CASE("spacings that are no power of two apart") {
+TEST_CASE("spacings with a ratio that is no power of two") {
   const Communicator world = Communicator::world();
   const auto cells = GENERATE(std::vector<int>{3, 9, 27}, std::vector<int>{4, 6, 10}, std::vector<int>{5, 7});
   INFO(cells[0] << " to " << cells.back() << " cells");
   const auto points = comm::exchangeGhosts(world, decomposed(cubes(Kind::Points, cells), world));
   CHECK(worstError(world, points, cube(0.0, 3.0)) < rounding);
   const auto means = comm::exchangeGhosts(world, decomposed(cubes(Kind::Cells, cells), world));
-  // Where cells of two levels aren't whole in each other, both sides look at each other: not to the last bit.
+  // If cells of two levels do not nest, each side interpolates in the other: not exact to the last bit.
   const bool whole = cells[0] == 3;
-  const double step = 100.0 / cells[0];  // the field's along a coarse cell's diagonal
+  const double step = 100.0 / cells[0];  // of the field, along a coarse cell's diagonal
   CHECK(worstError(world, means, shrunk(cube(0.0, 3.0), 1.0 / cells[0])) < (whole ? rounding : 0.05 * step));
 }
 
-TEST_CASE("a finer block over a coarse one owns the place, and what it covers doesn't bleed") {
+TEST_CASE("a finer block owns the place over a coarse one, and covered values don't bleed") {
   const Communicator world = Communicator::world();
   const Kind kind = GENERATE(Kind::Points, Kind::Cells);
   const int ratio = GENERATE(2, 4);
@@ -214,7 +213,7 @@ TEST_CASE("a finer block over a coarse one owns the place, and what it covers do
   for (const Block& block : after) CHECK(block.dims == block.stored().hi);
 }
 
-TEST_CASE("lattices that nearly fit, or don't: no seam") {
+TEST_CASE("lattices that fit nearly or not at all: no seam") {
   const Communicator world = Communicator::world();
   const Kind kind = GENERATE(Kind::Points, Kind::Cells);
   // Spacings that differ by 1e-6; the same spacing, shifted by 0.3 of it along the common face.
@@ -229,7 +228,7 @@ TEST_CASE("lattices that nearly fit, or don't: no seam") {
   CHECK(placesWithoutOneOwner(world, after, inner) == 0);
 }
 
-TEST_CASE("blocks of other types: all become one that holds them") {
+TEST_CASE("blocks of different types get one type that represents all") {
   const Communicator world = Communicator::world();
   const auto [type, common] =
       GENERATE(std::pair(ScalarType::U8, ScalarType::F32), std::pair(ScalarType::I32, ScalarType::F64));
@@ -250,7 +249,7 @@ TEST_CASE("blocks of other types: all become one that holds them") {
 
 TEST_CASE("gaps of points between levels get an owner") {
   const Communicator world = Communicator::world();
-  // Cells a side, and where the second block begins after the first one's last point at 1.
+  // Cells a side, and the distance from the first block's last point, at 1, to the second block.
   const auto [first, second, gap] =
       GENERATE(std::tuple(8, 4, 0.25), std::tuple(8, 4, 0.125), std::tuple(4, 8, 0.25),
                std::tuple(4, 8, 0.125), std::tuple(8, 8, 0.05));
@@ -264,7 +263,7 @@ TEST_CASE("gaps of points between levels get an owner") {
   CHECK(worstError(world, after, domain) < rounding);
 }
 
-TEST_CASE("points that are more than a cell apart stay apart") {
+TEST_CASE("blocks of points more than a cell apart stay apart") {
   const Communicator world = Communicator::world();
   std::vector<Block> all;
   all.push_back(blockIn(Kind::Points, cube(0.0, 1.0), glm::ivec3(4)));
@@ -282,7 +281,7 @@ TEST_CASE("points that are more than a cell apart stay apart") {
 TEST_CASE("faces that differ by rounding, or by 1e-4 of a voxel, are one; filled or not") {
   const Communicator world = Communicator::world();
   const bool fill = GENERATE(true, false);
-  const double off = GENERATE(1e-5, -1e-5, 1e-14);  // of a spacing of 0.1
+  const double off = GENERATE(1e-5, -1e-5, 1e-14);  // in spacings of 0.1
   std::vector<Block> all;
   for (int i = 0; i < 8; ++i) {
     const glm::dvec3 lo(i % 2, i / 2 % 2, i / 4);
@@ -303,7 +302,7 @@ TEST_CASE("faces that differ by rounding, or by 1e-4 of a voxel, are one; filled
 TEST_CASE("blocks of one level that overlap are refused on all ranks, with both names") {
   const Communicator world = Communicator::world();
   const bool fill = GENERATE(true, false);
-  const double depth = GENERATE(0.0003, 0.05, 1.0);  // of spacings of 0.1
+  const double depth = GENERATE(0.0003, 0.05, 1.0);  // in spacings of 0.1
   std::vector<Block> mine;
   if (world.rank() == 0) {
     mine.push_back(blockIn(Kind::Cells, cube(5.0, 6.0), glm::ivec3(10)));
@@ -326,7 +325,7 @@ TEST_CASE("blocks of one level that overlap are refused on all ranks, with both 
 TEST_CASE("a neighbour's values replace the caller's ghost layers, which stay at the domain's edge") {
   const Communicator world = Communicator::world();
   const double own = 7.0;
-  // Ghost layers that a code never fills, such as the edges of a star stencil's.
+  // Ghost layers that a simulation never fills, such as the edges of a star stencil.
   const auto whole = [&](const glm::dvec3& p) { return p.x > 1.0 ? own : linear(p); };
   Block left = blockIn(Kind::Cells, {glm::dvec3(0.0), {1.25, 1.0, 1.0}}, {10, 8, 8}, ScalarType::F64, whole);
   left.owned = cube(0.0, 1.0);
@@ -377,7 +376,7 @@ TEST_CASE("cells of two levels are continued to the domain's faces, without over
   CHECK(valueAt(block, -1, -1, 2) == Approx(-0.125));
 }
 
-TEST_CASE("masked values that nobody else has are those of the nearest own ones") {
+TEST_CASE("masked values that no other block has become the nearest own ones") {
   const Communicator world = Communicator::world();
   Block block = blockIn(Kind::Cells, cube(0.0, 1.0), glm::ivec3(4), ScalarType::F32,
                         [](const glm::dvec3& p) { return p.x < 0.5 ? 3.0 : -1e9; });
@@ -389,7 +388,7 @@ TEST_CASE("masked values that nobody else has are those of the nearest own ones"
   for (int k = 0; k < 4; ++k) CHECK(valueAt(after.front(), 2, 1, k) == 3.0);
 }
 
-TEST_CASE("NaN in finer values: what's left counts, and what's NaN alone stays NaN") {
+TEST_CASE("NaN in finer values: the others count, and NaN alone stays NaN") {
   const Communicator world = Communicator::world();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::vector<Block> mine;
@@ -408,7 +407,7 @@ TEST_CASE("NaN in finer values: what's left counts, and what's NaN alone stays N
 
 TEST_CASE("thousands of blocks of two levels take seconds") {
   const Communicator world = Communicator::world();
-  if (world.size() > 3) return;  // there may be two cores
+  if (world.size() > 3) return;  // the machine may have only two cores
   constexpr int side = 16;
   std::vector<Block> mine;
   for (int i = 0; i < side * side * side; ++i) {

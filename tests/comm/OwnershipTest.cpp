@@ -1,4 +1,4 @@
-// Who owns which lists: no communication, any number of ranks.
+// Ownership of lists: no communication, any number of ranks.
 #include <algorithm>
 #include <numeric>
 #include <random>
@@ -45,14 +45,14 @@ TEST_CASE("every list has one owner, in rank order") {
   }
 }
 
-TEST_CASE("equal shares where they fit") {
+TEST_CASE("shares are equal if they fit") {
   CHECK(Ownership::equal(24, 3).of(1) == ListRange{8, 16});
   CHECK(Ownership::equal(10, 3).of(2) == ListRange{8, 10});
   CHECK(Ownership::equal(2, 5).of(0) == ListRange{0, 2});
   CHECK(Ownership::equal(2, 5).of(4).count() == 0);
 }
 
-TEST_CASE("what's in one corner of a picture is shared by all") {
+TEST_CASE("all ranks share material in one corner of a picture") {
   constexpr std::uint64_t width = 400;
   constexpr std::uint64_t height = 400;
   // 20 supersegments a list in the lowest tenth of the rows.

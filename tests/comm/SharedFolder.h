@@ -12,8 +12,8 @@
 
 namespace vdi::test {
 
-/// The root's temporary folder, known to all ranks: making it is collective. It goes when all ranks are done
-/// with it.
+/// The root's temporary folder, known to all ranks. Creating it is collective. It is removed when all ranks
+/// have finished with it.
 class SharedFolder {
  public:
   explicit SharedFolder(const comm::Communicator& comm) : comm_(comm) {
@@ -30,7 +30,7 @@ class SharedFolder {
   SharedFolder(const SharedFolder&) = delete;
   SharedFolder& operator=(const SharedFolder&) = delete;
   const std::filesystem::path& path() const { return path_; }
-  std::size_t fileCount() const { return own_->fileCount(); }  // the root's to ask
+  std::size_t fileCount() const { return own_->fileCount(); }  // on the root only
 
  private:
   const comm::Communicator& comm_;

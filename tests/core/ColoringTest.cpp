@@ -1,4 +1,4 @@
-// What goes into legends: fewer nodes, the same function.
+// Colorings for legends: fewer nodes, the same function.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -38,7 +38,7 @@ TransferFunction sampled(int count, const std::function<glm::dvec3(double)>& col
 
 }  // namespace
 
-TEST_CASE("a smooth map gets by with few nodes, a ramp with two") {
+TEST_CASE("a smooth map needs few nodes, a ramp two") {
   const TransferFunction smooth =
       sampled(1025, [](double x) { return glm::dvec3(x * x, 0.5 + 0.5 * std::sin(6.0 * x), std::sqrt(x)); });
   const TransferFunction few = simplified(smooth);
@@ -64,7 +64,7 @@ TEST_CASE("steps stay steps") {
   CHECK(few.opacities == steps.opacities);
 }
 
-TEST_CASE("no function has more nodes than a legend can take") {
+TEST_CASE("no function has more nodes than a legend supports") {
   const TransferFunction noisy =
       sampled(20000, [](double x) { return glm::dvec3(0.5 + 0.5 * std::sin(1e6 * x)); });
   CHECK(simplified(noisy).colors.size() <= 4096);
@@ -73,7 +73,7 @@ TEST_CASE("no function has more nodes than a legend can take") {
   CHECK(simplified(atOnePlace).opacities.size() == 2);
 }
 
-TEST_CASE("a coloring that can't be is refused") {
+TEST_CASE("an invalid coloring is refused") {
   Coloring sound;
   sound.array.components = 3;
   sound.array.component = -1;

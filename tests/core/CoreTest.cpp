@@ -49,7 +49,7 @@ TEST_CASE("work in parallel: each element once, exceptions come out") {
 }
 
 TEST_CASE("a vector's tail is replaced, in place and beyond") {
-  const std::size_t many = (std::size_t{1} << 22) + 3;  // bytes enough for several threads
+  const std::size_t many = (std::size_t{1} << 22) + 3;  // enough bytes for several threads
   for (const std::size_t before : {std::size_t{0}, std::size_t{5}, many, 2 * many}) {
     for (const std::size_t first : {std::size_t{0}, std::size_t{5}}) {
       if (first > before) continue;
@@ -151,8 +151,8 @@ TEST_CASE("a margin is as large as asked for, but no larger than the scene") {
     Camera camera = Camera::framing(bounds, {-0.5, -0.35, -1.0}, {0.0, 1.0, 0.0});
     camera.parallelProjection = parallel;
     settings.margin = 0.5;
-    CHECK(marginOf(scene, camera, settings) == glm::ivec2(0));  // all of it is in the picture
-    // Zoomed in, all that was asked for; then all that there is.
+    CHECK(marginOf(scene, camera, settings) == glm::ivec2(0));  // the whole scene is in the picture
+    // Zoomed in: first the whole margin, then the whole scene.
     camera.viewAngle /= 4.0;
     camera.parallelScale /= 4.0;
     settings.margin = 0.25;
@@ -173,14 +173,14 @@ TEST_CASE("a margin is as large as asked for, but no larger than the scene") {
     CHECK(farthest.x > all.halfWidth() - 3.0 * pixel);
     CHECK(farthest.y > all.halfHeight() - 3.0 * pixel);
   }
-  // The scene reaches behind the eye: there's something to see everywhere.
+  // The scene reaches behind the eye: every direction shows something.
   Camera inside;
   inside.position = glm::dvec3(0.5, 0.5, 0.2);
   inside.focalPoint = glm::dvec3(0.5);
   settings.margin = 0.5;
   settings.samplesPerVoxel = 4.0;
   CHECK(marginOf(scene, inside, settings) == glm::ivec2(80, 45));
-  // Rays so oblique that a sample per voxel couldn't be a slab are left out.
+  // Excludes rays so oblique that a sample per voxel would not be a slab.
   settings.samplesPerVoxel = 1.0;
   settings.margin = maxMargin;
   const glm::ivec2 margin = marginOf(scene, inside, settings);
@@ -209,15 +209,15 @@ TEST_CASE("viewpoints from which a VDI shows nothing true are told from others")
     original.parallelProjection = parallel;
     CHECK_FALSE(issueFrom(camera));
     camera.focalPoint = {0.0, 0.0, 20.0};
-    CHECK(issueFrom(camera) == ViewpointIssue::SeesNothing);  // looks away
+    CHECK(issueFrom(camera) == ViewpointIssue::SeesNothing);  // looks away from the scene
     camera.position = {9.0, 0.0, 10.0};
     camera.focalPoint = {9.0, 0.0, 0.0};
-    CHECK(issueFrom(camera) == ViewpointIssue::SeesNothing);  // looks past
+    CHECK(issueFrom(camera) == ViewpointIssue::SeesNothing);  // looks past the scene
     camera.position = {0.9, 0.0, 0.0};
     CHECK(issueFrom(camera) == ViewpointIssue::Inside);
     original.position = camera.position;
     camera.position.x += 1e-8;
-    CHECK(issueFrom(camera) != ViewpointIssue::Inside);  // made there
+    CHECK(issueFrom(camera) != ViewpointIssue::Inside);  // V_O itself
     original.position = {0.0, 0.0, 10.0};
   }
   const View whole(original, 64, 48);
@@ -267,8 +267,8 @@ TEST_CASE("azimuth turns as vtkCamera does, and back") {
 }
 
 TEST_CASE("azimuth turns about view-up as it is set, whatever its direction and length") {
-  // Expected places are those of vtkCamera::Azimuth(50), VTK 9.1.
-  Camera above;  // 20 degrees above what it looks at
+  // The expected positions are those of vtkCamera::Azimuth(50), VTK 9.1.
+  Camera above;  // 20 degrees above its focal point
   const double elevation = glm::radians(20.0);
   above.focalPoint = {1.0, 2.0, 3.0};
   above.position = above.focalPoint + 10.0 * glm::dvec3(0.0, std::sin(elevation), std::cos(elevation));
@@ -289,11 +289,12 @@ TEST_CASE("azimuth turns about view-up as it is set, whatever its direction and 
     CHECK(glm::length(there.azimuth(-50.0).position - oblique.position) < 1e-12);
     CHECK(glm::dot(View(there, 4, 4).up(), up) > 0.0);
   }
-  oblique.viewUp = glm::dvec3(0.0);  // taken for y
+  oblique.viewUp = glm::dvec3(0.0);  // becomes y
   const glm::dvec3 aboutY(6.758585044654509, -1.0, 3.915804719075762);
   CHECK(glm::length(oblique.azimuth(50.0).position - aboutY) < 1e-12);
   CHECK(View(oblique, 4, 4).up().y > 0.0);
-  oblique.viewUp = 2.0 * (oblique.focalPoint - oblique.position);  // looked along: stays where it is
+  // Parallel to the view direction: the camera stays in place.
+  oblique.viewUp = 2.0 * (oblique.focalPoint - oblique.position);
   CHECK(glm::length(oblique.azimuth(50.0).position - oblique.position) < 1e-12);
   CHECK(oblique.azimuth(0.0) == oblique);
 }
@@ -336,7 +337,7 @@ TEST_CASE("a face computed in two ways snaps to one float") {
   const Scene scene{{glm::dvec3(-0.3, 1.0, 7.0), glm::dvec3(11.7, 9.0, 8.0)}, 0.1};
   for (int i = 0; i <= 120; ++i) {
     const double upper = -0.3 + i * 0.1;          // origin + count * spacing
-    const double lower = 11.7 - (120 - i) * 0.1;  // from the other end
+    const double lower = 11.7 - (120 - i) * 0.1;  // computed from the other end
     CHECK(snapToScene(scene, upper, 0) == snapToScene(scene, lower, 0));
   }
 }
@@ -399,7 +400,7 @@ TEST_CASE("settings and names out of range are refused by name") {
   CHECK_THROWS_WITH(scalarTypeFromString("f16"), vdi::test::ContainsSubstring("f32"));
 }
 
-TEST_CASE("a VDI that isn't sound is refused") {
+TEST_CASE("an invalid VDI is refused") {
   Vdi vdi;
   vdi.width = 2;
   vdi.height = 1;
@@ -427,15 +428,15 @@ TEST_CASE("a VDI that isn't sound is refused") {
   });
 }
 
-TEST_CASE("the level of a histogram: where lists hold the wanted total") {
+TEST_CASE("the level of a histogram gives lists the wanted total") {
   SupersegmentHistogram histogram;
   histogram.supersegments = {1000, 800, 600, 300, 200, 100, 50, 20, 10, 10};
   histogram.equally = 600;
   CHECK(histogram.levelFor(1.0) == 2.0F);
   CHECK(histogram.levelFor(0.75) == Approx(2.5F));  // 450
-  CHECK(histogram.levelFor(0.001) == 9.0F);         // less than one each can't be
+  CHECK(histogram.levelFor(0.001) == 9.0F);         // each list has at least one
   histogram.equally = 2000;
-  CHECK(histogram.levelFor(1.0) == 0.0F);  // all samples are fewer than wanted
+  CHECK(histogram.levelFor(1.0) == 0.0F);  // there are fewer samples than requested
   histogram.equally = 900;
   CHECK(histogram.levelFor(1.0) == Approx(0.5F));
   SupersegmentHistogram twice = histogram;
@@ -452,7 +453,7 @@ TEST_CASE("the level of a histogram: where lists hold the wanted total") {
   CHECK(sum / 1000.0 == Approx(8.25).epsilon(0.01));
 }
 
-TEST_CASE("budgets and fills that can't be are refused") {
+TEST_CASE("invalid budgets and fills are refused") {
   GenerateSettings settings;
   settings.budget = Budget::Total;
   settings.fill = 0.5;

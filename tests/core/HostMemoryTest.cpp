@@ -18,7 +18,7 @@ bool hasName(const std::string& name) {
   return std::filesystem::exists("/dev/shm" + name);
 }
 
-/// In a process of its own, which then is killed. What it returns, up to a pipe's size.
+/// Runs `work` in a process that is then killed, and returns its result, up to a pipe's size.
 template <typename Work>
 std::string inKilledProcess(Work work) {
   int ends[2];

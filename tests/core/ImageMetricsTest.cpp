@@ -1,10 +1,9 @@
-// The expected figures are scikit-image 0.19.3's, for the same formulas in NumPy:
+// The expected figures are those of scikit-image 0.19.3, from the same formulas in NumPy:
 //   structural_similarity(a, b, channel_axis=2, gaussian_weights=True, sigma=1.5,
-//   use_sample_covariance=False,
-//                         data_range=255)
+//                         use_sample_covariance=False, data_range=255)
 //   peak_signal_noise_ratio(a, b, data_range=255)
-// and NumPy's mean and max of the absolute differences. The picture smaller than the window has no Gaussian
-// weights there but win_size=7, its own size.
+// and NumPy's mean and max of the absolute differences. For the picture smaller than the window they use
+// win_size=7, its own size, without Gaussian weights.
 #include "tests/Catch.h"
 #include "vdi/core/ImageMetrics.h"
 

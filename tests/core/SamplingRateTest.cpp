@@ -16,7 +16,7 @@ double ball(const glm::ivec3& index, double width) {
   return std::clamp((13.0 - glm::distance(glm::dvec3(index), glm::dvec3(19.5))) / width + 0.5, 0.0, 1.0);
 }
 
-/// The points [lo, hi] of it; `owned`: what's between them.
+/// A block of the ball's points [lo, hi], which owns the box between them.
 template <typename Value>
 Block part(const glm::ivec3& lo, const glm::ivec3& hi, const glm::ivec3& ghosts, Value value) {
   const glm::ivec3 first = glm::max(lo - ghosts, glm::ivec3(0));
@@ -82,7 +82,7 @@ TEST_CASE("sampling rate: units of scalars and of the world don't matter") {
   CHECK(rateOf(blocks, function) == 2.0);
 }
 
-TEST_CASE("sampling rate: only what is shown counts") {
+TEST_CASE("sampling rate: only the visible region counts") {
   const auto sharp = whole([](const glm::ivec3& at) { return ball(at, 1.0); });
   const TransferFunction function = hues(15, 0.6);
   Region inside;
@@ -95,7 +95,7 @@ TEST_CASE("sampling rate: only what is shown counts") {
   CHECK(rateOf(sharp, function, outside) > 1.0);
 }
 
-TEST_CASE("sampling rate: values that aren't finite decide nothing") {
+TEST_CASE("sampling rate: values that are not finite do not count") {
   const float infinity = std::numeric_limits<float>::infinity();
   const auto holes = whole([&](const glm::ivec3& at) {
     if (at.x % 5 == 0) return at.y % 2 == 0 ? std::nanf("") : infinity;
@@ -123,7 +123,7 @@ TEST_CASE("sampling rate: every decomposition has the same probes") {
         const glm::ivec3 lo{x, y, z};
         const glm::ivec3 hi = glm::min(lo + glm::ivec3(8, 20, 13), glm::ivec3(39));
         const std::vector<Block> own{part(lo, hi, glm::ivec3(1), value)};
-        const std::vector<Probe> some = probesOf(scene, own);  // as a rank that has nothing else
+        const std::vector<Probe> some = probesOf(scene, own);  // as on a rank without other blocks
         probes.insert(probes.end(), some.begin(), some.end());
       }
     }

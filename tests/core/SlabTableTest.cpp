@@ -5,7 +5,7 @@ using namespace vdi;
 
 namespace {
 
-// Blue to green, without any red; rising opacity.
+// Blue to green, without any red, with rising opacity.
 TransferFunction withoutRed() {
   TransferFunction function;
   function.colors = {{0.0, {0.0, 0.0, 1.0}}, {0.5, {0.0, 0.2, 1.0}}, {1.0, {0.0, 1.0, 0.3}}};

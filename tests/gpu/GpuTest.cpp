@@ -1,4 +1,4 @@
-// Device choice, prefix sums, merging and the kd-tree, each against something plain.
+// Device choice, prefix sums, merging and the kd-tree, each compared with a plain computation.
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -32,7 +32,7 @@ shared::Brick brick(const glm::vec3& lo, const glm::vec3& hi) {
   return b;
 }
 
-/// The leaf that a point falls into: index of its brick, -1 for none.
+/// The index of the brick in the leaf that contains a point, -1 for none.
 int find(const KdTree& tree, const glm::vec3& p) {
   std::uint32_t node = 0;
   for (;;) {
@@ -49,7 +49,7 @@ int find(const KdTree& tree, const glm::vec3& p) {
 
 }  // namespace
 
-TEST_CASE("a device that isn't there is an error that lists those that are") {
+TEST_CASE("a missing device is an error that lists the present ones") {
   DeviceRequest request;
   request.selector = "no such device";
   try {
@@ -76,7 +76,7 @@ TEST_CASE("more memory than the device has is refused with the figures") {
   CHECK(device()->allocatedBytes() == held);
 }
 
-TEST_CASE("a smaller limit of textures than the device's is kept to") {
+TEST_CASE("a texture limit below the device's is respected") {
   DeviceRequest request = requestFromEnvironment(0);
   request.maxImageDimension3D = 24;
   const auto small = Device::create(request);
@@ -84,7 +84,7 @@ TEST_CASE("a smaller limit of textures than the device's is kept to") {
   CHECK_THROWS_AS(SampledImage(small, {25, 1, 1}, VK_FORMAT_R8_UNORM), Error);
 }
 
-TEST_CASE("validation messages name the object that's wrong") {
+TEST_CASE("validation messages name the faulty object") {
   DeviceRequest request = requestFromEnvironment(0);
   request.validation = true;
   const auto own = Device::create(request);
@@ -96,7 +96,7 @@ TEST_CASE("validation messages name the object that's wrong") {
                                      buffer.handle(),
                                      VK_FORMAT_R32_UINT,
                                      0,
-                                     VK_WHOLE_SIZE};  // of a buffer without texels
+                                     VK_WHOLE_SIZE};  // from a buffer without texels
   VkBufferView view = VK_NULL_HANDLE;
   if (vkCreateBufferView(own->vulkan().handle(), &wrong, nullptr, &view) == VK_SUCCESS)
     vkDestroyBufferView(own->vulkan().handle(), view, nullptr);
@@ -112,7 +112,7 @@ TEST_CASE("a device compiles a shader once for each specialisation, whichever th
   const auto handleOf = [&](std::uint32_t compact) {
     ComputePipelineInfo special = info;
     special.specialization = {0, 0, compact, 0};
-    return ComputePipeline(own, special).handle();  // stays when its user goes
+    return ComputePipeline(own, special).handle();  // outlives its user
   };
   std::array<VkPipeline, 4> handles{};
   std::vector<std::thread> threads;
@@ -148,7 +148,7 @@ TEST_CASE("prefix sums equal the host's at awkward sizes") {
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("commands may go as soon as they were waited for, whichever thread made them") {
+TEST_CASE("commands may be destroyed once waited for, whichever thread made them") {
   const auto work = [](std::uint32_t word, bool& right) {
     const Buffer from(device(), 4096, MemoryKind::Upload);
     const Buffer to(device(), 4096, MemoryKind::Readback);
@@ -178,7 +178,7 @@ TEST_CASE("commands may go as soon as they were waited for, whichever thread mad
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("a prefix sum beyond 32 bits is noticed") {
+TEST_CASE("a prefix sum beyond 32 bits is detected") {
   constexpr std::uint32_t count = 3000;
   ScanPass scan(device());
   Commands commands(device());
@@ -193,8 +193,8 @@ TEST_CASE("a prefix sum beyond 32 bits is noticed") {
 
 namespace {
 
-/// Pre-segments of many lists, as writing leaves them: none, few, many, more than a subgroup has room for;
-/// some all alike, some with gaps, some with cuts at these.
+/// Pre-segments of many lists, as the write step leaves them: none, few, many, and more than fit a subgroup;
+/// some all equal, some with gaps, some with cuts at gaps.
 struct PreSegments {
   static constexpr std::uint32_t maxCount = 12;  // N_S
   std::vector<shared::StoredPreSegment> preSegments;
@@ -248,7 +248,7 @@ std::vector<shared::Segment> reduced(const PreSegments& lists, ReducePass::Subgr
   const Buffer left = uploaded(lists.left);
   const Buffer leftOffsets = uploaded(lists.leftOffsets);
   const Buffer segments(device(), lists.leftOffsets.back() * sizeof(shared::Segment), MemoryKind::Readback);
-  const Buffer guard = uploaded(std::vector<std::uint32_t>{1});  // there's room
+  const Buffer guard = uploaded(std::vector<std::uint32_t>{1});  // there is room
   shared::ReduceConstants constants{};
   constants.preSegments = preSegments.address();
   constants.preSegmentOffsets = offsets.address();
@@ -288,8 +288,7 @@ TEST_CASE("subgroups merge pre-segments as single invocations do") {
                  : 1;
   }
   CHECK(wrong == 0);
-  // Each list's first depth, and what shines through all of it, stay what they were; nothing gets behind its
-  // last one.
+  // Each list keeps its first depth and its transmittance, and has no material behind its last depth.
   std::uint32_t off = 0;
   for (std::size_t list = 0; list < lists.written.size(); ++list) {
     if (lists.written[list] == 0) continue;
@@ -335,7 +334,7 @@ TEST_CASE("the kd-tree finds the brick of every point") {
 }
 
 TEST_CASE("boxes that no plane separates uncut are cut; boxes that overlap are refused") {
-  // A pinwheel: every plane through a face cuts some box.
+  // A pinwheel: every plane through a face cuts a box.
   std::vector<shared::Brick> pinwheel{brick({0, 0, 0}, {2, 1, 1}), brick({2, 0, 0}, {3, 2, 1}),
                                       brick({1, 2, 0}, {3, 3, 1}), brick({0, 1, 0}, {1, 3, 1}),
                                       brick({1, 1, 0}, {2, 2, 1})};

@@ -1,4 +1,4 @@
-// Whole files: what a reader and a writer of them see when things go wrong.
+// Whole files: the results of reading and writing when things go wrong.
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -75,7 +75,7 @@ TEST_CASE("a symbolic link stays one, the file that it names is written") {
   const fs::path second = folder.path() / "second";
   fs::create_symlink("sub/f", link);
   fs::create_symlink(link, second);
-  for (std::uint8_t value = 1; value <= 2; ++value) {  // made, then replaced
+  for (std::uint8_t value = 1; value <= 2; ++value) {  // created, then replaced
     io::writeAtomically(second, bytesOf(10, value));
     CHECK(fs::is_symlink(link));
     CHECK(fs::is_symlink(second));
@@ -113,7 +113,7 @@ TEST_CASE("devices and pipes are written to, not replaced") {
   CHECK(folder.fileCount() == 1);
 }
 
-TEST_CASE("what can't be written is known before there's anything to write") {
+TEST_CASE("a path that cannot be written is known before there is anything to write") {
   const test::TemporaryFolder folder;
   const auto refused = [](const fs::path& path) {
     const Error asked = test::errorOf([&] { io::requireWritable(path); });
@@ -142,7 +142,7 @@ TEST_CASE("what can't be written is known before there's anything to write") {
   }
 }
 
-TEST_CASE("a process that's killed while it writes leaves the old file, and no other one") {
+TEST_CASE("a process killed while it writes leaves the old file, and no other one") {
   const test::TemporaryFolder folder;
   const fs::path path = folder.path() / "f";
   io::writeAtomically(path, bytesOf(1000, 1));
@@ -150,7 +150,7 @@ TEST_CASE("a process that's killed while it writes leaves the old file, and no o
   if (child == 0) {
     const rlimit tight{4096, RLIM_INFINITY};
     ::setrlimit(RLIMIT_FSIZE, &tight);
-    std::signal(SIGXFSZ, SIG_DFL);  // ends the process in the middle of the write
+    std::signal(SIGXFSZ, SIG_DFL);  // ends the process in the middle of writing
     io::writeAtomically(path, bytesOf(100000, 2));
     ::_exit(0);
   }
@@ -163,7 +163,7 @@ TEST_CASE("a process that's killed while it writes leaves the old file, and no o
   CHECK(folder.fileCount() == (unnamed >= 0 ? 1 : 2));
 }
 
-TEST_CASE("what can't be read is Error{Io} with path and reason") {
+TEST_CASE("a file that cannot be read gives Error{Io} with path and reason") {
   const test::TemporaryFolder folder;
   const auto reading = [](const fs::path& path) {
     const Error error = test::errorOf([&] { io::InputFile file(path); });
@@ -176,7 +176,7 @@ TEST_CASE("what can't be read is Error{Io} with path and reason") {
   CHECK(reading("/dev/zero").find("not a regular file") != std::string::npos);
   const fs::path pipe = folder.path() / "pipe";
   REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
-  CHECK(reading(pipe).find("a pipe") != std::string::npos);  // and doesn't wait for a writer
+  CHECK(reading(pipe).find("a pipe") != std::string::npos);  // and does not wait for a writer
 
   io::writeAtomically(folder.path() / "shrinks", bytesOf(1000, 1));
   const io::InputFile file(folder.path() / "shrinks");
@@ -184,7 +184,7 @@ TEST_CASE("what can't be read is Error{Io} with path and reason") {
   CHECK(test::errorOf([&] { file.readAll(); }).code() == ErrorCode::Io);
 }
 
-TEST_CASE("what can't be written is Error{Io}, leaves nothing behind and the old file as it was") {
+TEST_CASE("a failed write gives Error{Io}, and leaves only the old file") {
   const test::TemporaryFolder folder;
   const fs::path missing = folder.path() / "none" / "f";
   const Error noFolder = test::errorOf([&] { io::writeAtomically(missing, bytesOf(1, 1)); });
@@ -231,7 +231,7 @@ TEST_CASE("readers beside several writers of one path always see a whole file") 
   CHECK(folder.fileCount() == 1);
 }
 
-TEST_CASE("a file that several write gets its name, and any bytes, once all are finished") {
+TEST_CASE("a file of several writers gets its name, and any bytes, once all have finished") {
   const test::TemporaryFolder folder;
   const fs::path path = folder.path() / "f";
   for (const bool old : {false, true}) {
@@ -262,7 +262,7 @@ TEST_CASE("a file that several write gets its name, and any bytes, once all are 
   }
 }
 
-TEST_CASE("a file that isn't finished leaves nothing, and the old one as it was") {
+TEST_CASE("an unfinished file leaves nothing but the old one") {
   const test::TemporaryFolder folder;
   const fs::path path = folder.path() / "f";
   io::writeAtomically(path, bytesOf(5, 9));

@@ -22,7 +22,7 @@ io::Picture noisePicture(int width, int height) {
   return picture;
 }
 
-/// A PNG of any of libpng's simplified formats, 2 x 2.
+/// Writes a 2 x 2 PNG in any of libpng's simplified formats.
 void writeOther(const fs::path& path, png_uint_32 format, const std::vector<png_byte>& pixels,
                 const std::vector<png_byte>& colormap = {}) {
   png_image image{};
@@ -86,7 +86,7 @@ TEST_CASE("grey, palette and RGBA files read as RGB") {
   CHECK(io::readPng(path).rgb == std::vector<std::uint8_t>{1, 2, 3, 4, 5, 6, 7, 8, 9, 0, 0, 0});
 }
 
-TEST_CASE("what isn't a PNG is Error{Format}, what isn't there Error{Io}, both with the path") {
+TEST_CASE("a file that is no PNG gives Error{Format}, a missing one Error{Io}, both with the path") {
   const test::TemporaryFolder folder;
   const fs::path path = folder.path() / "p.png";
   const auto reading = [&](const fs::path& file) {

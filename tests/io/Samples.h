@@ -60,8 +60,8 @@ inline Vdi emptyVdi(int width, int height, std::uint32_t budget) {
   return vdi;
 }
 
-/// Lists of any length up to the budget, any values that validate(Vdi) takes: nothing for a compressor to
-/// find.
+/// Lists of any length up to the budget, with any values that validate(Vdi) accepts, which a compressor
+/// cannot predict.
 inline Vdi noisyVdi(int width, int height, std::uint32_t budget, std::uint64_t seed = 1) {
   Vdi vdi = emptyVdi(width, height, budget);
   Noise noise(seed);
@@ -79,8 +79,8 @@ inline Vdi noisyVdi(int width, int height, std::uint32_t budget, std::uint64_t s
   return vdi;
 }
 
-/// What a ball of smooth material looks like: lists that resemble their neighbours, faces on multiples of the
-/// sample step, supersegments that mostly touch, colours with the last digits of accumulated samples.
+/// A VDI like that of a smooth ball: lists that resemble their neighbours, faces on multiples of the sample
+/// step, supersegments that mostly touch, colours with the last digits of accumulated samples.
 inline Vdi plausibleVdi(int width, int height, std::uint32_t budget) {
   Vdi vdi = emptyVdi(width, height, budget);
   const auto step = static_cast<float>(vdi.sampleStep);
@@ -112,7 +112,7 @@ inline Vdi plausibleVdi(int width, int height, std::uint32_t budget) {
   return vdi;
 }
 
-/// What the colours of a VDI may mean: a name with letters beyond ASCII, a step, numbers of any size.
+/// A coloring with non-ASCII letters in its name, a step, and numbers of any magnitude.
 inline Coloring sampleColoring() {
   return {
       .array = {.name = "vitesse \u00e9lev\u00e9e \"|v|\"", .cells = true, .components = 3, .component = -1},
@@ -122,13 +122,13 @@ inline Coloring sampleColoring() {
                    .unitDistance = 0.1}};
 }
 
-/// The same VDI with that.
+/// The same VDI with that coloring.
 inline Vdi colored(Vdi vdi) {
   vdi.coloring = sampleColoring();
   return vdi;
 }
 
-/// The same in codes.
+/// The same VDI in codes.
 inline Vdi compact(const Vdi& vdi) {
   Vdi result = vdi;
   result.depthCode = {0.5F, 0x1p-8F};
@@ -136,7 +136,7 @@ inline Vdi compact(const Vdi& vdi) {
   return result;
 }
 
-/// A folder that goes with everything in it.
+/// A folder that is removed with everything in it.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -156,7 +156,7 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// Files of this process can't grow beyond `bytes` while this lives.
+/// As long as it lives, files of this process cannot grow beyond `bytes`.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -176,7 +176,7 @@ class FileSizeLimit {
   void (*handler_)(int);
 };
 
-/// The error that `call` throws; fails the test when it throws none, or something else.
+/// The error that `call` throws; fails the test if it throws none, or another exception.
 inline Error errorOf(const std::function<void()>& call) {
   try {
     call();

@@ -1,6 +1,6 @@
-// Damaged .vdi files, the same ones in every run: each must be refused with Error{Format}; what passes the
-// checksums because they were made anew must give a VDI that validate() takes. Meant to run under sanitizers
-// too.
+// Damaged .vdi files, the same ones in every run: each must be refused with Error{Format}. A file whose
+// checksums were recomputed may pass, but must give a VDI that validate() accepts. Also meant to run under
+// sanitizers.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -21,9 +21,9 @@ constexpr std::size_t headerBytes = 240;
 
 enum class Outcome { Refused, Sound, Other };
 
-/// Other: another exception, or a VDI that isn't sound.
+/// Other: another exception, or an invalid VDI.
 Outcome outcomeOf(std::span<const std::byte> bytes) {
-  // A copy of just this size, so that a sanitizer sees every byte read beyond.
+  // A copy of exactly this size lets a sanitizer notice every byte read beyond it.
   const std::vector<std::byte> copy(bytes.begin(), bytes.end());
   try {
     const Vdi vdi = io::decode(copy);
@@ -50,7 +50,7 @@ std::uint32_t get32(const std::vector<std::byte>& bytes, std::size_t offset) {
   return value;
 }
 
-/// Makes every checksum of a damaged file right that its header and table still let be found.
+/// Recomputes every checksum of a damaged file that its header and table still locate.
 void reseal(std::vector<std::byte>& bytes) {
   const std::size_t chunks = get32(bytes, 40);
   const std::size_t room = (bytes.size() - headerBytes) / 16;
@@ -86,7 +86,7 @@ TEST_CASE("a small file with any one bit flipped is refused") {
   CHECK(passed == 0);
 }
 
-TEST_CASE("a small file cut at any length, or with bytes behind it, is refused") {
+TEST_CASE("a small file cut at any length, or with trailing bytes, is refused") {
   const Vdi noisy = test::noisyVdi(6, 5, 4);
   const std::vector<std::byte> sound = io::encode(GENERATE(false, true) ? test::colored(noisy) : noisy);
   std::size_t passed = 0;
@@ -115,7 +115,7 @@ TEST_CASE("a file of several chunks, damaged in many ways, is refused") {
       case 0:
         flip(damaged, noise.below(size * 8));
         break;
-      case 1:  // another value of a byte, then noise over what follows
+      case 1:  // another value of a byte, then noise over the following bytes
         damaged[from] ^= static_cast<std::byte>(1 + noise.below(255));
         for (std::uint32_t j = 1; j < length; ++j)
           damaged[from + j] = static_cast<std::byte>(noise.below(256));
@@ -132,7 +132,7 @@ TEST_CASE("a file of several chunks, damaged in many ways, is refused") {
   CHECK(passed == 0);
 }
 
-TEST_CASE("flipped bits below right checksums: refused, or a sound VDI") {
+TEST_CASE("flipped bits under valid checksums: refused, or a valid VDI") {
   const Vdi plausible = test::plausibleVdi(12, 9, 4);
   const std::vector<std::byte> sound =
       io::encode(GENERATE(false, true) ? test::colored(test::compact(plausible)) : plausible);
@@ -147,10 +147,10 @@ TEST_CASE("flipped bits below right checksums: refused, or a sound VDI") {
     if (outcome == Outcome::Sound) ++accepted;
   }
   CHECK(other == 0);
-  CHECK(accepted > 0);  // the checksums were right: the decoder below them was reached
+  CHECK(accepted > 0);  // with right checksums, the damage reached the decoder
 }
 
-TEST_CASE("noise below right checksums: refused, or a sound VDI") {
+TEST_CASE("noise under valid checksums: refused, or a valid VDI") {
   const Vdi plausible = test::plausibleVdi(100, 90, 6);
   const std::vector<std::byte> sound =
       io::encode(GENERATE(false, true) ? test::colored(test::compact(plausible)) : plausible);
@@ -170,11 +170,11 @@ TEST_CASE("noise below right checksums: refused, or a sound VDI") {
   CHECK(other == 0);
 }
 
-TEST_CASE("a file that claims more than it holds is refused before memory is taken") {
+TEST_CASE("a file that claims more than it holds is refused before allocation") {
   const bool compact = GENERATE(false, true);
   const Vdi noisy = test::noisyVdi(40, 40, 40);
   std::vector<std::byte> claims = io::encode(compact ? test::compact(noisy) : noisy);
-  REQUIRE(get32(claims, 40) == 1);  // chunk
+  REQUIRE(get32(claims, 40) == 1);  // the chunk count
   const std::uint64_t packed = get32(claims, headerBytes + 4);
   REQUIRE(packed > 100000);
   const std::uint64_t maxCount = (packed * 255 - 8 - 4 * 1600) / (compact ? 9 : 24);
@@ -182,7 +182,7 @@ TEST_CASE("a file that claims more than it holds is refused before memory is tak
   put32(claims, 32, static_cast<std::uint32_t>(maxCount));  // the budget
   put64(claims, 48, maxCount);
   reseal(claims);
-  // In a process of its own, for its largest size is that of all its life.
+  // A separate process, because a process's largest size covers its whole life.
   const pid_t child = ::fork();
   if (child == 0) {
     const auto largestKilobytes = [] {
@@ -201,7 +201,7 @@ TEST_CASE("a file that claims more than it holds is refused before memory is tak
   CHECK(WEXITSTATUS(status) == 0);
 }
 
-TEST_CASE("what a packed chunk expands to is known without expanding it") {
+TEST_CASE("a packed chunk's expanded size is known without expanding it") {
   for (const Vdi& vdi :
        {test::plausibleVdi(20, 15, 5), test::noisyVdi(20, 15, 5), test::plausibleVdi(1, 1, 1)}) {
     const auto lists = vdi.listCount();
@@ -216,7 +216,7 @@ TEST_CASE("what a packed chunk expands to is known without expanding it") {
   }
 }
 
-TEST_CASE("bytes of no meaning are refused") {
+TEST_CASE("meaningless bytes are refused") {
   test::Noise noise(23);
   const std::vector<std::byte> sound = io::encode(test::noisyVdi(6, 5, 4));
   std::size_t passed = 0;
@@ -230,7 +230,7 @@ TEST_CASE("bytes of no meaning are refused") {
   CHECK(passed == 0);
 }
 
-TEST_CASE("noise in place of packed lists is refused or fills just what was asked for") {
+TEST_CASE("noise in place of packed lists is refused, or fills exactly the requested lists") {
   test::Noise noise(31);
   const Vdi vdi = test::plausibleVdi(20, 15, 5);
   const std::vector<std::byte> sound = io::detail::packLists(test::full(vdi), {}, 0, 300);

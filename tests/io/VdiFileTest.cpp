@@ -1,4 +1,4 @@
-// The .vdi file: what goes in comes out, the byte map of docs/format.md, and clear refusals.
+// The .vdi file: round trips, the byte map of docs/format.md, and clear refusals.
 #include <xxhash.h>
 
 #include <cmath>
@@ -16,14 +16,14 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Equal to the bit: operator== takes 0 and -0 for equal.
+/// Equal to the bit: operator== treats 0 and -0 as equal.
 bool sameBits(const Vdi& a, const Vdi& b) {
   if (a.precision() == Precision::Compact) return a == b;
   return a == b && std::memcmp(test::full(a).segments.data(), test::full(b).segments.data(),
                                test::full(a).segments.size() * sizeof(Supersegment)) == 0;
 }
 
-/// A value at a place of the byte map.
+/// A value at an offset of the byte map.
 template <typename T>
 T at(std::span<const std::byte> bytes, std::size_t offset) {
   T value;
@@ -37,7 +37,7 @@ void put(std::vector<std::byte>& bytes, std::size_t offset, T value) {
 
 constexpr std::size_t headerBytes = 240;
 
-/// Makes both outer checksums right again.
+/// Recomputes both outer checksums.
 void seal(std::vector<std::byte>& bytes) {
   const auto chunks = at<std::uint32_t>(bytes, 40);
   const std::size_t table = std::min<std::size_t>(chunks * 16ULL, bytes.size() - headerBytes);
@@ -45,7 +45,7 @@ void seal(std::vector<std::byte>& bytes) {
   put<std::uint64_t>(bytes, 232, XXH64(bytes.data(), 232, 0));
 }
 
-/// What decode says about a file changed in one place, checksums of header and table in order.
+/// The refusal of a file changed in one place, with valid checksums of header and table.
 template <typename T>
 std::string refusal(std::vector<std::byte> bytes, std::size_t offset, T value) {
   put(bytes, offset, value);
@@ -67,7 +67,7 @@ using vdi::test::ContainsSubstring;
 
 }  // namespace
 
-TEST_CASE("a VDI comes back as it was, to the bit") {
+TEST_CASE("a VDI survives encoding and decoding to the bit") {
   SECTION("sizes around a chunk of lists") {
     const auto [width, height] =
         GENERATE(table<int, int>({{1, 1}, {1, 7}, {64, 64}, {4095, 1}, {1, 4097}, {97, 101}, {128, 64}}));
@@ -202,7 +202,7 @@ TEST_CASE("metadata make version 3 and lie behind the chunks as JSON, as docs/fo
   CHECK(sameBits(io::decode(bytes), vdi));
   CHECK(io::decodeInfo(bytes).version == 3);
   CHECK(io::decodeInfo(bytes).header.coloring == vdi.coloring);
-  // The same without metadata, which older programs read.
+  // The same VDI without metadata, which older programs read.
   vdi.coloring.reset();
   CHECK(at<std::uint32_t>(io::encode(vdi), 8) == (vdi.margin.x > 0 ? 2 : 1));
 }
@@ -261,7 +261,7 @@ TEST_CASE(
   CHECK_THAT(refusal(sound, place + 4, 1U), ContainsSubstring("bytes of metadata"));
   CHECK_THAT(refusal(sound, place + 8, std::uint64_t{1}), ContainsSubstring("metadata's checksum"));
   CHECK_THAT(refusal(sound, 8, 1U), ContainsSubstring("header says"));
-  // What such a file would be refused for isn't written.
+  // encode refuses the VDIs that decode would refuse.
   Vdi vdi = test::colored(test::noisyVdi(4, 4, 3));
   vdi.coloring->function.unitDistance = 0.0;
   CHECK(test::errorOf([&] { io::encode(vdi); }).code() == ErrorCode::Format);
@@ -299,14 +299,14 @@ TEST_CASE("later versions, encodings and flags are named in the refusal") {
   CHECK_THAT(refusal(sound, 0, 'v'), ContainsSubstring("VDI-FILE"));
 }
 
-TEST_CASE("a header or table that can't be true is refused, its checksums being right") {
+TEST_CASE("an impossible header or table with valid checksums is refused") {
   const std::vector<std::byte> sound = io::encode(test::noisyVdi(4, 4, 3));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   refusal(sound, 24, 0U);
-  refusal(sound, 24, 5U);  // another number of lists: the counts run out
+  refusal(sound, 24, 5U);  // more lists than counts
   refusal(sound, 28, 32769U);
   refusal(sound, 32, 0U);
-  refusal(sound, 32, 1U);  // a smaller budget than the lists need
+  refusal(sound, 32, 1U);  // a budget below the lists' size
   refusal(sound, 36, 0U);
   refusal(sound, 40, 2U);
   refusal(sound, 48, at<std::uint64_t>(sound, 48) + 1);
@@ -355,7 +355,7 @@ TEST_CASE("info is known without the lists") {
   };
   requireGood(io::readVdiInfo(path));
   requireGood(io::decodeInfo(bytes));
-  bytes.back() ^= std::byte{1};  // in a list
+  bytes.back() ^= std::byte{1};  // within a list
   io::writeAtomically(path, bytes);
   requireGood(io::readVdiInfo(path));
   CHECK(test::errorOf([&] { io::readVdi(path); }).code() == ErrorCode::Format);
@@ -364,7 +364,7 @@ TEST_CASE("info is known without the lists") {
   CHECK(test::errorOf([&] { io::readVdiInfo(path); }).code() == ErrorCode::Format);
 }
 
-TEST_CASE("what decode would refuse isn't written") {
+TEST_CASE("VDIs that decode would refuse are not written") {
   const test::TemporaryFolder folder;
   const fs::path path = folder.path() / "v.vdi";
   const Vdi sound = test::noisyVdi(8, 8, 4);
@@ -404,7 +404,7 @@ TEST_CASE("files: written, read, and refused with their path") {
   CHECK(test::errorOf([&] { io::readVdiInfo(path); }).code() == ErrorCode::Format);
 }
 
-TEST_CASE("unpackLists refuses what isn't just the lists and supersegments asked for") {
+TEST_CASE("unpackLists refuses anything but the requested lists and supersegments") {
   const Vdi vdi = test::noisyVdi(10, 10, 5);
   const std::vector<std::byte> packed = io::detail::packLists(test::full(vdi), {}, 20, 60);
   const std::size_t count = test::full(vdi).offsets[60] - test::full(vdi).offsets[20];
@@ -423,12 +423,12 @@ TEST_CASE("unpackLists refuses what isn't just the lists and supersegments asked
   }
   CHECK(test::errorOf([&] { unpack(41, count); }).code() == ErrorCode::Format);
   CHECK(test::errorOf([&] { unpack(40, count + 1); }).code() == ErrorCode::Format);
-  // As many bytes, dealt out otherwise: six counts in place of a supersegment, and the reverse.
+  // As many bytes, divided differently: six counts in place of a supersegment, and the reverse.
   CHECK(test::errorOf([&] { unpack(46, count - 1); }).code() == ErrorCode::Format);
   CHECK(test::errorOf([&] { unpack(34, count + 1); }).code() == ErrorCode::Format);
 }
 
-TEST_CASE("compact lists are stored in 2/5 of what full ones take, and refused when they aren't sound") {
+TEST_CASE("compact lists take 2/5 of the size of full ones, and invalid ones are refused") {
   const Vdi vdi = test::plausibleVdi(480, 270, 25);
   const Vdi compact = test::compact(vdi);
   const std::vector<std::byte> bytes = io::encode(compact);
@@ -445,7 +445,7 @@ TEST_CASE("compact lists are stored in 2/5 of what full ones take, and refused w
   refused([](Vdi& v) { v.depthCode.first = std::numeric_limits<float>::quiet_NaN(); });
   refused([](Vdi& v) {
     std::get<CompactLists>(v.lists).segments[5].depths = 7;
-  });  // ends where it begins, or before
+  });  // ends at its begin, or before
 }
 
 TEST_CASE("a VDI such as a generator makes is stored in less than 5/8 of its memory") {

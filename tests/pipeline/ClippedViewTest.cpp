@@ -1,4 +1,5 @@
-// Views of a VDI that planes clip: the device against the reference, and against what needs no planes.
+// Views of a VDI clipped by planes: the device compared with the reference, and with views that need no
+// planes.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -87,7 +88,7 @@ TEST_CASE(
   CHECK(pixelsThatDiffer(front, whole, 8.0F) > whole.rgba.size() / 20);
 }
 
-TEST_CASE("clipped views: all or nothing, and what is refused") {
+TEST_CASE("clipped views: everything or nothing, and refusals") {
   const Camera camera = test::oblique();
   VdiRenderer renderer(test::device());
   renderer.setVdi(makeVdi(camera));

@@ -1,4 +1,4 @@
-// What ranks compare: equal for equal parameters; where one differs, that one is named.
+// Fingerprints: equal for equal arguments; if one differs, it is named.
 #include <functional>
 #include <string>
 #include <vector>

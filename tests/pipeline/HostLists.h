@@ -1,4 +1,4 @@
-// Lists of the host to passes on the device, and back.
+// Brings lists from the host to passes on the device, and back.
 #pragma once
 
 #include <cstring>
@@ -8,8 +8,8 @@
 
 namespace vdi::test {
 
-/// What a Distributor would hand on of these lists, one rank's behind the other's. Every other rank's counts
-/// are words, as if one had no room in a byte.
+/// The parts that a Distributor would return for these lists, one rank after the other. Every other rank's
+/// counts are words, as if one did not fit a byte.
 class HostSubLists {
  public:
   template <typename Segment>
@@ -69,7 +69,7 @@ ListsOf<Segment> download(const std::shared_ptr<gpu::Device>& device, const deta
   return copy;
 }
 
-/// All ranks' lists composited.
+/// Composites all ranks' lists.
 template <typename Segment>
 ListsOf<Segment> composite(const std::shared_ptr<gpu::Device>& device, detail::Compositor& compositor,
                            const std::vector<ListsOf<Segment>>& subLists,

@@ -1,5 +1,5 @@
-// What a volume looks like by the optical model alone: an integral in double precision that shares no table,
-// no lattice of samples and no helper with what it judges.
+// The picture of a volume by the optical model alone: an integral in double precision that shares no table,
+// no lattice of samples and no helper with the code under test.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace vdi::test {
 
-/// A function of the place on a lattice, as plain numbers.
+/// A function of position on a lattice, as plain numbers.
 struct Lattice {
   glm::ivec3 size;
   glm::dvec3 spacing;
@@ -64,8 +64,8 @@ struct Lattice {
   }
 };
 
-/// Colour and opacity of a scalar in [0, 1]: between the nodes, linearly; the functions below are given by
-/// the same nodes.
+/// Colour and opacity of a scalar in [0, 1], linear between the nodes; the transfer functions below have the
+/// same nodes.
 struct Material {
   std::array<double, 3> low;
   std::array<double, 3> high;
@@ -85,14 +85,14 @@ struct Lamp {
   std::array<double, 3> color;
 };
 
-/// How it's lit, and which places are shown; none: all.
+/// The lighting, and the visible places; none: all.
 struct Look {
   std::vector<Lamp> lamps;
   double ambient = 0.0;
   std::function<bool(const glm::dvec3&)> shows{};
 };
 
-/// Along -z through (x, y), by steps of a 64th of a voxel.
+/// The integral along -z through (x, y), in steps of a 64th of a voxel.
 inline std::array<double, 4> integral(const Lattice& lattice, const Material& material, const Look& look,
                                       double x, double y) {
   std::array<double, 4> sum{};

@@ -1,4 +1,4 @@
-// Levels of blocks on any number of ranks against one uniform lattice of points.
+// Blocks of several levels on any number of ranks, compared with one uniform lattice of points.
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -29,8 +29,8 @@ double smooth(const glm::dvec3& p) {
   return 0.5 + 0.25 * std::sin(5.0 * p.x + 2.0 * p.y) + 0.25 * std::cos(4.0 * p.z - 3.0 * p.x);
 }
 
-/// Values from `box.lo` on, of cells or points. Cells have ghost layers, a coarsest cell thick, where the box
-/// ends with the unit cube: there's nobody there to get them from.
+/// Values from `box.lo` on, of cells or points. Cells have ghost layers, a coarsest cell thick, at the faces
+/// of the unit cube, where no neighbour can provide them.
 Block blockIn(bool cells, const Box& box, double spacing, const Field& field) {
   GhostLayers ghosts;
   glm::dvec3 origin = box.lo;
@@ -95,7 +95,8 @@ std::vector<Block> sideBySide(bool cells, const Field& field) {
   return all;
 }
 
-/// A coarse cube with finer boxes over it, `ratio` and ratio^2 times as fine; what they cover is off by far.
+/// A coarse cube with finer boxes over it, `ratio` and ratio^2 times as fine; the values that they cover are
+/// far off.
 std::vector<Block> overEachOther(bool cells, const Field& field, int ratio) {
   const double finest = 1.0 / 48;
   const Box middle{glm::dvec3(1.0 / 3), glm::dvec3(2.0 / 3)};
@@ -123,7 +124,7 @@ GenerateSettings settings() {
   return test::smallSettings(96, 72, 20);
 }
 
-/// Of the uniform lattice, on the first rank.
+/// The picture of the uniform lattice, on the first rank.
 std::optional<Image> truthOf(const Field& field) {
   if (comm::Communicator::world().rank() != 0) return std::nullopt;
   VdiGenerator one(device(), comm::Communicator::serial());
@@ -170,7 +171,7 @@ TEST_CASE("a curved field: no worse than the coarsest level alone, on any number
     CHECK(differenceOf(*volume, *one.renderVolume(test::oblique(), bands(), settings())).worst < 1.0);
     one.setBlocks({blockIn(cells, {glm::dvec3(0.0), glm::dvec3(1.0)}, 1.0 / 12, smooth)});
     GenerateSettings fine = settings();
-    fine.samplesPerVoxel = 4.0;  // the samples of the others
+    fine.samplesPerVoxel = 4.0;  // the same number as the others
     const auto coarse = one.renderVolume(test::oblique(), bands(), fine);
     const double share = differenceOf(*volume, *truth).wrongShare;
     const double coarseShare = differenceOf(*coarse, *truth).wrongShare;
@@ -203,7 +204,7 @@ TEST_CASE("blocks of one level that overlap between ranks: refused on all, and t
 
 TEST_CASE("large blocks, whose values a process with one core lets the device copy, get their patches") {
   const comm::Communicator world = comm::Communicator::world();
-  // Doubles are always staged. The coarse block takes 2 MiB, and a part of it is covered.
+  // Doubles are always staged. The coarse block takes 2 MiB, and it is partly covered.
   const double spacing = 1.0 / 80;
   const Box middle{glm::dvec3(0.25), glm::dvec3(0.75)};
   const auto covered = [&middle](const glm::dvec3& p) {

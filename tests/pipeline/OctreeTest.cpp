@@ -1,4 +1,5 @@
-// Leaves of an octree, cells without ghost layers on any number of ranks, against the same field as points.
+// Leaves of an octree, cells without ghost layers on any number of ranks, compared with the same field as
+// points.
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -86,9 +87,9 @@ TEST_CASE("an octree of cells with a thin ramp: the picture of the same octree o
     const char* name;
     Field field;
     double worst;       // of 255
-    double wrongShare;  // off by more than 16
+    double wrongShare;  // share of pixels off by more than 16
   };
-  // Cells and points interpolate a curved field at other places; the linear one tells seams apart.
+  // Cells and points interpolate a curved field at different places; the linear field isolates seams.
   const Scene scenes[] = {{"linear", linear, 1.0, 0.0}, {"ball", ball, 16.0, 0.0}, {"wave", wave, 4.0, 0.0}};
   GenerateSettings settings = test::smallSettings(120, 90, 20);
   settings.samplesPerVoxel = 4.0;

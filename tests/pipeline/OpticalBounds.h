@@ -1,4 +1,4 @@
-// How far pictures may be from the optical model in double precision.
+// Bounds on the difference between pictures and the optical model in double precision.
 #pragma once
 
 #include "tests/Catch.h"
@@ -18,15 +18,15 @@ inline GenerateSettings opticalSettings(double rate) {
 }
 
 struct Bound {
-  double largest;  // of smooth functions
+  double largest;  // for smooth functions
   double mean;
-  double pixels;  // share of them that's off by more than 8/255
+  double pixels;  // share of pixels off by more than 8/255
 };
 
-/// Of pictures, in 1/255. At eight samples a voxel rays are straight enough within a sample: 0.3 were
-/// measured, on average 0.04. At one a voxel the scalar isn't linear along a sample, as trilinear cells are
-/// cubic along it: 3.7 and 0.5. Steep functions make edges, and a pixel at an edge of something opaque is all
-/// wrong or right: 0.7 and 8 % of the pixels. Textures of GPUs have weights of 8 bits.
+/// Bounds for pictures, in 1/255. At eight samples a voxel, the scalar is nearly linear within a sample: the
+/// measured difference is 0.3 at most and 0.04 on average. At one sample a voxel it is not, since trilinear
+/// cells are cubic along a ray: 3.7 and 0.5. Steep functions make edges, and a pixel at the edge of an opaque
+/// object is all wrong or right: 0.7 and 8 % of the pixels. GPUs filter textures with 8-bit weights.
 inline Bound boundOf(const gpu::Device& device, double rate, bool steep) {
   const double coarse = device.isCpu() ? 1.0 : 3.0;
   if (rate > 1.0)

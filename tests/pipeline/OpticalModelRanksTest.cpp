@@ -1,5 +1,5 @@
-// Pictures of several ranks against the optical model in double precision, which knows neither ranks nor
-// blocks.
+// Pictures of several ranks compared with the optical model in double precision, which knows neither ranks
+// nor blocks.
 #include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/pipeline/OpticalBounds.h"
@@ -40,7 +40,7 @@ TEST_CASE("optical model: several ranks", "[ranks]") {
         const auto vdi = generator.generate(camera, named.function, settings);
         if (world.rank() != 0) continue;
         test::checkPicture(*volume, expected, named, bound);
-        // Each rank's codes are rounded by themselves, and those of what they become once more.
+        // Each rank rounds its codes, and compositing rounds the result once more.
         test::checkPicture(flatten(*vdi), expected, named,
                            {bound.largest + 1.0, bound.mean + 0.3, bound.pixels});
       }

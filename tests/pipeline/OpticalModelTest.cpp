@@ -1,5 +1,5 @@
-// Pictures of device, reference and VDIs against the optical model in double precision, with which they share
-// no table, no samples and no code. Errors that all of them have show here.
+// Pictures of device, reference and VDIs compared with the optical model in double precision, with which they
+// share no table, no samples and no code. This exposes their common errors.
 #include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/pipeline/OpticalBounds.h"
@@ -16,7 +16,7 @@ using test::device;
 
 namespace {
 
-/// All that makes pictures.
+/// Checks every way to make a picture.
 void checkAll(const test::Stretch& stretch, Joint joint, bool parallel, bool someOnly) {
   const test::OpticalScene scene = test::opticalScene(stretch, joint);
   VdiGenerator generator(device(), comm::Communicator::serial());
@@ -36,7 +36,7 @@ void checkAll(const test::Stretch& stretch, Joint joint, bool parallel, bool som
       const Bound bound = test::boundOf(*device(), rate, named.steep);
       const GenerateSettings settings = test::opticalSettings(rate);
       checkPicture(*generator.renderVolume(camera, named.function, settings), expected, named, bound);
-      // Codes carry what rounding changes to the next supersegment.
+      // Codes carry rounding errors over to the next supersegment.
       checkPicture(flatten(*generator.generate(camera, named.function, settings)), expected, named,
                    {bound.largest + 0.5, bound.mean + 0.1, bound.pixels});
       if (rate == 1.0 || !someOnly) {

@@ -1,4 +1,4 @@
-// How far a picture is from another one, in 1/255.
+// The difference between two pictures, in 1/255.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 namespace vdi::test {
 
 struct Difference {
-  double worst = 0.0;       // of 255, over all channels
-  double wrongShare = 0.0;  // of the object's pixels: off by more than 16
+  double worst = 0.0;       // in 1/255, over all channels
+  double wrongShare = 0.0;  // share of the object's pixels off by more than 16
 };
 
 /// Requires that the object covers a tenth of the picture.

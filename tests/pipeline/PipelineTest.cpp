@@ -1,4 +1,4 @@
-// Each device pass against the reference, and a VDI against DVR.
+// Each device pass compared with the reference, and a VDI compared with DVR.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -30,13 +30,13 @@ using test::device;
 
 namespace {
 
-/// Another one, which does as a GPU does.
+/// A second device, which runs the programs for GPUs.
 std::shared_ptr<gpu::Device> deviceAsGpu() {
   static const std::shared_ptr<gpu::Device> instance = test::makeDevice(true);
   return instance;
 }
 
-/// With the layers of values beyond their owned boxes that setBlocks gives them, too.
+/// The blocks with the layers of values beyond their owned boxes that setBlocks also gives them.
 std::vector<Block> withLayers(const std::vector<Block>& blocks) {
   return comm::exchangeGhosts(comm::Communicator::serial(), blocks);
 }
@@ -54,7 +54,7 @@ ImageDifference differenceOf(const Image& a, const Image& b) {
   return compare(io::toPicture(a).rgb, io::toPicture(b).rgb, a.width, a.height, 3);
 }
 
-/// Of pixels: one has a depth and the other none, or they're more than `tolerance` apart.
+/// Number of pixels of which only one has a depth, or whose depths are more than `tolerance` apart.
 std::size_t depthsThatDiffer(const Image& a, const Image& b, float tolerance) {
   REQUIRE(a.depth.size() == b.depth.size());
   std::size_t count = 0;
@@ -63,8 +63,8 @@ std::size_t depthsThatDiffer(const Image& a, const Image& b, float tolerance) {
   return count;
 }
 
-/// GPUs interpolate with weights of 8 bits, CPU devices and the reference with floats: where a transfer
-/// function is steep, that shows.
+/// GPUs interpolate with 8-bit weights, CPU devices and the reference with floats, which matters where a
+/// transfer function is steep.
 template <typename T>
 T byFilter(T precise, T coarse) {
   return device()->isCpu() ? precise : coarse;
@@ -79,7 +79,7 @@ bool alike(const Supersegment& a, const Supersegment& b, float tolerance) {
          close(a.blue, b.blue) && close(a.opacity, b.opacity);
 }
 
-/// Rounding may tip a decision, so a few are to be expected.
+/// Rounding may change a decision, so a few differences are expected.
 std::size_t listsThatDiffer(const SupersegmentLists& a, const SupersegmentLists& b,
                             float tolerance = rounding) {
   REQUIRE(a.listCount() == b.listCount());
@@ -106,7 +106,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
       const auto decomposed = test::decompose("turbulence", {26, 22, 24}, {2, 2, 2}, Layout::OnOneRank,
                                               Joint::SharedPoints, type, 0, 1);
       const TransferFunction function = test::threeHues(test::topOf(type) * 0.8);
-      // Odd sizes: the last row and column are between counted ones and nothing.
+      // Odd sizes: the last row and column lie beyond the last counted ones.
       const GenerateSettings settings = test::smallSettings(47, 35, 8);
       const Camera camera = test::oblique(parallel);
       VdiGenerator generator(device(), comm::Communicator::serial());
@@ -139,7 +139,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
         CHECK(listsThatDiffer(full->expandedLists(), lists) <=
               lists.listCount() / byFilter<std::size_t>(50, 20));
         CHECK(largestDifference(flatten(*full), expected) < 0.5F);
-        // The codes, from the very floats that the device made: rounding may tip a few of them.
+        // Codes of the very floats that the device made: rounding may change a few of them.
         const SupersegmentLists codes =
             expanded(reference::compacted(full->expandedLists(), vdi->depthCode), vdi->depthCode);
         CHECK(listsThatDiffer(vdi->expandedLists(), codes, oneCode) <= lists.listCount() / 50);
@@ -153,7 +153,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
         const Camera other = camera.azimuth(angle);
         for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
           INFO(toString(reconstruction));
-          // A size whose rays never run exactly between two lists: those may take either.
+          // At this size, no ray runs exactly between two lists, where either would be right.
           const Image seen = renderer.render(other, 40, 32, reconstruction);
           const Image expectedThere = reference::render(*vdi, View(other, 40, 32), reconstruction);
           CHECK(largestDifference(seen, expectedThere) < 2.0F);
@@ -172,7 +172,7 @@ TEST_CASE("a margin: the reference's lists around the picture, and no cut edge w
     const TransferFunction function = test::threeHues(0.8);
     VdiGenerator generator(device(), comm::Communicator::serial());
     generator.setBlocks(decomposed.mine);
-    Camera camera = test::oblique(parallel);  // zoomed in to a quarter of it
+    Camera camera = test::oblique(parallel);  // zoomed in to a quarter of the width
     camera.viewAngle /= 4.0;
     camera.parallelScale /= 4.0;
     GenerateSettings settings = test::smallSettings(32, 24, 8);
@@ -189,7 +189,7 @@ TEST_CASE("a margin: the reference's lists around the picture, and no cut edge w
     const reference::Frame frame(generator.scene(), camera, function, settings);
     const SupersegmentLists lists = reference::generate(frame, withLayers(decomposed.mine), false);
     CHECK(listsThatDiffer(vdi.expandedLists(), lists) <= lists.listCount() / byFilter<std::size_t>(50, 20));
-    // The picture is the one that was asked for, whatever the margin is.
+    // The picture does not depend on the margin.
     const Image picture = *generator.renderVolume(camera, function, settings);
     CHECK(picture.width == 32);
     CHECK(largestDifference(flatten(vdi), picture) < 0.5F);
@@ -212,7 +212,7 @@ TEST_CASE("a margin: the reference's lists around the picture, and no cut edge w
   }
 }
 
-TEST_CASE("rays that leave a picture within a tile of lists, through material at its edge") {
+TEST_CASE("rays leave a picture within a tile of lists, through material at its edge") {
   const auto decomposed = test::decompose("interface", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
                                           Joint::SharedPoints, ScalarType::F32, 0, 1);
   VdiGenerator generator(device(), comm::Communicator::serial());
@@ -225,7 +225,7 @@ TEST_CASE("rays that leave a picture within a tile of lists, through material at
     renderer.setVdi(*vdi);
     for (const double angle : {120.0, 160.0, 200.0, 240.0}) {
       INFO(angle);
-      // Many rays: rounding lets few of them go beyond the last list.
+      // There are many rays: rounding lets a few of them pass the last list.
       const Image seen = renderer.render(camera.azimuth(angle), 160, 160);
       const auto isSound = [](const glm::vec4& p) { return p.a >= 0.0F && p.a <= 1.0F && p.r >= 0.0F; };
       CHECK(std::all_of(seen.rgba.begin(), seen.rgba.end(), isSound));
@@ -235,16 +235,16 @@ TEST_CASE("rays that leave a picture within a tile of lists, through material at
 }
 
 TEST_CASE("macrocells that rays pass and samples that are counted as one: as in the reference") {
-  // Several macrocells along each axis, most of them empty.
+  // Each axis has several macrocells, most of them empty.
   const auto decomposed = test::decompose("coil", {70, 75, 66}, {1, 2, 1}, Layout::OnOneRank,
                                           Joint::SharedPoints, ScalarType::U8, 0, 1);
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   GenerateSettings settings = test::smallSettings(41, 33, 6);
   settings.precision = Precision::Full;
-  for (const double top : {80.0, 30.0, 200.0}) {  // the last one: next to nothing is visible
+  for (const double top : {80.0, 30.0, 200.0}) {  // with the last one, almost nothing is visible
     INFO(top);
-    // The smaller the budget, the more samples are counted as one.
+    // The smaller the budget, the more samples count as one.
     settings.supersegments = top == 80.0 ? 6 : top == 30.0 ? 1 : 3;
     const TransferFunction function = test::threeHues(top);
     const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
@@ -265,7 +265,7 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
 
 TEST_CASE(
     "values that are copied as they are and values that are staged, several buffers full, give one picture") {
-  // Equal texels from both: those of i16 are shifted up.
+  // Both give equal texels: those of i16 are shifted up.
   const glm::ivec3 size{262, 261, 260};
   std::vector<std::uint16_t> values;
   values.reserve(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
@@ -301,7 +301,7 @@ TEST_CASE(
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("rays go on behind material of opacity 1, unless they're to end") {
+TEST_CASE("rays go on behind material of opacity 1, unless they must end") {
   const auto decomposed = test::decompose("shells", {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank,
                                           Joint::SharedPoints, ScalarType::F32, 0, 1);
   TransferFunction function = test::threeHues(1.0);
@@ -319,8 +319,8 @@ TEST_CASE("rays go on behind material of opacity 1, unless they're to end") {
     const SupersegmentLists expected = reference::generate(frame, withLayers(decomposed.mine), false);
     CHECK(listsThatDiffer(vdi->expandedLists(), expected) <=
           expected.listCount() / byFilter<std::size_t>(50, 4));
-    // A device takes values at the scene's faces up to 2/256 of a voxel inside (VolumeStore.cpp); what's
-    // opaque there shows the colour of just that place.
+    // A device reads values at the scene's faces up to 2/256 of a voxel inside (VolumeStore.cpp); opaque
+    // material there shows the colour of exactly that place.
     CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, withLayers(decomposed.mine))) <
           byFilter(2.0F, 4.0F));
     counts.push_back(vdi->supersegmentCount());
@@ -343,7 +343,7 @@ TEST_CASE("a VDI in the memory of another one, whatever its precision and size w
     settings = test::smallSettings(40, 30, 5);
     Vdi again = vdiOf();
     CHECK(again == first);
-    // And in the memory of one that's as large, or smaller.
+    // Also in the memory of a picture that is as large, or smaller.
     again = {};
     again = vdiOf();
     CHECK(again == first);
@@ -407,7 +407,7 @@ TEST_CASE("bytes of a view are those of its floats, whichever was asked for befo
           maximum = std::max(maximum, std::abs(bytes.rgba[i][c] - expected));
         }
       }
-      // A division on a device may be off by its last bits.
+      // A device's division may be off in the last bits.
       CHECK(maximum <= (alpha == Alpha::Straight ? 1 : 0));
       CHECK(translucent > 100);
     }
@@ -415,7 +415,7 @@ TEST_CASE("bytes of a view are those of its floats, whichever was asked for befo
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the reference") {
+TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the reference") {
   const auto decomposed = test::decompose("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank,
                                           Joint::SharedPoints, ScalarType::U8, 0, 1);
   const bool parallel = GENERATE(false, true);
@@ -432,14 +432,14 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are passed: as in the refe
     cameras.push_back(camera.azimuth(angle));
     cameras.back().viewUp += 0.2 * glm::dvec3(1.0, 0.0, 0.5);
   }
-  // Near V_O, across its picture's columns and across its rows.
+  // Near V_O, across its picture's columns and rows.
   cameras.push_back(camera.azimuth(5.0));
   Camera above = camera;
   above.viewUp = glm::cross(camera.focalPoint - camera.position, camera.viewUp);
   above = above.azimuth(5.0);
   above.viewUp = camera.viewUp;
   cameras.push_back(above);
-  // From within the scene, outwards and back to V_O; and by the other projection.
+  // From inside the scene, outwards and back to V_O; and with the other projection.
   Camera inside = camera;
   inside.position = camera.focalPoint + glm::dvec3(0.1, 0.05, -0.1);
   inside.focalPoint = camera.focalPoint + glm::dvec3(0.6, -0.1, 0.3);
@@ -486,11 +486,12 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
     const Camera other = camera.azimuth(angle);
     const View whole(other, width, height);
     const glm::dvec2 half{whole.halfWidth(), whole.halfHeight()};
-    // Beside the middle, and with oblong pixels.
+    // Off-centre, and with oblong pixels.
     const View part(other, width, height,
                     ImagePlane{glm::dvec2(-0.9, -0.4) * half, glm::dvec2(0.3, 0.6) * half});
     for (const View& view : {whole, part}) {
-      // A slanted wall through the middle of the scene; left of it rays go on, right of it none begins.
+      // A slanted wall through the middle of the scene; to its left rays go on, to its right they end at
+      // once.
       const double middle = view.depthOf(vdi->bounds.center());
       const double depth = glm::length(vdi->bounds.size());
       std::vector<float> ends;
@@ -512,7 +513,7 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
           const bool isOpen = ends[i] == Image::noDepth;
           if (isOpen) CHECK(expected.rgba[i] == open.rgba[i]);
           if (ends[i] == 0.0F) CHECK(expected.rgba[i].a == 0.0F);
-          // Smoothly, a column that ends early blends its lists otherwise.
+          // With smooth reconstruction, a column that ends early blends its lists differently.
           if (reconstruction == Reconstruction::Constant) CHECK(expected.rgba[i].a <= open.rgba[i].a + 1e-5F);
           hidden += open.rgba[i].a > 0.1F && expected.rgba[i].a == 0.0F ? 1 : 0;
           dimmed += expected.rgba[i].a > 0.0F && expected.rgba[i].a < 0.9F * open.rgba[i].a ? 1 : 0;
@@ -520,7 +521,7 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
         CHECK(hidden + dimmed > 50);
         for (VdiRenderer* each : {&renderer, &rendererAsGpu}) {
           CHECK(largestDifference(each->render(view, ends, reconstruction), expected) < 2.0F);
-          // No trace of it stays.
+          // It leaves no trace.
           CHECK(largestDifference(each->render(view, {}, reconstruction), open) < 2.0F);
         }
       }
@@ -564,13 +565,13 @@ TEST_CASE("a picture of more tiles than a device has workgroups side by side") {
   const auto decomposed = test::decompose("ramp", {8, 8, 8}, {1, 1, 1}, Layout::OnOneRank,
                                           Joint::SharedPoints, ScalarType::F32, 0, 1);
   Camera camera = test::oblique(true);
-  camera.parallelScale = 0.1;  // the volume is all around
+  camera.parallelScale = 0.1;  // the volume surrounds the camera
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   const auto vdi = generator.generate(camera, test::threeHues(2.0), test::smallSettings(16, 16, 4));
   VdiRenderer renderer(device());
   renderer.setVdi(*vdi);
-  constexpr int side = 2064;  // 258 x 258 tiles; every device has 65535 workgroups
+  constexpr int side = 2064;  // 258 x 258 tiles; every device allows 65535 workgroups
   const Image seen = renderer.render(camera, side, side, Reconstruction::Constant);
   const Image lists = flatten(*vdi);
   float worst = 0.0F;
@@ -612,7 +613,7 @@ TEST_CASE("merging and compositing on the device equal the reference") {
   const SupersegmentLists result =
       test::composite(device(), compositor, subLists, {6, 6, frame.lattice.step, algorithm, {}});
   CHECK(listsThatDiffer(result, expected) <= expected.listCount() / 50);
-  // The flat picture of what was merged, by the device and by the host, is that of what was composited.
+  // Device and host flatten interleaved lists to the picture of the composited ones.
   detail::DeviceLists merged;
   const test::HostSubLists parts(device(), subLists);
   compositor.interleave(parts.parts(), {}, merged);
@@ -637,7 +638,7 @@ TEST_CASE("merging and compositing on the device equal the reference") {
     const float depth = seen.mappedAs<float>()[result.listCount() * 4 + i];
     CHECK((depth == front || std::abs(depth - front) < 1e-5F));
   }
-  // Codes in, codes out: what the reference makes of the codes' values.
+  // Codes in, codes out, compared with the reference for the codes' values.
   const DepthCode code = depthCodeFor(frame.lattice);
   std::vector<CompactLists> subCodes;
   std::vector<SupersegmentLists> subValues;
@@ -654,7 +655,7 @@ TEST_CASE("merging and compositing on the device equal the reference") {
 }
 
 TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the reference") {
-  // Many small blocks dealt at random: lists with many runs, some with more than the counted ones beside
+  // Many small blocks assigned at random: lists with many runs, some with more than the counted lists around
   // them.
   const auto blocks = GENERATE(glm::ivec3(3, 3, 3), glm::ivec3(9, 8, 9));
   const std::uint32_t supersegments = GENERATE(3U, 8U, 200U);
@@ -673,9 +674,9 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
   for (std::size_t i = 0; i < all.size(); ++i) blocksOf[i * 7 % ranks].push_back(all[i]);
   const std::vector<SupersegmentLists> expected = reference::generateTogether(frame, blocksOf);
 
-  // Each rank's ray caster, and the sum as ranks would make it.
+  // Each rank's ray caster, and the sum as ranks would compute it.
   const bool asGpu = GENERATE(false, true);
-  if (asGpu && supersegments != 8) return;  // compiling takes long
+  if (asGpu && supersegments != 8) return;  // compiling takes too long
   const auto own = asGpu ? deviceAsGpu() : device();
   std::vector<std::unique_ptr<detail::RayCaster>> casters;
   std::vector<detail::RayCaster::Cast> casts;
@@ -709,7 +710,7 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
     CHECK(listsThatDiffer(made, expected[r]) <= made.listCount() / 40);
     supersegmentsInAll += made.segments.size();
   }
-  CHECK(weights[1] == weights[0]);  // or ranks would own other lists than others think
+  CHECK(weights[1] == weights[0]);  // otherwise ranks would disagree on the owners of lists
   CHECK(weights[2] == weights[0]);
   std::uint64_t weight = 0;
   for (const std::uint32_t w : weights[0]) weight += w;
@@ -744,7 +745,7 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   CHECK(static_cast<double>(longest) > 5 * fill);
   CHECK(longest <= 10);
 
-  // Composited from three ranks' lists.
+  // Composites three ranks' lists.
   settings.budget = Budget::List;
   settings.fill = 1.0;
   const reference::Frame equalFrame(generator.scene(), test::oblique(), function, settings);
@@ -814,7 +815,7 @@ TEST_CASE("a VDI equals DVR at V_O and stays close around it") {
   }
 }
 
-TEST_CASE("VDIs that are set before the last one's upload has ended are seen whole") {
+TEST_CASE("VDIs set before the last one's upload has ended are rendered whole") {
   VdiGenerator generator(device(), comm::Communicator::serial());
   const Camera camera = test::oblique();
   std::vector<Vdi> vdis;
@@ -836,11 +837,11 @@ TEST_CASE("VDIs that are set before the last one's upload has ended are seen who
                             fresh.render(camera.azimuth(15.0), 96, 80)) == 0.0F);
   }
   VdiRenderer ended(device());
-  ended.setVdi(vdis.front());  // and no render: its end waits
+  ended.setVdi(vdis.front());  // without a render: its destructor waits
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("nothing is made anew between frames of the same size") {
+TEST_CASE("frames of the same size reuse everything") {
   const auto decomposed = test::decompose("shells", {20, 20, 20}, {2, 2, 2}, Layout::OnOneRank,
                                           Joint::SharedPoints, ScalarType::F32, 0, 1);
   const GenerateSettings settings = test::smallSettings();
@@ -872,10 +873,10 @@ TEST_CASE("thousands of small blocks in one pass") {
   CHECK(largestDifference(*image, *one.renderVolume(test::oblique(), function, settings)) < 1.0F);
 }
 
-TEST_CASE("a block that's cut to fit the device's images shows no cut") {
+TEST_CASE("a block cut to fit the device's images shows no seam") {
   const auto whole = test::decompose("turbulence", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank,
                                      Joint::SharedPoints, ScalarType::F32, 0, 1);
-  // Steep, so that samples beside a cut depend on what's beyond.
+  // A steep function, so that samples beside a cut depend on the values beyond it.
   TransferFunction function = test::threeHues(1.0);
   function.opacities = {{0.0, 0.0}, {0.5, 0.0}, {0.52, 1.0}, {0.54, 0.0}, {1.0, 0.0}};
   const GenerateSettings settings = test::smallSettings();
@@ -890,7 +891,7 @@ TEST_CASE("a block that's cut to fit the device's images shows no cut") {
 }
 
 TEST_CASE("blocks of different spacing side by side") {
-  // The upper half at twice the resolution.
+  // The upper half has twice the resolution.
   const synthetic::Field ramp = synthetic::makeField("ramp", 0);
   const auto make = [&](const glm::ivec3& dims, double z, double spacing) {
     const synthetic::Lattice lattice{

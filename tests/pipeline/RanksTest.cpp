@@ -1,4 +1,4 @@
-// N ranks against one: the decomposition must not show.
+// N ranks compared with one: the decomposition must not be visible.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -41,7 +41,7 @@ bool anythingSeen(const Image& image) {
   return seen > image.rgba.size() / 20;
 }
 
-/// That the call throws; Io if it doesn't.
+/// The error that the call throws; Io if it throws none.
 template <typename Call>
 ErrorCode codeOf(Call call) {
   try {
@@ -76,13 +76,13 @@ const Case cases[] = {
 TEST_CASE("the flat image and DVR of N ranks equal the DVR of one", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const bool root = world.rank() == 0;
-  // One of each for all cases: shapes, types and cameras change under them as they do under a user's.
+  // All cases share these generators: shapes, types and cameras change as they do for a user.
   VdiGenerator one(device(), comm::Communicator::serial());
   VdiGenerator many(device(), comm::Communicator::world());
   VdiRenderer renderer(device());
   for (const Case& c : cases) {
     INFO(c.name);
-    // A field with structure up to the domain's faces, so that a lost or doubled sample shows.
+    // A field with structure up to the domain's faces, so that a lost or repeated sample is visible.
     const glm::ivec3 size{34, 30, 37};
     const auto decomposed =
         test::decompose("turbulence", size, c.blocks, c.layout, c.joint, c.type, world.rank(), world.size());
@@ -102,7 +102,7 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one", "[ranks]") {
     many.setBlocks(decomposed.mine);
     auto volume = many.renderVolume(camera, function, settings);
     if (root) CHECK(largestDifference(*volume, *truth) < 1.0F);
-    volume.reset();  // the next one is made in its memory
+    volume.reset();  // the next one reuses its memory
     volume = many.renderVolume(camera, function, settings);
     if (root) CHECK(largestDifference(*volume, *truth) < 1.0F);
     for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
@@ -133,7 +133,7 @@ TEST_CASE("an automatic sampling rate: the one that the function needs, and the 
                                      ScalarType::F32, world.rank(), world.size());
   one.setBlocks(whole.mine);
   many.setBlocks(dealt.mine);
-  // In other units the same function is steeper: it runs through its hues many times.
+  // In other units the same function is steeper: it passes through its hues many times.
   TransferFunction steep = test::threeHues(1.0);
   steep.colors.clear();
   for (int i = 0; i <= 24; ++i)
@@ -151,7 +151,7 @@ TEST_CASE("an automatic sampling rate: the one that the function needs, and the 
       CHECK(largestDifference(*expected, *together) < 2.0F);
       CHECK(largestDifference(*expected, flatten(*vdi)) < 2.0F);
     }
-    // The same picture as at that rate.
+    // The picture equals that at the explicit rate.
     settings.samplesPerVoxel = rate;
     const std::optional<Image> numbered = one.renderVolume(test::oblique(), function, settings);
     CHECK(largestDifference(*expected, *numbered) == 0.0F);
@@ -175,8 +175,8 @@ TEST_CASE("shaded: the picture and VDI of N ranks are those of one", "[ranks]") 
     if (root) one.setBlocks(whole.mine);
     const TransferFunction function = test::threeHues(test::topOf(c.type) * 0.8);
     const Camera camera = test::oblique(c.parallel);
-    // ParaView's lights together make colours brighter than a supersegment can be; with 0.85 they don't.
-    // That one cut open.
+    // Together, ParaView's lights make colours brighter than a supersegment can be; at 0.85 they do not. The
+    // ball is cut open.
     for (const double diffuse : {1.0, 0.85}) {
       INFO(c.name << ", diffuse " << diffuse);
       GenerateSettings settings = test::smallSettings();
@@ -193,7 +193,7 @@ TEST_CASE("shaded: the picture and VDI of N ranks are those of one", "[ranks]") 
       REQUIRE(anythingSeen(*truth));
       CHECK(largestDifference(*volume, *truth) < 1.0F);
       const auto alone = one.generate(camera, function, settings);
-      // Colours that are cut off at 1 are rounded once more on each side.
+      // Colours clipped at 1 are rounded once more on each side.
       CHECK(largestDifference(flatten(*vdi), flatten(*alone)) < (diffuse < 1.0 ? 2.0F : 2.5F));
       if (diffuse < 1.0) CHECK(largestDifference(flatten(*vdi), *truth) < 1.5F);
     }
@@ -226,7 +226,7 @@ TEST_CASE("a margin on N ranks: the lists of one rank, and its picture") {
     CHECK(vdi->margin == alone.margin);
     const Image picture = *one.renderVolume(camera, test::threeHues(0.8), settings);
     CHECK(largestDifference(flatten(*vdi), picture) < 1.0F);
-    vdi->margin = alone.margin = glm::ivec2(0);  // all lists are the picture then
+    vdi->margin = alone.margin = glm::ivec2(0);  // then all lists belong to the picture
     CHECK(largestDifference(flatten(*vdi), flatten(alone)) < 1.5F);
   }
   settings.margin = world.rank() == 1 ? 0.25 : 0.5;
@@ -259,10 +259,10 @@ TEST_CASE(
 
 namespace {
 
-/// What all others must equal, bit by bit.
+/// The first VDI and picture, which all others must equal bit by bit.
 class FirstMade {
  public:
-  /// On the root; elsewhere there's nothing to check.
+  /// Checks on the root; other ranks have nothing to check.
   void check(const std::optional<Vdi>& vdi, const std::optional<Image>& image) {
     if (!vdi) return;
     if (!vdi_) vdi_ = *vdi;
@@ -300,7 +300,7 @@ TEST_CASE("ways between ranks: shared memory, messages, both, staging memory: th
       VdiGenerator generator(own, comm::Communicator::world(), {.transport = transport});
       unsetenv("VDI_RANKS_PER_HOST");
       generator.setBlocks(decomposed.mine);
-      for (int frame = 0; frame < 2; ++frame) {  // the second one in the memory of the first one
+      for (int frame = 0; frame < 2; ++frame) {  // the second frame reuses the first one's memory
         const auto vdi = generator.generate(test::oblique(), function, settings);
         const auto image = generator.renderVolume(test::oblique(), function, settings);
         first.check(vdi, image);
@@ -312,7 +312,7 @@ TEST_CASE("ways between ranks: shared memory, messages, both, staging memory: th
 TEST_CASE("rank 0's environment says how all ranks work, and what makes no sense is refused on all") {
   const comm::Communicator world = comm::Communicator::world();
   const auto optionsWith = [&](const char* name, const char* value) {
-    if (world.rank() == 0) setenv(name, value, 1);  // mpirun may not pass it on
+    if (world.rank() == 0) setenv(name, value, 1);  // mpirun may not pass it on to other ranks
     const auto unset = [&] { unsetenv(name); };
     try {
       const GeneratorOptions options = generatorOptionsFromEnvironment(world);
@@ -335,7 +335,7 @@ TEST_CASE("lists of more than 255 supersegments: both ways, and the picture of o
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
                                           Joint::SharedPoints, ScalarType::U8, world.rank(), world.size());
-  constexpr std::uint32_t budget = 1024;  // so many that each sample is a supersegment
+  constexpr std::uint32_t budget = 1024;  // enough to make each sample a supersegment
   GenerateSettings settings = test::smallSettings(9, 7, budget);
   settings.samplesPerVoxel = 32.0;
   const TransferFunction function = test::threeHues(80.0);
@@ -350,7 +350,7 @@ TEST_CASE("lists of more than 255 supersegments: both ways, and the picture of o
       const auto& offsets = vdi->offsets();
       for (std::size_t i = 0; i + 1 < offsets.size(); ++i)
         longest = std::max(longest, offsets[i + 1] - offsets[i]);
-      CHECK(longest > 255 * static_cast<std::uint32_t>(world.size()));  // some rank's part is beyond a byte
+      CHECK(longest > 255 * static_cast<std::uint32_t>(world.size()));  // some rank's count exceeds a byte
       CHECK(longest <= budget);
     }
     made.check(vdi, generator.renderVolume(test::oblique(), function, settings));
@@ -401,7 +401,7 @@ TEST_CASE("a large picture in bands, most of which are empty: the picture of one
                                      ScalarType::F32, world.rank(), world.size());
   const GenerateSettings settings = test::smallSettings(640, 360, 5);
   Camera camera = test::oblique(true);
-  camera.parallelScale *= 6.0;  // lists of the upper and lower bands are many, and empty
+  camera.parallelScale *= 6.0;  // the upper and lower bands have many lists, all empty
   VdiGenerator many(device(), comm::Communicator::world());
   many.setBlocks(parts.mine);
   const auto vdi = many.generate(camera, test::threeHues(0.8), settings);
@@ -435,14 +435,14 @@ TEST_CASE("tiny pictures: more ranks than rows and pixels", "[ranks]") {
   }
 }
 
-TEST_CASE("a rank that fails takes nobody down, and the next frame works", "[ranks]") {
+TEST_CASE("a failing rank leaves the others running, and the next frame works", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
                                           Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
   VdiGenerator generator(device(), comm::Communicator::world());
   auto broken = decomposed.mine;
   if (world.rank() == world.size() - 1) {
-    broken.emplace_back();  // no data, no dims
+    broken.emplace_back();  // neither data nor dims
   }
   CHECK_THROWS_AS(generator.setBlocks(broken), Error);
   CHECK_NOTHROW(generator.setBlocks(decomposed.mine));
@@ -460,7 +460,7 @@ TEST_CASE("frames that overlap are those that are made alone") {
   };
   const auto first = decomposedOf("turbulence");
   const auto second = decomposedOf("shells");
-  /// Viewpoint, function, size, supersegments and blocks change, as frames of a session do.
+  /// A frame's inputs. Viewpoint, function, size, supersegments and blocks change, as in a session.
   struct Wanted {
     const test::Decomposed* blocks;
     double azimuth;
@@ -512,7 +512,7 @@ TEST_CASE("frames that overlap are those that are made alone") {
   }
 }
 
-TEST_CASE("frames that nobody fetches, and frames under way when a rank fails") {
+TEST_CASE("frames that are never finished, and frames under way when a rank fails") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random,
                                           Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
@@ -527,7 +527,7 @@ TEST_CASE("frames that nobody fetches, and frames under way when a rank fails") 
   generator.start(test::oblique().azimuth(8), function, settings);
   const auto late = generator.finish(std::move(first));  // completed when the third one took its place
   if (late) CHECK(*late == *expected);
-  // What's refused leaves the frame under way as it is; what's stopped doesn't.
+  // A refused call leaves the frame under way intact; a cancelled one does not.
   VdiFrame kept = generator.start(test::oblique(), function, settings);
   GenerateSettings wrong = settings;
   if (world.rank() == 0) wrong.supersegments = 0;
@@ -551,12 +551,12 @@ TEST_CASE("frames that nobody fetches, and frames under way when a rank fails") 
   }
 }
 
-TEST_CASE("a frame that's stopped late leaves nothing in the memory of the next one") {
+TEST_CASE("a frame cancelled late leaves nothing in the next one's memory") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random,
                                           Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
   gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
-  request.importsHostMemory = false;  // what's staged must go, too
+  request.importsHostMemory = false;  // staged data must also arrive
   const auto copying = gpu::Device::create(request);
   const TransferFunction function = test::threeHues(80.0);
   const GenerateSettings settings = test::smallSettings(61, 45, 6);
@@ -662,7 +662,7 @@ TEST_CASE("parameters that differ between ranks are refused on every rank, by na
   if (world.rank() == 1) other.fill = 0.5;
   CHECK_THROWS_WITH(generator.generate(test::oblique(), test::threeHues(1.0), other),
                     ContainsSubstring("different values: width, fill"));
-  // One rank is told to stop: all stop.
+  // If one rank is told to stop, all stop.
   CHECK(codeOf([&] {
           generator.generate(test::oblique(), test::threeHues(1.0), settings,
                              [&](double) { return world.rank() != 1; });

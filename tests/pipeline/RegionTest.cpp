@@ -1,5 +1,5 @@
-// Cropping and clipping: the device against the reference, against the volume that is left, and against an
-// integral that shares nothing with them.
+// Cropping and clipping: the device compared with the reference, with a volume of the remaining values, and
+// with an integral that shares nothing with them.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -83,7 +83,7 @@ TEST_CASE("region: a box on the lattice shows the volume of the values in it") {
   TransferFunction function = test::threeHues(1.0, 3.0);
   GenerateSettings settings = test::smallSettings(40, 32);
   VdiGenerator generator(test::device(), comm::Communicator::serial());
-  settings.samplesPerVoxel = 4.0;  // those of the two begin at different depths
+  settings.samplesPerVoxel = 4.0;  // the samples of the two begin at different depths
   for (const glm::dvec3 direction :
        {glm::dvec3(0.0, 0.0, -1.0), glm::dvec3(-0.6, -0.4, -1.0), glm::dvec3(1.0, 0.3, 0.2)}) {
     const Camera camera =
@@ -97,7 +97,7 @@ TEST_CASE("region: a box on the lattice shows the volume of the values in it") {
     const auto cropped = generator.renderVolume(camera, function, settings);
     CHECK(largestDifference(*cropped, *expected) < 2.0F);
     CHECK(largestDifference(*all, *expected) > 60.0F);
-    // As six planes it's the same.
+    // Six planes give the same as the box.
     settings.region = {};
     for (int axis = 0; axis < 3; ++axis) {
       glm::dvec3 normal(0.0);
@@ -156,7 +156,7 @@ TEST_CASE("region: the optical model's integral, with light at the cut") {
   CHECK(255.0 * worst < 5.0);
 }
 
-TEST_CASE("region: nothing left, and what is refused by name") {
+TEST_CASE("region: an empty rest, and refusals by name") {
   const auto decomposed = test::decompose("turbulence", {12, 12, 12}, {1, 1, 1}, Layout::OnOneRank,
                                           Joint::SharedPoints, ScalarType::F32, 0, 1);
   VdiGenerator generator(test::device(), comm::Communicator::serial());

@@ -1,4 +1,4 @@
-// Bad and strange input: a clear error or a right picture.
+// Bad and unusual input: a clear error or a right picture.
 #include <cmath>
 #include <limits>
 
@@ -89,10 +89,11 @@ TEST_CASE("NaN is transparent, infinite scalars are beyond the transfer function
     for (int x = 0; x < image.width / 2 - 2; ++x)
       CHECK(image.rgba[static_cast<std::size_t>(y * image.width + x)].a == 0.0F);
   }
-  // threeHues is transparent below a third: what's negatively infinite lets the positively infinite be seen.
+  // threeHues is transparent below a third: rays pass the negatively infinite values and show the positively
+  // infinite ones.
   CHECK(at(image, 0.4, 0.7).a > 0.9F);
   CHECK(at(image, 0.4, 0.7).r > 4.0F * at(image, 0.4, 0.7).b);
-  // The ends of a function that is visible from end to end, and of one whose colours are far from the values.
+  // Ends of a function that is visible from end to end, and of one whose range is far from the values.
   for (const double scale : {1.0, 1e-20}) {
     INFO(scale);
     TransferFunction function{{{0.0, {0, 0, 1}}, {scale, {1, 0, 0}}}, {{0.0, 0.7}, {scale, 0.9}}, 0.05};
@@ -205,8 +206,8 @@ TEST_CASE("scales of 1e-9 and 1e9 give the picture of scale 1") {
 
 namespace {
 
-/// All algorithms, budgets and precisions: at most the budget, and from V_O the volume's own picture. From
-/// the side: as much light as the volume's picture has, to a few per cent.
+/// For all algorithms, budgets and precisions: lists stay within the budget, and V_O shows the volume's own
+/// picture. From the side, the picture has the same amount of light, to a few per cent.
 void requireFaithful(VdiGenerator& generator, const Camera& camera, const TransferFunction& function,
                      GenerateSettings settings) {
   const auto volume = generator.renderVolume(camera, function, settings);
@@ -270,7 +271,7 @@ TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's p
   }
   bands.unitDistance = 0.05;
   requireFaithful(generator, test::oblique(), bands, settings);
-  // As wide as a voxel's step.
+  // A band as wide as the step between two voxels.
   requireFaithful(generator, test::oblique(), band(0.5, 0.5 / 69.0), settings);
 
   generator.setBlocks({cube(16, 1.0 / 15.0, [](const glm::ivec3&) { return 0.7F; })});
@@ -278,7 +279,7 @@ TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's p
 
   generator.setBlocks(
       {cube(17, 1.0 / 16.0, [](const glm::ivec3& i) { return i == glm::ivec3(8) ? 1.0F : 0.0F; })});
-  // At one sample a voxel it's chance whether volume rendering itself meets it from the side.
+  // At one sample a voxel, volume rendering itself may or may not hit it from the side.
   GenerateSettings fine = test::smallSettings(160, 120, 6);
   fine.samplesPerVoxel = 4.0;
   requireFaithful(generator, test::oblique(), band(1.0, 0.8), fine);
@@ -333,7 +334,7 @@ TEST_CASE("rays of more samples than depth codes can tell apart give a VDI of fu
   CHECK_NOTHROW(validate(*vdi));
 }
 
-TEST_CASE("what single precision would lose: a right picture or an error") {
+TEST_CASE("values beyond single precision: a right picture or an error") {
   VdiGenerator generator(device(), comm::Communicator::serial());
   const auto blockOf = [](ScalarType type, double scale, double spacing = 1.0, double origin = 0.0) {
     const synthetic::Lattice lattice{glm::ivec3(8), glm::dvec3(origin), glm::dvec3(spacing), type,
@@ -370,14 +371,14 @@ TEST_CASE("what single precision would lose: a right picture or an error") {
     CHECK(refused(blockOf(ScalarType::F32, 1.0, spacing), "spacing must be"));
   for (const double origin : {1e13, 1e15})
     CHECK(refused(blockOf(ScalarType::F32, 1.0, 1.0, origin), "spacings from"));
-  // Small values beside others are as good as 0, and zeros alone are legal.
+  // Tiny values next to larger ones count as 0, and zeros alone are legal.
   CHECK_NOTHROW(generator.setBlocks({blockOf(ScalarType::F32, 0.0)}));
   Block beside = blockOf(ScalarType::F32, 1e-40);
   beside.origin.x += 7.0;
   beside.owned.lo.x += 7.0;
   beside.owned.hi.x += 7.0;
   CHECK_NOTHROW(generator.setBlocks({blockOf(ScalarType::F32, 1.0), beside}));
-  // A fill value that's far beyond the rest.
+  // A fill value far beyond the other values.
   std::vector<double> filled(512, 0.5);
   filled[100] = 1e36;
   Block block = blockOf(ScalarType::F64, 1.0);
@@ -418,7 +419,7 @@ TEST_CASE("wrong arguments are refused with their names") {
   TransferFunction empty;
   CHECK(codeOf([&] { generator.generate(test::oblique(), empty, test::smallSettings()); }) ==
         ErrorCode::InvalidArgument);
-  // After all that it still works.
+  // The generator still works after all that.
   CHECK(
       generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings())->supersegmentCount() >
       0);

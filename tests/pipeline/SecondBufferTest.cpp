@@ -56,12 +56,12 @@ TEST_CASE("a VDI that is shown from the device's lists is the one that goes by w
     INFO(bands << " bands, " << toString(precision));
     GenerateSettings settings = test::smallSettings(90, 70, 8);
     settings.precision = precision;
-    // The second frame has more supersegments than the first one had room for.
+    // The second frame has more supersegments than the first one reserved.
     for (const double density : {0.2, 20.0}) {
       const TransferFunction function = test::threeHues(density);
       const Vdi vdi = *generator.generate(test::oblique(), function, settings);
       generator.show(&renderer, test::oblique(), function, settings);
-      // The generator's memory is used again before the renderer is.
+      // The generator's memory is reused before the renderer's.
       generator.generate(test::oblique().azimuth(90.0), test::threeHues(3.0), settings);
       generator.show(&elsewhere, test::oblique(), function, settings);
       const Camera camera = test::oblique().azimuth(25.0);
@@ -74,7 +74,7 @@ TEST_CASE("a VDI that is shown from the device's lists is the one that goes by w
     }
     const Progress stop = [](double) { return false; };
     CHECK_THROWS_AS(generator.show(&renderer, test::oblique(), test::threeHues(1.0), settings, stop), Error);
-    CHECK_THROWS_AS(renderer.render(test::oblique(), 90, 70), Error);  // nothing is shown
+    CHECK_THROWS_AS(renderer.render(test::oblique(), 90, 70), Error);  // no VDI is shown
     CHECK_THROWS_AS(generator.show(nullptr, test::oblique(), test::threeHues(1.0), settings), Error);
     generator.setBlocks({});
     generator.show(&renderer, test::oblique(), test::threeHues(1.0), settings);
@@ -96,7 +96,7 @@ TEST_CASE("a VDI that is prepared beside renders changes none of them until it i
   VdiRenderer renderer(device());
   CHECK_FALSE(renderer.showPrepared());
   renderer.prepareVdi(vdis[0]);
-  CHECK_THROWS_AS(renderer.render(turned, 96, 80), Error);  // nothing is shown
+  CHECK_THROWS_AS(renderer.render(turned, 96, 80), Error);  // no VDI is shown
   CHECK(renderer.showPrepared());
   std::size_t shown = 0;
   for (const std::size_t next : {1U, 2U, 0U, 2U, 1U}) {
@@ -118,7 +118,7 @@ TEST_CASE("a VDI that is prepared beside renders changes none of them until it i
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("few lists show about the same, wherever they're seen from") {
+TEST_CASE("few lists show about the same from everywhere") {
   Camera camera = test::oblique();
   camera.parallelProjection = GENERATE(false, true);
   camera.parallelScale = 0.8;

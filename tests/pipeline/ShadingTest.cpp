@@ -1,5 +1,5 @@
-// Shading: the device against the reference, and against an integral in double precision that shares nothing
-// with them: no table, no lattice of samples, no helper.
+// Shading: the device compared with the reference, and with an integral in double precision that shares no
+// table, no lattice of samples and no helper with them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -82,7 +82,7 @@ TEST_CASE("shading: DVR and lists of the device are the reference's") {
       CHECK(largestDifference(*image, expected) < 1.5F);
       const auto vdi = generator.generate(camera, function, settings);
       CHECK(largestDifference(flatten(*vdi), expected) < 1.5F);
-      // It's not the picture without light.
+      // The picture differs from the unshaded one.
       GenerateSettings plain = settings;
       plain.shading.on = false;
       const auto unlit = generator.renderVolume(camera, function, plain);
@@ -92,8 +92,8 @@ TEST_CASE("shading: DVR and lists of the device are the reference's") {
 }
 
 TEST_CASE("shading: the optical model's integral, per channel") {
-  // Anisotropic voxels, seen along -z without perspective. A field with waves, whose gradient vanishes
-  // nowhere: normals turn round there within any sample.
+  // Anisotropic voxels, seen along -z in parallel projection. The field has waves, and its gradient vanishes
+  // nowhere, so normals never reverse within a sample.
   const glm::ivec3 size{26, 30, 18};
   const glm::dvec3 spacing{1.0, 0.8, 1.7};
   const Lattice lattice(size, spacing, [&](const glm::dvec3& p) {
@@ -106,7 +106,7 @@ TEST_CASE("shading: the optical model's integral, per channel") {
     Shading shading;
     std::vector<Lamp> lamps;
   };
-  // The camera's axes are the world's.
+  // The camera's axes are those of the world.
   const Shading ambient{.on = true, .ambient = 0.4, .diffuse = 0.0, .lights = {Light{}}};
   const Shading three{.on = true,
                       .ambient = 0.1,
@@ -128,7 +128,7 @@ TEST_CASE("shading: the optical model's integral, per channel") {
   camera.parallelProjection = true;
   camera.parallelScale = 14.0;
   VdiGenerator generator(test::device(), comm::Communicator::serial());
-  // A sample has the light of its middle: fine samples show the integral, ones of a voxel nearly so.
+  // A sample has the light of its middle: fine samples match the integral, samples of a voxel nearly do.
   for (const auto& [type, rate, most] :
        {std::tuple(ScalarType::F32, 8.0, 1.0), std::tuple(ScalarType::U16, 8.0, 1.0),
         std::tuple(ScalarType::F32, 1.0, 5.0)}) {
@@ -187,7 +187,7 @@ TEST_CASE("shading: no gradient, no light; values of any size and ones that aren
   CHECK(middleOf(picture(constant, 1.0, headlight())).r == 0.0F);
   CHECK(middleOf(picture(constant, 1.0, headlight(0.25))).r == Approx(0.25).margin(1e-3));
   CHECK(middleOf(picture(constant, 1.0, headlight())).a > 0.99F);
-  // A slope along the view axis, whatever its size.
+  // A slope along the view axis, of any magnitude.
   const auto slope = [](const glm::dvec3& p) { return (p.z + 1.0) / 13.0; };
   for (const double scale : {1e-25, 1.0, 1e30}) CHECK(middleOf(picture(slope, scale, headlight())).r > 0.97F);
   const auto broken = [&slope](const glm::dvec3& p) {
@@ -198,7 +198,7 @@ TEST_CASE("shading: no gradient, no light; values of any size and ones that aren
   }
 }
 
-TEST_CASE("shading: what is out of range is refused by name") {
+TEST_CASE("shading: values out of range are refused by name") {
   const auto refused = [](const Shading& shading, const std::string& what) {
     GenerateSettings settings;
     settings.shading = shading;

@@ -1,4 +1,4 @@
-// Time steps: the next one's blocks get to the device while this one is shown.
+// Time steps: the next step's blocks travel to the device while the current one is shown.
 #include <array>
 #include <cstring>
 #include <limits>
@@ -38,7 +38,7 @@ std::optional<Vdi> frame(VdiGenerator& generator, const TimeStep& step) {
   return generator.generate(test::oblique(), functionFor(step), test::smallSettings(47, 35, 8));
 }
 
-/// Made by a generator that has one step at a time.
+/// The VDI of a generator that has only this step.
 std::optional<Vdi> frameAlone(const TimeStep& step) {
   static VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(step.blocks);
@@ -62,10 +62,10 @@ TEST_CASE("the next step's blocks don't change what's shown until advance, and t
   const std::array steps{
       timeStep("turbulence", {26, 22, 24}, ScalarType::F32),
       timeStep("shells", {26, 22, 24}, ScalarType::F32),
-      timeStep("coil", {26, 22, 24}, ScalarType::F32),  // shapes that are known
+      timeStep("coil", {26, 22, 24}, ScalarType::F32),  // shapes that occurred before
       timeStep("shells", {18, 31, 20}, ScalarType::U8),
       timeStep("turbulence", {18, 31, 20}, ScalarType::F64),
-      timeStep("coil", {18, 31, 20}, ScalarType::U16),  // and others, of which some are converted
+      timeStep("coil", {18, 31, 20}, ScalarType::U16),  // new shapes, some of which need conversion
   };
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(steps[0].blocks);
@@ -110,7 +110,7 @@ TEST_CASE(
   CHECK(device()->allocatedBytes() < both - bytesOf(large) / 2);
 }
 
-TEST_CASE("the range of what's shown is that of its finite values") {
+TEST_CASE("the range of the shown step is that of its finite values") {
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   constexpr float infinite = std::numeric_limits<float>::infinity();
   constexpr float largest = std::numeric_limits<float>::max();
@@ -135,23 +135,23 @@ TEST_CASE("the range of what's shown is that of its finite values") {
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("steps that are never shown, and ones that are wrong, leave what's shown as it is") {
+TEST_CASE("steps that are never shown, and invalid ones, leave the shown one intact") {
   const TimeStep first = timeStep("turbulence", {26, 22, 24}, ScalarType::F32);
   const TimeStep second = timeStep("shells", {26, 22, 24}, ScalarType::F32);
   const auto expected = frameAlone(first);
   VdiGenerator generator(device(), comm::Communicator::serial());
-  CHECK_THROWS_AS(generator.advance(), Error);  // nothing was ever set
+  CHECK_THROWS_AS(generator.advance(), Error);  // no step was ever set
   generator.setBlocks(first.blocks);
   CHECK_THROWS_AS(generator.advance(), Error);
   CHECK(equal(*frame(generator, first), *expected));
 
   generator.setNextBlocks(second.blocks);
   CHECK_THROWS_AS(generator.setNextBlocks({withoutData()}), Error);
-  CHECK_THROWS_AS(generator.advance(), Error);  // the wrong ones took the place of those before
+  CHECK_THROWS_AS(generator.advance(), Error);  // the invalid blocks replaced the earlier ones
   CHECK(equal(*frame(generator, first), *expected));
 
   generator.setNextBlocks(second.blocks);
-  generator.setNextBlocks(first.blocks);  // replaces them
+  generator.setNextBlocks(first.blocks);  // replaces the earlier ones
   generator.advance();
   CHECK(equal(*frame(generator, first), *expected));
 
@@ -160,14 +160,14 @@ TEST_CASE("steps that are never shown, and ones that are wrong, leave what's sho
   CHECK_THROWS_AS(generator.advance(), Error);
   CHECK(equal(*frame(generator, first), *expected));
 
-  generator.setNextBlocks({});  // a step without anything is one
+  generator.setNextBlocks({});  // a step without blocks is valid
   generator.advance();
   CHECK(frame(generator, first)->supersegmentCount() == 0);
   generator.setNextBlocks(first.blocks);
   generator.advance();
   CHECK(equal(*frame(generator, first), *expected));
 
-  generator.setNextBlocks(second.blocks);  // goes down with the generator
+  generator.setNextBlocks(second.blocks);  // destroyed with the generator
   CHECK_THROWS_AS(generator.setBlocks({withoutData()}), Error);
   CHECK(frame(generator, first)->supersegmentCount() == 0);
   generator.setBlocks(first.blocks);

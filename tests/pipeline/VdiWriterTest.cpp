@@ -1,4 +1,5 @@
-// All ranks write one file: it's the file of one, whoever has which lists, or there's none.
+// All ranks write one file. It equals the file of one rank, whichever ranks have which lists, or there is
+// none.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -40,7 +41,7 @@ struct Range {
   std::uint64_t last = 0;
 };
 
-/// Who has what, in the order in which it's added.
+/// The ranges that each rank adds, in order.
 using Deal = std::vector<std::vector<Range>>;
 
 struct NamedDeal {
@@ -48,7 +49,7 @@ struct NamedDeal {
   Deal ranges;  // [ranks]
 };
 
-/// Bands, each dealt to all ranks at any places.
+/// Bands, each divided among all ranks at random places.
 Deal dealInBands(std::uint64_t lists, int ranks, std::uint64_t bands, std::uint64_t seed) {
   test::Noise noise(seed);
   Deal deal(static_cast<std::size_t>(ranks));
@@ -93,7 +94,7 @@ ListsOf<Segment> cut(const ListsOf<Segment>& lists, const Range& range) {
   return part;
 }
 
-/// Collective: of a VDI that all ranks know, each adds what it was dealt.
+/// Collective: all ranks know the VDI, and each adds the lists that it was dealt.
 WrittenVdi writeDealt(const fs::path& path, const Vdi& vdi, const Deal& deal,
                       WrittenBy writtenBy = WrittenBy::Owner) {
   return std::visit(
@@ -114,17 +115,17 @@ WrittenVdi writeDealt(const fs::path& path, const Vdi& vdi, const Deal& deal,
 std::vector<Vdi> samples() {
   return {
       test::noisyVdi(97, 131, 5),  // four chunks, the last one shorter
-      test::noisyVdi(128, 64, 3),  // just two
+      test::noisyVdi(128, 64, 3),  // exactly two
       test::colored(test::noisyVdi(128, 65, 3)),
-      test::plausibleVdi(64, 64, 8),  // just one
+      test::plausibleVdi(64, 64, 8),  // exactly one
       test::noisyVdi(3, 2, 4),        // fewer lists than ranks
       test::noisyVdi(1, 1, 4),        //
       test::emptyVdi(100, 83, 4),
   };
 }
 
-/// Collective: the error of a call that fails on all ranks, as rank `where` sees it; on others the text has
-/// that of rank `where`.
+/// Collective: the error of a call that fails on all ranks, as rank `where` gets it; other ranks' errors must
+/// contain its text.
 Error errorEverywhere(const std::function<void()>& call, int where) {
   const Error error = test::errorOf(call);
   if (world().rank() != where) {
@@ -136,7 +137,7 @@ Error errorEverywhere(const std::function<void()>& call, int where) {
 
 }  // namespace
 
-TEST_CASE("whoever has which lists, the file is that of one rank") {
+TEST_CASE("the file is that of one rank, whichever ranks have which lists") {
   const test::SharedFolder folder(world());
   const fs::path path = folder.path() / "f.vdi";
   for (const Vdi& full : samples()) {
@@ -197,12 +198,12 @@ TEST_CASE("a pipe gets the bytes in their order, a device what it takes") {
   std::vector<std::byte> got;
   std::thread reader;
   if (isRoot()) {
-    const int file = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);  // before there's a writer
+    const int file = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);  // before a writer opens it
     ::fcntl(file, F_SETFL, 0);
     reader = std::thread([&got, file] {
       std::array<std::byte, 4096> buffer{};
       ssize_t count = 0;
-      // Until the writer comes, a read finds an end.
+      // Before a writer opens the pipe, reads return an end of file.
       while ((count = ::read(file, buffer.data(), buffer.size())) > 0 || (count == 0 && got.empty())) {
         got.insert(got.end(), buffer.begin(), buffer.begin() + count);
       }
@@ -220,7 +221,7 @@ TEST_CASE("a pipe gets the bytes in their order, a device what it takes") {
   CHECK(std::string(full.what()).find("No space left") != std::string::npos);
 }
 
-TEST_CASE("where one rank fails all do, the old file stays, and the next one is written") {
+TEST_CASE("if one rank fails all do, the old file stays, and the next one is written") {
   const test::SharedFolder folder(world());
   const fs::path path = folder.path() / "f.vdi";
   const int last = world().size() - 1;
@@ -255,7 +256,7 @@ TEST_CASE("where one rank fails all do, the old file stays, and the next one is 
   }
   requireUnchanged();
 
-  // A disk that's full: where the root takes room, where it writes at once, where the last rank writes.
+  // A full disk: when the root reserves space, when it writes early, and when the last rank writes.
   for (const int where : {0, last}) {
     for (const WrittenBy by : {WrittenBy::Owner, WrittenBy::Root}) {
       std::optional<test::FileSizeLimit> full;
@@ -269,7 +270,7 @@ TEST_CASE("where one rank fails all do, the old file stays, and the next one is 
     }
   }
 
-  // Lists that no reader would take; a rank that gives up; lists that nobody has, or two.
+  // Lists that no reader would accept; a rank that gives up; lists that no rank has, or two ranks have.
   Vdi broken = vdi;
   test::full(broken).segments.back().opacity = 2.0F;
   Deal onLast(deal.size());
@@ -305,7 +306,7 @@ TEST_CASE("where one rank fails all do, the old file stays, and the next one is 
   CHECK(folder.fileCount() == 1);
 }
 
-TEST_CASE("who reads while all ranks write sees a whole file") {
+TEST_CASE("a reader sees a whole file while all ranks write") {
   const test::SharedFolder folder(world());
   const fs::path path = folder.path() / "f.vdi";
   const std::array vdis{test::noisyVdi(97, 131, 3, 1), test::noisyVdi(97, 131, 3, 2)};

@@ -1,4 +1,4 @@
-// A frame whose lists go into a file from where they are is the frame that's gathered.
+// A frame written to a file by all ranks equals the gathered frame.
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -43,7 +43,7 @@ const Case cases[] = {
 
 }  // namespace
 
-TEST_CASE("a frame that all ranks write is the file of the one that the root gathers") {
+TEST_CASE("the file of a frame that all ranks write is that of the gathered frame") {
   const comm::Communicator world = comm::Communicator::world();
   const bool root = world.rank() == 0;
   const test::SharedFolder folder(world);
@@ -84,7 +84,7 @@ TEST_CASE("a frame that all ranks write is the file of the one that the root gat
     CHECK(inAll == written.bytes);
   }
 
-  // What goes wrong leaves the old file, and the generator as usable as it was.
+  // Errors leave the old file, and the generator stays usable.
   const std::vector<std::byte> old = root ? io::InputFile(path).readAll() : std::vector<std::byte>();
   const GenerateSettings settings = test::smallSettings(161, 119, 6);
   const int last = world.size() - 1;

@@ -1,4 +1,4 @@
-// Supersegments in codes: how far they may be from the floats that they stand for.
+// Supersegments in codes: their distance from the floats that they represent.
 #include "tests/Catch.h"
 #include "vdi/reference/Compaction.h"
 
@@ -22,7 +22,7 @@ std::vector<Interval> randomList(std::mt19937& random, int count, float thickest
   for (int i = 0; i < count; ++i) {
     const float front = depth + (unit(random) < 0.5F ? 0.0F : 0.2F * unit(random));
     depth = front + 0.02F + 0.2F * unit(random);
-    // From next to nothing to opaque, evenly in the exponent.
+    // From almost transparent to opaque, evenly in the exponent.
     const float opticalDepth = thickest * std::exp2(-14.0F * unit(random));
     const float opacity = opacityOf(opticalDepth);
     list.push_back(
@@ -99,7 +99,7 @@ TEST_CASE("codes of codes are the same codes") {
   }
 }
 
-TEST_CASE("depth codes: none for lattices that don't fit, samples stay apart in those that do") {
+TEST_CASE("depth codes: none for lattices that do not fit, separate samples in those that do") {
   CHECK(depthCodeFor({1.0, 0.1, 8191}).step == 0.0F);
   CHECK(depthCodeFor({1.0, 0.0, 0}).step == 0.0F);
   for (const std::uint32_t count : {1U, 7U, 1000U, 8190U}) {

@@ -1,4 +1,4 @@
-// The optical model in double precision: against what can be worked out by hand.
+// The optical model in double precision, compared with results worked out by hand.
 #include "tests/Catch.h"
 #include "vdi/reference/Exact.h"
 
@@ -9,7 +9,7 @@ using namespace vdi::reference;
 
 namespace {
 
-/// The scalar is z, from 0 to 1.
+/// A volume whose scalar is z, from 0 to 1.
 ExactVolume ramp() {
   return {{2, 2, 2},
           glm::dvec3(0.0),
@@ -76,7 +76,7 @@ TEST_CASE("exact: pictures are by VTK's cameras, rows from below") {
       CHECK(flat.rgba[static_cast<std::size_t>(8 * y + x)].r == Approx(inside ? 1.0 : 0.0).margin(0.02));
     }
   }
-  // From the side, z is up: the scalar rises with the rows, of which the lowest comes first.
+  // From the side, z is up: the scalar rises with the rows, the lowest of which comes first.
   camera.position = {-4.0, 0.5, 0.5};
   camera.focalPoint = {0.5, 0.5, 0.5};
   camera.viewUp = {0.0, 0.0, 1.0};

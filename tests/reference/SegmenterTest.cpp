@@ -1,4 +1,4 @@
-// How intervals become supersegments, on lists small enough to be followed by hand.
+// Turns intervals into supersegments, on lists small enough to follow by hand.
 #include "tests/Catch.h"
 #include "vdi/reference/Segmenter.h"
 
@@ -61,7 +61,7 @@ TEST_CASE("gaps end a supersegment where another rank may have material, and onl
   CHECK(segmentWithSensitivity(samples, 2.0F, {9, 1.0F, true}).size() == 2);
   CHECK(segmentWithSensitivity(samples, 2.0F, {9, 1.0F, false}).size() == 1);
   for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
-    CHECK(segment(samples, {1, 1.0F, true}, algorithm).size() == 2);  // runs come before the budget
+    CHECK(segment(samples, {1, 1.0F, true}, algorithm).size() == 2);  // runs take precedence over the budget
     CHECK(segment(samples, {1, 1.0F, false}, algorithm).size() == 1);
   }
 }
@@ -114,14 +114,14 @@ TEST_CASE("the criterion does not depend on the length of a sample") {
 }
 
 TEST_CASE("merging fills the list where bisection collapses: bands of one value each") {
-  // Thin bands, all alike: at any sensitivity either all stay apart or all go together.
+  // Thin bands, all equal: at any sensitivity, either all stay apart or all merge.
   std::vector<Interval> samples;
   for (int k = 0; k < 300; ++k) samples.push_back(sample(k, 1.0F, k % 3 == 0 ? 0.02F : 0.0F));
   CHECK(segmentByMerging(samples, {25, 1.0F, false}).size() == 25);
   CHECK(segmentByBisection(samples, {25, 1.0F, false}).size() == 1);
 }
 
-TEST_CASE("merging keeps what stands out and gives up what's alike") {
+TEST_CASE("merging keeps distinct material and joins similar") {
   std::vector<Interval> samples;
   for (int k = 0; k < 60; ++k)
     samples.push_back(
@@ -148,7 +148,7 @@ TEST_CASE(
   CHECK(two[0].front == 40.0F);
   CHECK(two[0].back == 41.0F);
   CHECK(transmittance(two) == Approx(0.5F * 0.998F));
-  // In front of it there's something, so that the fainter one may go to the one behind.
+  // With material in front of it, the fainter one may move to the one behind.
   const std::vector<Interval> faintFirst{sample(0, 0.5F, 0.4F), sample(50, 0.5F, 0.001F),
                                          sample(90, 0.5F, 0.4F)};
   const auto behind = segmentByMerging(faintFirst, {2, 1.0F, false});
@@ -156,14 +156,14 @@ TEST_CASE(
   CHECK(behind[0].back - behind[0].front == 1.0F);
   CHECK(behind[1].back - behind[1].front == 1.0F);
   CHECK(transmittance(behind) == Approx(0.6F * 0.999F * 0.6F));
-  // Near each other they're one.
+  // Close to each other, they merge.
   const std::vector<Interval> near{sample(0, 0.5F, 0.4F), sample(2, 0.5F, 0.01F)};
   const auto joined = segmentByMerging(near, {1, 1.0F, false});
   REQUIRE(joined.size() == 1);
   CHECK(joined[0].back == 3.0F);
 }
 
-TEST_CASE("merging never joins what gaps keep apart") {
+TEST_CASE("merging never joins across kept gaps") {
   std::vector<Interval> samples;
   for (int k = 0; k < 40; ++k)
     samples.push_back(sample(k + k / 10, 0.5F, 0.01F * static_cast<float>(1 + k % 4)));
@@ -177,7 +177,7 @@ TEST_CASE("merging never joins what gaps keep apart") {
     }
   }
   CHECK(ends == 3);
-  CHECK(segmentByMerging(samples, {2, 1.0F, true}).size() == 4);  // as many as there are runs
+  CHECK(segmentByMerging(samples, {2, 1.0F, true}).size() == 4);  // as many as runs
 }
 
 TEST_CASE("a list that wasn't counted fits however wrong its interpolated tolerance is, and loses no light") {
@@ -200,7 +200,7 @@ TEST_CASE("a list that wasn't counted fits however wrong its interpolated tolera
     CHECK(list.size() >= guessed.room / 2);
     CHECK(transmittance(list) == Approx(expected).epsilon(1e-3));
   }
-  // Between lists that hold nothing there's room for something small all the same.
+  // Between empty lists, there is still room for something small.
   const ListTolerance nothing[] = {{}, {}};
   CHECK(segmentByMerging({samples.data(), 3}, rules, interpolatedTolerance(nothing)).size() >= 2);
   CHECK(segmentByMerging(samples, rules, ListTolerance()).empty());  // known to be empty

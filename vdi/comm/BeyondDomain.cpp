@@ -11,8 +11,8 @@ namespace vdi::comm {
 
 namespace {
 
-/// The next difference of a parabola whose last two differences are `before` and `last`, as far as
-/// both allow: 0 beyond an edge or an extremum, and at most twice the smaller one.
+/// The next difference of a parabola whose last two differences are `before` and `last`, limited by both: 0
+/// beyond an edge or an extremum, and at most twice the smaller one.
 double limitedDifference(double last, double before) {
   if (!(last * before > 0.0)) return 0.0;
   const double bound = std::min(std::abs(last), std::abs(before));
@@ -30,7 +30,7 @@ class Continuation {
     }
   }
 
-  /// Fills the open places that have known values beside them. False when there are none.
+  /// Fills the open places next to known values. Returns false if there are none.
   bool advance() {
     std::vector<Filled> filled;
     for (std::size_t i = 0; i < patches_.size(); ++i) {
@@ -67,7 +67,7 @@ class Continuation {
     return valueAt(block_, at.x, at.y, at.z);
   }
 
-  /// The mean over the axes that lead back to known values.
+  /// The mean over the axes that lead to known values.
   std::optional<double> continuedAt(const glm::ivec3& at) const {
     const IndexBox stored = block_.stored();
     double sum = 0.0;
@@ -82,7 +82,7 @@ class Continuation {
     return count > 0 ? std::optional(sum / count) : std::nullopt;
   }
 
-  /// `inward`: the step along the axis towards the stored values.
+  /// `inward` is the step along the axis towards the stored values.
   std::optional<double> continuedAlong(int axis, int inward, glm::ivec3 at) const {
     at[axis] += inward;
     const std::optional<double> nearest = known(at);
@@ -97,7 +97,7 @@ class Continuation {
 
   const Block& block_;
   std::span<const OpenPatch> patches_;
-  std::vector<std::vector<bool>> open_;  // of each patch: the places that are still open
+  std::vector<std::vector<bool>> open_;  // for each patch, the places still open
 };
 
 }  // namespace

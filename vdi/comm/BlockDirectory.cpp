@@ -45,7 +45,7 @@ std::vector<BlockEntry> entriesOf(std::span<const Block> blocks, int rank) {
   return entries;
 }
 
-/// Per axis: by how much of a value may the blocks' faces differ and be one.
+/// The distance, per axis, by which faces of the two blocks may differ and count as one.
 glm::dvec3 toleranceOf(const BlockEntry& a, const BlockEntry& b) {
   return latticeTolerance * glm::min(a.spacing, b.spacing);
 }
@@ -54,8 +54,8 @@ bool overlapBy(const Box& a, const Box& b, const glm::dvec3& tolerance) {
   return glm::all(glm::greaterThan(glm::min(a.hi, b.hi) - glm::max(a.lo, b.lo), tolerance));
 }
 
-/// Faces of all blocks along one axis, in order: those that follow each other within the tolerance
-/// become the lowest of them.
+/// Processes the faces of all blocks along one axis, in order: faces that follow each other within the
+/// tolerance become the lowest of them.
 void makeFacesOne(std::span<BlockEntry> entries, int axis) {
   struct Face {
     double at;
@@ -171,7 +171,7 @@ void BlockDirectory::plantTree() {
   tree_ = std::make_unique<BoxTree>(std::move(boxes));
 }
 
-/// Each rank finds the gaps that its own blocks have to close, and tells the others.
+/// Each rank finds the gaps that its own blocks must close, and tells the others.
 void BlockDirectory::growOverGaps(const Communicator& comm) {
   std::vector<Box> grown;
   std::array<std::uint64_t, 1> any{0};
@@ -194,7 +194,7 @@ void BlockDirectory::growOverGaps(const Communicator& comm) {
     std::memcpy(&entries_[i].owned, gathered.bytes.data() + i * sizeof(Box), sizeof(Box));
 }
 
-/// Of a block of points that owns `box` up to now: how far it has to grow on this side.
+/// The distance by which a block of points that now owns `box` must grow on this side.
 double BlockDirectory::gapBeside(std::size_t index, const Box& box, int axis, bool above) const {
   const BlockEntry& own = entries_[index];
   const double widest = (1.0 + latticeTolerance) * own.spacing[axis];
@@ -206,7 +206,7 @@ double BlockDirectory::gapBeside(std::size_t index, const Box& box, int axis, bo
     const BlockEntry& other = entries_[j];
     if (j == index || other.cells) continue;
     const glm::dvec3 tolerance = toleranceOf(own, other);
-    Box across = box;  // as far as the other one along this axis
+    Box across = box;  // as wide as the other block along this axis
     across.lo[axis] = other.owned.lo[axis];
     across.hi[axis] = other.owned.hi[axis];
     const double distance = above ? other.owned.lo[axis] - box.hi[axis] : box.lo[axis] - other.owned.hi[axis];
@@ -222,7 +222,7 @@ double BlockDirectory::gapBeside(std::size_t index, const Box& box, int axis, bo
 std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirectory& directory) {
   const std::span<const BlockEntry> entries = directory.entries();
   std::vector<OwnParts> parts;
-  std::array<std::uint64_t, 1> conflict{0};  // of all the first pair, counted from the end
+  std::array<std::uint64_t, 1> conflict{0};  // the first conflicting pair of all, counted from the end
   comm.together([&] {
     for (std::size_t i = directory.firstMine(); i < directory.lastMine(); ++i) {
       const BlockEntry& own = entries[i];
@@ -236,7 +236,7 @@ std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirect
           const std::uint64_t pair = std::min(i, j) * entries.size() + std::max(i, j);
           conflict[0] = std::max(conflict[0], ~pair);
         }
-        // Of a gap that two blocks of one level have closed the first one keeps what both have.
+        // If two blocks of one level have closed a gap, the first one keeps the common part.
         if (level == Level::Finer || (level == Level::Same && j < i)) left.finer.push_back(other.owned);
       }
       left.boxes = withoutAll(own.owned, left.finer);

@@ -7,7 +7,7 @@ namespace vdi::comm {
 
 namespace {
 
-/// In a form that compilers make vector instructions of.
+/// Written so that compilers vectorise it.
 void addTo(std::span<std::byte> sum, std::span<const std::byte> other) {
   auto* a = reinterpret_cast<std::uint8_t*>(sum.data());
   const auto* b = reinterpret_cast<const std::uint8_t*>(other.data());
@@ -40,7 +40,7 @@ Exchange::Place ByteSum::begin(std::uint64_t bytes) {
   return own_;
 }
 
-/// Other ranks' parts of this rank's share, onto its own.
+/// Adds other ranks' parts of this rank's share to its own.
 void ByteSum::addUp() {
   std::vector<Exchange::Outgoing> pieces;
   for (int rank = 0; rank < comm_.size(); ++rank) {

@@ -22,7 +22,7 @@ namespace vdi::comm {
 
 namespace {
 
-/// Elements of `bytes` bytes as one MPI datatype, so that counts stay below 2^31 where byte counts don't.
+/// Elements of `bytes` bytes as one MPI datatype, so that counts stay below 2^31 even if byte counts do not.
 class ElementType {
  public:
   explicit ElementType(std::size_t bytes) {
@@ -46,7 +46,7 @@ class ElementType {
 
 constexpr std::uint64_t maxElements = std::numeric_limits<int>::max();
 
-/// Counts and displacements as MPI takes them.
+/// Counts and displacements in MPI's form.
 struct Layout {
   std::vector<int> counts;
   std::vector<int> starts;
@@ -77,7 +77,7 @@ Gathered emptyGathered(const Layout& layout, std::size_t elementBytes) {
   return result;
 }
 
-/// An exception's text in a fixed size: telling the others that memory ran out needs none.
+/// An exception's text in a fixed size: reporting exhausted memory needs no memory.
 using Text = std::array<char, 1024>;
 
 Text describe(const std::exception_ptr& error) {
@@ -93,13 +93,13 @@ Text describe(const std::exception_ptr& error) {
   return text;
 }
 
-/// Which of several hosts a rank of this one is taken to be on.
+/// The simulated host of a rank, among several.
 int hostOf(int localRank) {
   const auto each = static_cast<int>(environmentCount("VDI_RANKS_PER_HOST", 0).value_or(0));
   return each > 0 ? localRank / each : 0;
 }
 
-/// Frees a communicator, unless MPI has gone already.
+/// Frees a communicator, unless MPI has been finalised.
 class OwnedComm {
  public:
   OwnedComm() = default;
@@ -138,7 +138,7 @@ struct Communicator::State {
          static_cast<int>(values.size()), type, operation, comm());
   }
 
-  /// Every rank's value, on every rank.
+  /// Returns every rank's value on every rank.
   std::vector<std::uint64_t> allGatherSize(std::uint64_t mine) const {
     std::vector<std::uint64_t> sizes(static_cast<std::size_t>(size));
     call("MPI_Allgather", MPI_Allgather, MPI_Iallgather, &mine, 1, MPI_UINT64_T, sizes.data(), 1,
@@ -174,7 +174,7 @@ Communicator Communicator::fromMpi(int fortranHandle) {
   OwnedComm part;
   int host = 0;
   std::exception_ptr
-      bad;  // told when all ranks can be: a rank that leaves here would leave the others waiting
+      bad;  // reported later, by all ranks: a rank that left here would leave the others waiting
   try {
     host = hostOf(state->localRank);
   } catch (const Error&) {
@@ -244,7 +244,7 @@ void Communicator::allReduceMax(std::span<std::uint64_t> values) const {
   state_->allReduce(values, MPI_UINT64_T, MPI_MAX);
 }
 
-// Memory is taken under together() before each exchange: a rank that has too little makes all fail, instead
+// Memory is allocated under together() before each exchange: a rank with too little makes all fail, instead
 // of leaving the others waiting in a call that it never makes.
 
 std::vector<std::byte> Communicator::broadcast(std::vector<std::byte> bytes, int root) const {
@@ -342,7 +342,7 @@ std::vector<std::uint64_t> Communicator::allToAllWords(std::span<const std::uint
 
 namespace {
 
-/// What the work threw; nothing if it didn't.
+/// The exception of `work`; null if there is none.
 template <typename Work>
 std::exception_ptr errorOf(Work&& work) {
   try {
@@ -410,7 +410,7 @@ void Communicator::requireEqual(std::uint64_t fingerprint, const std::string& wh
 }
 
 void Communicator::requireEqual(std::span<const Fingerprint> fingerprints) const {
-  // The largest of x and of ~x are x and ~x on every rank only if all have the same x.
+  // The maxima of x and ~x equal x and ~x on every rank only if all have the same x.
   std::vector<std::uint64_t> extremes;
   for (const Fingerprint& print : fingerprints) extremes.insert(extremes.end(), {print.value, ~print.value});
   allReduceMax(extremes);
@@ -423,7 +423,7 @@ void Communicator::requireEqual(std::span<const Fingerprint> fingerprints) const
               fmt::format("the ranks were given different values: {}", fmt::join(different, ", ")));
 }
 
-/// The MPI requests of messages that are under way.
+/// The MPI requests of messages under way.
 struct Messages::State {
   const Communicator& comm;
   std::vector<MPI_Request> requests;
@@ -432,7 +432,7 @@ struct Messages::State {
 
 namespace {
 
-/// MPI counts in int: larger messages go in several.
+/// MPI counts in int: larger messages are split.
 constexpr std::uint64_t largestMessage = 1ULL << 30;
 constexpr int messageTag = 1;
 
@@ -441,10 +441,10 @@ constexpr int messageTag = 1;
 Messages::Messages(const Communicator& comm) : state_(std::make_unique<State>(State{comm, {}})) {}
 
 Messages::~Messages() {
-  // Memory that a message is on its way to or from must stay: an exception may come by here.
+  // The memory of a message under way must stay, even while an exception unwinds the stack.
   try {
     waitForAll(state_->requests);
-  } catch (const Error&) {  // as little can be done as about the exception that's under way
+  } catch (const Error&) {  // this error can be handled no better than the exception that is unwinding
   }
 }
 

@@ -14,14 +14,14 @@ namespace vdi::comm {
 
 namespace {
 
-/// Pieces begin at multiples of it: what devices copy fast.
+/// Pieces begin at multiples of this, which devices copy fast.
 constexpr std::uint64_t alignment = 256;
 
 std::uint64_t aligned(std::uint64_t bytes) {
   return (bytes + alignment - 1) / alignment * alignment;
 }
 
-/// A name as words, which ranks exchange.
+/// A name as words, for exchange between ranks.
 using NameWords = std::array<std::uint64_t, 8>;
 
 NameWords wordsOf(const std::string& name) {
@@ -50,7 +50,7 @@ Exchange::Place Exchange::outbox(std::uint64_t bytes) {
     if (grows) shareNewWindow(comm_.allGatherWords(std::array{aligned(bytes)}));
     if (everyHostShares_) return outbox_;
   }
-  // All ranks come here if any does: hosts differ in what room they have.
+  // If one rank comes here, all do: hosts may differ in their free memory.
   comm_.together([&] {
     if (window_) return;
     if (!outbox_.memory || outbox_.memory->bytes().size() < bytes) {
@@ -61,7 +61,7 @@ Exchange::Place Exchange::outbox(std::uint64_t bytes) {
   return outbox_;
 }
 
-/// What the host's leader made. False where that can't be.
+/// Opens the window that the host's leader made. False if that fails.
 bool Exchange::openWindow(const std::string& name, std::uint64_t bytes) {
   if (name.empty()) return false;
   if (window_) return true;
@@ -73,8 +73,8 @@ bool Exchange::openWindow(const std::string& name, std::uint64_t bytes) {
   return true;
 }
 
-/// Of each host one, whose leader makes it. Where that fails the host has none. An error leaves all ranks
-/// without any, until the next outbox.
+/// Each host's leader makes a window. If that fails, the host has none. An error leaves all ranks without one
+/// until the next outbox.
 void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   const int leader = comm_.hostLeader(comm_.rank());
   window_.reset();
@@ -82,8 +82,8 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   parts_.clear();
   everyHostShares_ = false;
   messages_ = true;
-  // A half more, so that slow growth doesn't make a new one every frame; and as much as others have, for what
-  // one rank sends in this frame another one may send in the next.
+  // Half as much again, so that slow growth does not make a new window every frame; and as much as other
+  // ranks have, because the load may move from one rank to another between frames.
   std::vector<std::uint64_t> parts(sizes.begin(), sizes.end());
   const std::uint64_t mean = std::accumulate(parts.begin(), parts.end(), std::uint64_t{0}) / parts.size();
   for (std::uint64_t& part : parts) part = aligned(std::max(part + part / 2, 2 * mean));
@@ -107,7 +107,7 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   name = nameOf(std::span(names).subspan(static_cast<std::size_t>(leader) * words, words));
   const std::vector<std::uint64_t> opened =
       comm_.gatherTogether([&] { return openWindow(name, total) ? 1U : 0U; });
-  if (window_) window_->unlink();  // all have tried
+  if (window_) window_->unlink();  // all ranks have tried to open it
   everyHostShares_ = std::ranges::all_of(opened, [](std::uint64_t has) { return has != 0; });
   bool hostShares = true;
   bool oneHost = true;
@@ -140,7 +140,8 @@ std::vector<Exchange::Incoming> Exchange::send(std::span<const Outgoing> pieces)
     putHeader(piece,
               std::span(headers).subspan(static_cast<std::size_t>(piece.to) * headerWords, headerWords));
   }
-  // Who has a header has what it speaks of, where memory is shared: it's sent when that has been written.
+  // With shared memory, the data is ready as soon as its header arrives, since headers are sent after the
+  // data is written.
   const std::vector<std::uint64_t> from = comm_.allToAllWords(headers);
   std::vector<Incoming> incoming;
   for (int r = 0; r < comm_.size(); ++r)
@@ -148,7 +149,7 @@ std::vector<Exchange::Incoming> Exchange::send(std::span<const Outgoing> pieces)
   return receive(pieces, std::move(incoming));
 }
 
-/// What a header speaks of, where that can be read as it lies.
+/// Adds the data that a header describes, if it can be read in place.
 void Exchange::addIncoming(int from, const std::uint64_t* header, std::vector<Incoming>& incoming) const {
   if (header[1] == 0) return;
   const bool shared = sharesMemoryWith(from);
@@ -156,7 +157,7 @@ void Exchange::addIncoming(int from, const std::uint64_t* header, std::vector<In
       {from, {shared ? window_ : nullptr, shared ? header[0] : 0}, header[1], {header[2], header[3]}});
 }
 
-/// The messages of those with whom no memory is shared.
+/// Receives the messages of ranks that share no memory with this one.
 std::vector<Exchange::Incoming> Exchange::receive(std::span<const Outgoing> pieces,
                                                   std::vector<Incoming> incoming) {
   if (!messages_) return incoming;

@@ -21,17 +21,17 @@ namespace vdi::comm {
 
 namespace {
 
-/// Rays need values that far beyond an owned box, in spacings.
+/// Rays need values to this distance beyond an owned box, in spacings.
 constexpr double reach = valueReach;
 
-/// Of a spacing: more than rounding and latticeTolerance move a face, less than what tells values
-/// apart.
+/// In spacings: more than the distance by which rounding and latticeTolerance move a face, less than the
+/// distance that separates values.
 constexpr double indexTolerance = 0.01;
 
-/// Per axis, for a mean over finer values; where there are more, these are taken among them.
+/// Per axis, for a mean over finer values; if there are more of them, only these many are used.
 constexpr int maxParts = 16;
 
-/// Closed gaps and `reach` are within that many layers of the stored values.
+/// Closed gaps and `reach` are within this number of layers around the stored values.
 constexpr int maxLayers = 3;
 
 glm::ivec3 indexOf(const glm::dvec3& index, const Block& block) {
@@ -39,13 +39,13 @@ glm::ivec3 indexOf(const glm::dvec3& index, const Block& block) {
   return glm::ivec3(glm::clamp(index, -beyond, glm::dvec3(block.dims) + beyond));
 }
 
-/// Values whose places are in the box, faces included.
+/// Values whose positions are in the box, faces included.
 IndexBox valuesIn(const Box& box, const Block& block) {
   return {indexOf(glm::ceil((box.lo - block.origin) / block.spacing - indexTolerance), block),
           indexOf(glm::floor((box.hi - block.origin) / block.spacing + indexTolerance) + 1.0, block)};
 }
 
-/// Values that are interpolated in the box and up to `reach` beyond.
+/// Values for interpolation in the box and up to `reach` beyond.
 IndexBox valuesFor(const Box& box, const Block& block) {
   const double beyond = reach - indexTolerance;
   return {indexOf(glm::floor((box.lo - block.origin) / block.spacing - beyond), block),
@@ -63,12 +63,12 @@ void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
   boxes = std::move(rest);
 }
 
-/// What a rank asks another for: of the values `box` of a lattice, each the sum over those of its
-/// samples that lie in `clip`, [lo, hi). A value's samples are the middles of its parts.
+/// A rank's request to another: for each value in `box` of a lattice, the sum over those of its samples that
+/// lie in `clip`, [lo, hi). A value's samples are the middles of its parts.
 struct Request {
-  std::int32_t grid;    // on the rank that's asked
-  std::int32_t round;   // in which it's answered
-  std::int32_t copied;  // 1: values as they are, `shift` further in the grid that's asked
+  std::int32_t grid;    // on the rank that answers
+  std::int32_t round;   // in which it is answered
+  std::int32_t copied;  // 1: copies of values, `shift` further in the answering grid
   glm::ivec3 shift;
   IndexBox box;
   glm::ivec3 parts;  // per axis
@@ -80,7 +80,7 @@ struct Request {
     const double offset = (part + 0.5) / parts[axis] - 0.5;
     return origin[axis] + (index + offset) * spacing[axis];
   }
-  /// Of value `index`, the parts [first, last) along the axis whose samples are in the clip.
+  /// The parts [first, last) of value `index` along the axis whose samples are in the clip.
   std::pair<int, int> partsIn(int axis, int index) const {
     int first = 0;
     while (first < parts[axis] && place(axis, index, first) < clip.lo[axis]) ++first;
@@ -88,7 +88,7 @@ struct Request {
     while (last < parts[axis] && place(axis, index, last) < clip.hi[axis]) ++last;
     return {first, last};
   }
-  /// Leaves of the box what has samples in the clip.
+  /// Reduces the box to values with samples in the clip.
   void trim() {
     for (int axis = 0; axis < 3; ++axis) {
       const double lo = std::floor((clip.lo[axis] - origin[axis]) / spacing[axis]) - 1.0;
@@ -105,31 +105,31 @@ struct Request {
   }
 };
 
-/// Values that a grid lacks, or has but shouldn't use.
+/// Values that a grid lacks, or has but should not use.
 struct Wanted {
   IndexBox box;
-  bool keep = false;                    // the caller's: they stay where nobody knows better
+  bool keep = false;                    // the caller's ghost values, which stay if no block has better ones
   std::vector<IndexBox> asked;          // parts that other blocks have; they may overlap
-  std::size_t copies = 0;               // how many come as they are
+  std::size_t copies = 0;               // number of values to copy
   std::shared_ptr<std::byte[]> values;  // of the block's type
-  std::vector<double> sums;             // where some are means or interpolated
+  std::vector<double> sums;             // if some are means or interpolated
   std::vector<double> weights;
 };
 
-/// Values that one or several blocks of this rank share.
+/// Values that one block or several blocks of this rank share.
 struct Grid {
   Block block;
   bool cells = false;
-  double volume = 0.0;  // that a value stands for
+  double volume = 0.0;  // of a single value
   std::vector<Box> owned;
-  std::vector<Box> finer;       // that were taken off these
+  std::vector<Box> finer;       // parts that finer blocks took over
   std::vector<IndexBox> given;  // its own values
   std::vector<Wanted> wanted;
-  IndexBox asked;               // around all values that other blocks have
-  std::vector<OpenPatch> open;  // where values are continued beyond the domain's faces
+  IndexBox asked;               // bounds of all values that other blocks have
+  std::vector<OpenPatch> open;  // places where values are continued beyond the domain's faces
 };
 
-/// Trilinear interpolation in a block's values near some place.
+/// Trilinear interpolation in a block's values around a place.
 class Sampler {
  public:
   Sampler(const Block& block, const Box& where) : block_(block) {
@@ -171,7 +171,7 @@ class Sampler {
   std::vector<const Patch*> patches_;
 };
 
-/// All blocks of all ranks get the one type that holds all of theirs.
+/// Converts all blocks of all ranks to the one type that represents all of their values.
 void makeTypesOne(const Communicator& comm, std::vector<Block>& blocks) {
   std::array<std::uint64_t, 8> present{};
   for (const Block& block : blocks) present[static_cast<std::size_t>(block.type)] = 1;
@@ -198,7 +198,7 @@ void makeTypesOne(const Communicator& comm, std::vector<Block>& blocks) {
   });
 }
 
-/// The parts of each block that are its own, in the place of the block.
+/// Replaces each block by the parts that it still owns.
 std::vector<Block> partsOf(const std::vector<OwnParts>& parts, std::vector<Block> blocks) {
   std::vector<Block> result;
   std::size_t entry = 0;
@@ -255,8 +255,9 @@ class LayerExchange {
   }
 
  private:
-  /// First what coincides with donors' own values, then what's interpolated in donors of this level
-  /// or finer ones, then in coarser ones, the coarsest first: each finds the layers that it needs.
+  /// The first round answers values that coincide with donors' own ones, the next those interpolated in
+  /// donors of this level or finer ones, and later rounds those in coarser ones, the coarsest first. So each
+  /// round finds the layers that it needs.
   static constexpr std::int32_t exactRound = 0;
   static constexpr std::int32_t interpolatedRound = 1;
   static constexpr std::int32_t firstCoarserRound = 2;
@@ -300,7 +301,7 @@ class LayerExchange {
     for (Grid& grid : grids_) {
       for (const Box& box : grid.owned) {
         std::vector<IndexBox> values{valuesIn(box, grid.block).intersection(grid.block.stored())};
-        // Points on a finer block's face are the finer one's.
+        // Points on a finer block's face belong to the finer block.
         for (const Box& finer : grid.finer) subtract(values, valuesIn(finer, grid.block));
         std::erase_if(values, [](const IndexBox& part) { return part.empty(); });
         grid.given.insert(grid.given.end(), values.begin(), values.end());
@@ -308,8 +309,8 @@ class LayerExchange {
     }
   }
 
-  /// Values around the stored ones, and stored ones that aren't the grid's own but would be
-  /// interpolated with them.
+  /// Finds the values around the stored ones, and stored ones that are not the grid's own but take part in
+  /// interpolation.
   static void findWanted(Grid& grid) {
     const IndexBox stored = grid.block.stored();
     IndexBox all = stored;
@@ -338,15 +339,15 @@ class LayerExchange {
     }
   }
 
-  /// Finds who has the values, the finest first.
+  /// Finds the blocks that have the values, the finest first.
   void askFor(std::size_t gridIndex, std::size_t wantedIndex) {
     Grid& grid = grids_[gridIndex];
     const Wanted& wanted = grid.wanted[wantedIndex];
-    // What the values stand for.
+    // The volume that the values stand for.
     const Box volume{grid.block.origin + (glm::dvec3(wanted.box.lo) - 0.5) * grid.block.spacing,
                      grid.block.origin + (glm::dvec3(wanted.box.hi) - 0.5) * grid.block.spacing};
-    // First those who own the place, the finest first; of a level those with values there before
-    // those that only close a gap. Then those who store it, where it's nobody's.
+    // First the owners of a place, the finest first; within a level, blocks with a value there precede those
+    // that only close a gap. Then blocks that store a value where nobody owns the place.
     struct Claim {
       bool stored;
       std::int32_t level;
@@ -359,8 +360,7 @@ class LayerExchange {
     for (const std::size_t d : directory_.meeting(volume)) {
       const BlockEntry& donor = directory_.entries()[d];
       if (donor.rank == comm_.rank() && static_cast<std::size_t>(donor.grid) == gridIndex) continue;
-      // A little more, so that nothing is lost between faces and places that were computed
-      // differently.
+      // A margin, so that nothing is lost between faces and places that were computed differently.
       const glm::dvec3 spare = latticeTolerance * glm::min(donor.spacing, grid.block.spacing);
       const auto claim = [&](bool stored, bool gap, const Box& box) {
         claims.push_back({stored, levelNumber(donor), gap, d, {box.lo - spare, box.hi + spare}});
@@ -413,7 +413,7 @@ class LayerExchange {
     outgoing_[static_cast<std::size_t>(donor.rank)].push_back({request, gridIndex, wantedIndex});
   }
 
-  /// Whether all samples are places of the donor's values.
+  /// Whether all samples lie at the donor's values.
   static bool findShift(Request& request, const BlockEntry& donor) {
     for (int axis = 0; axis < 3; ++axis) {
       const int last = request.parts[axis] - 1;
@@ -431,7 +431,7 @@ class LayerExchange {
     return true;
   }
 
-  /// Layers where anybody has values for them, with the nearest own values where nobody has.
+  /// Makes layers where any block has values, with the nearest own values where no block has.
   void makePatches(std::size_t gridIndex) {
     Grid& grid = grids_[gridIndex];
     const IndexBox stored = grid.block.stored();
@@ -464,8 +464,8 @@ class LayerExchange {
     if (!patches->empty()) grid.block.patches = std::move(patches);
   }
 
-  /// Cells of several levels end at different distances from the domain's faces. On one level the
-  /// outermost values go on to the faces, as in ParaView's own volume rendering.
+  /// Cells of several levels end at different distances from the domain's faces. With a single level, the
+  /// outermost values extend to the faces, as in ParaView's own volume rendering.
   bool continuesBeyondDomain(const Grid& grid) const { return grid.cells && levels_.size() > 1; }
 
   static void addOpen(Grid& grid, const Wanted& wanted) {
@@ -474,15 +474,15 @@ class LayerExchange {
     if (!open.empty()) grid.open.push_back({wanted.box, wanted.values.get(), std::move(open)});
   }
 
-  /// Other levels interpolate in these values, and they follow from values that arrive, so this
-  /// happens before each round and after the last one.
+  /// Other levels interpolate in these values, which depend on values that arrive, so this runs before each
+  /// round and after the last one.
   void continueBeyondDomain() {
     for (const Grid& grid : grids_) {
       if (!grid.open.empty()) comm::continueBeyondDomain(grid.block, grid.open);
     }
   }
 
-  /// Stored values where these are to stay, else those of the nearest value that's the grid's own.
+  /// Fills with the stored values that must stay, else with the nearest value that is the grid's own.
   static void fillWithOwn(const Grid& grid, Wanted& wanted) {
     const std::size_t size = sizeOf(grid.block.type);
     const IndexBox stored = grid.block.stored();
@@ -517,7 +517,7 @@ class LayerExchange {
     incoming_ = comm_.allToAll(std::as_bytes(std::span(requests)), counts, sizeof(Request));
   }
 
-  /// Answers travel in units of 8 bytes, each begins with one.
+  /// Answers travel in units of 8 bytes, and each begins at a unit.
   static constexpr std::size_t unit = 8;
   static std::size_t answerBytes(const Request& request, ScalarType type) {
     const std::size_t each = request.copied != 0 ? sizeOf(type) : sizeof(double);
@@ -597,8 +597,8 @@ class LayerExchange {
           }
         }
       }
-      // What isn't finite has no share in a mean. A mean of nothing else is infinite if all of it that isn't
-      // NaN is so in one direction.
+      // Values that are not finite do not count in a mean. Without any finite value, the mean is infinite if
+      // all values but NaN are infinities of one sign.
       const int count = (x1 - x0) * (y1 - y0) * (z1 - z0);
       sum = finite > 0        ? sum * count / finite
             : infinite != 0.0 ? infinite
@@ -646,9 +646,9 @@ class LayerExchange {
   const Communicator& comm_;
   const BlockDirectory& directory_;
   std::vector<Block>& blocks_;
-  std::vector<double> levels_;  // volumes that values stand for, descending
+  std::vector<double> levels_;  // volumes of a value, descending
   std::vector<Grid> grids_;
-  std::vector<std::vector<Asked>> outgoing_;  // by the rank that's asked
+  std::vector<std::vector<Asked>> outgoing_;  // by the rank that answers
   Gathered incoming_;                         // requests of other ranks
 };
 

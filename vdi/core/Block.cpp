@@ -22,7 +22,7 @@ namespace {
 constexpr std::array<std::pair<const char*, std::size_t>, 8> scalarTypes{
     {{"u8", 1}, {"i8", 1}, {"u16", 2}, {"i16", 2}, {"u32", 4}, {"i32", 4}, {"f32", 4}, {"f64", 8}}};
 
-/// Calls `function` with the data as a pointer to their own type.
+/// Calls `function` with the data as a pointer to its own type.
 template <typename Void, typename Function>
 auto withTyped(ScalarType type, Void* data, Function function) {
   const auto as = [&](auto zero) {
@@ -54,8 +54,8 @@ bool finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-/// In a way that compilers make vector instructions of: this is done for each value of each step, in which a
-/// loop with a branch and one pair of bounds would take several times as long as the upload.
+/// Written so that compilers vectorise it. This runs for every value of every step; a loop with a branch and
+/// one pair of bounds would take several times as long as the upload.
 template <typename T>
 ScalarRange finiteRangeOf(std::span<const T> values) {
   using Limits = std::numeric_limits<T>;
@@ -220,7 +220,7 @@ void validate(std::span<const Block> blocks) {
                               block.dims.y, block.dims.z),
                   context);
     }
-    // What's computed in single precision keeps a distance from its limits.
+    // Values computed in single precision need a distance from its limits.
     constexpr double minSpacing = 1e-30;
     constexpr double maxSpacing = 1e30;
     if (!finite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(minSpacing))) ||

@@ -51,7 +51,7 @@ std::vector<IndexBox> coverWithBoxes(const glm::ivec3& size, std::vector<bool> o
 
 namespace {
 
-/// The holes' faces cut the box into a lattice of cells, of which each is whole in or out.
+/// The holes' faces cut the box into a lattice of cells, each wholly inside or outside the holes.
 constexpr std::size_t maxCells = std::size_t{1} << 22;
 
 std::vector<Box> cut(const Box& box, const std::vector<Box>& holes) {

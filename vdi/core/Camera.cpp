@@ -20,14 +20,14 @@ double radians(double degrees) {
   return degrees * std::numbers::pi / 180.0;
 }
 
-/// View-up of length 1; y for a zero one, as vtkCamera::SetViewUp has it. Finite whatever its length is.
+/// View-up scaled to length 1, finite whatever its length is; y if it is zero, as in vtkCamera::SetViewUp.
 glm::dvec3 unitUp(const glm::dvec3& up) {
   const glm::dvec3 magnitude = glm::abs(up);
   const double largest = std::max({magnitude.x, magnitude.y, magnitude.z});
   return largest > 0.0 ? glm::normalize(up / largest) : glm::dvec3(0.0, 1.0, 0.0);
 }
 
-/// The up direction made orthogonal to `forward`; any orthogonal direction where `up` doesn't say.
+/// The up direction made orthogonal to `forward`; any orthogonal direction if `up` does not determine one.
 glm::dvec3 orthogonalUp(const glm::dvec3& up, const glm::dvec3& forward) {
   const glm::dvec3 unit = unitUp(up);
   const glm::dvec3 rest = unit - glm::dot(unit, forward) * forward;
@@ -64,11 +64,11 @@ void validateCamera(const Camera& camera) {
 }  // namespace
 
 Camera Camera::azimuth(double degrees) const {
-  if (degrees == 0.0) return *this;  // to the bit
+  if (degrees == 0.0) return *this;  // exactly
   const glm::dvec3 fromFocal = position - focalPoint;
   const glm::dvec3 axis = unitUp(viewUp);
   const double angle = radians(degrees);
-  const double along = glm::dot(axis, fromFocal);  // stays, by Rodrigues' rotation
+  const double along = glm::dot(axis, fromFocal);  // constant, by Rodrigues' rotation
   Camera turned = *this;
   turned.position = focalPoint + std::cos(angle) * fromFocal + std::sin(angle) * glm::cross(axis, fromFocal) +
                     (1.0 - std::cos(angle)) * along * axis;
@@ -118,7 +118,7 @@ View::View(const Camera& camera, int width, int height, const ImagePlane& plane)
 
 View View::withMargin(const Camera& camera, int width, int height, const glm::ivec2& margin) {
   const View picture(camera, width, height);
-  if (margin == glm::ivec2(0)) return picture;  // to the bit
+  if (margin == glm::ivec2(0)) return picture;  // exactly
   const glm::dvec2 half = glm::dvec2(width, height) + 2.0 * glm::dvec2(margin);
   const glm::dvec2 extent = half * (picture.halfHeight_ / height);
   return {camera, width + 2 * margin.x, height + 2 * margin.y, ImagePlane{-extent, extent}};

@@ -31,8 +31,8 @@ OpacityNode between(const OpacityNode& a, const OpacityNode& b, double share) {
   return {0.0, glm::mix(a.opacity, b.opacity, share)};
 }
 
-/// The nodes from which linear interpolation gives all others to within `tolerance`: Ramer, Douglas and
-/// Peucker's, with errors measured in values.
+/// The fewest nodes found from which linear interpolation gives all others to within `tolerance`, by the
+/// algorithm of Ramer, Douglas and Peucker with errors measured in values.
 template <typename Node>
 std::vector<Node> withFewer(const std::vector<Node>& nodes, double tolerance) {
   if (nodes.size() < 3) return nodes;

@@ -9,7 +9,7 @@ namespace vdi {
 
 namespace {
 
-/// Columns and rows of the lists count from `margin` on. `value` gives a supersegment as floats.
+/// Flattens the lists from column and row `margin` on. `value` converts a supersegment to floats.
 template <typename Segment, typename Value>
 void flattenLists(const ListsOf<Segment>& lists, int listsWide, const glm::ivec2& margin, Value value,
                   Image& image) {

@@ -21,7 +21,7 @@ namespace vdi {
 
 namespace {
 
-/// Of a size that every Linux maps, and that devices import.
+/// A page size that every Linux maps, and that devices import.
 constexpr std::uint64_t page = 65536;
 
 std::uint64_t wholePages(std::uint64_t bytes) {
@@ -53,28 +53,28 @@ std::span<std::byte> map(std::uint64_t size, int flags, int descriptor, const ch
   return {static_cast<std::byte*>(pages), size};
 }
 
-/// Where shm_open has its names.
+/// The folder of shm_open's names.
 const std::string folder = "/dev/shm";
 constexpr std::string_view prefix = "/pv-vdi-";
 
-/// Memory of processes that were killed while it had a name. Each process locks its own as long as it lives.
+/// Unlinks memory of processes that were killed before they could. A process locks its memory while it lives.
 void removeNamesOfTheDead() {
   std::error_code unreadable;
   using Iterator = std::filesystem::directory_iterator;
   for (Iterator entry(folder, unreadable); !unreadable && entry != Iterator(); entry.increment(unreadable)) {
     const std::string name = fmt::format("/{}", entry->path().filename().string());
     if (!name.starts_with(prefix)) continue;
-    const File file(shm_open(name.c_str(), O_RDWR, 0));  // another user's can't be opened
+    const File file(shm_open(name.c_str(), O_RDWR, 0));  // fails for another user's memory
     if (file.descriptor() >= 0 && flock(file.descriptor(), LOCK_EX | LOCK_NB) == 0) shm_unlink(name.c_str());
   }
 }
 
-/// That no other process of the host uses, whatever container it's in.
+/// A name that no other process of the host uses, in whatever container.
 std::string newName() {
   static std::atomic<std::uint32_t> made{0};
   static const std::uint64_t process = (std::uint64_t{std::random_device()()} << 32) | std::random_device()();
   return fmt::format("{}{:x}-{}-{}", prefix, process, getpid(),
-                     made++);  // a forked process has all but the second
+                     made++);  // the only part that a forked process does not inherit
 }
 
 }  // namespace
@@ -83,7 +83,7 @@ std::shared_ptr<HostMemory> HostMemory::anonymous(std::uint64_t bytes) {
   std::shared_ptr<HostMemory> memory(new HostMemory);
   const std::uint64_t size = wholePages(bytes);
   memory->bytes_ = map(size, MAP_PRIVATE | MAP_ANONYMOUS, -1, "host");
-  madvise(memory->bytes_.data(), size, MADV_HUGEPAGE);  // fewer to pin; a wish
+  madvise(memory->bytes_.data(), size, MADV_HUGEPAGE);  // fewer pages to pin; only a hint
   return memory;
 }
 
@@ -92,7 +92,7 @@ std::shared_ptr<HostMemory> HostMemory::shareable(std::uint64_t bytes) {
   const std::uint64_t size = wholePages(bytes);
   memory->descriptor_ = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (memory->descriptor_ < 0) throwNoRoom(size, "shared", errno);
-  int error = EINTR;  // a signal may come between
+  int error = EINTR;  // a signal may interrupt it
   while (error == EINTR) error = posix_fallocate(memory->descriptor_, 0, static_cast<off_t>(size));
   if (error != 0) throwNoRoom(size, "shared", error);
   memory->bytes_ = map(size, MAP_SHARED, memory->descriptor_, "shared");
@@ -109,9 +109,9 @@ std::shared_ptr<HostMemory> HostMemory::shared(std::uint64_t bytes) {
 bool HostMemory::publish() {
   if (linked_) return true;
   if (descriptor_ < 0) return false;
-  static std::atomic<pid_t> remover{0};  // a forked process does it, too
+  static std::atomic<pid_t> remover{0};  // a forked process also does it
   if (remover.exchange(getpid()) != getpid()) removeNamesOfTheDead();
-  // Locked before it has a name: who finds it unlocked knows that this process has gone.
+  // Locked before it has a name: a process that finds it unlocked knows that this one has ended.
   if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) return false;
   const std::string self = fmt::format("/proc/self/fd/{}", descriptor_);
   linked_ = linkat(AT_FDCWD, self.c_str(), AT_FDCWD, (folder + name_).c_str(), AT_SYMLINK_FOLLOW) == 0;

@@ -98,7 +98,7 @@ Kernel gaussian() {
   return kernel;
 }
 
-/// Of one row of windows. The Gaussian is separable: columns first.
+/// Sum of SSIMs of one row of windows. The Gaussian is separable: columns first.
 double rowOfSsims(const Channel& channel, const Kernel& kernel, int y, std::vector<Moments>& columns) {
   for (std::size_t x = 0; x < columns.size(); ++x) {
     Moments m;
@@ -124,7 +124,7 @@ double windowedSsim(const Channel& channel, int width, int height) {
     for (std::size_t i = first; i < last; ++i)
       rows[i] = rowOfSsims(channel, kernel, static_cast<int>(i) + radius, columns);
   });
-  const double sum = std::accumulate(rows.begin(), rows.end(), 0.0);  // the same with any number of threads
+  const double sum = std::accumulate(rows.begin(), rows.end(), 0.0);  // independent of the number of threads
   return sum / (static_cast<double>(width - 2 * radius) * (height - 2 * radius));
 }
 

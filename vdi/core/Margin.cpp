@@ -8,8 +8,8 @@ namespace vdi {
 
 namespace {
 
-/// Lists from the picture's middle to the farthest that the scene's box is seen in, and one more; infinite
-/// where the box reaches behind the eye.
+/// Number of lists from the picture's middle to the farthest edge of the scene's box, and one more; infinite
+/// if the box reaches behind the eye.
 glm::dvec2 reachOf(const Box& bounds, const View& picture) {
   glm::dvec2 farthest{0.0};
   for (int corner = 0; corner < 8; ++corner) {

@@ -15,16 +15,17 @@ namespace {
 
 constexpr std::size_t probeCount = 8192;
 
-/// What squared errors of a voxel's samples may add up to, by the samples' opacity. With more, the picture's
-/// SSIM to a converged one may fall below 0.997 (docs/adr/steep-functions-get-more-samples.md).
+/// Bound on the sum of squared errors of a voxel's samples, weighted by the samples' opacity. With a larger
+/// bound, the picture's SSIM to a converged one may fall below 0.997
+/// (docs/adr/steep-functions-get-more-samples.md).
 constexpr double tolerance = 1e-4;
-/// Larger errors of a sample count as this: a few of them don't show in the picture as much as many.
+/// Larger errors of a sample count as this: a few large ones are less visible than many small ones.
 constexpr double largestError = 0.05;
 
 /// A point of an additive sequence that fills the unit cube evenly (M. Roberts, The Unreasonable
 /// Effectiveness of Quasirandom Sequences, 2018), in five dimensions.
 double coordinateOf(std::size_t index, std::size_t dimension) {
-  constexpr double root = 1.1347241384015194;  // of x^6 = x + 1
+  constexpr double root = 1.1347241384015194;  // root of x^6 = x + 1
   constexpr std::array powers{root, root * root, root * root * root, root * root * root * root,
                               root * root * root * root * root};
   const double place = static_cast<double>(index + 1) / powers[dimension];
@@ -33,7 +34,7 @@ double coordinateOf(std::size_t index, std::size_t dimension) {
 
 struct Place {
   glm::dvec3 center;  // relative to the scene's centre
-  glm::dvec3 step;    // along the ray, as long as a sample at rate 1
+  glm::dvec3 step;    // along the ray, one sample long at rate 1
 };
 
 Place placeOf(const Scene& scene, std::size_t index) {
@@ -62,7 +63,7 @@ double interpolated(const Block& block, const glm::dvec3& world) {
   return sum;
 }
 
-/// As samples are owned (snapToScene): each place has one owner, whatever rounding does to faces.
+/// Owns a place as samples are owned (snapToScene): each has one owner, despite rounding of faces.
 bool owns(const Scene& scene, const Block& block, const glm::dvec3& center) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto at = static_cast<float>(center[axis]);
@@ -104,7 +105,7 @@ std::vector<Probe> probesIn(const Region& region, const Scene& scene, std::span<
   return shown;
 }
 
-/// Of what one slab shows and what its two halves show.
+/// Difference between one slab and its two halves.
 struct SlabError {
   double squared = 0.0;
   double opacity = 0.0;
@@ -119,7 +120,7 @@ SlabError errorOf(const SlabIntegral& slabs, const std::array<double, 3>& positi
   return {largest * largest, halves.a};
 }
 
-/// At rate 1, or at rate 2 with a slab half as long in the probe's middle.
+/// Compares them at rate 1, or at rate 2 with a slab half as long in the probe's middle.
 bool showsEnough(const TransferTable& table, const SlabIntegral& slabs, double minSpacing,
                  std::span<const Probe> probes, double rate) {
   std::vector<SlabError> errors(probes.size());
@@ -147,7 +148,7 @@ bool showsEnough(const TransferTable& table, const SlabIntegral& slabs, double m
 
 std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
   if (scene.bounds.empty() || !(scene.minSpacing > 0.0)) return {};
-  std::vector<std::pair<Place, std::size_t>> places;  // by x: a block looks at those between its faces
+  std::vector<std::pair<Place, std::size_t>> places;  // by x: a block only searches those between its faces
   places.reserve(probeCount);
   for (std::size_t index = 0; index < probeCount; ++index) places.emplace_back(placeOf(scene, index), index);
   const auto isBefore = [](const auto& a, const auto& b) { return a.first.center.x < b.first.center.x; };
@@ -160,7 +161,8 @@ std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
   std::vector<Owned> owned;
   for (const Block& block : blocks) {
     if (block.owned.empty()) continue;
-    const double spare = 1e-5 * scene.bounds.size().x;  // more than snapping moves a face
+    // More than the distance by which snapping moves a face.
+    const double spare = 1e-5 * scene.bounds.size().x;
     const auto at = [&](double x) {
       return std::pair(Place{glm::dvec3(x - scene.bounds.center().x, 0.0, 0.0), {}}, std::size_t{0});
     };
@@ -171,7 +173,7 @@ std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
     }
   }
   std::ranges::sort(owned, {}, &Owned::index);
-  // Each step of a simulation takes this time, whatever rate is asked for.
+  // This takes time in each step of a simulation, whatever the rate.
   std::vector<Probe> probes(owned.size());
   inParallel(owned.size(), 256, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i)

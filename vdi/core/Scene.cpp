@@ -43,7 +43,8 @@ DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPe
     nearest = std::min(nearest, view.depthOf(point));
     farthest = std::max(farthest, view.depthOf(point));
   }
-  lattice.first = nearest > 0.0 ? nearest : 0.0;  // never -0, which shaders would take for large by its bits
+  // Never -0, whose bits shaders would take for a large number.
+  lattice.first = nearest > 0.0 ? nearest : 0.0;
   lattice.step = scene.minSpacing / samplesPerVoxel;
   if (farthest <= lattice.first) return lattice;
   const double samples = std::ceil((farthest - lattice.first) / lattice.step);
@@ -57,7 +58,7 @@ DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPe
 }
 
 bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice) {
-  double longest = 0.0;  // component of any ray's direction; they're linear in the pixel's coordinates
+  double longest = 0.0;  // component of any ray's direction, which is linear in the pixel's coordinates
   for (int corner = 0; corner < 4; ++corner) {
     const Ray ray =
         view.rayThrough((corner & 1) != 0 ? view.width() : 0.0, (corner & 2) != 0 ? view.height() : 0.0);

@@ -10,7 +10,7 @@ namespace vdi {
 
 namespace {
 
-/// Degrees, as vtkLightKit places its lights on a sphere around the focal point.
+/// Direction from angles in degrees, as vtkLightKit places its lights on a sphere around the focal point.
 glm::dvec3 onSphere(double elevation, double azimuth) {
   const double up = glm::radians(elevation);
   const double right = glm::radians(azimuth);

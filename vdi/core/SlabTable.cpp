@@ -15,7 +15,7 @@ namespace {
 using gpu::shared::slabSide;
 using gpu::shared::slabStripStep;
 
-/// Premultiplied colour and opacity of what has that mean entry along `length`.
+/// Premultiplied colour and opacity of material with that mean entry along `length`.
 glm::dvec4 accumulated(const glm::dvec4& mean, double length) {
   const double depth = std::max(mean.a, 0.0) * length;
   if (!(depth > 0.0)) return glm::dvec4(0.0);
@@ -43,21 +43,20 @@ glm::dvec4 SlabIntegral::mean(double front, double back, double length) const {
   return accumulated((upTo(back) - upTo(front)) / (back - front), length);
 }
 
-// In parts of equal length, front to back, for in each of them light comes from all places alike; as many as
-// it takes to tell the transfer function's features apart.
+// Divides the slab into parts of equal length, front to back. Within a part, light from all places counts the
+// same. Their number suffices to separate the transfer function's features.
 glm::dvec4 SlabIntegral::between(double front, double back, double length) const {
-  constexpr double thin = 0.1;     // optical depth that hides nothing behind it
-  constexpr double opaque = 16.0;  // that lets nothing through
+  constexpr double thin = 0.1;     // optical depth below which nearer material hides nothing
+  constexpr double opaque = 16.0;  // optical depth above which nothing shines through
   constexpr double maxParts = 64.0;
-  constexpr double nearlyNothing = 1e-6;  // where the difference of two sums is lost in rounding
+  constexpr double nearlyNothing = 1e-6;  // below it, rounding spoils the difference of two sums
   const double span = back - front;
   if (std::abs(span) < nearlyNothing)
     return mean(front - 0.5 * nearlyNothing, front + 0.5 * nearlyNothing, length);
   const glm::dvec4 start = upTo(front);
   const glm::dvec4 whole = (upTo(back) - start) / span;
   if (whole.a * length <= thin) return accumulated(whole, length);
-  const int parts =
-      static_cast<int>(std::clamp(std::abs(span), 1.0, maxParts));  // spans may be beyond any int
+  const int parts = static_cast<int>(std::clamp(std::abs(span), 1.0, maxParts));  // spans may exceed any int
   glm::dvec4 sum(0.0);
   glm::dvec4 before = start;
   for (int part = 1; part <= parts && sum.a < 1.0 - std::exp2(-opaque); ++part) {
@@ -70,10 +69,10 @@ glm::dvec4 SlabIntegral::between(double front, double back, double length) const
 
 namespace {
 
-/// No colour is brighter than white, after rounding to half floats as well.
+/// Limits colours to white, also after rounding to half floats.
 glm::u16vec4 texelOf(const glm::dvec4& slab) {
   const glm::u16vec4 half = toHalf(glm::vec4(slab));
-  // Compared as numbers: by its bits, -0 is above all of them. A falling slab of a channel that is 0 has it.
+  // Compares numbers: the bits of -0 exceed all others. A falling slab of a channel that is 0 has it.
   const glm::vec4 rounded = fromHalf(half);
   return toHalf(glm::max(glm::min(rounded, glm::vec4(rounded.a)), glm::vec4(0.0F)));
 }
@@ -85,7 +84,7 @@ std::size_t SlabTable::stripRows() const {
 }
 
 std::size_t SlabTable::levels() const {
-  // Up to what's one step of the square.
+  // Up to one step of the square.
   const double step = static_cast<double>(positions - 1) / slabStripStep;
   return static_cast<std::size_t>(std::max(std::ceil(std::log2(step)), 0.0)) + 1;
 }
@@ -136,7 +135,7 @@ SlabTable makeSlabTable(const TransferTable& transfer, float length) {
 
 namespace {
 
-/// Linear between texels; within one row where y is a whole number.
+/// Linear between texels; within one row if y is a whole number.
 glm::vec4 texelsAt(const SlabTable& table, double x, double y) {
   const auto column = std::min(static_cast<std::size_t>(x), std::size_t{slabSide} - 2);
   const auto row = std::min(static_cast<std::size_t>(y), table.height() - 2);
@@ -148,13 +147,13 @@ glm::vec4 texelsAt(const SlabTable& table, double x, double y) {
   return glm::mix(inRow(row), inRow(row + 1), static_cast<float>(y - static_cast<double>(row)));
 }
 
-/// What a filtered texel stands for.
+/// The slab of a filtered texel.
 Slab slabOf(const glm::vec4& texel) {
   if (!(texel.a > 0.0F)) return {};
   return {glm::vec3(texel) / texel.a, opticalDepthOf(texel.a)};
 }
 
-/// Both within the transfer table.
+/// The slab between two positions within the transfer table.
 glm::vec4 inside(const SlabTable& table, double front, double back) {
   const double last = static_cast<double>(table.positions - 1);
   const double toSquare = slabStripStep / last;
@@ -185,7 +184,7 @@ Slab SlabTable::between(double front, double back) const {
   const double span = std::abs(back - front);
   const double spanInside = std::abs(backInside - frontInside);
   if (!(spanInside > 0.0 && spanInside < span)) return slab;
-  // A part of it is like the table's ends.
+  // A part of the slab may lie beyond the table's ends.
   const auto shareOf = [&](double part) { return static_cast<float>(part / span); };
   const float depth = slab.opticalDepth * shareOf(spanInside);
   const float depthBelow = below.a * shareOf(std::max(-std::min(front, back), 0.0));

@@ -11,7 +11,7 @@ namespace vdi {
 
 namespace {
 
-/// `columns`, `rows`: of the lists that are taken, in [0, size), or -1: an empty one.
+/// `columns` and `rows` are indices of the lists to take, in [0, size), or -1 for an empty list.
 template <typename Segment>
 ListsOf<Segment> taken(const ListsOf<Segment>& lists, int width, const std::vector<int>& columns,
                        const std::vector<int>& rows) {
@@ -32,7 +32,7 @@ ListsOf<Segment> taken(const ListsOf<Segment>& lists, int width, const std::vect
   return few;
 }
 
-/// Which of `many` lists along an axis is at the centre of each of `few`, which cover `share` as much of it.
+/// Indices, among `many` lists along an axis, of those at the centres of `few`, which cover `share` as much.
 std::vector<int> placesOf(int few, int many, double share) {
   std::vector<int> places(static_cast<std::size_t>(few));
   for (int i = 0; i < few; ++i) {
@@ -49,7 +49,7 @@ Vdi thinned(const Vdi& vdi, int factor) {
   assert(factor >= 1);
   Vdi few;
   few.camera = vdi.camera;
-  // As high as all lists.
+  // The same height as all lists together.
   const double halfHeight = vdi.view().halfHeight();
   if (vdi.camera.parallelProjection) {
     few.camera.parallelScale = halfHeight;
@@ -65,7 +65,7 @@ Vdi thinned(const Vdi& vdi, int factor) {
   few.timeStep = vdi.timeStep;
   few.coloring = vdi.coloring;
   few.depthCode = vdi.depthCode;
-  // Pixels are squares: what the width is then differs by rounding.
+  // Pixels are squares, so the width differs by rounding.
   const double share =
       (static_cast<double>(few.width) * vdi.height) / (static_cast<double>(few.height) * vdi.width);
   const std::vector<int> columns = placesOf(few.width, vdi.width, share);

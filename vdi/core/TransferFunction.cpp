@@ -16,8 +16,8 @@ namespace {
 constexpr std::size_t smallestTable = 1024;
 constexpr std::size_t largestTable = 16384;
 
-/// Piecewise linear through nodes in ascending x; `valueOf` reads a node's value. Of two nodes at x the later
-/// one counts.
+/// Piecewise linear through nodes in ascending x; `valueOf` reads a node's value. Of two nodes at x, the
+/// later one counts.
 template <typename Node, typename ValueOf>
 auto piecewiseLinear(const std::vector<Node>& nodes, double x, ValueOf valueOf) {
   assert(!nodes.empty());
@@ -51,7 +51,7 @@ float extinctionOf(double opacity) {
   return std::min(static_cast<float>(-std::log2(1.0 - opacity)), maxExtinction);
 }
 
-/// Smallest distance between two nodes that aren't at the same x.
+/// Smallest nonzero distance between two nodes.
 template <typename Node>
 double closestNodes(const std::vector<Node>& nodes, double soFar) {
   for (std::size_t i = 1; i < nodes.size(); ++i) {
@@ -98,7 +98,7 @@ TransferTable bake(const TransferFunction& transferFunction) {
   table.min = std::min(transferFunction.colors.front().x, transferFunction.opacities.front().x);
   table.max = std::max(transferFunction.colors.back().x, transferFunction.opacities.back().x);
   if (!(table.max > table.min)) {
-    // One value only. Two nodes there are a step, which keeps its place between two neighbouring entries.
+    // A single scalar. Two nodes there are a step, which lies between two neighbouring entries.
     const double half = std::max(std::abs(table.min), 1e-30) * 1e-6;
     table.min -= half;
     table.max += half;
@@ -120,7 +120,7 @@ TransferTable bake(const TransferFunction& transferFunction) {
 
 double TransferTable::positionOf(double scalar) const {
   assert(entries.size() >= 2 && max > min);
-  constexpr double far = 1e30;  // as tablePosition of shaders/raycast.glsl has it
+  constexpr double far = 1e30;  // the limit of tablePosition in shaders/raycast.glsl
   return std::clamp((scalar - min) / (max - min) * static_cast<double>(entries.size() - 1), -far, far);
 }
 

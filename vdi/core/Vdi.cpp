@@ -15,7 +15,7 @@ namespace {
   throw Error(ErrorCode::Format, "not a sound VDI: " + what);
 }
 
-/// Negated comparisons, so that NaN fails.
+/// Uses negated comparisons, so that NaN fails.
 bool wellFormed(const Supersegment& segment, float previousBack) {
   const bool depths =
       segment.front >= previousBack && segment.front < segment.back && std::isfinite(segment.back);
@@ -24,7 +24,7 @@ bool wellFormed(const Supersegment& segment, float previousBack) {
   return depths && color && segment.opacity > 0.0F && segment.opacity <= 1.0F;
 }
 
-/// `number`: of the list in the VDI.
+/// `number` is the list's number in the VDI.
 void validateList(std::span<const Supersegment> list, std::uint64_t number) {
   float previousBack = 0.0F;
   for (const Supersegment& segment : list) {
@@ -63,7 +63,7 @@ SupersegmentLists Vdi::expandedLists() const {
 
 void validateShape(const Vdi& vdi) {
   if (vdi.width < 1 || vdi.height < 1) fail(fmt::format("{} x {} lists", vdi.width, vdi.height));
-  // Without a sum, which large values would overflow.
+  // Avoids the sum, which large values would overflow.
   const auto leavesSome = [](int size, int margin) { return margin >= 0 && margin <= (size - 1) / 2; };
   if (!leavesSome(vdi.width, vdi.margin.x) || !leavesSome(vdi.height, vdi.margin.y)) {
     fail(fmt::format("a margin of {} and {} of {} x {} lists", vdi.margin.x, vdi.margin.y, vdi.width,

@@ -25,7 +25,7 @@ Corners cornersOf(const Box& bounds) {
   return corners;
 }
 
-/// Of what lies in the view's picture, at the depths that the scene has there.
+/// Corners of the part of the view's frustum at the scene's depths.
 Corners cornersOf(const View& view, const Corners& scene) {
   double near = std::numeric_limits<double>::infinity();
   double far = 0.0;
@@ -43,9 +43,9 @@ Corners cornersOf(const View& view, const Corners& scene) {
   return corners;
 }
 
-/// Whether all corners lie on the outer side of one of the planes that bound what the view shows.
+/// Whether all corners lie on the outer side of one of the view frustum's planes.
 bool areOutside(const Corners& corners, const View& view) {
-  // How many corners are left of, right of, below, above and behind the picture.
+  // Number of corners left of, right of, below, above and behind the picture.
   std::array<std::size_t, 5> beyond{};
   for (const glm::dvec3& corner : corners) {
     const glm::dvec3 p = view.toView(corner);
@@ -60,7 +60,7 @@ bool areOutside(const Corners& corners, const View& view) {
   return std::ranges::find(beyond, corners.size()) != beyond.end();
 }
 
-/// From the camera to `point`, or along the axis if it projects in parallel; unit.
+/// Unit direction from the camera to `point`, or along the view axis in parallel projection.
 glm::dvec3 directionTo(const glm::dvec3& point, const Camera& camera) {
   const glm::dvec3 way =
       camera.parallelProjection ? camera.focalPoint - camera.position : point - camera.position;

@@ -29,7 +29,7 @@ ComputePipelineInfo sharingPipelineInfo() {
   return info;
 }
 
-/// One for each tolerance; a power of 2.
+/// One lane for each tolerance; a power of 2.
 constexpr std::uint32_t maxLanesPerRay = 8;
 static_assert(shared::castGroupX % maxLanesPerRay == 0);
 
@@ -57,7 +57,7 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
   }
   params.width = static_cast<std::uint32_t>(view.width());
   params.height = static_cast<std::uint32_t>(view.height());
-  // A position is the sum of a start and a depth times a direction, each rounded to 24 bits.
+  // A position is the sum of a start and of a depth times a direction, each rounded to 24 bits.
   const glm::dvec3 half = 0.5 * scene.bounds.size();
   const double reach =
       glm::length(glm::dvec3(params.startBase)) + lattice.count * lattice.step + glm::length(half) +
@@ -105,19 +105,19 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
                                 : algorithm == Algorithm::Bisection ? shared::castProgramSearch
                                 : writes                            ? shared::castProgramWritePreSegments
                                                                     : shared::castProgramCountPreSegments;
-  // Just the search stores supersegments itself.
+  // Only the search itself stores supersegments.
   const std::uint32_t compact = program == shared::castProgramSearch ? isCompact(band.form) : 0;
   const shared::CastConstants constants{writes ? shared::castModeWrite : shared::castModeSearch,
                                         band.firstRow, band.lastRow};
   const bool counts = program == shared::castProgramCountPreSegments ||
                       program == shared::castProgramHistogram || program == shared::castProgramCountLevels;
   const std::uint32_t stride = counts ? band.countedStride : 1;
-  // The row behind the band is counted too.
+  // The row after the band is counted too.
   const std::uint32_t rows = (band.lastRow - band.firstRow + stride - 1) / stride + (stride > 1 ? 1 : 0);
   const std::uint32_t lanes = stride > 1 ? lanesPerRay_ : 1;
   const std::uint32_t width = (band.width + stride - 1) / stride * lanes;
   pipelines_.update(commands, params);
-  // Counted samples may lie apart.
+  // Counted samples need not be adjacent.
   const std::uint32_t ahead = stride > 1 ? 1 : samplesAhead_;
   commands.dispatch(
       pipelineFor({program, compact, lanes, ahead, band.cutAtGaps, params.level >= 0.0F, params.shaded != 0}),

@@ -31,7 +31,7 @@ void CellsPass::record(Commands& commands, const shared::CellsConstants& constan
     pipeline.bindImages(images, sampler_);
     boundVersion_ = pagesVersion;
   }
-  const bool byGroups = constants.mode == shared::cellsModeMeasure;  // a workgroup a cell
+  const bool byGroups = constants.mode == shared::cellsModeMeasure;  // one workgroup a cell
   commands.dispatchMany(pipeline, constants, constants.cellCount, byGroups ? 1 : shared::cellsGroup);
 }
 

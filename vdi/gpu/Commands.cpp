@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint32_t maxMarks = 64;
 
-/// Waits for everything before; everything after waits for it.
+/// Waits for all earlier commands, and makes all later ones wait.
 void changeLayout(VkCommandBuffer commands, const SampledImage& image, VkImageLayout from, VkImageLayout to) {
   const VkImageMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
                                       nullptr,
@@ -56,7 +56,7 @@ Commands::Commands(std::shared_ptr<Device> device, QueueKind kind) : device_(std
 Commands::~Commands() {
   try {
     if (state_ == State::Submitted) device_->vulkan().wait(kind_, last_);
-  } catch (const Error&) {  // the device is lost: nothing runs any more
+  } catch (const Error&) {  // the device is lost, so nothing runs any more
   }
   release();
 }
@@ -95,7 +95,7 @@ void Commands::submit() {
     device_->vulkan().endLabel(buffer_);
     writeTimestamp(static_cast<std::uint32_t>(marks_.size()));
   }
-  // Makes what was written visible to the host after wait().
+  // Makes all writes visible to the host after wait().
   memoryBarrier(true);
   check(vkEndCommandBuffer(buffer_), "vkEndCommandBuffer");
   last_ = device_->vulkan().submit(kind_, waits_, buffer_);
@@ -103,7 +103,7 @@ void Commands::submit() {
   ++submissions_;
 }
 
-/// After a lost device the submission counts as not done: each further begin or wait throws again.
+/// After device loss the submission never counts as complete: each further begin or wait throws again.
 void Commands::wait() {
   if (state_ != State::Submitted) return;
   device_->vulkan().wait(kind_, last_);
@@ -114,7 +114,7 @@ void Commands::wait() {
 void Commands::drop() noexcept {
   try {
     wait();
-  } catch (const Error&) {  // the device is lost: nothing runs any more
+  } catch (const Error&) {  // the device is lost, so nothing runs any more
     state_ = State::Idle;
   }
 }
@@ -152,15 +152,14 @@ void Commands::barrier() {
   memoryBarrier(false);
 }
 
-/// `host`: what's written is visible to the host as well, which flushes more caches than the device alone
-/// needs.
+/// `host` also makes writes visible to the host, which flushes more caches than the device alone needs.
 void Commands::memoryBarrier(bool host) {
   VkPipelineStageFlags2 stages = VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT;
   VkAccessFlags2 writes = VK_ACCESS_2_TRANSFER_WRITE_BIT;
   VkAccessFlags2 reads = VK_ACCESS_2_TRANSFER_READ_BIT;
   if (kind_ == QueueKind::Compute) {
     stages |= VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT |
-              VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT;  // which reads the arguments of indirect dispatches
+              VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT;  // reads the arguments of indirect dispatches
     writes |= VK_ACCESS_2_SHADER_WRITE_BIT;
     reads |= VK_ACCESS_2_SHADER_READ_BIT | VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT;
   }

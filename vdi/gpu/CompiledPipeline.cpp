@@ -8,7 +8,7 @@ namespace vdi::gpu {
 
 namespace {
 
-/// Exists just while the pipeline is made.
+/// Exists only while the pipeline is made.
 class ShaderModule {
  public:
   ShaderModule(VkDevice device, std::span<const std::uint32_t> code) : device_(device) {
@@ -116,8 +116,8 @@ std::shared_ptr<const CompiledPipeline> CompiledPipelines::of(const PipelineTarg
     const std::lock_guard lock(mutex_);
     if (const auto found = pipelines_.find(key); found != pipelines_.end()) return found->second;
   }
-  // Not under the lock: another thread may need one that's there. Where two compile the same, the first one
-  // that's done counts.
+  // Compiles without the lock, because another thread may need a pipeline that exists. If two threads compile
+  // the same one, the first to finish wins.
   auto compiled = std::make_shared<const CompiledPipeline>(target, info);
   made(*compiled);
   const std::lock_guard lock(mutex_);

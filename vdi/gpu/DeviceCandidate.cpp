@@ -38,9 +38,9 @@ std::uint64_t largestDeviceHeap(VkPhysicalDevice device) {
   return largest;
 }
 
-/// The first family that computes and has timestamps: the one with graphics on common hardware, which has the
-/// whole device, while compute-only families may share it. For transfers one that can do nothing else, copy
-/// engines, if it copies boxes of any texels.
+/// Computes on the first family with timestamps: on common hardware it also has graphics and can use the
+/// whole device, while compute-only families may share it. Transfers use a family that can do nothing else
+/// (copy engines), if it copies boxes with any offset.
 bool findFamilies(VkPhysicalDevice device, DeviceCandidate& candidate) {
   std::uint32_t count = 0;
   vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
@@ -98,7 +98,7 @@ struct Subgroups {
     VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &v11, {}};
     vkGetPhysicalDeviceProperties2(device, &properties);
   }
-  /// In compute shaders.
+  /// Whether compute shaders support the operations.
   bool can(VkSubgroupFeatureFlags operations) const {
     return (v11.subgroupSupportedStages & VK_SHADER_STAGE_COMPUTE_BIT) != 0 &&
            (v11.subgroupSupportedOperations & operations) == operations;
@@ -118,7 +118,7 @@ std::uint32_t usefulSubgroupSize(const Subgroups& subgroups, const DeviceFeature
   return there ? std::min(largest, v13.maxSubgroupSize) : 0;
 }
 
-/// What needs Vulkan 1.3 to be asked for: limits, driver, and what's missing.
+/// Queries properties that need Vulkan 1.3: limits, driver, and missing requirements.
 void inspectFeatures(VkPhysicalDevice device, DeviceCandidate& candidate) {
   VkPhysicalDeviceDriverProperties driver{};
   driver.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES;
@@ -131,8 +131,8 @@ void inspectFeatures(VkPhysicalDevice device, DeviceCandidate& candidate) {
   candidate.summary.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
   DeviceLimits& limits = candidate.limits;
   limits.maxBufferBytes = m4.maxBufferSize;
-  // Some drivers report 4 GiB as the largest allocation and make larger ones: there the largest buffer, which
-  // they'd have to allocate, tells more.
+  // Some drivers report 4 GiB as the largest allocation and make larger ones. Their largest buffer, which
+  // they must be able to allocate, is the better figure.
   limits.maxAllocationBytes =
       std::min(limits.memoryBytes, std::max<std::uint64_t>(m3.maxMemoryAllocationSize, m4.maxBufferSize));
 

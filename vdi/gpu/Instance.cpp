@@ -38,7 +38,7 @@ Instance::Instance(bool validation) {
                 fmt::format("validation was asked for, but isn't installed: {}", nameOf(result)),
                 validationLayer);
   }
-  // The loader's answer to a machine without a driver.
+  // The loader returns this on a machine without a driver.
   if (result == VK_ERROR_INCOMPATIBLE_DRIVER) {
     handle_ = VK_NULL_HANDLE;
     return;

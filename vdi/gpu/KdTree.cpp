@@ -16,7 +16,7 @@ struct Plane {
   float position = 0.0F;
 };
 
-/// Among all faces the one that leaves the smaller halves; cut bricks count in both.
+/// Chooses the face whose fuller side has the fewest bricks; cut bricks cost extra.
 Plane choosePlane(const std::vector<Brick>& bricks) {
   Plane best;
   std::size_t bestCost = static_cast<std::size_t>(-1);
@@ -36,7 +36,7 @@ Plane choosePlane(const std::vector<Brick>& bricks) {
             static_cast<std::size_t>(std::lower_bound(lo.begin(), lo.end(), position) - lo.begin());
         const auto above =
             static_cast<std::size_t>(hi.end() - std::upper_bound(hi.begin(), hi.end(), position));
-        if (below == count || above == count) continue;  // separates nothing
+        if (below == count || above == count) continue;  // does not separate anything
         const std::size_t cut = below + above > count ? below + above - count : 0;
         const std::size_t cost = std::max(below, above) + cut;
         if (cost < bestCost) {

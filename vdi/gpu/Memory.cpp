@@ -22,7 +22,7 @@ double mebibytes(std::uint64_t bytes) {
   return static_cast<double>(bytes) / (1 << 20);
 }
 
-/// With the figures that a user needs to make the problem fit.
+/// Names the figures that a user needs to make the problem fit.
 [[noreturn]] void throwOutOfMemory(const Device& device, std::uint64_t bytes, const char* what) {
   throw Error(
       ErrorCode::OutOfMemory,
@@ -50,7 +50,7 @@ VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::
   return memory;
 }
 
-/// Of the queues that may use a buffer or an image.
+/// Queue families that may use a buffer or an image.
 class QueueFamilies {
  public:
   explicit QueueFamilies(const Device& device)
@@ -109,7 +109,7 @@ std::uint64_t texelBytes(VkFormat format) {
 
 Buffer::Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind kind)
     : device_(std::move(device)), size_(std::max(bytes, smallestBuffer)) {
-  // vkCmdFillBuffer reaches whole words only.
+  // vkCmdFillBuffer fills whole words only.
   const std::uint64_t words = (size_ + 3) / 4 * 4;
   const DeviceLimits& limits = device_->limits();
   if (words > limits.maxAllocationBytes || words > limits.maxBufferBytes)
@@ -229,7 +229,7 @@ bool Buffer::reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes,
   const bool grows = buffer_ != VK_NULL_HANDLE;
   const std::uint64_t maximum =
       std::min(device->limits().maxAllocationBytes, device->limits().maxBufferBytes);
-  release();  // first, so that both needn't fit at once
+  release();  // releases first, so that both need not fit at once
   if (grows && bytes < maximum) {
     try {
       *this = Buffer(device, std::min(bytes + bytes / 2, maximum), kind);
@@ -274,7 +274,7 @@ SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& ext
                             extent.y, extent.z, longest),
                 device_->name());
   }
-  // Drivers compute with sizes that overflow beyond what they can hold: ours decides first.
+  // Drivers overflow when they compute sizes beyond their limits, so this check comes first.
   const std::uint64_t bytes = std::uint64_t{extent.x} * extent.y * extent.z * texelBytes(format);
   if (bytes > device_->limits().maxAllocationBytes) throwOutOfMemory(*device_, bytes, "texture");
   const QueueFamilies families(*device_);

@@ -21,7 +21,7 @@ PipelineSet::PipelineSet(const PipelineSet& updated, ComputePipelineInfo common)
 
 void PipelineSet::updateBytes(Commands& commands, std::span<const std::byte> bytes) {
   assert(bytes.size() == common_.uniformBytes);
-  // What was recorded may have been dropped.
+  // The recorded update may have been dropped.
   const bool wasSubmitted = updatedBy_ == &commands && commands.submissions() > updatedBehind_;
   if (wasSubmitted && std::ranges::equal(bytes, updated_)) return;
   commands.barrier();

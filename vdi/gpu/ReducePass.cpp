@@ -23,12 +23,12 @@ ComputePipelineInfo subgroupInfo() {
   return info;
 }
 
-/// Of shared memory, which every device has.
+/// Shared memory that every device has.
 constexpr std::uint32_t sharedBytes = 16384;
-/// What a pre-segment takes of it in reduce_subgroup.comp.
+/// Shared memory of a pre-segment in reduce_subgroup.comp.
 constexpr std::uint32_t preSegmentBytes = 48;
 
-/// What a list takes, as far as there's room for that.
+/// Room for a list's pre-segments, limited by shared memory.
 std::uint32_t subgroupCapacity(std::uint64_t preSegments) {
   constexpr std::uint64_t unit = 16;
   constexpr std::uint64_t largest = sharedBytes / preSegmentBytes / unit * unit;
@@ -74,7 +74,7 @@ void ReducePass::recordSubgroups(Commands& commands, shared::ReduceConstants& co
   commands.barrier();
   commands.dispatch(find_, constants, groupsFor(constants.listCount, shared::longListsGroup));
   commands.barrier();
-  constexpr std::uint32_t maxSubgroups = 16384;  // enough for any device; each takes list after list
+  constexpr std::uint32_t maxSubgroups = 16384;  // enough for any device; each takes one list after another
   commands.dispatch(subgroup_.with({device_->limits().subgroupSize, constants.subgroupCapacity}), constants,
                     std::min(constants.listCount, maxSubgroups));
 }

@@ -20,16 +20,16 @@ ComputePipelineInfo renderInfo(std::string_view shader) {
   return info;
 }
 
-/// Invocations that share a ray (render.comp). With more, what each of them has to set up costs more than
-/// they save.
+/// Invocations that share a ray (render.comp). With more of them, the set-up of each costs more than they
+/// save.
 std::uint32_t lanesPerRayFor(const Device& device) {
   return device.runsGpuPrograms() && device.limits().subgroupSize > 0 ? 2 : 1;
 }
 
-/// What the view's rays have in common, by the one in the middle.
+/// The common course of a view's rays, taken from the one in the middle.
 struct Course {
-  bool isNear = false;  // nearly along V_O's: they meet many supersegments of each of a few lists
-  glm::vec2 way{0.0F};  // columns and rows of V_O's picture that are crossed within the VDI's depths
+  bool isNear = false;  // nearly along V_O's: rays meet many supersegments of each of a few lists
+  glm::vec2 way{0.0F};  // columns and rows of V_O's picture that a ray crosses within the VDI's depths
 };
 
 Course courseOf(const shared::RenderParams& params, const shared::RenderRays& rays) {
@@ -61,7 +61,7 @@ shared::RenderParams renderGeometry(const View& original, const View& view) {
   params.width = static_cast<std::uint32_t>(view.width());
   params.height = static_cast<std::uint32_t>(view.height());
   params.lists = {original.width(), original.height()};
-  // View allows no more.
+  // View guarantees this.
   assert(std::max(original.width(), original.height()) <= shared::renderMaxTiles * shared::renderTile);
   return params;
 }

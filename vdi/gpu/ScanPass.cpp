@@ -70,7 +70,7 @@ void ScanPass::recordRebase(Commands& commands, const Buffer& prefix, std::uint6
   if (count == 0 || base == 0) return;
   shared::ScanConstants constants{};
   constants.prefix = prefix.address() + first * sizeof(std::uint32_t);
-  constants.count = count - 1;  // the shader takes one more
+  constants.count = count - 1;  // the shader writes one more
   constants.mode = shared::scanModeRebase;
   constants.base = base;
   commands.barrier();

@@ -19,15 +19,15 @@ std::uint64_t volumeOf(const glm::uvec3& extent) {
   return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z;
 }
 
-/// Places boxes of one format into pages: rows of boxes along x, rows beside each other along y, layers on
-/// top of each other along z. Boxes come in descending order of height, so blocks of one shape, the usual
-/// case, waste next to nothing.
+/// Places boxes of one format into pages: rows of boxes along x, rows side by side along y, layers on top of
+/// each other along z. Boxes come in descending order of height, so blocks of one shape, the usual case,
+/// waste almost nothing.
 class Packer {
  public:
   Packer(std::uint32_t side, std::uint32_t maxDepth, std::uint64_t maxTexels)
       : side_(side), maxDepth_(std::min<std::uint64_t>(maxDepth, maxTexels / (std::uint64_t{side} * side))) {}
 
-  /// False when the page is full.
+  /// Returns false if the page is full.
   bool place(const glm::uvec3& dims, glm::uvec3& at) {
     if (cursor_.x + dims.x > side_) {
       cursor_ = {0, cursor_.y + rowHeight_, cursor_.z};
@@ -111,7 +111,7 @@ std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block) {
   }
   const ValueMap values = valueMapOf(block);
   std::vector<VolumePiece> pieces;
-  // Neighbours share a face's values and one layer beyond on either side.
+  // Neighbours share a face's values and one layer on either side of it.
   const glm::ivec3 stride = glm::max(glm::ivec3(largest) - 1 - 2 * pieceMargin, glm::ivec3(1));
   const auto next = [&](int at, int axis) {
     return at + static_cast<int>(largest[axis]) < all.hi[axis] ? at + stride[axis] : all.hi[axis];

@@ -21,12 +21,12 @@ namespace vdi::gpu {
 namespace {
 
 /// Coordinates stay this many texels inside the outermost texel centres, two steps of a filter with 8-bit
-/// weights: nearer, the filter would read texels of the neighbour in the page, if only with weight 0, and NaN
-/// times 0 is NaN.
+/// weights. Closer to the edge, the filter would read texels of the page's neighbouring piece, if only with
+/// weight 0, and NaN times 0 is NaN.
 constexpr double filterGuard = 2.0 / 256.0;
 
-/// Smallest, largest with its bits inverted, and whether there are infinite values, as cells.comp leaves
-/// them.
+/// Smallest value, largest value with its bits inverted, and whether there are infinite values, as cells.comp
+/// writes them.
 using PieceRangeBits = std::array<std::uint32_t, shared::pieceRangeWords>;
 
 float fromOrdered(std::uint32_t bits) {
@@ -95,7 +95,7 @@ void VolumeStore::dropNext() {
     onItsWay_.get();
     next().blocks.clear();
   } catch (const std::exception&) {
-    next() = {};  // nobody will ask for it
+    next() = {};  // nobody will request it
   }
 }
 
@@ -110,14 +110,14 @@ std::uint64_t VolumeStore::texelBytesHeld() const {
   return bytes;
 }
 
-/// All but the values: pages, macrocells and bricks, and the upload begun.
+/// Prepares all but the values: pages, macrocells and bricks; and begins the upload.
 void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& scene) {
   validate(blocks);
   step.tree.clear();
   step.blocks.assign(blocks.begin(), blocks.end());
   std::vector<VolumePiece> pieces;
   std::vector<PieceRange> piecesOf;  // of each block
-  // Blocks that share their values (the parts of a box with holes) share their pieces.
+  // Blocks that share values (the parts of a box with holes) share their pieces.
   std::map<std::tuple<const void*, const void*, double, double, double>, PieceRange> known;
   for (const Block& block : step.blocks) {
     PieceRange range;
@@ -141,7 +141,7 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
   upload_.begin(commands_);
 }
 
-/// Those of the same shapes are the same.
+/// Reuses the pages if their shapes are the same.
 void VolumeStore::makePages(Step& step, std::vector<VolumePiece> pieces) {
   const bool sameShapes =
       pieces.size() == step.pieces.size() &&
@@ -178,7 +178,7 @@ void VolumeStore::layBricks(Step& step, std::span<const PieceRange> piecesOf, co
       const glm::dvec3 extent = glm::dvec3(step.pages[piece.page].extent());
       const glm::dvec3 pieceOrigin = block.origin + glm::dvec3(piece.first) * block.spacing;
       for (int axis = 0; axis < 3; ++axis) {
-        // An owned box may reach beyond the outermost values (cells do); only inner cuts bound a piece.
+        // An owned box may extend beyond the outermost values (as for cells); only inner cuts bound a piece.
         double lo = block.owned.lo[axis];
         double hi = block.owned.hi[axis];
         if (piece.first[axis] > block.extended().lo[axis])
@@ -213,7 +213,7 @@ void VolumeStore::layBricks(Step& step, std::span<const PieceRange> piecesOf, co
     std::memcpy(step.nodeBuffer.mapped().data(), step.tree.data(), std::span(step.tree).size_bytes());
 }
 
-/// Macrocells of all pieces, and the ranges of values in them.
+/// Lays out the macrocells of all pieces, and their ranges of values.
 void VolumeStore::layCells(Step& step) const {
   step.cellPieces.clear();
   std::uint64_t cells = 0;
@@ -241,9 +241,9 @@ void VolumeStore::layCells(Step& step) const {
                                 MemoryKind::DeviceLocal);
 }
 
-/// After the upload.
+/// Completes the step after the upload.
 void VolumeStore::finish(Step& step) {
-  // What's here now isn't ours beyond the call that this is part of.
+  // The blocks' memory belongs to the caller after this call.
   step.blocks.clear();
   for (VolumePiece& piece : step.pieces) piece.block = nullptr;
   if (!table_.entries.empty()) placeTable(step);
@@ -264,7 +264,7 @@ bool VolumeStore::reachesBeyondTable() const {
   return shown().infinite || valueRange().min < table_.min || valueRange().max > table_.max;
 }
 
-/// After cells were measured.
+/// The values' range, after cells were measured.
 ScalarRange VolumeStore::rangeOf(const Step& step) const {
   ScalarRange range;
   for (std::size_t i = 0; i < step.pieces.size(); ++i) {
@@ -274,7 +274,7 @@ ScalarRange VolumeStore::rangeOf(const Step& step) const {
       continue;
     }
     const PieceRangeBits& bits = pieceRanges_.mappedAs<PieceRangeBits>()[i];
-    if (bits[0] == ~0U && bits[1] == ~0U) continue;  // nothing is finite
+    if (bits[0] == ~0U && bits[1] == ~0U) continue;  // no value is finite
     const auto valueOf = [&values](std::uint32_t ordered) {
       const double value = fromOrdered(ordered) * values.scale + values.offset;
       return values.whole ? std::round(value) : value;
@@ -284,7 +284,7 @@ ScalarRange VolumeStore::rangeOf(const Step& step) const {
   return range;
 }
 
-/// Measures cells if their values are new, and classifies them if there's a table.
+/// Measures cells if their values are new, and classifies them if there is a table.
 void VolumeStore::runCells(Step& step, bool measure) {
   if (step.cellCount == 0) return;
   const auto bytes = std::span(step.cellPieces).size_bytes();

@@ -16,16 +16,16 @@ namespace {
 
 constexpr std::uint64_t stagingBytes = 32ULL << 20;  // each of the two
 
-/// Below that, importing memory takes longer than copying it.
+/// Below this size, importing memory takes longer than copying it.
 constexpr std::uint64_t minImport = 1ULL << 20;
 
-/// Each takes one of the allocations that a device may have at a time, 4096 or more.
+/// Each import takes one of a device's allocations, at least 4096 in all.
 constexpr std::size_t maxImports = 256;
 
-/// Fewer take longer to copy values than one takes to pin their pages.
+/// Below this number of cores, copying values takes longer than pinning their pages.
 constexpr std::size_t coresThatCopyFaster = 2;
 
-/// Infinite texels would make NaN of all that's interpolated with them, and of what has weight 0 besides.
+/// Infinite texels would turn everything interpolated with them into NaN, even with weight 0.
 float filterable(float texel) {
   const auto infinite = bit_cast<float>(shared::infiniteTexelBits);
   return std::isinf(texel) ? std::copysign(infinite, texel) : texel;
@@ -42,8 +42,8 @@ bool anyInfinite(std::span<const float> values) {
   return false;
 }
 
-/// `count` values as texels: the unsigned integer formats shift signed values up, the float format is
-/// relative to the block's range except for f32, which is stored as it is, but for infinite values.
+/// `count` values as texels. The unsigned integer formats shift signed values up. The float format is
+/// relative to the block's range, except for f32, which is stored as it is unless it is infinite.
 template <typename From, typename To, typename Convert>
 void convertRow(const void* from, std::size_t first, std::size_t count, std::byte* to, Convert convert) {
   const auto* values = static_cast<const From*>(from) + first;
@@ -90,13 +90,13 @@ void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap
   }
 }
 
-/// An array of values that texels are made of.
+/// An array of source values for texels.
 struct Source {
   IndexBox box;  // in the block's indices
   const void* values;
 };
 
-/// Texels of `box`, in the block's indices, tightly packed: the stored values, and the patches over them.
+/// Writes texels of `box`, in the block's indices, tightly packed: the stored values, covered by the patches.
 void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
   const Block& block = *piece.block;
   std::vector<Source> sources{{block.stored(), block.data}};
@@ -127,7 +127,7 @@ void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
              });
 }
 
-/// Whether the block's values are texels of the piece's format as they are.
+/// Whether the block's values equal the texels of the piece's format.
 bool isTexels(const VolumePiece& piece) {
   switch (piece.block->type) {
     case ScalarType::U8:
@@ -146,16 +146,16 @@ bool isTexels(const VolumePiece& piece) {
 VolumeUpload::VolumeUpload(std::shared_ptr<Device> device)
     : device_(std::move(device)), halves_{Half(device_), Half(device_)} {}
 
-/// The device copies what's staged, while the other half is filled.
+/// Lets the device copy the staged data while the other half is filled.
 void VolumeUpload::turnOver() {
   filling().commands.submit();
   current_ = 1 - current_;
-  filling().commands.begin();  // waits until it's been copied
+  filling().commands.begin();  // waits until its data is copied
   filling().filled = 0;
 }
 
-/// The piece's stored values. False if the memory can't be imported, or isn't worth it. `imported` must live
-/// until the copies are done.
+/// Copies the piece's stored values from host memory. False if it cannot be imported, or is too small.
+/// `imported` must stay until the copies are complete.
 bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& page,
                                 std::vector<Buffer>& imported) {
   const Block& block = *piece.block;
@@ -182,14 +182,14 @@ bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& pa
   return true;
 }
 
-/// `values`: a part of the piece, in the block's indices.
+/// `values` is a part of the piece, in the block's indices.
 void VolumeUpload::stage(const VolumePiece& piece, const IndexBox& values, const SampledImage& page) {
   const std::uint64_t bytes = texelBytes(piece.format);
   const glm::u64vec3 size(values.size());
   const std::uint64_t rowBytes = size.x * bytes;
   const std::uint64_t sliceBytes = rowBytes * size.y;
-  // As many whole slices at a time as the staging buffer has room for, or as many whole rows of one slice.
-  // Vulkan wants offsets in multiples of 4.
+  // Stages as many whole slices at a time as the buffer can hold, or as many whole rows of one slice. Vulkan
+  // requires offsets in multiples of 4.
   glm::ivec3 at = values.lo;
   while (at.z < values.hi.z) {
     const bool slices = at.y == values.lo.y && sliceBytes <= stagingBytes;
@@ -238,7 +238,7 @@ void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Samp
         stage(piece, piece.box(), pages[piece.page]);
       }
     }
-    if (!direct.empty()) filling().commands.barrier();  // patches come over the values that were copied
+    if (!direct.empty()) filling().commands.barrier();  // patches overwrite the copied values
     for (const VolumePiece* piece : direct) {
       for (const Patch& patch : piece->block->patchList()) {
         const IndexBox part = patch.box.intersection(piece->box());
@@ -249,7 +249,7 @@ void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Samp
     filling().commands.submit();
     waitForAll();
   } catch (...) {
-    waitForAll();  // nothing may be read from memory that's about to go
+    waitForAll();  // no command may read memory that is about to be freed
     throw;
   }
 }

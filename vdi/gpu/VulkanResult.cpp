@@ -9,7 +9,7 @@
 
 namespace vdi::gpu {
 
-// Of vulkan.hpp's ErrorDeviceLost: VK_ERROR_DEVICE_LOST.
+// Converts vulkan.hpp's ErrorDeviceLost to VK_ERROR_DEVICE_LOST.
 std::string nameOf(VkResult result) {
   std::string name = "VK";
   bool wasLower = true;

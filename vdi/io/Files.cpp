@@ -51,7 +51,7 @@ class Descriptor {
   int get() const { return number_; }
   /// Returns close's result.
   int close() { return ::close(std::exchange(number_, -1)); }
-  /// Of one that is none yet.
+  /// Requires that none is open.
   void open(int number) { number_ = number; }
   int release() { return std::exchange(number_, -1); }
 
@@ -59,7 +59,7 @@ class Descriptor {
   int number_;
 };
 
-/// A reader that leaves its pipe is an error of the write, not the end of this process.
+/// Makes a closed pipe an error of the write instead of the end of this process.
 class PipeSignalBlocked {
  public:
   PipeSignalBlocked() {
@@ -83,7 +83,7 @@ class PipeSignalBlocked {
   sigset_t before_{};
 };
 
-/// Behind what was written before, or, where the file has offsets, at one.
+/// Writes at an offset, or, if the file has none, after the bytes written before.
 void writeTo(int descriptor, std::optional<std::uint64_t> offset, std::span<const std::byte> bytes,
              const fs::path& path) {
   while (!bytes.empty()) {
@@ -97,7 +97,7 @@ void writeTo(int descriptor, std::optional<std::uint64_t> offset, std::span<cons
   }
 }
 
-/// The file that a chain of symbolic links ends at; it may not exist.
+/// The file at the end of a chain of symbolic links; it may not exist.
 fs::path followLinks(const fs::path& path) {
   fs::path at = path;
   std::error_code error;
@@ -112,12 +112,12 @@ fs::path followLinks(const fs::path& path) {
   return at;
 }
 
-/// Where what's written to a path goes.
+/// The target of writing to a path.
 struct Destination {
-  fs::path path;                 // as it was named
+  fs::path path;                 // as the caller named it
   fs::path file;                 // links followed; equal to path if `through`
-  std::optional<Status> status;  // none: there's no such file yet
-  bool through = false;          // a device or pipe: written to as it is
+  std::optional<Status> status;  // none: the file does not exist yet
+  bool through = false;          // a device or pipe, which is written directly
 
   explicit Destination(fs::path named) : path(std::move(named)), file(path) {
     Status found{};
@@ -145,9 +145,9 @@ void requireWritable(const Destination& to) {
   if (!to.through) requireAccess(to.folder(), W_OK | X_OK, "write into the folder", to.path);
 }
 
-/// Of a device or pipe.
+/// Opens a device or pipe.
 int openAsItIs(const fs::path& path) {
-  // Not blocking: a pipe without a reader is refused, not waited for.
+  // Non-blocking: a pipe without a reader is refused, not waited for.
   Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
   if (!file && errno == ENXIO) throw Error(ErrorCode::Io, "nobody reads from the pipe", path.string());
   if (!file) fail("open the file", errno, path);
@@ -156,8 +156,9 @@ int openAsItIs(const fs::path& path) {
   return file.release();
 }
 
-/// A name in the folder that nobody uses. Process numbers repeat between the nodes of a cluster that share a
-/// file system, so it has a random part; it's short, for the file's own name may be as long as names can be.
+/// An unused name in the folder. It has a random part, because process numbers repeat between the nodes of a
+/// cluster that share a file system. It is short, because the file's own name may have the greatest possible
+/// length.
 fs::path temporaryName(const Destination& to) {
   std::random_device random;
   return to.folder() / fmt::format(".vdi-{}-{:08x}{:08x}.tmp", ::getpid(), random(), random());
@@ -168,7 +169,7 @@ bool giveName(int descriptor, const fs::path& name) {
   return ::linkat(AT_FDCWD, file.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
 }
 
-/// For where a file without a name gets none: without /proc, for example.
+/// For systems where an unnamed file cannot get a name, for example without /proc.
 void copyAll(int from, int to, const fs::path& path) {
   std::vector<std::byte> buffer(std::size_t{1} << 20);
   for (std::uint64_t at = 0;;) {
@@ -181,7 +182,7 @@ void copyAll(int from, int to, const fs::path& path) {
   }
 }
 
-/// So that the new name survives a power cut. File systems that can't do this say so by other errors.
+/// Makes the new name survive a power cut. File systems that cannot do this report other errors.
 void synchronizeFolder(const Destination& to) {
   const Descriptor folder(::open(to.folder().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder && ::fsync(folder.get()) != 0 && errno == EIO) fail("write the folder", errno, to.path);
@@ -190,7 +191,7 @@ void synchronizeFolder(const Destination& to) {
 }  // namespace
 
 InputFile::InputFile(fs::path path)
-    // Not blocking: a pipe without a writer is refused below, not waited for.
+    // Non-blocking: a pipe without a writer is refused below, not waited for.
     : path_(std::move(path)),
       descriptor_(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK)) {
   if (descriptor_ < 0) fail("open the file", errno, path_);
@@ -231,7 +232,7 @@ std::vector<std::byte> InputFile::read(std::uint64_t offset, std::uint64_t count
 struct OutputFile::State {
   Destination to;
   Descriptor file{-1};
-  fs::path name;  // until it has its own: none, where there are files without one
+  fs::path name;  // its temporary name; empty while the file has none
 
   explicit State(const fs::path& path) : to(path) {
     requireWritable(to);
@@ -262,7 +263,7 @@ struct OutputFile::State {
     return descriptor;
   }
 
-  /// A link replaces nothing, a renamed file does; and other processes find what has a name.
+  /// Only a renamed file can replace another one, a link cannot; and other processes need a name.
   void requireName() {
     if (!name.empty()) return;
     fs::path candidate;
@@ -281,10 +282,10 @@ struct OutputFile::State {
     file.open(other.release());
   }
 
-  /// The permissions of the file that it replaces.
+  /// Takes the permissions of the file that it replaces.
   void takePermissions() {
     if (!to.status) return;
-    // Only root may give files away; for others the file becomes their own.
+    // Only root may give files away; otherwise the file belongs to this process's user.
     static_cast<void>(::fchown(file.get(), to.status->st_uid, to.status->st_gid) == 0);
     if (::fchmod(file.get(), to.status->st_mode & 07777U) != 0) fail("set permissions", errno, to.path);
   }
@@ -332,7 +333,7 @@ void OutputFile::reserve(std::uint64_t bytes) {
   do {
     result = bytes > 0 ? ::fallocate(file, 0, 0, size) : 0;
   } while (result != 0 && errno == EINTR);
-  // Not every file system can promise room.
+  // Not every file system can reserve space.
   if (result != 0 && errno == EOPNOTSUPP) result = ::ftruncate(file, size);
   if (result != 0) fail("write the file", errno, state_->to.path);
 }

@@ -15,11 +15,11 @@ namespace vdi::io::detail {
 
 namespace {
 
-/// The columns of a chunk, one number of each for a supersegment.
+/// The columns of a chunk; each has one number a supersegment.
 constexpr std::size_t columns = 6;
 using Words = std::array<std::uint32_t, columns>;
 
-/// Small differences of either sign become small numbers.
+/// Maps small differences of either sign to small numbers.
 std::uint32_t fold(std::uint32_t difference) {
   return (difference << 1) ^ (0U - (difference >> 31));
 }
@@ -27,8 +27,8 @@ std::uint32_t unfold(std::uint32_t folded) {
   return (folded >> 1) ^ (0U - (folded & 1U));
 }
 
-/// What a supersegment is predicted from: the one at the same place of the list before, and where this one
-/// begins if it follows the last one without a gap.
+/// The context of a prediction: the supersegment at the same position in the list before, and the depth where
+/// this one begins if it follows the previous one without a gap.
 template <typename Coding>
 struct Context {
   typename Coding::Fields reference{};
@@ -36,7 +36,7 @@ struct Context {
 };
 
 /// Encoding 0. Fields are the bit patterns of floats. Prediction is integer arithmetic on them: floating
-/// point would make the file depend on the rounding mode that the host program runs in.
+/// point would make the file depend on the host program's rounding mode.
 struct FullCoding {
   using Segment = Supersegment;
   static constexpr Precision precision = Precision::Full;
@@ -63,8 +63,8 @@ struct FullCoding {
             bit_cast<float>(f.color[1]), bit_cast<float>(f.color[2]), bit_cast<float>(f.opacity)};
   }
 
-  /// Premultiplied colours grow with opacity; the bit pattern of a float is close to its logarithm, so a
-  /// factor is a difference.
+  /// Premultiplied colours grow with opacity. A float's bit pattern is close to its logarithm, so a factor
+  /// becomes a difference.
   static std::uint32_t predictColor(const Context<FullCoding>& context, std::uint32_t opacity,
                                     std::size_t channel) {
     const std::uint32_t color = context.reference.color[channel];
@@ -91,12 +91,12 @@ struct FullCoding {
   }
 };
 
-/// Encoding 1. Fields are the codes of a CompactSupersegment. Colours are straight, so they don't depend on
+/// Encoding 1. Fields are the codes of a CompactSupersegment. Colours are straight, so they do not depend on
 /// opacity; their residuals are differences modulo 256.
 struct CompactCoding {
   using Segment = CompactSupersegment;
   static constexpr Precision precision = Precision::Compact;
-  static constexpr std::size_t codeBytes = sizeof(DepthCode);  // in front of the chunk
+  static constexpr std::size_t codeBytes = sizeof(DepthCode);  // at the start of the chunk
   static constexpr std::array<std::size_t, columns> bytes{2, 2, 2, 1, 1, 1};
 
   struct Fields {
@@ -115,7 +115,7 @@ struct CompactCoding {
                          f.color[2] & 0xffU, f.opticalDepth & 0xfffU);
   }
 
-  /// A difference as a signed byte, folded.
+  /// Folds a difference as a signed byte.
   static std::uint32_t foldByte(std::uint32_t difference) {
     return fold((difference & 0xffU) < 128 ? difference & 0xffU : difference | ~0xffU) & 0xffU;
   }
@@ -143,7 +143,7 @@ struct CompactCoding {
 template <typename Segment>
 using CodingOf = std::conditional_t<std::is_same_v<Segment, Supersegment>, FullCoding, CompactCoding>;
 
-/// Traverses the supersegments of a chunk in order: which one each is predicted from, by index in the chunk.
+/// Visits the supersegments of a chunk in order, with the index in the chunk of the one that predicts each.
 class Traversal {
  public:
   static constexpr std::size_t none = ~std::size_t{0};
@@ -185,8 +185,8 @@ Context<Coding> contextOf(const Traversal::Step& step, std::span<const typename 
   return context;
 }
 
-/// Columns of numbers of `bytes` bytes, byte b of number i of a column of n at planes[b * n + i]: bytes of
-/// one significance lie together, and the upper ones are mostly zero.
+/// Columns of numbers of `bytes` bytes: byte b of number i, in a column of n, is at planes[b * n + i]. Bytes
+/// of equal significance lie together, and the upper ones are mostly zero.
 void putWord(std::byte* planes, std::size_t count, std::size_t i, std::uint32_t word, std::size_t bytes) {
   for (std::size_t b = 0; b < bytes; ++b) planes[b * count + i] = static_cast<std::byte>(word >> (8 * b));
 }
@@ -205,20 +205,20 @@ std::uint32_t getWord(const std::byte* planes, std::size_t count, std::size_t i,
 
 bool canExpandTo(std::uint64_t packedBytes, std::uint64_t bytes) {
   if (bytes > LZ4_MAX_INPUT_SIZE) return false;
-  // A byte of an LZ4 block stands for 255 bytes at most; what doesn't compress grows by 1/255.
+  // A byte of an LZ4 block expands to at most 255 bytes; incompressible data grows by 1/255.
   const auto bound = static_cast<std::uint64_t>(LZ4_compressBound(static_cast<int>(bytes)));
   return bytes <= packedBytes * 255 && packedBytes <= bound;
 }
 
 std::optional<std::uint64_t> announcedBytes(std::span<const std::byte> packed) {
-  // Sequences of a token, literals, and a match's offset and length; the last one ends behind its literals.
-  // LZ4's "Block Format Description" has the details.
-  constexpr std::size_t more = 15;  // of a length of four bits: bytes follow, until one isn't 255
+  // A block has sequences of a token, literals, and a match's offset and length; the last one ends after its
+  // literals. LZ4's "Block Format Description" has the details.
+  constexpr std::size_t more = 15;  // in a 4-bit length: bytes follow, up to the first that is not 255
   constexpr std::size_t offsetBytes = 2;
   constexpr std::size_t shortestMatch = 4;
   std::uint64_t total = 0;
   std::size_t at = 0;
-  const auto lengthOf = [&](std::size_t bits) {  // leaves `at` beyond the end where the block breaks off
+  const auto lengthOf = [&](std::size_t bits) {  // leaves `at` beyond the end if the block is cut short
     std::uint64_t length = bits;
     std::size_t byte = bits == more ? 255 : 0;
     while (byte == 255) {
@@ -277,7 +277,7 @@ std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode&
   const int packedSize = LZ4_compress_default(reinterpret_cast<const char*>(plain.data()),
                                               reinterpret_cast<char*>(packed.data()), static_cast<int>(size),
                                               static_cast<int>(packed.size()));
-  assert(packedSize > 0);  // the buffer holds any result
+  assert(packedSize > 0);  // the buffer fits any result
   packed.resize(static_cast<std::size_t>(packedSize));
   return packed;
 }

@@ -19,7 +19,7 @@ namespace {
   throw Error(ErrorCode::Format, "the metadata aren't sound: " + what);
 }
 
-/// The field of an object; fails where there is none.
+/// The field of an object; throws if it is missing.
 const json& at(const json& object, const char* name) {
   const auto found = object.find(name);
   if (found == object.end()) refuse(fmt::format("'{}' is missing", name));
@@ -52,7 +52,7 @@ int wholeNumberAt(const json& object, const char* name) {
   return value.get<int>();
 }
 
-/// Rows of `width` numbers.
+/// Reads rows of `width` numbers.
 std::vector<std::vector<double>> rowsAt(const json& object, const char* name, std::size_t width) {
   const json& value = at(object, name);
   std::vector<std::vector<double>> rows;

@@ -17,7 +17,8 @@ namespace vdi::io {
 
 namespace {
 
-/// libpng's simplified interface: it reports errors in the struct, not by a longjmp over our destructors.
+/// Wraps libpng's simplified interface, which reports errors in the struct instead of a longjmp past our
+/// destructors.
 class PngImage {
  public:
   PngImage() { image_.version = PNG_IMAGE_VERSION; }
@@ -31,7 +32,7 @@ class PngImage {
   png_image image_{};
 };
 
-/// `byteOf`: a pixel's channel.
+/// `byteOf` converts a pixel's channel.
 template <typename Pixels, typename ByteOf>
 Picture pictureOf(const Pixels& image, ByteOf byteOf) {
   Picture picture{image.width, image.height, {}};
@@ -48,7 +49,7 @@ Picture pictureOf(const Pixels& image, ByteOf byteOf) {
   return picture;
 }
 
-/// As the first chunk of a sound PNG has it.
+/// Reads the first chunk of a valid PNG.
 std::uint64_t bitsPerPixel(std::span<const std::byte> png) {
   constexpr std::size_t depthAt = 24;
   constexpr std::size_t colorTypeAt = 25;
@@ -75,7 +76,7 @@ void writePng(const std::filesystem::path& path, const Picture& picture) {
   image->width = static_cast<png_uint_32>(picture.width);
   image->height = static_cast<png_uint_32>(picture.height);
   image->format = PNG_FORMAT_RGB;
-  // An upper bound of the size: one compression, not one for the size and one for the bytes.
+  // An upper bound of the size avoids compressing twice, once for the size and once for the bytes.
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(*image.get());
   std::vector<std::byte> bytes(size);
   if (png_image_write_to_memory(image.get(), bytes.data(), &size, 0, picture.rgb.data(), 0, nullptr) == 0) {
@@ -89,7 +90,7 @@ Picture readPng(const std::filesystem::path& path) {
   const auto require = [&](bool good, std::string_view why) {
     if (!good) throw Error(ErrorCode::Format, fmt::format("not a sound PNG: {}", why), path.string());
   };
-  // Before the memory for another file's bytes is taken.
+  // Checks before it allocates memory for another file's bytes.
   constexpr std::uint64_t signatureBytes = 8;
   const std::vector<std::byte> start = file.read(0, std::min(file.size(), signatureBytes));
   require(start.size() == signatureBytes &&
@@ -98,7 +99,7 @@ Picture readPng(const std::filesystem::path& path) {
   const std::vector<std::byte> bytes = file.readAll();
   PngImage image;
   require(png_image_begin_read_from_memory(image.get(), bytes.data(), bytes.size()) != 0, image->message);
-  // A byte of a PNG holds at most 1032 bytes of rows (deflate).
+  // A byte of a PNG expands to at most 1032 bytes of rows (deflate).
   constexpr std::uint64_t maxPerByte = 1032;
   require(std::uint64_t{image->width} * image->height * bitsPerPixel(bytes) <= bytes.size() * maxPerByte * 8,
           "its header says that it's larger than its bytes can hold");

@@ -28,15 +28,15 @@ static_assert(std::endian::native == std::endian::little, "the .vdi file is read
 
 constexpr std::array<char, 8> magicText{'V', 'D', 'I', '-', 'F', 'I', 'L', 'E'};
 constexpr std::uint32_t plainVersion = 1;   // neither margin nor metadata
-constexpr std::uint32_t marginVersion = 2;  // a margin; written only where there is one
+constexpr std::uint32_t marginVersion = 2;  // a margin; written only if there is one
 constexpr std::uint32_t metadataVersion =
-    3;  // metadata and maybe a margin; written only where there are some
-// Encodings are the numbers of Precision.
+    3;  // metadata and maybe a margin; written only if there is metadata
+// Encodings have the numbers of Precision.
 static_assert(static_cast<int>(Precision::Full) == 0 && static_cast<int>(Precision::Compact) == 1);
 constexpr std::uint32_t flagParallel = 1;
 constexpr std::uint32_t knownFlags = flagParallel;
 
-/// docs/format.md has the table.
+/// docs/format.md has the table of fields.
 struct Header {
   std::array<char, 8> magic;
   std::uint32_t version;
@@ -92,10 +92,10 @@ static_assert(offsetof(Header, tableChecksum) == 224);
 static_assert(offsetof(Header, headerChecksum) == 232);
 static_assert(sizeof(Header) == 240);
 
-/// In front of the metadata, which are the file's last part.
+/// Precedes the metadata, which are the file's last part.
 struct MetadataHeader {
   std::array<char, 4> kind;
-  std::uint32_t bytes;  // of the text that follows
+  std::uint32_t bytes;  // of the following text
   std::uint64_t checksum;
 };
 static_assert(offsetof(MetadataHeader, bytes) == 4);
@@ -125,7 +125,7 @@ Precision precisionOf(const Header& header) {
   return static_cast<Precision>(header.encoding);
 }
 
-/// What validate(Vdi) leaves out: a camera that can be used and numbers that are numbers.
+/// Checks what validate(Vdi) does not: a usable camera and finite numbers.
 void requireSoundHeader(const Vdi& vdi) {
   try {
     static_cast<void>(vdi.view());
@@ -144,7 +144,7 @@ std::uint64_t listsOf(const Vdi& vdi) {
   return static_cast<std::uint64_t>(vdi.width) * static_cast<std::uint64_t>(vdi.height);
 }
 
-/// Without what the chunks add to it.
+/// The header without the fields that the chunks add.
 Header headerOf(const Vdi& vdi) {
   Header header{};
   header.magic = magicText;
@@ -158,7 +158,7 @@ Header headerOf(const Vdi& vdi) {
   header.height = static_cast<std::uint32_t>(vdi.height);
   header.budget = vdi.budget;
   header.listsPerChunk = listsPerChunk;
-  header.marginX = static_cast<std::uint16_t>(vdi.margin.x);  // validate allows no more
+  header.marginX = static_cast<std::uint16_t>(vdi.margin.x);  // validate guarantees that it fits
   header.marginY = static_cast<std::uint16_t>(vdi.margin.y);
   header.timeStep = vdi.timeStep;
   header.time = vdi.time;
@@ -199,8 +199,8 @@ Vdi vdiOf(const Header& header) {
   return vdi;
 }
 
-/// The header of a file of `fileBytes` that begins with `start`. What it says about version and encoding is
-/// looked at before its checksum, so that a file of a later version is named as such.
+/// The header of a file of `fileBytes` that begins with `start`. Version and encoding are checked before the
+/// checksum, so that the error names a file of a later version as such.
 Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   Header header{};
   if (start.size() < sizeof(Header)) fail(fmt::format("{} bytes are too few for a header", fileBytes));
@@ -244,16 +244,16 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   return header;
 }
 
-/// Of the metadata in the file, or of its end.
+/// Offset of the metadata in the file, or the file's end.
 std::uint64_t metadataOffset(const Header& header) {
   return sizeof(Header) + header.chunkCount * sizeof(ChunkEntry) + header.dataBytes;
 }
 
-/// Of what follows the chunks, to the file's end.
+/// Parses the bytes from the end of the chunks to the end of the file.
 std::optional<Coloring> parseMetadata(const Header& header, std::span<const std::byte> bytes) {
   if (header.version != metadataVersion) return std::nullopt;
   MetadataHeader head{};
-  std::memcpy(&head, bytes.data(), sizeof(MetadataHeader));  // parseHeader has seen that it's there
+  std::memcpy(&head, bytes.data(), sizeof(MetadataHeader));  // parseHeader has checked that it is there
   const std::span<const std::byte> text = bytes.subspan(sizeof(MetadataHeader));
   if (head.kind != kindJson) fail("its metadata aren't JSON");
   if (head.bytes != text.size()) {
@@ -271,9 +271,9 @@ std::uint64_t tableBytesOf(const Header& header) {
   return header.chunkCount * sizeof(ChunkEntry);
 }
 
-/// Where a chunk lies, in the file and in the VDI.
+/// A chunk's position in the file and in the VDI.
 struct Chunk {
-  std::uint64_t dataOffset;  // in the bytes behind the table
+  std::uint64_t dataOffset;  // in the bytes after the table
   std::uint64_t packedBytes;
   std::uint64_t checksum;
   std::uint64_t firstList;
@@ -282,7 +282,7 @@ struct Chunk {
   std::uint64_t supersegmentCount;
 };
 
-/// The table's chunks, once it's sure that the file can hold what they claim.
+/// Returns the table's chunks after checking that the file can hold their contents.
 std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> bytes) {
   std::vector<ChunkEntry> table(header.chunkCount);
   std::memcpy(table.data(), bytes.data(), tableBytesOf(header));
@@ -315,7 +315,7 @@ std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> b
   return chunks;
 }
 
-/// Before memory is taken for it: that the chunk is what was written, and expands to what the table says.
+/// Checks, before memory is allocated, that the chunk is unaltered and expands to the size in the table.
 void requireSound(const Chunk& chunk, std::span<const std::byte> packed, Precision precision) {
   if (chunk.checksum != checksumOf(packed)) {
     fail(fmt::format("the checksum of the chunk from list {} on is wrong", chunk.firstList));
@@ -327,7 +327,7 @@ void requireSound(const Chunk& chunk, std::span<const std::byte> packed, Precisi
   }
 }
 
-/// Returns the depth code that the chunk's supersegments have.
+/// Returns the depth code of the chunk's supersegments.
 template <typename Segment>
 DepthCode decodeChunk(const Chunk& chunk, std::span<const std::byte> packed, ListsOf<Segment>& lists) {
   try {
@@ -495,7 +495,7 @@ void writeVdi(const std::filesystem::path& path, const Vdi& vdi) {
 Vdi readVdi(const std::filesystem::path& path) {
   const InputFile file(path);
   return withPath(path, [&] {
-    static_cast<void>(readHeader(file));  // before the memory for another file's bytes is taken
+    static_cast<void>(readHeader(file));  // checks before it allocates memory for another file's bytes
     return decode(file.readAll());
   });
 }

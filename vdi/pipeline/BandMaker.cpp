@@ -49,7 +49,7 @@ void BandMaker::makeAlone(const RayCaster::Request& request, const Progress& pro
       report.generateSeconds += watch.lap();
       slot.usedBy = sink.add(
           {slot.lists, firstList(band), band + 1 == all.count()}, [] {}, report);
-      watch.lap();  // the sink's own time
+      watch.lap();  // excludes the sink's own time
       if (!advanced(all.doneWith(band))) return caster_.drop();
     }
     freeSlots(all.count());
@@ -57,7 +57,7 @@ void BandMaker::makeAlone(const RayCaster::Request& request, const Progress& pro
   noteTimes(report);
 }
 
-/// Collective: one tolerance for what all ranks have in a list.
+/// Collective: agrees on one tolerance for all ranks' material in each list.
 void BandMaker::agreeOnLists(RayCaster::Cast& cast) {
   if (!cast.agreed) return;
   const comm::Exchange::Place own = levelSum_.begin(RayCaster::levelBytes(cast));
@@ -72,8 +72,8 @@ void BandMaker::agreeOnLists(RayCaster::Cast& cast) {
   comm_.together([&] { caster_.agree(cast, sum); });
 }
 
-/// Who owns which of a band's lists: the same on all ranks. `weights`: what ranks agreed on, of the whole
-/// picture; none if they didn't.
+/// The owners of a band's lists, equal on all ranks. `weights` are the ranks' agreed weights of the whole
+/// picture, or none.
 comm::Ownership BandMaker::ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
                                        std::span<const std::uint32_t> weights) const {
   const std::uint64_t width = cast.build.width;
@@ -85,7 +85,7 @@ comm::Ownership BandMaker::ownershipOf(const RayCaster::Cast& cast, const Bands&
   return comm::Ownership::balanced(lists, comm_.size(), weights.subspan(first, last - first), width * stride);
 }
 
-/// Collective: this rank's lists, to the ranks that own them.
+/// Collective: sends this rank's lists to their owners.
 void BandMaker::distribute(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report) {
   slot.parts = slot.distributor->distribute(slot.lists, slot.owned, segmentBytes(code));
   report.bytesSent += slot.distributor->bytesSent();
@@ -98,7 +98,7 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
   RayCaster::Cast cast;
   comm_.together([&] { cast = caster_.begin(request); });
   std::array<double, 1> rows{static_cast<double>(cast.rowsPerBand)};
-  comm_.allReduceMin(rows);  // all ranks' bands are the same
+  comm_.allReduceMin(rows);  // all ranks use the same bands
   const Bands all{cast.height, static_cast<std::uint32_t>(rows[0])};
   agreeOnLists(cast);
   std::vector<std::uint32_t> weights;
@@ -130,7 +130,7 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
     distribute(slot, request.code, watch, report);
     if (band > 0) {
       steps.pass(band - 1);
-      watch.lap();  // the step's own time
+      watch.lap();  // excludes the step's own time
     }
     comm_.together([&] {
       compositor_.interleave(slot.parts, request.code, merged_[band].interleaved);
@@ -143,7 +143,7 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
   noteTimes(report);
 }
 
-/// Collective, with a total budget: how many supersegments a list gets, the bands together tell.
+/// Collective, with a total budget: the level that limits each list, from the histogram of all bands.
 float BandMaker::levelOfAll(const GenerateSettings& settings, const Compositor::Request& request) {
   SupersegmentHistogram histogram;
   comm_.together([&] {

@@ -24,7 +24,7 @@ void Compositor::noteTimes() {
   for (const gpu::StageTime& stage : commands_.stageTimes()) milliseconds_ += stage.milliseconds;
 }
 
-/// For the merge.
+/// Waits for the merge.
 void Compositor::wait() {
   if (!std::exchange(merging_, false)) return;
   commands_.wait();
@@ -58,8 +58,8 @@ double Compositor::takeMilliseconds() {
   return std::exchange(milliseconds_, 0.0);
 }
 
-/// What came, one rank's behind the other's: supersegments to received_; of each rank a row of counts, as
-/// words of four bytes to packedCounts_, or as a word each to subCounts_.
+/// Copies received lists, one rank after the other: supersegments to received_; each rank's counts as a row,
+/// in words of four bytes to packedCounts_, or as a word each to subCounts_.
 void Compositor::receive(const Distributed& parts) {
   const std::uint64_t ranks = parts.subLists.size();
   const std::uint64_t rowWords = gpu::groupsFor(parts.listCount, shared::countsPerWord);
@@ -124,7 +124,7 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Dev
   commands_.barrier();
   for (std::uint64_t r = 0; r < ranks; ++r) {
     if (!parts.subLists[r].wideCounts) continue;
-    // What's behind the row's last list must count for nothing.
+    // Counts after the row's last list must be 0.
     commands_.fill(subCounts_, r * rowLength * wordBytes, rowLength * wordBytes, 0);
     commands_.barrier();
     commands_.copy(wideCounts_, r * rowLength * wordBytes, subCounts_, r * rowLength * wordBytes,

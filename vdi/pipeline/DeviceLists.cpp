@@ -27,8 +27,9 @@ ListDownload<Segment>::~ListDownload() {
 template <typename Segment>
 void ListDownload<Segment>::recordOffsets(gpu::Commands& commands, const DeviceLists& band,
                                           std::uint64_t firstList) {
-  if (firstList == 0 && band.listCount == listCount_) return;  // they go as they are
-  // The last one says where the next band begins, which says so itself, perhaps before this one is done anew.
+  if (firstList == 0 && band.listCount == listCount_) return;  // they are downloaded as they are
+  // The last band also writes the offset where the next one would begin. Other bands leave that to the next
+  // one, which may run before this one is repeated.
   const std::uint64_t words = band.listCount + (firstList + band.listCount == listCount_ ? 1 : 0);
   commands.copy(band.offsets, 0, memory_.offsets, firstList * wordBytes, words * wordBytes);
 }
@@ -41,8 +42,8 @@ void ListDownload<Segment>::waitForTransfers() {
   }
 }
 
-/// Where more came than was expected, what's there is copied. As many more are expected of the lists that
-/// follow.
+/// If more supersegments arrive than expected, copies the present ones to larger memory. Assumes that the
+/// following lists have as many.
 template <typename Segment>
 void ListDownload<Segment>::makeRoom(std::uint64_t count) {
   if (count <= lists_.segments.capacity()) return;

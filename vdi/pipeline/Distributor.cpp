@@ -11,7 +11,7 @@ namespace {
 
 static_assert(comm::Ownership::granularity == shared::countsPerWord);
 
-/// Supersegments begin at a multiple of that, as shaders want them.
+/// Supersegments begin at a multiple of this, as shaders require.
 constexpr std::uint64_t segmentAlignment = 64;
 
 std::uint64_t aligned(std::uint64_t bytes) {
@@ -22,12 +22,12 @@ std::uint64_t packedBytes(std::uint64_t lists, bool wide) {
   return wide ? lists * wordBytes : (lists + shared::countsPerWord - 1) / shared::countsPerWord * wordBytes;
 }
 
-/// Of all the counts, those from a list on that begins a word.
+/// Offset of a list's count among all counts; the list must begin a word.
 std::uint64_t packedAt(std::uint64_t list, bool wide) {
   return wide ? list * wordBytes : list / shared::countsPerWord * wordBytes;
 }
 
-/// One rank's share of a band's lists, and this rank's supersegments of it.
+/// One rank's share of a band's lists, and this rank's supersegments in it.
 struct Stretch {
   comm::ListRange lists;
   std::uint64_t firstSegment = 0;
@@ -70,7 +70,7 @@ void Distributor::recordCounts(gpu::Commands& commands, const DeviceLists& lists
   counts_.record(commands, constants);
 }
 
-/// All lists' counts to packed_, and where each rank's supersegments begin to boundaryOffsets_.
+/// Packs all lists' counts in packed_, and the offset of each rank's supersegments in boundaryOffsets_.
 void Distributor::recordPack(gpu::Commands& commands, const DeviceLists& lists,
                              const comm::Ownership& owned) {
   const auto ranks = static_cast<std::size_t>(comm_.size());
@@ -83,7 +83,7 @@ void Distributor::recordPack(gpu::Commands& commands, const DeviceLists& lists,
   }
 }
 
-/// Where a count has no room in a byte: all of them as words.
+/// Packs all counts as words, if one of them does not fit a byte.
 void Distributor::packWide(const DeviceLists& lists) {
   commands_.begin();
   recordCounts(commands_, lists, true);
@@ -94,9 +94,9 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
                                     std::uint64_t segmentBytes) {
   bytesSent_ = 0;
   wide_ = tooLarge_.mappedAs<std::uint32_t>()[0] != 0;
-  // What others get, and where that lies in the outbox.
+  // Parts for other ranks, and their positions in the outbox.
   std::vector<comm::Exchange::Outgoing> pieces;
-  std::vector<Stretch> sent;  // of each piece
+  std::vector<Stretch> sent;  // for each piece
   Stretch kept;
   std::uint64_t outboxBytes = 0;
   const std::span<const std::uint32_t> boundaries = boundaryOffsets_.mappedAs<std::uint32_t>();

@@ -16,7 +16,7 @@ namespace vdi::detail {
 
 namespace {
 
-/// Of the bytes of plain values; -0 is equal to 0.
+/// Hashes the bytes of plain values; -0 equals 0.
 template <typename T>
 std::uint64_t hashOf(std::span<const T> values) {
   static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);

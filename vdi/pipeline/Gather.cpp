@@ -13,9 +13,9 @@ namespace {
 
 constexpr std::size_t nameBytes = 64;
 
-/// What the root says about an array.
+/// The root's description of an array.
 struct ArrayHeader {
-  std::array<char, nameBytes> memory{};  // empty: others can't open it
+  std::array<char, nameBytes> memory{};  // empty: others cannot open it
   std::uint64_t memoryBytes = 0;
   std::uint64_t at = 0;
   std::uint64_t bytes = 0;
@@ -43,13 +43,13 @@ Gather::Gather(std::shared_ptr<gpu::Device> device, const comm::Communicator& co
       root_(root),
       opened_(std::move(opened)) {}
 
-/// For the other ranks: the arrays, then all memory that the pool has.
+/// Describes, for the other ranks, the arrays and then all of the pool's memory.
 std::vector<std::byte> Gather::describe(HostPool& pool, std::span<const std::span<std::byte>> arrays) {
   std::vector<ArrayHeader> headers;
   for (const std::span<std::byte> array : arrays) {
     const HostPool::Place place = pool.placeOf(array.data());
     HostMemory& memory = *place.access->memory();
-    memory.publish();  // where it can't be, ranks that haven't opened it before send messages
+    memory.publish();  // if this fails, ranks that have not opened it before send messages
     ArrayHeader header;
     std::copy(memory.name().begin(), memory.name().end(), header.memory.begin());
     header.memoryBytes = memory.bytes().size();
@@ -82,7 +82,7 @@ void Gather::open(std::span<const std::byte> described) {
     if (here && header.memory.front() != '\0') {
       try {
         array.access = &opened_->of(header.memory.data(), header.memoryBytes);
-      } catch (const Error& error) {  // another file system there, for example: messages
+      } catch (const Error& error) {  // on another file system there, for example: uses messages
         if (error.code() != ErrorCode::Communication) throw;
       }
     }
@@ -103,7 +103,8 @@ void Gather::begin(HostPool& pool, std::span<const std::span<std::byte>> arrays)
     if (!isRoot) open(described);
   });
   if (isRoot) {
-    for (const Array& array : arrays_) array.access->memory()->unlink();  // all have opened it, or can't
+    // All ranks that can open it have done so.
+    for (const Array& array : arrays_) array.access->memory()->unlink();
   }
 }
 
@@ -141,7 +142,7 @@ void Gather::drop() {
   arrays_.clear();
 }
 
-/// The pieces of those who can't write there: what, and then the bytes.
+/// Sends the pieces of ranks that cannot write to the root's memory: a description, then the bytes.
 void Gather::sendMessages() {
   std::vector<std::uint64_t> words;
   for (const Message& message : messages_)

@@ -49,7 +49,7 @@ std::shared_ptr<HostMemory> HostPool::newMemory(std::uint64_t bytes) const {
   if (visible_ == Visible::ToHost) {
     try {
       return HostMemory::shareable(bytes);
-    } catch (const Error&) {  // other ranks send theirs by MPI then
+    } catch (const Error&) {  // then other ranks send their data by MPI
     }
   }
   return HostMemory::anonymous(bytes);
@@ -93,7 +93,7 @@ void* HostPool::do_allocate(std::size_t bytes, std::size_t) {
   }
   if (best == nullptr) {
     Block block;
-    block.memory = newMemory(bytes + bytes / 4);  // so that a frame that's a little larger fits too
+    block.memory = newMemory(bytes + bytes / 4);  // so that a slightly larger frame fits too
     if (device_) block.access = std::make_unique<HostAccess>(device_, block.memory);
     blocks_.push_back(std::move(block));
     best = &blocks_.back();

@@ -37,7 +37,7 @@ std::uint64_t ListBuilder::bytesPerList(std::uint32_t maxCount, Algorithm algori
   return segments + shared::maxPreSegments(maxCount) * sizeof(shared::StoredPreSegment);
 }
 
-/// What the host may do while the device is at work for another builder.
+/// Host work that may overlap the device's work for another builder.
 void ListBuilder::reserve() {
   const Request& request = started_->request;
   DeviceLists& lists = *started_->lists;
@@ -112,14 +112,14 @@ void ListBuilder::drop() {
   started_.reset();
 }
 
-/// With what comes behind the steps, and what they found wrong.
+/// Submits the steps with `behind`, and their error status.
 void ListBuilder::submit() {
   commands_.copy(status_, 0, statusReadback_, 0, statusReadback_.size());
   if (started_->behind) started_->behind(commands_);
   commands_.submit();
 }
 
-/// Of what was waited for.
+/// Adds the times of the completed submission.
 void ListBuilder::addTimes() {
   for (const gpu::StageTime& stage : commands_.stageTimes()) {
     times_.all += stage.milliseconds;
@@ -131,13 +131,13 @@ void ListBuilder::addTimes() {
 constexpr std::size_t preSegmentTotal = 0;
 constexpr std::size_t segmentTotal = 1;
 
-/// The last one of the offsets is to be one of totals_.
+/// Copies the last offset to totals_.
 void ListBuilder::recordTotal(const gpu::Buffer& offsets, std::uint32_t listCount, std::size_t which) {
   commands_.copy(offsets, std::uint64_t{listCount} * sizeof(std::uint32_t), totals_,
                  which * sizeof(std::uint32_t), sizeof(std::uint32_t));
 }
 
-/// The search alone: the host takes memory for what it finds.
+/// Submits the search alone: the host allocates memory for its results.
 void ListBuilder::submitBisection(const gpu::Submission& after) {
   const std::uint32_t listCount = started_->request.listCount();
   DeviceLists& lists = *started_->lists;
@@ -180,7 +180,7 @@ void ListBuilder::finishBisection() {
   addTimes();
 }
 
-/// Tolerances and capacities of all lists.
+/// Finds tolerances and capacities of all lists.
 void ListBuilder::recordSearch() {
   const Request& request = started_->request;
   if (request.runsOnly) {
@@ -218,7 +218,7 @@ void ListBuilder::recordSearch() {
   interpolate_.record(commands_, constants);
 }
 
-/// Pre-segments, and how many supersegments are to be left of them.
+/// Writes pre-segments, and the number of supersegments to keep of them.
 void ListBuilder::recordWrite() {
   const Request& request = started_->request;
   const std::uint32_t listCount = request.listCount();
@@ -263,8 +263,8 @@ void ListBuilder::recordReduce() {
   reduce_.record(commands_, constants, request.maxPerList);
 }
 
-/// All steps in one submission: the memory for pre-segments and supersegments is that of the frame before,
-/// and where it's too small the steps that need it do nothing.
+/// Submits all steps at once. They use the memory for pre-segments and supersegments of the frame before; if
+/// it is too small, the steps that need it do nothing.
 void ListBuilder::submitMerging(From from, const gpu::Submission& after) {
   commands_.begin();
   commands_.waitFor(after);
@@ -281,8 +281,8 @@ void ListBuilder::submitMerging(From from, const gpu::Submission& after) {
   submit();
 }
 
-/// Of each list of the next pictures, when one has had so many: as many and some more, as far as there's
-/// memory.
+/// Runs to expect in each list of the next pictures, after one list had this many: some more than that, as
+/// memory allows.
 std::uint32_t ListBuilder::runsToExpect(std::uint32_t most) const {
   constexpr std::uint64_t atLeast = 8;
   const std::uint64_t perRun =
@@ -291,7 +291,7 @@ std::uint32_t ListBuilder::runsToExpect(std::uint32_t most) const {
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(most + most / 4, std::max(room, atLeast)));
 }
 
-/// Where memory is taken for what was counted, and a quarter more, steps are submitted again.
+/// Allocates memory for the counted numbers and a quarter more; then steps must be submitted again.
 std::optional<ListBuilder::From> ListBuilder::againFrom(From from) {
   const Request& request = started_->request;
   DeviceLists& lists = *started_->lists;
@@ -304,7 +304,7 @@ std::optional<ListBuilder::From> ListBuilder::againFrom(From from) {
     return From::Write;
   }
   if (hasQuotas() && status[shared::statusWrongLists] != 0 && from != From::Reduce) {
-    // Lists that weren't counted may have more runs than was expected. They've said how many.
+    // Lists that were not counted may have more runs than expected. They have reported their number.
     if (request.runsOnly)
       expectedRuns_ = std::max(expectedRuns_, runsToExpect(status[shared::statusMostRuns]));
     return From::Write;

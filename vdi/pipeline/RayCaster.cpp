@@ -76,8 +76,8 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   return params;
 }
 
-/// One band on a GPU: the last rays of each one take a millisecond that nothing else fills, which is more
-/// than the next band hides. Eight on a CPU device, so that progress shows and an abort is heard.
+/// One band on a GPU: the last rays of each band take a millisecond that no other work fills, which is more
+/// than the next band hides. Eight on a CPU device, so that progress shows and an abort takes effect.
 std::uint32_t RayCaster::bandsWanted() const {
   constexpr std::uint32_t ofCpu = 8;
   constexpr std::uint32_t ofGpu = 1;
@@ -85,16 +85,16 @@ std::uint32_t RayCaster::bandsWanted() const {
   return device_->isCpu() ? ofCpu : ofGpu;
 }
 
-/// What memory allows, and at most a share of the picture. A multiple of shared::countedStride, or all.
+/// As many as memory allows, up to a share of the picture. A multiple of shared::countedStride, or all.
 std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytesPerPixel,
                                      std::uint32_t bands) const {
   const auto height = static_cast<std::uint64_t>(request.view.height());
   const std::uint64_t rowBytes = static_cast<std::uint64_t>(request.view.width()) * bytesPerPixel;
-  // Volumes beyond half the device leave less: lists, what they're merged from, and other frames share that.
+  // Volumes beyond half the device leave less memory, which lists, pre-segments and other frames share.
   const std::uint64_t memory = device_->limits().memoryBytes;
   const std::uint64_t left = memory - std::min(memory, volume_.texelBytesHeld());
   const std::uint64_t room = std::max(std::min(memory / 8, left / 4), rowBytes);
-  // A list is an invocation, or more, in workgroups of 64: as many as every device allows.
+  // A list takes one invocation or more, in workgroups of 64, whose number every device allows.
   constexpr std::uint64_t maxLists = std::uint64_t{64} * 65535;
   const std::uint64_t stride = shared::countedStride;
   const std::uint64_t most = maxLists / static_cast<std::uint64_t>(request.view.width()) / stride * stride;
@@ -104,7 +104,7 @@ std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytes
   return static_cast<std::uint32_t>(std::min(height, rows));
 }
 
-/// Of the lists that are counted, in the whole picture: bands of it must agree.
+/// The level of the counted lists of the whole picture, which its bands must share.
 float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) {
   const auto width = static_cast<std::uint32_t>(request.view.width());
   const auto height = static_cast<std::uint32_t>(request.view.height());
@@ -123,7 +123,7 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
   Cast cast;
   times_ = {};
   assert(started_ == finished_);
-  started_ = finished_ = 0;  // frames of one band take one builder's memory
+  started_ = finished_ = 0;  // frames of one band use one builder's memory
   cast.height = static_cast<std::uint32_t>(request.view.height());
   cast.cutAtGaps = request.cutAtGaps;
   cast.nothingThere = volume_.empty() || request.lattice.count == 0;
@@ -133,7 +133,7 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
   build.width = static_cast<std::uint32_t>(request.view.width());
   build.runsOnly = request.runsOnly;
   build.algorithm = request.runsOnly ? Algorithm::Merge : request.settings.algorithm;
-  // With cuts at gaps each list's runs must be counted, unless ranks agree on what they counted.
+  // With cuts at gaps, each list's runs must be counted, unless ranks agree on their counts.
   cast.agreed = request.cutAtGaps && build.algorithm == Algorithm::Merge && !request.runsOnly;
   build.countedStride =
       build.algorithm == Algorithm::Bisection && request.cutAtGaps ? 1 : shared::countedStride;
@@ -147,7 +147,7 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
       build.countedStride > 1
           ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments)
           : 1;
-  // What a list needs is known when all ranks' parts of it are together: parts have N_S each.
+  // A list's need is known only when all ranks' parts of it are together: until then, parts get N_S each.
   if (request.settings.budget == Budget::Total && !request.cutAtGaps && !cast.nothingThere) {
     cast.params.level = levelOfNeed(cast.params, request);
   }
@@ -156,7 +156,7 @@ RayCaster::Cast RayCaster::begin(const Request& request) {
 
 namespace {
 
-/// What quantises counts to bytes: whether pre-segments are too many must still show.
+/// Shift that fits counts into a byte while overflow stays detectable.
 std::uint32_t levelShiftFor(std::uint32_t budget) {
   std::uint32_t shift = 0;
   while ((shared::preSegmentsPerBudget * budget >> shift) >= 255) ++shift;
@@ -262,7 +262,7 @@ void RayCaster::startBand(Cast& cast, std::uint32_t firstRow, std::uint32_t last
   }
   const auto record = [this, &cast, build, firstRow, lastRow](gpu::Commands& commands,
                                                               const BandTargets& targets, bool write) {
-    // The shader counts lists from the picture's first; the targets hold just this band's.
+    // The shader counts lists from the picture's first one; the targets hold only this band's.
     const std::uint64_t skipped = std::uint64_t{firstRow} * build.width * sizeof(std::uint32_t);
     gpu::shared::CastParams params = cast.params;
     params.countedWidth = build.countedWidth();

@@ -17,7 +17,8 @@ namespace vdi::detail {
 
 namespace {
 
-/// Collective. Where no rank has anything but zeros and values that are lost, nothing would be seen.
+/// Collective. Throws if all ranks have only zeros and values too small for the device, so that nothing would
+/// be visible.
 void requireUsableValues(const comm::Communicator& comm, std::span<const Block> blocks) {
   const ValueSizes own = valueSizesOf(blocks);
   std::array<std::uint64_t, 2> any{own.usable ? 1U : 0U, own.tooSmall ? 1U : 0U};
@@ -82,7 +83,7 @@ void TimeSteps::dropNext() {
 
 void TimeSteps::setBlocks(std::vector<Block> blocks, bool fillGhosts) {
   dropNext();
-  shown_ = {};  // where a rank fails, nobody shows anything
+  shown_ = {};  // if one rank fails, no rank shows anything
   range_ = {};
   show(send(std::move(blocks), fillGhosts, &gpu::VolumeStore::setBlocks));
 }
@@ -92,7 +93,7 @@ void TimeSteps::setNextBlocks(std::vector<Block> blocks, bool fillGhosts) {
   try {
     next_ = send(std::move(blocks), fillGhosts, &gpu::VolumeStore::setNextBlocks);
   } catch (...) {
-    dropNext();  // a rank that hasn't failed may have sent its own
+    dropNext();  // ranks that have not failed may have sent theirs
     throw;
   }
 }
@@ -114,7 +115,7 @@ double TimeSteps::samplingRate(const TransferTable& table, const Region& region)
 }
 
 void TimeSteps::requireSpans(const TransferTable& table) const {
-  // Of f64 there are floats on the device that say where in the block's range a value lies.
+  // The device stores f64 as floats that give a value's position in the block's range.
   constexpr double maxCount = 1e33;
   const double span = range_.max - range_.min;
   if (!shown_.doubles || !(span > maxCount * (table.max - table.min))) return;

@@ -1,4 +1,4 @@
-// Which stages a frame takes, and what becomes of it.
+// The stages of a frame, and its outcome.
 #include "vdi/pipeline/VdiGenerator.h"
 
 #include <sys/resource.h>
@@ -53,7 +53,7 @@ struct VdiGenerator::State {
     });
   }
   ~State() {
-    // Handles of frames may outlive this.
+    // Handles of frames may outlive the generator.
     drop(std::make_exception_ptr(Error(ErrorCode::InvalidArgument, "the frame's generator has gone")));
     pool->detach();  // VDIs may outlive this
   }
@@ -68,15 +68,15 @@ struct VdiGenerator::State {
   std::unique_ptr<detail::BandMaker> bands;
   std::unique_ptr<detail::TimeSteps> steps;
   std::unique_ptr<detail::Frames> frames;
-  std::unique_ptr<detail::BandDownload> bandDownload;  // of what goes into a file
+  std::unique_ptr<detail::BandDownload> bandDownload;  // for lists that go into a file
   std::vector<detail::BandMaker::FlatBand> flat;
-  /// Settings and size of the last one.
+  /// Settings and size of the last frame.
   std::optional<std::tuple<GenerateSettings, int, int>> lastKind;
   detail::Expectation expected;
   RankReport mine;
   std::vector<RankReport> reports;
 
-  /// What generate, write and renderVolume have in common: checked parameters.
+  /// Checked parameters, which generate, write and renderVolume share.
   struct Prepared {
     View view;
     DepthLattice lattice;
@@ -96,7 +96,7 @@ struct VdiGenerator::State {
       GenerateSettings own = settings;
       if (settings.samplesPerVoxel == automaticRate)
         own.samplesPerVoxel = steps->samplingRate(table, settings.region);
-      // More samples are worth less than the compact form is.
+      // The compact form matters more than extra samples.
       while (settings.samplesPerVoxel == automaticRate && own.samplesPerVoxel > 1.0 &&
              !hasDepthCode(scene, camera, own))
         own.samplesPerVoxel *= 0.5;
@@ -118,8 +118,8 @@ struct VdiGenerator::State {
             settings,       comm.size() > 1, runsOnly,         code};
   }
 
-  /// Runs what makes a frame. After an error, nothing may go on in memory that the next frame takes, so
-  /// frames that were started before and aren't done fail too.
+  /// Runs the work of a frame. After an error, nothing may go on in memory that the next frame takes, so
+  /// unfinished frames that were started before fail too.
   template <typename Work>
   void frame(Work work) {
     try {
@@ -135,7 +135,7 @@ struct VdiGenerator::State {
     frames->drop(error);
   }
 
-  /// Collective: the frame is done, or has failed, on all ranks.
+  /// Collective: completes the frame, or makes it fail, on all ranks.
   void complete(detail::Frame& unfinished) {
     if (!unfinished.sink) return;
     try {
@@ -155,7 +155,7 @@ struct VdiGenerator::State {
     }
   }
 
-  /// Collective: one that no frame is under way in.
+  /// Collective: a flight without a frame under way.
   detail::Flight& freeFlight() {
     detail::Flight& flight = frames->next();
     if (flight.frame) complete(*flight.frame);
@@ -163,7 +163,7 @@ struct VdiGenerator::State {
     return flight;
   }
 
-  /// Collective: makes the VDI's lists and hands them to the sink, with several ranks all but the last band.
+  /// Collective: makes the VDI's lists and hands them to the sink; with several ranks, all but the last band.
   void makeLists(const Prepared& prepared, const GenerateSettings& settings, const Vdi& header,
                  std::vector<detail::OwnedLists>& owned, detail::VdiSink& sink, const Progress& progress) {
     const detail::RayCaster::Request request = requestOf(prepared, settings, header.depthCode);
@@ -176,7 +176,7 @@ struct VdiGenerator::State {
     }
   }
 
-  /// Collective: a whole frame, from the parameters to the reports. `make` makes it.
+  /// Collective: runs a whole frame, from the parameters to the reports, through `make`.
   template <typename Make>
   void wholeFrame(const Progress& progress, Make make) {
     completeAll();
@@ -185,7 +185,7 @@ struct VdiGenerator::State {
     if (progress) progress(1.0);
   }
 
-  /// Collective: a whole frame, whose lists go to the sink.
+  /// Collective: runs a whole frame whose lists go to the sink.
   void wholeVdi(const Prepared& prepared, const GenerateSettings& settings, const Vdi& header,
                 detail::VdiSink& sink, const Progress& progress) {
     wholeFrame(progress, [&] {
@@ -201,7 +201,7 @@ struct VdiGenerator::State {
     });
   }
 
-  /// Brings the lists to the root's memory. Segment says what is sent and stored.
+  /// Brings the lists to the root's memory. Segment is the type that is sent and stored.
   template <typename Segment>
   std::unique_ptr<detail::VdiSink> hostSink(detail::Flight& flight, Vdi& vdi) {
     if (comm.size() == 1) return std::make_unique<detail::DownloadSink<Segment>>(pool, flight, vdi, expected);
@@ -216,7 +216,7 @@ struct VdiGenerator::State {
     vdi.height = prepared.view.height();
     vdi.margin = (glm::ivec2(vdi.width, vdi.height) - glm::ivec2(settings.width, settings.height)) / 2;
     vdi.budget = maxPerList(settings.supersegments, settings.budget);
-    // Where nothing is shown, the scene's bounds are still those of something.
+    // Even if nothing is visible, the VDI keeps the scene's bounds.
     const Box shown = boundsIn(settings.region, steps->scene().bounds);
     vdi.bounds = shown.empty() ? steps->scene().bounds : shown;
     vdi.sampleStep = prepared.lattice.step;
@@ -227,7 +227,7 @@ struct VdiGenerator::State {
     return vdi;
   }
 
-  /// Collective: the picture of all ranks' volumes, on the root.
+  /// Collective: renders the picture of all ranks' volumes, on the root.
   void renderTogether(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress,
                       Image& image) {
     detail::Gather& gather = *frames->flights.front().gather;
@@ -245,7 +245,7 @@ struct VdiGenerator::State {
           detail::Gather::Piece{&own.depths, 1, own.firstPixel * depthBytes, own.pixelCount * depthBytes}};
       detail::Stopwatch watch;
       comm.together([&] {
-        gather.send(pieces, own.flattened);  // how much that is doesn't depend on what was composited
+        gather.send(pieces, own.flattened);  // its size does not depend on what was composited
         bands->compositor().finish();
       });
       mine.compositeSeconds += watch.lap();
@@ -259,14 +259,14 @@ struct VdiGenerator::State {
     mine.gatherSeconds = watch.lap();
   }
 
-  /// The same with one rank.
+  /// Renders the picture with one rank.
   void renderAlone(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress,
                    Image& image) {
     image = imageIn(settings);
     bands->render(requestOf(prepared, settings, {}), progress, *pool, image, mine);
   }
 
-  /// Of the settings' size, not cleared.
+  /// An image of the settings' size, not cleared.
   Image imageIn(const GenerateSettings& settings) const {
     Image image;
     image.width = settings.width;
@@ -278,7 +278,7 @@ struct VdiGenerator::State {
     return image;
   }
 
-  /// Collective: all ranks', on the root.
+  /// Collective: returns all ranks' reports on the root.
   std::vector<RankReport> gatherReports(RankReport& report) const {
     static_assert(std::is_trivially_copyable_v<RankReport>);
     report.deviceBytes = device->allocatedBytes();
@@ -322,7 +322,7 @@ VdiFrame VdiGenerator::start(const Camera& camera, const TransferFunction& trans
                              const GenerateSettings& settings, const Progress& progress) {
   State& s = *state_;
   const auto prepared = s.prepare(camera, transferFunction, settings);
-  // Memory that a frame uses isn't replaced: one of another size waits for it.
+  // Memory in use by a frame is not replaced, so a frame of another size waits for it.
   const std::tuple kind(settings, prepared->view.width(), prepared->view.height());
   if (s.lastKind != kind) s.completeAll();
   detail::Flight& flight = s.freeFlight();

@@ -16,9 +16,9 @@ namespace shared = gpu::shared;
 
 namespace {
 
-/// What fits is on its way while the caller goes on; more waits for the part before.
+/// Up to this size, the upload continues after the caller does; larger ones wait for the part before.
 constexpr std::uint64_t aloneBytes = std::uint64_t{128} << 20;
-/// A render waits for the part that's on its way.
+/// A render waits for the part under way.
 constexpr std::uint64_t besideBytes = std::uint64_t{2} << 20;
 
 }  // namespace
@@ -26,7 +26,7 @@ constexpr std::uint64_t besideBytes = std::uint64_t{2} << 20;
 VdiLoader::VdiLoader(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)), expand_(device_), scan_(device_), commands_(device_) {}
 
-/// Calls use(at, first, count) for parts of `values` that lie in staging, `at` bytes into it.
+/// Calls use(at, first, count) for parts of `values` in the staging buffer, `at` bytes into it.
 template <typename T, typename Use>
 void VdiLoader::inParts(const HostVector<T>& values, Use use) {
   for (std::size_t first = 0; first < values.size();) {
@@ -45,9 +45,9 @@ void VdiLoader::inParts(const HostVector<T>& values, Use use) {
   }
 }
 
-/// All that doesn't depend on how many supersegments there are.
+/// Prepares everything that does not depend on the number of supersegments.
 void VdiLoader::start(const Vdi& header, LoadedVdi& target) {
-  commands_.wait();  // for the last one, which may still use the buffers
+  commands_.wait();  // the last load may still use the buffers
   outgrown_ = {};
   target.original.reset();
   target_ = &target;
@@ -71,12 +71,12 @@ void VdiLoader::start(const Vdi& header, LoadedVdi& target) {
   constants_.perspective = header.camera.parallelProjection ? 0U : 1U;
 }
 
-/// Recorded commands follow, in which `count` supersegments are added to those that are there.
+/// Makes room for commands that add `count` supersegments to the present ones.
 void VdiLoader::reserveSegments(std::uint64_t count) {
   const std::uint64_t bytes = (added_ + count) * sizeof(shared::RenderSegment);
   gpu::Buffer& segments = target_->segments;
   if (segments && bytes > segments.size() && added_ > 0) {
-    outgrown_ = std::exchange(segments, {});  // what used it before has been waited for
+    outgrown_ = std::exchange(segments, {});  // its last use has been waited for
     segments.reserve(device_, bytes + bytes / 2, MemoryKind::DeviceLocal);
     commands_.copy(outgrown_, 0, segments, 0, added_ * sizeof(shared::RenderSegment));
     commands_.barrier();
@@ -86,7 +86,7 @@ void VdiLoader::reserveSegments(std::uint64_t count) {
   constants_.segments = segments.address();
 }
 
-/// Supersegments [first, first + count) of all.
+/// Expands supersegments [first, first + count) of all.
 void VdiLoader::recordSegments(VkDeviceAddress from, std::uint64_t first, std::uint64_t count) {
   shared::ExpandConstants constants = constants_;
   constants.mode = shared::expandModeSegments;
@@ -96,7 +96,7 @@ void VdiLoader::recordSegments(VkDeviceAddress from, std::uint64_t first, std::u
   expand_.record(commands_, constants);
 }
 
-/// When all supersegments are there.
+/// Call when all supersegments are there.
 void VdiLoader::recordMasks() {
   const shared::DepthRange nothing{std::numeric_limits<float>::infinity(), 0.0F, 0.0F};
   commands_.update(target_->depthRange, std::as_bytes(std::span(&nothing, 1)));
@@ -146,7 +146,7 @@ gpu::Submission VdiLoader::add(const DeviceLists& band, std::uint64_t firstList)
     throw Error(ErrorCode::OutOfMemory, "more than 2^32 supersegments in one VDI");
   commands_.begin();
   commands_.waitFor(band.written);
-  outgrown_ = {};  // begin has waited for what used it
+  outgrown_ = {};  // begin has waited for its last use
   reserveSegments(band.count);
   const std::uint64_t words = std::uint64_t{band.listCount} + 1;
   commands_.copy(band.offsets, 0, offsets_, firstList * wordBytes, words * wordBytes);
@@ -154,7 +154,7 @@ gpu::Submission VdiLoader::add(const DeviceLists& band, std::uint64_t firstList)
     scan_.recordRebase(commands_, offsets_, firstList, static_cast<std::uint32_t>(words),
                        static_cast<std::uint32_t>(added_));
   }
-  // As many at a time as lie within 4 GiB (shared/lists.h).
+  // As many at a time as fit 4 GiB (shared/lists.h).
   constexpr std::uint64_t atOnce = std::uint64_t{1} << 26;
   for (std::uint64_t first = 0; first < band.count; first += atOnce) {
     recordSegments(band.segments.address() + first * segmentBytes_, added_ + first,

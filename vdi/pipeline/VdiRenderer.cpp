@@ -33,11 +33,11 @@ struct VdiRenderer::State {
   detail::LoadedVdi prepared;
   double milliseconds = 0.0;
   std::vector<ClipPlane> clipPlanes;
-  gpu::Buffer ends;  // of rays; none until they're asked for
+  gpu::Buffer ends;  // of rays; empty until requested
   gpu::Buffer endsStaging;
-  /// Behind what it loads, for its end waits for what uses that.
+  /// Declared after the data that it loads, because its destructor waits for its use.
   detail::VdiLoader loader;
-  /// `shown` may still be on its way: a render waits for it, or who uses the loader next.
+  /// Whether `shown` may still be loading; the next render, or the next use of the loader, waits for it.
   bool loading = false;
   std::mutex loadingMutex;
 
@@ -45,7 +45,7 @@ struct VdiRenderer::State {
     const std::scoped_lock lock(loadingMutex);
     if (std::exchange(loading, false)) loader.wait();
   }
-  /// Into `picture`. `form`: shared::renderPicture...
+  /// Renders into `picture`. `form` is one of shared::renderPicture....
   void render(const View& view, std::span<const float> rayEnds, Reconstruction reconstruction,
               std::uint32_t form);
 };
@@ -73,7 +73,7 @@ void VdiRenderer::prepareVdi(const Vdi& vdi) {
 
 namespace {
 
-/// Loads bands of lists where the renderer reads them.
+/// Loads bands of lists for the renderer.
 class LoaderSink final : public detail::VdiSink {
  public:
   LoaderSink(detail::VdiLoader& loader, detail::LoadedVdi& target) : loader_(loader), target_(target) {}
@@ -117,7 +117,7 @@ void VdiRenderer::setClipPlanes(std::vector<ClipPlane> planes) {
 
 namespace {
 
-/// In the view space of the VDI's viewpoint.
+/// Sets the planes in the view space of V_O.
 void clipBy(shared::RenderParams& params, std::span<const ClipPlane> planes, const View& original) {
   static_assert(maxClipPlanes == shared::renderMaxClipPlanes);
   params.clipPlaneCount = static_cast<std::uint32_t>(planes.size());

@@ -9,7 +9,7 @@ namespace vdi::reference {
 
 namespace {
 
-/// By its nodes: between two of them linear, of several at one place the last, beyond them constant.
+/// Interpolates nodes: linear between two of them, the last of several at one place, constant beyond all.
 template <typename Node, typename Value>
 Value valueAt(const std::vector<Node>& nodes, Value Node::*value, double x) {
   std::size_t next = 0;
@@ -26,7 +26,7 @@ struct Line {
   glm::dvec3 to;
 };
 
-/// What of the half line from `origin` lies in the box; false if nothing does.
+/// Clips the half line from `origin` to the box; false if nothing is left.
 bool clip(const Box& box, const glm::dvec3& origin, const glm::dvec3& direction, Line& line) {
   double enter = 0.0;
   double leave = std::numeric_limits<double>::infinity();

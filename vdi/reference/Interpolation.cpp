@@ -10,7 +10,8 @@ double interpolate(const Block& block, const glm::dvec3& world) {
       glm::clamp((world - block.origin) / block.spacing, glm::dvec3(all.lo), glm::dvec3(all.hi - 1));
   const glm::ivec3 base = glm::min(glm::ivec3(glm::floor(position)), glm::max(all.hi - 2, all.lo));
   const glm::dvec3 share = position - glm::dvec3(base);
-  // Infinite values are beyond all others, but finite: a place between two of opposite sign is no NaN.
+  // Represents infinite values by finite ones beyond all others: interpolating between opposite signs gives
+  // no NaN.
   constexpr double infinite = 1e305;
   double sum = 0.0;
   for (int corner = 0; corner < 8; ++corner) {

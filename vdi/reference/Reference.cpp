@@ -17,11 +17,11 @@ struct SceneRay {
   glm::vec3 start;  // relative to the scene's centre, at the front of the sample lattice
   glm::vec3 direction;
   float step;
-  /// How far behind a sample's begin it is decided whose it is: its middle, but for rays that graze the
-  /// scene.
+  /// Distance from a sample's begin to the point that decides its owner: its middle, except for rays that
+  /// graze the scene.
   float middle = 0.5F;
 
-  /// `place` counts samples: k is where sample k begins.
+  /// `place` counts samples: k is the begin of sample k.
   glm::vec3 at(float place) const { return start + place * step * direction; }
   float middleOf(std::uint32_t k) const { return static_cast<float>(k) + middle; }
   glm::vec3 sample(std::uint32_t k) const { return at(middleOf(k)); }
@@ -50,15 +50,15 @@ OwnedBox ownedBox(const Scene& scene, const Block& block) {
   return box;
 }
 
-/// Indices of the samples in the box: one range, because each coordinate is monotone along the ray.
+/// Indices of the samples in the box; one range, because each coordinate is monotone along the ray.
 struct SampleRange {
   std::uint32_t first = 0;
   std::uint32_t last = 0;  // exclusive
 };
 
 SampleRange samplesIn(const OwnedBox& box, const SceneRay& ray, std::uint32_t count) {
-  // Where the ray is in the box, in units of samples, with two samples to spare; then exactly, sample by
-  // sample.
+  // First the part of the ray in the box, in units of samples, with two samples to spare; then exactly,
+  // sample by sample.
   float enter = 0.0F;
   auto leave = static_cast<float>(count);
   for (int axis = 0; axis < 3; ++axis) {
@@ -78,7 +78,7 @@ SampleRange samplesIn(const OwnedBox& box, const SceneRay& ray, std::uint32_t co
   return range;
 }
 
-/// Those whose middle lies in the part.
+/// The samples whose middle lies in the part.
 SampleRange clippedSamples(const SampleRange& samples, const RayPart& part, float step, std::uint32_t count) {
   const auto firstBehind = [&](float depth) {
     const float place = std::ceil(depth / step - 0.5F);
@@ -89,18 +89,17 @@ SampleRange clippedSamples(const SampleRange& samples, const RayPart& part, floa
   return inside.first < inside.last ? inside : SampleRange{};
 }
 
-/// The bounds of what is shown, the scene's or those of a region in it, seldom lie half-way between two
-/// samples: the first sample's interval starts where the ray enters them, the last one's ends where it
-/// leaves. Where a ray leaves them before it has come to the middle of any sample, what's between is one
-/// sample, and the middle of that says whose it is. Depends on ray and scene alone, so it's the same on every
-/// rank.
+/// The bounds of the visible part, the scene's or a region's, seldom lie half-way between two samples: the
+/// first sample's interval starts where the ray enters them, the last one's ends where it leaves. If a ray
+/// leaves them before it reaches the middle of any sample, the part between is one sample, and its middle
+/// decides its owner. This depends on ray and scene alone, so it is the same on every rank.
 struct SceneStretch {
   SampleRange samples;
   float enter = 0.0F;  // depth
   float leave = 0.0F;
 };
 
-/// Moves the middles of the ray's samples where it grazes the bounds.
+/// Moves the middles of the ray's samples if it grazes the bounds.
 SceneStretch sceneStretch(const Frame& frame, SceneRay& ray) {
   const Region& region = frame.settings.region;
   const Box shown = boundsIn(region, frame.scene.bounds);
@@ -178,7 +177,7 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
   const float slabsPerDepth =
       glm::length(ray.direction) / static_cast<float>(frame.table.unitDistance) / frame.slabTable.length;
   const float enough = terminationOpticalDepth(frame.settings);
-  // The place where sample k begins: those at the scene's faces are shorter or longer.
+  // The begin of sample k: samples at the scene's faces are shorter or longer.
   const auto placeOf = [&](std::uint32_t k) {
     const auto front = static_cast<float>(frame.lattice.first);
     if (k == scene.samples.first) return (scene.enter - front) / ray.step;
@@ -241,8 +240,7 @@ namespace {
 
 constexpr int stride = countedStride;
 
-/// The counted lists around a list along an axis: before and behind it; the last one where there's none
-/// behind.
+/// The counted lists around a list along an axis: before and after it; the last one if none follows.
 int countedBefore(int i) {
   return i - i % stride;
 }
@@ -259,7 +257,7 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
   const int height = frame.view.height();
   SupersegmentLists lists;
   const std::uint32_t atOnce = countedSamplesFor(frame.lattice.count, rules.budget);
-  // A rank's own lists get N_S each: what a list needs is known when all ranks' are together.
+  // A rank's own lists get N_S each: a list's need is known only when all ranks' are together.
   if (frame.settings.budget == Budget::Total && !cutAtGaps) {
     SupersegmentHistogram histogram;
     for (int y = 0; y < height; y += stride) {

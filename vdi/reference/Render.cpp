@@ -1,4 +1,4 @@
-// A VDI from a new viewpoint: a ray traverses the frusta of V_O's pixels. The shaders' twin is
+// Renders a VDI from a new viewpoint: a ray traverses the frusta of V_O's pixels. The shaders' twin is
 // shaders/render.comp.
 #include <algorithm>
 #include <cassert>
@@ -12,7 +12,7 @@ namespace vdi::reference {
 
 namespace {
 
-/// A ray p(t) = origin + t * direction in the view space of V_O, t being the new view's depth.
+/// A ray p(t) = origin + t * direction in the view space of V_O; t is the new view's depth.
 struct ViewRay {
   glm::dvec3 origin;
   glm::dvec3 direction;
@@ -42,7 +42,7 @@ struct Stretch {
   bool empty() const { return !(enter < leave); }
 };
 
-/// Keeps what satisfies value + t * slope >= 0.
+/// Keeps the part where value + t * slope >= 0.
 void clip(Stretch& stretch, double value, double slope) {
   if (slope > 0.0) {
     stretch.enter = std::max(stretch.enter, -value / slope);
@@ -54,7 +54,7 @@ void clip(Stretch& stretch, double value, double slope) {
 }
 
 Stretch insideFrustum(const ViewRay& ray, const View& view, double nearest, double farthest) {
-  Stretch stretch{0.0, std::numeric_limits<double>::infinity()};  // nothing behind the new eye
+  Stretch stretch{0.0, std::numeric_limits<double>::infinity()};  // the part in front of the new eye
   const glm::dvec2 half{view.halfWidth(), view.halfHeight()};
   for (int axis = 0; axis < 2; ++axis) {
     for (const double side : {-1.0, 1.0}) {
@@ -70,7 +70,7 @@ Stretch insideFrustum(const ViewRay& ray, const View& view, double nearest, doub
   return stretch;
 }
 
-/// Adds what the ray meets of one list between enter and leave.
+/// Adds the ray's intersection with one list between enter and leave.
 void addList(Accumulator& sum, std::span<const Supersegment> list, const ViewRay& ray, double pixelLength,
              const Stretch& stretch) {
   const auto depthAt = [&](double t) { return ray.origin.z + t * ray.direction.z; };
@@ -92,7 +92,7 @@ void addList(Accumulator& sum, std::span<const Supersegment> list, const ViewRay
   }
 }
 
-/// What the ray meets of the list of a pixel.
+/// Adds the ray's intersection with a pixel's list.
 void addListOf(Accumulator& sum, const SupersegmentLists& lists, const View& original,
                const glm::ivec2& pixel, const ViewRay& ray, const Stretch& stretch) {
   const double pixelLength = glm::length(original.rayThrough(pixel.x + 0.5, pixel.y + 0.5).direction);
@@ -130,7 +130,7 @@ Accumulator traverseLists(const SupersegmentLists& lists, const View& original, 
   }
 }
 
-/// Several lists seen as one.
+/// A weighted blend of several lists.
 class Blend {
  public:
   void add(const Accumulator& list, double weight) {
@@ -144,8 +144,8 @@ class Blend {
   float depth_ = Image::noDepth;
 };
 
-/// Of a point between the centres of two neighbouring lists: the first one, and the other one's share, which
-/// is exactly 0 on the first one's centre even where rounding isn't.
+/// A point between the centres of two neighbouring lists: the first one's index, and the second one's weight,
+/// which is exactly 0 at the first one's centre, despite rounding.
 struct BetweenCentres {
   int first;
   double shareOfNext;
@@ -157,7 +157,7 @@ struct BetweenCentres {
   double weight(int side) const { return side == 0 ? 1.0 - shareOfNext : shareOfNext; }
 };
 
-/// A ray that stays in about one place of V_O's picture: the four lists around that.
+/// Intersects a ray that stays near one position of V_O's picture with the four lists around it.
 Accumulator intersectAlongLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
                                 const Stretch& stretch, const glm::dvec2& place) {
   const BetweenCentres x(place.x);
@@ -177,15 +177,15 @@ Accumulator intersectAlongLists(const SupersegmentLists& lists, const View& orig
   return sum;
 }
 
-/// Reconstruction::Smooth. Column by column, or row by row, whichever the ray crosses more of: then it stays
-/// near the same two lists of each column, and those are blended. Blending across columns as well is worth
-/// nothing (measured) but where the ray crosses hardly any.
+/// Reconstruction::Smooth. Goes column by column, or row by row if the ray crosses more of these. The ray
+/// then stays near the same two lists of each column, which are blended. Blending across columns as well
+/// gains nothing (measured), except where the ray crosses hardly any.
 Accumulator traverseSmoothly(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
                              const Stretch& stretch) {
   const glm::dvec2 start = pixelAt(ray, original, stretch.enter);
   const glm::dvec2 end = pixelAt(ray, original, stretch.leave);
   const glm::dvec2 extent = glm::abs(end - start);
-  const int along = 1.001 * extent.x >= extent.y ? 0 : 1;  // diagonals: by columns, whatever rounding does
+  const int along = 1.001 * extent.x >= extent.y ? 0 : 1;  // diagonals: by columns, despite rounding
   const int across = 1 - along;
   if (extent[along] < 1.0) return intersectAlongLists(lists, original, ray, stretch, 0.5 * (start + end));
   Accumulator sum;
@@ -236,7 +236,7 @@ Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, st
     nearest = std::min(nearest, segment.front);
     farthest = std::max(farthest, segment.back);
   }
-  // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
+  // In perspective, the frusta of V_O's pixels meet in its eye, where depths cannot separate them.
   const double smallest = original.parallel() ? nearest : std::max(nearest, farthest * 1e-6F);
   for (int y = 0; y < view.height(); ++y) {
     for (int x = 0; x < view.width(); ++x) {

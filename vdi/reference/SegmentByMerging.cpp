@@ -29,13 +29,13 @@ Appearance overOneSample(float red, float green, float blue, float opticalDepth,
   return {red * scale, green * scale, blue * scale, part};
 }
 
-/// Sum of absolute differences: as good as the root of squares here (measured), and a device has it for less.
+/// Sum of absolute differences: as good as a root of squares here (measured), and cheaper on a device.
 float distance(const Appearance& a, const Appearance& b) {
   return std::abs(a.red - b.red) + std::abs(a.green - b.green) + std::abs(a.blue - b.blue) +
          std::abs(a.opacity - b.opacity);
 }
 
-/// Of what lies behind material of that transmittance.
+/// Weight of an interval behind material of that transmittance.
 float weightBehind(float transmittance) {
   return hiddenWeight + (1.0F - hiddenWeight) * transmittance;
 }
@@ -47,8 +47,8 @@ struct PreSegment {
   float green;
   float blue;
   float opticalDepth;
-  bool cut;                 // must not be merged with the pre-segment before it
-  float before;             // transmittance of what's in front of it
+  bool cut;                 // must not merge with the pre-segment before it
+  float before;             // transmittance in front of it
   Appearance appearance{};  // see setUpCosts
   void absorb(float theBack, float theRed, float theGreen, float theBlue, float theOpticalDepth) {
     const float transmittance = 1.0F - opacityOf(opticalDepth);
@@ -60,13 +60,13 @@ struct PreSegment {
   }
 };
 
-/// A negative tolerance makes each interval a pre-segment. See ListTolerance for `room`.
+/// A negative tolerance makes each interval a pre-segment. ListTolerance explains `room`.
 std::vector<PreSegment> preSegmentsOf(std::span<const Interval> intervals, float initialTolerance,
                                       const SegmentRules& rules,
                                       std::size_t room = std::numeric_limits<std::size_t>::max()) {
   std::vector<PreSegment> preSegments;
   float tolerance = initialTolerance;
-  std::size_t runs = 0;  // pre-segments that begin one
+  std::size_t runs = 0;  // pre-segments that begin a run
   const auto adaptTolerance = [&] {
     const std::size_t left = room - std::min(room, preSegments.size() - runs);
     if (left >= sparePreSegments) return;
@@ -117,17 +117,17 @@ std::vector<PreSegment> preSegmentsOf(std::span<const Interval> intervals, float
   return preSegments;
 }
 
-/// Where two neighbours are that were merged. Far apart, the fainter one's light goes to the place of the
-/// other: spread over the gap too, at least as much would be where it wasn't, in emptiness that rays couldn't
-/// pass any more. But a list stays where it begins, for that's its depth in a picture.
+/// The place of two merged neighbours. If they are far apart, the fainter one's light moves to the other's
+/// place. Spread over the gap too, most of it would be in the wrong place, in empty space that rays could no
+/// longer skip. But a list keeps its first depth, because that is its depth in a picture.
 enum class Place { OfBoth, OfFirst, OfSecond };
 
-/// How much there is of a pre-segment.
+/// The amount of a pre-segment's material.
 float amountOf(const PreSegment& preSegment) {
   return (preSegment.back - preSegment.front) * distance({}, preSegment.appearance);
 }
 
-/// What's as long, or as much, counts as longer, or more, whichever way it was rounded.
+/// Tolerances make equal lengths and amounts compare the same, however they were rounded.
 Place placeOf(const PreSegment& a, const PreSegment& b) {
   const float lengths = (a.back - a.front) + (b.back - b.front);
   if (b.front - a.back < lengths * 0.9999F) return Place::OfBoth;
@@ -135,7 +135,7 @@ Place placeOf(const PreSegment& a, const PreSegment& b) {
   return a.before < 1.0F ? Place::OfSecond : Place::OfBoth;
 }
 
-/// Appearances are those that costs were computed from; the result has none yet.
+/// Appearances are those from which costs were computed; the result has none yet.
 PreSegment merged(const PreSegment& a, const PreSegment& b) {
   PreSegment result = a;
   result.absorb(b.back, b.red, b.green, b.blue, b.opticalDepth);
@@ -145,8 +145,8 @@ PreSegment merged(const PreSegment& a, const PreSegment& b) {
   return result;
 }
 
-/// What merging two neighbours changes: the sum over both, and over the gap between them, of the distance to
-/// what's there then times the length.
+/// The change by merging two neighbours: the sum over both, and over the gap between them, of the distance to
+/// the merged material, times the length.
 float costOf(const PreSegment& a, const PreSegment& b) {
   if (b.cut) return unlimited;
   const float first = a.back - a.front;
@@ -155,7 +155,7 @@ float costOf(const PreSegment& a, const PreSegment& b) {
   const float gap = std::max(b.front - a.back, 0.0F);
   const Place place = placeOf(a, b);
   if (place != Place::OfBoth) {
-    // Missing where it was, too much where it's now.
+    // It is missing at its old place, and superfluous at the new one.
     return weightBehind(a.before) * 2.0F * amountOf(place == Place::OfFirst ? b : a);
   }
   const auto mean = [&](float x, float y) { return (first * x + second * y) / whole; };
@@ -167,7 +167,7 @@ float costOf(const PreSegment& a, const PreSegment& b) {
          (first * distance(x, both) + second * distance(y, both) + gap * distance({}, both));
 }
 
-/// What costs are computed from.
+/// Computes the values from which costs follow.
 void setUpCosts(std::vector<PreSegment>& preSegments, float sampleStep) {
   for (PreSegment& g : preSegments)
     g.appearance = overOneSample(g.red, g.green, g.blue, g.opticalDepth, g.back - g.front, sampleStep);
@@ -181,7 +181,7 @@ std::vector<float> costsOf(const std::vector<PreSegment>& preSegments) {
   return costs;
 }
 
-/// Of the mergers that are possible.
+/// Over the possible mergers.
 struct Costs {
   float sum = 0.0F;
   float finite = 0.0F;
@@ -190,19 +190,19 @@ struct Costs {
     sum += cost;
     finite += 1.0F;
   }
-  /// Rounded up, so that the mean of equal costs isn't below them.
+  /// Rounded up, so that equal costs do not exceed their mean.
   float limit() const { return sum / finite * 1.0001F; }
 };
 
-/// Of equal costs those at even places are the cheaper ones, so that of a long run of them every other goes
+/// Of equal costs, those at even places count as cheaper, so that every other merger of a long series is made
 /// in one round.
 bool isCheapest(const std::vector<float>& costs, std::size_t i) {
   const auto cheaperThan = [&](float other) { return i % 2 == 0 ? costs[i] <= other : costs[i] < other; };
   return (i == 0 || cheaperThan(costs[i - 1])) && (i + 1 == costs.size() || cheaperThan(costs[i + 1]));
 }
 
-/// One round; `excess` pre-segments at most are to go. Returns the costs of the mergers that weren't made, as
-/// they were before those that were.
+/// One round, which removes at most `excess` pre-segments. Returns the costs of the mergers not made, as they
+/// were before the others were made.
 Costs mergeOnce(std::vector<PreSegment>& preSegments, std::size_t excess, float limit, float sampleStep) {
   setUpCosts(preSegments, sampleStep);
   const std::vector<float> costs = costsOf(preSegments);
@@ -212,7 +212,7 @@ Costs mergeOnce(std::vector<PreSegment>& preSegments, std::size_t excess, float 
     if (excess > 0 && costs[i] < unlimited && costs[i] <= limit && isCheapest(costs, i)) {
       left.push_back(merged(preSegments[i], preSegments[i + 1]));
       --excess;
-      ++i;  // whose cost isn't the least, or it would have gone instead
+      ++i;  // its cost is not the least, or it would have merged
     } else {
       left.push_back(preSegments[i]);
     }
@@ -245,7 +245,7 @@ std::size_t visibleSamples(std::span<const Interval> intervals, std::size_t atOn
                                     [](const Interval& interval) { return interval.opticalDepth > 0.0F; }));
 }
 
-/// What a list that isn't empty would hold at a level of a Histogram.
+/// The number that a list with visible intervals would have at a level of a SupersegmentHistogram.
 std::size_t supersegmentsAtLevel(std::span<const Interval> intervals, const SegmentRules& rules,
                                  std::size_t atOnce, std::size_t level) {
   std::size_t count = 1;
@@ -257,7 +257,7 @@ std::size_t supersegmentsAtLevel(std::span<const Interval> intervals, const Segm
   return std::min<std::size_t>(count, maxPerList(rules.budget, Budget::Total));
 }
 
-/// What a list that isn't empty may hold, but for runs.
+/// The number that a list with visible intervals may have, apart from runs.
 std::size_t budgetOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce,
                      float rounding) {
   if (rules.level < 0.0F) return rules.budget;
@@ -376,7 +376,7 @@ ListTolerance agreedToleranceBetween(std::span<const ListTolerance> counted, std
   for (const ListTolerance& a : counted) {
     if (a.tolerance == 0.0F) continue;
     known.push_back(a);
-    // Ranks that have nothing where others have something find the same tolerance.
+    // Ranks without material in a list where others have some find the same tolerance.
     known.back().preSegments = std::max(a.preSegments, 1U);
     maxCount.preSegments = std::max(maxCount.preSegments, a.preSegments);
     maxCount.quota = std::max(maxCount.quota, a.quota);
@@ -385,7 +385,7 @@ ListTolerance agreedToleranceBetween(std::span<const ListTolerance> counted, std
   ListTolerance result = interpolatedTolerance(known);
   result.preSegments = maxCount.preSegments;
   result.room = maxCount.preSegments + uncountedSparePreSegments + maxCount.preSegments / 4;
-  // Where none of the counted lists has anything of this rank's, this one may have.
+  // A list may have material of this rank even if none of the counted lists around it has.
   result.quota = maxCount.quota > 0 ? maxCount.quota : budget;
   result.runs = maxCount.runs + 1;
   return result;

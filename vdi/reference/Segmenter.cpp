@@ -9,7 +9,7 @@ namespace vdi::reference {
 
 namespace {
 
-/// The supersegment that's being filled.
+/// The supersegment that is being filled.
 class OpenSegment {
  public:
   explicit OpenSegment(const Interval& first)
@@ -21,7 +21,8 @@ class OpenSegment {
 
   float reach() const { return reach_; }
 
-  /// The left side of Eq. 1: how far the material of `next` is from this segment's, each over one sample.
+  /// The left side of Eq. 1: the distance between the material of `next` and this segment's, each over one
+  /// sample.
   float difference(const Interval& next, float sampleStep) const {
     const float length = reach_ - front_;
     const float mine = densityScale(opticalDepth_, length, sampleStep);
@@ -50,15 +51,15 @@ class OpenSegment {
   }
 
  private:
-  /// What a colour accumulated over `length` is to be multiplied with to be that of one sample.
+  /// Factor that turns a colour accumulated over `length` into that of one sample.
   static float densityScale(float opticalDepth, float length, float sampleStep) {
     const float opacity = opacityOf(opticalDepth);
     return opacity > 0.0F ? opacityOf(opticalDepth * sampleStep / length) / opacity : 0.0F;
   }
 
   float front_;
-  float reach_;  // end of the last interval absorbed, transparent ones included
-  float back_;   // end of the last one that isn't transparent
+  float reach_;  // end of the last absorbed interval, transparent ones included
+  float back_;   // end of the last visible interval
   float color_[3];
   float opticalDepth_;
 };
@@ -83,7 +84,7 @@ std::size_t countRuns(std::span<const Interval> intervals) {
 std::vector<Supersegment> segmentWithSensitivity(std::span<const Interval> intervals, float sensitivity,
                                                  const SegmentRules& rules) {
   std::vector<Supersegment> list;
-  std::vector<OpenSegment> open;  // none or one
+  std::vector<OpenSegment> open;  // at most one
   const auto close = [&] {
     list.push_back(open.back().closed());
     open.clear();

@@ -9,7 +9,7 @@ namespace vdi::reference {
 
 namespace {
 
-/// Zero also where one of the values isn't finite.
+/// Zero also if one of the values is not finite.
 double differenceOf(double ahead, double behind) {
   const double difference = ahead - behind;
   const double least = leastGradient * (std::abs(ahead) + std::abs(behind));

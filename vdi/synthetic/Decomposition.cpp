@@ -19,7 +19,7 @@ const std::array<std::pair<const char*, Layout>, 6> layouts{{{"slabs", Layout::S
                                                              {"random", Layout::Random},
                                                              {"one-rank", Layout::OnOneRank}}};
 
-/// Where piece i of n begins when `size` steps are dealt out evenly.
+/// First step of piece i of n, when `size` steps are divided evenly.
 int cut(int size, int n, int i) {
   return static_cast<int>(static_cast<std::int64_t>(size) * i / n);
 }
@@ -63,7 +63,8 @@ std::vector<std::string> layoutNames() {
 
 std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, Layout layout, Joint joint,
                             int ranks, std::uint32_t seed) {
-  // Shared points: cells are dealt out, and a piece holds the points of its cells. Otherwise values are.
+  // Shared points: cells are divided, and a piece holds the points of its cells. Otherwise values are
+  // divided.
   const bool shared = joint == Joint::SharedPoints;
   const glm::ivec3 steps = shared ? size - 1 : size;
   const glm::ivec3 count =

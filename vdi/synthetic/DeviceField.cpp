@@ -68,7 +68,7 @@ std::shared_ptr<std::byte[]> DeviceField::makeValues(const Lattice& lattice, con
 std::vector<Block> DeviceField::makeBlocks(const Lattice& one, const Lattice& all,
                                            std::span<const Part> parts, double top) {
   std::vector<Block> blocks;
-  std::map<std::array<int, 6>, std::shared_ptr<std::byte[]>> made;  // by place and size in `one`
+  std::map<std::array<int, 6>, std::shared_ptr<std::byte[]>> made;  // by position and size in `one`
   for (const Part& part : parts) {
     Part own = part;
     own.first = part.first % one.size;

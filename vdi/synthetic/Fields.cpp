@@ -76,13 +76,13 @@ double mixing(const glm::dvec3& p, std::uint32_t seed) {
                     0.0, 1.0);
 }
 
-/// Two fluids torn into each other everywhere: mostly one or the other, with an intricate interface.
+/// Two fluids torn into each other everywhere: mostly pure, with an intricate interface.
 double interface(const glm::dvec3& p, std::uint32_t seed) {
   const double mixed = octaves(p * 9.0, 6, seed) - 0.5;
   return std::clamp(0.5 + 0.5 * std::tanh(18.0 * mixed), 0.0, 1.0);
 }
 
-/// A coiled tube of ribs in emptiness: thin, opaque, sparse.
+/// A coiled tube of ribs in empty space: thin, opaque, sparse.
 double coil(const glm::dvec3& p) {
   const glm::dvec3 q = p - 0.5;
   const double angle = std::atan2(q.y, q.x);
