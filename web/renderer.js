@@ -2,6 +2,7 @@
 // resolution; `present` puts background, outline and the picture on the canvas.
 
 import {basisOf, clipMatrix, pixelSizeOf, raysOf} from "./camera.js";
+import {REGION, cullShader} from "./cull.js";
 import {makeArrayTexture, makeProgram, tilingOf} from "./gl.js";
 import {WHOLE_PICTURE, traverseShader} from "./traverse.js";
 
@@ -90,8 +91,9 @@ function texturesOf(gl, vdi) {
 /**
  * A picture on the GPU, of which a view may fill a part.
  * @param {WebGL2RenderingContext} gl
+ * @param {number} filter of its texture
  */
-function makePicture(gl) {
+function makePicture(gl, filter) {
   const texture = gl.createTexture();
   const framebuffer = gl.createFramebuffer();
   const picture = {texture, framebuffer, width: 0, height: 0, part: [0, 0]};
@@ -102,7 +104,7 @@ function makePicture(gl) {
       if (this.width === width && this.height === height) return;
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, width, height, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
-      for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.LINEAR);
+      for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, filter);
       for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
       gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
       gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
@@ -138,8 +140,10 @@ export class Renderer {
     this.copy = makeProgram(gl, WHOLE_PICTURE, COPY);
     this.lines = makeProgram(gl, LINES, PLAIN);
     this.ends = gl.createBuffer();
-    this.shown = makePicture(gl);
-    this.next = makePicture(gl);
+    this.cull = makeProgram(gl, WHOLE_PICTURE, cullShader(tilingOf(gl)));
+    this.regions = makePicture(gl, gl.NEAREST);
+    this.shown = makePicture(gl, gl.LINEAR);
+    this.next = makePicture(gl, gl.LINEAR);
     gl.disable(gl.DITHER);
     const vdi = this.loaded?.vdi;
     this.loaded = undefined;
@@ -202,16 +206,42 @@ export class Renderer {
     const {gl, loaded, canvas, next} = this;
     if (!loaded || !next) return;
     const {width, height} = this.pictureSize(scale);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.disable(gl.BLEND);
+    this.findRegions(camera, scale, firstRow, endRow);
     next.resize(canvas.width, canvas.height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, next.framebuffer);
     gl.viewport(0, 0, width, height);
-    gl.enable(gl.SCISSOR_TEST);
     gl.scissor(0, firstRow, width, endRow - firstRow);
-    gl.disable(gl.BLEND);
-    this.setRays(camera, scale);
+    const program = this.programOf(loaded.vdi);
+    this.setRays(program, camera, scale);
+    gl.activeTexture(gl.TEXTURE4);
+    gl.bindTexture(gl.TEXTURE_2D, this.regions?.texture ?? null);
+    gl.uniform1i(program.uniform("regions"), 4);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.SCISSOR_TEST);
     next.part = [width / canvas.width, height / canvas.height];
+  }
+
+  /**
+   * Finds which regions of these rows may show something.
+   * @param {Camera} camera
+   * @param {number} scale
+   * @param {number} firstRow
+   * @param {number} endRow
+   */
+  findRegions(camera, scale, firstRow, endRow) {
+    const {gl, canvas, regions, cull} = this;
+    if (!regions || !cull) return;
+    const {width, height} = this.pictureSize(scale);
+    const [across, up] = [Math.ceil(width / REGION), Math.ceil(height / REGION)];
+    regions.resize(Math.ceil(canvas.width / REGION), Math.ceil(canvas.height / REGION));
+    gl.bindFramebuffer(gl.FRAMEBUFFER, regions.framebuffer);
+    gl.viewport(0, 0, across, up);
+    const first = Math.floor(firstRow / REGION);
+    gl.scissor(0, first, across, Math.ceil(endRow / REGION) - first);
+    this.setRays(cull, camera, scale);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
   /** @param {number} scale */
@@ -231,15 +261,16 @@ export class Renderer {
   }
 
   /**
-   * Uniforms of the VDI and of a view.
+   * Uniforms of the VDI and of a view, for a program that is used from now on.
+   * @param {ReturnType<typeof makeProgram>} made
    * @param {Camera} camera
    * @param {number} scale
    */
-  setRays(camera, scale) {
+  setRays(made, camera, scale) {
     const {gl, loaded} = this;
     if (!loaded) return;
     const {vdi, textures} = loaded;
-    const {program, uniform} = this.programOf(vdi);
+    const {program, uniform} = made;
     gl.useProgram(program);
     ["heads", "segments", "tiles"].forEach((name, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);

@@ -1,6 +1,7 @@
 // The fragment shader that shows a VDI from a new viewpoint. Twin of shaders/render.comp, line.glsl, traverse.glsl and
 // intersect.glsl, whose comments say why: a ray is straight in V_O's picture, which it passes column by column (or row by row).
-// Rays don't share work as invocations of a workgroup do there; each finds its own tiles, the large ones first.
+// Rays don't share work as invocations of a workgroup do there; each finds its own tiles, the large ones first. A first pass
+// finds the regions whose rays meet nothing (cull.js).
 
 /**
  * @typedef {object} Variant what a shader is made for
@@ -9,6 +10,9 @@
  * @property {number} rowShift textures hold element i at x = i mod 2^rowShift, in row i >> rowShift
  * @property {number} layerShift and row r in layer r >> layerShift, at y = r mod 2^layerShift
  */
+
+/** Regions of a picture have 2^REGION_SHIFT pixels a side. */
+export const REGION_SHIFT = 4;
 
 const COMPACT_SEGMENTS = `
 #define Words uvec2
@@ -40,7 +44,8 @@ vec3 colorOf(Words words) { return vec3(ivec3(words.w & 0x7ffu, (words.w >> 11) 
 const vec3 colorUnit = vec3(1.0 / 2040.0, 1.0 / 2040.0, 1.0 / 1020.0);
 `;
 
-const RAYS = `
+/** Rays, their way through V_O's picture, and masks of depths. */
+export const RAYS = `
 const float infinity = 3.0e38;
 const float opaqueAcross = 1.0 - 1.0 / 512.0;
 
@@ -343,10 +348,11 @@ const MAIN = `
 out vec4 picture;  // premultiplied
 
 void main() {
+  picture = vec4(0.0);
+  if (texelFetch(regions, ivec2(gl_FragCoord.xy) >> ${REGION_SHIFT}, 0).r == 0.0) return;
   vec2 uv = gl_FragCoord.xy * pixelScale - 0.5 * pictureSize;
   Ray ray = Ray(rayOrigin[0] + uv.x * rayOrigin[1] + uv.y * rayOrigin[2],
                 rayDirection[0] + uv.x * rayDirection[1] + uv.y * rayDirection[2]);
-  picture = vec4(0.0);
   vec2 stretch = insideFrustum(ray);
   if (!(stretch.x < stretch.y)) return;
   Line line = lineOf(ray, stretch);
@@ -362,13 +368,15 @@ void main() {
 }
 `;
 
-/** @param {Variant} variant */
-export function traverseShader(variant) {
+/**
+ * What a shader that looks at a VDI begins with.
+ * @param {{rowShift: number, layerShift: number}} tiling
+ */
+export function uniformsOf(tiling) {
   return `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2DArray;
-#define SMOOTH ${variant.smooth ? 1 : 0}
 uniform usampler2DArray heads;
 uniform usampler2DArray segments;
 uniform usampler2DArray tiles;
@@ -385,9 +393,16 @@ uniform vec2 pictureSize;      // in the pixels that rays count
 uniform float pixelScale;      // of these to a fragment
 
 ivec3 placeOf(int i) {
-  int row = i >> ${variant.rowShift};
-  return ivec3(i & ${(1 << variant.rowShift) - 1}, row & ${(1 << variant.layerShift) - 1}, row >> ${variant.layerShift});
+  int row = i >> ${tiling.rowShift};
+  return ivec3(i & ${(1 << tiling.rowShift) - 1}, row & ${(1 << tiling.layerShift) - 1}, row >> ${tiling.layerShift});
 }
+`;
+}
+
+/** @param {Variant} variant */
+export function traverseShader(variant) {
+  return `${uniformsOf(variant)}#define SMOOTH ${variant.smooth ? 1 : 0}
+uniform sampler2D regions;     // which regions of the picture may show something (cull.js)
 ${variant.compact ? COMPACT_SEGMENTS : FULL_SEGMENTS}${RAYS}${INTERSECT}${TRAVERSE}${MAIN}`;
 }
 
