@@ -31,7 +31,9 @@ assert failed.code == SCRIPT, failed.code
 corners = [np.array([i & 1, i >> 1 & 1, i >> 2]) / 2 for i in range(8) if i % RANKS == RANK]
 with Catalyst(MPI.COMM_WORLD, [sys.argv[1]]) as catalyst:
     catalyst.set_blocks(Block((N, N, N), corner, (0.5 / N,) * 3) for corner in corners)
-    values = [np.empty((N, N, N)) for _ in corners]
+    # Every second one is a field of a larger array, z fastest, and mirrored.
+    values = [np.empty((N, N, N)) if i % 2 == 0 else np.empty((N, N, N + 3, 2))[:, :, :N, 1].transpose()[:, ::-1]
+              for i, _ in enumerate(corners)]
     expect(ValueError, lambda: catalyst.set_array("V", values[1:] + values + values), "blocks")
     expect(ValueError, lambda: catalyst.set_array("V", [v[1:] for v in values]), "[z][y][x]")
     expect(ValueError, lambda: catalyst.set_array("V", [v > 0 for v in values]), "bool")
@@ -41,6 +43,7 @@ with Catalyst(MPI.COMM_WORLD, [sys.argv[1]]) as catalyst:
         for value, corner in zip(values, corners):  # in place: no array is set again
             z, y, x = np.meshgrid(*[(np.arange(N) + 0.5) * 0.5 / N + start for start in reversed(corner)], indexing="ij")
             value[...] = 0.1 * step * (1 + np.sin(9 * x) * np.cos(7 * y) * np.cos(5 * z))
+        assert catalyst.wants(step, 0.5 * step)
         catalyst.execute(step, 0.5 * step)
 catalyst.close()
 error = expect(CatalystError, lambda: catalyst.execute(3), "")

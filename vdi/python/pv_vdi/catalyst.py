@@ -1,4 +1,4 @@
-"""Hands a simulation's NumPy arrays to ParaView's in situ engine, without a copy.
+"""Hands a simulation's NumPy arrays to ParaView's in situ engine.
 
     from mpi4py import MPI
     from pv_vdi.catalyst import Block, Catalyst
@@ -55,12 +55,18 @@ class _Block(ctypes.Structure):
                 ("origin", ctypes.c_double * 3), ("spacing", ctypes.c_double * 3)]
 
 
+class _Strides(ctypes.Structure):
+    _fields_ = [("strides", ctypes.c_int64 * 3), ("component_stride", ctypes.c_int64)]
+
+
 def _load():
     library = ctypes.CDLL(os.path.join(os.path.dirname(os.path.abspath(__file__)), LIBRARY))
     handle, text = ctypes.c_void_p, ctypes.c_char_p
     library.vdi_catalyst_initialize.argtypes = [ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(text), ctypes.POINTER(handle)]
     library.vdi_catalyst_set_blocks.argtypes = [handle, ctypes.c_int32, ctypes.POINTER(_Block)]
-    library.vdi_catalyst_set_array.argtypes = [handle, text, ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(ctypes.c_void_p)]
+    library.vdi_catalyst_set_array_strided.argtypes = [
+        handle, text, ctypes.c_int32, ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(_Strides)]
+    library.vdi_catalyst_wants.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_execute.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_finalize.argtypes = [handle]
     library.vdi_catalyst_error.argtypes = [handle]
@@ -94,9 +100,12 @@ class Catalyst:
         self._kept = {}
 
     def set_array(self, name, arrays, points=False):
-        """The values of one named array: arrays[i], [z][y][x], belongs to block i. They are of cells, or of points, of which a
-        block has one more per axis. They are used where they lie and kept alive: change them in place between steps, or set
-        others. Raises ValueError for a shape that the block doesn't have and for values that don't lie one beside the other."""
+        """The values of one named array: arrays[i] belongs to block i. It is [z][y][x], or [z][y][x][component] for vectors, of
+        which the filter shows the magnitude. Values are of cells, or of points, of which a block has one more per axis.
+
+        Arrays are kept alive: change them in place between steps, or set others. Those that lie as a new array of NumPy's does
+        are used where they are; the engine copies others (slices, transposed ones, one field of several) at each step that a
+        script wants. Raises ValueError for a shape that the block doesn't have and for a type that the engine doesn't know."""
         arrays = list(arrays)
         if len(arrays) != len(self._blocks):
             raise ValueError("%d arrays for %d blocks" % (len(arrays), len(self._blocks)))
@@ -104,16 +113,22 @@ class Catalyst:
         if len(types) > 1 or not types <= set(_TYPES):
             raise ValueError("the values of '%s' are %s; they may be all of %s" % (
                 name, " and ".join(sorted(map(str, types))), ", ".join(map(str, _TYPES))))
+        components = {array.shape[3] if array.ndim == 4 else 1 for array in arrays} or {1}
         for array, block in zip(arrays, self._blocks):
             shape = tuple(count + bool(points) for count in reversed(block.cells))
-            if array.shape != shape:
+            if array.shape[:3] != shape or array.ndim > 4 or len(components) > 1:
                 raise ValueError("an array of '%s' is %s, its block has %s values [z][y][x]" % (name, array.shape, shape))
-            if not array.flags.c_contiguous:
-                raise ValueError("the values of '%s' don't lie one beside the other, x fastest" % name)
         pointers = (ctypes.c_void_p * max(len(arrays), 1))(*(array.ctypes.data for array in arrays))
-        self._check(self._library.vdi_catalyst_set_array(self._handle, name.encode(), _TYPES[types.pop()],
-                                                         _POINTS if points else _CELLS, pointers))
+        strides = (_Strides * max(len(arrays), 1))(
+            *(_Strides(array.strides[2::-1], array.strides[3] if array.ndim == 4 else 0) for array in arrays))
+        self._check(self._library.vdi_catalyst_set_array_strided(
+            self._handle, name.encode(), _TYPES[types.pop()], _POINTS if points else _CELLS, components.pop(), pointers,
+            strides))
         self._kept[name] = arrays
+
+    def wants(self, step, time=0.0):
+        """Whether a script will do anything at this step, the same on all ranks; if not, there is no need to call execute."""
+        return self._library.vdi_catalyst_wants(self._handle, step, time) != 0
 
     def execute(self, step, time=0.0):
         """Runs the scripts on the blocks as they are now. `step` is the same on all ranks."""
