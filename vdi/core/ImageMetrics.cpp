@@ -139,7 +139,7 @@ double meanSsim(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b
   return sum / channels;
 }
 
-/// Bytes of a picture of that size. Throws for pictures that aren't of it.
+/// Bytes of a picture of that size. Throws if the pictures have another size.
 std::size_t requireOneSize(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width,
                            int height, int channels) {
   const auto expected =
@@ -160,7 +160,7 @@ class Pixels {
         static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
     return bytes_.subspan(pixel * channels_, channels_);
   }
-  /// The most frequent one along the edge.
+  /// The most frequent pixel along the edge.
   std::vector<std::uint8_t> background() const {
     std::map<std::string, int> counts;  // by a pixel's bytes
     const auto count = [&](int x, int y) {
@@ -238,7 +238,7 @@ double objectSsim(std::span<const std::uint8_t> a, std::span<const std::uint8_t>
                   int channels) {
   const PictureBox object = objectBox(a, b, width, height, channels);
   if (object.width == 0) return 1.0;
-  PictureBox box;  // with what windows see around their middles
+  PictureBox box;  // the object's box, extended by the windows' radius
   box.x = std::max(object.x - radius, 0);
   box.y = std::max(object.y - radius, 0);
   box.width = std::min(object.x + object.width + radius, width) - box.x;

@@ -23,7 +23,7 @@ struct ImageDifference {
 ImageDifference compare(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width,
                         int height, int channels);
 
-/// A part of a picture: its corner with the lowest coordinates, and its size. Width 0: nothing.
+/// A part of a picture: its corner with the lowest coordinates, and its size. Width 0: empty.
 struct PictureBox {
   int x = 0;
   int y = 0;
@@ -31,14 +31,13 @@ struct PictureBox {
   int height = 0;
 };
 
-/// Where at least one of two pictures shows something: the bounding box of the pixels that have a channel off
-/// by more than 2/255 from the colour that is most frequent along their own picture's edge. Pictures and
-/// errors as of compare.
+/// The bounding box of the objects in either picture: pixels with a channel off by more than 2/255 from the
+/// most frequent colour along their own picture's edge. Takes the pictures of compare, and throws as it does.
 PictureBox objectBox(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int height,
                      int channels);
 
-/// The SSIM of compare, of windows that have their middle in objectBox; so an empty background, which is
-/// equal in any two pictures, doesn't hide what differs. 1 where there is no object.
+/// The SSIM of compare over the windows with their middle in objectBox, so that an empty background, equal in
+/// all pictures, does not hide differences. 1 if there is no object.
 double objectSsim(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b, int width, int height,
                   int channels);
 
