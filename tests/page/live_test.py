@@ -1,9 +1,11 @@
 """A live page in Chromium before a real server: frames that appear, a server that is killed and comes back, wrong tokens,
 several pages, a series. Waits have no upper bound but the test's own; nothing here measures time."""
+import gzip
 import json
 import os
 import signal
 import subprocess
+import urllib.request
 
 from pagetest import HEIGHT, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, rendered, run, shown, vdi, whole
 
@@ -70,17 +72,26 @@ def test_frames(browser):
         check(camera_of(browser)["position"] == turned["position"], "a new frame leaves the view as it is")
         compare("live, turned", shown(browser, "live_turned"), rendered("run/step_1.vdi", turned))
 
+        # A frame that comes while the GPU's context is lost is shown when that is back.
+        browser.value("window.context = vdiPage.viewer.renderer.gl.getExtension('WEBGL_lose_context'); context.loseContext()")
+        browser.wait("vdiPage.viewer.isLost", SECONDS)
+        make("run/step_2.vdi", 3)
+        wait_for_frame(browser, 2)
+        browser.value("context.restoreContext()")
+        browser.wait("!vdiPage.viewer.isLost", SECONDS)
+        compare("live, after a lost context", shown(browser), rendered("run/step_2.vdi", turned))
+
         browser.send("Page.reload")
-        wait_for_frame(browser, 1)
+        wait_for_frame(browser, 2)
         check(line(browser).startswith(("Live", "Series", "Ended")), f"a page that is loaded again is live: {line(browser)}")
         bare(browser)
         browser.value(f"vdiPage.setCamera({json.dumps(turned)})")
 
         browser.value("document.getElementById('pause').click()")
         check(line(browser).startswith("Paused"), f"a pause: {line(browser)}")
-        make("run/step_2.vdi", 3)
+        make("run/step_3.vdi", 4)
         browser.value("document.getElementById('pause').click()")
-        wait_for_frame(browser, 2)
+        wait_for_frame(browser, 3)
 
         # The server dies in the middle of things, and comes back with one frame more.
         before = shown(browser)
@@ -88,13 +99,26 @@ def test_frames(browser):
         browser.wait("vdiPage.live.live.state === 'lost'", SECONDS)
         check("Not connected" in line(browser) and "attempt" in line(browser), f"a server that is gone: {line(browser)}")
         check((shown(browser) == before).all(), "the last frame stays")
-        make("run/step_3.vdi", 4)
+        make("run/step_4.vdi", 5)
         with Server("run", port=server.port):
-            wait_for_frame(browser, 3)
-            compare("live, after a new start", shown(browser), rendered("run/step_3.vdi", turned))
+            wait_for_frame(browser, 4)
+            compare("live, after a new start", shown(browser), rendered("run/step_4.vdi", turned))
         # Refused connections are the browser's to tell of; the page itself throws nothing.
         complaints = [text for text in browser.complaints() if "WebSocket" not in text and "ERR_CONNECTION" not in text]
         check(not complaints, f"live: {complaints}")
+
+
+def test_size(_):
+    """Of the page as a server sends it."""
+    make("tiny.vdi", 5, large=False)
+    with Server("tiny.vdi") as server:
+        opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+        with opener.open(server.link.split("#")[0], timeout=SECONDS) as reply:
+            page = reply.read()
+    packed = len(gzip.compress(page))
+    print(f"the page: {len(page)} bytes, {packed} compressed", flush=True)
+    check(len(page) <= 250000 and packed <= 60000, "the page is small")
+    check(TOKEN.encode() not in page, "and has no secret")
 
 
 def test_tokens(browser):
@@ -158,4 +182,4 @@ def test_series(browser):
         whole(browser)
 
 
-run(test_frames, test_tokens, test_pages, test_series)
+run(test_frames, test_size, test_tokens, test_pages, test_series)
