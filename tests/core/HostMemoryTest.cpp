@@ -66,14 +66,15 @@ TEST_CASE("the next process removes names that a killed one has left, and those 
   const auto nameThatStays = [] {
     auto* kept =
         new std::shared_ptr(HostMemory::shared(1000));  // never deleted, as in a process that is killed
-    return (*kept)->name();
+    const std::string& name = (*kept)->name();
+    return hasName(name) ? name : "(none)";  // here: once it's killed, any process of the host may remove it
   };
   const auto living = HostMemory::shared(1000);
   const std::string first = inKilledProcess(nameThatStays);
-  CHECK(hasName(first));
+  CHECK(first != "(none)");
   const std::string second = inKilledProcess(nameThatStays);
+  CHECK(second != "(none)");
   CHECK(!hasName(first));
-  CHECK(hasName(second));
   CHECK(hasName(living->name()));
   std::filesystem::remove("/dev/shm" + second);
 }
