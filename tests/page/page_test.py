@@ -57,6 +57,64 @@ def angle_of(browser):
     return float(browser.value("document.getElementById('angle').textContent").rstrip("°"))
 
 
+def check_culling(browser):
+    """What is culled shows nothing: views from anywhere, the scene's inside included, are those without culling."""
+    browser.value("""window.both = (camera, scale) => {
+      const {renderer} = vdiPage.viewer, {gl} = renderer;
+      const {width, height} = renderer.pictureSize(scale), half = Math.floor(height / 2);
+      const draw = () => {
+        for (const [first, end] of [[0, half], [half, height]]) renderer.drawPicture(camera, scale, first, end);
+        const pixels = new Uint8Array(4 * width * height);
+        gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+        return pixels;
+      };
+      const culled = draw();
+      gl.bindFramebuffer(gl.FRAMEBUFFER, renderer.regions.framebuffer);
+      const shows = new Uint8Array(4 * Math.ceil(width / 16) * Math.ceil(height / 16));
+      gl.readPixels(0, 0, Math.ceil(width / 16), Math.ceil(height / 16), gl.RGBA, gl.UNSIGNED_BYTE, shows);
+      renderer.findRegions = () => {
+        gl.bindFramebuffer(gl.FRAMEBUFFER, renderer.regions.framebuffer);
+        gl.disable(gl.SCISSOR_TEST);
+        gl.clearColor(1, 1, 1, 1);
+        gl.clear(gl.COLOR_BUFFER_BIT);
+        gl.enable(gl.SCISSOR_TEST);
+      };
+      const whole = draw();
+      delete renderer.findRegions;
+      return {same: culled.every((value, i) => value === whole[i]), seen: whole.some((value) => value > 0),
+              blank: shows.filter((value) => value === 0).length / shows.length};
+    }; 0""")
+    start = camera_of(browser)
+    low, high = map(np.array, browser.value("vdiPage.vdi.bounds"))
+    size = np.max(high - low)
+    random = np.random.RandomState(3)
+    blank, seen = [], 0
+    for i in range(24):
+        reach = size * (0.1, 0.4, 0.8, 1.5, 3)[i % 5]
+        camera = {**start, "position": list((low + high) / 2 + reach * random.normal(size=3)),
+                  "focalPoint": list((low + high) / 2 + 0.2 * size * random.normal(size=3)),
+                  "viewUp": list(random.normal(size=3)), "viewAngle": (10, 30, 90, 140)[i % 4],
+                  "parallelScale": size * (0.1, 0.5, 1)[i % 3]}
+        view = browser.value(f"both({json.dumps(camera)}, {(1, 2.25)[i % 2]})")
+        check(view["same"], f"culling changes the view of {camera}")
+        blank.append(view["blank"])
+        seen += view["seen"]
+    print(f"culled {np.mean(blank):.2f} of the regions of {len(blank)} views, {seen} of which show something", flush=True)
+    check(seen > 12 and 0.1 < np.mean(blank) < 0.9, "views show something, and regions are culled")
+
+
+def test_culling_perspective(browser):
+    open_page(browser, "compact.html")
+    whole(browser)
+    check_culling(browser)
+
+
+def test_culling_parallel(browser):
+    open_page(browser, "parallel.html")
+    whole(browser)
+    check_culling(browser)
+
+
 def test_hands(browser):
     open_page(browser, "compact.html")
     whole(browser)
@@ -299,5 +357,5 @@ def test_network(browser):
     check(not beyond, f"the page asks for {beyond}")
 
 
-run(test_pictures, test_small_textures, test_hands, test_damage, test_lost_context, test_series, test_legend, test_frame_time,
-    test_looks, test_network)
+run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_hands, test_damage,
+    test_lost_context, test_series, test_legend, test_frame_time, test_looks, test_network)
