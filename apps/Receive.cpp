@@ -20,7 +20,7 @@
 #include "vdi/io/VdiFile.h"
 #include "vdi/pipeline/VdiRenderer.h"
 #include "vdi/stream/Client.h"
-#include "vdi/stream/Token.h"
+#include "vdi/stream/GivenToken.h"
 
 namespace vdi::apps {
 
@@ -41,7 +41,7 @@ struct ReceiveOptions {
 class Recorder {
  public:
   explicit Recorder(const ReceiveOptions& options) : options_(options) {
-    if (!options.picture.empty()) requireOutputs({{"--render", options.picture}}, {});
+    if (!options.picture.empty()) apps::requireOutputs({{"--render", options.picture}}, {});
     if (!options.folder.empty()) std::filesystem::create_directories(options.folder);
   }
 
@@ -121,7 +121,7 @@ void receive(const ReceiveOptions& options) {
   constexpr std::chrono::milliseconds pause{100};
   stream::ClientOptions connection;
   connection.url = stream::parseUrl(options.url);
-  if (connection.url.token.empty()) connection.url.token = givenToken(options.tokenFile);
+  if (connection.url.token.empty()) connection.url.token = stream::givenToken(options.tokenFile);
   if (connection.url.token.empty())
     throw Error(ErrorCode::InvalidArgument, "the link has no token: see --token-file",
                 connection.url.authority());

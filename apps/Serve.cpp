@@ -15,6 +15,7 @@
 #include "apps/StreamOptions.h"
 #include "vdi/core/Error.h"
 #include "vdi/page/Page.h"
+#include "vdi/stream/GivenToken.h"
 #include "vdi/stream/Server.h"
 #include "vdi/stream/Token.h"
 
@@ -35,7 +36,7 @@ struct ServeOptions {
   bool isFinished = false;
 };
 
-void say(const std::string& line) {
+void logLine(const std::string& line) {
   fmt::print(stderr, "vdi: {}\n", line);
 }
 
@@ -58,7 +59,7 @@ class EndSignals {
 
 FrameFiles::Options filesOf(const ServeOptions& options) {
   FrameFiles::Options files;
-  files.log = say;
+  files.log = logLine;
   files.follows = !options.isFinished;
   if (options.inputs.size() == 1 && std::filesystem::is_directory(options.inputs.front())) {
     files.folder = options.inputs.front();
@@ -71,7 +72,7 @@ FrameFiles::Options filesOf(const ServeOptions& options) {
 void serve(const ServeOptions& options) {
   const EndSignals endSignals;
   FrameFiles files(filesOf(options));
-  const std::string known = givenToken(options.tokenFile);
+  const std::string known = stream::givenToken(options.tokenFile);
   stream::ServerOptions server;
   server.host = options.host;
   server.port = options.port;
@@ -83,7 +84,7 @@ void serve(const ServeOptions& options) {
   server.certificate = options.certificate;
   server.key = options.key;
   server.show = [&files](std::uint32_t index) { files.show(index); };
-  server.log = say;
+  server.log = logLine;
   stream::Server running(std::move(server));
   files.start(running);
   // The only place that shows a token, and only one that nobody knows yet.

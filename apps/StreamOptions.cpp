@@ -7,7 +7,6 @@
 #include <map>
 
 #include "vdi/core/Error.h"
-#include "vdi/stream/Token.h"
 
 namespace vdi::apps {
 
@@ -16,14 +15,6 @@ void addTokenOption(CLI::App& command, std::string& file, const std::string& oth
       .add_option("--token-file", file,
                   "file whose first line is the token, as VDI_TOKEN in the environment; " + otherwise)
       ->type_name("FILE");
-}
-
-std::string givenToken(const std::string& file) {
-  if (!file.empty()) return stream::tokenIn(file);
-  const char* const variable = std::getenv("VDI_TOKEN");
-  if (variable == nullptr || *variable == '\0') return {};
-  stream::requireToken(variable, "VDI_TOKEN");
-  return variable;
 }
 
 double bytesPerSecond(const std::string& rate) {

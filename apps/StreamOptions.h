@@ -11,9 +11,6 @@ namespace vdi::apps {
 
 /// Adds --token-file.
 void addTokenOption(CLI::App& command, std::string& file, const std::string& otherwise);
-/// The token in the file, or in the environment variable VDI_TOKEN; empty if there is neither. Throws Error
-/// as stream::tokenIn and stream::requireToken.
-std::string givenToken(const std::string& file);
 
 /// Bytes a second of "100Mbit", "1Gbit" or "5MB", with decimal prefixes; 0 for an empty text. Throws
 /// Error{InvalidArgument} for texts that requireRate rejects.

@@ -25,6 +25,8 @@ constexpr std::array table{
                         "The plugin that Catalyst scripts load, instead of the installed one", true},
     EnvironmentVariable{"VDI_RANKS_PER_HOST", "a whole number from 0 on; 0: as it is",
                         "How many ranks are taken to be on one host", false},
+    EnvironmentVariable{"VDI_TOKEN", "16 to 256 letters, digits, '-', '.', '_' and '~'",
+                        "The secret that viewers of a VDI server need", true},
     EnvironmentVariable{"VDI_TRANSPORT", "shared or mpi",
                         "How ranks of one host pass bytes on, by shared memory or by messages", false},
     EnvironmentVariable{"VDI_VALIDATION", "0 or 1", "Whether the Vulkan validation layer checks all calls",

@@ -50,7 +50,7 @@ std::string nameInLinks(const std::string& host) {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? std::string(name.data()) : host;
 }
 
-const char* nameOf(Phase phase) {
+const char* phaseText(Phase phase) {
   if (phase == Phase::Waiting) return "waiting";
   return phase == Phase::Live ? "live" : "ended";
 }
@@ -136,7 +136,7 @@ class Server::Impl {
   std::string statusText() const {
     const ServerStatus now = statusNow();
     return nlohmann::json{{"session", now.session},
-                          {"state", nameOf(now.phase)},
+                          {"state", phaseText(now.phase)},
                           {"viewers", now.viewers},
                           {"frames", now.frames}}
         .dump();

@@ -38,12 +38,13 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
         socket_(context, arguments...) {}
 
   void start() override {
-    resolver_.async_resolve(url_.host, std::to_string(url_.port),
-                            [self = this->shared_from_this()](Error error, Resolver::results_type found) {
-                              if (error) return self->fail("can't find " + self->url_.host, error);
-                              for (const auto& entry : found) self->endpoints_.push_back(entry.endpoint());
-                              self->connect(boost::asio::error::host_not_found);
-                            });
+    resolver_.async_resolve(
+        url_.host, std::to_string(url_.port),
+        [self = this->shared_from_this()](Error error, const Resolver::results_type& found) {
+          if (error) return self->fail("can't find " + self->url_.host, error);
+          for (const auto& entry : found) self->endpoints_.push_back(entry.endpoint());
+          self->connect(boost::asio::error::host_not_found);
+        });
   }
 
   void send(std::string text) override {

@@ -1,0 +1,203 @@
+// What a viewer gets when: no network, and a clock that the test turns.
+#include <algorithm>
+#include <map>
+
+#include "tests/Catch.h"
+#include "vdi/stream/Outbox.h"
+
+using namespace vdi::stream;
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t mebibyte = std::size_t{1} << 20;
+
+FramePtr frameOf(std::uint32_t id, const std::vector<std::size_t>& bytes, std::uint32_t levels) {
+  auto frame = std::make_shared<Frame>();
+  frame->id = id;
+  frame->levelCount = levels;
+  for (const std::size_t size : bytes)
+    frame->levels.push_back(std::make_shared<EncodedLevel>(EncodedLevel{std::vector<std::byte>(size), 1, 1}));
+  return frame;
+}
+
+/// A viewer behind a line of that many bytes a second, that acknowledges all it gets.
+class Line {
+ public:
+  Line(Outbox& outbox, double bytesPerSecond) : outbox_(outbox), rate_(bytesPerSecond) {}
+
+  /// Everything until then.
+  void run(Clock::time_point from, Clock::time_point until) {
+    for (Clock::time_point now = from; now < until; now += 1ms) {
+      while (!arriving_.empty() && arriving_.front().at <= now) {
+        outbox_.acknowledge(arriving_.front().ack, now);
+        arriving_.erase(arriving_.begin());
+      }
+      while (const auto part = outbox_.next(now).part) {
+        busyUntil_ = std::max(busyUntil_, now) +
+                     std::chrono::duration_cast<Clock::duration>(
+                         std::chrono::duration<double>(static_cast<double>(part->bytes.size()) / rate_));
+        arriving_.push_back({busyUntil_, {part->frame->id, part->level, part->offset + part->bytes.size()}});
+        bytes_[{part->frame->id, part->level}] += part->bytes.size();
+        largest_ = std::max(largest_, outbox_.underWay());
+      }
+    }
+  }
+  /// That were sent of a level.
+  std::size_t sent(std::uint32_t frame, std::uint32_t level) { return bytes_[{frame, level}]; }
+  std::uint64_t mostUnderWay() const { return largest_; }
+
+ private:
+  struct Arriving {
+    Clock::time_point at;
+    Ack ack;
+  };
+  Outbox& outbox_;
+  double rate_;
+  Clock::time_point busyUntil_;
+  std::vector<Arriving> arriving_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> bytes_;
+  std::uint64_t largest_ = 0;
+};
+
+const Clock::time_point start = Clock::time_point(1000s);
+
+}  // namespace
+
+TEST_CASE("stream: parts make up the levels, the coarse one first") {
+  Outbox outbox(0.0);
+  const std::size_t coarse = 300000;
+  const std::size_t fine = 900000;
+  outbox.offer(frameOf(4, {coarse, fine}, 2), start);
+  std::uint32_t level = 0;
+  std::uint64_t offset = 0;
+  while (const auto part = outbox.next(start).part) {
+    if (part->level != level) {
+      CHECK(offset == coarse);
+      level = part->level;
+      offset = 0;
+    }
+    CHECK(part->frame->id == 4);
+    CHECK(part->offset == offset);
+    CHECK(part->bytes.data() == part->frame->levels[level]->bytes.data() + offset);
+    CHECK(part->bytes.size() <= chunkBytes);
+    offset += part->bytes.size();
+    outbox.acknowledge({4, level, offset}, start + 1ms);
+  }
+  CHECK(level == 1);
+  CHECK(offset == fine);
+  CHECK(outbox.underWay() == 0);
+}
+
+TEST_CASE("stream: a viewer that acknowledges nothing gets a window, then the newest") {
+  Outbox outbox(0.0);
+  std::uint64_t sent = 0;
+  for (std::uint32_t id = 0; id < 10; ++id) {
+    outbox.offer(frameOf(id, {mebibyte, 9 * mebibyte}, 2), start + id * 100ms);
+    while (const auto part = outbox.next(start + id * 100ms).part) sent += part->bytes.size();
+  }
+  CHECK(sent == outbox.window());
+  CHECK(outbox.underWay() == sent);
+  CHECK(outbox.dropped() == 8);  // but the first, which came, and the newest
+  // Words about what wasn't sent free nothing.
+  outbox.acknowledge({3, 0, mebibyte}, start + 2s);
+  outbox.acknowledge({0, 1, mebibyte}, start + 2s);
+  outbox.acknowledge({0, 0, 5}, start + 2s);
+  CHECK(outbox.underWay() == sent);
+  outbox.acknowledge({0, 0, mebibyte}, start + 2s);
+  outbox.acknowledge({0, 0, mebibyte}, start + 2s);  // again
+  CHECK(outbox.underWay() == 0);
+  const auto part = outbox.next(start + 2s).part;
+  REQUIRE(part);
+  CHECK(part->frame->id == 9);
+  CHECK(part->offset == 0);
+}
+
+TEST_CASE("stream: a newer frame ends a fine level, and waits for a coarse one") {
+  Outbox outbox(0.0);
+  outbox.offer(frameOf(0, {4 * chunkBytes, 4 * chunkBytes}, 2), start);
+  CHECK(outbox.next(start).part);
+  outbox.offer(frameOf(1, {chunkBytes, 3 * chunkBytes}, 2), start + 1s);
+  for (int i = 0; i < 3; ++i) CHECK(outbox.next(start + 1s).part->frame->id == 0);
+  outbox.acknowledge({0, 0, 4 * chunkBytes}, start + 1s);
+  CHECK(outbox.next(start + 1s).part->frame->id == 1);
+  CHECK(outbox.next(start + 1s).part->level == 1);
+  outbox.offer(frameOf(2, {chunkBytes}, 2), start + 2s);  // the fine level isn't encoded yet
+  const auto part = outbox.next(start + 2s).part;
+  CHECK(part->frame->id == 2);
+  outbox.acknowledge({2, 0, chunkBytes}, start + 2s);
+  CHECK_FALSE(outbox.next(start + 2s).part);
+  outbox.offer(frameOf(2, {chunkBytes, chunkBytes}, 2), start + 2s + 1ms);
+  CHECK(outbox.next(start + 2s + 1ms).part->level == 1);
+  CHECK(outbox.dropped() == 0);
+}
+
+TEST_CASE("stream: a slow line carries coarse levels while frames come, and the fine one afterwards") {
+  Outbox outbox(0.0);
+  const double rate = 2.0 * mebibyte;
+  Line line(outbox, rate);
+  Clock::time_point now = start;
+  const std::uint32_t frames = 20;
+  for (std::uint32_t id = 0; id < frames; ++id, now += 500ms) {
+    outbox.offer(frameOf(id, {mebibyte / 2, 4 * mebibyte}, 2), now);
+    line.run(now, now + 500ms);
+  }
+  std::size_t coarse = 0;
+  for (std::uint32_t id = 2; id < frames; ++id) coarse += line.sent(id, 0) == mebibyte / 2 ? 1 : 0;
+  CHECK(coarse == frames - 2);
+  std::size_t wasted = 0;
+  for (std::uint32_t id = 4; id + 1 < frames; ++id) wasted += line.sent(id, 1);
+  CHECK(wasted == 0);
+  CHECK(outbox.rate() == Approx(rate).epsilon(0.3));
+  CHECK(line.mostUnderWay() < mebibyte + chunkBytes);
+  line.run(now, now + 10s);
+  CHECK(line.sent(frames - 1, 1) == 4 * mebibyte);
+}
+
+TEST_CASE("stream: a viewer slower than the frames sees whole ones") {
+  Outbox outbox(0.0);
+  Line line(outbox, 1.0 * mebibyte);  // three frames' time for a coarse level
+  Clock::time_point now = start;
+  std::uint32_t id = 0;
+  for (; id < 60; ++id, now += 100ms) {
+    outbox.offer(frameOf(id, {3 * mebibyte / 10, 2 * mebibyte}, 2), now);
+    line.run(now, now + 100ms);
+  }
+  std::uint32_t whole = 0;
+  for (std::uint32_t i = 0; i < id; ++i) whole += line.sent(i, 0) == 3 * mebibyte / 10 ? 1 : 0;
+  CHECK(whole >= 15);
+  CHECK(outbox.dropped() >= 30);
+}
+
+TEST_CASE("stream: a limit is kept") {
+  const double limit = 1e6;
+  Outbox outbox(limit);
+  Line line(outbox, 1e9);
+  outbox.offer(frameOf(0, {10 * mebibyte}, 1), start);
+  line.run(start, start + 4s);
+  CHECK(static_cast<double>(line.sent(0, 0)) < 4.0 * limit + 2.0 * chunkBytes);
+  CHECK(static_cast<double>(line.sent(0, 0)) > 3.5 * limit);
+  CHECK(outbox.rate() <= limit);
+  // It says when to ask again.
+  Outbox::Next next = outbox.next(start + 4s);
+  while (next.part) next = outbox.next(start + 4s);
+  REQUIRE(next.retry);
+  CHECK(*next.retry > start + 4s);
+  CHECK(*next.retry < start + 5s);
+}
+
+TEST_CASE("stream: pause and skip") {
+  Outbox outbox(0.0);
+  outbox.pause(true);
+  outbox.offer(frameOf(0, {10}, 1), start);
+  CHECK_FALSE(outbox.next(start).part);
+  outbox.offer(frameOf(1, {10}, 1), start + 1s);
+  outbox.pause(false);
+  CHECK(outbox.next(start + 1s).part->frame->id == 1);
+  Outbox knows(0.0);
+  knows.skip(frameOf(5, {10}, 1));
+  CHECK_FALSE(knows.next(start).part);
+  knows.offer(frameOf(6, {10}, 1), start);
+  CHECK(knows.next(start).part->frame->id == 6);
+}

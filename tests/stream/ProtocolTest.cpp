@@ -1,0 +1,252 @@
+// Messages: what one side writes the other reads, and nothing else.
+#include <algorithm>
+#include <limits>
+
+#include "tests/Catch.h"
+#include "tests/io/Samples.h"
+#include "vdi/core/Error.h"
+#include "vdi/stream/Assembly.h"
+#include "vdi/stream/Http.h"
+#include "vdi/stream/Protocol.h"
+#include "vdi/stream/Token.h"
+#include "vdi/stream/Url.h"
+
+using namespace vdi;
+using namespace vdi::stream;
+
+namespace {
+
+const std::vector<FromViewer>& viewerMessages() {
+  static const std::vector<FromViewer> all{Hello{1, "0123456789abcdef", "session", 7U},
+                                           Hello{1, "~token~.-_", std::nullopt, std::nullopt},
+                                           Ack{4294967295U, 1, std::uint64_t{1} << 53U},
+                                           Show{12},
+                                           Pause{},
+                                           Resume{}};
+  return all;
+}
+
+const std::vector<FromServer>& serverMessages() {
+  static const std::vector<FromServer> all{
+      Welcome{1, "abc", false, std::nullopt, 3},
+      Welcome{1, "abc", true, Series{{0.5, std::nullopt, -1e300}, {1, 2, std::uint64_t{1} << 60U}}, 1},
+      SeriesPart{4096, Series{{2.0}, {9}}},
+      State{Phase::Waiting, 0},
+      State{Phase::Live, 8},
+      State{Phase::Ended, 1},
+      Level{7, 1, 2, 123456789, 1921, 1081, 200, 0.125, 0.5, 3},
+      Level{7, 0, 1, 1, 1, 1, 0, std::nullopt, 0.0, 0},
+      Missing{3, "gone"},
+      Refusal{"the token is wrong"}};
+  return all;
+}
+
+std::string text(std::size_t length, test::Noise& noise) {
+  std::string result;
+  for (std::size_t i = 0; i < length; ++i) result += static_cast<char>(noise.below(256));
+  return result;
+}
+
+/// Whether the message was read, or refused as it should be.
+template <typename Read>
+bool isReadOrRefused(const Read& read) {
+  try {
+    read();
+    return true;
+  } catch (const Error& error) {
+    return error.code() == ErrorCode::Format;
+  } catch (...) {
+    return false;
+  }
+}
+
+std::vector<std::byte> message(const Chunk& chunk) {
+  const auto head = chunkHead(chunk);
+  std::vector<std::byte> bytes(head.size() + chunk.bytes.size());
+  std::copy(head.begin(), head.end(), bytes.begin());
+  std::copy(chunk.bytes.begin(), chunk.bytes.end(), bytes.begin() + chunkHeadBytes);
+  return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("stream: messages are read as they were written") {
+  for (const FromViewer& m : viewerMessages()) CHECK(viewerMessage(textOf(m)) == m);
+  for (const FromServer& m : serverMessages()) CHECK(serverMessage(textOf(m)) == m);
+  CHECK(serverMessage(R"({"type":"to come","x":[1]})") == FromServer(Unknown{}));
+  // What another program writes.
+  CHECK(viewerMessage(R"( {"bytes":5,"more":{"a":[1]},"level":0,"frame":2,"type":"ack"})") ==
+        FromViewer(Ack{2, 0, 5}));
+  CHECK(std::get<Hello>(viewerMessage(R"({"type":"hello","version":9})")).version == 9);
+  const Level endless{1, 0, 1, 5, 1, 1, 0, std::numeric_limits<double>::quiet_NaN(), 0.0, 0};
+  CHECK_FALSE(std::get<Level>(serverMessage(textOf(FromServer(endless)))).time);
+}
+
+TEST_CASE("stream: messages that make no sense are refused") {
+  const std::vector<std::string> bad{"",
+                                     "null",
+                                     "[]",
+                                     "7",
+                                     "\"hello\"",
+                                     "{",
+                                     "{}",
+                                     R"({"type":null})",
+                                     R"({"type":"hello"})",
+                                     R"({"type":"hello","version":"1","token":"t"})",
+                                     R"({"type":"hello","version":1,"token":5})",
+                                     R"({"type":"hello","version":1})",
+                                     R"({"type":"hello","version":1,"token":"t","have":-1})",
+                                     R"({"type":"hello","version":1,"token":"t","have":4294967296})",
+                                     R"({"type":"hello","version":1e999,"token":"t"})",
+                                     R"({"type":"ack","frame":1,"level":0})",
+                                     R"({"type":"ack","frame":1,"level":0,"bytes":0.5})",
+                                     R"({"type":"ack","frame":1,"level":0,"bytes":-5})",
+                                     R"({"type":"show"})",
+                                     R"({"type":"show","index":null})",
+                                     R"({"type":"welcome"})",
+                                     R"({"type":"pause"} x)",
+                                     R"({"type":"pause","a":[[[[1]]]]})",
+                                     std::string(4000, '['),
+                                     "{\"type\":\"pause\",\"a\":\"" + std::string(4096, 'a') + "\"}",
+                                     "{\"type\":\"\xff\"}"};
+  for (const std::string& m : bad) {
+    INFO(m.substr(0, 80));
+    CHECK(test::errorOf([&] { viewerMessage(m); }).code() == ErrorCode::Format);
+  }
+  const std::vector<std::string> worse{
+      R"({"type":"welcome","version":1,"session":"s","steer":false,"series":{"times":[1],"steps":[]},"viewers":1})",
+      R"({"type":"welcome","version":1,"session":"s","steer":false,"series":[],"viewers":1})",
+      R"({"type":"state","state":"asleep","viewers":1})",
+      R"({"type":"level","frame":1,"level":2,"levels":2,"bytes":1,"width":1,"height":1,"age":0,"dropped":0})",
+      R"({"type":"level","frame":1,"level":0,"levels":2,"bytes":0,"width":1,"height":1,"age":0,"dropped":0})",
+      R"({"type":"level","frame":1,"level":0,"levels":2,"bytes":9,"width":4294967295,"height":1,"age":0,"dropped":0})"};
+  for (const std::string& m : worse) {
+    INFO(m);
+    CHECK(test::errorOf([&] { serverMessage(m); }).code() == ErrorCode::Format);
+  }
+}
+
+TEST_CASE("stream: damaged messages are read or refused") {
+  test::Noise noise(29);
+  std::vector<std::string> seeds;
+  for (const FromViewer& m : viewerMessages()) seeds.push_back(textOf(m));
+  for (const FromServer& m : serverMessages()) seeds.push_back(textOf(m));
+  const std::string marks = "{}[]\",:0-9e.\\untf";
+  std::size_t wrong = 0;
+  for (int i = 0; i < 20000; ++i) {
+    std::string m = seeds[noise.below(static_cast<std::uint32_t>(seeds.size()))];
+    for (std::uint32_t edits = 1 + noise.below(4); edits > 0 && !m.empty(); --edits) {
+      const auto at = noise.below(static_cast<std::uint32_t>(m.size()));
+      switch (noise.below(4)) {
+        case 0:
+          m[at] = static_cast<char>(noise.below(256));
+          break;
+        case 1:
+          m.resize(at);
+          break;
+        case 2:
+          m.insert(at, 1 + noise.below(3), marks[noise.below(static_cast<std::uint32_t>(marks.size()))]);
+          break;
+        default:
+          m.insert(at, m.substr(noise.below(static_cast<std::uint32_t>(m.size())), noise.below(20)));
+      }
+    }
+    if (!isReadOrRefused([&m] { viewerMessage(m); }) || !isReadOrRefused([&m] { serverMessage(m); })) ++wrong;
+  }
+  for (int i = 0; i < 2000; ++i) {
+    const std::string m = text(noise.below(60), noise);
+    if (!isReadOrRefused([&m] { viewerMessage(m); }) || !isReadOrRefused([&m] { serverMessage(m); })) ++wrong;
+  }
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("stream: levels are put together from parts in order alone") {
+  std::vector<std::byte> file(chunkBytes + 1000);
+  test::Noise noise(3);
+  for (std::byte& b : file) b = static_cast<std::byte>(noise.below(256));
+  const std::span<const std::byte> all(file);
+  const Level level{5, 1, 2, file.size(), 10, 10, 0, 0.0, 0.0, 0};
+  const auto first = message({5, 1, 0, all.first(chunkBytes)});
+  const auto second = message({5, 1, chunkBytes, all.subspan(chunkBytes)});
+  const auto refuses = [](Assembly& assembly, const std::vector<std::byte>& m) {
+    return test::errorOf([&] { assembly.add(m); }).code() == ErrorCode::Format;
+  };
+  Assembly assembly;
+  CHECK(refuses(assembly, first));  // none was begun
+  assembly.begin(level, file.size());
+  CHECK_FALSE(assembly.add(first));
+  CHECK(assembly.progress() == Ack{5, 1, chunkBytes});
+  CHECK(refuses(assembly, first));  // replayed
+  CHECK(refuses(assembly, message({4, 1, chunkBytes, all.subspan(chunkBytes)})));
+  CHECK(refuses(assembly, message({5, 0, chunkBytes, all.subspan(chunkBytes)})));
+  CHECK(refuses(assembly, message({5, 1, chunkBytes + 1, all.subspan(chunkBytes)})));
+  CHECK(refuses(assembly, message({5, 1, chunkBytes, all.first(1001)})));  // beyond the end
+  CHECK(refuses(assembly, {second.begin(), second.begin() + chunkHeadBytes}));
+  CHECK(refuses(assembly, std::vector<std::byte>(3)));
+  CHECK(refuses(assembly, std::vector<std::byte>(chunkHeadBytes + chunkBytes + 1)));
+  const auto whole = assembly.add(second);
+  REQUIRE(whole);
+  CHECK(whole->file == file);
+  CHECK(whole->level == level);
+  CHECK(refuses(assembly, second));
+  // One that is abandoned leaves nothing behind.
+  assembly.begin(level, file.size());
+  CHECK_FALSE(assembly.add(first));
+  assembly.begin(level, file.size());
+  CHECK(assembly.progress() == Ack{5, 1, 0});
+  Level large = level;
+  large.bytes = std::uint64_t{1} << 62U;
+  CHECK(test::errorOf([&] { assembly.begin(large, file.size()); }).code() == ErrorCode::Format);
+  assembly.begin(large, std::numeric_limits<std::uint64_t>::max());  // takes no memory
+}
+
+TEST_CASE("stream: tokens") {
+  const std::string token = randomToken();
+  CHECK(token.size() == 64);
+  CHECK(token != randomToken());
+  requireToken(token, "test");
+  const TokenCheck check(token);
+  CHECK(check.accepts(token));
+  CHECK_FALSE(check.accepts(""));
+  CHECK_FALSE(check.accepts(token.substr(1)));
+  CHECK_FALSE(check.accepts(token + "0"));
+  std::string other = token;
+  other.back() = other.back() == '0' ? '1' : '0';
+  CHECK_FALSE(check.accepts(other));
+  for (const std::string& bad :
+       {std::string("short"), std::string(300, 'a'), std::string("sixteen letters &")}) {
+    const Error error = test::errorOf([&] { requireToken(bad, "here"); });
+    CHECK(error.code() == ErrorCode::InvalidArgument);
+    CHECK(std::string(error.what()).find(bad) == std::string::npos);
+  }
+}
+
+TEST_CASE("stream: links") {
+  const Url url = parseUrl("http://node7:8080/#token=abc&camera=1,2");
+  CHECK(url.host == "node7");
+  CHECK(url.port == 8080);
+  CHECK(url.token == "abc");
+  CHECK_FALSE(url.isEncrypted);
+  CHECK(parseUrl("https://host").port == 443);
+  CHECK(parseUrl("http://host#camera=1&token=xyz").token == "xyz");
+  CHECK(parseUrl("http://[::1]:99/").host == "::1");
+  CHECK(parseUrl("http://[::1]:99/").authority() == "[::1]:99");
+  for (const std::string bad :
+       {"", "host:80", "ftp://h/", "http://", "http://:80/", "http://h:0/", "http://h:66000/",
+        "http://h:8x/#token=secret", "http://h:80/page#token=secret", "http://[::1/"}) {
+    INFO(bad);
+    const Error error = test::errorOf([&] { parseUrl(bad); });
+    CHECK(error.code() == ErrorCode::InvalidArgument);
+    CHECK(std::string(error.what()).find("secret") == std::string::npos);
+  }
+}
+
+TEST_CASE("stream: the page's scripts are named by their digests") {
+  CHECK(scriptSources("<p>none</p>") == "'none'");
+  // printf 'alert(1)' | openssl dgst -sha256 -binary | base64
+  const std::string one = "'sha256-bhHHL3z2vDgxUt0W3dWQOrprscmda2Y5pLsLg4GF+pI='";
+  CHECK(scriptSources("<script>alert(1)</script>") == one);
+  CHECK(scriptSources("a<script type=\"module\">alert(1)</script><script>alert(1)</script>b") ==
+        one + " " + one);
+  CHECK(scriptSources("<script>alert(1)") == "'none'");
+}

@@ -1,0 +1,77 @@
+#include "vdi/stream/Publisher.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <exception>
+#include <utility>
+
+namespace vdi::stream {
+
+namespace {
+
+/// Of this thread and those that it starts: Linux has a niceness for each thread.
+void giveWay() {
+  constexpr int niceness = 10;
+  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), niceness);
+}
+
+}  // namespace
+
+Publisher::Publisher(Server& server) : server_(server) {
+  thread_ = std::thread([this] { work(); });
+}
+
+Publisher::~Publisher() {
+  {
+    const std::scoped_lock lock(mutex_);
+    isEnding_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void Publisher::publish(std::shared_ptr<const Vdi> vdi) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (pending_) ++dropped_;
+    pending_ = {std::move(vdi), Clock::now()};
+  }
+  changed_.notify_all();
+}
+
+std::uint64_t Publisher::dropped() const {
+  const std::scoped_lock lock(mutex_);
+  return dropped_;
+}
+
+std::string Publisher::trouble() const {
+  const std::scoped_lock lock(mutex_);
+  return trouble_;
+}
+
+void Publisher::work() {
+  giveWay();
+  while (true) {
+    Pending pending;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return pending_ || isEnding_; });
+      if (!pending_) return;
+      pending = *std::exchange(pending_, std::nullopt);
+    }
+    encode(pending);
+  }
+}
+
+void Publisher::encode(const Pending& pending) {
+  try {
+    encodeFrame(*pending.vdi, nextId_++, pending.made, std::nullopt,
+                [this](FramePtr frame) { server_.publish(std::move(frame)); });
+  } catch (const std::exception& error) {
+    const std::scoped_lock lock(mutex_);
+    if (trouble_.empty()) trouble_ = error.what();
+  }
+}
+
+}  // namespace vdi::stream

@@ -1,0 +1,54 @@
+// VDIs of a running simulation as the frames of a server, encoded beside it.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "vdi/core/Vdi.h"
+#include "vdi/stream/Frame.h"
+#include "vdi/stream/Server.h"
+
+namespace vdi::stream {
+
+/// Encodes on a thread of its own and those that this starts, at a lower priority than the simulation's.
+class Publisher {
+ public:
+  /// The server outlives it.
+  explicit Publisher(Server& server);
+  /// What was published last is encoded and handed to the server before it returns.
+  ~Publisher();
+  Publisher(const Publisher&) = delete;
+  Publisher& operator=(const Publisher&) = delete;
+
+  /// Never waits. A VDI whose encoding hasn't begun when the next one comes is dropped.
+  void publish(std::shared_ptr<const Vdi> vdi);
+  std::uint64_t dropped() const;
+  /// The first VDI that couldn't be encoded, and why; empty: none. Later ones are encoded all the same.
+  std::string trouble() const;
+
+ private:
+  struct Pending {
+    std::shared_ptr<const Vdi> vdi;
+    Clock::time_point made;
+  };
+  void work();
+  void encode(const Pending& pending);
+
+  Server& server_;
+  std::uint32_t nextId_ = 0;  // the thread's
+
+  mutable std::mutex mutex_;  // for what follows
+  std::condition_variable changed_;
+  std::optional<Pending> pending_;
+  std::uint64_t dropped_ = 0;
+  std::string trouble_;
+  bool isEnding_ = false;
+  std::thread thread_;
+};
+
+}  // namespace vdi::stream
