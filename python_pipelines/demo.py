@@ -1,7 +1,8 @@
 """Catalyst script of the demo: at each step a VDI of V, its picture from where it was made and from 5, 20 and 50 degrees
 beside it, each next to plain volume rendering from the same viewpoint, and how alike they are (SSIM).
 
-Environment: VDI_PLUGIN (the plugin; the adaptor sets it), VDI_OUTPUT (folder), VDI_WIDTH and VDI_HEIGHT (of the pictures)."""
+Environment: VDI_PLUGIN (the plugin; the adaptor sets it), VDI_OUTPUT (folder), VDI_WIDTH and VDI_HEIGHT (of the pictures),
+VDI_LIVE (1: browsers see the VDIs; the link is in vdi-stream.link)."""
 
 import os
 
@@ -73,6 +74,10 @@ for angle, proxy in seen.items():
 
 extractor = CreateExtractor("VDI", image, registrationName="vdi")
 extractor.Writer.FileName = "vdi_{timestep:06d}.vdi"
+
+if os.environ.get("VDI_LIVE") == "1":
+    stream = CreateExtractor("VDIStream", image, registrationName="stream")
+    stream.Writer.LinkFile = os.path.join(OUTPUT, "vdi-stream.link")
 
 options = catalyst.Options()
 options.ExtractsOutputDirectory = OUTPUT

@@ -1,0 +1,54 @@
+"""The extractor VDIStream: what a simulation's script offers is what a viewer gets. The argument tells runs apart."""
+
+import gc
+import os
+import stat
+import subprocess
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from pvtest import *  # noqa: E402,F403
+
+name = sys.argv[1]
+link_file = os.path.join(OUTPUT, "stream_%s.link" % name)
+folder = os.path.join(OUTPUT, "stream_%s" % name)
+
+
+def receive(link, patience=100):
+    # A viewer isn't one of the ranks.
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PMI_"))}
+    return subprocess.run([os.environ["VDI_TOOL"], "receive", link, "-o", folder, "--frames", "1", "--patience", str(patience)],
+                          capture_output=True, text=True, timeout=150, env=environment)
+
+
+image = simple.VolumetricDepthImage(Input=simple.Wavelet(WholeExtent=[-12, 12, -12, 12, -12, 12]))
+image.SelectInputScalars = ["POINTS", "RTData"]
+image.Resolution = [160, 120]
+image.CameraPosition = [40, 30, 50]
+extractor = simple.CreateExtractor("VDIStream", image, registrationName="stream")
+extractor.Writer.LinkFile = link_file
+# What the extractor of files writes at the last of the scene's steps.
+files = simple.CreateExtractor("VDI", image, registrationName="files")
+files.Writer.FileName = "stream_%s.vdi" % name
+link = None
+for number, supersegments in enumerate((12, 5)):
+    image.Supersegments = supersegments
+    simple.SaveExtracts(ExtractsOutputDirectory=OUTPUT)
+    if link is None:
+        with open(link_file) as file:
+            link = file.read().strip()
+        check(stat.S_IMODE(os.stat(link_file).st_mode) == 0o600, "its owner alone can read the link")
+        check("#token=" in link and link.startswith("http://127.0.0.1:"), "the link has host, port and token")
+    done = receive(link)
+    check(done.returncode == 0, "a viewer gets VDI %d: %s" % (number, done.stderr))
+    with open(os.path.join(folder, "vdi_000000.vdi"), "rb") as file:
+        got = file.read()
+    with open(os.path.join(OUTPUT, "stream_%s.vdi" % name), "rb") as file:
+        check(got == file.read(), "VDI %d is the one that the extractor of files writes" % number)
+
+simple.Delete(extractor)
+del extractor
+gc.collect()
+check(not os.path.exists(link_file), "the link goes with the server")
+done = receive(link, 0.5)
+check(done.returncode == 1 and "no connection" in done.stderr, "and the server with the extractor")
