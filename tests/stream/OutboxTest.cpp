@@ -65,7 +65,7 @@ const Clock::time_point start = Clock::time_point(1000s);
 
 }  // namespace
 
-TEST_CASE("stream: parts make up the levels, the coarse one first") {
+TEST_CASE("parts make up the levels, the coarse one first") {
   Outbox outbox(0.0);
   const std::size_t coarse = 300000;
   const std::size_t fine = 900000;
@@ -90,7 +90,7 @@ TEST_CASE("stream: parts make up the levels, the coarse one first") {
   CHECK(outbox.underWay() == 0);
 }
 
-TEST_CASE("stream: a viewer that acknowledges nothing gets a window, then the newest") {
+TEST_CASE("a viewer that acknowledges nothing gets a window, then the newest") {
   Outbox outbox(0.0);
   std::uint64_t sent = 0;
   for (std::uint32_t id = 0; id < 10; ++id) {
@@ -114,7 +114,7 @@ TEST_CASE("stream: a viewer that acknowledges nothing gets a window, then the ne
   CHECK(part->offset == 0);
 }
 
-TEST_CASE("stream: a newer frame ends a fine level, and waits for a coarse one") {
+TEST_CASE("a newer frame ends a fine level, and waits for a coarse one") {
   Outbox outbox(0.0);
   outbox.offer(frameOf(0, {4 * chunkBytes, 4 * chunkBytes}, 2), start);
   CHECK(outbox.next(start).part);
@@ -133,7 +133,7 @@ TEST_CASE("stream: a newer frame ends a fine level, and waits for a coarse one")
   CHECK(outbox.dropped() == 0);
 }
 
-TEST_CASE("stream: a slow line carries coarse levels while frames come, and the fine one afterwards") {
+TEST_CASE("a slow line carries coarse levels while frames come, and the fine one afterwards") {
   Outbox outbox(0.0);
   const double rate = 2.0 * mebibyte;
   Line line(outbox, rate);
@@ -155,7 +155,7 @@ TEST_CASE("stream: a slow line carries coarse levels while frames come, and the 
   CHECK(line.sent(frames - 1, 1) == 4 * mebibyte);
 }
 
-TEST_CASE("stream: a viewer slower than the frames sees whole ones") {
+TEST_CASE("a viewer slower than the frames sees whole ones") {
   Outbox outbox(0.0);
   Line line(outbox, 1.0 * mebibyte);  // three frames' time for a coarse level
   Clock::time_point now = start;
@@ -170,7 +170,7 @@ TEST_CASE("stream: a viewer slower than the frames sees whole ones") {
   CHECK(outbox.dropped() >= 30);
 }
 
-TEST_CASE("stream: a limit is kept") {
+TEST_CASE("a limit is kept") {
   const double limit = 1e6;
   Outbox outbox(limit);
   Line line(outbox, 1e9);
@@ -187,7 +187,7 @@ TEST_CASE("stream: a limit is kept") {
   CHECK(*next.retry < start + 5s);
 }
 
-TEST_CASE("stream: pause and skip") {
+TEST_CASE("pause and skip") {
   Outbox outbox(0.0);
   outbox.pause(true);
   outbox.offer(frameOf(0, {10}, 1), start);

@@ -70,7 +70,7 @@ std::vector<std::byte> message(const Chunk& chunk) {
 
 }  // namespace
 
-TEST_CASE("stream: messages are read as they were written") {
+TEST_CASE("messages are read as they were written") {
   for (const FromViewer& m : viewerMessages()) CHECK(viewerMessage(textOf(m)) == m);
   for (const FromServer& m : serverMessages()) CHECK(serverMessage(textOf(m)) == m);
   CHECK(serverMessage(R"({"type":"to come","x":[1]})") == FromServer(Unknown{}));
@@ -82,7 +82,7 @@ TEST_CASE("stream: messages are read as they were written") {
   CHECK_FALSE(std::get<Level>(serverMessage(textOf(FromServer(endless)))).time);
 }
 
-TEST_CASE("stream: messages that make no sense are refused") {
+TEST_CASE("messages that make no sense are refused") {
   const std::vector<std::string> bad{"",
                                      "null",
                                      "[]",
@@ -126,7 +126,7 @@ TEST_CASE("stream: messages that make no sense are refused") {
   }
 }
 
-TEST_CASE("stream: damaged messages are read or refused") {
+TEST_CASE("damaged messages are read or refused") {
   test::Noise noise(29);
   std::vector<std::string> seeds;
   for (const FromViewer& m : viewerMessages()) seeds.push_back(textOf(m));
@@ -160,7 +160,7 @@ TEST_CASE("stream: damaged messages are read or refused") {
   CHECK(wrong == 0);
 }
 
-TEST_CASE("stream: levels are put together from parts in order alone") {
+TEST_CASE("levels are put together from parts in order alone") {
   std::vector<std::byte> file(chunkBytes + 1000);
   test::Noise noise(3);
   for (std::byte& b : file) b = static_cast<std::byte>(noise.below(256));
@@ -200,7 +200,7 @@ TEST_CASE("stream: levels are put together from parts in order alone") {
   assembly.begin(large, std::numeric_limits<std::uint64_t>::max());  // takes no memory
 }
 
-TEST_CASE("stream: tokens") {
+TEST_CASE("tokens") {
   const std::string token = randomToken();
   CHECK(token.size() == 64);
   CHECK(token != randomToken());
@@ -221,7 +221,7 @@ TEST_CASE("stream: tokens") {
   }
 }
 
-TEST_CASE("stream: links") {
+TEST_CASE("links") {
   const Url url = parseUrl("http://node7:8080/#token=abc&camera=1,2");
   CHECK(url.host == "node7");
   CHECK(url.port == 8080);
@@ -241,7 +241,7 @@ TEST_CASE("stream: links") {
   }
 }
 
-TEST_CASE("stream: the page's scripts are named by their digests") {
+TEST_CASE("the page's scripts are named by their digests") {
   CHECK(scriptSources("<p>none</p>") == "'none'");
   // printf 'alert(1)' | openssl dgst -sha256 -binary | base64
   const std::string one = "'sha256-bhHHL3z2vDgxUt0W3dWQOrprscmda2Y5pLsLg4GF+pI='";

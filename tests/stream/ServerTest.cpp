@@ -80,7 +80,7 @@ void writeCertificate(const std::filesystem::path& key, const std::filesystem::p
 
 }  // namespace
 
-TEST_CASE("stream: what is published arrives") {
+TEST_CASE("what is published arrives") {
   Server server(options());
   Client client(clientOf(server));
   Publisher publisher(server);
@@ -98,7 +98,7 @@ TEST_CASE("stream: what is published arrives") {
   CHECK(publisher.trouble().empty());
 }
 
-TEST_CASE("stream: a large VDI comes coarse, then in full") {
+TEST_CASE("a large VDI comes coarse, then in full") {
   Server server(options());
   Client client(clientOf(server));
   Publisher publisher(server);
@@ -119,7 +119,7 @@ TEST_CASE("stream: a large VDI comes coarse, then in full") {
   CHECK(io::decode(full.file) == *vdi);
 }
 
-TEST_CASE("stream: publishing waits for no encoder") {
+TEST_CASE("publishing waits for no encoder") {
   Server server(options());
   Publisher publisher(server);
   const auto vdi = std::make_shared<const Vdi>(test::noisyVdi(300, 200, 20));
@@ -134,7 +134,7 @@ TEST_CASE("stream: publishing waits for no encoder") {
   }
 }
 
-TEST_CASE("stream: the last VDI is sent before the end") {
+TEST_CASE("the last VDI is sent before the end") {
   Server server(options());
   Client client(clientOf(server));
   {
@@ -145,7 +145,7 @@ TEST_CASE("stream: the last VDI is sent before the end") {
   CHECK(nextOf(client).level.step == 1);
 }
 
-TEST_CASE("stream: a client comes back to a server that was started again") {
+TEST_CASE("a client comes back to a server that was started again") {
   ServerOptions again = options();
   auto first = std::make_unique<Server>(again);
   again.port = first->port();
@@ -165,7 +165,7 @@ TEST_CASE("stream: a client comes back to a server that was started again") {
   CHECK(client.standing().session != session);
 }
 
-TEST_CASE("stream: a wrong token and a foreign server end a client") {
+TEST_CASE("a wrong token and a foreign server end a client") {
   Server server(options());
   ClientOptions wrong = clientOf(server);
   wrong.url.token = randomToken();
@@ -176,7 +176,7 @@ TEST_CASE("stream: a wrong token and a foreign server end a client") {
   CHECK(test::errorOf([&] { client.next(patience); }).code() == ErrorCode::InvalidArgument);
 }
 
-TEST_CASE("stream: encrypted, for those who trust the certificate") {
+TEST_CASE("encrypted, for those who trust the certificate") {
   const test::TemporaryFolder folder;
   const auto path = [&folder](const char* name) { return folder.path() / name; };
   writeCertificate(path("key.pem"), path("cert.pem"), "127.0.0.1");
@@ -219,7 +219,7 @@ TEST_CASE("stream: encrypted, for those who trust the certificate") {
   CHECK(test::errorOf([&] { Server none(broken); }).code() == ErrorCode::Io);
 }
 
-TEST_CASE("stream: what can't be served is refused at once") {
+TEST_CASE("what can't be served is refused at once") {
   ServerOptions weak = options();
   weak.token = "short";
   CHECK(test::errorOf([&] { Server none(weak); }).code() == ErrorCode::InvalidArgument);
