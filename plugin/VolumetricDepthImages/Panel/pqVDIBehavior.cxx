@@ -15,17 +15,15 @@
 #include <vtkOutputWindow.h>
 #include <vtkPVPluginsInformation.h>
 #include <vtkSMPluginManager.h>
-#include <vtkSMPropertyHelper.h>
 #include <vtkSMProxyManager.h>
 #include <vtkSMRenderViewProxy.h>
 #include <vtkSMSession.h>
 #include <vtkSMTrace.h>
 #include <QTimer>
 
-#include <algorithm>
-#include <array>
 #include <string_view>
 
+#include "VDIViewpoint.h"
 #include "pqVDIRegenerator.h"
 #include "pqVDISaveData.h"
 #include "pqVDIStillFrames.h"
@@ -51,19 +49,10 @@ void lookFromViewpoint(pqPipelineSource* source) {
   pqView* view = pqActiveObjects::instance().activeView();
   auto* proxy = view != nullptr ? vtkSMRenderViewProxy::SafeDownCast(view->getViewProxy()) : nullptr;
   if (proxy == nullptr || !showsOnly(view, source)) return;
-  source->getProxy()->UpdatePropertyInformation(source->getProxy()->GetProperty("Viewpoint"));
-  std::array<double, 12> numbers{};
-  vtkSMPropertyHelper(source->getProxy(), "Viewpoint")
-      .Get(numbers.data(), static_cast<unsigned int>(numbers.size()));
-  if (std::equal(numbers.begin(), numbers.begin() + 3, numbers.begin() + 3)) return;  // no VDI could be read
+  const auto viewpoint = pv::viewpointOf(source->getProxy());
+  if (!viewpoint) return;
   BEGIN_UNDO_EXCLUDE();
-  vtkSMPropertyHelper(proxy, "CameraPosition").Set(numbers.data(), 3);
-  vtkSMPropertyHelper(proxy, "CameraFocalPoint").Set(&numbers[3], 3);
-  vtkSMPropertyHelper(proxy, "CameraViewUp").Set(&numbers[6], 3);
-  vtkSMPropertyHelper(proxy, "CameraViewAngle").Set(numbers[9]);
-  vtkSMPropertyHelper(proxy, "CameraParallelProjection").Set(numbers[10] != 0.0 ? 1 : 0);
-  vtkSMPropertyHelper(proxy, "CameraParallelScale").Set(numbers[11]);
-  proxy->UpdateVTKObjects();
+  pv::lookFrom(*viewpoint, proxy);
   END_UNDO_EXCLUDE();
   view->render();
 }
