@@ -72,7 +72,7 @@ std::vector<Node> withAtMost(const std::vector<Node>& nodes, double tolerance) {
   return few;
 }
 
-[[noreturn]] void fail(const std::string& what) {
+[[noreturn]] void failColoring(const std::string& what) {
   throw Error(ErrorCode::Format, "the coloring isn't sound: " + what);
 }
 
@@ -81,14 +81,14 @@ std::vector<Node> withAtMost(const std::vector<Node>& nodes, double tolerance) {
 void validate(const Coloring& coloring) {
   const ScalarArray& array = coloring.array;
   if (array.components < 1 || array.component < -1 || array.component >= array.components)
-    fail(fmt::format("component {} of {}", array.component, array.components));
+    failColoring(fmt::format("component {} of {}", array.component, array.components));
   const auto [low, high] = coloring.range;
   if (low <= high ? !std::isfinite(low) || !std::isfinite(high) : coloring.range != ScalarRange())
-    fail(fmt::format("a range from {} to {}", low, high));
+    failColoring(fmt::format("a range from {} to {}", low, high));
   try {
     validate(coloring.function);
   } catch (const Error& error) {
-    fail(error.what());
+    failColoring(error.what());
   }
 }
 
