@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Makes the .deb, looks at what it depends on and has, and runs its tool where it was unpacked. Arguments: the build folder, an
-# output folder, the libraries' folder in the package.
+# output folder, the libraries' folder in the package, Python.
 set -euo pipefail
 build=$1
 libraries=$3
+python=$4
 rm -rf "$2" && mkdir -p "$2" && cd "$2"
 (cd "$build" && cpack -B "$OLDPWD" >"$OLDPWD/cpack.log" 2>&1) || { cat cpack.log; exit 1; }
 depends=$(dpkg-deb -f pv-vdi_*.deb Depends)
@@ -16,7 +17,7 @@ for file in usr/bin/{vdi,paraview.conf} usr/include/pv-vdi/vdi_catalyst.{h,f90} 
   "usr/bin/$(cat root/usr/bin/paraview.conf)"; do
   [ -e "root/$file" ] || { echo "FAILED: it has no $file"; exit 1; }
 done
-PYTHONPATH=root/usr/lib/python3/dist-packages python3 -c "import pv_vdi.catalyst as c; c._load()" \
+PYTHONPATH=root/usr/lib/python3/dist-packages "$python" -c "import pv_vdi.catalyst as c; c._load()" \
   || { echo "FAILED: its Python package can't be imported"; exit 1; }
 if grep -rlF "$build" root; then
   echo "FAILED: the build folder's path is in these files"

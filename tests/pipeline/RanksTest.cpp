@@ -350,7 +350,8 @@ TEST_CASE("lists of more than 255 supersegments: both ways, and the picture of o
       const auto& offsets = vdi->offsets();
       for (std::size_t i = 0; i + 1 < offsets.size(); ++i)
         longest = std::max(longest, offsets[i + 1] - offsets[i]);
-      CHECK(longest > 255 * static_cast<std::uint32_t>(world.size()));  // some rank's count exceeds a byte
+      // Up to three ranks, some rank's own count exceeds a byte; with more, only the whole list's does.
+      CHECK(longest > 255 * static_cast<std::uint32_t>(std::min(world.size(), 3)));
       CHECK(longest <= budget);
     }
     made.check(vdi, generator.renderVolume(test::oblique(), function, settings));
