@@ -172,7 +172,7 @@ for name, low, high in (("set", -2.0, 9.0), ("unit", 0.0, 1.0)):
     filter_of(given, name=name).UpdatePipeline()
     check(range_of(name) == [low, high, low, high], "points set on [%g, %g] stay there" % (low, high))
 preset = simple.GetColorTransferFunction("preset")
-preset.ApplyPreset("Viridis (matplotlib)", True)
+preset.ApplyPreset("Cool to Warm", True)
 simple.GetOpacityTransferFunction("preset").Points = [0, 0, 0.5, 0, 2, 1, 0.5, 0]
 filter_of(producer_of(renamed(field([0, 0, 0]), "preset")), name="preset").UpdatePipeline()
 check(range_of("preset") == [0, 4, 0, 2], "a preset waits for the range, opacities set beside it don't move")
