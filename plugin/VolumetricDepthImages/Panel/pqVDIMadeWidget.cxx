@@ -47,7 +47,7 @@ std::optional<vdi::Coloring> coloringOf(vtkSMProxy* reader) {
 }
 
 QString nameOf(const vdi::ScalarArray& array) {
-  const QString name = QString::fromStdString(array.name);
+  QString name = QString::fromStdString(array.name);
   if (array.components < 2) return name;
   return array.component < 0 ? QObject::tr("%1, magnitude").arg(name)
                              : QObject::tr("%1, component %2").arg(name).arg(array.component);
