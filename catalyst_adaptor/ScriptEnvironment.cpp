@@ -42,13 +42,14 @@ void sharePython() {
   dlopen(fileOf(&Py_IsInitialized).c_str(), RTLD_NOW | RTLD_NOLOAD | RTLD_GLOBAL);
 }
 
+// In parentheses, for vtkPython.h has macros of these names that take no lock.
 PythonLock::PythonLock() {
-  if (Py_IsInitialized() != 0) before_ = PyGILState_Ensure();
+  if (Py_IsInitialized() != 0) before_ = (PyGILState_Ensure)();
 }
 
 PythonLock::~PythonLock() {
   // ParaView's end is Python's too, if ParaView started it.
-  if (before_ && Py_IsInitialized() != 0) PyGILState_Release(static_cast<PyGILState_STATE>(*before_));
+  if (before_ && Py_IsInitialized() != 0) (PyGILState_Release)(static_cast<PyGILState_STATE>(*before_));
 }
 
 }  // namespace vdi::catalyst

@@ -36,7 +36,9 @@ void copyRow(const StridedValues& values, std::int64_t count, const std::byte* f
 
 template <std::size_t scalarBytes>
 void copyAll(const StridedValues& values, std::byte* to) {
-  const auto& [nx, ny, nz] = values.counts;
+  const std::int64_t nx = values.counts[0];
+  const std::int64_t ny = values.counts[1];
+  const std::int64_t nz = values.counts[2];
   const std::int64_t valueBytes = static_cast<std::int64_t>(scalarBytes) * values.components;
   const bool wholeRows = rowInOrder(values);
   const std::int64_t tileX = wholeRows ? nx : tile;
