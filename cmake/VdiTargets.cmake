@@ -40,6 +40,7 @@ function(vdi_add_catch_test name)
     target_link_libraries(test_${name} PRIVATE vdi_test_main ${arg_LINK})
   endif()
   vdi_target_options(test_${name})
+  target_compile_options(test_${name} PRIVATE $<$<CONFIG:Release>:-O1>) # compiles faster; what it tests is optimised
   if("core" IN_LIST arg_LABELS)
     add_dependencies(core_tests test_${name})
   endif()

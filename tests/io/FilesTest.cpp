@@ -48,6 +48,22 @@ TEST_CASE("a file is written, replaced and read, whole or in part") {
   CHECK(folder.fileCount() == 1);
 }
 
+TEST_CASE("a link is replaced, and what isn't one stays") {
+  const test::TemporaryFolder folder;
+  const fs::path link = folder.path() / "latest";
+  io::replaceLink(link, "a");
+  io::writeAtomically(folder.path() / "b", bytesOf(1, 2));
+  io::replaceLink(link, "b");
+  CHECK(fs::read_symlink(link) == "b");
+  CHECK(io::InputFile(link).readAll() == bytesOf(1, 2));
+  CHECK(folder.fileCount() == 2);
+  const Error refused = test::errorOf([&] { io::replaceLink(folder.path() / "b", "a"); });
+  CHECK(refused.code() == ErrorCode::Io);
+  CHECK(io::InputFile(folder.path() / "b").readAll() == bytesOf(1, 2));
+  CHECK(test::errorOf([&] { io::replaceLink(folder.path() / "none" / "latest", "a"); }).code() ==
+        ErrorCode::Io);
+}
+
 TEST_CASE("a new file has the permissions that any new file has") {
   const test::TemporaryFolder folder;
   const mode_t before = ::umask(027);

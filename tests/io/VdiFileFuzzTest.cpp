@@ -21,19 +21,24 @@ constexpr std::size_t headerBytes = 240;
 
 enum class Outcome { Refused, Sound, Other };
 
-/// Other: another exception, or an invalid VDI.
-Outcome outcomeOf(std::span<const std::byte> bytes) {
-  // A copy of exactly this size lets a sanitizer notice every byte read beyond it.
-  const std::vector<std::byte> copy(bytes.begin(), bytes.end());
+template <typename Decode>
+Outcome outcomeOfCall(Decode decode) {
   try {
-    const Vdi vdi = io::decode(copy);
-    validate(vdi);
+    validate(decode());
     return Outcome::Sound;
   } catch (const Error& error) {
     return error.code() == ErrorCode::Format ? Outcome::Refused : Outcome::Other;
   } catch (...) {
     return Outcome::Other;
   }
+}
+
+/// Other: another exception, an invalid VDI, or a file that only one of the two decoders refuses.
+Outcome outcomeOf(std::span<const std::byte> bytes) {
+  // A copy of exactly this size lets a sanitizer notice every byte read beyond it.
+  const std::vector<std::byte> copy(bytes.begin(), bytes.end());
+  const Outcome outcome = outcomeOfCall([&copy] { return io::decode(copy); });
+  return outcomeOfCall([&copy] { return io::decodeThinned(copy, 3); }) == outcome ? outcome : Outcome::Other;
 }
 
 void put64(std::vector<std::byte>& bytes, std::size_t offset, std::uint64_t value) {

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Finite.h"
 #include "vdi/core/Parallel.h"
 
 namespace vdi {
@@ -48,10 +49,6 @@ auto withTyped(ScalarType type, Void* data, Function function) {
       break;
   }
   return as(double{});
-}
-
-bool finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
 /// Written so that compilers vectorise it. This runs for every value of every step; a loop with a branch and
@@ -223,7 +220,7 @@ void validate(std::span<const Block> blocks) {
     // Values computed in single precision need a distance from its limits.
     constexpr double minSpacing = 1e-30;
     constexpr double maxSpacing = 1e30;
-    if (!finite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(minSpacing))) ||
+    if (!isFinite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(minSpacing))) ||
         glm::any(glm::greaterThan(block.spacing, glm::dvec3(maxSpacing)))) {
       throw Error(ErrorCode::InvalidArgument,
                   fmt::format("spacing must be from {} to {}, it is ({}, {}, {}); other units of length help",
@@ -231,7 +228,8 @@ void validate(std::span<const Block> blocks) {
                   context);
     }
     const bool ownsNothing = block.owned.empty();
-    if (!finite(block.origin) || (!ownsNothing && (!finite(block.owned.lo) || !finite(block.owned.hi)))) {
+    if (!isFinite(block.origin) ||
+        (!ownsNothing && (!isFinite(block.owned.lo) || !isFinite(block.owned.hi)))) {
       throw Error(ErrorCode::InvalidArgument, "origin and owned box must be finite", context);
     }
     constexpr double farthest = 1e12;

@@ -7,14 +7,11 @@
 #include <numbers>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Finite.h"
 
 namespace vdi {
 
 namespace {
-
-bool finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 double radians(double degrees) {
   return degrees * std::numbers::pi / 180.0;
@@ -43,7 +40,7 @@ glm::dvec3 orthogonalUp(const glm::dvec3& up, const glm::dvec3& forward) {
 }
 
 void validateCamera(const Camera& camera) {
-  if (!finite(camera.position) || !finite(camera.focalPoint) || !finite(camera.viewUp)) {
+  if (!isFinite(camera.position) || !isFinite(camera.focalPoint) || !isFinite(camera.viewUp)) {
     throw Error(ErrorCode::InvalidArgument, "the camera's position, focal point and view-up must be finite");
   }
   const double distance = glm::length(camera.focalPoint - camera.position);
@@ -106,8 +103,8 @@ View::View(const Camera& camera, int width, int height) : camera_(camera), width
 View::View(const Camera& camera, int width, int height, const ImagePlane& plane)
     : View(camera, width, height) {
   const glm::dvec2 extent = plane.high - plane.low;
-  if (!(extent.x > 0.0) || !(extent.y > 0.0) || !finite({plane.low, extent.x}) ||
-      !finite({plane.high, extent.y})) {
+  if (!(extent.x > 0.0) || !(extent.y > 0.0) || !isFinite({plane.low, extent.x}) ||
+      !isFinite({plane.high, extent.y})) {
     throw Error(ErrorCode::InvalidArgument, "the image plane must be finite and have an extent");
   }
   halfWidth_ = 0.5 * extent.x;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstring>
 #include <future>
@@ -32,6 +33,16 @@ void inParallel(std::size_t count, std::size_t minimum, Work work) {
   }
   if (count > 0) work(std::size_t{0}, std::min(share, count));
   for (std::future<void>& other : others) other.get();
+}
+
+/// Calls work(index) for each of [0, count), on several threads, each of which takes the next index when it
+/// is done with one: for elements that take very different times. Otherwise as inParallel.
+template <typename Work>
+void eachInParallel(std::size_t count, Work work) {
+  std::atomic<std::size_t> next{0};
+  inParallel(std::min(count, usableCores()), 1, [&](std::size_t, std::size_t) {
+    for (std::size_t i = next++; i < count; i = next++) work(i);
+  });
 }
 
 /// Copies on several threads: one core copies about 10 GB/s.

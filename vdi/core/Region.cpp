@@ -5,16 +5,9 @@
 #include <cmath>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Finite.h"
 
 namespace vdi {
-
-namespace {
-
-bool isFinite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-}  // namespace
 
 void validate(const Region& region) {
   const auto refuse = [](const std::string& what) { throw Error(ErrorCode::InvalidArgument, what); };

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Finite.h"
 
 namespace vdi {
 
@@ -15,10 +16,6 @@ glm::dvec3 onSphere(double elevation, double azimuth) {
   const double up = glm::radians(elevation);
   const double right = glm::radians(azimuth);
   return {std::cos(up) * std::sin(right), std::sin(up), std::cos(up) * std::cos(right)};
-}
-
-bool isFinite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
 }  // namespace

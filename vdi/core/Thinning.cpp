@@ -1,38 +1,43 @@
 #include "vdi/core/Thinning.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <glm/trigonometric.hpp>
 #include <span>
+#include <utility>
 #include <variant>
 #include <vector>
+
+#include "vdi/core/Parallel.h"
 
 namespace vdi {
 
 namespace {
 
-/// `columns` and `rows` are indices of the lists to take, in [0, size), or -1 for an empty list.
 template <typename Segment>
-ListsOf<Segment> taken(const ListsOf<Segment>& lists, int width, const std::vector<int>& columns,
-                       const std::vector<int>& rows) {
+ListsOf<Segment> taken(const ListsOf<Segment>& lists, const std::vector<std::uint32_t>& sources) {
+  constexpr std::size_t listsPerThread = 1 << 14;
   ListsOf<Segment> few;
-  few.offsets.assign(1, 0);
-  few.offsets.reserve(columns.size() * rows.size() + 1);
-  for (const int row : rows) {
-    for (const int column : columns) {
-      if (row >= 0 && column >= 0) {
-        const std::span<const Segment> list =
-            lists.list(static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
-                       static_cast<std::size_t>(column));
-        few.segments.insert(few.segments.end(), list.begin(), list.end());
-      }
-      few.offsets.push_back(static_cast<std::uint32_t>(few.segments.size()));
-    }
+  few.offsets.reserve(sources.size() + 1);
+  std::uint32_t end = 0;
+  for (const std::uint32_t source : sources) {
+    if (source != Thinning::noList) end += lists.countOf(source);
+    few.offsets.push_back(end);
   }
+  few.segments.resize(end);
+  inParallel(sources.size(), listsPerThread, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      if (sources[i] == Thinning::noList) continue;
+      const std::span<const Segment> list = lists.list(sources[i]);
+      std::copy(list.begin(), list.end(), few.segments.begin() + few.offsets[i]);
+    }
+  });
   return few;
 }
 
-/// Indices, among `many` lists along an axis, of those at the centres of `few`, which cover `share` as much.
+/// Indices, among `many` lists along an axis, of those at the centres of `few`, which cover `share` as much;
+/// -1 for a centre outside all of them.
 std::vector<int> placesOf(int few, int many, double share) {
   std::vector<int> places(static_cast<std::size_t>(few));
   for (int i = 0; i < few; ++i) {
@@ -45,9 +50,10 @@ std::vector<int> placesOf(int few, int many, double share) {
 
 }  // namespace
 
-Vdi thinned(const Vdi& vdi, int factor) {
+Thinning thinningOf(const Vdi& vdi, int factor) {
   assert(factor >= 1);
-  Vdi few;
+  Thinning thinning;
+  Vdi& few = thinning.few;
   few.camera = vdi.camera;
   // The same height as all lists together.
   const double halfHeight = vdi.view().halfHeight();
@@ -70,8 +76,21 @@ Vdi thinned(const Vdi& vdi, int factor) {
       (static_cast<double>(few.width) * vdi.height) / (static_cast<double>(few.height) * vdi.width);
   const std::vector<int> columns = placesOf(few.width, vdi.width, share);
   const std::vector<int> rows = placesOf(few.height, vdi.height, 1.0);
-  std::visit([&](const auto& lists) { few.lists = taken(lists, vdi.width, columns, rows); }, vdi.lists);
-  return few;
+  thinning.sources.reserve(columns.size() * rows.size());
+  for (const int row : rows) {
+    for (const int column : columns) {
+      const bool isInside = row >= 0 && column >= 0;
+      thinning.sources.push_back(isInside ? static_cast<std::uint32_t>(row * vdi.width + column)
+                                          : Thinning::noList);
+    }
+  }
+  return thinning;
+}
+
+Vdi thinned(const Vdi& vdi, int factor) {
+  Thinning thinning = thinningOf(vdi, factor);
+  std::visit([&](const auto& lists) { thinning.few.lists = taken(lists, thinning.sources); }, vdi.lists);
+  return std::move(thinning.few);
 }
 
 }  // namespace vdi

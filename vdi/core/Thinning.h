@@ -1,5 +1,8 @@
-// VDIs with fewer lists, for views that must be fast.
+// VDIs with fewer lists, for views and networks that must be fast.
 #pragma once
+
+#include <cstdint>
+#include <vector>
 
 #include "vdi/core/Vdi.h"
 
@@ -8,5 +11,16 @@ namespace vdi {
 /// Keeps about one list in `factor` of each row and of each column, unchanged; `factor` is at least 1. Views
 /// of the result take less time on a CPU, and are as coarse as pictures with that many fewer pixels.
 Vdi thinned(const Vdi& vdi, int factor);
+
+/// What thinned() does to a VDI, without its lists, for readers that do not have all of them at once.
+struct Thinning {
+  Vdi few;  // the thinned VDI, but for its lists; the depth code is that of the VDI given
+  /// [few.height][few.width]: the list of the whole VDI that becomes this one, in ascending order; noList for
+  /// one that stays empty.
+  std::vector<std::uint32_t> sources;
+  static constexpr std::uint32_t noList = ~std::uint32_t{0};
+};
+/// Of `vdi`, all but the lists must be known.
+Thinning thinningOf(const Vdi& vdi, int factor);
 
 }  // namespace vdi

@@ -159,9 +159,9 @@ int openAsItIs(const fs::path& path) {
 /// An unused name in the folder. It has a random part, because process numbers repeat between the nodes of a
 /// cluster that share a file system. It is short, because the file's own name may have the greatest possible
 /// length.
-fs::path temporaryName(const Destination& to) {
+fs::path temporaryName(const fs::path& folder) {
   std::random_device random;
-  return to.folder() / fmt::format(".vdi-{}-{:08x}{:08x}.tmp", ::getpid(), random(), random());
+  return folder / fmt::format(".vdi-{}-{:08x}{:08x}.tmp", ::getpid(), random(), random());
 }
 
 bool giveName(int descriptor, const fs::path& name) {
@@ -255,7 +255,7 @@ struct OutputFile::State {
     fs::path candidate;
     int descriptor = -1;
     do {
-      candidate = temporaryName(to);
+      candidate = temporaryName(to.folder());
       descriptor = ::open(candidate.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     } while (descriptor < 0 && errno == EEXIST);
     if (descriptor < 0) fail("create the file", errno, to.path);
@@ -269,7 +269,7 @@ struct OutputFile::State {
     fs::path candidate;
     bool named = false;
     do {
-      candidate = temporaryName(to);
+      candidate = temporaryName(to.folder());
       named = giveName(file.get(), candidate);
     } while (!named && errno == EEXIST);
     if (named) {
@@ -384,6 +384,18 @@ void writeAtomically(const fs::path& path, std::span<const std::byte> bytes) {
   OutputFile file(path);
   file.write(0, bytes);
   file.commit();
+}
+
+void replaceLink(const fs::path& link, const fs::path& target) {
+  Status found{};
+  if (::lstat(link.c_str(), &found) == 0 && !S_ISLNK(found.st_mode))
+    throw Error(ErrorCode::Io, "what has the name of a link isn't one, and stays", link.string());
+  const fs::path made = temporaryName(link.has_parent_path() ? link.parent_path() : ".");
+  if (::symlink(target.c_str(), made.c_str()) != 0) fail("make a link", errno, link);
+  if (::rename(made.c_str(), link.c_str()) == 0) return;
+  const int reason = errno;
+  (void)::unlink(made.c_str());
+  fail("make a link", reason, link);
 }
 
 fs::path requireWritable(const fs::path& path) {

@@ -102,6 +102,10 @@ class SharedOutput {
   int descriptor_;
 };
 
+/// Makes `link` a symbolic link to `target`, which is relative to the link's folder. Readers see the old link
+/// or the new one. Throws Error{Io} with the link as context; what has that name and isn't a link stays.
+void replaceLink(const std::filesystem::path& link, const std::filesystem::path& target);
+
 /// Throws the Error{Io} that writeAtomically would throw now, before there is anything to write. Changes
 /// nothing. Returns the regular file that would be made or replaced, absolute and with links followed; an
 /// empty path for a device or pipe. Two paths with the same result are one file.

@@ -10,11 +10,13 @@
 #include <cmath>
 #include <cstring>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
+#include "vdi/core/Thinning.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/ListCodec.h"
 #include "vdi/io/Metadata.h"
@@ -327,17 +329,104 @@ void requireSound(const Chunk& chunk, std::span<const std::byte> packed, Precisi
   }
 }
 
-/// Returns the depth code of the chunk's supersegments.
+/// Decodes a chunk into place (see detail::unpackLists, where `ends` and `segments` are explained) and
+/// returns the depth code of its supersegments.
 template <typename Segment>
-DepthCode decodeChunk(const Chunk& chunk, std::span<const std::byte> packed, ListsOf<Segment>& lists) {
+DepthCode decodeChunk(const Chunk& chunk, std::span<const std::byte> packed, std::uint64_t before,
+                      std::span<std::uint32_t> ends, std::span<Segment> segments) {
   try {
-    return detail::unpackLists(
-        packed, static_cast<std::uint32_t>(chunk.firstSupersegment),
-        std::span(lists.offsets).subspan(chunk.firstList + 1, chunk.listCount),
-        std::span(lists.segments).subspan(chunk.firstSupersegment, chunk.supersegmentCount));
+    return detail::unpackLists(packed, static_cast<std::uint32_t>(before), ends, segments);
   } catch (const Error& error) {
     fail(fmt::format("the chunk from list {} on: {}", chunk.firstList, error.what()));
   }
+}
+
+/// The parts of a file in memory. Header, table, metadata and all checksums are sound.
+struct ParsedFile {
+  Vdi vdi;  // without lists and depth code
+  std::vector<Chunk> chunks;
+  std::span<const std::byte> data;
+
+  std::span<const std::byte> packed(const Chunk& chunk) const {
+    return data.subspan(chunk.dataOffset, chunk.packedBytes);
+  }
+};
+
+ParsedFile parseFile(std::span<const std::byte> bytes) {
+  const Header header = parseHeader(bytes, bytes.size());
+  ParsedFile file;
+  file.chunks = parseTable(header, bytes.subspan(sizeof(Header)));
+  file.vdi = vdiOf(header);
+  file.vdi.coloring = parseMetadata(header, bytes.subspan(metadataOffset(header)));
+  file.data = bytes.subspan(sizeof(Header) + tableBytesOf(header), header.dataBytes);
+  const Precision precision = precisionOf(header);
+  eachInParallel(file.chunks.size(), [&](std::size_t i) {
+    requireSound(file.chunks[i], file.packed(file.chunks[i]), precision);
+  });
+  return file;
+}
+
+/// Calls decodeOne(index) for all chunks, on several threads, and returns the depth code that they share.
+template <typename DecodeOne>
+DepthCode decodeChunks(const ParsedFile& file, DecodeOne decodeOne) {
+  std::vector<DepthCode> codes(file.chunks.size());
+  eachInParallel(file.chunks.size(), [&](std::size_t i) { codes[i] = decodeOne(i); });
+  for (const DepthCode& code : codes) {
+    if (code != codes.front()) fail("its chunks have different depth codes");
+  }
+  return codes.front();
+}
+
+/// The lists of one chunk that are kept.
+template <typename Segment>
+struct KeptLists {
+  std::vector<Segment> segments;
+  std::vector<std::uint32_t> counts;
+};
+
+/// `sources`: lists of the file, in ascending order, between which there may be Thinning::noList.
+template <typename Segment>
+ListsOf<Segment> decodeSome(const ParsedFile& file, std::span<const std::uint32_t> sources, DepthCode& code) {
+  std::vector<std::uint32_t> wanted(sources.begin(), sources.end());
+  wanted.erase(std::remove(wanted.begin(), wanted.end(), Thinning::noList), wanted.end());
+  std::vector<KeptLists<Segment>> kept(file.chunks.size());
+  code = decodeChunks(file, [&](std::size_t index) {
+    const Chunk& chunk = file.chunks[index];
+    ListsOf<Segment> all;
+    all.offsets.resize(chunk.listCount + 1);
+    all.offsets.front() = 0;
+    all.segments.resize(chunk.supersegmentCount);
+    const DepthCode chunkCode =
+        decodeChunk(chunk, file.packed(chunk), 0, std::span(all.offsets).subspan(1), std::span(all.segments));
+    validateLists(all, 0, chunk.listCount, chunk.firstList, file.vdi.budget);
+    auto source = std::lower_bound(wanted.begin(), wanted.end(), chunk.firstList);
+    for (; source != wanted.end() && *source < chunk.firstList + chunk.listCount; ++source) {
+      const std::span<const Segment> list = all.list(*source - chunk.firstList);
+      kept[index].segments.insert(kept[index].segments.end(), list.begin(), list.end());
+      kept[index].counts.push_back(static_cast<std::uint32_t>(list.size()));
+    }
+    return chunkCode;
+  });
+
+  ListsOf<Segment> lists;
+  lists.offsets.reserve(sources.size() + 1);
+  std::uint32_t end = 0;
+  std::size_t chunk = 0;
+  std::size_t place = 0;  // in the chunk
+  for (const std::uint32_t source : sources) {
+    if (source != Thinning::noList) {
+      while (place == kept[chunk].counts.size()) {
+        ++chunk;
+        place = 0;
+      }
+      end += kept[chunk].counts[place++];
+    }
+    lists.offsets.push_back(end);
+  }
+  lists.segments.reserve(end);
+  for (const KeptLists<Segment>& part : kept)
+    lists.segments.insert(lists.segments.end(), part.segments.begin(), part.segments.end());
+  return lists;
 }
 
 VdiFileInfo infoOf(const Header& header, std::optional<Coloring> coloring, std::uint64_t fileBytes) {
@@ -389,9 +478,7 @@ void encodeChunks(const ListsOf<Segment>& lists, std::size_t first, std::size_t 
   std::vector<EncodedChunk> chunks;
   for (std::size_t begin = first; begin < last; begin += chunks.size() * listsPerChunk) {
     chunks.resize(std::min<std::size_t>(atOnce, chunksOf(last - begin)));
-    inParallel(chunks.size(), 1, [&](std::size_t from, std::size_t to) {
-      for (std::size_t i = from; i < to; ++i) chunks[i] = encodeOne(begin + i * listsPerChunk);
-    });
+    eachInParallel(chunks.size(), [&](std::size_t i) { chunks[i] = encodeOne(begin + i * listsPerChunk); });
     for (EncodedChunk& chunk : chunks) take(std::move(chunk));
   }
 }
@@ -459,26 +546,44 @@ std::vector<std::byte> encode(const Vdi& vdi) {
 }
 
 Vdi decode(std::span<const std::byte> bytes) {
-  const Header header = parseHeader(bytes, bytes.size());
-  const std::vector<Chunk> chunks = parseTable(header, bytes.subspan(sizeof(Header)));
-  Vdi vdi = vdiOf(header);
-  vdi.coloring = parseMetadata(header, bytes.subspan(metadataOffset(header)));
-  const auto data = bytes.subspan(sizeof(Header) + tableBytesOf(header), header.dataBytes);
-  const auto packedOf = [&](const Chunk& chunk) { return data.subspan(chunk.dataOffset, chunk.packedBytes); };
-  for (const Chunk& chunk : chunks) requireSound(chunk, packedOf(chunk), precisionOf(header));
+  ParsedFile file = parseFile(bytes);
+  Vdi& vdi = file.vdi;
   std::visit(
       [&](auto& lists) {
-        lists.offsets.resize(std::size_t{header.width} * header.height + 1);
-        lists.segments.resize(header.supersegmentCount);
-        for (const Chunk& chunk : chunks) {
-          const DepthCode code = decodeChunk(chunk, packedOf(chunk), lists);
-          if (chunk.firstList == 0) vdi.depthCode = code;
-          if (code != vdi.depthCode) fail("its chunks have different depth codes");
-        }
+        lists.offsets.resize(listsOf(vdi) + 1);
+        lists.segments.resize(file.chunks.back().firstSupersegment + file.chunks.back().supersegmentCount);
+        vdi.depthCode = decodeChunks(file, [&](std::size_t index) {
+          const Chunk& chunk = file.chunks[index];
+          return decodeChunk(
+              chunk, file.packed(chunk), chunk.firstSupersegment,
+              std::span(lists.offsets).subspan(chunk.firstList + 1, chunk.listCount),
+              std::span(lists.segments).subspan(chunk.firstSupersegment, chunk.supersegmentCount));
+        });
+        eachInParallel(file.chunks.size(), [&](std::size_t i) {
+          const Chunk& chunk = file.chunks[i];
+          validateLists(lists, chunk.firstList, chunk.firstList + chunk.listCount, chunk.firstList,
+                        vdi.budget);
+        });
       },
       vdi.lists);
-  validate(vdi);
-  return vdi;
+  validateShape(vdi);
+  validateEnds(vdi);
+  return std::move(vdi);
+}
+
+Vdi decodeThinned(std::span<const std::byte> bytes, int factor) {
+  const ParsedFile file = parseFile(bytes);
+  Thinning thinning = thinningOf(file.vdi, factor);
+  Vdi& few = thinning.few;
+  std::visit(
+      [&](const auto& lists) {
+        using Lists = std::decay_t<decltype(lists)>;
+        using Segment = typename decltype(Lists::segments)::value_type;
+        few.lists = decodeSome<Segment>(file, thinning.sources, few.depthCode);
+      },
+      file.vdi.lists);
+  validateShape(few);
+  return std::move(few);
 }
 
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes) {
