@@ -36,21 +36,6 @@ Camera readCamera(const std::filesystem::path& path) {
   return camera;
 }
 
-Camera orbitCamera(const Box& bounds, const Orbit& orbit, double viewAngle) {
-  const glm::dvec3 up = glm::normalize(orbit.up);
-  const glm::dvec3 aside = std::abs(up.x) < 0.99 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 0.0, 1.0);
-  const glm::dvec3 right = glm::normalize(aside - glm::dot(aside, up) * up);
-  const glm::dvec3 back = glm::cross(right, up);
-  const double azimuth = radians(orbit.azimuth);
-  const double elevation = radians(orbit.elevation);
-  const glm::dvec3 around = std::cos(azimuth) * back + std::sin(azimuth) * right;
-  const glm::dvec3 from = std::cos(elevation) * around + std::sin(elevation) * up;
-  Camera camera = Camera::framing(bounds, -from, orbit.up, viewAngle);
-  camera.position = camera.focalPoint + (camera.position - camera.focalPoint) / orbit.zoom;
-  camera.parallelScale /= orbit.zoom;
-  return camera;
-}
-
 Camera turned(const Camera& camera, double azimuthDegrees, double elevationDegrees) {
   Camera result = camera.azimuth(azimuthDegrees);
   if (elevationDegrees == 0.0) return result;

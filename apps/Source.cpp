@@ -8,6 +8,7 @@
 #include "apps/Help.h"
 #include "apps/RawVolume.h"
 #include "apps/TransferFunctions.h"
+#include "vdi/config/Presets.h"
 #include "vdi/core/Error.h"
 #include "vdi/synthetic/DeviceField.h"
 #include "vdi/synthetic/Fields.h"
@@ -262,13 +263,13 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene) {
   // The distance that shows the whole scene depends on these; invalid values are rejected later.
   const double angle = options.camera.viewAngle.value_or(30.0);
   const bool sensible = angle > 0.0 && angle < 180.0;
-  Orbit orbit = options.orbit;
+  config::Orbit orbit = options.orbit;
   if (!options.camera.viewUp.empty()) {
     orbit.up = vectorOf(options.camera.viewUp);
     if (!(glm::length(orbit.up) > 0.0))
       throw Error(ErrorCode::InvalidArgument, "--view-up must be finite and not zero");
   }
-  Camera camera = orbitCamera(scene.bounds, orbit, sensible ? angle : 30.0);
+  Camera camera = config::orbitCamera(scene.bounds, orbit, sensible ? angle : 30.0);
   camera.parallelProjection = options.parallel;
   return chosenCamera(options.camera, camera);
 }
@@ -383,7 +384,7 @@ void addBudgetOptions(CLI::App& command, QualityOptions& options) {
 
 void addTransferFunctionOptions(CLI::App& command, QualityOptions& options) {
   std::string presets;
-  for (const PresetInfo& info : transferFunctionPresets())
+  for (const config::PresetInfo& info : config::transferFunctionPresets())
     presets += "\n  " + info.name + ": " + info.description;
   command
       .add_option("--transfer-function", options.transferFunction,
@@ -474,8 +475,8 @@ TransferFunction makeTransferFunction(const QualityOptions& options, const Scene
     function = readTransferFunction(options.transferFunction, range);
   } else {
     const double diagonal = glm::length(scene.bounds.size());
-    function =
-        presetTransferFunction(options.transferFunction, range, diagonal > 0.0 ? diagonal / 50.0 : 1.0);
+    function = config::presetTransferFunction(options.transferFunction, range,
+                                              diagonal > 0.0 ? diagonal / 50.0 : 1.0);
   }
   if (options.unitDistance) function.unitDistance = *options.unitDistance;
   return function;

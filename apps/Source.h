@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/Cameras.h"
+#include "vdi/config/Orbit.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Coloring.h"
 #include "vdi/core/GenerateSettings.h"
@@ -65,7 +66,7 @@ Camera chosenCamera(const CameraOptions& options, const Camera& otherwise);
 /// A viewpoint on an orbit around the scene, unless the camera is given.
 struct ViewOptions {
   CameraOptions camera;
-  Orbit orbit{.azimuth = 30.0, .elevation = 20.0};
+  config::Orbit orbit{.azimuth = 30.0, .elevation = 20.0};
   bool parallel = false;
 };
 void addViewOptions(CLI::App& command, ViewOptions& options);

@@ -31,6 +31,7 @@
 #include "ScriptGuard.h"
 #include "catalyst_adaptor/Agreement.h"
 #include "plugin/VolumetricDepthImages/Filters/VDICollective.h"
+#include "plugin/VolumetricDepthImages/Filters/VDIParameters.h"
 #include "plugin/VolumetricDepthImages/ParaViewVersions.h"
 
 namespace vdi::catalyst {
@@ -225,15 +226,19 @@ struct Engine::State {
   ParaViewComm comm;
   Agreement agreement;  // apart from ParaView's messages, and from the caller's
   Log log;
+  Parameters parameters;
   vtkNew<vtkCallbackCommand> entry;
+  vtkNew<vtkCallbackCommand> exchange;
   std::optional<Guard> guard;
   vtkSmartPointer<vtkSMSourceProxy> producer;
   std::vector<vtkSmartPointer<Pipeline>> pipelines;
 
   ~State() {
     producer = nullptr;
-    if (auto* controller = vtkMultiProcessController::GetGlobalController())
+    if (auto* controller = vtkMultiProcessController::GetGlobalController()) {
       controller->RemoveObserver(entry);
+      controller->RemoveObserver(exchange);
+    }
     if (vtkInSituInitializationHelper::IsInitialized()) vtkInSituInitializationHelper::Finalize();
   }
   void start(const std::string& plugin);
@@ -268,6 +273,15 @@ void Engine::State::watchEntries() {
     asked.refusal = static_cast<Agreement*>(client)->enter(asked.operation);
   });
   controller->AddObserver(pv::CollectiveEntry::event, entry);
+  exchange->SetClientData(&parameters);
+  exchange->SetCallback([](vtkObject*, unsigned long, void* client, void* data) {
+    auto& own = *static_cast<Parameters*>(client);
+    auto& asked = *static_cast<pv::ParameterExchange*>(data);
+    own.set(asked.changes);
+    for (const Parameter& one : own.all())
+      asked.parameters.push_back({one.name, one.isWhole, one.value, one.low, one.high});
+  });
+  controller->AddObserver(pv::ParameterExchange::event, exchange);
 }
 
 void Engine::State::add(const std::vector<std::string>& scripts) {
@@ -328,6 +342,10 @@ bool Engine::wants(int step, double time) const {
   const bool allLoaded =
       std::ranges::all_of(pipelines, [](const auto& pipeline) { return pipeline->loaded(); });
   return !allLoaded || (!pipelines.empty() && state_->guard->wants(step, time));
+}
+
+Parameters& Engine::parameters() {
+  return state_->parameters;
 }
 
 std::optional<std::string> Engine::finish() {

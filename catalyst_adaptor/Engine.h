@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "catalyst_adaptor/Parameters.h"
+
 class vtkDataObject;
 
 namespace vdi::catalyst {
@@ -38,6 +40,9 @@ class Engine {
 
   /// Whether a script does anything at this step, or may. Not collective.
   bool wants(int step, double time) const;
+
+  /// What the simulation has declared. Scripts' extractors change values, in execute alone.
+  Parameters& parameters();
 
   /// Runs every script on `grid`, also those that failed before. nullopt if all went well on this rank, else
   /// what went wrong here; "" where a script was stopped because of another rank. `step` >= 0.

@@ -1,5 +1,5 @@
-/* libvdi_catalyst.so: what a simulation links. It is small, and loads the engine with ParaView when it is
- * initialised, so that a simulation that doesn't use it doesn't pay for ParaView. */
+/* libvdi_catalyst.so: what a simulation links. It is small, and loads an engine when it is initialised, so
+ * that a simulation that doesn't use ParaView doesn't pay for it. */
 #include <dlfcn.h>
 #include <fenv.h>
 #include <mpi.h>
@@ -11,38 +11,51 @@
 
 enum { MESSAGE_SIZE = 4096, PATH_SIZE = 2048 };
 
-/* Null until the engine is loaded. Like the loaded library itself, there is one a process. */
-static const vdi_catalyst_functions* engine;
+/* What runs scripts, in ParaView, or what makes what a JSON text asks for. */
+typedef struct vdi_engine {
+  const char* file; /* in a folder beside this library */
+  const char* needs;
+  const vdi_catalyst_functions* functions; /* null until it's loaded */
+} vdi_engine;
 
-/* The engine lies in a folder beside this library. 0 if this library's own place is unknown or too long. */
-static int engine_path(char path[PATH_SIZE]) {
+/* Like the loaded libraries themselves, there is one of each a process. */
+static vdi_engine script_engine = {
+    VDI_CATALYST_ENGINE_FILE,
+    VDI_PARAVIEW
+    " with Python on every node (Debian: python3-paraview), its libraries on the loader's path "
+    "(LD_LIBRARY_PATH)",
+    NULL};
+static vdi_engine json_engine = {VDI_CATALYST_JSON_FILE, "the Vulkan loader (Debian: libvulkan1)", NULL};
+/* The JSON engine's handle until it's finalized; others are the script engine's, which knows its own. */
+static const vdi_catalyst* json_handle;
+
+/* 0 if this library's own place is unknown or too long. */
+static int engine_path(const char* file, char path[PATH_SIZE]) {
   Dl_info self;
-  if (dladdr((const void*)&engine, &self) == 0 || self.dli_fname == NULL) return 0;
+  if (dladdr((const void*)&script_engine, &self) == 0 || self.dli_fname == NULL) return 0;
   const char* slash = strrchr(self.dli_fname, '/');
   const int folder = slash != NULL ? (int)(slash - self.dli_fname) : 1;
-  const int length = snprintf(path, PATH_SIZE, "%.*s/" VDI_CATALYST_ENGINE_FILE, folder,
-                              slash != NULL ? self.dli_fname : ".");
+  const int length = snprintf(path, PATH_SIZE, "%.*s/%s", folder, slash != NULL ? self.dli_fname : ".", file);
   return length < PATH_SIZE;
 }
 
 /* Loads the engine, unless it is. Returns 0, or 1 with what went wrong in `message`. */
-static int load_engine(char message[MESSAGE_SIZE]) {
-  if (engine != NULL) return 0;
+static int load_engine(vdi_engine* wanted, char message[MESSAGE_SIZE]) {
+  if (wanted->functions != NULL) return 0;
   char path[PATH_SIZE];
-  if (!engine_path(path)) {
+  if (!engine_path(wanted->file, path)) {
     snprintf(message, MESSAGE_SIZE, "the engine can't be found: the path of libvdi_catalyst.so is unknown");
     return 1;
   }
-  /* Local: ParaView's symbols and those of the many libraries below it don't mix with the simulation's. */
+  /* Local: the symbols of the many libraries below it don't mix with the simulation's. */
   void* library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-  engine = library != NULL ? dlsym(library, VDI_CATALYST_ENGINE_SYMBOL) : NULL;
-  const char* reason = engine == NULL ? dlerror() : NULL;
-  if (engine != NULL) return 0;
-  snprintf(message, MESSAGE_SIZE,
-           "the engine %s can't be loaded: %s; it needs " VDI_PARAVIEW
-           " with Python on every node (Debian: python3-paraview), its libraries on the loader's path "
-           "(LD_LIBRARY_PATH), and libvdi_catalyst.so of the same version of pv-vdi",
-           path, reason != NULL ? reason : "no reason is known");
+  wanted->functions = library != NULL ? dlsym(library, VDI_CATALYST_ENGINE_SYMBOL) : NULL;
+  const char* reason = wanted->functions == NULL ? dlerror() : NULL;
+  if (wanted->functions != NULL) return 0;
+  snprintf(
+      message, MESSAGE_SIZE,
+      "the engine %s can't be loaded: %s; it needs %s, and libvdi_catalyst.so of the same version of pv-vdi",
+      path, reason != NULL ? reason : "no reason is known", wanted->needs);
   return 1;
 }
 
@@ -71,36 +84,56 @@ static int failed_anywhere(MPI_Comm comm, int failed, char message[MESSAGE_SIZE]
   return 1;
 }
 
-int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
-                            vdi_catalyst** catalyst) {
-  if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  *catalyst = NULL;
+/* Loads the engine on all ranks. Returns the code for the simulation. */
+static int prepare(vdi_engine* wanted, int32_t fortran_communicator) {
   const MPI_Comm comm = communicator_of(fortran_communicator);
   if (comm == MPI_COMM_NULL) {
     fprintf(stderr, "vdi_catalyst: there is no MPI, or no communicator has this Fortran handle\n");
     return VDI_CATALYST_BAD_ARGUMENT;
   }
   char message[MESSAGE_SIZE] = "";
-  int code = VDI_CATALYST_ENGINE;
+  const int failed = load_engine(wanted, message);
+  return failed_anywhere(comm, failed, message) || failed ? VDI_CATALYST_ENGINE : VDI_CATALYST_OK;
+}
+
+int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
+                            vdi_catalyst** catalyst) {
+  if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
+  *catalyst = NULL;
   vdi_process_state state;
   vdi_process_state_save(&state);
-  const int failed = load_engine(message);
-  if (!failed_anywhere(comm, failed, message) && engine != NULL)
-    code = engine->initialize(fortran_communicator, script_count, scripts, catalyst);
+  int code = prepare(&script_engine, fortran_communicator);
+  if (code == VDI_CATALYST_OK)
+    code = script_engine.functions->initialize(fortran_communicator, script_count, scripts, catalyst);
   vdi_process_state_restore(&state);
   return code;
 }
 
-/* Without an engine there are no handles either. */
-static int usable(const vdi_catalyst* catalyst) {
+int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
+  if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
+  *catalyst = NULL;
+  vdi_process_state state;
+  vdi_process_state_save(&state);
+  int code = prepare(&json_engine, fortran_communicator);
+  if (code == VDI_CATALYST_OK)
+    code = json_engine.functions->initialize_json(fortran_communicator, json, catalyst);
+  if (code == VDI_CATALYST_OK) json_handle = *catalyst;
+  vdi_process_state_restore(&state);
+  return code;
+}
+
+/* What to call with this handle; null if nothing is. Without an engine there are no handles either. */
+static const vdi_catalyst_functions* functions_of(const vdi_catalyst* catalyst) {
   int over = 0;
   MPI_Finalized(&over);
-  return engine != NULL && catalyst != NULL && !over;
+  if (over || catalyst == NULL) return NULL;
+  return catalyst == json_handle ? json_engine.functions : script_engine.functions;
 }
 
 /* This and the next two functions run nothing but our own code, which changes no more than that. */
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   fenv_t floating_point;
   feholdexcept(&floating_point);
   const int code = engine->set_blocks(catalyst, count, blocks);
@@ -110,7 +143,8 @@ int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_cat
 
 int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
                            const void* const* data) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   fenv_t floating_point;
   feholdexcept(&floating_point);
   const int code = engine->set_array(catalyst, name, type, association, data);
@@ -121,7 +155,8 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
 int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
                                    int32_t association, int32_t components, const void* const* data,
                                    const vdi_catalyst_strides* strides) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   fenv_t floating_point;
   feholdexcept(&floating_point);
   const int code = engine->set_array_strided(catalyst, name, type, association, components, data, strides);
@@ -130,7 +165,8 @@ int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int
 }
 
 int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
-  if (!usable(catalyst)) return 0;
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return 0;
   vdi_process_state state;
   vdi_process_state_save(&state);
   const int wants = engine->wants(catalyst, step, time);
@@ -139,7 +175,8 @@ int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
 }
 
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   vdi_process_state state;
   vdi_process_state_save(&state);
   const int code = engine->execute(catalyst, step, time);
@@ -147,19 +184,45 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   return code;
 }
 
+/* Like vdi_catalyst_set_blocks, these run nothing but our own code. */
+double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value, double low,
+                                  double high) {
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return value;
+  fenv_t floating_point;
+  feholdexcept(&floating_point);
+  const double result = engine->parameter_f64(catalyst, name, value, low, high);
+  fesetenv(&floating_point);
+  return result;
+}
+
+int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int64_t value, int64_t low,
+                                   int64_t high) {
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return value;
+  fenv_t floating_point;
+  feholdexcept(&floating_point);
+  const int64_t result = engine->parameter_i64(catalyst, name, value, low, high);
+  fesetenv(&floating_point);
+  return result;
+}
+
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
   int over = 0;
   MPI_Finalized(&over);
-  if (over && engine != NULL && catalyst != NULL)
+  if (over && catalyst != NULL && (script_engine.functions != NULL || json_engine.functions != NULL))
     fprintf(stderr, "vdi_catalyst: vdi_catalyst_finalize comes after MPI_Finalize, so nothing is ended\n");
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   vdi_process_state state;
   vdi_process_state_save(&state);
   const int code = engine->finalize(catalyst);
+  if (catalyst == json_handle) json_handle = NULL;
   vdi_process_state_restore(&state);
   return code;
 }
 
 const char* vdi_catalyst_error(const vdi_catalyst* catalyst) {
-  return usable(catalyst) ? engine->error(catalyst) : "";
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  return engine != NULL ? engine->error(catalyst) : "";
 }

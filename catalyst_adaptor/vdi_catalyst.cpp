@@ -29,22 +29,27 @@
 #include <utility>
 #include <vector>
 
+#include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/Engine.h"
+#include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/ScriptEnvironment.h"
 #include "catalyst_adaptor/StridedArray.h"
 
-struct vdi_catalyst {
-  MPI_Comm comm = MPI_COMM_NULL;  // a duplicate
+struct vdi_catalyst : vdi::catalyst::Calls {
   std::unique_ptr<vdi::catalyst::Engine> engine;
   bool haveBlocks = false;
   vtkSmartPointer<vtkPartitionedDataSet> grid;  // a partition a block
   /// By association and name: the arrays that are gathered, of those blocks whose values aren't in order.
   std::map<std::pair<int, std::string>, std::vector<vdi::catalyst::StridedArray>> gathered;
-  std::string error;
-  std::string printed;  // so that what fails at every step is told in full once
 };
 
 namespace {
+
+using vdi::catalyst::checkBlock;
+using vdi::catalyst::guarded;
+using vdi::catalyst::isStep;
+using vdi::catalyst::require;
+using vdi::catalyst::requireEqual;
 
 /// The handle that's alive: there's one engine in a process. What isn't it is a handle that was finalized,
 /// and mustn't be looked into.
@@ -55,107 +60,6 @@ vdi_catalyst*& alive() {
 
 bool usable(const vdi_catalyst* catalyst) {
   return catalyst != nullptr && catalyst == alive();
-}
-
-/// The first line, and the second where the first says only who speaks.
-std::string firstLine(const std::string& text) {
-  std::size_t end = text.find('\n');
-  std::string line = text.substr(0, end);
-  while (!line.empty() && line.back() == ' ') line.pop_back();
-  if (end == std::string::npos || line.empty() || line.back() != ':') return line;
-  const std::size_t next = end + 1;
-  end = text.find('\n', next);
-  return line + " " + text.substr(next, end == std::string::npos ? end : end - next);
-}
-
-/// By rank 0, on one line for what was printed before: a step whose files are missing is always told.
-void print(vdi_catalyst& self, std::optional<std::int64_t> step) {
-  const bool again = self.error == self.printed;
-  if (again && !step) return;
-  self.printed = self.error;
-  const std::string place = step ? "step " + std::to_string(*step) + ": " : "";
-  const std::string text = again ? "again, " + firstLine(self.error) : self.error;
-  std::fprintf(stderr, "vdi_catalyst: %s%s\n", place.c_str(), text.c_str());
-}
-
-/// What a failing call comes to: the highest code of any rank, and the text of the lowest rank that has it
-/// and something to say, on all ranks; rank 0 prints it. `step`: of execute.
-int conclude(vdi_catalyst& self, int code, const std::string& text, std::optional<std::int64_t> step) {
-  int worst = code;
-  MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_INT, MPI_MAX, self.comm);
-  if (worst == VDI_CATALYST_OK) return worst;
-  int rank = 0;
-  int size = 0;
-  MPI_Comm_rank(self.comm, &rank);
-  MPI_Comm_size(self.comm, &size);
-  // Ranks with the code and a text come first, then those with the code only, then the others.
-  int speaker = rank + size * (code != worst ? 2 : text.empty() ? 1 : 0);
-  MPI_Allreduce(MPI_IN_PLACE, &speaker, 1, MPI_INT, MPI_MIN, self.comm);
-  speaker %= size;
-  std::string message = rank == speaker ? text : "";
-  int length = static_cast<int>(message.size());
-  MPI_Bcast(&length, 1, MPI_INT, speaker, self.comm);
-  message.resize(static_cast<std::size_t>(length));
-  MPI_Bcast(message.data(), length, MPI_CHAR, speaker, self.comm);
-  if (message.empty()) message = "a script failed without saying why";
-  self.error = "rank " + std::to_string(speaker) + ": " + message;
-  if (rank == 0) print(self, step);
-  return worst;
-}
-
-/// Runs `work`, which returns nothing or what went wrong; that or an exception becomes `code`.
-template <typename Work>
-int guarded(vdi_catalyst& self, int code, Work work, std::optional<std::int64_t> step = std::nullopt) {
-  std::optional<std::string> failure;
-  try {
-    if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
-      work();
-    } else {
-      failure = work();
-    }
-  } catch (const std::bad_alloc&) {
-    failure = "out of memory on this host";
-  } catch (const std::exception& error) {
-    failure = error.what();
-  } catch (...) {
-    failure = "an unknown exception";
-  }
-  return conclude(self, failure ? code : VDI_CATALYST_OK, failure.value_or(""), step);
-}
-
-void require(bool good, const char* what) {
-  if (!good) throw std::invalid_argument(what);
-}
-
-void requireEqual(MPI_Comm comm, std::int64_t value, const char* what) {
-  std::array<std::int64_t, 2> extremes{value, ~value};
-  MPI_Allreduce(MPI_IN_PLACE, extremes.data(), 2, MPI_INT64_T, MPI_MAX, comm);
-  require(extremes[0] == ~extremes[1], what);
-}
-
-/// Of points, of which there are more than cells. Throws where VTK's counts would overflow.
-void requireCountable(const vdi_catalyst_block& block) {
-  std::int64_t points = 1;
-  constexpr std::int64_t maximum = std::int64_t{1} << 60;
-  for (const int32_t cells : block.cells) {
-    const std::int64_t more = std::int64_t{cells} + 1;
-    require(more <= std::numeric_limits<int>::max() && points <= maximum / more,
-            "a block of more cells than can be counted");
-    points *= more;
-  }
-}
-
-void checkBlock(const vdi_catalyst_block& block) {
-  for (int axis = 0; axis < 3; ++axis) {
-    require(block.cells[axis] >= 1, "a block needs at least one cell per axis");
-    require(block.ghost_lo[axis] >= 0 && block.ghost_hi[axis] >= 0, "ghost layers can't be negative");
-    require(std::int64_t{block.ghost_lo[axis]} + block.ghost_hi[axis] < block.cells[axis],
-            "a block of nothing but ghost cells");
-    require(std::isfinite(block.spacing[axis]) && block.spacing[axis] > 0.0,
-            "spacing must be finite and > 0");
-    require(std::isfinite(block.origin[axis]), "the origin must be finite");
-  }
-  requireCountable(block);
 }
 
 void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
@@ -198,10 +102,6 @@ void markModified(vtkPartitionedDataSet& grid) {
     image->Modified();
   }
   grid.Modified();
-}
-
-bool isStep(std::int64_t step) {
-  return step >= 0 && step <= std::numeric_limits<int>::max();
 }
 
 /// ParaView counts steps in an int, and files are named by it: another one would be lost, or replace another
@@ -496,6 +396,18 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
       step);
   if (result == VDI_CATALYST_OK) catalyst->printed.clear();
   return result;
+}
+
+double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value, double low,
+                                  double high) {
+  if (!usable(catalyst)) return value;
+  return vdi::catalyst::inForce(*catalyst, catalyst->engine->parameters(), name, value, low, high);
+}
+
+int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int64_t value, int64_t low,
+                                   int64_t high) {
+  if (!usable(catalyst)) return value;
+  return vdi::catalyst::inForce(*catalyst, catalyst->engine->parameters(), name, value, low, high);
 }
 
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {

@@ -28,7 +28,7 @@ module vdi_catalyst
   integer(c_int32_t), parameter :: vdi_catalyst_cells = 1
 
   type, bind(c) :: vdi_catalyst_block
-    integer(c_int32_t) :: cells(3)
+    integer(c_int32_t) :: cells(3) = 0
     integer(c_int32_t) :: ghost_lo(3) = 0
     integer(c_int32_t) :: ghost_hi(3) = 0
     real(c_double) :: origin(3) = 0
@@ -46,6 +46,15 @@ module vdi_catalyst
       import :: c_int, c_int32_t, c_ptr
       integer(c_int32_t), value :: communicator, script_count
       type(c_ptr), intent(in) :: scripts(*)
+      type(c_ptr), intent(out) :: catalyst
+      integer(c_int) :: code
+    end function
+
+    ! json: the text or a file's name, with c_null_char at its end.
+    function vdi_catalyst_initialize_json(communicator, json, catalyst) bind(c) result(code)
+      import :: c_char, c_int, c_int32_t, c_ptr
+      integer(c_int32_t), value :: communicator
+      character(kind=c_char), intent(in) :: json(*)
       type(c_ptr), intent(out) :: catalyst
       integer(c_int) :: code
     end function
@@ -92,6 +101,22 @@ module vdi_catalyst
       integer(c_int64_t), value :: step
       real(c_double), value :: time
       integer(c_int) :: code
+    end function
+
+    function vdi_catalyst_parameter_f64(catalyst, name, value, low, high) bind(c) result(in_force)
+      import :: c_char, c_double, c_ptr
+      type(c_ptr), value :: catalyst
+      character(kind=c_char), intent(in) :: name(*)
+      real(c_double), value :: value, low, high
+      real(c_double) :: in_force
+    end function
+
+    function vdi_catalyst_parameter_i64(catalyst, name, value, low, high) bind(c) result(in_force)
+      import :: c_char, c_int64_t, c_ptr
+      type(c_ptr), value :: catalyst
+      character(kind=c_char), intent(in) :: name(*)
+      integer(c_int64_t), value :: value, low, high
+      integer(c_int64_t) :: in_force
     end function
 
     function vdi_catalyst_finalize(catalyst) bind(c) result(code)

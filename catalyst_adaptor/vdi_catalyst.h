@@ -1,9 +1,11 @@
-/* What a simulation links to hand its volume to ParaView's in situ engine: C, no VTK, no MPI header.
+/* What a simulation links to make VDIs of its volume, by ParaView's in situ engine and scripts, or by a JSON
+ * text and without ParaView: C, no VTK, no MPI header.
  *
  * Life of a run, on every rank of the communicator:
  *
  *     vdi_catalyst_initialize(MPI_Comm_c2f(comm), 1, scripts, &catalyst);
  *     loop {
+ *       feed = vdi_catalyst_parameter_f64(catalyst, "feed", 0.037, 0.0, 0.1);     what viewers may change
  *       vdi_catalyst_set_blocks(catalyst, count, blocks);          when the blocks or their pointers change
  *       vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_POINTS, data);
  *       if (vdi_catalyst_wants(catalyst, step, time))               or at each step
@@ -113,6 +115,19 @@ typedef struct vdi_catalyst vdi_catalyst;
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 
+/* Instead of vdi_catalyst_initialize: makes what a JSON text asks for, without scripts, ParaView or Python.
+ * `json` is the text, or the name of a file with it; the first rank's counts, and it alone reads files.
+ * "{\"field\": \"V\", \"every\": 10}" writes vdi_000010.vdi and so on of the array V.
+ * docs/vdi-run.schema.json has all fields; `vdi check FILE` finds mistakes before the run.
+ *
+ * The other functions are the same, but for these: a step may be any number from 0 on, blocks with ghost
+ * layers take no more memory than others, and a frame that fails is VDI_CATALYST_SCRIPT. Of a text with a
+ * mistake VDI_CATALYST_SCRIPT is returned here, and the place of the mistake is told; without a Vulkan device
+ * VDI_CATALYST_ENGINE. After a failure *catalyst is null. One such run can go on in a process at a time,
+ * beside scripts or without them. */
+VDI_CATALYST_API int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json,
+                                                  vdi_catalyst** catalyst);
+
 /* This rank's blocks, none included; forgets all arrays. Blocks with ghost layers take a byte a cell. */
 VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count,
                                              const vdi_catalyst_block* blocks);
@@ -153,6 +168,20 @@ VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, do
 /* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX, since
  * ParaView counts and names files so; others are VDI_CATALYST_BAD_ARGUMENT each time. */
 VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time);
+
+/* A number that viewers may change while the simulation runs, where a script lets them (VDIStream's Steer).
+ * The first call declares it: its name, of 1 to 64 letters, digits, "_", "-" and "."; its value until a
+ * viewer sets another; its bounds, both included. Each call returns the value in force, the first rank's on
+ * all ranks. It changes in vdi_catalyst_execute alone, so all calls between two steps return the same one.
+ * Later calls ignore value and bounds.
+ *
+ * 64 parameters at most. Bounds of the second function lie within 2^53 of 0. The functions return `value` for
+ * a null or finalized handle, and where vdi_catalyst_error says what's wrong: a name, bounds that aren't
+ * finite, a value out of them, another type than before, or ranks that ask for different ones. */
+VDI_CATALYST_API double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value,
+                                                   double low, double high);
+VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int64_t value,
+                                                    int64_t low, int64_t high);
 
 /* Ends the scripts and the engine and frees `catalyst`; a second call does nothing but return
  * VDI_CATALYST_BAD_ARGUMENT. So does one after MPI_Finalize, as all other functions then, and says so. */

@@ -30,6 +30,10 @@ program fortran_simulation
   if (vdi_catalyst_execute(catalyst, -1_c_int64_t, 0.0_c_double) /= vdi_catalyst_bad_argument) &
     call mpi_abort(mpi_comm_world, 3, error)
   if (index(vdi_catalyst_error(catalyst), "step -1 isn't") == 0) call mpi_abort(mpi_comm_world, 4, error)
+  if (abs(vdi_catalyst_parameter_f64(catalyst, "feed" // c_null_char, 0.037_c_double, 0.0_c_double, 0.1_c_double) - &
+    0.037_c_double) > 0) call mpi_abort(mpi_comm_world, 6, error)
+  if (vdi_catalyst_parameter_i64(catalyst, "waves" // c_null_char, 3_c_int64_t, 1_c_int64_t, 9_c_int64_t) /= 3_c_int64_t) &
+    call mpi_abort(mpi_comm_world, 7, error)
   do step = 1, 2
     if (vdi_catalyst_wants(catalyst, step, 0.5d0 * step) /= 1) call mpi_abort(mpi_comm_world, 5, error)
     do k = 0, n

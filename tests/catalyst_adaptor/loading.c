@@ -1,7 +1,8 @@
 /* What libvdi_catalyst.so costs before it is initialised and after, and what it says when it can't be.
- * Arguments: the code that initialising must return, a text that rank 0 must then print once ("-" for any),
- * the library of rank 0, and the one of the other ranks (rank 0's unless given). Exit status 0 if all is as
- * it must be. */
+ * With VDI_TEST_JSON it's initialised with that JSON text, loads no ParaView, and takes at most
+ * VDI_TEST_MEBIBYTES. Arguments: the code that initialising must return, a text that rank 0 must then print
+ * once ("-" for any), the library of rank 0, and the one of the other ranks (rank 0's unless given). Exit
+ * status 0 if all is as it must be. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fenv.h>
@@ -17,7 +18,8 @@ enum { MAX_KIB_BEFORE = 2048 };
 
 typedef struct cost {
   int libraries;
-  int of_paraview; /* of these, the ones of ParaView, Python and Vulkan */
+  int of_paraview; /* of these, the ones of ParaView and Python */
+  int of_vulkan;
   long resident_kib;
 } cost;
 
@@ -27,7 +29,7 @@ static void fail(const char* what) {
 }
 
 static cost measure(void) {
-  cost result = {0, 0, 0};
+  cost result = {0, 0, 0, 0};
   char line[4096];
   char last[4096] = "";
   FILE* maps = fopen("/proc/self/maps", "r");
@@ -36,8 +38,9 @@ static cost measure(void) {
     if (path == NULL || strstr(path, ".so") == NULL || strcmp(path, last) == 0) continue;
     strcpy(last, path); /* a library's parts follow each other */
     ++result.libraries;
-    result.of_paraview += strstr(path, "libvtk") != NULL || strstr(path, "-pv5") != NULL ||
-                          strstr(path, "libpython") != NULL || strstr(path, "libvulkan") != NULL;
+    result.of_paraview +=
+        strstr(path, "libvtk") != NULL || strstr(path, "-pv5") != NULL || strstr(path, "libpython") != NULL;
+    result.of_vulkan += strstr(path, "libvulkan") != NULL;
   }
   FILE* rollup = fopen("/proc/self/smaps_rollup", "r");
   while (rollup != NULL && fgets(line, sizeof line, rollup) != NULL)
@@ -51,8 +54,9 @@ static cost measure(void) {
 
 static void print(int rank, const char* when, cost before, cost now) {
   if (rank > 0) return;
-  printf("%s: %d libraries (%d of ParaView, Python and Vulkan), %ld KiB resident\n", when,
-         now.libraries - before.libraries, now.of_paraview, now.resident_kib - before.resident_kib);
+  printf("%s: %d libraries (%d of ParaView and Python, %d of Vulkan), %ld KiB resident\n", when,
+         now.libraries - before.libraries, now.of_paraview, now.of_vulkan,
+         now.resident_kib - before.resident_kib);
 }
 
 /* How often `text` is in the file. */
@@ -79,15 +83,18 @@ int main(int argc, char** argv) {
   if (library == NULL) fail(dlerror());
   const cost linked = measure();
   print(rank, "linked", none, linked);
-  if (linked.of_paraview > 0) fail("ParaView, Python or Vulkan is loaded before it is needed");
+  if (linked.of_paraview + linked.of_vulkan > 0)
+    fail("ParaView, Python or Vulkan is loaded before it is needed");
   if (linked.resident_kib - none.resident_kib > MAX_KIB_BEFORE) fail("linking alone costs too much memory");
 
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**) =
       dlsym(library, "vdi_catalyst_initialize");
+  int (*initialize_json)(int32_t, const char*, vdi_catalyst**) =
+      dlsym(library, "vdi_catalyst_initialize_json");
   int (*execute)(vdi_catalyst*, int64_t, double) = dlsym(library, "vdi_catalyst_execute");
   int (*finalize)(vdi_catalyst*) = dlsym(library, "vdi_catalyst_finalize");
   const char* (*error)(const vdi_catalyst*) = dlsym(library, "vdi_catalyst_error");
-  if (initialize == NULL || execute == NULL || finalize == NULL || error == NULL)
+  if (initialize == NULL || initialize_json == NULL || execute == NULL || finalize == NULL || error == NULL)
     fail("a function is missing");
   if (execute(NULL, 1, 0.0) != VDI_CATALYST_BAD_ARGUMENT || error(NULL)[0] != '\0')
     fail("a null handle was taken");
@@ -98,7 +105,10 @@ int main(int argc, char** argv) {
   fflush(stderr);
   dup2(fileno(said), STDERR_FILENO);
   vdi_catalyst* catalyst = NULL;
-  const int code = initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 0, NULL, &catalyst);
+  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
+  const char* json = getenv("VDI_TEST_JSON");
+  const int code =
+      json != NULL ? initialize_json(comm, json, &catalyst) : initialize(comm, 0, NULL, &catalyst);
   fflush(stderr);
   dup2(terminal, STDERR_FILENO);
   if (fegetexcept() != (FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW)) fail("initialising changed what traps");
@@ -106,7 +116,12 @@ int main(int argc, char** argv) {
   if (code != wanted) fail("initialising returned another code than it must");
   if (strcmp(text, "-") != 0 && times != (rank == 0 ? 1 : 0)) fail("rank 0 must say it, once");
   if (code == VDI_CATALYST_OK) {
-    print(rank, "initialised", none, measure());
+    const cost initialised = measure();
+    print(rank, "initialised", none, initialised);
+    if (json != NULL && initialised.of_paraview > 0) fail("ParaView or Python is loaded, which isn't needed");
+    const char* most = getenv("VDI_TEST_MEBIBYTES");
+    if (most != NULL && initialised.resident_kib - none.resident_kib > 1024 * atol(most))
+      fail("initialising costs too much memory");
     if (finalize(catalyst) != VDI_CATALYST_OK) fail("finalising failed");
   } else if (catalyst != NULL || finalize(catalyst) != VDI_CATALYST_BAD_ARGUMENT) {
     fail("there must be no handle");

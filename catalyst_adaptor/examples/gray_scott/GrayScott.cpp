@@ -13,6 +13,8 @@
 
 namespace {
 
+constexpr double largestRate = 0.1;
+
 struct Options {
   gray_scott::Parameters parameters;
   int steps = 600;
@@ -41,6 +43,14 @@ std::vector<vdi_catalyst_block> describe(const gray_scott::Simulation& simulatio
   return blocks;
 }
 
+/// F and k are viewers' to change, where a script lets them.
+void takeRates(vdi_catalyst* catalyst, const gray_scott::Parameters& given,
+               gray_scott::Simulation& simulation) {
+  const double feed = vdi_catalyst_parameter_f64(catalyst, "feed", given.feed, 0.0, largestRate);
+  const double kill = vdi_catalyst_parameter_f64(catalyst, "kill", given.kill, 0.0, largestRate);
+  simulation.setRates(feed, kill);
+}
+
 int simulate(const Options& options) {
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
@@ -63,6 +73,7 @@ int simulate(const Options& options) {
   };
   const std::vector<vdi_catalyst_block> blocks = describe(simulation, options.parameters.size);
   for (int step = 1; step <= options.steps; ++step) {
+    takeRates(catalyst, options.parameters, simulation);
     simulation.step();
     if (catalyst == nullptr || step % options.every != 0) continue;
     simulated += seconds();

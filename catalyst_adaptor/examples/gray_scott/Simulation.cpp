@@ -93,6 +93,11 @@ void Simulation::step() {
   exchangeHalos();
 }
 
+void Simulation::setRates(double feed, double kill) {
+  parameters_.feed = feed;
+  parameters_.kill = kill;
+}
+
 void Simulation::react(Block& block) const {
   const auto du = static_cast<float>(parameters_.diffusionU);
   const auto dv = static_cast<float>(parameters_.diffusionV);

@@ -37,6 +37,8 @@ class Simulation {
   Simulation(MPI_Comm comm, const Parameters& parameters);
 
   void step();
+  /// From the next step on. The same on all ranks.
+  void setRates(double feed, double kill);
 
   int cellsPerBlock() const { return n_; }  // per axis, without halo
   /// This rank's blocks. Halo cells are up to date after step() and after construction.

@@ -1,4 +1,4 @@
-"""Hands a simulation's NumPy arrays to ParaView's in situ engine.
+"""Makes VDIs of a simulation's NumPy arrays while it runs, by scripts in ParaView's in situ engine or by a JSON text.
 
     from mpi4py import MPI
     from pv_vdi.catalyst import Block, Catalyst
@@ -10,11 +10,13 @@
             catalyst.set_array("V", [values])     # values: float64 [z][y][x], of cells
             catalyst.execute(step, 0.1 * step)
 
+With `Catalyst(MPI.COMM_WORLD, json={"field": "V", "every": 10})` neither a script nor ParaView is needed.
 All calls are collective over the communicator. vdi_catalyst.h says more about each.
 """
 
 import ctypes
 import dataclasses
+import json as json_module
 import os
 
 import numpy as np
@@ -63,11 +65,16 @@ def _load():
     library = ctypes.CDLL(os.path.join(os.path.dirname(os.path.abspath(__file__)), LIBRARY))
     handle, text = ctypes.c_void_p, ctypes.c_char_p
     library.vdi_catalyst_initialize.argtypes = [ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(text), ctypes.POINTER(handle)]
+    library.vdi_catalyst_initialize_json.argtypes = [ctypes.c_int32, text, ctypes.POINTER(handle)]
     library.vdi_catalyst_set_blocks.argtypes = [handle, ctypes.c_int32, ctypes.POINTER(_Block)]
     library.vdi_catalyst_set_array_strided.argtypes = [
         handle, text, ctypes.c_int32, ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(_Strides)]
     library.vdi_catalyst_wants.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_execute.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
+    library.vdi_catalyst_parameter_f64.argtypes = [handle, text, ctypes.c_double, ctypes.c_double, ctypes.c_double]
+    library.vdi_catalyst_parameter_f64.restype = ctypes.c_double
+    library.vdi_catalyst_parameter_i64.argtypes = [handle, text, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64]
+    library.vdi_catalyst_parameter_i64.restype = ctypes.c_int64
     library.vdi_catalyst_finalize.argtypes = [handle]
     library.vdi_catalyst_error.argtypes = [handle]
     library.vdi_catalyst_error.restype = text
@@ -75,10 +82,14 @@ def _load():
 
 
 class Catalyst:
-    """The engine, with its scripts. One can be made in a process; it ends with close() or its `with`."""
+    """The engine, with its scripts or what `json` asks for. One with scripts can be made in a process, and one at a time with
+    json; it ends with close() or its `with`."""
 
-    def __init__(self, communicator, scripts):
-        """`communicator`: mpi4py's, or None for a simulation without MPI. `scripts`: paths of Catalyst scripts."""
+    def __init__(self, communicator, scripts=None, json=None):
+        """`communicator`: mpi4py's, or None for a simulation without MPI. Either `scripts`, paths of Catalyst scripts, or
+        `json`, a dict, a JSON text or a file's name: what docs/vdi-run.schema.json describes."""
+        if (scripts is None) == (json is None):
+            raise ValueError("either scripts or json")
         if communicator is None:
             from mpi4py import MPI  # the engine needs MPI in any case
             communicator = MPI.COMM_SELF
@@ -86,6 +97,11 @@ class Catalyst:
         self._handle = ctypes.c_void_p()
         self._blocks = []
         self._kept = {}  # arrays that the engine points to
+        if json is not None:
+            text = json_module.dumps(json) if isinstance(json, dict) else json
+            self._check(self._library.vdi_catalyst_initialize_json(
+                communicator.py2f(), os.fsencode(text), ctypes.byref(self._handle)))
+            return
         paths = [os.fsencode(script) for script in scripts]
         self._check(self._library.vdi_catalyst_initialize(
             communicator.py2f(), len(paths), (ctypes.c_char_p * len(paths))(*paths), ctypes.byref(self._handle)))
@@ -133,6 +149,17 @@ class Catalyst:
     def execute(self, step, time=0.0):
         """Runs the scripts on the blocks as they are now. `step` is the same on all ranks."""
         self._check(self._library.vdi_catalyst_execute(self._handle, step, time))
+
+    def parameter(self, name, value, low, high):
+        """A number from `low` to `high` that viewers may change, where a script lets them. Returns the value in force, the same
+        on all ranks: `value`, as the first call had it, until a viewer sets another. It takes whole numbers only where all
+        three are of type int. To be called at each step, on all ranks; values change in execute alone. Raises ValueError unless
+        `value` lies between finite bounds."""
+        whole = all(isinstance(number, int) for number in (value, low, high))
+        if not (low <= value <= high) or abs(low) == float("inf") or abs(high) == float("inf"):
+            raise ValueError("the parameter '%s' is %s, not from %s to %s" % (name, value, low, high))
+        ask = self._library.vdi_catalyst_parameter_i64 if whole else self._library.vdi_catalyst_parameter_f64
+        return ask(self._handle, name.encode(), value, low, high)
 
     def close(self):
         """Ends the scripts and the engine, before MPI is finalized. A second call does nothing."""

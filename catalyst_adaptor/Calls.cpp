@@ -1,0 +1,93 @@
+#include "catalyst_adaptor/Calls.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+namespace vdi::catalyst {
+
+namespace {
+
+/// The first line, and the second where the first says only who speaks.
+std::string firstLine(const std::string& text) {
+  std::size_t end = text.find('\n');
+  std::string line = text.substr(0, end);
+  while (!line.empty() && line.back() == ' ') line.pop_back();
+  if (end == std::string::npos || line.empty() || line.back() != ':') return line;
+  const std::size_t next = end + 1;
+  end = text.find('\n', next);
+  return line + " " + text.substr(next, end == std::string::npos ? end : end - next);
+}
+
+/// By rank 0, on one line for what was printed before: a step whose files are missing is always told.
+void print(Calls& self, std::optional<std::int64_t> step) {
+  const bool again = self.error == self.printed;
+  if (again && !step) return;
+  self.printed = self.error;
+  const std::string place = step ? "step " + std::to_string(*step) + ": " : "";
+  const std::string text = again ? "again, " + firstLine(self.error) : self.error;
+  std::fprintf(stderr, "vdi_catalyst: %s%s\n", place.c_str(), text.c_str());
+}
+
+/// Of points, of which there are more than cells. Throws where VTK's counts would overflow.
+void requireCountable(const vdi_catalyst_block& block) {
+  std::int64_t points = 1;
+  constexpr std::int64_t maximum = std::int64_t{1} << 60;
+  for (const int32_t cells : block.cells) {
+    const std::int64_t more = std::int64_t{cells} + 1;
+    require(more <= std::numeric_limits<int>::max() && points <= maximum / more,
+            "a block of more cells than can be counted");
+    points *= more;
+  }
+}
+
+}  // namespace
+
+int conclude(Calls& self, int code, const std::string& text, std::optional<std::int64_t> step) {
+  int worst = code;
+  MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_INT, MPI_MAX, self.comm);
+  if (worst == VDI_CATALYST_OK) return worst;
+  int rank = 0;
+  int size = 0;
+  MPI_Comm_rank(self.comm, &rank);
+  MPI_Comm_size(self.comm, &size);
+  // Ranks with the code and a text come first, then those with the code only, then the others.
+  int speaker = rank + size * (code != worst ? 2 : text.empty() ? 1 : 0);
+  MPI_Allreduce(MPI_IN_PLACE, &speaker, 1, MPI_INT, MPI_MIN, self.comm);
+  speaker %= size;
+  std::string message = rank == speaker ? text : "";
+  int length = static_cast<int>(message.size());
+  MPI_Bcast(&length, 1, MPI_INT, speaker, self.comm);
+  message.resize(static_cast<std::size_t>(length));
+  MPI_Bcast(message.data(), length, MPI_CHAR, speaker, self.comm);
+  if (message.empty()) message = "a script failed without saying why";
+  self.error = "rank " + std::to_string(speaker) + ": " + message;
+  if (rank == 0) print(self, step);
+  return worst;
+}
+
+void requireEqual(MPI_Comm comm, std::int64_t value, const char* what) {
+  std::array<std::int64_t, 2> extremes{value, ~value};
+  MPI_Allreduce(MPI_IN_PLACE, extremes.data(), 2, MPI_INT64_T, MPI_MAX, comm);
+  require(extremes[0] == ~extremes[1], what);
+}
+
+void checkBlock(const vdi_catalyst_block& block) {
+  for (int axis = 0; axis < 3; ++axis) {
+    require(block.cells[axis] >= 1, "a block needs at least one cell per axis");
+    require(block.ghost_lo[axis] >= 0 && block.ghost_hi[axis] >= 0, "ghost layers can't be negative");
+    require(std::int64_t{block.ghost_lo[axis]} + block.ghost_hi[axis] < block.cells[axis],
+            "a block of nothing but ghost cells");
+    require(std::isfinite(block.spacing[axis]) && block.spacing[axis] > 0.0,
+            "spacing must be finite and > 0");
+    require(std::isfinite(block.origin[axis]), "the origin must be finite");
+  }
+  requireCountable(block);
+}
+
+bool isStep(std::int64_t step) {
+  return step >= 0 && step <= std::numeric_limits<int>::max();
+}
+
+}  // namespace vdi::catalyst

@@ -1,0 +1,60 @@
+// What the calls of both engines have in common: arguments are checked, and a call ends alike on all ranks.
+#pragma once
+
+#include <mpi.h>
+
+#include <cstdint>
+#include <exception>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace vdi::catalyst {
+
+/// The part of a handle that this needs.
+struct Calls {
+  MPI_Comm comm = MPI_COMM_NULL;  // a duplicate of the simulation's
+  std::string error;
+  std::string printed;  // so that what fails at every step is told in full once
+};
+
+/// What a failing call comes to: the highest code of any rank, and the text of the lowest rank that has it
+/// and something to say, on all ranks; rank 0 prints it. `step`: of execute.
+int conclude(Calls& self, int code, const std::string& text, std::optional<std::int64_t> step);
+
+/// Runs `work`, which returns nothing or what went wrong; that or an exception becomes `code`.
+template <typename Work>
+int guarded(Calls& self, int code, Work work, std::optional<std::int64_t> step = std::nullopt) {
+  std::optional<std::string> failure;
+  try {
+    if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
+      work();
+    } else {
+      failure = work();
+    }
+  } catch (const std::bad_alloc&) {
+    failure = "out of memory on this host";
+  } catch (const std::exception& error) {
+    failure = error.what();
+  } catch (...) {
+    failure = "an unknown exception";
+  }
+  return conclude(self, failure ? code : VDI_CATALYST_OK, failure.value_or(""), step);
+}
+
+/// Throws std::invalid_argument with that text unless it is good.
+inline void require(bool good, const char* what) {
+  if (!good) throw std::invalid_argument(what);
+}
+/// Collective: throws std::invalid_argument with that text on all ranks if the ranks' values differ.
+void requireEqual(MPI_Comm comm, std::int64_t value, const char* what);
+/// Throws std::invalid_argument with the reason for a block that can't be.
+void checkBlock(const vdi_catalyst_block& block);
+/// Whether ParaView could count it.
+bool isStep(std::int64_t step);
+
+}  // namespace vdi::catalyst

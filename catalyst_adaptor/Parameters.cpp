@@ -1,0 +1,91 @@
+#include "catalyst_adaptor/Parameters.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+namespace vdi::catalyst {
+
+namespace {
+
+// As vdi/stream/Steering.h has them.
+constexpr std::size_t mostParameters = 64;
+constexpr std::size_t longestName = 64;
+constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+
+/// Equal for equal declarations. Values may differ: the first rank's counts.
+std::int64_t fingerprintOf(const Parameter& parameter) {
+  std::size_t hash = std::hash<std::string>()(parameter.name);
+  for (const double number : {parameter.isWhole ? 1.0 : 0.0, parameter.low, parameter.high})
+    hash = hash * 31U + std::hash<double>()(number);
+  return static_cast<std::int64_t>(hash >> 1U);
+}
+
+/// The value in force; none where something is wrong, which has been said.
+std::optional<double> valueOf(Calls& self, Parameters& parameters, const char* name, Parameter parameter) {
+  int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(name != nullptr, "a parameter needs a name");
+    parameter.name = name;
+    Parameters::check(parameter);
+  });
+  if (code != VDI_CATALYST_OK) return std::nullopt;
+  double value = 0.0;
+  code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    requireEqual(self.comm, fingerprintOf(parameter), "the ranks ask for different parameters");
+    value = parameters.declare(parameter);
+  });
+  if (code != VDI_CATALYST_OK) return std::nullopt;
+  MPI_Bcast(&value, 1, MPI_DOUBLE, 0, self.comm);
+  return value;
+}
+
+}  // namespace
+
+void Parameters::check(const Parameter& parameter) {
+  const std::string& name = parameter.name;
+  if (name.empty() || name.size() > longestName || name.find_first_not_of(letters) != std::string::npos)
+    throw std::invalid_argument("a parameter's name has 1 to 64 letters, digits, \"_\", \"-\" and \".\"");
+  const auto fail = [&](const char* what) {
+    throw std::invalid_argument("the parameter \"" + name + "\" " + what);
+  };
+  if (!std::isfinite(parameter.low) || !std::isfinite(parameter.high)) fail("has bounds that aren't finite");
+  if (!(parameter.low <= parameter.value && parameter.value <= parameter.high)) fail("is out of its bounds");
+  constexpr double largestWhole = 9007199254740992.0;  // of which a double has all
+  if (parameter.isWhole && std::max(std::abs(parameter.low), std::abs(parameter.high)) > largestWhole)
+    fail("has bounds beyond 2^53");
+}
+
+double Parameters::declare(const Parameter& parameter) {
+  const auto found = std::ranges::find(all_, parameter.name, &Parameter::name);
+  if (found == all_.end()) {
+    if (all_.size() >= mostParameters) throw std::invalid_argument("there are 64 parameters at most");
+    return all_.emplace_back(parameter).value;
+  }
+  if (found->isWhole != parameter.isWhole)
+    throw std::invalid_argument("the parameter \"" + parameter.name + "\" was declared with another type");
+  return found->value;
+}
+
+void Parameters::set(const std::map<std::string, double>& values) {
+  for (Parameter& parameter : all_) {
+    const auto found = values.find(parameter.name);
+    if (found != values.end()) parameter.value = std::clamp(found->second, parameter.low, parameter.high);
+  }
+}
+
+double inForce(Calls& self, Parameters& parameters, const char* name, double value, double low, double high) {
+  return valueOf(self, parameters, name, {"", false, value, low, high}).value_or(value);
+}
+
+std::int64_t inForce(Calls& self, Parameters& parameters, const char* name, std::int64_t value,
+                     std::int64_t low, std::int64_t high) {
+  const auto number = [](std::int64_t whole) { return static_cast<double>(whole); };
+  const std::optional<double> found =
+      valueOf(self, parameters, name, {"", true, number(value), number(low), number(high)});
+  return found ? static_cast<std::int64_t>(*found) : value;
+}
+
+}  // namespace vdi::catalyst

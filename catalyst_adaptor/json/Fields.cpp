@@ -1,0 +1,185 @@
+#include "catalyst_adaptor/json/Fields.h"
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <stdexcept>
+
+namespace vdi::catalyst {
+
+namespace {
+
+glm::ivec3 vectorOf(const int32_t (&v)[3]) {
+  return {v[0], v[1], v[2]};
+}
+glm::dvec3 vectorOf(const double (&v)[3]) {
+  return {v[0], v[1], v[2]};
+}
+
+bool isWide(int type) {
+  return type == VDI_CATALYST_I64 || type == VDI_CATALYST_U64;
+}
+
+/// The library's types have the numbers of vdi_catalyst.h's; it has no 64-bit integers.
+ScalarType scalarTypeOf(int type) {
+  static_assert(static_cast<int>(ScalarType::U8) == VDI_CATALYST_U8 &&
+                static_cast<int>(ScalarType::I8) == VDI_CATALYST_I8 &&
+                static_cast<int>(ScalarType::U16) == VDI_CATALYST_U16 &&
+                static_cast<int>(ScalarType::I16) == VDI_CATALYST_I16 &&
+                static_cast<int>(ScalarType::U32) == VDI_CATALYST_U32 &&
+                static_cast<int>(ScalarType::I32) == VDI_CATALYST_I32 &&
+                static_cast<int>(ScalarType::F32) == VDI_CATALYST_F32 &&
+                static_cast<int>(ScalarType::F64) == VDI_CATALYST_F64);
+  return static_cast<ScalarType>(type);
+}
+
+double loadAny(int type, const std::byte* data, std::size_t index) {
+  if (!isWide(type)) return loadValue(scalarTypeOf(type), data, index);
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, data + index * sizeof bits, sizeof bits);
+  return type == VDI_CATALYST_U64 ? static_cast<double>(bits)
+                                  : static_cast<double>(static_cast<std::int64_t>(bits));
+}
+
+/// What a block reads, and what keeps it.
+struct Memory {
+  const void* data = nullptr;
+  std::shared_ptr<const void> keepAlive;
+};
+
+Memory gathered(const StridedValues& values) {
+  const auto array = std::make_shared<StridedArray>(values);
+  array->gather();
+  return {array->data(), array};
+}
+
+/// Of each value, the only component or the magnitude of all; as doubles.
+Memory asDoubles(const StridedValues& values, int type) {
+  StridedArray array(values);
+  array.gather();
+  const auto* from = static_cast<const std::byte*>(array.data());
+  const auto components = static_cast<std::size_t>(values.components);
+  const auto count = static_cast<std::size_t>(values.scalars()) / components;
+  std::shared_ptr<double[]> doubles(new (std::nothrow) double[count]);
+  if (!doubles) {
+    throw std::runtime_error(
+        "no memory for the shown values of an array: " + std::to_string(count * sizeof(double)) + " bytes");
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (components == 1) {
+      doubles[i] = loadAny(type, from, i);
+      continue;
+    }
+    double sum = 0.0;
+    for (std::size_t c = 0; c < components; ++c) {
+      const double value = loadAny(type, from, i * components + c);
+      sum += value * value;
+    }
+    doubles[i] = std::sqrt(sum);
+  }
+  return {doubles.get(), doubles};
+}
+
+}  // namespace
+
+std::size_t bytesOf(int type) {
+  if (isWide(type)) return sizeof(std::uint64_t);
+  if (type < VDI_CATALYST_U8 || type > VDI_CATALYST_F64) throw std::invalid_argument("unknown scalar type");
+  return sizeOf(scalarTypeOf(type));
+}
+
+void Fields::setBlocks(std::vector<vdi_catalyst_block> blocks) {
+  blocks_ = std::move(blocks);
+  arrays_.clear();
+}
+
+StridedValues Fields::inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
+                              const void* data) const {
+  StridedValues values;
+  values.first = static_cast<const std::byte*>(data);
+  values.components = components;
+  values.scalarBytes = bytesOf(type);
+  values.componentStride = static_cast<std::int64_t>(values.scalarBytes);
+  std::int64_t stride = values.componentStride * components;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    values.counts[axis] = block.cells[axis] + (cells ? 0 : 1);
+    values.strides[axis] = stride;
+    stride *= values.counts[axis];
+  }
+  return values;
+}
+
+void Fields::setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values) {
+  arrays_[{cells, name}] = {type, std::move(values)};
+}
+
+const Fields::Array* Fields::find(const std::string& name, bool cells) const {
+  const auto found = arrays_.find({cells, name});
+  return found != arrays_.end() ? &found->second : nullptr;
+}
+
+std::string Fields::names() const {
+  std::string names;
+  for (const auto& [key, array] : arrays_)
+    names +=
+        (names.empty() ? "" : ", ") + std::string(key.first ? "cells" : "points") + " '" + key.second + "'";
+  return names.empty() ? "none" : names;
+}
+
+std::optional<bool> Fields::associationOf(const std::string& name) const {
+  const bool ofCells = find(name, true) != nullptr;
+  const bool ofPoints = find(name, false) != nullptr;
+  if (ofCells && ofPoints)
+    throw std::runtime_error("there are arrays '" + name +
+                             "' of cells and of points: 'association' must name one");
+  if (ofCells || ofPoints) return ofCells;
+  if (!blocks_.empty())
+    throw std::runtime_error("there is no array '" + name + "'; the arrays are: " + names());
+  return std::nullopt;
+}
+
+int Fields::componentsOf(const std::string& name, bool cells) const {
+  const Array* array = find(name, cells);
+  return array != nullptr && !array->values.empty() ? array->values.front().components : 1;
+}
+
+std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int component) const {
+  std::vector<Block> blocks;
+  if (blocks_.empty()) return blocks;
+  const Array* array = find(name, cells);
+  if (array == nullptr) {
+    throw std::runtime_error("there is no array '" + name + "' of " + (cells ? "cells" : "points") +
+                             "; the arrays are: " + names());
+  }
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    StridedValues values = array->values[i];
+    if (values.components > 1 && component >= values.components) {
+      throw std::runtime_error("there is no component " + std::to_string(component) + ", '" + name +
+                               "' has " + std::to_string(values.components));
+    }
+    if (values.components > 1 && component >= 0) {
+      values.first += component * values.componentStride;
+      values.components = 1;
+    }
+    const bool isConverted = values.components > 1 || isWide(array->type);
+    Memory memory{values.first, nullptr};
+    if (isConverted) {
+      memory = asDoubles(values, array->type);
+    } else if (!values.inOrder()) {
+      memory = gathered(values);
+    }
+    const ScalarType type = isConverted ? ScalarType::F64 : scalarTypeOf(array->type);
+    const vdi_catalyst_block& b = blocks_[i];
+    const GhostLayers ghosts{vectorOf(b.ghost_lo), vectorOf(b.ghost_hi)};
+    const glm::ivec3 counts = vectorOf(b.cells) + (cells ? 0 : 1);
+    Block block =
+        cells ? Block::fromCells(counts, vectorOf(b.origin), vectorOf(b.spacing), type, memory.data, ghosts)
+              : Block::fromPoints(counts, vectorOf(b.origin), vectorOf(b.spacing), type, memory.data, ghosts);
+    block.keepAlive = std::move(memory.keepAlive);
+    blocks.push_back(std::move(block));
+  }
+  return blocks;
+}
+
+}  // namespace vdi::catalyst

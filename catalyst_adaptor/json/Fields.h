@@ -1,0 +1,57 @@
+// The simulation's blocks and arrays, as vdi/pipeline takes them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "catalyst_adaptor/StridedArray.h"
+#include "catalyst_adaptor/vdi_catalyst.h"
+#include "vdi/core/Block.h"
+#include "vdi/core/Coloring.h"
+
+namespace vdi::catalyst {
+
+/// This rank's. Arguments have been checked: types and associations are those of vdi_catalyst.h.
+class Fields {
+ public:
+  /// Forgets all arrays.
+  void setBlocks(std::vector<vdi_catalyst_block> blocks);
+  const std::vector<vdi_catalyst_block>& blocks() const { return blocks_; }
+
+  /// The places of a block's values: x fastest, components side by side, no gaps.
+  StridedValues inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
+                        const void* data) const;
+  /// One for each block.
+  void setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
+
+  /// Whether the array of that name is one of cells; nothing if this rank has neither blocks nor such an
+  /// array. Throws std::runtime_error if arrays of both kinds have the name, or none has it.
+  std::optional<bool> associationOf(const std::string& name) const;
+  /// The names of all arrays, for messages: "cells 'V', points 'p'".
+  std::string names() const;
+
+  int componentsOf(const std::string& name, bool cells) const;  // 1 without blocks
+  /// The blocks with the values of an array that there is, which are read where they are unless they are
+  /// out of order, 64-bit integers, or a magnitude. Throws std::runtime_error: no such component, no memory.
+  std::vector<Block> blocksOf(const std::string& name, bool cells, int component) const;
+
+ private:
+  struct Array {
+    int type = VDI_CATALYST_F64;
+    std::vector<StridedValues> values;
+  };
+  const Array* find(const std::string& name, bool cells) const;
+
+  std::vector<vdi_catalyst_block> blocks_;
+  std::map<std::pair<bool, std::string>, Array> arrays_;  // by: of cells, name
+};
+
+/// Throws std::invalid_argument for one that vdi_catalyst.h doesn't have.
+std::size_t bytesOf(int type);
+
+}  // namespace vdi::catalyst

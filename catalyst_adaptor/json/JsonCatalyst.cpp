@@ -1,0 +1,258 @@
+// The C interface of runs without a script: checks arguments, keeps the ranks together.
+#include <mpi.h>
+
+#include <chrono>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "catalyst_adaptor/Calls.h"
+#include "catalyst_adaptor/EngineFunctions.h"
+#include "catalyst_adaptor/Parameters.h"
+#include "catalyst_adaptor/json/Fields.h"
+#include "catalyst_adaptor/json/RunEngine.h"
+#include "vdi/comm/Communicator.h"
+#include "vdi/config/Json.h"
+#include "vdi/core/Error.h"
+
+struct vdi_catalyst : vdi::catalyst::Calls {
+  std::unique_ptr<vdi::catalyst::RunEngine> engine;
+  bool haveBlocks = false;
+  vdi::catalyst::Fields fields;
+  vdi::catalyst::Parameters parameters;
+};
+
+namespace {
+
+using vdi::catalyst::checkBlock;
+using vdi::catalyst::guarded;
+using vdi::catalyst::require;
+using vdi::catalyst::requireEqual;
+using vdi::catalyst::StridedValues;
+
+constexpr int maxComponents = 16;
+
+/// The handle that's alive. What isn't it is a handle that was finalized, and mustn't be looked into.
+vdi_catalyst*& alive() {
+  static vdi_catalyst* handle = nullptr;
+  return handle;
+}
+
+bool usable(const vdi_catalyst* catalyst) {
+  return catalyst != nullptr && catalyst == alive();
+}
+
+/// As guarded, for work that fails on all ranks together: those that fail because of another one say nothing.
+template <typename Work>
+int guardedTogether(vdi_catalyst& self, int code, Work work,
+                    std::optional<std::int64_t> step = std::nullopt) {
+  return guarded(
+      self, code,
+      [&]() -> std::optional<std::string> {
+        try {
+          work();
+          return std::nullopt;
+        } catch (const vdi::Error& error) {
+          return error.code() == vdi::ErrorCode::RemoteRank ? "" : error.what();
+        }
+      },
+      step);
+}
+
+/// The root's text on all ranks.
+std::string shared(const vdi::comm::Communicator& comm, const std::string& text) {
+  const auto* const bytes = reinterpret_cast<const std::byte*>(text.data());
+  const std::vector<std::byte> all = comm.broadcast({bytes, bytes + text.size()}, 0);
+  return {reinterpret_cast<const char*>(all.data()), all.size()};
+}
+
+/// The run that rank 0 names. Rank 0 reads files; all others get their text.
+class Reading {
+ public:
+  explicit Reading(vdi_catalyst& self)
+      : self_(self), comm_(vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(self.comm))) {}
+
+  int read(const char* json) {
+    int code = guarded(self_, VDI_CATALYST_BAD_ARGUMENT,
+                       [&] { require(comm_.rank() != 0 || json != nullptr, "no JSON given"); });
+    if (code != VDI_CATALYST_OK) return code;
+    code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
+      if (comm_.rank() != 0) return;
+      const vdi::config::JsonLimits limits;
+      source_ = vdi::config::readRun({json, ::strnlen(json, limits.bytes + 1)});
+    });
+    if (code != VDI_CATALYST_OK) return code;
+    source_.text = shared(comm_, source_.text);
+    code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
+      run = vdi::config::parseRun(source_.text, source_.name);
+      if (comm_.rank() == 0) colors_ = vdi::config::readColorsFile(run, source_).value_or("");
+    });
+    if (code != VDI_CATALYST_OK || run.colors.file.empty()) return code;
+    colors_ = shared(comm_, colors_);
+    return guarded(self_, VDI_CATALYST_SCRIPT,
+                   [&] { map = vdi::config::colorMapOf(colors_, run.colors.file, run.colors.name); });
+  }
+
+  vdi::config::Run run;
+  std::optional<vdi::config::ColorMap> map;
+
+ private:
+  vdi_catalyst& self_;
+  vdi::comm::Communicator comm_;
+  vdi::config::RunText source_;
+  std::string colors_;
+};
+
+int start(vdi_catalyst& self, const char* json) {
+  int code = guarded(self, VDI_CATALYST_ENGINE, [&] {
+    require(alive() == nullptr, "a run by JSON goes on in this process; finalize it first");
+  });
+  if (code != VDI_CATALYST_OK) return code;
+  Reading reading(self);
+  code = reading.read(json);
+  if (code != VDI_CATALYST_OK) return code;
+  return guardedTogether(self, VDI_CATALYST_ENGINE, [&] {
+    self.engine = std::make_unique<vdi::catalyst::RunEngine>(MPI_Comm_c2f(self.comm), std::move(reading.run),
+                                                             std::move(reading.map));
+  });
+}
+
+int initializeJson(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
+  // Loader.c has seen to it that MPI runs, that the handle is a communicator's and that *catalyst is null.
+  auto self = std::make_unique<vdi_catalyst>();
+  if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
+    return VDI_CATALYST_BAD_ARGUMENT;
+  MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
+  const int code = start(*self, json);
+  if (code == VDI_CATALYST_OK) {
+    *catalyst = alive() = self.release();
+  } else {
+    self->engine.reset();
+    MPI_Comm_free(&self->comm);
+  }
+  return code;
+}
+
+int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  std::vector<vdi_catalyst_block> copies;
+  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
+    for (int i = 0; i < count; ++i) checkBlock(blocks[i]);
+    copies.assign(blocks, blocks + count);
+  });
+  if (code != VDI_CATALYST_OK) return code;  // all ranks keep the blocks that they have
+  catalyst->fields.setBlocks(std::move(copies));
+  catalyst->haveBlocks = true;
+  return code;
+}
+
+/// `strides` is null for values in order.
+int setAnyArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
+                int32_t components, const void* const* data, const vdi_catalyst_strides* strides) {
+  std::vector<StridedValues> all;
+  const bool cells = association == VDI_CATALYST_CELLS;
+  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(catalyst->haveBlocks, "arrays were given before blocks");
+    require(name != nullptr && *name != '\0', "an array needs a name");
+    require(cells || association == VDI_CATALYST_POINTS, "unknown association");
+    require(components >= 1 && components <= maxComponents, "the number of components must be 1 to 16");
+    (void)vdi::catalyst::bytesOf(type);
+    const std::vector<vdi_catalyst_block>& blocks = catalyst->fields.blocks();
+    require(blocks.empty() || data != nullptr, "an array without data");
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      require(data[i] != nullptr, "an array without data for one of the blocks");
+      StridedValues values = catalyst->fields.inOrder(blocks[i], type, cells, components, data[i]);
+      for (std::size_t axis = 0; axis < 3 && strides != nullptr; ++axis)
+        values.strides[axis] = strides[i].strides[axis];
+      if (strides != nullptr && components > 1) values.componentStride = strides[i].component_stride;
+      require(values.reachable(), "strides that lead beyond the address space");
+      all.push_back(values);
+    }
+  });
+  if (code == VDI_CATALYST_OK) catalyst->fields.setArray(name, cells, type, std::move(all));
+  return code;
+}
+
+int setArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
+             const void* const* data) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  return setAnyArray(catalyst, name, type, association, 1, data, nullptr);
+}
+
+int setArrayStrided(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
+                    int32_t components, const void* const* data, const vdi_catalyst_strides* strides) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const bool isMissing = strides == nullptr && !catalyst->fields.blocks().empty();
+  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT,
+                           [&] { require(!isMissing, "a strided array without strides"); });
+  if (code != VDI_CATALYST_OK) return code;
+  return setAnyArray(catalyst, name, type, association, components, data, strides);
+}
+
+int wants(vdi_catalyst* catalyst, int64_t step, double) {
+  if (!usable(catalyst)) return 0;
+  int wanted = catalyst->engine->wants(step) ? 1 : 0;
+  MPI_Allreduce(MPI_IN_PLACE, &wanted, 1, MPI_INT, MPI_MAX, catalyst->comm);
+  return wanted;
+}
+
+int execute(vdi_catalyst* catalyst, int64_t step, double time) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const auto start = std::chrono::steady_clock::now();
+  int code = guarded(
+      *catalyst, VDI_CATALYST_BAD_ARGUMENT,
+      [&] {
+        require(catalyst->haveBlocks, "no blocks were given yet");
+        require(step >= 0, "steps count from 0");
+      },
+      step);
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(
+        *catalyst, VDI_CATALYST_BAD_ARGUMENT,
+        [&] { requireEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
+  }
+  if (code != VDI_CATALYST_OK || !catalyst->engine->wants(step)) return code;
+  // All ranks have met by now.
+  const double waited = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  code = guardedTogether(
+      *catalyst, VDI_CATALYST_SCRIPT,
+      [&] { catalyst->engine->execute(catalyst->fields, step, time, waited); }, step);
+  if (code == VDI_CATALYST_OK) catalyst->printed.clear();
+  return code;
+}
+
+double parameterF64(vdi_catalyst* catalyst, const char* name, double value, double low, double high) {
+  if (!usable(catalyst)) return value;
+  return vdi::catalyst::inForce(*catalyst, catalyst->parameters, name, value, low, high);
+}
+
+int64_t parameterI64(vdi_catalyst* catalyst, const char* name, int64_t value, int64_t low, int64_t high) {
+  if (!usable(catalyst)) return value;
+  return vdi::catalyst::inForce(*catalyst, catalyst->parameters, name, value, low, high);
+}
+
+int finalize(vdi_catalyst* catalyst) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(), nullptr));
+  const int code = guardedTogether(*self, VDI_CATALYST_ENGINE, [&] { self->engine->finish(); });
+  self->engine.reset();
+  MPI_Comm_free(&self->comm);
+  return code;
+}
+
+const char* error(const vdi_catalyst* catalyst) {
+  return usable(catalyst) ? catalyst->error.c_str() : "";
+}
+
+}  // namespace
+
+const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
+    nullptr, initializeJson, setBlocks,    setArray, setArrayStrided, wants,
+    execute, parameterF64,   parameterI64, finalize, error,
+};

@@ -1,0 +1,152 @@
+/* A simulation without a script: 24 x 24 x 24 cells, a slab along x of each rank, over which the fields V, of
+ * cells, z fastest, p, of 64-bit integers at points, and w, of vectors of cells, move. Arguments: a JSON text
+ * or the name of a file with one (or of a script, which ends in .py), then the code that each step must
+ * return. Exit status 0 if all did. VDI_TEST_BAD=1: before, JSON texts and files that can't be, of which each
+ * says why and the next works. */
+#include <mpi.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+enum { N = 24, DEPTH = 10000 };
+
+static double cells[N][N][N];               /* [x][y][z] */
+static int64_t points[N + 1][N + 1][N + 1]; /* [z][y][x] */
+static float vectors[N][N][N][3];           /* [z][y][x] */
+
+/* At step 0 a hump in the middle, which moves along y. */
+static double hump(int x, int y, int z, int step) {
+  const double dx = x - N / 2.0 + 0.5;
+  const double dy = y - N / 2.0 - 0.5 * step;
+  const double dz = z - N / 2.0 + 1.0;
+  return 1.0 / (1.0 + 0.02 * (dx * dx + dy * dy + dz * dz));
+}
+
+static void simulate(int first, int count, int step) {
+  for (int z = 0; z <= N; ++z) {
+    for (int y = 0; y <= N; ++y) {
+      for (int x = 0; x <= count; ++x) {
+        const double value = hump(first + x, y, z, step);
+        points[z][y][x] = (int64_t)(1e6 * value);
+        if (x == count || y == N || z == N) continue;
+        cells[x][y][z] = value;
+        for (int c = 0; c < 3; ++c) vectors[z][y][x][c] = (float)value * (float)(c + 1);
+      }
+    }
+  }
+}
+
+static int expect(int rank, const char* what, int wanted, int code) {
+  if (code == wanted) return 0;
+  fprintf(stderr, "rank %d: %s returned %d, not %d\n", rank, what, code, wanted);
+  return 1;
+}
+
+static int refuse(int rank, const char* json, int wanted) {
+  vdi_catalyst* catalyst = NULL;
+  const int wrong = expect(rank, "initialize_json", wanted,
+                           vdi_catalyst_initialize_json(MPI_Comm_c2f(MPI_COMM_WORLD), json, &catalyst));
+  return wrong + expect(rank, "the handle of a failed initialize_json", 1, catalyst == NULL);
+}
+
+/* Files come and go on rank 0, which alone reads them. */
+static int refuse_bad(int rank) {
+  static char deep[6 * DEPTH + 1];
+  for (int i = 0; i < DEPTH; ++i) strcpy(deep + i * 5, "{\"a\":");
+  int wrong = refuse(rank, deep, VDI_CATALYST_SCRIPT);
+  wrong += refuse(rank, "{\"field\": \"V\", \"every\": 10, \"every\": 5}", VDI_CATALYST_SCRIPT);
+  wrong += refuse(rank, "{\"field\": \"V\",\n\"camera\": {\"positon\": [0, 0, 1]}}", VDI_CATALYST_SCRIPT);
+  wrong += refuse(rank, "{\"field\": \"V\", \"colors\": {\"range\": [NaN, 1]}}", VDI_CATALYST_SCRIPT);
+  wrong += refuse(rank, "{\"field\": \"V\", \"colors\": {\"file\": \"none.json\"}}", VDI_CATALYST_SCRIPT);
+  wrong += refuse(rank, "none.json", VDI_CATALYST_SCRIPT);
+  wrong += refuse(rank, "", VDI_CATALYST_SCRIPT);
+  wrong += refuse(rank, rank == 0 ? NULL : "{}", VDI_CATALYST_BAD_ARGUMENT);
+  if (rank == 0) {
+    unlink("pipe.json");
+    if (mkfifo("pipe.json", 0600) != 0) abort();
+    FILE* file = fopen("large.json", "w");
+    if (file == NULL || ftruncate(fileno(file), 1 << 30) != 0) abort();
+    fclose(file);
+  }
+  wrong += refuse(rank, "pipe.json", VDI_CATALYST_SCRIPT);
+  wrong += refuse(rank, "large.json", VDI_CATALYST_SCRIPT);
+  if (rank == 0) {
+    unlink("pipe.json");
+    unlink("large.json");
+  }
+  return wrong;
+}
+
+int main(int argc, char** argv) {
+  MPI_Init(&argc, &argv);
+  int rank = 0;
+  int ranks = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  if (argc < 2) MPI_Abort(MPI_COMM_WORLD, 2);
+  const char* folder = getenv("VDI_OUTPUT");
+  if (folder != NULL && chdir(folder) != 0) MPI_Abort(MPI_COMM_WORLD, 3);
+  int wrong = getenv("VDI_TEST_BAD") != NULL ? refuse_bad(rank) : 0;
+
+  const char* full = getenv("VDI_TEST_FULL");
+  if (full != NULL && rank == 0) {
+    unlink(full);
+    if (symlink("/dev/full", full) != 0) abort();
+  }
+
+  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
+  const size_t length = strlen(argv[1]);
+  const int is_script = length > 3 && strcmp(argv[1] + length - 3, ".py") == 0;
+  const char* scripts[] = {argv[1]};
+  vdi_catalyst* catalyst = NULL;
+  wrong += expect(rank, "initialize", VDI_CATALYST_OK,
+                  is_script ? vdi_catalyst_initialize(comm, 1, scripts, &catalyst)
+                            : vdi_catalyst_initialize_json(comm, argv[1], &catalyst));
+  if (!is_script) wrong += refuse(rank, argv[1], VDI_CATALYST_ENGINE); /* one at a time */
+
+  const int first = rank * N / ranks;
+  const int count = (rank + 1) * N / ranks - first;
+  const vdi_catalyst_block block = {
+      {count, N, N}, {0, 0, 0}, {0, 0, 0}, {(double)first / N, 0.0, 0.0}, {1.0 / N, 1.0 / N, 1.0 / N}};
+  wrong += expect(rank, "execute before blocks", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_execute(catalyst, 0, 0.0));
+  wrong += expect(rank, "set_blocks", VDI_CATALYST_OK, vdi_catalyst_set_blocks(catalyst, 1, &block));
+  const void* data[] = {cells};
+  vdi_catalyst_strides strides = {{sizeof(cells[0]), sizeof(cells[0][0]), sizeof(double)}, 0};
+  wrong += expect(rank, "an unknown type", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_set_array(catalyst, "V", 99, VDI_CATALYST_CELLS, data));
+  wrong += expect(
+      rank, "V", VDI_CATALYST_OK,
+      vdi_catalyst_set_array_strided(catalyst, "V", VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data, &strides));
+  data[0] = points;
+  strides = (vdi_catalyst_strides){{sizeof(int64_t), sizeof(points[0][0]), sizeof(points[0])}, 0};
+  wrong += expect(rank, "p", VDI_CATALYST_OK,
+                  vdi_catalyst_set_array_strided(catalyst, "p", VDI_CATALYST_I64, VDI_CATALYST_POINTS, 1,
+                                                 data, &strides));
+  data[0] = vectors;
+  strides = (vdi_catalyst_strides){{sizeof(vectors[0][0][0]), sizeof(vectors[0][0]), sizeof(vectors[0])},
+                                   sizeof(float)};
+  wrong += expect(
+      rank, "w", VDI_CATALYST_OK,
+      vdi_catalyst_set_array_strided(catalyst, "w", VDI_CATALYST_F32, VDI_CATALYST_CELLS, 3, data, &strides));
+  for (int step = 0; step < argc - 2; ++step) {
+    simulate(first, count, step);
+    const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step);
+    wrong += expect(rank, "execute", atoi(argv[step + 2]), code);
+    if (code != VDI_CATALYST_OK)
+      wrong += expect(rank, "the error's text", 1, vdi_catalyst_error(catalyst)[0] != '\0');
+  }
+  wrong += expect(rank, "a step before the first is wanted", 0, vdi_catalyst_wants(catalyst, -1, 0.0));
+  wrong += expect(rank, "a step before the first", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_execute(catalyst, -1, 0.0));
+  wrong += expect(rank, "finalize", VDI_CATALYST_OK, vdi_catalyst_finalize(catalyst));
+  wrong += expect(rank, "a second finalize", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_finalize(catalyst));
+  wrong += expect(rank, "a step is wanted after it", 0, vdi_catalyst_wants(catalyst, 0, 0.0));
+  MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
+  MPI_Finalize();
+  return wrong == 0 ? 0 : 1;
+}

@@ -1,0 +1,30 @@
+"""What json_same.json asks for, as a script: the files are the same."""
+
+import os
+
+from paraview import catalyst
+from paraview.simple import *  # noqa: F403
+
+RANGE = [0.2, 1.0]
+grid = TrivialProducer(registrationName="grid")
+image = VolumetricDepthImage(Input=grid)
+image.SelectInputScalars = ["CELLS", os.environ.get("VDI_TEST_FIELD", "V")]
+colors = GetColorTransferFunction("V")
+colors.ColorSpace = "RGB"
+colors.RGBPoints = [RANGE[0], 0.1, 0.2, 0.8, 0.6, 0.9, 0.9, 0.9, RANGE[1], 0.8, 0.1, 0.1]
+opacities = GetOpacityTransferFunction("V")
+opacities.Points = [RANGE[0], 0.0, 0.5, 0.0, 0.5, 0.1, 0.5, 0.0, RANGE[1], 0.9, 0.5, 0.0]
+image.LookupTable = colors
+image.ScalarOpacityFunction = opacities
+image.Resolution = [96, 64]
+image.Supersegments = 12
+image.Margin = 0.1
+image.CameraPosition = [2.6, 2.0, 3.1]
+image.CameraFocalPoint = [0.5, 0.5, 0.5]
+
+extractor = CreateExtractor("VDI", image, registrationName="vdi")
+extractor.Writer.FileName = "script_{timestep:06d}.vdi"
+extractor.Trigger.Frequency = 2
+
+options = catalyst.Options()
+options.ExtractsOutputDirectory = os.environ["VDI_OUTPUT"]

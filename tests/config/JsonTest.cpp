@@ -1,0 +1,92 @@
+// JSON with places: what is refused, where, and that a hostile document costs little.
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "tests/Catch.h"
+#include "vdi/config/Json.h"
+#include "vdi/core/Error.h"
+
+using namespace vdi;
+using config::parseJson;
+
+namespace {
+
+void refused(const std::string& text, const std::string& part) {
+  INFO(text.substr(0, 200));
+  CHECK_THROWS_WITH(parseJson(text, "x.json"), test::ContainsSubstring(part));
+}
+
+}  // namespace
+
+TEST_CASE("values of a document") {
+  const auto value = parseJson("\n{\"a\": [1, -2.5, 3e2],\n \"b\": {\"c\": true, \"d\": \"x\"}}\n", "x.json");
+  CHECK(value.at("a").numbers(3) == std::vector<double>{1.0, -2.5, 300.0});
+  CHECK(value.at("b").at("c").flag());
+  CHECK(value.at("b").at("d").text() == "x");
+  CHECK_FALSE(value.find("z"));
+  CHECK(value.at("a").items()[0].whole(0, 5) == 1);
+}
+
+TEST_CASE("a mistake has the pointer and the line of its value") {
+  const auto value = parseJson("{\"a\":\n5\n,\"b/c\": {\"~d\":\n[1,\n\"x\"\n]},\n\"e\": 7\n}", "x.json");
+  CHECK_THROWS_WITH(value.at("a").text(), "/a: must be a text (x.json, line 2)");
+  CHECK_THROWS_WITH(value.at("b/c").at("~d").numbers(2), "/b~1c/~0d/1: must be a number (x.json, line 5)");
+  CHECK_THROWS_WITH(value.at("e").flag(), "/e: must be true or false (x.json, line 7)");
+  CHECK_THROWS_WITH(value.at("b/c").at("z"), "/b~1c: the field 'z' is missing (x.json, line 3)");
+  CHECK_THROWS_WITH(value.requireObject({"a", "b/c"}),
+                    "/e: no such field; there are a, b/c (x.json, line 7)");
+  CHECK_THROWS_WITH(value.at("a").whole(6, 9), test::ContainsSubstring("from 6 to 9"));
+  CHECK_THROWS_WITH(parseJson("{\"a\": 1.5}", "x.json").at("a").whole(0, 9),
+                    test::ContainsSubstring("whole"));
+  CHECK_THROWS_WITH(parseJson("{\"a\": 1e300}", "x.json").at("a").number(0.0, 1.0),
+                    test::ContainsSubstring("to 1"));
+}
+
+TEST_CASE("what isn't JSON is refused with its line") {
+  refused("", "not valid JSON");
+  refused("{\"a\": 1,\n\"b\": }", "(x.json, line 2)");
+  refused("{\"a\": NaN}", "not valid JSON");
+  refused("{\"a\": 1e999}", "not valid JSON");
+  refused("{\"a\": 1} x", "not valid JSON");
+  refused("{\"a\": 1,\n\n\"b\": {\"a\": 2},\n\"a\": 3}", "the field 'a' stands there twice (x.json, line 4)");
+  refused(std::string("{\"a\": \"") + '\xff' + "\"}", "not valid JSON");
+  try {
+    parseJson("{\"a\": \"" + std::string(100000, 'x'), "x.json");
+    FAIL("a text without an end");
+  } catch (const Error& error) {
+    constexpr std::size_t line = 400;
+    CHECK(std::string(error.what()).size() < line);
+    CHECK(error.code() == ErrorCode::Format);
+  }
+}
+
+TEST_CASE("a document beyond the limits is refused") {
+  refused(std::string(10000, '['), "deep in each other");
+  std::string deep;
+  for (int i = 0; i < 10000; ++i) deep += "{\"a\":";
+  refused(deep, "deep in each other");
+  std::string many = "[0";
+  for (int i = 0; i < 200000; ++i) many += ",1";
+  refused(many + "]", "more values");
+  refused(std::string(std::size_t{2} << 20, ' '), "too many");
+}
+
+TEST_CASE("files that aren't read") {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("vdi-json-" + std::to_string(::getpid()));
+  std::filesystem::create_directory(folder);
+  const std::string pipe = (folder / "pipe").string();
+  REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK_THROWS_AS(config::readJsonText(pipe), Error);  // and doesn't wait for a writer
+  CHECK_THROWS_AS(config::readJsonText(folder.string()), Error);
+  CHECK_THROWS_AS(config::readJsonText((folder / "none").string()), Error);
+  const std::string large = (folder / "large").string();
+  std::ofstream(large).close();
+  std::filesystem::resize_file(large, std::uintmax_t{1} << 30);  // has no blocks
+  CHECK_THROWS_WITH(config::readJsonText(large), test::ContainsSubstring("1073741824 bytes are too many"));
+  std::filesystem::remove_all(folder);
+}

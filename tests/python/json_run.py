@@ -1,0 +1,62 @@
+"""A simulation in Python without a script: files, a picture, and a stream that vdi receive takes. Argument: vdi."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+from mpi4py import MPI
+
+import pv_vdi
+from pv_vdi.catalyst import ENGINE, SCRIPT, Block, Catalyst, CatalystError
+
+N = 16
+FOLDER = os.environ["VDI_OUTPUT"]
+shutil.rmtree(FOLDER, ignore_errors=True)
+os.makedirs(FOLDER)
+os.chdir(FOLDER)
+
+
+def refused(code, **what):
+    try:
+        Catalyst(MPI.COMM_WORLD, **what)
+    except CatalystError as error:
+        assert error.code == code, error.code
+        return
+    raise AssertionError("it's taken: %s" % what)
+
+
+refused(SCRIPT, json={"field": "V", "evry": 10})
+refused(SCRIPT, json="none.json")
+run = {"field": "V", "every": 10, "resolution": [48, 32], "stream": {"link_file": "link"},
+       "output": {"vdi": "v_{timestep:03d}.vdi", "png": "v_{timestep:03d}.png"}}
+x = (np.arange(N) + 0.5) / N
+with Catalyst(MPI.COMM_WORLD, json=run) as catalyst:
+    catalyst.set_blocks([Block(cells=(N, N, N), spacing=(1 / N,) * 3)])
+    values = np.zeros((N, N, N))
+    catalyst.set_array("V", [values])
+    for step in range(21):
+        values[...] = np.sin(5 * x)[:, None, None] * np.cos(4 * x)[None, :, None] * (x + 0.01 * step)
+        assert catalyst.wants(step) == (step % 10 == 0), step
+        catalyst.execute(step, 0.1 * step)
+    refused(ENGINE, json=run)
+    link = open("link").read().strip()
+    assert os.stat("link").st_mode & 0o777 == 0o600
+    # Not one of the ranks.
+    alone = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_", "PMIX_"))}
+    subprocess.run([sys.argv[1], "receive", link, "-o", "received", "--frames", "1"], env=alone, check=True, timeout=60)
+assert not os.path.exists("link")
+made = sorted(name for name in os.listdir(".") if name.startswith("v_"))
+assert made == ["v_%03d.%s" % (step, kind) for step in (0, 10, 20) for kind in ("png", "vdi")], made
+vdi = pv_vdi.read("v_020.vdi")
+assert (vdi.width, vdi.height, vdi.time_step) == (48, 32, 20)
+assert abs(vdi.time - 2.0) < 1e-12
+assert vdi.metadata["array"]["name"] == "V", vdi.metadata
+assert len(vdi.segments) > 1000
+received = [os.path.join("received", name) for name in os.listdir("received")]
+assert open(received[0], "rb").read() == open("v_020.vdi", "rb").read(), "what's received isn't what's written"
+# Another one may follow in the process.
+with Catalyst(MPI.COMM_WORLD, json={"field": "V"}) as catalyst:
+    catalyst.set_blocks([])
+    assert catalyst.wants(1)

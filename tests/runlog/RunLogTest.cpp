@@ -1,0 +1,102 @@
+// The log's files: appended to, whole lines or none.
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "tests/Catch.h"
+#include "tests/io/Samples.h"
+#include "vdi/core/Error.h"
+#include "vdi/runlog/RunLog.h"
+
+using namespace vdi;
+using runlog::FrameRecord;
+using runlog::readRecords;
+using runlog::RunLog;
+using runlog::RunRecords;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+FrameRecord frameOf(std::int64_t step, double milliseconds, const std::string& error = {}) {
+  FrameRecord frame;
+  frame.step = step;
+  frame.milliseconds = milliseconds;
+  frame.error = error;
+  return frame;
+}
+
+std::string contentOf(const fs::path& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+}  // namespace
+
+TEST_CASE("a log has the run's start, its frames and its end, and a second run appends") {
+  const test::TemporaryFolder folder;
+  const fs::path json = folder.path() / "new" / "run.jsonl";
+  const fs::path text = folder.path() / "run.log";
+  for (int run = 0; run < 2; ++run) {
+    RunLog log({json, text}, {"V", 2, 0});
+    log.add(frameOf(10, 3.0));
+    log.add(frameOf(20, 5.0, "no"));
+    const runlog::RunSummary summary = log.finish();
+    CHECK(summary.frames == 1);
+    CHECK(summary.failed == 1);
+    CHECK(summary.seconds >= 0.0);
+  }
+  const RunRecords records = readRecords(json);
+  CHECK(records.starts.size() == 2);
+  CHECK(records.frames.size() == 4);
+  CHECK(records.summaries.size() == 2);
+  CHECK(records.skipped == 0);
+  const std::string lines = contentOf(text);
+  CHECK(std::count(lines.begin(), lines.end(), '\n') == 8);
+  CHECK_THAT(lines, test::ContainsSubstring("step 20, time 0: 5.0 ms, failed: no\n"));
+}
+
+TEST_CASE("a line that has no room leaves nothing of itself, and the next one is whole") {
+  const test::TemporaryFolder folder;
+  const fs::path json = folder.path() / "run.jsonl";
+  const fs::path text = folder.path() / "run.log";
+  RunLog log({json, text}, {"V", 1, 0});
+  log.add(frameOf(1, 1.0));
+  const std::string before = contentOf(json);
+  {
+    const test::FileSizeLimit full(before.size() + 20);
+    CHECK_THROWS_WITH(log.add(frameOf(2, 1.0)), test::ContainsSubstring("run.jsonl"));
+  }
+  CHECK(contentOf(json) == before);
+  CHECK_THAT(contentOf(text), test::ContainsSubstring("step 2,"));  // it had room
+  log.add(frameOf(3, 1.0));
+  const RunRecords records = readRecords(json);
+  CHECK(records.skipped == 0);
+  REQUIRE(records.frames.size() == 2);
+  CHECK(records.frames[1].step == 3);
+}
+
+TEST_CASE("a line that was left unfinished spoils no other") {
+  const test::TemporaryFolder folder;
+  const fs::path json = folder.path() / "run.jsonl";
+  std::ofstream(json) << "{\"event\": \"fra";
+  RunLog log({json, {}}, {"V", 1, 0});
+  log.add(frameOf(1, 1.0));
+  const RunRecords records = readRecords(json);
+  CHECK(records.skipped == 1);
+  CHECK(records.starts.size() == 1);
+  CHECK(records.frames.size() == 1);
+}
+
+TEST_CASE("a log that can't be is refused at once") {
+  const test::TemporaryFolder folder;
+  CHECK_THROWS_AS(RunLog({folder.path(), {}}, {"V", 1, 0}), Error);
+  CHECK_THROWS_WITH(RunLog({"/dev/null", {}}, {"V", 1, 0}), test::ContainsSubstring("regular file"));
+  const fs::path file = folder.path() / "other";
+  std::ofstream(file) << "some text\n";
+  CHECK_THROWS_WITH(readRecords(file), test::ContainsSubstring("not a run's log"));
+  CHECK_THROWS_WITH(readRecords(folder.path() / "none"), test::ContainsSubstring("none"));
+}

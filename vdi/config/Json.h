@@ -1,0 +1,68 @@
+// JSON that people write, read strictly: each mistake is told with its place.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace vdi::config {
+
+/// What a document may have, so that a hostile one costs neither memory nor stack.
+struct JsonLimits {
+  std::size_t bytes = std::size_t{1} << 20;
+  std::size_t depth = 16;       // of values in values
+  std::size_t values = 100000;  // of any kind
+};
+
+struct JsonNode;
+
+/// A value in a document, which it keeps alive. Functions that return what it holds throw Error{Format} with
+/// the value's JSON pointer, and the document's name and the line as context, if it holds something else.
+class JsonValue {
+ public:
+  bool isObject() const;
+  bool isArray() const;
+  bool isText() const;
+  bool isFlag() const;
+
+  /// The value of a field; nothing if this object lacks it.
+  std::optional<JsonValue> find(std::string_view name) const;
+  /// The same; throws if it is missing.
+  JsonValue at(std::string_view name) const;
+  /// Throws unless this is an object whose fields are all among `known`.
+  void requireObject(const std::vector<std::string>& known) const;
+
+  double number() const;  // finite
+  double number(double least, double most) const;
+  std::int64_t whole(std::int64_t least, std::int64_t most) const;
+  bool flag() const;
+  const std::string& text() const;
+  std::vector<JsonValue> items() const;
+  std::vector<double> numbers(std::size_t count) const;
+
+  [[noreturn]] void fail(const std::string& what) const;
+
+ private:
+  friend JsonValue parseJson(std::string_view text, const std::string& name, const JsonLimits& limits);
+  JsonValue(std::shared_ptr<const JsonNode> node, std::shared_ptr<const std::string> document,
+            std::string pointer);
+  JsonValue child(const JsonNode& node, const std::string& step) const;
+
+  std::shared_ptr<const JsonNode> node_;
+  std::shared_ptr<const std::string> document_;  // its name
+  std::string pointer_;
+};
+
+/// `name` is the document's, for messages. Throws Error{Format}, with the line, for what isn't JSON, a field
+/// that an object has twice, and a document beyond the limits.
+JsonValue parseJson(std::string_view text, const std::string& name, const JsonLimits& limits = {});
+
+/// The text of a file. Throws Error: Io unless it is a regular file that can be read, Format if it is larger
+/// than the limit; it isn't read then.
+std::string readJsonText(const std::string& path, const JsonLimits& limits = {});
+
+}  // namespace vdi::config

@@ -1,0 +1,27 @@
+// Transfer functions that fit any data.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vdi/core/ScalarRange.h"
+#include "vdi/core/TransferFunction.h"
+
+namespace vdi::config {
+
+struct PresetInfo {
+  std::string name;
+  std::string description;
+};
+const std::vector<PresetInfo>& transferFunctionPresets();
+
+/// A preset stretched over the range, as `stretched` does. Throws Error{InvalidArgument} that lists the valid
+/// names.
+TransferFunction presetTransferFunction(const std::string& name, const ScalarRange& range,
+                                        double unitDistance);
+
+/// The function whose x of 0 and 1 come to lie at the ends of `range`; a range without width is widened to 1,
+/// an empty one becomes [0, 1].
+TransferFunction stretched(TransferFunction function, const ScalarRange& range);
+
+}  // namespace vdi::config

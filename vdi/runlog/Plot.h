@@ -1,0 +1,20 @@
+// A run's log as a picture.
+#pragma once
+
+#include <string>
+
+#include "vdi/runlog/Record.h"
+
+namespace vdi::runlog {
+
+struct PlotOptions {
+  std::string title;
+  bool means = false;  // of the ranks, in place of the slowest rank
+};
+
+/// An SVG document: above, each frame's stages on top of each other, in milliseconds, with a line where the
+/// simulation's wait ends; below, the bytes that the frame wrote. Frames stand in the log's order; their
+/// steps are written below them, and failed ones are red. Throws Error{Format} if there are no frames.
+std::string plot(const RunRecords& records, const PlotOptions& options);
+
+}  // namespace vdi::runlog

@@ -1,0 +1,91 @@
+// The log of a run in situ: one record a frame, as a line of text and as a line of JSON.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "vdi/pipeline/Reports.h"
+
+namespace vdi::runlog {
+
+/// Wall-clock milliseconds of a stage, waiting for other ranks within it included.
+struct StageTime {
+  std::string name;
+  double slowest = 0.0;  // of the ranks
+  double mean = 0.0;     // of the ranks
+  bool operator==(const StageTime&) const = default;
+};
+
+/// Of the milliseconds that each rank took; there is at least one.
+StageTime stageOf(std::string name, std::span<const double> milliseconds);
+
+/// upload, generate, distribute, composite, gather and output, in this order; `reports` are all ranks'.
+std::vector<StageTime> stagesOf(std::span<const RankReport> reports);
+
+/// The beginning of a run.
+struct RunStart {
+  std::string field;
+  int ranks = 1;
+  std::int64_t unixTime = 0;  // seconds
+  bool operator==(const RunStart&) const = default;
+};
+
+struct FrameRecord {
+  std::int64_t step = 0;
+  double time = 0.0;
+  std::string camera;               // empty: the run's only one
+  double milliseconds = 0.0;        // the simulation waited for this frame, as the first rank saw it
+  std::vector<StageTime> stages;    // of a failed frame: none
+  std::uint64_t bytesWritten = 0;   // into files
+  std::uint64_t bytesSent = 0;      // between ranks, all of them together
+  std::uint64_t deviceBytes = 0;    // device memory held, the most of a rank
+  std::uint64_t hostPeakBytes = 0;  // the most of a rank's process so far
+  std::uint64_t dropped = 0;        // frames that the stream has left out so far
+  std::vector<std::string> files;   // as the run names them
+  std::string error;                // of a failed frame; empty: it was made
+  bool operator==(const FrameRecord&) const = default;
+};
+
+/// Fills what `reports` of all ranks tell: stages, bytes and memory.
+void setReports(FrameRecord& record, std::span<const RankReport> reports);
+
+/// The end of a run that was finalized.
+struct RunSummary {
+  std::uint64_t frames = 0;  // made
+  std::uint64_t failed = 0;
+  std::uint64_t dropped = 0;  // by the stream
+  std::uint64_t bytesWritten = 0;
+  double seconds = 0.0;              // of the run, from its start
+  double waitedSeconds = 0.0;        // of these, the simulation's wait for frames, failed ones included
+  double longestMilliseconds = 0.0;  // of a frame
+  std::vector<StageTime> stages;     // sums over frames
+  bool operator==(const RunSummary&) const = default;
+
+  void add(const FrameRecord& record);
+};
+
+// One line each, without the line's end.
+std::string jsonLine(const RunStart& start);
+std::string jsonLine(const FrameRecord& record);
+std::string jsonLine(const RunSummary& summary);
+std::string textLine(const RunStart& start);
+std::string textLine(const FrameRecord& record);
+std::string textLine(const RunSummary& summary);
+
+/// What a log of JSON lines tells: of several runs, if they have appended to one file.
+struct RunRecords {
+  std::vector<RunStart> starts;
+  std::vector<FrameRecord> frames;
+  std::vector<RunSummary> summaries;
+  std::size_t skipped = 0;  // lines that aren't records, such as one that a full disk has cut
+};
+RunRecords parseRecords(std::string_view lines);
+/// Throws Error: Io as io::InputFile, Format if no line of the file is a record or the file has more than
+/// 1 GiB.
+RunRecords readRecords(const std::filesystem::path& file);
+
+}  // namespace vdi::runlog

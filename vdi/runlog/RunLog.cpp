@@ -1,0 +1,103 @@
+#include "vdi/runlog/RunLog.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <exception>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "vdi/core/Error.h"
+
+namespace vdi::runlog {
+
+namespace {
+
+[[noreturn]] void failWith(const char* what, int number, const std::filesystem::path& path) {
+  throw Error(ErrorCode::Io, std::string("can't ") + what + ": " + std::system_category().message(number),
+              path.string());
+}
+
+}  // namespace
+
+/// A file to which lines are appended.
+class RunLog::Appended {
+ public:
+  explicit Appended(std::filesystem::path path) : path_(std::move(path)) {
+    std::error_code error;
+    if (path_.has_parent_path()) std::filesystem::create_directories(path_.parent_path(), error);
+    if (error) throw Error(ErrorCode::Io, "can't make the log's folder: " + error.message(), path_.string());
+    // Non-blocking, for a pipe without a reader would be waited for.
+    constexpr mode_t readable = 0666;
+    descriptor_ =
+        ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, readable);
+    if (descriptor_ < 0) failWith("open the log", errno, path_);
+    struct stat status {};
+    if (::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) return;
+    ::close(descriptor_);
+    throw Error(ErrorCode::Io, "the log must be a regular file", path_.string());
+  }
+  ~Appended() { ::close(descriptor_); }
+  Appended(const Appended&) = delete;
+  Appended& operator=(const Appended&) = delete;
+
+  void append(const std::string& line) {
+    const off_t before = ::lseek(descriptor_, 0, SEEK_END);
+    if (before < 0) failWith("write the log", errno, path_);
+    std::string bytes = line + '\n';
+    char last = '\n';
+    // A line that another program has left unfinished doesn't spoil this one.
+    if (before > 0 && ::pread(descriptor_, &last, 1, before - 1) == 1 && last != '\n')
+      bytes.insert(0, 1, '\n');
+    std::size_t done = 0;
+    while (done < bytes.size()) {
+      const ssize_t written = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) {
+        const int reason = written < 0 ? errno : EIO;
+        if (done > 0) (void)::ftruncate(descriptor_, before);
+        failWith("write the log", reason, path_);
+      }
+      done += static_cast<std::size_t>(written);
+    }
+  }
+
+ private:
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+};
+
+RunLog::RunLog(const LogFiles& files, const RunStart& start) {
+  if (files.json) json_ = std::make_unique<Appended>(*files.json);
+  if (files.text) text_ = std::make_unique<Appended>(*files.text);
+  append(jsonLine(start), textLine(start));
+}
+
+RunLog::~RunLog() = default;
+
+void RunLog::append(const std::string& json, const std::string& text) {
+  std::exception_ptr failure;
+  try {
+    if (json_) json_->append(json);
+  } catch (const Error&) {
+    failure = std::current_exception();
+  }
+  if (text_) text_->append(text);
+  if (failure) std::rethrow_exception(failure);
+}
+
+void RunLog::add(const FrameRecord& record) {
+  summary_.add(record);
+  append(jsonLine(record), textLine(record));
+}
+
+RunSummary RunLog::finish() {
+  summary_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  append(jsonLine(summary_), textLine(summary_));
+  return summary_;
+}
+
+}  // namespace vdi::runlog

@@ -1,0 +1,46 @@
+// Writes a run's log while it goes on.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "vdi/runlog/Record.h"
+
+namespace vdi::runlog {
+
+/// At least one of the two.
+struct LogFiles {
+  std::optional<std::filesystem::path> json;
+  std::optional<std::filesystem::path> text;
+};
+
+/// One rank's. A line is appended when it comes, in one piece or not at all, so that the log of a killed run
+/// ends with its last frame. What was in a file before stays.
+class RunLog {
+ public:
+  /// Makes folders and files if need be. Throws Error{Io} with the path.
+  RunLog(const LogFiles& files, const RunStart& start);
+  /// Doesn't write the summary.
+  ~RunLog();
+  RunLog(const RunLog&) = delete;
+  RunLog& operator=(const RunLog&) = delete;
+
+  /// Throws Error{Io} if the line couldn't be appended, after the other file got its one.
+  void add(const FrameRecord& record);
+  const RunSummary& soFar() const { return summary_; }
+  /// Appends the summary, and returns it. Throws as add.
+  RunSummary finish();
+
+ private:
+  class Appended;
+  void append(const std::string& json, const std::string& text);
+
+  std::unique_ptr<Appended> json_;
+  std::unique_ptr<Appended> text_;
+  RunSummary summary_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace vdi::runlog
