@@ -1,6 +1,10 @@
 #include "apps/FolderWatch.h"
 
+#include <sys/inotify.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <system_error>
 #include <utility>
 
@@ -20,6 +24,13 @@ std::string numberAt(const std::string& text, std::size_t& at) {
   const std::size_t begin = at;
   while (at < text.size() && isDigit(text[at])) ++at;
   return text.substr(begin, at - begin);
+}
+
+/// Whether it is a link to a file of the same folder, such as latest.vdi.
+bool isAnotherName(const std::filesystem::directory_entry& entry) {
+  std::error_code none;
+  const std::filesystem::path target = std::filesystem::read_symlink(entry.path(), none);
+  return !none && !target.has_parent_path();
 }
 
 }  // namespace
@@ -43,13 +54,36 @@ bool comesBefore(const std::string& a, const std::string& b) {
   return a < b;  // "01" and "1"
 }
 
-FolderWatch::FolderWatch(std::filesystem::path folder) : folder_(std::move(folder)) {
+FolderWatch::FolderWatch(std::filesystem::path folder)
+    : folder_(std::move(folder)), descriptor_(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC)) {
   std::error_code error;
   const std::filesystem::directory_iterator entries(folder_, error);
-  if (error) throw Error(ErrorCode::Io, "can't read the folder: " + error.message(), folder_.string());
+  if (error) {
+    if (descriptor_ >= 0) ::close(descriptor_);
+    throw Error(ErrorCode::Io, "can't read the folder: " + error.message(), folder_.string());
+  }
+  watch();
+}
+
+FolderWatch::~FolderWatch() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+/// Watches the folder that has the name now. Does nothing if that one is watched already.
+void FolderWatch::watch() const {
+  if (descriptor_ < 0) return;
+  // Files without a name (O_TMPFILE) are created when they get one.
+  (void)::inotify_add_watch(descriptor_, folder_.c_str(),
+                            IN_CREATE | IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
 }
 
 std::vector<std::filesystem::path> FolderWatch::changed() {
+  if (descriptor_ >= 0) {
+    std::array<std::byte, 4096> events{};
+    while (::read(descriptor_, events.data(), events.size()) > 0) {
+    }
+    watch();  // before the listing, so that nothing falls between the two
+  }
   std::vector<std::filesystem::path> files;
   std::map<std::filesystem::path, Look> seen;
   std::error_code error;
@@ -57,6 +91,7 @@ std::vector<std::filesystem::path> FolderWatch::changed() {
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
     const std::filesystem::path& file = entries->path();
     if (file.extension() != ".vdi" || file.filename().string().starts_with('.')) continue;
+    if (isAnotherName(*entries)) continue;
     std::error_code gone;  // the file may vanish between two listings
     const Look look{std::filesystem::file_size(file, gone), std::filesystem::last_write_time(file, gone)};
     if (gone) continue;

@@ -1,7 +1,13 @@
 #include "apps/FrameFiles.h"
 
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <cassert>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <system_error>
@@ -24,18 +30,37 @@ stream::Clock::time_point writtenAt(const std::filesystem::path& file) {
   return age.count() > 0 ? now - std::chrono::duration_cast<stream::Clock::duration>(age) : now;
 }
 
+/// Time that a program has for writing a file under its final name.
+constexpr std::chrono::seconds writingTime{1};
+
+int makeWakeup() {
+  const int descriptor = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+  if (descriptor < 0)
+    throw Error(ErrorCode::Io, "can't watch files: " + std::generic_category().message(errno));
+  return descriptor;
+}
+
+void wake(int wakeup) {
+  (void)::eventfd_write(wakeup, 1);
+}
+
 }  // namespace
 
-FrameFiles::FrameFiles(Options options) : options_(std::move(options)) {
+FrameFiles::FrameFiles(Options options) : options_(std::move(options)), wakeup_(makeWakeup()) {
   assert(options_.files.empty() != options_.folder.empty());
 }
 
 FrameFiles::~FrameFiles() {
+  stop();
+  ::close(wakeup_);
+}
+
+void FrameFiles::stop() {
   {
     const std::scoped_lock lock(mutex_);
     isEnding_ = true;
   }
-  changed_.notify_all();
+  wake(wakeup_);
   if (thread_.joinable()) thread_.join();
 }
 
@@ -60,22 +85,15 @@ void FrameFiles::show(std::uint32_t index) {
     const std::scoped_lock lock(mutex_);
     if (std::find(wanted_.begin(), wanted_.end(), index) == wanted_.end()) wanted_.push_back(index);
   }
-  changed_.notify_all();
+  wake(wakeup_);
 }
 
 void FrameFiles::work() {
-  const bool follows = watch_ && options_.follows;
   while (true) {
-    if (follows) look();
+    if (follows()) look();
     std::optional<std::uint32_t> index;
     {
-      std::unique_lock lock(mutex_);
-      const auto hasWork = [this] { return isEnding_ || !wanted_.empty(); };
-      if (follows) {
-        changed_.wait_for(lock, options_.interval, hasWork);
-      } else {
-        changed_.wait(lock, hasWork);
-      }
+      const std::scoped_lock lock(mutex_);
       if (isEnding_) return;
       if (!wanted_.empty()) {
         index = wanted_.front();
@@ -83,7 +101,18 @@ void FrameFiles::work() {
       }
     }
     if (index && server_->isWanted(*index)) provide(*index);
+    tellIncomplete();
+    if (!index) waitForWork();
   }
+}
+
+void FrameFiles::waitForWork() {
+  std::array<pollfd, 2> descriptors{pollfd{wakeup_, POLLIN, 0},
+                                    pollfd{follows() ? watch_->descriptor() : -1, POLLIN, 0}};
+  const int timeout = follows() ? static_cast<int>(options_.interval.count()) : -1;
+  (void)::poll(descriptors.data(), descriptors.size(), timeout);
+  eventfd_t count = 0;
+  (void)::eventfd_read(wakeup_, &count);
 }
 
 void FrameFiles::look() {
@@ -96,11 +125,22 @@ void FrameFiles::look() {
   }
 }
 
-/// An incomplete file is found again when it changes.
-void FrameFiles::tell(const std::filesystem::path& file, const std::string& what) {
-  std::string& said = told_[file];
-  if (said.empty()) options_.log(what + "; it's left out");
-  said = what;
+/// The file is found again when it changes.
+void FrameFiles::leaveOut(const std::filesystem::path& file, const std::string& what) {
+  Incomplete& incomplete = incomplete_[file];
+  incomplete.what = what;
+  incomplete.since = stream::Clock::now();
+}
+
+/// Logs each incomplete file once. A followed folder may have files that are still being written, which are
+/// not worth a word yet.
+void FrameFiles::tellIncomplete() {
+  const auto patience = follows() ? writingTime : std::chrono::seconds(0);
+  for (auto& [file, incomplete] : incomplete_) {
+    if (incomplete.isTold || stream::Clock::now() - incomplete.since < patience) continue;
+    options_.log(incomplete.what + "; it's left out");
+    incomplete.isTold = true;
+  }
 }
 
 /// Adds all files to the series, and shows the last one that is complete.
@@ -113,7 +153,7 @@ void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
       entries.steps.push_back(header.timeStep);
       series_.push_back(file);
     } catch (const Error& error) {
-      tell(file, error.what());
+      leaveOut(file, error.what());
     }
   }
   if (entries.size() == 0) return;
@@ -131,15 +171,14 @@ bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::Fram
     std::vector<std::byte> bytes = io::InputFile(file).readAll();
     const stream::Clock::time_point made = writtenAt(file);
     try {
-      const Vdi vdi = io::decode(bytes);
-      stream::encodeFrame(vdi, index, made, std::move(bytes), take);
+      stream::passFrame(std::move(bytes), index, made, take);
     } catch (const Error& error) {
       throw Error(error.code(), error.what(), file.string());
     }
-    told_.erase(file);
+    incomplete_.erase(file);
     return true;
   } catch (const Error& error) {
-    tell(file, error.what());
+    leaveOut(file, error.what());
     return false;
   }
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
@@ -27,10 +26,10 @@ namespace vdi::apps {
 class FrameFiles {
  public:
   struct Options {
-    std::vector<std::filesystem::path> files;     // a finished series; or
-    std::filesystem::path folder;                 // whose files are the series, and
-    bool follows = true;                          // which is watched for new files
-    std::chrono::milliseconds interval{250};      // between two listings of the folder
+    std::vector<std::filesystem::path> files;  // a finished series; or
+    std::filesystem::path folder;              // whose files are the series, and
+    bool follows = true;                       // which is watched for new files
+    std::chrono::milliseconds interval{250};   // between two listings of a folder that doesn't report changes
     std::function<void(const std::string&)> log;  // one line, from any thread
   };
   explicit FrameFiles(Options options);
@@ -38,9 +37,12 @@ class FrameFiles {
   FrameFiles(const FrameFiles&) = delete;
   FrameFiles& operator=(const FrameFiles&) = delete;
 
-  /// Starts once. The server must outlive this. Throws Error: Io for a folder or a file that cannot be read,
-  /// Format for a file that is not a VDI; bad files of a folder are logged and skipped.
+  /// Starts once. The server must live until stop() or this object's end. Throws Error: Io for a folder or a
+  /// file that cannot be read, Format for a file that is not a VDI; bad files of a folder are logged and
+  /// skipped.
   void start(stream::Server& server);
+  /// Nothing is handed to the server any more. The server may end afterwards, and may still call show.
+  void stop();
   /// For ServerOptions::show.
   void show(std::uint32_t index);
 
@@ -50,19 +52,26 @@ class FrameFiles {
   void add(const std::vector<std::filesystem::path>& files);
   void provide(std::uint32_t index);
   bool send(std::uint32_t index, const std::function<void(stream::FramePtr)>& take);
-  void tell(const std::filesystem::path& file, const std::string& what);
+  bool follows() const { return watch_ && options_.follows; }
+  void waitForWork();
+  void leaveOut(const std::filesystem::path& file, const std::string& what);
+  void tellIncomplete();
 
   Options options_;
   stream::Server* server_ = nullptr;
   std::optional<FolderWatch> watch_;
   std::vector<std::filesystem::path> series_;
   std::list<stream::FramePtr> kept_;  // the last few frames shown
-  /// Files that were incomplete, with the message logged for each.
-  std::map<std::filesystem::path, std::string> told_;
+  struct Incomplete {
+    std::string what;
+    stream::Clock::time_point since;  // the file's last change
+    bool isTold = false;
+  };
+  std::map<std::filesystem::path, Incomplete> incomplete_;
   std::string folderTrouble_;
 
+  int wakeup_;        // an eventfd: something below has changed
   std::mutex mutex_;  // for the next two
-  std::condition_variable changed_;
   std::deque<std::uint32_t> wanted_;
   bool isEnding_ = false;
   std::thread thread_;

@@ -28,6 +28,7 @@ namespace {
 
 struct ReceiveOptions {
   std::string url;
+  std::string command;
   std::string folder;
   std::string picture;
   std::uint64_t frames = 0;  // 0: until the server has ended
@@ -120,13 +121,13 @@ void requirePatience(const stream::Client::Standing& standing, double patience, 
 void receive(const ReceiveOptions& options) {
   constexpr std::chrono::milliseconds pause{100};
   stream::ClientOptions connection;
-  connection.url = stream::parseUrl(options.url);
-  if (connection.url.token.empty()) connection.url.token = stream::givenToken(options.tokenFile);
-  if (connection.url.token.empty())
-    throw Error(ErrorCode::InvalidArgument, "the link has no token: see --token-file",
-                connection.url.authority());
+  if (options.command.empty()) {
+    (void)stream::parseUrl(options.url);  // a link that isn't one is no command
+    connection = clientOf(options.url, options.tokenFile);
+  } else {
+    connection = clientOf(options.command, "");
+  }
   connection.authority = options.authority;
-  connection.log = [](const std::string& line) { fmt::print(stderr, "vdi: {}\n", line); };
   Recorder recorder(options);
   stream::Client client(std::move(connection));
   SeriesWalk walk;
@@ -163,9 +164,14 @@ void addReceive(CLI::App& app, Job& job) {
       "A lost connection is made again. Of a finished series all frames are received, else the newest ones;\n"
       "of a server that has more frames than time, some are left out.");
   const auto options = std::make_shared<ReceiveOptions>();
-  command->add_option("url", options->url, "the link that vdi serve or VDIStream printed")
-      ->type_name("")
-      ->required();
+  CLI::Option* const url =
+      command->add_option("url", options->url, "the link that vdi serve or VDIStream printed")->type_name("");
+  command
+      ->add_option("--from", options->command,
+                   "in place of the link: a command that runs vdi serve --stdio, such as\n"
+                   "'ssh host vdi serve --stdio results'")
+      ->type_name("COMMAND")
+      ->excludes(url);
   command->add_option("-o,--output", options->folder, "folder for vdi_000000.vdi and so on")
       ->type_name("FOLDER");
   command->add_option("--render", options->picture, "PNG of the newest frame, from where it was made")
@@ -182,7 +188,10 @@ void addReceive(CLI::App& app, Job& job) {
   command
       ->add_option("--authority", options->authority, "PEM file of certificates to trust beside the system's")
       ->type_name("FILE");
-  command->callback([options, &job] { job = {[options](const comm::Communicator&) { receive(*options); }}; });
+  command->callback([options, &job] {
+    if (options->url.empty() && options->command.empty()) throw CLI::RequiredError("a link, or --from");
+    job = {[options](const comm::Communicator&) { receive(*options); }};
+  });
 }
 
 }  // namespace vdi::apps

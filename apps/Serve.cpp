@@ -2,8 +2,12 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <unistd.h>
+
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -12,10 +16,12 @@
 #include "apps/Commands.h"
 #include "apps/FrameFiles.h"
 #include "apps/Help.h"
+#include "apps/Relay.h"
 #include "apps/StreamOptions.h"
 #include "vdi/core/Error.h"
 #include "vdi/page/Page.h"
 #include "vdi/stream/GivenToken.h"
+#include "vdi/stream/Pipe.h"
 #include "vdi/stream/Server.h"
 #include "vdi/stream/Token.h"
 
@@ -25,6 +31,9 @@ namespace {
 
 struct ServeOptions {
   std::vector<std::string> inputs;
+  std::string from;
+  std::string fromTokenFile;
+  bool isStdio = false;
   std::string host = "127.0.0.1";
   std::uint16_t port = 0;
   std::string tokenFile;
@@ -52,9 +61,25 @@ class EndSignals {
     int signal = 0;
     sigwait(&set_, &signal);
   }
+  bool hasCome() const {
+    const timespec none{};
+    return sigtimedwait(&set_, nullptr, &none) > 0;
+  }
 
  private:
   sigset_t set_{};
+};
+
+/// Stops `files` before the server that they go to ends: it is destroyed first.
+class FilesStop {
+ public:
+  explicit FilesStop(FrameFiles& files) : files_(files) {}
+  ~FilesStop() { files_.stop(); }
+  FilesStop(const FilesStop&) = delete;
+  FilesStop& operator=(const FilesStop&) = delete;
+
+ private:
+  FrameFiles& files_;
 };
 
 FrameFiles::Options filesOf(const ServeOptions& options) {
@@ -69,10 +94,30 @@ FrameFiles::Options filesOf(const ServeOptions& options) {
   return files;
 }
 
-void serve(const ServeOptions& options) {
-  const EndSignals endSignals;
+/// Prints the link, or without the token where that is known: the only place that shows a token.
+void printLink(const stream::Server& server, bool isKnown) {
+  fmt::print("{}\n", isKnown ? server.address() : server.link());
+  std::fflush(stdout);
+}
+
+/// At standard input and output, until they are closed. Nothing else is written there.
+void serveStdio(const ServeOptions& options) {
+  std::signal(SIGPIPE, SIG_IGN);
   FrameFiles files(filesOf(options));
-  const std::string known = stream::givenToken(options.tokenFile);
+  stream::ServerOptions server;
+  server.listens = false;
+  server.token = stream::randomToken();
+  server.mostBytesPerSecond = bytesPerSecond(options.rate);
+  server.show = [&files](std::uint32_t index) { files.show(index); };
+  server.log = logLine;
+  const std::string token = server.token;
+  stream::Server running(std::move(server));
+  const FilesStop stop(files);
+  files.start(running);
+  stream::serveOver(running, token, STDIN_FILENO, STDOUT_FILENO);
+}
+
+stream::ServerOptions serverOf(const ServeOptions& options, const std::string& known) {
   stream::ServerOptions server;
   server.host = options.host;
   server.port = options.port;
@@ -83,13 +128,29 @@ void serve(const ServeOptions& options) {
   server.mostViewers = options.viewers;
   server.certificate = options.certificate;
   server.key = options.key;
-  server.show = [&files](std::uint32_t index) { files.show(index); };
   server.log = logLine;
+  return server;
+}
+
+void relay(const ServeOptions& options) {
+  constexpr std::chrono::milliseconds pause{100};
+  const EndSignals endSignals;
+  const std::string known = stream::givenToken(options.tokenFile);
+  Relay relay(clientOf(options.from, options.fromTokenFile), serverOf(options, known));
+  printLink(relay.server(), !known.empty());
+  while (!endSignals.hasCome()) relay.step(pause);
+}
+
+void serve(const ServeOptions& options) {
+  const EndSignals endSignals;
+  FrameFiles files(filesOf(options));
+  const std::string known = stream::givenToken(options.tokenFile);
+  stream::ServerOptions server = serverOf(options, known);
+  server.show = [&files](std::uint32_t index) { files.show(index); };
   stream::Server running(std::move(server));
+  const FilesStop stop(files);
   files.start(running);
-  // The only place that shows a token, and only one that nobody knows yet.
-  fmt::print("{}\n", known.empty() ? running.link() : running.address());
-  std::fflush(stdout);
+  printLink(running, !known.empty());
   endSignals.wait();
 }
 
@@ -103,9 +164,9 @@ void addServe(CLI::App& app, Job& job) {
       "prints a link. Each .vdi file that appears in the folder is shown where the link is open.\n"
       "docs/live.md says how to reach a server on another machine.");
   const auto options = std::make_shared<ServeOptions>();
-  command->add_option("inputs", options->inputs, "a folder to follow, or the .vdi files of a series")
-      ->type_name("")
-      ->required();
+  CLI::Option* const inputs =
+      command->add_option("inputs", options->inputs, "a folder to follow, or the .vdi files of a series")
+          ->type_name("");
   command->add_flag("--finished", options->isFinished, "the folder's series is finished; don't follow it");
   command->add_option("--host", options->host, "name or address to listen at; 0.0.0.0: any of this machine's")
       ->capture_default_str();
@@ -122,7 +183,36 @@ void addServe(CLI::App& app, Job& job) {
       ->add_option("--origin", options->origins,
                    "of another site whose pages may connect: https://example.org")
       ->type_name("ORIGIN");
-  command->callback([options, &job] { job = {[options](const comm::Communicator&) { serve(*options); }}; });
+  CLI::Option* const from =
+      command
+          ->add_option("--from", options->from,
+                       "offer what another server offers: its link, or a command that runs\n"
+                       "vdi serve --stdio, such as 'ssh host vdi serve --stdio results'")
+          ->type_name("LINK|COMMAND")
+          ->excludes(inputs);
+  command
+      ->add_option("--from-token-file", options->fromTokenFile,
+                   "file whose first line is the token of --from's link, where that has none")
+      ->type_name("FILE")
+      ->needs(from);
+  CLI::Option* const stdio =
+      command->add_flag("--stdio", options->isStdio, "serve one viewer at standard input and output; no port")
+          ->excludes(from);
+  for (const char* const name : {"--host", "--port", "--token-file", "--certificate", "--key", "--origin"})
+    stdio->excludes(command->get_option(name));
+  command->callback([options, &job] {
+    if (options->inputs.empty() && options->from.empty())
+      throw CLI::RequiredError("a folder, .vdi files, or --from");
+    job = {[options](const comm::Communicator&) {
+      if (options->isStdio) {
+        serveStdio(*options);
+      } else if (!options->from.empty()) {
+        relay(*options);
+      } else {
+        serve(*options);
+      }
+    }};
+  });
 }
 
 }  // namespace vdi::apps

@@ -1,14 +1,35 @@
 #include "apps/StreamOptions.h"
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <map>
 
 #include "vdi/core/Error.h"
+#include "vdi/stream/GivenToken.h"
+#include "vdi/stream/Url.h"
 
 namespace vdi::apps {
+
+stream::ClientOptions clientOf(const std::string& from, const std::string& tokenFile) {
+  stream::ClientOptions options;
+  options.log = [](const std::string& line) { fmt::print(stderr, "vdi: {}\n", line); };
+  const bool isLink = from.starts_with("http://") || from.starts_with("https://");
+  if (!isLink) {
+    options.command = from;
+    return options;
+  }
+  options.url = stream::parseUrl(from);
+  if (options.url.token.empty()) options.url.token = stream::givenToken(tokenFile);
+  if (options.url.token.empty()) {
+    throw Error(ErrorCode::InvalidArgument, "the link has no token: see --token-file",
+                options.url.authority());
+  }
+  return options;
+}
 
 void addTokenOption(CLI::App& command, std::string& file, const std::string& otherwise) {
   command

@@ -3,11 +3,18 @@
 
 #include <string>
 
+#include "vdi/stream/Client.h"
+
 namespace CLI {
 class App;
 }
 
 namespace vdi::apps {
+
+/// Where frames come from: a link, whose token may be in the file or in VDI_TOKEN, or a command for `sh -c`
+/// that runs `vdi serve --stdio`. Throws Error{InvalidArgument} for a link without a token, and as
+/// givenToken.
+stream::ClientOptions clientOf(const std::string& from, const std::string& tokenFile);
 
 /// Adds --token-file.
 void addTokenOption(CLI::App& command, std::string& file, const std::string& otherwise);

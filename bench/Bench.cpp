@@ -18,6 +18,7 @@
 #include "bench/IcetCompositor.h"
 #include "bench/RanksSuite.h"
 #include "bench/Run.h"
+#include "bench/StreamSuite.h"
 #include "bench/Suites.h"
 #include "bench/ViewpointsSuite.h"
 #include "vdi/core/Error.h"
@@ -47,6 +48,7 @@ void requireSound(const BenchOptions& options, int ranks) {
   }
   if (options.suite == ranksSuite) requireSoundRanks(options, ranks);
   if (options.suite == viewpointsSuite) requireSoundViewpoints(options);
+  if (options.suite == streamSuite) requireSoundStream(options);
   for (const DataSet& set : dataSets(options)) {
     if (set.field.empty()) {
       (void)apps::readSidecar(set.raw);
@@ -94,6 +96,8 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
     rows = runRanks(options, world, device, table);
   } else if (options.suite == viewpointsSuite) {
     rows = runViewpoints(options, world, device, table);
+  } else if (options.suite == streamSuite) {
+    rows = runStream(options, world, device, table);
   } else {
     for (const BenchRow& row : runBench(options, world, device, table)) rows.push_back(toJson(row));
   }
@@ -128,6 +132,11 @@ around the focal point ('sphere'), and over four turned from it to each side ('t
 of the picture, at worst and on average, where volume rendering shows something and the VDI nothing. A set is
 of several VDIs: 'nearest' shows the one whose viewpoint is nearest by angle, 'blend' the two nearest. MiB and
 ms are those of the whole set.
+The table of suite stream has frames that a viewer decoded and drew (--turn degrees from their viewpoint) a
+second, and their age then, from the beginning of the VDI's generation ('live': made and published as the
+extractor VDIStream does) or from the file's appearance ('folder': followed as vdi serve does). Server and
+viewer share this machine and its device; --rates limit the bytes between them. 'view' is what the viewer took
+for a level.
 The table of suite ranks has the wall clock of the slowest rank for each stage, and whole frames; 'faster' and
 'more' compare the frame and VDIs/s with one rank's of the same layout, DVR is volume_rendering_ms.
 JSON has, beside what the table has:
@@ -218,8 +227,8 @@ void addSuiteOptions(CLI::App& command, BenchOptions& options) {
           "--suite", options.suite,
           "data sets, sizes, viewpoints and N_S of docs/benchmarks.md: paper (needs a GPU and 32 GiB), "
           "small (a minute on a CPU); --fields picks some of it; ranks: whole frames on fewer and more of "
-          "mpirun's ranks, of the volume and picture that the options say; or viewpoints: how true VDIs "
-          "of these are from all around")
+          "mpirun's ranks, of the volume and picture that the options say; viewpoints: how true VDIs "
+          "of these are from all around; or stream: how many of them a viewer gets, and how old")
       ->check(CLI::IsMember(suiteNames()));
   command
       .add_option(
@@ -263,7 +272,9 @@ void addViewpointsOptions(CLI::App& command, BenchOptions& options) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str()
       ->group(viewpointsGroup);
-  command.add_option("--turn", options.turn, "degrees that the other four viewpoints are turned by")
+  command
+      .add_option("--turn", options.turn,
+                  "degrees that the other four viewpoints are turned by; in suite stream, the viewer's view")
       ->capture_default_str()
       ->group(viewpointsGroup);
   command
@@ -287,6 +298,17 @@ void addViewpointsOptions(CLI::App& command, BenchOptions& options) {
                   "VDIs in a set: 1, 2 (front and back), 4 (a tetrahedron) or 6 (front, back and sides)")
       ->capture_default_str()
       ->group(viewpointsGroup);
+}
+
+void addStreamOptions(CLI::App& command, BenchOptions& options) {
+  const char* const streamGroup = "Suite stream";
+  command.add_option("--rates", options.rates, "limits for the viewer, such as 1Gbit or 12MB a second")
+      ->type_name("RATE")
+      ->capture_default_str()
+      ->group(streamGroup);
+  command.add_option("--period", options.period, "milliseconds between two frames; there are --frames")
+      ->capture_default_str()
+      ->group(streamGroup);
 }
 
 void addOutputOptions(CLI::App& command, BenchOptions& options) {
@@ -315,6 +337,7 @@ void addBench(CLI::App& app, apps::Job& job) {
   addSuiteOptions(*command, *options);
   addRanksOptions(*command, *options);
   addViewpointsOptions(*command, *options);
+  addStreamOptions(*command, *options);
   addOutputOptions(*command, *options);
   command->callback([options, &job] {
     job = {[options](const comm::Communicator& world) { run(*options, world); }, true};

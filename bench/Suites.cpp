@@ -23,7 +23,7 @@ std::vector<DataSet> suiteSets(const std::string& suite) {
 }  // namespace
 
 const std::vector<std::string>& suiteNames() {
-  static const std::vector<std::string> names{"paper", "small", ranksSuite, viewpointsSuite};
+  static const std::vector<std::string> names{"paper", "small", ranksSuite, viewpointsSuite, streamSuite};
   return names;
 }
 
@@ -48,8 +48,7 @@ void applySuite(BenchOptions& options) {
 }
 
 std::vector<DataSet> dataSets(const BenchOptions& options) {
-  const bool hasSets =
-      !options.suite.empty() && options.suite != ranksSuite && options.suite != viewpointsSuite;
+  const bool hasSets = options.suite == "paper" || options.suite == "small";
   if (hasSets) {
     std::vector<DataSet> sets = suiteSets(options.suite);
     if (!options.fields.empty()) {
@@ -64,9 +63,10 @@ std::vector<DataSet> dataSets(const BenchOptions& options) {
     sets.push_back({std::filesystem::path(sidecar).stem().string(), "", sidecar, "", ""});
   std::vector<std::string> fields = options.fields;
   if (fields.empty() && options.raws.empty()) {
-    fields = options.suite == ranksSuite        ? std::vector<std::string>{"interface"}
-             : options.suite == viewpointsSuite ? std::vector<std::string>{"mixing", "interface", "coil"}
-                                                : std::vector<std::string>{"turbulence", "mixing", "coil"};
+    fields = options.suite == ranksSuite ? std::vector<std::string>{"interface"}
+             : options.suite == viewpointsSuite || options.suite == streamSuite
+                 ? std::vector<std::string>{"mixing", "interface", "coil"}
+                 : std::vector<std::string>{"turbulence", "mixing", "coil"};
   }
   for (const std::string& field : fields)
     sets.push_back({field, field, "", options.decomposition.size, options.decomposition.type});

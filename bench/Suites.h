@@ -41,6 +41,9 @@ struct BenchOptions {
   std::vector<double> margins{0.0};
   std::vector<int> sets{1};
   std::vector<std::string> listResolutions;  // for VDIs' pictures; empty: the views'
+  // For the suite `stream`, which takes `turn` and `frames` too:
+  std::vector<std::string> rates{"1Gbit", "100Mbit"};  // of bytes to the viewer
+  double period = 33.0;                                // milliseconds between two frames
 };
 
 struct DataSet {
@@ -57,6 +60,8 @@ const std::vector<std::string>& suiteNames();
 inline constexpr const char* ranksSuite = "ranks";
 /// The suite of viewpoints around the scene, which has no data sets of its own.
 inline constexpr const char* viewpointsSuite = "viewpoints";
+/// The suite of frames on their way to a viewer, which has no data sets of its own.
+inline constexpr const char* streamSuite = "stream";
 
 /// Completes the options with the suite's values, or with the defaults without a suite.
 void applySuite(BenchOptions& options);

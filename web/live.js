@@ -6,6 +6,8 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 /** @typedef {import("./messages.js").Level} Level */
 /** @typedef {import("./messages.js").Series} Series */
+/** @typedef {import("./messages.js").Steering} Steering */
+/** @typedef {import("./messages.js").Wish} Wish */
 /** @typedef {import("./messages.js").Welcome} Welcome */
 
 /**
@@ -30,7 +32,7 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
  * @property {string} token
  * @property {(file: Uint8Array) => Promise<PreparedVdi>} decode
  * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void> | void} onLevel shows it
- * @property {() => void} onChange of state, cause, series or viewers
+ * @property {() => void} onChange of state, cause, series, viewers or steering
  */
 
 const ACK_BYTES = 512 << 10;
@@ -63,6 +65,10 @@ export class Live {
     /** @type {number | null} the series' frame that the user wants; null: the newest */
     this.wanted = null;
     this.viewers = 0;
+    /** @type {Steering | null} null: there is none, or none yet */
+    this.steering = null;
+    /** Why the server hasn't done what this viewer asked for last; empty: it has, or will. */
+    this.denied = "";
     /** @type {Arrived | undefined} the level that is shown */
     this.shown = undefined;
     this.session = "";
@@ -104,6 +110,8 @@ export class Live {
     this.socket = undefined;
     this.assembler.drop();
     this.waiting = undefined;
+    this.steering = null;
+    this.denied = "";
     socket?.close();
   }
 
@@ -197,6 +205,12 @@ export class Live {
     } else if (message.type === "state") {
       this.viewers = message.viewers;
       this.change(message.state, "");
+    } else if (message.type === "steering") {
+      this.steering = message;
+      this.change(this.state, this.cause);
+    } else if (message.type === "denied") {
+      this.denied = message.cause;
+      this.change(this.state, this.cause);
     } else if (message.type === "level") {
       const {type: _, ...level} = message;
       this.madeAt = performance.now() - 1000 * level.age;
@@ -299,6 +313,24 @@ export class Live {
     this.wanted = index;
     this.askForWanted();
     this.options.onChange();
+  }
+
+  /** Asks for control of the simulation. */
+  drive() {
+    this.denied = "";
+    this.send({type: "drive"});
+  }
+
+  /** Gives it back. */
+  release() {
+    this.denied = "";
+    this.send({type: "release"});
+  }
+
+  /** @param {Wish} wish */
+  steer(wish) {
+    this.denied = "";
+    this.send({type: "steer", ...wish});
   }
 
   /** @returns {number} bytes a second, of the last few seconds */

@@ -12,6 +12,7 @@ import {SUBPROTOCOL} from "./messages.js";
  * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void>} show
  * @property {(message: string) => void} tell
  * @property {(index: number) => void} onSeries the server has a series, of which it shows that frame
+ * @property {() => void} onChange of what the server says
  */
 
 const PATIENCE_MS = 700;   // of a series that plays, for a frame's finer levels
@@ -56,6 +57,7 @@ export function liveText(live, now) {
   const parts = [isOn && live.isPaused ? "Paused" : isSeries ? "Series" : words[state]];
   if (state === "lost") parts.push(live.cause, `next attempt in ${Math.max(Math.ceil((live.retryAt - now) / 1000), 0)} s`);
   else if (live.cause) parts.push(live.cause);
+  if (live.steering?.paused) parts.push("the simulation waits");
   if (shown) {
     if (live.series && live.wanted !== null) parts.push(`frame ${shown.frame + 1} of ${live.series.steps.length}`);
     if (shown.step !== null) parts.push(`step ${shown.step}`);
@@ -183,6 +185,7 @@ export class LivePanel {
     const hasSeries = this.count() > 0;
     if (hasSeries || this.hadSeries) this.view.onSeries(this.index());
     this.hadSeries = hasSeries;
+    this.view.onChange();
     // What ends it is told over the picture; while attempts go on, the picture isn't covered.
     this.say(state === "refused" ? live.cause : live.shown || state === "closed" ? "" : liveText(live, performance.now()));
     this.refresh();

@@ -38,8 +38,19 @@ function refuse(what) {
  * @typedef {{type: "error", cause: string}} Refusal
  * @typedef {{type: "state", state: "waiting" | "live" | "ended", viewers: number}} ServerState
  * @typedef {{type: "level"} & Level} LevelBegin
+ * @typedef {{name: string, whole: boolean, value: number, low: number, high: number}} Parameter of the simulation, in force
+ * @typedef {object} Generator what makes the VDIs
+ * @property {[number, number]} resolution 0: not set
+ * @property {number} supersegments
+ * @property {[number, number] | null} range of the colour map; null: there is none
+ * @property {string[]} presets
+ * @typedef {{type: "steering", you: number, driver: number | null, period: number, paused: boolean, parameters: Parameter[],
+ *            generator: Generator | null}} Steering what can be steered, who does, and what is in force
+ * @typedef {{type: "denied", cause: string}} Denied
+ * @typedef {{camera?: object, resolution?: [number, number], supersegments?: number, range?: [number, number],
+ *            preset?: string, period?: number, paused?: boolean, parameters?: {[name: string]: number}}} Wish of a driver
  * @typedef {{type: "other"}} Other of a kind that viewers don't need
- * @typedef {Welcome | SeriesPart | Refusal | ServerState | LevelBegin | Other} ServerMessage
+ * @typedef {Welcome | SeriesPart | Refusal | ServerState | LevelBegin | Steering | Denied | Other} ServerMessage
  */
 
 const MOST_TEXT = 1 << 20;       // characters
@@ -47,6 +58,7 @@ const MOST_FRAMES = 1 << 20;     // of a series
 const MOST_LEVEL_BYTES = 1 << 30;
 const MOST_LEVELS = 16;
 const MOST_LISTS = 32768;        // a side
+const MOST_ENTRIES = 64;         // of steering: parameters, presets
 const PART_HEADER_BYTES = 16;
 const FIRST_ROOM = 1 << 20;
 
@@ -109,6 +121,39 @@ function levelOf(json) {
   };
 }
 
+/** @param {unknown} list @param {string} name @returns {any[]} */
+function fewOf(list, name) {
+  if (!Array.isArray(list) || list.length > MOST_ENTRIES) refuse(`${name} aren't a short list`);
+  return list;
+}
+
+/** @param {any} json @returns {Parameter} */
+function parameterOf(json) {
+  const {whole, value, low, high} = json ?? {};
+  if (![value, low, high].every(Number.isFinite) || !(low <= value && value <= high)) refuse("a parameter out of its bounds");
+  return {name: textOf(json.name, MOST_ENTRIES), whole: whole === true, value, low, high};
+}
+
+/** @param {any} json @returns {Generator} */
+function generatorOf({resolution, supersegments, range, presets}) {
+  const isSize = Array.isArray(resolution) && resolution.length === 2 && resolution.every((side) => isWhole(side, 0, MOST_LISTS));
+  if (!isSize || !isWhole(supersegments, 0, 255)) refuse("a resolution that isn't one");
+  const rises = Array.isArray(range) && range.length === 2 && range.every(Number.isFinite) && range[0] < range[1];
+  if (!rises && range !== null) refuse("a range that doesn't rise");
+  return {resolution: [resolution[0], resolution[1]], supersegments, range: rises ? [range[0], range[1]] : null,
+          presets: fewOf(presets, "presets").map((name) => textOf(name, MOST_ENTRIES))};
+}
+
+/** @param {any} json @returns {Steering} */
+function steeringOf(json) {
+  const {you, driver, period, paused, parameters, generator} = json;
+  if (!isWhole(you, 0, 0xffffffff) || !isWhole(driver ?? 0, 0, 0xffffffff)) refuse("viewers without numbers");
+  if (!isWhole(period, 1, 1e6)) refuse("a period that isn't one");
+  return {type: "steering", you, driver: driver ?? null, period, paused: paused === true,
+          parameters: fewOf(parameters, "parameters").map(parameterOf),
+          generator: generator ? generatorOf(generator) : null};
+}
+
 /**
  * Reads a control message. Throws StreamError for one that isn't as the protocol says. Kinds that this page has no use
  * for are of type "other".
@@ -135,6 +180,10 @@ export function serverMessageOf(text) {
     case "state":
       if (!["waiting", "live", "ended"].includes(json.state)) refuse("a state that this page doesn't know");
       return {type: "state", state: json.state, viewers: viewersOf(json.viewers)};
+    case "steering":
+      return steeringOf(json);
+    case "denied":
+      return {type: "denied", cause: textOf(json.cause, 300).replace(/\s+/g, " ")};
     case "level":
       return levelOf(json);
     default:

@@ -6,6 +6,7 @@ import {addControls} from "./controls.js";
 import {Decoder, serveDecoding} from "./decoder.js";
 import {showLegend} from "./legend.js";
 import {LivePanel, takeToken} from "./livepanel.js";
+import {SteerPanel} from "./steerpanel.js";
 import {embeddedSource, filesSource} from "./sources.js";
 import {Viewer} from "./viewer.js";
 
@@ -58,6 +59,8 @@ class Page {
     this.source = undefined;
     /** @type {LivePanel | undefined} */
     this.live = undefined;
+    /** @type {SteerPanel | undefined} */
+    this.steer = undefined;
     /** @type {PreparedVdi | undefined} */
     this.vdi = undefined;
     this.frame = 0;
@@ -65,7 +68,10 @@ class Page {
     /** Counts requests for frames, so that an older one that comes late is dropped. */
     this.request = 0;
     this.ownBackground = false;
-    this.viewer.onRest = () => this.keepInUrl();
+    this.viewer.onRest = () => {
+      this.keepInUrl();
+      this.steer?.onRest();
+    };
     this.connect();
     this.takeTheme();
   }
@@ -96,6 +102,13 @@ class Page {
     input("files").addEventListener("change", () => this.openFiles([...(input("files").files ?? [])]));
     element("view").addEventListener("keydown", (event) => this.onKey(event));
     element("view").addEventListener("pointerdown", () => element("look").removeAttribute("open"));
+    // Of the panels above the bar one is open at a time. That of steering stays while the hand is on the picture.
+    const panels = [element("look"), element("steer")];
+    for (const panel of panels) {
+      panel.addEventListener("toggle", () => {
+        if (panel.hasAttribute("open")) for (const other of panels) if (other !== panel) other.removeAttribute("open");
+      });
+    }
     window.addEventListener("resize", () => viewer.redraw());
     window.addEventListener("hashchange", () => this.onNewUrl());
     this.darkScheme.addEventListener("change", () => this.takeTheme());
@@ -176,7 +189,9 @@ class Page {
       show: (vdi, level) => this.takeLevel(vdi, level),
       tell,
       onSeries: (index) => this.showSeries(index),
+      onChange: () => this.steer?.refresh(),
     });
+    this.steer = new SteerPanel(this.live.live, {camera: () => this.viewer.camera, angle: () => this.degrees()});
     const wanted = fragment().get("frame") ?? "";
     this.live.start(/^\d{1,7}$/.test(wanted) ? Number(wanted) : undefined);
   }
@@ -271,11 +286,17 @@ class Page {
     this.showView();
   }
 
+  /** Between the view and the VDI's own. */
+  degrees() {
+    const {vdi, viewer} = this;
+    return vdi && viewer.camera ? degreesBetween(centerOf(vdi.bounds), vdi.camera, viewer.camera) : NaN;
+  }
+
   /** What the page says of the view. */
   showView() {
     const {vdi, viewer} = this;
     if (!vdi || !viewer.camera) return;
-    const angle = degreesBetween(centerOf(vdi.bounds), vdi.camera, viewer.camera);
+    const angle = this.degrees();
     element("angle").textContent = Number.isFinite(angle) ? `${Math.round(angle)}°` : "";
     element("axes").style.display = input("triad").checked ? "" : "none";
     drawAxes(/** @type {SVGElement} */ (/** @type {unknown} */ (element("axes"))), viewer.camera);

@@ -182,4 +182,87 @@ def test_series(browser):
         whole(browser)
 
 
-run(test_frames, test_size, test_tokens, test_pages, test_series)
+# A connection whose messages of steering are this test's: vdi serve has nothing to steer.
+STEERED = """
+class Steered extends WebSocket {
+  constructor(...words) { super(...words); window.wire = this; this.asked = []; }
+  send(text) {
+    const message = JSON.parse(text);
+    if (["drive", "release", "steer"].includes(message.type)) this.asked.push(message);
+    else super.send(text);
+  }
+  say(message) {
+    this.onmessage({data: JSON.stringify({
+      type: "steering", you: 2, driver: null, period: 1, paused: false,
+      parameters: [{name: "feed", whole: false, value: 0.03, low: 0, high: 0.1}],
+      generator: {resolution: [640, 360], supersegments: 25, range: [0, 0.5], presets: ["X Ray"]}, ...message})});
+  }
+}
+window.WebSocket = Steered;
+"""
+
+
+def test_steering(browser):
+    os.mkdir("steered")
+    make("steered/step_0.vdi", 12, large=False)
+    script = browser.send("Page.addScriptToEvaluateOnNewDocument", source=STEERED)["identifier"]
+
+    def asked():
+        return browser.value("wire.asked.splice(0)")
+
+    def enter(name, value):
+        browser.value(f"(() => {{ const field = document.querySelector({json.dumps(name)}); field.value = {json.dumps(value)};"
+                      " field.dispatchEvent(new Event('input')); field.dispatchEvent(new Event('change')); })()")
+
+    def hidden(name):
+        return browser.value(f"document.getElementById('{name}').offsetParent === null")
+
+    with Server("steered") as server:
+        browser.open(server.link)
+        wait_for_frame(browser, 0)
+        check(hidden("steer") and hidden("newview"), "a server that allows no steering shows nothing of it")
+        browser.value("wire.say({})")
+        browser.value("document.getElementById('steer').open = true")
+        check(hidden("newview") and not hidden("drive") and browser.value("document.getElementById('period').disabled"),
+              "who doesn't drive sees what is in force, and changes nothing")
+        browser.value("document.getElementById('drive').click()")
+        check(asked() == [{"type": "drive"}], "a wish to drive")
+        browser.value("wire.say({driver: 2})")
+        check(not hidden("newview"), "a driver may ask for a new view")
+        enter("#parameters input", 0.05)
+        enter("#parameters input[type=number]", 7)
+        enter("#period", 3)
+        enter("#supersegments", 300)
+        enter("#resolution", "960 × 540")
+        enter("#preset", "X Ray")
+        enter("#high", 0.25)
+        browser.value("document.getElementById('halt').click()")
+        wishes = asked()
+        check([{key: wish[key] for key in wish if key != "type"} for wish in wishes] == [
+            {"parameters": {"feed": 0.05}}, {"parameters": {"feed": 0.1}}, {"period": 3}, {"resolution": [960, 540]},
+            {"preset": "X Ray"}, {"range": [0, 0.25]}, {"paused": True}], f"wishes: {wishes}")
+        near, far = azimuth(camera_of(browser), 10), azimuth(camera_of(browser), 40)
+
+        def rest_at(camera):
+            browser.value(f"vdiPage.setCamera({json.dumps(camera)})")
+            whole(browser)
+            browser.value("new Promise((done) => setTimeout(done, 400))")
+            return asked()
+
+        check(rest_at(near) == [], "nothing is asked for unless somebody says so")
+        browser.value("document.getElementById('newview').click()")
+        wish = asked()[0]
+        check(wish["camera"]["position"] == near["position"] and wish["camera"]["viewAngle"] == near["viewAngle"], f"{wish}")
+        browser.value("document.getElementById('auto').click()")
+        check(rest_at(near) == [], "Auto leaves small angles alone")
+        wishes = rest_at(far)
+        check([wish["camera"]["position"] for wish in wishes] == [far["position"]], f"Auto asks once: {wishes}")
+        check(rest_at(far) == [], "and not again for the same view")
+        browser.value("wire.say({driver: 5})")
+        check("Viewer 5" in browser.value("document.getElementById('driver').textContent") and hidden("newview"),
+              "another viewer drives")
+        check(rest_at(azimuth(far, 30)) == [], "and this one asks for nothing")
+    browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
+
+
+run(test_frames, test_size, test_tokens, test_pages, test_series, test_steering)

@@ -32,6 +32,10 @@ const level = {type: "level", frame: 7, level: 0, levels: 2, bytes: 700000, widt
 const welcome = {type: "welcome", version: 1, session: "abc", steer: false, viewers: 2,
                  series: {times: [0, null, 0.5], steps: [0, 1, 2]}};
 
+const steering = {type: "steering", you: 2, driver: null, period: 1, paused: false,
+                  parameters: [{name: "feed", whole: false, value: 0.037, low: 0, high: 0.1}],
+                  generator: {resolution: [640, 360], supersegments: 25, range: [0, 0.5], presets: ["X Ray"]}};
+
 function part(frame, index, offset, bytes) {
   const message = new Uint8Array(16 + bytes.length);
   const view = new DataView(message.buffer);
@@ -49,7 +53,17 @@ function testTexts() {
   check(series.type === "welcome" && series.series?.times[1] === null && series.series.steps.length === 3, "a welcome with a series");
   check(serverMessageOf(JSON.stringify({...welcome, series: null})).series === null, "a welcome without a series");
   check(serverMessageOf('{"type":"driver","you":true}').type === "other", "a kind that the page has no use for");
+  const told = serverMessageOf(JSON.stringify(steering));
+  check(JSON.stringify(told) === JSON.stringify(steering), "how steering stands");
+  check(serverMessageOf(JSON.stringify({...steering, driver: 7, generator: null})).driver === 7, "somebody drives");
+  check(serverMessageOf('{"type":"denied","cause":"viewer 2\\ndrives"}').cause === "viewer 2 drives", "a denial of one line");
+  const {generator} = steering;
   const bad = [
+    {...steering, you: -1}, {...steering, driver: "2"}, {...steering, period: 0}, {...steering, parameters: {}},
+    {...steering, parameters: [null]}, {...steering, parameters: [{name: "a", value: 2, low: 0, high: 1}]},
+    {...steering, parameters: [{name: 5, value: 0, low: 0, high: 1}]}, {...steering, generator: {}},
+    {...steering, parameters: Array(65).fill(steering.parameters[0])}, {...steering, generator: {...generator, range: [1, 1]}},
+    {...steering, generator: {...generator, resolution: [1e9, 1]}}, {...steering, generator: {...generator, presets: [5]}},
     "", "{", "[]", "null", "1", '"x"', "{}", '{"type":3}', "x".repeat((1 << 20) + 1),
     {...level, frame: -1}, {...level, frame: 2 ** 32}, {...level, frame: "7"}, {...level, level: 2}, {...level, levels: 1e9},
     {...level, bytes: 0}, {...level, bytes: 2 ** 40}, {...level, bytes: 1.5}, {...level, bytes: null}, {...level, width: 0},

@@ -16,14 +16,42 @@ using namespace vdi::stream;
 
 namespace {
 
+Wish everyWish() {
+  Wish wish;
+  wish.camera.emplace();
+  wish.camera->position = {1.0, -2.0, 1e9};
+  wish.camera->viewAngle = 12.5;
+  wish.resolution = {1920, 1080};
+  wish.supersegments = 255;
+  wish.range = {-0.5, 0.25};
+  wish.preset = "X Ray";
+  wish.period = 1000000;
+  wish.paused = true;
+  wish.parameters = {{"feed", 0.037}, {"kill", -1e-300}};
+  return wish;
+}
+
 const std::vector<FromViewer>& viewerMessages() {
   static const std::vector<FromViewer> all{Hello{1, "0123456789abcdef", "session", 7U},
                                            Hello{1, "~token~.-_", std::nullopt, std::nullopt},
                                            Ack{4294967295U, 1, std::uint64_t{1} << 53U},
                                            Show{12},
                                            Pause{},
-                                           Resume{}};
+                                           Resume{},
+                                           Drive{},
+                                           Release{},
+                                           Steer{},
+                                           Steer{everyWish()}};
   return all;
+}
+
+Controls everyControl() {
+  Controls controls;
+  controls.generator = GeneratorControls{{0, 360}, 25, std::array{-1.0, 1e300}, {"Viridis", "X Ray"}};
+  controls.period = 7;
+  controls.paused = true;
+  controls.parameters = {{"feed", false, 0.037, 0.0, 0.1}, {"seeds_0.x-y", true, 3.0, -1.0, 1e15}};
+  return controls;
 }
 
 const std::vector<FromServer>& serverMessages() {
@@ -37,8 +65,17 @@ const std::vector<FromServer>& serverMessages() {
       Level{7, 1, 2, 123456789, 1921, 1081, 200, 0.125, 0.5, 3},
       Level{7, 0, 1, 1, 1, 1, 0, std::nullopt, 0.0, 0},
       Missing{3, "gone"},
+      Steering{1, std::nullopt, Controls{}},
+      Steering{4294967295U, 2, everyControl()},
+      Denied{"viewer 2 drives"},
       Refusal{"the token is wrong"}};
   return all;
+}
+
+std::string steerWithCamera(const std::string& position, const std::string& focalPoint,
+                            const std::string& angle) {
+  return R"({"type":"steer","camera":{"viewUp":[0,1,0],"position":)" + position + R"(,"focalPoint":)" +
+         focalPoint + R"(,"viewAngle":)" + angle + "}}";
 }
 
 std::string text(std::size_t length, test::Noise& noise) {
@@ -78,37 +115,68 @@ TEST_CASE("messages are read as they were written") {
   CHECK(viewerMessage(R"( {"bytes":5,"more":{"a":[1]},"level":0,"frame":2,"type":"ack"})") ==
         FromViewer(Ack{2, 0, 5}));
   CHECK(std::get<Hello>(viewerMessage(R"({"type":"hello","version":9})")).version == 9);
+  Wish parallel;
+  parallel.camera.emplace();
+  parallel.camera->parallelProjection = true;
+  parallel.camera->parallelScale = 3.0;
+  CHECK(viewerMessage(textOf(FromViewer(Steer{parallel}))) == FromViewer(Steer{parallel}));
   const Level endless{1, 0, 1, 5, 1, 1, 0, std::numeric_limits<double>::quiet_NaN(), 0.0, 0};
   CHECK_FALSE(std::get<Level>(serverMessage(textOf(FromServer(endless)))).time);
 }
 
 TEST_CASE("messages that make no sense are refused") {
-  const std::vector<std::string> bad{"",
-                                     "null",
-                                     "[]",
-                                     "7",
-                                     "\"hello\"",
-                                     "{",
-                                     "{}",
-                                     R"({"type":null})",
-                                     R"({"type":"hello"})",
-                                     R"({"type":"hello","version":"1","token":"t"})",
-                                     R"({"type":"hello","version":1,"token":5})",
-                                     R"({"type":"hello","version":1})",
-                                     R"({"type":"hello","version":1,"token":"t","have":-1})",
-                                     R"({"type":"hello","version":1,"token":"t","have":4294967296})",
-                                     R"({"type":"hello","version":1e999,"token":"t"})",
-                                     R"({"type":"ack","frame":1,"level":0})",
-                                     R"({"type":"ack","frame":1,"level":0,"bytes":0.5})",
-                                     R"({"type":"ack","frame":1,"level":0,"bytes":-5})",
-                                     R"({"type":"show"})",
-                                     R"({"type":"show","index":null})",
-                                     R"({"type":"welcome"})",
-                                     R"({"type":"pause"} x)",
-                                     R"({"type":"pause","a":[[[[1]]]]})",
-                                     std::string(4000, '['),
-                                     "{\"type\":\"pause\",\"a\":\"" + std::string(4096, 'a') + "\"}",
-                                     "{\"type\":\"\xff\"}"};
+  const std::vector<std::string> bad{
+      "",
+      "null",
+      "[]",
+      "7",
+      "\"hello\"",
+      "{",
+      "{}",
+      R"({"type":null})",
+      R"({"type":"hello"})",
+      R"({"type":"hello","version":"1","token":"t"})",
+      R"({"type":"hello","version":1,"token":5})",
+      R"({"type":"hello","version":1})",
+      R"({"type":"hello","version":1,"token":"t","have":-1})",
+      R"({"type":"hello","version":1,"token":"t","have":4294967296})",
+      R"({"type":"hello","version":1e999,"token":"t"})",
+      R"({"type":"ack","frame":1,"level":0})",
+      R"({"type":"ack","frame":1,"level":0,"bytes":0.5})",
+      R"({"type":"ack","frame":1,"level":0,"bytes":-5})",
+      R"({"type":"show"})",
+      R"({"type":"show","index":null})",
+      R"({"type":"welcome"})",
+      R"({"type":"pause"} x)",
+      R"({"type":"steer","camera":5})",
+      R"({"type":"steer","camera":{"position":[0,0,1]}})",
+      steerWithCamera("[0,0,1]", "[0,0,1]", "30"),
+      steerWithCamera("[0,0,1]", "[0,0]", "30"),
+      steerWithCamera("[0,0,1]", "[0,0,0]", "180"),
+      steerWithCamera("[0,0,1e999]", "[0,0,0]", "30"),
+      steerWithCamera("[0,0,\"1\"]", "[0,0,0]", "30"),
+      R"({"type":"steer","resolution":[0,360]})",
+      R"({"type":"steer","resolution":[640,32769]})",
+      R"({"type":"steer","resolution":[640.5,360]})",
+      R"({"type":"steer","resolution":[640]})",
+      R"({"type":"steer","supersegments":0})",
+      R"({"type":"steer","supersegments":256})",
+      R"({"type":"steer","supersegments":18446744073709551615})",
+      R"({"type":"steer","range":[1,1]})",
+      R"({"type":"steer","range":[-1e308,1e308]})",
+      R"({"type":"steer","preset":7})",
+      R"({"type":"steer","period":-1})",
+      R"({"type":"steer","paused":1})",
+      R"({"type":"steer","parameters":[1]})",
+      R"({"type":"steer","parameters":{"feed":"1"}})",
+      R"({"type":"steer","parameters":{"a b":1}})",
+      R"({"type":"steer","parameters":{"":1}})",
+      "{\"type\":\"steer\",\"parameters\":{\"" + std::string(65, 'a') + "\":1}}",
+      "{\"type\":\"steer\",\"preset\":\"" + std::string(65, 'a') + "\"}",
+      R"({"type":"pause","a":[[[[1]]]]})",
+      std::string(4000, '['),
+      "{\"type\":\"pause\",\"a\":\"" + std::string(4096, 'a') + "\"}",
+      "{\"type\":\"\xff\"}"};
   for (const std::string& m : bad) {
     INFO(m.substr(0, 80));
     CHECK(test::errorOf([&] { viewerMessage(m); }).code() == ErrorCode::Format);
@@ -117,6 +185,10 @@ TEST_CASE("messages that make no sense are refused") {
       R"({"type":"welcome","version":1,"session":"s","steer":false,"series":{"times":[1],"steps":[]},"viewers":1})",
       R"({"type":"welcome","version":1,"session":"s","steer":false,"series":[],"viewers":1})",
       R"({"type":"state","state":"asleep","viewers":1})",
+      R"({"type":"steering","you":1,"period":1,"paused":false})",
+      R"({"type":"steering","you":1,"period":1,"paused":false,"parameters":[5]})",
+      R"({"type":"steering","you":1,"period":1,"paused":false,"parameters":[{"name":"a","whole":true,"value":5,"low":0,"high":1}]})",
+      R"({"type":"steering","you":1,"period":1,"paused":false,"parameters":[],"generator":{}})",
       R"({"type":"level","frame":1,"level":2,"levels":2,"bytes":1,"width":1,"height":1,"age":0,"dropped":0})",
       R"({"type":"level","frame":1,"level":0,"levels":2,"bytes":0,"width":1,"height":1,"age":0,"dropped":0})",
       R"({"type":"level","frame":1,"level":0,"levels":2,"bytes":9,"width":4294967295,"height":1,"age":0,"dropped":0})"};

@@ -25,7 +25,9 @@ std::optional<Received> Assembly::add(std::span<const std::byte> message) {
   if (!isNext) throw Error(ErrorCode::Format, "a part of a level is out of order");
   file_.insert(file_.end(), chunk.bytes.begin(), chunk.bytes.end());
   if (file_.size() < level_->bytes) return std::nullopt;
-  Received whole{*level_, std::exchange(file_, {}), {}};
+  Received whole;
+  whole.level = *level_;
+  whole.file = std::exchange(file_, {});
   level_.reset();
   return whole;
 }

@@ -19,6 +19,7 @@ struct Received {
   std::vector<std::byte> file;
   std::string
       missing;  // why there's no file of a frame that was asked for; of `level` there's the frame alone
+  std::string session;  // whose frame it is; Client fills it in
 };
 
 /// What comes from one connection, in order. It takes memory for bytes that have come, not for those that are

@@ -25,6 +25,11 @@ namespace asio = boost::asio;
 
 constexpr std::chrono::milliseconds firstPause{250};
 constexpr std::chrono::milliseconds longestPause{5000};
+constexpr std::chrono::seconds longestEnd{2};
+/// A server that keeps to acknowledgements stays below these.
+constexpr std::uint64_t mostAhead = std::uint64_t{32} << 20;  // bytes, beside a whole level
+constexpr std::size_t mostWaiting = 65536;
+constexpr std::size_t longestSeries = std::size_t{1} << 20;
 
 }  // namespace
 
@@ -41,8 +46,16 @@ class Client::Impl {
     asio::post(context_, [this] {
       isEnding_ = true;
       pause_.cancel();
-      if (line_) line_->close();
+      if (!line_) {
+        context_.stop();
+        return;
+      }
       work_.reset();
+      end_.expires_after(longestEnd);
+      end_.async_wait([this](boost::system::error_code error) {
+        if (!error) context_.stop();  // nothing may hold up whoever ends the client
+      });
+      line_->close();
     });
     thread_.join();
   }
@@ -55,6 +68,7 @@ class Client::Impl {
     if (!wholes_.empty()) {
       Whole whole = std::move(wholes_.front());
       wholes_.pop_front();
+      waitingBytes_ -= whole.received.file.size();
       const Level& level = whole.received.level;
       const Ack ack{level.frame, level.level, level.bytes};
       asio::post(context_, [this, ack, connection = whole.connection] {
@@ -69,6 +83,13 @@ class Client::Impl {
   Standing standing() const {
     const std::scoped_lock lock(mutex_);
     return standing_;
+  }
+
+  Series seriesFrom(std::size_t from) const {
+    const std::scoped_lock lock(mutex_);
+    const auto first = static_cast<std::ptrdiff_t>(std::min(from, series_.size()));
+    return {{series_.times.begin() + first, series_.times.end()},
+            {series_.steps.begin() + first, series_.steps.end()}};
   }
 
   void show(std::optional<std::uint32_t> index) {
@@ -106,6 +127,8 @@ class Client::Impl {
                   options_.authority.string());
   }
 
+  std::string name() const { return options_.command.empty() ? options_.url.authority() : "the command"; }
+
   void run() {
     for (bool done = false; !done;) {
       try {
@@ -133,15 +156,20 @@ class Client::Impl {
         [this] { sayHello(); }, [this](std::string_view text) { guarded([&] { take(text); }); },
         [this](std::span<const std::byte> message) { guarded([&] { take(message); }); },
         [this](std::uint16_t code, const std::string& why, bool isFinal) { lose(code, why, isFinal); }};
-    line_ = options_.url.isEncrypted ? encryptedLine(context_, tls_, options_.url, std::move(events))
-                                     : line(context_, options_.url, std::move(events));
+    if (!options_.command.empty()) {
+      line_ = commandLine(context_, options_.command, std::move(events));
+    } else if (options_.url.isEncrypted) {
+      line_ = encryptedLine(context_, tls_, options_.url, std::move(events));
+    } else {
+      line_ = line(context_, options_.url, std::move(events));
+    }
     line_->start();
   }
 
   void sayHello() {
     isWelcome_ = false;
     Hello hello;
-    hello.token = options_.url.token;
+    hello.token = line_->token();
     if (!session_.empty() && have_) {
       hello.session = session_;
       hello.have = have_;
@@ -159,7 +187,7 @@ class Client::Impl {
     try {
       work();
     } catch (const Error& error) {
-      fail(error.code(), options_.url.authority() + ": " + error.what());
+      fail(error.code(), name() + ": " + error.what());
       line_->close();
     }
   }
@@ -180,12 +208,19 @@ class Client::Impl {
       standing_.since = std::chrono::steady_clock::now();
       standing_.session = session_;
       standing_.series = welcome.series ? std::optional(welcome.series->size()) : std::nullopt;
+      series_ = welcome.series.value_or(Series());
     });
     if (shown_) send(Show{*shown_});
     if (isPaused_) send(Pause{});
   }
   void take(const SeriesPart& part) {
-    change([&] { standing_.series = part.from + part.entries.size(); });
+    if (part.from != series_.size() || part.from + part.entries.size() > longestSeries)
+      throw Error(ErrorCode::Format, "a part of a series is out of order, or it is too long");
+    change([&] {
+      series_.times.insert(series_.times.end(), part.entries.times.begin(), part.entries.times.end());
+      series_.steps.insert(series_.steps.end(), part.entries.steps.begin(), part.entries.steps.end());
+      standing_.series = series_.size();
+    });
   }
   void take(const State& state) {
     change([&] { standing_.state = state; });
@@ -198,16 +233,20 @@ class Client::Impl {
     Received none;
     none.level.frame = missing.frame;
     none.missing = missing.cause;
-    change([&] { wholes_.push_back({std::move(none), connection_}); });
+    none.session = session_;
+    keep(std::move(none));
   }
   void take(const Refusal& refusal) { cause_ = refusal.cause; }
+  static void take(const Steering&) {}  // this viewer doesn't drive
+  static void take(const Denied&) {}
   static void take(const Unknown&) {}
   void take(std::span<const std::byte> message) {
     std::optional<Received> whole = assembly_.add(message);
     if (whole) {
       const Level& level = whole->level;
       if (level.level + 1 == level.levels) have_ = level.frame;
-      change([&] { wholes_.push_back({*std::move(whole), connection_}); });
+      whole->session = session_;
+      keep(*std::move(whole));
       return;
     }
     const std::optional<Ack> progress = assembly_.progress();
@@ -217,8 +256,22 @@ class Client::Impl {
     }
   }
 
+  /// For next(), within bounds.
+  void keep(Received received) {
+    const std::uint64_t bytes = received.file.size();
+    change([&] {
+      const bool isTooMuch =
+          wholes_.size() >= mostWaiting ||
+          (!wholes_.empty() && waitingBytes_ + bytes > options_.mostLevelBytes + mostAhead);
+      if (isTooMuch) throw Error(ErrorCode::Format, "the server doesn't wait for acknowledgements");
+      wholes_.push_back({std::move(received), connection_});
+      waitingBytes_ += bytes;
+    });
+  }
+
   void lose(std::uint16_t code, const std::string& why, bool isFinal) {
     line_.reset();
+    end_.cancel();
     isWelcome_ = false;
     const std::string trouble = cause_.empty() ? why : cause_;
     change([&] {
@@ -227,11 +280,11 @@ class Client::Impl {
       standing_.trouble = trouble;
     });
     const auto close = static_cast<Close>(code);
-    if (close == Close::WrongToken)
-      fail(ErrorCode::InvalidArgument, options_.url.authority() + ": " + trouble);
+    if (close == Close::WrongToken) fail(ErrorCode::InvalidArgument, name() + ": " + trouble);
     if (close == Close::OtherVersion || close == Close::BadMessage)
-      fail(ErrorCode::Format, options_.url.authority() + ": " + trouble);
+      fail(ErrorCode::Format, name() + ": " + trouble);
     if (isFinal) fail(ErrorCode::Io, trouble);
+    if (isEnding_) context_.stop();
     if (isEnding_ || hasFailed_) return;
     if (options_.log && trouble != said_) options_.log(trouble);
     said_ = trouble;
@@ -250,16 +303,19 @@ class Client::Impl {
 
   const ClientOptions options_;
 
-  mutable std::mutex mutex_;  // for the next four
+  mutable std::mutex mutex_;  // for the next six
   std::condition_variable changed_;
   std::deque<Whole> wholes_;
+  std::uint64_t waitingBytes_ = 0;  // in them
   Standing standing_;
+  Series series_;  // the thread alone changes it
   std::optional<Error> failure_;
 
   // The rest belongs to the thread.
   asio::io_context context_{1};
   asio::executor_work_guard<asio::io_context::executor_type> work_{context_.get_executor()};
   asio::steady_timer pause_{context_};
+  asio::steady_timer end_{context_};
   asio::ssl::context tls_{asio::ssl::context::tls_client};
   std::shared_ptr<Line> line_;
   Assembly assembly_;
@@ -287,6 +343,10 @@ std::optional<Received> Client::next(std::chrono::milliseconds timeout) {
 
 Client::Standing Client::standing() const {
   return impl_->standing();
+}
+
+Series Client::seriesFrom(std::size_t from) const {
+  return impl_->seriesFrom(from);
 }
 
 void Client::show(std::uint32_t index) {

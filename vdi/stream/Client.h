@@ -17,6 +17,9 @@ namespace vdi::stream {
 
 struct ClientOptions {
   Url url;  // with a token
+  /// In place of the link: `sh -c` runs this and finds a server at its standard input and output, as
+  /// "ssh host vdi serve --stdio folder" does. Each connection runs it anew.
+  std::string command;
   /// PEM: certificates to trust beside the system's.
   std::filesystem::path authority;
   /// A level of more bytes ends the connection.
@@ -31,7 +34,7 @@ class Client {
  public:
   /// Throws Error{Io} for an authority that can't be read. Whether the server can be reached shows later.
   explicit Client(ClientOptions options);
-  /// Ends the connection, within a second.
+  /// Ends the connection, within two seconds, or four where a command runs.
   ~Client();
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
@@ -50,6 +53,8 @@ class Client {
     std::string trouble;                          // why there is no connection; empty: none so far
   };
   Standing standing() const;
+  /// The series of the last connection, from its entry `from` on; empty: there's none, or none so far.
+  Series seriesFrom(std::size_t from) const;
 
   /// Asks for a frame of the series, here and after a reconnect.
   void show(std::uint32_t index);

@@ -29,6 +29,8 @@ class Connection {
   virtual void finish() = 0;
   /// Cuts it off.
   virtual void cut() = 0;
+  /// Whether it has shown the token.
+  virtual bool isWelcome() const = 0;
 };
 
 std::shared_ptr<Connection> connection(Plain::socket_type socket, const Surroundings& surroundings);

@@ -9,26 +9,46 @@ namespace vdi::stream {
 
 namespace {
 
-std::size_t bytesInMemory(const Vdi& vdi) {
+std::uint64_t bytesInMemory(const Vdi& vdi) {
   const std::size_t each =
       vdi.precision() == Precision::Compact ? sizeof(CompactSupersegment) : sizeof(Supersegment);
   return vdi.supersegmentCount() * each + vdi.listCount() * sizeof(std::uint32_t);
 }
 
+std::uint32_t levelCountOf(std::uint64_t bytesInMemory) {
+  return bytesInMemory < smallBytes ? 1 : 2;
+}
+
+/// Adds a level to the frame, and returns the frame as it is then.
+FramePtr addLevel(Frame& frame, std::vector<std::byte> bytes, const Vdi& size) {
+  frame.levels.push_back(
+      std::make_shared<EncodedLevel>(EncodedLevel{std::move(bytes), size.width, size.height}));
+  return std::make_shared<Frame>(frame);
+}
+
 }  // namespace
 
 void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
-                 std::optional<std::vector<std::byte>> file, const std::function<void(FramePtr)>& take) {
-  Frame frame{id, vdi.timeStep, vdi.time, made, bytesInMemory(vdi) < smallBytes ? 1U : 2U, {}};
+                 const std::function<bool(FramePtr)>& take) {
+  Frame frame{id, vdi.timeStep, vdi.time, made, levelCountOf(bytesInMemory(vdi)), {}};
   if (frame.levelCount > 1) {
     const Vdi coarse = thinned(vdi, coarseFactor);
-    frame.levels.push_back(
-        std::make_shared<EncodedLevel>(EncodedLevel{io::encode(coarse), coarse.width, coarse.height}));
-    take(std::make_shared<Frame>(frame));
+    if (!take(addLevel(frame, io::encode(coarse), coarse))) return;
   }
-  frame.levels.push_back(std::make_shared<EncodedLevel>(
-      EncodedLevel{file ? std::move(*file) : io::encode(vdi), vdi.width, vdi.height}));
-  take(std::make_shared<Frame>(std::move(frame)));
+  (void)take(addLevel(frame, io::encode(vdi), vdi));
+}
+
+void passFrame(std::vector<std::byte> file, std::uint32_t id, Clock::time_point made,
+               const std::function<void(FramePtr)>& take) {
+  const io::VdiFileInfo info = io::decodeInfo(file);
+  Frame frame{id, info.header.timeStep, info.header.time, made, levelCountOf(info.expandedBytes), {}};
+  if (frame.levelCount > 1) {
+    const Vdi coarse = io::decodeThinned(file, coarseFactor);  // checks all of the file
+    take(addLevel(frame, io::encode(coarse), coarse));
+  } else {
+    static_cast<void>(io::decode(file));
+  }
+  take(addLevel(frame, std::move(file), info.header));
 }
 
 }  // namespace vdi::stream

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "vdi/core/Vdi.h"
@@ -39,9 +38,13 @@ inline constexpr int coarseFactor = 3;
 inline constexpr std::size_t smallBytes = std::size_t{1} << 20;
 
 /// Encodes a VDI, on all cores. `take` gets the frame when its first level is there and again with each other
-/// one, from the calling thread. `file`: the VDI's own file where that is known, which becomes the last
-/// level. Throws Error{Format} for a VDI that io::decode would refuse, and what `take` throws.
+/// one, from the calling thread, as long as it returns true. Throws Error{Format} for a VDI that io::decode
+/// would refuse, and what `take` throws.
 void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
-                 std::optional<std::vector<std::byte>> file, const std::function<void(FramePtr)>& take);
+                 const std::function<bool(FramePtr)>& take);
+/// The same of a VDI's file, whose bytes become the last level as they are. All of the file is checked before
+/// `take` gets anything, but never expanded as a whole, and `take` gets all levels. Throws as io::decode.
+void passFrame(std::vector<std::byte> file, std::uint32_t id, Clock::time_point made,
+               const std::function<void(FramePtr)>& take);
 
 }  // namespace vdi::stream

@@ -30,11 +30,16 @@ class Line {
  public:
   virtual ~Line() = default;
   virtual void start() = 0;
+  /// What the server asks for: the link's, or the one that a command's other end has given.
+  virtual std::string token() const = 0;
   virtual void send(std::string text) = 0;
   virtual void close() = 0;  // politely, within a second
 };
 
 std::shared_ptr<Line> line(boost::asio::io_context& context, const Url& url, LineEvents events);
+/// Over the standard input and output of a command of the shell, at whose end serveOver (Pipe.h) runs.
+std::shared_ptr<Line> commandLine(boost::asio::io_context& context, const std::string& command,
+                                  LineEvents events);
 std::shared_ptr<Line> encryptedLine(boost::asio::io_context& context, boost::asio::ssl::context& tls,
                                     const Url& url, LineEvents events);
 

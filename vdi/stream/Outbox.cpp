@@ -31,24 +31,61 @@ Clock::time_point after(Clock::time_point start, double seconds) {
 }  // namespace
 
 void Outbox::offer(FramePtr frame, Clock::time_point now) {
+  if (isClosed_) return;
   if (newest_ && newest_->id == frame->id) {
     if (current_ == newest_) current_ = frame;
     newest_ = std::move(frame);
+    release();
     return;
   }
+  if (held().empty()) movedAt_ = now;
   if (newest_ != current_) ++dropped_;
   if (offeredAt_) {
     const double interval = secondsBetween(*offeredAt_, now);
     period_ = period_ == 0.0 ? interval : period_ + newPeriodShare * (interval - period_);
   }
   offeredAt_ = now;
+  if (current_ && current_->id == frame->id) current_ = frame;
   newest_ = std::move(frame);
+  release();
 }
 
 void Outbox::skip(FramePtr frame) {
   nextLevel_ = frame->levelCount;
   offset_ = frame->levels.back()->bytes.size();
   current_ = newest_ = std::move(frame);
+  release();
+}
+
+void Outbox::release() {
+  if (!current_) return;
+  if (current_ != newest_) {
+    if (nextLevel_ != 1 || !isUnderWay()) {
+      current_.reset();
+    } else if (current_->levels.size() > 1) {
+      Frame coarse = *current_;
+      coarse.levels.resize(1);
+      current_ = std::make_shared<Frame>(std::move(coarse));
+    }
+  } else if (nextLevel_ == current_->levelCount && !isUnderWay() && !current_->levels.empty()) {
+    Frame sent = *current_;  // which one that was counts, not what was in it
+    sent.levels.clear();
+    current_ = newest_ = std::make_shared<Frame>(std::move(sent));
+  }
+}
+
+std::vector<std::shared_ptr<const EncodedLevel>> Outbox::held() const {
+  std::vector<std::shared_ptr<const EncodedLevel>> levels;
+  if (newest_) levels = newest_->levels;
+  if (current_ && current_ != newest_)
+    levels.insert(levels.end(), current_->levels.begin(), current_->levels.end());
+  return levels;
+}
+
+void Outbox::close() {
+  isClosed_ = true;
+  newest_.reset();
+  current_.reset();
 }
 
 double Outbox::rate() const {
@@ -77,7 +114,7 @@ bool Outbox::isWorthBeginning(std::uint64_t bytes, Clock::time_point now,
 }
 
 bool Outbox::begin(Clock::time_point now, std::optional<Clock::time_point>& retry) {
-  if (isPaused_ || !newest_) return false;
+  if (isPaused_ || !newest_ || newest_->levels.empty()) return false;
   if (newest_ != current_) {
     current_ = newest_;
     nextLevel_ = 0;
@@ -99,6 +136,7 @@ Outbox::Part Outbox::take(Clock::time_point now) {
   underWay_ += count;
   sent_.push_back({current_->id, level, offset_, count, now, delivered_});
   allowance_ -= static_cast<double>(count);
+  release();
   return part;
 }
 
@@ -128,6 +166,7 @@ void Outbox::acknowledge(const Ack& ack, Clock::time_point now) {
   const auto last = std::find_if(sent_.rbegin(), sent_.rend(), isCovered);
   if (last == sent_.rend()) return;
   const Sent newest = *last;
+  movedAt_ = now;
   for (auto sent = sent_.begin(); sent != last.base(); ++sent) {
     underWay_ -= sent->bytes;
     delivered_ += sent->bytes;

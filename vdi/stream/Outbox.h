@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "vdi/stream/Frame.h"
 #include "vdi/stream/Protocol.h"
@@ -50,6 +52,13 @@ class Outbox {
   /// Bytes that may be under way.
   std::uint64_t window() const;
 
+  /// Levels that are still to be sent, or may be. Those that have been sent, or won't be, aren't kept.
+  std::vector<std::shared_ptr<const EncodedLevel>> held() const;
+  /// When the viewer last took something, or was given the first that it has to take.
+  Clock::time_point movedAt() const { return movedAt_; }
+  /// Keeps nothing any more, and gives nothing out.
+  void close();
+
  private:
   struct Sent {
     std::uint32_t frame;
@@ -65,11 +74,14 @@ class Outbox {
   bool isWorthBeginning(std::uint64_t bytes, Clock::time_point now,
                         std::optional<Clock::time_point>& retry) const;
   Part take(Clock::time_point now);
+  void release();
 
   double cap_;
   double allowance_ = 0.0;  // bytes that the limit lets go now; may be negative
   std::optional<Clock::time_point> allowedAt_;
   bool isPaused_ = false;
+  bool isClosed_ = false;
+  Clock::time_point movedAt_;
 
   FramePtr newest_;  // offered last
   FramePtr current_;

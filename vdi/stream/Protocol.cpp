@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "vdi/core/Error.h"
+#include "vdi/stream/SteeringJson.h"
 
 namespace vdi::stream {
 
@@ -147,6 +148,17 @@ Json jsonOf(const Pause&) {
 Json jsonOf(const Resume&) {
   return Json::object({{"type", "resume"}});
 }
+Json jsonOf(const Drive&) {
+  return Json::object({{"type", "drive"}});
+}
+Json jsonOf(const Release&) {
+  return Json::object({{"type", "release"}});
+}
+Json jsonOf(const Steer& steer) {
+  Json message = jsonOf(steer.wish);
+  message["type"] = "steer";
+  return message;
+}
 Json jsonOf(const Welcome& welcome) {
   Json message{{"type", "welcome"},
                {"version", welcome.version},
@@ -173,6 +185,16 @@ Json jsonOf(const Level& level) {
 }
 Json jsonOf(const Missing& missing) {
   return {{"type", "missing"}, {"frame", missing.frame}, {"cause", missing.cause}};
+}
+Json jsonOf(const Steering& steering) {
+  Json message = jsonOf(steering.controls);
+  message["type"] = "steering";
+  message["you"] = steering.you;
+  message["driver"] = steering.driver ? Json(*steering.driver) : Json();
+  return message;
+}
+Json jsonOf(const Denied& denied) {
+  return {{"type", "denied"}, {"cause", denied.cause}};
 }
 Json jsonOf(const Refusal& refusal) {
   return {{"type", "error"}, {"cause", refusal.cause}};
@@ -210,6 +232,14 @@ Welcome welcomeIn(const Fields& fields) {
     welcome.series = Fields(series).series();
   }
   return welcome;
+}
+
+Steering steeringIn(const Fields& fields, const Json& object) {
+  Steering steering;
+  steering.you = fields.count("you");
+  if (fields.has("driver")) steering.driver = fields.count("driver");
+  steering.controls = controlsIn(object);
+  return steering;
 }
 
 Level levelIn(const Fields& fields) {
@@ -253,6 +283,9 @@ FromViewer viewerMessage(std::string_view text) {
   if (type == "show") return Show{fields.count("index")};
   if (type == "pause") return Pause{};
   if (type == "resume") return Resume{};
+  if (type == "drive") return Drive{};
+  if (type == "release") return Release{};
+  if (type == "steer") return Steer{wishIn(object)};
   refuse("a message is of an unknown type");
 }
 
@@ -266,6 +299,8 @@ FromServer serverMessage(std::string_view text) {
   if (type == "state") return State{phaseOf(fields.text("state")), fields.count("viewers")};
   if (type == "level") return levelIn(fields);
   if (type == "missing") return Missing{fields.count("frame"), fields.text("cause")};
+  if (type == "steering") return steeringIn(fields, object);
+  if (type == "denied") return Denied{fields.text("cause")};
   if (type == "error") return Refusal{fields.text("cause")};
   return Unknown{};
 }

@@ -11,6 +11,8 @@
 #include <variant>
 #include <vector>
 
+#include "vdi/stream/Steering.h"
+
 namespace vdi::stream {
 
 inline constexpr int protocolVersion = 1;
@@ -34,6 +36,7 @@ enum class Close : std::uint16_t {
   WrongToken = 4401,
   Late = 4408,
   OtherVersion = 4409,
+  Stalled = 4410,
   TooMany = 4503,
 };
 
@@ -65,7 +68,20 @@ struct Pause {
 struct Resume {
   bool operator==(const Resume&) const = default;
 };
-using FromViewer = std::variant<Hello, Ack, Show, Pause, Resume>;
+/// Asks for control of the simulation, which one viewer has at a time.
+struct Drive {
+  bool operator==(const Drive&) const = default;
+};
+/// Gives it back.
+struct Release {
+  bool operator==(const Release&) const = default;
+};
+/// From the viewer that drives.
+struct Steer {
+  Wish wish;
+  bool operator==(const Steer&) const = default;
+};
+using FromViewer = std::variant<Hello, Ack, Show, Pause, Resume, Drive, Release, Steer>;
 
 // From the server.
 
@@ -116,6 +132,18 @@ struct Missing {
   std::string cause;
   bool operator==(const Missing&) const = default;
 };
+/// How things stand with steering, where it is allowed: at the beginning and after each change.
+struct Steering {
+  std::uint32_t you = 0;                // the viewer's number
+  std::optional<std::uint32_t> driver;  // that of the viewer that drives
+  Controls controls;
+  bool operator==(const Steering&) const = default;
+};
+/// What this viewer asked for isn't done.
+struct Denied {
+  std::string cause;
+  bool operator==(const Denied&) const = default;
+};
 /// Comes before the server closes the connection.
 struct Refusal {
   std::string cause;
@@ -125,7 +153,8 @@ struct Refusal {
 struct Unknown {
   bool operator==(const Unknown&) const = default;
 };
-using FromServer = std::variant<Welcome, SeriesPart, State, Level, Missing, Refusal, Unknown>;
+using FromServer =
+    std::variant<Welcome, SeriesPart, State, Level, Missing, Steering, Denied, Refusal, Unknown>;
 
 std::string textOf(const FromViewer& message);
 std::string textOf(const FromServer& message);

@@ -66,8 +66,11 @@ void Publisher::work() {
 
 void Publisher::encode(const Pending& pending) {
   try {
-    encodeFrame(*pending.vdi, nextId_++, pending.made, std::nullopt,
-                [this](FramePtr frame) { server_.publish(std::move(frame)); });
+    encodeFrame(*pending.vdi, nextId_++, pending.made, [this](FramePtr frame) {
+      server_.publish(std::move(frame));
+      const std::scoped_lock lock(mutex_);
+      return !pending_;
+    });
   } catch (const std::exception& error) {
     const std::scoped_lock lock(mutex_);
     if (trouble_.empty()) trouble_ = error.what();

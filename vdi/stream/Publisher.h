@@ -20,12 +20,13 @@ class Publisher {
  public:
   /// The server outlives it.
   explicit Publisher(Server& server);
-  /// What was published last is encoded and handed to the server before it returns.
+  /// What was published last is encoded in full and handed to the server before it returns.
   ~Publisher();
   Publisher(const Publisher&) = delete;
   Publisher& operator=(const Publisher&) = delete;
 
-  /// Never waits. A VDI whose encoding hasn't begun when the next one comes is dropped.
+  /// Never waits. A VDI whose encoding hasn't begun when the next one comes is dropped, and so are the levels
+  /// that haven't been begun of one whose encoding has: the next one's coarse level comes first.
   void publish(std::shared_ptr<const Vdi> vdi);
   std::uint64_t dropped() const;
   /// The first VDI that couldn't be encoded, and why; empty: none. Later ones are encoded all the same.

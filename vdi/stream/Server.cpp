@@ -34,7 +34,7 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 
-constexpr std::chrono::seconds goodbyePatience{1};
+constexpr std::chrono::seconds goodbyePatience{1};  // and once more when they are cut off
 constexpr std::chrono::milliseconds acceptPause{100};
 
 std::string addressText(const std::string& host, std::uint16_t port) {
@@ -77,7 +77,8 @@ class Server::Impl {
   explicit Impl(ServerOptions options)
       : options_((requireToken(options.token, "token"), std::move(options))),
         tls_(tlsContext(options_)),
-        hub_({options_.token, options_.mostBytesPerSecond, options_.mostViewers, options_.show}),
+        hub_({options_.token, options_.mostBytesPerSecond, options_.mostViewers, options_.mostHeldBytes,
+              options_.show, options_.steer, options_.log}),
         site_(std::move(options_.page), options_.token, options_.origins, [this] { return statusText(); }),
         acceptor_(context_),
         pause_(context_),
@@ -182,7 +183,7 @@ class Server::Impl {
   }
 
   void serve(Plain::socket_type socket) {
-    if (connections_.size() >= options_.mostConnections || isEnding_) return;  // it's closed
+    if (isEnding_ || (connections_.size() >= options_.mostConnections && !makeRoom())) return;  // it's closed
     const std::uint64_t number = nextNumber_++;
     const Surroundings surroundings{hub_, site_, [this, number] { leave(number); }};
     const std::shared_ptr<Connection> made = tls_
@@ -190,6 +191,19 @@ class Server::Impl {
                                                  : connection(std::move(socket), surroundings);
     connections_.emplace(number, made);
     made->start();
+  }
+
+  /// The oldest connection that hasn't shown the token gives way: those who open many and say little, or
+  /// nothing, keep nobody out. Returns whether there was one.
+  bool makeRoom() {
+    for (auto at = connections_.begin(); at != connections_.end(); ++at) {
+      const std::shared_ptr<Connection> oldest = at->second.lock();
+      if (oldest && oldest->isWelcome()) continue;
+      connections_.erase(at);
+      if (oldest) oldest->cut();
+      return true;
+    }
+    return false;
   }
 
   void leave(std::uint64_t number) {
@@ -213,6 +227,11 @@ class Server::Impl {
     patience_.async_wait([this](boost::system::error_code) {
       forEach([](Connection& connection) { connection.cut(); });
       work_.reset();
+      if (connections_.empty()) return;
+      patience_.expires_after(goodbyePatience);
+      patience_.async_wait([this](boost::system::error_code error) {
+        if (!error) context_.stop();  // nothing may hold up whoever ends the server
+      });
     });
   }
 
@@ -293,6 +312,10 @@ void Server::append(Series entries) {
 
 void Server::setPhase(Phase phase) {
   impl_->onThread([&hub = impl_->hub(), phase] { hub.setPhase(phase); });
+}
+
+void Server::setControls(Controls controls) {
+  impl_->onThread([&hub = impl_->hub(), held = std::move(controls)] { hub.setControls(held); });
 }
 
 void Server::adopt(int descriptor) {

@@ -22,12 +22,18 @@ struct ServerOptions {
   std::vector<std::string> origins;  // of other sites' pages that may connect: "https://example.org"
   double mostBytesPerSecond = 0.0;   // to each viewer; 0: no limit
   std::uint32_t mostViewers = 64;
+  /// Bytes of frames that are kept for viewers alone, the newest frame apart. Beyond them the viewer that has
+  /// taken nothing for longest is disconnected.
+  std::uint64_t mostHeldBytes = std::uint64_t{1} << 30;
   std::uint32_t mostConnections = 256;  // of any kind, viewers included
   std::filesystem::path certificate;    // PEM, a chain; empty: no TLS
   std::filesystem::path key;            // PEM
   /// A viewer wants that frame of the series; answered by Server::provide or miss. Called on the network's
   /// thread: it must return at once.
   std::function<void(std::uint32_t index)> show;
+  /// The viewer that drives wishes that; empty: nobody steers. Wishes have been held against the controls
+  /// that were set last. Called on the network's thread: it must return at once.
+  std::function<void(std::uint32_t viewer, const Wish& wish)> steer;
   /// Gets lines for the operator, without secrets, on the network's thread.
   std::function<void(const std::string& line)> log;
 };
@@ -46,7 +52,7 @@ class Server {
   /// Listens when it returns. Throws Error: Io for an address that can't be had, or a certificate or key that
   /// can't be read; InvalidArgument for a token that requireToken refuses, or a certificate without a key.
   explicit Server(ServerOptions options);
-  /// Tells viewers that it ends, and waits for them a second at most.
+  /// Tells viewers that it ends, and waits for them two seconds at most.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -67,6 +73,8 @@ class Server {
   /// The series has these entries behind those that it had.
   void append(Series entries);
   void setPhase(Phase phase);
+  /// What can be steered, and what is in force: viewers are told of changes.
+  void setControls(Controls controls);
   /// Serves a connected stream socket, which it owns from now on.
   void adopt(int descriptor);
   ServerStatus status() const;

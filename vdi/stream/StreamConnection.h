@@ -61,12 +61,14 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
   }
 
   void finish() override {
-    if (viewer_ && viewer_->isWelcome()) {
+    if (isWelcome()) {
       viewer_->refuse(Close::GoingAway, "the server ends");
     } else {
       cut();
     }
   }
+
+  bool isWelcome() const override { return viewer_ && viewer_->isWelcome() && !hasEnded_; }
 
   void cut() override {
     timer_.cancel();
@@ -147,7 +149,7 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
 
   void listen() {
     socket_.async_read(buffer_, [self = this->shared_from_this()](ErrorCodeOf error, std::size_t) {
-      if (error) {
+      if (error || self->hasEnded_) {
         self->end();
         return;
       }
@@ -159,19 +161,27 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
       }
       self->buffer_.consume(data.size());
       self->pump();
-      self->listen();
+      // Closing reads what's left by itself. A second reader beside it may never come to an end.
+      const bool isClosing = self->isWriting_ && std::holds_alternative<Viewer::Farewell>(self->outgoing_);
+      if (!isClosing) self->listen();
     });
   }
 
   /// The viewer is gone. What's still under way on the socket ends with an error, and then this goes.
   void end() {
-    hasEnded_ = true;
+    if (std::exchange(hasEnded_, true)) return;
     cut();
+    viewer_->leave();
   }
 
   /// Sends what there is to send, one message after the other.
   void pump() {
-    if (isWriting_ || hasEnded_) return;
+    if (hasEnded_) return;
+    if (isWriting_) {
+      // A level that doesn't get through is in the way of the reason, too.
+      if (viewer_->isStalled() && std::holds_alternative<Viewer::Binary>(outgoing_)) end();
+      return;
+    }
     outgoing_ = viewer_->next(Clock::now());
     std::visit([this](auto& message) { put(message); }, outgoing_);
   }

@@ -6,6 +6,7 @@
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read_until.hpp>
 #include <boost/asio/ssl/error.hpp>
 #include <boost/asio/ssl/host_name_verification.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -16,12 +17,16 @@
 #include <chrono>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "vdi/stream/Command.h"
 #include "vdi/stream/Line.h"
+#include "vdi/stream/Pipe.h"
 #include "vdi/stream/Protocol.h"
 
 namespace vdi::stream {
@@ -35,9 +40,16 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
         events_(std::move(events)),
         resolver_(context),
         patience_(context),
-        socket_(context, arguments...) {}
+        socket_(context, arguments...),
+        token_(url.token) {}
+
+  /// start() runs this command and talks over its standard input and output.
+  void runFirst(const std::string& command) { command_ = command; }
+
+  std::string token() const override { return token_; }
 
   void start() override {
+    if (!command_.empty()) return run();
     resolver_.async_resolve(
         url_.host, std::to_string(url_.port),
         [self = this->shared_from_this()](Error error, const Resolver::results_type& found) {
@@ -71,6 +83,43 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
   using Error = boost::beast::error_code;
   using Resolver = boost::asio::ip::tcp::resolver;
   static constexpr bool isEncrypted = std::is_same_v<Stream, Encrypted>;
+
+  std::string name() const { return command_.empty() ? url_.authority() : "the command"; }
+
+  void run() {
+    process_.emplace(command_);
+    Error error;
+    transport().socket().assign(boost::asio::generic::stream_protocol(AF_UNIX, 0), process_->takeSocket(),
+                                error);
+    if (error) return fail("can't talk to the command", error);
+    transport().expires_after(forGreeting);
+    readGreeting();
+  }
+
+  /// What a shell says when it starts comes before.
+  void readGreeting() {
+    boost::asio::async_read_until(
+        transport(), boost::asio::dynamic_buffer(line_, mostGreetingBytes), '\n',
+        [self = this->shared_from_this()](Error error, std::size_t count) {
+          if (self->hasEnded_) return;
+          self->greetingBytes_ += count;
+          if (error == boost::asio::error::not_found || self->greetingBytes_ > mostGreetingBytes)
+            return self->end(0, "the command doesn't start as vdi serve --stdio does", true);
+          if (error) return self->endOfCommand();
+          const std::optional<std::string> token =
+              tokenInGreeting(std::string_view(self->line_).substr(0, count - 1));
+          self->line_.erase(0, count);
+          if (!token) return self->readGreeting();
+          self->token_ = *token;
+          self->upgrade();
+        });
+  }
+
+  void endOfCommand() {
+    transport().close();
+    const Command::Ending ending = process_->end();
+    end(0, "the command " + ending.how + " and offered no VDIs", ending.isNotFound);
+  }
 
   Plain& transport() { return boost::beast::get_lowest_layer(socket_); }
 
@@ -124,11 +173,10 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
             // An error of the server's, such as 502 of a proxy, may pass.
             constexpr int serverErrors = 500;
             const int status = static_cast<int>(self->response_.result_int());
-            self->end(0,
-                      self->url_.authority() + " has no VDIs to offer: HTTP status " + std::to_string(status),
+            self->end(0, self->name() + " has no VDIs to offer: HTTP status " + std::to_string(status),
                       status < serverErrors);
           } else if (error) {
-            self->fail("can't talk to " + self->url_.authority(), error);
+            self->fail("can't talk to " + self->name(), error);
           } else if (!self->hasEnded_) {
             self->isOpen_ = true;
             self->events_.opened();
@@ -149,7 +197,8 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
       } else {
         self->events_.binary({bytes, data.size()});
       }
-      if (self->hasEnded_) return;
+      // Closing reads what's left by itself. A second reader beside it may never come to an end.
+      if (self->hasEnded_ || self->isClosing_) return;
       self->buffer_.consume(data.size());
       self->read();
     });
@@ -190,11 +239,14 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
     resolver_.cancel();
     patience_.cancel();
     transport().close();
+    process_.reset();
     events_.ended(code, why, isFinal);
   }
 
   static constexpr std::chrono::seconds waiting{10};
   static constexpr std::chrono::seconds silence{60};
+  static constexpr std::chrono::seconds forGreeting{120};  // somebody may have to enter a password
+  static constexpr std::size_t mostGreetingBytes = std::size_t{64} << 10;
 
   const Url url_;
   LineEvents events_;
@@ -206,6 +258,11 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
   boost::beast::flat_buffer buffer_;
   std::deque<std::string> queue_;
   std::string writing_;
+  std::string command_;
+  std::optional<Command> process_;
+  std::string line_;
+  std::size_t greetingBytes_ = 0;
+  std::string token_;
   bool isOpen_ = false;
   bool isWriting_ = false;
   bool isClosing_ = false;

@@ -35,12 +35,50 @@ void Hub::publish(FramePtr frame, Clock::time_point now) {
   for (Viewer* const viewer : viewers_) {
     if (!viewer->shown_) viewer->offer(newest_, now);
   }
+  limitHeld(now);
   wakeAll();
 }
 
 void Hub::provide(const FramePtr& frame, Clock::time_point now) {
   for (Viewer* const viewer : viewers_) {
     if (viewer->shown_ == frame->id) viewer->offer(frame, now);
+  }
+  limitHeld(now);
+}
+
+std::set<std::shared_ptr<const EncodedLevel>> Hub::heldFor(const Viewer& viewer) const {
+  std::set<std::shared_ptr<const EncodedLevel>> levels;
+  if (viewer.isStalled()) return levels;  // it's on its way out
+  for (const auto& level : viewer.held()) levels.insert(level);
+  if (newest_) {
+    for (const auto& level : newest_->levels) levels.erase(level);
+  }
+  return levels;
+}
+
+std::uint64_t Hub::heldBytes() const {
+  std::set<std::shared_ptr<const EncodedLevel>> levels;
+  for (const Viewer* const viewer : viewers_) levels.merge(heldFor(*viewer));
+  std::uint64_t bytes = 0;
+  for (const auto& level : levels) bytes += level->bytes.size();
+  return bytes;
+}
+
+/// A viewer that takes its frames lets go of them. The one that hasn't for longest goes first.
+void Hub::limitHeld(Clock::time_point now) {
+  while (heldBytes() > options_.mostHeldBytes) {
+    Viewer* oldest = nullptr;
+    for (Viewer* const viewer : viewers_) {
+      if (heldFor(*viewer).empty()) continue;
+      if (oldest == nullptr || viewer->outbox_.movedAt() < oldest->outbox_.movedAt()) oldest = viewer;
+    }
+    const double seconds = std::chrono::duration<double>(now - oldest->outbox_.movedAt()).count();
+    const std::string cause = fmt::format(
+        "a viewer took nothing for {:.1f} s while viewers hold more than {} MiB of frames: "
+        "it's disconnected",
+        seconds, options_.mostHeldBytes >> 20U);
+    if (options_.log) options_.log(cause);
+    oldest->refuse(Close::Stalled, cause);
   }
 }
 
@@ -69,11 +107,34 @@ void Hub::setPhase(Phase phase) {
   wakeAll();
 }
 
+void Hub::setControls(Controls controls) {
+  if (controls_ == controls) return;
+  controls_ = std::move(controls);
+  ++steeringVersion_;
+  wakeAll();
+}
+
+void Hub::endDrive() {
+  Wish goOn;
+  goOn.paused = false;
+  if (std::exchange(driverPaused_, false)) options_.steer(*driver_, goOn);
+  driver_.reset();
+  ++steeringVersion_;
+}
+
 Viewer::Viewer(Hub& hub, std::function<void()> wake)
     : hub_(hub), wake_(std::move(wake)), outbox_(hub.options_.mostBytesPerSecond) {}
 
 Viewer::~Viewer() {
-  if (hub_.viewers_.erase(this) > 0) hub_.wakeAll();
+  leave();
+}
+
+void Viewer::leave() {
+  outbox_.close();
+  announced_.reset();
+  if (hub_.viewers_.erase(this) == 0) return;
+  if (hub_.driver_ == number_) hub_.endDrive();
+  hub_.wakeAll();
 }
 
 void Viewer::offer(const FramePtr& frame, Clock::time_point now) {
@@ -81,8 +142,17 @@ void Viewer::offer(const FramePtr& frame, Clock::time_point now) {
   wake_();
 }
 
+std::vector<std::shared_ptr<const EncodedLevel>> Viewer::held() const {
+  std::vector<std::shared_ptr<const EncodedLevel>> levels = outbox_.held();
+  if (announced_) levels.push_back(announced_->frame->levels[announced_->level]);
+  if (const auto level = inFlight_.lock()) levels.push_back(level);
+  return levels;
+}
+
 void Viewer::refuse(Close code, std::string cause) {
   if (!farewell_) farewell_ = {code, std::move(cause)};
+  outbox_.close();
+  announced_.reset();
   wake_();
 }
 
@@ -101,6 +171,7 @@ void Viewer::enter(const Hello& hello, Clock::time_point now) {
     return;
   }
   isWelcome_ = true;
+  number_ = ++hub_.lastNumber_;
   hub_.viewers_.insert(this);
   if (hub_.newest_) {
     const bool hasIt = hello.session == hub_.session_ && hello.have == hub_.newest_->id;
@@ -122,6 +193,43 @@ void Viewer::show(std::uint32_t index) {
   hub_.options_.show(index);
 }
 
+void Viewer::deny(std::string cause) {
+  denied_ = {std::move(cause)};
+}
+
+void Viewer::drive() {
+  if (!hub_.canSteer()) {
+    deny("steering isn't allowed here");
+  } else if (hub_.driver_ && hub_.driver_ != number_) {
+    deny(fmt::format("viewer {} drives", *hub_.driver_));
+  } else if (!hub_.driver_) {
+    hub_.driver_ = number_;
+    ++hub_.steeringVersion_;
+    hub_.wakeAll();
+  }
+}
+
+void Viewer::release() {
+  if (hub_.driver_ != number_) return;
+  hub_.endDrive();
+  hub_.wakeAll();
+}
+
+void Viewer::steer(const Wish& wish) {
+  if (!hub_.canSteer() || hub_.driver_ != number_) {
+    deny(hub_.canSteer() ? "this viewer doesn't drive" : "steering isn't allowed here");
+    return;
+  }
+  std::string objection = objectionTo(wish, hub_.controls_);
+  if (!objection.empty()) {
+    deny(std::move(objection));
+    return;
+  }
+  if (wish.isEmpty()) return;
+  if (wish.paused) hub_.driverPaused_ = *wish.paused;
+  hub_.options_.steer(number_, wish);
+}
+
 void Viewer::receive(std::string_view text, Clock::time_point now) {
   if (farewell_) return;
   try {
@@ -135,6 +243,12 @@ void Viewer::receive(std::string_view text, Clock::time_point now) {
       outbox_.acknowledge(*ack, now);
     } else if (const auto* const wish = std::get_if<Show>(&message)) {
       show(wish->index);
+    } else if (std::holds_alternative<Drive>(message)) {
+      drive();
+    } else if (std::holds_alternative<Release>(message)) {
+      release();
+    } else if (const auto* const steered = std::get_if<Steer>(&message)) {
+      steer(steered->wish);
     } else {
       const bool pauses = std::holds_alternative<Pause>(message);
       outbox_.pause(pauses);
@@ -152,7 +266,7 @@ std::optional<std::string> Viewer::news() {
   const std::optional<Series>& series = hub_.series_;
   if (!wasWelcomed_) {
     wasWelcomed_ = true;
-    Welcome welcome{protocolVersion, hub_.session_, false, std::nullopt, hub_.viewerCount()};
+    Welcome welcome{protocolVersion, hub_.session_, hub_.canSteer(), std::nullopt, hub_.viewerCount()};
     if (series) {
       welcome.series = partOf(*series, 0);
       seriesSent_ = welcome.series->size();
@@ -168,6 +282,11 @@ std::optional<std::string> Viewer::news() {
     stateSent_ = hub_.state();
     return textOf(*stateSent_);
   }
+  if (hub_.canSteer() && steeringSent_ != hub_.steeringVersion_) {
+    steeringSent_ = hub_.steeringVersion_;
+    return textOf(Steering{number_, hub_.driver_, hub_.controls_});
+  }
+  if (denied_) return textOf(*std::exchange(denied_, std::nullopt));
   if (missing_) return textOf(*std::exchange(missing_, std::nullopt));
   return std::nullopt;
 }
@@ -198,8 +317,9 @@ Viewer::Outgoing Viewer::next(Clock::time_point now) {
       return announcement(*part, now);
     }
   }
-  return Binary{chunkHead({part->frame->id, part->level, part->offset, part->bytes}), part->frame,
-                part->bytes};
+  const std::shared_ptr<const EncodedLevel>& level = part->frame->levels[part->level];
+  inFlight_ = level;
+  return Binary{chunkHead({part->frame->id, part->level, part->offset, part->bytes}), level, part->bytes};
 }
 
 }  // namespace vdi::stream

@@ -4,11 +4,13 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "vdi/stream/Frame.h"
 #include "vdi/stream/Outbox.h"
@@ -26,8 +28,14 @@ class Hub {
     std::string token;
     double mostBytesPerSecond = 0.0;  // to each viewer; 0: no limit
     std::uint32_t mostViewers = 0;
+    /// Bytes of frames that may be kept for viewers alone, the newest frame apart.
+    std::uint64_t mostHeldBytes = std::uint64_t{1} << 30;
     /// A viewer wants that frame of the series: to be answered by provide or miss.
     std::function<void(std::uint32_t index)> show;
+    /// The viewer that drives wishes that; empty: nobody steers.
+    std::function<void(std::uint32_t viewer, const Wish& wish)> steer;
+    /// Gets lines for the operator; may be empty.
+    std::function<void(const std::string& line)> log;
   };
   /// A random session. Throws Error{Io} as randomToken.
   explicit Hub(Options options);
@@ -43,6 +51,8 @@ class Hub {
   bool isWanted(std::uint32_t index) const;
   void append(const Series& entries);
   void setPhase(Phase phase);
+  /// What can be steered, and what is in force.
+  void setControls(Controls controls);
 
   const std::string& session() const { return session_; }
   Phase phase() const { return phase_; }
@@ -51,10 +61,17 @@ class Hub {
   std::uint32_t viewerCount() const { return static_cast<std::uint32_t>(viewers_.size()); }
   std::uint64_t published() const { return published_; }
   State state() const { return {phase_, viewerCount()}; }
+  /// Bytes of frames that are kept for viewers alone, the newest frame apart.
+  std::uint64_t heldBytes() const;
 
  private:
   friend class Viewer;
   void wakeAll();
+  bool canSteer() const { return static_cast<bool>(options_.steer); }
+  /// Nobody drives any more; what waits for this driver goes on.
+  void endDrive();
+  std::set<std::shared_ptr<const EncodedLevel>> heldFor(const Viewer& viewer) const;
+  void limitHeld(Clock::time_point now);
 
   Options options_;
   TokenCheck token_;
@@ -64,6 +81,11 @@ class Hub {
   std::optional<Series> series_;
   std::uint64_t published_ = 0;
   std::set<Viewer*> viewers_;  // that said hello and were let in
+  std::uint32_t lastNumber_ = 0;
+  std::optional<std::uint32_t> driver_;
+  bool driverPaused_ = false;  // asked for a pause last
+  Controls controls_;
+  std::uint64_t steeringVersion_ = 0;  // counts changes of the driver and of the controls
 };
 
 class Viewer {
@@ -79,10 +101,14 @@ class Viewer {
   /// It goes once the cause has been told.
   void refuse(Close code, std::string cause);
   bool isWelcome() const { return isWelcome_; }
+  /// It's gone: the hub forgets it.
+  void leave();
+  /// Whether it has to go at once, even in the middle of a message.
+  bool isStalled() const { return farewell_ && farewell_->code == Close::Stalled; }
 
   struct Binary {
     std::array<std::byte, chunkHeadBytes> head;
-    FramePtr frame;  // keeps the bytes
+    std::shared_ptr<const EncodedLevel> level;  // keeps the bytes
     std::span<const std::byte> bytes;
   };
   struct Wait {
@@ -99,10 +125,15 @@ class Viewer {
  private:
   void enter(const Hello& hello, Clock::time_point now);
   void show(std::uint32_t index);
+  void drive();
+  void release();
+  void steer(const Wish& wish);
+  void deny(std::string cause);
   std::optional<std::string> news();
   std::string announcement(const Outbox::Part& part, Clock::time_point now) const;
   friend class Hub;
   void offer(const FramePtr& frame, Clock::time_point now);
+  std::vector<std::shared_ptr<const EncodedLevel>> held() const;
 
   Hub& hub_;
   std::function<void()> wake_;
@@ -113,7 +144,11 @@ class Viewer {
   std::optional<State> stateSent_;
   std::optional<std::uint32_t> shown_;  // of the series
   std::optional<Missing> missing_;
+  std::uint32_t number_ = 0;  // from 1 in each session
+  std::optional<std::uint64_t> steeringSent_;
+  std::optional<Denied> denied_;
   std::optional<Outbox::Part> announced_;
+  std::weak_ptr<const EncodedLevel> inFlight_;  // of the binary message given out last
   std::optional<Farewell> farewell_;
   bool isCauseTold_ = false;
 };

@@ -1,0 +1,138 @@
+#include "apps/Relay.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "vdi/core/Error.h"
+
+namespace vdi::apps {
+
+Relay::Relay(stream::ClientOptions from, stream::ServerOptions to)
+    : options_(std::move(to)), client_(std::move(from)) {
+  options_.show = [this](std::uint32_t index) {
+    const std::scoped_lock lock(mutex_);
+    if (std::find(wanted_.begin(), wanted_.end(), index) == wanted_.end()) wanted_.push_back(index);
+  };
+  server_ = std::make_unique<stream::Server>(options_);
+  options_.port = server_->port();
+}
+
+void Relay::step(std::chrono::milliseconds time) {
+  std::optional<stream::Received> received = client_.next(time);
+  follow(client_.standing());
+  if (received && received->session == session_) pass(*std::move(received));
+  ask();
+}
+
+void Relay::follow(const stream::Client::Standing& standing) {
+  if (standing.session.empty()) return;
+  if (session_ != standing.session) {
+    if (!session_.empty()) restart();
+    session_ = standing.session;
+  }
+  stream::Series more = client_.seriesFrom(seriesPassed_);
+  if (more.size() > 0) {
+    seriesPassed_ += more.size();
+    server_->append(std::move(more));
+  }
+  if (phase_ == standing.state.phase) return;
+  phase_ = standing.state.phase;
+  server_->setPhase(*phase_);
+}
+
+/// Frames are counted anew: viewers that know older ones must not mix them up.
+void Relay::restart() {
+  server_.reset();
+  {
+    const std::scoped_lock lock(mutex_);
+    wanted_.clear();
+  }
+  seriesPassed_ = 0;
+  phase_.reset();
+  current_.reset();
+  whole_.clear();
+  asked_.reset();
+  newest_.reset();
+  client_.resume();
+  server_ = std::make_unique<stream::Server>(options_);
+}
+
+/// The other server shows one frame of its series at a time.
+void Relay::ask() {
+  while (!asked_) {
+    std::optional<std::uint32_t> index;
+    {
+      const std::scoped_lock lock(mutex_);
+      if (wanted_.empty()) return;
+      index = wanted_.front();
+      wanted_.pop_front();
+    }
+    if (!server_->isWanted(*index)) continue;
+    const auto known = std::find_if(whole_.begin(), whole_.end(),
+                                    [index](const stream::FramePtr& frame) { return frame->id == *index; });
+    if (known != whole_.end()) {
+      server_->provide(*known);
+      continue;
+    }
+    asked_ = index;
+    client_.show(*index);
+  }
+}
+
+void Relay::finish(std::uint32_t index) {
+  if (asked_ != index) return;
+  asked_.reset();
+  ask();
+  // A finished series has no newer frames.
+  if (!asked_ && phase_ != stream::Phase::Ended) client_.resume();
+}
+
+void Relay::pass(stream::Received received) {
+  const std::uint32_t id = received.level.frame;
+  if (!received.missing.empty()) {
+    server_->miss({id, received.missing});
+    finish(id);
+    return;
+  }
+  const bool isFull = received.level.level + 1 == received.level.levels;
+  add(std::move(received));
+  if (!current_) return;
+  if (!newest_ || id >= *newest_) {
+    newest_ = id;
+    server_->publish(current_);
+  }
+  if (asked_ == id) server_->provide(current_);
+  if (!isFull) return;
+  constexpr std::size_t mostKept = 4;
+  whole_.remove_if([id](const stream::FramePtr& frame) { return frame->id == id; });
+  whole_.push_front(std::exchange(current_, nullptr));
+  if (whole_.size() > mostKept) whole_.pop_back();
+  finish(id);
+}
+
+/// To the frame whose levels come, which it may begin.
+void Relay::add(stream::Received received) {
+  const stream::Level& level = received.level;
+  auto frame = std::make_shared<stream::Frame>();
+  if (level.level == 0) {
+    frame->id = level.frame;
+    frame->step = level.step;
+    frame->time = level.time.value_or(std::numeric_limits<double>::quiet_NaN());
+    constexpr double longestAge = 1e9;  // s
+    const std::chrono::duration<double> age(std::clamp(level.age, 0.0, longestAge));
+    frame->made = stream::Clock::now() - std::chrono::duration_cast<stream::Clock::duration>(age);
+    frame->levelCount = level.levels;
+  } else if (current_ && current_->id == level.frame && current_->levels.size() == level.level) {
+    *frame = *current_;
+  } else {
+    current_.reset();
+    return;
+  }
+  frame->levels.push_back(std::make_shared<stream::EncodedLevel>(
+      stream::EncodedLevel{std::move(received.file), level.width, level.height}));
+  current_ = std::move(frame);
+}
+
+}  // namespace vdi::apps

@@ -1,0 +1,189 @@
+// What viewers that take their frames slowly, or not at all, cost the server: no network, and a clock that
+// the test turns.
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/Catch.h"
+#include "vdi/stream/Viewer.h"
+
+using namespace vdi::stream;
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t mebibyte = std::size_t{1} << 20;
+constexpr std::size_t coarseBytes = 3 * mebibyte;
+constexpr std::size_t fullBytes = 20 * mebibyte;
+const std::string token(32, 't');
+const Clock::time_point start = Clock::time_point(1000s);
+
+/// Counts the bytes of the levels that somebody still has.
+class Levels {
+ public:
+  FramePtr frame(std::uint32_t id) {
+    auto made = std::make_shared<Frame>();
+    made->id = id;
+    made->levelCount = 2;
+    for (const std::size_t bytes : {coarseBytes, fullBytes}) {
+      made->levels.push_back(
+          std::make_shared<EncodedLevel>(EncodedLevel{std::vector<std::byte>(bytes), 1, 1}));
+      all_.push_back(made->levels.back());
+    }
+    return made;
+  }
+  std::size_t bytesAlive() const {
+    std::size_t bytes = 0;
+    for (const auto& weak : all_) {
+      if (const auto level = weak.lock()) bytes += level->bytes.size();
+    }
+    return bytes;
+  }
+
+ private:
+  std::vector<std::weak_ptr<const EncodedLevel>> all_;
+};
+
+Hub::Options limited(std::uint64_t bytes) {
+  Hub::Options options;
+  options.token = token;
+  options.mostViewers = 1000;
+  options.mostHeldBytes = bytes;
+  return options;
+}
+
+/// A viewer and the network to it, which holds the message that is being written.
+struct Connected {
+  explicit Connected(Hub& hub, Clock::time_point now = start) : viewer(hub, [] {}) {
+    Hello hello;
+    hello.token = token;
+    viewer.receive(textOf(FromViewer(hello)), now);
+  }
+  /// The next part of a level, which stays on its way until the next call; none: there is nothing to send.
+  std::optional<Chunk> part(Clock::time_point now) {
+    for (;;) {
+      writing = viewer.next(now);
+      if (const auto* const text = std::get_if<std::string>(&writing)) {
+        const FromServer news = serverMessage(*text);
+        if (const auto* const level = std::get_if<Level>(&news)) announced = *level;
+      } else if (const auto* const binary = std::get_if<Viewer::Binary>(&writing)) {
+        message.assign(binary->head.begin(), binary->head.end());
+        message.insert(message.end(), binary->bytes.begin(), binary->bytes.end());
+        return chunkIn(message);
+      } else {
+        return std::nullopt;
+      }
+    }
+  }
+  void acknowledge(const Chunk& chunk, Clock::time_point now) {
+    taken += chunk.bytes.size();
+    viewer.receive(textOf(FromViewer(Ack{chunk.frame, chunk.level, chunk.offset + chunk.bytes.size()})), now);
+  }
+  /// Takes all that it gets, and acknowledges it.
+  void takeAll(Clock::time_point now) {
+    while (const auto chunk = part(now)) acknowledge(*chunk, now);
+  }
+
+  Viewer viewer;
+  Viewer::Outgoing writing;
+  std::vector<std::byte> message;
+  Level announced;
+  std::size_t taken = 0;
+};
+
+}  // namespace
+
+TEST_CASE("a viewer that has taken a frame keeps nothing of it") {
+  Levels levels;
+  Hub hub(limited(1000 * mebibyte));
+  Connected viewer(hub);
+  for (std::uint32_t id = 0; id < 5; ++id) {
+    hub.publish(levels.frame(id), start + id * 1s);
+    viewer.takeAll(start + id * 1s);
+    CHECK(levels.bytesAlive() == coarseBytes + fullBytes);
+    CHECK(hub.heldBytes() == 0);
+  }
+  CHECK(viewer.taken == 5 * (coarseBytes + fullBytes));
+  CHECK(viewer.announced.dropped == 0);
+}
+
+TEST_CASE("a viewer that stalls in a full level keeps it no longer than it's the newest") {
+  Levels levels;
+  Hub hub(limited(1000 * mebibyte));
+  Connected viewer(hub);
+  hub.publish(levels.frame(0), start);
+  for (auto chunk = viewer.part(start); chunk && chunk->level == 0; chunk = viewer.part(start))
+    viewer.acknowledge(*chunk, start);
+  REQUIRE(std::holds_alternative<Viewer::Binary>(viewer.writing));
+  hub.publish(levels.frame(1), start + 1s);
+  CHECK(hub.heldBytes() == fullBytes);  // a part of it is being written
+  viewer.writing = Viewer::Wait{};
+  CHECK(hub.heldBytes() == 0);
+  CHECK(levels.bytesAlive() == coarseBytes + fullBytes);
+}
+
+TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
+  constexpr std::size_t limit = 10 * mebibyte;
+  Levels levels;
+  std::vector<std::string> lines;
+  Hub::Options options = limited(limit);
+  options.log = [&lines](const std::string& line) { lines.push_back(line); };
+  Hub hub(options);
+  Connected good(hub);
+  std::vector<std::unique_ptr<Connected>> stalled;
+  for (std::uint32_t id = 0; id < 40; ++id) {
+    const Clock::time_point now = start + id * 1s;
+    hub.publish(levels.frame(id), now);
+    // What a server does with those that are to go.
+    for (const auto& viewer : stalled) {
+      if (viewer->viewer.isStalled()) viewer->writing = Viewer::Wait{};
+    }
+    CHECK(hub.heldBytes() <= limit);
+    CHECK(levels.bytesAlive() <= limit + coarseBytes + fullBytes);
+    stalled.push_back(std::make_unique<Connected>(hub, now));
+    REQUIRE(stalled.back()->part(now));  // which never arrives
+    good.takeAll(now);
+  }
+  CHECK_FALSE(good.viewer.isStalled());
+  CHECK(good.taken == 40 * (coarseBytes + fullBytes));
+  // Three coarse levels are within the limit, beside the one of the newest frame.
+  const auto left = std::count_if(stalled.begin(), stalled.end(),
+                                  [](const auto& viewer) { return !viewer->viewer.isStalled(); });
+  CHECK(left == 4);
+  for (std::size_t i = 0; i < stalled.size(); ++i) CHECK(stalled[i]->viewer.isStalled() == (i < 36));
+  CHECK(lines.size() == 36);
+  CHECK(lines.front().find("took nothing for") != std::string::npos);
+
+  // It's told why, and then it goes.
+  Viewer& first = stalled.front()->viewer;
+  const Viewer::Outgoing reason = first.next(start + 100s);
+  REQUIRE(std::holds_alternative<std::string>(reason));
+  CHECK(serverMessage(std::get<std::string>(reason)) == FromServer(Refusal{lines.front()}));
+  const Viewer::Outgoing end = first.next(start + 100s);
+  REQUIRE(std::holds_alternative<Viewer::Farewell>(end));
+  CHECK(std::get<Viewer::Farewell>(end).code == Close::Stalled);
+}
+
+TEST_CASE("those who look at different frames of a series are within the bound too") {
+  Levels levels;
+  Hub::Options options = limited(30 * mebibyte);
+  options.show = [](std::uint32_t) {};
+  Hub hub(options);
+  Series series;
+  series.times.resize(10);
+  series.steps.resize(10);
+  hub.append(series);
+  std::vector<std::unique_ptr<Connected>> viewers;
+  for (std::uint32_t id = 0; id < 10; ++id) {
+    const Clock::time_point now = start + id * 1s;
+    viewers.push_back(std::make_unique<Connected>(hub, now));
+    viewers.back()->viewer.receive(textOf(FromViewer(Show{id})), now);
+    hub.provide(levels.frame(id), now);
+    viewers.back()->takeAll(now);
+    CHECK(levels.bytesAlive() == 0);  // all is sent
+    CHECK_FALSE(viewers.back()->viewer.isStalled());
+  }
+}

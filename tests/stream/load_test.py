@@ -1,0 +1,177 @@
+"""What clients that come in great numbers, or slowly, cost `vdi serve`. Arguments: vdi, how many connections one after
+another (10000). It prints the server's memory, threads and open files before and after."""
+import pathlib
+import selectors
+import socket
+import struct
+import sys
+import tempfile
+import threading
+import time
+
+from tool import PATIENCE, Server, make, until
+from viewer import Closed, Viewer
+
+count = int(sys.argv[1]) if len(sys.argv) > 1 else 10000
+failures = []
+
+
+def check(condition, what):
+    print("ok      " if condition else "FAILED  ", what, flush=True)
+    if not condition:
+        failures.append(what)
+
+
+def standing(server):
+    """Resident MiB, threads, open files."""
+    lines = pathlib.Path(f"/proc/{server.process.pid}/status").read_text().splitlines()
+    fields = dict(line.split(":", 1) for line in lines)
+    files = len(list(pathlib.Path(f"/proc/{server.process.pid}/fd").iterdir()))
+    return int(fields["VmRSS"].split()[0]) / 1024, int(fields["Threads"]), files
+
+
+def connect(server):
+    return socket.create_connection(("127.0.0.1", server.port), PATIENCE)
+
+
+def page(server):
+    assert server.get("/")[0].status == 200
+
+
+def stranger(server):
+    assert server.get("/status")[0].status == 401
+
+
+def visitor(server):
+    viewer = Viewer(server.port, PATIENCE)
+    viewer.hello(server.token)
+    next(viewer.levels())
+    viewer.close()
+
+
+def silent(server):
+    connect(server).close()
+
+
+def abrupt(server):
+    """Closes in the middle of its request, by a reset."""
+    connection = connect(server)
+    connection.sendall(b"GET /stream HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgr")
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    connection.close()
+
+
+def vanishing(server):
+    """Closes when a level has begun."""
+    viewer = Viewer(server.port, PATIENCE)
+    viewer.hello(server.token)
+    viewer.text_message("level")
+    viewer.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    viewer.close()
+
+
+def one_after_another(server):
+    kinds = [page, stranger, visitor, silent, abrupt, vanishing]
+    for number in range(60):
+        kinds[number % len(kinds)](server)
+    until(lambda: server.viewers() == 0, "no viewers")
+    before = standing(server)
+    start = time.monotonic()
+    for number in range(count):
+        kinds[number % len(kinds)](server)
+    seconds = time.monotonic() - start
+    until(lambda: server.viewers() == 0 and standing(server)[2] <= before[2], "closed connections")
+    after = standing(server)
+    print("%d connections in %.1f s: %.1f MiB, %d threads, %d files before; %.1f, %d, %d after" %
+          (count, seconds, *before, *after))
+    check(after[0] - before[0] < 16, "connections leave no memory behind")
+    check(after[1:] == before[1:], "no threads and no files")
+
+
+def at_once(server):
+    codes, frames = [], []
+
+    def look():
+        viewer = Viewer(server.port, PATIENCE)
+        viewer.hello(server.token)
+        try:
+            frames.append(next(viewer.levels())[1])
+            start.wait(PATIENCE)
+        except Closed as closed:
+            codes.append(closed.code)
+            start.wait(PATIENCE)
+        viewer.close()
+
+    start = threading.Barrier(100)
+    threads = [threading.Thread(target=look) for _ in range(100)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(PATIENCE)
+    print("100 at once: %d are shown a frame, %d are refused; %.1f MiB" % (len(frames), len(codes), standing(server)[0]))
+    check(len(frames) == 64 and codes == [4503] * 36, "64 of 100 viewers are let in, the others are told why not")
+    check(len(set(frames)) == 1, "and all see the same")
+
+
+def slowly(server):
+    """More connections than the server has, each of which sends a byte now and then."""
+    before = standing(server)
+    seen = Viewer(server.port, PATIENCE)
+    seen.hello(server.token)
+    seen.text_message("level")
+    slow = [connect(server) for _ in range(400)]
+    selector = selectors.DefaultSelector()
+    for connection in slow:
+        connection.setblocking(False)
+        selector.register(connection, selectors.EVENT_READ)
+    request = b"GET /stream HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Header: " + b"x" * 100
+    start = time.monotonic()
+    longest, answered, lost = 0.0, 0, {}
+    for step in range(len(request)):
+        if len(lost) == len(slow) or time.monotonic() > start + 30:
+            break
+        for connection in slow:
+            if connection in lost:
+                continue
+            try:
+                connection.send(request[step:step + 1])
+            except OSError:
+                lost[connection] = time.monotonic() - start
+        asked = time.monotonic()
+        visitor(server)
+        answered += 1
+        longest = max(longest, time.monotonic() - asked)
+        time.sleep(0.25)
+        for key, _ in selector.select(0):
+            try:
+                key.fileobj.recv(100)
+            except OSError:
+                pass
+            lost.setdefault(key.fileobj, time.monotonic() - start)
+            selector.unregister(key.fileobj)
+    print("400 slow ones: %d lost, the last after %.1f s; meanwhile %d viewers were shown a frame, within %.2f s; %.1f MiB" %
+          (len(lost), max(lost.values(), default=0), answered, longest, standing(server)[0]))
+    check(len(lost) == 400 and max(lost.values()) < 20, "slow ones are cut off")
+    check(answered > 10 and longest < 5, "and keep nobody out")
+    seen.send(type="pause")
+    check(server.viewers() == 1, "the viewer who was there before stays")
+    seen.close()
+    for connection in slow:
+        connection.close()
+    until(lambda: standing(server)[2] <= before[2], "closed connections")
+    check(standing(server)[0] - before[0] < 16, "they leave no memory behind")
+
+
+with tempfile.TemporaryDirectory() as folder:
+    made = pathlib.Path(folder) / "small.vdi"
+    make(made, "24x24x24", "48x32", 6)
+    running = Server(made)
+    try:
+        one_after_another(running)
+        at_once(running)
+        slowly(running)
+        check(running.end() == 0, "the server ends in order")
+        check(running.said() == "", "and had nothing to complain about")
+    finally:
+        running.close()
+sys.exit(1 if failures else 0)

@@ -1,0 +1,203 @@
+"""`vdi serve --stdio` at the end of a command, and --from. `sh -c` stands for ssh. Argument: vdi."""
+import json
+import os
+import pathlib
+import shlex
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+from tool import PATIENCE, VDI, ServedFolder, make, receive, until
+from viewer import Viewer
+
+
+def vdi(*arguments):
+    return " ".join(shlex.quote(str(part)) for part in (VDI, *arguments))
+
+
+def serving_at_a_pipe(folder):
+    """The processes that run vdi serve --stdio for that folder."""
+    found = []
+    for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            command = path.read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if b"--stdio" in command and os.fsencode(folder) in command:
+            found.append(int(path.parent.name))
+    return found
+
+
+def listens(process):
+    """Whether it has a TCP socket that listens."""
+    inodes = set()
+    for table in ("tcp", "tcp6"):
+        for line in pathlib.Path(f"/proc/{process}/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[3] == "0A":
+                inodes.add(f"socket:[{fields[9]}]")
+    return any(os.readlink(entry) in inodes for entry in pathlib.Path(f"/proc/{process}/fd").iterdir() if entry.is_symlink())
+
+
+class PipeTest(ServedFolder):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        for step in range(3):
+            make(cls.made / f"small{step}.vdi", "24x24x24", "48x32", 6, step)
+        make(cls.made / "large.vdi", "24x24x24", "320x240", 8, 9)
+
+    def view(self, server):
+        viewer = Viewer(server.port, PATIENCE)
+        self.addCleanup(viewer.close)
+        viewer.hello(server.token)
+        return viewer
+
+    def test_receive_takes_all_frames_of_a_series(self):
+        names = ["small0", "large", "small2"]
+        # What a login shell may say first is skipped.
+        command = "echo 'Welcome to the cluster'; echo; exec " + vdi(
+            "serve", "--stdio", *(self.made / f"{name}.vdi" for name in names))
+        done = receive("--from", command, "-o", self.folder / "got")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, "")
+        for number, name in enumerate(names):
+            self.assertEqual((self.folder / "got" / f"vdi_{number:06}.vdi").read_bytes(), self.bytes_of(name))
+
+    def test_it_ends_with_its_pipe_and_listens_nowhere(self):
+        self.appear("small0", "a.vdi")
+        with subprocess.Popen([VDI, "serve", "--stdio", self.live], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+            self.addCleanup(process.kill)
+            first = process.stdout.readline().decode().split()
+            self.assertEqual(first[0], "pv-vdi.1")
+            self.assertEqual(len(first[1]), 64)
+            self.assertFalse(listens(process.pid))
+            process.stdin.close()
+            self.assertEqual(process.wait(PATIENCE), 0)
+            self.assertEqual(process.stdout.read(), b"")
+
+    def test_the_page_shows_what_the_command_offers(self):
+        self.appear("small0", "a.vdi")
+        server = self.serve("--from", vdi("serve", "--stdio", self.live))
+        self.assertIn(b"<title>", server.get("/")[1])
+        viewer = self.view(server)
+        levels = viewer.levels()
+        announced, data = next(levels)
+        self.assertEqual((announced["frame"], announced["step"], data), (0, 0, self.bytes_of("small0")))
+        self.appear("large", "b.vdi")
+        received = [next(levels) for _ in range(2)]
+        self.assertEqual([(a["frame"], a["level"], a["levels"], a["step"]) for a, _ in received], [(1, 0, 2, 9), (1, 1, 2, 9)])
+        self.assertEqual(received[1][1], self.bytes_of("large"))
+        # A viewer that comes later has the series, and goes back in it.
+        other = self.view(server)
+        welcome = other.text_message("welcome")
+        self.assertEqual(welcome["series"], {"times": [0, 4.5], "steps": [0, 9]})
+        other.send(type="show", index=0)
+        for announced, data in other.levels():
+            if announced["frame"] == 0:
+                break
+        self.assertEqual(data, self.bytes_of("small0"))
+        # The first one goes on.
+        self.appear("small2", "c.vdi")
+        announced, data = next(levels)
+        self.assertEqual((announced["frame"], data), (2, self.bytes_of("small2")))
+        # Frames that nobody keeps any more are fetched again; one that is gone has a cause.
+        for name in "defg":
+            self.appear("small1", name + ".vdi")
+            next(levels)
+        os.remove(self.live / "b.vdi")
+        other.send(type="show", index=1)
+        while True:
+            message = other.message()
+            if isinstance(message, dict) and message["type"] == "missing":
+                break
+        self.assertEqual(message["frame"], 1)
+        other.send(type="show", index=2)
+        for announced, data in other.levels():
+            if announced["frame"] == 2:
+                break
+        self.assertEqual(data, self.bytes_of("small2"))
+        command = serving_at_a_pipe(self.live)
+        self.assertEqual(len(command), 1)
+        self.assertEqual(server.end(), 0)
+        until(lambda: not pathlib.Path(f"/proc/{command[0]}").exists(), "the command's end")
+
+    def test_many_viewers_look_at_many_frames(self):
+        count = 12
+        for number in range(count):
+            shutil.copy(self.made / f"small{number % 3}.vdi", self.live / f"{number:03}.vdi")
+        server = self.serve("--from", vdi("serve", "--stdio", "--finished", self.live))
+        until(lambda: json.loads(server.get("/status", Authorization="Bearer " + server.token)[1])["frames"] > 0, "a frame")
+        viewers = [self.view(server) for _ in range(count)]
+        for _ in range(2):
+            for index, viewer in enumerate(viewers):
+                viewer.send(type="show", index=index)
+            for index, viewer in enumerate(viewers):
+                if index == count - 1:
+                    continue  # it may have the newest one already
+                for announced, data in viewer.levels():
+                    if announced["frame"] == index:
+                        break
+                self.assertEqual(data, self.bytes_of(f"small{index % 3}"))
+            viewers = viewers[1:] + viewers[:1]
+        self.assertEqual(server.end(), 0)
+
+    def test_a_command_that_is_killed_is_run_again(self):
+        self.appear("small0", "a.vdi")
+        server = self.serve("--from", vdi("serve", "--stdio", self.live))
+        viewer = self.view(server)
+        session = viewer.text_message("welcome")["session"]
+        self.assertEqual(next(viewer.levels())[1], self.bytes_of("small0"))
+        killed = serving_at_a_pipe(self.live)
+        os.kill(killed[0], signal.SIGKILL)
+        self.assertEqual(viewer.end(), 1001)
+        again = None
+        end = time.monotonic() + PATIENCE
+        while again is None and time.monotonic() < end:
+            try:
+                again = self.view(server)
+            except OSError:
+                time.sleep(0.1)
+        self.assertNotEqual(again.text_message("welcome")["session"], session)
+        self.assertEqual(next(again.levels())[1], self.bytes_of("small0"))
+        self.assertIn("connection is lost", server.said())
+        self.assertEqual(server.end(), 0)
+
+    def test_a_server_of_a_server(self):
+        first = self.serve("--token-file", self.token(), self.live)
+        second = self.serve("--from", first.address, "--from-token-file", self.token())
+        third = self.serve("--from", second.link)
+        viewer = self.view(third)
+        self.appear("large", "a.vdi")
+        levels = [data for _, data in (next(viewer.levels()) for _ in range(2))]
+        self.assertEqual(levels[1], self.bytes_of("large"))
+        self.assertEqual(third.end(), 0)
+
+    def token(self):
+        path = self.folder / "token"
+        path.write_text("t" * 32)
+        return path
+
+    def test_commands_that_offer_nothing(self):
+        for command, what in (("exec /nowhere/vdi", "status 127"), ("exec yes", "doesn't start as vdi serve"),
+                              ("exec " + vdi("serve", "--stdio", self.folder / "nothing"), "status 1")):
+            done = receive("--from", command, "--patience", "1")
+            self.assertEqual(done.returncode, 1, command)
+            self.assertIn(what, done.stderr)
+        done = subprocess.run([VDI, "serve", "--from", "exec /nowhere/vdi"], capture_output=True, text=True, timeout=PATIENCE,
+                              check=False)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("status 127", done.stderr)
+        for wrong in ([], ["--from", "true", self.live], ["--stdio"], ["--stdio", "--from", "true"],
+                      ["--stdio", "--port", "8080", self.live], ["--from-token-file", "file", self.live]):
+            done = subprocess.run([VDI, "serve", *map(str, wrong)], capture_output=True, text=True, timeout=PATIENCE,
+                                  check=False)
+            self.assertEqual(done.returncode, 2, wrong)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        self.assertEqual(receive().returncode, 2)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,153 @@
+"""A viewer drives a simulation on three ranks. Arguments: the script, mpirun and what follows it on its command line."""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from viewer import Viewer  # noqa: E402
+
+script, *launch = sys.argv[1:]
+RANKS = 3
+PATIENCE = 150
+
+
+def check(holds, what):
+    if not holds:
+        sys.exit("FAILED  %s" % (what,))
+
+
+def lines(path):
+    """Those that are whole."""
+    text = path.read_text()
+    return text[:text.rfind("\n") + 1].splitlines()
+
+
+def link_of(simulation, link):
+    end = time.monotonic() + PATIENCE
+    while not link.exists():
+        check(simulation.poll() is None and time.monotonic() < end, "no link")
+        time.sleep(0.1)
+    address, token = link.read_text().strip().split("#token=")
+    return int(address.split(":")[2].strip("/")), token
+
+
+def listen(viewer, kind, holds=lambda message: True):
+    """The next message of that type of which that holds. Parts of levels are acknowledged, and skipped."""
+    while True:
+        message = viewer.message()
+        if isinstance(message, tuple):
+            frame, number, offset, part = message
+            viewer.send(type="ack", frame=frame, level=number, bytes=offset + len(part))
+        elif message["type"] == kind and holds(message):
+            return message
+
+
+def steering(viewer, holds):
+    return listen(viewer, "steering", holds)
+
+
+def level(viewer, holds=lambda message: True):
+    return listen(viewer, "level", holds)
+
+
+def values(message):
+    return {one["name"]: one["value"] for one in message["parameters"]}
+
+
+def enter(port, token):
+    viewer = Viewer(port, timeout=PATIENCE)
+    viewer.hello(token)
+    return viewer
+
+
+def drive(port, token, folder):
+    driver, other = enter(port, token), enter(port, token)
+    check(listen(driver, "welcome")["steer"], "steering is allowed")
+    start = steering(driver, lambda message: message["generator"] is not None)
+    check(start["driver"] is None and start["period"] == 1 and not start["paused"], start)
+    check(start["generator"]["resolution"] == [96, 54] and start["generator"]["range"] == [0, 1], start)
+    check([(one["name"], one["whole"], one["value"], one["low"], one["high"]) for one in start["parameters"]] ==
+          [("level", False, 0.5, 0, 1), ("waves", True, 3, 1, 9), ("stop", True, 0, 0, 1)], start)
+    other.send(type="steer", parameters={"level": 0.9})
+    check("doesn't drive" in listen(other, "denied")["cause"], "only the viewer that drives steers")
+    driver.send(type="drive")
+    me = steering(driver, lambda message: message["driver"] is not None)
+    check(me["driver"] == me["you"], me)
+    check(steering(other, lambda message: message["driver"] is not None)["driver"] == me["you"], "others see who drives")
+    other.send(type="drive")
+    check("drives" in listen(other, "denied")["cause"], "one viewer drives")
+    driver.send(type="steer", parameters={"level": 1.5})
+    check("from 0 to 1" in listen(driver, "denied")["cause"], "bounds hold")
+
+    # All of it in one message arrives at one step.
+    camera = {"position": [60.0, 20.0, 30.0], "focalPoint": [18.0, 6.0, 6.0], "viewUp": [0.0, 1.0, 0.0], "viewAngle": 25.0}
+    driver.send(type="steer", camera=camera, parameters={"level": 0.8125, "waves": 5}, resolution=[120, 60], supersegments=7,
+                preset="X Ray", range=[0.25, 0.75])
+    now = steering(driver, lambda message: values(message)["waves"] == 5)
+    check(now["generator"]["resolution"] == [120, 60] and now["generator"]["supersegments"] == 7, now)
+    check(now["generator"]["range"] == [0.25, 0.75] and values(now)["level"] == 0.8125, now)
+    check(steering(other, lambda message: values(message)["waves"] == 5)["driver"] == me["you"], "others see what is in force")
+    level(driver, lambda announced: announced["width"] == 120)
+
+    # While the simulation waits, its last step is made anew for a new view, and no other step comes.
+    driver.send(type="steer", paused=True)
+    steering(driver, lambda message: message["paused"])
+    time.sleep(0.5)
+    before = lines(folder / "parameters_0.txt")
+    driver.send(type="steer", resolution=[64, 48], preset="Viridis (matplotlib)")
+    now = steering(driver, lambda message: message["generator"]["resolution"] == [64, 48])
+    check(now["generator"]["range"] == [0.25, 0.75], "another colour map has the range that there is: %s" % now)
+    again = level(driver, lambda announced: announced["width"] == 64)
+    check(again["step"] == int(before[-1].split()[0]), "the step that waits is made anew")
+    driver.send(type="steer", parameters={"level": 0.125})
+    steering(driver, lambda message: values(message)["level"] == 0.125)
+    check(lines(folder / "parameters_0.txt") == before, "the simulation waits")
+    # A driver who goes lets it go on, and the next one may drive.
+    driver.close()
+    steering(other, lambda message: message["driver"] is None and not message["paused"])
+    other.send(type="drive")
+    other.send(type="steer", period=4)
+    steering(other, lambda message: message["period"] == 4)
+    steps = [level(other)["step"] for _ in range(4)][1:]
+    check(all((b - a) % 4 == 0 for a, b in zip(steps, steps[1:])), "a VDI every four steps: %s" % steps)
+    other.send(type="steer", parameters={"stop": 1})
+    return me["you"], int(before[-1].split()[0]), camera
+
+
+def told(folder, driver, paused_at, camera):
+    """What each rank was given, and when."""
+    parameters = [lines(folder / ("parameters_%d.txt" % rank)) for rank in range(RANKS)]
+    views = [[json.loads(line) for line in lines(folder / ("view_%d.txt" % rank))] for rank in range(RANKS)]
+    check(parameters[0] == parameters[1] == parameters[2], "all ranks have the same parameters at the same steps")
+    check(views[0] == views[1] == views[2], "all ranks have the same properties at the same steps")
+    log = [json.loads(line) for line in lines(folder / "vdi-steering.jsonl")]
+    changes = [(entry["viewer"], *entry["steer"]) for entry in log]
+    check(changes[0] == (driver, "camera", "parameters", "preset", "range", "resolution", "supersegments"), changes)
+    check(all(entry["time"] == 0.5 * entry["step"] for entry in log), "the log has steps and times")
+    given = {int(step): (float(value), int(waves)) for step, value, waves in (line.split() for line in parameters[0])}
+    at = log[0]["step"]
+    check(given[at] == (0.5, 3) and given[at + 1] == (0.8125, 5), "parameters change after the step that the log names")
+    seen = {view["step"]: view for view in views[0]}
+    check(seen[at]["position"] == [18.0, 20.0, 60.0] and seen[at]["supersegments"] == 25, "and so does the view")
+    after = seen[at + 1]
+    check(after["position"] == camera["position"] and after["angle"] == 25.0 and after["supersegments"] == 7, after)
+    check(after["resolution"] == [120, 60] and after["colours"] == after["opacities"] == [0.25, 0.75], after)
+    check(after["first"] == [1.0, 1.0, 1.0], "X Ray begins with white: %s" % after["first"])
+    check(given[paused_at][0] == 0.8125 and given[paused_at + 1][0] == 0.125, "what changes meanwhile is in force then")
+
+
+with tempfile.TemporaryDirectory() as name:
+    root = pathlib.Path(name)
+    program = subprocess.Popen([*launch, script], env={**os.environ, "VDI_OUTPUT": name})
+    try:
+        told_by_viewers = drive(*link_of(program, root / "vdi-stream.link"), root)
+        check(program.wait(PATIENCE) == 0, "the simulation ended with %s" % program.returncode)
+        told(root, *told_by_viewers)
+    finally:
+        if program.poll() is None:
+            program.terminate()
+            program.wait(PATIENCE)

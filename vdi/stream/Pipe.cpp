@@ -1,0 +1,112 @@
+#include "vdi/stream/Pipe.h"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+#include "vdi/core/Error.h"
+#include "vdi/stream/Protocol.h"
+
+namespace vdi::stream {
+
+namespace {
+
+constexpr std::size_t bufferBytes = std::size_t{256} << 10;
+
+[[noreturn]] void refuse(const char* what) {
+  throw Error(ErrorCode::Io, std::string(what) + ": " + std::strerror(errno));
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() { ::close(number_); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+/// 0 or less: there's no more.
+ssize_t readSome(int from, std::vector<char>& buffer) {
+  for (;;) {
+    const ssize_t count = ::read(from, buffer.data(), buffer.size());
+    if (count >= 0 || errno != EINTR) return count;
+  }
+}
+
+bool writeAll(int to, const char* bytes, std::size_t count) {
+  while (count > 0) {
+    const ssize_t written = ::write(to, bytes, count);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes += written;
+    count -= static_cast<std::size_t>(written);
+  }
+  return true;
+}
+
+/// Until there's no more, or `stop` has something to read.
+void carry(int from, int to, int stop) {
+  std::vector<char> buffer(bufferBytes);
+  for (;;) {
+    std::array<pollfd, 2> ready{{{from, POLLIN, 0}, {stop, POLLIN, 0}}};
+    if (::poll(ready.data(), ready.size(), -1) < 0 && errno != EINTR) return;
+    if (ready[1].revents != 0) return;
+    if (ready[0].revents == 0) continue;
+    const ssize_t count = readSome(from, buffer);
+    if (count <= 0 || !writeAll(to, buffer.data(), static_cast<std::size_t>(count))) return;
+  }
+}
+
+}  // namespace
+
+std::string greeting(const std::string& token) {
+  return std::string(subprotocol) + " " + token;
+}
+
+std::optional<std::string> tokenInGreeting(std::string_view line) {
+  const std::string start = greeting("");
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  if (!line.starts_with(start) || line.size() == start.size()) return std::nullopt;
+  return std::string(line.substr(start.size()));
+}
+
+void serveOver(Server& server, const std::string& token, int input, int output) {
+  std::array<int, 2> ends{};
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
+    refuse("can't connect to the server");
+  const Descriptor socket(ends[0]);
+  server.adopt(ends[1]);
+  const Descriptor stop(::eventfd(0, EFD_CLOEXEC));
+  if (stop.number() < 0) refuse("can't connect to the server");
+
+  const std::string first = greeting(token) + "\n";
+  if (!writeAll(output, first.data(), first.size())) return;
+  std::thread inwards([&] {
+    carry(input, socket.number(), stop.number());
+    ::shutdown(socket.number(), SHUT_WR);
+  });
+  std::vector<char> buffer(bufferBytes);
+  for (ssize_t count = 1; count > 0;) {
+    count = readSome(socket.number(), buffer);
+    if (count > 0 && !writeAll(output, buffer.data(), static_cast<std::size_t>(count))) break;
+  }
+  const std::uint64_t one = 1;
+  (void)!::write(stop.number(), &one, sizeof(one));
+  ::shutdown(socket.number(), SHUT_RDWR);
+  inwards.join();
+}
+
+}  // namespace vdi::stream

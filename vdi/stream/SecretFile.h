@@ -1,0 +1,21 @@
+// A file with a secret in it.
+#pragma once
+
+#include <string>
+
+namespace vdi::stream {
+
+/// Its owner alone can read it, and it is there while this lives.
+class SecretFile {
+ public:
+  /// Replaces a file of that name. Throws Error{Io} with the path as context if it can't be written.
+  SecretFile(std::string path, const std::string& line);
+  ~SecretFile();
+  SecretFile(const SecretFile&) = delete;
+  SecretFile& operator=(const SecretFile&) = delete;
+
+ private:
+  std::string path_;
+};
+
+}  // namespace vdi::stream

@@ -1,0 +1,105 @@
+// What a viewer may change of a running simulation and of its VDIs.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "vdi/core/Camera.h"
+
+namespace vdi::stream {
+
+/// The most parameters that a simulation can offer, and the most bytes of a name.
+inline constexpr std::size_t maxParameters = 64;
+inline constexpr std::size_t maxNameBytes = 64;
+inline constexpr int maxPeriod = 1'000'000;
+inline constexpr int maxSupersegments = 255;
+
+/// 1 to maxNameBytes letters, digits, "_", "-" and ".".
+bool isParameterName(std::string_view name);
+
+/// A number that the simulation reads at each step.
+struct Parameter {
+  std::string name;      // isParameterName
+  bool isWhole = false;  // takes whole numbers only
+  double value = 0.0;    // in force
+  double low = 0.0;      // finite bounds, both included
+  double high = 0.0;
+  bool operator==(const Parameter&) const = default;
+};
+
+/// What makes the VDIs that are sent.
+struct GeneratorControls {
+  std::array<int, 2> resolution{};             // as set: 0 is a view's, or the default
+  int supersegments = 0;                       // N_S
+  std::optional<std::array<double, 2>> range;  // of the colour map, if there is one
+  std::vector<std::string> presets;            // names of colour maps to choose from
+  bool operator==(const GeneratorControls&) const = default;
+};
+
+/// What can be steered, and what is in force.
+struct Controls {
+  std::optional<GeneratorControls> generator;  // none: the VDIs come from elsewhere
+  int period = 1;                              // every so many steps a VDI is made
+  bool paused = false;                         // the simulation waits
+  std::vector<Parameter> parameters;
+  bool operator==(const Controls&) const = default;
+};
+
+/// What a viewer asks for. What it leaves out stays.
+struct Wish {
+  std::optional<Camera> camera;                  // a viewpoint V_O that View accepts
+  std::optional<std::array<int, 2>> resolution;  // 1 to View::maxSide
+  std::optional<int> supersegments;              // 1 to maxSupersegments
+  std::optional<std::array<double, 2>> range;    // finite, rising
+  std::optional<std::string> preset;             // one of GeneratorControls::presets
+  std::optional<int> period;                     // 1 to maxPeriod
+  std::optional<bool> paused;
+  std::map<std::string, double> parameters;  // at most maxParameters
+
+  bool isEmpty() const { return *this == Wish{}; }
+  bool operator==(const Wish&) const = default;
+};
+
+/// Why the wish can't be granted where these are the controls; empty: it can.
+std::string objectionTo(const Wish& wish, const Controls& controls);
+/// Adds a later wish, which wins.
+void merge(Wish& wish, const Wish& later);
+
+struct Request {
+  std::uint32_t viewer = 0;  // who asked last
+  Wish wish;                 // all that has been asked for since requests were taken last
+};
+
+/// A wish as text and back, for other ranks. These three are in SteeringJson.cpp.
+std::string textOf(const Wish& wish);
+/// Throws Error{Format} for what textOf hasn't made.
+Wish wishOf(std::string_view text);
+/// One object of JSON on one line, as the log has it: {"step":…,"time":…,"viewer":…,"steer":{…}}.
+std::string logEntryOf(const Request& request, std::int64_t step, double time);
+/// The wish in words for people, such as "feed = 0.04, a new viewpoint".
+std::string summaryOf(const Wish& wish);
+
+/// Carries wishes from the network's thread to the simulation's. Holds one request, however many come.
+class Wishes {
+ public:
+  /// Never waits.
+  void put(std::uint32_t viewer, const Wish& wish);
+  /// Waits so long at most; none: nothing was asked for.
+  std::optional<Request> take(std::chrono::milliseconds patience);
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<Request> request_;
+};
+
+}  // namespace vdi::stream

@@ -1,0 +1,18 @@
+// Wishes and controls as JSON. Included by sources alone: it drags in the library.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "vdi/stream/Steering.h"
+
+namespace vdi::stream {
+
+/// The fields of "steer" but for its type, those that are set alone.
+nlohmann::json jsonOf(const Wish& wish);
+/// The fields of "steering" that hold controls.
+nlohmann::json jsonOf(const Controls& controls);
+/// Throw Error{Format} for fields of the wrong kind or out of the bounds that Steering.h gives.
+Wish wishIn(const nlohmann::json& object);
+Controls controlsIn(const nlohmann::json& object);
+
+}  // namespace vdi::stream

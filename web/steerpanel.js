@@ -1,0 +1,193 @@
+// What the user asks of the simulation: who drives, a new viewpoint, what the VDIs are made with, and the parameters that the
+// simulation has declared. Servers that allow no steering show nothing of it.
+
+import {cameraText} from "./camera.js";
+
+/** @typedef {import("./format.js").Camera} Camera */
+/** @typedef {import("./live.js").Live} Live */
+/** @typedef {import("./messages.js").Parameter} Parameter */
+/** @typedef {import("./messages.js").Wish} Wish */
+
+/**
+ * @typedef {object} SteeredView what is steered by hand
+ * @property {() => Camera | undefined} camera the user's
+ * @property {() => number} angle in degrees, between that and the shown VDI's
+ */
+
+const AUTO_DEGREES = 15;   // beyond which Auto asks for a new viewpoint
+const RESOLUTIONS = ["480 × 270", "640 × 360", "960 × 540", "1280 × 720", "1920 × 1080"];
+
+/** @param {string} id */
+const partOf = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+/** @param {string} id */
+const fieldOf = (id) => /** @type {HTMLInputElement} */ (document.getElementById(id));
+
+/**
+ * A camera as messages have it.
+ * @param {Camera} camera
+ */
+export function wishedCamera({position, focalPoint, viewUp, parallel, parallelScale, viewAngle}) {
+  return {position, focalPoint, viewUp, ...parallel ? {parallelScale} : {viewAngle}};
+}
+
+/** @param {number} value */
+const shortText = (value) => String(Number(value.toPrecision(6)));
+
+/** A parameter's row: its name, a slider, and a field for exact numbers. */
+class ParameterRow {
+  /** @param {Parameter} parameter @param {(wish: Wish) => void} ask */
+  constructor(parameter, ask) {
+    const {name, whole, low, high} = parameter;
+    this.name = name;
+    this.slider = document.createElement("input");
+    this.slider.type = "range";
+    this.field = document.createElement("input");
+    this.field.type = "number";
+    for (const one of [this.slider, this.field]) {
+      one.min = String(low);
+      one.max = String(high);
+      one.setAttribute("aria-label", name);
+    }
+    this.slider.step = whole ? "1" : String((high - low) / 500 || 1);
+    this.field.step = whole ? "1" : "any";
+    this.slider.addEventListener("input", () => this.field.value = shortText(this.slider.valueAsNumber));
+    for (const one of [this.slider, this.field]) {
+      one.addEventListener("change", () => {
+        const value = one === this.slider ? Number(shortText(one.valueAsNumber)) : one.valueAsNumber;
+        if (Number.isFinite(value)) ask({parameters: {[name]: Math.min(Math.max(value, low), high)}});
+      });
+    }
+    const label = document.createElement("span");
+    label.textContent = name;
+    this.cells = [label, this.slider, this.field];
+  }
+
+  /** @param {number} value in force @param {boolean} isMine */
+  show(value, isMine) {
+    this.slider.disabled = this.field.disabled = !isMine;
+    if (this.slider.matches(":active") || document.activeElement === this.field) return;  // the user's hand is on it
+    this.slider.value = String(value);
+    this.field.value = shortText(value);
+  }
+}
+
+export class SteerPanel {
+  /** @param {Live} live @param {SteeredView} view */
+  constructor(live, view) {
+    this.live = live;
+    this.view = view;
+    /** @type {ParameterRow[]} */
+    this.rows = [];
+    this.declared = "";
+    /** The camera that was asked for last, as text. */
+    this.asked = "";
+    partOf("drive").addEventListener("click", () => this.isMine() ? live.release() : live.drive());
+    partOf("newview").addEventListener("click", () => this.askForView());
+    partOf("halt").addEventListener("click", () => this.ask({paused: !live.steering?.paused}));
+    this.onNumber("supersegments", (value) => ({supersegments: value}));
+    this.onNumber("period", (value) => ({period: value}));
+    fieldOf("resolution").addEventListener("change", () => {
+      const [width, height] = fieldOf("resolution").value.split(" × ").map(Number);
+      if (width > 0 && height > 0) this.ask({resolution: [width, height]});
+    });
+    fieldOf("preset").addEventListener("change", () => {
+      if (fieldOf("preset").value !== "") this.ask({preset: fieldOf("preset").value});
+    });
+    for (const id of ["low", "high"]) {
+      fieldOf(id).addEventListener("change", () => {
+        const low = fieldOf("low").valueAsNumber, high = fieldOf("high").valueAsNumber;
+        if (low < high) this.ask({range: [low, high]});
+      });
+    }
+    fieldOf("auto").addEventListener("change", () => this.onRest());
+  }
+
+  /** @param {string} id @param {(value: number) => Wish} wishOf */
+  onNumber(id, wishOf) {
+    fieldOf(id).addEventListener("change", () => {
+      const value = fieldOf(id).valueAsNumber;
+      if (Number.isInteger(value) && fieldOf(id).validity.valid) this.ask(wishOf(value));
+    });
+  }
+
+  /** Whether this page drives. */
+  isMine() {
+    const {steering} = this.live;
+    return steering !== null && steering.driver === steering.you;
+  }
+
+  /** @param {Wish} wish */
+  ask(wish) {
+    if (this.isMine()) this.live.steer(wish);
+  }
+
+  askForView() {
+    const camera = this.view.camera();
+    if (!camera || !this.isMine() || !this.live.steering?.generator) return;
+    this.asked = cameraText(camera);
+    this.ask({camera: wishedCamera(camera)});
+  }
+
+  /** The hand has rested. */
+  onRest() {
+    const camera = this.view.camera();
+    if (!camera || !fieldOf("auto").checked || cameraText(camera) === this.asked) return;
+    if (this.view.angle() > AUTO_DEGREES) this.askForView();
+  }
+
+  /** Shows what the server says. */
+  refresh() {
+    const {steering, denied} = this.live;
+    partOf("steer").hidden = steering === null;
+    partOf("newview").hidden = !this.isMine() || !steering?.generator;
+    if (steering === null) return;
+    const {driver, you, generator, period, paused, parameters} = steering;
+    const isMine = this.isMine();
+    partOf("driver").textContent = denied !== "" ? denied : isMine ? `You drive, as viewer ${you}`
+      : driver === null ? "Nobody drives" : `Viewer ${driver} drives`;
+    partOf("drive").textContent = isMine ? "Give back" : "Drive";
+    /** @type {HTMLButtonElement} */ (partOf("drive")).disabled = driver !== null && !isMine;
+    for (const id of ["halt", "auto", "resolution", "supersegments", "preset", "low", "high", "period"])
+      fieldOf(id).disabled = !isMine;
+    partOf("halt").textContent = paused ? "Let the simulation go on" : "Let the simulation wait";
+    this.put("period", String(period));
+    for (const one of document.querySelectorAll(".generator")) /** @type {HTMLElement} */ (one).hidden = generator === null;
+    for (const one of document.querySelectorAll(".colours"))
+      /** @type {HTMLElement} */ (one).hidden = !generator?.range;
+    if (generator) {
+      const [width, height] = generator.resolution;
+      this.put("supersegments", String(generator.supersegments));
+      this.choose("resolution", RESOLUTIONS, width > 0 ? `${width} × ${height}` : "");
+      this.choose("preset", generator.presets, "");
+      this.put("low", shortText(generator.range?.[0] ?? 0));
+      this.put("high", shortText(generator.range?.[1] ?? 1));
+    }
+    this.showParameters(parameters, isMine);
+  }
+
+  /** @param {Parameter[]} parameters @param {boolean} isMine */
+  showParameters(parameters, isMine) {
+    const declared = JSON.stringify(parameters.map(({name, whole, low, high}) => [name, whole, low, high]));
+    if (declared !== this.declared) {
+      this.declared = declared;
+      this.rows = parameters.map((one) => new ParameterRow(one, (wish) => this.ask(wish)));
+      partOf("parameters").replaceChildren(...this.rows.flatMap((row) => row.cells));
+    }
+    parameters.forEach(({value}, i) => this.rows[i].show(value, isMine));
+  }
+
+  /** @param {string} id of a field that the user may be writing in @param {string} value */
+  put(id, value) {
+    if (document.activeElement !== fieldOf(id)) fieldOf(id).value = value;
+  }
+
+  /** @param {string} id of a select @param {string[]} choices @param {string} value one of them, or another */
+  choose(id, choices, value) {
+    const select = /** @type {HTMLSelectElement} */ (/** @type {HTMLElement} */ (fieldOf(id)));
+    if (document.activeElement === select) return;
+    const all = choices.includes(value) ? choices : [value, ...choices];
+    if (JSON.stringify([...select.options].map((option) => option.value)) !== JSON.stringify(all))
+      select.replaceChildren(...all.map((text) => new Option(text === "" ? "…" : text, text)));
+    select.value = value;
+  }
+}
