@@ -366,6 +366,9 @@ class Window:
     def apply(self, seconds=120):
         self.click("Apply")
         wait_for("end of Apply", lambda: not self.is_enabled("Apply"), seconds)
+        panel = self.find("Properties", "frame")
+        time.sleep(0.5)  # a VDI begins to be made beside the window
+        wait_for("VDI", lambda: not self.is_making(panel), seconds)
 
     def show_wavelet(self):
         """As a volume."""

@@ -9,6 +9,7 @@
 #include <vtkInformationIntegerKey.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkStreamingDemandDrivenPipeline.h>
 #include <vtkStringArray.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnsignedIntArray.h>
@@ -30,6 +31,9 @@
 namespace pv {
 
 namespace {
+
+constexpr const char* beingMadeName = "VDI.isBeingMade";
+constexpr const char* waitingName = "VDI.waiting";
 
 template <typename Array>
 auto* addField(vtkFieldData* fields, const char* name, int components, vtkIdType tuples) {
@@ -91,6 +95,13 @@ vdi::ListsOf<Segment> listsFrom(vtkUnsignedIntArray* offsets, Array* segments) {
 }
 
 }  // namespace
+
+void announcePicture(vtkInformation* output, const int (&extent)[6]) {
+  output->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent, 6);
+  output->Set(vtkDataObject::SPACING(), 1.0, 1.0, 1.0);
+  output->Set(vtkDataObject::ORIGIN(), 0.0, 0.0, 0.0);
+  vtkDataObject::SetPointDataActiveScalarInfo(output, VTK_UNSIGNED_CHAR, 4);
+}
 
 void setPicture(vtkImageData* image, const vdi::ImageBytes& picture) {
   image->SetDimensions(picture.width, picture.height, 1);
@@ -175,6 +186,34 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat) {
   for (const char* name : {"VDI.offsets", "VDI.codes", "VDI.supersegments"}) {
     if (vtkDataArray* array = fields->GetArray(name)) rememberRanges(array);
   }
+}
+
+void setBeingMade(vtkImageData* image, const vdi::Camera& camera, const vdi::Box& bounds) {
+  setPlace(image->GetFieldData(), camera, bounds);
+  vtkNew<vtkStringArray> mark;
+  mark->SetName(beingMadeName);
+  mark->InsertNextValue("");
+  image->GetFieldData()->AddArray(mark);
+  hide(image->GetPointData()->GetScalars());
+  for (int i = 0; i < image->GetFieldData()->GetNumberOfArrays(); ++i)
+    hide(image->GetFieldData()->GetAbstractArray(i));
+}
+
+bool isBeingMade(vtkFieldData* fields) {
+  return fields->GetAbstractArray(beingMadeName) != nullptr;
+}
+
+void setWaiting(vtkImageData* image, const std::string& why) {
+  vtkNew<vtkStringArray> reason;
+  reason->SetName(waitingName);
+  reason->InsertNextValue(why);
+  image->GetFieldData()->AddArray(reason);
+  hide(reason);
+}
+
+std::string waitingIn(vtkFieldData* fields) {
+  auto* reason = vtkStringArray::SafeDownCast(fields->GetAbstractArray(waitingName));
+  return reason != nullptr && reason->GetNumberOfValues() == 1 ? reason->GetValue(0) : std::string();
 }
 
 vtkSmartPointer<vtkUnsignedCharArray> fileOf(const vdi::Vdi& vdi) {

@@ -15,6 +15,8 @@
 //               VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ...; likewise
 //               VDI.parameters     double [4]: N_S, sample step, time, time step
 //               (the array's name) double [n]: some of the values shown (VDIValues.h)
+//               VDI.isBeingMade    string [1]: there is no VDI yet; of what views get meanwhile alone
+//               VDI.waiting        string [1]: why there is no VDI so far; the image has no points then
 //               VDI.coloring       string [1]: vdi::Coloring, as vdi::io::metadataText; absent where unknown
 #ifndef VDIImageData_h
 #define VDIImageData_h
@@ -24,6 +26,8 @@
 #include <optional>
 #include <string>
 
+#include "vdi/core/Box.h"
+#include "vdi/core/Camera.h"
 #include "vdi/core/Coloring.h"
 #include "vdi/core/Image.h"
 #include "vdi/core/Vdi.h"
@@ -31,10 +35,14 @@
 class vtkDataObject;
 class vtkFieldData;
 class vtkImageData;
+class vtkInformation;
 class vtkUnsignedCharArray;
 
 namespace pv {
 
+/// For RequestInformation: tells the pipeline of a picture with RGBA and this whole extent. Ranks without a
+/// picture announce an empty one, which keeps the pipeline from asking them for more again and again.
+void announcePicture(vtkInformation* output, const int (&extent)[6]);
 /// Makes `image` w x h x 1 with RGBA and Depth. `picture` is straight.
 void setPicture(vtkImageData* image, const vdi::ImageBytes& picture);
 /// Makes `image` w x h x 1 with RGBA, and Depth if `withDepth`.
@@ -43,6 +51,14 @@ void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth);
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi);
 /// The same, of a flat picture that's there already (vdi::flatten).
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat);
+/// Says, and tells of field data, that there's no VDI because it is being made. Bounds and camera are those
+/// that it will have.
+void setBeingMade(vtkImageData* image, const vdi::Camera& camera, const vdi::Box& bounds);
+bool isBeingMade(vtkFieldData* fields);
+/// Says of an image without points why there's no VDI so far.
+void setWaiting(vtkImageData* image, const std::string& why);
+/// That reason; empty: none is given.
+std::string waitingIn(vtkFieldData* fields);
 /// The bytes of its .vdi file. From any thread.
 vtkSmartPointer<vtkUnsignedCharArray> fileOf(const vdi::Vdi& vdi);
 /// Whether the image carries one, sound or not.

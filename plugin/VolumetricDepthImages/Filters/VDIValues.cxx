@@ -82,4 +82,9 @@ void setShownValues(vtkImageData* image, const vdi::ScalarArray& array, std::spa
   image->GetFieldData()->AddArray(shown);
 }
 
+void setShownRange(vtkImageData* image, const vdi::Coloring& coloring) {
+  const auto& [low, high] = coloring.range;
+  if (low <= high) setShownValues(image, coloring.array, std::array{low, high});
+}
+
 }  // namespace pv

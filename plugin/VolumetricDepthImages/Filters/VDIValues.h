@@ -26,6 +26,8 @@ std::vector<double> sampleOf(std::span<const vdi::Block> blocks, const vdi::Scal
 /// are of, in which the component that is shown has them and the others are 0. So its ranges, of that
 /// component or of the magnitude, are those of what is shown. Without a name or values there is none.
 void setShownValues(vtkImageData* image, const vdi::ScalarArray& array, std::span<const double> values);
+/// The same of both ends of the coloring's range, where it has one: what a VDI says that was made elsewhere.
+void setShownRange(vtkImageData* image, const vdi::Coloring& coloring);
 
 }  // namespace pv
 

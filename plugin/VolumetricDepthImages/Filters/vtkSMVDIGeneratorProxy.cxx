@@ -160,12 +160,20 @@ vtkStandardNewMacro(vtkSMVDIGeneratorProxy);
 
 void vtkSMVDIGeneratorProxy::UpdatePipeline() {
   this->TakeWhatIsNotSet(std::nullopt);
+  const bool isForView = this->UpdatesForView;
+  // A view that got something earlier has left the proxy as updated, and the superclass would do nothing.
+  if (!isForView && this->IsOutdated()) this->MarkDirty(this);
+  if (isForView) this->InvokeCommand("BeginView");
   this->Superclass::UpdatePipeline();
+  if (isForView) this->InvokeCommand("EndView");
 }
 
 void vtkSMVDIGeneratorProxy::UpdatePipeline(double time) {
   this->TakeWhatIsNotSet(time);
+  const bool isForView = this->UpdatesForView;
+  if (isForView) this->InvokeCommand("BeginView");
   this->Superclass::UpdatePipeline(time);
+  if (isForView) this->InvokeCommand("EndView");
 }
 
 void vtkSMVDIGeneratorProxy::UpdateVTKObjects() {
@@ -398,9 +406,14 @@ void vtkSMVDIGeneratorProxy::PrepareUpstream(vtkSMProxy* proxy, std::optional<do
   }
 }
 
+bool vtkSMVDIGeneratorProxy::IsOutdated() {
+  this->UpdatePropertyInformation(this->GetProperty("Outdated"));
+  return vtkSMPropertyHelper(this, "Outdated").GetAsInt() != 0;
+}
+
 void vtkSMVDIGeneratorProxy::ReleaseNow() {
   this->UpdatePropertyInformation(this->GetProperty("Held"));
-  if (vtkSMPropertyHelper(this, "Held").GetAsInt() == 0) return;
+  if (vtkSMPropertyHelper(this, "Held").GetAsInt() == 0 && !this->IsOutdated()) return;
   this->InvokeCommand("Release");
   this->MarkDirty(this);
 }

@@ -44,6 +44,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   void UpdatePipeline() override;
   void UpdatePipeline(double time) override;
 
+  /// Whether UpdatePipeline is for a view, which needn't wait for a VDI where views are deferred
+  /// (vtkVDIGenerator::DeferViews). Default off: who updates the filter gets its VDI.
+  vtkSetMacro(UpdatesForView, bool);
+
   void UpdateVTKObjects() override;
   int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
 
@@ -69,8 +73,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// By how many degrees the view sees the middle of the input from elsewhere than the camera that's set.
   double DegreesFrom(vtkSMRenderViewProxy* view);
 
-  /// Ends that the filter is held (vtkVDIGenerator::Hold), for whoever needs the VDI of the maps and
-  /// properties as they are.
+  /// Whether views show something earlier than what they have asked for. Asks the server.
+  bool IsOutdated();
+  /// Ends that the filter is held (vtkVDIGenerator::Hold), and that it shows something earlier, for whoever
+  /// needs the VDI of the maps and properties as they are.
   void ReleaseNow();
   /// For proxies behind it that are updated without it: writers, extractors, RenderVDI. Lets all generators
   /// upstream of `proxy` take what isn't set, and releases them. Collective where each rank has a client.
@@ -116,6 +122,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   };
   Subject CurrentSubject();
 
+  bool UpdatesForView = false;
   bool Taken = false;                       // what the view has
   bool Choosing = false;                    // in ChooseLookupTable or FollowArray
   std::string Chosen;                       // the array whose map this proxy has set

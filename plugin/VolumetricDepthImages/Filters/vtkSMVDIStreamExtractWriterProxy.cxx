@@ -5,13 +5,30 @@
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMSourceProxy.h>
 
+#include <exception>
+
+#include "VDISteering.h"
+
 vtkStandardNewMacro(vtkSMVDIStreamExtractWriterProxy);
+
+vtkSMVDIStreamExtractWriterProxy::vtkSMVDIStreamExtractWriterProxy()
+    : Steering(std::make_unique<pv::Steering>()) {}
+
+vtkSMVDIStreamExtractWriterProxy::~vtkSMVDIStreamExtractWriterProxy() = default;
 
 bool vtkSMVDIStreamExtractWriterProxy::Write(vtkSMExtractsController* extractor) {
   auto* const writer = vtkSMSourceProxy::SafeDownCast(this->GetSubProxy("Writer"));
   if (writer == nullptr) return false;
   vtkSMPropertyHelper(writer, "TimeStep").Set(extractor->GetTimeStep());
   writer->UpdateVTKObjects();
-  writer->UpdatePipeline(extractor->GetTime());
+  const bool isSteered = vtkSMPropertyHelper(writer, "Steer").GetAsInt() != 0;
+  if (!isSteered || this->Steering->IsDue()) writer->UpdatePipeline(extractor->GetTime());
+  if (!isSteered) return true;
+  try {
+    this->Steering->Meet(writer, extractor);
+  } catch (const std::exception& error) {
+    vtkErrorMacro(<< error.what());
+    return false;
+  }
   return true;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>  // fmt::join
+#include <vtkCommunicator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
@@ -17,12 +18,13 @@
 #include <vtkPointData.h>
 #include <vtkScalarsToColors.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
+#include <vtkTimeStamp.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cmath>
 #include <cstring>
+#include <exception>
 #include <optional>
 #include <string>
 #include <utility>
@@ -40,6 +42,8 @@
 #include "VDIValues.h"
 #include "vdi/core/BitCast.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Scene.h"
+#include "vdi/core/UnitDistance.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vtkVDIImageData.h"
 
@@ -63,17 +67,51 @@ struct vtkVDIGenerator::Frame {
   vdi::GenerateSettings Settings;
 };
 
-struct vtkVDIGenerator::Internals {
+/// What a view has asked for and hasn't got yet.
+struct vtkVDIGenerator::Request {
+  Origin Of;
+  std::vector<vdi::Block> Blocks;  // this rank's; they share their values with the input
+  vdi::Box Bounds;                 // of all ranks' blocks
+  double VoxelVolume = 0.0;        // of the smallest voxel of all ranks; 0 without any
+  vdi::ScalarArray Array;
+};
+
+/// What makes VDIs.
+struct vtkVDIGenerator::Maker {
   std::unique_ptr<vdi::VdiGenerator> Generator;  // none until the first update
   std::uint64_t Identity = 0;                    // of the generator: the same on all ranks, and no other's
-  std::optional<Origin> Shown;                   // by the generator
+
+  Maker() = default;
+  /// Collective: with the process's device, which takes a while to be made.
+  explicit Maker(vdi::comm::Communicator comm) {
+    std::shared_ptr<vdi::gpu::Device> device;
+    comm.together([&] { device = pv::sharedDevice(comm.localRank()); });
+    const vdi::GeneratorOptions options = vdi::generatorOptionsFromEnvironment(comm);
+    this->Generator = std::make_unique<vdi::VdiGenerator>(std::move(device), std::move(comm), options);
+    const vdi::comm::Communicator& own = this->Generator->communicator();
+    std::array<std::uint64_t, 1> rootsAddress{
+        own.rank() == 0 ? reinterpret_cast<std::uintptr_t>(this->Generator.get()) : 0U};
+    own.allReduceMax(rootsAddress);
+    this->Identity = rootsAddress[0];
+  }
+};
+
+struct vtkVDIGenerator::Internals : Maker {
+  std::optional<Maker> Coming;  // made by the preparation's thread, and its own till it ends
+  std::optional<Origin> Shown;  // by the generator
   /// The last frame failed. Data counts as newer than any output then: left to the executive, rank 0, whose
   /// empty output isn't what was asked for, would try again alone.
   bool Failed = false;
   pv::Failure Said;
   bool Held = false;
   vtkNew<vtkVDIImageData> Made;  // the last output: VTK empties it before it asks for another one
+  std::optional<Origin> MadeOf;  // where Made is an output
   vtkMTimeType Executed = 0;     // CurrentMTime of the last frame
+  bool Defers = false;           // DeferViews
+  int Views = 0;                 // of BeginView, without their EndView
+  std::optional<Request> Asked;  // by a view, which got an earlier output
+  vtkTimeStamp AskedTime;        // of the last EndView by which they got that, or of its replacement
+  bool InPlace = false;          // what is asked for can't be prepared
   double VoxelVolume = 0.0;      // of the smallest voxel of all ranks; 0 without any
   vdi::ScalarArray Array;        // of the generator's blocks
   std::vector<double> Values;    // some of theirs; the root's
@@ -81,7 +119,25 @@ struct vtkVDIGenerator::Internals {
   /// would flicker.
   std::optional<vdi::ScalarRange> FirstRange;
   pv::ArrayChoice FirstChoice;
+  std::optional<Origin> PreparedFor;           // what is prepared
   std::unique_ptr<pv::Preparation> Preparing;  // last: its thread uses the generator; who has one keeps off
+
+  /// Views haven't seen yet what replaces an earlier output.
+  void Answer() {
+    if (!this->Asked) return;
+    this->Asked.reset();
+    this->AskedTime.Modified();
+  }
+  /// Of the generator's blocks.
+  void Keep(const Origin& origin, const vdi::ScalarArray& array, double voxelVolume,
+            std::vector<double> values) {
+    this->VoxelVolume = voxelVolume;
+    this->Array = array;
+    this->Values = std::move(values);
+    this->Shown = origin;
+    if (this->FirstRange && !(this->FirstChoice == origin.Choice)) this->FirstRange.reset();
+    this->FirstChoice = origin.Choice;
+  }
 };
 
 vtkVDIGenerator::vtkVDIGenerator()
@@ -196,9 +252,13 @@ void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
 }
 
 vtkMTimeType vtkVDIGenerator::GetMTime() {
-  if (this->Internal->Held) return this->Internal->Executed;
-  if (this->Internal->Failed) this->Modified();
-  return this->CurrentMTime();
+  const Internals& internal = *this->Internal;
+  // What a view has got is good enough for views, until it's replaced, and for nobody else.
+  const bool isGoodEnough = internal.Asked && this->ServesView();
+  const vtkMTimeType asked = isGoodEnough ? 0 : internal.AskedTime.GetMTime();
+  if (internal.Held && (isGoodEnough || !internal.Asked)) return std::max(internal.Executed, asked);
+  if (internal.Failed) this->Modified();
+  return std::max(this->CurrentMTime(), asked);
 }
 
 vtkMTimeType vtkVDIGenerator::CurrentMTime() {
@@ -226,16 +286,10 @@ vtkTypeBool vtkVDIGenerator::ProcessRequest(vtkInformation* request, vtkInformat
 
 int vtkVDIGenerator::RequestInformation(vtkInformation*, vtkInformationVector**,
                                         vtkInformationVector* outputs) {
-  // The other ranks' pictures are empty; announcing that keeps the pipeline from asking them for more again
-  // and again.
   const bool root = this->IsRoot();
   const auto [width, height] = this->PictureSize();
   const int extent[6] = {0, root ? width - 1 : -1, 0, root ? height - 1 : -1, 0, root ? 0 : -1};
-  vtkInformation* info = outputs->GetInformationObject(0);
-  info->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent, 6);
-  info->Set(vtkDataObject::SPACING(), 1.0, 1.0, 1.0);
-  info->Set(vtkDataObject::ORIGIN(), 0.0, 0.0, 0.0);
-  vtkDataObject::SetPointDataActiveScalarInfo(info, VTK_UNSIGNED_CHAR, 4);
+  pv::announcePicture(outputs->GetInformationObject(0), extent);
   return 1;
 }
 
@@ -301,6 +355,31 @@ void setTime(vtkImageData* output, std::optional<double> time) {
   }
 }
 
+vdi::Image nothingOf(int width, int height) {
+  vdi::Image nothing{.width = width, .height = height, .rgba = {}, .depth = {}};
+  nothing.rgba.resize(nothing.pixelCount());
+  return nothing;
+}
+
+/// How many of the smallest voxels there are in a unit of volume; 0 without any.
+double mostPerVolume(const std::vector<vdi::Block>& blocks) {
+  double most = 0.0;
+  for (const vdi::Block& block : blocks) {
+    const double volume = block.spacing.x * block.spacing.y * block.spacing.z;
+    if (volume > 0.0) most = std::max(most, 1.0 / volume);
+  }
+  return most;
+}
+
+/// `components`: what the array has on those ranks that have it; 0: on none.
+vdi::ScalarArray arrayOf(const pv::ArrayChoice& choice, int components) {
+  const int count = std::max(components, 1);
+  return {.name = choice.name,
+          .cells = choice.cells,
+          .components = count,
+          .component = count > 1 ? choice.component : 0};
+}
+
 std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
   std::string text =
       "rank  blocks  volume MiB  upload s  generate s  distribute s  composite s  gather s  sent MiB  device "
@@ -318,6 +397,24 @@ std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::str
   return text + "device of rank 0: " + device + "\n";
 }
 
+std::string whatOf(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+bool isCancellation(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const vdi::Error& error) {
+    return error.code() == vdi::ErrorCode::Cancelled;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
@@ -331,68 +428,79 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   }
   Internals& internal = *this->Internal;
   const Origin origin = this->OriginOf(input, time);
-  const bool isOfThis = internal.Shown == origin;
-  if (!isOfThis) internal.Made->Initialize();  // no need to have two in memory
+  const bool isHeld = internal.Held && !internal.Asked;
   // Who asks for other pieces of it, a writer on several ranks, gets what is there.
-  const bool isMade = isOfThis && !internal.Failed &&
-                      (internal.Held || internal.Executed == this->CurrentMTime()) &&
+  const bool isMade = internal.MadeOf == origin && !internal.Failed &&
+                      (isHeld || internal.Executed == this->CurrentMTime()) &&
                       (internal.Made->GetNumberOfPoints() > 0 || !this->IsRoot());
   const vtkMTimeType executed = std::exchange(internal.Executed, this->CurrentMTime());
-  internal.Failed = true;
+  const bool hasFailed = std::exchange(internal.Failed, true);
+  std::exception_ptr failure;
   try {
+    this->Enter();
+    if (pv::onAllRanks(this->Controller, isMade)) {
+      output->ShallowCopy(internal.Made);
+      setTime(output, time);
+      internal.Executed = executed;
+      internal.Failed = false;
+      internal.Answer();
+      if (!(internal.PreparedFor == origin)) this->GivesUpPreparation();
+      return 1;
+    }
+    if (this->Defer(input, origin, hasFailed, output)) {
+      internal.Executed = executed;
+      internal.Failed = false;
+      return 1;
+    }
+    internal.Answer();
+    internal.InPlace = false;
+    this->Generate(input, origin, output);
+  } catch (const std::exception&) {
+    failure = std::current_exception();
+  }
+  if (failure && this->DropLostDevice()) {
+    vtkWarningMacro(<< whatOf(failure) << "; trying a new device");
+    failure = nullptr;
     try {
-      this->Enter();
-      if (pv::onAllRanks(this->Controller, isMade)) {
-        output->ShallowCopy(internal.Made);
-        setTime(output, time);
-        internal.Executed = executed;
-        internal.Failed = false;
-        return 1;
-      }
-      this->Generate(input, origin, output);
-    } catch (const vdi::Error& error) {
-      if (!this->DropLostDevice(error)) throw;
-      vtkWarningMacro(<< error.what() << "; trying a new device");
       output->Initialize();
       this->Enter();
       this->Generate(input, origin, output);
+    } catch (const std::exception&) {
+      failure = std::current_exception();
+      this->DropLostDevice();
     }
-  } catch (const vdi::Error& error) {
+  }
+  if (failure) {
     output->Initialize();
-    if (error.code() == vdi::ErrorCode::Cancelled) {
+    if (isCancellation(failure)) {
       // As ParaView's filters: it's not tried again until something changes.
       internal.Failed = false;
       this->SetAbortOutput(false);  // or the executive empties the output
       this->KeepEarlier(output);
       return 1;
     }
-    this->DropLostDevice(error);
-    this->SayFailure(error);
-    return 0;
-  } catch (const std::exception& error) {
-    output->Initialize();
-    this->SayFailure(error);
+    this->SayFailure(whatOf(failure));
     return 0;
   }
   internal.Made->ShallowCopy(output);
+  internal.MadeOf = origin;
   internal.Failed = false;
   internal.Said.isOver();
   internal.Executed = this->CurrentMTime();  // a map's table has been built
   return 1;
 }
 
-void vtkVDIGenerator::SayFailure(const std::exception& error) {
+void vtkVDIGenerator::SayFailure(const std::string& what) {
   // Simulations learn from the message that a step has failed, so each step has one.
-  const bool isNew = this->Internal->Said.isNew(this, error.what());
-  if (isNew || pv::isWatched(this->Controller)) vtkErrorMacro(<< error.what());
+  const bool isNew = this->Internal->Said.isNew(this, what);
+  if (isNew || pv::isWatched(this->Controller)) vtkErrorMacro(<< what);
 }
 
-/// Whether `error` is that a rank has lost its device: the generators are given up then, and new ones get
-/// devices that aren't lost. Collective where there's a generator, for then all ranks have failed together.
-bool vtkVDIGenerator::DropLostDevice(const vdi::Error& error) {
-  const bool maybe =
-      error.code() == vdi::ErrorCode::DeviceFailure || error.code() == vdi::ErrorCode::RemoteRank;
-  if (!maybe || !this->Internal->Generator) return false;
+/// Whether a rank has failed because it has lost its device: the generators are given up then, and new ones
+/// get devices that aren't lost. All ranks fail together where there's a generator, and all must call this
+/// then, whatever each of them failed of.
+bool vtkVDIGenerator::DropLostDevice() {
+  if (!this->Internal->Generator) return false;
   const vdi::VdiGenerator& generator = *this->Internal->Generator;
   if (!generator.communicator().anyTogether([&] { return generator.device().isLost(); })) return false;
   this->DropPreparation();
@@ -410,9 +518,108 @@ void vtkVDIGenerator::KeepEarlier(vtkImageData* output) {
   if (size[0] == width && size[1] == height) {
     output->ShallowCopy(this->Internal->Made);
   } else {
-    vdi::Image nothing{.width = width, .height = height, .rgba = {}, .depth = {}};
-    nothing.rgba.resize(nothing.pixelCount());
-    pv::setPicture(output, nothing, false);
+    pv::setPicture(output, nothingOf(width, height), false);
+  }
+}
+
+bool vtkVDIGenerator::ServesView() const {
+  return this->Internal->Views > 0 && this->Internal->Defers && !this->PictureOnly;
+}
+
+void vtkVDIGenerator::DeferViews() {
+  this->Internal->Defers = true;
+}
+
+void vtkVDIGenerator::DeferNoViews() {
+  this->Internal->Defers = false;
+}
+
+void vtkVDIGenerator::BeginView() {
+  ++this->Internal->Views;
+}
+
+void vtkVDIGenerator::EndView() {
+  --this->Internal->Views;
+  if (this->Internal->Asked) this->Internal->AskedTime.Modified();
+}
+
+int vtkVDIGenerator::GetOutdated() {
+  return this->Internal->Asked ? 1 : 0;
+}
+
+/// For a view that needn't wait: gives it an earlier output, and notes what it asks for. False where the VDI
+/// is to be made in place, or taken: it has just been prepared. Collective.
+bool vtkVDIGenerator::Defer(vtkDataObject* input, const Origin& origin, bool hasFailed,
+                            vtkImageData* output) {
+  Internals& internal = *this->Internal;
+  // Without a map the colours need the range of the scalars, which is known once they're on the device.
+  const bool can = this->ServesView() && !hasFailed && !internal.InPlace && this->LookupTable != nullptr;
+  if (!pv::onAllRanks(this->Controller, can)) return false;
+  const auto& preparing = internal.Preparing;
+  if (pv::onAllRanks(this->Controller, this->IsPrepared(origin))) {
+    if (!pv::onAllRanks(this->Controller, !preparing->isDone())) return false;
+  } else {
+    this->GivesUpPreparation();
+  }
+  if (!this->Ask(input, origin)) return false;
+  this->GiveEarlier(output);
+  setTime(output, origin.Time);
+  return true;
+}
+
+/// Notes what Prepare is to make. False where the input is no good, which an update in place says.
+/// Collective.
+bool vtkVDIGenerator::Ask(vtkDataObject* input, const Origin& origin) {
+  Internals& internal = *this->Internal;
+  const bool isAsked = internal.Asked && internal.Asked->Of == origin;
+  if (pv::onAllRanks(this->Controller, isAsked)) return true;
+  internal.Asked.reset();
+  Request request{.Of = origin, .Blocks = {}, .Bounds = {}, .Array = {}};
+  bool isGood = true;
+  try {
+    requireInput(input);
+    pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.Choice);
+    request.Blocks = pv::blocksOf(input, origin.Choice);
+  } catch (const vdi::Error&) {
+    isGood = false;
+  }
+  if (!pv::onAllRanks(this->Controller, isGood)) return false;
+  const vdi::Box own = vdi::localScene(request.Blocks).bounds;
+  const double components = pv::componentsOf(input, origin.Choice);
+  std::array<double, 8> least{own.lo.x,  own.lo.y,  own.lo.z,    -own.hi.x,
+                              -own.hi.y, -own.hi.z, -components, -mostPerVolume(request.Blocks)};
+  if (this->Controller != nullptr && this->Controller->GetNumberOfProcesses() > 1) {
+    const std::array<double, 8> mine = least;
+    this->Controller->AllReduce(mine.data(), least.data(), static_cast<vtkIdType>(least.size()),
+                                vtkCommunicator::MIN_OP);
+  }
+  request.Bounds = {{least[0], least[1], least[2]}, {-least[3], -least[4], -least[5]}};
+  request.Array = arrayOf(origin.Choice, static_cast<int>(-least[6]));
+  request.VoxelVolume = least[7] < 0.0 ? -1.0 / least[7] : 0.0;
+  internal.Asked = std::move(request);
+  return true;
+}
+
+/// What views get instead of what isn't made yet: the VDI that was made last, in a picture of the announced
+/// size; without one, nothing, at its place.
+void vtkVDIGenerator::GiveEarlier(vtkImageData* output) {
+  if (!this->IsRoot()) return;
+  const Internals& internal = *this->Internal;
+  const Request& asked = *internal.Asked;
+  output->ShallowCopy(internal.Made);
+  const auto [width, height] = this->PictureSize();
+  int size[3];
+  output->GetDimensions(size);
+  if (size[0] != width || size[1] != height) {
+    output->GetPointData()->Initialize();
+    pv::setPicture(output, nothingOf(width, height), false);
+    if (internal.Made->GetNumberOfPoints() == 0)
+      pv::setBeingMade(output, this->Viewpoint(asked.Bounds), asked.Bounds);
+  }
+  // Views colour by the array that they ask for, and adapt its map to its range.
+  if (output->GetFieldData()->GetAbstractArray(asked.Array.name.c_str()) == nullptr) {
+    const double* range = this->LookupTable->GetRange();
+    pv::setShownValues(output, asked.Array, std::array{range[0], range[1]});
   }
 }
 
@@ -454,27 +661,16 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const Origin& origin) {
     blocks = pv::blocksOf(input, origin.Choice);
   });
   // Doubles that aren't negative are ordered as their bits are.
-  std::array<std::uint64_t, 2> largest{0, static_cast<std::uint64_t>(pv::componentsOf(input, origin.Choice))};
-  for (const vdi::Block& block : blocks) {
-    const double volume = block.spacing.x * block.spacing.y * block.spacing.z;
-    if (volume > 0.0) largest[0] = std::max(largest[0], vdi::bit_cast<std::uint64_t>(1.0 / volume));
-  }
+  std::array<std::uint64_t, 2> largest{vdi::bit_cast<std::uint64_t>(mostPerVolume(blocks)),
+                                       static_cast<std::uint64_t>(pv::componentsOf(input, origin.Choice))};
   comm.allReduceMax(largest);
-  this->Internal->VoxelVolume = largest[0] > 0 ? 1.0 / vdi::bit_cast<double>(largest[0]) : 0.0;
-  const int components = std::max(static_cast<int>(largest[1]), 1);
-  this->Internal->Array = {.name = origin.Choice.name,
-                           .cells = origin.Choice.cells,
-                           .components = components,
-                           .component = components > 1 ? origin.Choice.component : 0};
+  const double voxelVolume = largest[0] > 0 ? 1.0 / vdi::bit_cast<double>(largest[0]) : 0.0;
   this->UpdateProgress(0.05);
   this->Internal->Shown.reset();
   const std::vector<vdi::Block> shown = blocks;  // the values are shared
   generator.setBlocks(std::move(blocks), this->FillGhosts);
-  this->Internal->Values = pv::sampleOf(shown, generator.scalarRange(), comm);
-  this->Internal->Shown = origin;
-  if (this->Internal->FirstRange && !(this->Internal->FirstChoice == origin.Choice))
-    this->Internal->FirstRange.reset();
-  this->Internal->FirstChoice = origin.Choice;
+  this->Internal->Keep(origin, arrayOf(origin.Choice, static_cast<int>(largest[1])), voxelVolume,
+                       pv::sampleOf(shown, generator.scalarRange(), comm));
 }
 
 vdi::ScalarRange vtkVDIGenerator::StandInRange() {
@@ -517,16 +713,12 @@ std::array<int, 2> vtkVDIGenerator::PictureSize() const {
   return {this->Resolution[0], this->Resolution[1]};
 }
 
-/// Of the generator's blocks and the properties and maps as they are.
-vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame() {
-  const vdi::Box& bounds = this->Internal->Generator->scene().bounds;
-  const glm::dvec3 size = bounds.empty() ? glm::dvec3(0.0) : bounds.size();
+/// Of blocks in these bounds and the properties and maps as they are. `range`: of the map that stands in for
+/// none.
+vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame(const vdi::Box& bounds, double voxelVolume,
+                                                     const vdi::ScalarRange& range) {
   double unit = this->ScalarOpacityUnitDistance;
-  if (unit <= 0.0) {
-    const double volume = size.x * size.y * size.z;
-    unit = volume > 0.0 ? glm::length(size) * std::cbrt(this->Internal->VoxelVolume / volume) : 1.0;
-  }
-  const vdi::ScalarRange range = this->StandInRange();
+  if (unit <= 0.0) unit = vdi::unitDistanceOf(bounds, voxelVolume);
   Frame frame{.Camera = this->Viewpoint(bounds),
               .Function = pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min,
                                                  range.max, unit),
@@ -559,7 +751,7 @@ void vtkVDIGenerator::Release() {
   Internals& internal = *this->Internal;
   internal.Held = false;
   const vtkMTimeType time = this->CurrentMTime();
-  if (internal.Executed == time) return;
+  if (internal.Executed == time && !internal.Asked) return;
   // An output that was asked for meanwhile, and stayed as it was, is younger than what was modified.
   this->Modified();
   if (internal.Preparing && internal.Preparing->time() == time)
@@ -591,27 +783,65 @@ bool vtkVDIGenerator::GivesUpPreparation() {
 
 /// Collective.
 void vtkVDIGenerator::DropPreparation() {
-  this->Internal->Preparing.reset();
+  Internals& internal = *this->Internal;
+  internal.Preparing.reset();
+  if (internal.Coming) static_cast<Maker&>(internal) = std::move(*internal.Coming);
+  internal.Coming.reset();
+}
+
+/// Whether what is under way, or there, is what the update asks for.
+bool vtkVDIGenerator::IsPrepared(const Origin& origin) const {
+  const Internals& internal = *this->Internal;
+  return internal.Preparing && !internal.Preparing->isGivenUp() &&
+         internal.Preparing->time() == internal.Executed && internal.PreparedFor == origin;
 }
 
 void vtkVDIGenerator::Prepare() {
   Internals& internal = *this->Internal;
   this->DropPreparation();
-  const bool isMade = !internal.Failed && internal.Executed == this->CurrentMTime();
-  bool can = !isMade && internal.Generator && internal.Shown && !this->PictureOnly;
+  const bool isMade = !internal.Failed && internal.Executed == this->CurrentMTime() && !internal.Asked;
+  const bool isOfInput = internal.Asked || (internal.Shown && internal.Shown == internal.MadeOf);
+  bool can = !isMade && isOfInput && (internal.Asked || internal.Generator) && !this->PictureOnly;
   Frame frame;
-  try {
-    if (can) frame = this->CurrentFrame();
-  } catch (const vdi::Error&) {
-    can = false;  // said by the update that comes instead
+  const bool isAlone = this->Controller == nullptr || this->Controller->GetNumberOfProcesses() == 1;
+  if (pv::onAllRanks(this->Controller, can)) {
+    try {
+      // A thread must not free a communicator of several ranks, as it would where it can't make one.
+      if (!isAlone) this->MakeGenerator();
+      if (internal.Asked) {
+        frame = this->CurrentFrame(internal.Asked->Bounds, internal.Asked->VoxelVolume, {0.0, 1.0});
+      } else {
+        frame = this->CurrentFrame(internal.Generator->scene().bounds, internal.VoxelVolume,
+                                   this->StandInRange());
+      }
+    } catch (const vdi::Error&) {
+      can = false;  // said by the update that comes instead
+    }
+  } else {
+    can = false;
   }
-  if (!pv::onAllRanks(this->Controller, can)) return;
+  if (!pv::onAllRanks(this->Controller, can)) {
+    internal.InPlace = internal.Asked.has_value();
+    return;
+  }
+  std::optional<Request> request;  // of other blocks than the generator's
+  const bool isShown = !internal.Asked || internal.Shown == internal.Asked->Of;
+  if (!pv::onAllRanks(this->Controller, isShown)) request = internal.Asked;
+  internal.PreparedFor = internal.Asked ? internal.Asked->Of : *internal.Shown;
   internal.Preparing = std::make_unique<pv::Preparation>(
       this->Controller, this->CurrentMTime(),
-      [&internal, frame = std::move(frame), step = std::max(this->TimeStep, 0)](const vdi::Progress& progress,
-                                                                                vtkVDIImageData* output) {
+      [&internal, frame = std::move(frame), request = std::move(request), step = std::max(this->TimeStep, 0)](
+          const vdi::Progress& progress, vtkVDIImageData* output) {
+        if (!internal.Generator) internal.Coming.emplace(vdi::comm::Communicator::serial());
+        vdi::VdiGenerator& generator = internal.Coming ? *internal.Coming->Generator : *internal.Generator;
+        if (request) {
+          internal.Shown.reset();
+          generator.setBlocks(request->Blocks, request->Of.FillGhosts);
+          internal.Keep(request->Of, request->Array, request->VoxelVolume,
+                        pv::sampleOf(request->Blocks, generator.scalarRange(), generator.communicator()));
+        }
         std::optional<vdi::Vdi> vdi =
-            internal.Generator->generate(frame.Camera, frame.Function, frame.Settings, progress);
+            generator.generate(frame.Camera, frame.Function, frame.Settings, progress);
         if (!vdi) return;  // another rank has it
         vdi->time = internal.Shown->Time.value_or(0.0);
         vdi->timeStep = static_cast<std::uint64_t>(step);
@@ -630,9 +860,7 @@ bool vtkVDIGenerator::TakePreparation(const Origin& origin, vtkImageData* output
   Internals& internal = *this->Internal;
   const auto& preparing = internal.Preparing;
   if (!preparing) return false;
-  const bool isOfThis =
-      !preparing->isGivenUp() && preparing->time() == internal.Executed && internal.Shown == origin;
-  if (!pv::onAllRanks(this->Controller, isOfThis)) {
+  if (!pv::onAllRanks(this->Controller, this->IsPrepared(origin))) {
     this->DropPreparation();
     return false;
   }
@@ -644,13 +872,14 @@ bool vtkVDIGenerator::TakePreparation(const Origin& origin, vtkImageData* output
     this->DropPreparation();
     throw vdi::Error(vdi::ErrorCode::Cancelled, "it was aborted");
   }
-  if (end == pv::Preparation::End::Good) {
+  const bool isGood = end == pv::Preparation::End::Good;
+  if (isGood) {
     output->ShallowCopy(preparing->output());
-    this->TakeReport();
     if (output->GetNumberOfPoints() > 0) setTime(output, origin.Time);
   }
   this->DropPreparation();
-  return end == pv::Preparation::End::Good;
+  if (isGood) this->TakeReport();
+  return isGood;
 }
 
 void vtkVDIGenerator::TakeReport() {
@@ -659,25 +888,24 @@ void vtkVDIGenerator::TakeReport() {
       generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
 }
 
+/// Collective.
+void vtkVDIGenerator::MakeGenerator() {
+  if (this->Internal->Generator) return;
+  static_cast<Maker&>(*this->Internal) = Maker(pv::communicatorOf(this->Controller));
+}
+
 void vtkVDIGenerator::Generate(vtkDataObject* input, const Origin& origin, vtkImageData* output) {
-  if (!this->Internal->Generator) {
-    vdi::comm::Communicator comm = pv::communicatorOf(this->Controller);
-    std::shared_ptr<vdi::gpu::Device> device;
-    comm.together([&] { device = pv::sharedDevice(comm.localRank()); });
-    const vdi::GeneratorOptions options = vdi::generatorOptionsFromEnvironment(comm);
-    this->Internal->Generator =
-        std::make_unique<vdi::VdiGenerator>(std::move(device), std::move(comm), options);
-    const auto& own = this->Internal->Generator;
-    std::array<std::uint64_t, 1> rootsAddress{
-        own->communicator().rank() == 0 ? reinterpret_cast<std::uintptr_t>(own.get()) : 0U};
-    own->communicator().allReduceMax(rootsAddress);
-    this->Internal->Identity = rootsAddress[0];
-  }
-  vdi::VdiGenerator& generator = *this->Internal->Generator;
   if (this->TakePreparation(origin, output)) return;
+  this->MakeGenerator();
+  vdi::VdiGenerator& generator = *this->Internal->Generator;
+  if (!(this->Internal->MadeOf == origin)) {
+    this->Internal->Made->Initialize();  // no need to have two in memory
+    this->Internal->MadeOf.reset();
+  }
   this->ShowBlocks(input, origin);
   this->UpdateProgress(0.1);
-  const auto [camera, function, settings] = this->CurrentFrame();
+  const auto [camera, function, settings] =
+      this->CurrentFrame(generator.scene().bounds, this->Internal->VoxelVolume, this->StandInRange());
   const auto progress = [this](double done) {
     this->UpdateProgress(0.1 + 0.9 * done);
     return !this->CheckAbort();

@@ -15,15 +15,14 @@
 #include <vtkSmartPointer.h>
 
 #include <array>
-#include <exception>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "vtkVolumetricDepthImagesModule.h"
 
 namespace vdi {
-class Error;
 struct Box;
 struct Camera;
 struct Region;
@@ -145,16 +144,32 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
    * How a window gets a new VDI without waiting for it. After Hold, changed maps and properties don't make
    * the output out of date, until Release; another input still does. What Prepare has begun is given up: once
    * GetPreparation says that it has ended, another Prepare waits for nothing. Prepare starts to make the VDI
-   * of the properties and maps as they are now, in a thread of its own, unless the output is that already.
-   * On several ranks it gets on while somebody calls ServePreparation again and again, which takes some
-   * milliseconds, on all of them. The update after Release takes that VDI, or waits for it, if nothing has
-   * changed since, and makes one otherwise. Collective, but for Hold and Release.
+   * of the properties and maps as they are now, in a thread of its own, unless the output is that already,
+   * and of the input that a view has asked for last. On several ranks it gets on while somebody calls
+   * ServePreparation again and again, which takes some milliseconds, on all of them. The update after Release
+   * takes that VDI, or waits for it, if nothing has changed since, and makes one otherwise. Collective, but
+   * for Hold and Release.
    */
   void Hold();
   void Prepare();
   void ServePreparation();
   void Release();
   int GetHeld();
+  ///@}
+  ///@{
+  /**
+   * How a window's views do without waiting for what isn't made yet. Between BeginView and EndView the output
+   * is updated for a view. After DeferViews such an update makes nothing: it gives the VDI that was made
+   * last, or a picture of nothing that says so (pv::isBeingMade), and GetOutdated is true until the output is
+   * what was asked for. Prepare then makes that, new blocks included. All other updates make it in place or
+   * wait for the preparation, and so do a view's where Prepare can't make it, with PictureOnly, without a
+   * colour map, and after a failure. DeferNoViews ends it (default). To be called on all ranks.
+   */
+  void DeferViews();
+  void DeferNoViews();
+  void BeginView();
+  void EndView();
+  int GetOutdated();
   ///@}
   /// Of what Prepare has begun, in percent; 100 when it's there. -1: nothing is prepared, because nothing was
   /// begun, it was given up or went wrong, or it can't be: before the first update, and with PictureOnly.
@@ -177,16 +192,24 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkVDIGenerator(const vtkVDIGenerator&) = delete;
   void operator=(const vtkVDIGenerator&) = delete;
 
+  struct Maker;
   struct Internals;
   struct Origin;
   struct Frame;
+  struct Request;
+  void MakeGenerator();
+  bool ServesView() const;
+  bool IsPrepared(const Origin& origin) const;
+  bool Defer(vtkDataObject* input, const Origin& origin, bool hasFailed, vtkImageData* output);
+  bool Ask(vtkDataObject* input, const Origin& origin);
+  void GiveEarlier(vtkImageData* output);
   void Generate(vtkDataObject* input, const Origin& origin, vtkImageData* output);
   bool IsRoot() const;
   void Enter();
   void ShowBlocks(vtkDataObject* input, const Origin& origin);
   vdi::ScalarRange StandInRange();
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
-  Frame CurrentFrame();
+  Frame CurrentFrame(const vdi::Box& bounds, double voxelVolume, const vdi::ScalarRange& range);
   vdi::Shading CurrentShading() const;
   vdi::Region CurrentRegion() const;
   vtkMTimeType CurrentMTime();
@@ -194,10 +217,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   bool GivesUpPreparation();
   void DropPreparation();
   bool TakePreparation(const Origin& origin, vtkImageData* output);
-  void SayFailure(const std::exception& error);
+  void SayFailure(const std::string& what);
   void TakeReport();
   void KeepEarlier(vtkImageData* output);
-  bool DropLostDevice(const vdi::Error& error);
+  bool DropLostDevice();
   std::array<int, 2> PictureSize() const;
   void SetReport(const char* text);
 

@@ -7,7 +7,6 @@
 #include <vtkObjectFactory.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
-#include <array>
 #include <exception>
 #include <future>
 #include <optional>
@@ -132,10 +131,7 @@ int vtkVDIReader::RequestInformation(vtkInformation*, vtkInformationVector**, vt
     extent[3] = announced->Height - 1;
     extent[5] = 0;
   }
-  info->Set(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent, 6);
-  info->Set(vtkDataObject::SPACING(), 1.0, 1.0, 1.0);
-  info->Set(vtkDataObject::ORIGIN(), 0.0, 0.0, 0.0);
-  vtkDataObject::SetPointDataActiveScalarInfo(info, VTK_UNSIGNED_CHAR, 4);
+  pv::announcePicture(info, extent);
   return 1;
 }
 
@@ -146,8 +142,7 @@ int vtkVDIReader::RequestData(vtkInformation*, vtkInformationVector**, vtkInform
   try {
     const Contents contents = this->Read();
     pv::setVdi(output, contents.Vdi, contents.Flat);
-    if (const auto& coloring = contents.Vdi.coloring; coloring && coloring->range.min <= coloring->range.max)
-      pv::setShownValues(output, coloring->array, std::array{coloring->range.min, coloring->range.max});
+    if (contents.Vdi.coloring) pv::setShownRange(output, *contents.Vdi.coloring);
     output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), contents.Vdi.time);
     this->Said.clear();
   } catch (const std::exception& error) {

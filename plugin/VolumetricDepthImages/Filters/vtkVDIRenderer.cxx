@@ -71,11 +71,7 @@ int vtkVDIRenderer::RequestInformation(vtkInformation*, vtkInformationVector** i
     extent[1] = this->Resolution[0] - 1;
     extent[3] = this->Resolution[1] - 1;
   }
-  vtkInformation* out = outputs->GetInformationObject(0);
-  out->Set(Pipeline::WHOLE_EXTENT(), extent, 6);
-  out->Set(vtkDataObject::SPACING(), 1.0, 1.0, 1.0);
-  out->Set(vtkDataObject::ORIGIN(), 0.0, 0.0, 0.0);
-  vtkDataObject::SetPointDataActiveScalarInfo(out, VTK_UNSIGNED_CHAR, 4);
+  pv::announcePicture(outputs->GetInformationObject(0), extent);
   return 1;
 }
 

@@ -1,18 +1,13 @@
 #include "vtkVDIStreamWriter.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <vtkErrorCode.h>
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkObjectFactory.h>
 
-#include <cerrno>
 #include <cstdint>
 #include <cstdio>
-#include <cstring>
 #include <string>
 #include <utility>
 
@@ -21,7 +16,9 @@
 #include "vdi/page/Page.h"
 #include "vdi/stream/GivenToken.h"
 #include "vdi/stream/Publisher.h"
+#include "vdi/stream/SecretFile.h"
 #include "vdi/stream/Server.h"
+#include "vdi/stream/Steering.h"
 #include "vdi/stream/Token.h"
 
 namespace {
@@ -30,40 +27,23 @@ std::string textOf(const char* value) {
   return value != nullptr ? value : "";
 }
 
-/// A file that its owner alone can read, and that is there while this lives.
-class SecretFile {
- public:
-  SecretFile(std::string path, const std::string& line) : path_(std::move(path)) {
-    constexpr mode_t ownerOnly = 0600;
-    const std::string part = fmt::format("{}.{}.part", path_, ::getpid());
-    (void)::unlink(part.c_str());
-    const int file = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, ownerOnly);
-    const std::string text = line + "\n";
-    const bool isWritten =
-        file >= 0 && ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-    int error = isWritten ? 0 : errno;
-    if (file >= 0) ::close(file);
-    if (error == 0 && std::rename(part.c_str(), path_.c_str()) != 0) error = errno;
-    if (error == 0) return;
-    (void)::unlink(part.c_str());
-    throw vdi::Error(vdi::ErrorCode::Io, std::string("can't write the link: ") + std::strerror(error), path_);
-  }
-  ~SecretFile() { (void)::unlink(path_.c_str()); }
-  SecretFile(const SecretFile&) = delete;
-  SecretFile& operator=(const SecretFile&) = delete;
-
- private:
-  std::string path_;
-};
-
 }  // namespace
 
 /// The publisher hands its last frame over before the server ends.
 struct vtkVDIStreamWriter::Service {
-  explicit Service(vdi::stream::ServerOptions options) : Server(std::move(options)), Publisher(Server) {}
+  Service(vdi::stream::ServerOptions options, bool isSteered)
+      : Server(Steered(std::move(options), isSteered)), Publisher(Server) {}
+  vdi::stream::ServerOptions Steered(vdi::stream::ServerOptions options, bool isSteered) {
+    if (isSteered)
+      options.steer = [this](std::uint32_t viewer, const vdi::stream::Wish& wish) {
+        this->Wishes.put(viewer, wish);
+      };
+    return options;
+  }
+  vdi::stream::Wishes Wishes;  // of which the server's thread knows
   vdi::stream::Server Server;
   vdi::stream::Publisher Publisher;
-  std::unique_ptr<SecretFile> Link;
+  std::unique_ptr<vdi::stream::SecretFile> Link;
   std::string Told;  // of the publisher's trouble
 };
 
@@ -79,6 +59,7 @@ vtkVDIStreamWriter::~vtkVDIStreamWriter() {
   this->vtkVDIStreamWriter::SetLinkFile(nullptr);
   this->vtkVDIStreamWriter::SetCertificate(nullptr);
   this->vtkVDIStreamWriter::SetKey(nullptr);
+  this->vtkVDIStreamWriter::SetSteeringLog(nullptr);
 }
 
 void vtkVDIStreamWriter::PrintSelf(ostream& os, vtkIndent indent) {
@@ -105,14 +86,23 @@ void vtkVDIStreamWriter::Start() {
   options.mostBytesPerSecond = this->Rate > 0.0 ? this->Rate * bytesPerMegabit : 0.0;
   options.certificate = textOf(this->Certificate);
   options.key = textOf(this->Key);
-  auto service = std::make_unique<Service>(std::move(options));
+  auto service = std::make_unique<Service>(std::move(options), this->Steer);
   const std::string link = given.empty() ? service->Server.link() : service->Server.address();
   const std::string file = textOf(this->LinkFile);
-  if (!file.empty()) service->Link = std::make_unique<SecretFile>(file, link);
+  if (!file.empty()) service->Link = std::make_unique<vdi::stream::SecretFile>(file, link);
   // The token stays out of logs. It's in the file, or known.
   fmt::print(stderr, "VDIStream: serving at {}{}\n", service->Server.address(),
              file.empty() ? "" : "; the link is in " + file);
   this->Running = std::move(service);
+}
+
+std::optional<vdi::stream::Request> vtkVDIStreamWriter::TakeRequest(std::chrono::milliseconds patience) {
+  if (!this->Running) return std::nullopt;
+  return this->Running->Wishes.take(patience);
+}
+
+void vtkVDIStreamWriter::SetControls(const vdi::stream::Controls& controls) {
+  if (this->Running) this->Running->Server.setControls(controls);
 }
 
 void vtkVDIStreamWriter::WriteData() {

@@ -11,9 +11,18 @@
 
 #include <vtkWriter.h>
 
+#include <chrono>
 #include <memory>
+#include <optional>
 
 #include "vtkVolumetricDepthImagesModule.h"
+
+#ifndef __VTK_WRAP__
+namespace vdi::stream {
+struct Controls;
+struct Request;
+}  // namespace vdi::stream
+#endif
 
 class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
  public:
@@ -37,10 +46,24 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   vtkGetFilePathMacro(Certificate);
   vtkSetFilePathMacro(Key);
   vtkGetFilePathMacro(Key);
+  vtkSetMacro(Steer, bool);  // whether viewers may ask for changes, which an extractor makes (VDISteering.h)
+  vtkGetMacro(Steer, bool);
+  vtkBooleanMacro(Steer, bool);
   ///@}
+
+  vtkSetFilePathMacro(SteeringLog);  // gets a line of JSON for each change; none: no such file
+  vtkGetFilePathMacro(SteeringLog);
 
   /// The simulation's step, for viewers; -1 (default): the VDI's own.
   vtkSetMacro(TimeStep, int);
+
+#ifndef __VTK_WRAP__
+  /// What viewers have asked for since this was called last. Waits so long at most; none: nothing, or the
+  /// server hasn't started or lets nobody steer.
+  std::optional<vdi::stream::Request> TakeRequest(std::chrono::milliseconds patience);
+  /// What viewers may ask for, and what is in force. Without effect before the server has started.
+  void SetControls(const vdi::stream::Controls& controls);
+#endif
 
  protected:
   vtkVDIStreamWriter();
@@ -63,6 +86,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   char* Certificate = nullptr;
   char* Key = nullptr;
   int TimeStep = -1;
+  bool Steer = false;
+  char* SteeringLog = nullptr;
 
   struct Service;
   std::unique_ptr<Service> Running;

@@ -1,5 +1,10 @@
 #include "VDIViewpoint.h"
 
+#include <pqActiveObjects.h>
+#include <pqDataRepresentation.h>
+#include <pqPipelineSource.h>
+#include <pqUndoStack.h>
+#include <pqView.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
 #include <vtkSMRenderViewProxy.h>
@@ -7,6 +12,22 @@
 #include <algorithm>
 
 namespace pv {
+
+namespace {
+
+/// Whether the view shows the source, and nothing else.
+bool showsOnly(pqView* view, pqPipelineSource* source) {
+  bool shown = false;
+  for (pqRepresentation* each : view->getRepresentations()) {
+    auto* data = qobject_cast<pqDataRepresentation*>(each);
+    if (data == nullptr || !data->isVisible()) continue;
+    if (data->getInput() != source) return false;
+    shown = true;
+  }
+  return shown;
+}
+
+}  // namespace
 
 std::optional<ViewpointNumbers> viewpointOf(vtkSMProxy* reader) {
   reader->UpdatePropertyInformation(reader->GetProperty("Viewpoint"));
@@ -24,6 +45,20 @@ void lookFrom(const ViewpointNumbers& viewpoint, vtkSMRenderViewProxy* view) {
   vtkSMPropertyHelper(view, "CameraParallelProjection").Set(viewpoint[10] != 0.0 ? 1 : 0);
   vtkSMPropertyHelper(view, "CameraParallelScale").Set(viewpoint[11]);
   view->UpdateVTKObjects();
+}
+
+/// A VDI is truest from its viewpoint, and may be seen from there alone: ParaView's own choice is to look
+/// along z.
+void lookFromViewpointOf(pqPipelineSource* source) {
+  pqView* view = pqActiveObjects::instance().activeView();
+  auto* proxy = view != nullptr ? vtkSMRenderViewProxy::SafeDownCast(view->getViewProxy()) : nullptr;
+  if (proxy == nullptr || !showsOnly(view, source)) return;
+  const auto viewpoint = viewpointOf(source->getProxy());
+  if (!viewpoint) return;
+  BEGIN_UNDO_EXCLUDE();
+  lookFrom(*viewpoint, proxy);
+  END_UNDO_EXCLUDE();
+  view->render();
 }
 
 }  // namespace pv

@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 
+class pqPipelineSource;
 class vtkSMProxy;
 class vtkSMRenderViewProxy;
 
@@ -18,6 +19,10 @@ std::optional<ViewpointNumbers> viewpointOf(vtkSMProxy* reader);
 
 /// Moves the view's camera there.
 void lookFrom(const ViewpointNumbers& viewpoint, vtkSMRenderViewProxy* view);
+
+/// Moves the active view's camera to where the VDI of a reader was made, if it shows that and nothing else,
+/// and renders it.
+void lookFromViewpointOf(pqPipelineSource* source);
 
 }  // namespace pv
 

@@ -1,22 +1,17 @@
 #include "pqVDIBehavior.h"
 
-#include <pqActiveObjects.h>
 #include <pqApplicationCore.h>
 #include <pqCoreUtilities.h>
-#include <pqDataRepresentation.h>
 #include <pqObjectBuilder.h>
 #include <pqPipelineSource.h>
 #include <pqPluginManager.h>
 #include <pqPropertiesPanel.h>
 #include <pqServer.h>
 #include <pqServerManagerModel.h>
-#include <pqUndoStack.h>
-#include <pqView.h>
 #include <vtkOutputWindow.h>
 #include <vtkPVPluginsInformation.h>
 #include <vtkSMPluginManager.h>
 #include <vtkSMProxyManager.h>
-#include <vtkSMRenderViewProxy.h>
 #include <vtkSMSession.h>
 #include <vtkSMTrace.h>
 #include <QTimer>
@@ -27,35 +22,10 @@
 #include "pqVDIRegenerator.h"
 #include "pqVDISaveData.h"
 #include "pqVDIStillFrames.h"
+#include "pqVDIStreamFollower.h"
 #include "vtkSMVDIGeneratorProxy.h"
 
 namespace {
-
-/// Whether the view shows the source, and nothing else.
-bool showsOnly(pqView* view, pqPipelineSource* source) {
-  bool shown = false;
-  for (pqRepresentation* each : view->getRepresentations()) {
-    auto* data = qobject_cast<pqDataRepresentation*>(each);
-    if (data == nullptr || !data->isVisible()) continue;
-    if (data->getInput() != source) return false;
-    shown = true;
-  }
-  return shown;
-}
-
-/// A VDI is truest from its viewpoint, and may be seen from there alone: ParaView's own choice is to look
-/// along z.
-void lookFromViewpoint(pqPipelineSource* source) {
-  pqView* view = pqActiveObjects::instance().activeView();
-  auto* proxy = view != nullptr ? vtkSMRenderViewProxy::SafeDownCast(view->getViewProxy()) : nullptr;
-  if (proxy == nullptr || !showsOnly(view, source)) return;
-  const auto viewpoint = pv::viewpointOf(source->getProxy());
-  if (!viewpoint) return;
-  BEGIN_UNDO_EXCLUDE();
-  pv::lookFrom(*viewpoint, proxy);
-  END_UNDO_EXCLUDE();
-  view->render();
-}
 
 bool isLoadedOn(pqServer* server) {
   vtkPVPluginsInformation* plugins =
@@ -112,6 +82,8 @@ void pqVDIBehavior::lookAtServers() {
 }
 
 void pqVDIBehavior::shutdown() {
+  // Not at the very end with this, when the list of views that it empties has gone.
+  delete this->findChild<pqVDIStillFrames*>();
   // What it made belongs to the sources.
   if (pqApplicationCore* core = pqApplicationCore::instance()) {
     core->getServerManagerModel()->disconnect(this);
@@ -122,8 +94,9 @@ void pqVDIBehavior::shutdown() {
 
 void pqVDIBehavior::sourceAdded(pqPipelineSource* source) {
   if (vtkSMVDIGeneratorProxy::SafeDownCast(source->getProxy()) != nullptr) new pqVDIRegenerator(source);
-  if (std::string_view(source->getProxy()->GetXMLName()) != "VDIReader" ||
-      pqApplicationCore::instance()->isLoadingState())
+  const std::string_view name(source->getProxy()->GetXMLName());
+  if (name == "VDIStream") new pqVDIStreamFollower(source);
+  if ((name != "VDIReader" && name != "VDIStream") || pqApplicationCore::instance()->isLoadingState())
     return;  // a state has its camera
   // Only what's applied by hand: scripts set their cameras. The panels may be younger than this.
   QWidget* window = pqCoreUtilities::mainWidget();
@@ -138,5 +111,11 @@ void pqVDIBehavior::applied(pqProxy* proxy) {
   auto* source = qobject_cast<pqPipelineSource*>(proxy);
   if (source == nullptr || this->Opened.removeAll(source) == 0) return;
   // Behind what ParaView does then: it shows the source and resets the camera.
-  QTimer::singleShot(0, source, [source] { lookFromViewpoint(source); });
+  QTimer::singleShot(0, source, [source] {
+    if (auto* follower = pqVDIStreamFollower::of(source->getProxy())) {
+      follower->lookFromViewpoint();
+    } else {
+      pv::lookFromViewpointOf(source);
+    }
+  });
 }

@@ -1,6 +1,6 @@
 // Started with the plugin: gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator, has still
-// frames deferred, looks at what the user has opened from where it was made, and tells of servers that lack
-// the plugin.
+// frames deferred, has views follow each VDIStream, looks at what the user has opened from where it was made,
+// and tells of servers that lack the plugin.
 #ifndef pqVDIBehavior_h
 #define pqVDIBehavior_h
 

@@ -61,6 +61,13 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
 
 pqVDIRegenerateWidget::~pqVDIRegenerateWidget() = default;
 
+/// Apply of the panel, and of it alone: scripts don't come here.
+void pqVDIRegenerateWidget::apply() {
+  this->pqPropertyWidget::apply();
+  if (auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(this->proxy())))
+    regenerator->applies();
+}
+
 void pqVDIRegenerateWidget::regenerate() {
   auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(this->proxy()));
   if (regenerator == nullptr) return;  // not a filter of the pipeline

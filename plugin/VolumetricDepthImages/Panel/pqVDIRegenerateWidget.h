@@ -17,6 +17,8 @@ class pqVDIRegenerateWidget : public pqPropertyWidget {
   pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty* property, QWidget* parent = nullptr);
   ~pqVDIRegenerateWidget() override;
 
+  void apply() override;
+
  private:
   Q_SLOT void regenerate();
   Q_SLOT void setAuto(bool on);

@@ -1,6 +1,7 @@
 #include "pqVDIRegenerator.h"
 
 #include <pqActiveObjects.h>
+#include <pqAnimationScene.h>
 #include <pqApplicationCore.h>
 #include <pqCoreUtilities.h>
 #include <pqDataRepresentation.h>
@@ -11,6 +12,7 @@
 #include <pqView.h>
 #include <vtkCamera.h>
 #include <vtkCommand.h>
+#include <vtkSMComparativeViewProxy.h>
 #include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMRenderViewProxy.h>
@@ -69,6 +71,13 @@ pqVDIRegenerator::pqVDIRegenerator(pqPipelineSource* source) : QObject(source), 
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::viewAdded, this, &pqVDIRegenerator::viewAdded);
   for (pqView* view : model->findItems<pqView*>()) this->viewAdded(view);
+  this->connect(source, &pqPipelineSource::representationAdded, this,
+                &pqVDIRegenerator::lookWhetherViewsWait);
+  this->connect(source, &pqPipelineSource::representationRemoved, this,
+                &pqVDIRegenerator::lookWhetherViewsWait);
+  this->connect(model, &pqServerManagerModel::proxyAdded, this, &pqVDIRegenerator::proxyAdded);
+  for (pqAnimationScene* scene : model->findItems<pqAnimationScene*>()) this->proxyAdded(scene);
+  this->lookWhetherViewsWait();
 }
 
 pqVDIRegenerator::~pqVDIRegenerator() {
@@ -119,19 +128,80 @@ bool pqVDIRegenerator::isShownIn(pqView* view) const {
 
 /// The first Apply has been undone: the next one is the first again.
 void pqVDIRegenerator::stateChanged() {
-  if (this->Source->modifiedState() == pqProxy::UNINITIALIZED) this->generator()->Forget();
+  if (this->Source->modifiedState() != pqProxy::UNINITIALIZED) {
+    this->generator()->SetUpdatesForView(false);
+    return;
+  }
+  this->generator()->Forget();
+  if (this->Now == State::Idle) return;
+  this->Looking.stop();
+  this->Now = State::Idle;
+  this->generator()->InvokeCommand("Hold");  // gives up what is made
+  this->generator()->InvokeCommand("Release");
+  Q_EMIT this->progress(-1);
+}
+
+/// While an animation is played, views wait: no step would be shown otherwise.
+void pqVDIRegenerator::proxyAdded(pqProxy* proxy) {
+  auto* scene = qobject_cast<pqAnimationScene*>(proxy);
+  if (scene == nullptr) return;
+  using Signal = void (pqAnimationScene::*)(vtkObject*, unsigned long, void*, void*);
+  const auto play = [this](bool plays) {
+    this->IsPlaying = plays;
+    this->lookWhetherViewsWait();
+  };
+  this->connect(scene, static_cast<Signal>(&pqAnimationScene::beginPlay), this, [play] { play(true); });
+  this->connect(scene, static_cast<Signal>(&pqAnimationScene::endPlay), this, [play] { play(false); });
 }
 
 void pqVDIRegenerator::viewAdded(pqView* view) {
   this->connect(view, &pqView::beginRender, this, &pqVDIRegenerator::beginRender);
+  this->connect(view, &pqView::endRender, this, &pqVDIRegenerator::endRender);
+  this->connect(view, &pqView::updateDataEvent, this, &pqVDIRegenerator::viewUpdated);
 }
 
 /// Screenshots and frames of animations wait for the VDI that's being made.
 void pqVDIRegenerator::beginRender() {
   auto* view = qobject_cast<pqView*>(this->sender());
-  if (this->Now == State::Idle || view == nullptr || !this->isShownIn(view)) return;
+  if (view == nullptr || !this->isShownIn(view)) return;
   vtkRenderWindow* window = view->getViewProxy()->GetRenderWindow();
-  if (window != nullptr && vtkVDIRepresentation::IsCaptured(window)) this->generator()->ReleaseNow();
+  if (window == nullptr || !vtkVDIRepresentation::IsCaptured(window)) return;
+  this->IsCaptured = true;
+  this->lookWhetherViewsWait();
+  this->generator()->ReleaseNow();
+}
+
+void pqVDIRegenerator::endRender() {
+  if (!this->IsCaptured) return;
+  this->IsCaptured = false;
+  this->lookWhetherViewsWait();
+}
+
+/// Views that show several time steps side by side would need several VDIs.
+void pqVDIRegenerator::lookWhetherViewsWait() {
+  const QList<pqView*> views = this->Source->getViews();
+  const bool arePlain = std::all_of(views.begin(), views.end(), [](pqView* view) {
+    return vtkSMComparativeViewProxy::SafeDownCast(view->getProxy()) == nullptr;
+  });
+  const bool defers = arePlain && !this->IsCaptured && !this->IsPlaying;
+  if (defers == this->Defers) return;
+  this->Defers = defers;
+  this->generator()->InvokeCommand(defers ? "DeferViews" : "DeferNoViews");
+}
+
+/// The view may have asked for what isn't made yet.
+void pqVDIRegenerator::viewUpdated() {
+  if (this->Now != State::Idle || !this->Defers) return;
+  auto* view = qobject_cast<pqView*>(this->sender());
+  if (view == nullptr || !this->isShownIn(view) || !this->generator()->IsOutdated()) return;
+  this->Now = State::Waiting;
+  this->Rest = 0;
+  this->Resting.start();
+  this->Looking.start();
+}
+
+void pqVDIRegenerator::applies() {
+  if (this->Source->modifiedState() == pqProxy::UNINITIALIZED) this->generator()->SetUpdatesForView(true);
 }
 
 int pqVDIRegenerator::preparation() {

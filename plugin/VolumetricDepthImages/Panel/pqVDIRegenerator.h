@@ -2,7 +2,9 @@
 // opacity function was edited, from a view's camera, and by itself where the filter's Auto is on.
 //
 // While a map is being edited the filter is held: it shows what it has. Once the edit has rested and no mouse
-// button is down, a thread makes the new VDI, which takes the old one's place when it's there.
+// button is down, a thread makes the new VDI, which takes the old one's place when it's there. Likewise where
+// a view asks for a VDI that isn't made yet, after Apply, Undo or with another time step: it goes on showing
+// what it has, unless a picture is taken of it or an animation is played.
 #ifndef pqVDIRegenerator_h
 #define pqVDIRegenerator_h
 
@@ -16,6 +18,7 @@
 #include <vector>
 
 class pqPipelineSource;
+class pqProxy;
 class vtkSMRenderViewProxy;
 class vtkSMVDIGeneratorProxy;
 
@@ -27,6 +30,8 @@ class pqVDIRegenerator : public QObject {
   explicit pqVDIRegenerator(pqPipelineSource* source);
   ~pqVDIRegenerator() override;
 
+  /// The panel is about to apply: the update that comes is for a view.
+  void applies();
   /// From the camera of the view, at its size. The result is empty, or why that can't be.
   QString regenerate(pqView* view);
   /// That of a proxy, null if it's none of a VolumetricDepthImage in the pipeline.
@@ -50,6 +55,10 @@ class pqVDIRegenerator : public QObject {
   Q_SLOT void stateChanged();
   Q_SLOT void viewAdded(pqView* view);
   Q_SLOT void beginRender();
+  Q_SLOT void endRender();
+  Q_SLOT void lookWhetherViewsWait();
+  Q_SLOT void proxyAdded(pqProxy* proxy);
+  Q_SLOT void viewUpdated();
 
   enum class State { Idle, Waiting, Preparing };
 
@@ -73,7 +82,10 @@ class pqVDIRegenerator : public QObject {
   bool IsAuto = false;    // as Auto was when it changed last
   QPointer<pqView> AutoView;
   std::array<double, 10> LastCamera{};
-  bool Tried = false;  // to make a VDI from where the camera rests, or it's left to the user
+  bool Defers = false;      // views don't wait
+  bool IsPlaying = false;   // an animation is
+  bool IsCaptured = false;  // a picture is taken of a view
+  bool Tried = false;       // to make a VDI from where the camera rests, or it's left to the user
   struct Watched;
   std::vector<Watched> Maps;
 };

@@ -72,7 +72,12 @@ void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
   packNothing(piece);
   auto* image = vtkImageData::SafeDownCast(data);
   if (image != nullptr && image->GetNumberOfPoints() == 0) {
-    packProblem(failedUpstream, piece);
+    const std::string why = waitingIn(image->GetFieldData());
+    packProblem(why.empty() ? failedUpstream : noneYet + why + ".", piece);
+    return;
+  }
+  if (image != nullptr && isBeingMade(image->GetFieldData())) {
+    piece->GetFieldData()->ShallowCopy(image->GetFieldData());
     return;
   }
   if (image == nullptr || image->GetFieldData()->GetAbstractArray("VDI.offsets") == nullptr) {
@@ -89,6 +94,10 @@ void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
   } catch (const std::exception& error) {
     packProblem(error.what(), piece);
   }
+}
+
+bool isSaidUpstream(const std::string& problem) {
+  return problem == failedUpstream || problem.starts_with(noneYet);
 }
 
 void markFiltered(vtkPolyData* piece) {

@@ -3,6 +3,7 @@
 //   within a process  the arrays of the VDI's image (VDIImageData.h), shared with it
 //   between two       VDI.file: unsigned char [n], a .vdi file
 // and VDI.problem: a string, instead of either where there's no VDI to show;
+//     VDI.isBeingMade: likewise, where it's being made;
 //     VDI.filter: an empty string, where the pipeline has the filter that has made it.
 #ifndef VDIPiece_h
 #define VDIPiece_h
@@ -20,6 +21,11 @@ namespace pv {
 
 /// The problem where the VDI's filter or reader has failed, which says why as an error.
 constexpr const char* failedUpstream = "There is no VDI to show: what makes it has failed.";
+
+/// How the problem begins where a source waits for a VDI (VDI.waiting).
+constexpr const char* noneYet = "There is no VDI to show yet: ";
+/// Whether it's one of these two, which a view shows and doesn't repeat as an error.
+bool isSaidUpstream(const std::string& problem);
 
 /// Makes `piece` nothing, as ranks and clients without a VDI have it.
 void packNothing(vtkPolyData* piece);

@@ -18,3 +18,35 @@ void vtkVDIImageRepresentation::AddRepresentation(const char* key, vtkPVDataRepr
       vtkVDIPictureRepresentation::SafeDownCast(representation) != nullptr)
     this->Superclass::AddRepresentation(key, representation);
 }
+
+/// Null for null, as where the input is taken away.
+vtkAlgorithmOutput* vtkVDIImageRepresentation::PassOn(vtkAlgorithmOutput* input) {
+  this->Passing->SetInputConnection(input);
+  return input != nullptr ? this->Passing->GetOutputPort() : nullptr;
+}
+
+void vtkVDIImageRepresentation::SetInputConnection(int port, vtkAlgorithmOutput* input) {
+  this->Superclass::SetInputConnection(port, this->PassOn(input));
+}
+
+void vtkVDIImageRepresentation::SetInputConnection(vtkAlgorithmOutput* input) {
+  this->Superclass::SetInputConnection(this->PassOn(input));
+}
+
+void vtkVDIImageRepresentation::AddInputConnection(int port, vtkAlgorithmOutput* input) {
+  this->Superclass::AddInputConnection(port, this->PassOn(input));
+}
+
+void vtkVDIImageRepresentation::AddInputConnection(vtkAlgorithmOutput* input) {
+  this->Superclass::AddInputConnection(this->PassOn(input));
+}
+
+void vtkVDIImageRepresentation::RemoveInputConnection(int port, vtkAlgorithmOutput* input) {
+  this->Superclass::RemoveInputConnection(port, this->Passing->GetOutputPort());
+  this->Passing->RemoveInputConnection(0, input);
+}
+
+void vtkVDIImageRepresentation::RemoveInputConnection(int port, int index) {
+  this->Superclass::RemoveInputConnection(port, index);
+  this->Passing->RemoveInputConnection(0, index);
+}

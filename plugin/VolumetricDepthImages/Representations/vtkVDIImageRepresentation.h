@@ -8,7 +8,10 @@
 #ifndef vtkVDIImageRepresentation_h
 #define vtkVDIImageRepresentation_h
 
+#include <vtkNew.h>
 #include <vtkPVCompositeRepresentation.h>
+
+#include "vtkVDIForViews.h"
 
 #include "vtkVolumetricDepthImagesRepresentationsModule.h"
 
@@ -22,6 +25,16 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIImageRepresentation
   /// Takes those of this module only. The XML has others, too: those of its base.
   void AddRepresentation(const char* key, vtkPVDataRepresentation* representation) override;
 
+  ///@{
+  /// The axes that it has get their input through vtkVDIForViews.
+  void SetInputConnection(int port, vtkAlgorithmOutput* input) override;
+  void SetInputConnection(vtkAlgorithmOutput* input) override;
+  void AddInputConnection(int port, vtkAlgorithmOutput* input) override;
+  void AddInputConnection(vtkAlgorithmOutput* input) override;
+  void RemoveInputConnection(int port, vtkAlgorithmOutput* input) override;
+  void RemoveInputConnection(int port, int index) override;
+  ///@}
+
  protected:
   vtkVDIImageRepresentation() = default;
   ~vtkVDIImageRepresentation() override = default;
@@ -29,6 +42,10 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIImageRepresentation
  private:
   vtkVDIImageRepresentation(const vtkVDIImageRepresentation&) = delete;
   void operator=(const vtkVDIImageRepresentation&) = delete;
+
+  vtkAlgorithmOutput* PassOn(vtkAlgorithmOutput* input);
+
+  vtkNew<vtkVDIForViews> Passing;
 };
 
 #endif

@@ -1,6 +1,7 @@
 #include "vtkVDIProp.h"
 
 #include <vtkDataObject.h>
+#include <vtkFieldData.h>
 #include <vtkInformation.h>
 #include <vtkInformationObjectBaseVectorKey.h>
 #include <vtkMath.h>
@@ -33,6 +34,7 @@
 #include <vector>
 
 #include "VDIBuffers.h"
+#include "VDIImageData.h"
 #include "VDIMessage.h"
 #include "VDIPiece.h"
 #include "VDISession.h"
@@ -175,6 +177,8 @@ struct vtkVDIProp::Internals {
   pv::VDIBuffers Buffers;
   vtkSmartPointer<vtkDataObject> Piece;
   vtkMTimeType PieceTime = 0;
+  bool IsBeingMade = false;  // there is no VDI in the piece yet
+  bool HasJustCome = false;  // the first VDI, after such a piece
   Frame NextFrame = Frame::Whole;
   bool IsBehind = false;           // the window is
   bool IsRecovering = false;       // until a frame has been drawn on the new device as it's to be
@@ -272,7 +276,7 @@ void vtkVDIProp::Say(const std::string& text) {
   this->Internal->ShowMessage(this->GetVisibility() != 0);
   if (text.empty() || text == this->Internal->Said) return;
   this->Internal->Said = text;
-  if (text != pv::failedUpstream) vtkErrorMacro(<< text);
+  if (!pv::isSaidUpstream(text)) vtkErrorMacro(<< text);
 }
 
 void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
@@ -284,6 +288,9 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
     internal.PieceTime = time;
     this->Modified();
     if (piece != nullptr) {
+      const bool isBeingMade = pv::isBeingMade(piece->GetFieldData());
+      internal.HasJustCome = !isBeingMade && (internal.HasJustCome || internal.IsBeingMade);
+      internal.IsBeingMade = isBeingMade;
       internal.Buffers.load(piece);
     } else {
       internal.Buffers.clear();
@@ -293,8 +300,10 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
   if (frame == Frame::Interactive) {
     this->Take(std::chrono::seconds(0));
   } else {
-    this->Take(frame == Frame::Deferred && internal.Buffers.hasVdi() ? shortWait : untilDone);
+    const bool hasFrame = internal.Buffers.hasVdi() || internal.HasJustCome;
+    this->Take(frame == Frame::Deferred && hasFrame ? shortWait : untilDone);
   }
+  if (!internal.Buffers.isLoading()) internal.HasJustCome = false;
   // Whatever is drawn, or isn't as where the camera looks away. A picture of the window that's taken
   // meanwhile doesn't show in it.
   if (frame != Frame::Whole) internal.IsBehind = frame == Frame::Deferred && internal.Buffers.isLoading();
@@ -314,6 +323,10 @@ void vtkVDIProp::LookAround(vtkObject* renderer, unsigned long, void*) {
 void vtkVDIProp::NoteViewpoint(vtkRenderer* renderer) {
   Internals& internal = *this->Internal;
   internal.NoticePlace = vtkVDIMessage::Place::Middle;
+  if (internal.IsBeingMade || internal.HasJustCome) {
+    internal.Notice = "The VDI is being made.";
+    return;
+  }
   if (internal.Buffers.isEmpty()) {
     internal.Notice =
         "This VDI shows nothing: from its viewpoint nothing of its scene is seen, or all of it is "

@@ -1,7 +1,9 @@
 #include "vtkVDIRepresentation.h"
 
+#include <vtkAbstractArray.h>
 #include <vtkAlgorithmOutput.h>
 #include <vtkCommand.h>
+#include <vtkFieldData.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
 #include <vtkMPIMoveData.h>
@@ -24,7 +26,7 @@
 
 #include "VDIPiece.h"
 #include "VDISession.h"
-#include "vtkVDIGenerator.h"
+#include "vtkVDIForViews.h"
 #include "vtkVDIProp.h"
 
 vtkStandardNewMacro(vtkVDIRepresentation);
@@ -50,13 +52,10 @@ bool drawsOnRanks() {
          module->GetNumberOfLocalPartitions() > 1;
 }
 
-/// Whether the filter is upstream, which can make the VDI anew.
-bool comesOfGenerator(vtkAlgorithm* from) {
-  while (from != nullptr && vtkVDIGenerator::SafeDownCast(from) == nullptr) {
-    const bool hasInput = from->GetNumberOfInputPorts() > 0 && from->GetNumberOfInputConnections(0) > 0;
-    from = hasInput ? from->GetInputAlgorithm(0, 0) : nullptr;
-  }
-  return from != nullptr;
+/// Offsets of the VDI that the data set carries; null where there's none.
+vtkAbstractArray* offsetsOf(vtkDataObject* data) {
+  vtkFieldData* fields = data != nullptr ? data->GetFieldData() : nullptr;
+  return fields != nullptr ? fields->GetAbstractArray("VDI.offsets") : nullptr;
 }
 
 bool showsVolumes(vtkPVRenderView* view) {
@@ -134,8 +133,15 @@ int vtkVDIRepresentation::RequestData(vtkInformation* request, vtkInformationVec
                                       vtkInformationVector* outputs) {
   const bool hasInput = inputs[0]->GetNumberOfInformationObjects() > 0;
   if (hasInput && isRoot()) {
-    pv::packVdi(vtkDataObject::GetData(inputs[0]), pv::isServer(), this->Piece);
-    if (comesOfGenerator(this)) pv::markFiltered(this->Piece);
+    vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
+    vtkAbstractArray* offsets = offsetsOf(input);
+    this->HasPacked = true;
+    // The same again, as where the next VDI is being made, isn't sent and loaded once more.
+    if (offsets != nullptr && offsets == this->PackedOf)
+      return this->Superclass::RequestData(request, inputs, outputs);
+    pv::packVdi(input, pv::isServer(), this->Piece);
+    if (vtkVDIForViews::GeneratorOf(this) != nullptr) pv::markFiltered(this->Piece);
+    this->PackedOf = offsets;
   } else {
     pv::packNothing(this->Piece);  // clients have no input, other ranks no VDI
   }
@@ -148,11 +154,15 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
                                              vtkInformation* out) {
   const bool updates = request == vtkPVView::REQUEST_UPDATE() && this->GetNeedsUpdate();
   this->HasPacked = false;
-  if (!this->Superclass::ProcessViewRequest(request, in, out)) return 0;
+  {
+    const vtkVDIForViews::Bracket bracket(request == vtkPVView::REQUEST_UPDATE() ? this : nullptr);
+    if (!this->Superclass::ProcessViewRequest(request, in, out)) return 0;
+  }
   auto* view = vtkPVRenderView::SafeDownCast(in->Get(vtkPVView::VIEW()));
   if (updates && !this->HasPacked && isRoot() && view != nullptr && !view->IsCached(this)) {
     // The input's update has failed. What it was before isn't what is asked for.
     pv::packProblem(pv::failedUpstream, this->Piece);
+    this->PackedOf = nullptr;
     view->ClearCache(this);
   }
   if (request == vtkPVView::REQUEST_UPDATE()) {

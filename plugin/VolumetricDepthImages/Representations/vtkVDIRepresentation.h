@@ -20,6 +20,7 @@
 #include "vtkVDIProp.h"
 #include "vtkVolumetricDepthImagesRepresentationsModule.h"
 
+class vtkAbstractArray;
 class vtkPVRenderView;
 class vtkPolyData;
 class vtkRenderWindow;
@@ -66,8 +67,9 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   void Drop();
   void ForgetInteractor();
 
-  vtkNew<vtkPolyData> Piece;  // pv::packVdi
-  bool HasPacked = false;     // in the update that's going on
+  vtkNew<vtkPolyData> Piece;                  // pv::packVdi
+  bool HasPacked = false;                     // in the update that's going on
+  vtkWeakPointer<vtkAbstractArray> PackedOf;  // offsets of the VDI in the piece
   vtkNew<vtkVDIProp> Prop;
 
   vtkWeakPointer<vtkRenderWindowInteractor> Interactor;  // the view's, observed

@@ -1,0 +1,224 @@
+#include "VDISteering.h"
+
+#include <fmt/format.h>
+#include <vtkMultiProcessController.h>
+#include <vtkProcessModule.h>
+#include <vtkSMExtractsController.h>
+#include <vtkSMPropertyHelper.h>
+#include <vtkSMSourceProxy.h>
+#include <vtkSMTransferFunctionPresets.h>
+#include <vtkSMTransferFunctionProxy.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "VDIParameters.h"
+#include "VDISession.h"
+#include "vdi/core/Error.h"
+#include "vdi/stream/Steering.h"
+#include "vtkVDIStreamWriter.h"
+
+namespace pv {
+
+namespace {
+
+using vdi::stream::Controls;
+using vdi::stream::Wish;
+
+constexpr std::chrono::milliseconds waitingPause{50};
+
+/// The ranks that have clients of their own; null where there is one client.
+vtkMultiProcessController* Ranks() {
+  auto* const controller = vtkMultiProcessController::GetGlobalController();
+  const bool areMany = controller != nullptr && controller->GetNumberOfProcesses() > 1 &&
+                       vtkProcessModule::GetProcessModule()->GetSymmetricMPIMode();
+  return areMany ? controller : nullptr;
+}
+
+bool IsRoot() {
+  auto* const ranks = Ranks();
+  return ranks == nullptr || ranks->GetLocalProcessId() == 0;
+}
+
+/// The filter that makes the VDIs of this input; null if none does.
+vtkSMProxy* GeneratorOf(vtkSMProxy* consumer) {
+  constexpr int farthest = 16;
+  for (int i = 0; i < farthest && consumer != nullptr; ++i) {
+    if (std::string_view(consumer->GetXMLName()) == "VolumetricDepthImage") return consumer;
+    consumer = consumer->GetProperty("Input") != nullptr ? vtkSMPropertyHelper(consumer, "Input").GetAsProxy()
+                                                         : nullptr;
+  }
+  return nullptr;
+}
+
+/// Those of these that this ParaView has.
+std::vector<std::string> Presets() {
+  std::vector<std::string> names;
+  for (const char* const name :
+       {"Cool to Warm (Extended)", "Viridis (matplotlib)", "Inferno (matplotlib)", "Plasma (matplotlib)",
+        "Turbo", "Black-Body Radiation", "Rainbow Uniform", "X Ray"}) {
+    if (vtkSMTransferFunctionPresets::GetInstance()->HasPreset(name)) names.emplace_back(name);
+  }
+  return names;
+}
+
+vtkSMProxy* FunctionOf(vtkSMProxy* generator, const char* property) {
+  return vtkSMPropertyHelper(generator, property).GetAsProxy();
+}
+
+void SetNumbers(vtkSMProxy* proxy, const char* property, const glm::dvec3& numbers) {
+  const std::array<double, 3> all{numbers.x, numbers.y, numbers.z};
+  vtkSMPropertyHelper(proxy, property).Set(all.data(), 3);
+}
+
+void SetCamera(vtkSMProxy* generator, const vdi::Camera& camera) {
+  SetNumbers(generator, "CameraPosition", camera.position);
+  SetNumbers(generator, "CameraFocalPoint", camera.focalPoint);
+  SetNumbers(generator, "CameraViewUp", camera.viewUp);
+  vtkSMPropertyHelper(generator, "CameraParallelProjection").Set(camera.parallelProjection ? 1 : 0);
+  if (camera.parallelProjection) {
+    vtkSMPropertyHelper(generator, "CameraParallelScale").Set(camera.parallelScale);
+  } else {
+    vtkSMPropertyHelper(generator, "CameraViewAngle").Set(camera.viewAngle);
+  }
+}
+
+void SetColours(vtkSMProxy* generator, const Wish& wish) {
+  vtkSMProxy* const colours = FunctionOf(generator, "LookupTable");
+  if (colours == nullptr) return;  // then viewers aren't offered any
+  // The range stays, and the opacities do.
+  constexpr bool toCurrentRange = true;
+  if (wish.preset) vtkSMTransferFunctionProxy::ApplyPreset(colours, wish.preset->c_str(), toCurrentRange);
+  for (vtkSMProxy* const function : {colours, FunctionOf(generator, "ScalarOpacityFunction")}) {
+    if (function == nullptr) continue;
+    if (wish.range)
+      vtkSMTransferFunctionProxy::RescaleTransferFunction(function, (*wish.range)[0], (*wish.range)[1]);
+    function->UpdateVTKObjects();
+  }
+}
+
+bool ChangesVDI(const Wish& wish) {
+  return wish.camera || wish.resolution || wish.supersegments || wish.range || wish.preset;
+}
+
+ParameterExchange ExchangeParameters(std::map<std::string, double> changes) {
+  ParameterExchange exchange{std::move(changes), {}};
+  if (auto* const controller = vtkMultiProcessController::GetGlobalController())
+    controller->InvokeEvent(ParameterExchange::event, &exchange);
+  return exchange;
+}
+
+vdi::stream::GeneratorControls ControlsOf(vtkSMProxy* generator) {
+  vdi::stream::GeneratorControls controls;
+  const vtkSMPropertyHelper resolution(generator, "Resolution");
+  controls.resolution = {resolution.GetAsInt(0), resolution.GetAsInt(1)};
+  controls.supersegments = vtkSMPropertyHelper(generator, "Supersegments").GetAsInt();
+  std::array<double, 2> range{};
+  vtkSMProxy* const colours = FunctionOf(generator, "LookupTable");
+  if (colours != nullptr && vtkSMTransferFunctionProxy::GetRange(colours, range.data()) &&
+      range[0] < range[1]) {
+    controls.range = range;
+    controls.presets = Presets();
+  }
+  return controls;
+}
+
+/// Appends a line. Returns what went wrong; "": nothing did.
+std::string Log(const std::string& path, const std::string& line) {
+  if (path.empty()) return {};
+  std::FILE* const file = std::fopen(path.c_str(), "ae");
+  bool isWritten = file != nullptr && std::fputs((line + "\n").c_str(), file) >= 0;
+  if (file != nullptr && std::fclose(file) != 0) isWritten = false;
+  if (isWritten) return {};
+  return fmt::format("can't log what viewers change to {}: {}", path, std::strerror(errno));
+}
+
+/// The first rank's text.
+std::string OnAllRanks(std::string text) {
+  auto* const ranks = Ranks();
+  if (ranks == nullptr) return text;
+  int length = static_cast<int>(text.size());
+  ranks->Broadcast(&length, 1, 0);
+  text.resize(static_cast<std::size_t>(length));
+  if (length > 0) ranks->Broadcast(text.data(), length, 0);
+  return text;
+}
+
+}  // namespace
+
+bool Steering::IsDue() {
+  if (++this->SinceLast < this->Period) return false;
+  this->SinceLast = 0;
+  return true;
+}
+
+void Steering::Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor) {
+  auto* const server = vtkVDIStreamWriter::SafeDownCast(writer->GetClientSideObject());
+  if (server == nullptr)
+    throw vdi::Error(vdi::ErrorCode::InvalidArgument, "steering needs a script in the process that serves");
+  if (auto* const ranks = Ranks()) enterCollective(ranks, "steering of VDIStream");
+  vtkSMProxy* const generator = GeneratorOf(writer);
+  const bool isRoot = IsRoot();
+  std::string trouble;  // told when no other rank waits for this one
+  if (isRoot) this->Tell(server, generator);
+  do {
+    const std::chrono::milliseconds patience = this->IsPaused ? waitingPause : std::chrono::milliseconds(0);
+    std::optional<vdi::stream::Request> request;
+    if (isRoot) {
+      request = server->TakeRequest(patience);
+    } else {
+      std::this_thread::sleep_for(patience);  // a broadcast would take all of a core while it waits
+    }
+    const std::string text = OnAllRanks(request ? vdi::stream::textOf(request->wish) : "");
+    if (text.empty()) continue;
+    const Wish wish = vdi::stream::wishOf(text);
+    this->Apply(wish, generator);
+    if (isRoot) {
+      this->Tell(server, generator);
+      fmt::print(stderr, "VDIStream: step {}: {} (viewer {})\n", extractor->GetTimeStep(),
+                 vdi::stream::summaryOf(wish), request->viewer);
+      const std::string failure =
+          Log(vtkSMPropertyHelper(writer, "SteeringLog").GetAsString(),
+              vdi::stream::logEntryOf(*request, extractor->GetTimeStep(), extractor->GetTime()));
+      if (trouble.empty()) trouble = failure;
+    }
+    if (!ChangesVDI(wish)) continue;
+    this->SinceLast = this->Period;  // whoever asks for a view needn't wait for a long period
+    if (this->IsPaused) writer->UpdatePipeline(extractor->GetTime());
+  } while (this->IsPaused);
+  if (!trouble.empty()) throw vdi::Error(vdi::ErrorCode::Io, trouble);
+}
+
+void Steering::Apply(const Wish& wish, vtkSMProxy* generator) {
+  if (generator != nullptr && ChangesVDI(wish)) {
+    if (wish.camera) SetCamera(generator, *wish.camera);
+    if (wish.resolution) vtkSMPropertyHelper(generator, "Resolution").Set(wish.resolution->data(), 2);
+    if (wish.supersegments) vtkSMPropertyHelper(generator, "Supersegments").Set(*wish.supersegments);
+    SetColours(generator, wish);
+    generator->UpdateVTKObjects();
+  }
+  if (!wish.parameters.empty()) (void)ExchangeParameters(wish.parameters);
+  this->Period = wish.period.value_or(this->Period);
+  this->IsPaused = wish.paused.value_or(this->IsPaused);
+}
+
+void Steering::Tell(vtkVDIStreamWriter* server, vtkSMProxy* generator) const {
+  Controls controls;
+  if (generator != nullptr) controls.generator = ControlsOf(generator);
+  controls.period = this->Period;
+  controls.paused = this->IsPaused;
+  for (const ParameterExchange::Parameter& one : ExchangeParameters({}).parameters)
+    controls.parameters.push_back({one.name, one.isWhole, one.value, one.low, one.high});
+  server->SetControls(controls);
+}
+
+}  // namespace pv

@@ -1,0 +1,59 @@
+#include "pqVDIStreamFollower.h"
+
+#include <pqApplicationCore.h>
+#include <pqPipelineSource.h>
+#include <pqServer.h>
+#include <pqServerManagerModel.h>
+#include <vtkSMPropertyHelper.h>
+#include <vtkSMSourceProxy.h>
+#include <QApplication>
+
+#include "VDIViewpoint.h"
+
+namespace {
+
+constexpr int lookMilliseconds = 100;
+constexpr int lookRemotelyMilliseconds = 250;
+
+}  // namespace
+
+pqVDIStreamFollower::pqVDIStreamFollower(pqPipelineSource* source) : QObject(source), Source(source) {
+  this->Looking.setInterval(source->getServer()->isRemote() ? lookRemotelyMilliseconds : lookMilliseconds);
+  this->connect(&this->Looking, &QTimer::timeout, this, &pqVDIStreamFollower::look);
+  this->Looking.start();
+}
+
+pqVDIStreamFollower::~pqVDIStreamFollower() = default;
+
+pqVDIStreamFollower* pqVDIStreamFollower::of(vtkSMProxy* proxy) {
+  auto* source = pqApplicationCore::instance()->getServerManagerModel()->findItem<pqPipelineSource*>(proxy);
+  return source != nullptr ? source->findChild<pqVDIStreamFollower*>() : nullptr;
+}
+
+void pqVDIStreamFollower::lookFromViewpoint() {
+  this->WaitsForFirst = !pv::viewpointOf(this->Source->getProxy());
+  if (!this->WaitsForFirst) pv::lookFromViewpointOf(this->Source);
+}
+
+void pqVDIStreamFollower::look() {
+  // A hand that turns the view isn't interrupted. A server that is at work would let this wait.
+  if (this->Source->modifiedState() == pqProxy::UNINITIALIZED ||
+      QApplication::mouseButtons() != Qt::NoButton || this->Source->getServer()->isProgressPending())
+    return;
+  auto* proxy = vtkSMSourceProxy::SafeDownCast(this->Source->getProxy());
+  for (const char* name : {"Arrivals", "Connection"})
+    proxy->UpdatePropertyInformation(proxy->GetProperty(name));
+  const int arrivals = vtkSMPropertyHelper(proxy, "Arrivals").GetAsInt();
+  if (arrivals != this->Seen) {
+    this->Seen = arrivals;
+    proxy->InvokeCommand("Take");
+    proxy->MarkDirty(proxy);
+    this->Source->renderAllViews();
+    if (this->WaitsForFirst) this->lookFromViewpoint();
+    proxy->UpdatePropertyInformation(proxy->GetProperty("Connection"));
+  }
+  const QString line = vtkSMPropertyHelper(proxy, "Connection").GetAsString();
+  if (line == this->Line) return;
+  this->Line = line;
+  Q_EMIT this->lineChanged();
+}

@@ -1,0 +1,280 @@
+"""The source VDI Stream against `vdi serve` of a folder: what is shown is what an opened file shows, a new one arrives, Pause
+keeps one, a server comes back, and the token stays out of what is saved and said. On any number of ranks."""
+
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+
+import server
+from paraview import servermanager, simple, smtrace
+from pvtest import OUTPUT, check, finish, make_view, message_in, read_png
+from vtkmodules.util.numpy_support import vtk_to_numpy
+
+TOOL, SIZE, PATIENCE = os.environ["VDI_TOOL"], [160, 120], 60
+TOKEN = "aToken-of-this-test-alone"
+scratch = tempfile.mkdtemp()
+environment = server.clean_environment(VDI_TOKEN=TOKEN)
+
+
+def run(*arguments):
+    subprocess.run([TOOL, *arguments], check=True, timeout=PATIENCE, env=environment, stdout=subprocess.DEVNULL)
+
+
+def until(condition, what):
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > end:
+            check(False, what + ": never")
+            return
+        time.sleep(0.05)
+
+
+class Folder:
+    """With VDIs in it, and its server."""
+
+    def __init__(self, name):
+        self.path = os.path.join(scratch, name)
+        os.mkdir(self.path)
+        self.process, self.port = None, "0"
+
+    def appear(self, step):
+        """As a simulation's file does: whole at once."""
+        shutil.copy(made(step), os.path.join(self.path, ".part"))
+        os.rename(os.path.join(self.path, ".part"), os.path.join(self.path, "%06d.vdi" % step))
+
+    def serve(self):
+        self.process = subprocess.Popen([TOOL, "serve", "--port", self.port, self.path], stdout=subprocess.PIPE, text=True,
+                                        env=environment, stderr=subprocess.DEVNULL)
+        self.address = self.process.stdout.readline().strip()
+        self.port = self.address.rstrip("/").rpartition(":")[2]
+        self.link = self.address + "#token=" + TOKEN
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+
+def made(step):
+    path = os.path.join(scratch, "made_%d.vdi" % step)
+    if not os.path.exists(path):
+        run("generate", "--field", "turbulence", "--seed", str(step), "--size", "24x24x24", "--resolution", "96x72",
+            "--supersegments", "8", "--step", str(step), "--time", str(step), "-o", path)
+    return path
+
+
+def information(source, name):
+    source.UpdatePropertyInformation(source.GetProperty(name).SMProperty)
+    return source.GetPropertyValue(name)
+
+
+def take(source):
+    source.InvokeCommand("Take")
+    source.MarkDirty(source.SMProxy)
+
+
+def take_next(source, seen):
+    """Once there are more arrivals than `seen`."""
+    until(lambda: information(source, "Arrivals") > seen, "another arrival")
+    take(source)
+
+
+def step_of(source):
+    """Of the VDI that it gives."""
+    source.UpdatePipeline()
+    parameters = source.GetClientSideObject().GetOutputDataObject(0).GetFieldData().GetArray("VDI.parameters")
+    return None if parameters is None else int(vtk_to_numpy(parameters)[3])
+
+
+def screenshot(source):
+    """From beside the viewpoint, of that source alone."""
+    simple.HideAll(view)
+    simple.Show(source, view).SetRepresentationType("VDI")
+    view.CameraPosition, view.CameraFocalPoint = [2.2, 1.4, 2.0], [0.5, 0.5, 0.5]
+    path = os.path.join(OUTPUT, "stream_source_{}.png".format(os.getpid()))
+    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
+    seen = read_png(path)
+    os.remove(path)
+    return seen
+
+
+def shows(source, step):
+    """Whether the view shows what the opened file shows."""
+    opened = simple.OpenDataFile(made(step))
+    expected = screenshot(opened)
+    seen = screenshot(source)
+    simple.Delete(opened)
+    return expected.std() > 10 and bool((seen == expected).all())
+
+
+def said(call):
+    """What is written to the standard error meanwhile."""
+    with tempfile.TemporaryFile("w+") as file:
+        kept = os.dup(2)
+        os.dup2(file.fileno(), 2)
+        try:
+            call()
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+        file.seek(0)
+        return file.read()
+
+
+def text_of(path):
+    with open(path, encoding="utf-8") as file:
+        return file.read()
+
+
+def shown_and_renewed():
+    live = Folder("live")
+    live.appear(1)
+    live.serve()
+    source = simple.VDIStream(URL=live.link, Patience=PATIENCE)
+    check(shows(source, 1), "the stream looks like the opened file")
+    check(source.URL == live.address, "the token leaves the URL at once: " + source.URL.replace(TOKEN, "TOKEN"))
+    line = information(source, "Connection")
+    check(line.startswith("127.0.0.1:%s: live" % live.port) and "step 1" in line, "the panel's line: " + line)
+
+    seen = information(source, "Arrivals")
+    live.appear(2)
+    take_next(source, seen)
+    check(step_of(source) == 2, "a file that appears is taken")
+
+    source.Pause = 1
+    source.UpdateVTKObjects()
+    live.appear(3)
+    time.sleep(0.5)
+    take(source)
+    check(step_of(source) == 2, "a pause keeps the VDI")
+    seen = information(source, "Arrivals")
+    source.Pause = 0
+    source.UpdateVTKObjects()
+    until(lambda: take(source) or step_of(source) == 3, "the newest one after a pause")
+    check(information(source, "Arrivals") > seen, "the end of a pause counts")
+
+    live.kill()
+    until(lambda: "trying again" in information(source, "Connection"), "word of a lost connection")
+    take(source)
+    check(step_of(source) == 3, "what a lost server has sent stays")
+    live.appear(4)
+    seen = information(source, "Arrivals")
+    live.serve()
+    until(lambda: take(source) or step_of(source) == 4, "the next VDI of a server that is back")
+    check(shows(source, 4), "a server that is back is shown")
+    return live, source
+
+
+def paused_from_the_start(live):
+    source = simple.VDIStream(URL=live.link, Patience=PATIENCE, Pause=1)
+    check(step_of(source) == 4, "a source that begins in a pause has the first VDI")
+    simple.Delete(source)
+
+
+def two(live, source):
+    other = Folder("other")
+    other.appear(5)
+    other.serve()
+    second = simple.VDIStream(URL=other.link, Patience=PATIENCE)
+    check(step_of(second) == 5 and step_of(source) == 4, "two sources have a VDI each")
+    seen = information(second, "Arrivals")
+    second.URL = live.link
+    check(step_of(second) == 4 and information(second, "Arrivals") > seen, "another URL brings that server's VDI")
+    simple.Delete(second)
+    check(step_of(source) == 4, "and one outlives the other")
+    other.kill()
+
+
+def nothing_yet():
+    empty = Folder("empty")
+    empty.serve()
+    source = simple.VDIStream(URL=empty.link, Patience=0.5)
+    text = said(lambda: screenshot(source))
+    check(text == "", "a source that waits is no error: " + text)
+    check("There is no VDI to show yet" in message_in(view), "the view says that there is none yet: " + message_in(view))
+    empty.appear(1)
+    take_next(source, 0)
+    check(step_of(source) == 1, "and has the first one")
+    simple.Delete(source)
+    empty.kill()
+
+
+def wrong_token(live):
+    wrong = "0123456789abcdef-isn't-it"
+    source = simple.VDIStream(URL=live.address + "#token=" + wrong, Patience=PATIENCE)
+
+    def use():
+        for _ in range(2):
+            screenshot(source)
+            take(source)
+
+    text = said(use)
+    line = information(source, "Connection")
+    check("the token is wrong" in line and "\n" not in line, "a wrong token is one line: " + line)
+    check(text.count("the token is wrong") == 1, "and is said once: " + text)
+    check("the token is wrong" in message_in(view), "and in the view: " + message_in(view))
+    check(wrong not in text + line + message_in(view), "without the token")
+    source.URL = live.link
+    check(step_of(source) == 4, "the right link mends that")
+    simple.Delete(source)
+
+
+def saved_without_token(live, source):
+    smtrace.start_trace()
+    traced = simple.VDIStream(registrationName="traced", URL=live.link)
+    trace = smtrace.stop_trace()
+    simple.Delete(traced)
+    texts = {"trace": trace, "description": str(source.GetClientSideObject())}
+    files = {name: os.path.join(scratch, "saved." + name) for name in ("pvsm", "py", "json")}
+    simple.SaveState(files["pvsm"])
+    simple.SaveState(files["py"])
+    settings = servermanager.vtkSMSettings.GetInstance()
+    settings.SetProxySettings(source.SMProxy, None)
+    settings.SaveSettingsToFile(files["json"])
+    for name, path in files.items():
+        with open(path, encoding="utf-8") as file:
+            texts[name] = file.read()
+    for name, text in texts.items():
+        check(live.address in text, "there's the URL in the " + name)
+        check(TOKEN not in text, "and no token")
+
+    simple.ResetSession()
+    simple.LoadState(files["pvsm"])
+    loaded, = simple.GetSources().values()
+    text = said(loaded.UpdatePipeline)
+    check("there is no token" in information(loaded, "Connection") and text.count("there is no token") == 1,
+          "a loaded state says that it needs one, once: " + text)
+    loaded.URL = live.link
+    check(step_of(loaded) == 4, "and gets it by the link")
+    return loaded
+
+
+def deleted_while_connecting():
+    """To what takes connections and never answers."""
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        source = simple.VDIStream(URL="http://127.0.0.1:%d/#token=%s" % (silent.getsockname()[1], TOKEN), Patience=0)
+        begin = time.monotonic()
+        source.UpdatePipeline()
+        simple.Delete(source)
+        del source
+        seconds = time.monotonic() - begin
+        check(seconds < 0.5, "a source that connects in vain is deleted at once, not after %g s" % seconds)
+
+
+view = make_view(SIZE, [2.2, 1.4, 2.0], [0.5, 0.5, 0.5])
+live, source = shown_and_renewed()
+paused_from_the_start(live)
+two(live, source)
+nothing_yet()
+wrong_token(live)
+source = saved_without_token(live, source)
+deleted_while_connecting()
+simple.Delete(source)
+live.kill()
+shutil.rmtree(scratch)
+finish()
