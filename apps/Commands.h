@@ -23,6 +23,8 @@ void addExport(CLI::App& app, Job& job);
 void addServe(CLI::App& app, Job& job);
 void addReceive(CLI::App& app, Job& job);
 void addCompare(CLI::App& app, Job& job);
+void addCheck(CLI::App& app, Job& job);
+void addLog(CLI::App& app, Job& job);
 void addInfo(CLI::App& app, Job& job);
 
 }  // namespace vdi::apps

@@ -95,6 +95,8 @@ Outcome runTool(int argc, char** argv) {
   vdi::apps::addServe(app, job);
   vdi::apps::addReceive(app, job);
   vdi::apps::addCompare(app, job);
+  vdi::apps::addCheck(app, job);
+  vdi::apps::addLog(app, job);
   vdi::apps::addInfo(app, job);
   vdi::bench::addBench(app, job);
   try {

@@ -2,7 +2,7 @@
 beside it, each next to plain volume rendering from the same viewpoint, and how alike they are (SSIM).
 
 Environment: VDI_PLUGIN (the plugin; the adaptor sets it), VDI_OUTPUT (folder), VDI_WIDTH and VDI_HEIGHT (of the pictures),
-VDI_LIVE (1: browsers see the VDIs; the link is in vdi-stream.link)."""
+VDI_LIVE (1: browsers see the VDIs and may steer; the link is in vdi-stream.link)."""
 
 import os
 
@@ -78,6 +78,8 @@ extractor.Writer.FileName = "vdi_{timestep:06d}.vdi"
 if os.environ.get("VDI_LIVE") == "1":
     stream = CreateExtractor("VDIStream", image, registrationName="stream")
     stream.Writer.LinkFile = os.path.join(OUTPUT, "vdi-stream.link")
+    stream.Writer.Steer = 1
+    stream.Writer.SteeringLog = os.path.join(OUTPUT, "vdi-steering.jsonl")
 
 options = catalyst.Options()
 options.ExtractsOutputDirectory = OUTPUT

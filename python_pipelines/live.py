@@ -28,6 +28,9 @@ image.CameraFocalPoint = [0.5, 0.5, 0.5]
 
 stream = CreateExtractor("VDIStream", image, registrationName="stream")
 stream.Writer.Port = 0  # a port that is free; one of your own stays the same from run to run
+# 1: whoever has the link may steer, that is, change viewpoint, colours and the parameters that the simulation declares.
+stream.Writer.Steer = int(os.environ.get("VDI_STEER", 0))
+stream.Writer.SteeringLog = os.path.join(os.environ.get("VDI_OUTPUT", "."), "vdi-steering.jsonl")
 stream.Writer.LinkFile = os.path.join(os.environ.get("VDI_OUTPUT", "."), "vdi-stream.link")
 
 options = catalyst.Options()

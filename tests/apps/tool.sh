@@ -117,6 +117,16 @@ assert cut["missing_most"] > 0.01 > 0.002 > kept["missing_most"], (cut, kept)
 assert kept["ssim"] > cut["ssim"] and kept["stored_bytes"] > cut["stored_bytes"], (cut, kept)
 assert row["sphere", 1, 2, "nearest"]["stored_bytes"] > 1.5 * kept["stored_bytes"]
 P
+works "bench on the way to a viewer" "$vdi" bench --suite stream --fields turbulence "${small[@]}" --frames 3 \
+  --period 200 --rates 1Gbit -o stream.json
+python3 - <<'P' || fail "stream.json isn't what it should be"
+import json
+rows = json.load(open("stream.json"))["rows"]
+assert [row["way"] for row in rows] == ["live", "folder"], rows
+for row in rows:
+    assert row["frames_seen"] >= 2 and row["frames_per_second"] > 0 and row["age_ms"] > 0, row
+P
+refused 2 "rates" "$vdi" bench --suite stream --fields sphere "${small[@]}" --rates fast -o x.json
 refused 2 "sets" "$vdi" bench --suite viewpoints --fields sphere "${small[@]}" --sets 3 -o x.json
 
 works "bench" "$vdi" bench --fields sphere "${small[@]}" --repeats 1 --angles 0 20 -o bench.json
@@ -267,6 +277,18 @@ refused 1 "regressions" "$vdi" bench --compare bench.json worse.json
 head -c 200 one.vdi >short.vdi
 refused 1 "short.vdi" "$vdi" render short.vdi -o x.png
 refused 1 "v.json" "$vdi" info v.json
+works "check" "$vdi" check '{"field": "V", "every": 10}'
+grep -q "steps 0, 10, 20" out.txt || fail "check doesn't tell the steps"
+grep -q "vdi_000010.vdi" out.txt || fail "check doesn't tell the files"
+printf '{"field": "V",\n"camera": {"position": [0, 0]}}' >run.json
+refused 1 "/camera/position: must be an array of 3 numbers .run.json, line 2." "$vdi" check run.json
+works "check" "$vdi" check '{"field": "V", "log": "logs/run.jsonl"}'
+grep -q "a log: logs/run.jsonl" out.txt || fail "check doesn't tell the log"
+refused 1 "not a run's log .*odd.json" "$vdi" log odd.json
+refused 2 "would write over" "$vdi" log odd.json -o odd.json
+mkfifo pipe.json
+refused 1 "pipe.json" timeout 10 "$vdi" check pipe.json
+refused 1 "none.json" "$vdi" check '{"field": "V", "colors": {"file": "none.json"}}'
 refused 2 "nonsense" "$vdi" generate --field nonsense -o x.vdi
 refused 2 "supersegments" "$vdi" generate --field sphere --supersegments 0 -o x.vdi
 refused 2 "0x5" "$vdi" generate --field sphere --resolution 0x5 -o x.vdi
