@@ -41,8 +41,7 @@ with open(LOG, "w") as log, open(os.path.join(OUTPUT, "server.log"), "w+") as se
     finally:
         for process in (client, pvserver):
             if process is not None:
-                process.terminate()
-                process.wait(20)
+                server.end(process)
 said = lines()
 print("".join(said))
 assert len(said) == 1 and "VolumetricDepthImages" in said[0], "the window says it %d times" % len(said)

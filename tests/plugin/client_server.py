@@ -37,7 +37,7 @@ class Session:
         try:
             self.server.wait(5)  # mpirun doesn't always see that its ranks have ended
         except subprocess.TimeoutExpired:
-            self.server.terminate()
+            server.end(self.server)
         self.relay.kill()
 
     def bytes(self):

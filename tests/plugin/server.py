@@ -30,3 +30,14 @@ def start(*arguments, ranks=1, **options):
 def start_reverse(port, **options):
     """One that connects to a client, which is the one to listen."""
     return start("--reverse-connection", "--client-host=127.0.0.1", "--server-port=" + port, **options)
+
+
+def end(process, patience=20):
+    """Ends a process of ParaView's. ParaView prints its stack when it gets SIGTERM, and locks up if it was allocating
+    memory just then, as it does when a client has left it. It is killed after `patience` seconds."""
+    process.terminate()
+    try:
+        process.wait(patience)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -19,6 +19,5 @@ try:
     simple.Render(view)
     assert view.GetRenderWindow().GetSize()[0] > 0
 finally:
-    pvserver.terminate()
-    pvserver.wait(20)
+    server.end(pvserver)
 print("the wavelet was shown")

@@ -203,8 +203,7 @@ class Server:
         return self
 
     def __exit__(self, *error):
-        self.process.terminate()
-        self.process.wait()
+        server.end(self.process)
 
 
 class Window:
@@ -241,18 +240,13 @@ class Window:
         if error and error[0] is not None:
             self.screenshot("failed.png")
         if self.process.poll() is None:
-            self.process.terminate()
-            try:
-                self.process.wait(10)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-                self.process.wait()
+            server.end(self.process, 10)
         self.log.close()
         self.session.end()
 
     def _main_window(self):
         assert self.process.poll() is None, "ParaView ended by itself: " + self.log_text()[-2000:]
-        found = xdotool("search", "--onlyvisible", "--pid", str(self.process.pid), "--name", "^ParaView 5").split()
+        found = xdotool("search", "--onlyvisible", "--pid", str(self.process.pid), "--name", "^ParaView [56]").split()
         return found[-1] if found else None
 
     def _answers(self):
