@@ -11,6 +11,7 @@ layout(push_constant, scalar) uniform Push { ExpandConstants push; };
 #include "exact.glsl"
 #include "store.glsl"
 #include "render_segment.glsl"
+#include "slopes.glsl"
 
 void expandSegment(uint i) {
   OpticalSegment segment = loadSegment(push.from, i, push.form);
@@ -53,18 +54,29 @@ void findBins() {
       floatBitsToUint(farthest > nearest ? float(renderBins) / (farthest - nearest) : 0.0);
 }
 
+// How far a leaning face moves in a list. Rays are intersected with a list up to half a list from its middle
+// along one axis, and one and a half lists along the other.
+float reachOf(vec2 slopes) { return 1.5 * max(slopes.x, slopes.y) + 0.5 * min(slopes.x, slopes.y); }
+
 void maskList(uint list) {
   float nearest = uintBitsToFloat(push.depthRange.at[0]);
   float binScale = uintBitsToFloat(push.depthRange.at[2]);
+  float slopeUnit = footprintOf() * (renderMaxSlope / renderSlopes);
+  float reach = 0.0;
   uint64_t mask = 0ul;
   uint first = push.offsets.at[list];
   uint end = push.offsets.at[list + 1u];
   RenderSegmentArray segments = renderSegmentsFrom(push.segments, first);
   for (uint i = 0u; i < end - first; ++i) {
     RenderSegment segment = segments.at[i];
-    mask |= maskOf(segment.front, segment.back, nearest, binScale);
+    vec4 slopes = abs(segmentSlopes(push.slopes.at[first + i]));
+    float front = reachOf(slopes.xy);
+    float back = reachOf(slopes.zw);
+    reach = max(reach, max(front, back));
+    mask |= maskOf(segment.front - slopeUnit * front, segment.back + slopeUnit * back, nearest, binScale);
   }
-  push.heads.at[list] = ListHead(first, end - first, mask);
+  uint reachCode = uint(ceil(reach / listReachUnit));
+  push.heads.at[list] = ListHead(first, end - first | reachCode << listCountBits, mask);
 }
 
 // Includes the lists around the tile, which smooth reconstruction uses within the tile.
@@ -96,6 +108,9 @@ void main() {
     addDepths(i, i < uint(push.lists.x) * uint(push.lists.y));
   } else if (push.mode == expandModeBins) {
     if (i == 0u) findBins();
+  } else if (push.mode == expandModeSlopes) {
+    if (i < uint(push.lists.x) * uint(push.lists.y))
+      findSlopes(ivec2(int(i) % push.lists.x, int(i) / push.lists.x));
   } else if (push.mode == expandModeMasks) {
     uint listCount = uint(push.lists.x) * uint(push.lists.y);
     if (i < listCount) maskList(i);

@@ -21,3 +21,10 @@ float segmentDensity(uvec4 segment) { return uintBitsToFloat(segment.z); }
 
 // Front and back.
 vec2 segmentDepths(uvec4 segment) { return uintBitsToFloat(segment.xy); }
+
+// Slopes of front and back, along x and y each (vdi/reference/Slopes.h).
+vec4 segmentSlopes(uint word) {
+  int bits = int(word);
+  return vec4(bitfieldExtract(bits, 0, 8), bitfieldExtract(bits, 8, 8), bitfieldExtract(bits, 16, 8),
+              bitfieldExtract(bits, 24, 8));
+}

@@ -1,5 +1,5 @@
-// Traverses a ray from column to column of V_O's picture. Reconstruction::Smooth blends the two lists of each
-// that are beside the ray; Reconstruction::Constant uses the one or two that the ray crosses. Twin of
+// Traverses a ray from column to column of V_O's picture. Reconstruction::Smooth and Sheared blend the two
+// lists of each that are beside the ray; Reconstruction::Constant uses the one or two that the ray crosses. Twin of
 // traverseSmoothly and traverseLists in vdi/reference/Render.cpp.
 //
 // Needs: masks.glsl, tile_mask.glsl, line.glsl, intersect.glsl; params, smoothReconstruction, lanesPerRay,
@@ -25,7 +25,9 @@ Intersection ofBoth(Intersection own) {
 
 // Intersects a ray that stays near one position of V_O's picture with the four lists around it.
 Intersection intersectAlongLists(PictureLine line, vec2 stretch) {
-  vec2 place = 0.5 * (pictureAt(ray, stretch.x) + pictureAt(ray, stretch.y)) - 0.5;
+  vec2 begin = pictureAt(ray, stretch.x) - 0.5;
+  vec2 end = pictureAt(ray, stretch.y) - 0.5;
+  vec2 place = 0.5 * (begin + end);
   vec2 first = floor(place);
   float shareX = shareOfNext(place.x - first.x);
   float shareY = shareOfNext(place.y - first.y);
@@ -37,8 +39,10 @@ Intersection intersectAlongLists(PictureLine line, vec2 stretch) {
     uint list = listOf(true, pixel.x, pixel.y);
     if (!(weight > 0.0) || !mayMeet(params.heads.at[list].mask, vec2(line.bins.x, at(line.bins, 1.0))))
       continue;
-    Intersection intersection =
-        intersectWholeList(list, partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5)));
+    Part part = partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5));
+    part.begin = begin - vec2(pixel);
+    part.end = end - vec2(pixel);
+    Intersection intersection = intersectWholeList(list, part);
     sum.light += weight * intersection.light;
     sum.entered = min(sum.entered, intersection.entered);
   }
@@ -48,6 +52,8 @@ Intersection intersectAlongLists(PictureLine line, vec2 stretch) {
 // A column that the ray crosses, and two of its lists: those beside the ray, or those where the ray enters
 // and leaves the column.
 struct Column {
+  int column;
+  vec2 edges;  // progress where the ray enters and leaves it
   vec2 fractions;
   ivec2 rows;
   float share;  // of the second one
@@ -57,6 +63,8 @@ struct Column {
 // `edges` are the line's progress, in columns, at the column's two edges.
 Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
   Column here;
+  here.column = column;
+  here.edges = vec2(min(edges.x, edges.y), max(edges.x, edges.y));
   here.fractions = vec2(min(fractions.x, fractions.y), max(fractions.x, fractions.y));
   ivec2 maxRow = ivec2(columnCount(!line.byColumns) - 1);
   if (smoothReconstruction) {
@@ -65,8 +73,7 @@ Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
     here.share = shareOfNext(centre - below);
     here.rows = clamp(int(below) + ivec2(0, 1), ivec2(0), maxRow);
   } else {
-    vec2 inOut = vec2(min(edges.x, edges.y), max(edges.x, edges.y));
-    here.rows = clamp(ivec2(floor(line.row + inOut * line.rows)), ivec2(0), maxRow);
+    here.rows = clamp(ivec2(floor(line.row + here.edges * line.rows)), ivec2(0), maxRow);
     // A diagonal through corners may touch a third list: too little to intersect.
     here.rows.x = clamp(here.rows.x, here.rows.y - 1, here.rows.y + 1);
     here.share = here.rows.x == here.rows.y ? 0.0 : 0.5;
@@ -132,8 +139,14 @@ Intersection intersectSide(PictureLine line, Column here, float shortening, bool
     split = clamp(split, fractions.x, fractions.y);
     fractions = second ? vec2(split, fractions.y) : vec2(fractions.x, split);
   }
-  Intersection intersection =
-      intersectList(second ? here.lists.y : here.lists.x, partOf(line, fractions, shortening), hint);
+  Part part = partOf(line, fractions, shortening);
+  if (shearedReconstruction) {
+    vec2 along = line.start + line.direction * here.edges - (float(here.column) + 0.5);
+    vec2 across = line.row + line.rows * here.edges - (float(second ? here.rows.y : here.rows.x) + 0.5);
+    part.begin = line.byColumns ? vec2(along.x, across.x) : vec2(across.x, along.x);
+    part.end = line.byColumns ? vec2(along.y, across.y) : vec2(across.y, along.y);
+  }
+  Intersection intersection = intersectList(second ? here.lists.y : here.lists.x, part, hint);
   if (smoothReconstruction) intersection.light *= second ? here.share : 1.0 - here.share;
   return intersection;
 }

@@ -5,11 +5,15 @@
 
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
+#include "vdi/core/Reconstruction.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/synthetic/Decomposition.h"
 #include "vdi/synthetic/Fields.h"
 
 namespace vdi::test {
+
+inline constexpr Reconstruction reconstructions[] = {Reconstruction::Sheared, Reconstruction::Smooth,
+                                                     Reconstruction::Constant};
 
 /// Low and high values of the scalar type that a field's [0, 1] is stretched over.
 inline double topOf(ScalarType type) {

@@ -27,6 +27,15 @@ VDI_CONST uint expandModeBins = 2;        // one invocation
 VDI_CONST uint expandModeMasks = 3;       // one a list
 VDI_CONST uint expandModeTiles = 4;       // one a tile
 VDI_CONST uint expandModeLargeTiles = 5;  // one a large tile
+VDI_CONST uint expandModeSlopes = 6;      // one a list
+// Reconstruction::Sheared (vdi/reference/Slopes.h).
+VDI_CONST float renderMaxSlope = 8.0F;  // depth per list, in footprints: 83 degrees
+VDI_CONST float renderSlopes = 127.0F;  // steps from 0 to renderMaxSlope
+VDI_CONST int renderNoSlope = -128;
+VDI_CONST float renderMostDepth = 6.0F;      // optical depth of a supersegment, behind which hardly anything shows
+// Values that are equal but for rounding decide the same everywhere.
+VDI_CONST float renderTie = 1.0F / 64.0F;
+VDI_CONST float renderLeastOpacity = 0.05F;  // over a footprint
 VDI_CONST int renderTileShift = 3;
 VDI_CONST int renderTile = 1 << renderTileShift;  // lists per side of a tile
 VDI_CONST int renderLargeTile = 64;               // lists per side, a multiple of renderTile
@@ -49,10 +58,13 @@ struct DepthRange {
 };
 
 // The data of a list that a ray reads first: the position of its supersegments in the compact array, and its
-// mask.
+// mask. `countAndReach` has the number of supersegments in its low listCountBits bits, and above them how far
+// leaning faces reach beyond their depths in the list's middle, in units of listReachUnit slopes.
+VDI_CONST uint listCountBits = 24;
+VDI_CONST float listReachUnit = 2.0F;
 struct ListHead {
   uint first;
-  uint count;
+  uint countAndReach;
   uint64_t mask;
 };
 
@@ -82,9 +94,15 @@ RenderSegmentArray renderSegmentsFrom(RenderSegmentArray all, uint first) {
 RenderSegmentWords segmentWordsFrom(RenderSegmentWords all, uint first) {
   return RenderSegmentWords(uint64_t(all) + 16ul * first);
 }
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ListHeads { ListHead at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer TileQueueAddress { TileQueue at; };
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer MaskArray { uint64_t at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer ListHeads {
+  ListHead at[];
+};
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer TileQueueAddress {
+  TileQueue at;
+};
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer MaskArray {
+  uint64_t at[];
+};
 #endif
 
 VDI_SHARED_BEGIN
@@ -96,6 +114,7 @@ struct ExpandConstants {
   VDI_ADDRESS(UintArray) offsets;            // [lists + 1]
   VDI_ADDRESS(SegmentArray) from;            // compact array, as stored; a part of the supersegments
   VDI_ADDRESS(RenderSegmentArray) segments;  // all; expandModeSegments: those made from `from`
+  VDI_ADDRESS(UintArray) slopes;             // [supersegments], four bytes each (render_segment.glsl)
   VDI_ADDRESS(ListHeads) heads;              // [lists]
   VDI_ADDRESS(MaskArray) tileDepthMasks;     // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
   // a DepthRange; depths are not negative, so their bits compare as they do
@@ -103,6 +122,7 @@ struct ExpandConstants {
   uint mode;
   uint count;        // supersegments in `from`
   uint perspective;  // projection of V_O
+  float pixelSize;   // as in RenderParams
   ivec2 lists;
   StoredForm form;
 };
@@ -112,9 +132,10 @@ VDI_CONST uint renderMaxClipPlanes = 6;
 struct RenderParams {
   VDI_ADDRESS(ListHeads) heads;
   VDI_ADDRESS(RenderSegmentWords) segments;  // compact array
+  VDI_ADDRESS(UintArray) slopes;             // beside it
   VDI_ADDRESS(MaskArray) tileDepthMasks;
-  VDI_ADDRESS(Vec4Array) colors;       // [height][width]; for bytes, a word each
-  VDI_ADDRESS(FloatArray) depths;      // [height][width]
+  VDI_ADDRESS(Vec4Array) colors;   // [height][width]; for bytes, a word each
+  VDI_ADDRESS(FloatArray) depths;  // [height][width]
   // [height][width], if hasEnds: depths in the new view at which rays end
   VDI_ADDRESS(FloatArray) ends;
   VDI_ADDRESS(TileQueueAddress) queue;
@@ -124,6 +145,7 @@ struct RenderParams {
   float farthest;
   float pixelSize;  // of V_O: view-space size of a pixel at depth 1 (perspective) or anywhere (parallel)
   uint parallel;    // projection of V_O
+  float slopeUnit;  // depth per list that a slope of 1 stands for
   uint width;       // of the picture
   uint height;
   ivec2 lists;  // of the VDI: width, height

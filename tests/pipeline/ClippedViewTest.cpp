@@ -49,7 +49,7 @@ TEST_CASE("clipped views: those of the reference, from anywhere") {
       const Vdi vdi = makeVdi(camera);
       renderer.setVdi(vdi);
       for (const double degrees : {0.0, 25.0, 110.0}) {
-        for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
+        for (const Reconstruction reconstruction : test::reconstructions) {
           INFO(degrees << (parallel ? ", parallel" : ""));
           const Camera turned = camera.azimuth(degrees);
           renderer.setClipPlanes({});

@@ -50,6 +50,20 @@ float largestDifference(const Image& a, const Image& b) {
   return worst * 255.0F;
 }
 
+/// Whether the device's view equals the reference's. Where rounding decides to which place a face leans, a
+/// sheared view has a pixel or two of its own.
+bool isView(const Image& seen, const Image& expected, Reconstruction reconstruction) {
+  const bool sheared = reconstruction == Reconstruction::Sheared;
+  std::size_t different = 0;
+  for (std::size_t i = 0; i < seen.rgba.size(); ++i) {
+    const glm::vec4 difference = 255.0F * glm::abs(seen.rgba[i] - expected.rgba[i]);
+    different += glm::any(glm::greaterThan(difference, glm::vec4(2.0F))) ? 1 : 0;
+  }
+  INFO(different << " pixels differ");
+  return seen.rgba.size() == expected.rgba.size() && different <= (sheared ? seen.rgba.size() / 500 : 0) &&
+         largestDifference(seen, expected) < (sheared ? 16.0F : 2.0F);
+}
+
 ImageDifference differenceOf(const Image& a, const Image& b) {
   return compare(io::toPicture(a).rgb, io::toPicture(b).rgb, a.width, a.height, 3);
 }
@@ -151,12 +165,12 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
       for (const double angle : {0.0, 7.0, 35.0, 100.0, 180.0}) {
         INFO("from " << angle << " degrees");
         const Camera other = camera.azimuth(angle);
-        for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
+        for (const Reconstruction reconstruction : test::reconstructions) {
           INFO(toString(reconstruction));
           // At this size, no ray runs exactly between two lists, where either would be right.
           const Image seen = renderer.render(other, 40, 32, reconstruction);
           const Image expectedThere = reference::render(*vdi, View(other, 40, 32), reconstruction);
-          CHECK(largestDifference(seen, expectedThere) < 2.0F);
+          CHECK(isView(seen, expectedThere, reconstruction));
         }
       }
     }
@@ -450,7 +464,7 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the ref
   cameras.push_back(test::oblique(!parallel).azimuth(15.0));
   std::size_t seenFrom = 0;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
+    for (const Reconstruction reconstruction : test::reconstructions) {
       INFO("camera " << i << ", " << toString(reconstruction) << ", parallel " << parallel);
       const Image expected = reference::render(*vdi, View(cameras[i], 65, 47), reconstruction);
       seenFrom += std::any_of(expected.rgba.begin(), expected.rgba.end(),
@@ -459,12 +473,12 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the ref
                       : 0;
       for (VdiRenderer* each : {&renderer, &rendererAsGpu}) {
         const Image seen = each->render(cameras[i], 65, 47, reconstruction);
-        CHECK(largestDifference(seen, expected) < 2.0F);
+        CHECK(isView(seen, expected, reconstruction));
         CHECK(depthsThatDiffer(seen, expected, 1e-3F) <= seen.depth.size() / 100);
       }
     }
   }
-  CHECK(seenFrom >= 2 * (cameras.size() - 1));
+  CHECK(seenFrom >= std::size(test::reconstructions) * (cameras.size() - 1));
   CHECK(deviceAsGpu()->validationMessages() == "");
 }
 
@@ -503,7 +517,7 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
                                                : static_cast<float>(wall));
         }
       }
-      for (const Reconstruction reconstruction : {Reconstruction::Smooth, Reconstruction::Constant}) {
+      for (const Reconstruction reconstruction : test::reconstructions) {
         INFO("from " << angle << ", " << toString(reconstruction) << ", parallel " << parallel);
         const Image open = reference::render(*vdi, view, reconstruction);
         const Image expected = reference::render(*vdi, view, reconstruction, ends);
@@ -513,16 +527,16 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
           const bool isOpen = ends[i] == Image::noDepth;
           if (isOpen) CHECK(expected.rgba[i] == open.rgba[i]);
           if (ends[i] == 0.0F) CHECK(expected.rgba[i].a == 0.0F);
-          // With smooth reconstruction, a column that ends early blends its lists differently.
+          // A column that ends early blends its lists differently.
           if (reconstruction == Reconstruction::Constant) CHECK(expected.rgba[i].a <= open.rgba[i].a + 1e-5F);
           hidden += open.rgba[i].a > 0.1F && expected.rgba[i].a == 0.0F ? 1 : 0;
           dimmed += expected.rgba[i].a > 0.0F && expected.rgba[i].a < 0.9F * open.rgba[i].a ? 1 : 0;
         }
         CHECK(hidden + dimmed > 50);
         for (VdiRenderer* each : {&renderer, &rendererAsGpu}) {
-          CHECK(largestDifference(each->render(view, ends, reconstruction), expected) < 2.0F);
+          CHECK(isView(each->render(view, ends, reconstruction), expected, reconstruction));
           // It leaves no trace.
-          CHECK(largestDifference(each->render(view, {}, reconstruction), open) < 2.0F);
+          CHECK(isView(each->render(view, {}, reconstruction), open, reconstruction));
         }
       }
     }

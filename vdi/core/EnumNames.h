@@ -13,11 +13,11 @@ struct EnumName {
   Enum value;
   const char* name;
 };
-template <typename Enum>
-using EnumNames = std::array<EnumName<Enum>, 2>;
+template <typename Enum, std::size_t Count = 2>
+using EnumNames = std::array<EnumName<Enum>, Count>;
 
-template <typename Enum>
-const char* nameOf(Enum value, const EnumNames<Enum>& names) {
+template <typename Enum, std::size_t Count>
+const char* nameOf(Enum value, const EnumNames<Enum, Count>& names) {
   for (const EnumName<Enum>& known : names) {
     if (known.value == value) return known.name;
   }
@@ -26,13 +26,15 @@ const char* nameOf(Enum value, const EnumNames<Enum>& names) {
 
 /// Throws Error{InvalidArgument} that lists the valid names, in their order. `what` is the kind of thing
 /// named, such as "algorithm".
-template <typename Enum>
-Enum namedValue(const std::string& name, const char* what, const EnumNames<Enum>& names) {
-  for (const EnumName<Enum>& known : names) {
-    if (name == known.name) return known.value;
+template <typename Enum, std::size_t Count>
+Enum namedValue(const std::string& name, const char* what, const EnumNames<Enum, Count>& names) {
+  std::string list;
+  for (std::size_t i = 0; i < Count; ++i) {
+    if (name == names[i].name) return names[i].value;
+    if (i > 0) list += i + 1 == Count ? " and " : ", ";
+    list += names[i].name;
   }
-  throw Error(ErrorCode::InvalidArgument, std::string("no ") + what + " '" + name + "'; there are " +
-                                              names[0].name + " and " + names[1].name);
+  throw Error(ErrorCode::InvalidArgument, std::string("no ") + what + " '" + name + "'; there are " + list);
 }
 
 }  // namespace vdi

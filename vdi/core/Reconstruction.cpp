@@ -6,8 +6,9 @@ namespace vdi {
 
 namespace {
 
-constexpr EnumNames<Reconstruction> reconstructionNames{
-    {{Reconstruction::Smooth, "smooth"}, {Reconstruction::Constant, "constant"}}};
+constexpr EnumNames<Reconstruction, 3> reconstructionNames{{{Reconstruction::Sheared, "sheared"},
+                                                            {Reconstruction::Smooth, "smooth"},
+                                                            {Reconstruction::Constant, "constant"}}};
 
 }  // namespace
 

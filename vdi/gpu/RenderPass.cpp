@@ -99,7 +99,8 @@ std::vector<std::uint32_t> RenderPass::specialization(const shared::RenderParams
                                                       const shared::RenderRays& rays,
                                                       Reconstruction reconstruction,
                                                       std::uint32_t form) const {
-  const std::uint32_t smooth = reconstruction == Reconstruction::Smooth ? 1 : 0;
+  const std::uint32_t smooth = reconstruction == Reconstruction::Constant ? 0 : 1;
+  const std::uint32_t sheared = reconstruction == Reconstruction::Sheared ? 1 : 0;
   const std::uint32_t invocations = lanesPerRay_ * shared::renderPictureTile * shared::renderPictureTile;
   std::uint32_t segmentsAtOnce = 1;
   std::uint32_t pixelOrder = shared::renderOrderSquares;
@@ -109,7 +110,7 @@ std::vector<std::uint32_t> RenderPass::specialization(const shared::RenderParams
     segmentsAtOnce = 3;
     pixelOrder = course.way.x == crossed ? shared::renderOrderColumns : shared::renderOrderRows;
   }
-  return {smooth, lanesPerRay_, invocations, segmentsAtOnce, pixelOrder, form};
+  return {smooth, lanesPerRay_, invocations, segmentsAtOnce, pixelOrder, form, sheared};
 }
 
 void RenderPass::record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,

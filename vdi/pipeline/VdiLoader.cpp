@@ -69,6 +69,8 @@ void VdiLoader::start(const Vdi& header, LoadedVdi& target) {
   constants_.form = storedForm(header.depthCode);
   segmentBytes_ = segmentBytes(header.depthCode);
   constants_.perspective = header.camera.parallelProjection ? 0U : 1U;
+  const View original = header.view();
+  constants_.pixelSize = static_cast<float>(2.0 * original.halfHeight() / original.height());
 }
 
 /// Makes room for commands that add `count` supersegments to the present ones.
@@ -97,11 +99,14 @@ void VdiLoader::recordSegments(VkDeviceAddress from, std::uint64_t first, std::u
 }
 
 /// Call when all supersegments are there.
-void VdiLoader::recordMasks() {
+void VdiLoader::recordMasks(std::uint64_t segmentCount) {
+  target_->slopes.reserve(device_, segmentCount * wordBytes, MemoryKind::DeviceLocal);
+  constants_.slopes = target_->slopes.address();
   const shared::DepthRange nothing{std::numeric_limits<float>::infinity(), 0.0F, 0.0F};
   commands_.update(target_->depthRange, std::as_bytes(std::span(&nothing, 1)));
-  for (const std::uint32_t mode : {shared::expandModeDepths, shared::expandModeBins, shared::expandModeMasks,
-                                   shared::expandModeTiles, shared::expandModeLargeTiles}) {
+  for (const std::uint32_t mode :
+       {shared::expandModeDepths, shared::expandModeBins, shared::expandModeSlopes, shared::expandModeMasks,
+        shared::expandModeTiles, shared::expandModeLargeTiles}) {
     commands_.barrier();
     constants_.mode = mode;
     expand_.record(commands_, constants_);
@@ -125,7 +130,7 @@ void VdiLoader::loadLists(const ListsOf<Segment>& lists, Kind kind) {
     recordSegments(staging_.address() + at, first, count);
   });
   commands_.barrier();
-  recordMasks();
+  recordMasks(lists.segments.size());
   commands_.submit();
   if (kind == Kind::Beside) commands_.wait();
 }
@@ -168,7 +173,7 @@ gpu::Submission VdiLoader::add(const DeviceLists& band, std::uint64_t firstList)
 void VdiLoader::finish() {
   commands_.begin();
   outgrown_ = {};
-  recordMasks();
+  recordMasks(added_);
   commands_.submit();
 }
 

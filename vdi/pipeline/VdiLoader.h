@@ -18,6 +18,7 @@ namespace vdi::detail {
 /// A VDI on the device, as render.comp reads it.
 struct LoadedVdi {
   gpu::Buffer segments;
+  gpu::Buffer slopes;  // a word for each supersegment
   gpu::Buffer heads;
   gpu::Buffer tileDepthMasks;
   gpu::Buffer depthRange;          // shared::DepthRange
@@ -54,7 +55,7 @@ class VdiLoader {
   void start(const Vdi& header, LoadedVdi& target);
   void reserveSegments(std::uint64_t count);
   void recordSegments(VkDeviceAddress from, std::uint64_t first, std::uint64_t count);
-  void recordMasks();
+  void recordMasks(std::uint64_t segmentCount);
   template <typename Segment>
   void loadLists(const ListsOf<Segment>& lists, Kind kind);
   template <typename T, typename Use>

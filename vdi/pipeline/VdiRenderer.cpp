@@ -144,12 +144,15 @@ void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds
   shared::RenderParams params = gpu::renderGeometry(*shown.original, view);
   params.heads = shown.heads.address();
   params.segments = shown.segments.address();
+  params.slopes = shown.slopes.address();
   params.tileDepthMasks = shown.tileDepthMasks.address();
   params.binScale = depths.binScale;
   params.colors = picture.colors();
   params.depths = picture.depths();
   params.nearest = depths.nearest;
   params.farthest = depths.farthest;
+  const float middle = params.parallel != 0 ? 1.0F : 0.5F * (depths.nearest + depths.farthest);
+  params.slopeUnit = params.pixelSize * middle * (shared::renderMaxSlope / shared::renderSlopes);
   clipBy(params, clipPlanes, *shown.original);
   if (!rayEnds.empty()) {
     endsStaging.reserve(device, rayEnds.size_bytes(), MemoryKind::Upload);

@@ -7,6 +7,7 @@
 
 #include "vdi/reference/Accumulator.h"
 #include "vdi/reference/Reference.h"
+#include "vdi/reference/Slopes.h"
 
 namespace vdi::reference {
 
@@ -70,38 +71,67 @@ Stretch insideFrustum(const ViewRay& ray, const View& view, double nearest, doub
   return stretch;
 }
 
-/// Adds the ray's intersection with one list between enter and leave.
-void addList(Accumulator& sum, std::span<const Supersegment> list, const ViewRay& ray, double pixelLength,
-             const Stretch& stretch) {
-  const auto depthAt = [&](double t) { return ray.origin.z + t * ray.direction.z; };
-  const double nearDepth = std::min(depthAt(stretch.enter), depthAt(stretch.leave));
-  const double farDepth = std::max(depthAt(stretch.enter), depthAt(stretch.leave));
+/// A VDI's lists, and how their faces lean.
+struct LeaningLists {
+  const SupersegmentLists& lists;
+  std::vector<Slopes> slopes;  // empty: not at all
+  float slopeUnit = 0.0F;
+};
+
+/// The part of a ray's stretch that lies within a supersegment, as fractions of the stretch.
+struct Fractions {
+  double enter = 0.0;
+  double leave = 1.0;
+  /// Keeps the part where a value that changes evenly from `first` to `last` is at least 0.
+  void clip(double first, double last) {
+    if (first < 0.0 && last < 0.0) leave = -1.0;
+    if (first < 0.0 && last >= 0.0) enter = std::max(enter, first / (first - last));
+    if (first >= 0.0 && last < 0.0) leave = std::min(leave, first / (first - last));
+  }
+};
+
+/// Adds the ray's intersection with a pixel's list.
+void addListOf(Accumulator& sum, const LeaningLists& leaning, const View& original, const glm::ivec2& pixel,
+               const ViewRay& ray, const Stretch& stretch) {
+  const SupersegmentLists& lists = leaning.lists;
+  const glm::dvec2 centre = glm::dvec2(pixel) + 0.5;
+  const double pixelLength = glm::length(original.rayThrough(centre.x, centre.y).direction);
+  const auto index = static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(original.width()) +
+                     static_cast<std::size_t>(pixel.x);
+  const std::span<const Supersegment> list = lists.list(index);
+  if (list.empty() || stretch.empty()) return;
+  const double firstDepth = ray.origin.z + stretch.enter * ray.direction.z;
+  const double lastDepth = ray.origin.z + stretch.leave * ray.direction.z;
+  const glm::dvec2 first = pixelAt(ray, original, stretch.enter) - centre;
+  const glm::dvec2 last = pixelAt(ray, original, stretch.leave) - centre;
   const bool forward = ray.direction.z >= 0.0;
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const Supersegment& segment = forward ? list[i] : list[list.size() - 1 - i];
-    Stretch part = stretch;
-    clip(part, ray.origin.z - segment.front, ray.direction.z);
-    clip(part, segment.back - ray.origin.z, -ray.direction.z);
-    if (segment.back <= nearDepth || segment.front >= farDepth || part.empty()) continue;
-    const double met = (part.leave - part.enter) * ray.worldPerT;
+  for (std::size_t place = 0; place < list.size(); ++place) {
+    const std::size_t i = forward ? place : list.size() - 1 - place;
+    const Supersegment& segment = list[i];
+    glm::dvec2 front(0.0);
+    glm::dvec2 back(0.0);
+    if (!leaning.slopes.empty()) {
+      const Slopes& slopes = leaning.slopes[lists.offsets[index] + i];
+      front = static_cast<double>(leaning.slopeUnit) * glm::dvec2(slopes.frontX, slopes.frontY);
+      back = static_cast<double>(leaning.slopeUnit) * glm::dvec2(slopes.backX, slopes.backY);
+    }
+    Fractions part;
+    part.clip(firstDepth - segment.front - glm::dot(front, first),
+              lastDepth - segment.front - glm::dot(front, last));
+    part.clip(segment.back + glm::dot(back, first) - firstDepth,
+              segment.back + glm::dot(back, last) - lastDepth);
+    if (!(part.enter < part.leave)) continue;
+    const double length = stretch.leave - stretch.enter;
+    const double met = (part.leave - part.enter) * length * ray.worldPerT;
     const double whole = (segment.back - segment.front) * pixelLength;
     const float opacity = opacityOf(opticalDepthOf(segment.opacity) * static_cast<float>(met / whole));
     const float scale = opacity / segment.opacity;
     sum.add(scale * glm::vec3(segment.red, segment.green, segment.blue), opacity,
-            static_cast<float>(part.enter));
+            static_cast<float>(stretch.enter + part.enter * length));
   }
 }
 
-/// Adds the ray's intersection with a pixel's list.
-void addListOf(Accumulator& sum, const SupersegmentLists& lists, const View& original,
-               const glm::ivec2& pixel, const ViewRay& ray, const Stretch& stretch) {
-  const double pixelLength = glm::length(original.rayThrough(pixel.x + 0.5, pixel.y + 0.5).direction);
-  const auto index = static_cast<std::size_t>(pixel.y) * static_cast<std::size_t>(original.width()) +
-                     static_cast<std::size_t>(pixel.x);
-  addList(sum, lists.list(index), ray, pixelLength, stretch);
-}
-
-Accumulator traverseLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+Accumulator traverseLists(const LeaningLists& lists, const View& original, const ViewRay& ray,
                           const Stretch& stretch) {
   Accumulator sum;
   const glm::dvec2 start = pixelAt(ray, original, stretch.enter);
@@ -158,7 +188,7 @@ struct BetweenCentres {
 };
 
 /// Intersects a ray that stays near one position of V_O's picture with the four lists around it.
-Accumulator intersectAlongLists(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+Accumulator intersectAlongLists(const LeaningLists& lists, const View& original, const ViewRay& ray,
                                 const Stretch& stretch, const glm::dvec2& place) {
   const BetweenCentres x(place.x);
   const BetweenCentres y(place.y);
@@ -177,10 +207,10 @@ Accumulator intersectAlongLists(const SupersegmentLists& lists, const View& orig
   return sum;
 }
 
-/// Reconstruction::Smooth. Goes column by column, or row by row if the ray crosses more of these. The ray
-/// then stays near the same two lists of each column, which are blended. Blending across columns as well
-/// gains nothing (measured), except where the ray crosses hardly any.
-Accumulator traverseSmoothly(const SupersegmentLists& lists, const View& original, const ViewRay& ray,
+/// Reconstruction::Smooth and Sheared. Goes column by column, or row by row if the ray crosses more of these.
+/// The ray then stays near the same two lists of each column, which are blended. Blending across columns as
+/// well gains nothing (measured), except where the ray crosses hardly any.
+Accumulator traverseSmoothly(const LeaningLists& lists, const View& original, const ViewRay& ray,
                              const Stretch& stretch) {
   const glm::dvec2 start = pixelAt(ray, original, stretch.enter);
   const glm::dvec2 end = pixelAt(ray, original, stretch.leave);
@@ -237,7 +267,13 @@ Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, st
     farthest = std::max(farthest, segment.back);
   }
   // In perspective, the frusta of V_O's pixels meet in its eye, where depths cannot separate them.
-  const double smallest = original.parallel() ? nearest : std::max(nearest, farthest * 1e-6F);
+  if (!original.parallel()) nearest = std::max(nearest, farthest * 1e-6F);
+  LeaningLists leaning{lists, {}};
+  if (reconstruction == Reconstruction::Sheared) {
+    const SlopeUnit unit = slopeUnitOf(original, nearest, farthest);
+    leaning.slopes = slopesOf(lists, {original.width(), original.height()}, unit);
+    leaning.slopeUnit = unit.unit;
+  }
   for (int y = 0; y < view.height(); ++y) {
     for (int x = 0; x < view.width(); ++x) {
       const Ray world = view.rayThrough(x + 0.5, y + 0.5);
@@ -247,16 +283,16 @@ Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, st
       const ViewRay ray{original.toView(world.origin), direction, glm::length(world.direction)};
       const auto pixel =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
-      Stretch stretch = insideFrustum(ray, original, smallest, farthest);
+      Stretch stretch = insideFrustum(ray, original, nearest, farthest);
       for (const ClipPlane& plane : planes) {
         const glm::dvec3 normal = glm::normalize(plane.normal);
         clip(stretch, glm::dot(normal, world.origin - plane.origin), glm::dot(normal, world.direction));
       }
       if (!ends.empty()) stretch.leave = std::min(stretch.leave, static_cast<double>(ends[pixel]));
       if (stretch.empty()) continue;
-      const Accumulator sum = reconstruction == Reconstruction::Smooth
-                                  ? traverseSmoothly(lists, original, ray, stretch)
-                                  : traverseLists(lists, original, ray, stretch);
+      const Accumulator sum = reconstruction == Reconstruction::Constant
+                                  ? traverseLists(leaning, original, ray, stretch)
+                                  : traverseSmoothly(leaning, original, ray, stretch);
       image.rgba[pixel] = sum.rgba();
       image.depth[pixel] = sum.depth();
     }

@@ -1,0 +1,39 @@
+// How the faces of supersegments lean: Reconstruction::Sheared. The shaders' twin is shaders/slopes.glsl.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vdi/core/Camera.h"
+#include "vdi/core/Vdi.h"
+
+namespace vdi::reference {
+
+/// Change of depth of a supersegment's front and back from one list to the next in x and in y, in units of
+/// `SlopeUnit`. 0 at both: the supersegment ends at the same depths all over its pixel.
+struct Slopes {
+  std::int8_t frontX = 0;
+  std::int8_t frontY = 0;
+  std::int8_t backX = 0;
+  std::int8_t backY = 0;
+  bool operator==(const Slopes&) const = default;
+};
+
+/// Lengths in V_O's view, at the middle of the VDI's depths.
+struct SlopeUnit {
+  float footprint = 0.0F;  // size of a pixel
+  float unit = 0.0F;       // depth per list that a slope of 1 stands for
+};
+SlopeUnit slopeUnitOf(const View& original, float nearest, float farthest);
+
+/// The slopes of all supersegments, [lists.segments.size()]. For each of the four lists beside a list:
+///   1. A run, supersegments that touch each other, belongs to the neighbour's run that it overlaps most, or
+///      that is nearest within maxSlope footprints.
+///   2. A face is where the neighbour's run has the same optical depth in front of it, for faces in the
+///      front half of their run's optical depth; behind it, for the others. A face without such a place
+///      within maxSlope footprints has no slope towards that neighbour.
+///   3. The slope along an axis is the mean of both neighbours', or that of one if the other has none.
+/// It fades out for material whose opacity over a footprint is below twice leastOpacity: haze has no faces.
+std::vector<Slopes> slopesOf(const SupersegmentLists& lists, const glm::ivec2& size, const SlopeUnit& unit);
+
+}  // namespace vdi::reference
