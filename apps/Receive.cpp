@@ -78,7 +78,7 @@ class Recorder {
     const glm::ivec2 size = vdi.pictureSize();
     io::writePng(options_.picture,
                  io::toPicture(renderer_->renderBytes(vdi.camera, size.x, size.y, Alpha::Premultiplied,
-                                                      Reconstruction::Smooth)));
+                                                      defaultReconstruction)));
   }
 
   const ReceiveOptions& options_;

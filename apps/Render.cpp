@@ -25,7 +25,7 @@ struct RenderOptions {
   std::vector<double> azimuths{0.0};
   double elevation = 0.0;
   std::string resolution;
-  std::string reconstruction = "smooth";
+  std::string reconstruction = toString(defaultReconstruction);
   std::vector<double> clip;  // 6 for each plane
 };
 

@@ -444,7 +444,8 @@ void addReconstructionOption(CLI::App& command, std::string& name) {
   command
       .add_option(
           "--reconstruction", name,
-          "between lists: smooth, which blends two of them, or constant, as in the paper; faster on a CPU")
+          "between lists: sheared, where faces lean as neighbouring lists suggest; smooth, which blends two "
+          "lists; or constant, as in the paper. The first is truest, the last fastest on a CPU")
       ->type_name("NAME")
       ->capture_default_str();
 }

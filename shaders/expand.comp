@@ -58,25 +58,22 @@ void findBins() {
 // along one axis, and one and a half lists along the other.
 float reachOf(vec2 slopes) { return 1.5 * max(slopes.x, slopes.y) + 0.5 * min(slopes.x, slopes.y); }
 
-void maskList(uint list) {
+void maskList(uint list, uint first, uint count, bool leans) {
   float nearest = uintBitsToFloat(push.depthRange.at[0]);
   float binScale = uintBitsToFloat(push.depthRange.at[2]);
   float slopeUnit = footprintOf() * (renderMaxSlope / renderSlopes);
   float reach = 0.0;
   uint64_t mask = 0ul;
-  uint first = push.offsets.at[list];
-  uint end = push.offsets.at[list + 1u];
   RenderSegmentArray segments = renderSegmentsFrom(push.segments, first);
-  for (uint i = 0u; i < end - first; ++i) {
+  for (uint i = 0u; i < count; ++i) {
     RenderSegment segment = segments.at[i];
-    vec4 slopes = abs(segmentSlopes(push.slopes.at[first + i]));
+    vec4 slopes = leans ? abs(segmentSlopes(push.slopes.at[first + i])) : vec4(0.0);
     float front = reachOf(slopes.xy);
     float back = reachOf(slopes.zw);
     reach = max(reach, max(front, back));
     mask |= maskOf(segment.front - slopeUnit * front, segment.back + slopeUnit * back, nearest, binScale);
   }
-  uint reachCode = uint(ceil(reach / listReachUnit));
-  push.heads.at[list] = ListHead(first, end - first | reachCode << listCountBits, mask);
+  push.heads.at[list] = ListHead(first, count | uint(ceil(reach / listReachUnit)) << listCountBits, mask);
 }
 
 // Includes the lists around the tile, which smooth reconstruction uses within the tile.
@@ -102,18 +99,20 @@ void maskLargeTile(ivec2 largeTile, ivec2 tiles, uint index) {
 
 void main() {
   uint i = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * expandGroup;
+  uint listCount = uint(push.lists.x) * uint(push.lists.y);
   if (push.mode == expandModeSegments) {
     if (i < push.count) expandSegment(i);
   } else if (push.mode == expandModeDepths) {
-    addDepths(i, i < uint(push.lists.x) * uint(push.lists.y));
+    addDepths(i, i < listCount);
   } else if (push.mode == expandModeBins) {
     if (i == 0u) findBins();
-  } else if (push.mode == expandModeSlopes) {
-    if (i < uint(push.lists.x) * uint(push.lists.y))
-      findSlopes(ivec2(int(i) % push.lists.x, int(i) / push.lists.x));
   } else if (push.mode == expandModeMasks) {
-    uint listCount = uint(push.lists.x) * uint(push.lists.y);
-    if (i < listCount) maskList(i);
+    uint first = i < listCount ? push.offsets.at[i] : 0u;
+    if (i < listCount) maskList(i, first, push.offsets.at[i + 1u] - first, false);
+  } else if (push.mode == expandModeSlopes) {
+    if (i < listCount) findSlopes(ivec2(int(i) % push.lists.x, int(i) / push.lists.x));
+  } else if (push.mode == expandModeLeaningMasks) {
+    if (i < listCount) maskList(i, push.heads.at[i].first, segmentCount(push.heads.at[i]), true);
   } else {
     ivec2 tiles = tilesOf(push.lists, renderTile);
     ivec2 largeTiles = tilesOf(push.lists, renderLargeTile);

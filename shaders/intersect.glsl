@@ -124,7 +124,7 @@ Leaning segmentFrom(uint slot, int i, int more, int step) {
 int useList(ListHead head) {
   listSegments = segmentWordsFrom(params.segments, head.first);
   listSlopes = UintArray(uint64_t(params.slopes) + 4ul * head.first);
-  return int(head.countAndReach & ((1u << listCountBits) - 1u)) - 1;
+  return int(segmentCount(head)) - 1;
 }
 
 // How far the list's leaning faces reach beyond their depths in its middle.

@@ -22,6 +22,8 @@ float segmentDensity(uvec4 segment) { return uintBitsToFloat(segment.z); }
 // Front and back.
 vec2 segmentDepths(uvec4 segment) { return uintBitsToFloat(segment.xy); }
 
+uint segmentCount(ListHead head) { return head.countAndReach & ((1u << listCountBits) - 1u); }
+
 // Slopes of front and back, along x and y each (vdi/reference/Slopes.h).
 vec4 segmentSlopes(uint word) {
   int bits = int(word);

@@ -33,8 +33,8 @@ SlopeList slopeListOf(ivec2 pixel) {
   if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, push.lists)))
     return SlopeList(push.segments, 0u, 0u);
   uint list = uint(pixel.y) * uint(push.lists.x) + uint(pixel.x);
-  uint first = push.offsets.at[list];
-  return SlopeList(renderSegmentsFrom(push.segments, first), first, push.offsets.at[list + 1u] - first);
+  ListHead head = push.heads.at[list];
+  return SlopeList(renderSegmentsFrom(push.segments, head.first), head.first, segmentCount(head));
 }
 
 Run runFrom(SlopeList list, uint first) {

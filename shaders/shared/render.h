@@ -27,7 +27,8 @@ VDI_CONST uint expandModeBins = 2;        // one invocation
 VDI_CONST uint expandModeMasks = 3;       // one a list
 VDI_CONST uint expandModeTiles = 4;       // one a tile
 VDI_CONST uint expandModeLargeTiles = 5;  // one a large tile
-VDI_CONST uint expandModeSlopes = 6;      // one a list
+VDI_CONST uint expandModeSlopes = 6;        // one a list, after the others
+VDI_CONST uint expandModeLeaningMasks = 7;  // one a list; then the tiles again
 // Reconstruction::Sheared (vdi/reference/Slopes.h).
 VDI_CONST float renderMaxSlope = 8.0F;  // depth per list, in footprints: 83 degrees
 VDI_CONST float renderSlopes = 127.0F;  // steps from 0 to renderMaxSlope
@@ -114,7 +115,8 @@ struct ExpandConstants {
   VDI_ADDRESS(UintArray) offsets;            // [lists + 1]
   VDI_ADDRESS(SegmentArray) from;            // compact array, as stored; a part of the supersegments
   VDI_ADDRESS(RenderSegmentArray) segments;  // all; expandModeSegments: those made from `from`
-  VDI_ADDRESS(UintArray) slopes;             // [supersegments], four bytes each (render_segment.glsl)
+  // [supersegments], four bytes each (render_segment.glsl); for Reconstruction::Sheared alone
+  VDI_ADDRESS(UintArray) slopes;
   VDI_ADDRESS(ListHeads) heads;              // [lists]
   VDI_ADDRESS(MaskArray) tileDepthMasks;     // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
   // a DepthRange; depths are not negative, so their bits compare as they do

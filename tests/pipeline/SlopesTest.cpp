@@ -28,7 +28,9 @@ TEST_CASE("slopes of faces: the device's are the reference's") {
   const std::uint64_t bytes = vdi->supersegmentCount() * sizeof(Slopes);
   gpu::Buffer readback(test::device(), bytes, gpu::MemoryKind::Readback);
   gpu::Commands commands(test::device());
+  gpu::ExpandPass expand(test::device());
   commands.begin();
+  detail::recordLeaning(commands, expand, test::device(), loaded);
   commands.copy(loaded.slopes, 0, readback, 0, bytes);
   commands.submitAndWait();
   const auto seen = readback.mappedAs<Slopes>().first(vdi->supersegmentCount());

@@ -124,9 +124,11 @@ check(np.array_equal(picture(full), volume), "full precision gives the same pict
 check(picture(with_camera(simple.RenderVDI(Input=full))).max() > 60, "a VDI of full precision is rendered")
 rendered = {
     name: picture(simple.RenderVDI(Input=full, UseOriginalCamera=1, Azimuth=10, Reconstruction=name))
-    for name in ("Smooth", "Constant")
+    for name in ("Sheared", "Smooth", "Constant")
 }
 apart = np.abs(rendered["Smooth"].astype(int) - rendered["Constant"]).mean()
+leaning = np.abs(rendered["Smooth"].astype(int) - rendered["Sheared"]).mean()
+check(0 < leaning < 4, "faces lean a little, by %.2f on average" % leaning)
 check(0 < apart < 4, "reconstructions are alike but not equal, off by %.2f on average" % apart)
 
 # Azimuth is vtkCamera's, also where view-up isn't orthogonal to the view direction. (position, view-up, degrees)

@@ -17,6 +17,8 @@ enum class Reconstruction : std::uint32_t {
   Sheared = 2,
 };
 
+constexpr Reconstruction defaultReconstruction = Reconstruction::Sheared;
+
 const char* toString(Reconstruction reconstruction);  // "constant", "smooth", "sheared"
 /// Throws Error{InvalidArgument} that lists the valid names.
 Reconstruction reconstructionFromString(const std::string& name);

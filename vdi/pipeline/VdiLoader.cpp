@@ -50,6 +50,7 @@ void VdiLoader::start(const Vdi& header, LoadedVdi& target) {
   commands_.wait();  // the last load may still use the buffers
   outgrown_ = {};
   target.original.reset();
+  target.leans = false;
   target_ = &target;
   const glm::ivec2 size{header.width, header.height};
   listCount_ = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y);
@@ -69,8 +70,6 @@ void VdiLoader::start(const Vdi& header, LoadedVdi& target) {
   constants_.form = storedForm(header.depthCode);
   segmentBytes_ = segmentBytes(header.depthCode);
   constants_.perspective = header.camera.parallelProjection ? 0U : 1U;
-  const View original = header.view();
-  constants_.pixelSize = static_cast<float>(2.0 * original.halfHeight() / original.height());
 }
 
 /// Makes room for commands that add `count` supersegments to the present ones.
@@ -99,19 +98,40 @@ void VdiLoader::recordSegments(VkDeviceAddress from, std::uint64_t first, std::u
 }
 
 /// Call when all supersegments are there.
-void VdiLoader::recordMasks(std::uint64_t segmentCount) {
-  target_->slopes.reserve(device_, segmentCount * wordBytes, MemoryKind::DeviceLocal);
-  constants_.slopes = target_->slopes.address();
+void VdiLoader::recordMasks() {
   const shared::DepthRange nothing{std::numeric_limits<float>::infinity(), 0.0F, 0.0F};
   commands_.update(target_->depthRange, std::as_bytes(std::span(&nothing, 1)));
-  for (const std::uint32_t mode :
-       {shared::expandModeDepths, shared::expandModeBins, shared::expandModeSlopes, shared::expandModeMasks,
-        shared::expandModeTiles, shared::expandModeLargeTiles}) {
+  for (const std::uint32_t mode : {shared::expandModeDepths, shared::expandModeBins, shared::expandModeMasks,
+                                   shared::expandModeTiles, shared::expandModeLargeTiles}) {
     commands_.barrier();
     constants_.mode = mode;
     expand_.record(commands_, constants_);
   }
   commands_.copy(target_->depthRange, 0, target_->depthRangeReadback, 0, sizeof(shared::DepthRange));
+}
+
+void recordLeaning(gpu::Commands& commands, gpu::ExpandPass& expand,
+                   const std::shared_ptr<gpu::Device>& device, LoadedVdi& vdi) {
+  const View& original = *vdi.original;
+  const std::uint64_t room = vdi.segments.size() / sizeof(shared::RenderSegment);
+  vdi.slopes.reserve(device, room * wordBytes, MemoryKind::DeviceLocal);
+  shared::ExpandConstants constants{};
+  constants.segments = vdi.segments.address();
+  constants.slopes = vdi.slopes.address();
+  constants.heads = vdi.heads.address();
+  constants.tileDepthMasks = vdi.tileDepthMasks.address();
+  constants.depthRange = vdi.depthRange.address();
+  constants.perspective = original.parallel() ? 0U : 1U;
+  constants.pixelSize = static_cast<float>(2.0 * original.halfHeight() / original.height());
+  constants.lists = {original.width(), original.height()};
+  for (const std::uint32_t mode : {shared::expandModeSlopes, shared::expandModeLeaningMasks,
+                                   shared::expandModeTiles, shared::expandModeLargeTiles}) {
+    commands.barrier();
+    constants.mode = mode;
+    expand.record(commands, constants);
+  }
+  commands.barrier();
+  vdi.leans = true;
 }
 
 template <typename Segment>
@@ -130,7 +150,7 @@ void VdiLoader::loadLists(const ListsOf<Segment>& lists, Kind kind) {
     recordSegments(staging_.address() + at, first, count);
   });
   commands_.barrier();
-  recordMasks(lists.segments.size());
+  recordMasks();
   commands_.submit();
   if (kind == Kind::Beside) commands_.wait();
 }
@@ -173,7 +193,7 @@ gpu::Submission VdiLoader::add(const DeviceLists& band, std::uint64_t firstList)
 void VdiLoader::finish() {
   commands_.begin();
   outgrown_ = {};
-  recordMasks(added_);
+  recordMasks();
   commands_.submit();
 }
 

@@ -18,15 +18,20 @@ namespace vdi::detail {
 /// A VDI on the device, as render.comp reads it.
 struct LoadedVdi {
   gpu::Buffer segments;
-  gpu::Buffer slopes;  // a word for each supersegment
+  gpu::Buffer slopes;  // a word for each supersegment, once it leans
   gpu::Buffer heads;
   gpu::Buffer tileDepthMasks;
   gpu::Buffer depthRange;          // shared::DepthRange
   gpu::Buffer depthRangeReadback;  // the same, for the host
   std::unique_ptr<View> original;  // null until a VDI is loaded
+  bool leans = false;              // whether recordLeaning has been called for it
   /// Call when the VDI is loaded.
   gpu::shared::DepthRange depths() const { return depthRangeReadback.mappedAs<gpu::shared::DepthRange>()[0]; }
 };
+
+/// Finds how the faces of a loaded VDI lean, which Reconstruction::Sheared needs.
+void recordLeaning(gpu::Commands& commands, gpu::ExpandPass& expand,
+                   const std::shared_ptr<gpu::Device>& device, LoadedVdi& vdi);
 
 class VdiLoader {
  public:
@@ -55,7 +60,7 @@ class VdiLoader {
   void start(const Vdi& header, LoadedVdi& target);
   void reserveSegments(std::uint64_t count);
   void recordSegments(VkDeviceAddress from, std::uint64_t first, std::uint64_t count);
-  void recordMasks(std::uint64_t segmentCount);
+  void recordMasks();
   template <typename Segment>
   void loadLists(const ListsOf<Segment>& lists, Kind kind);
   template <typename T, typename Use>

@@ -23,10 +23,11 @@ using gpu::MemoryKind;
 
 struct VdiRenderer::State {
   explicit State(std::shared_ptr<gpu::Device> theDevice)
-      : device(std::move(theDevice)), commands(device), pass(device), loader(device) {}
+      : device(std::move(theDevice)), commands(device), expand(device), pass(device), loader(device) {}
 
   std::shared_ptr<gpu::Device> device;
   gpu::Commands commands;
+  gpu::ExpandPass expand;
   gpu::RenderPass pass;
   detail::PictureBuffers picture;
   detail::LoadedVdi shown;
@@ -144,7 +145,6 @@ void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds
   shared::RenderParams params = gpu::renderGeometry(*shown.original, view);
   params.heads = shown.heads.address();
   params.segments = shown.segments.address();
-  params.slopes = shown.slopes.address();
   params.tileDepthMasks = shown.tileDepthMasks.address();
   params.binScale = depths.binScale;
   params.colors = picture.colors();
@@ -162,6 +162,10 @@ void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds
     params.hasEnds = 1;
   }
   commands.begin();
+  if (reconstruction == Reconstruction::Sheared) {
+    if (!shown.leans) detail::recordLeaning(commands, expand, device, shown);
+    params.slopes = shown.slopes.address();
+  }
   commands.mark("render");
   if (!rayEnds.empty()) {
     commands.copy(endsStaging, 0, ends, 0, rayEnds.size_bytes());

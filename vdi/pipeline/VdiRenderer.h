@@ -46,18 +46,18 @@ class VdiRenderer {
   /// by half a step at most. Throws Error{InvalidArgument} before the first setVdi, and for cameras and sizes
   /// that View rejects.
   Image render(const Camera& camera, int width, int height,
-               Reconstruction reconstruction = Reconstruction::Smooth);
+               Reconstruction reconstruction = defaultReconstruction);
   /// Renders for a screen: downloads 8 instead of 20 bytes a pixel, since the download takes longer than
   /// rendering. With Alpha::Premultiplied, each byte is toByte of the value that render gives. Valid until
   /// the next call.
   ImageBytes renderBytes(const Camera& camera, int width, int height, Alpha alpha,
-                         Reconstruction reconstruction = Reconstruction::Smooth);
+                         Reconstruction reconstruction = defaultReconstruction);
   /// Renders among opaque objects. `ends` has the depths at which the view's rays end, [height][width]:
   /// infinity where no object is hit, empty if there are no objects.
   Image render(const View& view, std::span<const float> ends,
-               Reconstruction reconstruction = Reconstruction::Smooth);
+               Reconstruction reconstruction = defaultReconstruction);
   ImageBytes renderBytes(const View& view, std::span<const float> ends, Alpha alpha,
-                         Reconstruction reconstruction = Reconstruction::Smooth);
+                         Reconstruction reconstruction = defaultReconstruction);
   double renderMilliseconds() const;  // device time of the last render
 
   /// For VdiGenerator::show: a sink that shows lists made on the renderer's own device, without a detour

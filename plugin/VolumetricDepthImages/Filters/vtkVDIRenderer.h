@@ -47,8 +47,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   /// Of the picture; 0 0: the VDI's.
   vtkSetVector2Macro(Resolution, int);
 
-  /// vdi::Reconstruction: 1 (default) blends neighbouring lists, 0 shows each as it is.
-  vtkSetClampMacro(Reconstruction, int, 0, 1);
+  /// vdi::Reconstruction: 2 (default) also leans the faces of supersegments, 1 blends neighbouring lists, 0
+  /// shows each as it is.
+  vtkSetClampMacro(Reconstruction, int, 0, 2);
 
   ///@{
   /// What is seen lies on the sides of these planes to which their normals point; at most 6.
@@ -86,7 +87,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   bool UseOriginalCamera = false;
   double Azimuth = 0.0;
   int Resolution[2] = {0, 0};
-  int Reconstruction = 1;
+  int Reconstruction = 2;
   std::vector<std::array<double, 6>> ClippingPlanes;
 };
 

@@ -73,8 +73,9 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// IceT, compositing by depth, drops them otherwise, colour and all. Default off.
   vtkSetMacro(MarksDepth, bool);
 
-  /// vdi::Reconstruction: 1 (default) blends neighbouring lists, 0 shows each as it is.
-  vtkSetClampMacro(Reconstruction, int, 0, 1);
+  /// vdi::Reconstruction: 2 (default) also leans the faces of supersegments, 1 blends neighbouring lists, 0
+  /// shows each as it is.
+  vtkSetClampMacro(Reconstruction, int, 0, 2);
   vtkGetMacro(Reconstruction, int);
   /// Of the VDI's part in interactive frames, per second.
   vtkSetClampMacro(FrameRate, double, 1.0, 1000.0);
@@ -127,7 +128,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
 
   std::unique_ptr<Internals> Internal;
   bool MarksDepth = false;
-  int Reconstruction = 1;
+  int Reconstruction = 2;
   double FrameRate = 30.0;
   double Opacity = 1.0;
   bool IsCaptured = false;

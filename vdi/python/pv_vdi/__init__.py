@@ -96,12 +96,13 @@ class Vdi:
             self._segments = segments
         return self._segments
 
-    def render(self, camera=None, size=None, reconstruction="smooth"):
+    def render(self, camera=None, size=None, reconstruction="sheared"):
         """The picture from a camera, by default V_O, of (width, height) pixels, by default those of V_O's picture.
 
         Returns colours, float32 [height][width][4], premultiplied RGBA, and depths, float32 [height][width], view-space,
-        infinity where nothing is. Row 0 is the top row, as in image files. `reconstruction` is "smooth" or "constant".
-        Renders on the device that VDI_DEVICE names, or the best one. Threads may call it side by side; they take turns.
+        infinity where nothing is. Row 0 is the top row, as in image files. `reconstruction` is "sheared", "smooth" or
+        "constant". Renders on the device that VDI_DEVICE names, or the best one. Threads may call it side by side; they
+        take turns.
         Raises Error for a camera that can't be used and where no device can.
         """
         if self._renderer is None:
