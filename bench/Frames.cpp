@@ -141,7 +141,7 @@ Spread measureShown(VdiGenerator& generator, const std::shared_ptr<gpu::Device>&
       comm.together([&] {
         if (!renderer) return;
         renderer->renderBytes(input.camera, input.settings.width, input.settings.height,
-                              Alpha::Premultiplied);
+                              Alpha::Premultiplied, Reconstruction::Smooth);
       });
     });
   });

@@ -24,7 +24,7 @@ struct BenchOptions {
   int views = 0;                             // 0: 1, or the suite's
   int repeats = 5;
   int frames = 20;  // on the orbit that counts VDIs per second; 0: not measured
-  std::string reconstruction = toString(defaultReconstruction);
+  std::string reconstruction = toString(Reconstruction::Smooth);  // as in moving windows
   double truthRate = 8.0;  // samples per voxel of the volume rendering to which all views are compared
   std::string suite;       // empty, or a name that suiteNames() has
   std::string rival;       // empty, or icet
