@@ -8,6 +8,10 @@ import numpy as np
 import pvtest
 from paraview import simple
 from pvtest import check
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkRenderingCore import VTK_STEREO_RIGHT
 
 SIZE, CAMERA, CENTER = [320, 240], [80, 56, 92], [0, 0, 0]
 VDI = os.path.join(pvtest.OUTPUT, "representation.vdi")
@@ -120,6 +124,64 @@ def elsewhere():
     simple.Delete(view)
 
 
+def ball(centre, radius):
+    """A volume that is opaque inside of it alone."""
+    image = vtkImageData()
+    image.SetDimensions(64, 64, 64)
+    image.SetOrigin(-31, -31, -31)
+    z, y, x = np.meshgrid(*[np.arange(64.0) - 31] * 3, indexing="ij")
+    distance = np.sqrt((x - centre[0]) ** 2 + (y - centre[1]) ** 2 + (z - centre[2]) ** 2)
+    array = numpy_to_vtk(np.clip(radius - distance, -0.5, 0.5).ravel(), deep=True)
+    array.SetName("inside")
+    image.GetPointData().SetScalars(array)
+    source = simple.TrivialProducer()
+    source.GetClientSideObject().SetOutput(image)
+    source.UpdatePipeline()
+    return source
+
+
+def column_of(picture):
+    """Of the middle of what is bright."""
+    columns = (picture.max(axis=2) > 60).sum(axis=0)
+    return float((columns * np.arange(len(columns))).sum() / columns.sum())
+
+
+def window_column(view, source):
+    """Of what the window itself shows of the source: ParaView takes screenshots without stereo."""
+    simple.Show(source, view)
+    simple.Render(view)  # the first picture of a view moves its camera
+    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA, CENTER, [0, 1, 0]
+    for _ in range(2):  # the window is late to know which eye it is
+        simple.Render(view)
+    window, data = view.GetRenderWindow(), vtkUnsignedCharArray()
+    width, height = window.GetSize()
+    window.GetPixelData(0, 0, width - 1, height - 1, 0, data, 0)
+    simple.Hide(source, view)
+    return column_of(vtk_to_numpy(data).reshape(height, width, -1)[:, :, :3])
+
+
+def stereo():
+    """The right eye sees a ball of the VDI where it sees the same one as a surface, before and behind the focal point."""
+    view = pvtest.make_view(SIZE, CAMERA, CENTER)
+    pvtest.set_colors("inside", -0.5, 0.5)
+    columns = {}
+    for centre in ((14, 10, 18), (-14, -8, -20)):
+        surface = simple.Sphere(Radius=7, Center=centre, ThetaResolution=48, PhiResolution=48)
+        image = pvtest.vdi_filter(ball(centre, 7), view, "POINTS", "inside", 1)
+        columns[centre] = [surface, image, window_column(view, surface)]
+    own = view.GetClientSideObject()
+    view.GetRenderWindow().SetSwapBuffers(0)
+    own.SetStereoRender(True)
+    own.SetStereoType(VTK_STEREO_RIGHT)
+    for centre, (surface, image, alone) in columns.items():
+        window_column(view, surface)
+        seen, expected = window_column(view, image), window_column(view, surface)
+        print("a ball at {}: column {:.2f} for the right eye, {:.2f} as a surface, {:.2f} without stereo".format(
+            centre, seen, expected, alone))
+        check(abs(expected - alone) > 1 and abs(seen - expected) < 0.7, "the right eye sees the VDI in its place")
+
+
 volume_beside_vdi()
 elsewhere()
+stereo()
 pvtest.finish()

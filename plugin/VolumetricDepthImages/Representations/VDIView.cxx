@@ -26,6 +26,12 @@ ViewMatrices::ViewMatrices(vtkMatrix4x4* worldToView, vtkMatrix4x4* viewToClip) 
   // Of clip coordinates at depth 1, where view-space z is -1; the same anywhere if parallel.
   const glm::dvec2 middle = camera_.parallelProjection ? glm::dvec2(toClip(0, 3), toClip(1, 3))
                                                        : -glm::dvec2(toClip(0, 2), toClip(1, 2));
+  // Where x and y of clip coordinates meet in view space: beside its origin for the eyes of a stereo picture.
+  if (!camera_.parallelProjection) {
+    const glm::dvec2 eye = -glm::dvec2(toClip(0, 3), toClip(1, 3)) / scale;
+    camera_.position += eye.x * right + eye.y * up;
+    camera_.focalPoint = camera_.position - back;
+  }
   plane_.low = (glm::dvec2(-1.0) - middle) / scale;
   plane_.high = (glm::dvec2(1.0) - middle) / scale;
   depthScale_ = toClip(2, 2);
