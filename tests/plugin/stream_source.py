@@ -225,7 +225,12 @@ def wrong_token(live):
 def saved_without_token(live, source):
     smtrace.start_trace()
     traced = simple.VDIStream(registrationName="traced", URL=live.link)
+    applied = smtrace.PropertiesModified(traced.SMProxy)  # as Apply in the panel does
+    traced.URL = live.link + "x"
+    traced.URL = live.link
+    applied.finalize()
     trace = smtrace.stop_trace()
+    check("# Properties modified" in trace and trace.count(live.address) == 2, "a change of the URL is traced")
     simple.Delete(traced)
     texts = {"trace": trace, "description": str(source.GetClientSideObject())}
     files = {name: os.path.join(scratch, "saved." + name) for name in ("pvsm", "py", "json")}

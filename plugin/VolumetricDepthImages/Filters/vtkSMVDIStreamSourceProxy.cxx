@@ -1,9 +1,11 @@
 #include "vtkSMVDIStreamSourceProxy.h"
 
+#include <vtkClientServerStream.h>
 #include <vtkObjectFactory.h>
 #include <vtkSMPropertyHelper.h>
 
 #include <string_view>
+#include <utility>
 
 #include "vdi/core/Error.h"
 #include "vdi/stream/Url.h"
@@ -28,6 +30,18 @@ void vtkSMVDIStreamSourceProxy::TakeToken() {
     if (hash != std::string::npos) token = vdi::stream::parseUrl(url).token;
   } catch (const vdi::Error&) {  // the source says what is wrong with the rest of it
   }
-  vtkSMPropertyHelper(this, "Token").Set(token.c_str());
+  if (hash != std::string::npos) this->Tokens[this->Address] = token;
+  this->IsTokenSent = false;
   if (hash != std::string::npos) vtkSMPropertyHelper(this, "URL").Set(this->Address.c_str());
+}
+
+void vtkSMVDIStreamSourceProxy::UpdateVTKObjects() {
+  this->CreateVTKObjects();
+  if (this->ObjectsCreated && !std::exchange(this->IsTokenSent, true)) {
+    vtkClientServerStream stream;
+    stream << vtkClientServerStream::Invoke << VTKOBJECT(this) << "SetToken"
+           << this->Tokens[this->Address].c_str() << vtkClientServerStream::End;
+    this->ExecuteStream(stream);
+  }
+  this->Superclass::UpdateVTKObjects();
 }
