@@ -244,11 +244,21 @@ def delete_while_making(window):
     window.screenshot("13_deleted.png")
 
 
+def close_while_making(window):
+    window.menu("Filters", "Volumetric Depth Images", "Volumetric Depth Image")
+    window.enter("Sampling Rate", 8)
+    panel = window.find("Properties", "frame")
+    window.click("Apply")
+    wait_for("new VDI", lambda: window.is_making(panel), 30)
+    window.close()
+
+
 with Screen() as screen:
     with Window(screen, output=OUTPUT, folder=OUTPUT) as window:
         vdi, state = first_session(window)
         from_state = second_session(window, state)
         delete_while_making(window)
+        close_while_making(window)
     replayed = path("replayed.vdi")
     subprocess.run(["pvbatch", os.path.join(OUTPUT, "trace.py")], check=True, timeout=200,
                    env=dict(os.environ, VDI_REPLAYED=replayed, PV_PLUGIN_CONFIG_FILE=os.environ["VDI_PLUGIN_LIST"]))

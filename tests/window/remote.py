@@ -105,6 +105,7 @@ def reopened(screen):
         print("Look as Made: SSIM %.4f to what was shown at first" % similar, flush=True)
         check(similar > 0.95, "Look as Made shows what was shown at first")
         window.screenshot("7_as_made.png")
+        window.close()
 
 
 with Screen() as screen:

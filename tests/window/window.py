@@ -548,6 +548,13 @@ class Window:
             xdotool("windowactivate", "--sync", window, "key", "alt+F4")
         time.sleep(0.5)
 
+    def close(self, seconds=60):
+        """By the button of its frame. ParaView has to end well."""
+        xdotool("windowactivate", "--sync", self.window, "key", "alt+F4")
+        code = self.process.wait(seconds)
+        check(code == 0, "ParaView's window is closed: exit code %s" % code)
+        check("nullptr" not in self.log_text(), "and Qt has nothing to say against it")
+
     def pixels(self):
         """Of the middle of the view: bytes of red, green and blue."""
         if self.middle is None:

@@ -16,6 +16,7 @@
 #include <vtkSMTrace.h>
 #include <QTimer>
 
+#include <initializer_list>
 #include <string_view>
 
 #include "VDIViewpoint.h"
@@ -85,10 +86,11 @@ void pqVDIBehavior::shutdown() {
   // Not at the very end with this, when the list of views that it empties has gone.
   delete this->findChild<pqVDIStillFrames*>();
   // What it made belongs to the sources.
-  if (pqApplicationCore* core = pqApplicationCore::instance()) {
-    core->getServerManagerModel()->disconnect(this);
-    core->getPluginManager()->disconnect(this);
-    core->getObjectBuilder()->disconnect(this);
+  pqApplicationCore* core = pqApplicationCore::instance();
+  if (core == nullptr) return;
+  for (QObject* sender : std::initializer_list<QObject*>{
+           core->getServerManagerModel(), core->getPluginManager(), core->getObjectBuilder()}) {
+    if (sender != nullptr) sender->disconnect(this);  // some have gone by then
   }
 }
 
