@@ -102,6 +102,18 @@ def screenshots_while_made():
         assert inside("captures_the_same()"), "a screenshot that is taken while a VDI is made isn't the one after that"
 
 
+def compared_vdis():
+    """Each cell of a comparative view has the VDI of its own value."""
+    inside("compare_distances([2, 40])")
+
+    def differ():
+        thick, thin = inside("compared()")
+        return thick - thin > 1
+
+    wait_for("another VDI in each cell", differ, 60)
+    inside("close_comparative()")
+
+
 def two_views():
     """Auto follows the view in which it was turned on, whichever is active, and makes one VDI each time."""
     inside("show_in_two_views()")
@@ -145,5 +157,6 @@ with Screen(1100, 760) as screen, Window(screen, "--script=" + os.path.join(HERE
     steps()
     comparative()
     screenshots_while_made()
+    compared_vdis()
     two_views()
     lost_stills()

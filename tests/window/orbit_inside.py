@@ -3,7 +3,8 @@ shows in the window by itself."""
 
 import numpy as np
 import pvtest
-from paraview import simple
+from paraview import servermanager, simple
+from paraview.modules.vtkRemotingServerManager import vtkSMPropertyHelper
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkCollection, vtkUnsignedCharArray
 
@@ -169,6 +170,30 @@ def edit_and_capture(peak, prepares):
 
 def captures_the_same():
     return same(screenshot("later.png"), shown["captured"])
+
+
+def compare_distances(distances):
+    """The VDI in a comparative view, with another unit distance in each of two cells."""
+    layout = simple.CreateLayout("Distances")
+    view = simple.CreateView("ComparativeRenderView")
+    simple.AssignViewToLayout(view, layout, 0)
+    view.Dimensions = [2, 1]
+    simple.Show(shown["vdi"], view)
+    simple.Render(view)
+    cue = servermanager.ProxyManager().NewProxy("animation", "ComparativeAnimationCue")
+    for name, value in (("AnimatedProxy", shown["vdi"].SMProxy), ("AnimatedPropertyName", "ScalarOpacityUnitDistance")):
+        vtkSMPropertyHelper(cue, name).Set(value)
+    cue.UpdateVTKObjects()
+    cue.UpdateXRange(0, *distances)
+    vtkSMPropertyHelper(view.SMProxy, "Cues").Set(0, cue)
+    view.SMProxy.UpdateVTKObjects()
+    simple.Render(view)
+    shown["comparative"] = view
+
+
+def compared():
+    """What the two cells show, as the mean of their brightness."""
+    return [float(pixels(view.GetRenderWindow()).mean()) for view in views_in(shown["comparative"])]
 
 
 def show_in_two_views():

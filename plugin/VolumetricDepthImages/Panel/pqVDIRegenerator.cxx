@@ -71,8 +71,6 @@ pqVDIRegenerator::pqVDIRegenerator(pqPipelineSource* source) : QObject(source), 
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::viewAdded, this, &pqVDIRegenerator::viewAdded);
   for (pqView* view : model->findItems<pqView*>()) this->viewAdded(view);
-  this->connect(source, &pqPipelineSource::representationAdded, this,
-                &pqVDIRegenerator::lookWhetherViewsWait);
   this->connect(source, &pqPipelineSource::representationRemoved, this,
                 &pqVDIRegenerator::lookWhetherViewsWait);
   this->connect(model, &pqServerManagerModel::proxyAdded, this, &pqVDIRegenerator::proxyAdded);
@@ -158,6 +156,9 @@ void pqVDIRegenerator::viewAdded(pqView* view) {
   this->connect(view, &pqView::beginRender, this, &pqVDIRegenerator::beginRender);
   this->connect(view, &pqView::endRender, this, &pqVDIRegenerator::endRender);
   this->connect(view, &pqView::updateDataEvent, this, &pqVDIRegenerator::viewUpdated);
+  // The source says so before the view has it.
+  this->connect(view, &pqView::representationAdded, this, &pqVDIRegenerator::lookWhetherViewsWait);
+  this->connect(view, &pqView::representationRemoved, this, &pqVDIRegenerator::lookWhetherViewsWait);
 }
 
 /// Screenshots and frames of animations wait for the VDI that's being made.
@@ -177,13 +178,19 @@ void pqVDIRegenerator::endRender() {
   this->lookWhetherViewsWait();
 }
 
-/// Views that show several time steps side by side would need several VDIs.
+/// Those that show several values or time steps side by side, each of which needs a VDI of its own.
+QList<pqView*> pqVDIRegenerator::comparativeViews() const {
+  QList<pqView*> views = this->Source->getViews();
+  views.erase(std::remove_if(views.begin(), views.end(),
+                             [](pqView* view) {
+                               return vtkSMComparativeViewProxy::SafeDownCast(view->getProxy()) == nullptr;
+                             }),
+              views.end());
+  return views;
+}
+
 void pqVDIRegenerator::lookWhetherViewsWait() {
-  const QList<pqView*> views = this->Source->getViews();
-  const bool arePlain = std::all_of(views.begin(), views.end(), [](pqView* view) {
-    return vtkSMComparativeViewProxy::SafeDownCast(view->getProxy()) == nullptr;
-  });
-  const bool defers = arePlain && !this->IsCaptured && !this->IsPlaying;
+  const bool defers = this->comparativeViews().empty() && !this->IsCaptured && !this->IsPlaying;
   if (defers == this->Defers) return;
   this->Defers = defers;
   this->generator()->InvokeCommand(defers ? "DeferViews" : "DeferNoViews");
@@ -231,6 +238,10 @@ void pqVDIRegenerator::look() {
   }
   if (this->Now == State::Waiting) {
     if (this->Resting.elapsed() < this->Rest) return;
+    if (!this->comparativeViews().empty()) {
+      this->finish();
+      return;
+    }
     // What an earlier edit began has been given up, but takes a moment to end.
     if (const int earlier = this->preparation(); earlier >= 0 && earlier < 100) return;
     this->generator()->InvokeCommand("Prepare");
@@ -251,6 +262,8 @@ void pqVDIRegenerator::finish() {
   this->Now = State::Idle;
   this->generator()->InvokeCommand("Release");
   this->generator()->MarkDirty(this->generator());
+  // They have kept what the filter gave them while it was held.
+  for (pqView* view : this->comparativeViews()) view->getProxy()->MarkDirty(this->generator());
   Q_EMIT this->progress(-1);
   this->Source->renderAllViews();
 }

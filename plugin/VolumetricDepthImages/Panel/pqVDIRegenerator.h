@@ -4,12 +4,13 @@
 // While a map is being edited the filter is held: it shows what it has. Once the edit has rested and no mouse
 // button is down, a thread makes the new VDI, which takes the old one's place when it's there. Likewise where
 // a view asks for a VDI that isn't made yet, after Apply, Undo or with another time step: it goes on showing
-// what it has, unless a picture is taken of it or an animation is played.
+// what it has, unless a picture is taken of it, an animation is played, or it is a comparative view.
 #ifndef pqVDIRegenerator_h
 #define pqVDIRegenerator_h
 
 #include <pqView.h>
 #include <QElapsedTimer>
+#include <QList>
 #include <QObject>
 #include <QPointer>
 #include <QTimer>
@@ -65,6 +66,7 @@ class pqVDIRegenerator : public QObject {
   vtkSMVDIGeneratorProxy* generator() const;
   bool isShown() const;
   bool isShownIn(pqView* view) const;
+  QList<pqView*> comparativeViews() const;
   void setAutoView(pqView* view);
   /// That of autoView, if it shows the VDI; null otherwise.
   vtkSMRenderViewProxy* followedView();
