@@ -135,10 +135,12 @@ class Picture {
                           start.ranks == 1 ? "" : "s");
     }
     std::string out = fmt::format("<text x=\"{}\" y=\"22\" font-size=\"15\">{}</text>\n", left, what);
+    const std::string leftOut =
+        records_.leftOut.empty() ? "" : fmt::format("{} left out, ", records_.leftOut.size());
     out += fmt::format(
-        "<text x=\"{}\" y=\"40\">{} frames made, {} failed, {} dropped by the stream; ms of the {} "
+        "<text x=\"{}\" y=\"40\">{} frames made, {} failed, {}{} dropped by the stream; ms of the {} "
         "rank</text>\n",
-        left, sum.frames, sum.failed, sum.dropped, options_.means ? "mean" : "slowest");
+        left, sum.frames, sum.failed, leftOut, sum.dropped, options_.means ? "mean" : "slowest");
     double at = left;
     for (std::size_t i = 0; i < names_.size(); ++i) {
       out +=

@@ -79,10 +79,17 @@ FrameRecord frameFrom(const Json& line) {
   return record;
 }
 
+LeftOut leftOutFrom(const Json& line) {
+  return {line.at("step").get<std::int64_t>(),
+          line.at("time").is_null() ? std::nan("") : line.at("time").get<double>(),
+          line.at("cause").get<std::string>()};
+}
+
 RunSummary summaryFrom(const Json& line) {
   RunSummary summary;
   summary.frames = line.at("frames").get<std::uint64_t>();
   summary.failed = line.at("failed").get<std::uint64_t>();
+  summary.leftOut = line.value("left_out", std::uint64_t{0});  // older logs have none
   summary.dropped = line.at("dropped").get<std::uint64_t>();
   summary.bytesWritten = line.at("bytes_written").get<std::uint64_t>();
   summary.seconds = line.at("seconds").get<double>();
@@ -100,6 +107,8 @@ bool take(const Json& line, RunRecords& records) {
     records.starts.push_back(startFrom(line));
   } else if (event == "frame") {
     records.frames.push_back(frameFrom(line));
+  } else if (event == "left_out") {
+    records.leftOut.push_back(leftOutFrom(line));
   } else if (event == "end") {
     records.summaries.push_back(summaryFrom(line));
   } else {
@@ -195,10 +204,15 @@ std::string jsonLine(const FrameRecord& record) {
   return dumped(line);
 }
 
+std::string jsonLine(const LeftOut& frame) {
+  return dumped({{"event", "left_out"}, {"step", frame.step}, {"time", frame.time}, {"cause", frame.cause}});
+}
+
 std::string jsonLine(const RunSummary& summary) {
   return dumped({{"event", "end"},
                  {"frames", summary.frames},
                  {"failed", summary.failed},
+                 {"left_out", summary.leftOut},
                  {"dropped", summary.dropped},
                  {"bytes_written", summary.bytesWritten},
                  {"seconds", rounded(summary.seconds)},
@@ -229,12 +243,18 @@ std::string textLine(const FrameRecord& record) {
   return line;
 }
 
+std::string textLine(const LeftOut& frame) {
+  return fmt::format("step {}, time {:g}: left out: {}", frame.step, frame.time, onOneLine(frame.cause));
+}
+
 std::string textLine(const RunSummary& summary) {
   const std::uint64_t all = summary.frames + summary.failed;
   const double share = summary.seconds > 0.0 ? 100.0 * summary.waitedSeconds / summary.seconds : 0.0;
-  std::string line = fmt::format("{} frame{} made, {} failed, {} dropped by the stream; {} written",
-                                 summary.frames, summary.frames == 1 ? "" : "s", summary.failed,
-                                 summary.dropped, mebibytes(summary.bytesWritten));
+  std::string line = fmt::format("{} frame{} made, {} failed, ", summary.frames,
+                                 summary.frames == 1 ? "" : "s", summary.failed);
+  if (summary.leftOut > 0) line += fmt::format("{} left out, ", summary.leftOut);
+  line +=
+      fmt::format("{} dropped by the stream; {} written", summary.dropped, mebibytes(summary.bytesWritten));
   line += fmt::format("; the simulation waited {:.2f} s of {:.2f} s ({:.1f} %)", summary.waitedSeconds,
                       summary.seconds, share);
   if (all > 0) {

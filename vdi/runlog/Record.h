@@ -53,10 +53,19 @@ struct FrameRecord {
 /// Fills what `reports` of all ranks tell: stages, bytes and memory.
 void setReports(FrameRecord& record, std::span<const RankReport> reports);
 
+/// A frame that was due and has not been made.
+struct LeftOut {
+  std::int64_t step = 0;
+  double time = 0.0;
+  std::string cause;
+  bool operator==(const LeftOut&) const = default;
+};
+
 /// The end of a run that was finalized.
 struct RunSummary {
   std::uint64_t frames = 0;  // made
   std::uint64_t failed = 0;
+  std::uint64_t leftOut = 0;
   std::uint64_t dropped = 0;  // by the stream
   std::uint64_t bytesWritten = 0;
   double seconds = 0.0;              // of the run, from its start
@@ -71,15 +80,18 @@ struct RunSummary {
 // One line each, without the line's end.
 std::string jsonLine(const RunStart& start);
 std::string jsonLine(const FrameRecord& record);
+std::string jsonLine(const LeftOut& frame);
 std::string jsonLine(const RunSummary& summary);
 std::string textLine(const RunStart& start);
 std::string textLine(const FrameRecord& record);
+std::string textLine(const LeftOut& frame);
 std::string textLine(const RunSummary& summary);
 
 /// What a log of JSON lines tells: of several runs, if they have appended to one file.
 struct RunRecords {
   std::vector<RunStart> starts;
   std::vector<FrameRecord> frames;
+  std::vector<LeftOut> leftOut;
   std::vector<RunSummary> summaries;
   std::size_t skipped = 0;  // lines that aren't records, such as one that a full disk has cut
 };

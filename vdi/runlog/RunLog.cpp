@@ -26,7 +26,7 @@ namespace {
 /// A file to which lines are appended.
 class RunLog::Appended {
  public:
-  explicit Appended(std::filesystem::path path) : path_(std::move(path)) {
+  Appended(std::filesystem::path path, Before before) : path_(std::move(path)) {
     std::error_code error;
     if (path_.has_parent_path()) std::filesystem::create_directories(path_.parent_path(), error);
     if (error) throw Error(ErrorCode::Io, "can't make the log's folder: " + error.message(), path_.string());
@@ -36,7 +36,12 @@ class RunLog::Appended {
         ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, readable);
     if (descriptor_ < 0) failWith("open the log", errno, path_);
     struct stat status {};
-    if (::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) return;
+    if (::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) {
+      if (before == Before::Stays || ::ftruncate(descriptor_, 0) == 0) return;
+      const int reason = errno;
+      ::close(descriptor_);
+      failWith("empty the log", reason, path_);
+    }
     ::close(descriptor_);
     throw Error(ErrorCode::Io, "the log must be a regular file", path_.string());
   }
@@ -70,9 +75,9 @@ class RunLog::Appended {
   int descriptor_ = -1;
 };
 
-RunLog::RunLog(const LogFiles& files, const RunStart& start) {
-  if (files.json) json_ = std::make_unique<Appended>(*files.json);
-  if (files.text) text_ = std::make_unique<Appended>(*files.text);
+RunLog::RunLog(const LogFiles& files, const RunStart& start, Before before) {
+  if (files.json) json_ = std::make_unique<Appended>(*files.json, before);
+  if (files.text) text_ = std::make_unique<Appended>(*files.text, before);
   append(jsonLine(start), textLine(start));
 }
 
@@ -92,6 +97,11 @@ void RunLog::append(const std::string& json, const std::string& text) {
 void RunLog::add(const FrameRecord& record) {
   summary_.add(record);
   append(jsonLine(record), textLine(record));
+}
+
+void RunLog::add(const LeftOut& frame) {
+  ++summary_.leftOut;
+  append(jsonLine(frame), textLine(frame));
 }
 
 RunSummary RunLog::finish() {

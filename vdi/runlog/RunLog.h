@@ -17,11 +17,12 @@ struct LogFiles {
 };
 
 /// One rank's. A line is appended when it comes, in one piece or not at all, so that the log of a killed run
-/// ends with its last frame. What was in a file before stays.
+/// ends with its last frame.
 class RunLog {
  public:
+  enum class Before { Stays, Goes };  // what is in the files
   /// Makes folders and files if need be. Throws Error{Io} with the path.
-  RunLog(const LogFiles& files, const RunStart& start);
+  RunLog(const LogFiles& files, const RunStart& start, Before before = Before::Stays);
   /// Doesn't write the summary.
   ~RunLog();
   RunLog(const RunLog&) = delete;
@@ -29,6 +30,7 @@ class RunLog {
 
   /// Throws Error{Io} if the line couldn't be appended, after the other file got its one.
   void add(const FrameRecord& record);
+  void add(const LeftOut& frame);  // throws as above
   const RunSummary& soFar() const { return summary_; }
   /// Appends the summary, and returns it. Throws as add.
   RunSummary finish();
