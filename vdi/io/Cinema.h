@@ -1,0 +1,41 @@
+// The index of a Cinema database (specification D), which Cinema viewers read.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace vdi::io {
+
+/// A picture, and from where it shows the volume.
+struct CinemaPicture {
+  double time = 0.0;   // of the simulation
+  double phi = 0.0;    // degrees: azimuth
+  double theta = 0.0;  // degrees: elevation
+  std::string file;    // relative to the database's folder
+};
+
+/// data.csv in the database's folder: a line for each picture, with the columns time, phi, theta and FILE.
+class CinemaIndex {
+ public:
+  /// `keep`: goes on with the pictures of an index that is there. Throws Error: Io as InputFile, Format for
+  /// an index that has other columns.
+  CinemaIndex(std::filesystem::path folder, bool keep);
+
+  /// In place of what the index has for this file. It's written by `write`.
+  void add(const CinemaPicture& picture);
+  /// Readers see the index of before or this one. Throws Error{Io} as writeAtomically.
+  void write() const;
+  std::filesystem::path path() const { return folder_ / "data.csv"; }
+
+ private:
+  void put(const std::string& file, std::string line);
+  void read();
+
+  std::filesystem::path folder_;
+  std::vector<std::string> lines_;             // of pictures
+  std::map<std::string, std::size_t> lineOf_;  // by file
+};
+
+}  // namespace vdi::io
