@@ -1,11 +1,15 @@
 // vdi check: finds the mistakes of a vdi.json before a simulation runs with it.
 #include <fmt/format.h>
+#include <fmt/ranges.h>  // fmt::join
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/Commands.h"
 #include "apps/Help.h"
@@ -25,6 +29,44 @@ void requireWritable(const std::filesystem::path& file) {
   if (folder.empty() || std::filesystem::exists(folder)) (void)io::requireWritable(file);
 }
 
+/// When frames are made, in words.
+std::string triggersOf(const config::Run& run) {
+  std::vector<std::string> due;
+  if (run.every > 0) due.push_back(fmt::format("at steps 0, {}, {} ...", run.every, 2 * run.every));
+  if (run.everyTime) due.push_back(fmt::format("every {} of the simulation's time", *run.everyTime));
+  if (run.everySeconds) due.push_back(fmt::format("every {} s", *run.everySeconds));
+  std::string text = fmt::format("{}", fmt::join(due, " and "));
+  if (run.when) {
+    using Measure = config::RunCondition::Measure;
+    const char* measure = run.when->measure == Measure::Max    ? "maximum"
+                          : run.when->measure == Measure::Min  ? "minimum"
+                          : run.when->measure == Measure::Mean ? "mean"
+                                                               : "mean's change";
+    text += fmt::format(", if {}'s {} is", run.when->field, measure);
+    if (run.when->above) text += fmt::format(" above {}", *run.when->above);
+    if (run.when->above && run.when->below) text += " and";
+    if (run.when->below) text += fmt::format(" below {}", *run.when->below);
+  }
+  if (run.maxShare) text += fmt::format(", in {} % of the wall time at most", 100.0 * *run.maxShare);
+  return text;
+}
+
+/// The files of a step.
+void checkFiles(const config::Run& run) {
+  const std::int64_t step = std::max<std::int64_t>(run.every, 1);
+  const auto check = [&](const config::FilePattern& pattern) {
+    for (const config::RunCamera& camera : run.cameras) requireWritable(pattern.path(step, camera.name));
+    fmt::print("step {}: {}\n", step, pattern.path(step, run.cameras.front().name).string());
+    if (run.cameras.size() > 1) fmt::print("... and {} other viewpoints\n", run.cameras.size() - 1);
+  };
+  if (run.vdi) check(*run.vdi);
+  if (run.png) check(*run.png);
+  if (run.cinema) {
+    check(run.cinema->pictures);
+    fmt::print("a Cinema database: {}\n", run.cinema->folder.string());
+  }
+}
+
 void check(const std::string& file) {
   const config::RunText source = config::readRun(file);
   const config::Run run = config::parseRun(source.text, source.name);
@@ -33,21 +75,27 @@ void check(const std::string& file) {
     map = config::colorMapOf(*colors, run.colors.file, run.colors.name);
   const ScalarRange any{0.0, 1.0};
   validate(run.transferFunction(map, any, 1.0));
-  fmt::print("{}: {}, {} x {}, at steps 0, {}, {} ...\n", source.name, run.field, run.settings.width,
-             run.settings.height, run.every, 2 * run.every);
-  for (const auto& pattern : {run.vdi, run.png}) {
-    if (!pattern) continue;
-    requireWritable(pattern->path(run.every));
-    fmt::print("step {}: {}\n", run.every, pattern->path(run.every).string());
-  }
+  fmt::print("{}: {}, {} x {}, {}\n", source.name, run.field, run.settings.width, run.settings.height,
+             triggersOf(run));
+  checkFiles(run);
   for (const std::string& log : {run.log.json, run.log.text}) {
     if (log.empty()) continue;
     requireWritable(log);
     fmt::print("a log: {}\n", log);
   }
-  if (run.stream) fmt::print("a stream, at {}:{}\n", run.stream->host, run.stream->port);
+  if (run.stream) {
+    fmt::print("a stream, at {}:{}{}\n", run.stream->host, run.stream->port,
+               run.stream->steer ? ", whose viewers steer" : "");
+  }
   if (!run.colors.range)
     fmt::print("colours without a range: the first frame's values decide, also after a restart\n");
+  // From this folder, which may not be the run's.
+  if (const auto there = run.firstExisting(); there && run.existing == config::Existing::Refuse) {
+    fmt::print(
+        "{} is there already: in this folder a run refuses to start, unless \"existing\" is "
+        "\"continue\" or \"overwrite\"\n",
+        there->string());
+  }
 }
 
 }  // namespace

@@ -5,6 +5,9 @@
 #include <memory>
 #include <new>
 #include <stdexcept>
+#include <utility>
+
+#include "vdi/core/Error.h"
 
 namespace vdi::catalyst {
 
@@ -54,6 +57,16 @@ Memory gathered(const StridedValues& values) {
   return {array->data(), array};
 }
 
+Block blockAt(const vdi_catalyst_block& b, bool cells, ScalarType type, Memory memory) {
+  const GhostLayers ghosts{vectorOf(b.ghost_lo), vectorOf(b.ghost_hi)};
+  const glm::ivec3 counts = vectorOf(b.cells) + (cells ? 0 : 1);
+  Block block =
+      cells ? Block::fromCells(counts, vectorOf(b.origin), vectorOf(b.spacing), type, memory.data, ghosts)
+            : Block::fromPoints(counts, vectorOf(b.origin), vectorOf(b.spacing), type, memory.data, ghosts);
+  block.keepAlive = std::move(memory.keepAlive);
+  return block;
+}
+
 /// Of each value, the only component or the magnitude of all; as doubles.
 Memory asDoubles(const StridedValues& values, int type) {
   StridedArray array(values);
@@ -92,6 +105,7 @@ std::size_t bytesOf(int type) {
 void Fields::setBlocks(std::vector<vdi_catalyst_block> blocks) {
   blocks_ = std::move(blocks);
   arrays_.clear();
+  ++version_;
 }
 
 StridedValues Fields::inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
@@ -144,42 +158,65 @@ int Fields::componentsOf(const std::string& name, bool cells) const {
   return array != nullptr && !array->values.empty() ? array->values.front().components : 1;
 }
 
-std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int component) const {
-  std::vector<Block> blocks;
-  if (blocks_.empty()) return blocks;
+Fields::Values Fields::valuesOf(const std::string& name, bool cells, int component) const {
+  if (blocks_.empty()) return {};
   const Array* array = find(name, cells);
   if (array == nullptr) {
     throw std::runtime_error("there is no array '" + name + "' of " + (cells ? "cells" : "points") +
                              "; the arrays are: " + names());
   }
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    StridedValues values = array->values[i];
+  for (const StridedValues& values : array->values) {
     if (values.components > 1 && component >= values.components) {
       throw std::runtime_error("there is no component " + std::to_string(component) + ", '" + name +
                                "' has " + std::to_string(values.components));
     }
+  }
+  return {array->type, array->values};
+}
+
+std::vector<Block> Fields::placesOf(bool cells) const {
+  std::vector<Block> places;
+  for (const vdi_catalyst_block& block : blocks_)
+    places.push_back(blockAt(block, cells, ScalarType::U8, {&block, nullptr}));
+  return places;
+}
+
+std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int component) const {
+  std::vector<Block> blocks;
+  const Values all = valuesOf(name, cells, component);
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    StridedValues values = all.blocks[i];
     if (values.components > 1 && component >= 0) {
       values.first += component * values.componentStride;
       values.components = 1;
     }
-    const bool isConverted = values.components > 1 || isWide(array->type);
+    const bool isConverted = values.components > 1 || isWide(all.type);
     Memory memory{values.first, nullptr};
     if (isConverted) {
-      memory = asDoubles(values, array->type);
+      memory = asDoubles(values, all.type);
     } else if (!values.inOrder()) {
       memory = gathered(values);
     }
-    const ScalarType type = isConverted ? ScalarType::F64 : scalarTypeOf(array->type);
-    const vdi_catalyst_block& b = blocks_[i];
-    const GhostLayers ghosts{vectorOf(b.ghost_lo), vectorOf(b.ghost_hi)};
-    const glm::ivec3 counts = vectorOf(b.cells) + (cells ? 0 : 1);
-    Block block =
-        cells ? Block::fromCells(counts, vectorOf(b.origin), vectorOf(b.spacing), type, memory.data, ghosts)
-              : Block::fromPoints(counts, vectorOf(b.origin), vectorOf(b.spacing), type, memory.data, ghosts);
-    block.keepAlive = std::move(memory.keepAlive);
-    blocks.push_back(std::move(block));
+    const ScalarType type = isConverted ? ScalarType::F64 : scalarTypeOf(all.type);
+    blocks.push_back(blockAt(blocks_[i], cells, type, std::move(memory)));
   }
   return blocks;
+}
+
+bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const std::string& name,
+                  std::optional<bool> given) {
+  // Ranks without blocks may not know, all others agree.
+  std::array<std::uint64_t, 2> kinds{0, 0};  // of points, of cells
+  comm.together([&] {
+    const std::optional<bool> cells = given ? given : fields.associationOf(name);
+    if (cells) kinds[*cells ? 1 : 0] = 1;
+  });
+  comm.allReduceMax(kinds);
+  if (kinds[0] > 0 && kinds[1] > 0) {
+    throw Error(ErrorCode::InvalidArgument,
+                "ranks have '" + name + "' of cells and of points: 'association' must name one");
+  }
+  return kinds[1] > 0;
 }
 
 }  // namespace vdi::catalyst

@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "catalyst_adaptor/StridedArray.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "vdi/comm/Communicator.h"
 #include "vdi/core/Block.h"
 #include "vdi/core/Coloring.h"
 
@@ -22,6 +24,8 @@ class Fields {
   /// Forgets all arrays.
   void setBlocks(std::vector<vdi_catalyst_block> blocks);
   const std::vector<vdi_catalyst_block>& blocks() const { return blocks_; }
+  /// Another one after each setBlocks; equal on all ranks.
+  std::uint64_t version() const { return version_; }
 
   /// The places of a block's values: x fastest, components side by side, no gaps.
   StridedValues inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
@@ -36,6 +40,17 @@ class Fields {
   std::string names() const;
 
   int componentsOf(const std::string& name, bool cells) const;  // 1 without blocks
+  /// An array's values where the simulation has them, one for each block.
+  struct Values {
+    int type = VDI_CATALYST_F64;
+    std::span<const StridedValues> blocks;
+  };
+  /// Of an array that there is, unless there are no blocks; `component` is one of the array's, or -1 for all.
+  /// Throws std::runtime_error: no such array or component.
+  Values valuesOf(const std::string& name, bool cells, int component) const;
+  /// The blocks without values, each at its place: what it owns and where its values lie. `data` of each is
+  /// another address, and isn't to be read.
+  std::vector<Block> placesOf(bool cells) const;
   /// The blocks with the values of an array that there is, which are read where they are unless they are
   /// out of order, 64-bit integers, or a magnitude. Throws std::runtime_error: no such component, no memory.
   std::vector<Block> blocksOf(const std::string& name, bool cells, int component) const;
@@ -48,10 +63,16 @@ class Fields {
   const Array* find(const std::string& name, bool cells) const;
 
   std::vector<vdi_catalyst_block> blocks_;
+  std::uint64_t version_ = 0;
   std::map<std::pair<bool, std::string>, Array> arrays_;  // by: of cells, name
 };
 
 /// Throws std::invalid_argument for one that vdi_catalyst.h doesn't have.
 std::size_t bytesOf(int type);
+
+/// Collective: whether the array of that name is one of cells, where `given` doesn't say so. Throws on all
+/// ranks as Fields::associationOf, and Error{InvalidArgument} if ranks differ.
+bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const std::string& name,
+                  std::optional<bool> given);
 
 }  // namespace vdi::catalyst

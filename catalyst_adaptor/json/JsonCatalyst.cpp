@@ -92,6 +92,10 @@ class Reading {
       run = vdi::config::parseRun(source_.text, source_.name);
       if (comm_.rank() == 0) colors_ = vdi::config::readColorsFile(run, source_).value_or("");
     });
+    if (code != VDI_CATALYST_OK) return code;
+    code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
+      if (comm_.rank() == 0) vdi::config::requireNothingInTheWay(run);
+    });
     if (code != VDI_CATALYST_OK || run.colors.file.empty()) return code;
     colors_ = shared(comm_, colors_);
     return guarded(self_, VDI_CATALYST_SCRIPT,
@@ -195,9 +199,9 @@ int setArrayStrided(vdi_catalyst* catalyst, const char* name, int32_t type, int3
   return setAnyArray(catalyst, name, type, association, components, data, strides);
 }
 
-int wants(vdi_catalyst* catalyst, int64_t step, double) {
+int wants(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return 0;
-  int wanted = catalyst->engine->wants(step) ? 1 : 0;
+  int wanted = catalyst->engine->wants(step, time) ? 1 : 0;
   MPI_Allreduce(MPI_IN_PLACE, &wanted, 1, MPI_INT, MPI_MAX, catalyst->comm);
   return wanted;
 }
@@ -217,12 +221,12 @@ int execute(vdi_catalyst* catalyst, int64_t step, double time) {
         *catalyst, VDI_CATALYST_BAD_ARGUMENT,
         [&] { requireEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
   }
-  if (code != VDI_CATALYST_OK || !catalyst->engine->wants(step)) return code;
+  if (code != VDI_CATALYST_OK || !catalyst->engine->mayExecute(step, time)) return code;
   // All ranks have met by now.
   const double waited = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   code = guardedTogether(
       *catalyst, VDI_CATALYST_SCRIPT,
-      [&] { catalyst->engine->execute(catalyst->fields, step, time, waited); }, step);
+      [&] { catalyst->engine->execute(catalyst->fields, catalyst->parameters, step, time, waited); }, step);
   if (code == VDI_CATALYST_OK) catalyst->printed.clear();
   return code;
 }

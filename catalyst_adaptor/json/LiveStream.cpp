@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <cstdio>
 #include <string>
 #include <utility>
@@ -18,7 +19,15 @@ namespace vdi::catalyst {
 
 /// The publisher hands its last frame over before the server ends.
 struct LiveStream::Service {
-  explicit Service(stream::ServerOptions options) : server(std::move(options)), publisher(server) {}
+  Service(stream::ServerOptions options, bool isSteered)
+      : server(steered(std::move(options), isSteered)), publisher(server) {}
+  stream::ServerOptions steered(stream::ServerOptions options, bool isSteered) {
+    if (isSteered)
+      options.steer = [this](std::uint32_t viewer, const stream::Wish& wish) { wishes.put(viewer, wish); };
+    return options;
+  }
+
+  stream::Wishes wishes;  // of which the server's thread knows
   stream::Server server;
   stream::Publisher publisher;
   std::unique_ptr<stream::SecretFile> link;
@@ -36,7 +45,7 @@ LiveStream::LiveStream(const config::RunStream& options) {
   server.mostBytesPerSecond = options.megabits * bytesPerMegabit;
   server.certificate = options.certificate;
   server.key = options.key;
-  service_ = std::make_unique<Service>(std::move(server));
+  service_ = std::make_unique<Service>(std::move(server), options.steer);
   const std::string link = given.empty() ? service_->server.link() : service_->server.address();
   const std::string& file = options.linkFile;
   if (!file.empty()) service_->link = std::make_unique<stream::SecretFile>(file, link);
@@ -57,6 +66,14 @@ void LiveStream::publish(std::shared_ptr<const Vdi> vdi) {
 
 std::uint64_t LiveStream::dropped() const {
   return service_->publisher.dropped();
+}
+
+std::optional<stream::Request> LiveStream::takeRequest(std::chrono::milliseconds patience) {
+  return service_->wishes.take(patience);
+}
+
+void LiveStream::setControls(stream::Controls controls) {
+  service_->server.setControls(std::move(controls));
 }
 
 }  // namespace vdi::catalyst

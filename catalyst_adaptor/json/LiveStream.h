@@ -1,11 +1,14 @@
 // The frames of a run in browsers, as the extractor VDIStream shows them.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "vdi/config/Run.h"
 #include "vdi/core/Vdi.h"
+#include "vdi/stream/Steering.h"
 
 namespace vdi::catalyst {
 
@@ -23,6 +26,12 @@ class LiveStream {
   void publish(std::shared_ptr<const Vdi> vdi);
   /// Frames that viewers never got, for the next one came before they were encoded.
   std::uint64_t dropped() const;
+
+  /// What viewers have asked for since this was called last. Waits so long at most; none: nothing, or the run
+  /// lets nobody steer.
+  std::optional<stream::Request> takeRequest(std::chrono::milliseconds patience);
+  /// What viewers may ask for, and what is in force.
+  void setControls(stream::Controls controls);
 
  private:
   struct Service;

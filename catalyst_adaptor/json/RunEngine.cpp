@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -16,12 +17,16 @@
 #include <vector>
 
 #include "catalyst_adaptor/json/LiveStream.h"
+#include "catalyst_adaptor/json/Measure.h"
+#include "catalyst_adaptor/json/RunSteering.h"
 #include "vdi/comm/Communicator.h"
+#include "vdi/config/Schedule.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
 #include "vdi/core/UnitDistance.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/gpu/DeviceRequest.h"
+#include "vdi/io/Cinema.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
@@ -53,17 +58,41 @@ runlog::LogFiles logFilesOf(const config::RunLogFiles& names) {
   return files;
 }
 
-runlog::FrameRecord recordOf(std::int64_t step, double time) {
+runlog::FrameRecord recordOf(std::int64_t step, double time, const config::RunCamera& camera) {
   runlog::FrameRecord record;
   record.step = step;
   record.time = time;
+  record.camera = camera.name;
   return record;
+}
+
+std::vector<const config::FilePattern*> patternsOf(const config::Run& run) {
+  std::vector<const config::FilePattern*> patterns;
+  if (run.vdi) patterns.push_back(&*run.vdi);
+  if (run.png) patterns.push_back(&*run.png);
+  if (run.cinema) patterns.push_back(&run.cinema->pictures);
+  return patterns;
 }
 
 }  // namespace
 
+/// What the cameras of a step have in common.
+struct RunEngine::Frame {
+  std::int64_t step = 0;
+  double time = 0.0;
+  double unitDistance = 1.0;
+  ScalarRange range;  // of the colours, unless the run has one
+  vdi::TimeStamp stamp;
+};
+
 struct RunEngine::State {
-  explicit State(int handle) : fortranCommunicator(handle), comm(comm::Communicator::fromMpi(handle)) {}
+  State(int handle, const config::Run& run)
+      : fortranCommunicator(handle),
+        comm(comm::Communicator::fromMpi(handle)),
+        schedule(run),
+        budget(run.maxShare) {
+    if (run.when) measure.emplace(*run.when);
+  }
 
   /// Collective.
   void start() {
@@ -72,69 +101,217 @@ struct RunEngine::State {
                                                generatorOptionsFromEnvironment(comm));
   }
   bool isRoot() const { return comm.rank() == 0; }
+  /// Collective: the root's answer on all ranks.
+  bool asRootSays(bool answer) const {
+    std::array<std::uint64_t, 1> word{isRoot() && answer ? std::uint64_t{1} : 0};
+    comm.allReduceMax(word);
+    return word[0] != 0;
+  }
+  double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
   int fortranCommunicator;
   comm::Communicator comm;
+  Clock::time_point begin = Clock::now();
   std::shared_ptr<gpu::Device> device;
   std::unique_ptr<VdiGenerator> generator;
-  std::unique_ptr<runlog::RunLog> log;    // the root's
-  std::unique_ptr<LiveStream> stream;     // the root's
+  config::Schedule schedule;
+  config::Budget budget;
+  std::optional<Measure> measure;
+  std::optional<double> meanNow;            // that decided on the step
+  std::optional<double> meanOfLast;         // frame
+  std::unique_ptr<runlog::RunLog> log;      // the root's
+  std::unique_ptr<LiveStream> stream;       // the root's
+  std::unique_ptr<io::CinemaIndex> cinema;  // the root's
+  std::optional<RunSteering> steering;
   std::optional<ScalarRange> firstRange;  // of the colours, unless the run has one
-};
-
-/// All that the generator needs beside its blocks.
-struct RunEngine::Frame {
-  Camera camera;
-  TransferFunction function;
-  TimeStamp stamp;
+  std::optional<Frame> frame;             // that the device has
+  bool isAskedFor = false;                // a viewer's view, to be shown at the next step
+  bool hasToldOfBudget = false;
 };
 
 RunEngine::RunEngine(int fortranCommunicator, config::Run run, std::optional<config::ColorMap> map)
-    : run_(std::move(run)), map_(std::move(map)), state_(std::make_unique<State>(fortranCommunicator)) {
+    : run_(std::move(run)), map_(std::move(map)), state_(std::make_unique<State>(fortranCommunicator, run_)) {
   state_->start();
-  state_->comm.together([&] {
-    if (!state_->isRoot()) return;
-    if (run_.log.any()) {
-      const runlog::RunStart start{run_.field, state_->comm.size(), std::time(nullptr)};
-      state_->log = std::make_unique<runlog::RunLog>(logFilesOf(run_.log), start);
-    }
-    if (run_.stream) state_->stream = std::make_unique<LiveStream>(*run_.stream);
-  });
+  start();
 }
 
 RunEngine::~RunEngine() = default;
 
-void RunEngine::execute(const Fields& fields, std::int64_t step, double time, double waited) {
-  const auto start = std::chrono::steady_clock::now();
-  runlog::FrameRecord record = recordOf(step, time);
-  if (!run_.log.any()) {
-    makeOrRetry(fields, step, time, record);
-    return;
+/// The root's files and stream.
+void RunEngine::start() {
+  State& state = *state_;
+  const bool isAnew = run_.existing == config::Existing::Overwrite;
+  state.comm.together([&] {
+    if (!state.isRoot()) return;
+    if (run_.log.any()) {
+      const runlog::RunStart start{run_.field, state.comm.size(), std::time(nullptr)};
+      using Before = runlog::RunLog::Before;
+      state.log = std::make_unique<runlog::RunLog>(logFilesOf(run_.log), start,
+                                                   isAnew ? Before::Goes : Before::Stays);
+    }
+    if (run_.cinema) state.cinema = std::make_unique<io::CinemaIndex>(run_.cinema->folder, !isAnew);
+    if (run_.stream) state.stream = std::make_unique<LiveStream>(*run_.stream);
+  });
+  if (run_.stream && run_.stream->steer) state.steering.emplace(state.comm, state.stream.get());
+}
+
+bool RunEngine::wants(std::int64_t step, double time) const {
+  if (step < 0 || !mayExecute(step, time)) return false;
+  if (state_->steering) return true;
+  if (state_->schedule.needsRoot() && !state_->isRoot()) return false;
+  return state_->schedule.isDue(step, time, state_->elapsed());
+}
+
+bool RunEngine::mayExecute(std::int64_t step, double time) const {
+  return state_->steering || state_->schedule.needsRoot() || state_->schedule.isDue(step, time, 0.0);
+}
+
+bool RunEngine::isDue(std::int64_t step, double time) {
+  State& state = *state_;
+  const double now = state.elapsed();
+  bool due = state.schedule.isDue(step, time, now);
+  if (state.schedule.needsRoot()) due = state.asRootSays(due);
+  if (due) state.schedule.begin(time, now);
+  return due;
+}
+
+/// Of a step at which a frame is due.
+bool RunEngine::isToBeMade(const Fields& fields, std::int64_t step, double time) {
+  State& state = *state_;
+  if (state.measure) {
+    const config::RunCondition& condition = state.measure->condition();
+    const std::optional<double> value = state.measure->of(state.comm, fields);
+    bool holds = value.has_value();
+    if (condition.measure == config::RunCondition::Measure::Change) {
+      holds = value && (!state.meanOfLast || condition.holds(std::abs(*value - *state.meanOfLast)));
+      state.meanNow = value;
+    } else if (value) {
+      holds = condition.holds(*value);
+    }
+    // Sums may differ in their last bits.
+    if (!state.asRootSays(holds)) return false;
   }
-  const std::vector<double> waits = millisecondsOfRanks(waited);
+  if (!state.budget.isLimited() || state.asRootSays(state.budget.hasRoom(state.elapsed()))) return true;
+  leaveOut(step, time);
+  return false;
+}
+
+void RunEngine::leaveOut(std::int64_t step, double time) {
+  State& state = *state_;
+  state.comm.together([&] {
+    if (!state.isRoot()) return;
+    constexpr double percent = 100.0;
+    const std::string cause =
+        fmt::format("frames have taken {:.3g} s of {:.3g} s, \"max_share\" is {:g} %", state.budget.spent(),
+                    state.elapsed(), percent * state.budget.share());
+    if (!std::exchange(state.hasToldOfBudget, true)) {
+      fmt::print(stderr, "vdi_catalyst: step {}: left out: {}; {}\n", step, cause,
+                 state.log ? "the log has all such steps" : "more such steps aren't told");
+    }
+    if (state.log) state.log->add(runlog::LeftOut{step, time, cause});
+  });
+}
+
+void RunEngine::execute(const Fields& fields, Parameters& parameters, std::int64_t step, double time,
+                        double waited) {
+  State& state = *state_;
+  state.frame.reset();  // values may be others
   std::exception_ptr failure;
+  bool isMade = false;
   try {
-    makeOrRetry(fields, step, time, record);
-  } catch (const std::exception& error) {
+    if (isDue(step, time)) {
+      isMade = isToBeMade(fields, step, time);
+      if (isMade) makeAll(fields, step, time, waited, true);
+    }
+    if (!isMade && state.isAskedFor) makeAll(fields, step, time, waited, false);
+  } catch (...) {
     failure = std::current_exception();
-    record = recordOf(step, time);
-    record.error = error.what();
+  }
+  state.isAskedFor = false;
+  if (state.steering) steer(fields, parameters, step, time);
+  if (failure) std::rethrow_exception(failure);
+  if (state.steering) state.steering->requireLogged();
+}
+
+/// Where it is for the stream alone, the first camera's.
+void RunEngine::makeAll(const Fields& fields, std::int64_t step, double time, double waited,
+                        bool isForFiles) {
+  State& state = *state_;
+  const auto begin = Clock::now();
+  std::vector<double> waits;
+  if (run_.log.any()) waits = millisecondsOfRanks(waited);
+  std::exception_ptr first;
+  for (const config::RunCamera& camera : run_.cameras) {
+    const auto start = Clock::now();
+    runlog::FrameRecord frame = recordOf(step, time, camera);
+    std::exception_ptr failure;
+    try {
+      makeOne(fields, step, time, camera, isForFiles, frame);
+    } catch (const std::exception& error) {  // on all ranks, but with another exception on each
+      failure = std::current_exception();
+      frame = recordOf(step, time, camera);
+      frame.error = error.what();
+    }
+    try {
+      record(frame, failure, waits, start);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    waits.clear();
+    if (!first) first = failure;
+    if (!state.frame || !isForFiles) break;  // other cameras would fail as well
+  }
+  state.budget.spend(std::chrono::duration<double>(Clock::now() - begin).count());
+  if (isForFiles && !first) state.meanOfLast = state.meanNow;
+  try {
+    state.comm.together([&] {
+      if (state.cinema && isForFiles) state.cinema->write();
+    });
+  } catch (...) {
+    if (!first) first = std::current_exception();
+  }
+  if (first) std::rethrow_exception(first);
+}
+
+/// Collective, if the run has a log. Throws the failure, or the log's.
+void RunEngine::record(runlog::FrameRecord& frame, const std::exception_ptr& failure,
+                       const std::vector<double>& waits, Clock::time_point start) {
+  if (!run_.log.any()) {
+    if (failure) std::rethrow_exception(failure);
+    return;
   }
   state_->comm.together([&] {
     if (failure && !state_->log) std::rethrow_exception(failure);
     if (!state_->log) return;
-    const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
-    record.milliseconds = waits.front() + spent.count();
-    if (!failure) record.stages.insert(record.stages.begin(), runlog::stageOf("wait", waits));
-    if (state_->stream) record.dropped = state_->stream->dropped();
+    const std::chrono::duration<double, std::milli> spent = Clock::now() - start;
+    frame.milliseconds = (waits.empty() ? 0.0 : waits.front()) + spent.count();
+    if (!failure && !waits.empty()) frame.stages.insert(frame.stages.begin(), runlog::stageOf("wait", waits));
+    if (state_->stream) frame.dropped = state_->stream->dropped();
     try {
-      state_->log->add(record);
+      state_->log->add(frame);
     } catch (const std::exception& error) {
       if (!failure) throw;
-      fmt::print(stderr, "vdi_catalyst: step {}: {}\n", step, error.what());
+      fmt::print(stderr, "vdi_catalyst: step {}: {}\n", frame.step, error.what());
     }
     if (failure) std::rethrow_exception(failure);
   });
+}
+
+/// What viewers ask for. While the simulation is to wait, a VDI for each view that they ask for.
+void RunEngine::steer(const Fields& fields, Parameters& parameters, std::int64_t step, double time) {
+  State& state = *state_;
+  const Steered steered{run_, map_, state.schedule, state.firstRange, parameters};
+  while (state.steering->take(steered, step, time)) {
+    state.isAskedFor = true;
+    if (!state.steering->isPaused()) return;
+    try {
+      runlog::FrameRecord none = recordOf(step, time, run_.cameras.front());
+      makeOne(fields, step, time, run_.cameras.front(), false, none);
+      state.isAskedFor = false;
+    } catch (const std::exception& error) {  // the viewer may ask for something else
+      if (state.isRoot()) fmt::print(stderr, "vdi_catalyst: step {}: {}\n", step, error.what());
+    }
+  }
 }
 
 void RunEngine::finish() {
@@ -154,43 +331,37 @@ std::vector<double> RunEngine::millisecondsOfRanks(double seconds) const {
   return ranks;
 }
 
-void RunEngine::makeOrRetry(const Fields& fields, std::int64_t step, double time,
-                            runlog::FrameRecord& record) {
+/// Once more with another device if the first one was lost.
+template <typename Work>
+void RunEngine::tryTwice(Work work) {
   std::exception_ptr failure;
   try {
-    make(fields, step, time, record);
+    work();
   } catch (...) {  // on all ranks, but with another exception on each
     failure = std::current_exception();
   }
   if (!failure) return;
   if (!state_->comm.anyTogether([&] { return state_->device->isLost(); })) std::rethrow_exception(failure);
+  state_->frame.reset();
   state_->generator.reset();
   state_->start();
-  record = recordOf(step, time);
-  make(fields, step, time, record);
+  work();
 }
 
-void RunEngine::make(const Fields& fields, std::int64_t step, double time, runlog::FrameRecord& record) {
-  const Frame frame = frameOf(fields, step, time);
-  deliver(frame, step, record);
+void RunEngine::makeOne(const Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
+                        bool isForFiles, runlog::FrameRecord& record) {
+  tryTwice([&] {
+    record = recordOf(step, time, camera);
+    if (!state_->frame) prepare(fields, step, time);
+    deliver(camera, isForFiles, record);
+  });
 }
 
-RunEngine::Frame RunEngine::frameOf(const Fields& fields, std::int64_t step, double time) {
+/// Gives the device the step's values.
+void RunEngine::prepare(const Fields& fields, std::int64_t step, double time) {
   State& state = *state_;
   const comm::Communicator& comm = state.comm;
-  // Whether the field is one of cells: ranks without blocks may not know, all others agree.
-  std::array<std::uint64_t, 2> kinds{0, 0};  // of points, of cells
-  comm.together([&] {
-    const std::optional<bool> cells = run_.cells ? run_.cells : fields.associationOf(run_.field);
-    if (cells) kinds[*cells ? 1 : 0] = 1;
-  });
-  comm.allReduceMax(kinds);
-  if (kinds[0] > 0 && kinds[1] > 0) {
-    throw Error(ErrorCode::InvalidArgument, "ranks have '" + run_.field +
-                                                "' of cells and of points: 'association' "
-                                                "must name one");
-  }
-  const bool cells = kinds[1] > 0;
+  const bool cells = agreeOnCells(comm, fields, run_.field, run_.cells);
   std::vector<Block> blocks;
   comm.together([&] { blocks = fields.blocksOf(run_.field, cells, run_.component); });
   double mostPerVolume = 0.0;
@@ -201,76 +372,110 @@ RunEngine::Frame RunEngine::frameOf(const Fields& fields, std::int64_t step, dou
 
   VdiGenerator& generator = *state.generator;
   generator.setBlocks(std::move(blocks));
-  ScalarRange range = generator.scalarRange();
+  const ScalarRange range = generator.scalarRange();
   if (!state.firstRange && range.min < range.max) state.firstRange = range;
-  if (state.firstRange) range = *state.firstRange;
-  const Box& bounds = generator.scene().bounds;
   const double voxelVolume = largest[0] > 0.0 ? 1.0 / largest[0] : 0.0;
   const int components = static_cast<int>(largest[1]);
   Frame frame;
-  comm.together([&] {
-    frame.camera = run_.cameraAt(step, bounds);
-    frame.function = run_.transferFunction(map_, range, unitDistanceOf(bounds, voxelVolume));
-  });
+  frame.step = step;
+  frame.time = time;
+  frame.range = state.firstRange.value_or(range);
+  frame.unitDistance = unitDistanceOf(generator.scene().bounds, voxelVolume);
   frame.stamp = {time,
                  static_cast<std::uint64_t>(step),
                  {.name = run_.field,
                   .cells = cells,
                   .components = components,
                   .component = components > 1 ? run_.component : 0}};
-  return frame;
+  state.frame = std::move(frame);
 }
 
-void RunEngine::deliver(const Frame& frame, std::int64_t step, runlog::FrameRecord& record) {
+void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record) {
   State& state = *state_;
   VdiGenerator& generator = *state.generator;
+  const Frame& frame = *state.frame;
   const bool isRoot = state.isRoot();
+  Camera from;
+  TransferFunction function;
   state.comm.together([&] {
-    if (isRoot && run_.vdi) makeFolderOf(run_.vdi->path(step));
-    if (isRoot && run_.png) makeFolderOf(run_.png->path(step));
+    from = run_.cameraAt(camera, frame.step, frame.time, generator.scene().bounds);
+    function = run_.transferFunction(map_, frame.range, frame.unitDistance);
+    if (!isRoot || !isForFiles) return;
+    for (const config::FilePattern* pattern : patternsOf(run_))
+      makeFolderOf(pattern->path(frame.step, camera.name));
   });
-  if (!run_.png && !run_.stream) {  // no rank ever has the whole VDI
-    generator.write(run_.vdi->path(step), frame.camera, frame.function, run_.settings, frame.stamp);
+  const bool isStreamed = run_.stream && &camera == run_.cameras.data();
+  if (isForFiles && !run_.makesPictures() && !isStreamed) {
+    if (!run_.vdi) return;
+    // No rank ever has the whole VDI.
+    const std::filesystem::path file = run_.vdi->path(frame.step, camera.name);
+    generator.write(file, from, function, run_.settings, frame.stamp);
     state.comm.together([&] {
       if (!isRoot) return;
       runlog::setReports(record, generator.reports());
-      noteFiles(step, record);
+      record.files.push_back(file.string());
+      noteLatest(camera);
     });
     return;
   }
-  std::optional<Vdi> made = generator.generate(frame.camera, frame.function, run_.settings);
+  std::optional<Vdi> made = generator.generate(from, function, run_.settings);
   state.comm.together([&] {
     if (!made) return;
     made->time = frame.stamp.time;
     made->timeStep = frame.stamp.step;
     made->coloring->array = frame.stamp.array;
-    save(std::move(*made), step, record);
+    save(std::move(*made), camera, isForFiles, record);
   });
 }
 
 /// On the root, which has the VDI. What it takes is output, too.
-void RunEngine::save(Vdi vdi, std::int64_t step, runlog::FrameRecord& record) {
-  const auto start = std::chrono::steady_clock::now();
+void RunEngine::save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record) {
+  const auto start = Clock::now();
   std::vector<RankReport> reports = state_->generator->reports();
-  if (run_.vdi) io::writeVdi(run_.vdi->path(step), vdi);
-  if (run_.png) io::writePng(run_.png->path(step), io::toPicture(flatten(vdi)));
-  if (state_->stream) state_->stream->publish(std::make_shared<const Vdi>(std::move(vdi)));
-  noteFiles(step, record);
+  if (isForFiles) {
+    if (run_.vdi) {
+      const std::filesystem::path file = run_.vdi->path(record.step, camera.name);
+      io::writeVdi(file, vdi);
+      record.files.push_back(file.string());
+    }
+    if (run_.makesPictures()) writePictures(vdi, camera, record);
+    noteLatest(camera);
+  }
+  if (state_->stream && &camera == run_.cameras.data())
+    state_->stream->publish(std::make_shared<const Vdi>(std::move(vdi)));
   for (const std::string& file : record.files) reports.front().bytesWritten += sizeOfFile(file);
-  reports.front().outputSeconds +=
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  reports.front().outputSeconds += std::chrono::duration<double>(Clock::now() - start).count();
   runlog::setReports(record, reports);
 }
 
-void RunEngine::noteFiles(std::int64_t step, runlog::FrameRecord& record) {
-  const auto note = [&](const std::optional<config::FilePattern>& pattern, const char* latest) {
-    if (!pattern) return;
-    const std::filesystem::path file = pattern->path(step);
+/// On the root.
+void RunEngine::writePictures(const Vdi& vdi, const config::RunCamera& camera, runlog::FrameRecord& record) {
+  const auto picture = io::toPicture(flatten(vdi));
+  if (run_.png) {
+    const std::filesystem::path file = run_.png->path(record.step, camera.name);
+    io::writePng(file, picture);
     record.files.push_back(file.string());
-    if (run_.latest) io::replaceLink(file.parent_path() / latest, file.filename());
+  }
+  if (!run_.cinema || camera.fixed) return;  // a viewer's viewpoint isn't on the orbit
+  const std::filesystem::path file = run_.cinema->pictures.path(record.step, camera.name);
+  io::writePng(file, picture);
+  record.files.push_back(file.string());
+  const config::Orbit place = run_.orbitAt(*camera.orbit, record.step, record.time);
+  state_->cinema->add({record.time, place.azimuth, place.elevation,
+                       file.lexically_relative(run_.cinema->folder).generic_string()});
+}
+
+/// On the root: links to the step's files.
+void RunEngine::noteLatest(const config::RunCamera& camera) const {
+  if (!run_.latest) return;
+  const std::string name = camera.name.empty() ? "latest" : "latest_" + camera.name;
+  const auto link = [&](const std::optional<config::FilePattern>& pattern, const char* extension) {
+    if (!pattern) return;
+    const std::filesystem::path file = pattern->path(state_->frame->step, camera.name);
+    io::replaceLink(file.parent_path() / (name + extension), file.filename());
   };
-  note(run_.vdi, "latest.vdi");
-  note(run_.png, "latest.png");
+  link(run_.vdi, ".vdi");
+  link(run_.png, ".png");
 }
 
 }  // namespace vdi::catalyst

@@ -1,11 +1,14 @@
 // Makes what a run asks for (vdi/config/Run.h) by vdi/pipeline, without ParaView and Python.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/json/Fields.h"
 #include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
@@ -14,8 +17,9 @@
 
 namespace vdi::catalyst {
 
-/// All functions but `wants` are collective. When one throws, it does so on all ranks, with Error{RemoteRank}
-/// or std::runtime_error where another rank has more to tell, and the next frame is tried anew.
+/// All functions that don't say otherwise are collective. When one throws, it does so on all ranks, with
+/// Error{RemoteRank} or std::runtime_error where another rank has more to tell, and the next frame is tried
+/// anew.
 class RunEngine {
  public:
   /// `map` is that of the colours' file, if the run names one. Finds the device, and starts the stream on the
@@ -26,22 +30,38 @@ class RunEngine {
   RunEngine(const RunEngine&) = delete;
   RunEngine& operator=(const RunEngine&) = delete;
 
-  bool wants(std::int64_t step) const { return step >= 0 && run_.wants(step); }
-  /// Makes the step's frame from the fields as they are now. `waited` is how many seconds this rank has
-  /// waited for the others to begin the step.
-  void execute(const Fields& fields, std::int64_t step, double time, double waited);
+  /// Whether the step may have a frame: what is due can be told here, what the data decide can't. Where only
+  /// the first rank can tell, the others answer no. Not collective.
+  bool wants(std::int64_t step, double time) const;
+  /// Whether execute has anything to do at the step, equal on all ranks. Not collective.
+  bool mayExecute(std::int64_t step, double time) const;
+  /// Makes the step's frames, if any, from the fields as they are now, and takes what viewers ask for.
+  /// `waited` is how many seconds this rank has waited for the others to begin the step.
+  void execute(const Fields& fields, Parameters& parameters, std::int64_t step, double time, double waited);
   /// Ends the log. No more frames.
   void finish();
 
  private:
   struct State;
   struct Frame;
-  void makeOrRetry(const Fields& fields, std::int64_t step, double time, runlog::FrameRecord& record);
-  void make(const Fields& fields, std::int64_t step, double time, runlog::FrameRecord& record);
-  Frame frameOf(const Fields& fields, std::int64_t step, double time);
-  void deliver(const Frame& frame, std::int64_t step, runlog::FrameRecord& record);
-  void save(Vdi vdi, std::int64_t step, runlog::FrameRecord& record);
-  void noteFiles(std::int64_t step, runlog::FrameRecord& record);
+  using Clock = std::chrono::steady_clock;
+  void start();
+  bool isDue(std::int64_t step, double time);
+  bool isToBeMade(const Fields& fields, std::int64_t step, double time);
+  void leaveOut(std::int64_t step, double time);
+  void makeAll(const Fields& fields, std::int64_t step, double time, double waited, bool isForFiles);
+  void makeOne(const Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
+               bool isForFiles, runlog::FrameRecord& record);
+  void record(runlog::FrameRecord& record, const std::exception_ptr& failure,
+              const std::vector<double>& waits, Clock::time_point start);
+  void steer(const Fields& fields, Parameters& parameters, std::int64_t step, double time);
+  template <typename Work>
+  void tryTwice(Work work);
+  void prepare(const Fields& fields, std::int64_t step, double time);
+  void deliver(const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record);
+  void save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record);
+  void writePictures(const Vdi& vdi, const config::RunCamera& camera, runlog::FrameRecord& record);
+  void noteLatest(const config::RunCamera& camera) const;
   std::vector<double> millisecondsOfRanks(double seconds) const;
 
   config::Run run_;

@@ -26,7 +26,14 @@ const std::vector<std::string> runs{
  "output": {"vdi": "a/{timestep}.vdi", "png": "b_{timestep:03d}.png"},
  "stream": {"host": "::1", "port": 8080, "certificate": "c", "key": "k", "megabits": 100}})",
     R"({"field": "V", "camera": {"position": [0, 0, 1], "focal_point": [0, 0, 0], "view_up": [0, 1, 0],
- "parallel_scale": 2}, "colors": "bands", "output": "{timestep:06d}.png", "stream": true})"};
+ "parallel_scale": 2}, "colors": "bands", "output": "{timestep:06d}.png", "stream": true})",
+    R"({"field": "V", "every_time": 0.5, "every_seconds": 60, "max_share": 0.05, "existing": "continue",
+ "when": {"change": "V", "component": 1, "above": 0.1, "below": 3},
+ "cameras": [{"name": "front", "orbit": {"azimuth": 5}},
+  {"name": "b", "camera": {"position": [0, 0, 1], "focal_point": [0, 0, 0]}}],
+ "stream": {"steer": true, "steering_log": "a"}})",
+    R"({"field": "V", "orbit": {"count": 3, "elevations": [-10, 20]}, "output": {"cinema": "a.cdb",
+ "vdi": "{camera}/{timestep}.vdi"}})"};
 const std::vector<std::string> presets{
     R"([{"Name": "a", "ColorSpace": "Diverging", "RGBPoints": [0, 0.1, 0.2, 0.3, 1, 0.9, 0.8, 0.2, 3, 1, 1, 1]}])",
     R"({"ColorSpace": "Lab", "RGBPoints": [-1, 0, 0, 0, 1, 1, 1, 1], "Points": [0, 0, 0.5, 0, 2, 0.5, 0.5, 0]})",
@@ -91,8 +98,11 @@ void readAndMake(const std::string& text) {
   const Box bounds{glm::dvec3(-1.0), glm::dvec3(2.0)};
   REQUIRE_NOTHROW(validate(run.settings));
   REQUIRE_NOTHROW(validate(run.transferFunction(std::nullopt, {0.0, 1.0}, 1.0)));
-  REQUIRE_NOTHROW(View(run.cameraAt(run.every, bounds), 4, 4));
-  if (run.vdi) REQUIRE(run.vdi->path(7).has_filename());
+  REQUIRE_FALSE(run.cameras.empty());
+  for (const config::RunCamera& camera : run.cameras)
+    REQUIRE_NOTHROW(View(run.cameraAt(camera, run.every, 2.0, bounds), 4, 4));
+  if (run.vdi) REQUIRE(run.vdi->path(7, run.cameras.back().name).has_filename());
+  if (run.when) REQUIRE((run.when->above || run.when->below));
 }
 
 void readMap(const std::string& text) {

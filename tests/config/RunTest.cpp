@@ -1,12 +1,18 @@
 // What vdi.json can say, and what is refused.
+#include <unistd.h>
+
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "tests/Catch.h"
 #include "vdi/config/Run.h"
+#include "vdi/config/Schedule.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/UnitDistance.h"
 
@@ -14,6 +20,7 @@ using namespace vdi;
 using config::FilePattern;
 using config::parseRun;
 using config::Run;
+using config::Schedule;
 using nlohmann::json;
 
 namespace {
@@ -32,6 +39,12 @@ json schema() {
   return json::parse(file);
 }
 
+/// What a reference of the schema leads to, or the part itself.
+const json& followed(const json& all, const json& part) {
+  if (!part.contains("$ref")) return part;
+  return all.at(json::json_pointer(part.at("$ref").get<std::string>().substr(1)));
+}
+
 /// The object with "properties" in a part of the schema, below anyOf if need be.
 const json* objectIn(const json& part) {
   if (part.contains("properties")) return &part;
@@ -47,9 +60,11 @@ const json* objectIn(const json& part) {
 TEST_CASE("V every 10 steps is one line") {
   const Run run = parseRun(R"({"field": "V", "every": 10})", "vdi.json");
   CHECK(run.field == "V");
-  CHECK(run.wants(0));
-  CHECK_FALSE(run.wants(5));
-  CHECK(run.wants(30));
+  const Schedule schedule(run);
+  CHECK_FALSE(schedule.needsRoot());
+  CHECK(schedule.isDue(0, 0.0, 0.0));
+  CHECK_FALSE(schedule.isDue(5, 0.0, 0.0));
+  CHECK(schedule.isDue(30, 0.0, 0.0));
   CHECK(run.component == -1);
   CHECK(run.settings.width == 1280);
   CHECK(run.settings.samplesPerVoxel == automaticRate);
@@ -58,7 +73,9 @@ TEST_CASE("V every 10 steps is one line") {
   CHECK_FALSE(run.png);
   CHECK_FALSE(run.stream);
   const Box unit{glm::dvec3(0.0), glm::dvec3(1.0)};
-  CHECK(run.cameraAt(0, unit) == Camera::framing(unit, {0.0, 0.0, -1.0}, {0.0, 1.0, 0.0}));
+  REQUIRE(run.cameras.size() == 1);
+  CHECK(run.cameraAt(run.cameras[0], 0, 0.0, unit) ==
+        Camera::framing(unit, {0.0, 0.0, -1.0}, {0.0, 1.0, 0.0}));
 }
 
 TEST_CASE("every field of the schema is read, and no other") {
@@ -76,7 +93,10 @@ TEST_CASE("every field of the schema is read, and no other") {
   };
   compare("", all);
   for (const auto& [name, part] : all.at("properties").items()) {
-    if (const json* object = objectIn(part)) compare("/" + name, *object);
+    const json& value = followed(all, part);
+    if (const json* object = objectIn(value)) compare("/" + name, *object);
+    if (value.contains("items") && value.at("items").contains("properties"))
+      compare("/" + name + "/*", value.at("items"));
   }
   CHECK(seen.size() == config::runFields().size());
 }
@@ -89,13 +109,15 @@ TEST_CASE("the schema's presets are those that there are, and its defaults those
   CHECK(all.at("$defs").at("preset").at("enum").size() == 5);
   json given{{"field", "V"}};
   for (const auto& [name, part] : all.at("properties").items()) {
-    if (part.contains("default")) given[name] = part.at("default");
+    const json& value = followed(all, part);
+    if (value.contains("default")) given[name] = value.at("default");
   }
-  CHECK(given.size() > 6);
+  CHECK(given.size() > 7);
   const Run stated = parseRun(given.dump(), "vdi.json");
   const Run implied = parseRun(R"({"field": "V"})", "vdi.json");
   CHECK(stated.settings == implied.settings);
   CHECK(stated.every == implied.every);
+  CHECK(stated.existing == implied.existing);
   CHECK(stated.component == implied.component);
 }
 
@@ -105,10 +127,12 @@ TEST_CASE("everything at once") {
     "orbit": {"azimuth": 30, "elevation": 20, "view_up": [0, 0, 1], "zoom": 2, "turn": 10, "view_angle": 40},
     "colors": {"preset": "haze", "range": [0, 2], "opacities": [[0, 0], [2, 0.5]], "unit_distance": 3},
     "resolution": [320, 200], "supersegments": 12, "margin": 0.5, "sampling_rate": 2, "shade": true,
-    "output": {"vdi": "a/{timestep}.vdi", "png": "b_{timestep:03d}.png", "latest": true},
+    "output": {"vdi": "a/{timestep}.vdi", "png": "b_{timestep:03d}.png", "cinema": "c.cdb", "latest": true},
+    "when": {"mean": "p", "association": "cells", "component": 1, "above": -1, "below": 2},
+    "max_share": 0.05, "existing": "continue",
     "log": {"json": "run.jsonl", "text": "run.log"},
     "stream": {"host": "::1", "port": 8080, "token_file": "t", "link_file": "l", "certificate": "c", "key": "k",
-               "megabits": 100}})",
+               "megabits": 100, "steer": true, "steering_log": "s"}})",
                            "vdi.json");
   CHECK(run.cells == std::optional<bool>(false));
   CHECK(run.component == 2);
@@ -125,12 +149,25 @@ TEST_CASE("everything at once") {
   CHECK(run.log.text == "run.log");
   CHECK(run.stream->port == 8080);
   CHECK(run.stream->megabits == 100.0);
+  CHECK(run.stream->steer);
+  CHECK(run.stream->steeringLog == "s");
+  CHECK(run.cinema->folder == "c.cdb");
+  CHECK(run.cinema->pictures.path(12) == "c.cdb/000012.png");
+  CHECK(run.when->measure == config::RunCondition::Measure::Mean);
+  CHECK(run.when->field == "p");
+  CHECK(run.when->cells == std::optional<bool>(true));
+  CHECK(run.when->component == 1);
+  CHECK(run.when->holds(1.9));
+  CHECK_FALSE(run.when->holds(-1.0));
+  CHECK_FALSE(run.when->holds(2.0));
+  CHECK(run.maxShare == 0.05);
+  CHECK(run.existing == config::Existing::Continue);
   const TransferFunction function = run.transferFunction(std::nullopt, {5.0, 6.0}, 7.0);
   CHECK(function.colors.back().x == 2.0);
   CHECK(function.opacities == std::vector<OpacityNode>{{0.0, 0.0}, {2.0, 0.5}});
   CHECK(function.unitDistance == 3.0);
   const Box unit{glm::dvec3(0.0), glm::dvec3(1.0)};
-  CHECK(run.cameraAt(8, unit) ==
+  CHECK(run.cameraAt(run.cameras[0], 8, 0.0, unit) ==
         config::orbitCamera(unit, {.azimuth = 50.0, .elevation = 20.0, .up = {0.0, 0.0, 1.0}, .zoom = 2.0},
                             40.0));
 }
@@ -155,6 +192,22 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("every": 0)", "/every: must be a whole number from 1 to 2147483647 (vdi.json, line 2)");
   refusedField(R"("every": "10")", "/every: must be a whole number");
   refusedField(R"("every": 1e400)", "line 2");
+  refusedField(R"("every_time": 0)", "/every_time: must be > 0 (vdi.json, line 2)");
+  refusedField(R"("every_seconds": "60")", "/every_seconds: must be a number");
+  refusedField(R"("when": "max")", "/when: must be an object");
+  refusedField(R"("when": {"max": "V"})", "/when: must have a bound, 'above' or 'below'");
+  refusedField(R"("when": {"above": 1})", "/when: must have 'max', 'min', 'mean' or 'change'");
+  refusedField(R"("when": {"max": "V", "min": "V", "above": 1})", "/when/min: a condition has one of");
+  refusedField(R"("when": {"max": 1, "above": 1})", "/when/max: must be a text");
+  refusedField(R"("when": {"max": "", "above": 1})", "/when/max: must be an array's name");
+  refusedField(R"("when": {"max": "V", "above": "high"})", "/when/above: must be a number");
+  refusedField(R"("when": {"max": "V", "above": 2, "below": 2})", "/when: never holds");
+  refusedField(R"("when": {"max": "V", "above": 1, "component": 16})", "/when/component");
+  refusedField(R"("when": {"max": "V", "above": 1, "association": "faces"})", "/when/association");
+  refusedField(R"("max_share": 1.5)", "/max_share: is a share, 1 at most");
+  refusedField(R"("max_share": 0)", "/max_share: must be > 0");
+  refusedField(R"("existing": "append")", "/existing: must be 'refuse', 'overwrite' or 'continue'");
+  refusedField(R"("existing": true)", "/existing: must be a text");
   refusedField(R"("association": "nodes")", "/association: must be 'cells' or 'points'");
   refusedField(R"("component": -1)", "/component");
   refusedField(R"("camera": {"position": [0, 0, 1]})", "/camera: the field 'focal_point' is missing");
@@ -176,7 +229,7 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("resolution": [0, 5])", "/resolution/0: must be a whole number from 1 to 32768");
   refusedField(R"("sampling_rate": 65)", "/sampling_rate: ");
   refusedField(R"("output": "a.vdi")", "/output: must contain {timestep}");
-  refusedField(R"("output": "{timestep}.jpg")", "/output: must end in .vdi or .png");
+  refusedField(R"("output": "{timestep}.jpg")", "/output: must end in .vdi, .png or .cdb");
   refusedField(R"("output": {})", "/output: must name a file");
   refusedField(R"("output": {"png": "{timestep:6d}.png"})", "/output/png: the step's number is");
   refusedField(R"("output": {"png": "{timestep}{timestep}.png"})", "/output/png: only");
@@ -189,6 +242,147 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("log": {"json": "a", "text": "a"})", "/log: 'json' and 'text' must be two files");
   refusedField(R"("stream": {"port": 65536})", "/stream/port");
   refusedField(R"("stream": {"certificate": "c"})", "/stream: 'certificate' and 'key'");
+  refusedField(R"("stream": {"steer": 1})", "/stream/steer: must be true or false");
+  refusedField(R"("stream": {"steering_log": "s"})", "/stream/steering_log: needs \"steer\": true");
+}
+
+TEST_CASE("mistakes of several cameras are told with their place") {
+  const std::string fixed = R"("camera": {"position": [0, 0, 1], "focal_point": [0, 0, 0]})";
+  refusedField(R"("cameras": {})", "/cameras: must be an array");
+  refusedField(R"("cameras": [])", "/cameras: must have a camera");
+  refusedField(R"("cameras": [{}])", "/cameras/0: the field 'name' is missing");
+  refusedField(R"("cameras": [{"name": "a"}])", "/cameras/0: must have a 'camera' or an 'orbit'");
+  refusedField(R"("cameras": [{"name": "a/b", "orbit": {}}])", "/cameras/0/name: a camera's name has");
+  refusedField(R"("cameras": [{"name": ".a", "orbit": {}}])", "/cameras/0/name: a camera's name has");
+  refusedField(R"("cameras": [{"name": "a", "orbit": {}}, {"name": "a", "orbit": {}}])",
+               "/cameras/1/name: another camera has this name");
+  refusedField(R"("cameras": [{"name": "a", "orbit": {}, )" + fixed + "}]", "/cameras/0/orbit: either");
+  refusedField(R"("cameras": [{"name": "a", "orbit": {"count": 4}}])",
+               "/cameras/0/orbit/count: a camera of 'cameras' is one viewpoint");
+  refusedField(R"("cameras": [{"name": "a", "orbit": {}}], )" + fixed, "/cameras: either this or 'camera'");
+  refusedField(R"("orbit": {}, "cameras": [{"name": "a", "orbit": {}}])", "/cameras: either this or 'orbit'");
+  refusedField(R"("orbit": {"count": 0})", "/orbit/count: must be a whole number from 1 to 1000");
+  refusedField(R"("orbit": {"count": 600, "elevations": [0, 10]})", "/orbit: 1200 viewpoints are too many");
+  refusedField(R"("orbit": {"elevations": []})", "/orbit/elevations: must have an elevation");
+  refusedField(R"("orbit": {"elevations": [0, 0]})", "/orbit/elevations/1: stands there twice");
+  refusedField(R"("orbit": {"elevations": [91]})", "/orbit/elevations/0: must be from -90 to 90");
+  refusedField(R"("orbit": {"elevations": [1], "elevation": 1})", "/orbit/elevations: either");
+  refusedField(R"("orbit": {"count": 2, "turn": 5})", "/orbit/turn: either");
+  refusedField(R"("orbit": {"turn": 5}, "every_seconds": 5)", "an orbit's 'turn' goes with either");
+  refusedField(R"("output": "{timestep}_{camera}.vdi")", "/output: {camera} needs several viewpoints");
+  refusedField(R"("orbit": {"count": 2}, "output": "{timestep}_{camera}{camera}.vdi")", "/output: only");
+  refusedField(R"("output": "a.cdb")", "/output: a Cinema database needs an 'orbit'");
+  refusedField(R"("orbit": {}, "output": {"cinema": "a"})", "/output/cinema: must be a folder's name");
+  refusedField(R"("orbit": {}, "output": {"cinema": "{timestep}.cdb"})",
+               "/output/cinema: must be a folder's");
+}
+
+TEST_CASE("each camera has files of its own") {
+  const Run run = parseRun(R"({"field": "V", "orbit": {"azimuth": 10, "count": 4, "elevations": [0, 30, 60]},
+                               "output": {"vdi": "a.b/{timestep}", "png": "{camera}/{timestep:03d}.png",
+                                          "cinema": "c.cdb"}})",
+                           "vdi.json");
+  REQUIRE(run.cameras.size() == 12);
+  CHECK(run.cameras[5].name == "05");
+  CHECK(run.vdi->path(7, "05") == "a.b/7_05");
+  CHECK(run.png->path(7, "05") == "05/007.png");
+  CHECK(run.cinema->pictures.path(7, "05") == "c.cdb/000007/05.png");
+  const config::Orbit place = run.orbitAt(*run.cameras[5].orbit, 7, 0.0);
+  CHECK(place.azimuth == Approx(100.0));
+  CHECK(place.elevation == 30.0);
+  const Run named = parseRun(R"({"field": "V", "cameras": [{"name": "front", "orbit": {}},
+      {"name": "top", "orbit": {"elevation": 90, "view_up": [0, 0, 1]}}]})",
+                             "vdi.json");
+  CHECK(named.vdi->path(7, "top") == "vdi_000007_top.vdi");
+  const Box unit{glm::dvec3(0.0), glm::dvec3(1.0)};
+  CHECK(named.cameraAt(named.cameras[1], 0, 0.0, unit).position.z > 1.0);
+  const Run turning = parseRun(R"({"field": "V", "every_time": 0.5, "orbit": {"turn": 10}})", "vdi.json");
+  CHECK(turning.orbitAt(*turning.cameras[0].orbit, 77, 1.5).azimuth == Approx(30.0));
+}
+
+TEST_CASE("times of the simulation are met after a restart as before it") {
+  const Run run = parseRun(R"({"field": "V", "every_time": 0.1})", "vdi.json");
+  const auto dueFrom = [&](int first, int last) {
+    Schedule schedule(run);
+    std::vector<int> due;
+    double time = 0.0;
+    for (int step = 0; step < last; ++step, time += 0.025) {  // rounding adds up
+      if (step < first || !schedule.isDue(step, time, 0.0)) continue;
+      schedule.begin(time, 0.0);
+      due.push_back(step);
+    }
+    return due;
+  };
+  CHECK(dueFrom(0, 18) == std::vector<int>{0, 4, 8, 12, 16});
+  CHECK(dueFrom(6, 18) == std::vector<int>{6, 8, 12, 16});  // the first step has a frame
+  Schedule schedule(run);
+  CHECK(schedule.needsRoot());
+  CHECK_FALSE(schedule.isDue(0, std::numeric_limits<double>::quiet_NaN(), 0.0));
+  schedule.begin(0.5, 0.0);
+  CHECK(schedule.isDue(1, 0.25, 0.0));  // back to a checkpoint
+}
+
+TEST_CASE("seconds count from the last frame, and any trigger will do") {
+  Schedule schedule(parseRun(R"({"field": "V", "every": 10, "every_seconds": 60})", "vdi.json"));
+  CHECK(schedule.isDue(3, 0.0, 5.0));
+  schedule.begin(0.0, 5.0);
+  CHECK_FALSE(schedule.isDue(4, 0.0, 64.0));
+  CHECK(schedule.isDue(10, 0.0, 20.0));
+  schedule.begin(0.0, 20.0);  // because of the step
+  CHECK(schedule.isDue(11, 0.0, 65.0));
+  schedule.setPeriod(7);
+  CHECK_FALSE(schedule.isDue(11, 0.0, 1e6));
+  CHECK(schedule.isDue(14, 0.0, 0.0));
+  CHECK_FALSE(schedule.needsRoot());
+}
+
+TEST_CASE("frames take their share of the time at most") {
+  config::Budget budget(0.1);
+  double spent = 0.0;
+  int made = 0;
+  double now = 0.0;
+  for (int step = 0; step < 1000; ++step) {
+    now += 1.0;
+    if (!budget.hasRoom(now)) continue;
+    const double cost = 3.0;
+    now += cost;
+    spent += cost;
+    budget.spend(cost);
+    if (++made > 1) CHECK(spent <= 0.1 * now);
+  }
+  CHECK(spent > 0.09 * now);
+  CHECK(config::Budget(std::nullopt).hasRoom(0.0));
+}
+
+TEST_CASE("what is in the way of a run is named") {
+  const auto folder = std::filesystem::temp_directory_path() / ("vdi_run_test_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder / "a_7" / "b");
+  const auto touch = [&](const char* name) { std::ofstream(folder / name) << "x"; };
+  const auto at = [&](const std::string& pattern) { return FilePattern((folder / pattern).string()); };
+  for (const char* name : {"v_000020.vdi", "v_3.vdi", "v_000100.vdi", "v_000010.vdi.bak", "w_12_top.vdi",
+                           "v_0000x0.vdi", "a_7/b/c.vdi"})
+    touch(name);
+  CHECK(at("v_{timestep:06d}.vdi").firstExisting() == folder / "v_000020.vdi");
+  CHECK(at("v_{timestep}.vdi").firstExisting() == folder / "v_3.vdi");
+  CHECK(at("w_{timestep}.vdi").firstExisting("top") == folder / "w_12_top.vdi");
+  CHECK_FALSE(at("w_{timestep}.vdi").firstExisting());
+  CHECK(at("a_{timestep}/b/c.vdi").firstExisting() == folder / "a_7" / "b" / "c.vdi");
+  CHECK_FALSE(at("a_{timestep}/b/d.vdi").firstExisting());
+  CHECK_FALSE(at("none/v_{timestep}.vdi").firstExisting());
+
+  const std::string start =
+      R"({"field": "V", "output": ")" + (folder / "v_{timestep:06d}.vdi").string() + "\"";
+  const Run refusing = parseRun(start + "}", "vdi.json");
+  CHECK_THROWS_WITH(config::requireNothingInTheWay(refusing),
+                    test::ContainsSubstring("v_000020.vdi") && test::ContainsSubstring("\"overwrite\""));
+  CHECK_NOTHROW(config::requireNothingInTheWay(parseRun(start + R"(, "existing": "continue"})", "vdi.json")));
+  const std::string log =
+      R"({"field": "V", "stream": true, "log": ")" + (folder / "run.jsonl").string() + "\"}";
+  CHECK_NOTHROW(config::requireNothingInTheWay(parseRun(log, "vdi.json")));
+  touch("run.jsonl");
+  CHECK_THROWS_WITH(config::requireNothingInTheWay(parseRun(log, "vdi.json")),
+                    test::ContainsSubstring("run.jsonl"));
+  std::filesystem::remove_all(folder);
 }
 
 TEST_CASE("text is told from a file's name") {

@@ -1,0 +1,133 @@
+#include "catalyst_adaptor/json/RunSteering.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstdio>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "vdi/core/Error.h"
+
+namespace vdi::catalyst {
+
+namespace {
+
+constexpr std::chrono::milliseconds waitingPause{50};
+
+/// Another range for nodes that stand at values of the old one, as ParaView rescales functions.
+void rescale(std::vector<OpacityNode>& nodes, const std::array<double, 2>& range) {
+  if (nodes.empty()) return;
+  const double first = nodes.front().x;
+  const double width = nodes.back().x - first;
+  if (!(width > 0.0)) return;
+  for (OpacityNode& node : nodes) node.x = range[0] + (range[1] - range[0]) * ((node.x - first) / width);
+  nodes.back().x = range[1];
+}
+
+void appendLine(const std::string& path, const std::string& line) {
+  std::FILE* const file = std::fopen(path.c_str(), "ae");
+  bool isWritten = file != nullptr && std::fputs((line + "\n").c_str(), file) >= 0;
+  if (file != nullptr && std::fclose(file) != 0) isWritten = false;
+  if (isWritten) return;
+  throw Error(ErrorCode::Io, "can't log what viewers change: " + std::system_category().message(errno), path);
+}
+
+}  // namespace
+
+stream::Controls RunSteering::controlsOf(const Steered& steered) const {
+  const config::Run& run = steered.run;
+  stream::GeneratorControls generator;
+  generator.resolution = {run.settings.width, run.settings.height};
+  generator.supersegments = static_cast<int>(run.settings.supersegments);
+  const std::optional<ScalarRange> range = run.colors.range ? run.colors.range : steered.range;
+  if (range) {
+    generator.range = {range->min, range->max};
+    generator.presets = config::presetNames();
+  }
+  stream::Controls controls;
+  controls.generator = std::move(generator);
+  controls.period = static_cast<int>(std::min<std::int64_t>(steered.schedule.period(), stream::maxPeriod));
+  controls.paused = isPaused_;
+  for (const Parameter& one : steered.parameters.all())
+    controls.parameters.push_back({one.name, one.isWhole, one.value, one.low, one.high});
+  return controls;
+}
+
+void RunSteering::apply(const stream::Wish& wish, const Steered& steered) {
+  config::Run& run = steered.run;
+  if (wish.camera) run.cameras.front().fixed = wish.camera;
+  if (wish.resolution) {
+    run.settings.width = (*wish.resolution)[0];
+    run.settings.height = (*wish.resolution)[1];
+  }
+  if (wish.supersegments) run.settings.supersegments = static_cast<std::uint32_t>(*wish.supersegments);
+  if (wish.preset) {  // the range stays, and opacities that the run names do
+    if (!run.colors.range) run.colors.range = steered.range;
+    run.colors.preset = *wish.preset;
+    run.colors.file.clear();
+    steered.map.reset();
+  }
+  if (wish.range) {
+    run.colors.range = ScalarRange{(*wish.range)[0], (*wish.range)[1]};
+    rescale(run.colors.opacities, *wish.range);
+  }
+  steered.parameters.set(wish.parameters);
+  if (wish.period) steered.schedule.setPeriod(*wish.period);
+  isPaused_ = wish.paused.value_or(isPaused_);
+}
+
+/// On the first rank.
+void RunSteering::tell(const stream::Request& request, const std::string& log, std::int64_t step,
+                       double time) {
+  fmt::print(stderr, "vdi_catalyst: step {}: {} (viewer {})\n", step, stream::summaryOf(request.wish),
+             request.viewer);
+  if (log.empty()) return;
+  try {
+    appendLine(log, stream::logEntryOf(request, step, time));
+  } catch (const Error&) {  // told when no other rank waits for this one
+    trouble_ = std::current_exception();
+  }
+}
+
+void RunSteering::requireLogged() {
+  comm_.together([&] {
+    if (trouble_) std::rethrow_exception(std::exchange(trouble_, nullptr));
+  });
+}
+
+bool RunSteering::take(const Steered& steered, std::int64_t step, double time) {
+  comm_.together([&] {
+    if (stream_ != nullptr) stream_->setControls(controlsOf(steered));
+  });
+  std::optional<stream::Request> request;
+  while (true) {
+    const std::chrono::milliseconds patience = isPaused_ ? waitingPause : std::chrono::milliseconds(0);
+    if (stream_ != nullptr) {
+      request = stream_->takeRequest(patience);
+    } else {
+      std::this_thread::sleep_for(patience);  // a broadcast would take all of a core while it waits
+    }
+    const std::string own = request ? stream::textOf(request->wish) : "";
+    const auto* const bytes = reinterpret_cast<const std::byte*>(own.data());
+    const std::vector<std::byte> text = comm_.broadcast({bytes, bytes + own.size()}, 0);
+    if (text.empty() && isPaused_) continue;
+    if (text.empty()) return false;
+    const stream::Wish wish = stream::wishOf({reinterpret_cast<const char*>(text.data()), text.size()});
+    apply(wish, steered);
+    const bool changesVdi = wish.camera || wish.resolution || wish.supersegments || wish.range || wish.preset;
+    comm_.together([&] {
+      if (stream_ == nullptr) return;
+      stream_->setControls(controlsOf(steered));
+      tell(*request, steered.run.stream->steeringLog, step, time);
+    });
+    if (changesVdi || !isPaused_) return changesVdi;
+  }
+}
+
+}  // namespace vdi::catalyst

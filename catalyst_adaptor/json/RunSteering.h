@@ -1,0 +1,52 @@
+// What viewers of a run's stream ask for, on all ranks after the same step.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <string>
+
+#include "catalyst_adaptor/Parameters.h"
+#include "catalyst_adaptor/json/LiveStream.h"
+#include "vdi/comm/Communicator.h"
+#include "vdi/config/ColorMap.h"
+#include "vdi/config/Run.h"
+#include "vdi/config/Schedule.h"
+#include "vdi/core/ScalarRange.h"
+#include "vdi/stream/Steering.h"
+
+namespace vdi::catalyst {
+
+/// What viewers change: parts of the engine, equal on all ranks.
+struct Steered {
+  config::Run& run;
+  std::optional<config::ColorMap>& map;
+  config::Schedule& schedule;
+  const std::optional<ScalarRange>& range;  // of the colours where the run has none
+  Parameters& parameters;
+};
+
+class RunSteering {
+ public:
+  /// `stream` is the first rank's, null on the others; both must outlive it.
+  RunSteering(const comm::Communicator& comm, LiveStream* stream) : comm_(comm), stream_(stream) {}
+
+  /// Collective: applies what viewers have asked for since this was called last, waiting for it where the
+  /// simulation is to wait, and logs it as of this step. Returns whether the VDI is another one now.
+  bool take(const Steered& steered, std::int64_t step, double time);
+  /// Collective: throws Error{Io} on all ranks if a line of the log couldn't be written since the last call.
+  void requireLogged();
+  bool isPaused() const { return isPaused_; }
+
+ private:
+  stream::Controls controlsOf(const Steered& steered) const;
+  void apply(const stream::Wish& wish, const Steered& steered);
+  void tell(const stream::Request& request, const std::string& log, std::int64_t step, double time);
+
+  const comm::Communicator& comm_;
+  LiveStream* stream_;
+  bool isPaused_ = false;
+  std::exception_ptr trouble_;  // of the log
+};
+
+}  // namespace vdi::catalyst

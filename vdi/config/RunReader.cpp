@@ -1,0 +1,475 @@
+// Reads a run's JSON: each mistake is told with its place.
+#include <fmt/format.h>
+#include <fmt/ranges.h>  // fmt::join
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "vdi/config/Json.h"
+#include "vdi/config/Run.h"
+#include "vdi/core/Error.h"
+
+namespace vdi::config {
+
+namespace {
+
+constexpr std::int64_t lastStep = std::numeric_limits<std::int32_t>::max();
+constexpr std::int64_t mostCameras = 1000;
+
+const std::vector<std::string>& fieldsOf(const char* object) {
+  return runFields().at(object);
+}
+
+glm::dvec3 vectorOf(const JsonValue& value) {
+  const std::vector<double> v = value.numbers(3);
+  return {v[0], v[1], v[2]};
+}
+
+/// A direction, which has a length that can be computed with.
+glm::dvec3 directionOf(const JsonValue& value) {
+  constexpr double extreme = 1e100;
+  const glm::dvec3 direction = vectorOf(value);
+  const double length = glm::length(direction);
+  if (!(length > 0.0)) value.fail("must not be zero");
+  if (!(length > 1.0 / extreme && length < extreme)) value.fail("is too short or too long");
+  return direction;
+}
+
+/// Runs `read` with the field's value if the object has it.
+template <typename Read>
+void ifThere(const JsonValue& object, const char* name, Read read) {
+  if (const std::optional<JsonValue> value = object.find(name)) read(*value);
+}
+
+/// Calls `check`; what it throws gets the value's place.
+template <typename Check>
+auto placed(const JsonValue& value, Check check) {
+  try {
+    return check();
+  } catch (const std::exception& error) {
+    value.fail(error.what());
+  }
+}
+
+double viewAngleOf(const JsonValue& value) {
+  const double angle = value.number();
+  if (!(angle > 0.0 && angle < 180.0)) value.fail("must lie between 0 and 180 degrees");
+  return angle;
+}
+
+double positiveOf(const JsonValue& value) {
+  const double number = value.number();
+  if (!(number > 0.0)) value.fail("must be > 0");
+  return number;
+}
+
+Camera cameraOf(const JsonValue& value) {
+  value.requireObject(fieldsOf("/camera"));
+  Camera camera;
+  camera.position = vectorOf(value.at("position"));
+  camera.focalPoint = vectorOf(value.at("focal_point"));
+  ifThere(value, "view_up", [&](const JsonValue& up) { camera.viewUp = directionOf(up); });
+  ifThere(value, "view_angle", [&](const JsonValue& angle) { camera.viewAngle = viewAngleOf(angle); });
+  ifThere(value, "parallel_scale", [&](const JsonValue& scale) {
+    if (value.find("view_angle")) scale.fail("either this or 'view_angle'");
+    camera.parallelProjection = true;
+    camera.parallelScale = positiveOf(scale);
+  });
+  placed(value, [&] { (void)View(camera, 1, 1); });
+  return camera;
+}
+
+/// One viewpoint of an orbit.
+RunOrbit orbitOf(const JsonValue& value) {
+  value.requireObject(fieldsOf("/orbit"));
+  constexpr double pole = 90.0;
+  constexpr double turns = 3600.0;
+  constexpr double mostZoom = 1000.0;
+  RunOrbit orbit;
+  ifThere(value, "azimuth",
+          [&](const JsonValue& angle) { orbit.start.azimuth = angle.number(-turns, turns); });
+  ifThere(value, "elevation",
+          [&](const JsonValue& angle) { orbit.start.elevation = angle.number(-pole, pole); });
+  ifThere(value, "view_up", [&](const JsonValue& up) { orbit.start.up = directionOf(up); });
+  ifThere(value, "zoom",
+          [&](const JsonValue& zoom) { orbit.start.zoom = zoom.number(1.0 / mostZoom, mostZoom); });
+  ifThere(value, "turn", [&](const JsonValue& angle) { orbit.turn = angle.number(-turns, turns); });
+  ifThere(value, "view_angle", [&](const JsonValue& angle) { orbit.viewAngle = angle.number(1.0, 179.0); });
+  return orbit;
+}
+
+std::vector<double> elevationsOf(const JsonValue& value) {
+  constexpr double pole = 90.0;
+  std::vector<double> elevations;
+  for (const JsonValue& item : value.items()) {
+    elevations.push_back(item.number(-pole, pole));
+    if (std::count(elevations.begin(), elevations.end(), elevations.back()) > 1)
+      item.fail("stands there twice");
+  }
+  if (elevations.empty()) value.fail("must have an elevation");
+  return elevations;
+}
+
+/// All viewpoints of an orbit: one, without a name, or `count` about the axis at each elevation, numbered.
+std::vector<RunCamera> camerasOfOrbit(const JsonValue& value) {
+  const RunOrbit orbit = orbitOf(value);
+  const std::optional<JsonValue> count = value.find("count");
+  const std::optional<JsonValue> elevations = value.find("elevations");
+  if (!count && !elevations) return {{"", std::nullopt, orbit}};
+  if (const auto turn = value.find("turn")) turn->fail("either this or several viewpoints");
+  if (elevations && value.find("elevation")) elevations->fail("either this or 'elevation'");
+  const std::int64_t azimuths = count ? count->whole(1, mostCameras) : 1;
+  const std::vector<double> angles =
+      elevations ? elevationsOf(*elevations) : std::vector<double>{orbit.start.elevation};
+  const auto all = azimuths * static_cast<std::int64_t>(angles.size());
+  if (all > mostCameras)
+    value.fail(fmt::format("{} viewpoints are too many, {} are the most", all, mostCameras));
+  const std::size_t digits = std::to_string(all - 1).size();
+  std::vector<RunCamera> cameras;
+  for (const double elevation : angles) {
+    for (std::int64_t i = 0; i < azimuths; ++i) {
+      RunCamera camera{fmt::format("{:0{}}", cameras.size(), digits), std::nullopt, orbit};
+      camera.orbit->start.elevation = elevation;
+      camera.orbit->start.azimuth += 360.0 * static_cast<double>(i) / static_cast<double>(azimuths);
+      cameras.push_back(std::move(camera));
+    }
+  }
+  return cameras;
+}
+
+std::string cameraNameOf(const JsonValue& value) {
+  constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+  constexpr std::size_t longest = 64;
+  const std::string& name = value.text();
+  if (name.empty() || name.size() > longest || name[0] == '.' ||
+      name.find_first_not_of(letters) != std::string::npos)
+    value.fail("a camera's name has 1 to 64 letters, digits, '_', '-' and '.', which isn't the first");
+  return name;
+}
+
+RunCamera namedCameraOf(const JsonValue& value) {
+  value.requireObject(fieldsOf("/cameras/*"));
+  RunCamera camera;
+  camera.name = cameraNameOf(value.at("name"));
+  ifThere(value, "camera", [&](const JsonValue& fixed) { camera.fixed = cameraOf(fixed); });
+  ifThere(value, "orbit", [&](const JsonValue& orbit) {
+    if (camera.fixed) orbit.fail("either this or 'camera'");
+    for (const char* name : {"count", "elevations"})
+      ifThere(orbit, name,
+              [](const JsonValue& several) { several.fail("a camera of 'cameras' is one viewpoint"); });
+    camera.orbit = orbitOf(orbit);
+  });
+  if (!camera.fixed && !camera.orbit) value.fail("must have a 'camera' or an 'orbit'");
+  return camera;
+}
+
+std::vector<RunCamera> camerasOf(const JsonValue& value) {
+  std::vector<RunCamera> cameras;
+  std::set<std::string> names;
+  for (const JsonValue& item : value.items()) {
+    if (cameras.size() >= static_cast<std::size_t>(mostCameras))
+      value.fail(fmt::format("there are {} cameras at most", mostCameras));
+    cameras.push_back(namedCameraOf(item));
+    if (!names.insert(cameras.back().name).second) item.at("name").fail("another camera has this name");
+  }
+  if (cameras.empty()) value.fail("must have a camera");
+  return cameras;
+}
+
+void readCameras(const JsonValue& document, Run& run) {
+  ifThere(document, "camera", [&](const JsonValue& value) { run.cameras.front().fixed = cameraOf(value); });
+  ifThere(document, "orbit", [&](const JsonValue& value) {
+    if (document.find("camera")) value.fail("either this or 'camera'");
+    run.cameras = camerasOfOrbit(value);
+  });
+  ifThere(document, "cameras", [&](const JsonValue& value) {
+    for (const char* other : {"camera", "orbit"}) {
+      if (document.find(other)) value.fail(fmt::format("either this or '{}'", other));
+    }
+    run.cameras = camerasOf(value);
+  });
+  // Where an orbit is after a restart, the step or the time must tell.
+  const bool turns = std::ranges::any_of(
+      run.cameras, [](const RunCamera& camera) { return camera.orbit && camera.orbit->turn != 0.0; });
+  const bool areCounted = !run.everySeconds && (run.every > 0) != run.everyTime.has_value();
+  if (turns && !areCounted) document.fail("an orbit's 'turn' goes with either 'every' or 'every_time' alone");
+}
+
+int componentOf(const JsonValue& value) {
+  constexpr std::int64_t last = 15;
+  if (value.isText() && value.text() == "magnitude") return -1;
+  if (value.isText()) value.fail("must be a number from 0 on, or 'magnitude'");
+  return static_cast<int>(value.whole(0, last));
+}
+
+bool areCells(const JsonValue& value) {
+  if (value.text() != "cells" && value.text() != "points") value.fail("must be 'cells' or 'points'");
+  return value.text() == "cells";
+}
+
+std::string arrayNameOf(const JsonValue& value) {
+  const std::string& name = value.text();
+  if (name.empty() || name.find('\0') != std::string::npos) value.fail("must be an array's name");
+  return name;
+}
+
+RunCondition conditionOf(const JsonValue& value) {
+  using Measure = RunCondition::Measure;
+  value.requireObject(fieldsOf("/when"));
+  RunCondition condition;
+  int measures = 0;
+  for (const auto& [name, measure] :
+       {std::pair("max", Measure::Max), std::pair("min", Measure::Min), std::pair("mean", Measure::Mean),
+        std::pair("change", Measure::Change)}) {
+    ifThere(value, name, [&, which = measure](const JsonValue& field) {
+      if (++measures > 1) field.fail("a condition has one of 'max', 'min', 'mean' and 'change'");
+      condition.measure = which;
+      condition.field = arrayNameOf(field);
+    });
+  }
+  if (measures == 0) value.fail("must have 'max', 'min', 'mean' or 'change', with an array's name");
+  ifThere(value, "association", [&](const JsonValue& kind) { condition.cells = areCells(kind); });
+  ifThere(value, "component",
+          [&](const JsonValue& component) { condition.component = componentOf(component); });
+  ifThere(value, "above", [&](const JsonValue& bound) { condition.above = bound.number(); });
+  ifThere(value, "below", [&](const JsonValue& bound) { condition.below = bound.number(); });
+  if (!condition.above && !condition.below) value.fail("must have a bound, 'above' or 'below'");
+  if (condition.above && condition.below && !(*condition.above < *condition.below))
+    value.fail("never holds: 'above' must be less than 'below'");
+  return condition;
+}
+
+void readTriggers(const JsonValue& document, Run& run) {
+  ifThere(document, "every_time", [&](const JsonValue& value) { run.everyTime = positiveOf(value); });
+  ifThere(document, "every_seconds", [&](const JsonValue& value) { run.everySeconds = positiveOf(value); });
+  if (run.everyTime || run.everySeconds) run.every = 0;
+  ifThere(document, "every", [&](const JsonValue& value) { run.every = value.whole(1, lastStep); });
+  ifThere(document, "when", [&](const JsonValue& value) { run.when = conditionOf(value); });
+  ifThere(document, "max_share", [&](const JsonValue& value) {
+    run.maxShare = positiveOf(value);
+    if (*run.maxShare > 1.0) value.fail("is a share, 1 at most");
+  });
+}
+
+Existing existingOf(const JsonValue& value) {
+  if (value.text() == "refuse") return Existing::Refuse;
+  if (value.text() == "overwrite") return Existing::Overwrite;
+  if (value.text() == "continue") return Existing::Continue;
+  value.fail("must be 'refuse', 'overwrite' or 'continue'");
+}
+
+ScalarRange rangeOf(const JsonValue& value) {
+  const std::vector<double> ends = value.numbers(2);
+  if (!(ends[0] < ends[1])) value.fail("the first number must be the smaller one");
+  if (!std::isfinite(ends[1] - ends[0])) value.fail("is too wide");
+  return {ends[0], ends[1]};
+}
+
+std::vector<OpacityNode> opacitiesOf(const JsonValue& value) {
+  std::vector<OpacityNode> nodes;
+  for (const JsonValue& item : value.items()) {
+    const std::vector<double> node = item.numbers(2);
+    if (!(node[1] >= 0.0 && node[1] <= 1.0)) item.fail("an opacity must be from 0 to 1");
+    if (!nodes.empty() && node[0] < nodes.back().x) item.fail("nodes must ascend in their first number");
+    nodes.push_back({node[0], node[1]});
+  }
+  if (nodes.empty()) value.fail("must have a node");
+  return nodes;
+}
+
+std::string presetOf(const JsonValue& value) {
+  const std::vector<std::string> names = presetNames();
+  if (std::ranges::find(names, value.text()) == names.end()) {
+    value.fail(fmt::format("no such preset; there are {}; others come from a 'file' that ParaView exports",
+                           fmt::join(names, ", ")));
+  }
+  return value.text();
+}
+
+RunColors colorsOf(const JsonValue& value) {
+  RunColors colors;
+  if (value.isText()) {
+    colors.preset = presetOf(value);
+    return colors;
+  }
+  value.requireObject(fieldsOf("/colors"));
+  ifThere(value, "preset", [&](const JsonValue& name) { colors.preset = presetOf(name); });
+  ifThere(value, "file", [&](const JsonValue& file) {
+    if (!colors.preset.empty()) file.fail("either this or 'preset'");
+    colors.file = file.text();
+    if (colors.file.empty()) file.fail("must name a file");
+  });
+  ifThere(value, "name", [&](const JsonValue& name) {
+    if (colors.file.empty()) name.fail("names a preset in 'file', which is missing");
+    colors.name = name.text();
+  });
+  ifThere(value, "range", [&](const JsonValue& range) { colors.range = rangeOf(range); });
+  ifThere(value, "opacities", [&](const JsonValue& nodes) { colors.opacities = opacitiesOf(nodes); });
+  ifThere(value, "unit_distance",
+          [&](const JsonValue& distance) { colors.unitDistance = positiveOf(distance); });
+  return colors;
+}
+
+FilePattern patternOf(const JsonValue& value, const Run& run) {
+  const std::string& text = value.text();
+  FilePattern pattern = placed(value, [&] { return FilePattern(text); });
+  if (pattern.namesCamera() && run.cameras.front().name.empty())
+    value.fail("{camera} needs several viewpoints");
+  return pattern;
+}
+
+RunCinema cinemaOf(const JsonValue& value, const Run& run) {
+  const std::filesystem::path folder = value.text();
+  if (folder.extension() != ".cdb" || value.text().find_first_of(std::string("{}\0", 3)) != std::string::npos)
+    value.fail("must be a folder's name that ends in .cdb");
+  const bool areOrbits =
+      std::ranges::all_of(run.cameras, [](const RunCamera& one) { return one.orbit.has_value(); });
+  if (!areOrbits) value.fail("a Cinema database needs an 'orbit'");
+  const std::string pictures =
+      run.cameras.front().name.empty() ? "{timestep:06d}.png" : "{timestep:06d}/{camera}.png";
+  return {folder, FilePattern((folder / pictures).string())};
+}
+
+void readOutput(const JsonValue& value, Run& run) {
+  if (value.isText()) {
+    const std::filesystem::path extension = std::filesystem::path(value.text()).extension();
+    if (extension == ".cdb") {
+      run.cinema = cinemaOf(value, run);
+    } else if (extension == ".vdi") {
+      run.vdi = patternOf(value, run);
+    } else if (extension == ".png") {
+      run.png = patternOf(value, run);
+    } else {
+      value.fail("must end in .vdi, .png or .cdb");
+    }
+    return;
+  }
+  value.requireObject(fieldsOf("/output"));
+  ifThere(value, "vdi", [&](const JsonValue& file) { run.vdi = patternOf(file, run); });
+  ifThere(value, "png", [&](const JsonValue& file) { run.png = patternOf(file, run); });
+  ifThere(value, "cinema", [&](const JsonValue& folder) { run.cinema = cinemaOf(folder, run); });
+  if (!run.vdi && !run.makesPictures()) value.fail("must name a file, 'vdi', 'png' or 'cinema'");
+  ifThere(value, "latest", [&](const JsonValue& latest) { run.latest = latest.flag(); });
+}
+
+std::string logFileOf(const JsonValue& value) {
+  const std::string& name = value.text();
+  if (name.find('\0') != std::string::npos || !std::filesystem::path(name).has_filename())
+    value.fail("must be a file's name");
+  return name;
+}
+
+RunLogFiles logOf(const JsonValue& value) {
+  RunLogFiles files;
+  if (value.isText()) {
+    const std::filesystem::path extension = std::filesystem::path(value.text()).extension();
+    if (extension != ".jsonl" && extension != ".log")
+      value.fail("must end in .jsonl, for lines of JSON, or in .log, for text");
+    (extension == ".jsonl" ? files.json : files.text) = logFileOf(value);
+    return files;
+  }
+  value.requireObject(fieldsOf("/log"));
+  ifThere(value, "json", [&](const JsonValue& file) { files.json = logFileOf(file); });
+  ifThere(value, "text", [&](const JsonValue& file) { files.text = logFileOf(file); });
+  if (!files.any()) value.fail("must name a file, 'json' or 'text'");
+  if (files.json == files.text) value.fail("'json' and 'text' must be two files");
+  return files;
+}
+
+std::optional<RunStream> streamOf(const JsonValue& value) {
+  if (value.isFlag()) return value.flag() ? std::optional<RunStream>(RunStream()) : std::nullopt;
+  value.requireObject(fieldsOf("/stream"));
+  constexpr std::int64_t lastPort = 65535;
+  RunStream stream;
+  ifThere(value, "host", [&](const JsonValue& host) { stream.host = host.text(); });
+  ifThere(value, "port",
+          [&](const JsonValue& port) { stream.port = static_cast<std::uint16_t>(port.whole(0, lastPort)); });
+  ifThere(value, "token_file", [&](const JsonValue& file) { stream.tokenFile = file.text(); });
+  ifThere(value, "link_file", [&](const JsonValue& file) { stream.linkFile = file.text(); });
+  ifThere(value, "certificate", [&](const JsonValue& file) { stream.certificate = file.text(); });
+  ifThere(value, "key", [&](const JsonValue& file) { stream.key = file.text(); });
+  ifThere(value, "megabits", [&](const JsonValue& rate) { stream.megabits = positiveOf(rate); });
+  ifThere(value, "steer", [&](const JsonValue& steer) { stream.steer = steer.flag(); });
+  ifThere(value, "steering_log", [&](const JsonValue& file) {
+    if (!stream.steer) file.fail("needs \"steer\": true");
+    stream.steeringLog = file.text();
+  });
+  if (stream.certificate.empty() != stream.key.empty()) value.fail("'certificate' and 'key' come together");
+  return stream;
+}
+
+void readSettings(const JsonValue& document, GenerateSettings& settings) {
+  settings.samplesPerVoxel = automaticRate;
+  ifThere(document, "resolution", [&](const JsonValue& value) {
+    const std::vector<JsonValue> sides = value.items();
+    if (sides.size() != 2) value.fail("must be width and height");
+    settings.width = static_cast<int>(sides[0].whole(1, View::maxSide));
+    settings.height = static_cast<int>(sides[1].whole(1, View::maxSide));
+  });
+  ifThere(document, "supersegments", [&](const JsonValue& value) {
+    settings.supersegments = static_cast<std::uint32_t>(value.whole(1, maxSupersegments));
+  });
+  ifThere(document, "margin",
+          [&](const JsonValue& value) { settings.margin = value.number(0.0, maxMargin); });
+  ifThere(document, "sampling_rate", [&](const JsonValue& value) {
+    settings.samplesPerVoxel = value.number();
+    placed(value, [&] { validate(settings); });
+  });
+  ifThere(document, "shade", [&](const JsonValue& value) { settings.shading.on = value.flag(); });
+}
+
+}  // namespace
+
+const std::map<std::string, std::vector<std::string>>& runFields() {
+  static const std::map<std::string, std::vector<std::string>> fields{
+      {"", {"$schema",       "field",
+            "association",   "component",
+            "every",         "every_time",
+            "every_seconds", "when",
+            "max_share",     "existing",
+            "camera",        "cameras",
+            "orbit",         "colors",
+            "resolution",    "supersegments",
+            "margin",        "sampling_rate",
+            "shade",         "output",
+            "stream",        "log"}},
+      {"/when", {"max", "min", "mean", "change", "association", "component", "above", "below"}},
+      {"/cameras/*", {"name", "camera", "orbit"}},
+      {"/camera", {"position", "focal_point", "view_up", "view_angle", "parallel_scale"}},
+      {"/orbit", {"azimuth", "elevation", "view_up", "zoom", "turn", "view_angle", "count", "elevations"}},
+      {"/colors", {"preset", "file", "name", "range", "opacities", "unit_distance"}},
+      {"/output", {"vdi", "png", "cinema", "latest"}},
+      {"/stream",
+       {"host", "port", "token_file", "link_file", "certificate", "key", "megabits", "steer",
+        "steering_log"}},
+      {"/log", {"json", "text"}},
+  };
+  return fields;
+}
+
+Run parseRun(std::string_view text, const std::string& name) {
+  const JsonValue document = parseJson(text, name);
+  document.requireObject(fieldsOf(""));
+  Run run;
+  ifThere(document, "$schema", [](const JsonValue& value) { (void)value.text(); });
+  run.field = arrayNameOf(document.at("field"));
+  ifThere(document, "association", [&](const JsonValue& value) { run.cells = areCells(value); });
+  ifThere(document, "component", [&](const JsonValue& value) { run.component = componentOf(value); });
+  readTriggers(document, run);
+  ifThere(document, "existing", [&](const JsonValue& value) { run.existing = existingOf(value); });
+  readCameras(document, run);
+  ifThere(document, "colors", [&](const JsonValue& value) { run.colors = colorsOf(value); });
+  readSettings(document, run.settings);
+  ifThere(document, "stream", [&](const JsonValue& value) { run.stream = streamOf(value); });
+  ifThere(document, "output", [&](const JsonValue& value) { readOutput(value, run); });
+  ifThere(document, "log", [&](const JsonValue& value) { run.log = logOf(value); });
+  if (!run.vdi && !run.makesPictures() && !run.stream) run.vdi = FilePattern("vdi_{timestep:06d}.vdi");
+  return run;
+}
+
+}  // namespace vdi::config
