@@ -2,7 +2,9 @@
  * cells, z fastest, p, of 64-bit integers at points, and w, of vectors of cells, move. Arguments: a JSON text
  * or the name of a file with one (or of a script, which ends in .py), then the code that each step must
  * return. Exit status 0 if all did. VDI_TEST_BAD=1: before, JSON texts and files that can't be, of which each
- * says why and the next works. */
+ * says why and the next works. VDI_TEST_REFUSED=1: initialising returns VDI_CATALYST_SCRIPT, and that's all.
+ * VDI_TEST_FIRST: the first step's number. VDI_TEST_WANTS: for each step whether it is wanted, such as 1010;
+ * others aren't handed over. VDI_TEST_PAUSE: milliseconds between steps. */
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -98,6 +100,13 @@ int main(int argc, char** argv) {
     if (symlink("/dev/full", full) != 0) abort();
   }
 
+  if (getenv("VDI_TEST_REFUSED") != NULL) {
+    wrong += refuse(rank, argv[1], VDI_CATALYST_SCRIPT);
+    MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
+    MPI_Finalize();
+    return wrong == 0 ? 0 : 1;
+  }
+
   const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
   const size_t length = strlen(argv[1]);
   const int is_script = length > 3 && strcmp(argv[1] + length - 3, ".py") == 0;
@@ -133,10 +142,20 @@ int main(int argc, char** argv) {
   wrong += expect(
       rank, "w", VDI_CATALYST_OK,
       vdi_catalyst_set_array_strided(catalyst, "w", VDI_CATALYST_F32, VDI_CATALYST_CELLS, 3, data, &strides));
-  for (int step = 0; step < argc - 2; ++step) {
+  const char* wanted = getenv("VDI_TEST_WANTS");
+  const char* first_step = getenv("VDI_TEST_FIRST");
+  const char* pause = getenv("VDI_TEST_PAUSE");
+  for (int i = 0; i < argc - 2; ++i) {
+    const int step = i + (first_step != NULL ? atoi(first_step) : 0);
     simulate(first, count, step);
+    if (pause != NULL) usleep((useconds_t)atoi(pause) * 1000);
+    if (wanted != NULL) {
+      const int wants = vdi_catalyst_wants(catalyst, step, 0.5 * step);
+      wrong += expect(rank, "wants", wanted[i] - '0', wants);
+      if (wants == 0) continue;
+    }
     const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step);
-    wrong += expect(rank, "execute", atoi(argv[step + 2]), code);
+    wrong += expect(rank, "execute", atoi(argv[i + 2]), code);
     if (code != VDI_CATALYST_OK)
       wrong += expect(rank, "the error's text", 1, vdi_catalyst_error(catalyst)[0] != '\0');
   }

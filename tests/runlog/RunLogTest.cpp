@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include "tests/Catch.h"
 #include "tests/io/Samples.h"
@@ -99,4 +100,26 @@ TEST_CASE("a log that can't be is refused at once") {
   std::ofstream(file) << "some text\n";
   CHECK_THROWS_WITH(readRecords(file), test::ContainsSubstring("not a run's log"));
   CHECK_THROWS_WITH(readRecords(folder.path() / "none"), test::ContainsSubstring("none"));
+}
+
+TEST_CASE("a log begins anew where it is told to, and has what was left out") {
+  const test::TemporaryFolder folder;
+  const fs::path json = folder.path() / "run.jsonl";
+  const fs::path text = folder.path() / "run.log";
+  for (int run = 0; run < 2; ++run) {
+    RunLog log({json, text}, {"V", 2, 0}, RunLog::Before::Goes);
+    log.add(frameOf(10, 3.0));
+    log.add(runlog::LeftOut{20, 0.25, "no\ntime"});
+    CHECK(log.finish().leftOut == 1);
+  }
+  const RunRecords records = readRecords(json);
+  CHECK(records.starts.size() == 1);
+  CHECK(records.frames.size() == 1);
+  CHECK(records.leftOut == std::vector<runlog::LeftOut>{{20, 0.25, "no\ntime"}});
+  REQUIRE(records.summaries.size() == 1);
+  CHECK(records.summaries[0].leftOut == 1);
+  CHECK(records.skipped == 0);
+  CHECK(
+      contentOf(text).find("\nstep 20, time 0.25: left out: no time\n1 frame made, 0 failed, 1 left out, ") !=
+      std::string::npos);
 }

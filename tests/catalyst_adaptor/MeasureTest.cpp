@@ -1,0 +1,205 @@
+// A condition's measures are those of the whole field, however it is dealt to ranks.
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "catalyst_adaptor/json/Fields.h"
+#include "catalyst_adaptor/json/Measure.h"
+#include "tests/Catch.h"
+#include "vdi/comm/Communicator.h"
+
+using namespace vdi;
+using catalyst::Fields;
+using catalyst::Measure;
+using catalyst::StridedValues;
+using Kind = config::RunCondition::Measure;
+
+namespace {
+
+constexpr int side = 12;  // cells of the domain, of unit spacing
+
+std::optional<double> measured(Kind kind, const comm::Communicator& comm, const Fields& fields,
+                               int component = -1) {
+  Measure measure({.measure = kind, .field = "f", .cells = {}, .component = component, .above = {}, .below = {}});
+  const std::optional<double> first = measure.of(comm, fields);
+  CHECK(measure.of(comm, fields) == first);
+  std::vector<double> same{first.value_or(0.0), -first.value_or(0.0)};
+  comm.allReduceMax(same);
+  CHECK(same[0] == Approx(-same[1]));
+  return first;
+}
+
+/// This rank's slab along z, with ghost layers at its inner faces and `halo` of them at its outer ones.
+struct Slab {
+  Slab(const comm::Communicator& comm, int ghosts, int halo) {
+    const int rank = comm.rank();
+    const int size = comm.size();
+    lo = rank * side / size;
+    hi = (rank + 1) * side / size;
+    below = rank == 0 ? halo : ghosts;
+    above = rank == size - 1 ? halo : ghosts;
+    block = {{side, side, hi - lo + below + above},
+             {0, 0, below},
+             {0, 0, above},
+             {0.0, 0.0, double(lo - below)},
+             {1.0, 1.0, 1.0}};
+  }
+  int lo = 0;
+  int hi = 0;
+  int below = 0;
+  int above = 0;
+  vdi_catalyst_block block{};
+};
+
+/// A polynomial in a point's place.
+double at(double x, double y, double z) {
+  return 3.0 + x + 2.0 * y + 4.0 * z;
+}
+
+/// Of the field in the slab, with nonsense in all ghost layers.
+template <typename Scalar>
+std::vector<Scalar> valuesIn(const Slab& slab, bool cells) {
+  const int more = cells ? 0 : 1;
+  const double middle = cells ? 0.5 : 0.0;
+  std::vector<Scalar> values;
+  for (int z = 0; z < slab.block.cells[2] + more; ++z) {
+    const bool isGhost = z < slab.below || z >= slab.block.cells[2] + more - slab.above;
+    for (int y = 0; y < side + more; ++y) {
+      for (int x = 0; x < side + more; ++x)
+        values.push_back(static_cast<Scalar>(
+            isGhost ? 120.0 : at(x + middle, y + middle, z + slab.lo - slab.below + middle)));
+    }
+  }
+  return values;
+}
+
+template <typename Scalar>
+void checkType(const comm::Communicator& comm, int type, bool cells) {
+  INFO("type " << type << (cells ? ", cells" : ", points"));
+  const Slab slab(comm, 1, 2);
+  const std::vector<Scalar> values = valuesIn<Scalar>(slab, cells);
+  Fields fields;
+  fields.setBlocks({slab.block});
+  fields.setArray("f", cells, type, {fields.inOrder(slab.block, type, cells, 1, values.data())});
+  // Means of integers: cells' middles make 3 + 3.5 + 0.5 k.
+  const double cut = std::is_integral_v<Scalar> && cells ? 0.5 : 0.0;
+  const double half = cells ? 0.5 : 0.0;
+  const double last = side - half;
+  CHECK(*measured(Kind::Max, comm, fields) == at(last, last, last) - cut);
+  CHECK(*measured(Kind::Min, comm, fields) == at(half, half, half) - cut);
+  CHECK(*measured(Kind::Mean, comm, fields) == Approx(at(0.5 * side, 0.5 * side, 0.5 * side) - cut));
+}
+
+comm::Communicator world() {
+  return comm::Communicator::world();
+}
+
+}  // namespace
+
+TEST_CASE("ghost layers don't count, and points on a face between blocks count once, for all types") {
+  const comm::Communicator comm = world();
+  for (const bool cells : {true, false}) {
+    checkType<std::uint8_t>(comm, VDI_CATALYST_U8, cells);
+    checkType<std::int8_t>(comm, VDI_CATALYST_I8, cells);
+    checkType<std::uint16_t>(comm, VDI_CATALYST_U16, cells);
+    checkType<std::int16_t>(comm, VDI_CATALYST_I16, cells);
+    checkType<std::uint32_t>(comm, VDI_CATALYST_U32, cells);
+    checkType<std::int32_t>(comm, VDI_CATALYST_I32, cells);
+    checkType<std::int64_t>(comm, VDI_CATALYST_I64, cells);
+    checkType<std::uint64_t>(comm, VDI_CATALYST_U64, cells);
+    checkType<float>(comm, VDI_CATALYST_F32, cells);
+    checkType<double>(comm, VDI_CATALYST_F64, cells);
+  }
+}
+
+TEST_CASE("components, magnitudes and values out of order are measured where they are") {
+  const comm::Communicator comm = world();
+  const Slab slab(comm, 0, 0);
+  const int layers = slab.hi - slab.lo;
+  // [x][y][z][3], z fastest, beside a fourth number that isn't a component.
+  std::vector<float> values;
+  for (int x = 0; x < side; ++x) {
+    for (int y = 0; y < side; ++y) {
+      for (int z = slab.lo; z < slab.hi; ++z)
+        values.insert(values.end(), {2.0F * float(z), -float(x), 0.0F, 1e9F});
+    }
+  }
+  constexpr std::int64_t stride = 4 * sizeof(float);
+  StridedValues strided;
+  strided.first = reinterpret_cast<const std::byte*>(values.data());
+  strided.counts = {side, side, layers};
+  strided.strides = {stride * side * layers, stride * layers, stride};
+  strided.components = 3;
+  strided.componentStride = sizeof(float);
+  strided.scalarBytes = sizeof(float);
+  Fields fields;
+  fields.setBlocks({slab.block});
+  fields.setArray("f", true, VDI_CATALYST_F32, {strided});
+  constexpr double last = side - 1.0;
+  CHECK(*measured(Kind::Max, comm, fields, 0) == 2.0 * last);
+  CHECK(*measured(Kind::Min, comm, fields, 1) == -last);
+  CHECK(*measured(Kind::Mean, comm, fields, 1) == Approx(-0.5 * last));
+  CHECK(*measured(Kind::Max, comm, fields) == Approx(std::sqrt(5.0) * last));
+  CHECK_THROWS_WITH(measured(Kind::Max, comm, fields, 3), test::ContainsSubstring("there is no component 3"));
+}
+
+TEST_CASE("what finer blocks cover doesn't count") {
+  const comm::Communicator comm = world();
+  // Rank 0 has the domain in cells of 2, the last rank an eighth of it in cells of 1.
+  const vdi_catalyst_block coarse{{6, 6, 6}, {}, {}, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}};
+  const vdi_catalyst_block fine{{6, 6, 6}, {}, {}, {6.0, 6.0, 6.0}, {1.0, 1.0, 1.0}};
+  std::vector<double> two(216, 2.0);
+  for (int z = 3; z < 6; ++z) {
+    for (int y = 3; y < 6; ++y) {
+      for (int x = 3; x < 6; ++x) two[static_cast<std::size_t>(36 * z + 6 * y + x)] = 100.0;
+    }
+  }
+  const std::vector<double> ten(216, 10.0);
+  std::vector<vdi_catalyst_block> blocks;
+  std::vector<const void*> data;
+  if (comm.rank() == 0) {
+    blocks.push_back(coarse);
+    data.push_back(two.data());
+  }
+  if (comm.rank() == comm.size() - 1) {
+    blocks.push_back(fine);
+    data.push_back(ten.data());
+  }
+  Fields fields;
+  fields.setBlocks(blocks);
+  std::vector<StridedValues> values;
+  for (std::size_t i = 0; i < blocks.size(); ++i)
+    values.push_back(fields.inOrder(blocks[i], VDI_CATALYST_F64, true, 1, data[i]));
+  fields.setArray("f", true, VDI_CATALYST_F64, values);
+  CHECK(*measured(Kind::Max, comm, fields) == 10.0);
+  CHECK(*measured(Kind::Mean, comm, fields) == Approx(2.0 * 7.0 / 8.0 + 10.0 / 8.0));
+}
+
+TEST_CASE("NaN doesn't count, and infinite values count for the extremes alone") {
+  const comm::Communicator comm = world();
+  const Slab slab(comm, 0, 0);
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  std::vector<double> values(static_cast<std::size_t>(side * side * (slab.hi - slab.lo)), 5.0);
+  values[0] = std::numeric_limits<double>::quiet_NaN();
+  values[1] = infinite;
+  Fields fields;
+  const auto set = [&] {
+    fields.setBlocks({slab.block});
+    fields.setArray("f", true, VDI_CATALYST_F64,
+                    {fields.inOrder(slab.block, VDI_CATALYST_F64, true, 1, values.data())});
+  };
+  set();
+  CHECK(*measured(Kind::Max, comm, fields) == infinite);
+  CHECK(*measured(Kind::Min, comm, fields) == 5.0);
+  CHECK(*measured(Kind::Mean, comm, fields) == 5.0);
+  values.assign(values.size(), std::numeric_limits<double>::quiet_NaN());
+  set();
+  CHECK_FALSE(measured(Kind::Max, comm, fields));
+  CHECK_FALSE(measured(Kind::Mean, comm, fields));
+  fields.setBlocks({});
+  CHECK_FALSE(measured(Kind::Min, comm, fields));
+}

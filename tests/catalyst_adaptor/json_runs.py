@@ -1,0 +1,184 @@
+"""Runs without a script in a folder each: existing files, triggers, cameras, budgets, a disk that is full. Arguments: the
+case, vdi, and the simulation with its launcher."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+case, tool, *simulation = sys.argv[1:]
+SMALL = {"field": "V", "resolution": [40, 30]}
+PATIENCE = 200
+
+
+def run(document, *codes, said="", **environment):
+    """Returns what it says. Each step must return its code."""
+    process = subprocess.run([*simulation, json.dumps({**SMALL, **document}), *(str(code) for code in codes)],
+                             env={**os.environ, "VDI_OUTPUT": os.getcwd(), **environment}, capture_output=True, text=True,
+                             timeout=PATIENCE)
+    print(process.stderr)
+    assert process.returncode == 0, process.returncode
+    assert said in process.stderr, said
+    return process.stderr
+
+
+def refused(document, file):
+    text = run(document, VDI_TEST_REFUSED="1")
+    lines = [line for line in text.splitlines() if line.startswith("vdi_catalyst: ")]
+    assert len(lines) == 1 and file in lines[0], lines
+    assert '"existing": "continue"' in lines[0] and '"existing": "overwrite"' in lines[0], lines
+
+
+def made(kind=".vdi"):
+    return sorted(name for name in os.listdir(".") if name.endswith(kind))
+
+
+def events(name="run.jsonl"):
+    return [json.loads(line) for line in open(name)]
+
+
+def written(names):
+    return {name: os.stat(name).st_ino for name in names}
+
+
+def existing():
+    document = {"every": 2, "output": "v_{timestep}.vdi", "log": "run.jsonl"}
+    run(document, 0, 0, 0, 0, 0)
+    assert made() == ["v_0.vdi", "v_2.vdi", "v_4.vdi"], made()
+    first = written(made())
+    refused(document, "v_0.vdi")
+    # A restart from step 2: it and later ones are made anew, and earlier ones stay.
+    run({**document, "existing": "continue"}, *5 * [0], VDI_TEST_FIRST="2")
+    assert made() == ["v_0.vdi", "v_2.vdi", "v_4.vdi", "v_6.vdi"], made()
+    again = written(made())
+    assert [again[name] == first.get(name) for name in made()] == [True, False, False, False], (first, again)
+    starts = [event["event"] for event in events()]
+    assert starts.count("start") == 2 and starts.count("frame") == 6, starts
+    for name in made():
+        os.remove(name)
+    refused(document, "run.jsonl")
+    run({**document, "existing": "overwrite"}, 0)
+    assert [event["event"] for event in events()] == ["start", "frame", "end"], events()
+
+
+def triggers():
+    """Times are half a step each. The first step has a frame, then the first of each time unit and a quarter."""
+    run({"every_time": 1.25}, *8 * [0], VDI_TEST_WANTS="10010100")
+    assert made() == ["vdi_%06d.vdi" % step for step in (0, 3, 5)], made()
+    run({"every_time": 1.25, "existing": "continue"}, *5 * [0], VDI_TEST_FIRST="4", VDI_TEST_WANTS="11001")
+    assert made() == ["vdi_%06d.vdi" % step for step in (0, 3, 4, 5, 8)], made()
+    run({"every": 4, "every_seconds": 3600, "output": "s_{timestep}.vdi"}, *6 * [0], VDI_TEST_FIRST="1",
+        VDI_TEST_WANTS="100100")
+    assert [name for name in made() if name.startswith("s")] == ["s_1.vdi", "s_4.vdi"], made()
+    # Whoever doesn't ask gets the same.
+    run({"every_seconds": 0.001, "output": "t_{timestep}.vdi"}, 0, 0, VDI_TEST_PAUSE="10")
+    assert [name for name in made() if name.startswith("t")] == ["t_0.vdi", "t_1.vdi"], made()
+
+
+def conditions():
+    """V as the simulation has it, p is a million times V at points, w is V times (1, 2, 3)."""
+    steps = range(6)
+    values = [[1 / (1 + 0.02 * ((x - 11.5) ** 2 + (y - 12 - 0.5 * step) ** 2 + (z - 11) ** 2))
+               for x in range(24) for y in range(24) for z in range(24)] for step in steps]
+    maxima = [max(one) for one in values]
+    means = [sum(one) / len(one) for one in values]
+
+    def check(expected, condition, name):
+        wants = dict(VDI_TEST_WANTS="111111")  # the data must tell
+        run({"output": name + "_{timestep}.vdi", "when": condition}, *6 * [0], **wants)
+        files = ["%s_%d.vdi" % (name, step) for step in steps if expected(step)]
+        assert 0 < len(files) < 6 and [file for file in made() if file.startswith(name + "_")] == files, (files, made())
+
+    between = (maxima[0] + maxima[1]) / 2
+    check(lambda step: maxima[step] > between, {"max": "p", "above": 1e6 * between}, "p")
+    between = (means[2] + means[3]) / 2
+    check(lambda step: means[step] < between, {"mean": "w", "component": 1, "below": 2 * between}, "w")
+    enough = 1.5 * abs(means[5] - means[4])
+    last = [None]
+
+    def has_moved(step):
+        if last[0] is not None and abs(means[step] - last[0]) <= enough:
+            return False
+        last[0] = means[step]
+        return True
+
+    check(has_moved, {"change": "V", "above": enough}, "c")
+    assert "none" in run({"when": {"max": "none", "above": 0}, "existing": "continue"}, 3, said="there is no array 'none'")
+
+
+def cameras():
+    run({"every": 2, "cameras": [{"name": "front", "orbit": {}}, {"name": "top", "orbit": {"elevation": 60}},
+                                 {"name": "near", "camera": {"position": [0.5, 0.5, 3], "focal_point": [0.5, 0.5, 0.5]}}],
+         "output": {"vdi": "{camera}/v_{timestep}.vdi", "png": "p_{timestep}.png", "latest": True}, "log": "run.jsonl"},
+        0, 0, 0)
+    frames = [event for event in events() if event["event"] == "frame"]
+    assert [(frame["step"], frame["camera"]) for frame in frames] == [(step, name) for step in (0, 2)
+                                                                    for name in ("front", "top", "near")], frames
+    for frame in frames:
+        assert frame["files"] == ["%s/v_%d.vdi" % (frame["camera"], frame["step"]),
+                                  "p_%d_%s.png" % (frame["step"], frame["camera"])], frame
+        assert all(os.path.getsize(file) > 0 for file in frame["files"])
+        # One upload, and one set of pipelines and buffers.
+        assert (frame["stages"]["upload"]["mean"] > 0) == (frame["camera"] == "front"), frame
+        assert frame["device_bytes"] < 1.1 * frames[0]["device_bytes"], frame
+    assert os.readlink("top/latest_top.vdi") == "v_2.vdi" and os.readlink("latest_top.png") == "p_2_top.png"
+    pictures = {open("p_0_%s.png" % name, "rb").read() for name in ("front", "top", "near")}
+    assert len(pictures) == 3, "each viewpoint has a picture of its own"
+
+
+def cinema():
+    document = {"every": 2, "output": "o.cdb", "orbit": {"azimuth": -90, "count": 4, "elevations": [-30, 0, 45]}}
+    run(document, 0, 0, 0)
+    rows = list(csv.DictReader(open("o.cdb/data.csv")))
+    assert list(rows[0]) == ["time", "phi", "theta", "FILE"], rows[0]
+    places = [(float(row["time"]), float(row["phi"]), float(row["theta"])) for row in rows]
+    assert places == [(time, phi, theta) for time in (0, 1) for theta in (-30, 0, 45) for phi in (-90, 0, 90, 180)], places
+    contents = [open(os.path.join("o.cdb", row["FILE"]), "rb").read() for row in rows]
+    assert all(content.startswith(b"\x89PNG") for content in contents) and len(set(contents)) == len(rows)
+    refused(document, "o.cdb/000000/00.png")
+    # After a restart the pictures of before are still in the index, and each stands there once.
+    run({**document, "existing": "continue"}, 0, 0, 0, VDI_TEST_FIRST="2")
+    again = list(csv.DictReader(open("o.cdb/data.csv")))
+    assert again[:24] == rows and len(again) == 36, len(again)
+    run({**document, "existing": "overwrite"}, 0)
+    assert len(list(csv.DictReader(open("o.cdb/data.csv")))) == 12
+
+
+def budget():
+    text = run({"max_share": 0.0001, "log": {"json": "run.jsonl", "text": "run.log"}}, 0, 0, 0, VDI_TEST_WANTS="111",
+               said="step 1: left out: frames have taken")
+    assert text.count("left out: frames") == 1 and "2 left out" in text, text
+    assert made() == ["vdi_000000.vdi"], made()
+    all_events = events()
+    assert [event["event"] for event in all_events] == ["start", "frame", "left_out", "left_out", "end"], all_events
+    assert all_events[3]["step"] == 2 and "max_share" in all_events[3]["cause"] and all_events[4]["left_out"] == 2
+    assert "step 2, time 1: left out: " in open("run.log").read()
+    log = subprocess.run([tool, "log", "run.jsonl"], check=True, capture_output=True, text=True, timeout=30)
+    assert "2 left out" in log.stdout and "aren't records" not in log.stderr and "2 left out" in open("run.svg").read()
+    run({"max_share": 1, "existing": "continue"}, 0, 0, 0)
+    assert len(made()) == 3
+
+
+def full():
+    """A picture and an index that find no room fail their steps, and the next step works."""
+    os.symlink("/dev/full", "p_1.png")
+    run({"output": "p_{timestep}.png", "existing": "overwrite"}, 0, 3, 0, said="No space left")
+    assert made(".png") == ["p_0.png", "p_1.png", "p_2.png"], made(".png")
+    os.mkdir("o.cdb")
+    os.symlink("/dev/full", "o.cdb/data.csv")
+    run({"every": 2, "orbit": {}, "output": "o.cdb", "existing": "overwrite"}, 3, 0, said="data.csv")
+    assert os.path.getsize("o.cdb/000000.png") > 0
+    # One camera's files that find no room don't keep those of the others away.
+    os.symlink("/dev/full", "c_0_a.vdi")
+    run({"cameras": [{"name": "a", "orbit": {}}, {"name": "b", "orbit": {"elevation": 9}}], "output": "c_{timestep}.vdi",
+         "existing": "overwrite", "log": "run.jsonl"}, 3, 0, said="c_0_a.vdi")
+    assert [("error" in event) for event in events() if event["event"] == "frame"] == [True, False, False, False], events()
+    assert os.path.getsize("c_0_b.vdi") > 0 and os.path.getsize("c_1_a.vdi") > 0
+
+
+with tempfile.TemporaryDirectory() as folder:
+    os.chdir(folder)
+    globals()[case]()
+    os.chdir("/")
