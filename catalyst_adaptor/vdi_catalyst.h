@@ -122,7 +122,8 @@ VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32
  *
  * The other functions are the same, but for these: a step may be any number from 0 on, blocks with ghost
  * layers take no more memory than others, and a frame that fails is VDI_CATALYST_SCRIPT. Of a text with a
- * mistake VDI_CATALYST_SCRIPT is returned here, and the place of the mistake is told; without a Vulkan device
+ * mistake VDI_CATALYST_SCRIPT is returned here, and the place of the mistake is told. So it is where files of
+ * another run exist and the text doesn't say what becomes of them. Without a Vulkan device it's
  * VDI_CATALYST_ENGINE. After a failure *catalyst is null. One such run can go on in a process at a time,
  * beside scripts or without them. */
 VDI_CATALYST_API int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json,
@@ -161,15 +162,18 @@ VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, cons
 /* Whether a script will do anything at this step: 1 if so or if it can't be told, 0 if not, the same on all
  * ranks. Then the simulation need neither prepare its values nor call vdi_catalyst_execute. It's 1 where a
  * script wasn't loaded yet, as before the first step; where one defines catalyst_execute, which runs at each
- * step; and where the trigger of an extractor is due. 0 for a null or finalized handle and for a step that
- * vdi_catalyst_execute refuses. */
+ * step; and where the trigger of an extractor is due. Without a script it's 1 where a frame is due by step,
+ * time or clock, whether or not the data and the share of wall time will let it be made, and at each step
+ * where viewers may steer. 0 for a null or finalized handle and for a step that vdi_catalyst_execute
+ * refuses. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX, since
  * ParaView counts and names files so; others are VDI_CATALYST_BAD_ARGUMENT each time. */
 VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time);
 
-/* A number that viewers may change while the simulation runs, where a script lets them (VDIStream's Steer).
+/* A number that viewers may change while the simulation runs, where a script lets them (VDIStream's Steer) or
+ * a run without one ("steer" of its stream).
  * The first call declares it: its name, of 1 to 64 letters, digits, "_", "-" and "."; its value until a
  * viewer sets another; its bounds, both included. Each call returns the value in force, the first rank's on
  * all ranks. It changes in vdi_catalyst_execute alone, so all calls between two steps return the same one.

@@ -1,4 +1,5 @@
-"""A viewer drives a simulation on three ranks. Arguments: the script, mpirun and what follows it on its command line."""
+"""A viewer drives a simulation. Arguments: the script, or "json" for a run without one; vdi; the number of ranks; mpirun
+and what follows it on its command line."""
 import json
 import os
 import pathlib
@@ -10,8 +11,12 @@ import time
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from viewer import Viewer  # noqa: E402
 
-script, *launch = sys.argv[1:]
-RANKS = 3
+script, tool, ranks, *launch = sys.argv[1:]
+RANKS = int(ranks)
+CAMERA = {"position": [18, 20, 60], "focal_point": [18, 6, 6]}
+RUN = {"field": "V", "camera": CAMERA, "resolution": [96, 54], "output": "v_{timestep:06d}.vdi", "log": "run.jsonl",
+       "colors": {"range": [0, 1], "opacities": [[0, 0], [1, 1]]}, "stream": {"steer": True}}
+PRESETS = ["bands", "haze"] if script == "json" else ["X Ray", "Viridis (matplotlib)"]
 PATIENCE = 150
 
 
@@ -86,7 +91,7 @@ def drive(port, token, folder):
     # All of it in one message arrives at one step.
     camera = {"position": [60.0, 20.0, 30.0], "focalPoint": [18.0, 6.0, 6.0], "viewUp": [0.0, 1.0, 0.0], "viewAngle": 25.0}
     driver.send(type="steer", camera=camera, parameters={"level": 0.8125, "waves": 5}, resolution=[120, 60], supersegments=7,
-                preset="X Ray", range=[0.25, 0.75])
+                preset=PRESETS[0], range=[0.25, 0.75])
     now = steering(driver, lambda message: values(message)["waves"] == 5)
     check(now["generator"]["resolution"] == [120, 60] and now["generator"]["supersegments"] == 7, now)
     check(now["generator"]["range"] == [0.25, 0.75] and values(now)["level"] == 0.8125, now)
@@ -98,7 +103,7 @@ def drive(port, token, folder):
     steering(driver, lambda message: message["paused"])
     time.sleep(0.5)
     before = lines(folder / "parameters_0.txt")
-    driver.send(type="steer", resolution=[64, 48], preset="Viridis (matplotlib)")
+    driver.send(type="steer", resolution=[64, 48], preset=PRESETS[1])
     now = steering(driver, lambda message: message["generator"]["resolution"] == [64, 48])
     check(now["generator"]["range"] == [0.25, 0.75], "another colour map has the range that there is: %s" % now)
     again = level(driver, lambda announced: announced["width"] == 64)
@@ -118,12 +123,31 @@ def drive(port, token, folder):
     return me["you"], int(before[-1].split()[0]), camera
 
 
+def files_of(folder):
+    """What vdi tells of each step's file."""
+    def told_of(path):
+        return subprocess.run([tool, "info", path], check=True, capture_output=True, text=True, timeout=PATIENCE).stdout
+    return {int(path.stem[2:]): told_of(path) for path in sorted(folder.glob("v_*.vdi"))}
+
+
+def in_files(folder, at, paused_at):
+    """Files are the VDIs of their steps, as they were to be made then. Views of a step that waits are for viewers alone."""
+    files = files_of(folder)
+    check("96 x 54" in files[at] and "(18, 20, 60)" in files[at] and "at most 25 " in files[at], files[at])
+    after = files[at + 1]
+    check("120 x 60" in after and "(60, 20, 30)" in after and "at most 7 " in after and "from 0.25 to 0.75" in after, after)
+    check("120 x 60" in files[paused_at] and "64 x 48" in files[paused_at + 1], files[paused_at + 1])
+    steps = sorted(files)
+    check(steps[-1] % 4 == 0 and steps[-1] - steps[-2] == 4, "the last ones are every fourth step's: %s" % steps[-5:])
+    frames = [json.loads(line) for line in lines(folder / "run.jsonl")]
+    logged = [frame["step"] for frame in frames if frame["event"] == "frame" and frame["files"]]
+    check(logged == steps, "the run's log has the files")
+
+
 def told(folder, driver, paused_at, camera):
     """What each rank was given, and when."""
     parameters = [lines(folder / ("parameters_%d.txt" % rank)) for rank in range(RANKS)]
-    views = [[json.loads(line) for line in lines(folder / ("view_%d.txt" % rank))] for rank in range(RANKS)]
-    check(parameters[0] == parameters[1] == parameters[2], "all ranks have the same parameters at the same steps")
-    check(views[0] == views[1] == views[2], "all ranks have the same properties at the same steps")
+    check(all(one == parameters[0] for one in parameters), "all ranks have the same parameters at the same steps")
     log = [json.loads(line) for line in lines(folder / "vdi-steering.jsonl")]
     changes = [(entry["viewer"], *entry["steer"]) for entry in log]
     check(changes[0] == (driver, "camera", "parameters", "preset", "range", "resolution", "supersegments"), changes)
@@ -131,18 +155,24 @@ def told(folder, driver, paused_at, camera):
     given = {int(step): (float(value), int(waves)) for step, value, waves in (line.split() for line in parameters[0])}
     at = log[0]["step"]
     check(given[at] == (0.5, 3) and given[at + 1] == (0.8125, 5), "parameters change after the step that the log names")
+    check(given[paused_at][0] == 0.8125 and given[paused_at + 1][0] == 0.125, "what changes meanwhile is in force then")
+    if script == "json":
+        in_files(folder, at, paused_at)
+        return
+    views = [[json.loads(line) for line in lines(folder / ("view_%d.txt" % rank))] for rank in range(RANKS)]
+    check(all(one == views[0] for one in views), "all ranks have the same properties at the same steps")
     seen = {view["step"]: view for view in views[0]}
     check(seen[at]["position"] == [18.0, 20.0, 60.0] and seen[at]["supersegments"] == 25, "and so does the view")
     after = seen[at + 1]
     check(after["position"] == camera["position"] and after["angle"] == 25.0 and after["supersegments"] == 7, after)
     check(after["resolution"] == [120, 60] and after["colours"] == after["opacities"] == [0.25, 0.75], after)
     check(after["first"] == [1.0, 1.0, 1.0], "X Ray begins with white: %s" % after["first"])
-    check(given[paused_at][0] == 0.8125 and given[paused_at + 1][0] == 0.125, "what changes meanwhile is in force then")
 
 
 with tempfile.TemporaryDirectory() as name:
     root = pathlib.Path(name)
-    program = subprocess.Popen([*launch, script], env={**os.environ, "VDI_OUTPUT": name})
+    what = json.dumps(RUN) if script == "json" else script
+    program = subprocess.Popen([*launch, what], env={**os.environ, "VDI_OUTPUT": name}, cwd=name)
     try:
         told_by_viewers = drive(*link_of(program, root / "vdi-stream.link"), root)
         check(program.wait(PATIENCE) == 0, "the simulation ended with %s" % program.returncode)
