@@ -85,13 +85,14 @@ class Sweep {
   Totals run(Loader load) const {
     Totals all;
     std::mutex mutex;
-    const auto& [x, y, z] = part_.extents;
-    const std::size_t slice = x.size() * y.size();
+    const std::size_t rows = part_.extents[1].size();
+    const std::size_t slices = part_.extents[2].size();
+    const std::size_t slice = rows * part_.extents[0].size();
     constexpr std::size_t values = 100000;  // some 100 us
-    inParallel(z.size(), std::max<std::size_t>(1, values / slice), [&](std::size_t first, std::size_t last) {
+    inParallel(slices, std::max<std::size_t>(1, values / slice), [&](std::size_t first, std::size_t last) {
       Totals mine;
       for (std::size_t k = first; k < last; ++k) {
-        for (std::size_t j = 0; j < y.size(); ++j) mine.take(row(load, j, k));
+        for (std::size_t j = 0; j < rows; ++j) mine.take(row(load, j, k));
       }
       const std::scoped_lock lock(mutex);
       all.take(mine);

@@ -284,6 +284,17 @@ printf '{"field": "V",\n"camera": {"position": [0, 0]}}' >run.json
 refused 1 "/camera/position: must be an array of 3 numbers .run.json, line 2." "$vdi" check run.json
 works "check" "$vdi" check '{"field": "V", "log": "logs/run.jsonl"}'
 grep -q "a log: logs/run.jsonl" out.txt || fail "check doesn't tell the log"
+mkdir -p there
+cp one.vdi there/vdi_000003.vdi
+run='{"field": "V", "every_time": 0.5, "every_seconds": 9, "when": {"max": "p", "above": 2}, "max_share": 0.05,
+  "cameras": [{"name": "a", "orbit": {}}, {"name": "b", "orbit": {}}], "output": "there/vdi_{timestep:06d}.vdi"'
+works "check" "$vdi" check "$run}"
+grep -q "every 0.5 of the simulation's time and every 9 s, if p's maximum is above 2, in 5 % of the wall" out.txt ||
+  fail "check doesn't tell when frames are made"
+works "check" "$vdi" check '{"field": "V", "output": "there/vdi_{timestep:06d}.vdi"}'
+grep -q "there/vdi_000003.vdi is there already" out.txt || fail "check doesn't tell what is in the way"
+printf '{"field": "V",\n"when": {"max": "V"}}' >run.json
+refused 1 "/when: must have a bound, 'above' or 'below' .run.json, line 2." "$vdi" check run.json
 refused 1 "not a run's log .*odd.json" "$vdi" log odd.json
 refused 2 "would write over" "$vdi" log odd.json -o odd.json
 mkfifo pipe.json

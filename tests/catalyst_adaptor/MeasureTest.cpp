@@ -24,7 +24,8 @@ constexpr int side = 12;  // cells of the domain, of unit spacing
 
 std::optional<double> measured(Kind kind, const comm::Communicator& comm, const Fields& fields,
                                int component = -1) {
-  Measure measure({.measure = kind, .field = "f", .cells = {}, .component = component, .above = {}, .below = {}});
+  Measure measure(
+      {.measure = kind, .field = "f", .cells = {}, .component = component, .above = {}, .below = {}});
   const std::optional<double> first = measure.of(comm, fields);
   CHECK(measure.of(comm, fields) == first);
   std::vector<double> same{first.value_or(0.0), -first.value_or(0.0)};

@@ -105,7 +105,7 @@ def conditions():
         return True
 
     check(has_moved, {"change": "V", "above": enough}, "c")
-    assert "none" in run({"when": {"max": "none", "above": 0}, "existing": "continue"}, 3, said="there is no array 'none'")
+    run({"when": {"max": "none", "above": 0}, "existing": "continue"}, 3, said="there is no array 'none'")
 
 
 def cameras():
@@ -114,8 +114,8 @@ def cameras():
          "output": {"vdi": "{camera}/v_{timestep}.vdi", "png": "p_{timestep}.png", "latest": True}, "log": "run.jsonl"},
         0, 0, 0)
     frames = [event for event in events() if event["event"] == "frame"]
-    assert [(frame["step"], frame["camera"]) for frame in frames] == [(step, name) for step in (0, 2)
-                                                                    for name in ("front", "top", "near")], frames
+    expected = [(step, name) for step in (0, 2) for name in ("front", "top", "near")]
+    assert [(frame["step"], frame["camera"]) for frame in frames] == expected, frames
     for frame in frames:
         assert frame["files"] == ["%s/v_%d.vdi" % (frame["camera"], frame["step"]),
                                   "p_%d_%s.png" % (frame["step"], frame["camera"])], frame

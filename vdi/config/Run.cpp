@@ -19,8 +19,8 @@ constexpr const char* defaultPreset = "Cool to Warm";
 
 Orbit Run::orbitAt(const RunOrbit& orbit, std::int64_t step, double time) const {
   constexpr double full = 360.0;
-  double frame = 0.0;
-  if (every > 0) frame = static_cast<double>(step / every);
+  const std::int64_t counted = every > 0 ? step / every : 0;
+  double frame = static_cast<double>(counted);
   if (every == 0 && everyTime) frame = periodsIn(time, *everyTime);
   Orbit place = orbit.start;
   const double turned = orbit.turn * frame;
@@ -61,7 +61,8 @@ std::optional<std::filesystem::path> Run::firstExisting() const {
   if (cinema) patterns.push_back(cinema->pictures);
   for (const FilePattern& pattern : patterns) {
     for (const RunCamera& one : cameras) {
-      if (const std::optional<std::filesystem::path> file = pattern.firstExisting(one.name)) return file;
+      std::optional<std::filesystem::path> file = pattern.firstExisting(one.name);
+      if (file) return file;
     }
   }
   std::error_code error;
