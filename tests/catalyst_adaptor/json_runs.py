@@ -178,6 +178,19 @@ def full():
     assert os.path.getsize("c_0_b.vdi") > 0 and os.path.getsize("c_1_a.vdi") > 0
 
 
+def lost_device():
+    """A device that is lost costs no frame: the values go to the next one, for all cameras."""
+    document = {"cameras": [{"name": "a", "orbit": {}}, {"name": "b", "orbit": {"elevation": 30}}], "log": "run.jsonl"}
+    run({**document, "output": "one_{timestep}.vdi"}, 0)
+    open("lose", "w").close()
+    run({**document, "output": "two_{timestep}.vdi", "existing": "continue"}, 0,
+        LD_PRELOAD=os.environ["VDI_TEST_PRELOAD"] + ":libvulkan.so.1", VDI_TEST_LOSE_DEVICE=os.path.abspath("lose"))
+    assert not os.path.exists("lose"), "no device was lost"
+    for name in "ab":
+        assert open("one_0_%s.vdi" % name, "rb").read() == open("two_0_%s.vdi" % name, "rb").read()
+    assert not any("error" in event for event in events()), events()
+
+
 with tempfile.TemporaryDirectory() as folder:
     os.chdir(folder)
     globals()[case]()

@@ -31,7 +31,7 @@ const std::vector<std::string> runs{
  "when": {"change": "V", "component": 1, "above": 0.1, "below": 3},
  "cameras": [{"name": "front", "orbit": {"azimuth": 5}},
   {"name": "b", "camera": {"position": [0, 0, 1], "focal_point": [0, 0, 0]}}],
- "stream": {"steer": true, "steering_log": "a"}})",
+ "stream": {"steer": true, "steering_log": "a"}, "output": "{timestep}.vdi"})",
     R"({"field": "V", "orbit": {"count": 3, "elevations": [-10, 20]}, "output": {"cinema": "a.cdb",
  "vdi": "{camera}/{timestep}.vdi"}})"};
 const std::vector<std::string> presets{

@@ -271,6 +271,8 @@ TEST_CASE("mistakes of several cameras are told with their place") {
   refusedField(R"("orbit": {"turn": 5}, "every_seconds": 5)", "an orbit's 'turn' goes with either");
   refusedField(R"("output": "{timestep}_{camera}.vdi")", "/output: {camera} needs several viewpoints");
   refusedField(R"("orbit": {"count": 2}, "output": "{timestep}_{camera}{camera}.vdi")", "/output: only");
+  refusedField(R"("orbit": {"count": 2}, "stream": true)", "several viewpoints need an 'output'");
+  refusedField(R"("orbit": {}, "output": {"cinema": "a.cdb", "latest": true})", "/output/latest: needs");
   refusedField(R"("output": "a.cdb")", "/output: a Cinema database needs an 'orbit'");
   refusedField(R"("orbit": {}, "output": {"cinema": "a"})", "/output/cinema: must be a folder's name");
   refusedField(R"("orbit": {}, "output": {"cinema": "{timestep}.cdb"})",

@@ -354,7 +354,10 @@ void readOutput(const JsonValue& value, Run& run) {
   ifThere(value, "png", [&](const JsonValue& file) { run.png = patternOf(file, run); });
   ifThere(value, "cinema", [&](const JsonValue& folder) { run.cinema = cinemaOf(folder, run); });
   if (!run.vdi && !run.makesPictures()) value.fail("must name a file, 'vdi', 'png' or 'cinema'");
-  ifThere(value, "latest", [&](const JsonValue& latest) { run.latest = latest.flag(); });
+  ifThere(value, "latest", [&](const JsonValue& latest) {
+    run.latest = latest.flag();
+    if (run.latest && !run.vdi && !run.png) latest.fail("needs 'vdi' or 'png', whose newest files it links");
+  });
 }
 
 std::string logFileOf(const JsonValue& value) {
@@ -468,6 +471,8 @@ Run parseRun(std::string_view text, const std::string& name) {
   ifThere(document, "stream", [&](const JsonValue& value) { run.stream = streamOf(value); });
   ifThere(document, "output", [&](const JsonValue& value) { readOutput(value, run); });
   ifThere(document, "log", [&](const JsonValue& value) { run.log = logOf(value); });
+  if (run.cameras.size() > 1 && run.stream && !run.vdi && !run.makesPictures())
+    document.fail("several viewpoints need an 'output': the stream shows the first alone");
   if (!run.vdi && !run.makesPictures() && !run.stream) run.vdi = FilePattern("vdi_{timestep:06d}.vdi");
   return run;
 }
