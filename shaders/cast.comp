@@ -91,7 +91,12 @@ void main() {
   if (volumeOnly) {
     accumulated = vec4(0.0);
     firstDepth = uintBitsToFloat(0x7f800000u);
+    extreme = noExtreme;
     castRay();
+    if (projects) {
+      params.extremes.at[listIndex] = extremeKey();
+      return;
+    }
     params.colors.at[listIndex] = accumulated;
     params.depths.at[listIndex] = firstDepth;
     return;

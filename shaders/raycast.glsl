@@ -137,12 +137,14 @@ vec3 placeAmongCells(Brick brick, uint k) {
 }
 
 #include "shading.glsl"
+#include "blending.glsl"
 
 uvec3 cellAround(Brick brick, vec3 place) { return min(uvec3(place), brick.cellDims - 1u); }
 
 bool showsAnything(Brick brick, uvec3 cell) {
-  return params.cells.at[brick.firstCell + (cell.z * brick.cellDims.y + cell.y) * brick.cellDims.x +
-                         cell.x] != 0u;
+  uint index = brick.firstCell + (cell.z * brick.cellDims.y + cell.y) * brick.cellDims.x + cell.x;
+  if (blendMode != blendComposite) return adds(brick, params.ranges.at[index]);
+  return params.cells.at[index] != 0u;
 }
 
 // The macrocell of sample k: whether it has anything visible, and the first sample after it.
@@ -192,9 +194,24 @@ vec2 spanOf(uint first, uint last) {
 // The first sample to use, from k on.
 uint usedFrom(uint k) { return (k + samplesAtOnce - 1u) / samplesAtOnce * samplesAtOnce; }
 
+// Samples [begin, end) of a projection.
+void projectSamples(Brick brick, uint begin, uint end) {
+  if (begin < end) project(tablePosition(brick, beginOf(begin)), beginOf(begin));
+  for (uint batch = begin; batch < end; batch += samplesAhead) {
+    float positions[samplesAhead];
+    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i)
+      positions[i] = tablePosition(brick, endOf(min(batch + i, end - 1u)));
+    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) project(positions[i], endOf(min(batch + i, end - 1u)));
+  }
+}
+
 // Uses samples [emptyBegin, begin) as one transparent one, if there are any; the result is the same. Then
 // uses the multiples of samplesAtOnce in [begin, end). Returns false once the ray is opaque enough.
 bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
+  if (projects) {
+    projectSamples(brick, begin, end);
+    return true;
+  }
   uint emptyFirst = usedFrom(emptyBegin);
   uint first = usedFrom(begin);
   bool empty = emptyFirst < first;
@@ -208,17 +225,24 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
     if (!begun || !endsMeet) ends[0] = tablePosition(brick, beginOf(batch));
     begun = true;
     [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) ends[i + 1u] = tablePosition(brick, endOf(batch + i));
-    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) {
-      between[i] = slabTexel(mix(ends[i + 1u], ends[i], params.slabs != 0u), ends[i + 1u]);
+    if (!showsIsosurfaces) {
+      [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) {
+        between[i] = slabTexel(mix(ends[i + 1u], ends[i], params.slabs != 0u), ends[i + 1u]);
+      }
     }
     [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) {
       uint k = batch + i * samplesAtOnce;
       if (samplesAhead == 1u || k < end) {
         bool here = i == 0u && empty;
         vec2 span = spanOf(here ? emptyFirst : k, k);
-        vec4 slab = slabOf(between[i], mix(ends[i + 1u], ends[i], params.slabs != 0u), ends[i + 1u]);
-        Sample it = sampleOf(mix(slab, vec4(0.0), bvec4(here)), span.y - span.x);
-        useSample(span.x, span.y, lit(brick, k, it));
+        Sample it = transparentSample;
+        if (showsIsosurfaces) {
+          if (!here) it = crossed(brick, k, ends[i], ends[i + 1u]);
+        } else {
+          vec4 slab = slabOf(between[i], mix(ends[i + 1u], ends[i], params.slabs != 0u), ends[i + 1u]);
+          it = lit(brick, k, sampleOf(mix(slab, vec4(0.0), bvec4(here)), span.y - span.x));
+        }
+        useSample(span.x, span.y, it);
         rayOpticalDepth += it.opticalDepth;
         if (rayOpticalDepth >= params.enough) return false;
       }

@@ -9,6 +9,7 @@
 #ifndef __cplusplus
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BrickArray { Brick at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer KdNodeArray { KdNode at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer UintPairArray { uvec2 at[]; };
 #endif
 
 VDI_SHARED_BEGIN
@@ -24,6 +25,12 @@ VDI_CONST uint castProgramHistogram = 4;    // total budget: the histogram of li
 VDI_CONST uint castProgramCountLevels = 5;  // merging with other ranks: counts at all tolerances (quota.h)
 VDI_CONST uint castMaxLights = 8;
 VDI_CONST uint castMaxClipPlanes = 6;
+VDI_CONST uint castMaxIsosurfaces = 16;
+// BlendMode (core/Blending.h), a constant of the program.
+VDI_CONST uint blendComposite = 0;
+VDI_CONST uint blendMaximum = 1;
+VDI_CONST uint blendMinimum = 2;
+VDI_CONST uint blendIsosurface = 3;
 // A difference between two values below this share of them counts as rounding (core/Shading.h).
 VDI_CONST float leastGradient = 1.0e-6f;
 VDI_CONST uint castModeSearch = 0;          // sensitivities and counts
@@ -44,6 +51,8 @@ struct CastParams {
   VDI_ADDRESS(UintArray) left;               // [h][w]: the number of them to keep
   VDI_ADDRESS(Vec4Array) colors;             // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;            // [h][w]
+  VDI_ADDRESS(UintPairArray) extremes;       // [h][w]: instead of colors and depths (blending.glsl)
+  VDI_ADDRESS(CellRangeArray) ranges;        // of macrocells (cells.h); for blend modes other than composite
   VDI_ADDRESS(UintArray) status;             // [statusWords]
   VDI_ADDRESS(UintArray) histogram;          // [histogramLevels + 1][2]
   VDI_ADDRESS(UintArray) levels;             // [rows][countedWidth][countedLevelWords]
@@ -99,6 +108,11 @@ struct CastParams {
   vec4 clipPlanes[castMaxClipPlanes];  // the visible side has dot(xyz, position) >= w
   uint clipPlaneCount;
   uint shaded;  // 1: colours are shaded; a constant of the program
+  uint blendMode;
+  // Positions in the transfer table, ascending, and premultiplied colours and opacities.
+  float isosurfacePositions[castMaxIsosurfaces];
+  vec4 isosurfaceMaterials[castMaxIsosurfaces];
+  uint isosurfaceCount;
 };
 
 struct CastConstants {

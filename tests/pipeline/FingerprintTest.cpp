@@ -65,7 +65,9 @@ TEST_CASE("fingerprints name the parameter that differs") {
        [](Parameters& p) {
          p.settings.region.box = Box{glm::dvec3(0.0), glm::dvec3(1.0)};
        }},
-      {"clipping planes", [](Parameters& p) { p.settings.region.planes.push_back({}); }}};
+      {"clipping planes", [](Parameters& p) { p.settings.region.planes.push_back({}); }},
+      {"blend mode", [](Parameters& p) { p.settings.blending.mode = BlendMode::Minimum; }},
+      {"isovalues", [](Parameters& p) { p.settings.blending.isovalues.push_back(0.5); }}};
   const Parameters given;
   CHECK(different(given, Parameters(given)).empty());
   CHECK(changes.size() == detail::fingerprintsOf(given.camera, given.function, given.settings).size());

@@ -243,6 +243,15 @@ void Communicator::allReduceSum(std::span<std::uint64_t> values) const {
 void Communicator::allReduceMax(std::span<std::uint64_t> values) const {
   state_->allReduce(values, MPI_UINT64_T, MPI_MAX);
 }
+void Communicator::reduceMax(std::span<std::uint64_t> values, int root) const {
+  assert(values.size() <= maxElements);
+  if (state_->serial()) return;
+  const bool isRoot = rank() == root;
+  const void* sent = isRoot ? MPI_IN_PLACE : values.data();
+  void* received = isRoot ? values.data() : nullptr;
+  call("MPI_Reduce", MPI_Reduce, MPI_Ireduce, sent, received, static_cast<int>(values.size()), MPI_UINT64_T,
+       MPI_MAX, root, state_->comm());
+}
 
 // Memory is allocated under together() before each exchange: a rank with too little makes all fail, instead
 // of leaving the others waiting in a call that it never makes.

@@ -61,6 +61,9 @@ class Communicator {
   void allReduceSum(std::span<std::uint64_t> values) const;
   void allReduceMax(std::span<std::uint64_t> values) const;
 
+  /// Collective: the root gets the largest values; other ranks' stay as they are.
+  void reduceMax(std::span<std::uint64_t> values, int root) const;
+
   // Exchanges of bytes, all collective. Elements of `elementBytes` each travel as one MPI datatype, so more
   // than 2 GiB is fine, as long as no rank sends or receives 2^31 elements or more in one call. If that limit
   // is exceeded, or a rank lacks the memory, nothing is sent and every rank throws: a failing rank its own

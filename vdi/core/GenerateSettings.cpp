@@ -55,6 +55,7 @@ void validate(const GenerateSettings& settings) {
           settings.terminationOpacity, "(0, 1]");
   validate(settings.shading);
   validate(settings.region);
+  validate(settings.blending);
 }
 
 float terminationOpticalDepth(const GenerateSettings& settings) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "vdi/core/Blending.h"
 #include "vdi/core/Budget.h"
 #include "vdi/core/Region.h"
 #include "vdi/core/Shading.h"
@@ -50,6 +51,7 @@ struct GenerateSettings {
   double terminationOpacity = 1.0;
   Shading shading{};  // off by default
   Region region{};    // everything by default
+  Blending blending{};  // composite by default; VDIs need it
   bool operator==(const GenerateSettings&) const = default;
 };
 

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Supersegment.h"
 
 namespace vdi {
 
@@ -131,6 +132,19 @@ TransferTableEntry TransferTable::at(double position) const {
   const glm::vec4 entry = glm::mix(entries[below].vector(), entries[below + 1].vector(),
                                    static_cast<float>(inside - static_cast<double>(below)));
   return {entry.r, entry.g, entry.b, entry.a};
+}
+
+glm::vec4 TransferTable::materialAt(double position) const {
+  if (std::isnan(position)) return glm::vec4(0.0F);
+  const double inside = std::clamp(position, 0.0, static_cast<double>(entries.size() - 1));
+  const auto below = std::min(static_cast<std::size_t>(inside), entries.size() - 2);
+  const auto materialOf = [](const TransferTableEntry& entry) {
+    if (!(entry.extinction > 0.0F)) return glm::vec4(0.0F);
+    const float opacity = opacityOf(entry.extinction);
+    return glm::vec4(glm::vec3(entry.vector()) / entry.extinction * opacity, opacity);
+  };
+  return glm::mix(materialOf(entries[below]), materialOf(entries[below + 1]),
+                  static_cast<float>(inside - static_cast<double>(below)));
 }
 
 bool TransferTable::visible(double lo, double hi) const {

@@ -64,6 +64,9 @@ struct TransferTable {
   double positionOf(double scalar) const;
   /// The entry at a position; transparent for NaN.
   TransferTableEntry at(double position) const;
+  /// Premultiplied colour and opacity of unitDistance of the material at a position, as the function has
+  /// them; transparent for NaN.
+  glm::vec4 materialAt(double position) const;
   TransferTableEntry lookup(double scalar) const { return at(positionOf(scalar)); }
   bool operator==(const TransferTable&) const = default;
   /// Whether some scalar in [lo, hi] has opacity > 0. Empty-space skipping uses this.

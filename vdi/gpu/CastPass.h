@@ -34,7 +34,8 @@ class CastPass {
   /// they are first recorded.
   void bind(const VolumeStore& volume) { volume_ = &volume; }
 
-  /// The purpose of a dispatch: Volume renders the picture. Histogram counts the demand of lists, and
+  /// The purpose of a dispatch: Volume renders the picture, or the extremes that
+  /// it shows (CastParams::blendMode). Histogram counts the demand of lists, and
   /// CountLevels the counts that this rank shares with others; both are for merging. Count is the first step
   /// of an algorithm (sensitivities or tolerances, and counts), Write the second one (supersegments or
   /// pre-segments).
@@ -61,6 +62,7 @@ class CastPass {
     bool cutAtGaps = false;
     bool byNeed = false;
     bool shaded = false;
+    std::uint32_t blendMode = 0;
   };
   ComputePipeline& pipelineFor(const Program& program);
   /// The images that a pipeline reads.

@@ -72,6 +72,8 @@ class VolumeStore {
   const SampledImage& slabs() const { return slabs_; }
   /// Macrocells, indexed from the bricks' firstCell on: 1 if the table makes any of their values visible.
   VkDeviceAddress cells() const { return shown().visibleBuffer.address(); }
+  /// Smallest and largest texel of each macrocell, with the same indices; inverted where all are NaN.
+  VkDeviceAddress cellRanges() const { return shown().rangeBuffer.address(); }
   std::span<const SampledImage> pages() const { return shown().pages; }
   /// Bytes of all values' texels, those of a next step included.
   std::uint64_t texelBytesHeld() const;

@@ -216,4 +216,13 @@ void BandMaker::render(const RayCaster::Request& request, const Progress& progre
   noteTimes(report);
 }
 
+void BandMaker::project(const RayCaster::Request& request, const Progress& progress, HostPool& pool,
+                        HostVector<std::uint64_t>& keys, RankReport& report) {
+  Stopwatch watch;
+  cancellable(comm_, progress, 0.95,
+              [&](const RayCaster::Progress& advanced) { caster_.project(request, advanced, pool, keys); });
+  report.generateSeconds = watch.lap();
+  noteTimes(report);
+}
+
 }  // namespace vdi::detail

@@ -64,6 +64,9 @@ class BandMaker {
   /// Renders one rank's volume to a picture: RayCaster::render.
   void render(const RayCaster::Request& request, const Progress& progress, HostPool& pool, Image& image,
               RankReport& report);
+  /// Finds the extreme scalars of one rank's volume: RayCaster::project.
+  void project(const RayCaster::Request& request, const Progress& progress, HostPool& pool,
+               HostVector<std::uint64_t>& keys, RankReport& report);
 
   /// Call when no frame is under way: the next frame uses the same memory as the last one after a restart.
   void restart() { firstSlot_ = 0; }

@@ -104,7 +104,9 @@ std::vector<comm::Communicator::Fingerprint> fingerprintsOf(const Camera& camera
           {hashOf(settings.shading.diffuse), "diffuse"},
           {hashOf(settings.shading.lights), "lights"},
           {hashOf(settings.region.box), "cropping box"},
-          {hashOf(settings.region.planes), "clipping planes"}};
+          {hashOf(settings.region.planes), "clipping planes"},
+          {hashOf(settings.blending.mode), "blend mode"},
+          {hashOf(std::span<const double>(settings.blending.isovalues)), "isovalues"}};
 }
 
 }  // namespace vdi::detail

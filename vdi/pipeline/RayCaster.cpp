@@ -48,6 +48,25 @@ void setRegion(shared::CastParams& params, const Region& region, const Scene& sc
   }
 }
 
+void setBlending(shared::CastParams& params, const Blending& blending, const TransferTable& table) {
+  static_assert(maxIsovalues == shared::castMaxIsosurfaces);
+  static_assert(static_cast<std::uint32_t>(BlendMode::Composite) == shared::blendComposite &&
+                static_cast<std::uint32_t>(BlendMode::Maximum) == shared::blendMaximum &&
+                static_cast<std::uint32_t>(BlendMode::Minimum) == shared::blendMinimum &&
+                static_cast<std::uint32_t>(BlendMode::Isosurface) == shared::blendIsosurface);
+  params.blendMode = static_cast<std::uint32_t>(blending.mode);
+  for (const Isosurface& surface : isosurfacesOf(blending, table)) {
+    params.isosurfacePositions[params.isosurfaceCount] = static_cast<float>(surface.position);
+    params.isosurfaceMaterials[params.isosurfaceCount] = surface.material;
+    ++params.isosurfaceCount;
+  }
+}
+
+template <typename T>
+std::byte* bytesOf(HostVector<T>& values) {
+  return std::as_writable_bytes(std::span(values)).data();
+}
+
 }  // namespace
 
 shared::CastParams RayCaster::prepare(const Request& request) {
@@ -65,7 +84,9 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.slabsPerDepth = static_cast<float>(1.0 / (request.table.unitDistance * slabs.length));
   setRegion(params, request.settings.region, request.scene);
   setLights(params, request.settings.shading, request.view);
+  setBlending(params, request.settings.blending, request.table);
   params.cells = volume_.cells();
+  params.ranges = volume_.cellRanges();
   params.nodeCount = volume_.nodeCount();
   params.enough = terminationOpticalDepth(request.settings);
   params.budget = request.settings.supersegments;
@@ -301,40 +322,64 @@ void RayCaster::drop() {
   finished_ = started_;
 }
 
-void RayCaster::render(const Request& request, const Progress& progress, HostPool& pool, Image& image) {
+/// Casts the volume band after band, and brings each band's values of the arrays to the host.
+void RayCaster::castPixels(const Request& request, const Progress& progress, HostPool& pool,
+                           std::span<const PixelArray> arrays) {
   const auto width = static_cast<std::uint32_t>(request.view.width());
   const auto height = static_cast<std::uint32_t>(request.view.height());
+  shared::CastParams params = prepare(request);
+  std::uint64_t bytesPerPixel = 0;
+  for (const PixelArray& array : arrays) bytesPerPixel += array.bytes;
+  const std::uint32_t band = rowsPerBand(request, bytesPerPixel, bandsWanted());
+  for (std::uint32_t row = 0; row < height; row += band) {
+    const std::uint32_t end = std::min(height, row + band);
+    const std::uint64_t first = std::uint64_t{row} * width;
+    const std::uint64_t pixels = std::uint64_t{end - row} * width;
+    for (const PixelArray& array : arrays) {
+      array.buffer.reserve(device_, pixels * array.bytes, gpu::MemoryKind::DeviceLocal);
+      params.*array.address = array.buffer.address() - first * array.bytes;
+    }
+    commands_.begin();
+    commands_.mark("cast");
+    pass_.record(commands_, params, gpu::CastPass::Work::Volume, Algorithm::Merge, {width, row, end});
+    commands_.barrier();
+    commands_.mark("download");
+    std::vector<HostAccess*> written;
+    for (const PixelArray& array : arrays) {
+      const HostPool::Place place = pool.placeOf(array.host + first * array.bytes);
+      place.access->recordWrite(commands_, array.buffer, 0, place.at, pixels * array.bytes);
+      written.push_back(place.access);
+    }
+    commands_.submitAndWait();
+    for (HostAccess* access : written) access->finish();
+    times_.all += commands_.stageTimes().front().milliseconds;
+    if (!progress(static_cast<double>(end) / height)) break;
+  }
+}
+
+void RayCaster::render(const Request& request, const Progress& progress, HostPool& pool, Image& image) {
   times_ = {};
   if (volume_.empty() || request.lattice.count == 0) {
     std::ranges::fill(image.rgba, glm::vec4(0.0F));
     std::ranges::fill(image.depth, Image::noDepth);
     return;
   }
-  shared::CastParams params = prepare(request);
-  const std::uint32_t band = rowsPerBand(request, sizeof(glm::vec4) + sizeof(float), bandsWanted());
-  for (std::uint32_t row = 0; row < height; row += band) {
-    const std::uint32_t end = std::min(height, row + band);
-    const std::uint64_t first = std::uint64_t{row} * width;
-    const std::uint64_t pixels = std::uint64_t{end - row} * width;
-    colors_.reserve(device_, pixels * sizeof(glm::vec4), gpu::MemoryKind::DeviceLocal);
-    depths_.reserve(device_, pixels * sizeof(float), gpu::MemoryKind::DeviceLocal);
-    params.colors = colors_.address() - first * sizeof(glm::vec4);
-    params.depths = depths_.address() - first * sizeof(float);
-    commands_.begin();
-    commands_.mark("cast");
-    pass_.record(commands_, params, gpu::CastPass::Work::Volume, Algorithm::Merge, {width, row, end});
-    commands_.barrier();
-    commands_.mark("download");
-    const HostPool::Place colors = pool.placeOf(image.rgba.data() + first);
-    const HostPool::Place depths = pool.placeOf(image.depth.data() + first);
-    colors.access->recordWrite(commands_, colors_, 0, colors.at, pixels * sizeof(glm::vec4));
-    depths.access->recordWrite(commands_, depths_, 0, depths.at, pixels * sizeof(float));
-    commands_.submitAndWait();
-    colors.access->finish();
-    depths.access->finish();
-    times_.all += commands_.stageTimes().front().milliseconds;
-    if (!progress(static_cast<double>(end) / height)) break;
+  const std::array arrays{
+      PixelArray{colors_, bytesOf(image.rgba), sizeof(glm::vec4), &shared::CastParams::colors},
+      PixelArray{depths_, bytesOf(image.depth), sizeof(float), &shared::CastParams::depths}};
+  castPixels(request, progress, pool, arrays);
+}
+
+void RayCaster::project(const Request& request, const Progress& progress, HostPool& pool,
+                        HostVector<std::uint64_t>& keys) {
+  times_ = {};
+  if (volume_.empty() || request.lattice.count == 0) {
+    std::ranges::fill(keys, 0);
+    return;
   }
+  const std::array arrays{
+      PixelArray{extremes_, bytesOf(keys), sizeof(std::uint64_t), &shared::CastParams::extremes}};
+  castPixels(request, progress, pool, arrays);
 }
 
 }  // namespace vdi::detail

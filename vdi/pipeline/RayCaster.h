@@ -89,10 +89,23 @@ class RayCaster {
   void drop();
   /// DVR: renders all pixels of `image`, which has the view's size and its memory from `pool`.
   void render(const Request& request, const Progress& progress, HostPool& pool, Image& image);
+  /// Finds the extreme scalar of each pixel's ray, for a blend mode that projects: colorExtremes explains
+  /// `keys`, which has the view's size and its memory from `pool`.
+  void project(const Request& request, const Progress& progress, HostPool& pool,
+               HostVector<std::uint64_t>& keys);
   /// Times of the last frame, without transfers. A picture sets `all` only.
   const ListTimes& times() const { return times_; }
 
  private:
+  /// An array of values for the pixels of a picture, on the device and on the host.
+  struct PixelArray {
+    gpu::Buffer& buffer;
+    std::byte* host;      // from a HostPool
+    std::uint64_t bytes;  // of a pixel
+    std::uint64_t gpu::shared::CastParams::*address;
+  };
+  void castPixels(const Request& request, const Progress& progress, HostPool& pool,
+                  std::span<const PixelArray> arrays);
   gpu::shared::CastParams prepare(const Request& request);
   float levelOfNeed(gpu::shared::CastParams params, const Request& request);
   std::uint32_t bandsWanted() const;
@@ -117,6 +130,7 @@ class RayCaster {
   gpu::Buffer weightsReadback_;
   gpu::Buffer colors_;
   gpu::Buffer depths_;
+  gpu::Buffer extremes_;
   HistogramBuffer histogram_;
   ListTimes times_;
 };

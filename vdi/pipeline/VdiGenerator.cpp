@@ -14,6 +14,7 @@
 #include "vdi/core/Margin.h"
 #include "vdi/pipeline/BandDownload.h"
 #include "vdi/pipeline/BandMaker.h"
+#include "vdi/pipeline/Extremes.h"
 #include "vdi/pipeline/FileSink.h"
 #include "vdi/pipeline/Fingerprint.h"
 #include "vdi/pipeline/Frames.h"
@@ -32,6 +33,19 @@ constexpr int root = 0;
 bool hasDepthCode(const Scene& scene, const Camera& camera, const GenerateSettings& settings) {
   const View view = viewWithMargin(scene, camera, settings);
   return depthCodeFor(depthLattice(scene, view, settings.samplesPerVoxel)).step > 0.0F;
+}
+
+/// The settings' rate, or the least power of two times it at which samples are slabs: only these show what
+/// lies between two of them.
+double rateOfSlabs(const Scene& scene, const Camera& camera, const GenerateSettings& settings) {
+  const View view = viewWithMargin(scene, camera, settings);
+  double rate = settings.samplesPerVoxel;
+  const auto areSlabs = [&] {
+    const DepthLattice lattice = depthLattice(scene, view, rate);
+    return lattice.count == 0 || samplesAreSlabs(scene, view, lattice);
+  };
+  while (!areSlabs()) rate *= 2.0;
+  return rate;
 }
 
 }  // namespace
@@ -85,12 +99,15 @@ struct VdiGenerator::State {
     TransferFunction legend;  // the function, simplified
   };
 
+  enum class For { Vdi, Picture };
+
   std::unique_ptr<Prepared> prepare(const Camera& camera, const TransferFunction& function,
-                                    const GenerateSettings& settings) {
+                                    const GenerateSettings& settings, For result) {
     comm.requireEqual(detail::fingerprintsOf(camera, function, settings));
     std::unique_ptr<Prepared> prepared;
     comm.together([&] {
       validate(settings);
+      if (result == For::Vdi) requireComposite(settings.blending);
       const Scene& scene = steps->scene();
       TransferTable table = bake(function);
       GenerateSettings own = settings;
@@ -100,6 +117,7 @@ struct VdiGenerator::State {
       while (settings.samplesPerVoxel == automaticRate && own.samplesPerVoxel > 1.0 &&
              !hasDepthCode(scene, camera, own))
         own.samplesPerVoxel *= 0.5;
+      if (settings.blending.mode == BlendMode::Isosurface) own.samplesPerVoxel = rateOfSlabs(scene, camera, own);
       const View view = viewWithMargin(scene, camera, own);
       prepared =
           std::make_unique<Prepared>(Prepared{view, depthLattice(scene, view, own.samplesPerVoxel),
@@ -266,6 +284,25 @@ struct VdiGenerator::State {
     bands->render(requestOf(prepared, settings, {}), progress, *pool, image, mine);
   }
 
+  /// Collective: renders the picture of the extreme scalars along the rays, on the root. Their order doesn't
+  /// matter, so ranks need no lists: each pixel's largest key is the result.
+  void project(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress,
+               HostVector<std::uint64_t>& extremes, Image& image) {
+    comm.together([&] {
+      extremes.resize(static_cast<std::size_t>(settings.width) * static_cast<std::size_t>(settings.height));
+      if (comm.rank() == root) image = imageIn(settings);
+    });
+    bands->project(requestOf(prepared, settings, {}), progress, *pool, extremes, mine);
+    detail::Stopwatch watch;
+    comm.reduceMax(extremes, root);
+    if (comm.rank() != root) mine.bytesSent += extremes.size() * sizeof(std::uint64_t);
+    mine.gatherSeconds = watch.lap();
+    comm.together([&] {
+      if (comm.rank() == root) detail::colorExtremes(extremes, settings.blending.mode, prepared.table, image);
+    });
+    mine.compositeSeconds = watch.lap();
+  }
+
   /// An image of the settings' size, not cleared.
   Image imageIn(const GenerateSettings& settings) const {
     Image image;
@@ -321,7 +358,7 @@ std::optional<Vdi> VdiGenerator::generate(const Camera& camera, const TransferFu
 VdiFrame VdiGenerator::start(const Camera& camera, const TransferFunction& transferFunction,
                              const GenerateSettings& settings, const Progress& progress) {
   State& s = *state_;
-  const auto prepared = s.prepare(camera, transferFunction, settings);
+  const auto prepared = s.prepare(camera, transferFunction, settings, State::For::Vdi);
   // Memory in use by a frame is not replaced, so a frame of another size waits for it.
   const std::tuple kind(settings, prepared->view.width(), prepared->view.height());
   if (s.lastKind != kind) s.completeAll();
@@ -360,7 +397,7 @@ WrittenVdi VdiGenerator::write(const std::filesystem::path& path, const Camera& 
                                const TransferFunction& transferFunction, const GenerateSettings& settings,
                                const TimeStamp& stamp, const Progress& progress) {
   State& s = *state_;
-  const auto prepared = s.prepare(camera, transferFunction, settings);
+  const auto prepared = s.prepare(camera, transferFunction, settings, State::For::Vdi);
   Vdi header = s.headerOf(*prepared, camera, settings);
   header.time = stamp.time;
   header.timeStep = stamp.step;
@@ -383,7 +420,7 @@ void VdiGenerator::show(VdiRenderer* renderer, const Camera& camera, const Trans
   });
   if (s.comm.size() == 1) {
     if (const std::unique_ptr<detail::VdiSink> sink = renderer->sinkFor(*s.device)) {
-      const auto prepared = s.prepare(camera, transferFunction, settings);
+      const auto prepared = s.prepare(camera, transferFunction, settings, State::For::Vdi);
       s.wholeVdi(*prepared, settings, s.headerOf(*prepared, camera, settings), *sink, progress);
       return;
     }
@@ -405,10 +442,13 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
   State& s = *state_;
   GenerateSettings settings = asked;
   settings.margin = 0.0;
-  const auto prepared = s.prepare(camera, transferFunction, settings);
-  Image image;  // devices may still write to it when `frame` handles an error
+  const auto prepared = s.prepare(camera, transferFunction, settings, State::For::Picture);
+  Image image;  // devices may still write to these when `frame` handles an error
+  HostVector<std::uint64_t> extremes{HostAllocator<std::uint64_t>(s.pool)};
   s.wholeFrame(progress, [&] {
-    if (s.comm.size() > 1) {
+    if (settings.blending.projects()) {
+      s.project(*prepared, settings, progress, extremes, image);
+    } else if (s.comm.size() > 1) {
       s.renderTogether(*prepared, settings, progress, image);
     } else {
       s.renderAlone(*prepared, settings, progress, image);

@@ -117,7 +117,8 @@ class VdiGenerator {
             const GenerateSettings& settings, const Progress& progress = {});
 
   /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0.
-  /// Ignores the settings' supersegments, algorithm and margin.
+  /// Ignores the settings' supersegments, algorithm and margin. All blend modes; the functions that make VDIs
+  /// throw Error{InvalidArgument} unless the mode is Composite.
   std::optional<Image> renderVolume(const Camera& camera, const TransferFunction& transferFunction,
                                     const GenerateSettings& settings, const Progress& progress = {});
 

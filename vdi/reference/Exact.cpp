@@ -80,9 +80,54 @@ glm::dvec4 integrate(const ExactVolume& volume, const TransferFunction& function
   return {light, 1.0 - transmittance};
 }
 
+namespace {
+
+/// Premultiplied; the opacity function's opacity as it is.
+glm::dvec4 materialAt(const TransferFunction& function, double scalar) {
+  const double opacity = valueAt(function.opacities, &OpacityNode::opacity, scalar);
+  return {opacity * valueAt(function.colors, &ColorNode::color, scalar), opacity};
+}
+
+}  // namespace
+
+glm::dvec4 project(const ExactVolume& volume, const TransferFunction& function, const glm::dvec3& from,
+                   const glm::dvec3& to, int parts, bool largest) {
+  double extreme = volume.at(from);
+  for (int i = 1; i <= parts; ++i) {
+    const double scalar = volume.at(from + (to - from) * (static_cast<double>(i) / parts));
+    extreme = largest ? std::max(extreme, scalar) : std::min(extreme, scalar);
+  }
+  return materialAt(function, extreme);
+}
+
+glm::dvec4 cross(const ExactVolume& volume, const TransferFunction& function,
+                 const std::vector<double>& isovalues, const glm::dvec3& from, const glm::dvec3& to,
+                 int parts) {
+  glm::dvec4 sum(0.0);
+  double before = volume.at(from);
+  for (int i = 1; i <= parts; ++i) {
+    const double scalar = volume.at(from + (to - from) * (static_cast<double>(i) / parts));
+    std::vector<double> passed;
+    for (const double value : isovalues) {
+      if ((before < value) != (scalar < value)) passed.push_back(value);
+    }
+    std::ranges::sort(passed, [&](double a, double b) { return before < scalar ? a < b : b < a; });
+    for (const double value : passed) sum += (1.0 - sum.a) * materialAt(function, value);
+    before = scalar;
+  }
+  return sum;
+}
+
 Image renderExactly(const ExactVolume& volume, const TransferFunction& function, const Camera& camera,
-                    int width, int height, int samplesPerVoxel) {
+                    int width, int height, int samplesPerVoxel, const Blending& blending) {
   assert(!function.colors.empty() && !function.opacities.empty());
+  const auto colorOf = [&](const Line& line, int parts) {
+    if (blending.mode == BlendMode::Isosurface)
+      return cross(volume, function, blending.isovalues, line.from, line.to, parts);
+    if (blending.mode == BlendMode::Composite)
+      return integrate(volume, function, line.from, line.to, parts);
+    return project(volume, function, line.from, line.to, parts, blending.mode == BlendMode::Maximum);
+  };
   const glm::dvec3 forward = glm::normalize(camera.focalPoint - camera.position);
   const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.viewUp));
   const glm::dvec3 up = glm::cross(right, forward);
@@ -102,8 +147,7 @@ Image renderExactly(const ExactVolume& volume, const TransferFunction& function,
                             : clip(volume.bounds, camera.position, forward + offset, line);
       const double voxels = hits ? glm::length(line.to - line.from) / smallest : 0.0;
       const int samples = std::max(1, static_cast<int>(std::ceil(voxels * samplesPerVoxel)));
-      image.rgba.push_back(hits ? glm::vec4(integrate(volume, function, line.from, line.to, samples))
-                                : glm::vec4(0.0F));
+      image.rgba.push_back(hits ? glm::vec4(colorOf(line, samples)) : glm::vec4(0.0F));
     }
   }
   return image;

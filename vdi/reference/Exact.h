@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "vdi/core/Blending.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Image.h"
@@ -30,9 +31,19 @@ struct ExactVolume {
 glm::dvec4 integrate(const ExactVolume& volume, const TransferFunction& function, const glm::dvec3& from,
                      const glm::dvec3& to, int samples);
 
+/// Premultiplied colour and opacity of the largest or smallest scalar at the ends of `parts` parts of a ray.
+glm::dvec4 project(const ExactVolume& volume, const TransferFunction& function, const glm::dvec3& from,
+                   const glm::dvec3& to, int parts, bool largest);
+
+/// Premultiplied colour and opacity of the isovalues between the scalars at the ends of each of `parts` parts
+/// of a ray, front to back.
+glm::dvec4 cross(const ExactVolume& volume, const TransferFunction& function,
+                 const std::vector<double>& isovalues, const glm::dvec3& from, const glm::dvec3& to,
+                 int parts);
+
 /// The picture of the camera, row 0 at the bottom, without depths: a ray through each pixel's centre, with 64
-/// samples for each voxel that it may cross.
+/// samples for each voxel that it may cross. Isosurfaces are unshaded.
 Image renderExactly(const ExactVolume& volume, const TransferFunction& function, const Camera& camera,
-                    int width, int height, int samplesPerVoxel = 64);
+                    int width, int height, int samplesPerVoxel = 64, const Blending& blending = {});
 
 }  // namespace vdi::reference

@@ -152,85 +152,171 @@ Frame::Frame(const Scene& theScene, const Camera& camera, const TransferFunction
       table(bake(transferFunction)),
       settings(theSettings),
       slabs(samplesAreSlabs(theScene, view, lattice)),
-      slabTable(makeSlabTable(table, slabLength(lattice, table))) {
+      slabTable(makeSlabTable(table, slabLength(lattice, table))),
+      isosurfaces(isosurfacesOf(theSettings.blending, table)) {
   validate(theSettings);
 }
 
-std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y,
-                              std::uint32_t atOnce) {
+namespace {
+
+/// A ray's samples that some blocks own, and the scalars along it.
+class SampledRay {
+ public:
   struct Piece {
     SampleRange range;
     const Block* block;
   };
-  SceneRay ray = rayOf(frame, x, y);
-  const SceneStretch scene = sceneStretch(frame, ray);
-  std::vector<Piece> pieces;
-  for (const Block& block : blocks) {
-    if (block.owned.empty()) continue;
-    SampleRange range = samplesIn(ownedBox(frame.scene, block), ray, frame.lattice.count);
-    range = {std::max(range.first, scene.samples.first), std::min(range.last, scene.samples.last)};
-    if (range.first < range.last) pieces.push_back({range, &block});
-  }
-  std::sort(pieces.begin(), pieces.end(),
-            [](const Piece& a, const Piece& b) { return a.range.first < b.range.first; });
 
-  const float slabsPerDepth =
-      glm::length(ray.direction) / static_cast<float>(frame.table.unitDistance) / frame.slabTable.length;
-  const float enough = terminationOpticalDepth(frame.settings);
-  // The begin of sample k: samples at the scene's faces are shorter or longer.
-  const auto placeOf = [&](std::uint32_t k) {
-    const auto front = static_cast<float>(frame.lattice.first);
-    if (k == scene.samples.first) return (scene.enter - front) / ray.step;
-    if (k == scene.samples.last) return (scene.leave - front) / ray.step;
+  SampledRay(const Frame& frame, std::span<const Block> blocks, int x, int y)
+      : frame_(frame), ray_(rayOf(frame, x, y)), scene_(sceneStretch(frame, ray_)) {
+    for (const Block& block : blocks) {
+      if (block.owned.empty()) continue;
+      SampleRange range = samplesIn(ownedBox(frame.scene, block), ray_, frame.lattice.count);
+      range = {std::max(range.first, scene_.samples.first), std::min(range.last, scene_.samples.last)};
+      if (range.first < range.last) pieces_.push_back({range, &block});
+    }
+    std::sort(pieces_.begin(), pieces_.end(),
+              [](const Piece& a, const Piece& b) { return a.range.first < b.range.first; });
+  }
+
+  /// Front to back.
+  const std::vector<Piece>& pieces() const { return pieces_; }
+  const SampleRange& inScene() const { return scene_.samples; }
+  float frontOf(std::uint32_t k) const {
+    return k == scene_.samples.first ? scene_.enter : static_cast<float>(frame_.lattice.frontOf(k));
+  }
+  /// Of the last of some samples, the one before `end`.
+  float backOf(std::uint32_t end) const {
+    return end == scene_.samples.last ? scene_.leave : static_cast<float>(frame_.lattice.frontOf(end));
+  }
+  /// The places at which sample k is classified, its two ends or its middle.
+  float beginOf(std::uint32_t k) const { return frame_.slabs ? placeOf(k) : ray_.middleOf(k); }
+  float endOf(std::uint32_t k) const { return frame_.slabs ? placeOf(k + 1) : ray_.middleOf(k); }
+  float depthAt(float place) const { return static_cast<float>(frame_.lattice.first) + place * ray_.step; }
+  /// The scalar at a place, as a position in the transfer table.
+  double positionAt(float place, const Block& block) const {
+    return frame_.table.positionOf(interpolate(block, worldAt(place)));
+  }
+  glm::vec3 lightOn(float place, const Block& block) const {
+    return lightAt(frame_.settings.shading, frame_.view, block, worldAt(place), ray_.direction);
+  }
+  float middleOf(std::uint32_t k) const { return ray_.middleOf(k); }
+  float lengthPerDepth() const { return glm::length(ray_.direction); }
+
+ private:
+  /// The begin of sample k: samples at the scene's faces are shorter or longer.
+  float placeOf(std::uint32_t k) const {
+    const auto front = static_cast<float>(frame_.lattice.first);
+    if (k == scene_.samples.first) return (scene_.enter - front) / ray_.step;
+    if (k == scene_.samples.last) return (scene_.leave - front) / ray_.step;
     return static_cast<float>(k);
-  };
-  const auto lightOn = [&](std::uint32_t k, const Block& block) {
-    const glm::dvec3 world = glm::dvec3(ray.sample(k)) + frame.scene.bounds.center();
-    return lightAt(frame.settings.shading, frame.view, block, world, ray.direction);
-  };
-  const auto slabOf = [&](std::uint32_t k, const Block& block) {
-    const auto positionAt = [&](float place) {
-      const glm::dvec3 world = glm::dvec3(ray.at(place)) + frame.scene.bounds.center();
-      return frame.table.positionOf(interpolate(block, world));
-    };
-    const double middle = positionAt(ray.middleOf(k));
-    if (!frame.slabs) return frame.slabTable.between(middle, middle);
-    return frame.slabTable.between(positionAt(placeOf(k)), positionAt(placeOf(k + 1)));
-  };
+  }
+  glm::dvec3 worldAt(float place) const {
+    return glm::dvec3(ray_.at(place)) + frame_.scene.bounds.center();
+  }
+
+  const Frame& frame_;
+  SceneRay ray_;
+  SceneStretch scene_;
+  std::vector<Piece> pieces_;
+};
+
+/// A sample's premultiplied colour, and its optical depth.
+struct Material {
+  glm::vec3 color{0.0F};
+  float opticalDepth = 0.0F;
+};
+
+Material slabMaterial(const Frame& frame, const SampledRay& ray, std::uint32_t k, const Block& block,
+                      float length) {
+  const float slabsPerDepth =
+      ray.lengthPerDepth() / static_cast<float>(frame.table.unitDistance) / frame.slabTable.length;
+  const Slab slab = frame.slabTable.between(ray.positionAt(ray.beginOf(k), block),
+                                            ray.positionAt(ray.endOf(k), block));
+  const float opticalDepth = std::min(slab.opticalDepth * slabsPerDepth * length, maxExtinction);
+  glm::vec3 color = slab.color * opacityOf(opticalDepth);
+  if (frame.settings.shading.on && opticalDepth > 0.0F) color *= ray.lightOn(ray.middleOf(k), block);
+  return {color, opticalDepth};
+}
+
+Material isosurfaceMaterial(const Frame& frame, const SampledRay& ray, std::uint32_t k, const Block& block) {
+  const float begin = ray.beginOf(k);
+  const float end = ray.endOf(k);
+  const glm::vec4 seen =
+      crossed(frame.isosurfaces, ray.positionAt(begin, block), ray.positionAt(end, block),
+              [&](double share) {
+                if (!frame.settings.shading.on) return glm::vec3(1.0F);
+                return ray.lightOn(glm::mix(begin, end, static_cast<float>(share)), block);
+              });
+  return {glm::vec3(seen), opticalDepthOf(seen.a)};
+}
+
+}  // namespace
+
+std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y,
+                              std::uint32_t atOnce) {
+  const SampledRay ray(frame, blocks, x, y);
+  const float enough = terminationOpticalDepth(frame.settings);
+  const bool isosurfaces = frame.settings.blending.mode == BlendMode::Isosurface;
   std::vector<Interval> samples;
   float total = 0.0F;
-  for (const Piece& piece : pieces) {
+  for (const SampledRay::Piece& piece : ray.pieces()) {
     const std::uint32_t first = (piece.range.first + atOnce - 1) / atOnce * atOnce;
     for (std::uint32_t k = first; k < piece.range.last; k += atOnce) {
-      const std::uint32_t end = std::min(k + atOnce, scene.samples.last);
-      const float front =
-          k == scene.samples.first ? scene.enter : static_cast<float>(frame.lattice.frontOf(k));
-      const float back =
-          end == scene.samples.last ? scene.leave : static_cast<float>(frame.lattice.frontOf(end));
-      const Slab slab = slabOf(k, *piece.block);
-      const float opticalDepth = std::min(slab.opticalDepth * slabsPerDepth * (back - front), maxExtinction);
-      glm::vec3 color = slab.color * opacityOf(opticalDepth);
-      if (frame.settings.shading.on && opticalDepth > 0.0F) color *= lightOn(k, *piece.block);
-      samples.push_back({front, back, color.r, color.g, color.b, opticalDepth});
-      total += opticalDepth;
+      const float front = ray.frontOf(k);
+      const float back = ray.backOf(std::min(k + atOnce, ray.inScene().last));
+      const Material material = isosurfaces ? isosurfaceMaterial(frame, ray, k, *piece.block)
+                                            : slabMaterial(frame, ray, k, *piece.block, back - front);
+      const glm::vec3& color = material.color;
+      samples.push_back({front, back, color.r, color.g, color.b, material.opticalDepth});
+      total += material.opticalDepth;
       if (total >= enough) return samples;
     }
   }
   return samples;
 }
 
+std::optional<Projection::Extreme> projectRay(const Frame& frame, std::span<const Block> blocks, int x,
+                                              int y) {
+  const SampledRay ray(frame, blocks, x, y);
+  Projection projection(frame.settings.blending.mode);
+  for (const SampledRay::Piece& piece : ray.pieces()) {
+    for (std::uint32_t k = piece.range.first; k < piece.range.last; ++k) {
+      for (const float place : {ray.beginOf(k), ray.endOf(k)})
+        projection.add(ray.positionAt(place, *piece.block), ray.depthAt(place));
+    }
+  }
+  return projection.extreme();
+}
+
+namespace {
+
+void renderRay(const Frame& frame, std::span<const Block> blocks, int x, int y, glm::vec4& rgba,
+               float& depth) {
+  if (frame.settings.blending.projects()) {
+    const auto extreme = projectRay(frame, blocks, x, y);
+    if (!extreme) return;
+    rgba = frame.table.materialAt(extreme->position);
+    if (rgba.a > 0.0F) depth = extreme->depth;
+    return;
+  }
+  Accumulator sum;
+  for (const Interval& sample : castRay(frame, blocks, x, y)) {
+    sum.add({sample.red, sample.green, sample.blue}, opacityOf(sample.opticalDepth), sample.front);
+  }
+  rgba = sum.rgba();
+  depth = sum.depth();
+}
+
+}  // namespace
+
 Image renderVolume(const Frame& frame, std::span<const Block> blocks) {
   Image image = blankImage(frame.view.width(), frame.view.height());
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
-      Accumulator sum;
-      for (const Interval& sample : castRay(frame, blocks, x, y)) {
-        sum.add({sample.red, sample.green, sample.blue}, opacityOf(sample.opticalDepth), sample.front);
-      }
       const auto pixel =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
-      image.rgba[pixel] = sum.rgba();
-      image.depth[pixel] = sum.depth();
+      renderRay(frame, blocks, x, y, image.rgba[pixel], image.depth[pixel]);
     }
   }
   return image;

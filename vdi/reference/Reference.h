@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "vdi/core/SlabTable.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
+#include "vdi/reference/Blending.h"
 #include "vdi/reference/Interpolation.h"
 #include "vdi/reference/Segmenter.h"
 
@@ -30,6 +32,7 @@ struct Frame {
   GenerateSettings settings;
   bool slabs = true;  // samplesAreSlabs
   SlabTable slabTable;
+  std::vector<Isosurface> isosurfaces;  // isosurfacesOf
 
   /// `view` includes the settings' margin, for pictures too. Throws as depthLattice, bake and View do.
   Frame(const Scene& scene, const Camera& camera, const TransferFunction& transferFunction,
@@ -38,11 +41,17 @@ struct Frame {
 
 /// The samples of the ray through the centre of pixel (x, y) that `blocks` own, front to back, including
 /// transparent ones, up to the one at which the ray reaches the termination opacity. `atOnce` takes only
-/// samples whose number is a multiple of it; each stands for that many.
+/// samples whose number is a multiple of it; each stands for that many. The blend mode is Composite or
+/// Isosurface.
 std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y,
                               std::uint32_t atOnce = 1);
 
-/// DVR: the ground truth. Depth as in Image.
+/// The extreme scalar of the ray's samples that `blocks` own, at the places where samples are classified, if
+/// they have any. The blend mode is Maximum or Minimum.
+std::optional<Projection::Extreme> projectRay(const Frame& frame, std::span<const Block> blocks, int x,
+                                              int y);
+
+/// DVR: the ground truth, in any blend mode. Depth as in Image; that of an extreme is where it first occurs.
 Image renderVolume(const Frame& frame, std::span<const Block> blocks);
 
 /// The (sub-)VDI of these blocks, one list per pixel. SegmentRules describes `cutAtGaps`; pass false if these
