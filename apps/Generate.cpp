@@ -123,6 +123,15 @@ void requireSound(const Options& options) {
   }
 }
 
+/// Throws Error unless a VDI holds this blend mode.
+void requireHeld(const Blending& blending) {
+  if (blending.mode == BlendMode::Composite) return;
+  throw Error(ErrorCode::InvalidArgument,
+              "a VDI holds composite blending alone; for a picture of this blend mode give --dvr, without -o "
+              "and --flat",
+              fmt::format("--blend {}", toString(blending.mode)));
+}
+
 /// Throws Error if an output cannot be written, or would overwrite an input.
 void requireOutputs(const Options& options) {
   std::vector<NamedFile> inputs{{"--camera", options.view.camera.file},
@@ -223,6 +232,7 @@ void generate(const Options& options, const comm::Communicator& world) {
   std::shared_ptr<gpu::Device> device;
   world.together([&] {
     settings = makeSettings(options.quality);
+    if (options.wantsVdi()) requireHeld(settings.blending);
     requireSound(options);
     if (world.rank() == 0) requireOutputs(options);
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
@@ -266,7 +276,7 @@ void addGenerate(CLI::App& app, Job& job) {
   addFile("-o,--output", options->output, "the .vdi file to write");
   addFile("--flat", options->flat,
           "PNG of the VDI seen from its own viewpoint; gathers the whole VDI on the first rank");
-  addFile("--dvr", options->volume, "PNG of plain volume rendering from there");
+  addFile("--dvr", options->volume, "PNG of plain volume rendering from there; takes any --blend");
   command->add_option("--time", options->time, "simulation time of the first step, kept in the file")
       ->capture_default_str()
       ->group("Output");

@@ -310,6 +310,23 @@ void addRegionOptions(CLI::App& command, QualityOptions& options) {
   addClipOption(command, options.clip, qualityGroup);
 }
 
+void addBlendingOptions(CLI::App& command, QualityOptions& options) {
+  command
+      .add_option(
+          "--blend", options.blend,
+          "how a ray's scalars become a pixel: composite; maximum or minimum, the colour and opacity of "
+          "that scalar; isosurface, those of each isovalue on the ray. A VDI holds composite alone")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group(qualityGroup);
+  command
+      .add_option("--isovalues", options.isovalues,
+                  "with --blend isosurface: the scalars to show, up to " + std::to_string(maxIsovalues))
+      ->expected(1, static_cast<int>(maxIsovalues))
+      ->type_name("X")
+      ->group(qualityGroup);
+}
+
 Region makeRegion(const QualityOptions& options) {
   Region region;
   const std::vector<double>& b = options.crop;
@@ -431,6 +448,7 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
   addBudgetOptions(command, options);
   addShadingOptions(command, options);
   addRegionOptions(command, options);
+  if (use == QualityUse::One) addBlendingOptions(command, options);
   command
       .add_option(
           "--sampling-rate", options.samplesPerVoxel,
@@ -465,6 +483,7 @@ GenerateSettings makeSettings(const QualityOptions& options) {
   settings.terminationOpacity = options.terminationOpacity;
   settings.shading = makeShading(options);
   settings.region = makeRegion(options);
+  settings.blending = {blendModeFromString(options.blend), options.isovalues};
   validate(settings);
   return settings;
 }

@@ -86,8 +86,10 @@ struct QualityOptions {
   double ambient = Shading().ambient;
   double diffuse = Shading().diffuse;
   std::string lights = "kit";
-  std::vector<double> crop;                     // 6, or none
-  std::vector<double> clip;                     // 6 for each plane
+  std::vector<double> crop;  // 6, or none
+  std::vector<double> clip;  // 6 for each plane
+  std::string blend = "composite";
+  std::vector<double> isovalues;
   std::string transferFunction = "three-hues";  // a preset or a file
   std::optional<double> unitDistance;
 };

@@ -45,7 +45,8 @@ void validate(const Blending& blending) {
   const auto refuse = [](const std::string& what) { throw Error(ErrorCode::InvalidArgument, what); };
   const std::size_t count = blending.isovalues.size();
   if (blending.mode != BlendMode::Isosurface) {
-    if (count > 0) refuse(fmt::format("isovalues need blend mode isosurface, not {}", toString(blending.mode)));
+    if (count > 0)
+      refuse(fmt::format("isovalues need blend mode isosurface, not {}", toString(blending.mode)));
     return;
   }
   if (count == 0) refuse("blend mode isosurface needs at least one isovalue");

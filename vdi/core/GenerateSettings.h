@@ -49,8 +49,8 @@ struct GenerateSettings {
   /// leaves out at V_O is missing when seen from V_N, hence the default (docs/adr). Pictures need no more
   /// than pictureTermination.
   double terminationOpacity = 1.0;
-  Shading shading{};  // off by default
-  Region region{};    // everything by default
+  Shading shading{};    // off by default
+  Region region{};      // everything by default
   Blending blending{};  // composite by default; VDIs need it
   bool operator==(const GenerateSettings&) const = default;
 };

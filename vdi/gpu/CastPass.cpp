@@ -82,8 +82,7 @@ ComputePipeline& CastPass::pipelineFor(const Program& program) {
       pipelines.with({program.program, static_cast<std::uint32_t>(pageCount), program.compact,
                       program.samplesAhead, program.lanesPerRay, program.cutAtGaps ? 1U : 0U,
                       program.byNeed ? 1U : 0U, volume_->mayBeInfinite() ? 1U : 0U,
-                      volume_->reachesBeyondTable() ? 1U : 0U, program.shaded ? 1U : 0U,
-                      program.blendMode});
+                      volume_->reachesBeyondTable() ? 1U : 0U, program.shaded ? 1U : 0U, program.blendMode});
   const Bound now{volume_->pagesVersion(), volume_->slabsVersion()};
   Bound& bound = bound_[&pipeline];
   if (bound != now) {
@@ -120,10 +119,9 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   pipelines_.update(commands, params);
   // Counted samples need not be adjacent.
   const std::uint32_t ahead = stride > 1 ? 1 : samplesAhead_;
-  commands.dispatch(
-      pipelineFor({program, compact, lanes, ahead, band.cutAtGaps, params.level >= 0.0F, params.shaded != 0,
-                   params.blendMode}),
-      constants, groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
+  commands.dispatch(pipelineFor({program, compact, lanes, ahead, band.cutAtGaps, params.level >= 0.0F,
+                                 params.shaded != 0, params.blendMode}),
+                    constants, groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
 }
 
 }  // namespace vdi::gpu

@@ -117,7 +117,8 @@ struct VdiGenerator::State {
       while (settings.samplesPerVoxel == automaticRate && own.samplesPerVoxel > 1.0 &&
              !hasDepthCode(scene, camera, own))
         own.samplesPerVoxel *= 0.5;
-      if (settings.blending.mode == BlendMode::Isosurface) own.samplesPerVoxel = rateOfSlabs(scene, camera, own);
+      if (settings.blending.mode == BlendMode::Isosurface)
+        own.samplesPerVoxel = rateOfSlabs(scene, camera, own);
       const View view = viewWithMargin(scene, camera, own);
       prepared =
           std::make_unique<Prepared>(Prepared{view, depthLattice(scene, view, own.samplesPerVoxel),

@@ -6,8 +6,8 @@ namespace vdi::reference {
 
 void Projection::add(double position, float depth) {
   if (std::isnan(position)) return;
-  const bool isExtreme =
-      !extreme_ || (mode_ == BlendMode::Maximum ? position > extreme_->position : position < extreme_->position);
+  const bool isExtreme = !extreme_ || (mode_ == BlendMode::Maximum ? position > extreme_->position
+                                                                   : position < extreme_->position);
   if (isExtreme) extreme_ = Extreme{position, depth};
 }
 

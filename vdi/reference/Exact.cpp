@@ -124,8 +124,7 @@ Image renderExactly(const ExactVolume& volume, const TransferFunction& function,
   const auto colorOf = [&](const Line& line, int parts) {
     if (blending.mode == BlendMode::Isosurface)
       return cross(volume, function, blending.isovalues, line.from, line.to, parts);
-    if (blending.mode == BlendMode::Composite)
-      return integrate(volume, function, line.from, line.to, parts);
+    if (blending.mode == BlendMode::Composite) return integrate(volume, function, line.from, line.to, parts);
     return project(volume, function, line.from, line.to, parts, blending.mode == BlendMode::Maximum);
   };
   const glm::dvec3 forward = glm::normalize(camera.focalPoint - camera.position);

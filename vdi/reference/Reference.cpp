@@ -211,9 +211,7 @@ class SampledRay {
     if (k == scene_.samples.last) return (scene_.leave - front) / ray_.step;
     return static_cast<float>(k);
   }
-  glm::dvec3 worldAt(float place) const {
-    return glm::dvec3(ray_.at(place)) + frame_.scene.bounds.center();
-  }
+  glm::dvec3 worldAt(float place) const { return glm::dvec3(ray_.at(place)) + frame_.scene.bounds.center(); }
 
   const Frame& frame_;
   SceneRay ray_;
@@ -231,8 +229,8 @@ Material slabMaterial(const Frame& frame, const SampledRay& ray, std::uint32_t k
                       float length) {
   const float slabsPerDepth =
       ray.lengthPerDepth() / static_cast<float>(frame.table.unitDistance) / frame.slabTable.length;
-  const Slab slab = frame.slabTable.between(ray.positionAt(ray.beginOf(k), block),
-                                            ray.positionAt(ray.endOf(k), block));
+  const Slab slab =
+      frame.slabTable.between(ray.positionAt(ray.beginOf(k), block), ray.positionAt(ray.endOf(k), block));
   const float opticalDepth = std::min(slab.opticalDepth * slabsPerDepth * length, maxExtinction);
   glm::vec3 color = slab.color * opacityOf(opticalDepth);
   if (frame.settings.shading.on && opticalDepth > 0.0F) color *= ray.lightOn(ray.middleOf(k), block);
@@ -243,11 +241,10 @@ Material isosurfaceMaterial(const Frame& frame, const SampledRay& ray, std::uint
   const float begin = ray.beginOf(k);
   const float end = ray.endOf(k);
   const glm::vec4 seen =
-      crossed(frame.isosurfaces, ray.positionAt(begin, block), ray.positionAt(end, block),
-              [&](double share) {
-                if (!frame.settings.shading.on) return glm::vec3(1.0F);
-                return ray.lightOn(glm::mix(begin, end, static_cast<float>(share)), block);
-              });
+      crossed(frame.isosurfaces, ray.positionAt(begin, block), ray.positionAt(end, block), [&](double share) {
+        if (!frame.settings.shading.on) return glm::vec3(1.0F);
+        return ray.lightOn(glm::mix(begin, end, static_cast<float>(share)), block);
+      });
   return {glm::vec3(seen), opticalDepthOf(seen.a)};
 }
 

@@ -11,9 +11,11 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "vdi/core/Blending.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Shading.h"
@@ -32,6 +34,17 @@ bool isVolume(vtkSMProxy* shown) {
   const char* kind = vtkSMPropertyHelper(shown, "Representation").GetAsString();
   return kind != nullptr && std::string(kind) == "Volume";
 }
+
+/// vtkVolumeMapper::BlendModes.
+enum VolumeBlend {
+  Composite,
+  MaximumIntensity,
+  MinimumIntensity,
+  AverageIntensity,
+  Additive,
+  Isosurface,
+  Slice
+};
 
 /// Of a property that some kinds of volumes don't have.
 bool isOn(vtkSMProxy* shown, const char* name) {
@@ -134,38 +147,45 @@ void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& bounds)
   vtkSMPropertyHelper(filter, "CroppingBox").Set(box.data(), 6);
 }
 
+void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown) {
+  if (!isVolume(shown) || shown->GetProperty("BlendMode") == nullptr) return;
+  const int shownMode = vtkSMPropertyHelper(shown, "BlendMode").GetAsInt();
+  std::optional<vdi::BlendMode> mode;
+  if (shownMode == VolumeBlend::MaximumIntensity) mode = vdi::BlendMode::Maximum;
+  if (shownMode == VolumeBlend::MinimumIntensity) mode = vdi::BlendMode::Minimum;
+  if (shownMode == VolumeBlend::Isosurface && shown->GetProperty("IsosurfaceValues") != nullptr) {
+    mode = vdi::BlendMode::Isosurface;
+    const std::vector<double> values = vtkSMPropertyHelper(shown, "IsosurfaceValues").GetDoubleArray();
+    vtkSMPropertyHelper(filter, "IsosurfaceValues")
+        .Set(values.data(), static_cast<unsigned int>(values.size()));
+  }
+  if (mode) vtkSMPropertyHelper(filter, "BlendMode").Set(static_cast<int>(*mode));
+}
+
 std::string blendModeIssue(vtkSMProxy* shown) {
   if (!isVolume(shown) || shown->GetProperty("BlendMode") == nullptr) return {};
-  // vtkVolumeMapper::BlendModes.
   const char* name = nullptr;
   switch (vtkSMPropertyHelper(shown, "BlendMode").GetAsInt()) {
-    case 0:
+    case VolumeBlend::Composite:
+    case VolumeBlend::MaximumIntensity:
+    case VolumeBlend::MinimumIntensity:
+    case VolumeBlend::Isosurface:
       return {};
-    case 1:
-      name = "maximum intensities";
-      break;
-    case 2:
-      name = "minimum intensities";
-      break;
-    case 3:
+    case VolumeBlend::AverageIntensity:
       name = "average intensities";
       break;
-    case 4:
+    case VolumeBlend::Additive:
       name = "additive intensities";
       break;
-    case 5:
-      name = "isosurfaces";
-      break;
-    case 6:
+    case VolumeBlend::Slice:
       name = "a slice";
       break;
     default:
       name = "something else than the composited volume";
   }
   return std::string("The view shows ") + name +
-         " of this volume (its Blend Mode). A VDI holds a composited volume, so it shows what Blend Mode "
-         "Composite "
-         "shows.";
+         " of this volume (its Blend Mode), which VolumetricDepthImage can't. It shows what Blend Mode "
+         "Composite shows.";
 }
 
 }  // namespace pv

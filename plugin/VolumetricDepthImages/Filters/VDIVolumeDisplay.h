@@ -22,7 +22,12 @@ void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view);
 /// Sets Cropping and CroppingBox where `shown` is shown as a cropped volume of those bounds.
 void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& bounds);
 
-/// What to tell a user whose volume is shown in a way that no VDI can hold; empty where it isn't.
+/// Sets BlendMode and IsosurfaceValues of `filter` where `shown` is shown as a volume in a blend mode that it
+/// has.
+void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown);
+
+/// What to tell a user whose volume is shown in a blend mode that the filter doesn't have; empty where it has
+/// it.
 std::string blendModeIssue(vtkSMProxy* shown);
 
 }  // namespace pv

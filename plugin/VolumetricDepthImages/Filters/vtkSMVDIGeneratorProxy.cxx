@@ -298,6 +298,7 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   this->TakeUnitDistance();
   pv::takeShading(this, shown, view);
   pv::takeCropping(this, shown, this->InputBounds());
+  pv::takeBlending(this, shown);
   if (const std::string issue = pv::blendModeIssue(shown); !issue.empty()) vtkWarningMacro(<< issue);
   if (placed && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
                     vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray())

@@ -5,7 +5,8 @@
  * What isn't set at the first update is taken from the active view, if that is a render view that shows its
  * input or whose camera somebody has placed: the camera where position and focal point are the same,
  * Resolution where it is 0 0, ScalarOpacityUnitDistance where it is 0, Shade, Diffuse and Ambient where the
- * view shows it as a shaded volume, Cropping and CroppingBox where it shows it as a cropped one, Lights.
+ * view shows it as a shaded volume, Cropping and CroppingBox where it shows it as a cropped one, BlendMode
+ * and IsosurfaceValues where it shows it as a volume, Lights.
  * Traces and state files have these values. Proxies that a state file makes take nothing.
  *
  * When nobody has set LookupTable, the proxy takes ParaView's colour map for the chosen array, the one that a

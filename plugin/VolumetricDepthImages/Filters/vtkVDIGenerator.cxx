@@ -41,6 +41,7 @@
 #include "VDITransferFunctions.h"
 #include "VDIValues.h"
 #include "vdi/core/BitCast.h"
+#include "vdi/core/Blending.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/UnitDistance.h"
@@ -184,6 +185,8 @@ void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
      << indent << "Cropping: " << this->Cropping << "\n"
      << indent << "CroppingBox: " << fmt::format("{}", fmt::join(this->CroppingBox, " ")) << "\n"
      << indent << "ClippingPlanes: " << this->ClippingPlanes.size() << "\n"
+     << indent << "BlendMode: " << this->BlendMode << "\n"
+     << indent << "IsosurfaceValues: " << fmt::format("{}", fmt::join(this->IsosurfaceValues, " ")) << "\n"
      << indent << "ScalarOpacityUnitDistance: " << this->ScalarOpacityUnitDistance << "\n";
 }
 
@@ -220,6 +223,29 @@ void vtkVDIGenerator::RemoveAllClippingPlanes() {
   if (this->ClippingPlanes.empty()) return;
   this->ClippingPlanes.clear();
   this->Modified();
+}
+
+void vtkVDIGenerator::AddIsosurfaceValue(double value) {
+  this->IsosurfaceValues.push_back(value);
+  this->Modified();
+}
+
+void vtkVDIGenerator::RemoveAllIsosurfaceValues() {
+  if (this->IsosurfaceValues.empty()) return;
+  this->IsosurfaceValues.clear();
+  this->Modified();
+}
+
+/// Throws vdi::Error where a VDI can't hold it.
+vdi::Blending vtkVDIGenerator::CurrentBlending() const {
+  vdi::Blending blending;
+  blending.mode = static_cast<vdi::BlendMode>(this->BlendMode);
+  if (blending.mode == vdi::BlendMode::Isosurface) blending.isovalues = this->IsosurfaceValues;
+  if (blending.mode != vdi::BlendMode::Composite && !this->PictureOnly)
+    throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                     "a VDI holds composite blending alone. Choose Composite as Blend Mode, or Picture Only "
+                     "(PictureOnly) for a picture of this mode without a VDI");
+  return blending;
 }
 
 vdi::Region vtkVDIGenerator::CurrentRegion() const {
@@ -652,6 +678,8 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const Origin& origin) {
   comm.requireEqual(static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component");
   comm.requireEqual(this->FillGhosts ? 1U : 0U, "FillGhosts");
   comm.requireEqual(this->PictureOnly ? 1U : 0U, "PictureOnly");
+  comm.requireEqual(static_cast<std::uint64_t>(this->BlendMode), "BlendMode");
+  comm.together([&] { static_cast<void>(this->CurrentBlending()); });  // before values are loaded in vain
   std::array<std::uint64_t, 1> changed{this->Internal->Shown == origin ? 0U : 1U};
   comm.allReduceMax(changed);
   if (changed[0] == 0) return;
@@ -736,6 +764,7 @@ vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame(const vdi::Box& bounds, dou
   settings.precision = static_cast<vdi::Precision>(this->Precision);
   settings.shading = this->CurrentShading();
   settings.region = this->CurrentRegion();
+  settings.blending = this->CurrentBlending();
   settings.terminationOpacity = this->PictureOnly
                                     ? std::min(this->TerminationOpacity, vdi::pictureTermination)
                                     : this->TerminationOpacity;

@@ -23,6 +23,7 @@
 #include "vtkVolumetricDepthImagesModule.h"
 
 namespace vdi {
+struct Blending;
 struct Box;
 struct Camera;
 struct Region;
@@ -109,13 +110,24 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
                         double normalZ);
   void RemoveAllClippingPlanes();
   ///@}
+  ///@{
+  /**
+   * How the scalars along a ray become a pixel, an enumerator of vdi::BlendMode: 0 (default) composite, 1
+   * maximum intensity, 2 minimum intensity, 3 isosurfaces of the IsosurfaceValues. A VDI holds composite
+   * blending alone: an update with another mode fails unless PictureOnly is on.
+   */
+  vtkSetClampMacro(BlendMode, int, 0, 3);
+  vtkGetMacro(BlendMode, int);
+  void AddIsosurfaceValue(double value);
+  void RemoveAllIsosurfaceValues();
+  ///@}
   /// How samples become supersegments, an enumerator of vdi::Algorithm: 1 merge, 0 bisection.
   vtkSetClampMacro(Algorithm, int, 0, 1);
   /// Exchange ghost layers where blocks lack them.
   vtkSetMacro(FillGhosts, bool);
 
-  /// Plain volume rendering of the blocks, right for any arrangement, without a VDI beside the picture;
-  /// default off.
+  /// Plain volume rendering of the blocks, right for any arrangement and in any blend mode, without a VDI
+  /// beside the picture; default off.
   vtkSetMacro(PictureOnly, bool);
   /// The simulation's step, kept in the VDI.
   vtkSetMacro(TimeStep, int);
@@ -212,6 +224,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   Frame CurrentFrame(const vdi::Box& bounds, double voxelVolume, const vdi::ScalarRange& range);
   vdi::Shading CurrentShading() const;
   vdi::Region CurrentRegion() const;
+  vdi::Blending CurrentBlending() const;
   vtkMTimeType CurrentMTime();
   Origin OriginOf(vtkDataObject* input, std::optional<double> time);
   bool GivesUpPreparation();
@@ -246,6 +259,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   bool Cropping = false;
   double CroppingBox[6] = {0.0, 1.0, 0.0, 1.0, 0.0, 1.0};
   std::vector<std::array<double, 6>> ClippingPlanes;
+  int BlendMode = 0;
+  std::vector<double> IsosurfaceValues;
   bool FillGhosts = true;
   bool PictureOnly = false;
   int TimeStep = 0;
