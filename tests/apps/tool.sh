@@ -79,6 +79,21 @@ refused 2 "diffuse" "$vdi" generate --field sphere "${small[@]}" --shade --diffu
 refused 2 "cropping box" "$vdi" generate --field sphere "${small[@]}" --crop 1 0 0 1 0 1 -o x.vdi
 refused 2 "normal" "$vdi" generate --field sphere "${small[@]}" --clip 0 0 0 0 0 0 -o x.vdi
 refused 2 "termination" "$vdi" generate --field sphere "${small[@]}" --termination-opacity 0 -o x.vdi
+# Pictures of other blend modes, on one rank and on three; a VDI refuses them.
+for blend in maximum minimum "isosurface --isovalues 0.3 0.5 0.7"; do
+  read -r -a mode <<<"$blend"
+  works "$blend" "$vdi" generate --field mixing "${small[@]}" --joint cells --blend "${mode[@]}" --dvr blend_one.png
+  works "$blend on 3 ranks" "${mpirun[@]}" 3 "$vdi" generate --field mixing "${small[@]}" --joint cells --blocks 3x2x2 \
+    --layout random --blend "${mode[@]}" --dvr blend_three.png
+  works "compare" "$vdi" compare --json blend_one.png blend_three.png
+  python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] > 0.999, r" || fail "$blend: ranks differ"
+  works "compare" "$vdi" compare --json blend_one.png need_dvr.png
+  python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] < 0.98, r" || fail "$blend: as composite"
+  refused 2 "composite blending alone" "$vdi" generate --field mixing "${small[@]}" --blend "${mode[@]}" -o x.vdi --dvr x.png
+done
+refused 2 "at least one isovalue" "$vdi" generate --field mixing "${small[@]}" --blend isosurface --dvr x.png
+refused 2 "need blend mode isosurface" "$vdi" generate --field mixing "${small[@]}" --isovalues 0.5 --dvr x.png
+refused 2 "composite, maximum, minimum and isosurface" "$vdi" generate --field mixing "${small[@]}" --blend mip --dvr x.png
 # A page of VDIs is the same each time; where it can't be made, the file stays as it was.
 works "export" "$vdi" export one.vdi three.vdi -o page.html --title "<Two>"
 grep -q '<title>&lt;Two&gt;</title>' page.html || fail "the page's title isn't escaped"

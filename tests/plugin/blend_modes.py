@@ -1,0 +1,103 @@
+"""Maximum and minimum intensities and isosurfaces against ParaView's own pictures, which the first update takes over; VDIs
+refuse them."""
+
+import os
+import sys
+
+import numpy as np
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from pvtest import *  # noqa: E402,F403
+from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
+from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
+
+SHAPE, SPACING = (50, 70, 60), [1.2, 1.0, 1.5]
+UNIT = 7.0  # no mode but Composite depends on it
+
+
+def waves_source(name, as_cells):
+    z, y, x = np.meshgrid(*[np.arange(n) * s for n, s in zip(SHAPE, SPACING[::-1])], indexing="ij")
+    values = 125 + 125 * np.sin(0.15 * x + np.sin(0.12 * y)) * np.cos(0.11 * z + 0.05 * x) * np.cos(0.09 * y)
+    image = vtkImageData()
+    image.SetDimensions(*[n + (1 if as_cells else 0) for n in SHAPE[::-1]])
+    image.SetSpacing(*SPACING)
+    array = numpy_to_vtk(values.astype(np.float32).ravel(), deep=True)
+    array.SetName(name)
+    (image.GetCellData() if as_cells else image.GetPointData()).SetScalars(array)
+    producer = simple.TrivialProducer()
+    producer.GetClientSideObject().SetOutput(image)
+    producer.UpdatePipeline()
+    return producer, np.array(image.GetBounds()).reshape(3, 2).mean(axis=1)
+
+
+said = []
+
+
+def note(caller, event, message):
+    said.append(message)
+
+
+note.CallDataType = "string0"
+for event in ("ErrorEvent", "WarningEvent"):
+    vtkOutputWindow.GetInstance().AddObserver(event, note)
+
+
+def set_blend(representation, number, values):
+    """By number: ParaView's panel doesn't offer each mode for each kind of data."""
+    representation.SMProxy.GetProperty("BlendMode").SetElement(0, number)
+    representation.SMProxy.UpdateVTKObjects()
+    if values:
+        representation.IsosurfaceValues = values
+
+
+# vtkVolumeMapper's number, Shade, isovalues.
+MODES = {
+    "Maximum Intensity": (1, 0, []),
+    "Minimum Intensity": (2, 0, []),
+    "Isosurface": (5, 0, [90, 150, 200]),
+    "Isosurface, shaded": (5, 1, [90, 150, 200]),
+}
+# A surface has edges, and where a ray just touches it, the two see different pixels of it. ParaView shades a surface by the
+# gradient at the sample behind it.
+LEAST = {"Maximum Intensity": 0.99, "Minimum Intensity": 0.99, "Isosurface": 0.97, "Isosurface, shaded": 0.95}
+for as_cells in (False, True):
+    association = "CELLS" if as_cells else "POINTS"
+    source, center = waves_source("waves", as_cells)
+    view = make_view([240, 240], list(center + [70, 60, 130]), list(center))
+    for name, (number, shade, values) in MODES.items():
+        colors, opacity = set_colors("waves", 0, 250)
+        opacity.Points = [0, 0.9, 0.5, 0, 80, 0.3, 0.5, 0, 150, 0.5, 0.5, 0, 250, 0.9, 0.5, 0]
+        paraview_volume(source, view, association, "waves", UNIT, keep_range=True, Shade=shade)
+        shown = simple.GetRepresentation(source, view)
+        set_blend(shown, number, values)
+        theirs = paraview_volume(source, view, association, "waves", UNIT, keep_range=True, Shade=shade)
+        simple.SetActiveView(view)
+        image = vdi_filter(source, view, association, "waves", UNIT, PictureOnly=1)
+        ours = picture(image)
+        what = "%s of %s" % (name, association.lower())
+        check(image.BlendMode == name.split(",")[0], what + ": the first update takes the mode, " + str(image.BlendMode))
+        check(list(image.IsosurfaceValues) == values and image.Shade == shade, what + ": and the values and the shading")
+        off = np.abs(ours.astype(float) - theirs).mean()
+        check(theirs.max() > 100 and ssim(ours, theirs) >= LEAST[name],
+              "%s: SSIM with ParaView's own %.4f, mean difference %.2f" % (what, ssim(ours, theirs), off))
+        write_png("blend_%s.png" % what.replace(",", "").replace(" ", "_"), np.hstack([ours, theirs]))
+        image.BlendMode = "Composite"
+        check(ssim(picture(image), ours) < 0.9, what + ": composited, it looks different")
+        simple.Delete(image)
+        set_blend(shown, 0, [])
+
+# What a VDI can't hold.
+simple.SetActiveView(None)
+image = vdi_filter(source, view, "CELLS", "waves", UNIT)
+for mode in ("Maximum Intensity", "Minimum Intensity", "Isosurface"):
+    image.BlendMode = mode
+    image.IsosurfaceValues = [150]
+    said.clear()
+    image.UpdatePipeline()
+    about = [message for message in said if "composite blending alone" in message]
+    check(len(about) == 1 and len(said) == 1 and "Picture Only" in about[0],
+          "%s: a VDI refuses it in one message: %s" % (mode, " | ".join(said)))
+image.BlendMode = "Composite"
+said.clear()
+check(picture(image).max() > 100 and not said, "and Composite makes one again")
+finish()
