@@ -57,9 +57,9 @@ MODES = {
     "Isosurface": (5, 0, [90, 150, 200]),
     "Isosurface, shaded": (5, 1, [90, 150, 200]),
 }
-# A surface has edges, and where a ray just touches it, the two see different pixels of it. ParaView shades a surface by the
-# gradient at the sample behind it.
-LEAST = {"Maximum Intensity": 0.99, "Minimum Intensity": 0.99, "Isosurface": 0.97, "Isosurface, shaded": 0.95}
+# Surfaces have edges, a pixel of which is all one or the other: where a ray just touches a surface, samples at other depths
+# see or miss it. ParaView shades a surface by the gradient at the sample behind it.
+LEAST = {"Maximum Intensity": 0.99, "Minimum Intensity": 0.99, "Isosurface": 0.96, "Isosurface, shaded": 0.95}
 for as_cells in (False, True):
     association = "CELLS" if as_cells else "POINTS"
     source, center = waves_source("waves", as_cells)
@@ -78,7 +78,7 @@ for as_cells in (False, True):
         check(image.BlendMode == name.split(",")[0], what + ": the first update takes the mode, " + str(image.BlendMode))
         check(list(image.IsosurfaceValues) == values and image.Shade == shade, what + ": and the values and the shading")
         off = np.abs(ours.astype(float) - theirs).mean()
-        check(theirs.max() > 100 and ssim(ours, theirs) >= LEAST[name],
+        check(theirs.max() > 100 and ssim(ours, theirs) >= LEAST[name] and off < 2 and wrong_share(ours, theirs) < 0.05,
               "%s: SSIM with ParaView's own %.4f, mean difference %.2f" % (what, ssim(ours, theirs), off))
         write_png("blend_%s.png" % what.replace(",", "").replace(" ", "_"), np.hstack([ours, theirs]))
         image.BlendMode = "Composite"
@@ -89,9 +89,11 @@ for as_cells in (False, True):
 # What a VDI can't hold.
 simple.SetActiveView(None)
 image = vdi_filter(source, view, "CELLS", "waves", UNIT)
+image.IsosurfaceValues = [150]
 for mode in ("Maximum Intensity", "Minimum Intensity", "Isosurface"):
+    image.BlendMode = "Composite"  # ends the failure of the mode before, which is said once
+    image.UpdatePipeline()
     image.BlendMode = mode
-    image.IsosurfaceValues = [150]
     said.clear()
     image.UpdatePipeline()
     about = [message for message in said if "composite blending alone" in message]
