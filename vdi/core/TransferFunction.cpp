@@ -6,9 +6,9 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "vdi/core/Error.h"
-#include "vdi/core/Supersegment.h"
 
 namespace vdi {
 
@@ -140,7 +140,7 @@ glm::vec4 TransferTable::materialAt(double position) const {
   const auto below = std::min(static_cast<std::size_t>(inside), entries.size() - 2);
   const auto materialOf = [](const TransferTableEntry& entry) {
     if (!(entry.extinction > 0.0F)) return glm::vec4(0.0F);
-    const float opacity = opacityOf(entry.extinction);
+    const auto opacity = static_cast<float>(-std::expm1(-std::numbers::ln2 * entry.extinction));
     return glm::vec4(glm::vec3(entry.vector()) / entry.extinction * opacity, opacity);
   };
   return glm::mix(materialOf(entries[below]), materialOf(entries[below + 1]),
