@@ -190,6 +190,26 @@ TEST_CASE("blending: surfaces at any sampling rate, and a region's part of them"
   CHECK(generator.renderVolume(camera, function, settings)->rgba[16 * 32 + 16].a == Approx(0.5).margin(1e-3));
 }
 
+TEST_CASE("blending: several surfaces within one sample, the nearest first") {
+  // The scalar rises along z, over one voxel, which is less than a sample.
+  const test::Lattice lattice({8, 8, 2}, glm::dvec3(1.0), [](const glm::dvec3& p) { return p.z; });
+  VdiGenerator generator(test::device(), comm::Communicator::serial());
+  generator.setBlocks({lattice.block(ScalarType::F32, 1.0)});
+  const TransferFunction function{{{0.0, {1, 0, 0}}, {1.0, {0, 0, 1}}}, {{0.0, 0.5}, {1.0, 0.5}}, 1.0};
+  GenerateSettings settings = test::smallSettings(32, 32);
+  settings.samplesPerVoxel = 0.6;
+  settings.blending = {BlendMode::Isosurface, {0.2, 0.7}};
+  const auto middleFrom = [&](double direction) {
+    const Camera camera =
+        Camera::framing({glm::dvec3(0.0), glm::dvec3(7.0, 7.0, 1.0)}, {0.0, 0.0, direction}, {0.0, 1.0, 0.0});
+    return generator.renderVolume(camera, function, settings)->rgba[16 * 32 + 16];
+  };
+  const glm::vec4 high(0.15F, 0.0F, 0.35F, 0.5F);  // of 0.7
+  const glm::vec4 low(0.4F, 0.0F, 0.1F, 0.5F);
+  CHECK(glm::length(middleFrom(-1.0) - (high + 0.5F * low)) < 2e-3F);
+  CHECK(glm::length(middleFrom(1.0) - (low + 0.5F * high)) < 2e-3F);
+}
+
 TEST_CASE("blending: what can't be is refused by name") {
   const auto refused = [](const Blending& blending, const std::string& what) {
     GenerateSettings settings;
