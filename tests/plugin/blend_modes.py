@@ -60,11 +60,11 @@ MODES = {
 # Surfaces have edges, a pixel of which is all one or the other: where a ray just touches a surface, samples at other depths
 # see or miss it. ParaView shades a surface by the gradient at the sample behind it.
 LEAST = {"Maximum Intensity": 0.99, "Minimum Intensity": 0.99, "Isosurface": 0.96, "Isosurface, shaded": 0.95}
-for as_cells in (False, True):
-    association = "CELLS" if as_cells else "POINTS"
-    source, center = waves_source("waves", as_cells)
+for association, names in (("POINTS", MODES), ("CELLS", ("Maximum Intensity", "Isosurface, shaded"))):
+    source, center = waves_source("waves", association == "CELLS")
     view = make_view([240, 240], list(center + [70, 60, 130]), list(center))
-    for name, (number, shade, values) in MODES.items():
+    for name in names:
+        number, shade, values = MODES[name]
         colors, opacity = set_colors("waves", 0, 250)
         opacity.Points = [0, 0.9, 0.5, 0, 80, 0.3, 0.5, 0, 150, 0.5, 0.5, 0, 250, 0.9, 0.5, 0]
         paraview_volume(source, view, association, "waves", UNIT, keep_range=True, Shade=shade)
@@ -81,8 +81,6 @@ for as_cells in (False, True):
         check(theirs.max() > 100 and ssim(ours, theirs) >= LEAST[name] and off < 2 and wrong_share(ours, theirs) < 0.05,
               "%s: SSIM with ParaView's own %.4f, mean difference %.2f" % (what, ssim(ours, theirs), off))
         write_png("blend_%s.png" % what.replace(",", "").replace(" ", "_"), np.hstack([ours, theirs]))
-        image.BlendMode = "Composite"
-        check(ssim(picture(image), ours) < 0.9, what + ": composited, it looks different")
         simple.Delete(image)
         set_blend(shown, 0, [])
 
