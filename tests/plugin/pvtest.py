@@ -158,21 +158,34 @@ def picture(proxy):
     return np.flipud(np.rint(rgba[..., :3] * rgba[..., 3:] / 255)).astype(np.uint8)
 
 
-def message_in(view):
-    """What the representation VDI says in a view instead of showing something, without line breaks; "" if nothing."""
+DEGREES = "\u00b0"
+
+
+def texts_in(view):
+    """What the representation VDI says in a view, without line breaks."""
     actors = view.GetClientSideObject().GetNonCompositedRenderer().GetActors2D()
     actors.InitTraversal()
     texts = [actors.GetNextActor2D() for _ in range(actors.GetNumberOfItems())]
     texts = [text.GetInput() for text in texts if text.IsA("vtkTextActor") and text.GetVisibility()]
-    return " ".join(text for text in texts if "VDI" in text).replace("\n", " ")
+    return [text.replace("\n", " ") for text in texts if "VDI" in text]
 
 
-def message_boxes(view):
-    """Lowest and highest row of what message_in gives, for each VDI that says something."""
+def message_in(view):
+    """What it says instead of showing something, or of what is wrong; "" if nothing."""
+    return " ".join(text for text in texts_in(view) if DEGREES not in text)
+
+
+def angle_in(view):
+    """What it says of how far the view is turned; "" if nothing."""
+    return " ".join(text for text in texts_in(view) if DEGREES in text)
+
+
+def text_boxes(view, part="VDI"):
+    """Lowest and highest row of each text of these that has that part."""
     renderer = view.GetClientSideObject().GetNonCompositedRenderer()
     boxes = []
     for actor in renderer.GetViewProps():
-        if actor.IsA("vtkTextActor") and actor.GetVisibility() and "VDI" in actor.GetInput():
+        if actor.IsA("vtkTextActor") and actor.GetVisibility() and part in actor.GetInput():
             box = [0, 0, 0, 0]
             actor.GetBoundingBox(renderer, box)
             middle = actor.GetPositionCoordinate().GetComputedViewportValue(renderer)[1]

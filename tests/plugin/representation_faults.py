@@ -95,7 +95,7 @@ simple.Show(picture, view)
 simple.Render(view)
 said = pvtest.message_in(view)
 check("no VDI in this data set" in said and "shows nothing" in said, "what is no VDI gets a message, beside the other one's")
-boxes = pvtest.message_boxes(view)
+boxes = pvtest.text_boxes(view)
 check(len(boxes) == 2 and (boxes[0][0] > boxes[1][1] or boxes[1][0] > boxes[0][1]), "and they don't overlap")
 look(view, "no_vdi")
 simple.Hide(empty, view)
@@ -124,7 +124,7 @@ for scale in (None, 1):
     check(said_from([2.2, 1.9, 2.4], scale=scale) == "", "and nothing when it looks there again" + kind)
     check(said_from([0.7, 0.5, 0.4], scale=scale) == "From inside, this VDI is rough: press Reset Camera.",
           "a view from inside says so" + kind)
-    low, high = pvtest.message_boxes(view)[0]
+    low, high = pvtest.text_boxes(view)[0]
     check(0.9 * SIZE[1] < low < high < SIZE[1], "at its upper edge" + kind)
 check(SMALL in said_from([2000, 2000, 2000]), "and one from too far away")
 check(SMALL in said_from([3, 3, 3], scale=1000), "and one of a wide parallel scale")

@@ -152,7 +152,10 @@ with Screen(1100, 760) as screen, Window(screen, "--script=" + os.path.join(HERE
     left, top, width, height = window.view()
     middle = (left + width // 2, top + height // 2)
     compare(window, "opened.png", middle, middle, "opened")
+    assert inside("what_angle_is_said()") == "", "a view from the VDI's viewpoint says that it is turned"
     compare(window, "orbited.png", middle, (middle[0] + 180, middle[1] + 60))
+    turned = inside("what_angle_is_said()")
+    assert turned.endswith("from the VDI's viewpoint"), "a view that is turned says " + repr(turned)
     compare(window, "orbited_back.png", middle, (middle[0] - 90, middle[1] - 180))
     steps()
     comparative()

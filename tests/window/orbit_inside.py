@@ -51,10 +51,16 @@ def place(view):
 
 def show(files, view):
     shown["reader"] = simple.OpenDataFile(files)
-    simple.Show(shown["reader"], view).SetRepresentationType("VDI")
+    display = simple.Show(shown["reader"], view)
+    display.SetRepresentationType("VDI")
+    display.VDIAngle = 0  # screenshots don't have it
     simple.Render(view)  # the first picture of a view moves its camera
     place(view)
     simple.Render(view)
+
+
+def what_angle_is_said():
+    return pvtest.angle_in(simple.GetActiveView())
 
 
 def be_small(size):
@@ -91,7 +97,9 @@ def show_comparative():
     layout = simple.CreateLayout("Comparative")
     view = simple.CreateView("ComparativeRenderView")
     simple.AssignViewToLayout(view, layout, 0)
-    simple.Show(shown["reader"], view).SetRepresentationType("VDI")
+    display = simple.Show(shown["reader"], view)
+    display.SetRepresentationType("VDI")
+    display.VDIAngle = 0
     simple.Render(view)
     place(view)
     simple.Render(view)

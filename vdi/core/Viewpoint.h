@@ -20,6 +20,9 @@ enum class ViewpointIssue {
 /// Angle between the directions in which V_O and the viewpoint see the scene's centre.
 constexpr double farBesideDegrees = 60.0;
 
+/// The same angle, up to which a view counts as one from V_O.
+constexpr double besideDegrees = 5.0;
+
 /// Diameter, in the picture, of the sphere around the scene.
 constexpr double farAwayPixels = 4.0;
 

@@ -16,7 +16,9 @@ namespace {
 
 // In pixels, of fontSize points at 72 dots per inch.
 constexpr int fontSize = 16;
+constexpr int smallFontSize = 12;
 constexpr double letterWidth = 9.0;
+constexpr double smallLetterWidth = 6.5;
 constexpr double lineHeight = 18.0;
 constexpr double gap = 12.0;
 
@@ -71,8 +73,12 @@ void vtkVDIMessage::PutIn(vtkViewport* viewport) {
   // VTK 9.1 goes on using the shaders of what was drawn before, which go when another view is closed.
   if (this->IsNew) this->ReleaseGraphicsResources(renderer->GetVTKWindow());
   this->IsNew = false;
+  const bool isSmall = this->At == Place::Bottom;
+  this->GetTextProperty()->SetFontSize(isSmall ? smallFontSize : fontSize);
+  this->GetTextProperty()->SetJustification(isSmall ? VTK_TEXT_CENTERED : VTK_TEXT_LEFT);
   const double scale = renderer->GetVTKWindow()->GetDPI() / 72.0;
-  const auto columns = static_cast<std::size_t>(std::max(width / (letterWidth * scale), 20.0));
+  const double letter = (isSmall ? smallLetterWidth : letterWidth) * scale;
+  const auto columns = static_cast<std::size_t>(std::max(width / letter, 20.0));
   double above = 0.0;  // pixels
   double own = 0.0;
   double all = 0.0;
@@ -92,6 +98,9 @@ void vtkVDIMessage::PutIn(vtkViewport* viewport) {
     }
     all += itsHeight;
   }
-  const double highest = this->At == Place::Middle ? 0.5 * (height + all) : height - 0.5 * gap * scale;
-  this->SetPosition(0.03, (highest - above - 0.5 * own) / height);
+  const double edge = 0.5 * gap * scale;
+  const double highest = this->At == Place::Middle ? 0.5 * (height + all)
+                         : this->At == Place::Top  ? height - edge
+                                                   : all + edge;
+  this->SetPosition(isSmall ? 0.5 : 0.03, (highest - above - 0.5 * own) / height);
 }

@@ -15,7 +15,8 @@ class vtkVDIMessage : public vtkTextActor {
 
   enum class Place {
     Middle,  // of the height: in place of a picture
-    Top      // over a picture
+    Top,     // over a picture
+    Bottom   // over a picture, small, and in the middle of its width
   };
   /// Shown when it's not empty.
   void Show(const std::string& text, Place place);

@@ -196,6 +196,8 @@ struct vtkVDIProp::Internals {
   std::string Notice;  // nothing is wrong
   vtkVDIMessage::Place NoticePlace = vtkVDIMessage::Place::Middle;
   std::string Said;  // as an error
+  vtkNew<vtkVDIMessage> AngleMessage;
+  std::string Angle;
 
   vtkNew<vtkTextureObject> Texture;
   std::unique_ptr<vtkOpenGLQuadHelper> Quad;
@@ -240,6 +242,7 @@ struct vtkVDIProp::Internals {
     const std::string& text = problem.empty() ? this->Notice : problem;
     this->Message->Show(isVisible ? text : std::string(),
                         problem.empty() ? this->NoticePlace : vtkVDIMessage::Place::Middle);
+    this->AngleMessage->Show(isVisible ? this->Angle : std::string(), vtkVDIMessage::Place::Bottom);
   }
 };
 
@@ -263,6 +266,10 @@ void vtkVDIProp::SetVisibility(vtkTypeBool visible) {
 
 vtkTextActor* vtkVDIProp::GetMessageActor() {
   return this->Internal->Message;
+}
+
+vtkTextActor* vtkVDIProp::GetAngleActor() {
+  return this->Internal->AngleMessage;
 }
 
 void vtkVDIProp::SetObstacle(const std::string& text) {
@@ -314,12 +321,28 @@ void vtkVDIProp::LookAround(vtkObject* renderer, unsigned long, void*) {
   auto* own = vtkRenderer::SafeDownCast(renderer);
   if (own == nullptr || own->GetSelector() != nullptr || this->GetVisibility() == 0) return;
   internal.Notice.clear();
-  if (!this->IsCaptured) this->NoteViewpoint(own);
+  internal.Angle.clear();
+  if (!this->IsCaptured) {
+    this->NoteViewpoint(own);
+    this->NoteAngle(own);
+  }
   internal.ShowMessage(true);
 }
 
-/// What's to be said of the VDI's viewpoint, or of the view's. That the view is turned far isn't: a VDI with
-/// all of its scene looks right from all around. Nor that there are cut edges, which are seen.
+/// None where drawing says what is wrong with it.
+std::optional<vdi::View> vtkVDIProp::ViewOf(vtkRenderer* renderer) {
+  const glm::ivec2 size = viewportOf(renderer).size;
+  if (size.x < 1 || size.y < 1) return std::nullopt;
+  try {
+    return matricesOf(renderer).view(size.x, size.y);
+  } catch (const vdi::Error&) {
+    return std::nullopt;
+  }
+}
+
+/// What's to be said of the VDI's viewpoint, or of the view's. That the view is turned far isn't, but by a
+/// small line (NoteAngle): a VDI with all of its scene looks right from all around. Nor that there are cut
+/// edges, which are seen.
 void vtkVDIProp::NoteViewpoint(vtkRenderer* renderer) {
   Internals& internal = *this->Internal;
   internal.NoticePlace = vtkVDIMessage::Place::Middle;
@@ -333,14 +356,8 @@ void vtkVDIProp::NoteViewpoint(vtkRenderer* renderer) {
         "transparent.";
     return;
   }
-  const glm::ivec2 size = viewportOf(renderer).size;
-  if (size.x < 1 || size.y < 1) return;
-  std::optional<vdi::View> view;
-  try {
-    view = matricesOf(renderer).view(size.x, size.y);
-  } catch (const vdi::Error&) {
-    return;  // drawing says it
-  }
+  const std::optional<vdi::View> view = this->ViewOf(renderer);
+  if (!view) return;
   const std::optional<vdi::ViewpointIssue> issue = this->IssueIn(*view);
   if (!issue || !this->IsFirst(renderer, *view, *issue)) return;
   switch (*issue) {
@@ -372,6 +389,39 @@ std::optional<vdi::ViewpointIssue> vtkVDIProp::IssueIn(const vdi::View& view) {
   const pv::VDIBuffers& buffers = this->Internal->Buffers;
   if (!this->IsShown()) return std::nullopt;
   return vdi::viewpointIssue(boxOf(buffers.bounds().data()), *buffers.viewpoint(), view);
+}
+
+/// Where the VDI is seen, from outside, and is to say it.
+std::optional<double> vtkVDIProp::AngleIn(const vdi::View& view) {
+  const Internals& internal = *this->Internal;
+  if (!this->SaysAngle || !internal.Obstacle.empty() || !this->IsShown()) return std::nullopt;
+  if (this->IssueIn(view).value_or(vdi::ViewpointIssue::FarBeside) != vdi::ViewpointIssue::FarBeside)
+    return std::nullopt;
+  return vdi::degreesBetween(boxOf(internal.Buffers.bounds().data()), internal.Buffers.viewpoint()->camera(),
+                             view.camera());
+}
+
+void vtkVDIProp::NoteAngle(vtkRenderer* renderer) {
+  const std::optional<vdi::View> view = this->ViewOf(renderer);
+  const std::optional<double> own = view ? this->AngleIn(*view) : std::nullopt;
+  if (!own || *own <= vdi::besideDegrees) return;
+  bool isAlone = true;
+  bool isBefore = true;  // the VDIs that have been looked at come first
+  vtkPropCollection* props = renderer->GetViewProps();
+  vtkCollectionSimpleIterator at;
+  props->InitTraversal(at);
+  while (vtkProp* prop = props->GetNextProp(at)) {
+    auto* other = vtkVDIProp::SafeDownCast(prop);
+    isBefore = isBefore && other != this;
+    const std::optional<double> angle =
+        other != nullptr && other != this ? other->AngleIn(*view) : std::nullopt;
+    if (!angle) continue;
+    isAlone = false;
+    if (*angle > *own || (*angle == *own && isBefore)) return;
+  }
+  const std::string degrees = std::to_string(std::lround(*own)) + "\u00b0";
+  this->Internal->Angle =
+      isAlone ? degrees + " from the VDI's viewpoint" : "up to " + degrees + " from the VDIs' viewpoints";
 }
 
 /// Whether nothing else is seen in the view.

@@ -9,7 +9,7 @@
  * frames, beside which the picture in full is made.
  *
  * What goes wrong is said in the view (MessageActor) and, once, as an error; the rest of the picture is
- * drawn.
+ * drawn. How far the view is turned from the VDI's viewpoint is said, too (AngleActor).
  */
 #ifndef vtkVDIProp_h
 #define vtkVDIProp_h
@@ -65,6 +65,9 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   void SetObstacle(const std::string& text);
   /// Says why there's nothing to see; in a renderer of the same size that draws after this prop's.
   vtkTextActor* GetMessageActor();
+  /// Says by how many degrees the view is turned; there, too. Of several VDIs, the one that is turned
+  /// farthest says it for all.
+  vtkTextActor* GetAngleActor();
   /// For an observer of StartEvent of the renderer that has this prop: props that it doesn't see aren't
   /// drawn.
   void LookAround(vtkObject* renderer, unsigned long event, void* data);
@@ -86,6 +89,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// Whether the frames to come are for a picture that is taken. Where nothing is wrong but the viewpoint, of
   /// the VDI or of the view, others alone say so. Default off.
   vtkSetMacro(IsCaptured, bool);
+  /// Whether the frames to come say how far the view is turned. Default off.
+  vtkSetMacro(SaysAngle, bool);
 
   void SetVisibility(vtkTypeBool visible) override;
   double* GetBounds() override;
@@ -109,7 +114,10 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   std::optional<vdi::ViewpointIssue> IssueIn(const vdi::View& view);
   bool IsBlank(vtkRenderer* renderer, const vdi::View& view);
   bool IsFirst(vtkRenderer* renderer, const vdi::View& view, vdi::ViewpointIssue issue);
+  std::optional<double> AngleIn(const vdi::View& view);
+  std::optional<vdi::View> ViewOf(vtkRenderer* renderer);
   void NoteViewpoint(vtkRenderer* renderer);
+  void NoteAngle(vtkRenderer* renderer);
   int DrawIn(vtkViewport* viewport);
   bool Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
   bool DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view);
@@ -132,6 +140,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   double FrameRate = 30.0;
   double Opacity = 1.0;
   bool IsCaptured = false;
+  bool SaysAngle = false;
 };
 
 #endif

@@ -52,6 +52,11 @@ bool drawsOnRanks() {
          module->GetNumberOfLocalPartitions() > 1;
 }
 
+/// Whether views are windows. pvbatch and simulations have them for pictures alone.
+bool hasWindows() {
+  return vtkProcessModule::GetProcessType() == vtkProcessModule::PROCESS_CLIENT;
+}
+
 /// Offsets of the VDI that the data set carries; null where there's none.
 vtkAbstractArray* offsetsOf(vtkDataObject* data) {
   vtkFieldData* fields = data != nullptr ? data->GetFieldData() : nullptr;
@@ -189,6 +194,7 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
     vtkAlgorithmOutput* port = vtkPVRenderView::GetPieceProducer(in, this);
     if (port != nullptr && view != nullptr) {
       this->Prop->SetIsCaptured(IsCaptured(view->GetRenderWindow()));
+      this->Prop->SetSaysAngle(this->SaysAngle && hasWindows());
       this->Prop->Prepare(port->GetProducer()->GetOutputDataObject(port->GetIndex()), this->FrameOf(view));
     }
   }
@@ -264,6 +270,7 @@ bool vtkVDIRepresentation::AddToView(vtkView* view) {
       renderView->GetRenderer()->AddObserver(vtkCommand::StartEvent, prop, &vtkVDIProp::LookAround);
   renderView->GetRenderer()->AddViewProp(this->Prop);
   renderView->GetNonCompositedRenderer()->AddViewProp(this->Prop->GetMessageActor());
+  renderView->GetNonCompositedRenderer()->AddViewProp(this->Prop->GetAngleActor());
   return this->Superclass::AddToView(view);
 }
 
@@ -274,5 +281,6 @@ bool vtkVDIRepresentation::RemoveFromView(vtkView* view) {
   renderView->GetRenderer()->RemoveObserver(this->StartObserver);
   renderView->GetRenderer()->RemoveViewProp(this->Prop);
   renderView->GetNonCompositedRenderer()->RemoveViewProp(this->Prop->GetMessageActor());
+  renderView->GetNonCompositedRenderer()->RemoveViewProp(this->Prop->GetAngleActor());
   return this->Superclass::RemoveFromView(view);
 }

@@ -47,6 +47,9 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   void SetReconstruction(int reconstruction);
   void SetFrameRate(double rate);
   void SetOpacity(double opacity);
+  /// Whether windows say how far the view is turned from the VDI's viewpoint. Default on. Pictures that are
+  /// taken don't.
+  vtkSetMacro(SaysAngle, bool);
 
  protected:
   vtkVDIRepresentation();
@@ -75,7 +78,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   vtkWeakPointer<vtkRenderWindowInteractor> Interactor;  // the view's, observed
   std::array<unsigned long, 2> Observers{};
   unsigned long StartObserver = 0;  // of the view's renderer
-  bool IsDragged = false;           // the camera is, by mouse
+  bool SaysAngle = true;
+  bool IsDragged = false;  // the camera is, by mouse
   std::chrono::steady_clock::time_point LastInteractive;
 };
 

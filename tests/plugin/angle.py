@@ -1,0 +1,105 @@
+"""Windows say how far the view is turned from the VDI's viewpoint; pictures that are taken, and pvbatch, leave it out. Run by
+both pvpython, which has windows, and pvbatch."""
+
+import os
+import subprocess
+
+import numpy as np
+import pvtest
+from paraview import simple
+from pvtest import check
+
+SIZE, CENTER, CAMERA = [480, 360], [0.5, 0.5, 0.5], [0.5, 0.5, 4.0]
+
+
+def make(name, *options):
+    path = os.path.join(pvtest.OUTPUT, name)
+    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "24x24x24", "--resolution", "120x90",
+                    "--focal-point", *map(str, CENTER), "--view-up", "0", "1", "0", "-o", path] + list(options), check=True,
+                   stdout=subprocess.DEVNULL)
+    return simple.OpenDataFile(path)
+
+
+def turned(degrees, elevation=0, render=simple.Render):
+    """What the view says after that turn from CAMERA."""
+    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA, CENTER, [0, 1, 0]
+    view.GetActiveCamera().Azimuth(degrees)
+    view.GetActiveCamera().Elevation(elevation)
+    render(view)
+    return pvtest.angle_in(view)
+
+
+def interactive(view):
+    view.SMProxy.InteractiveRender()
+
+
+def screenshot(name):
+    path = os.path.join(pvtest.OUTPUT, "angle_{}.png".format(name))
+    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
+    return pvtest.read_png(path)
+
+
+def said(degrees):
+    return "{}\u00b0 from the VDI's viewpoint".format(degrees)
+
+
+def one_vdi():
+    check(turned(0) == "" and turned(4) == "" and turned(0, -4) == "", "nothing is said from near the viewpoint")
+    for degrees in (6, 47, 90, -133):
+        check(turned(degrees) == said(abs(degrees)), "a view that is turned by {} degrees says so".format(degrees))
+    check(turned(0, 30) == said(30), "and one from above")
+    check(turned(20, render=interactive) == said(20) and turned(23, render=interactive) == said(23),
+          "and one whose camera moves, in each frame")
+    view.CameraParallelProjection = 1
+    check(turned(47) == said(47) and turned(2) == "", "in parallel projection, too")
+    view.CameraParallelProjection = 0
+
+
+def other_messages():
+    view.CameraPosition, view.CameraFocalPoint = [0.7, 0.5, 0.4], CENTER
+    simple.Render(view)
+    check("From inside" in pvtest.message_in(view) and pvtest.angle_in(view) == "", "a view from inside says that alone")
+    view.CameraPosition, view.CameraFocalPoint = [3, 0.5, 3], [6, 0.5, 6]
+    simple.Render(view)
+    check("out of sight" in pvtest.message_in(view) and pvtest.angle_in(view) == "", "one that looks away likewise")
+
+
+def pictures():
+    turned(47)
+    taken = screenshot("taken")
+    display.VDIAngle = 0
+    check(turned(47) == "" and np.array_equal(taken, screenshot("off")), "pictures that are taken leave it out")
+    display.VDIAngle = 1
+    simple.Render(view)
+    check(pvtest.angle_in(view) == said(47), "and the window says it again")
+    low, high = pvtest.text_boxes(view, pvtest.DEGREES)[0]
+    check(0 < low < high < 0.1 * SIZE[1], "at its lower edge: rows {:g} to {:g}".format(low, high))
+
+
+def several():
+    other = make("angle_other.vdi", "--position", "4.0", "0.5", "0.5")
+    shown = simple.Show(other, view)
+    check(turned(30) == "up to 60\u00b0 from the VDIs' viewpoints", "of two VDIs the farther one counts")
+    check(turned(60) == "up to 60\u00b0 from the VDIs' viewpoints", "whichever it is")
+    shown.VDIAngle = 0
+    check(turned(30) == said(30), "and one alone where the other one's line is off")
+    shown.VDIAngle = 1
+    simple.Hide(other, view)
+    check(turned(30) == said(30), "or which is hidden")
+    simple.Hide(reader, view)
+    simple.Render(view)
+    check(pvtest.angle_in(view) == "", "and nothing where both are")
+
+
+reader = make("angle.vdi", "--position", *map(str, CAMERA))
+view = pvtest.make_view(SIZE, CAMERA, CENTER)
+display = simple.Show(reader, view)
+simple.Render(view)
+if os.environ.get("VDI_TEST_WINDOWS") == "1":
+    one_vdi()
+    other_messages()
+    pictures()
+    several()
+else:
+    check(display.VDIAngle == 1 and turned(47) == "", "without windows nothing is said")
+pvtest.finish()
