@@ -253,6 +253,27 @@ TEST_CASE("what a VDI that is zoomed in lacks is nothing to be seen") {
   }
 }
 
+TEST_CASE("a view shows fewer lists from nearer") {
+  const Box bounds{glm::dvec3(-1.0), glm::dvec3(1.0)};
+  Camera original;
+  original.position = {0.0, 0.0, 12.0};
+  for (const bool parallel : {false, true}) {
+    original.parallelProjection = parallel;
+    original.parallelScale = 3.0;
+    const View all(original, 640, 360);
+    const auto across = [&](const Camera& camera) { return listsAcross(bounds, all, View(camera, 64, 36)); };
+    CHECK(across(original) == Approx(640.0));
+    CHECK(across(original.azimuth(90.0)) == Approx(640.0));
+    Camera near = original;
+    near.position.z = 3.0;
+    near.parallelScale = 0.75;
+    CHECK(across(near) == Approx(160.0));
+    near.position.z = -3.0;  // behind the scene, and looks away from it
+    near.focalPoint.z = -9.0;
+    if (!parallel) CHECK(across(near) == 0.0);
+  }
+}
+
 TEST_CASE("what is said of viewpoints") {
   for (const auto issue : {ViewpointIssue::Inside, ViewpointIssue::SeesNothing, ViewpointIssue::FarBeside})
     CHECK_FALSE(describe(issue).empty());

@@ -13,6 +13,7 @@ import numpy as np
 from paraview import simple
 from skimage.metrics import structural_similarity
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkIOImage import vtkPNGReader, vtkPNGWriter
 
@@ -191,6 +192,14 @@ def text_boxes(view, part="VDI"):
             middle = actor.GetPositionCoordinate().GetComputedViewportValue(renderer)[1]
             boxes.append([middle + box[2], middle + box[3]])
     return boxes
+
+
+def pixels(window, front=1):
+    """What the window shows, without rendering."""
+    data = vtkUnsignedCharArray()
+    width, height = window.GetSize()
+    window.GetPixelData(0, 0, width - 1, height - 1, front, data, 0)
+    return vtk_to_numpy(data).reshape(height, width, -1)[::-1, :, :3].copy()
 
 
 def read_png(path):

@@ -5,8 +5,8 @@ import numpy as np
 import pvtest
 from paraview import servermanager, simple
 from paraview.modules.vtkRemotingServerManager import vtkSMPropertyHelper
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkCollection, vtkUnsignedCharArray
+from pvtest import pixels
+from vtkmodules.vtkCommonCore import vtkCollection
 
 CENTER = [0.5, 0.5, 0.5]
 shown = {}  # what the calls leave for the next ones
@@ -19,14 +19,6 @@ def views_in(view):
     views = vtkCollection()
     view.SMProxy.GetViews(views)
     return [views.GetItemAsObject(index) for index in range(views.GetNumberOfItems())]
-
-
-def pixels(window, front=1):
-    """What the window shows, without rendering."""
-    data = vtkUnsignedCharArray()
-    width, height = window.GetSize()
-    window.GetPixelData(0, 0, width - 1, height - 1, front, data, 0)
-    return vtk_to_numpy(data).reshape(height, width, -1)[::-1, :, :3].copy()
 
 
 def in_full(view):

@@ -94,6 +94,14 @@ double degreesBetween(const Box& bounds, const Camera& original, const Camera& c
   return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
 }
 
+double listsAcross(const Box& bounds, const View& original, const View& view) {
+  const auto halfWidthAt = [&](const View& at) {
+    return at.halfWidth() * (at.parallel() ? 1.0 : std::max(at.toView(bounds.center()).z, 0.0));
+  };
+  const double all = halfWidthAt(original);
+  return all > 0.0 ? original.width() * halfWidthAt(view) / all : 0.0;
+}
+
 std::string describe(ViewpointIssue issue) {
   switch (issue) {
     case ViewpointIssue::Inside:

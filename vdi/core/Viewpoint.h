@@ -34,6 +34,10 @@ std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const View& orig
 /// The angle, in degrees, between the directions in which `original` and `camera` see the scene's centre.
 double degreesBetween(const Box& bounds, const Camera& original, const Camera& camera);
 
+/// How many lists in a row are seen across the view, at the depth of the scene's centre: all of V_O's where
+/// both views see equally much, fewer in a view from nearer. 0 where the centre isn't in front of the view.
+double listsAcross(const Box& bounds, const View& original, const View& view);
+
 /// The issue in words, for a warning.
 std::string describe(ViewpointIssue issue);
 

@@ -17,8 +17,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Across a VDI with few lists. Rough pictures on a CPU are hardly larger.
-constexpr int thinWidth = 160;
+/// Across a VDI with few lists. Rough pictures on a CPU are hardly larger. The second is for views from
+/// nearer, which show a part of the lists alone.
+constexpr std::array<int, VDIBuffers::thinLevels> thinWidths{160, 320};
 
 }  // namespace
 
@@ -64,16 +65,12 @@ VDIBuffers::Loaded VDIBuffers::loaded(vtkFieldData* fields, Renderers& renderers
   if (!renderers.whole) {
     const std::shared_ptr<vdi::gpu::Device> device = pv::sharedDevice(0);
     renderers.whole = std::make_unique<vdi::VdiRenderer>(device);
-    if (device->isCpu()) renderers.thin = std::make_unique<vdi::VdiRenderer>(device);
+    renderers.isOnCpu = device->isCpu();
+    if (renderers.isOnCpu)
+      for (auto& thin : renderers.thins) thin = std::make_unique<vdi::VdiRenderer>(device);
   }
-  const int factor = vdi->width / thinWidth;
-  if (renderers.thin && factor > 1) {
-    const vdi::Vdi thin = vdi::thinned(*vdi, factor);
-    if (thin.supersegmentCount() > 0) {
-      renderers.thin->prepareVdi(thin);
-      result.thinLists = thin.listCount();
-    }
-  }
+  for (std::size_t level = 0; renderers.isOnCpu && level < thinLevels; ++level)
+    result.thins[level] = loadThin(*vdi, thinWidths[level], renderers.thins[level]);
   try {
     renderers.whole->prepareVdi(*vdi);
   } catch (const vdi::Error& error) {
@@ -81,6 +78,17 @@ VDIBuffers::Loaded VDIBuffers::loaded(vtkFieldData* fields, Renderers& renderers
     result.tooLarge = std::move(vdi);
   }
   return result;
+}
+
+/// None where the whole VDI has hardly more.
+VDIBuffers::Thin VDIBuffers::loadThin(const vdi::Vdi& vdi, int width,
+                                      std::unique_ptr<vdi::VdiRenderer>& renderer) {
+  const int factor = vdi.width / width;
+  if (factor < 2) return {};
+  const vdi::Vdi thin = vdi::thinned(vdi, factor);
+  if (thin.supersegmentCount() == 0) return {};
+  renderer->prepareVdi(thin);
+  return {thin.listCount(), static_cast<double>(thin.width) / vdi.width};
 }
 
 void VDIBuffers::takeOne() {
@@ -92,13 +100,15 @@ void VDIBuffers::takeOne() {
     isEmpty_ = result.isEmpty;
     bounds_ = result.bounds;
     viewpoint_ = result.viewpoint;
-    thinLists_ = result.thinLists;
+    thins_ = result.thins;
     if (result.tooLarge) {
       renderers_->whole->setVdi(*result.tooLarge);
     } else if (hasVdi_) {
       renderers_->whole->showPrepared();
     }
-    if (thinLists_ > 0) renderers_->thin->showPrepared();
+    for (std::size_t level = 0; level < thinLevels; ++level) {
+      if (thins_[level].lists > 0) renderers_->thins[level]->showPrepared();
+    }
   } catch (const vdi::Error& error) {
     hasVdi_ = false;
     const bool isSound =

@@ -52,28 +52,36 @@ class VDIBuffers {
   const std::optional<vdi::View>& viewpoint() const { return viewpoint_; }
   /// There's a VDI.
   vdi::VdiRenderer& renderer() { return *renderers_->whole; }
-  /// The same VDI with fewer lists, for rough pictures; nullptr where the device is no CPU, or there are few
-  /// anyway.
-  vdi::VdiRenderer* thinRenderer() { return thinLists_ > 0 ? renderers_->thin.get() : nullptr; }
-  std::size_t thinLists() const { return thinLists_; }
-  bool isOnCpu() const { return renderers_->thin != nullptr; }
+  /// The same VDI with fewer lists, for rough pictures, and how many of them there are and in a row. Levels
+  /// are from few to more. No lists: there's no such level, for the device is no CPU, or the VDI has hardly
+  /// more lists itself.
+  static constexpr std::size_t thinLevels = 2;
+  struct Thin {
+    std::size_t lists = 0;
+    double share = 1.0;  // of the lists in a row
+  };
+  const Thin& thin(std::size_t level) const { return thins_.at(level); }
+  vdi::VdiRenderer& thinRenderer(std::size_t level) { return *renderers_->thins.at(level); }
+  bool isOnCpu() const { return renderers_->isOnCpu; }
   /// The picture of that VDI that is made beside the frames: goes with the VDI. Who renders drops it first.
   VDIStill& still() { return still_; }
 
  private:
   struct Renderers {
     std::unique_ptr<vdi::VdiRenderer> whole;
-    std::unique_ptr<vdi::VdiRenderer> thin;
+    std::array<std::unique_ptr<vdi::VdiRenderer>, thinLevels> thins;
+    bool isOnCpu = false;
   };
   struct Loaded {
     bool hasVdi = false;
     bool isEmpty = false;
     std::array<double, 6> bounds{};
     std::optional<vdi::View> viewpoint;
-    std::size_t thinLists = 0;
+    std::array<Thin, thinLevels> thins{};
     std::optional<vdi::Vdi> tooLarge;  // for a second buffer
   };
   static Loaded loaded(vtkFieldData* fields, Renderers& renderers);
+  static Thin loadThin(const vdi::Vdi& vdi, int width, std::unique_ptr<vdi::VdiRenderer>& renderer);
   void startNext();
   void takeOne();
 
@@ -82,7 +90,7 @@ class VDIBuffers {
   bool isEmpty_ = false;
   std::array<double, 6> bounds_{};
   std::optional<vdi::View> viewpoint_;
-  std::size_t thinLists_ = 0;
+  std::array<Thin, thinLevels> thins_{};
   std::future<Loaded> job_;
   vtkSmartPointer<vtkFieldData> loading_;  // the job's; goes on this thread
   vtkSmartPointer<vtkFieldData> waiting_;

@@ -170,7 +170,7 @@ class vtkVDIProp::Pace {
 /// How a picture of the VDI is made.
 struct vtkVDIProp::Form {
   glm::ivec2 size;
-  bool isThin;  // of few lists
+  std::optional<std::size_t> thin;  // of few lists: the level of them
 };
 
 struct vtkVDIProp::Internals {
@@ -205,8 +205,8 @@ struct vtkVDIProp::Internals {
   std::vector<float> Window;  // depth buffer
   std::vector<float> Ends;
 
-  Pace Whole;              // of the VDI with all its lists
-  Pace Thin;               // and with few of them
+  Pace Whole;                                          // of the VDI with all its lists
+  std::array<Pace, pv::VDIBuffers::thinLevels> Thins;  // and with few of them
   double Reduction = 1.0;  // pixels of the viewport on a pixel's side, in interactive frames
   bool WasSmooth = false;  // the renderer's edges were to be smoothed, and aren't in this frame
 
@@ -217,18 +217,30 @@ struct vtkVDIProp::Internals {
     return this->Whole.Seconds(static_cast<double>(port.x) * port.y)
                .value_or(this->Buffers.isOnCpu() ? 2.0 * longTime : 0.0) > longTime;
   }
-  Form InteractiveForm(const glm::ivec2& port, double rate) {
-    const double all = static_cast<double>(port.x) * port.y;
-    Form form{port, false};
-    double pixels = this->Whole.Pixels(rate).value_or(0.0);
-    const auto fewLists =
-        this->Buffers.thinRenderer() != nullptr ? static_cast<double>(this->Buffers.thinLists()) : 0.0;
-    if (pixels < std::min(all, 2.0 * fewLists)) {
-      // The lists between would hardly be seen.
-      form.isThin = true;
-      pixels = this->Thin.Pixels(rate).value_or(fewLists);
+  /// Of few lists, but of enough for what the view shows of the VDI; none: of all.
+  std::optional<std::size_t> ThinLevelFor(const vdi::View& view) {
+    constexpr double leastAcross = 100.0;
+    const double across =
+        vdi::listsAcross(boxOf(this->Buffers.bounds().data()), *this->Buffers.viewpoint(), view);
+    for (std::size_t level = 0; level < pv::VDIBuffers::thinLevels; ++level) {
+      const pv::VDIBuffers::Thin& thin = this->Buffers.thin(level);
+      const bool isLast = level + 1 == pv::VDIBuffers::thinLevels;
+      if (thin.lists > 0 && (isLast || across * thin.share >= leastAcross)) return level;
     }
-    constexpr double coarsest = 12.0;  // beyond that, nothing is recognised
+    return std::nullopt;
+  }
+  Form InteractiveForm(const pv::ViewMatrices& matrices, const glm::ivec2& port, double rate) {
+    const double all = static_cast<double>(port.x) * port.y;
+    Form form{port, std::nullopt};
+    double pixels = this->Whole.Pixels(rate).value_or(0.0);
+    const std::optional<std::size_t> thin = this->ThinLevelFor(matrices.view(port.x, port.y));
+    const double fewLists = thin ? static_cast<double>(this->Buffers.thin(*thin).lists) : 0.0;
+    if (thin && pixels < std::min(all, 2.0 * fewLists)) {
+      // The lists between would hardly be seen.
+      form.thin = thin;
+      pixels = this->Thins.at(*thin).Pixels(rate).value_or(fewLists);
+    }
+    constexpr double coarsest = 8.0;  // beyond that, little is recognised
     const double wanted = std::sqrt(std::clamp(all / std::max(pixels, 1.0), 1.0, coarsest * coarsest));
     // What changes from frame to frame would flicker.
     const double ratio = wanted / this->Reduction;
@@ -630,8 +642,8 @@ bool vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   }
   internal.Buffers.still().drop();
   const Form form = internal.NextFrame == Frame::Interactive
-                        ? internal.InteractiveForm(port.size, this->FrameRate)
-                        : Form{port.size, false};
+                        ? internal.InteractiveForm(matrices, port.size, this->FrameRate)
+                        : Form{port.size, std::nullopt};
   this->DrawNow(window, matrices, port.size, form);
   return true;
 }
@@ -641,7 +653,7 @@ bool vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view)
   pv::VDIStill& still = internal.Buffers.still();
   if (internal.RoughTime == internal.PieceTime && internal.RoughSize == view.size) {
     still.drop();  // of another size
-    this->DrawNow(window, view.matrices, view.size, internal.InteractiveForm(view.size, this->FrameRate));
+    this->DrawRough(window, view);
     return true;
   }
   if (still.isOf(view) && still.isDone()) {
@@ -666,10 +678,10 @@ bool vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view)
   const bool isUseless = still.isDone() && !still.isSeen();
   still.drop();
   if (isUseless) {
-    this->DrawNow(window, view.matrices, view.size, {view.size, false});
+    this->DrawNow(window, view.matrices, view.size, {view.size, std::nullopt});
     return true;
   }
-  this->DrawNow(window, view.matrices, view.size, internal.InteractiveForm(view.size, this->FrameRate));
+  this->DrawRough(window, view);
   if (!internal.Buffers.isLoading()) still.start(internal.Buffers.renderer(), std::move(view));
   internal.IsBehind = true;
   return false;
@@ -683,9 +695,14 @@ void vtkVDIProp::StayRough(vtkOpenGLRenderWindow* window, const pv::StillView& v
   if (!this->Recover(error)) throw vdi::Error(error);
   internal.RoughTime = internal.PieceTime;
   internal.RoughSize = view.size;
-  this->DrawNow(window, view.matrices, view.size, internal.InteractiveForm(view.size, this->FrameRate));
+  this->DrawRough(window, view);
   this->Say(std::string("The VDI is shown with few pixels, for its picture in full can't be made: ") +
             error.what());
+}
+
+void vtkVDIProp::DrawRough(vtkOpenGLRenderWindow* window, const pv::StillView& view) {
+  this->DrawNow(window, view.matrices, view.size,
+                this->Internal->InteractiveForm(view.matrices, view.size, this->FrameRate));
 }
 
 void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& matrices,
@@ -697,7 +714,8 @@ void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& 
   internal.Ends.resize(hasObjects ? static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) : 0);
   if (hasObjects) pv::depthsOf(matrices, internal.Window, portSize, size, internal.Ends);
 
-  vdi::VdiRenderer& views = form.isThin ? *internal.Buffers.thinRenderer() : internal.Buffers.renderer();
+  vdi::VdiRenderer& views =
+      form.thin ? internal.Buffers.thinRenderer(*form.thin) : internal.Buffers.renderer();
   const Clock::time_point renderStart = Clock::now();
   const vdi::ImageBytes picture =
       views.renderBytes(matrices.view(size.x, size.y), internal.Ends, vdi::Alpha::Premultiplied,
@@ -706,7 +724,7 @@ void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& 
   this->ShowPicture(window, size, picture.rgba);
 
   const double pixels = static_cast<double>(size.x) * size.y;
-  Pace& pace = form.isThin ? internal.Thin : internal.Whole;
+  Pace& pace = form.thin ? internal.Thins.at(*form.thin) : internal.Whole;
   if (internal.NextFrame == Frame::Whole) {
     pace.Guess(renderSeconds, pixels);
   } else {

@@ -4,7 +4,8 @@
  *
  * Drawn with the volumes: after all opaque geometry, which hides what lies behind it, and blended over it.
  * Where volumes are peeled together with translucent geometry, after that, too.
- * While it's interactive, it has as few pixels as it takes to be drawn FrameRate times a second; and a VDI
+ * While it's interactive, it has as few pixels as it takes to be drawn FrameRate times a second, but one for
+ * each 64 of the window's at least; and a VDI
  * that comes is loaded beside the frames, which go on showing the one before. The same holds for deferred
  * frames, beside which the picture in full is made.
  *
@@ -122,6 +123,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   bool Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
   bool DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view);
   void StayRough(vtkOpenGLRenderWindow* window, const pv::StillView& view, const vdi::Error& error);
+  void DrawRough(vtkOpenGLRenderWindow* window, const pv::StillView& view);
   void DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& matrices, const glm::ivec2& portSize,
                const Form& form);
   void ShowPicture(vtkOpenGLRenderWindow* window, const glm::ivec2& size,
