@@ -64,6 +64,18 @@ def regenerate_before_apply(window):
     wait_for("panel as it was", lambda: window.values() == unset)
 
 
+def estimates(window, begin):
+    """The line that the panel says of the VDI to come, and what another number of supersegments makes of it without Apply."""
+    line = wait_for("estimate", lambda: window.text_that_begins(begin))
+    window.enter("Supersegments", 50)
+    more = wait_for("another estimate", lambda: window.text_that_begins(begin) not in (None, line)
+                    and window.text_that_begins(begin))
+    window.enter("Supersegments", 25)
+    wait_for("the first estimate again", lambda: window.text_that_begins(begin) == line)
+    print("25 supersegments: %s; 50: %s" % (line, more), flush=True)
+    return line
+
+
 def regenerate_in_2d(window):
     """Why that can't be is said until it can; and what is said moves nothing under the mouse."""
     place = window.find("Auto", "check box").box
@@ -135,6 +147,7 @@ def first_session(window):
     window.key("Escape", "Escape")
     window.menu("Filters", "Volumetric Depth Images", "Volumetric Depth Image")
     window.screenshot("3_filter.png")
+    check(" s" not in estimates(window, "Estimate for an average volume: "), "no time is invented")
     regenerate_in_2d(window)
     regenerate_before_apply(window)
     window.apply()
@@ -142,6 +155,7 @@ def first_session(window):
     window.screenshot("4_applied.png")
     check_like_volume(volume, middle_of_view(window, "vdi_middle.png"))
     values = window.values()
+    check(estimates(window, "Estimate from the last VDI: ").endswith(" s"), "and then the last VDI's is scaled")
     check(any(value.startswith("1.73205") for value in values), "the unit distance is the volume's")
     check(any(value.isdigit() and abs(int(value) - width) < 8 for value in values), "the width is the view's")
 

@@ -15,6 +15,7 @@
 
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Estimate.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/core/Thinning.h"
 #include "vdi/io/Files.h"
@@ -436,10 +437,8 @@ VdiFileInfo infoOf(const Header& header, std::optional<Coloring> coloring, std::
   info.header.coloring = std::move(coloring);
   info.supersegmentCount = header.supersegmentCount;
   info.storedBytes = fileBytes;
-  info.expandedBytes =
-      (std::uint64_t{header.width} * header.height + 1) * sizeof(std::uint32_t) +
-      header.supersegmentCount *
-          (precisionOf(header) == Precision::Compact ? sizeof(CompactSupersegment) : sizeof(Supersegment));
+  info.expandedBytes = bytesInMemory<std::uint64_t>(std::uint64_t{header.width} * header.height + 1,
+                                                    header.supersegmentCount, precisionOf(header));
   return info;
 }
 

@@ -2,18 +2,13 @@
 
 #include <utility>
 
+#include "vdi/core/Estimate.h"
 #include "vdi/core/Thinning.h"
 #include "vdi/io/VdiFile.h"
 
 namespace vdi::stream {
 
 namespace {
-
-std::uint64_t bytesInMemory(const Vdi& vdi) {
-  const std::size_t each =
-      vdi.precision() == Precision::Compact ? sizeof(CompactSupersegment) : sizeof(Supersegment);
-  return vdi.supersegmentCount() * each + vdi.listCount() * sizeof(std::uint32_t);
-}
 
 std::uint32_t levelCountOf(std::uint64_t bytesInMemory) {
   return bytesInMemory < smallBytes ? 1 : 2;
@@ -30,7 +25,8 @@ FramePtr addLevel(Frame& frame, std::vector<std::byte> bytes, const Vdi& size) {
 
 void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
                  const std::function<bool(FramePtr)>& take) {
-  Frame frame{id, vdi.timeStep, vdi.time, made, levelCountOf(bytesInMemory(vdi)), {}};
+  const auto bytes = bytesInMemory<std::uint64_t>(vdi.listCount(), vdi.supersegmentCount(), vdi.precision());
+  Frame frame{id, vdi.timeStep, vdi.time, made, levelCountOf(bytes), {}};
   if (frame.levelCount > 1) {
     const Vdi coarse = thinned(vdi, coarseFactor);
     if (!take(addLevel(frame, io::encode(coarse), coarse))) return;

@@ -21,6 +21,7 @@
 #include <vtkSMTransferFunctionManager.h>
 #include <vtkSMTransferFunctionPresets.h>
 #include <vtkSMTransferFunctionProxy.h>
+#include <vtkSMUncheckedPropertyHelper.h>
 #include <vtkScalarsToColors.h>
 #include <vtkSmartPointer.h>
 #include <vtk_jsoncpp.h>
@@ -34,11 +35,13 @@
 #include <utility>
 #include <vector>
 
+#include "VDILastVdi.h"
 #include "VDISession.h"
 #include "VDIVolumeDisplay.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Estimate.h"
 #include "vdi/core/Viewpoint.h"
 
 namespace {
@@ -250,6 +253,12 @@ vtkSMViewProxy* vtkSMVDIGeneratorProxy::ActiveView() {
   return active != nullptr ? vtkSMViewProxy::SafeDownCast(active->GetCurrentProxy()) : nullptr;
 }
 
+vtkSMRenderViewProxy* vtkSMVDIGeneratorProxy::ViewToTakeFrom() {
+  vtkSMRenderViewProxy* view = RenderViewOf(this->ActiveView());
+  if (view == nullptr) return nullptr;
+  return this->RepresentationIn(this->ActiveView()) != nullptr || isPlaced(view) ? view : nullptr;
+}
+
 vtkSMProxy* vtkSMVDIGeneratorProxy::RepresentationIn(vtkSMViewProxy* view) {
   vtkSMPropertyHelper input(this, "Input");
   auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
@@ -291,17 +300,15 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   if (this->Taken) return;
   this->Taken = true;
   vtkSMProxy* shown = this->RepresentationIn(this->ActiveView());
-  vtkSMRenderViewProxy* view = RenderViewOf(this->ActiveView());
+  vtkSMRenderViewProxy* view = this->ViewToTakeFrom();
   if (view == nullptr) return;
-  const bool placed = isPlaced(view);
-  if (shown == nullptr && !placed) return;
   this->TakeUnitDistance();
   pv::takeShading(this, shown, view);
   pv::takeCropping(this, shown, this->InputBounds());
   pv::takeBlending(this, shown);
   if (const std::string issue = pv::blendModeIssue(shown); !issue.empty()) vtkWarningMacro(<< issue);
-  if (placed && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
-                    vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray())
+  if (isPlaced(view) && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
+                            vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray())
     SetCamera(this, view);
   vtkSMPropertyHelper resolution(this, "Resolution");
   if (resolution.GetAsInt(0) == 0 && resolution.GetAsInt(1) == 0) {
@@ -392,6 +399,36 @@ std::string vtkSMVDIGeneratorProxy::SetViewpoint(vtkSMViewProxy* view) {
   vtkSMPropertyHelper(this, "Resolution").Set(size.data(), 2);
   this->UpdateVTKObjects();
   return {};
+}
+
+std::optional<vdi::VdiEstimate> vtkSMVDIGeneratorProxy::EstimateToCome() {
+  const auto number = [this](const char* name, unsigned int i = 0) {
+    return vtkSMUncheckedPropertyHelper(this, name).GetAsDouble(i);
+  };
+  if (number("PictureOnly") != 0.0) return std::nullopt;
+  vdi::GenerateSettings settings;  // with the size of a filter that takes nothing from a view
+  const int width = static_cast<int>(number("Resolution", 0));
+  const int height = static_cast<int>(number("Resolution", 1));
+  vtkSMRenderViewProxy* view = this->Taken ? nullptr : this->ViewToTakeFrom();
+  if (width > 0 || height > 0) {
+    settings.width = width;
+    settings.height = height;
+  } else if (view != nullptr) {
+    const std::array<int, 2> size = resolutionOf(view);
+    settings.width = size[0];
+    settings.height = size[1];
+  }
+  settings.margin = number("Margin");
+  settings.supersegments = static_cast<std::uint32_t>(std::max(number("Supersegments"), 0.0));
+  settings.samplesPerVoxel = number("SamplingRate");
+  settings.algorithm = static_cast<vdi::Algorithm>(static_cast<int>(number("Algorithm")));
+  settings.budget = static_cast<vdi::Budget>(static_cast<int>(number("Budget")));
+  settings.fill = number("Fill");
+  settings.precision = static_cast<vdi::Precision>(static_cast<int>(number("Precision")));
+  this->UpdatePropertyInformation(this->GetProperty("LastVdi"));
+  pv::LastVdiNumbers last{};
+  vtkSMPropertyHelper(this, "LastVdi").Get(last.data(), static_cast<unsigned int>(last.size()));
+  return vdi::estimateOf(settings, pv::lastVdiOf(last));
 }
 
 void vtkSMVDIGeneratorProxy::PrepareUpstream(vtkSMProxy* proxy, std::optional<double> time) {

@@ -33,7 +33,8 @@
 
 namespace vdi {
 struct Box;
-}
+struct VdiEstimate;
+}  // namespace vdi
 class vtkSMRenderViewProxy;
 class vtkSMViewProxy;
 
@@ -74,6 +75,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// By how many degrees the view sees the middle of the input from elsewhere than the camera that's set.
   double DegreesFrom(vtkSMRenderViewProxy* view);
 
+  /// Of the VDI that the panel's numbers ask for, applied or not; none with PictureOnly. Asks the server.
+  std::optional<vdi::VdiEstimate> EstimateToCome();
+
   /// Whether views show something earlier than what they have asked for. Asks the server.
   bool IsOutdated();
   /// Ends that the filter is held (vtkVDIGenerator::Hold), and that it shows something earlier, for whoever
@@ -94,6 +98,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   void TakeWhatIsNotSet(std::optional<double> time);
   void TakeFromView();
   vtkSMViewProxy* ActiveView();
+  /// The active view, if it's one to take from; null otherwise.
+  vtkSMRenderViewProxy* ViewToTakeFrom();
   vdi::Box InputBounds();
   /// How the view shows the input; null if it never has.
   vtkSMProxy* RepresentationIn(vtkSMViewProxy* view);

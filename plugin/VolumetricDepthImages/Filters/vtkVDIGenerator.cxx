@@ -34,6 +34,7 @@
 #include "VDIBlocks.h"
 #include "VDIFailure.h"
 #include "VDIImageData.h"
+#include "VDILastVdi.h"
 #include "VDIPlace.h"
 #include "VDIPreparation.h"
 #include "VDIRetire.h"
@@ -510,6 +511,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   }
   internal.Made->ShallowCopy(output);
   internal.MadeOf = origin;
+  this->NoteMade(output);
   internal.Failed = false;
   internal.Said.isOver();
   internal.Executed = this->CurrentMTime();  // a map's table has been built
@@ -750,8 +752,12 @@ vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame(const vdi::Box& bounds, dou
   Frame frame{.Camera = this->Viewpoint(bounds),
               .Function = pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min,
                                                  range.max, unit),
-              .Settings = {}};
-  vdi::GenerateSettings& settings = frame.Settings;
+              .Settings = this->CurrentSettings()};
+  return frame;
+}
+
+vdi::GenerateSettings vtkVDIGenerator::CurrentSettings() const {
+  vdi::GenerateSettings settings;
   const auto [width, height] = this->PictureSize();
   settings.width = width;
   settings.height = height;
@@ -768,7 +774,28 @@ vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame(const vdi::Box& bounds, dou
   settings.terminationOpacity = this->PictureOnly
                                     ? std::min(this->TerminationOpacity, vdi::pictureTermination)
                                     : this->TerminationOpacity;
-  return frame;
+  return settings;
+}
+
+/// For the estimate of the next one. The properties are as they were when it was made.
+void vtkVDIGenerator::NoteMade(vtkImageData* output) {
+  vtkFieldData* fields = output->GetFieldData();
+  vtkDataArray* offsets = fields->GetArray("VDI.offsets");
+  const vdi::VdiGenerator& generator = *this->Internal->Generator;
+  if (offsets == nullptr || generator.reports().empty()) return;
+  const vtkIdType lists = offsets->GetNumberOfTuples() - 1;
+  vdi::MadeVdi made{.settings = this->CurrentSettings(),
+                    .lists = static_cast<std::uint64_t>(lists),
+                    .supersegments = static_cast<std::uint64_t>(offsets->GetTuple1(lists))};
+  made.settings.precision =
+      fields->GetArray("VDI.codes") != nullptr ? vdi::Precision::Compact : vdi::Precision::Full;
+  made.settings.samplesPerVoxel = generator.reports().front().samplesPerVoxel;
+  for (const vdi::RankReport& report : generator.reports()) {
+    made.castSeconds = std::max(made.castSeconds, report.generateSeconds);
+    made.listSeconds =
+        std::max(made.listSeconds, report.distributeSeconds + report.compositeSeconds + report.gatherSeconds);
+  }
+  std::ranges::copy(pv::numbersOf(made), this->LastVdi);
 }
 
 void vtkVDIGenerator::Hold() {

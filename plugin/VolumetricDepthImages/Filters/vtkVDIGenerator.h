@@ -26,6 +26,7 @@ namespace vdi {
 struct Blending;
 struct Box;
 struct Camera;
+struct GenerateSettings;
 struct Region;
 struct ScalarRange;
 struct Shading;
@@ -150,6 +151,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   /// Time and memory of the last frame, a line per rank; empty on ranks other than 0.
   vtkGetStringMacro(Report);
+  /// What the last VDI was and took, as pv::numbersOf gives it; all 0 without one, and on ranks other than 0.
+  vtkGetVectorMacro(LastVdi, double, 13);
 
   ///@{
   /**
@@ -232,6 +235,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   bool TakePreparation(const Origin& origin, vtkImageData* output);
   void SayFailure(const std::string& what);
   void TakeReport();
+  vdi::GenerateSettings CurrentSettings() const;
+  void NoteMade(vtkImageData* output);
   void KeepEarlier(vtkImageData* output);
   bool DropLostDevice();
   std::array<int, 2> PictureSize() const;
@@ -271,6 +276,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   bool CameraParallelProjection = false;
   double CameraParallelScale = 1.0;
   char* Report = nullptr;
+  double LastVdi[13] = {};
 };
 
 #endif

@@ -1,0 +1,82 @@
+#include "pqVDIEstimateWidget.h"
+
+#include <pqActiveObjects.h>
+#include <pqCoreUtilities.h>
+#include <vtkCommand.h>
+#include <vtkSMProperty.h>
+#include <vtkSMProxy.h>
+#include <QLabel>
+#include <QLocale>
+#include <QVBoxLayout>
+
+#include <optional>
+
+#include "pqVDIRegenerator.h"
+#include "vdi/core/Estimate.h"
+#include "vtkSMVDIGeneratorProxy.h"
+
+namespace {
+
+constexpr int soonMilliseconds = 50;
+
+QString bytesText(double bytes) {
+  return QLocale().formattedDataSize(static_cast<qint64>(bytes), 1);
+}
+
+QString secondsText(double seconds) {
+  constexpr double least = 0.1;
+  constexpr double many = 10.0;
+  if (seconds < least) return QObject::tr("less than 0.1 s");
+  return QObject::tr("%1 s").arg(QLocale().toString(seconds, 'f', seconds < many ? 1 : 0));
+}
+
+QString textOf(const vdi::VdiEstimate& estimate) {
+  const QString memory = bytesText(estimate.bytesInMemory);
+  const QString file = bytesText(estimate.bytesAsFile);
+  if (!estimate.isFromLast) {
+    return QObject::tr("Estimate for an average volume: %1 in memory (at most %2), %3 as a file")
+        .arg(memory, bytesText(estimate.mostBytesInMemory), file);
+  }
+  const QString bytes =
+      QObject::tr("Estimate from the last VDI: %1 in memory, %2 as a file").arg(memory, file);
+  return estimate.seconds ? bytes + ", " + secondsText(*estimate.seconds) : bytes;
+}
+
+}  // namespace
+
+pqVDIEstimateWidget::pqVDIEstimateWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget* parent)
+    : pqPropertyWidget(proxy, parent), Line(new QLabel(this)) {
+  this->setShowLabel(false);
+  auto* layout = new QVBoxLayout(this);
+  layout->setContentsMargins(0, 0, 0, 0);
+  this->Line->setObjectName("EstimateLine");
+  this->Line->setWordWrap(true);
+  // With room for what it may say: it moves nothing under the mouse.
+  this->Line->setMinimumHeight(2 * this->Line->fontMetrics().lineSpacing());
+  layout->addWidget(this->Line);
+  this->Soon.setInterval(soonMilliseconds);
+  this->Soon.setSingleShot(true);
+  this->connect(&this->Soon, &QTimer::timeout, this, &pqVDIEstimateWidget::estimate);
+  for (const char* name : {"Resolution", "Margin", "Supersegments", "SamplingRate", "Algorithm", "Budget",
+                           "Fill", "Precision", "PictureOnly"}) {
+    vtkSMProperty* property = proxy->GetProperty(name);
+    for (const unsigned long event : {vtkCommand::UncheckedPropertyModifiedEvent, vtkCommand::ModifiedEvent})
+      pqCoreUtilities::connect(property, event, &this->Soon, SLOT(start()));
+  }
+  pqCoreUtilities::connect(proxy, vtkCommand::UpdateDataEvent, &this->Soon, SLOT(start()));
+  // Whose size the first Apply takes.
+  this->connect(&pqActiveObjects::instance(), &pqActiveObjects::viewChanged, &this->Soon,
+                QOverload<>::of(&QTimer::start));
+  if (auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(proxy)))
+    this->connect(regenerator, &pqVDIRegenerator::progress, &this->Soon, QOverload<>::of(&QTimer::start));
+  this->estimate();
+}
+
+pqVDIEstimateWidget::~pqVDIEstimateWidget() = default;
+
+void pqVDIEstimateWidget::estimate() {
+  auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(this->proxy());
+  const std::optional<vdi::VdiEstimate> estimate =
+      generator != nullptr ? generator->EstimateToCome() : std::nullopt;
+  this->Line->setText(estimate ? textOf(*estimate) : QString());
+}

@@ -1,0 +1,52 @@
+#include "vdi/core/Estimate.h"
+
+#include <algorithm>
+
+namespace vdi {
+
+namespace {
+
+/// With all of the margin that the settings ask for, also where the scene ends before it.
+double listsOf(const GenerateSettings& settings) {
+  const double share = 1.0 + 2.0 * settings.margin;
+  return share * settings.width * share * settings.height;
+}
+
+double mostPerList(const GenerateSettings& settings) {
+  return settings.supersegments * (settings.budget == Budget::Total ? settings.fill : 1.0);
+}
+
+/// Of a sample each, on all rays.
+double samplesOf(const GenerateSettings& settings, double automatic) {
+  return listsOf(settings) *
+         (settings.samplesPerVoxel == automaticRate ? automatic : settings.samplesPerVoxel);
+}
+
+}  // namespace
+
+VdiEstimate estimateOf(const GenerateSettings& settings, const std::optional<MadeVdi>& last) {
+  double lists = listsOf(settings);
+  double supersegments = typicalFill * lists * mostPerList(settings);
+  VdiEstimate estimate;
+  if (last && last->lists > 0) {
+    estimate.isFromLast = true;
+    const GenerateSettings& before = last->settings;
+    const double growth = lists / listsOf(before);
+    const double supersegmentGrowth = growth * mostPerList(settings) / mostPerList(before);
+    lists = growth * static_cast<double>(last->lists);
+    supersegments = supersegmentGrowth * static_cast<double>(last->supersegments);
+    if (settings.algorithm == before.algorithm && settings.budget == before.budget) {
+      const double rate = before.samplesPerVoxel;
+      estimate.seconds = last->castSeconds * samplesOf(settings, rate) / samplesOf(before, rate) +
+                         last->listSeconds * supersegmentGrowth;
+    }
+  }
+  const double most = lists * mostPerList(settings);
+  supersegments = std::min(supersegments, most);
+  estimate.bytesInMemory = bytesInMemory(lists, supersegments, settings.precision);
+  estimate.mostBytesInMemory = bytesInMemory(lists, most, settings.precision);
+  estimate.bytesAsFile = supersegments * packedBytes(settings.precision);
+  return estimate;
+}
+
+}  // namespace vdi
