@@ -717,8 +717,9 @@ void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& 
   vdi::VdiRenderer& views =
       form.thin ? internal.Buffers.thinRenderer(*form.thin) : internal.Buffers.renderer();
   auto reconstruction = static_cast<vdi::Reconstruction>(this->Reconstruction);
-  // The lists that a surface goes on in are missing.
-  if (form.thin) reconstruction = std::min(reconstruction, vdi::Reconstruction::Smooth);
+  // Faces lean at rest alone, for speed. A thinned VDI lacks the lists in which a surface goes on.
+  if (form.thin || internal.NextFrame == Frame::Interactive)
+    reconstruction = std::min(reconstruction, vdi::Reconstruction::Smooth);
   const Clock::time_point renderStart = Clock::now();
   const vdi::ImageBytes picture = views.renderBytes(matrices.view(size.x, size.y), internal.Ends,
                                                     vdi::Alpha::Premultiplied, reconstruction);
