@@ -140,8 +140,8 @@ Spread measureShown(VdiGenerator& generator, const std::shared_ptr<gpu::Device>&
       generator.show(renderer ? &*renderer : nullptr, input.camera, input.function, input.settings);
       comm.together([&] {
         if (!renderer) return;
-        renderer->renderBytes(input.camera, input.settings.width, input.settings.height,
-                              Alpha::Premultiplied, Reconstruction::Smooth);
+        renderer->renderBytes(input.camera, input.settings.width, input.settings.height, Alpha::Premultiplied,
+                              Reconstruction::Smooth);
       });
     });
   });
