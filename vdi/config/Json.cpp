@@ -96,7 +96,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
     auto& members = std::get<JsonNode::Members>(open_.back().value);
     if (!names_.back().insert(name).second)
       failAt(document_, line(), fmt::format("the field {} stands there twice", inQuotes(name)));
-    members.emplace_back(std::move(name), JsonNode());
+    members.emplace_back().first = std::move(name);
     return true;
   }
   bool parse_error(std::size_t, const std::string&, const nlohmann::json::exception& error) override {
