@@ -1,6 +1,7 @@
 #include "vdi/stream/Steering.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>  // fmt::join
 
 #include <algorithm>
 #include <cmath>
