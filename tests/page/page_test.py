@@ -25,7 +25,8 @@ def test_pictures(browser):
         bare(browser)
         start = camera_of(browser)
         angles = (0, 10, 30, 90)
-        vdi("render", f"{name}.vdi", "-o", f"{name}.png", "--resolution", f"{WIDTH}x{HEIGHT}", "--azimuth", *angles)
+        vdi("render", f"{name}.vdi", "-o", f"{name}.png", "--resolution", f"{WIDTH}x{HEIGHT}", "--reconstruction", "smooth",
+            "--azimuth", *angles)
         for degrees in angles:
             camera = azimuth(start, degrees)
             browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
@@ -298,8 +299,8 @@ def test_frame_time(browser):
     open_page(browser, page_of("large.vdi"))
     whole(browser)
     start = camera_of(browser)
-    output = subprocess.run([VDI, "render", "large.vdi", "-o", "large.png", "--azimuth", "10", "30"], check=True, timeout=120,
-                            capture_output=True, text=True).stdout
+    command = [VDI, "render", "large.vdi", "-o", "large.png", "--reconstruction", "smooth", "--azimuth", "10", "30"]
+    output = subprocess.run(command, check=True, timeout=120, capture_output=True, text=True).stdout
     ours = [float(line.split()[1]) for line in output.splitlines()]
     for degrees, device in zip((10, 30), ours):
         browser.value(f"vdiPage.setCamera({json.dumps(azimuth(start, degrees))}, false)")
