@@ -1,6 +1,6 @@
 /* Loaded before a program (LD_PRELOAD): when there's a file VDI_TEST_LOSE_DEVICE, removes it, and the Vulkan
  * device that is waited for next is lost. A folder of that name stays: all devices are.
- * While there's a file VDI_TEST_LOSE_STILLS, a device is lost when a thread waits for the tenth time that
+ * While there's a file VDI_TEST_LOSE_STILLS, a device is lost when a thread waits for the 20th time that
  * isn't the program's first one: those that make pictures in full do, strip by strip, and those that load
  * VDIs don't. */
 #define _GNU_SOURCE
@@ -24,7 +24,7 @@ VKAPI_ATTR VkResult VKAPI_CALL vkWaitSemaphores(VkDevice device, const VkSemapho
     if (lost_count < most) lost[lost_count++] = device;
   }
   const char* stills = getenv("VDI_TEST_LOSE_STILLS");
-  if (stills != NULL && gettid() != getpid() && ++waits >= 10 && access(stills, F_OK) == 0 &&
+  if (stills != NULL && gettid() != getpid() && ++waits >= 20 && access(stills, F_OK) == 0 &&
       lost_count < most)
     lost[lost_count++] = device;
   for (int i = 0; i < lost_count; ++i) {
