@@ -54,9 +54,13 @@ ComputePipelineInfo renderInfo(std::uint32_t lanes) {
 
 }  // namespace
 
+float pixelSizeOf(const View& original) {
+  return static_cast<float>(2.0 * original.halfHeight() / original.height());
+}
+
 shared::RenderParams renderGeometry(const View& original, const View& view) {
   shared::RenderParams params{};
-  params.pixelSize = static_cast<float>(2.0 * original.halfHeight() / original.height());
+  params.pixelSize = pixelSizeOf(original);
   params.parallel = original.parallel() ? 1U : 0U;
   params.width = static_cast<std::uint32_t>(view.width());
   params.height = static_cast<std::uint32_t>(view.height());

@@ -17,6 +17,8 @@ class View;
 
 namespace vdi::gpu {
 
+/// RenderParams::pixelSize.
+float pixelSizeOf(const View& original);
 /// The part of RenderParams that follows from the two views; addresses and depth range are left 0.
 shared::RenderParams renderGeometry(const View& original, const View& view);
 shared::RenderRays renderRays(const View& original, const View& view);

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "vdi/core/Error.h"
+#include "vdi/gpu/RenderPass.h"
 #include "vdi/pipeline/ListBuilder.h"
 
 namespace vdi::detail {
@@ -122,7 +123,7 @@ void recordLeaning(gpu::Commands& commands, gpu::ExpandPass& expand,
   constants.tileDepthMasks = vdi.tileDepthMasks.address();
   constants.depthRange = vdi.depthRange.address();
   constants.perspective = original.parallel() ? 0U : 1U;
-  constants.pixelSize = static_cast<float>(2.0 * original.halfHeight() / original.height());
+  constants.pixelSize = gpu::pixelSizeOf(original);
   constants.lists = {original.width(), original.height()};
   for (const std::uint32_t mode : {shared::expandModeSlopes, shared::expandModeLeaningMasks,
                                    shared::expandModeTiles, shared::expandModeLargeTiles}) {
