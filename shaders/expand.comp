@@ -11,6 +11,7 @@ layout(push_constant, scalar) uniform Push { ExpandConstants push; };
 #include "exact.glsl"
 #include "store.glsl"
 #include "render_segment.glsl"
+#include "box_faces.glsl"
 #include "slopes.glsl"
 
 void expandSegment(uint i) {
@@ -60,18 +61,34 @@ float reachOf(vec2 slopes) { return 1.5 * max(slopes.x, slopes.y) + 0.5 * min(sl
 
 void maskList(uint list, uint first, uint count, bool leans) {
   float nearest = uintBitsToFloat(push.depthRange.at[0]);
+  float farthest = uintBitsToFloat(push.depthRange.at[1]);
   float binScale = uintBitsToFloat(push.depthRange.at[2]);
   float slopeUnit = footprintOf() * (renderMaxSlope / renderSlopes);
   float reach = 0.0;
   uint64_t mask = 0ul;
   RenderSegmentArray segments = renderSegmentsFrom(push.segments, first);
+  ivec2 pixel = ivec2(int(list) % push.lists.x, int(list) / push.lists.x);
   for (uint i = 0u; i < count; ++i) {
     RenderSegment segment = segments.at[i];
-    vec4 slopes = leans ? abs(segmentSlopes(push.slopes.at[first + i])) : vec4(0.0);
-    float front = reachOf(slopes.xy);
-    float back = reachOf(slopes.zw);
-    reach = max(reach, max(front, back));
-    mask |= maskOf(segment.front - slopeUnit * front, segment.back + slopeUnit * back, nearest, binScale);
+    vec4 slopes = leans ? segmentSlopes(push.slopes.at[first + i]) : vec4(0.0);
+    vec2 ends = vec2(segment.front, segment.back);
+    // An end on a face doesn't count as reach: it's a list's first front or last back, and all intersections
+    // that come that far look at these.
+    if (frontIsOnFace(slopes)) {
+      ends.x = clamp(faceDepthsAround(boxPassage(pixel).enter, pixel).x, nearest, ends.x);
+    } else {
+      float front = reachOf(abs(slopes.xy));
+      reach = max(reach, front);
+      ends.x -= slopeUnit * front;
+    }
+    if (backIsOnFace(slopes)) {
+      ends.y = clamp(faceDepthsAround(boxPassage(pixel).leave, pixel).y, ends.y, farthest);
+    } else {
+      float back = reachOf(abs(slopes.zw));
+      reach = max(reach, back);
+      ends.y += slopeUnit * back;
+    }
+    mask |= maskOf(ends.x, ends.y, nearest, binScale);
   }
   push.heads.at[list] = ListHead(first, count | uint(ceil(reach / listReachUnit)) << listCountBits, mask);
 }

@@ -41,8 +41,12 @@ vec2 inMetOrder(vec2 depths) { return rayAscends ? depths : -depths.yx; }
 // In the list's middle.
 vec2 metDepths(Leaning of) { return inMetOrder(segmentDepths(of.segment)); }
 
-// How much deeper its faces are at an offset from the list's centre.
-vec2 leaningAt(vec4 slopes, vec2 offset) { return vec2(dot(slopes.xy, offset), dot(slopes.zw, offset)); }
+// Depths of its faces at an offset from the list's centre. A face of the box ends the ray itself.
+vec2 leaningDepths(Leaning of, vec4 slopes, vec2 offset) {
+  vec4 change = slopes * params.slopeUnit;
+  vec2 depths = segmentDepths(of.segment) + vec2(dot(change.xy, offset), dot(change.zw, offset));
+  return vec2(frontIsOnFace(slopes) ? -infinity : depths.x, backIsOnFace(slopes) ? infinity : depths.y);
+}
 
 // A part of a ray, relative to a list.
 struct Part {
@@ -90,9 +94,9 @@ void add(inout Seen seen, uvec4 segment, float front, float met, Part part) {
 
 void meet(inout Seen seen, Leaning of, Part part) {
   if (shearedReconstruction) {
-    vec4 slopes = segmentSlopes(of.slopes) * params.slopeUnit;
-    vec2 begin = inMetOrder(segmentDepths(of.segment) + leaningAt(slopes, part.begin));
-    vec2 end = inMetOrder(segmentDepths(of.segment) + leaningAt(slopes, part.end));
+    vec4 slopes = segmentSlopes(of.slopes);
+    vec2 begin = inMetOrder(leaningDepths(of, slopes, part.begin));
+    vec2 end = inMetOrder(leaningDepths(of, slopes, part.end));
     vec2 fractions = vec2(0.0, 1.0);
     keepWhere(vec2(part.low - begin.x, part.high - end.x), fractions);
     keepWhere(vec2(begin.y - part.low, end.y - part.high), fractions);

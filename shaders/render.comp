@@ -96,6 +96,12 @@ void renderPixels(uint tile) {
   ray = rayAt(vec2(at) + 0.5);
   accumulated = nothing;
   vec2 stretch = insideFrustum();
+  if (shearedReconstruction) {
+    for (uint i = 0u; i < renderFaces; ++i) {
+      vec4 face = params.boxFaces[i];
+      clip(stretch, dot(face.xyz, ray.origin) - face.w, dot(face.xyz, ray.direction));
+    }
+  }
   for (uint i = 0u; i < params.clipPlaneCount; ++i) {
     vec4 plane = params.clipPlanes[i];
     clip(stretch, dot(plane.xyz, ray.origin) - plane.w, dot(plane.xyz, ray.direction));

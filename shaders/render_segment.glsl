@@ -30,3 +30,6 @@ vec4 segmentSlopes(uint word) {
   return vec4(bitfieldExtract(bits, 0, 8), bitfieldExtract(bits, 8, 8), bitfieldExtract(bits, 16, 8),
               bitfieldExtract(bits, 24, 8));
 }
+
+bool frontIsOnFace(vec4 slopes) { return slopes.x == float(renderOnFace) && slopes.y == float(renderOnFace); }
+bool backIsOnFace(vec4 slopes) { return slopes.z == float(renderOnFace) && slopes.w == float(renderOnFace); }

@@ -1,6 +1,6 @@
 // How the faces of supersegments lean. Twin of vdi/reference/Slopes.cpp, where the rules stand.
 //
-// Needs: shared/render.h, optical.glsl; push.
+// Needs: shared/render.h, optical.glsl, box_faces.glsl; push.
 
 const float nowhere = 1.0 / 0.0;
 
@@ -165,6 +165,21 @@ void fade(SlopeList list, float footprint) {
   }
 }
 
+// Marks the list's ends that lie on faces of the box.
+void putOnFaces(SlopeList list, BoxPassage passage) {
+  const uint onFace = uint(renderOnFace) & 0xffu;
+  const uint bothOnFace = onFace | onFace << 8;
+  uint last = list.count - 1u;
+  if (isOnFace(list.segments.at[0].front, passage.enter)) {
+    uint word = push.slopes.at[list.first];
+    push.slopes.at[list.first] = bitfieldInsert(word, bothOnFace, 0, 16);
+  }
+  if (isOnFace(list.segments.at[last].back, passage.leave)) {
+    uint word = push.slopes.at[list.first + last];
+    push.slopes.at[list.first + last] = bitfieldInsert(word, bothOnFace, 16, 16);
+  }
+}
+
 void findSlopes(ivec2 pixel) {
   SlopeList list = slopeListOf(pixel);
   float footprint = footprintOf();
@@ -173,4 +188,5 @@ void findSlopes(ivec2 pixel) {
   addNeighbour(list, SlopeNeighbour(slopeListOf(pixel - ivec2(0, 1)), false, footprint), 1);
   addNeighbour(list, SlopeNeighbour(slopeListOf(pixel + ivec2(0, 1)), true, footprint), 1);
   fade(list, footprint);
+  if (list.count > 0u) putOnFaces(list, boxPassage(pixel));
 }

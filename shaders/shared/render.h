@@ -32,7 +32,9 @@ VDI_CONST uint expandModeLeaningMasks = 7;  // one a list; then the tiles again
 // Reconstruction::Sheared (vdi/reference/Slopes.h).
 VDI_CONST float renderMaxSlope = 8.0F;  // depth per list, in footprints: 83 degrees
 VDI_CONST float renderSlopes = 127.0F;  // steps from 0 to renderMaxSlope
-VDI_CONST int renderNoSlope = -128;
+VDI_CONST int renderNoSlope = -128;     // while slopes are looked for
+VDI_CONST int renderOnFace = -128;      // in both slopes of a front or a back: it lies on a face of the box
+VDI_CONST uint renderFaces = 6;         // of a box
 VDI_CONST float renderMostDepth = 6.0F;      // optical depth of a supersegment, behind which hardly anything shows
 // Values that are equal but for rounding decide the same everywhere.
 VDI_CONST float renderTie = 1.0F / 64.0F;
@@ -108,6 +110,12 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) buffer MaskArray {
 
 VDI_SHARED_BEGIN
 
+// core/BoxFaces.h: FaceTolerance.
+struct FaceRounding {
+  float depth;
+  float distance;
+};
+
 // Data for skipping empty space. Bit b of a mask tells whether there is material in the b-th of renderBins
 // equal parts of the VDI's depth range. There is a mask for each list, each tile of 8 x 8 lists, and each
 // large tile of 64 x 64 lists.
@@ -121,6 +129,8 @@ struct ExpandConstants {
   VDI_ADDRESS(MaskArray) tileDepthMasks;     // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]
   // a DepthRange; depths are not negative, so their bits compare as they do
   VDI_ADDRESS(UintArray) depthRange;
+  VDI_ADDRESS(Vec4Array) boxFaces;  // [renderFaces], core/BoxFaces.h; for expandModeSlopes and LeaningMasks
+  FaceRounding rounding;            // of lists that end on them
   uint mode;
   uint count;        // supersegments in `from`
   uint perspective;  // projection of V_O
@@ -154,6 +164,7 @@ struct RenderParams {
   float binScale;
   uint hasEnds;
   uint clipPlaneCount;
+  vec4 boxFaces[renderFaces];            // core/BoxFaces.h, for Reconstruction::Sheared; all 0: of all space
   vec4 clipPlanes[renderMaxClipPlanes];  // in V_O's view space; the visible side has dot(xyz, position) >= w
 };
 

@@ -9,6 +9,7 @@
 
 #include "tests/Catch.h"
 #include "vdi/core/Block.h"
+#include "vdi/core/BoxFaces.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/GenerateSettings.h"
@@ -490,4 +491,22 @@ TEST_CASE("invalid budgets and fills are refused") {
   CHECK(maxPerList(25, Budget::List) == 25);
   CHECK(maxPerList(25, Budget::Total) == 50);
   CHECK(maxPerList(1000, Budget::Total) == maxSupersegments);
+}
+
+TEST_CASE("box faces: points are inside exactly where all six say so; an empty box is all space") {
+  const Box box{{-1.0, 2.0, 0.5}, {3.0, 2.5, 4.0}};
+  Camera camera = Camera::framing(box, {-0.5, -0.35, -1.0}, {0.2, 1.0, 0.0});
+  camera.parallelProjection = GENERATE(false, true);
+  const View view(camera, 30, 20);
+  const auto isInside = [&](const Box& of, const glm::dvec3& world) {
+    const BoxFaces faces = facesOf(of, view);
+    return std::all_of(faces.begin(), faces.end(), [&](const glm::dvec4& face) {
+      return glm::dot(glm::dvec3(face), view.toView(world)) >= face.w;
+    });
+  };
+  for (int i = 0; i < 27; ++i) {
+    const glm::dvec3 share = glm::dvec3(i % 3, i / 3 % 3, i / 9) * 0.7 - 0.2;  // of the box's size
+    CHECK(isInside(box, box.lo + share * box.size()) == (i == 13));
+    CHECK(isInside(Box{}, box.lo + share * box.size()));
+  }
 }

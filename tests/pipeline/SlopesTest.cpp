@@ -35,9 +35,9 @@ TEST_CASE("slopes of faces: the device's are the reference's") {
   commands.submitAndWait();
   const auto seen = readback.mappedAs<Slopes>().first(vdi->supersegmentCount());
   const shared::DepthRange depths = loaded.depths();
-  const std::vector<Slopes> expected =
-      reference::slopesOf(vdi->expandedLists(), {vdi->width, vdi->height},
-                          reference::slopeUnitOf(vdi->view(), depths.nearest, depths.farthest));
+  const std::vector<Slopes> expected = reference::slopesOf(
+      vdi->expandedLists(), vdi->view(), reference::slopeUnitOf(vdi->view(), depths.nearest, depths.farthest),
+      reference::listBoxOf(*vdi, depths.farthest));
   std::size_t leaning = 0;
   std::size_t different = 0;
   for (std::size_t i = 0; i < expected.size(); ++i) {

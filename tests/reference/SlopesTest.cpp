@@ -39,6 +39,12 @@ SupersegmentLists listsOf(ListAt listAt) {
   return lists;
 }
 
+/// In no box.
+std::vector<Slopes> slopesOf(const SupersegmentLists& lists) {
+  const View original(Camera{}, size.x, size.y);
+  return reference::slopesOf(lists, original, unit, {facesOf({}, original), {}});
+}
+
 using List = std::vector<Supersegment>;
 
 /// Two layers that touch each other, the front one thin; its front lies at `depth`.
@@ -54,7 +60,7 @@ TEST_CASE("reference: the faces of a tilted layer lean as it does") {
     return 20.0F + 2.5F * static_cast<float>(x) - 0.75F * static_cast<float>(y);
   };
   const SupersegmentLists lists = listsOf([&](int x, int y) { return layersAt(depthAt(x, y)); });
-  for (const Slopes& slopes : reference::slopesOf(lists, size, unit)) {
+  for (const Slopes& slopes : slopesOf(lists)) {
     CHECK(isNear(slopes.frontX, 2.5F));
     CHECK(isNear(slopes.backX, 2.5F));
     CHECK(isNear(slopes.frontY, -0.75F));
@@ -73,7 +79,7 @@ TEST_CASE("reference: a face leans to where the neighbour has the same optical d
     };
     return List{layer(0.0F, split), layer(split, 4.0F)};
   };
-  for (const Slopes& slopes : reference::slopesOf(listsOf(listAt), size, unit)) {
+  for (const Slopes& slopes : slopesOf(listsOf(listAt))) {
     CHECK(isNear(slopes.frontX, 1.0F));
     CHECK(isNear(slopes.backX, 1.0F));
     CHECK(slopes.frontY == 0);
@@ -87,7 +93,7 @@ TEST_CASE("reference: faces of the rear half are found from behind") {
     return List{{10.0F, 11.0F, 0.0F, haze, 0.0F, haze}, {11.0F, 12.0F, 0.99F, 0.0F, 0.0F, 0.99F}};
   };
   const SupersegmentLists lists = listsOf(listAt);
-  const std::vector<Slopes> slopes = reference::slopesOf(lists, size, unit);
+  const std::vector<Slopes> slopes = slopesOf(lists);
   for (std::size_t i = 0; i < slopes.size(); i += 2) {
     CHECK(slopes[i].frontX == 0);
     CHECK(slopes[i + 1].backX == 0);
@@ -97,7 +103,7 @@ TEST_CASE("reference: faces of the rear half are found from behind") {
 TEST_CASE("reference: faces without a counterpart don't lean") {
   const auto isFlat = [](const SupersegmentLists& lists) {
     bool flat = !lists.segments.empty();
-    for (const Slopes& slopes : reference::slopesOf(lists, size, unit)) flat = flat && slopes == Slopes{};
+    for (const Slopes& slopes : slopesOf(lists)) flat = flat && slopes == Slopes{};
     return flat;
   };
   CHECK(isFlat(listsOf([](int x, int y) { return x == 2 && y == 2 ? layersAt(20.0F) : List{}; })));

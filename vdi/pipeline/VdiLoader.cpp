@@ -1,6 +1,7 @@
 #include "vdi/pipeline/VdiLoader.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -52,6 +53,8 @@ void VdiLoader::start(const Vdi& header, LoadedVdi& target) {
   outgrown_ = {};
   target.original.reset();
   target.leans = false;
+  target.faces = facesOf(header.bounds, header.view());
+  target.depthStep = header.depthCode.step;
   target_ = &target;
   const glm::ivec2 size{header.width, header.height};
   listCount_ = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y);
@@ -111,17 +114,30 @@ void VdiLoader::recordMasks() {
   commands_.copy(target_->depthRange, 0, target_->depthRangeReadback, 0, sizeof(shared::DepthRange));
 }
 
+std::array<glm::vec4, shared::renderFaces> facesForDevice(const LoadedVdi& vdi) {
+  std::array<glm::vec4, shared::renderFaces> faces;
+  std::transform(vdi.faces.begin(), vdi.faces.end(), faces.begin(),
+                 [](const glm::dvec4& face) { return glm::vec4(face); });
+  return faces;
+}
+
 void recordLeaning(gpu::Commands& commands, gpu::ExpandPass& expand,
                    const std::shared_ptr<gpu::Device>& device, LoadedVdi& vdi) {
   const View& original = *vdi.original;
   const std::uint64_t room = vdi.segments.size() / sizeof(shared::RenderSegment);
   vdi.slopes.reserve(device, room * wordBytes, MemoryKind::DeviceLocal);
+  const std::array<glm::vec4, shared::renderFaces> faces = facesForDevice(vdi);
+  vdi.boxFaces.reserve(device, sizeof(faces), MemoryKind::DeviceLocal);
+  commands.update(vdi.boxFaces, std::as_bytes(std::span(faces)));
+  const FaceTolerance tolerance = faceToleranceOf(vdi.depthStep, vdi.depths().farthest);
   shared::ExpandConstants constants{};
   constants.segments = vdi.segments.address();
   constants.slopes = vdi.slopes.address();
   constants.heads = vdi.heads.address();
   constants.tileDepthMasks = vdi.tileDepthMasks.address();
   constants.depthRange = vdi.depthRange.address();
+  constants.boxFaces = vdi.boxFaces.address();
+  constants.rounding = {static_cast<float>(tolerance.depth), static_cast<float>(tolerance.distance)};
   constants.perspective = original.parallel() ? 0U : 1U;
   constants.pixelSize = gpu::pixelSizeOf(original);
   constants.lists = {original.width(), original.height()};

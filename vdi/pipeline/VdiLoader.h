@@ -2,9 +2,11 @@
 // just made. Not part of the library's interface.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 
+#include "vdi/core/BoxFaces.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/gpu/Commands.h"
@@ -23,13 +25,19 @@ struct LoadedVdi {
   gpu::Buffer tileDepthMasks;
   gpu::Buffer depthRange;          // shared::DepthRange
   gpu::Buffer depthRangeReadback;  // the same, for the host
+  gpu::Buffer boxFaces;            // shared::renderFaces vec4, once it leans
+  BoxFaces faces{};                // of the VDI's box, in the view space of V_O
+  double depthStep = 0.0;          // DepthCode::step
   std::unique_ptr<View> original;  // null until a VDI is loaded
   bool leans = false;              // whether recordLeaning has been called for it
   /// Call when the VDI is loaded.
   gpu::shared::DepthRange depths() const { return depthRangeReadback.mappedAs<gpu::shared::DepthRange>()[0]; }
 };
 
-/// Finds how the faces of a loaded VDI lean, which Reconstruction::Sheared needs.
+/// RenderParams::boxFaces.
+std::array<glm::vec4, gpu::shared::renderFaces> facesForDevice(const LoadedVdi& vdi);
+
+/// Finds how the faces of a loaded VDI's supersegments lean, which Reconstruction::Sheared needs.
 void recordLeaning(gpu::Commands& commands, gpu::ExpandPass& expand,
                    const std::shared_ptr<gpu::Device>& device, LoadedVdi& vdi);
 

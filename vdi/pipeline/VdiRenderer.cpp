@@ -165,6 +165,7 @@ void VdiRenderer::State::render(const View& view, std::span<const float> rayEnds
   if (reconstruction == Reconstruction::Sheared) {
     if (!shown.leans) detail::recordLeaning(commands, expand, device, shown);
     params.slopes = shown.slopes.address();
+    std::ranges::copy(detail::facesForDevice(shown), params.boxFaces);
   }
   commands.mark("render");
   if (!rayEnds.empty()) {

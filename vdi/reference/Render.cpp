@@ -76,6 +76,7 @@ struct LeaningLists {
   const SupersegmentLists& lists;
   std::vector<Slopes> slopes;  // empty: not at all
   float slopeUnit = 0.0F;
+  BoxFaces faces{};  // of the box in which they lie; all 0: of all space
 };
 
 /// The part of a ray's stretch that lies within a supersegment, as fractions of the stretch.
@@ -110,16 +111,21 @@ void addListOf(Accumulator& sum, const LeaningLists& leaning, const View& origin
     const Supersegment& segment = list[i];
     glm::dvec2 front(0.0);
     glm::dvec2 back(0.0);
+    Slopes slopes;
     if (!leaning.slopes.empty()) {
-      const Slopes& slopes = leaning.slopes[lists.offsets[index] + i];
+      slopes = leaning.slopes[lists.offsets[index] + i];
       front = static_cast<double>(leaning.slopeUnit) * glm::dvec2(slopes.frontX, slopes.frontY);
       back = static_cast<double>(leaning.slopeUnit) * glm::dvec2(slopes.backX, slopes.backY);
     }
     Fractions part;
-    part.clip(firstDepth - segment.front - glm::dot(front, first),
-              lastDepth - segment.front - glm::dot(front, last));
-    part.clip(segment.back + glm::dot(back, first) - firstDepth,
-              segment.back + glm::dot(back, last) - lastDepth);
+    if (!slopes.frontIsOnFace()) {
+      part.clip(firstDepth - segment.front - glm::dot(front, first),
+                lastDepth - segment.front - glm::dot(front, last));
+    }
+    if (!slopes.backIsOnFace()) {
+      part.clip(segment.back + glm::dot(back, first) - firstDepth,
+                segment.back + glm::dot(back, last) - lastDepth);
+    }
     if (!(part.enter < part.leave)) continue;
     const double length = stretch.leave - stretch.enter;
     const double met = (part.leave - part.enter) * length * ray.worldPerT;
@@ -271,8 +277,10 @@ Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, st
   LeaningLists leaning{lists, {}};
   if (reconstruction == Reconstruction::Sheared) {
     const SlopeUnit unit = slopeUnitOf(original, nearest, farthest);
-    leaning.slopes = slopesOf(lists, {original.width(), original.height()}, unit);
+    const ListBox box = listBoxOf(vdi, farthest);
+    leaning.slopes = slopesOf(lists, original, unit, box);
     leaning.slopeUnit = unit.unit;
+    leaning.faces = box.faces;
   }
   for (int y = 0; y < view.height(); ++y) {
     for (int x = 0; x < view.width(); ++x) {
@@ -288,6 +296,9 @@ Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction, st
         const glm::dvec3 normal = glm::normalize(plane.normal);
         clip(stretch, glm::dot(normal, world.origin - plane.origin), glm::dot(normal, world.direction));
       }
+      // Lists reach to the box's faces, and may reach beyond.
+      for (const glm::dvec4& face : leaning.faces)
+        clip(stretch, glm::dot(glm::dvec3(face), ray.origin) - face.w, glm::dot(glm::dvec3(face), direction));
       if (!ends.empty()) stretch.leave = std::min(stretch.leave, static_cast<double>(ends[pixel]));
       if (stretch.empty()) continue;
       const Accumulator sum = reconstruction == Reconstruction::Constant

@@ -19,6 +19,8 @@ using shared::renderNoSlope;
 using shared::renderSlopes;
 using shared::renderTie;
 
+static_assert(Slopes::onFace == shared::renderOnFace);
+
 constexpr float nowhere = std::numeric_limits<float>::infinity();
 
 float depthOf(const Supersegment& segment) {
@@ -155,7 +157,52 @@ void fade(std::span<const Supersegment> list, float footprint, std::span<Slopes>
   }
 }
 
+/// Where a ray enters and leaves the box: depths, and how fast it goes through the faces there, as distance
+/// from the face per depth.
+struct Passage {
+  double enter = -std::numeric_limits<double>::infinity();
+  double leave = std::numeric_limits<double>::infinity();
+  double enterRate = 1.0;
+  double leaveRate = 1.0;
+};
+
+Passage passageOf(const BoxFaces& faces, const View& original, const glm::ivec2& pixel) {
+  const Ray world = original.rayThrough(pixel.x + 0.5, pixel.y + 0.5);
+  const glm::dvec3 origin = original.toView(world.origin);
+  const glm::dvec3 direction(glm::dot(world.direction, original.right()),
+                             glm::dot(world.direction, original.up()),
+                             glm::dot(world.direction, original.forward()));
+  Passage passage;
+  for (const glm::dvec4& face : faces) {
+    const double rate = glm::dot(glm::dvec3(face), direction);
+    const double depth = (face.w - glm::dot(glm::dvec3(face), origin)) / rate;
+    if (rate > 0.0 && depth > passage.enter) {
+      passage.enter = depth;
+      passage.enterRate = rate;
+    } else if (rate < 0.0 && depth < passage.leave) {
+      passage.leave = depth;
+      passage.leaveRate = -rate;
+    }
+  }
+  return passage;
+}
+
+void putOnFaces(std::span<const Supersegment> list, const Passage& passage, const FaceTolerance& tolerance,
+                std::span<Slopes> slopes) {
+  const auto isNear = [&](float depth, double face, double rate) {
+    return std::abs(depth - face) <= tolerance.depth + tolerance.distance / rate;
+  };
+  if (isNear(list.front().front, passage.enter, passage.enterRate))
+    slopes.front().frontX = slopes.front().frontY = Slopes::onFace;
+  if (isNear(list.back().back, passage.leave, passage.leaveRate))
+    slopes.back().backX = slopes.back().backY = Slopes::onFace;
+}
+
 }  // namespace
+
+ListBox listBoxOf(const Vdi& vdi, float farthest) {
+  return {facesOf(vdi.bounds, vdi.view()), faceToleranceOf(vdi.depthCode.step, farthest)};
+}
 
 SlopeUnit slopeUnitOf(const View& original, float nearest, float farthest) {
   const auto pixel = static_cast<float>(2.0 * original.halfHeight() / original.height());
@@ -163,7 +210,9 @@ SlopeUnit slopeUnitOf(const View& original, float nearest, float farthest) {
   return {footprint, footprint * (renderMaxSlope / renderSlopes)};
 }
 
-std::vector<Slopes> slopesOf(const SupersegmentLists& lists, const glm::ivec2& size, const SlopeUnit& unit) {
+std::vector<Slopes> slopesOf(const SupersegmentLists& lists, const View& original, const SlopeUnit& unit,
+                             const ListBox& box) {
+  const glm::ivec2 size{original.width(), original.height()};
   std::vector<Slopes> slopes(lists.segments.size());
   for (int y = 0; y < size.y; ++y) {
     for (int x = 0; x < size.x; ++x) {
@@ -185,6 +234,7 @@ std::vector<Slopes> slopesOf(const SupersegmentLists& lists, const glm::ivec2& s
       addNeighbour(list, beside(x, y - 1, false), own, &Slopes::frontY, &Slopes::backY);
       addNeighbour(list, beside(x, y + 1, true), own, &Slopes::frontY, &Slopes::backY);
       fade(list, unit.footprint, own);
+      if (!list.empty()) putOnFaces(list, passageOf(box.faces, original, {x, y}), box.tolerance, own);
     }
   }
   return slopes;
