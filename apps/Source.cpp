@@ -10,6 +10,7 @@
 #include "apps/TransferFunctions.h"
 #include "vdi/config/Presets.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/synthetic/DeviceField.h"
 #include "vdi/synthetic/Fields.h"
 
@@ -276,21 +277,30 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene) {
 
 namespace {
 
-void addShadingOptions(CLI::App& command, QualityOptions& options) {
-  command
-      .add_flag(
-          "--shade", options.shade,
-          "light the volume by its gradient, from the viewpoint; the VDI keeps that light when it's turned")
-      ->group(qualityGroup);
-  command
-      .add_option("--ambient", options.ambient,
-                  "with --shade: share of the colour that shows without light, 0 to 1")
-      ->capture_default_str()
-      ->group(qualityGroup);
-  command
-      .add_option("--diffuse", options.diffuse, "with --shade: share of the light that's reflected, 0 to 1")
-      ->capture_default_str()
-      ->group(qualityGroup);
+/// Options for all settings of the table, except those that `use` leaves to the command.
+void addSettingsOptions(CLI::App& command, GenerateSettings& settings, QualityUse use) {
+  const std::vector<std::string> several{"Supersegments", "Algorithm"};
+  for (const Setting& setting : settingsTable()) {
+    if (use == QualityUse::Several && std::ranges::count(several, setting.property) > 0) continue;
+    const std::string name = optionOf(setting);
+    const auto put = [&settings, &setting](double value) { setting.set(settings, value); };
+    CLI::Option* option = nullptr;
+    if (setting.kind == Setting::Kind::Flag) {
+      option = command.add_flag_callback(
+          name, [put] { put(1.0); }, setting.help);
+    } else if (setting.kind == Setting::Kind::Name) {
+      const auto putName = [put, &setting](const std::string& value) { put(setting.named(value)); };
+      option = command.add_option_function<std::string>(name, putName, setting.help)->type_name("NAME");
+    } else {
+      option = command.add_option_function<double>(name, put, setting.help);
+      if (setting.kind == Setting::Kind::Count) option->type_name("UINT");
+    }
+    if (setting.kind != Setting::Kind::Flag) option->default_str(setting.text(setting.get(settings)));
+    option->group(qualityGroup);
+  }
+}
+
+void addLightsOption(CLI::App& command, QualityOptions& options) {
   command
       .add_option("--lights", options.lights,
                   "with --shade: kit, ParaView's five lights; headlight, one that shines along each ray")
@@ -335,15 +345,6 @@ Region makeRegion(const QualityOptions& options) {
   return region;
 }
 
-Shading makeShading(const QualityOptions& options) {
-  Shading shading;
-  shading.on = options.shade;
-  shading.ambient = options.ambient;
-  shading.diffuse = options.diffuse;
-  if (options.lights == "headlight") shading.lights = {Light{}};
-  return shading;
-}
-
 }  // namespace
 
 void addClipOption(CLI::App& command, std::vector<double>& numbers, const char* group) {
@@ -367,37 +368,6 @@ std::vector<ClipPlane> makeClipPlanes(const std::vector<double>& numbers) {
 }
 
 namespace {
-
-void addBudgetOptions(CLI::App& command, QualityOptions& options) {
-  command
-      .add_option("--budget", options.budget,
-                  "who gets supersegments: list, up to N_S each; total, as many in all, but up to twice N_S "
-                  "where a list needs them and fewer elsewhere")
-      ->type_name("NAME")
-      ->capture_default_str()
-      ->group(qualityGroup);
-  command
-      .add_option("--fill", options.fill,
-                  "with --budget total: share of these supersegments that is made, (0, 1]; half of them look "
-                  "nearly the same")
-      ->capture_default_str()
-      ->group(qualityGroup);
-  command
-      .add_option(
-          "--precision", options.precision,
-          "what a supersegment takes: compact, 8 bytes, seen from the VDI's viewpoint within 1/255; full, "
-          "24 bytes of floats")
-      ->type_name("NAME")
-      ->capture_default_str()
-      ->group(qualityGroup);
-  command
-      .add_option(
-          "--termination-opacity", options.terminationOpacity,
-          "a ray ends once it has accumulated this opacity, (0, 1]; what's hidden behind is missing from "
-          "other viewpoints; 1: never")
-      ->capture_default_str()
-      ->group(qualityGroup);
-}
 
 void addTransferFunctionOptions(CLI::App& command, QualityOptions& options) {
   std::string presets;
@@ -427,34 +397,10 @@ void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse us
       ->type_name("WxH")
       ->capture_default_str()
       ->group(qualityGroup);
-  command
-      .add_option(
-          "--margin", options.margin,
-          "share of the picture, 0 to 4, for which there are lists beyond each of its edges, as far as "
-          "there is something to see: what turning and moving brings into view when it's zoomed in")
-      ->capture_default_str()
-      ->group(qualityGroup);
-  if (use == QualityUse::One) {
-    command.add_option("--supersegments", options.supersegments, "the most in one list (N_S), 1 to 1024")
-        ->capture_default_str()
-        ->group(qualityGroup);
-    command
-        .add_option("--algorithm", options.algorithm,
-                    "how samples become supersegments: merge, without search; bisection, the paper's search")
-        ->type_name("NAME")
-        ->capture_default_str()
-        ->group(qualityGroup);
-  }
-  addBudgetOptions(command, options);
-  addShadingOptions(command, options);
+  addSettingsOptions(command, options.settings, use);
+  addLightsOption(command, options);
   addRegionOptions(command, options);
   if (use == QualityUse::One) addBlendingOptions(command, options);
-  command
-      .add_option(
-          "--sampling-rate", options.samplesPerVoxel,
-          "samples per voxel, 1/64 to 64; 0: 1, 2 or 4, as the transfer function needs on this volume")
-      ->capture_default_str()
-      ->group(qualityGroup);
   addTransferFunctionOptions(command, options);
 }
 
@@ -469,19 +415,11 @@ void addReconstructionOption(CLI::App& command, std::string& name) {
 }
 
 GenerateSettings makeSettings(const QualityOptions& options) {
-  GenerateSettings settings;
+  GenerateSettings settings = options.settings;
   const std::vector<int> sizes = parseSizes(options.resolution, 2);
   settings.width = sizes[0];
   settings.height = sizes[1];
-  settings.margin = options.margin;
-  settings.supersegments = options.supersegments;
-  settings.budget = budgetFromString(options.budget);
-  settings.fill = options.fill;
-  settings.samplesPerVoxel = options.samplesPerVoxel;
-  settings.algorithm = algorithmFromString(options.algorithm);
-  settings.precision = precisionFromString(options.precision);
-  settings.terminationOpacity = options.terminationOpacity;
-  settings.shading = makeShading(options);
+  if (options.lights == "headlight") settings.shading.lights = {Light{}};
   settings.region = makeRegion(options);
   settings.blending = {blendModeFromString(options.blend), options.isovalues};
   validate(settings);

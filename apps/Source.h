@@ -74,17 +74,8 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene);
 
 struct QualityOptions {
   std::string resolution = "640x360";
-  double margin = GenerateSettings().margin;
-  std::uint32_t supersegments = 25;
-  std::string budget = "list";
-  double fill = 1.0;
-  double samplesPerVoxel = automaticRate;
-  std::string algorithm = "merge";
-  std::string precision = "compact";
-  double terminationOpacity = GenerateSettings().terminationOpacity;
-  bool shade = false;
-  double ambient = Shading().ambient;
-  double diffuse = Shading().diffuse;
+  /// What the table of settings has; the other members hold the rest. makeSettings puts both together.
+  GenerateSettings settings{.samplesPerVoxel = automaticRate};
   std::string lights = "kit";
   std::vector<double> crop;  // 6, or none
   std::vector<double> clip;  // 6 for each plane

@@ -65,7 +65,7 @@ void requireSound(const BenchOptions& options, int ranks) {
       validate(benchSettings(options, algorithm, supersegments));
   }
   apps::QualityOptions quality = options.quality;
-  quality.samplesPerVoxel = options.truthRate;
+  quality.settings.samplesPerVoxel = options.truthRate;
   try {
     (void)apps::makeSettings(quality);
   } catch (const Error& error) {
@@ -194,7 +194,7 @@ void addInputOptions(CLI::App& command, BenchOptions& options) {
       ->group("Volume and ranks");
   apps::addDecompositionOptions(command, options.decomposition);
   apps::addViewOptions(command, options.view);
-  options.quality.samplesPerVoxel = 1.0;  // times refer to one rate, whatever the transfer function
+  options.quality.settings.samplesPerVoxel = 1.0;  // times refer to one rate, whatever the transfer function
   apps::addQualityOptions(command, options.quality, apps::QualityUse::Several);
 }
 

@@ -153,7 +153,7 @@ std::vector<GenerateSettings> allSettings(const BenchOptions& options) {
       for (const double margin : options.margins) {
         BenchOptions own = options;
         own.quality.resolution = resolution;
-        own.quality.margin = margin;
+        own.quality.settings.margin = margin;
         all.push_back(benchSettings(own, options.algorithms.front(), supersegments));
         validate(all.back());
       }

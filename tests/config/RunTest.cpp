@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -14,6 +15,7 @@
 #include "vdi/config/Run.h"
 #include "vdi/config/Schedule.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/core/UnitDistance.h"
 
 using namespace vdi;
@@ -119,6 +121,33 @@ TEST_CASE("the schema's presets are those that there are, and its defaults those
   CHECK(stated.every == implied.every);
   CHECK(stated.existing == implied.existing);
   CHECK(stated.component == implied.component);
+}
+
+TEST_CASE("the schema has the ranges and names of the table of settings") {
+  const json all = schema();
+  for (const Setting& setting : settingsTable()) {
+    INFO(setting.key);
+    const json& part = all.at("properties").at(setting.key);
+    const double standard =
+        setting.key == std::string("sampling_rate") ? automaticRate : setting.get(GenerateSettings());
+    switch (setting.kind) {
+      case Setting::Kind::Flag:
+        CHECK(part.at("type") == "boolean");
+        CHECK(part.at("default") == (standard != 0.0));
+        break;
+      case Setting::Kind::Name:
+        CHECK(part.at("default") == setting.nameOf(standard));
+        CHECK(part.at("enum").size() == static_cast<std::size_t>(setting.high) + 1);
+        for (const std::string name : part.at("enum")) CHECK(setting.nameOf(setting.named(name)) == name);
+        break;
+      default:
+        CHECK(part.at("type") == (setting.kind == Setting::Kind::Count ? "integer" : "number"));
+        CHECK(part.at("default") == standard);
+        CHECK(part.at("maximum") == setting.high);
+        const double least = std::isnan(setting.automatic) ? setting.low : setting.automatic;
+        CHECK(part.at(setting.excludesLow ? "exclusiveMinimum" : "minimum") == least);
+    }
+  }
 }
 
 TEST_CASE("everything at once") {
@@ -227,7 +256,11 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("colors": {"opacities": [[1, 0], [0, 1]]})", "/colors/opacities/1: nodes must ascend");
   refusedField(R"("colors": {"opacities": [[1, 2]]})", "/colors/opacities/0: an opacity");
   refusedField(R"("resolution": [0, 5])", "/resolution/0: must be a whole number from 1 to 32768");
-  refusedField(R"("sampling_rate": 65)", "/sampling_rate: ");
+  refusedField(R"("sampling_rate": 65)", "/sampling_rate: sampling rate must lie in [1/64, 64], or be 0");
+  refusedField(R"("supersegments": 2.5)", "/supersegments: supersegments must be a whole number");
+  refusedField(R"("algorithm": "best")", "/algorithm: no algorithm 'best'; there are merge and bisection");
+  refusedField(R"("fill": 0.5)", "a fill of 0.5 needs the total budget");
+  refusedField(R"("precision": 1)", "/precision: ");
   refusedField(R"("output": "a.vdi")", "/output: must contain {timestep}");
   refusedField(R"("output": "{timestep}.jpg")", "/output: must end in .vdi, .png or .cdb");
   refusedField(R"("output": {})", "/output: must name a file");

@@ -17,6 +17,7 @@
 #include "vdi/core/Margin.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/core/Scene.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/core/Viewpoint.h"
@@ -509,4 +510,23 @@ TEST_CASE("box faces: points are inside exactly where all six say so; an empty b
     CHECK(isInside(box, box.lo + share * box.size()) == (i == 13));
     CHECK(isInside(Box{}, box.lo + share * box.size()));
   }
+}
+
+TEST_CASE("the table of settings: each row has a member of its own, a range and a valid default") {
+  for (const Setting& setting : settingsTable()) {
+    INFO(setting.name);
+    CHECK(&settingOf(setting.property) == &setting);
+    GenerateSettings settings;
+    const double standard = setting.get(settings);
+    CHECK_NOTHROW(setting.check(standard));
+    const double other = standard == setting.high ? std::max(setting.low, 0.5 * setting.high) : setting.high;
+    setting.set(settings, setting.kind == Setting::Kind::Number ? other : std::floor(other));
+    for (const Setting& each : settingsTable())
+      CHECK((each.get(settings) != each.get(GenerateSettings())) == (&each == &setting));
+    for (const double value : {setting.low - 1.0, setting.high + 1.0, std::nan("")}) {
+      if (value != setting.automatic) CHECK_THROWS_AS(setting.set(settings, value), Error);
+    }
+    if (setting.kind != Setting::Kind::Number) CHECK_THROWS_AS(setting.set(settings, 0.5), Error);
+  }
+  CHECK(optionOf(settingOf("TerminationOpacity")) == "--termination-opacity");
 }

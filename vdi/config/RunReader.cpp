@@ -13,6 +13,7 @@
 #include "vdi/config/Json.h"
 #include "vdi/config/Run.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/SettingsTable.h"
 
 namespace vdi::config {
 
@@ -406,6 +407,17 @@ std::optional<RunStream> streamOf(const JsonValue& value) {
   return stream;
 }
 
+double numberOf(const JsonValue& value, const Setting& setting) {
+  switch (setting.kind) {
+    case Setting::Kind::Flag:
+      return value.flag() ? 1.0 : 0.0;
+    case Setting::Kind::Name:
+      return placed(value, [&] { return setting.named(value.text()); });
+    default:
+      return value.number();
+  }
+}
+
 void readSettings(const JsonValue& document, GenerateSettings& settings) {
   settings.samplesPerVoxel = automaticRate;
   ifThere(document, "resolution", [&](const JsonValue& value) {
@@ -414,33 +426,34 @@ void readSettings(const JsonValue& document, GenerateSettings& settings) {
     settings.width = static_cast<int>(sides[0].whole(1, View::maxSide));
     settings.height = static_cast<int>(sides[1].whole(1, View::maxSide));
   });
-  ifThere(document, "supersegments", [&](const JsonValue& value) {
-    settings.supersegments = static_cast<std::uint32_t>(value.whole(1, maxSupersegments));
-  });
-  ifThere(document, "margin",
-          [&](const JsonValue& value) { settings.margin = value.number(0.0, maxMargin); });
-  ifThere(document, "sampling_rate", [&](const JsonValue& value) {
-    settings.samplesPerVoxel = value.number();
-    placed(value, [&] { validate(settings); });
-  });
-  ifThere(document, "shade", [&](const JsonValue& value) { settings.shading.on = value.flag(); });
+  for (const Setting& setting : settingsTable()) {
+    ifThere(document, setting.key, [&](const JsonValue& value) {
+      const double number = numberOf(value, setting);
+      placed(value, [&] { setting.set(settings, number); });
+    });
+  }
+  placed(document, [&] { validate(settings); });
+}
+
+}  // namespace
+
+namespace {
+
+/// Of the whole document.
+std::vector<std::string> documentFields() {
+  std::vector<std::string> fields{"$schema",    "field",         "association", "component", "every",
+                                  "every_time", "every_seconds", "when",        "max_share", "existing",
+                                  "camera",     "cameras",       "orbit",       "colors",    "resolution",
+                                  "output",     "stream",        "log"};
+  for (const Setting& setting : settingsTable()) fields.emplace_back(setting.key);
+  return fields;
 }
 
 }  // namespace
 
 const std::map<std::string, std::vector<std::string>>& runFields() {
   static const std::map<std::string, std::vector<std::string>> fields{
-      {"", {"$schema",       "field",
-            "association",   "component",
-            "every",         "every_time",
-            "every_seconds", "when",
-            "max_share",     "existing",
-            "camera",        "cameras",
-            "orbit",         "colors",
-            "resolution",    "supersegments",
-            "margin",        "sampling_rate",
-            "shade",         "output",
-            "stream",        "log"}},
+      {"", documentFields()},
       {"/when", {"max", "min", "mean", "change", "association", "component", "above", "below"}},
       {"/cameras/*", {"name", "camera", "orbit"}},
       {"/camera", {"position", "focal_point", "view_up", "view_angle", "parallel_scale"}},

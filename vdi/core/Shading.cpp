@@ -33,10 +33,6 @@ std::vector<Light> lightKit() {
 void validate(const Shading& shading) {
   if (!shading.on) return;
   const auto refuse = [](const std::string& what) { throw Error(ErrorCode::InvalidArgument, what); };
-  if (!(shading.ambient >= 0.0 && shading.ambient <= 1.0))
-    refuse(fmt::format("ambient must lie in [0, 1], it is {}", shading.ambient));
-  if (!(shading.diffuse >= 0.0 && shading.diffuse <= 1.0))
-    refuse(fmt::format("diffuse must lie in [0, 1], it is {}", shading.diffuse));
   if (shading.lights.size() > maxLights)
     refuse(fmt::format("at most {} lights can shine on a volume, there are {}", maxLights,
                        shading.lights.size()));

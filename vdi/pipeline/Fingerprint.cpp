@@ -10,6 +10,7 @@
 
 #include "vdi/core/Camera.h"
 #include "vdi/core/GenerateSettings.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/core/TransferFunction.h"
 
 namespace vdi::detail {
@@ -80,33 +81,26 @@ std::uint64_t hashOf(const std::vector<OpacityNode>& nodes) {
 std::vector<comm::Communicator::Fingerprint> fingerprintsOf(const Camera& camera,
                                                             const TransferFunction& function,
                                                             const GenerateSettings& settings) {
-  return {{hashOf(camera.position), "camera position"},
-          {hashOf(camera.focalPoint), "camera focal point"},
-          {hashOf(camera.viewUp), "camera view-up"},
-          {hashOf(camera.viewAngle), "camera view angle"},
-          {hashOf(camera.parallelProjection), "camera parallel projection"},
-          {hashOf(camera.parallelScale), "camera parallel scale"},
-          {hashOf(function.colors), "transfer function's colours"},
-          {hashOf(function.opacities), "transfer function's opacities"},
-          {hashOf(function.unitDistance), "scalar opacity unit distance"},
-          {hashOf(settings.width), "width"},
-          {hashOf(settings.height), "height"},
-          {hashOf(settings.margin), "margin"},
-          {hashOf(settings.supersegments), "supersegments"},
-          {hashOf(settings.budget), "budget"},
-          {hashOf(settings.fill), "fill"},
-          {hashOf(settings.samplesPerVoxel), "sampling rate"},
-          {hashOf(settings.algorithm), "algorithm"},
-          {hashOf(settings.precision), "precision"},
-          {hashOf(settings.terminationOpacity), "termination opacity"},
-          {hashOf(settings.shading.on), "shade"},
-          {hashOf(settings.shading.ambient), "ambient"},
-          {hashOf(settings.shading.diffuse), "diffuse"},
-          {hashOf(settings.shading.lights), "lights"},
-          {hashOf(settings.region.box), "cropping box"},
-          {hashOf(settings.region.planes), "clipping planes"},
-          {hashOf(settings.blending.mode), "blend mode"},
-          {hashOf(std::span<const double>(settings.blending.isovalues)), "isovalues"}};
+  std::vector<comm::Communicator::Fingerprint> fingerprints{
+      {hashOf(camera.position), "camera position"},
+      {hashOf(camera.focalPoint), "camera focal point"},
+      {hashOf(camera.viewUp), "camera view-up"},
+      {hashOf(camera.viewAngle), "camera view angle"},
+      {hashOf(camera.parallelProjection), "camera parallel projection"},
+      {hashOf(camera.parallelScale), "camera parallel scale"},
+      {hashOf(function.colors), "transfer function's colours"},
+      {hashOf(function.opacities), "transfer function's opacities"},
+      {hashOf(function.unitDistance), "scalar opacity unit distance"},
+      {hashOf(settings.width), "width"},
+      {hashOf(settings.height), "height"},
+      {hashOf(settings.shading.lights), "lights"},
+      {hashOf(settings.region.box), "cropping box"},
+      {hashOf(settings.region.planes), "clipping planes"},
+      {hashOf(settings.blending.mode), "blend mode"},
+      {hashOf(std::span<const double>(settings.blending.isovalues)), "isovalues"}};
+  for (const Setting& setting : settingsTable())
+    fingerprints.push_back({hashOf(setting.get(settings)), setting.name});
+  return fingerprints;
 }
 
 }  // namespace vdi::detail

@@ -1,0 +1,181 @@
+#include "vdi/core/SettingsTable.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <type_traits>
+#include <utility>
+
+#include "vdi/core/Error.h"
+
+namespace vdi {
+
+namespace {
+
+using Kind = Setting::Kind;
+
+template <auto Member, auto... Inner>
+auto& memberOf(auto& object) {
+  if constexpr (sizeof...(Inner) == 0)
+    return object.*Member;
+  else
+    return memberOf<Inner...>(object.*Member);
+}
+
+/// A row of the table: a member of GenerateSettings, or of one of its members.
+template <auto... Members>
+constexpr Setting row(Setting setting) {
+  setting.get = [](const GenerateSettings& settings) {
+    return static_cast<double>(memberOf<Members...>(settings));
+  };
+  setting.put = [](GenerateSettings& settings, double value) {
+    auto& member = memberOf<Members...>(settings);
+    member = static_cast<std::remove_reference_t<decltype(member)>>(value);
+  };
+  return setting;
+}
+
+/// The same for an enumeration, with its toString and its ...FromString.
+template <auto Member, auto ToString, auto FromString>
+constexpr Setting namedRow(Setting setting) {
+  using Enum = std::remove_reference_t<decltype(std::declval<GenerateSettings>().*Member)>;
+  setting.kind = Kind::Name;
+  setting.nameOf = [](double value) {
+    return ToString(static_cast<Enum>(static_cast<std::uint32_t>(value)));
+  };
+  setting.named = [](const std::string& name) { return static_cast<double>(FromString(name)); };
+  return row<Member>(setting);
+}
+
+const char* nameOfBudget(Budget budget) {
+  return toString(budget);
+}
+const char* nameOfAlgorithm(Algorithm algorithm) {
+  return toString(algorithm);
+}
+const char* nameOfPrecision(Precision precision) {
+  return toString(precision);
+}
+
+constexpr std::array table{
+    row<&GenerateSettings::margin>(
+        {.name = "margin",
+         .property = "Margin",
+         .key = "margin",
+         .help = "lists beyond each edge of the picture, as a share of its size, 0 to 4. They hold the "
+                 "material that comes into view when a zoomed-in camera turns or moves",
+         .high = maxMargin}),
+    row<&GenerateSettings::supersegments>(
+        {.kind = Kind::Count,
+         .name = "supersegments",
+         .property = "Supersegments",
+         .key = "supersegments",
+         .help = "maximum number of supersegments in a list (N_S), 1 to 1024",
+         .low = 1.0,
+         .high = maxSupersegments}),
+    row<&GenerateSettings::samplesPerVoxel>(
+        {.name = "sampling rate",
+         .property = "SamplingRate",
+         .key = "sampling_rate",
+         .help = "samples per voxel, 1/64 to 64; 0: 1, 2 or 4, as transfer function and volume require",
+         .low = 1.0 / 64.0,
+         .high = 64.0,
+         .automatic = automaticRate}),
+    namedRow<&GenerateSettings::algorithm, nameOfAlgorithm, algorithmFromString>(
+        {.name = "algorithm",
+         .property = "Algorithm",
+         .key = "algorithm",
+         .help = "how samples become supersegments: merge, or bisection, which is the paper's search"}),
+    namedRow<&GenerateSettings::budget, nameOfBudget, budgetFromString>(
+        {.name = "budget",
+         .property = "Budget",
+         .key = "budget",
+         .help = "how lists share supersegments: list, up to N_S each; total, as many in all, but up to "
+                 "twice N_S for a list that needs them and fewer for the others"}),
+    row<&GenerateSettings::fill>(
+        {.name = "fill",
+         .property = "Fill",
+         .key = "fill",
+         .help = "with --budget total: share of these supersegments to make, (0, 1]; with half of them the "
+                 "picture looks nearly the same",
+         .excludesLow = true}),
+    namedRow<&GenerateSettings::precision, nameOfPrecision, precisionFromString>(
+        {.name = "precision",
+         .property = "Precision",
+         .key = "precision",
+         .help = "form of a supersegment: compact, 8 bytes, accurate to 1/255 from the VDI's viewpoint; "
+                 "full, 24 bytes of floats"}),
+    row<&GenerateSettings::terminationOpacity>(
+        {.name = "termination opacity",
+         .property = "TerminationOpacity",
+         .key = "termination_opacity",
+         .help = "opacity at which a ray ends, (0, 1]; the material behind is missing from other "
+                 "viewpoints; 1: rays never end early",
+         .excludesLow = true}),
+    row<&GenerateSettings::shading, &Shading::on>(
+        {.kind = Kind::Flag,
+         .name = "shade",
+         .property = "Shade",
+         .key = "shade",
+         .help = "light the volume by its gradient, seen from the viewpoint; a turned VDI keeps this light"}),
+    row<&GenerateSettings::shading, &Shading::ambient>(
+        {.name = "ambient",
+         .property = "Ambient",
+         .key = "ambient",
+         .help = "with --shade: share of the colour that is visible without light, 0 to 1"}),
+    row<&GenerateSettings::shading, &Shading::diffuse>(
+        {.name = "diffuse",
+         .property = "Diffuse",
+         .key = "diffuse",
+         .help = "with --shade: share of the light that the material reflects, 0 to 1"}),
+};
+
+}  // namespace
+
+std::string Setting::text(double value) const {
+  return kind == Kind::Name ? nameOf(value) : fmt::format("{:g}", value);
+}
+
+void Setting::check(double value) const {
+  if (value == automatic) return;
+  const auto refuse = [&](const std::string& rule) {
+    throw Error(ErrorCode::InvalidArgument, fmt::format("{} must {}, it is {}", name, rule, value));
+  };
+  if (!((excludesLow ? value > low : value >= low) && value <= high)) {
+    const auto number = [](double end) {
+      return end > 0.0 && end < 1.0 ? fmt::format("1/{:g}", 1.0 / end) : fmt::format("{:g}", end);
+    };
+    std::string range = fmt::format("lie in {}{}, {}]", excludesLow ? "(" : "[", number(low), number(high));
+    if (!std::isnan(automatic)) range += fmt::format(", or be {:g} for automatic", automatic);
+    refuse(range);
+  }
+  if (kind != Kind::Number && value != std::floor(value)) refuse("be a whole number");
+}
+
+void Setting::set(GenerateSettings& settings, double value) const {
+  check(value);
+  put(settings, value);
+}
+
+std::span<const Setting> settingsTable() {
+  return table;
+}
+
+const Setting& settingOf(const std::string& property) {
+  const auto found =
+      std::ranges::find_if(table, [&](const Setting& setting) { return setting.property == property; });
+  assert(found != table.end());
+  return *found;
+}
+
+std::string optionOf(const Setting& setting) {
+  std::string option = std::string("--") + setting.key;
+  std::ranges::replace(option, '_', '-');
+  return option;
+}
+
+}  // namespace vdi

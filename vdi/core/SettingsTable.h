@@ -1,0 +1,50 @@
+// The table of settings: what is the same for each of them is written once, and reads this table. Checks,
+// the comparison between ranks, the options of the tool, the keys of JSON runs, and the properties of
+// ParaView's filter come from it.
+#pragma once
+
+#include <limits>
+#include <span>
+#include <string>
+
+#include "vdi/core/GenerateSettings.h"
+
+namespace vdi {
+
+/// A setting that is one number, one of several names, or a flag, as a double: an enumerator's value, 0 or 1.
+/// The picture's size, the region, the lights and the isovalues are not in the table.
+struct Setting {
+  enum class Kind { Number, Count, Name, Flag };
+
+  Kind kind = Kind::Number;
+  const char* name = "";      // in messages: "termination opacity"
+  const char* property = "";  // of ParaView's filter: "TerminationOpacity"
+  const char* key = "";       // of JSON runs: "termination_opacity"
+  const char* help = "";      // of the tool's option, whose name is optionOf(*this)
+  double low = 0.0;           // the range, [low, high]
+  double high = 1.0;
+  bool excludesLow = false;                                     // (low, high]
+  double automatic = std::numeric_limits<double>::quiet_NaN();  // a value beside the range, or none
+  /// Of Kind::Name: the name of an enumerator in [0, high], and the enumerator of a name. The latter throws
+  /// Error{InvalidArgument} that lists the valid names.
+  const char* (*nameOf)(double) = nullptr;
+  double (*named)(const std::string&) = nullptr;
+
+  double (*get)(const GenerateSettings&) = nullptr;
+  void (*put)(GenerateSettings&, double) = nullptr;
+
+  /// "0.5" or "merge".
+  std::string text(double value) const;
+  /// Throws Error{InvalidArgument} that names the setting, the value and the range.
+  void check(double value) const;
+  /// `put`, after the check.
+  void set(GenerateSettings& settings, double value) const;
+};
+
+std::span<const Setting> settingsTable();
+/// By its property's name, which must be in the table.
+const Setting& settingOf(const std::string& property);
+/// "--termination-opacity"
+std::string optionOf(const Setting& setting);
+
+}  // namespace vdi
