@@ -2,13 +2,19 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <poll.h>
+
+#include <chrono>
 #include <filesystem>
+#include <optional>
 #include <set>
 
 #include "apps/Cameras.h"
 #include "apps/Commands.h"
+#include "apps/FolderWatch.h"
 #include "apps/OutputFiles.h"
 #include "apps/Source.h"
+#include "vdi/core/Error.h"
 #include "vdi/core/Viewpoint.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
@@ -27,6 +33,8 @@ struct RenderOptions {
   std::string resolution;
   std::string reconstruction = toString(defaultReconstruction);
   std::vector<double> clip;  // 6 for each plane
+  bool follows = false;      // `input` is a folder
+  std::uint64_t frames = 0;  // with it: the number of VDIs to render; 0: no end
 };
 
 /// The path of an azimuth's picture; with several azimuths, the degrees are added to its name.
@@ -35,30 +43,92 @@ std::filesystem::path pictureOf(const RenderOptions& options, double azimuth) {
   return withSuffix(options.output, fmt::format("{:g}deg", azimuth));
 }
 
-void render(const RenderOptions& options) {
+void requirePictures(const RenderOptions& options) {
   std::vector<NamedFile> outputs;
   for (const double azimuth : options.azimuths)
     outputs.push_back({fmt::format("the picture of {} degrees", azimuth), pictureOf(options, azimuth)});
   requireOutputs(outputs, {{"the VDI", options.input}, {"--camera", options.camera.file}});
-  const Vdi vdi = io::readVdi(options.input);
-  const glm::ivec2 picture = vdi.pictureSize();
-  const std::vector<int> size =
-      options.resolution.empty() ? std::vector<int>{picture.x, picture.y} : parseSizes(options.resolution, 2);
-  const Reconstruction reconstruction = reconstructionFromString(options.reconstruction);
-  VdiRenderer renderer(gpu::Device::create(gpu::requestFromEnvironment(0)));
-  renderer.setVdi(vdi);
-  renderer.setClipPlanes(makeClipPlanes(options.clip));
-  const Camera start = chosenCamera(options.camera, vdi.camera);
-  std::set<ViewpointIssue> warned;
-  for (const double azimuth : options.azimuths) {
-    const Camera camera = turned(start, azimuth, options.elevation);
-    const auto issue = viewpointIssue(vdi.bounds, vdi.view(), View(camera, size[0], size[1]));
-    if (issue && warned.insert(*issue).second)
-      fmt::print(stderr, "vdi: warning, at {} degrees: {}\n", azimuth, describe(*issue));
-    const std::filesystem::path path = pictureOf(options, azimuth);
-    io::writePng(path, io::toPicture(renderer.renderBytes(camera, size[0], size[1], Alpha::Premultiplied,
-                                                          reconstruction)));
-    fmt::print("{}: {:.2f} ms on the device\n", path.string(), renderer.renderMilliseconds());
+}
+
+/// Renders VDIs, one after the other, to the same pictures.
+class Painter {
+ public:
+  explicit Painter(const RenderOptions& options)
+      : options_(options),
+        reconstruction_(reconstructionFromString(options.reconstruction)),
+        renderer_(gpu::Device::create(gpu::requestFromEnvironment(0))) {
+    renderer_.setClipPlanes(makeClipPlanes(options.clip));
+  }
+
+  void paint(const Vdi& vdi) {
+    const glm::ivec2 picture = vdi.pictureSize();
+    const std::vector<int> size = options_.resolution.empty() ? std::vector<int>{picture.x, picture.y}
+                                                              : parseSizes(options_.resolution, 2);
+    renderer_.setVdi(vdi);
+    const Camera start = chosenCamera(options_.camera, vdi.camera);
+    for (const double azimuth : options_.azimuths) {
+      const Camera camera = turned(start, azimuth, options_.elevation);
+      const auto issue = viewpointIssue(vdi.bounds, vdi.view(), View(camera, size[0], size[1]));
+      if (issue && warned_.insert(*issue).second)
+        fmt::print(stderr, "vdi: warning, at {} degrees: {}\n", azimuth, describe(*issue));
+      const std::filesystem::path path = pictureOf(options_, azimuth);
+      io::writePng(path, io::toPicture(renderer_.renderBytes(camera, size[0], size[1], Alpha::Premultiplied,
+                                                             reconstruction_)));
+      fmt::print("{}: {:.2f} ms on the device\n", path.string(), renderer_.renderMilliseconds());
+    }
+  }
+
+ private:
+  const RenderOptions& options_;
+  Reconstruction reconstruction_;
+  VdiRenderer renderer_;
+  std::set<ViewpointIssue> warned_;
+};
+
+/// Waits for changes of a folder, whose file system may not report them.
+void awaitChange(const FolderWatch& watch) {
+  constexpr std::chrono::milliseconds interval(250);
+  pollfd descriptor{watch.descriptor(), POLLIN, 0};
+  (void)::poll(&descriptor, 1, static_cast<int>(interval.count()));
+}
+
+/// The last complete VDI of some files. A file that is still being written is found again when it changes.
+std::optional<Vdi> newestOf(const std::vector<std::filesystem::path>& files) {
+  for (auto file = files.rbegin(); file != files.rend(); ++file) {
+    try {
+      Vdi vdi = io::readVdi(*file);
+      fmt::print("{}\n", file->string());
+      return vdi;
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::Io && error.code() != ErrorCode::Format) throw;
+      fmt::print(stderr, "vdi: {}; skipped for now\n", error.what());
+    }
+  }
+  return std::nullopt;
+}
+
+/// Keeps the pictures up to date with the newest VDI of a folder.
+void follow(const RenderOptions& options) {
+  FolderWatch watch(options.input);
+  Painter painter(options);
+  for (std::uint64_t done = 0; options.frames == 0 || done < options.frames;) {
+    const std::optional<Vdi> newest = newestOf(watch.changed());
+    if (newest) {
+      painter.paint(*newest);
+      ++done;
+      (void)std::fflush(stdout);  // others may read along
+    } else {
+      awaitChange(watch);
+    }
+  }
+}
+
+void render(const RenderOptions& options) {
+  requirePictures(options);
+  if (options.follows) {
+    follow(options);
+  } else {
+    Painter(options).paint(io::readVdi(options.input));
   }
 }
 
@@ -69,9 +139,13 @@ void addRender(CLI::App& app, Job& job) {
   command->footer(
       "Example:\n"
       "  vdi render coil.vdi -o coil.png --azimuth 0 5 20 50\n"
-      "writes coil_0deg.png, coil_5deg.png, coil_20deg.png and coil_50deg.png.");
+      "writes coil_0deg.png, coil_5deg.png, coil_20deg.png and coil_50deg.png.\n"
+      "  vdi render --follow results/ -o now.png\n"
+      "keeps a picture of the newest VDI in results/ while a simulation writes there.");
   const auto options = std::make_shared<RenderOptions>();
-  command->add_option("input", options->input, "the .vdi file")->type_name("")->required();
+  command->add_option("input", options->input, "the .vdi file; with --follow, a folder")
+      ->type_name("")
+      ->required();
   command
       ->add_option("-o,--output", options->output,
                    "PNG; with several azimuths their degrees are added to its name")
@@ -92,6 +166,11 @@ void addRender(CLI::App& app, Job& job) {
       ->group("Viewpoint");
   addReconstructionOption(*command, options->reconstruction);
   addClipOption(*command, options->clip, "Viewpoint");
+  CLI::Option* follows = command->add_flag(
+      "--follow", options->follows,
+      "render the newest VDI of a folder again and again, as files appear; Ctrl+C ends that");
+  command->add_option("--frames", options->frames, "with --follow: end after so many VDIs; default: 0, never")
+      ->needs(follows);
   command->callback([options, &job] { job = {[options](const comm::Communicator&) { render(*options); }}; });
 }
 

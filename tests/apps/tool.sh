@@ -315,6 +315,25 @@ refused 2 "would write over" "$vdi" log odd.json -o odd.json
 mkfifo pipe.json
 refused 1 "pipe.json" timeout 10 "$vdi" check pipe.json
 refused 1 "none.json" "$vdi" check '{"field": "V", "colors": {"file": "none.json"}}'
+
+mkdir -p follow
+head -c 200 one.vdi >follow/vdi_000001.vdi  # still being written
+timeout 60 "$vdi" render --follow follow -o now.png --azimuth 10 --frames 2 >follow.txt 2>follow_err.txt &
+follower=$!
+sleep 1
+[ ! -e now.png ] || fail "a file that is still being written is shown"
+cp one.vdi follow/vdi_000001.vdi
+for _ in $(seq 100); do [ -e now.png ] && break; sleep 0.1; done
+cp now.png first.png || fail "no picture of the first VDI in a followed folder"
+cp need.vdi follow/.part && mv follow/.part follow/vdi_000002.vdi
+wait $follower || { fail "render --follow: status $?"; cat follow.txt follow_err.txt; }
+works "render one" "$vdi" render one.vdi -o expected.png --azimuth 10
+cmp -s first.png expected.png || fail "the first picture of a followed folder isn't its VDI's"
+works "render need" "$vdi" render need.vdi -o expected.png --azimuth 10
+cmp -s now.png expected.png || fail "the last picture of a followed folder isn't the newest VDI's"
+refused 1 "nowhere" "$vdi" render --follow nowhere -o now.png
+refused 2 "follow" "$vdi" render one.vdi -o now.png --frames 2
+
 refused 2 "nonsense" "$vdi" generate --field nonsense -o x.vdi
 refused 2 "supersegments" "$vdi" generate --field sphere --supersegments 0 -o x.vdi
 refused 2 "0x5" "$vdi" generate --field sphere --resolution 0x5 -o x.vdi
