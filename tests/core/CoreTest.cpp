@@ -1,10 +1,16 @@
 // Camera, sample lattice, transfer tables, blocks and the checks of a VDI.
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <random>
+#include <regex>
+#include <string>
 #include <vector>
 
 #include "tests/Catch.h"
@@ -515,7 +521,7 @@ TEST_CASE("box faces: points are inside exactly where all six say so; an empty b
 TEST_CASE("the table of settings: each row has a member of its own, a range and a valid default") {
   for (const Setting& setting : settingsTable()) {
     INFO(setting.name);
-    CHECK(&settingOf(setting.property) == &setting);
+    CHECK(&settingsTable()[indexOfSetting(setting.property)] == &setting);
     GenerateSettings settings;
     const double standard = setting.get(settings);
     CHECK_NOTHROW(setting.check(standard));
@@ -528,5 +534,47 @@ TEST_CASE("the table of settings: each row has a member of its own, a range and 
     }
     if (setting.kind != Setting::Kind::Number) CHECK_THROWS_AS(setting.set(settings, 0.5), Error);
   }
-  CHECK(optionOf(settingOf("TerminationOpacity")) == "--termination-opacity");
+  CHECK(optionOf(settingsTable()[indexOfSetting("TerminationOpacity")]) == "--termination-opacity");
+}
+
+namespace {
+
+/// An attribute of an XML element's beginning; nothing if there is none.
+std::optional<std::string> attributeOf(const std::string& element, const std::string& name) {
+  std::smatch found;
+  if (!std::regex_search(element, found, std::regex("\\s" + name + "=\"([^\"]*)\""))) return std::nullopt;
+  return found[1];
+}
+
+}  // namespace
+
+TEST_CASE("the filter's properties have the ranges, names and defaults of the table of settings") {
+  std::ifstream file(VDI_FILTER_XML);
+  std::string xml{std::istreambuf_iterator<char>(file), {}};
+  xml = xml.substr(xml.find("<VDIGeneratorProxy name=\"VolumetricDepthImage\""));
+  GenerateSettings standard;
+  standard.samplesPerVoxel = automaticRate;
+  for (const Setting& setting : settingsTable()) {
+    INFO(setting.property);
+    const std::size_t begin = xml.find("VectorProperty name=\"" + std::string(setting.property) + "\"");
+    REQUIRE(begin != std::string::npos);
+    const std::string property = xml.substr(begin, xml.find("VectorProperty>", begin) - begin);
+    CHECK(attributeOf(property, "command") == "Set" + std::string(setting.property));
+    CHECK(std::stod(attributeOf(property, "default_values").value()) == setting.get(standard));
+    if (setting.kind == Setting::Kind::Flag) {
+      CHECK(property.find("<BooleanDomain") != std::string::npos);
+    } else if (setting.kind == Setting::Kind::Name) {
+      for (int value = 0; value <= static_cast<int>(setting.high); ++value) {
+        std::string name = setting.nameOf(value);
+        name[0] = static_cast<char>(std::toupper(name[0]));
+        CHECK(property.find("<Entry text=\"" + name + "\" value=\"" + std::to_string(value) + "\"") !=
+              std::string::npos);
+      }
+    } else {
+      // A panel may offer less.
+      const std::string domain = property.substr(property.find("Domain"));
+      CHECK_NOTHROW(setting.check(std::stod(attributeOf(domain, "min").value())));
+      CHECK_NOTHROW(setting.check(std::stod(attributeOf(domain, "max").value())));
+    }
+  }
 }

@@ -55,26 +55,27 @@ check("generate" in image.SMProxy.GetProperty("Report").GetElement(0), "the repo
 def last_vdi(proxy):
     """What the panel's estimate goes by."""
     proxy.SMProxy.UpdatePropertyInformation()
-    return [proxy.SMProxy.GetProperty("LastVdi").GetElement(i) for i in range(13)]
+    return [proxy.SMProxy.GetProperty("LastVdi").GetElement(i) for i in range(17)]
 
 
 # What estimates of the next VDI go by.
 last = last_vdi(image)
 fields = image.GetClientSideObject().GetOutputDataObject(0).GetFieldData()
 segments = fields.GetArray("VDI.codes").GetNumberOfTuples()
-check(last[:6] == [120, 90, 0, 25, 0, 1] and last[7:11] == [1, 1, 120 * 90, segments] and last[6] in (1, 2, 4),
+check(last[:4] == [120, 90, 0, 25] and last[4] in (1, 2, 4) and last[5:13] == [1, 0, 1, 1, 1, 0, 0, 1] and
+      last[13:15] == [120 * 90, segments],
       "the last VDI's numbers are those of its settings and lists: {}".format(last))
-check(last[11] > 0 and last[12] >= 0, "and what it took")
+check(last[15] > 0 and last[16] >= 0, "and what it took")
 image.Resolution, image.Margin, image.Precision = [240, 180], 0.25, 0
 image.UpdatePipeline()
 larger = last_vdi(image)
 check(larger[0:3] == [240, 180, 0.25] and larger[8] == 0, "and those of the next one")
-growth = larger[9] / last[9]
-check(growth >= 4 and abs(larger[10] / last[10] / growth - 1) < 0.1,
-      "supersegments grow with lists: {:.2f} times as many in {:.2f}".format(larger[10] / last[10], growth))
+growth = larger[13] / last[13]
+check(growth >= 4 and abs(larger[14] / last[14] / growth - 1) < 0.1,
+      "supersegments grow with lists: {:.2f} times as many in {:.2f}".format(larger[14] / last[14], growth))
 image.Resolution, image.Margin, image.Precision = [120, 90], 0, 1
 image.UpdatePipeline()
-check(last_vdi(simple.VolumetricDepthImage(Input=wavelet)) == [0] * 13, "without a VDI there is nothing to go by")
+check(last_vdi(simple.VolumetricDepthImage(Input=wavelet)) == [0] * 17, "without a VDI there is nothing to go by")
 
 # Saved, read again, rendered: the same.
 path = os.path.join(OUTPUT, "wavelet.vdi")

@@ -7,6 +7,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -34,7 +35,10 @@ constexpr Setting row(Setting setting) {
   };
   setting.put = [](GenerateSettings& settings, double value) {
     auto& member = memberOf<Members...>(settings);
-    member = static_cast<std::remove_reference_t<decltype(member)>>(value);
+    using Member = std::remove_reference_t<decltype(member)>;
+    if constexpr (!std::is_same_v<Member, double>)  // bool, std::uint32_t and enumerations of that
+      value = value > 0.0 ? std::min(value, 1.0 * std::numeric_limits<std::uint32_t>::max()) : 0.0;
+    member = static_cast<Member>(value);
   };
   return setting;
 }
@@ -161,15 +165,15 @@ void Setting::set(GenerateSettings& settings, double value) const {
   put(settings, value);
 }
 
-std::span<const Setting> settingsTable() {
+std::span<const Setting, settingCount> settingsTable() {
   return table;
 }
 
-const Setting& settingOf(const std::string& property) {
+std::size_t indexOfSetting(std::string_view property) {
   const auto found =
       std::ranges::find_if(table, [&](const Setting& setting) { return setting.property == property; });
   assert(found != table.end());
-  return *found;
+  return static_cast<std::size_t>(found - table.begin());
 }
 
 std::string optionOf(const Setting& setting) {

@@ -3,9 +3,11 @@
 // ParaView's filter come from it.
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "vdi/core/GenerateSettings.h"
 
@@ -31,6 +33,7 @@ struct Setting {
   double (*named)(const std::string&) = nullptr;
 
   double (*get)(const GenerateSettings&) = nullptr;
+  /// A value beyond what the member's type holds becomes the nearest one that it does.
   void (*put)(GenerateSettings&, double) = nullptr;
 
   /// "0.5" or "merge".
@@ -41,9 +44,10 @@ struct Setting {
   void set(GenerateSettings& settings, double value) const;
 };
 
-std::span<const Setting> settingsTable();
+inline constexpr std::size_t settingCount = 11;
+std::span<const Setting, settingCount> settingsTable();
 /// By its property's name, which must be in the table.
-const Setting& settingOf(const std::string& property);
+std::size_t indexOfSetting(std::string_view property);
 /// "--termination-opacity"
 std::string optionOf(const Setting& setting);
 

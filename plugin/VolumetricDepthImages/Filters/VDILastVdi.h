@@ -4,50 +4,39 @@
 #define VDILastVdi_h
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
 #include "vdi/core/Estimate.h"
+#include "vdi/core/SettingsTable.h"
 
 namespace pv {
 
 /// All 0 where there is none.
-using LastVdiNumbers = std::array<double, 13>;
+using LastVdiNumbers = std::array<double, vdi::settingCount + 6>;
 
 inline LastVdiNumbers numbersOf(const vdi::MadeVdi& made) {
-  const vdi::GenerateSettings& settings = made.settings;
-  return {1.0 * settings.width,
-          1.0 * settings.height,
-          settings.margin,
-          1.0 * settings.supersegments,
-          static_cast<double>(settings.budget),
-          settings.fill,
-          settings.samplesPerVoxel,
-          static_cast<double>(settings.algorithm),
-          static_cast<double>(settings.precision),
-          static_cast<double>(made.lists),
-          static_cast<double>(made.supersegments),
-          made.castSeconds,
-          made.listSeconds};
+  LastVdiNumbers numbers{1.0 * made.settings.width, 1.0 * made.settings.height};
+  std::size_t i = 2;
+  for (const vdi::Setting& setting : vdi::settingsTable()) numbers[i++] = setting.get(made.settings);
+  numbers[i++] = static_cast<double>(made.lists);
+  numbers[i++] = static_cast<double>(made.supersegments);
+  numbers[i++] = made.castSeconds;
+  numbers[i] = made.listSeconds;
+  return numbers;
 }
 
 inline std::optional<vdi::MadeVdi> lastVdiOf(const LastVdiNumbers& numbers) {
-  const auto count = [&](std::size_t i) { return static_cast<std::uint64_t>(numbers[i]); };
   vdi::MadeVdi made;
-  vdi::GenerateSettings& settings = made.settings;
-  settings.width = static_cast<int>(numbers[0]);
-  settings.height = static_cast<int>(numbers[1]);
-  settings.margin = numbers[2];
-  settings.supersegments = static_cast<std::uint32_t>(numbers[3]);
-  settings.budget = static_cast<vdi::Budget>(count(4));
-  settings.fill = numbers[5];
-  settings.samplesPerVoxel = numbers[6];
-  settings.algorithm = static_cast<vdi::Algorithm>(count(7));
-  settings.precision = static_cast<vdi::Precision>(count(8));
-  made.lists = count(9);
-  made.supersegments = count(10);
-  made.castSeconds = numbers[11];
-  made.listSeconds = numbers[12];
+  made.settings.width = static_cast<int>(numbers[0]);
+  made.settings.height = static_cast<int>(numbers[1]);
+  std::size_t i = 2;
+  for (const vdi::Setting& setting : vdi::settingsTable()) setting.put(made.settings, numbers[i++]);
+  made.lists = static_cast<std::uint64_t>(numbers[i++]);
+  made.supersegments = static_cast<std::uint64_t>(numbers[i++]);
+  made.castSeconds = numbers[i++];
+  made.listSeconds = numbers[i];
   if (made.lists == 0) return std::nullopt;
   return made;
 }

@@ -42,6 +42,7 @@
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Estimate.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/core/Viewpoint.h"
 
 namespace {
@@ -418,13 +419,7 @@ std::optional<vdi::VdiEstimate> vtkSMVDIGeneratorProxy::EstimateToCome() {
     settings.width = size[0];
     settings.height = size[1];
   }
-  settings.margin = number("Margin");
-  settings.supersegments = static_cast<std::uint32_t>(std::max(number("Supersegments"), 0.0));
-  settings.samplesPerVoxel = number("SamplingRate");
-  settings.algorithm = static_cast<vdi::Algorithm>(static_cast<int>(number("Algorithm")));
-  settings.budget = static_cast<vdi::Budget>(static_cast<int>(number("Budget")));
-  settings.fill = number("Fill");
-  settings.precision = static_cast<vdi::Precision>(static_cast<int>(number("Precision")));
+  for (const vdi::Setting& setting : vdi::settingsTable()) setting.put(settings, number(setting.property));
   this->UpdatePropertyInformation(this->GetProperty("LastVdi"));
   pv::LastVdiNumbers last{};
   vtkSMPropertyHelper(this, "LastVdi").Get(last.data(), static_cast<unsigned int>(last.size()));

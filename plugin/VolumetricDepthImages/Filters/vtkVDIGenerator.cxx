@@ -45,6 +45,7 @@
 #include "vdi/core/Blending.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Scene.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/core/UnitDistance.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vtkVDIImageData.h"
@@ -146,6 +147,8 @@ vtkVDIGenerator::vtkVDIGenerator()
     : Internal(new Internals), Controller(vtkMultiProcessController::GetGlobalController()) {
   this->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS,
                                vtkDataSetAttributes::SCALARS);
+  for (const vdi::Setting& setting : vdi::settingsTable())
+    this->Settings.push_back(setting.get({.samplesPerVoxel = vdi::automaticRate}));
 }
 
 vtkVDIGenerator::~vtkVDIGenerator() {
@@ -170,19 +173,12 @@ void vtkVDIGenerator::SetReport(const char* text) {
 
 void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);
-  os << indent << "Resolution: " << this->Resolution[0] << " x " << this->Resolution[1] << "\n"
-     << indent << "Margin: " << this->Margin << "\n"
-     << indent << "Supersegments: " << this->Supersegments << "\n"
-     << indent << "SamplingRate: " << this->SamplingRate << "\n"
-     << indent << "Algorithm: " << this->Algorithm << "\n"
-     << indent << "Budget: " << this->Budget << "\n"
-     << indent << "Fill: " << this->Fill << "\n"
-     << indent << "Precision: " << this->Precision << "\n"
-     << indent << "TerminationOpacity: " << this->TerminationOpacity << "\n"
-     << indent << "Shade: " << this->Shade << "\n"
-     << indent << "Ambient: " << this->Ambient << "\n"
-     << indent << "Diffuse: " << this->Diffuse << "\n"
-     << indent << "Lights: " << this->Lights.size() << "\n"
+  os << indent << "Resolution: " << this->Resolution[0] << " x " << this->Resolution[1] << "\n";
+  for (std::size_t i = 0; i < this->Settings.size(); ++i) {
+    const vdi::Setting& setting = vdi::settingsTable()[i];
+    os << indent << setting.property << ": " << this->Settings[i] << "\n";
+  }
+  os << indent << "Lights: " << this->Lights.size() << "\n"
      << indent << "Cropping: " << this->Cropping << "\n"
      << indent << "CroppingBox: " << fmt::format("{}", fmt::join(this->CroppingBox, " ")) << "\n"
      << indent << "ClippingPlanes: " << this->ClippingPlanes.size() << "\n"
@@ -258,15 +254,15 @@ vdi::Region vtkVDIGenerator::CurrentRegion() const {
   return region;
 }
 
-vdi::Shading vtkVDIGenerator::CurrentShading() const {
-  vdi::Shading shading;
-  shading.on = this->Shade;
-  shading.ambient = this->Ambient;
-  shading.diffuse = this->Diffuse;
-  if (!this->Lights.empty()) shading.lights.clear();
-  for (const std::array<double, 6>& light : this->Lights)
-    shading.lights.push_back({{light[0], light[1], light[2]}, {light[3], light[4], light[5]}});
-  return shading;
+void vtkVDIGenerator::SetSetting(const char* property, double value) {
+  double& setting = this->Settings[vdi::indexOfSetting(property)];
+  if (setting == value) return;
+  setting = value;
+  this->Modified();
+}
+
+double vtkVDIGenerator::GetSetting(const char* property) const {
+  return this->Settings[vdi::indexOfSetting(property)];
 }
 
 void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
@@ -761,19 +757,15 @@ vdi::GenerateSettings vtkVDIGenerator::CurrentSettings() const {
   const auto [width, height] = this->PictureSize();
   settings.width = width;
   settings.height = height;
-  settings.margin = this->Margin;
-  settings.supersegments = static_cast<std::uint32_t>(std::max(this->Supersegments, 0));
-  settings.samplesPerVoxel = this->SamplingRate;
-  settings.algorithm = static_cast<vdi::Algorithm>(this->Algorithm);
-  settings.budget = static_cast<vdi::Budget>(this->Budget);
-  settings.fill = this->Fill;
-  settings.precision = static_cast<vdi::Precision>(this->Precision);
-  settings.shading = this->CurrentShading();
+  for (std::size_t i = 0; i < this->Settings.size(); ++i)
+    vdi::settingsTable()[i].put(settings, this->Settings[i]);
+  if (!this->Lights.empty()) settings.shading.lights.clear();
+  for (const std::array<double, 6>& light : this->Lights)
+    settings.shading.lights.push_back({{light[0], light[1], light[2]}, {light[3], light[4], light[5]}});
   settings.region = this->CurrentRegion();
   settings.blending = this->CurrentBlending();
-  settings.terminationOpacity = this->PictureOnly
-                                    ? std::min(this->TerminationOpacity, vdi::pictureTermination)
-                                    : this->TerminationOpacity;
+  if (this->PictureOnly)
+    settings.terminationOpacity = std::min(settings.terminationOpacity, vdi::pictureTermination);
   return settings;
 }
 

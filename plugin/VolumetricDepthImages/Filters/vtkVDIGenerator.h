@@ -63,37 +63,31 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkSetMacro(Component, int);
   /// Lists of the VDI's picture: columns and rows. 0 0 (default): 1280 x 720.
   vtkSetVector2Macro(Resolution, int);
-  /// Share of the picture for which there are lists beyond each of its edges, as far as there's something to
-  /// see: vdi::GenerateSettings::margin.
-  vtkSetClampMacro(Margin, double, 0.0, 4.0);
-  vtkGetMacro(Margin, double);
-  /// N_S, the most supersegments in a list.
-  vtkSetMacro(Supersegments, int);
-  /// Samples per voxel.
-  vtkSetMacro(SamplingRate, double);
-  /// Who gets supersegments, an enumerator of vdi::Budget: 0 (default) each list up to Supersegments, 1 as
-  /// many in all, but lists what they need. Fill, in (0, 1]: with the latter, share of them that's made.
-  vtkSetClampMacro(Budget, int, 0, 1);
-  vtkGetMacro(Budget, int);
-  vtkSetClampMacro(Fill, double, 0.01, 1.0);
-  vtkGetMacro(Fill, double);
-  /// What a supersegment takes, an enumerator of vdi::Precision: 1 compact (8 bytes), 0 full (24).
-  vtkSetClampMacro(Precision, int, 0, 1);
-  vtkGetMacro(Precision, int);
-  /// A ray ends once it has accumulated this opacity; 1: never.
-  vtkSetClampMacro(TerminationOpacity, double, 0.01, 1.0);
-  vtkGetMacro(TerminationOpacity, double);
   ///@{
   /**
-   * Shading by gradients, as ParaView's volume representation has it: vdi::Shading. Off by default. Lights
-   * move with the viewpoint; none: ParaView's light kit as a new view has it.
+   * The settings of vdi/core/SettingsTable.h, which has their ranges and defaults. Names are enumerators:
+   * vdi::Algorithm, vdi::Budget and vdi::Precision. A value out of range fails the next update.
    */
-  vtkSetMacro(Shade, bool);
-  vtkGetMacro(Shade, bool);
-  vtkSetClampMacro(Ambient, double, 0.0, 1.0);
-  vtkGetMacro(Ambient, double);
-  vtkSetClampMacro(Diffuse, double, 0.0, 1.0);
-  vtkGetMacro(Diffuse, double);
+  void SetMargin(double share) { this->SetSetting("Margin", share); }
+  void SetSupersegments(int most) { this->SetSetting("Supersegments", most); }
+  void SetSamplingRate(double samples) { this->SetSetting("SamplingRate", samples); }
+  void SetAlgorithm(int algorithm) { this->SetSetting("Algorithm", algorithm); }
+  void SetBudget(int budget) { this->SetSetting("Budget", budget); }
+  void SetFill(double share) { this->SetSetting("Fill", share); }
+  void SetPrecision(int precision) { this->SetSetting("Precision", precision); }
+  void SetTerminationOpacity(double opacity) { this->SetSetting("TerminationOpacity", opacity); }
+  void SetShade(bool shade) { this->SetSetting("Shade", shade ? 1.0 : 0.0); }
+  void SetAmbient(double share) { this->SetSetting("Ambient", share); }
+  void SetDiffuse(double share) { this->SetSetting("Diffuse", share); }
+  /// By one of these names, which must be in the table.
+  void SetSetting(const char* property, double value);
+  double GetSetting(const char* property) const;
+  ///@}
+  ///@{
+  /**
+   * The lights of Shade, at most 8, which move with the viewpoint; none: ParaView's light kit as a new view
+   * has it.
+   */
   /// Its direction in the camera's axes and its colour: vdi::Light.
   void AddLight(double right, double up, double back, double red, double green, double blue);
   void RemoveAllLights();
@@ -122,8 +116,6 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void AddIsosurfaceValue(double value);
   void RemoveAllIsosurfaceValues();
   ///@}
-  /// How samples become supersegments, an enumerator of vdi::Algorithm: 1 merge, 0 bisection.
-  vtkSetClampMacro(Algorithm, int, 0, 1);
   /// Exchange ghost layers where blocks lack them.
   vtkSetMacro(FillGhosts, bool);
 
@@ -152,7 +144,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   /// Time and memory of the last frame, a line per rank; empty on ranks other than 0.
   vtkGetStringMacro(Report);
   /// What the last VDI was and took, as pv::numbersOf gives it; all 0 without one, and on ranks other than 0.
-  vtkGetVectorMacro(LastVdi, double, 13);
+  vtkGetVectorMacro(LastVdi, double, 17);
 
   ///@{
   /**
@@ -225,7 +217,6 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vdi::ScalarRange StandInRange();
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
   Frame CurrentFrame(const vdi::Box& bounds, double voxelVolume, const vdi::ScalarRange& range);
-  vdi::Shading CurrentShading() const;
   vdi::Region CurrentRegion() const;
   vdi::Blending CurrentBlending() const;
   vtkMTimeType CurrentMTime();
@@ -249,17 +240,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   double ScalarOpacityUnitDistance = 0.0;
   int Component = -1;
   int Resolution[2] = {0, 0};
-  double Margin = 0.0;
-  int Supersegments = 25;
-  double SamplingRate = 0.0;
-  int Algorithm = 1;
-  int Budget = 0;
-  double Fill = 1.0;
-  int Precision = 1;
-  double TerminationOpacity = 1.0;
-  bool Shade = false;
-  double Ambient = 0.0;
-  double Diffuse = 1.0;
+  std::vector<double> Settings;  // [vdi::settingsTable().size()]
   std::vector<std::array<double, 6>> Lights;
   bool Cropping = false;
   double CroppingBox[6] = {0.0, 1.0, 0.0, 1.0, 0.0, 1.0};
@@ -276,7 +257,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   bool CameraParallelProjection = false;
   double CameraParallelScale = 1.0;
   char* Report = nullptr;
-  double LastVdi[13] = {};
+  double LastVdi[17] = {};
 };
 
 #endif

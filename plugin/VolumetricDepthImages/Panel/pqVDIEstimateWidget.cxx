@@ -13,6 +13,7 @@
 
 #include "pqVDIRegenerator.h"
 #include "vdi/core/Estimate.h"
+#include "vdi/core/SettingsTable.h"
 #include "vtkSMVDIGeneratorProxy.h"
 
 namespace {
@@ -57,8 +58,9 @@ pqVDIEstimateWidget::pqVDIEstimateWidget(vtkSMProxy* proxy, vtkSMProperty*, QWid
   this->Soon.setInterval(soonMilliseconds);
   this->Soon.setSingleShot(true);
   this->connect(&this->Soon, &QTimer::timeout, this, &pqVDIEstimateWidget::estimate);
-  for (const char* name : {"Resolution", "Margin", "Supersegments", "SamplingRate", "Algorithm", "Budget",
-                           "Fill", "Precision", "PictureOnly"}) {
+  std::vector<const char*> names{"Resolution", "PictureOnly"};
+  for (const vdi::Setting& setting : vdi::settingsTable()) names.push_back(setting.property);
+  for (const char* name : names) {
     vtkSMProperty* property = proxy->GetProperty(name);
     for (const unsigned long event : {vtkCommand::UncheckedPropertyModifiedEvent, vtkCommand::ModifiedEvent})
       pqCoreUtilities::connect(property, event, &this->Soon, SLOT(start()));
