@@ -1,6 +1,7 @@
 // Material over one sample; twin of Appearance in vdi/reference/SegmentByMerging.cpp.
-//
-// Needs: shared/segmenting.h, optical.glsl.
+#ifndef VDI_APPEARANCE_GLSL
+#define VDI_APPEARANCE_GLSL
+#include "optical.glsl"
 
 // Premultiplied colour and opacity that `opticalDepth` over `length` has over one sample.
 vec4 appearanceOf(vec3 color, float opticalDepth, float length, float sampleStep) {
@@ -16,3 +17,5 @@ float differenceOf(vec4 a, vec4 b) {
   vec4 d = abs(a - b);
   return (d.r + d.g) + (d.b + d.a);
 }
+
+#endif

@@ -1,7 +1,11 @@
 // Blend modes other than composite (vdi/core/Blending.h). Twin of vdi/reference/Blending.cpp. The mode is a
 // constant, so each mode costs nothing in the others' programs.
 //
-// Needs: shared/cast.h, slab.glsl, shading.glsl; params, tablePosition.
+// A part of raycast.glsl. The program provides params.
+#ifndef VDI_BLENDING_GLSL
+#define VDI_BLENDING_GLSL
+#include "shading.glsl"
+#include "slab.glsl"
 
 layout(constant_id = 10) const uint blendMode = blendComposite;
 const bool projects = blendMode == blendMaximum || blendMode == blendMinimum;
@@ -65,3 +69,5 @@ Sample crossed(Brick brick, uint k, float front, float back) {
   }
   return Sample(sum.rgb / max(sum.a, 1.0e-30), opticalDepthOf(sum.a), sum.a, sum.a);
 }
+
+#endif

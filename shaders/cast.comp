@@ -38,11 +38,13 @@ const bool writesPreSegments = castProgram == castProgramWritePreSegments;
 #define SEVERAL_RANKS
 #include "lists.glsl"
 #include "pre_segments.glsl"
+#include "raycast.glsl"
 
+// The results of useSample: a pixel's light, or a list's pre-segments. castRay has no parameter for
+// them, because a search's results are the globals of search.glsl.
 vec4 accumulated;
 float firstDepth;
-
-#include "raycast.glsl"
+ListState list;
 
 // Uses a sample as an interval of a list, or as light of a pixel.
 void useSample(float front, float back, Sample it) {
@@ -50,8 +52,8 @@ void useSample(float front, float back, Sample it) {
     if (it.opacity > 0.0 && accumulated.a == 0.0) firstDepth = front;
     accumulated += (1.0 - accumulated.a) * it.opacity * vec4(it.color, 1.0);
   } else if (countsPreSegments || writesPreSegments) {
-    preSegmentsAdd(front, back, it.color * it.opacity, it.opacity, it.opticalDepth,
-                   vec4(it.color, 1.0) * it.overStep);
+    addInterval(list, Interval(front, back, it.color * it.opacity, it.opacity, it.opticalDepth,
+                               vec4(it.color, 1.0) * it.overStep));
   } else {
     searchAdd(front, back, it.color * it.opacity, it.opticalDepth);
   }
@@ -79,12 +81,27 @@ void main() {
   bool hasRay = x < params.width && y < endRow;
   if (!hasRay && !fillsHistogram) return;
   samplesAtOnce = countsPreSegments ? params.countedSamples : 1u;
-  preSegmentsAtOnce = samplesAtOnce;
   setUpRay(x, y);
   setUpScene();
 
-  if (fillsHistogram) {
-    addToHistogram(hasRay);
+  if (countsPreSegments) {
+    if (fillsHistogram) clearGroupHistogram();
+    if (hasRay || !fillsHistogram) {
+      list = beginCounting(samplesAtOnce);
+      castRay();
+    }
+    endCounting(list, listIndex, hasRay);
+    return;
+  }
+
+  if (writesPreSegments) {
+    if (params.capacities.at[listIndex] == 0u) {
+      storeCounts(0u, 0u, listIndex);
+      return;
+    }
+    list = beginWriting(listIndex);
+    castRay();
+    endWriting(list, listIndex);
     return;
   }
 
@@ -102,13 +119,5 @@ void main() {
     return;
   }
 
-  if (countsLevels) {
-    countLevels();
-  } else if (countsPreSegments) {
-    countPreSegments();
-  } else if (writesPreSegments) {
-    writePreSegments();
-  } else {
-    searchOrWriteList(push.mode == castModeWrite);
-  }
+  searchOrWriteList(push.mode == castModeWrite);
 }

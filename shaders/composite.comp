@@ -20,6 +20,8 @@ const bool cutAtGaps = false;  // a gap is a transparent sample
 #include "lists.glsl"
 #include "pre_segments.glsl"
 
+ListState list;
+
 void feedIntervals() {
   SegmentArray interleaved = params.interleaved;
   StoredForm form = params.form;
@@ -28,7 +30,8 @@ void feedIntervals() {
     OpticalSegment s = loadSegment(interleaved, i, form);
     if (countsPreSegments || writesPreSegments) {
       vec4 x = appearanceOf(s.color, s.opticalDepth, s.back - s.front, params.step);
-      preSegmentsAdd(s.front, s.back, s.color, opacityOf(s.opticalDepth), s.opticalDepth, x);
+      addInterval(list,
+                  Interval(s.front, s.back, s.color, opacityOf(s.opticalDepth), s.opticalDepth, x));
     } else {
       searchAdd(s.front, s.back, s.color, s.opticalDepth);
     }
@@ -40,7 +43,12 @@ void main() {
   listIndex = gl_GlobalInvocationID.x;
   bool hasList = listIndex < params.listCount;
   if (fillsHistogram) {
-    addToHistogram(hasList);
+    clearGroupHistogram();
+    if (hasList) {
+      list = beginCounting(1u);
+      feedIntervals();
+    }
+    endCounting(list, listIndex, hasList);
     return;
   }
   if (!hasList) return;
@@ -58,9 +66,17 @@ void main() {
     return;
   }
   if (countsPreSegments) {
-    countPreSegments();
+    list = beginCounting(1u);
+    feedIntervals();
+    endCounting(list, listIndex, true);
   } else if (writesPreSegments) {
-    writePreSegments();
+    if (params.capacities.at[listIndex] == 0u) {
+      storeCounts(0u, 0u, listIndex);
+      return;
+    }
+    list = beginWriting(listIndex);
+    feedIntervals();
+    endWriting(list, listIndex);
   } else {
     searchOrWriteList(push.mode == compositeModeWrite);
   }

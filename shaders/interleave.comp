@@ -8,8 +8,6 @@
 layout(local_size_x = compositeGroup) in;
 layout(push_constant, scalar) uniform Push { InterleaveConstants push; };
 
-#include "optical.glsl"
-#include "exact.glsl"
 #include "store.glsl"
 
 uint subOffset(uint rank, uint list) { return push.subOffsets.at[rank * push.rowLength + list]; }

@@ -2,7 +2,11 @@
 // crosses more of these. Either is called a column here, and the lists along it are its rows. Progress is
 // counted in columns from the start, or as a fraction of the ray's stretch.
 //
-// Needs: view.glsl, packet.glsl; params, ray.
+// The program provides params and ray.
+#ifndef VDI_LINE_GLSL
+#define VDI_LINE_GLSL
+#include "packet.glsl"
+#include "view.glsl"
 
 struct PictureLine {
   bool byColumns;
@@ -59,3 +63,5 @@ float fractionAfter(PictureLine line, float columns) {
 }
 
 float at(vec2 range, float fraction) { return range.x + fraction * range.y; }
+
+#endif

@@ -1,16 +1,13 @@
 // Turns a list's intervals into stored supersegments: searches in one dispatch, and writes in a later one.
 //
-// Needs: params with thresholds, capacities, offsets, segments, form, status; void feedIntervals().
+// The program provides params with thresholds, capacities, offsets, segments, form, status; void
+// feedIntervals().
+#ifndef VDI_LISTS_GLSL
+#define VDI_LISTS_GLSL
+#include "search.glsl"
+#include "store.glsl"
 
 uint listIndex;
-
-#include "optical.glsl"
-#include "appearance.glsl"
-#include "exact.glsl"
-#include "store.glsl"
-void emitSegment(OpticalSegment segment);
-#include "segmenter.glsl"
-#include "search.glsl"
 
 void emitSegment(OpticalSegment segment) {
   if (search.writing && search.emitted < params.capacities.at[listIndex]) {
@@ -35,3 +32,5 @@ void searchOrWriteList(bool write) {
     params.capacities.at[listIndex] = result.count;
   }
 }
+
+#endif

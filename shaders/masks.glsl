@@ -1,4 +1,7 @@
 // Masks of the parts of the VDI's depth range; see shared/render.h.
+#ifndef VDI_MASKS_GLSL
+#define VDI_MASKS_GLSL
+#include "shared/render.h"
 
 int clampedBin(float bin) { return int(clamp(bin, 0.0, float(renderBins - 1))); }
 
@@ -21,3 +24,5 @@ bool mayMeet(uint64_t mask, vec2 bins) {
 
 // Number of tiles of `size` x `size` lists.
 ivec2 tilesOf(ivec2 lists, int size) { return (lists + size - 1) / size; }
+
+#endif

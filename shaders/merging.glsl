@@ -1,6 +1,8 @@
 // Merges two neighbouring pre-segments: the cost, and the result. Twin of vdi/reference/SegmentByMerging.cpp.
-//
-// Needs: optical.glsl, appearance.glsl, stored_pre_segment.glsl.
+#ifndef VDI_MERGING_GLSL
+#define VDI_MERGING_GLSL
+#include "appearance.glsl"
+#include "stored_pre_segment.glsl"
 
 vec4 appearanceOf(StoredPreSegment preSegment, float sampleStep) {
   vec4 light = lightOf(preSegment);
@@ -62,3 +64,5 @@ bool isCheapest(uint i, float previous, float cost, float next, float limit) {
 // The limit for a round's mergers: the mean cost of the possible ones, rounded up so that equal costs do not
 // exceed it.
 float limitOf(float sum, float number) { return sum / number * 1.0001; }
+
+#endif

@@ -1,6 +1,7 @@
 // Opacity and optical depth (-log2 of transmittance); twins of vdi/core/Supersegment.cpp.
-//
-// Needs: shared/segmenting.h.
+#ifndef VDI_OPTICAL_GLSL
+#define VDI_OPTICAL_GLSL
+#include "shared/segmenting.h"
 
 float opacityOf(float opticalDepth) {
   const float ln2 = 0.69314718;
@@ -14,3 +15,5 @@ float opticalDepthOf(float opacity) {
   float depth = opacity < 1e-3 ? opacity * (1.0 + 0.5 * opacity) * perLn2 : -log2(1.0 - opacity);
   return min(depth, maxOpticalDepth);
 }
+
+#endif

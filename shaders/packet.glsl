@@ -1,7 +1,11 @@
 // Packets: the rays of a rectangle of the new picture's pixels, which are close to each other, so that empty
 // space is found once for all of them.
 //
-// Needs: shared/render.h, masks.glsl, view.glsl; params.
+// The program provides params.
+#ifndef VDI_PACKET_GLSL
+#define VDI_PACKET_GLSL
+#include "masks.glsl"
+#include "view.glsl"
 
 struct RayPacket {
   vec2 first;   // position of the rays of its first column and row
@@ -87,3 +91,5 @@ uint64_t packetMask(RayPacket packet, bool byColumns, int tile, int first, int l
   }
   return met & mask;
 }
+
+#endif

@@ -1,6 +1,9 @@
 // Form in which a picture's pixels leave the device.
 //
-// Needs: shared/render.h; params, pictureForm.
+// The program provides params and pictureForm.
+#ifndef VDI_PICTURE_GLSL
+#define VDI_PICTURE_GLSL
+#include "shared/render.h"
 
 // Rounds as vdi::toByte does.
 uint bytesOf(vec4 shares) {
@@ -19,3 +22,5 @@ void leavePixel(uint index, vec4 light, float depth) {
   }
   params.depths.at[index] = depth;
 }
+
+#endif

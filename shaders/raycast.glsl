@@ -1,6 +1,10 @@
 // Casts one ray through the kd-tree of bricks, front to back, sample by sample.
 //
-// Needs: shared/cast.h, optical.glsl; params, pages, pageCount, lanesPerRay, rayLane; useSample (below).
+// The program provides params, pages, slabs, pageCount, lanesPerRay, rayLane; useSample (below).
+#ifndef VDI_RAYCAST_GLSL
+#define VDI_RAYCAST_GLSL
+#include "shared/cast.h"
+#include "optical.glsl"
 
 vec3 rayStart;
 vec3 rayDirection;
@@ -334,3 +338,5 @@ void castRay() {
     }
   }
 }
+
+#endif

@@ -2,7 +2,9 @@
 // exchange the visible ones. A ray then waits for memory once for all of their samples, and a step's time is
 // that of using the visible samples.
 //
-// Needs: raycast.glsl; lanesPerRay, rayLane.
+// A part of raycast.glsl. The program provides lanesPerRay and rayLane.
+#ifndef VDI_RAYCAST_LANES_GLSL
+#define VDI_RAYCAST_LANES_GLSL
 
 // Bits of the ray's invocations for which `own` is true.
 uint lanesWhere(bool own) {
@@ -57,3 +59,5 @@ bool castLanes(Brick brick, uint begin, uint end) {
   }
   return true;
 }
+
+#endif

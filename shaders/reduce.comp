@@ -8,9 +8,6 @@
 layout(local_size_x = reduceGroup) in;
 layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
-#include "optical.glsl"
-#include "appearance.glsl"
-#include "stored_pre_segment.glsl"
 #include "merging.glsl"
 
 struct PreSegment {

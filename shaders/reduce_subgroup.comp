@@ -12,9 +12,6 @@ layout(local_size_x_id = 0) in;  // gl_SubgroupSize, at most 32
 layout(constant_id = 1) const uint capacity = 16u;  // pre-segments of a list
 layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
-#include "optical.glsl"
-#include "appearance.glsl"
-#include "stored_pre_segment.glsl"
 #include "merging.glsl"
 
 // The list's pre-segments, in one array per member, so that neighbouring invocations read neighbouring banks.

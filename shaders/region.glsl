@@ -1,6 +1,9 @@
 // Clipping of a ray by planes. Twin of vdi/reference/Region.cpp; vdi/core/Region.h describes the planes.
 //
-// Needs: shared/cast.h; params, rayStart, rayDirection.
+// A part of raycast.glsl. The program provides params.
+#ifndef VDI_REGION_GLSL
+#define VDI_REGION_GLSL
+#include "shared/cast.h"
 
 // The part of [enter, leave], in depths from the lattice's front, on the visible sides of the planes. Depends
 // on the ray and the planes alone, so it is the same on every rank.
@@ -22,3 +25,5 @@ uvec2 clippedSamples(uvec2 samples, vec2 part) {
   uvec2 inside = uvec2(max(samples.x, uint(places.x)), min(samples.y, uint(places.y)));
   return inside.x < inside.y ? inside : uvec2(0u);
 }
+
+#endif

@@ -1,6 +1,8 @@
 // Supersegments as render.comp reads them: the words of RenderSegment.
-//
-// Needs: shared/render.h, exact.glsl.
+#ifndef VDI_RENDER_SEGMENT_GLSL
+#define VDI_RENDER_SEGMENT_GLSL
+#include "shared/render.h"
+#include "exact.glsl"
 
 // Straight colour in 11, 11 and 10 bits; multiples of the 8-bit colours of codes, which stay exact.
 const uvec3 maxSegmentColor = uvec3(2040u, 2040u, 1020u);
@@ -33,3 +35,5 @@ vec4 segmentSlopes(uint word) {
 
 bool frontIsOnFace(vec4 slopes) { return slopes.x == float(renderOnFace) && slopes.y == float(renderOnFace); }
 bool backIsOnFace(vec4 slopes) { return slopes.z == float(renderOnFace) && slopes.w == float(renderOnFace); }
+
+#endif

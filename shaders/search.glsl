@@ -1,7 +1,11 @@
 // The sensitivity search of vdi/reference/Segmenter.h, and writing with its result. One function does both,
 // so that the very same instructions count and write.
 //
-// Needs: segmenter.glsl; void feedIntervals(): feeds every interval of the list to searchAdd, front to back.
+// The program provides void feedIntervals(), which feeds every interval of the list to searchAdd, front to
+// back.
+#ifndef VDI_SEARCH_GLSL
+#define VDI_SEARCH_GLSL
+#include "segmenter.glsl"
 
 struct SearchState {
   bool writing;
@@ -77,3 +81,5 @@ SearchResult searchList(bool write, float known, uint budget) {
   }
   return best;
 }
+
+#endif

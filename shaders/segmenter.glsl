@@ -1,8 +1,13 @@
 // Turns intervals into supersegments for one sensitivity: the exchangeable part. This is
 // segmentWithSensitivity of vdi/reference/Segmenter.cpp as a state machine that takes one interval at a time.
 //
-// Needs: optical.glsl, appearance.glsl, store.glsl; bool cutAtGaps, constant; void emitSegment(OpticalSegment
-// segment).
+// The program provides bool cutAtGaps, constant; void emitSegment(OpticalSegment segment).
+#ifndef VDI_SEGMENTER_GLSL
+#define VDI_SEGMENTER_GLSL
+#include "appearance.glsl"
+#include "store.glsl"
+
+void emitSegment(OpticalSegment segment);
 
 struct SegmenterState {
   float sensitivity;
@@ -71,3 +76,5 @@ void segmenterAdd(float front, float back, vec3 color, float opticalDepth) {
 void segmenterEnd() {
   if (segmenter.open) segmenterClose();
 }
+
+#endif

@@ -1,6 +1,9 @@
 // The light on a sample. Twin of vdi/reference/Shading.cpp; vdi/core/Shading.h has the formula.
 //
-// Needs: shared/cast.h; params, rayDirection, texel, coordinateOf.
+// A part of raycast.glsl. The program provides params.
+#ifndef VDI_SHADING_GLSL
+#define VDI_SHADING_GLSL
+#include "shared/cast.h"
 
 // Whether colours are shaded; without shading its code costs nothing.
 layout(constant_id = 9) const bool shaded = false;
@@ -54,3 +57,5 @@ Sample lit(Brick brick, uint k, Sample it) {
   if (shaded && it.opticalDepth > 0.0) it.color *= lightAt(brick, middleOf(k));
   return it;
 }
+
+#endif

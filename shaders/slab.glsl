@@ -1,7 +1,11 @@
 // The material of a slab, the part of a ray that a sample stands for, by one fetch from the table of slabs.
 // Twin of vdi/core/SlabTable.cpp, whose header describes the layout.
 //
-// Needs: shared/cast.h, optical.glsl; params, slabs, rayLengthOfDepth.
+// A part of raycast.glsl. The program provides params and slabs.
+#ifndef VDI_SLAB_GLSL
+#define VDI_SLAB_GLSL
+#include "shared/cast.h"
+#include "optical.glsl"
 
 // The material of an interval of a ray.
 struct Sample {
@@ -77,3 +81,5 @@ vec4 slabOf(vec4 texel, float front, float back) {
   if (mayBeInfinite) slab.a *= mix(0.0, 0.5, isFinite(front)) + mix(0.0, 0.5, isFinite(back));
   return slab;
 }
+
+#endif

@@ -7,8 +7,6 @@
 layout(local_size_x = storeGroup) in;
 layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 
-#include "optical.glsl"
-#include "exact.glsl"
 #include "store.glsl"
 #include "stored_pre_segment.glsl"
 

@@ -1,7 +1,10 @@
 // Supersegments in memory: 24 bytes of floats, or 8 of codes. Storing codes is the twin of
 // vdi/reference/Compaction.h, loading them of `expanded` in vdi/core/Supersegment.cpp.
-//
-// Needs: shared/lists.h, exact.glsl, optical.glsl.
+#ifndef VDI_STORE_GLSL
+#define VDI_STORE_GLSL
+#include "shared/lists.h"
+#include "exact.glsl"
+#include "optical.glsl"
 
 // A supersegment that keeps its optical depth even if its opacity rounds to 1.
 struct OpticalSegment {
@@ -124,3 +127,5 @@ void storeCode(CompactArray codes, uvec2 code, uint at, uint i, uint count) {
   waiting[1] = waiting[2];
   waiting[2] = code;
 }
+
+#endif

@@ -1,6 +1,10 @@
 // Finds the parts of V_O's picture that a workgroup's rays must traverse.
 //
-// Needs: packet.glsl, line.glsl; params.
+// The program provides params.
+#ifndef VDI_TILE_MASK_GLSL
+#define VDI_TILE_MASK_GLSL
+#include "line.glsl"
+#include "packet.glsl"
 
 // Bit t of an axis' tile mask: rays along that axis may meet material in columns of tile t.
 const int invocations = int(gl_WorkGroupSize.x);
@@ -57,3 +61,5 @@ int nextTile(PictureLine line, int tile, int last) {
   int found = word * 32 + (up ? findLSB(bits) : findMSB(bits));
   return (up ? found > last : found < last) ? -1 : found;
 }
+
+#endif

@@ -1,6 +1,9 @@
 // The new view's rays in V_O's view space.
 //
-// Needs: shared/render.h; params, rays.
+// The program provides params and rays.
+#ifndef VDI_VIEW_GLSL
+#define VDI_VIEW_GLSL
+#include "shared/render.h"
 
 const float infinity = 1.0 / 0.0;
 
@@ -32,3 +35,5 @@ vec2 pictureAt(Ray of, float t) {
 uvec2 pictureTiles() {
   return (uvec2(params.width, params.height) + renderPictureTile - 1u) / renderPictureTile;
 }
+
+#endif
