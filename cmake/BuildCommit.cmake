@@ -1,4 +1,5 @@
-# Writes OUTPUT with the short commit of SOURCE_DIR ("unknown" outside a checkout, "-dirty" with uncommitted changes).
+# Writes a header OUTPUT with the short commit of SOURCE_DIR. The commit is "unknown" outside a
+# checkout, and ends in "-dirty" with uncommitted changes.
 execute_process(
   COMMAND git describe --always --dirty --exclude=*
   WORKING_DIRECTORY "${SOURCE_DIR}"

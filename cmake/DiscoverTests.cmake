@@ -1,11 +1,12 @@
-# Writes OUTPUT, a file for ctest with a test for each case of the Catch2 program PROGRAM: "NAME:
-# case". Where there are RANKS it's a test for each number of them, "NAME_np3", of all cases: to
-# start many processes with a device each takes longer than most cases. With SOME_RANKS as many it
-# has only the cases of the tag [ranks]; the others are "NAME_np3_rest", whose label is long too. So
-# is that of all cases with LONG_RANKS as many. They're started by LAUNCHER (mpiexec ... -n). Each
-# test gets TIMEOUT, LABELS and ENVIRONMENT. With LIST_OPTIONS the program lists its cases; NO_TESTS
-# is the warning by which it fails where no case has the name. Catch2's own catch_discover_tests knows neither several
-# launchers nor lists as properties.
+# Writes OUTPUT, a file for ctest. It has a test "NAME: case" for each case of the Catch2 program
+# PROGRAM. If RANKS is set, it has a test "NAME_np3" of all cases for each number of ranks instead,
+# because starting many processes with a device each takes longer than most cases. For the numbers
+# in SOME_RANKS this test runs only the cases with the tag [ranks]. A test "NAME_np3_rest" with the
+# additional label long runs the others. For the numbers in LONG_RANKS the test of all cases has
+# that label. LAUNCHER (mpiexec ... -n) starts programs on several ranks. Each test gets TIMEOUT,
+# LABELS and ENVIRONMENT. LIST_OPTIONS make the program list its cases. NO_TESTS is the warning that
+# makes it fail if no case has the given name. Catch2's own catch_discover_tests supports neither
+# several launchers nor lists as properties.
 execute_process(
   COMMAND ${CMAKE_COMMAND} -E env ASAN_OPTIONS=detect_leaks=0 "${PROGRAM}" ${LIST_OPTIONS}
   OUTPUT_VARIABLE cases
@@ -13,7 +14,7 @@ execute_process(
 if(NOT cases)
   message(FATAL_ERROR "${PROGRAM} lists no tests")
 endif()
-set(semicolon "<semicolon>") # in a name; else it separates names
+set(semicolon "<semicolon>") # stands for one in a name, because others separate names
 string(REPLACE ";" "${semicolon}" cases "${cases}")
 string(REPLACE "\n" ";" cases "${cases}")
 
@@ -47,9 +48,9 @@ if(RANKS)
 endif()
 foreach(case IN LISTS cases)
   string(REPLACE "${semicolon}" ";" case "${case}")
-  # What Catch2's command line would take for more than a name.
+  # Escapes characters that Catch2's command line would interpret.
   string(REGEX REPLACE "([][,\\])" "\\\\\\1" pattern "${case}")
-  set(command "[==[${PROGRAM}]==] [==[${pattern}]==] --warn ${NO_TESTS}") # or no match would pass
+  set(command "[==[${PROGRAM}]==] [==[${pattern}]==] --warn ${NO_TESTS}") # otherwise a name without a match would pass
   add("[==[${NAME}: ${case}]==]" "${command}")
 endforeach()
 file(WRITE "${OUTPUT}" "${tests}")

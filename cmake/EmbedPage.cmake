@@ -1,6 +1,7 @@
-# Puts the page's files together and writes them into OUTPUT as a C++ literal. FOLDER: web/. MODULES: its modules, each after
-# those that it imports, separated by commas. A page that opens from disk can't load modules, so that they become one: imports
-# go, and exports are plain declarations. Names at the top of modules therefore differ.
+# Joins the page's files and writes them to OUTPUT as a C++ literal. FOLDER is web/. MODULES lists
+# its modules, separated by commas, each after those that it imports. A page that opens from disk
+# can't load modules, so they become one: imports vanish, and exports become plain declarations.
+# Top-level names of modules must therefore differ.
 cmake_minimum_required(VERSION 3.25)
 string(REPLACE "," ";" modules "${MODULES}")
 set(script "")
@@ -14,7 +15,8 @@ foreach(module IN LISTS modules)
   if(text MATCHES "</script|<!--")
     message(FATAL_ERROR "${module}.js would end the page's script")
   endif()
-  # Half of the text is comments and indentation. Comments behind code stay, for what looks like one may be a part of a string.
+  # Half of the text is comments and indentation. Comments at the ends of lines stay, because the
+  # same characters may be part of a string.
   string(REGEX REPLACE "/\\*\\*([^*]|\\*+[^*/])*\\*+/" "" text "${text}")
   string(REGEX REPLACE "\n[ ]*//[^\n]*" "\n" text "\n${text}")
   string(REGEX REPLACE "\n[ \n]+" "\n" text "${text}")

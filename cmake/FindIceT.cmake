@@ -1,6 +1,7 @@
-# IceT, which composites whole pictures of many ranks: ParaView's, or one that is installed by itself. Defines IceT_FOUND and
-# the target IceT::MPI. ParaView's own target for it asks for all of ParaView.
-set(_icet_suffix "-pv${ParaView_VERSION_MAJOR}.${ParaView_VERSION_MINOR}") # of the ParaView that was found
+# Finds IceT, which composites whole pictures of many ranks: ParaView's, or a separate installation.
+# Defines IceT_FOUND and the target IceT::MPI. ParaView's own target for IceT requires all of
+# ParaView.
+set(_icet_suffix "-pv${ParaView_VERSION_MAJOR}.${ParaView_VERSION_MINOR}") # as in the found ParaView
 find_path(IceT_INCLUDE_DIR IceTMPI.h PATH_SUFFIXES "${VDI_PARAVIEW_NAME}/vtkicet/src/include")
 find_library(IceT_CORE_LIBRARY NAMES IceTCore "vtkIceTCore${_icet_suffix}")
 find_library(IceT_MPI_LIBRARY NAMES IceTMPI "vtkIceTMPI${_icet_suffix}")

@@ -1,14 +1,16 @@
-# Finds ParaView, 5.11 to 6.x, and holds what differs between its versions. The C++ half is
-# plugin/VolumetricDepthImages/ParaViewVersions.h. Defines, beside ParaView's own variables:
-#   VDI_PARAVIEW_NAME  the folder's name that its libraries and headers have, for example paraview-5.11
-#   VDI_QT             the Qt that ParaView's window was built with: Qt5 or Qt6
+# Finds ParaView 5.11 to 6.x and handles the differences between its versions. The C++ half is
+# plugin/VolumetricDepthImages/ParaViewVersions.h. Defines, in addition to ParaView's own variables:
+#   VDI_PARAVIEW_NAME  name of the folder with its libraries and headers, for example paraview-5.11
+#   VDI_QT             the Qt of ParaView's window: Qt5 or Qt6
 #   VDI_PLUGIN_HELP    whether this ParaView makes the help of a plugin's panel
-#   VDI_GL_LOADER      the VTK target through which OpenGL is called
+#   VDI_GL_LOADER      the VTK target that loads OpenGL's functions
 
-# vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): Debian 13's paraview-dev names vtkmodules/X.so where
-# python3-paraview has X.cpython-313-x86_64-linux-gnu.so. CMake checks that every exported file is there, although nothing here
-# links to these modules, and refuses the package. It makes no such check of a target that it knows as an Apple XCFramework,
-# which this says of each module that is there under its longer name; a module that isn't there at all is still refused.
+# vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): makes CMake accept Debian 13's
+# paraview-dev. That package names vtkmodules/X.so, but python3-paraview has
+# X.cpython-313-x86_64-linux-gnu.so. CMake checks that every exported file exists and refuses the
+# package, although nothing here links to these modules. CMake skips this check for a target that it
+# takes for an Apple XCFramework. The function marks each module so that exists under its longer
+# name. CMake still refuses a module that is missing.
 function(vdi_pass_over_python_modules folder)
   file(GLOB exports "${folder}/vtk/VTKPython-targets-*.cmake" "${folder}/ParaViewPython*-targets-*.cmake")
   foreach(export IN LISTS exports)
@@ -27,7 +29,7 @@ function(vdi_pass_over_python_modules folder)
   endforeach()
 endfunction()
 
-# A version that nobody has: this looks where ParaView is and reads nothing but its version.
+# No ParaView has this version. The call only finds ParaView's folder and version.
 find_package(ParaView 1000 QUIET CONFIG)
 foreach(config IN LISTS ParaView_CONSIDERED_CONFIGS)
   get_filename_component(folder "${config}" DIRECTORY)

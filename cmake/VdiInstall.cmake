@@ -1,4 +1,4 @@
-# What `cmake --install` puts where, and the packages that CMake and pkg-config find there.
+# Rules for `cmake --install`, and the packages that CMake and pkg-config find afterwards.
 include(CMakePackageConfigHelpers)
 
 set(headerDir "${CMAKE_INSTALL_INCLUDEDIR}/pv-vdi")
@@ -6,7 +6,8 @@ set(dataDir "${CMAKE_INSTALL_DATADIR}/pv-vdi")
 set(cmakeDir "${CMAKE_INSTALL_LIBDIR}/cmake/pv-vdi")
 set(pkgConfigDir "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 
-# vdi_install_pkg_config(<name>): from cmake/<name>.pc.in; the prefix is found from where the file lies.
+# vdi_install_pkg_config(<name>): installs cmake/<name>.pc.in. The file finds the prefix from its
+# own place.
 function(vdi_install_pkg_config name)
   file(RELATIVE_PATH toPrefix "/prefix/${pkgConfigDir}" /prefix)
   string(REGEX REPLACE "/$" "" toPrefix "${toPrefix}")
@@ -14,7 +15,8 @@ function(vdi_install_pkg_config name)
   install(FILES "${CMAKE_BINARY_DIR}/${name}.pc" DESTINATION "${pkgConfigDir}")
 endfunction()
 
-# The library without VTK, with the headers that vdi/pipeline/VdiGenerator.h and VdiRenderer.h include and those of its files.
+# The library without VTK. Its headers are those for files, VdiGenerator.h and VdiRenderer.h of
+# vdi/pipeline, and the headers that these include.
 install(
   TARGETS vdi
   EXPORT pv-vdi-vdi-targets
@@ -34,14 +36,15 @@ vdi_install_pkg_config(pv-vdi)
 
 install(TARGETS vdi_tool)
 
-# The Python package, where Debian's Python looks; below another prefix, PYTHONPATH names this folder.
+# The Python package, in the folder that Debian's Python searches. With another prefix, users add
+# the folder to PYTHONPATH.
 if(TARGET vdi_python)
   set(pythonDir lib/python3/dist-packages/pv_vdi)
   install(TARGETS vdi_python LIBRARY DESTINATION "${pythonDir}")
   install(FILES vdi/python/pv_vdi/__init__.py DESTINATION "${pythonDir}")
   if(VDI_BUILD_PARAVIEW)
     install(FILES vdi/python/pv_vdi/catalyst.py DESTINATION "${pythonDir}")
-    # Programs link libvdi_catalyst.so; what runs needs only the file with the version.
+    # Programs link libvdi_catalyst.so. At run time they need only the file with the version.
     file(RELATIVE_PATH library "/prefix/${pythonDir}"
          "/prefix/${CMAKE_INSTALL_LIBDIR}/libvdi_catalyst.so.${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}")
     file(CONFIGURE OUTPUT _location.py CONTENT "LIBRARY = \"@library@\"\n" @ONLY)
@@ -62,7 +65,7 @@ if(VDI_BUILD_PARAVIEW)
   set(pluginDir "${CMAKE_INSTALL_LIBDIR}/${PARAVIEW_PLUGIN_SUBDIR}")
   install(TARGETS VolumetricDepthImages DESTINATION "${pluginDir}/VolumetricDepthImages")
   install(FILES "${CMAKE_BINARY_DIR}/lib/${PARAVIEW_PLUGIN_SUBDIR}/pv-vdi.plugins.xml" DESTINATION "${pluginDir}")
-  # The file from which a ParaView in the same bin/ learns what plugins there are, one list of plugins a line.
+  # A ParaView in the same bin/ finds its plugins by this file. Each line names a list of plugins.
   file(RELATIVE_PATH pluginList "/prefix/${CMAKE_INSTALL_BINDIR}"
        "/prefix/${pluginDir}/pv-vdi.plugins.xml")
   file(CONFIGURE OUTPUT paraview.conf CONTENT "@pluginList@\n" @ONLY)

@@ -1,4 +1,4 @@
-# `cpack` in the build folder makes pv-vdi_<version>_<architecture>.deb, for the Debian that it was built on.
+# `cpack` in the build folder makes pv-vdi_<version>_<architecture>.deb for the Debian of the build.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME pv-vdi)
 set(CPACK_PACKAGE_VENDOR "pv-vdi developers")
@@ -15,7 +15,8 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-# What shows in no library's list: Vulkan's driver, the modules that scripts import, what our headers include.
+# Dependencies that no library lists: Vulkan's driver, modules that scripts import, headers that our
+# headers include.
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "mesa-vulkan-drivers | vulkan-icd, libglm-dev")
 if(VDI_BUILD_PARAVIEW)
   string(APPEND CPACK_DEBIAN_PACKAGE_DEPENDS ", paraview, python3-paraview")

@@ -3,11 +3,12 @@
 find_program(GLSLANG_VALIDATOR glslangValidator REQUIRED)
 find_program(SPIRV_VAL spirv-val REQUIRED)
 
-# vdi_embed_shaders(<target> <folder> [NAMESPACE <namespace>] SHADERS name ...): compiles <folder>/<name>.comp for
-# Vulkan 1.3, runs spirv-val on the result, and adds to the target a source that defines
+# vdi_embed_shaders(<target> <folder> [NAMESPACE <namespace>] SHADERS name ...): compiles
+# <folder>/<name>.comp for Vulkan 1.3, runs spirv-val on the result, and adds a source to the target
+# that defines
 #   std::span<const std::uint32_t> <namespace>::shaderCode(std::string_view name)
-# for those names; the namespace is vdi::gpu unless given. What a shader includes is tracked: a changed header
-# recompiles just the shaders that use it.
+# for those names. The default namespace is vdi::gpu. The build tracks includes: a changed header
+# recompiles only the shaders that use it.
 function(vdi_embed_shaders target folder)
   cmake_parse_arguments(PARSE_ARGV 2 arg "" "NAMESPACE" "SHADERS")
   set(namespace "${arg_NAMESPACE}")

@@ -1,6 +1,7 @@
-# Functions that make the project's libraries, programs and tests, all with the same warnings and sanitizers.
+# Functions that define the project's libraries, programs and tests, with the same warnings and
+# sanitizers.
 
-# Warnings and sanitizers for one target of ours.
+# Adds warnings and sanitizers to a target of this project.
 function(vdi_target_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}>")
@@ -10,8 +11,8 @@ function(vdi_target_options target)
   endif()
 endfunction()
 
-# vdi_add_library(core SOURCES ... [LINK public libraries] [LINK_PRIVATE libraries]): static library vdi_core, alias
-# vdi::core.
+# vdi_add_library(core SOURCES ... [LINK public libraries] [LINK_PRIVATE libraries]): defines the
+# static library vdi_core with the alias vdi::core.
 function(vdi_add_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LINK;LINK_PRIVATE")
   add_library(vdi_${name} STATIC ${arg_SOURCES})
@@ -20,14 +21,15 @@ function(vdi_add_library name)
   vdi_target_options(vdi_${name})
 endfunction()
 
-# The environment that every test needs: mpirun as root in a container, no interference between ranks on few cores.
+# The environment of all tests. It allows mpirun as root in a container, and keeps ranks on few
+# cores from disturbing each other.
 set(VDI_TEST_ENVIRONMENT OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
                          OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_vader_single_copy_mechanism=none)
 
 # vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [SOME_RANKS 2] [LONG_RANKS 5] [TIMEOUT
-# seconds] [LABELS ...]): program test_<name> with Catch2's main (or tests/MpiMain.cpp when RANKS is
-# given), and a ctest for each of its cases or rank counts, as cmake/DiscoverTests.cmake says. Every
-# one has a time limit.
+# seconds] [LABELS ...]): defines the program test_<name> with Catch2's main (or tests/MpiMain.cpp
+# if RANKS is given), and a ctest for each of its cases or rank counts; see
+# cmake/DiscoverTests.cmake. Each test has a time limit.
 function(vdi_add_catch_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;SOME_RANKS;LONG_RANKS;LABELS;ENVIRONMENT")
   if(NOT arg_TIMEOUT)
@@ -40,7 +42,7 @@ function(vdi_add_catch_test name)
     target_link_libraries(test_${name} PRIVATE vdi_test_main ${arg_LINK})
   endif()
   vdi_target_options(test_${name})
-  target_compile_options(test_${name} PRIVATE $<$<CONFIG:Release>:-O1>) # compiles faster; what it tests is optimised
+  target_compile_options(test_${name} PRIVATE $<$<CONFIG:Release>:-O1>) # compiles faster; the tested code is optimised
   if("core" IN_LIST arg_LABELS)
     add_dependencies(core_tests test_${name})
   endif()
@@ -57,7 +59,7 @@ function(vdi_add_catch_test name)
       "${CMAKE_SOURCE_DIR}/cmake/DiscoverTests.cmake"
     BYPRODUCTS "${tests}"
     VERBATIM)
-  # Until it's built there is a test that fails.
+  # Until the program is built, a failing test takes its place.
   file(CONFIGURE OUTPUT ${name}_include.cmake CONTENT "if(EXISTS \"${tests}\")
   include(\"${tests}\")
 else()
@@ -67,9 +69,10 @@ endif()
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${CMAKE_CURRENT_BINARY_DIR}/${name}_include.cmake")
 endfunction()
 
-# vdi_virtual_screen(<variable>): a command prefix that gives what follows an X server. Each has a number of its own to start
-# from: a server that is still ending takes the next one's socket away if that has the same number. And none starts anew when
-# its last client has left (-noreset): another rank that comes just then would find no server.
+# vdi_virtual_screen(<variable>): sets the variable to a command prefix that runs a command with an
+# X server. Each server starts its search for a number elsewhere, because a server that is still
+# ending removes the socket of a new one with the same number. A server doesn't reset when its last
+# client leaves (-noreset). Otherwise a rank that connects at that moment would find no server.
 function(vdi_virtual_screen variable)
   find_program(XVFB_RUN xvfb-run REQUIRED)
   get_property(screens GLOBAL PROPERTY VDI_VIRTUAL_SCREENS)
@@ -79,7 +82,8 @@ function(vdi_virtual_screen variable)
   set(${variable} "${XVFB_RUN}" -a -n ${number} -s "-screen 0 1280x1024x24 -noreset" PARENT_SCOPE)
 endfunction()
 
-# vdi_test_properties(<test> TIMEOUT seconds [LABELS ...] [ENVIRONMENT ...]): those, and the environment that every test needs.
+# vdi_test_properties(<test> TIMEOUT seconds [LABELS ...] [ENVIRONMENT ...]): sets these properties,
+# and adds the environment of all tests.
 function(vdi_test_properties test)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "LABELS;ENVIRONMENT")
   set_tests_properties(

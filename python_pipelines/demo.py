@@ -1,8 +1,10 @@
-"""Catalyst script of the demo: at each step a VDI of V, its picture from where it was made and from 5, 20 and 50 degrees
-beside it, each next to plain volume rendering from the same viewpoint, and how alike they are (SSIM).
+"""The demo's Catalyst script. At each step it makes a VDI of V, and pictures of it from the VDI's
+viewpoint and from 5, 20 and 50 degrees beside it. It renders the volume from the same viewpoints and
+compares each pair of pictures by SSIM.
 
-Environment: VDI_PLUGIN (the plugin; the adaptor sets it), VDI_OUTPUT (folder), VDI_WIDTH and VDI_HEIGHT (of the pictures),
-VDI_LIVE (1: browsers see the VDIs and may steer; the link is in vdi-stream.link)."""
+Environment: VDI_PLUGIN (the plugin, which the adaptor sets), VDI_OUTPUT (the folder), VDI_WIDTH and
+VDI_HEIGHT (of the pictures), VDI_LIVE (1: browsers show the VDIs and may steer; the link is in
+vdi-stream.link)."""
 
 import os
 
@@ -20,7 +22,7 @@ LoadPlugin(os.environ["VDI_PLUGIN"], remote=False, ns=globals())
 OUTPUT = os.environ.get("VDI_OUTPUT", ".")
 SIZE = [int(os.environ.get("VDI_WIDTH", 640)), int(os.environ.get("VDI_HEIGHT", 360))]
 ANGLES = [0, 5, 20, 50]
-BACKGROUND = 24  # of 255
+BACKGROUND = 24  # grey level, up to 255
 IS_ROOT = vtkProcessModule.GetProcessModule().GetPartitionId() == 0
 
 POSITION = np.array([2.05, 1.75, 2.45])
@@ -28,7 +30,7 @@ FOCAL_POINT = np.array([0.5, 0.5, 0.5])
 
 
 def turned(degrees):
-    """The camera's position turned about the focal point, around the y axis."""
+    """The camera's position, turned about the focal point around the y axis."""
     angle = np.radians(degrees)
     x, y, z = POSITION - FOCAL_POINT
     return FOCAL_POINT + [x * np.cos(angle) + z * np.sin(angle), y, z * np.cos(angle) - x * np.sin(angle)]
@@ -43,7 +45,7 @@ def set_camera(proxy, degrees):
 
 
 def volume_filter(degrees, picture_only):
-    """VolumetricDepthImage of V from that viewpoint."""
+    """A VolumetricDepthImage of V from that viewpoint."""
     proxy = VolumetricDepthImage(Input=grid)
     proxy.SelectInputScalars = ["CELLS", "V"]
     proxy.LookupTable = colors
@@ -60,7 +62,7 @@ colors = GetColorTransferFunction("V")
 colors.ColorSpace = "RGB"
 colors.RGBPoints = [0.0, 0.05, 0.10, 0.40, 0.12, 0.10, 0.55, 0.85, 0.22, 0.95, 0.90, 0.60,
                     0.30, 0.95, 0.50, 0.15, 0.42, 0.60, 0.05, 0.10]
-colors.ScalarRangeInitialized = 1  # or ParaView's own views, none here, would move the points to the data's range
+colors.ScalarRangeInitialized = 1  # keeps ParaView's views, which aren't used here, from moving the points to the data's range
 opacities = GetOpacityTransferFunction("V")
 opacities.Points = [0.0, 0.0, 0.5, 0.0, 0.06, 0.0, 0.5, 0.0, 0.14, 0.10, 0.5, 0.0,
                     0.24, 0.35, 0.5, 0.0, 0.34, 0.85, 0.5, 0.0, 0.42, 0.95, 0.5, 0.0]
@@ -88,7 +90,8 @@ summary = []
 
 
 def picture_of(proxy, time):
-    """The proxy's picture over the background, rows from the top, on rank 0; None elsewhere. All ranks must call it."""
+    """Returns the proxy's picture over the background on rank 0, rows from the top, and None on the
+    other ranks. Collective."""
     proxy.UpdatePipeline(time)
     data = proxy.GetClientSideObject().GetOutputDataObject(0)
     if not IS_ROOT:
@@ -137,9 +140,9 @@ def catalyst_execute(info):
 def catalyst_finalize():
     if not IS_ROOT or not summary:
         return
-    print("\nSSIM of the VDI with volume rendering, by degrees from where it was made")
+    print("\nSSIM of the VDI with volume rendering, by degrees from its viewpoint")
     print("  step  " + "  ".join("%6d" % angle for angle in ANGLES))
     for step, similarities, _ in summary:
         print("%6d  " % step + "  ".join("%6.4f" % s for s in similarities))
-    print("\nStages of the last VDI, rank by rank")
+    print("\nStages of the last VDI on each rank")
     print(summary[-1][2])

@@ -1,14 +1,16 @@
-"""The shortest Catalyst script: a Volumetric Depth Image of the array V at every step, as files vdi_000100.vdi, ..., each with
-its step's number and time inside.
+"""The shortest Catalyst script. It writes a Volumetric Depth Image of the array V at each step, to
+files vdi_000100.vdi and so on. A file has the step's number and time inside.
 
-The adaptor has loaded the plugin before. Copy this file and change array, range, camera and colours."""
+The adaptor has loaded the plugin already. Copy this file and change array, range, camera and
+colours."""
 
 import os
 
 from paraview import catalyst
 from paraview.simple import *  # noqa: F403
 
-RANGE = [0.0, 0.45]  # of V in the whole run; left out, it is that of the first step seen, which a restart changes
+# V's range in the whole run. The default is the range of the first step, which a restart changes.
+RANGE = [0.0, 0.45]
 
 grid = TrivialProducer(registrationName="grid")
 image = VolumetricDepthImage(Input=grid)
@@ -19,11 +21,11 @@ colors.RescaleTransferFunction(*RANGE)
 opacities = GetOpacityTransferFunction("V")
 opacities.Points = [RANGE[0], 0.0, 0.5, 0.0, RANGE[1], 1.0, 0.5, 0.0]  # value, opacity, midpoint, sharpness
 for function in (colors, opacities):
-    function.ScalarRangeInitialized = 1  # or views of ParaView move it to the data's range
+    function.ScalarRangeInitialized = 1  # keeps ParaView's views from moving it to the data's range
 image.LookupTable = colors
 image.ScalarOpacityFunction = opacities
 image.Resolution = [640, 360]
-image.CameraPosition = [2.6, 2.0, 3.1]  # of the unit cube, all of it
+image.CameraPosition = [2.6, 2.0, 3.1]  # shows the whole unit cube
 image.CameraFocalPoint = [0.5, 0.5, 0.5]
 
 extractor = CreateExtractor("VDI", image, registrationName="vdi")
