@@ -1,0 +1,338 @@
+"""Runs or compiles the snippets of README.md and docs/*.md in C, Fortran, CMake, Python and JSON.
+
+Each such snippet needs a test below, and each test needs its snippet. The tests add the
+surroundings that a document's text describes, such as the simulation's variables. They change the
+snippets only in one port, which another program may hold, and in one number of steps.
+
+Arguments: a part (core or paraview), the source folder, vdi. The environment has MPICC, MPIFORT,
+PVBATCH, PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
+"""
+
+import collections
+import glob
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+PART, SOURCE, TOOL = sys.argv[1:4]
+LANGUAGES = ("c", "fortran", "cmake", "python", "json")
+ADAPTOR = os.path.join(SOURCE, "catalyst_adaptor")
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.M | re.S)
+Test = collections.namedtuple("Test", "part document start function")
+TESTS = []
+
+
+def snippets():
+    """(document, text) of each fenced block in one of the languages."""
+    guides = sorted(glob.glob(os.path.join(SOURCE, "docs", "*.md")))
+    for path in [os.path.join(SOURCE, "README.md"), *guides]:
+        with open(path) as file:
+            for language, text in BLOCK.findall(file.read()):
+                if language in LANGUAGES:
+                    yield os.path.relpath(path, SOURCE), text
+
+
+def tests(part, document, start):
+    """Registers a function as the test of the document's snippet that begins with `start`."""
+    def register(function):
+        TESTS.append(Test(part, document, start, function))
+        return function
+    return register
+
+
+def run(*command, **options):
+    """Runs a command in the present folder. Throws with its output if it fails."""
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          timeout=200, **options)
+    line = " ".join(command)
+    assert done.returncode == 0, "%s: status %d\n%s" % (line, done.returncode, done.stdout)
+
+
+def write(name, text):
+    with open(name, "w") as file:
+        file.write(text)
+
+
+def vdi(*options):
+    run(TOOL, "generate", *options, "--resolution", "48x32", "--supersegments", "8",
+        "-o", "made.vdi")
+
+
+def compile_c(declarations, text):
+    write("snippet.c", """#include <mpi.h>
+#include <stddef.h>
+#include <stdint.h>
+#include "vdi_catalyst.h"
+void snippet(%s) {
+%s}
+""" % (declarations, text))
+    run(os.environ["MPICC"], "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only",
+        "-I", ADAPTOR, "snippet.c")
+
+
+@tests("core", "README.md", "const char* scripts[]")
+def c_with_script(text):
+    compile_c("MPI_Comm comm, size_t block_count, const vdi_catalyst_block* blocks,"
+              " const void* const* values, int64_t step, double time", text)
+
+
+@tests("core", "docs/catalyst-guide.md", "vdi_catalyst* vdi;")
+def c_with_json(text):
+    compile_c("MPI_Comm comm, vdi_catalyst_block block, const void* pointer, int64_t step,"
+              " double time", text)
+
+
+@tests("core", "docs/catalyst-guide.md", "feed = ")
+def c_parameter(text):
+    compile_c("vdi_catalyst* catalyst", "double feed;\n" + text + "(void)feed;\n")
+
+
+@tests("core", "docs/catalyst-guide.md", "type(c_ptr) :: vdi")
+def fortran(text):
+    declaration, statements = text.split("\n", 1)
+    write("snippet.f90", """subroutine snippet(comm, blocks, name, values, step, time)
+  use, intrinsic :: iso_c_binding
+  use vdi_catalyst
+  implicit none
+  integer :: comm, code
+  type(vdi_catalyst_block) :: blocks(1)
+  character(kind=c_char, len=*) :: name
+  real(c_double), target :: values(:, :, :)
+  integer(c_int64_t) :: step
+  real(c_double) :: time
+%s
+%send subroutine
+""" % (declaration, statements))
+    module = os.path.join(ADAPTOR, "vdi_catalyst.f90")
+    run(os.environ["MPIFORT"], "-fsyntax-only", module, "snippet.f90")
+
+
+@tests("core", "docs/catalyst-guide.md", "find_package(pv-vdi")
+def cmake(text):
+    """The tests of the installation configure this project."""
+    with open(os.path.join(SOURCE, "tests", "install", "project", "CMakeLists.txt")) as file:
+        project = file.read()
+    for line in text.splitlines():
+        command = re.sub(r"\s*#.*", "", line).replace("(simulation ", "(from_c ")
+        command = command.replace("COMPONENTS catalyst)", "COMPONENTS catalyst vdi)")
+        assert command in project, "the tested project lacks: " + command
+
+
+def check_run(text):
+    write("viridis.json", '[{"Name": "viridis", "RGBPoints": [0, 0, 0, 0, 1, 1, 1, 1]}]')
+    write("run.json", text)
+    run(TOOL, "check", "run.json")
+
+
+for document, start in (("docs/catalyst-guide.md", '{"field": "V", "every": 10}'),
+                        ("docs/catalyst-guide.md", '{\n  "field": "V",\n  "every": 10'),
+                        ("docs/catalyst-guide.md", '{"field": "V", "every_time"'),
+                        ("docs/catalyst-guide.md", '{"field": "V", "every": 10, "cameras"'),
+                        ("docs/live.md", '{"field": "V", "stream"')):
+    tests("core", document, start)(check_run)
+
+
+@tests("core", "docs/live.md", '{"step":120,')
+def steering_record(text):
+    """tests/stream/steering_test.py checks the records that a run writes."""
+    record = json.loads(text)
+    assert list(record) == ["step", "time", "viewer", "steer"], record
+
+
+def same_kind(a, b):
+    """Whether two JSON values have the same names and types. Compares lists by first elements."""
+    if isinstance(a, dict):
+        same_names = isinstance(b, dict) and a.keys() == b.keys()
+        return same_names and all(same_kind(a[name], b[name]) for name in a)
+    if isinstance(a, list):
+        return isinstance(b, list) and same_kind(a[0], b[0])
+    return isinstance(b, (int, float)) if isinstance(a, (int, float)) else isinstance(b, type(a))
+
+
+@tests("core", "docs/format.md", '{\n  "array"')
+def metadata(text):
+    vdi("--field", "sphere", "--size", "16x16x16")
+    with open("made.vdi", "rb") as file:
+        made = json.loads(re.search(rb"JSON.{12}(\{.*\})$", file.read(), re.S)[1])
+    assert same_kind(json.loads(text), made), "a file has: %s" % made
+
+
+@tests("core", "docs/raw-volumes.md", '{\n  "file": "volume.raw"')
+def sidecar(text):
+    write("volume.json", text)
+    with open("volume.raw", "wb") as file:
+        file.truncate(2 * 256 * 256 * 109)
+    vdi("--raw", "volume.json")
+
+
+@tests("core", "docs/raw-volumes.md", '{\n  "colors"')
+def transfer_function(text):
+    write("colors.json", text)
+    vdi("--field", "sphere", "--size", "16x16x16", "--type", "u8",
+        "--transfer-function", "colors.json")
+
+
+@tests("core", "docs/raw-volumes.md", '{"position"')
+def camera(text):
+    write("camera.json", text)
+    vdi("--field", "sphere", "--size", "16x16x16", "--camera", "camera.json")
+
+
+@tests("core", "docs/python.md", "import pv_vdi")
+def read_in_python(text):
+    vdi("--field", "sphere", "--size", "16x16x16")
+    os.rename("made.vdi", "vdi_000100.vdi")
+    run(sys.executable, "-c", text + "assert turned.shape == (720, 1280, 4), turned.shape\n")
+
+
+def in_situ(script, steps=1):
+    """Runs a script in a simulation of the cells of a cube."""
+    write("script.py", script)
+    write("simulation.py", """import numpy as np
+from mpi4py import MPI
+from pv_vdi.catalyst import Block, Catalyst
+
+N = 16
+with Catalyst(MPI.COMM_WORLD, ["script.py"]) as catalyst:
+    catalyst.set_blocks([Block((N, N, N), (0, 0, 0), (1 / N,) * 3)])
+    catalyst.set_array("V", [np.linspace(0, 0.45, N ** 3).reshape(N, N, N)])
+    for step in range(%d):
+        catalyst.execute(step, 0.1 * step)
+""" % steps)
+    environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+    run(sys.executable, "simulation.py", env=environment)
+
+
+def made(pattern):
+    """Sorted names of the files that a test has made, in any folder."""
+    paths = glob.glob(os.path.join("**", pattern), recursive=True)
+    return sorted(os.path.basename(path) for path in paths)
+
+
+@tests("paraview", "README.md", 'image = VolumetricDepthImage(Input=TrivialProducer')
+def script_in_short(text):
+    in_situ("from paraview.simple import *\n" + text)
+    assert made("*.vdi") == ["vdi_000000.vdi"], made("*.vdi")
+
+
+@tests("paraview", "docs/catalyst-guide.md", "from paraview import catalyst")
+def script_in_full(text):
+    in_situ(text, 11)
+    assert made("*.vdi") == ["vdi_000000.vdi", "vdi_000010.vdi"], made("*.vdi")
+
+
+def snippet(start):
+    """The snippet that begins so."""
+    return next(text for _, text in snippets() if text.startswith(start))
+
+
+GUIDE = snippet("from paraview import catalyst")
+EXTRACTOR = snippet("stream = CreateExtractor").replace("8080", "0")
+
+
+@tests("paraview", "docs/live.md", "stream = CreateExtractor")
+def extractor_of_stream(text):
+    in_situ(GUIDE + EXTRACTOR + "assert stream.Writer.Port == 0\n")
+
+
+@tests("paraview", "docs/live.md", "stream.Writer.Steer = 1")
+def steered_stream(text):
+    in_situ(GUIDE + EXTRACTOR + text + "assert stream.Writer.Steer == 1\n")
+
+
+@tests("paraview", "docs/python.md", "import numpy as np")
+def simulation_in_python(text):
+    write("snippet.py", "def advance(values):\n    values += 0.01\n\n\n"
+          + text.replace("range(100)", "range(11)"))
+    run(sys.executable, "snippet.py")
+    assert len(made("*.vdi")) == 2, made("*.vdi")
+
+
+def pvbatch(script):
+    write("script.py", script)
+    run(os.environ["PVBATCH"], "script.py")
+
+
+WRITING = snippet("from paraview.simple import *\nLoadDistributed")
+SHOWING = snippet("reader = OpenDataFile")
+
+
+@tests("paraview", "README.md", "from paraview.simple import *\nLoadDistributedPlugin")
+def script_with_filter(text):
+    pvbatch(text)
+    assert made("wavelet*") == ["wavelet.vdi", "wavelet_20.png"], made("wavelet*")
+
+
+@tests("paraview", "docs/user-guide.md", "LoadDistributedPlugin(")
+def plugin_of_a_client(text):
+    pvbatch("from paraview.simple import *\n" + text + "VolumetricDepthImage(Input=Wavelet())\n")
+
+
+@tests("paraview", "docs/user-guide.md", "reader = OpenDataFile")
+def shown_file(text):
+    pvbatch(WRITING + text)
+    assert made("wavelet.png"), made("*")
+
+
+@tests("paraview", "docs/user-guide.md", "reader.SMProxy.UpdatePropertyInformation()")
+def own_viewpoint(text):
+    pvbatch(WRITING + SHOWING + text + "assert list(view.CameraPosition) == [60, 45, 75]\n")
+
+
+@tests("paraview", "docs/live.md", "stream = VDIStream(URL=link)")
+def stream_source(text):
+    vdi("--field", "sphere", "--size", "16x16x16")
+    command = [TOOL, "serve", "--finished", "made.vdi"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            pvbatch("""from paraview.simple import *
+LoadDistributedPlugin("VolumetricDepthImages", ns=globals())
+link = %r
+%sassert stream.GetDataInformation().GetNumberOfPoints() > 0
+""" % (server.stdout.readline().strip(), text))
+        finally:
+            server.terminate()
+
+
+def fits(test, document, text):
+    return test.document == document and text.startswith(test.start)
+
+
+def passes(function, text):
+    """Runs a test in a folder of its own, and prints the result."""
+    folder = tempfile.mkdtemp()
+    os.chdir(folder)
+    try:
+        function(text)
+        print("passed  " + function.__name__, flush=True)
+        return True
+    except Exception as error:
+        print("FAILED  %s: %s\n%s" % (function.__name__, error, text), flush=True)
+        return False
+    finally:
+        os.chdir(SOURCE)
+        shutil.rmtree(folder)
+
+
+def main():
+    failures = 0
+    found = list(snippets())
+    for document, text in found:
+        fitting = [test for test in TESTS if fits(test, document, text)]
+        if len(fitting) != 1:
+            failures += 1
+            print("FAILED  %s has a snippet with %d tests:\n%s" % (document, len(fitting), text))
+        elif fitting[0].part == PART:
+            failures += not passes(fitting[0].function, text)
+    for test in TESTS:
+        if not any(fits(test, document, text) for document, text in found):
+            failures += 1
+            print("FAILED  %s has no snippet for %s" % (test.document, test.function.__name__))
+    sys.exit(failures > 0)
+
+
+main()
