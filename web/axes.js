@@ -1,4 +1,4 @@
-// The directions of the world's axes, in a corner of the view.
+// Draws the directions of the world's axes in a corner of the view.
 
 import {basisOf} from "./camera.js";
 import {dot} from "./vector.js";

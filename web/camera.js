@@ -1,5 +1,6 @@
-// Cameras, the rays of their pictures, and how a hand moves them. Conventions are those of vdi/core/Camera.h: view space has x
-// to the right, y up and z = depth; pictures count pixels from their lower left corner.
+// Cameras, the rays of their pictures, and the motions that a user gives them. vdi/core/Camera.h
+// has the conventions: in view space x points right, y points up and z is the depth. Pictures count
+// pixels from their lower left corner.
 
 import {cross, dot, length, minus, normalize, plus, times, turn} from "./vector.js";
 
@@ -7,7 +8,7 @@ import {cross, dot, length, minus, normalize, plus, times, turn} from "./vector.
 /** @typedef {import("./format.js").Camera} Camera */
 /** @typedef {import("./format.js").Header} Header */
 
-/** @param {Vec3} up @returns {Vec3} of length 1; y for one of length 0, as vtkCamera has it */
+/** @param {Vec3} up @returns {Vec3} of length 1; y for one of length 0, as in vtkCamera */
 function unitUp(up) {
   const largest = Math.max(...up.map(Math.abs));
   return largest > 0 ? normalize(times(1 / largest, up)) : [0, 1, 0];
@@ -24,7 +25,7 @@ export function basisOf(camera) {
   const forward = normalize(minus(camera.focalPoint, camera.position));
   const wanted = unitUp(camera.viewUp);
   let rest = minus(wanted, times(dot(wanted, forward), forward));
-  if (!(length(rest) > 1e-9)) {  // any orthogonal one
+  if (!(length(rest) > 1e-9)) {  // any orthogonal vector serves
     const sizes = forward.map(Math.abs);
     const least = sizes.indexOf(Math.min(...sizes));
     const axis = /** @type {Vec3} */ ([0, 1, 2].map((i) => i === least ? 1 : 0));
@@ -35,7 +36,7 @@ export function basisOf(camera) {
 }
 
 /**
- * Half the height of the image plane: at depth 1, or anywhere for parallel projection.
+ * Half the height of the image plane at depth 1; in parallel projection, at any depth.
  * @param {Camera} camera
  */
 export function halfHeightOf(camera) {
@@ -43,7 +44,7 @@ export function halfHeightOf(camera) {
 }
 
 /**
- * World to view space.
+ * Transforms a point from world to view space.
  * @param {Vec3} world
  * @param {Camera} camera
  * @param {Basis} basis
@@ -55,9 +56,11 @@ export function toView(world, camera, basis) {
 }
 
 /**
- * The rays of a new picture in the view space of V_O, as RenderRays in shaders/shared/render.h: a ray starts from
- * origin + u * originRight + v * originUp, and likewise its direction; u and v count pixels from the picture's middle.
- * @typedef {{origin: Vec3, originRight: Vec3, originUp: Vec3, direction: Vec3, directionRight: Vec3, directionUp: Vec3}} Rays
+ * The rays of a new picture in the view space of V_O, as RenderRays in shaders/shared/render.h. A
+ * ray starts at origin + u * originRight + v * originUp; its direction has the same form. u and v
+ * count pixels from the picture's middle.
+ * @typedef {{origin: Vec3, originRight: Vec3, originUp: Vec3,
+ *            direction: Vec3, directionRight: Vec3, directionUp: Vec3}} Rays
  */
 
 /**
@@ -84,7 +87,7 @@ export function raysOf(camera, height, original) {
 }
 
 /**
- * V_O's pixel at depth 1, or anywhere for parallel projection.
+ * The size of V_O's pixel at depth 1; in parallel projection, at any depth.
  * @param {Header} header
  */
 export function pixelSizeOf(header) {
@@ -92,9 +95,9 @@ export function pixelSizeOf(header) {
 }
 
 /**
- * Columns of the matrix that takes world coordinates to WebGL's clip space; depth is not resolved.
+ * The matrix from world coordinates to WebGL's clip space. It doesn't resolve depth.
  * @param {Camera} camera
- * @param {[number, number]} extent half of what the canvas shows: its width and height, in the camera's half heights
+ * @param {[number, number]} extent half the canvas' width and height, in the camera's half heights
  * @returns {Float32Array} 16 numbers, by columns
  */
 export function clipMatrix(camera, extent) {
@@ -121,7 +124,8 @@ export function centerOf(bounds) {
 }
 
 /**
- * By how many degrees two cameras see a point from different directions; of parallel ones, their axes.
+ * The angle between the directions from which two cameras see a point, in degrees. A parallel
+ * camera sees every point along its axis.
  * @param {Vec3} point
  * @param {Camera} a
  * @param {Camera} b
@@ -135,8 +139,8 @@ export function degreesBetween(point, a, b) {
 }
 
 /**
- * Turns the camera about `center` to its own right and upwards, as vtkCamera's Azimuth and Elevation about view-up
- * do; view-up follows, so that nothing turns over. Degrees.
+ * Turns the camera about `center`, to its own right and upwards, by degrees. vtkCamera's Azimuth
+ * and Elevation do the same. View-up turns, too, so that the picture never flips over.
  * @param {Camera} camera
  * @param {Vec3} center
  * @param {number} azimuth
@@ -167,10 +171,10 @@ export function rolled(camera, degrees) {
 }
 
 /**
- * Moves the camera so that what lies at the focal point follows a hand.
+ * Moves the camera so that the material at the focal point follows the pointer.
  * @param {Camera} camera
- * @param {number} dx shares of the picture's height to the right
- * @param {number} dy and upwards
+ * @param {number} dx shift to the right, as a share of the picture's height
+ * @param {number} dy shift upwards, likewise
  * @returns {Camera}
  */
 export function panned(camera, dx, dy) {
@@ -182,7 +186,7 @@ export function panned(camera, dx, dy) {
 }
 
 /**
- * Shows things `factor` times as large: from nearer in perspective.
+ * Magnifies the picture by `factor`. In perspective the camera moves closer.
  * @param {Camera} camera
  * @param {number} factor > 0
  * @returns {Camera}
@@ -194,7 +198,7 @@ export function zoomed(camera, factor) {
 }
 
 /**
- * Between two cameras, for a motion from one to the other.
+ * Interpolates between two cameras.
  * @param {Camera} a
  * @param {Camera} b
  * @param {number} share of b
@@ -207,7 +211,7 @@ export function between(a, b, share) {
   const fromB = minus(b.position, b.focalPoint);
   const distance = Math.exp((1 - share) * Math.log(length(fromA)) + share * Math.log(length(fromB)));
   const back = mix(normalize(fromA), normalize(fromB));
-  if (length(back) < 0.1) return share < 0.5 ? a : b;  // opposite ones have no way between them
+  if (length(back) < 0.1) return share < 0.5 ? a : b;  // there is no shortest way between opposite directions
   const scale = Math.exp((1 - share) * Math.log(a.parallelScale) + share * Math.log(b.parallelScale));
   return {
     ...b, focalPoint,
@@ -218,7 +222,7 @@ export function between(a, b, share) {
 }
 
 /**
- * For a URL: numbers with the digits of single precision.
+ * A camera as text for a URL. Numbers have the digits of single precision.
  * @param {Camera} camera
  */
 export function cameraText(camera) {
@@ -229,8 +233,8 @@ export function cameraText(camera) {
 
 /**
  * @param {string} text
- * @param {Camera} original gives what the text leaves out
- * @returns {Camera | undefined} none if the text is no camera
+ * @param {Camera} original gives the values that the text omits
+ * @returns {Camera | undefined} undefined if the text describes no camera
  */
 export function cameraOfText(text, original) {
   const parallel = text.startsWith("parallel,");

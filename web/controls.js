@@ -1,26 +1,26 @@
-// How a hand moves the camera: mouse, touch and keyboard.
+// Moves the camera by mouse, touch and keyboard.
 
 import {orbited, panned, rolled, zoomed} from "./camera.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
 /** @typedef {import("./format.js").Vec3} Vec3 */
 
-const DEGREES_PER_HEIGHT = 180;  // of a drag
+const DEGREES_PER_HEIGHT = 180;  // a drag across the picture's height turns this far
 const KEY_DEGREES = 5;
 const KEY_PAN = 0.05;
 const KEY_ZOOM = 1.1;
 
 /**
- * @typedef {object} Hand what the controls move
+ * @typedef {object} Hand the camera that the controls move
  * @property {() => Camera | undefined} camera
- * @property {() => Vec3} center that is orbited
+ * @property {() => Vec3} center point that the camera orbits
  * @property {(camera: Camera) => void} move
  */
 
 /** @typedef {{x: number, y: number}} Place in CSS pixels */
 
 /**
- * What a drag does.
+ * The motion that a drag causes.
  * @param {PointerEvent} event
  * @returns {"orbit" | "pan" | "roll" | "zoom"}
  */
@@ -49,7 +49,7 @@ function addPointers(element, hand) {
   };
 
   /**
-   * Two fingers: what is between them stays between them.
+   * Moves the camera by two fingers. The material between them stays between them.
    * @param {Camera} camera
    * @param {Place} fixed
    * @param {Place} from

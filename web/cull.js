@@ -1,12 +1,13 @@
-// Finds regions of a new picture that may show something, so that the rays of the others, which are most, needn't look for it.
-// Twin of shaders/cull.comp and packet.glsl, whose comments say why: the rays at a region's corners bound those between them.
+// Finds the regions of a new picture that may show material. Rays of the other regions, which are
+// most, skip their search. Twin of shaders/cull.comp and packet.glsl, whose comments give the
+// reasons: the rays at a region's corners bound the rays between them.
 
 import {RAYS, REGION_SHIFT, uniformsOf} from "./traverse.js";
 
-export const REGION = 1 << REGION_SHIFT;  // pixels of a region's side
+export const REGION = 1 << REGION_SHIFT;  // pixels along a region's side
 
 const CULL = `
-out vec4 shows;  // 1: the region may show something
+out vec4 shows;  // 1: the region may show material
 
 Ray rayAt(vec2 pixel) {
   vec2 uv = pixel * pixelScale - 0.5 * pictureSize;
@@ -55,7 +56,7 @@ bool meetsColumn(Ray corners[4], bool byColumns, int tile, int first, int last) 
     depths = vec2(min(depths.x, depth), max(depths.y, depth));
   }
   if (!finite || !(ascends || descends) || !(parallel || depths.x > 0.0)) return true;
-  const float spare = 0.01;  // rows; masks of tiles know a row more than they hold
+  const float spare = 0.01;  // in rows; a tile's mask includes the rows next to the tile
   float rowCount = float(columnCount(!byColumns));
   vec2 places = clamp(rows + 0.5 * rowCount + vec2(-spare, spare), vec2(0.0), vec2(rowCount - 1.0));
   const float spareBins = 0.05;
@@ -93,7 +94,7 @@ bool mayShow(Ray corners[4]) {
   vec2 low = vec2(0.0);
   vec2 high = vec2(lists);
   vec2 depths = vec2(nearest, farthest);
-  // Else anywhere: the picture of what is beside V_O's eye has no bounds.
+  // Otherwise the rays may pass beside V_O's eye, and their places in the picture have no bounds.
   const float finite = 1e30;
   if (stretch.y < finite && (parallel || min(least(depthsIn), least(depthsOut)) > 0.0)) {
     vec4 pixelsIn = 1.0 / (pixelSize * (parallel ? vec4(1.0) : depthsIn));
@@ -114,7 +115,7 @@ bool mayShow(Ray corners[4]) {
   ivec2 lastTile = last >> 3;
   ivec2 span = lastTile - firstTile + 1;
   const int few = 16;
-  if (span.x * span.y <= few) {  // rays that stay about where they are: all tiles
+  if (span.x * span.y <= few) {  // the rays hardly move in the picture: look at all tiles
     uvec2 mask = maskBetween((depths - nearest) * binScale);
     for (int y = firstTile.y; y <= lastTile.y; ++y) {
       for (int x = firstTile.x; x <= lastTile.x; ++x) {
@@ -139,7 +140,7 @@ void main() {
 }
 `;
 
-/** @param {{rowShift: number, layerShift: number}} tiling of textures: see Variant in traverse.js */
+/** @param {{rowShift: number, layerShift: number}} tiling see Variant in traverse.js */
 export function cullShader(tiling) {
   return `${uniformsOf(tiling)}${RAYS}${CULL}`;
 }

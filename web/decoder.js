@@ -1,5 +1,6 @@
-// Makes VDIs ready for the renderer. A worker does it, so that a user who orbits doesn't wait for it. The worker runs the
-// page's own script, which does nothing else there. Browsers that refuse workers decode in the page, in short steps.
+// Prepares VDIs for the renderer. A worker does so, and the picture keeps moving meanwhile. The
+// worker runs the page's own script, which does nothing else there. If a browser refuses workers,
+// the page decodes in short steps.
 
 import {decodeVdi} from "./format.js";
 import {expandedSegments, headsOf} from "./heads.js";
@@ -9,19 +10,20 @@ import {unpack} from "./unpack.js";
 /** @typedef {import("./heads.js").Heads} Heads */
 
 /**
- * A decoded VDI as the renderer takes it.
- * @typedef {Header & Heads & {code: {first: number, step: number}, segments: Uint32Array}} PreparedVdi
+ * A decoded VDI in the renderer's form.
+ * @typedef {Header & Heads & {code: {first: number, step: number}, segments: Uint32Array}}
+ *     PreparedVdi
  */
 
 /**
- * The bytes of a .vdi file, or what `vdi export` packed into text.
+ * The bytes of a .vdi file, or the text into which `vdi export` packed them.
  * @typedef {{file: Uint8Array} | {packed: string, size: number}} Encoded
  */
 
 /** @typedef {{id: number, vdi?: PreparedVdi, error?: string}} Answer */
 
 /**
- * Lets the page do other things each 12 ms.
+ * Lets the page handle events every 12 ms.
  * @returns {() => Promise<void> | undefined}
  */
 export function politely() {
@@ -37,7 +39,7 @@ export function politely() {
 
 /**
  * @param {Encoded} encoded
- * @param {() => Promise<void> | undefined} [pause] as of decodeVdi
+ * @param {() => Promise<void> | undefined} [pause] see decodeVdi
  * @returns {Promise<PreparedVdi>}
  */
 async function prepare(encoded, pause) {
@@ -47,14 +49,14 @@ async function prepare(encoded, pause) {
     const vdi = {...rest, offsets, words};
     return {...rest, ...headsOf(vdi), segments: vdi.compact ? words : expandedSegments(vdi)};
   } catch (error) {
-    if (error instanceof RangeError) throw new Error("too little memory for this VDI");
+    if (error instanceof RangeError) throw new Error("there is too little memory for this VDI");
     throw error;
   }
 }
 
-/** What the page's script does in a worker. */
+/** Runs the page's script in a worker. */
 export function serveDecoding() {
-  const scope = /** @type {any} */ (globalThis);  // its type is in a library that excludes the DOM's
+  const scope = /** @type {any} */ (globalThis);  // its type is in a library that conflicts with the DOM's
   scope.onmessage = async (/** @type {MessageEvent<{id: number, encoded: Encoded}>} */ {data}) => {
     try {
       const vdi = await prepare(data.encoded);
@@ -72,7 +74,7 @@ export class Decoder {
     /** @type {Map<number, {resolve: (vdi: PreparedVdi) => void, reject: (error: Error) => void}>} */
     this.asked = new Map();
     this.next = 0;
-    /** A worker that answers; none if the browser refuses it. */
+    /** Starts a worker and waits for its answer; undefined if the browser refuses workers. */
     this.worker = this.start(script);
   }
 
@@ -103,16 +105,16 @@ export class Decoder {
     else asked?.reject(new Error(answer.error));
   }
 
-  /** @param {Worker} worker that has ended */
+  /** @param {Worker} worker one that has ended */
   fail(worker) {
     worker.terminate();
     this.worker = Promise.resolve(undefined);
-    for (const {reject} of this.asked.values()) reject(new Error("the browser ended the decoding of this VDI"));
+    for (const {reject} of this.asked.values()) reject(new Error("the browser stopped decoding this VDI"));
     this.asked.clear();
   }
 
   /**
-   * Throws Error with one line for the user. A file's bytes are gone afterwards.
+   * Throws Error with one line for the user. The call takes over the file's bytes.
    * @param {Encoded} encoded
    * @returns {Promise<PreparedVdi>}
    */

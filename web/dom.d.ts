@@ -1,4 +1,4 @@
-// What the DOM has and TypeScript 4.8, Debian 12's, doesn't know.
+// Parts of the DOM that TypeScript 4.8, which Debian 12 has, doesn't know.
 declare class DecompressionStream {
   constructor(format: "deflate-raw");
   readonly readable: ReadableStream<Uint8Array>;

@@ -1,10 +1,11 @@
-// Decodes .vdi files (docs/format.md). A file may be damaged or hostile: every number is checked before it is used, and
-// memory is taken only for what the file's bytes justify. Twin of vdi/io/VdiFile.cpp and vdi/io/ListCodec.cpp.
+// Decodes .vdi files (docs/format.md). A file may be damaged or hostile. The decoder checks every
+// number before it uses it, and allocates only the memory that the file's bytes justify. Twin of
+// vdi/io/VdiFile.cpp and vdi/io/ListCodec.cpp.
 
 import {lz4AnnouncedBytes, lz4Expand} from "./lz4.js";
 import {xxh64} from "./xxh64.js";
 
-/** What a file isn't. Its message is one line for the user. */
+/** Reports a file that breaks the format. The message is one line for the user. */
 export class FormatError extends Error {}
 
 /** @typedef {[number, number, number]} Vec3 */
@@ -24,24 +25,25 @@ export class FormatError extends Error {}
  * A VDI without its lists.
  * @typedef {object} Header
  * @property {number} version
- * @property {boolean} compact supersegments are codes (encoding 1), not floats (encoding 0)
- * @property {number} width lists per row, the margin's included
+ * @property {boolean} compact supersegments are codes (encoding 1) rather than floats (encoding 0)
+ * @property {number} width lists per row, including the margin
  * @property {number} height rows; row 0 is at the bottom
- * @property {[number, number]} margin lists on either side of the picture that the camera frames
- * @property {number} budget the most supersegments in a list
+ * @property {[number, number]} margin lists beyond each side of the picture that the camera frames
+ * @property {number} budget maximum number of supersegments in a list
  * @property {number} listsPerChunk
  * @property {number} chunkCount
  * @property {number} supersegmentCount
  * @property {number} dataBytes
  * @property {number} timeStep
  * @property {number} time of the simulation
- * @property {[Vec3, Vec3]} bounds of the scene, world: low and high corner; low above high for an empty scene
+ * @property {[Vec3, Vec3]} bounds of the scene: low and high corner in world space; low exceeds
+ *     high if the scene is empty
  * @property {Camera} camera V_O
- * @property {Coloring} [coloring] what colours mean; none in files of versions 1 and 2
+ * @property {Coloring} [coloring] meaning of the colours; absent in files of versions 1 and 2
  */
 
 /**
- * What a VDI's colours mean: the metadata's fields (docs/format.md).
+ * The meaning of a VDI's colours: the fields of the metadata (docs/format.md).
  * @typedef {object} Coloring
  * @property {{name: string, association: string, components: number, component: number}} array
  * @property {[number, number]} [range] of the values shown
@@ -49,13 +51,14 @@ export class FormatError extends Error {}
  */
 
 /**
- * A decoded VDI. List i holds the supersegments offsets[i] … offsets[i + 1] - 1, front to back.
- * Compact: two words each, of vdi/core/Supersegment.h. Full: six words, the bit patterns of the floats front, back, red,
- * green, blue (premultiplied) and opacity.
+ * A decoded VDI. List i holds the supersegments offsets[i] … offsets[i + 1] - 1, front to back. A
+ * compact supersegment has the two words of vdi/core/Supersegment.h. A full one has six words: the
+ * bit patterns of the floats front, back, red, green, blue (premultiplied) and opacity.
  * @typedef {object} Lists
  * @property {Uint32Array} offsets width * height + 1
  * @property {Uint32Array} words
- * @property {{first: number, step: number}} code depth of code c: first + c * step; compact only
+ * @property {{first: number, step: number}} code code c stands for depth first + c * step; compact
+ *     only
  */
 /** @typedef {Header & Lists} Vdi */
 
@@ -77,7 +80,7 @@ function bigCount(view, at) {
   return view.getUint32(at, true) + view.getUint32(at + 4, true) * 0x100000000;
 }
 
-/** @param {Uint8Array} bytes @param {DataView} view @param {number} at of the checksum that `bytes` should have */
+/** @param {Uint8Array} bytes @param {DataView} view @param {number} at where their checksum lies */
 function checksumHolds(bytes, view, at) {
   const sum = xxh64(bytes);
   return sum.low === view.getUint32(at, true) && sum.high === view.getUint32(at + 4, true);
@@ -89,7 +92,7 @@ function vectorAt(view, at) {
 }
 
 /**
- * Throws unless the camera can be used.
+ * Throws FormatError unless a picture can have this camera.
  * @param {Camera} camera
  */
 function requireCamera(camera) {
@@ -103,7 +106,7 @@ function requireCamera(camera) {
 }
 
 /**
- * Throws FormatError for a size that the fields contradict.
+ * Throws FormatError if the fields contradict each other or the file's size.
  * @param {Header} header
  * @param {number} fileBytes
  */
@@ -111,22 +114,22 @@ function requireSizes(header, fileBytes) {
   const {width, height, margin, listsPerChunk} = header;
   const goodSide = (/** @type {number} */ side) => side >= 1 && side <= MAX_SIDE;
   if (!goodSide(width) || !goodSide(height) || listsPerChunk === 0)
-    fail(`${width} x ${height} lists in chunks of ${listsPerChunk}`);
+    fail(`it has ${width} x ${height} lists in chunks of ${listsPerChunk}`);
   if (2 * margin[0] >= width || 2 * margin[1] >= height) fail("its margin leaves no picture");
-  if (header.budget < 1) fail("a budget of no supersegments");
+  if (header.budget < 1) fail("its lists have room for no supersegments");
   const chunks = Math.ceil(width * height / listsPerChunk);
-  if (chunks !== header.chunkCount) fail(`${header.chunkCount} chunks, there should be ${chunks}`);
+  if (chunks !== header.chunkCount) fail(`it has ${header.chunkCount} chunks instead of ${chunks}`);
   const before = HEADER_BYTES + chunks * ENTRY_BYTES;
   const rest = fileBytes - before - header.dataBytes;
   const hasMetadata = header.version === METADATA_VERSION;
   if (rest < 0 || (!hasMetadata && rest !== 0))
-    fail(`it has ${fileBytes} bytes, its header says ${before + header.dataBytes}`);
+    fail(`it has ${fileBytes} bytes instead of ${before + header.dataBytes}`);
   if (hasMetadata && (rest < METADATA_HEADER_BYTES || rest > METADATA_HEADER_BYTES + MAX_METADATA_BYTES))
-    fail(`${rest} bytes behind its chunks can't be metadata`);
+    fail(`the ${rest} bytes after its chunks can't be metadata`);
 }
 
 /**
- * Whether these are rows of `length` numbers each.
+ * Tells whether these are rows of `length` numbers each.
  * @param {unknown} rows @param {number} length
  */
 function areRows(rows, length) {
@@ -135,7 +138,7 @@ function areRows(rows, length) {
 }
 
 /**
- * @param {any} json what the text holds
+ * @param {any} json the parsed metadata
  * @returns {Coloring}
  */
 function coloringOf(json) {
@@ -143,22 +146,22 @@ function coloringOf(json) {
   const whole = (/** @type {unknown} */ value, /** @type {number} */ least) => Number.isInteger(value) && Number(value) >= least;
   if (typeof array?.name !== "string" || !["points", "cells"].includes(array.association) || !whole(array.components, 1) ||
       !whole(array.component, -1) || array.component >= array.components)
-    fail("its metadata don't tell the array");
+    fail("its metadata don't describe the array");
   if (range !== undefined && !(Array.isArray(range) && range.length === 2 && range.every(Number.isFinite)))
-    fail("the metadata's range isn't two numbers");
+    fail("the range in its metadata isn't two numbers");
   if (!areRows(map?.colors, 4) || !areRows(map?.opacities, 2) || !(map.unitDistance > 0))
-    fail("its metadata don't tell the transfer function");
+    fail("its metadata don't describe the transfer function");
   return {array, range, transferFunction: map};
 }
 
 /**
- * What follows the chunks, to the file's end.
+ * Decodes the metadata, which follow the chunks.
  * @param {Uint8Array} bytes @param {DataView} view @param {number} at
  */
 function decodeMetadata(bytes, view, at) {
   const text = bytes.subarray(at + METADATA_HEADER_BYTES);
   if (String.fromCharCode(...bytes.subarray(at, at + 4)) !== "JSON") fail("its metadata aren't JSON");
-  if (view.getUint32(at + 4, true) !== text.length) fail("its metadata have another length");
+  if (view.getUint32(at + 4, true) !== text.length) fail("its metadata have the wrong length");
   if (!checksumHolds(text, view, at + 8)) fail("the metadata's checksum is wrong");
   let json;
   try {
@@ -170,8 +173,8 @@ function decodeMetadata(bytes, view, at) {
 }
 
 /**
- * Reads the header. What it says of version and encoding is looked at before its checksum, so that a file of a later
- * version is named as such.
+ * Reads the header. It checks version and encoding before the checksum, so that the message for a
+ * file of a later version names the version.
  * @param {Uint8Array} bytes the whole file
  * @returns {Header}
  */
@@ -182,11 +185,11 @@ export function decodeHeader(bytes) {
   if (String.fromCharCode(...bytes.subarray(0, 8)) !== "VDI-FILE") fail("it doesn't start with VDI-FILE");
   const version = word(8);
   if (version < 1 || version > METADATA_VERSION)
-    fail(`it has version ${version}, this page reads versions 1 to ${METADATA_VERSION}`);
+    fail(`it has version ${version}, but this page reads versions 1 to ${METADATA_VERSION}`);
   if (word(12) !== HEADER_BYTES) fail(`its header has ${word(12)} bytes`);
   if (!checksumHolds(bytes.subarray(0, 232), view, 232)) fail("the header's checksum is wrong");
   const encoding = word(16);
-  if (encoding > 1) fail(`its supersegments have encoding ${encoding}, this page reads encodings 0 and 1`);
+  if (encoding > 1) fail(`its supersegments have encoding ${encoding}, but this page reads encodings 0 and 1`);
   /** @type {[number, number]} */
   const margin = [view.getUint16(44, true), view.getUint16(46, true)];
   const flags = word(20);
@@ -218,7 +221,7 @@ export function decodeHeader(bytes) {
   requireSizes(header, bytes.length);
   if (!checksumHolds(bytes.subarray(HEADER_BYTES, HEADER_BYTES + header.chunkCount * ENTRY_BYTES), view, 224))
     fail("the chunk table's checksum is wrong");
-  if (!Number.isFinite(header.time) || header.bounds.flat().some(Number.isNaN)) fail("time or bounds aren't numbers");
+  if (!Number.isFinite(header.time) || header.bounds.flat().some(Number.isNaN)) fail("its time or bounds aren't numbers");
   requireCamera(header.camera);
   if (version === METADATA_VERSION) {
     const behind = HEADER_BYTES + header.chunkCount * ENTRY_BYTES + header.dataBytes;
@@ -232,13 +235,13 @@ export function decodeHeader(bytes) {
  * @property {Uint8Array} packed
  * @property {number} firstList
  * @property {number} listCount
- * @property {number} first supersegment
- * @property {number} count of supersegments
+ * @property {number} first index of its first supersegment
+ * @property {number} count number of supersegments
  * @property {number} plainBytes
  */
 
 /**
- * The table's chunks, once it is sure that the file can hold what they claim.
+ * The table's chunks. Throws FormatError unless the file can hold what they claim.
  * @param {Uint8Array} bytes
  * @param {Header} header
  */
@@ -276,11 +279,12 @@ function unfold(folded) {
 }
 
 /**
- * Walks the lists of a chunk and calls `restore(index, reference, previous)` for each supersegment: the one that it
- * is predicted from, and the one before it in its list; -1 for none.
+ * Walks the lists of a chunk and calls `restore(index, reference, previous)` for each supersegment.
+ * `reference` is the supersegment that predicts it, `previous` the one before it in its list; -1
+ * stands for none.
  * @param {Chunk} chunk
  * @param {Uint8Array} plain
- * @param {number} lengthsAt in `plain`
+ * @param {number} lengthsAt place of the lists' lengths in `plain`
  * @param {Header} header
  * @param {Uint32Array} offsets of all lists
  * @param {(index: number, reference: number, previous: number) => void} restore
@@ -369,7 +373,7 @@ function decodeFull(chunk, plain, vdi) {
 }
 
 /**
- * Takes the depth code of a chunk, which all chunks share.
+ * Reads the depth code of a chunk. All chunks of a file have the same one.
  * @param {Uint8Array} plain
  * @param {Chunk} chunk
  * @param {Vdi} vdi
@@ -382,7 +386,7 @@ function takeCode(plain, chunk, vdi) {
     const last = Math.fround(code.first + Math.fround(MAX_CODE * code.step));
     const beforeLast = Math.fround(code.first + Math.fround((MAX_CODE - 1) * code.step));
     if (!(code.step > 0 && code.first >= 0 && last < Infinity && last > beforeLast))
-      fail(`depths from ${code.first} in steps of ${code.step}`);
+      fail(`its depths begin at ${code.first} in steps of ${code.step}`);
   } else if (code.first !== vdi.code.first || code.step !== vdi.code.step) {
     fail("its chunks have different depth codes");
   }
@@ -391,8 +395,8 @@ function takeCode(plain, chunk, vdi) {
 /**
  * Decodes a whole file.
  * @param {Uint8Array} bytes
- * @param {() => Promise<void> | undefined} [pause] called between chunks; the decoder waits for what it returns.
- *     Throws to end the decoding.
+ * @param {() => Promise<void> | undefined} [pause] the decoder calls it between chunks, and awaits
+ *     the promise if it returns one. It may throw to stop the decoder.
  * @returns {Promise<Vdi>}
  */
 export async function decodeVdi(bytes, pause = () => undefined) {

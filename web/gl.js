@@ -3,27 +3,28 @@
 /** @param {WebGL2RenderingContext} gl @param {number} kind @param {string} source */
 function compile(gl, kind, source) {
   const shader = gl.createShader(kind);
-  if (!shader) throw new Error("WebGL gave no shader");
+  if (!shader) throw new Error("WebGL created no shader");
   gl.shaderSource(shader, source);
   gl.compileShader(shader);
   return shader;
 }
 
 /**
- * A program with its uniforms by name. Throws Error for one that doesn't build, unless the context is lost.
+ * A program, with its uniforms by name. Throws Error if it doesn't build, unless the context is
+ * lost.
  * @param {WebGL2RenderingContext} gl
  * @param {string} vertex
  * @param {string} fragment
  */
 export function makeProgram(gl, vertex, fragment) {
   const program = gl.createProgram();
-  if (!program) throw new Error("WebGL gave no program");
+  if (!program) throw new Error("WebGL created no program");
   const shaders = [compile(gl, gl.VERTEX_SHADER, vertex), compile(gl, gl.FRAGMENT_SHADER, fragment)];
   for (const shader of shaders) gl.attachShader(program, shader);
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
     const logs = [...shaders.map((shader) => gl.getShaderInfoLog(shader)), gl.getProgramInfoLog(program)];
-    throw new Error(`the graphics driver refuses a shader: ${logs.filter(Boolean).join(" ").split("\n")[0]}`);
+    throw new Error(`the graphics driver rejects a shader: ${logs.filter(Boolean).join(" ").split("\n")[0]}`);
   }
   for (const shader of shaders) gl.deleteShader(shader);
   /** @type {Map<string, WebGLUniformLocation | null>} */
@@ -39,7 +40,7 @@ export function makeProgram(gl, vertex, fragment) {
 }
 
 /**
- * How elements of long arrays lie in textures: see Variant in traverse.js.
+ * The layout of long arrays in textures; see Variant in traverse.js.
  * @param {WebGL2RenderingContext} gl
  */
 export function tilingOf(gl) {
@@ -47,16 +48,17 @@ export function tilingOf(gl) {
   return {rowShift: shift, layerShift: shift};
 }
 
-const UPLOAD_BYTES = 2 << 20;  // at a time
+const UPLOAD_BYTES = 2 << 20;  // bytes of one upload
 
 /**
- * An array of two or four words an element as an integer texture of rows and layers. Throws Error where the GPU
- * can't hold it.
+ * Makes an integer texture of rows and layers from an array of two or four words per element.
+ * Throws Error if the GPU can't hold it.
  * @param {WebGL2RenderingContext} gl
  * @param {Uint32Array} words
  * @param {2 | 4} perElement
  * @param {{rowShift: number, layerShift: number}} tiling
- * @returns {{texture: WebGLTexture | null, uploads: (() => void)[]}} the texture is complete once all uploads were called
+ * @returns {{texture: WebGLTexture | null, uploads: (() => void)[]}} call all uploads to complete
+ *     the texture
  */
 export function makeArrayTexture(gl, words, perElement, tiling) {
   const width = 1 << tiling.rowShift;

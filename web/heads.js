@@ -1,24 +1,26 @@
-// What a ray asks of a list before it looks at supersegments: where they are, and in which of 60 parts of the VDI's depth range
-// there are any. Tiles of 8 x 8 and of 64 x 64 lists have such masks too. Twin of shaders/expand.comp.
+// A list's head tells a ray where the list's supersegments are, and which of 60 parts of the VDI's
+// depth range they occupy. Tiles of 8 x 8 and of 64 x 64 lists have such masks, too. Twin of
+// shaders/expand.comp.
 
 /** @typedef {import("./format.js").Vdi} Vdi */
 
 export const TILE = 8;
 export const LARGE_TILE = 64;
 export const BINS = 60;
-const WORD_BINS = 30;  // in a word of a mask, so that shaders get their bits without shifts
+const WORD_BINS = 30;  // bins in a word of a mask; shaders get their bits without shifts
 
 /**
  * @typedef {object} Heads
- * @property {Uint32Array} heads four words a list: first supersegment, count, low and high half of the mask
- * @property {Uint32Array} tiles two words a tile, of all small ones and then of all large ones
- * @property {number} nearest depth range of all supersegments
- * @property {number} farthest
+ * @property {Uint32Array} heads four words per list: first supersegment, count, mask's low and high
+ *     half
+ * @property {Uint32Array} tiles two words per tile: all small tiles, then all large ones
+ * @property {number} nearest least depth of all supersegments
+ * @property {number} farthest greatest depth
  * @property {number} binScale bins per unit of depth
  */
 
 /**
- * Front and back of supersegments by index.
+ * The depths at which supersegments begin and end, by index.
  * @param {Vdi} vdi
  */
 function depthsOf(vdi) {
@@ -36,13 +38,14 @@ function depthsOf(vdi) {
   };
 }
 
-/** @param {number} bits @returns {number} a word of a mask with so many low bits set, or all, or none */
+/** @param {number} bits @returns {number} a word of a mask with that many low bits set, at most all */
 function lowBits(bits) {
   return (1 << Math.min(Math.max(bits, 0), WORD_BINS)) - 1;
 }
 
 /**
- * Tiles with the lists around them, which smooth reconstruction sees from within.
+ * Masks of tiles. They include the lists around a tile, because smooth reconstruction blends with
+ * these.
  * @param {Uint32Array} heads
  * @param {number} width
  * @param {number} height
@@ -80,12 +83,12 @@ export function headsOf(vdi) {
   const {front, back} = depthsOf(vdi);
   const lists = width * height;
   let nearest = Infinity, farthest = 0;
-  for (let i = 0; i < lists; ++i) {  // lists are in order of depth: their ends tell
+  for (let i = 0; i < lists; ++i) {  // a list is in order of depth, so its two ends suffice
     if (offsets[i] === offsets[i + 1]) continue;
     nearest = Math.min(nearest, front(offsets[i]));
     farthest = Math.max(farthest, back(offsets[i + 1] - 1));
   }
-  // In perspective the frusta of V_O's pixels meet in its eye; nothing can be told apart there.
+  // In perspective the frusta of V_O's pixels meet in its eye, where depths say nothing.
   if (!vdi.camera.parallel) nearest = Math.max(nearest, farthest * 1e-6);
   const binScale = farthest > nearest ? BINS / (farthest - nearest) : 0;
   const binOf = (/** @type {number} */ depth) =>
@@ -109,8 +112,8 @@ export function headsOf(vdi) {
 const MAX_OPTICAL_DEPTH = 65504;  // maxExtinction of vdi/core/TransferFunction.h
 
 /**
- * Full supersegments as the shader reads them, four words each: front, back, optical depth per depth, and the
- * straight colour in 11, 11 and 10 bits (shaders/render_segment.glsl).
+ * Full supersegments in the shader's form, four words each: front, back, optical depth per unit of
+ * depth, and the straight colour in 11, 11 and 10 bits (shaders/render_segment.glsl).
  * @param {Vdi} vdi
  * @returns {Uint32Array}
  */

@@ -1,10 +1,10 @@
-// The colour bar: what a VDI's colours mean.
+// The colour bar, which shows the meaning of a VDI's colours.
 
 /** @typedef {import("./format.js").Coloring} Coloring */
 
 /**
  * @param {number} value
- * @param {number} span of all values
+ * @param {number} span distance between the least and the greatest value
  */
 function numberText(value, span) {
   if (Math.abs(value) < span * 1e-9) return "0";
@@ -15,7 +15,7 @@ function numberText(value, span) {
 }
 
 /**
- * Both ends, and round numbers between them that leave room.
+ * The numbers beside the bar: both ends, and round numbers between them that don't collide.
  * @param {number} low @param {number} high
  */
 function ticksOf(low, high) {
@@ -51,7 +51,7 @@ function part(name, text = "") {
 }
 
 /**
- * Fills `figure`, or hides it where nothing is known.
+ * Fills `figure`, or hides it if the VDI has no metadata.
  * @param {HTMLElement} figure @param {Coloring | undefined} coloring
  */
 export function showLegend(figure, coloring) {

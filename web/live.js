@@ -1,5 +1,5 @@
-// A connection to a server: shows the newest frame that the network and this machine can take, and comes back when it breaks.
-// docs/live.md has the protocol.
+// A connection to a server. It shows the newest frame that network and machine can keep up with,
+// and reconnects after a failure. docs/live.md has the protocol.
 
 import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessageOf} from "./messages.js";
 
@@ -11,18 +11,20 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
 /** @typedef {import("./messages.js").Welcome} Welcome */
 
 /**
- * What a Live needs of WebSocket.
- * @typedef {Pick<WebSocket, "binaryType" | "readyState" | "send" | "close" | "onopen" | "onmessage" | "onclose">} Socket
+ * The members of WebSocket that Live uses.
+ * @typedef {Pick<WebSocket, "binaryType" | "readyState" | "send" | "close" |
+ *                          "onopen" | "onmessage" | "onclose">} Socket
  */
 
 /**
- * A level that has come, with the clock's milliseconds when its frame was made.
+ * A received level, and the time at which its frame was made, in milliseconds of the page's clock.
  * @typedef {Level & {madeAt: number}} Arrived
  */
 
 /**
- * "connecting": no answer yet; "waiting": connected, the simulation has made no frame; "live"; "ended": so is the
- * simulation; "lost": will connect again; "refused": will not, until `restart`; "closed": by the user.
+ * "connecting": the server hasn't answered yet; "waiting": the simulation has made no frame yet;
+ * "live": frames arrive; "ended": the simulation has ended; "lost": the page will reconnect;
+ * "refused": it won't until `restart`; "closed": the user has closed the connection.
  * @typedef {"connecting" | "waiting" | "live" | "ended" | "lost" | "refused" | "closed"} LiveState
  */
 
@@ -31,19 +33,19 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
  * @property {() => Socket} open
  * @property {string} token
  * @property {(file: Uint8Array) => Promise<PreparedVdi>} decode
- * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void> | void} onLevel shows it
- * @property {() => void} onChange of state, cause, series, viewers or steering
+ * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void> | void} onLevel shows a level
+ * @property {() => void} onChange called when state, cause, series, viewers or steering change
  */
 
 const ACK_BYTES = 512 << 10;
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 10000;
-const ANSWER_MS = 10000;       // within which a server says welcome
-const RATE_MS = 4000;          // over which the rate is a mean
+const ANSWER_MS = 10000;       // time for a server to answer
+const RATE_MS = 4000;          // the rate is a mean over this time
 const WRONG_TOKEN = 4401;
 const OTHER_VERSION = 4409;
 
-/** @param {number} now @param {{at: number, bytes: number}[]} arrivals @returns {number} bytes a second */
+/** @param {number} now @param {{at: number, bytes: number}[]} arrivals @returns {number} bytes per second */
 export function rateOf(now, arrivals) {
   const some = arrivals.filter(({at}) => now - at < RATE_MS);
   if (some.length === 0) return 0;
@@ -57,19 +59,19 @@ export class Live {
     this.options = options;
     /** @type {LiveState} */
     this.state = "connecting";
-    /** Why it is lost or refused: one line. */
+    /** The reason for being lost or refused, in one line. */
     this.cause = "";
     this.isPaused = false;
     /** @type {Series | null} */
     this.series = null;
-    /** @type {number | null} the series' frame that the user wants; null: the newest */
+    /** @type {number | null} the frame of the series that the user wants; null: the newest */
     this.wanted = null;
     this.viewers = 0;
-    /** @type {Steering | null} null: there is none, or none yet */
+    /** @type {Steering | null} null: the server has sent none */
     this.steering = null;
-    /** Why the server hasn't done what this viewer asked for last; empty: it has, or will. */
+    /** Why the server rejected this viewer's last wish; empty if it didn't. */
     this.denied = "";
-    /** @type {Arrived | undefined} the level that is shown */
+    /** @type {Arrived | undefined} the level on show */
     this.shown = undefined;
     this.session = "";
     /** @type {Socket | undefined} */
@@ -79,7 +81,10 @@ export class Live {
     this.madeAt = 0;
     /** @type {{at: number, bytes: number}[]} */
     this.arrivals = [];
-    /** @type {{level: Arrived, file: Uint8Array, done: () => void} | undefined} the newest that waits for the decoder */
+    /**
+     * The newest level that waits for the decoder.
+     * @type {{level: Arrived, file: Uint8Array, done: () => void} | undefined}
+     */
     this.waiting = undefined;
     this.isDecoding = false;
     this.failures = 0;
@@ -89,8 +94,8 @@ export class Live {
   }
 
   /**
-   * Connects, or connects anew.
-   * @param {string} [token] another one than before
+   * Connects or reconnects.
+   * @param {string} [token] replaces the former one
    */
   restart(token) {
     if (token !== undefined) this.options.token = token;
@@ -98,7 +103,7 @@ export class Live {
     this.connect();
   }
 
-  /** Ends it; the last frame stays. */
+  /** Closes the connection. The last frame stays. */
   close() {
     this.hangUp();
     this.change("closed", "");
@@ -122,7 +127,7 @@ export class Live {
     let socket;
     try {
       socket = this.options.open();
-    } catch (error) {  // a URL that the browser forbids
+    } catch (error) {  // the browser forbids the URL
       this.refuse(error instanceof Error ? error.message : String(error));
       return;
     }
@@ -152,27 +157,27 @@ export class Live {
     this.options.onChange();
   }
 
-  /** @param {number} code of the WebSocket's end */
+  /** @param {number} code with which the WebSocket closed */
   onClose(code) {
-    if (code === WRONG_TOKEN) this.refuse("the server refuses this link's token; use the link that it printed last");
+    if (code === WRONG_TOKEN) this.refuse("the server rejects the token in this link; use the link that it printed last");
     else if (code === OTHER_VERSION) this.refuse(this.cause || "the server speaks another version of the protocol; reload this page");
     else this.lose(this.cause || "the server doesn't answer");
   }
 
-  /** @param {string} cause that another attempt won't mend */
+  /** @param {string} cause one that another attempt won't remove */
   refuse(cause) {
     this.hangUp();
     this.change("refused", cause);
   }
 
   /**
-   * Connects again after a while, a longer one each time.
+   * Reconnects after a pause, which grows with each attempt.
    * @param {string} cause
    */
   lose(cause) {
     this.hangUp();
     const longest = Math.min(FIRST_WAIT_MS * 2 ** this.failures, LONGEST_WAIT_MS);
-    const wait = longest * (0.75 + 0.25 * Math.random());  // so that viewers don't all come at once
+    const wait = longest * (0.75 + 0.25 * Math.random());  // spreads out viewers that lost the server together
     ++this.failures;
     this.retryAt = performance.now() + wait;
     this.timer = setTimeout(() => this.connect(), wait);
@@ -223,10 +228,11 @@ export class Live {
   takeWelcome(welcome) {
     clearTimeout(this.timer);
     if (welcome.version !== STREAM_VERSION) {
-      this.refuse(`the server speaks version ${welcome.version} of the protocol, this page version ${STREAM_VERSION}; reload it`);
+      this.refuse(`the server speaks version ${welcome.version} of the protocol, ` +
+                  `but this page speaks version ${STREAM_VERSION}; reload it`);
       return;
     }
-    if (welcome.session !== this.session) this.shown = undefined;  // another run counts its frames anew
+    if (welcome.session !== this.session) this.shown = undefined;  // another run numbers its own frames
     this.session = welcome.session;
     this.series = welcome.series;
     this.viewers = welcome.viewers;
@@ -257,7 +263,8 @@ export class Live {
       if (assembler.received - this.acknowledged >= ACK_BYTES) acknowledge(assembler.received);
       return;
     }
-    // The end is acknowledged once the decoder has this level, so that a slow machine gets no more than it can show.
+    // The page acknowledges a level's end when the decoder takes the level. A slow machine thus
+    // gets no more than it can show.
     const socket = this.socket;
     const done = () => {
       if (socket === this.socket) acknowledge(level.bytes);
@@ -281,21 +288,21 @@ export class Live {
         this.shown = level;
         this.failures = 0;
         this.change(this.state, "");
-      } catch (error) {  // nothing is lost but this level
+      } catch (error) {  // only this level is lost
         this.change(this.state, error instanceof Error ? error.message : String(error));
       }
     }
     this.isDecoding = false;
   }
 
-  /** Stays at what is shown. */
+  /** Keeps the frame on show. */
   pause() {
     this.isPaused = true;
     this.send({type: "pause"});
     this.options.onChange();
   }
 
-  /** Goes on with the newest frames. */
+  /** Follows the newest frames. */
   follow() {
     this.isPaused = false;
     this.wanted = null;
@@ -304,7 +311,7 @@ export class Live {
   }
 
   /**
-   * Stays at a frame of the series.
+   * Shows a frame of the series and stays there.
    * @param {number} index
    */
   show(index) {
@@ -315,13 +322,13 @@ export class Live {
     this.options.onChange();
   }
 
-  /** Asks for control of the simulation. */
+  /** Requests control of the simulation. */
   drive() {
     this.denied = "";
     this.send({type: "drive"});
   }
 
-  /** Gives it back. */
+  /** Gives control back. */
   release() {
     this.denied = "";
     this.send({type: "release"});
@@ -333,7 +340,7 @@ export class Live {
     this.send({type: "steer", ...wish});
   }
 
-  /** @returns {number} bytes a second, of the last few seconds */
+  /** @returns {number} bytes per second over the last few seconds */
   rate() {
     return rateOf(performance.now(), this.arrivals);
   }

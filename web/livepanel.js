@@ -1,4 +1,4 @@
-// What the page shows of a connection to a server, and the button that pauses it.
+// Shows the state of a connection to a server, and has the button that pauses it.
 
 import {Live} from "./live.js";
 import {SUBPROTOCOL} from "./messages.js";
@@ -8,21 +8,23 @@ import {SUBPROTOCOL} from "./messages.js";
 /** @typedef {import("./live.js").Arrived} Arrived */
 
 /**
- * @typedef {object} LiveView what shows the frames
+ * @typedef {object} LiveView the part of the page that shows the frames
  * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void>} show
  * @property {(message: string) => void} tell
- * @property {(index: number) => void} onSeries the server has a series, of which it shows that frame
- * @property {() => void} onChange of what the server says
+ * @property {(index: number) => void} onSeries called if the server has a series; `index` is on
+ *     show
+ * @property {() => void} onChange called when the server reports something new
  */
 
-const PATIENCE_MS = 700;   // of a series that plays, for a frame's finer levels
-const REFRESH_MS = 500;    // of what is said
-const STALE_S = 10;        // a frame of that age is told of in full seconds
+const PATIENCE_MS = 700;   // time that a playing series waits for a frame's finer levels
+const REFRESH_MS = 500;    // interval between updates of the line
+const STALE_S = 10;        // from this age on, the line shows whole seconds
 
 /**
- * Takes the token out of the URL, where a screenshot or somebody behind the user would show it, and keeps it in this tab's
- * entry of the session's history: so reloading still works. The rest of the fragment stays.
- * @returns {string} empty if there is none
+ * Removes the token from the URL, where a screenshot or an onlooker would reveal it. This tab's
+ * entry of the session's history keeps it, so reloading still works. The rest of the fragment
+ * stays.
+ * @returns {string} empty without a token
  */
 export function takeToken() {
   const words = new URLSearchParams(location.hash.slice(1));
@@ -44,7 +46,7 @@ function ageText(seconds) {
 }
 
 /**
- * One line on a connection.
+ * The state of a connection in one line.
  * @param {Live} live
  * @param {number} now milliseconds
  */
@@ -57,7 +59,7 @@ export function liveText(live, now) {
   const parts = [isOn && live.isPaused ? "Paused" : isSeries ? "Series" : words[state]];
   if (state === "lost") parts.push(live.cause, `next attempt in ${Math.max(Math.ceil((live.retryAt - now) / 1000), 0)} s`);
   else if (live.cause) parts.push(live.cause);
-  if (live.steering?.paused) parts.push("the simulation waits");
+  if (live.steering?.paused) parts.push("the simulation is paused");
   if (shown) {
     if (live.series && live.wanted !== null) parts.push(`frame ${shown.frame + 1} of ${live.series.steps.length}`);
     if (shown.step !== null) parts.push(`step ${shown.step}`);
@@ -66,7 +68,7 @@ export function liveText(live, now) {
     if (shown.levels > 1) parts.push(shown.level + 1 < shown.levels ? `level ${shown.level + 1} of ${shown.levels}` : "full");
   }
   if (isOn && shown) parts.push(`${(live.rate() / 1048576).toFixed(1)} MiB/s`);
-  if (isOn && shown && shown.dropped > 0 && !isSeries) parts.push(`${shown.dropped} left out`);
+  if (isOn && shown && shown.dropped > 0 && !isSeries) parts.push(`${shown.dropped} dropped`);
   return parts.join(" · ");
 }
 
@@ -80,7 +82,10 @@ export class LivePanel {
     const url = new URL("stream", location.href);
     url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
     url.hash = url.search = "";
-    /** @type {((level: Arrived | undefined) => void)[]} told of each level that is shown, and of a lost connection */
+    /**
+     * Called with each level on show; with undefined if the connection is lost.
+     * @type {((level: Arrived | undefined) => void)[]}
+     */
     this.listeners = [];
     this.live = new Live({
       token,
@@ -99,7 +104,7 @@ export class LivePanel {
     setInterval(() => this.refresh(), REFRESH_MS);
   }
 
-  /** @param {number | undefined} index of a series' frame to begin with; none: the newest */
+  /** @param {number | undefined} index of the series' first frame to show; undefined: the newest */
   start(index) {
     this.live.wanted = index ?? null;
     byId("live").hidden = byId("pause").hidden = false;
@@ -115,19 +120,19 @@ export class LivePanel {
     this.live.close();
   }
 
-  /** Doesn't wait for the next attempt when there is reason to hope. */
+  /** Reconnects at once when an attempt may succeed now. */
   hurry() {
     if (this.live.state === "lost" && document.visibilityState === "visible") this.live.connect();
   }
 
-  /** What the button says. */
+  /** The button's label. */
   label() {
     const {live} = this;
     if (["closed", "refused", "lost"].includes(live.state)) return "Connect";
     return live.isPaused ? "Resume" : live.wanted !== null ? "Newest" : "Pause";
   }
 
-  /** The button was pressed. */
+  /** Handles a press of the button. */
   toggle() {
     const {live} = this;
     const label = this.label();
@@ -136,17 +141,17 @@ export class LivePanel {
     else live.follow();
   }
 
-  /** How many frames there are to choose from. */
+  /** Number of frames to choose from. */
   count() {
     return this.live.state === "closed" ? 0 : this.live.series?.steps.length ?? 0;
   }
 
-  /** The series' frame that is wanted: the newest unless the user wants another. */
+  /** The series' frame that the user wants: the newest unless they chose another. */
   index() {
     return this.live.wanted ?? Math.max(this.count() - 1, 0);
   }
 
-  /** Whether the user wants a certain frame. */
+  /** Whether the user chose a frame. */
   isChosen() {
     return this.live.wanted !== null;
   }
@@ -154,7 +159,8 @@ export class LivePanel {
   /**
    * Shows a frame of a series.
    * @param {number} index
-   * @returns {Promise<boolean>} whether it is shown: in full, or as far as it came within PATIENCE_MS
+   * @returns {Promise<boolean>} whether the page shows it, in full or at the level that came in
+   *     time
    */
   show(index) {
     const {live} = this;
@@ -186,12 +192,12 @@ export class LivePanel {
     if (hasSeries || this.hadSeries) this.view.onSeries(this.index());
     this.hadSeries = hasSeries;
     this.view.onChange();
-    // What ends it is told over the picture; while attempts go on, the picture isn't covered.
+    // A final failure covers the picture with its message. Attempts to reconnect leave it visible.
     this.say(state === "refused" ? live.cause : live.shown || state === "closed" ? "" : liveText(live, performance.now()));
     this.refresh();
   }
 
-  /** @param {string} message over the picture; takes back only what was said here */
+  /** @param {string} message shown over the picture; empty removes only this panel's own message */
   say(message) {
     if (message !== this.said) this.view.tell(message);
     this.said = message;

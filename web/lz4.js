@@ -1,12 +1,13 @@
-// LZ4 blocks, as LZ4's "Block Format Description" has them. No length that a block states is trusted.
+// Expands LZ4 blocks, as LZ4's "Block Format Description" defines them. It trusts no length in a
+// block.
 
-const MORE = 15;  // of a length of four bits: bytes follow, until one is not 255
+const MORE = 15;  // in a length's four bits: the length continues in bytes, until one isn't 255
 const SHORTEST_MATCH = 4;
 
 /**
- * How many bytes a block says that it expands to, found without expanding it.
+ * The number of bytes to which a block claims to expand, found without expanding it.
  * @param {Uint8Array} packed
- * @returns {number} -1 for a block that breaks off
+ * @returns {number} -1 if the block is truncated
  */
 export function lz4AnnouncedBytes(packed) {
   const end = packed.length;
@@ -42,7 +43,8 @@ export function lz4AnnouncedBytes(packed) {
  * Expands a block into `plain`.
  * @param {Uint8Array} packed
  * @param {Uint8Array} plain
- * @returns {boolean} whether the block is sound and fills `plain` exactly; else `plain` holds anything
+ * @returns {boolean} whether the block is sound and fills `plain` exactly; otherwise the content of
+ *     `plain` is undefined
  */
 export function lz4Expand(packed, plain) {
   const end = packed.length;

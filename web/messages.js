@@ -1,10 +1,11 @@
-// What a server sends over a stream: control messages as JSON, and levels of frames in parts. A server may be damaged or hostile:
-// every field is checked, and memory is taken only for bytes that have come. docs/live.md has the protocol.
+// Reads a server's messages: control messages as JSON, and levels of frames in parts. A server may
+// be damaged or hostile. The reader checks every field, and allocates memory only for bytes that
+// have arrived. docs/live.md has the protocol.
 
 export const STREAM_VERSION = 1;
 export const SUBPROTOCOL = "pv-vdi.1";
 
-/** What a message isn't. Its message is one line for the user. */
+/** Reports a message that breaks the protocol. Its text is one line for the user. */
 export class StreamError extends Error {}
 
 /** @param {string} what @returns {never} */
@@ -19,46 +20,53 @@ function refuse(what) {
  * @property {number} level 0 is the coarsest
  * @property {number} levels of this frame
  * @property {number} bytes of the file
- * @property {number} width lists a row
+ * @property {number} width lists per row
  * @property {number} height
  * @property {number | null} step
  * @property {number | null} time
- * @property {number} age seconds since the frame was made, when this level's first byte was sent
- * @property {number} dropped frames that this viewer didn't get
+ * @property {number} age seconds from making the frame to sending this level's first byte
+ * @property {number} dropped frames that the server didn't send to this viewer
  */
 
 /**
- * Frames that the server offers by number, with the simulation's times, which may be unknown, and steps.
+ * Frames that the server offers by number, with the simulation's steps and times. Times may be
+ * unknown.
  * @typedef {{times: (number | null)[], steps: number[]}} Series
  */
 
 /**
- * @typedef {{type: "welcome", version: number, session: string, series: Series | null, viewers: number, steer: boolean}} Welcome
- * @typedef {{type: "series", from: number} & Series} SeriesPart more of a series, from that frame on
+ * @typedef {{type: "welcome", version: number, session: string, series: Series | null,
+ *            viewers: number, steer: boolean}} Welcome
+ * @typedef {{type: "series", from: number} & Series} SeriesPart a series' further frames, beginning
+ *     at `from`
  * @typedef {{type: "error", cause: string}} Refusal
  * @typedef {{type: "state", state: "waiting" | "live" | "ended", viewers: number}} ServerState
  * @typedef {{type: "level"} & Level} LevelBegin
- * @typedef {{name: string, whole: boolean, value: number, low: number, high: number}} Parameter of the simulation, in force
- * @typedef {object} Generator what makes the VDIs
+ * @typedef {{name: string, whole: boolean, value: number, low: number, high: number}} Parameter a
+ *     parameter of the simulation, with its present value
+ * @typedef {object} Generator the settings that make the VDIs
  * @property {[number, number]} resolution 0: not set
  * @property {number} supersegments
- * @property {[number, number] | null} range of the colour map; null: there is none
+ * @property {[number, number] | null} range of the colour map; null without one
  * @property {string[]} presets
- * @typedef {{type: "steering", you: number, driver: number | null, period: number, paused: boolean, parameters: Parameter[],
- *            generator: Generator | null}} Steering what can be steered, who does, and what is in force
+ * @typedef {{type: "steering", you: number, driver: number | null, period: number, paused: boolean,
+ *            parameters: Parameter[], generator: Generator | null}} Steering what a driver may change,
+ *     its present state, and the driver
  * @typedef {{type: "denied", cause: string}} Denied
- * @typedef {{camera?: object, resolution?: [number, number], supersegments?: number, range?: [number, number],
- *            preset?: string, period?: number, paused?: boolean, parameters?: {[name: string]: number}}} Wish of a driver
- * @typedef {{type: "other"}} Other of a kind that viewers don't need
- * @typedef {Welcome | SeriesPart | Refusal | ServerState | LevelBegin | Steering | Denied | Other} ServerMessage
+ * @typedef {{camera?: object, resolution?: [number, number], supersegments?: number,
+ *            range?: [number, number], preset?: string, period?: number, paused?: boolean,
+ *            parameters?: {[name: string]: number}}} Wish a driver's request
+ * @typedef {{type: "other"}} Other a message that viewers don't need
+ * @typedef {Welcome | SeriesPart | Refusal | ServerState | LevelBegin | Steering | Denied | Other}
+ *     ServerMessage
  */
 
-const MOST_TEXT = 1 << 20;       // characters
-const MOST_FRAMES = 1 << 20;     // of a series
+const MOST_TEXT = 1 << 20;       // characters in a message
+const MOST_FRAMES = 1 << 20;     // in a series
 const MOST_LEVEL_BYTES = 1 << 30;
 const MOST_LEVELS = 16;
-const MOST_LISTS = 32768;        // a side
-const MOST_ENTRIES = 64;         // of steering: parameters, presets
+const MOST_LISTS = 32768;        // along a side
+const MOST_ENTRIES = 64;         // parameters or presets
 const PART_HEADER_BYTES = 16;
 const FIRST_ROOM = 1 << 20;
 
@@ -80,7 +88,7 @@ function numberOrNull(value, name) {
   return value;
 }
 
-/** @param {unknown} value @returns {number} none counts as no viewer */
+/** @param {unknown} value @returns {number} 0 if it is missing */
 function viewersOf(value) {
   return isWhole(value, 0, 1e9) ? Number(value) : 0;
 }
@@ -95,7 +103,7 @@ function seriesOf(json) {
 }
 
 /**
- * A series with what follows. Throws StreamError unless it does follow.
+ * Appends a part to a series. Throws StreamError unless the part follows it.
  * @param {Series | null} series
  * @param {SeriesPart} part
  * @returns {Series}
@@ -103,14 +111,14 @@ function seriesOf(json) {
 export function extendedSeries(series, part) {
   const {times, steps} = series ?? {times: [], steps: []};
   if (part.from !== steps.length || steps.length + part.steps.length > MOST_FRAMES)
-    refuse(`frames from ${part.from} on of a series of ${steps.length}`);
+    refuse(`frames beginning at ${part.from} for a series of ${steps.length}`);
   return {times: [...times, ...part.times], steps: [...steps, ...part.steps]};
 }
 
 /** @param {any} json @returns {LevelBegin} */
 function levelOf(json) {
   const {frame, level, levels, bytes, width, height, age, dropped} = json;
-  if (!isWhole(frame, 0, 0xffffffff)) refuse("a level of no frame");
+  if (!isWhole(frame, 0, 0xffffffff)) refuse("a level without a frame");
   if (!isWhole(levels, 1, MOST_LEVELS) || !isWhole(level, 0, levels - 1)) refuse(`level ${level} of ${levels}`);
   if (!isWhole(bytes, 1, MOST_LEVEL_BYTES)) refuse(`a level of ${bytes} bytes`);
   if (!isWhole(width, 1, MOST_LISTS) || !isWhole(height, 1, MOST_LISTS)) refuse(`${width} x ${height} lists`);
@@ -130,16 +138,16 @@ function fewOf(list, name) {
 /** @param {any} json @returns {Parameter} */
 function parameterOf(json) {
   const {whole, value, low, high} = json ?? {};
-  if (![value, low, high].every(Number.isFinite) || !(low <= value && value <= high)) refuse("a parameter out of its bounds");
+  if (![value, low, high].every(Number.isFinite) || !(low <= value && value <= high)) refuse("a parameter beyond its bounds");
   return {name: textOf(json.name, MOST_ENTRIES), whole: whole === true, value, low, high};
 }
 
 /** @param {any} json @returns {Generator} */
 function generatorOf({resolution, supersegments, range, presets}) {
   const isSize = Array.isArray(resolution) && resolution.length === 2 && resolution.every((side) => isWhole(side, 0, MOST_LISTS));
-  if (!isSize || !isWhole(supersegments, 0, 255)) refuse("a resolution that isn't one");
+  if (!isSize || !isWhole(supersegments, 0, 255)) refuse("a wrong resolution");
   const rises = Array.isArray(range) && range.length === 2 && range.every(Number.isFinite) && range[0] < range[1];
-  if (!rises && range !== null) refuse("a range that doesn't rise");
+  if (!rises && range !== null) refuse("a range whose ends don't ascend");
   return {resolution: [resolution[0], resolution[1]], supersegments, range: rises ? [range[0], range[1]] : null,
           presets: fewOf(presets, "presets").map((name) => textOf(name, MOST_ENTRIES))};
 }
@@ -148,15 +156,15 @@ function generatorOf({resolution, supersegments, range, presets}) {
 function steeringOf(json) {
   const {you, driver, period, paused, parameters, generator} = json;
   if (!isWhole(you, 0, 0xffffffff) || !isWhole(driver ?? 0, 0, 0xffffffff)) refuse("viewers without numbers");
-  if (!isWhole(period, 1, 1e6)) refuse("a period that isn't one");
+  if (!isWhole(period, 1, 1e6)) refuse("a wrong period");
   return {type: "steering", you, driver: driver ?? null, period, paused: paused === true,
           parameters: fewOf(parameters, "parameters").map(parameterOf),
           generator: generator ? generatorOf(generator) : null};
 }
 
 /**
- * Reads a control message. Throws StreamError for one that isn't as the protocol says. Kinds that this page has no use
- * for are of type "other".
+ * Reads a control message. Throws StreamError if it breaks the protocol. Messages that this page
+ * doesn't need get the type "other".
  * @param {string} text
  * @returns {ServerMessage}
  */
@@ -193,8 +201,8 @@ export function serverMessageOf(text) {
 }
 
 /**
- * Puts the parts of levels together. One level is under way at a time; another one's beginning ends it, finished or not.
- * Room grows with what has come, to twice of it at most.
+ * Joins the parts of levels. It assembles one level at a time and drops an unfinished one when the
+ * next begins. Its buffer grows with the received bytes, up to twice their number.
  */
 export class LevelAssembler {
   constructor() {
@@ -204,14 +212,14 @@ export class LevelAssembler {
     this.room = new Uint8Array(0);
   }
 
-  /** @param {Level} level that follows */
+  /** @param {Level} level the next one */
   begin(level) {
     this.level = level;
     this.received = 0;
     this.room = new Uint8Array(Math.min(level.bytes, FIRST_ROOM));
   }
 
-  /** Forgets what is under way. */
+  /** Drops the unfinished level. */
   drop() {
     this.level = undefined;
     this.received = 0;
@@ -219,8 +227,8 @@ export class LevelAssembler {
   }
 
   /**
-   * Takes a binary message: u32 frame, u32 level, u64 offset, then bytes. Throws StreamError for a part that doesn't
-   * follow the last one of the level that is under way.
+   * Takes a binary message: u32 frame, u32 level, u64 offset, then bytes. Throws StreamError if
+   * this part doesn't continue the unfinished level.
    * @param {ArrayBuffer} message
    * @returns {Uint8Array | undefined} the level's file, once it is complete
    */
@@ -229,13 +237,13 @@ export class LevelAssembler {
     if (message.byteLength <= PART_HEADER_BYTES) refuse("a part without bytes");
     const view = new DataView(message);
     const offset = view.getUint32(8, true) + view.getUint32(12, true) * 0x100000000;
-    if (!level) refuse("a part of no level");
+    if (!level) refuse("a part without a level");
     if (view.getUint32(0, true) !== level.frame || view.getUint32(4, true) !== level.level)
-      refuse("a part of another level than the one that was announced");
-    if (offset !== this.received) refuse(`a part from byte ${offset} on, where ${this.received} bytes had come`);
+      refuse("a part of a level that wasn't announced");
+    if (offset !== this.received) refuse(`a part at byte ${offset} after ${this.received} bytes`);
     const part = new Uint8Array(message, PART_HEADER_BYTES);
     const end = this.received + part.length;
-    if (end > level.bytes) refuse(`more than the ${level.bytes} bytes that were announced`);
+    if (end > level.bytes) refuse(`more than the announced ${level.bytes} bytes`);
     if (end > this.room.length) {
       const larger = new Uint8Array(Math.min(level.bytes, Math.max(2 * this.room.length, end)));
       larger.set(this.room.subarray(0, this.received));

@@ -1,4 +1,4 @@
-// The page: puts viewer, controls and frames together.
+// The page. It connects viewer, controls and sources of frames.
 
 import {drawAxes} from "./axes.js";
 import {between, cameraOfText, cameraText, centerOf, degreesBetween} from "./camera.js";
@@ -23,7 +23,7 @@ const element = (id) => /** @type {HTMLElement} */ (document.getElementById(id))
 const input = (id) => /** @type {HTMLInputElement} */ (document.getElementById(id));
 
 /**
- * One line for the user; none: nothing to say.
+ * Shows the user one line; an empty one hides the message.
  * @param {string} message
  */
 function tell(message) {
@@ -36,7 +36,7 @@ function messageOf(error) {
   return error instanceof Error ? error.message : String(error);
 }
 
-/** @param {string} hex as of an input of type color @returns {Color} */
+/** @param {string} hex the value of a colour input @returns {Color} */
 function colorOf(hex) {
   const n = parseInt(hex.slice(1), 16);
   return [(n >> 16) / 255, ((n >> 8) & 255) / 255, (n & 255) / 255];
@@ -45,7 +45,7 @@ function colorOf(hex) {
 const MOTION_MS = 350;
 const FRAMES_PER_SECOND = 10;
 
-/** What follows # in the URL. */
+/** The settings in the URL's fragment. */
 function fragment() {
   return new URLSearchParams(location.hash.slice(1));
 }
@@ -65,7 +65,7 @@ class Page {
     this.vdi = undefined;
     this.frame = 0;
     this.isPlaying = false;
-    /** Counts requests for frames, so that an older one that comes late is dropped. */
+    /** Counts requests for frames. A late answer to an older request is dropped. */
     this.request = 0;
     this.ownBackground = false;
     this.viewer.onRest = () => {
@@ -102,7 +102,8 @@ class Page {
     input("files").addEventListener("change", () => this.openFiles([...(input("files").files ?? [])]));
     element("view").addEventListener("keydown", (event) => this.onKey(event));
     element("view").addEventListener("pointerdown", () => element("look").removeAttribute("open"));
-    // Of the panels above the bar one is open at a time. That of steering stays while the hand is on the picture.
+    // One panel above the bar is open at a time. The steering panel stays open while the user drags
+    // the picture.
     const panels = [element("look"), element("steer")];
     for (const panel of panels) {
       panel.addEventListener("toggle", () => {
@@ -130,7 +131,7 @@ class Page {
   }
 
   /**
-   * The focal point if it lies in the scene, else the scene's middle.
+   * The focal point if it lies in the scene, otherwise the scene's middle.
    * @returns {Vec3}
    */
   orbitCenter() {
@@ -150,7 +151,8 @@ class Page {
   }
 
   /**
-   * Shows a source's first frame, from where it was made. What was shown before stays if that fails.
+   * Shows a source's first frame from the viewpoint at which it was made. If that fails, the former
+   * frame stays.
    * @param {Source} source
    */
   async open(source) {
@@ -173,7 +175,7 @@ class Page {
     return this.source?.count ?? this.live?.count() ?? 0;
   }
 
-  /** @param {number} frame that the slider stands at */
+  /** @param {number} frame position of the slider */
   showSeries(frame) {
     element("series").hidden = this.count() < 2;
     input("frame").max = String(Math.max(this.count() - 1, 0));
@@ -181,7 +183,7 @@ class Page {
   }
 
   /**
-   * Shows what a server sends.
+   * Shows a server's frames.
    * @param {string} token
    */
   goLive(token) {
@@ -197,8 +199,8 @@ class Page {
   }
 
   /**
-   * Shows a level of a server's frame. The user's camera stays; one who is where the last VDI was made goes to where this
-   * one was made.
+   * Shows a level of a server's frame. The camera stays unless it is at the last VDI's viewpoint.
+   * Then it moves to the new VDI's viewpoint.
    * @param {PreparedVdi} vdi
    * @param {Arrived} level
    */
@@ -223,7 +225,7 @@ class Page {
     this.showView();
   }
 
-  /** @param {number} frame @returns {Promise<boolean>} whether it is shown */
+  /** @param {number} frame @returns {Promise<boolean>} whether the page shows it */
   async show(frame) {
     const {source, viewer} = this;
     if (!source) return this.live ? this.live.show(frame) : false;
@@ -271,7 +273,7 @@ class Page {
     }
   }
 
-  /** @param {string[]} facts that come first */
+  /** @param {string[]} facts shown before the others */
   showFacts(facts) {
     const {vdi} = this;
     if (!vdi) return;
@@ -280,19 +282,19 @@ class Page {
     element("facts").textContent = parts.filter(Boolean).join(" · ");
   }
 
-  /** @param {Camera} camera @param {boolean} [moving] */
+  /** @param {Camera} camera @param {boolean} [moving] whether further cameras will follow */
   setCamera(camera, moving = true) {
     this.viewer.setCamera(camera, moving);
     this.showView();
   }
 
-  /** Between the view and the VDI's own. */
+  /** The angle between the view and the VDI's viewpoint. */
   degrees() {
     const {vdi, viewer} = this;
     return vdi && viewer.camera ? degreesBetween(centerOf(vdi.bounds), vdi.camera, viewer.camera) : NaN;
   }
 
-  /** What the page says of the view. */
+  /** Updates the texts that depend on the view. */
   showView() {
     const {vdi, viewer} = this;
     if (!vdi || !viewer.camera) return;
@@ -309,7 +311,7 @@ class Page {
     const start = performance.now();
     let last = from;
     const step = () => {
-      if (viewer.camera !== last) return;  // the hand is back
+      if (viewer.camera !== last) return;  // the user moves the camera again
       const share = Math.min((performance.now() - start) / MOTION_MS, 1);
       last = share < 1 ? between(from, to, share * share * (3 - 2 * share)) : to;
       this.setCamera(last);
@@ -340,11 +342,11 @@ class Page {
     try {
       history.replaceState(history.state, "", parts.length > 0 ? `#${parts.join("&")}` : location.pathname + location.search);
     } catch {
-      // Some browsers allow it a few times a second only; the next view will be kept.
+      // Some browsers allow this only a few times per second. A later view will succeed.
     }
   }
 
-  /** The user has gone to another link of this page. */
+  /** Follows the fragment when the user opens another link to this page. */
   onNewUrl() {
     const token = takeToken();
     if (token && this.live) this.live.restart(token);

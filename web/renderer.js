@@ -1,5 +1,5 @@
-// Shows a VDI in a canvas. A view has two steps: `drawPicture` shows the VDI into a picture of its own, in strips and at any
-// resolution; `present` puts background, outline and the picture on the canvas.
+// Shows a VDI in a canvas, in two steps. `drawPicture` renders the VDI to a picture of its own, in
+// strips and at any resolution. `present` puts background, outline and that picture on the canvas.
 
 import {basisOf, clipMatrix, pixelSizeOf, raysOf} from "./camera.js";
 import {REGION, cullShader} from "./cull.js";
@@ -14,7 +14,7 @@ import {WHOLE_PICTURE, traverseShader} from "./traverse.js";
 const COPY = `#version 300 es
 precision highp float;
 uniform sampler2D picture;
-uniform vec2 part;        // of the texture that the picture fills
+uniform vec2 part;        // part of the texture that the picture fills
 uniform vec2 canvasSize;
 out vec4 color;
 void main() { color = texture(picture, min(gl_FragCoord.xy / canvasSize * part, part - 0.5 / vec2(textureSize(picture, 0)))); }
@@ -36,7 +36,7 @@ out vec4 color;
 void main() { color = plain; }
 `;
 
-/** The 12 edges of a box: corners by bits x, y, z; and the two faces beside each as axis * 2 + side. */
+/** The 12 edges of a box: two corners, with bits for x, y, z; and two faces, as axis * 2 + side. */
 const EDGES = [0, 1, 2].flatMap((axis) => [0, 1, 2, 3].map((i) => {
   const [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
   const from = ((i & 1) << u) | ((i >> 1) << v);
@@ -49,8 +49,8 @@ function cornerOf(bounds, corner) {
 }
 
 /**
- * Edges of the box as ends of lines. In front: those beside a face that is turned to the camera; all in the box is
- * behind them.
+ * Edges of the box as ends of lines. An edge is in front if one of its faces looks at the camera.
+ * All material in the box is behind it.
  * @param {[Vec3, Vec3]} bounds
  * @param {Camera} camera
  * @param {boolean} inFront
@@ -67,7 +67,7 @@ function outlineEnds(bounds, camera, inFront) {
 }
 
 /**
- * A VDI's textures, and what is left to do for them. None while the context is lost.
+ * A VDI's textures, and the uploads that complete them. There are none while the context is lost.
  * @param {WebGL2RenderingContext} gl
  * @param {PreparedVdi} vdi
  * @returns {{vdi: PreparedVdi, textures: (WebGLTexture | null)[], uploads: (() => void)[]}}
@@ -89,7 +89,7 @@ function texturesOf(gl, vdi) {
 }
 
 /**
- * A picture on the GPU, of which a view may fill a part.
+ * A picture on the GPU. A view may fill a part of it.
  * @param {WebGL2RenderingContext} gl
  * @param {number} filter of its texture
  */
@@ -99,7 +99,7 @@ function makePicture(gl, filter) {
   const picture = {texture, framebuffer, width: 0, height: 0, part: [0, 0]};
   return {
     ...picture,
-    /** @param {number} width @param {number} height at least */
+    /** @param {number} width least width @param {number} height least height */
     resize(width, height) {
       if (this.width === width && this.height === height) return;
       gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -115,27 +115,27 @@ function makePicture(gl, filter) {
 
 export class Renderer {
   /**
-   * Throws Error without WebGL2. The canvas' pixels are as many as its owner sets.
+   * Throws Error without WebGL2. The owner of the canvas sets its size in pixels.
    * @param {HTMLCanvasElement} canvas
    */
   constructor(canvas) {
     const gl = canvas.getContext("webgl2", {alpha: false, antialias: true, powerPreference: "high-performance"});
-    if (!gl) throw new Error("this browser has no WebGL2, which showing a VDI needs");
+    if (!gl) throw new Error("this browser has no WebGL2, and VDIs can't be shown without");
     this.gl = gl;
     this.canvas = canvas;
     /** @type {ReturnType<typeof texturesOf> | undefined} */
     this.loaded = undefined;
     this.smooth = true;
-    /** How often everything was made anew: what was made before is gone. */
+    /** Counts contexts. Objects of former contexts are gone. */
     this.age = 0;
     this.restore();
   }
 
-  /** Makes everything on the GPU, at first and after the context was lost. */
+  /** Creates all objects on the GPU, at first and whenever the context was lost. */
   restore() {
     const gl = this.gl;
     ++this.age;
-    /** @type {Map<string, ReturnType<typeof makeProgram>>} programs that show VDIs, by variant */
+    /** @type {Map<string, ReturnType<typeof makeProgram>>} programs that render VDIs, by variant */
     this.programs = new Map();
     this.copy = makeProgram(gl, WHOLE_PICTURE, COPY);
     this.lines = makeProgram(gl, LINES, PLAIN);
@@ -154,11 +154,12 @@ export class Renderer {
   }
 
   /**
-   * Throws Error if the GPU can't hold it; the VDI before then stays.
+   * Uploads a VDI. Throws Error if the GPU can't hold it; the former VDI then stays.
    * @param {PreparedVdi} vdi
-   * @param {() => Promise<void> | undefined} pause called between parts of the upload, which waits for what it returns
-   * @param {() => boolean} isWanted asked before it is shown
-   * @returns {Promise<boolean>} whether it is shown
+   * @param {() => Promise<void> | undefined} pause called between parts of the upload, which awaits
+   *     the promise if it returns one
+   * @param {() => boolean} isWanted called after the upload; false drops the VDI
+   * @returns {Promise<boolean>} whether the VDI replaced the former one
    */
   async setVdi(vdi, pause, isWanted) {
     const {gl} = this;
@@ -171,7 +172,7 @@ export class Renderer {
         await pause();
       }
       if (!gl.isContextLost()) this.programOf(vdi);  // throws before anything has changed
-      if (age !== this.age) continue;  // the context was lost meanwhile, and these textures with it
+      if (age !== this.age) continue;  // these textures are gone with a lost context
       const wanted = isWanted();
       const unused = wanted ? this.loaded : loaded;
       if (wanted) this.loaded = loaded;
@@ -181,7 +182,7 @@ export class Renderer {
   }
 
   /**
-   * The program that shows a VDI.
+   * The program that renders a VDI.
    * @param {PreparedVdi} vdi
    */
   programOf(vdi) {
@@ -195,8 +196,8 @@ export class Renderer {
   }
 
   /**
-   * Draws rows of a picture for a canvas of the present size, from `firstRow` to before `endRow` of its own, from the
-   * bottom. The picture is seen once `finishPicture` was called.
+   * Draws rows [firstRow, endRow) of a picture for a canvas of the present size. Rows count from
+   * the bottom. The picture becomes visible with `finishPicture`.
    * @param {Camera} camera
    * @param {number} scale canvas pixels to one of the picture, >= 1
    * @param {number} firstRow
@@ -224,7 +225,7 @@ export class Renderer {
   }
 
   /**
-   * Finds which regions of these rows may show something.
+   * Finds the regions of these rows that may show material.
    * @param {Camera} camera
    * @param {number} scale
    * @param {number} firstRow
@@ -250,8 +251,8 @@ export class Renderer {
   }
 
   /**
-   * How many canvas pixels the camera's vertical extent takes: all, or fewer where the canvas is narrower than the VDI's picture,
-   * which stays in view in its whole width.
+   * The number of canvas pixels in the camera's vertical extent. On a canvas that is narrower than
+   * the VDI's picture it is less than the canvas' height, because the whole width stays in view.
    */
   framedHeight() {
     const {loaded, canvas} = this;
@@ -261,7 +262,7 @@ export class Renderer {
   }
 
   /**
-   * Uniforms of the VDI and of a view, for a program that is used from now on.
+   * Makes a program current and sets its uniforms for the VDI and a view.
    * @param {ReturnType<typeof makeProgram>} made
    * @param {Camera} camera
    * @param {number} scale
@@ -292,7 +293,7 @@ export class Renderer {
     gl.uniform1f(uniform("pixelScale"), scale);
   }
 
-  /** What was drawn becomes the picture that `present` shows. */
+  /** Makes the drawn picture the one that `present` shows. */
   finishPicture() {
     [this.shown, this.next] = [this.next, this.shown];
   }
@@ -300,7 +301,7 @@ export class Renderer {
   /**
    * @param {Camera} camera
    * @param {Color} background
-   * @param {Color | undefined} outline its colour, if there is to be one
+   * @param {Color | undefined} outline its colour; undefined for none
    */
   present(camera, background, outline) {
     const {gl, canvas} = this;
@@ -328,7 +329,7 @@ export class Renderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  /** @param {Camera} camera @param {Color} color @param {boolean} inFront which part */
+  /** @param {Camera} camera @param {Color} color @param {boolean} inFront which part to draw */
   drawOutline(camera, color, inFront) {
     const {gl, loaded, lines, ends, canvas} = this;
     if (!loaded || !lines || !ends) return;

@@ -1,19 +1,19 @@
-// Where frames come from that are there already. The page knows only `Source`: frames by number, decoded when they are asked
-// for. Frames may be inside the page (`embeddedSource`) or files that were opened or dropped (`filesSource`). Those of a
-// server come unasked: see live.js.
+// Sources of frames that exist already. The page knows only `Source`, which decodes a frame on
+// request. Frames may be inside the page (`embeddedSource`), or files that the user opened or
+// dropped (`filesSource`). A server sends frames on its own; see live.js.
 
 /** @typedef {import("./decoder.js").Decoder} Decoder */
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 
 /**
  * @typedef {object} Source
- * @property {number} count of frames
+ * @property {number} count number of frames
  * @property {(frame: number) => string} nameOf
  * @property {(frame: number) => Promise<PreparedVdi>} load throws Error with one line for the user
  */
 
 /**
- * Keeps the last few decoded frames, as far as they fit into `mostBytes`.
+ * Caches the latest decoded frames that fit into `mostBytes`.
  * @param {(frame: number) => Promise<PreparedVdi>} load
  * @param {number} mostBytes
  */
@@ -37,7 +37,8 @@ function keepingSome(load, mostBytes) {
 const MOST_BYTES = 512 << 20;
 
 /**
- * The frames inside the page: elements with the packed file as text, and attributes data-name and data-size.
+ * The frames inside the page: elements with the packed file as text, and the attributes data-name
+ * and data-size.
  * @param {HTMLElement[]} elements
  * @param {Decoder} decoder
  * @returns {Source}
@@ -52,7 +53,7 @@ export function embeddedSource(elements, decoder) {
 }
 
 /**
- * Files in the order of the numbers in their names.
+ * Files, ordered by the numbers in their names.
  * @param {File[]} files
  * @param {Decoder} decoder
  * @returns {Source}

@@ -1,5 +1,6 @@
-// What the user asks of the simulation: who drives, a new viewpoint, what the VDIs are made with, and the parameters that the
-// simulation has declared. Servers that allow no steering show nothing of it.
+// The panel that steers the simulation: control, a new viewpoint, the settings that make the VDIs,
+// and the parameters that the simulation has declared. It is hidden if the server allows no
+// steering.
 
 import {cameraText} from "./camera.js";
 
@@ -9,12 +10,12 @@ import {cameraText} from "./camera.js";
 /** @typedef {import("./messages.js").Wish} Wish */
 
 /**
- * @typedef {object} SteeredView what is steered by hand
+ * @typedef {object} SteeredView the view that the user moves
  * @property {() => Camera | undefined} camera the user's
- * @property {() => number} angle in degrees, between that and the shown VDI's
+ * @property {() => number} angle between that camera and the VDI's, in degrees
  */
 
-const AUTO_DEGREES = 15;   // beyond which Auto asks for a new viewpoint
+const AUTO_DEGREES = 15;   // beyond this angle Auto requests a new viewpoint
 const RESOLUTIONS = ["480 × 270", "640 × 360", "960 × 540", "1280 × 720", "1920 × 1080"];
 
 /** @param {string} id */
@@ -23,7 +24,7 @@ const partOf = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const fieldOf = (id) => /** @type {HTMLInputElement} */ (document.getElementById(id));
 
 /**
- * A camera as messages have it.
+ * A camera in the form that messages have.
  * @param {Camera} camera
  */
 export function wishedCamera({position, focalPoint, viewUp, parallel, parallelScale, viewAngle}) {
@@ -33,7 +34,7 @@ export function wishedCamera({position, focalPoint, viewUp, parallel, parallelSc
 /** @param {number} value */
 const shortText = (value) => String(Number(value.toPrecision(6)));
 
-/** A parameter's row: its name, a slider, and a field for exact numbers. */
+/** A parameter's row: its name, a slider, and a field for exact values. */
 class ParameterRow {
   /** @param {Parameter} parameter @param {(wish: Wish) => void} ask */
   constructor(parameter, ask) {
@@ -62,10 +63,10 @@ class ParameterRow {
     this.cells = [label, this.slider, this.field];
   }
 
-  /** @param {number} value in force @param {boolean} isMine */
+  /** @param {number} value the present one @param {boolean} isMine whether this page drives */
   show(value, isMine) {
     this.slider.disabled = this.field.disabled = !isMine;
-    if (this.slider.matches(":active") || document.activeElement === this.field) return;  // the user's hand is on it
+    if (this.slider.matches(":active") || document.activeElement === this.field) return;  // the user is changing it
     this.slider.value = String(value);
     this.field.value = shortText(value);
   }
@@ -79,7 +80,7 @@ export class SteerPanel {
     /** @type {ParameterRow[]} */
     this.rows = [];
     this.declared = "";
-    /** The camera that was asked for last, as text. */
+    /** The camera of the last request, as text. */
     this.asked = "";
     partOf("drive").addEventListener("click", () => this.isMine() ? live.release() : live.drive());
     partOf("newview").addEventListener("click", () => this.askForView());
@@ -128,14 +129,14 @@ export class SteerPanel {
     this.ask({camera: wishedCamera(camera)});
   }
 
-  /** The hand has rested. */
+  /** Called when the view has rested. */
   onRest() {
     const camera = this.view.camera();
     if (!camera || !fieldOf("auto").checked || cameraText(camera) === this.asked) return;
     if (this.view.angle() > AUTO_DEGREES) this.askForView();
   }
 
-  /** Shows what the server says. */
+  /** Shows the server's state. */
   refresh() {
     const {steering, denied} = this.live;
     partOf("steer").hidden = steering === null;
@@ -143,13 +144,13 @@ export class SteerPanel {
     if (steering === null) return;
     const {driver, you, generator, period, paused, parameters} = steering;
     const isMine = this.isMine();
-    partOf("driver").textContent = denied !== "" ? denied : isMine ? `You drive, as viewer ${you}`
-      : driver === null ? "Nobody drives" : `Viewer ${driver} drives`;
+    partOf("driver").textContent = denied !== "" ? denied : isMine ? `You are driving as viewer ${you}`
+      : driver === null ? "Nobody is driving" : `Viewer ${driver} is driving`;
     partOf("drive").textContent = isMine ? "Give back" : "Drive";
     /** @type {HTMLButtonElement} */ (partOf("drive")).disabled = driver !== null && !isMine;
     for (const id of ["halt", "auto", "resolution", "supersegments", "preset", "low", "high", "period"])
       fieldOf(id).disabled = !isMine;
-    partOf("halt").textContent = paused ? "Let the simulation go on" : "Let the simulation wait";
+    partOf("halt").textContent = paused ? "Resume simulation" : "Pause simulation";
     this.put("period", String(period));
     for (const one of document.querySelectorAll(".generator")) /** @type {HTMLElement} */ (one).hidden = generator === null;
     for (const one of document.querySelectorAll(".colours"))
@@ -176,12 +177,12 @@ export class SteerPanel {
     parameters.forEach(({value}, i) => this.rows[i].show(value, isMine));
   }
 
-  /** @param {string} id of a field that the user may be writing in @param {string} value */
+  /** @param {string} id of a field in which the user may be typing @param {string} value */
   put(id, value) {
     if (document.activeElement !== fieldOf(id)) fieldOf(id).value = value;
   }
 
-  /** @param {string} id of a select @param {string[]} choices @param {string} value one of them, or another */
+  /** @param {string} id of a select @param {string[]} choices @param {string} value any text */
   choose(id, choices, value) {
     const select = /** @type {HTMLSelectElement} */ (/** @type {HTMLElement} */ (fieldOf(id)));
     if (document.activeElement === select) return;

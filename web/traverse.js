@@ -1,14 +1,17 @@
-// The fragment shader that shows a VDI from a new viewpoint. Twin of shaders/render.comp, line.glsl, traverse.glsl and
-// intersect.glsl, whose comments say why: a ray is straight in V_O's picture, which it passes column by column (or row by row).
-// Rays don't share work as invocations of a workgroup do there; each finds its own tiles, the large ones first. A first pass
+// The fragment shader that shows a VDI from a new viewpoint. Twin of shaders/render.comp,
+// line.glsl, traverse.glsl and intersect.glsl, whose comments give the reasons. A ray is straight
+// in V_O's picture and passes it column by column, or row by row. Here rays don't share work as the
+// invocations of a workgroup do. Each ray finds its own tiles, the large ones first. A first pass
 // finds the regions whose rays meet nothing (cull.js).
 
 /**
- * @typedef {object} Variant what a shader is made for
- * @property {boolean} compact supersegments are codes in two words, else four words (expandedSegments)
- * @property {boolean} smooth Reconstruction::Smooth, else Constant
- * @property {number} rowShift textures hold element i at x = i mod 2^rowShift, in row i >> rowShift
- * @property {number} layerShift and row r in layer r >> layerShift, at y = r mod 2^layerShift
+ * @typedef {object} Variant the constants of a shader
+ * @property {boolean} compact supersegments are codes of two words, otherwise expanded to four
+ *     words
+ * @property {boolean} smooth Reconstruction::Smooth, otherwise Constant
+ * @property {number} rowShift element i of an array lies at x = i mod 2^rowShift in row i >>
+ *     rowShift
+ * @property {number} layerShift row r lies at y = r mod 2^layerShift in layer r >> layerShift
  */
 
 /** Regions of a picture have 2^REGION_SHIFT pixels a side. */
@@ -44,7 +47,7 @@ vec3 colorOf(Words words) { return vec3(ivec3(words.w & 0x7ffu, (words.w >> 11) 
 const vec3 colorUnit = vec3(1.0 / 2040.0, 1.0 / 2040.0, 1.0 / 1020.0);
 `;
 
-/** Rays, their way through V_O's picture, and masks of depths. */
+/** Rays, their paths through V_O's picture, and masks of depths. */
 export const RAYS = `
 const float infinity = 3.0e38;
 const float opaqueAcross = 1.0 - 1.0 / 512.0;
@@ -80,7 +83,8 @@ vec2 insideFrustum(Ray ray) {
   return stretch;
 }
 
-// The ray's way through V_O's picture (line.glsl). What it goes from and to is called a column, be it a row.
+// A ray's path through V_O's picture (line.glsl), from column to column. A column may be a row of
+// lists.
 struct Line {
   bool byColumns;
   float start;
@@ -90,7 +94,9 @@ struct Line {
   float rows;
   float gain;
   float bend;
-  vec2 depths;  // in codes: at the start, and from there to the end; ascending, negative if the ray comes nearer to V_O's eye
+  // Depth at the start, and the change to the end, in codes. Both are negated if the ray comes nearer
+  // to V_O's eye, so that depths ascend along the ray.
+  vec2 depths;
   vec2 bins;
   int first;
   int last;
@@ -128,10 +134,10 @@ float columnsTo(Line line, float along) { return clamp((along - line.start) * li
 float fractionAfter(Line line, float columns) { return columns * line.gain / (1.0 + columns * line.bend); }
 float at(vec2 range, float fraction) { return range.x + fraction * range.y; }
 
-// 2^n for n from 0 to 30. CPUs that run WebGL shift all lanes by one number only.
+// 2^n for n from 0 to 30. A CPU that runs WebGL can shift all lanes only by the same number.
 ivec4 powersOf2(vec4 n) { return ivec4(intBitsToFloat((ivec4(n) + 127) << 23)); }
 
-// The bits between two bins, in any order.
+// The bits between two bins, given in any order.
 uvec2 maskBetween(vec2 bins) {
   const float spare = 0.01;
   float low = floor(clamp(min(bins.x, bins.y) - spare, 0.0, 59.0));
@@ -144,8 +150,8 @@ bool sharesBit(uvec2 mask, uvec2 other) { return (mask.x & other.x | mask.y & ot
 `;
 
 const INTERSECT = `
-bool ascends;    // the ray meets a list's supersegments in their order; else backwards
-float raySlant;  // how long the ray is for a change of depth; where that says nothing, its whole length
+bool ascends;    // the ray meets a list's supersegments in their order; otherwise backwards
+float raySlant;  // the ray's length per change of depth; its whole length if depth hardly changes
 
 bool changesDepth(Line line) { return line.depths.y * code.y > 0.01 * farthest; }
 
@@ -171,8 +177,9 @@ vec2 metDepths(Words words) {
   return ascends ? depths : -depths.yx;
 }
 
-// What a part of the ray meets of a list of at least one supersegment, premultiplied. 'hint': where the last intersection with
-// a neighbouring list ended, counted as the ray meets them. Each supersegment is read once.
+// The light of the part of a list that a part of the ray meets, premultiplied. The list has at
+// least one supersegment. 'hint' is the place where the last intersection with a neighbouring list
+// ended, counted along the ray. Each supersegment is read once.
 vec4 intersectList(uvec4 head, Part part, inout int hint) {
   int last = int(head.y) - 1;
   int step = ascends ? 1 : -1;
@@ -212,7 +219,7 @@ float shareOfNext(float beyond) {
   return clamp((beyond - onCentre) / (1.0 - 2.0 * onCentre), 0.0, 1.0);
 }
 
-// A ray that stays in about one place of V_O's picture: the four lists around that.
+// The light on a ray that hardly moves in V_O's picture, from the four lists around its place.
 vec4 alongLists(Ray ray, Line line, vec2 stretch) {
   vec2 place = 0.5 * (pictureAt(ray, stretch.x) + pictureAt(ray, stretch.y)) - 0.5;
   vec2 first = floor(place);
@@ -233,7 +240,8 @@ vec4 alongLists(Ray ray, Line line, vec2 stretch) {
 
 ivec2 listOf(bool byColumns, int column, int row) { return byColumns ? ivec2(column, row) : ivec2(row, column); }
 
-// Of a column that the ray crosses between two numbers of columns from its start.
+// The light of a column. 'edges' are the distances from the ray's start, in columns, at which the
+// ray enters and leaves it.
 vec4 intersectColumn(Line line, int column, vec2 edges, vec2 fractions, inout ivec2 hints) {
   int maxRow = columnCount(!line.byColumns) - 1;
   uvec2 mask = maskBetween(vec2(at(line.bins, fractions.x), at(line.bins, fractions.y)));
@@ -246,7 +254,7 @@ vec4 intersectColumn(Line line, int column, vec2 edges, vec2 fractions, inout iv
 #else
   vec2 inOut = vec2(min(edges.x, edges.y), max(edges.x, edges.y));
   ivec2 rows = clamp(ivec2(floor(line.row + inOut * line.rows)), ivec2(0), ivec2(maxRow));
-  rows.x = clamp(rows.x, rows.y - 1, rows.y + 1);  // a diagonal through corners may touch a third one
+  rows.x = clamp(rows.x, rows.y - 1, rows.y + 1);  // a diagonal through corners may touch a third row
   float share = rows.x == rows.y ? 0.0 : 0.5;
 #endif
   ivec2 list = listOf(line.byColumns, column, rows.x);
@@ -279,8 +287,8 @@ vec4 intersectColumn(Line line, int column, vec2 edges, vec2 fractions, inout iv
 #endif
 }
 
-// Whether the ray may meet something between the edges of a column of tiles of 1 << shift lists. Masks of tiles know the lists
-// around them; one row more is for rounding.
+// Whether the ray may meet material in a column of tiles of 1 << shift lists. A tile's mask
+// includes the lists around the tile, which allows for rounding.
 bool meetsTiles(Line line, int tile, int shift) {
   vec2 edges = vec2(columnsTo(line, float(tile << shift)), columnsTo(line, float((tile + 1) << shift)));
   vec2 bins = vec2(at(line.bins, fractionAfter(line, edges.x)), at(line.bins, fractionAfter(line, edges.y)));
@@ -369,7 +377,7 @@ void main() {
 `;
 
 /**
- * What a shader that looks at a VDI begins with.
+ * The beginning of each shader that reads a VDI.
  * @param {{rowShift: number, layerShift: number}} tiling
  */
 export function uniformsOf(tiling) {
@@ -387,10 +395,10 @@ uniform float nearest;
 uniform float farthest;
 uniform float binScale;
 uniform vec2 code;             // depth of code c: code.x + c * code.y; 0 and 1 where supersegments have depths
-uniform vec3 rayOrigin[3];     // at the picture's middle, and for each pixel to the right and up
+uniform vec3 rayOrigin[3];     // at the picture's middle, and its change per pixel to the right and up
 uniform vec3 rayDirection[3];
-uniform vec2 pictureSize;      // in the pixels that rays count
-uniform float pixelScale;      // of these to a fragment
+uniform vec2 pictureSize;      // in pixels of the canvas
+uniform float pixelScale;      // pixels of the canvas per fragment
 
 ivec3 placeOf(int i) {
   int row = i >> ${tiling.rowShift};
@@ -402,7 +410,7 @@ ivec3 placeOf(int i) {
 /** @param {Variant} variant */
 export function traverseShader(variant) {
   return `${uniformsOf(variant)}#define SMOOTH ${variant.smooth ? 1 : 0}
-uniform sampler2D regions;     // which regions of the picture may show something (cull.js)
+uniform sampler2D regions;     // regions of the picture that may show material (cull.js)
 ${variant.compact ? COMPACT_SEGMENTS : FULL_SEGMENTS}${RAYS}${INTERSECT}${TRAVERSE}${MAIN}`;
 }
 

@@ -1,4 +1,4 @@
-// Unpacks what `vdi export` put into a page: deflate data as base64.
+// Unpacks the data that `vdi export` puts into a page: deflate data as base64.
 
 import {FormatError} from "./format.js";
 
@@ -15,10 +15,10 @@ function bytesOfBase64(text) {
   return bytes;
 }
 
-const MOST_INFLATED = 1032;  // bytes that a byte of deflate data stands for
+const MOST_INFLATED = 1032;  // most bytes to which a byte of deflate data expands
 
 /**
- * Expands packed data, and never to more than `size` bytes.
+ * Expands packed data to at most `size` bytes.
  * @param {string} text
  * @param {number} size
  */
@@ -27,13 +27,13 @@ export async function unpack(text, size) {
   if (typeof DecompressionStream === "undefined")
     throw new Error("this browser is too old to unpack the data (no DecompressionStream)");
   if (!(size > 0 && size <= packed.length * MOST_INFLATED))
-    throw new FormatError("the data in this page are damaged: their size is wrong");
+    throw new FormatError("the data in this page are damaged: they have the wrong size");
   const bytes = new Uint8Array(size);
   let at = 0;
   try {
     const reader = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw")).getReader();
     for (let part = await reader.read(); !part.done; part = await reader.read()) {
-      bytes.set(part.value, at);  // throws beyond the end
+      bytes.set(part.value, at);  // throws if the part doesn't fit
       at += part.value.length;
     }
   } catch {

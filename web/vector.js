@@ -18,7 +18,7 @@ export const length = (a) => Math.hypot(a[0], a[1], a[2]);
 export const normalize = (a) => times(1 / length(a), a);
 
 /**
- * Turns `a` about the unit vector `axis`, counterclockwise for who looks against it.
+ * Turns `a` about the unit vector `axis`, counterclockwise as seen from its tip.
  * @param {Vec3} a
  * @param {Vec3} axis
  * @param {number} radians

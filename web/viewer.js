@@ -1,5 +1,5 @@
-// Decides when what is drawn: while something moves, as many pixels as the frame rate allows; at rest the whole picture, in
-// strips, so that a hand that comes back never waits for it.
+// Schedules drawing. While the view moves, a picture has as many pixels as the frame rate allows.
+// At rest the whole picture is drawn in strips, so that a new motion never waits for it.
 
 import {politely} from "./decoder.js";
 import {Renderer} from "./renderer.js";
@@ -8,9 +8,9 @@ import {Renderer} from "./renderer.js";
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 /** @typedef {import("./renderer.js").Color} Color */
 
-const FRAME_MS = 33;       // that a moving picture may take
-const STRIP_MS = 40;       // and a strip of one at rest
-const REST_MS = 150;       // without motion is rest
+const FRAME_MS = 33;       // time for a picture in motion
+const STRIP_MS = 40;       // time for a strip of a picture at rest
+const REST_MS = 150;       // the view rests after this time without motion
 const LARGEST_SCALE = 8;
 
 export class Viewer {
@@ -31,11 +31,11 @@ export class Viewer {
     this.outlineColor = [0.5, 0.5, 0.5];
     this.outline = true;
     this.isLost = false;
-    /** Milliseconds for a canvas pixel, as measured. */
+    /** Measured milliseconds per canvas pixel. */
     this.cost = 1e-4;
     this.movedAt = -Infinity;
     /**
-     * What the shown picture lacks: all of it, or detail.
+     * The missing part of the picture: everything, or detail.
      * @type {"all" | "detail" | "nothing"}
      */
     this.missing = "nothing";
@@ -43,13 +43,13 @@ export class Viewer {
     /** @type {{sync: WebGLSync, since: number, pixels: number} | undefined} */
     this.pending = undefined;
     this.isScheduled = false;
-    /** Called after each picture that is whole. */
+    /** Called after each whole picture. */
     this.onRest = () => {};
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.isLost = true;
       this.pending = undefined;
-      tell("The graphics driver has lost the picture; waiting for it to come back.");
+      tell("The graphics driver has lost the picture. It will return when the driver recovers.");
     });
     canvas.addEventListener("webglcontextrestored", () => {
       this.isLost = false;
@@ -64,10 +64,10 @@ export class Viewer {
   }
 
   /**
-   * Throws Error if the GPU can't hold it.
+   * Shows a VDI. Throws Error if the GPU can't hold it.
    * @param {PreparedVdi} vdi
-   * @param {() => boolean} isWanted asked before it is shown
-   * @returns {Promise<boolean>} whether it is shown
+   * @param {() => boolean} isWanted called after the upload; false drops the VDI
+   * @returns {Promise<boolean>} whether the VDI replaced the former one
    */
   async setVdi(vdi, isWanted) {
     const isShown = await this.renderer.setVdi(vdi, politely(), isWanted);
@@ -81,20 +81,20 @@ export class Viewer {
     this.redraw();
   }
 
-  /** @param {Camera} camera @param {boolean} [moving] further ones will follow */
+  /** @param {Camera} camera @param {boolean} [moving] whether further cameras will follow */
   setCamera(camera, moving = true) {
     this.camera = camera;
     if (moving) this.movedAt = performance.now();
     this.redraw();
   }
 
-  /** The picture is out of date. */
+  /** Redraws the picture. */
   redraw() {
     this.missing = "all";
     this.schedule();
   }
 
-  /** Only what is around the picture has changed. */
+  /** Redraws background and outline around the same picture. */
   refresh() {
     if (!this.camera || this.isLost) return;
     this.renderer.present(this.camera, this.background, this.outline ? this.outlineColor : undefined);
@@ -110,8 +110,8 @@ export class Viewer {
   }
 
   /**
-   * Canvas pixels as many as the screen has.
-   * @returns {boolean} whether that changed something
+   * Gives the canvas the screen's number of pixels.
+   * @returns {boolean} whether the number changed
    */
   fitCanvas() {
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
@@ -123,7 +123,7 @@ export class Viewer {
     return true;
   }
 
-  /** Whether the GPU is still at the last picture or strip. Learns what it took. */
+  /** Whether the GPU is still drawing the last picture or strip. Measures its time when it ends. */
   isBusy() {
     const {gl} = this.renderer;
     if (!this.pending) return false;
@@ -137,7 +137,7 @@ export class Viewer {
     return false;
   }
 
-  /** @param {number} pixels that were just drawn */
+  /** @param {number} pixels number of pixels just drawn */
   watch(pixels) {
     const {gl} = this.renderer;
     const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -191,13 +191,13 @@ export class Viewer {
     this.onRest();
   }
 
-  /** Whether the shown picture is the whole one. */
+  /** Whether the picture on show is whole. */
   isWhole() {
     return !this.isLost && this.missing === "nothing" && !this.pending;
   }
 
   /**
-   * The canvas as PNG, whole.
+   * The whole canvas as PNG.
    * @returns {Promise<Blob>}
    */
   screenshot() {
@@ -207,7 +207,7 @@ export class Viewer {
     renderer.finishPicture();
     this.refresh();
     return new Promise((resolve, reject) => {
-      canvas.toBlob((blob) => blob ? resolve(blob) : reject(new Error("the browser makes no PNG of the picture")), "image/png");
+      canvas.toBlob((blob) => blob ? resolve(blob) : reject(new Error("the browser can't save the picture as PNG")), "image/png");
     });
   }
 }

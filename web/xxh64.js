@@ -1,7 +1,7 @@
-// XXH64 with seed 0, the checksum of .vdi files (docs/format.md), on pairs of 32-bit halves: engines compute BigInt ten
-// times slower.
+// XXH64 with seed 0, the checksum of .vdi files (docs/format.md). It computes with pairs of 32-bit
+// halves, because BigInt takes ten times as long.
 
-// The primes, as high and low half.
+// The primes, as high and low halves.
 const P1H = 0x9e3779b1, P1L = 0x85ebca87;
 const P2H = 0xc2b2ae3d, P2L = 0x27d4eb4f;
 const P3H = 0x165667b1, P3L = 0x9e3779f9;
