@@ -45,7 +45,7 @@ Camera turned(const Camera& camera, double azimuthDegrees, double elevationDegre
   const glm::dvec3 back = -view.forward() * std::cos(angle) + view.up() * std::sin(angle);
   result.position = result.focalPoint + back * distance;
   const glm::dvec3 up = view.up() * std::cos(angle) + view.forward() * std::sin(angle);
-  // The sine of the angle between view-up and view direction, negative if the picture would turn over.
+  // The sine of the angle between view-up and view direction, negative if the picture would flip.
   if (glm::dot(glm::normalize(result.viewUp), up) < 1e-3) result.viewUp = up;
   return result;
 }

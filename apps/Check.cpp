@@ -1,4 +1,4 @@
-// vdi check: finds the mistakes of a vdi.json before a simulation runs with it.
+// vdi check: finds mistakes in a vdi.json before a simulation uses it.
 #include <fmt/format.h>
 #include <fmt/ranges.h>  // fmt::join
 #include <CLI/CLI.hpp>
@@ -23,13 +23,13 @@ namespace vdi::apps {
 
 namespace {
 
-/// A folder that isn't there will be made.
+/// Ignores a missing folder, because the run creates it.
 void requireWritable(const std::filesystem::path& file) {
   const std::filesystem::path folder = file.parent_path();
   if (folder.empty() || std::filesystem::exists(folder)) (void)io::requireWritable(file);
 }
 
-/// When frames are made, in words.
+/// Describes when a run makes frames.
 std::string triggersOf(const config::Run& run) {
   std::vector<std::string> due;
   if (run.every > 0) due.push_back(fmt::format("at steps 0, {}, {} ...", run.every, 2 * run.every));
@@ -47,17 +47,17 @@ std::string triggersOf(const config::Run& run) {
     if (run.when->above && run.when->below) text += " and";
     if (run.when->below) text += fmt::format(" below {}", *run.when->below);
   }
-  if (run.maxShare) text += fmt::format(", in {} % of the wall time at most", 100.0 * *run.maxShare);
+  if (run.maxShare) text += fmt::format(", in at most {} % of the wall time", 100.0 * *run.maxShare);
   return text;
 }
 
-/// The files of a step.
+/// Checks and prints the files of a step.
 void checkFiles(const config::Run& run) {
   const std::int64_t step = std::max<std::int64_t>(run.every, 1);
   const auto check = [&](const config::FilePattern& pattern) {
     for (const config::RunCamera& camera : run.cameras) requireWritable(pattern.path(step, camera.name));
     fmt::print("step {}: {}\n", step, pattern.path(step, run.cameras.front().name).string());
-    if (run.cameras.size() > 1) fmt::print("... and {} other viewpoints\n", run.cameras.size() - 1);
+    if (run.cameras.size() > 1) fmt::print("... and those of {} other viewpoints\n", run.cameras.size() - 1);
   };
   if (run.vdi) check(*run.vdi);
   if (run.png) check(*run.png);
@@ -85,15 +85,15 @@ void check(const std::string& file) {
   }
   if (run.stream) {
     fmt::print("a stream, at {}:{}{}\n", run.stream->host, run.stream->port,
-               run.stream->steer ? ", whose viewers steer" : "");
+               run.stream->steer ? ", which viewers may steer" : "");
   }
   if (!run.colors.range)
-    fmt::print("colours without a range: the first frame's values decide, also after a restart\n");
-  // From this folder, which may not be the run's.
+    fmt::print("the colours have no range: the first frame's values set it, also after a restart\n");
+  // The run may start in another folder.
   if (const auto there = run.firstExisting(); there && run.existing == config::Existing::Refuse) {
     fmt::print(
-        "{} is there already: in this folder a run refuses to start, unless \"existing\" is "
-        "\"continue\" or \"overwrite\"\n",
+        "{} exists already: a run won't start in this folder unless \"existing\" is \"continue\" or "
+        "\"overwrite\"\n",
         there->string());
   }
 }
@@ -102,9 +102,9 @@ void check(const std::string& file) {
 
 void addCheck(CLI::App& app, Job& job) {
   CLI::App* command = app.add_subcommand(
-      "check", "Find mistakes in a vdi.json, with which a simulation makes VDIs without a script");
+      "check", "Find mistakes in a vdi.json, which lets a simulation make VDIs without a script");
   const auto file = std::make_shared<std::string>();
-  command->add_option("run", *file, "the file, or its text; docs/vdi-run.schema.json has all fields")
+  command->add_option("run", *file, "the file or its text; docs/vdi-run.schema.json lists all fields")
       ->required()
       ->type_name("FILE");
   command->callback([file, &job] { job = {[file](const comm::Communicator&) { check(*file); }, false}; });

@@ -1,5 +1,5 @@
-// The subcommands of `vdi`. Each adds its options to the program. Selecting it on the command line sets the
-// job, which runs after the whole command line is parsed.
+// The subcommands of `vdi`. Each adds its options to the program. Selecting it on the command line
+// sets the job, which runs after the whole command line is parsed.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// vdi export: puts VDIs into one page for any browser.
+// vdi export: writes VDIs into one page for any browser.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -28,7 +28,7 @@ void exportPage(const ExportOptions& options) {
   std::uintmax_t inputBytes = 0;
   for (const std::filesystem::path& file : files) {
     inputs.push_back({"a VDI", file});
-    std::error_code error;  // a missing file is reported when it is read
+    std::error_code error;  // reading reports a missing file
     const std::uintmax_t bytes = std::filesystem::file_size(file, error);
     if (!error) inputBytes += bytes;
   }
@@ -47,18 +47,18 @@ void exportPage(const ExportOptions& options) {
 
 void addExport(CLI::App& app, Job& job) {
   CLI::App* command =
-      app.add_subcommand("export", "Write a page that shows VDIs in any browser, in one file");
+      app.add_subcommand("export", "Write a page, in one file, that shows VDIs in any browser");
   command->footer(
       "Example:\n"
       "  vdi export coil.vdi -o coil.html\n"
-      "writes a page that opens from disk. Several files are the frames of a series, in the order given.");
+      "writes a page that opens from disk. Several files become the frames of a series, in the given order.");
   const auto options = std::make_shared<ExportOptions>();
   command->add_option("inputs", options->inputs, "the .vdi files")->type_name("")->required();
   command->add_option("-o,--output", options->output, "the page, an HTML file")
       ->type_name("FILE")
       ->required()
       ->check(requireFileName);
-  command->add_option("--title", options->title, "of the page; default: the first file's name")
+  command->add_option("--title", options->title, "the page's title; default: the first file's name")
       ->type_name("TEXT");
   command->callback(
       [options, &job] { job = {[options](const comm::Communicator&) { exportPage(*options); }}; });

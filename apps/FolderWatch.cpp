@@ -69,10 +69,10 @@ FolderWatch::~FolderWatch() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-/// Watches the folder that has the name now. Does nothing if that one is watched already.
+/// Watches the folder that has the name now, unless it is watched already.
 void FolderWatch::watch() const {
   if (descriptor_ < 0) return;
-  // Files without a name (O_TMPFILE) are created when they get one.
+  // A file that is opened without a name (O_TMPFILE) is created when it gets one.
   (void)::inotify_add_watch(descriptor_, folder_.c_str(),
                             IN_CREATE | IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
 }
@@ -82,7 +82,7 @@ std::vector<std::filesystem::path> FolderWatch::changed() {
     std::array<std::byte, 4096> events{};
     while (::read(descriptor_, events.data(), events.size()) > 0) {
     }
-    watch();  // before the listing, so that nothing falls between the two
+    watch();  // before the listing, so that no file appears unseen in between
   }
   std::vector<std::filesystem::path> files;
   std::map<std::filesystem::path, Look> seen;

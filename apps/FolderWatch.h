@@ -1,5 +1,6 @@
-// Finds new .vdi files in a folder by listing it. The system says when to list a local folder; network file
-// systems do not report what other machines write, so their folders must be listed repeatedly.
+// Finds new .vdi files in a folder by listing it. The system reports changes of a local folder.
+// Network file systems don't report files from other machines, so their folders must be listed
+// repeatedly.
 #pragma once
 
 #include <cstdint>
@@ -18,14 +19,14 @@ class FolderWatch {
   FolderWatch(const FolderWatch&) = delete;
   FolderWatch& operator=(const FolderWatch&) = delete;
 
-  /// Becomes readable when this machine has changed the folder since the last call of changed(). -1 where the
-  /// system has no more such watches to give (fs.inotify.max_user_instances).
+  /// Becomes readable when this machine has changed the folder since the last call of changed(). -1
+  /// if the system has no watches left (fs.inotify.max_user_instances).
   int descriptor() const { return descriptor_; }
 
-  /// Files named *.vdi that are new since the last call, or have changed their size or time since. They are
-  /// ordered by name, where numbers count as numbers. Names that begin with a dot are skipped:
-  /// io::writeAtomically may leave such files. So are links to files of this folder. Throws Error{Io} while
-  /// the folder cannot be read.
+  /// Returns the files named *.vdi that are new since the last call, or whose size or time has
+  /// changed. They are ordered by name, with numbers compared as numbers. Names that begin with a
+  /// dot are skipped, because io::writeAtomically may leave such files. Links to files of this
+  /// folder are skipped, too. Throws Error{Io} while the folder can't be read.
   std::vector<std::filesystem::path> changed();
 
  private:

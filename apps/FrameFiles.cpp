@@ -20,7 +20,7 @@ namespace vdi::apps {
 
 namespace {
 
-/// The file's time, on the clock of frames.
+/// The file's time on the clock of frames.
 stream::Clock::time_point writtenAt(const std::filesystem::path& file) {
   std::error_code error;
   const auto time = std::filesystem::last_write_time(file, error);
@@ -30,7 +30,7 @@ stream::Clock::time_point writtenAt(const std::filesystem::path& file) {
   return age.count() > 0 ? now - std::chrono::duration_cast<stream::Clock::duration>(age) : now;
 }
 
-/// Time that a program has for writing a file under its final name.
+/// How long a program may take to write a file under its final name.
 constexpr std::chrono::seconds writingTime{1};
 
 int makeWakeup() {
@@ -125,25 +125,25 @@ void FrameFiles::look() {
   }
 }
 
-/// The file is found again when it changes.
+/// The watch reports the file again when it changes.
 void FrameFiles::leaveOut(const std::filesystem::path& file, const std::string& what) {
   Incomplete& incomplete = incomplete_[file];
   incomplete.what = what;
   incomplete.since = stream::Clock::now();
 }
 
-/// Logs each incomplete file once. A followed folder may have files that are still being written, which are
-/// not worth a word yet.
+/// Logs each incomplete file once. A followed folder may hold files that are still being written.
+/// Those aren't logged yet.
 void FrameFiles::tellIncomplete() {
   const auto patience = follows() ? writingTime : std::chrono::seconds(0);
   for (auto& [file, incomplete] : incomplete_) {
     if (incomplete.isTold || stream::Clock::now() - incomplete.since < patience) continue;
-    options_.log(incomplete.what + "; it's left out");
+    options_.log(incomplete.what + "; it was skipped");
     incomplete.isTold = true;
   }
 }
 
-/// Adds all files to the series, and shows the last one that is complete.
+/// Adds all files to the series and shows the last complete one.
 void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
   stream::Series entries;
   for (const std::filesystem::path& file : files) {

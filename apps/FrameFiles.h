@@ -1,4 +1,4 @@
-// .vdi files as the frames of a server: the files of a list, or those that appear in a folder.
+// .vdi files as the frames of a server: a list of files, or the files that appear in a folder.
 #pragma once
 
 #include <chrono>
@@ -21,15 +21,15 @@
 
 namespace vdi::apps {
 
-/// Reads, checks and encodes files on a thread of its own, and hands them to a server as the frames of one
-/// series. A frame's id is its index in the series.
+/// Reads, checks and encodes files on a thread of its own, and passes them to a server as the
+/// frames of one series. A frame's id is its index in the series.
 class FrameFiles {
  public:
   struct Options {
-    std::vector<std::filesystem::path> files;  // a finished series; or
-    std::filesystem::path folder;              // whose files are the series, and
-    bool follows = true;                       // which is watched for new files
-    std::chrono::milliseconds interval{250};   // between two listings of a folder that doesn't report changes
+    std::vector<std::filesystem::path> files;     // a finished series; otherwise
+    std::filesystem::path folder;                 // its files are the series
+    bool follows = true;                          // whether to watch the folder for new files
+    std::chrono::milliseconds interval{250};      // between listings of a folder that reports no changes
     std::function<void(const std::string&)> log;  // one line, from any thread
   };
   explicit FrameFiles(Options options);
@@ -37,11 +37,11 @@ class FrameFiles {
   FrameFiles(const FrameFiles&) = delete;
   FrameFiles& operator=(const FrameFiles&) = delete;
 
-  /// Starts once. The server must live until stop() or this object's end. Throws Error: Io for a folder or a
-  /// file that cannot be read, Format for a file that is not a VDI; bad files of a folder are logged and
-  /// skipped.
+  /// Starts once. The server must live until stop() or this object's end. Throws Error: Io for a
+  /// folder or a file that cannot be read, Format for a file that is not a VDI; bad files of a
+  /// folder are logged and skipped.
   void start(stream::Server& server);
-  /// Nothing is handed to the server any more. The server may end afterwards, and may still call show.
+  /// Stops passing frames to the server. The server may still call show, and may end afterwards.
   void stop();
   /// For ServerOptions::show.
   void show(std::uint32_t index);
@@ -70,7 +70,7 @@ class FrameFiles {
   std::map<std::filesystem::path, Incomplete> incomplete_;
   std::string folderTrouble_;
 
-  int wakeup_;        // an eventfd: something below has changed
+  int wakeup_;        // an eventfd; signals that a member below has changed
   std::mutex mutex_;  // for the next two
   std::deque<std::uint32_t> wanted_;
   bool isEnding_ = false;

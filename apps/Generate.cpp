@@ -24,7 +24,7 @@ namespace vdi::apps {
 namespace {
 
 struct Options {
-  std::vector<std::string> raws;  // sidecars of time steps; none: a procedural field
+  std::vector<std::string> raws;  // sidecars of time steps; empty: a procedural field
   std::string field = "turbulence";
   DecompositionOptions decomposition;
   ViewOptions view;
@@ -40,7 +40,8 @@ struct Options {
   std::size_t steps() const { return std::max<std::size_t>(raws.size(), 1); }
   std::uint64_t number(std::size_t index) const { return step + index; }
   double timeOf(std::size_t index) const { return time + static_cast<double>(index) * interval; }
-  /// The path for the index-th step: with several steps, picture.png of step 7 is picture_0007.png.
+  /// The path of the index-th step. With several steps, picture.png becomes picture_0007.png for
+  /// step 7.
   std::filesystem::path numbered(const std::filesystem::path& path, std::size_t index) const {
     return steps() == 1 ? path : withSuffix(path, fmt::format("{:04}", number(index)));
   }
@@ -79,7 +80,7 @@ void printOutcome(const GenerateSettings& settings, std::uint64_t supersegments,
   printReport(generator.reports());
 }
 
-/// Also writes a picture of the VDI, which needs the whole VDI on the root.
+/// Also writes a picture of the VDI. For that the root gathers the whole VDI.
 void writeVdiFiles(const Options& options, std::size_t index, const Shot& shot, Vdi& vdi) {
   vdi.coloring->array = shot.array;
   vdi.time = options.timeOf(index);
@@ -88,7 +89,7 @@ void writeVdiFiles(const Options& options, std::size_t index, const Shot& shot, 
   io::writePng(options.numbered(options.flat, index), io::toPicture(flatten(vdi)));
 }
 
-/// The others wait for the root's writing: all ranks fail if it fails.
+/// The other ranks wait for the root to write. If it fails, all ranks fail.
 void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGenerator& generator,
            const comm::Communicator& world) {
   if (options.wantsVdi() && options.flat.empty() && !options.output.empty()) {
@@ -112,11 +113,11 @@ void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGener
   });
 }
 
-/// Checks everything that is known before the work starts. Throws Error.
+/// Checks the options before the work starts. Throws Error.
 void requireSound(const Options& options) {
   const std::size_t last = options.steps() - 1;
   if (options.number(last) < last) {
-    throw Error(ErrorCode::InvalidArgument, "the last time step's number is beyond 2^64 - 1", "--step");
+    throw Error(ErrorCode::InvalidArgument, "the number of the last time step exceeds 2^64 - 1", "--step");
   }
   if (!std::isfinite(options.timeOf(0)) || !std::isfinite(options.timeOf(last))) {
     throw Error(ErrorCode::InvalidArgument, "the time must be finite", "--time, --interval");
@@ -127,7 +128,7 @@ void requireSound(const Options& options) {
 void requireHeld(const Blending& blending) {
   if (blending.mode == BlendMode::Composite) return;
   throw Error(ErrorCode::InvalidArgument,
-              "a VDI holds composite blending alone; for a picture of this blend mode give --dvr, without -o "
+              "a VDI holds composite blending only; for a picture of this blend mode use --dvr, without -o "
               "and --flat",
               fmt::format("--blend {}", toString(blending.mode)));
 }
@@ -140,7 +141,7 @@ void requireOutputs(const Options& options) {
     inputs.push_back({"--raw", sidecar});
     try {
       inputs.push_back({"the raw volume", readSidecar(sidecar).data});
-    } catch (const Error&) {  // it is reported when this step's turn comes
+    } catch (const Error&) {  // this step's turn will report it
     }
   }
   std::vector<NamedFile> outputs;
@@ -154,7 +155,7 @@ void requireOutputs(const Options& options) {
   requireOutputs(outputs, inputs);
 }
 
-/// Makes the VDIs of all time steps that can be read. All functions are collective.
+/// Makes the VDIs of all readable time steps. All functions are collective.
 class Series {
  public:
   Series(const Options& options, const comm::Communicator& world, std::shared_ptr<gpu::Device> device)
@@ -163,8 +164,8 @@ class Series {
         device_(std::move(device)),
         generator_(device_, comm::Communicator::world(), generatorOptionsFromEnvironment(world)) {}
 
-  /// Throws the error of the first step that cannot be read, after writing all others. The very first step
-  /// must be valid: it determines camera and transfer function.
+  /// Writes all readable steps, then throws the error of the first unreadable one. The very first
+  /// step must be readable, because it determines camera and transfer function.
   void make(const GenerateSettings& settings) {
     Shot shot;
     shot.settings = settings;
@@ -176,7 +177,8 @@ class Series {
       shot.camera = makeCamera(options_.view, generator_.scene());
       shot.function = makeTransferFunction(options_.quality, generator_.scene(), generator_.scalarRange());
     });
-    // While a step's frame is made, the next one's values travel to the device, and the one after it is read.
+    // While one step's frame is made, the next step travels to the device, and the step after that
+    // is read.
     startReading(1);
     for (std::size_t index = 0; index < options_.steps();) {
       std::size_t next = index + 1;
@@ -203,7 +205,7 @@ class Series {
     world_.together([&] { blocks = reading_.get(); });
     return blocks;
   }
-  /// Returns false if the step is bad. Starts to read the step after it in any case.
+  /// Returns false if the step is unreadable. Starts reading the next step in either case.
   bool setNext(std::size_t index) {
     std::exception_ptr bad;
     try {
@@ -224,7 +226,7 @@ class Series {
   std::shared_ptr<gpu::Device> device_;
   VdiGenerator generator_;
   std::exception_ptr firstBad_;
-  std::future<std::vector<Block>> reading_;  // waits in its destructor, so it comes last
+  std::future<std::vector<Block>> reading_;  // its destructor waits, so it comes last
 };
 
 void generate(const Options& options, const comm::Communicator& world) {
@@ -244,21 +246,21 @@ void generate(const Options& options, const comm::Communicator& world) {
 
 void addGenerate(CLI::App& app, Job& job) {
   CLI::App* command = app.add_subcommand(
-      "generate", "Make a VDI of a raw volume or a procedural field; on several ranks under mpirun");
+      "generate", "Make a VDI of a raw volume or a procedural field, also on several ranks under mpirun");
   command->footer(
       "Examples:\n"
       "  vdi generate --field coil -o coil.vdi --flat coil.png\n"
       "  mpirun -np 4 vdi generate --raw brain.json --blocks 4x4x4 --layout random -o brain.vdi\n"
       "  vdi generate --raw step*.json -o steps.vdi\n"
-      "The last one writes steps_0000.vdi, steps_0001.vdi and so on, which ParaView opens as a series. All "
-      "steps\n"
-      "have the same viewpoint and transfer function; where these depend on the volume, on the first one.");
+      "The last one writes steps_0000.vdi, steps_0001.vdi and so on, which ParaView opens as a series. All\n"
+      "steps have the same viewpoint and transfer function. If these depend on the volume, the first step\n"
+      "decides.");
   const auto options = std::make_shared<Options>();
   CLI::Option* raw =
       command
           ->add_option("--raw", options->raws,
-                       "JSON sidecars of raw volumes (docs/raw-volumes.md); several are time steps, whose "
-                       "output files get numbers")
+                       "JSON sidecars of raw volumes (docs/raw-volumes.md); several sidecars are time steps, "
+                       "and their output files get numbers")
           ->type_name("FILE")
           ->group("Volume and ranks");
   command->add_option("--field", options->field, "procedural field:" + fieldsHelp())
@@ -275,15 +277,15 @@ void addGenerate(CLI::App& app, Job& job) {
   };
   addFile("-o,--output", options->output, "the .vdi file to write");
   addFile("--flat", options->flat,
-          "PNG of the VDI seen from its own viewpoint; gathers the whole VDI on the first rank");
-  addFile("--dvr", options->volume, "PNG of plain volume rendering from there; takes any --blend");
-  command->add_option("--time", options->time, "simulation time of the first step, kept in the file")
+          "PNG of the VDI from its own viewpoint; the first rank gathers the whole VDI");
+  addFile("--dvr", options->volume, "PNG of direct volume rendering from that viewpoint; allows any --blend");
+  command->add_option("--time", options->time, "simulation time of the first step, stored in the file")
       ->capture_default_str()
       ->group("Output");
-  command->add_option("--interval", options->interval, "simulation time from step to step")
+  command->add_option("--interval", options->interval, "simulation time between steps")
       ->capture_default_str()
       ->group("Output");
-  command->add_option("--step", options->step, "number of the first time step, kept in the file")
+  command->add_option("--step", options->step, "number of the first time step, stored in the file")
       ->check(requireWholeNumber)
       ->capture_default_str()
       ->group("Output");

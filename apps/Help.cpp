@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t nameColumn = 30;
 constexpr std::size_t textWidth = 74;
 
-/// Breaks lines at blanks; continued lines have the indentation of their first line.
+/// Breaks lines at blanks. A continued line is indented like its first line.
 std::string wrapped(const std::string& line) {
   const std::size_t first = line.find_first_not_of(' ');
   const std::string indent(first == std::string::npos ? 0 : first, ' ');
@@ -71,7 +71,7 @@ std::string requireWholeNumber(const std::string& text) {
   const char* const end = text.data() + text.size();
   const auto [after, error] = std::from_chars(text.data(), end, value);
   const bool good = error == std::errc() && after == end;
-  return good ? "" : "must be a whole number from 0 to 2^64 - 1, it is " + text;
+  return good ? "" : "must be a whole number from 0 to 2^64 - 1, but is " + text;
 }
 
 }  // namespace vdi::apps

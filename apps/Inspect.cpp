@@ -1,4 +1,4 @@
-// vdi compare and info: examines existing files.
+// vdi compare and vdi info: examine existing files.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -26,7 +26,7 @@ void comparePictures(const CompareOptions& options) {
   const io::Picture a = io::readPng(options.a);
   const io::Picture b = io::readPng(options.b);
   if (a.width != b.width || a.height != b.height) {
-    throw Error(ErrorCode::InvalidArgument, fmt::format("the pictures are of {} x {} and {} x {} pixels",
+    throw Error(ErrorCode::InvalidArgument, fmt::format("the pictures have {} x {} and {} x {} pixels",
                                                         a.width, a.height, b.width, b.height));
   }
   const ImageDifference d = compare(a.rgb, b.rgb, a.width, a.height, 3);
@@ -53,7 +53,7 @@ void comparePictures(const CompareOptions& options) {
 }
 
 std::string shownOf(const ScalarArray& array) {
-  if (array.name.empty()) return "an array of no name";
+  if (array.name.empty()) return "an array without a name";
   std::string what = fmt::format("{} of {}", array.name, array.cells ? "cells" : "points");
   if (array.components > 1)
     what += array.component < 0 ? ", its magnitude"
@@ -84,10 +84,11 @@ void printInfo(const InfoOptions& options) {
     fmt::print("{}\n  version          {}\n  lists            {} x {}, at most {} supersegments each\n", file,
                info.version, v.width, v.height, v.budget);
     if (v.margin != glm::ivec2(0)) {
-      fmt::print("  picture          {} x {}, and a margin of {} lists beside and {} above and below it\n",
-                 v.pictureSize().x, v.pictureSize().y, v.margin.x, v.margin.y);
+      fmt::print(
+          "  picture          {} x {}, and a margin of {} lists on either side and {} above and below\n",
+          v.pictureSize().x, v.pictureSize().y, v.margin.x, v.margin.y);
     }
-    fmt::print("  supersegments    {} ({:.2f} a list), {} precision\n", info.supersegmentCount,
+    fmt::print("  supersegments    {} ({:.2f} per list), {} precision\n", info.supersegmentCount,
                static_cast<double>(info.supersegmentCount) / (static_cast<double>(v.width) * v.height),
                toString(v.precision()));
     fmt::print("  stored           {:.2f} MiB of {:.2f} MiB\n",
@@ -111,13 +112,11 @@ void printInfo(const InfoOptions& options) {
 
 void addCompare(CLI::App& app, Job& job) {
   CLI::App* command =
-      app.add_subcommand("compare", "Tell how alike two PNGs are: SSIM, PSNR, mean and largest error");
+      app.add_subcommand("compare", "Measure the similarity of two PNGs: SSIM, PSNR, mean and largest error");
   command->footer(
-      "The object's SSIM is that of the part of the picture where either PNG shows something on its "
-      "background,\n"
-      "which is the colour that is most frequent along the edge. JSON has null for the infinite PSNR of "
-      "equal\n"
-      "pictures.");
+      "The object's SSIM covers the part of the picture where either PNG differs from its background. The\n"
+      "background is the most frequent colour along the edge. In JSON, null stands for the infinite PSNR of\n"
+      "equal pictures.");
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("a", options->a, "PNG")->type_name("")->required();
   command->add_option("b", options->b, "PNG")->type_name("")->required();
@@ -130,7 +129,7 @@ void addInfo(CLI::App& app, Job& job) {
   CLI::App* command = app.add_subcommand("info", "Describe .vdi files or this machine's devices");
   const auto options = std::make_shared<InfoOptions>();
   command->add_option("files", options->files, ".vdi files")->type_name("");
-  command->add_flag("--devices", options->devices, "list the Vulkan devices and whether each can be used");
+  command->add_flag("--devices", options->devices, "list the Vulkan devices, and whether each is usable");
   command->callback([options, &job] {
     if (options->files.empty() && !options->devices) throw CLI::RequiredError("A .vdi file or --devices");
     job = {[options](const comm::Communicator&) { printInfo(*options); }};

@@ -33,16 +33,16 @@ std::string joined(const std::set<std::string>& names) {
 json readJson(const std::filesystem::path& path) {
   const auto fail = [&](const std::string& what) { throw Error(ErrorCode::Format, what, path.string()); };
   const io::InputFile file(path);
-  // guards against a picture or volume given by mistake
+  // a larger file is probably a picture or volume, given by mistake
   constexpr std::uint64_t maxBytes = std::uint64_t{256} << 20;
   if (file.size() > maxBytes) fail(fmt::format("{} bytes are too many for JSON", file.size()));
   const std::vector<std::byte> bytes = file.readAll();
-  std::vector<std::set<std::string>> open;  // the names so far in each object being read
+  std::vector<std::set<std::string>> open;  // the names so far in each unfinished object
   const auto noteNames = [&](int, json::parse_event_t event, const json& value) {
     if (event == json::parse_event_t::object_start) open.emplace_back();
     if (event == json::parse_event_t::object_end) open.pop_back();
     if (event == json::parse_event_t::key && !open.back().insert(value.get<std::string>()).second) {
-      fail(fmt::format("the field '{}' stands there twice", value.get<std::string>()));
+      fail(fmt::format("the field '{}' occurs twice", value.get<std::string>()));
     }
     return true;
   };
@@ -77,7 +77,7 @@ bool JsonFile::flag(const char* name) const {
 
 std::string JsonFile::text(const char* name) const {
   const json& value = at(name);
-  if (!value.is_string()) fail(fmt::format("'{}' must be a text", name));
+  if (!value.is_string()) fail(fmt::format("'{}' must be a string", name));
   return value.get<std::string>();
 }
 
@@ -110,7 +110,7 @@ glm::ivec3 JsonFile::positives(const char* name) const {
 std::string JsonFile::choice(const char* name, const std::set<std::string>& choices) const {
   std::string value = text(name);
   if (!choices.contains(value)) {
-    fail(fmt::format("'{}' must be one of {}, it is '{}'", name, joined(choices), value));
+    fail(fmt::format("'{}' must be one of {}, but is '{}'", name, joined(choices), value));
   }
   return value;
 }

@@ -1,4 +1,4 @@
-// A JSON object in a file, read strictly: anything unknown is an error, never a default.
+// A JSON object in a file, read strictly: an unknown field is an error.
 #pragma once
 
 #include <cstdint>
@@ -11,20 +11,21 @@
 
 namespace vdi::apps {
 
-/// Reads the document in a file. Throws Error: Io if it cannot be read; Format if it is not JSON or an object
-/// has two fields of one name. Both have the path as context.
+/// Reads the document in a file. Throws Error: Io if it cannot be read; Format if it is not JSON or
+/// an object has two fields of one name. Both have the path as context.
 nlohmann::json readJson(const std::filesystem::path& path);
 
 class JsonFile {
  public:
-  /// Throws Error: as readJson; Format if it is not one JSON object, or has a field outside `known`.
+  /// Throws Error: as readJson; Format if it is not one JSON object, or has a field outside
+  /// `known`.
   JsonFile(std::filesystem::path path, const std::set<std::string>& known);
 
   const std::filesystem::path& path() const { return path_; }
   bool has(const char* name) const { return object_.contains(name); }
 
-  // The value of a field. Each throws Error{Format} with the field's name if it is missing or of another
-  // kind.
+  // Return the value of a field. Throw Error{Format} with the field's name if it is missing or has
+  // another type.
   double number(const char* name) const;
   bool flag(const char* name) const;
   std::string text(const char* name) const;

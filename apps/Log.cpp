@@ -1,4 +1,4 @@
-// vdi log: draws what a run in situ has logged.
+// vdi log: draws the log of an in situ run.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -36,7 +36,7 @@ void drawLog(const LogOptions& options) {
   if (records.skipped > 0)
     fmt::print(stderr, "vdi: {}: {} lines aren't records\n", input.string(), records.skipped);
   for (const runlog::RunSummary& summary : records.summaries) fmt::print("{}\n", textLine(summary));
-  if (records.summaries.size() < records.starts.size()) {  // killed, or it goes on
+  if (records.summaries.size() < records.starts.size()) {  // killed, or still running
     runlog::RunSummary sum;
     for (const runlog::FrameRecord& frame : records.frames) sum.add(frame);
     fmt::print("{} of {} runs not finalized; {} frames in all, {} failed\n",
@@ -50,17 +50,17 @@ void drawLog(const LogOptions& options) {
 
 void addLog(CLI::App& app, Job& job) {
   CLI::App* command =
-      app.add_subcommand("log", "Draw the log of a run in situ: each frame's stages over the steps");
+      app.add_subcommand("log", "Draw the log of an in situ run: each frame's stages over the steps");
   command->footer(
       "Example:\n"
       "  vdi log run.jsonl\n"
-      "writes run.svg, and prints the summary. The field 'log' of a vdi.json makes a run write such a log.");
+      "writes run.svg and prints the summary. The field 'log' of a vdi.json makes a run write such a log.");
   const auto options = std::make_shared<LogOptions>();
   command->add_option("log", options->input, "the log, of JSON lines")->type_name("FILE")->required();
   command->add_option("-o,--output", options->output, "the picture; default: the log's name with .svg")
       ->type_name("FILE")
       ->check(requireFileName);
-  command->add_flag("--mean", options->means, "show the ranks' mean in place of the slowest rank");
+  command->add_flag("--mean", options->means, "show the mean of all ranks instead of the slowest rank");
   command->callback([options, &job] { job = {[options](const comm::Communicator&) { drawLog(*options); }}; });
 }
 

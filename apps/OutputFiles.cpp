@@ -13,7 +13,7 @@ namespace vdi::apps {
 void requireOutputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs) {
   std::map<std::filesystem::path, std::string> origins;
   for (const NamedFile& input : inputs) {
-    std::error_code error;  // a missing file is reported when it is read
+    std::error_code error;  // reading reports a missing file
     origins.emplace(std::filesystem::canonical(input.path, error), input.origin);
   }
   for (const NamedFile& output : outputs) {
@@ -22,7 +22,7 @@ void requireOutputs(const std::vector<NamedFile>& outputs, const std::vector<Nam
     const auto [found, isNew] = origins.emplace(file, output.origin);
     if (isNew) continue;
     throw Error(ErrorCode::InvalidArgument,
-                fmt::format("{} would write over {}", output.origin,
+                fmt::format("{} would overwrite {}", output.origin,
                             found->second == output.origin ? "itself" : "the file of " + found->second),
                 output.path.string());
   }

@@ -1,4 +1,4 @@
-// Checks of a command's outputs, made before it computes anything.
+// Checks a command's outputs before the command computes anything.
 #pragma once
 
 #include <filesystem>
@@ -13,8 +13,9 @@ struct NamedFile {
   std::filesystem::path path;
 };
 
-/// Throws Error: Io if one of `outputs` cannot be written (as io::requireWritable), InvalidArgument if two of
-/// them are the same file or one is among `inputs`. Devices and pipes may be written twice.
+/// Throws Error: Io if one of `outputs` cannot be written (as io::requireWritable), InvalidArgument
+/// if two of them are the same file or one is among `inputs`. Devices and pipes may be written
+/// twice.
 void requireOutputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs);
 
 }  // namespace vdi::apps

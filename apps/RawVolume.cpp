@@ -44,7 +44,7 @@ void requireSize(const JsonFile& sidecar, const RawVolume& volume) {
   const glm::u64vec3 size(volume.lattice.size);
   const std::uint64_t expected = volume.skip + size.x * size.y * size.z * sizeOf(volume.lattice.type);
   if (bytes != expected) {
-    sidecar.fail(fmt::format("the raw file has {} bytes, the sidecar describes {}", bytes, expected));
+    sidecar.fail(fmt::format("the raw file has {} bytes, but the sidecar describes {}", bytes, expected));
   }
 }
 

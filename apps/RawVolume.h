@@ -15,8 +15,8 @@ struct RawVolume {
   std::uint64_t skip = 0;  // bytes before the first value
 };
 
-/// Throws Error: Io if a file is missing; Format if the sidecar is not JSON, lacks a field, or has an unknown
-/// or impossible one, or if the raw file's size differs from the sidecar's.
+/// Throws Error: Io if a file is missing; Format if the sidecar is not JSON, lacks a field, or has
+/// an unknown or impossible one, or if the raw file's size differs from the sidecar's.
 RawVolume readSidecar(const std::filesystem::path& path);
 
 /// Reads the values of one part from the file; the block owns them. Throws Error{Io}.

@@ -1,4 +1,4 @@
-// vdi receive: a viewer without a window that stores or draws a server's frames.
+// vdi receive: a viewer without a window. It stores or draws a server's frames.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -48,7 +48,7 @@ class Recorder {
 
   std::uint64_t count() const { return count_; }
 
-  /// A bad file is reported, and does not count.
+  /// Reports a bad file and doesn't count it.
   void take(const stream::Received& received) {
     const stream::Level& level = received.level;
     std::optional<Vdi> vdi;
@@ -94,7 +94,7 @@ class SeriesWalk {
   bool isDone(const stream::Client::Standing& standing) const {
     return next_ && standing.series && *next_ >= *standing.series;
   }
-  /// Requests the first frame, once there is a finished series.
+  /// Requests the first frame once the server has a finished series.
   void begin(stream::Client& client, const stream::Client::Standing& standing) {
     if (next_ || !standing.isConnected || !standing.series || standing.state.phase != stream::Phase::Ended)
       return;
@@ -114,7 +114,7 @@ class SeriesWalk {
 void requirePatience(const stream::Client::Standing& standing, double patience, std::uint64_t count) {
   const auto alone = std::chrono::steady_clock::now() - standing.since;
   if (standing.isConnected || alone < std::chrono::duration<double>(patience)) return;
-  throw Error(ErrorCode::Io, fmt::format("no connection for {:g} s, after {} frames: {}", patience, count,
+  throw Error(ErrorCode::Io, fmt::format("no connection for {:g} s after {} frames: {}", patience, count,
                                          standing.trouble.empty() ? "no answer" : standing.trouble));
 }
 
@@ -122,7 +122,7 @@ void receive(const ReceiveOptions& options) {
   constexpr std::chrono::milliseconds pause{100};
   stream::ClientOptions connection;
   if (options.command.empty()) {
-    (void)stream::parseUrl(options.url);  // a link that isn't one is no command
+    (void)stream::parseUrl(options.url);  // a malformed link is not a command
     connection = clientOf(options.url, options.tokenFile);
   } else {
     connection = clientOf(options.command, "");
@@ -157,36 +157,37 @@ void receive(const ReceiveOptions& options) {
 }  // namespace
 
 void addReceive(CLI::App& app, Job& job) {
-  CLI::App* command = app.add_subcommand("receive", "Keep or draw the VDIs that a server offers");
+  CLI::App* command = app.add_subcommand("receive", "Store or draw the VDIs that a server offers");
   command->footer(
       "Example:\n"
       "  vdi receive 'http://127.0.0.1:8080/#token=...' -o received --frames 10\n"
-      "A lost connection is made again. Of a finished series all frames are received, else the newest ones;\n"
-      "of a server that has more frames than time, some are left out.");
+      "The command reconnects after a failure. It receives all frames of a finished series. While a series\n"
+      "grows, it receives the newest frames and may skip some.");
   const auto options = std::make_shared<ReceiveOptions>();
   CLI::Option* const url =
       command->add_option("url", options->url, "the link that vdi serve or VDIStream printed")->type_name("");
   command
       ->add_option("--from", options->command,
-                   "in place of the link: a command that runs vdi serve --stdio, such as\n"
+                   "instead of the link: a command that runs vdi serve --stdio, such as\n"
                    "'ssh host vdi serve --stdio results'")
       ->type_name("COMMAND")
       ->excludes(url);
   command->add_option("-o,--output", options->folder, "folder for vdi_000000.vdi and so on")
       ->type_name("FOLDER");
-  command->add_option("--render", options->picture, "PNG of the newest frame, from where it was made")
+  command->add_option("--render", options->picture, "PNG of the newest frame from its own viewpoint")
       ->type_name("FILE");
-  command->add_option("--frames", options->frames, "how many; default: until the server has ended")
+  command->add_option("--frames", options->frames, "number of frames; default: all until the server ends")
       ->type_name("N")
       ->check(requirePositive);
-  command->add_flag("--coarse", options->isCoarse, "take coarse levels too, which come first");
-  command->add_option("--patience", options->patience, "seconds without a connection until it gives up")
+  command->add_flag("--coarse", options->isCoarse, "also take coarse levels, which arrive first");
+  command->add_option("--patience", options->patience, "seconds without a connection after which to give up")
       ->type_name("S")
       ->capture_default_str()
       ->check(requirePositive);
   addTokenOption(*command, options->tokenFile, "default: the link's");
   command
-      ->add_option("--authority", options->authority, "PEM file of certificates to trust beside the system's")
+      ->add_option("--authority", options->authority,
+                   "PEM file of certificates to trust in addition to the system's")
       ->type_name("FILE");
   command->callback([options, &job] {
     if (options->url.empty() && options->command.empty()) throw CLI::RequiredError("a link, or --from");

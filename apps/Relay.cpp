@@ -42,7 +42,7 @@ void Relay::follow(const stream::Client::Standing& standing) {
   server_->setPhase(*phase_);
 }
 
-/// Frames are counted anew: viewers that know older ones must not mix them up.
+/// Numbers frames anew. Viewers that know former frames must not mix them up.
 void Relay::restart() {
   server_.reset();
   {
@@ -112,7 +112,7 @@ void Relay::pass(stream::Received received) {
   finish(id);
 }
 
-/// To the frame whose levels come, which it may begin.
+/// Adds a level to its frame, which it may begin.
 void Relay::add(stream::Received received) {
   const stream::Level& level = received.level;
   auto frame = std::make_shared<stream::Frame>();

@@ -1,4 +1,4 @@
-// Offers here what another server offers.
+// Offers another server's frames here.
 #pragma once
 
 #include <chrono>
@@ -16,9 +16,9 @@
 
 namespace vdi::apps {
 
-/// A client of the other server and a server of its own. Frames pass as they are. A frame of the series that
-/// a viewer asks for is fetched; meanwhile, newer ones wait. The other server's restart is one for viewers
-/// too.
+/// A client of the other server and a server of its own. It passes on frames unchanged. If a viewer
+/// asks for a frame of the series, the relay fetches it, and newer frames wait meanwhile. If the
+/// other server restarts, viewers see a restart, too.
 class Relay {
  public:
   /// Throws Error as Client and Server do.
@@ -27,7 +27,7 @@ class Relay {
   Relay& operator=(const Relay&) = delete;
 
   const stream::Server& server() const { return *server_; }
-  /// Passes on what comes within that time. Throws Error as Client::next.
+  /// Passes on the frames that arrive within that time. Throws Error as Client::next does.
   void step(std::chrono::milliseconds time);
 
  private:
@@ -39,13 +39,13 @@ class Relay {
   void finish(std::uint32_t index);
 
   stream::ServerOptions options_;
-  std::string session_;  // of the other server
+  std::string session_;  // the other server's
   std::size_t seriesPassed_ = 0;
   std::optional<stream::Phase> phase_;
-  std::shared_ptr<const stream::Frame> current_;  // that comes in
-  std::list<stream::FramePtr> whole_;             // the last few that came in whole
+  std::shared_ptr<const stream::Frame> current_;  // the frame that is arriving
+  std::list<stream::FramePtr> whole_;             // the latest whole frames
   std::optional<std::uint32_t> newest_;
-  std::optional<std::uint32_t> asked_;  // of the series
+  std::optional<std::uint32_t> asked_;  // the wanted frame of the series
   std::mutex mutex_;                    // for the next one
   std::deque<std::uint32_t> wanted_;
   std::unique_ptr<stream::Server> server_;

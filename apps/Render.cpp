@@ -34,10 +34,10 @@ struct RenderOptions {
   std::string reconstruction = toString(defaultReconstruction);
   std::vector<double> clip;  // 6 for each plane
   bool follows = false;      // `input` is a folder
-  std::uint64_t frames = 0;  // with it: the number of VDIs to render; 0: no end
+  std::uint64_t frames = 0;  // number of VDIs to render if `follows`; 0: no end
 };
 
-/// The path of an azimuth's picture; with several azimuths, the degrees are added to its name.
+/// The path of an azimuth's picture. With several azimuths, the degrees become part of its name.
 std::filesystem::path pictureOf(const RenderOptions& options, double azimuth) {
   if (options.azimuths.size() == 1) return options.output;
   return withSuffix(options.output, fmt::format("{:g}deg", azimuth));
@@ -46,7 +46,7 @@ std::filesystem::path pictureOf(const RenderOptions& options, double azimuth) {
 void requirePictures(const RenderOptions& options) {
   std::vector<NamedFile> outputs;
   for (const double azimuth : options.azimuths)
-    outputs.push_back({fmt::format("the picture of {} degrees", azimuth), pictureOf(options, azimuth)});
+    outputs.push_back({fmt::format("the picture at {} degrees", azimuth), pictureOf(options, azimuth)});
   requireOutputs(outputs, {{"the VDI", options.input}, {"--camera", options.camera.file}});
 }
 
@@ -92,7 +92,7 @@ void awaitChange(const FolderWatch& watch) {
   (void)::poll(&descriptor, 1, static_cast<int>(interval.count()));
 }
 
-/// The last complete VDI of some files. A file that is still being written is found again when it changes.
+/// The last complete VDI of some files. The watch reports an incomplete file again when it changes.
 std::optional<Vdi> newestOf(const std::vector<std::filesystem::path>& files) {
   for (auto file = files.rbegin(); file != files.rend(); ++file) {
     try {
@@ -116,7 +116,7 @@ void follow(const RenderOptions& options) {
     if (newest) {
       painter.paint(*newest);
       ++done;
-      (void)std::fflush(stdout);  // others may read along
+      (void)std::fflush(stdout);  // other programs may read the output
     } else {
       awaitChange(watch);
     }
@@ -135,7 +135,7 @@ void render(const RenderOptions& options) {
 }  // namespace
 
 void addRender(CLI::App& app, Job& job) {
-  CLI::App* command = app.add_subcommand("render", "Show a VDI from new viewpoints, as PNG");
+  CLI::App* command = app.add_subcommand("render", "Render a VDI from new viewpoints to PNG");
   command->footer(
       "Example:\n"
       "  vdi render coil.vdi -o coil.png --azimuth 0 5 20 50\n"
@@ -148,28 +148,31 @@ void addRender(CLI::App& app, Job& job) {
       ->required();
   command
       ->add_option("-o,--output", options->output,
-                   "PNG; with several azimuths their degrees are added to its name")
+                   "PNG; with several azimuths, the degrees become part of its name")
       ->type_name("FILE")
       ->required();
-  command->add_option("--resolution", options->resolution, "pixels; default: those of the VDI's picture")
+  command
+      ->add_option("--resolution", options->resolution, "size in pixels; default: that of the VDI's picture")
       ->type_name("WxH");
-  addCameraOptions(*command, options->camera, "the one that the VDI was made for");
+  addCameraOptions(*command, options->camera, "the one with which the VDI was made");
   command
       ->add_option("--azimuth", options->azimuths,
-                   "degrees to turn the camera about its focal point, around its view-up as set (vtkCamera's "
-                   "Azimuth); several make several pictures")
+                   "degrees by which to turn the camera about its focal point, around the given view-up "
+                   "(vtkCamera's Azimuth); several azimuths make several pictures")
       ->type_name("DEG")
       ->capture_default_str()
       ->group("Viewpoint");
-  command->add_option("--elevation", options->elevation, "degrees to raise it after that")
+  command->add_option("--elevation", options->elevation, "degrees by which to raise the camera afterwards")
       ->capture_default_str()
       ->group("Viewpoint");
   addReconstructionOption(*command, options->reconstruction);
   addClipOption(*command, options->clip, "Viewpoint");
-  CLI::Option* follows = command->add_flag(
-      "--follow", options->follows,
-      "render the newest VDI of a folder again and again, as files appear; Ctrl+C ends that");
-  command->add_option("--frames", options->frames, "with --follow: end after so many VDIs; default: 0, never")
+  CLI::Option* follows =
+      command->add_flag("--follow", options->follows,
+                        "render the newest VDI of a folder whenever a file appears, until Ctrl+C");
+  command
+      ->add_option("--frames", options->frames,
+                   "with --follow: number of VDIs after which to end; default: 0, never")
       ->needs(follows);
   command->callback([options, &job] { job = {[options](const comm::Communicator&) { render(*options); }}; });
 }

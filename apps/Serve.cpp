@@ -1,4 +1,4 @@
-// vdi serve: offers VDIs to browsers and other programs, over the network.
+// vdi serve: offers VDIs to browsers and other programs over the network.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -49,7 +49,7 @@ void logLine(const std::string& line) {
   fmt::print(stderr, "vdi: {}\n", line);
 }
 
-/// Signals that end a server; they must be blocked before the first thread starts.
+/// The signals that end a server. The program must block them before it starts the first thread.
 class EndSignals {
  public:
   EndSignals() {
@@ -70,7 +70,7 @@ class EndSignals {
   sigset_t set_{};
 };
 
-/// Stops `files` before the server that they go to ends: it is destroyed first.
+/// Its destructor stops `files` before their server ends.
 class FilesStop {
  public:
   explicit FilesStop(FrameFiles& files) : files_(files) {}
@@ -94,13 +94,13 @@ FrameFiles::Options filesOf(const ServeOptions& options) {
   return files;
 }
 
-/// Prints the link, or without the token where that is known: the only place that shows a token.
+/// Prints the link. It omits the token if the user gave one. Nothing else prints a token.
 void printLink(const stream::Server& server, bool isKnown) {
   fmt::print("{}\n", isKnown ? server.address() : server.link());
   std::fflush(stdout);
 }
 
-/// At standard input and output, until they are closed. Nothing else is written there.
+/// Serves standard input and output until they are closed. Nothing else writes to them.
 void serveStdio(const ServeOptions& options) {
   std::signal(SIGPIPE, SIG_IGN);
   FrameFiles files(filesOf(options));
@@ -161,43 +161,47 @@ void addServe(CLI::App& app, Job& job) {
   command->footer(
       "Example:\n"
       "  vdi serve results/\n"
-      "prints a link. Each .vdi file that appears in the folder is shown where the link is open.\n"
-      "docs/live.md says how to reach a server on another machine.");
+      "prints a link. Whoever has it open sees each .vdi file that appears in the folder.\n"
+      "docs/live.md explains how to reach a server on another machine.");
   const auto options = std::make_shared<ServeOptions>();
   CLI::Option* const inputs =
       command->add_option("inputs", options->inputs, "a folder to follow, or the .vdi files of a series")
           ->type_name("");
   command->add_flag("--finished", options->isFinished, "the folder's series is finished; don't follow it");
-  command->add_option("--host", options->host, "name or address to listen at; 0.0.0.0: any of this machine's")
+  command
+      ->add_option("--host", options->host,
+                   "name or address to listen at; 0.0.0.0: all addresses of this machine")
       ->capture_default_str();
-  command->add_option("--port", options->port, "0: one that is free")->capture_default_str();
-  addTokenOption(*command, options->tokenFile, "default: a new one, which is in the link");
-  command->add_option("--rate", options->rate, "limit for each viewer, such as 100Mbit or 5MB a second")
+  command->add_option("--port", options->port, "port to listen at; 0: any free one")->capture_default_str();
+  addTokenOption(*command, options->tokenFile, "default: a new token, which is part of the link");
+  command->add_option("--rate", options->rate, "limit per viewer and second, such as 100Mbit or 5MB")
       ->type_name("RATE")
       ->check(requireRate);
-  command->add_option("--viewers", options->viewers, "most of them at a time")->capture_default_str();
-  command->add_option("--certificate", options->certificate, "PEM file of a certificate: encrypts by TLS")
+  command->add_option("--viewers", options->viewers, "maximum number of viewers at a time")
+      ->capture_default_str();
+  command->add_option("--certificate", options->certificate, "PEM file of a certificate; turns on TLS")
       ->type_name("FILE");
   command->add_option("--key", options->key, "PEM file of the certificate's key")->type_name("FILE");
   command
       ->add_option("--origin", options->origins,
-                   "of another site whose pages may connect: https://example.org")
+                   "another site whose pages may connect, such as https://example.org")
       ->type_name("ORIGIN");
   CLI::Option* const from =
       command
           ->add_option("--from", options->from,
-                       "offer what another server offers: its link, or a command that runs\n"
+                       "offer another server's frames: its link, or a command that runs\n"
                        "vdi serve --stdio, such as 'ssh host vdi serve --stdio results'")
           ->type_name("LINK|COMMAND")
           ->excludes(inputs);
   command
       ->add_option("--from-token-file", options->fromTokenFile,
-                   "file whose first line is the token of --from's link, where that has none")
+                   "file whose first line is the token, if the link of --from has none")
       ->type_name("FILE")
       ->needs(from);
-  CLI::Option* const stdio =
-      command->add_flag("--stdio", options->isStdio, "serve one viewer at standard input and output; no port")
-          ->excludes(from);
+  CLI::Option* const stdio = command
+                                 ->add_flag("--stdio", options->isStdio,
+                                            "serve one viewer at standard input and output instead of a port")
+                                 ->excludes(from);
   for (const char* const name : {"--host", "--port", "--token-file", "--certificate", "--key", "--origin"})
     stdio->excludes(command->get_option(name));
   command->callback([options, &job] {

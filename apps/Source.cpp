@@ -22,7 +22,7 @@ synthetic::Joint jointOf(const std::string& name) {
   if (name == "shared") return synthetic::Joint::SharedPoints;
   if (name == "gap") return synthetic::Joint::Gap;
   if (name == "cells") return synthetic::Joint::Cells;
-  throw Error(ErrorCode::InvalidArgument, "no joint '" + name + "'; there are shared, gap and cells");
+  throw Error(ErrorCode::InvalidArgument, "there is no joint '" + name + "', only shared, gap and cells");
 }
 
 template <typename T>
@@ -30,8 +30,8 @@ glm::vec<3, T> vectorOf(const std::vector<T>& v) {
   return {v[0], v[1], v[2]};
 }
 
-/// The value to which a field's 1 is stretched: most of an integer type's positive range, 1 for floating
-/// point.
+/// The value that stands for a field's 1: near the greatest value of an integer type, 1 for
+/// floating point.
 double topOf(ScalarType type) {
   switch (type) {
     case ScalarType::U8:
@@ -79,7 +79,7 @@ std::vector<int> parseSizes(const std::string& text, std::size_t count) {
   }
   if (sizes.size() != count || at != end) {
     throw Error(ErrorCode::InvalidArgument,
-                "'" + text + "' isn't " + std::to_string(count) + " positive whole numbers joined by x");
+                "'" + text + "' must be " + std::to_string(count) + " positive whole numbers joined by x");
   }
   return sizes;
 }
@@ -102,8 +102,8 @@ void addDecompositionOptions(CLI::App& command, DecompositionOptions& options) {
       ->group(decompositionGroup);
   command
       .add_option("--copies", options.copies,
-                  "of a field, side by side along each axis, each of --size and in --blocks; they share the "
-                  "host's memory, so that a volume may be larger than that. Takes cell data")
+                  "copies of a field along each axis, each of --size values and --blocks blocks. They share "
+                  "memory, so the volume may be larger than the host's memory. Requires cell data")
       ->type_name("XxYxZ")
       ->capture_default_str()
       ->group(decompositionGroup);
@@ -111,7 +111,7 @@ void addDecompositionOptions(CLI::App& command, DecompositionOptions& options) {
       ->type_name("TYPE")
       ->capture_default_str()
       ->group(decompositionGroup);
-  command.add_option("--seed", options.seed, "of random fields and layouts")
+  command.add_option("--seed", options.seed, "seed of random fields and layouts")
       ->capture_default_str()
       ->group(decompositionGroup);
   command.add_option("--blocks", options.blocks, "blocks per axis")
@@ -120,15 +120,15 @@ void addDecompositionOptions(CLI::App& command, DecompositionOptions& options) {
       ->group(decompositionGroup);
   command
       .add_option("--layout", options.layout,
-                  "which rank holds which block: " + joined(synthetic::layoutNames()) +
-                      "; on fewer blocks than ranks some hold nothing")
+                  "assignment of blocks to ranks: " + joined(synthetic::layoutNames()) +
+                      "; with fewer blocks than ranks, some ranks hold nothing")
       ->type_name("LAYOUT")
       ->capture_default_str()
       ->group(decompositionGroup);
   command
       .add_option("--joint", options.joint,
-                  "neighbouring blocks both hold the points of their common face (shared), no point is held "
-                  "twice (gap), or cell data (cells); default: shared, or what the raw volume is")
+                  "shared: neighbouring blocks both hold the points of their common face; gap: no point is "
+                  "held twice; cells: cell data; default: shared, or the raw volume's")
       ->type_name("JOINT")
       ->group(decompositionGroup);
 }
@@ -140,7 +140,7 @@ std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOpti
     const synthetic::Joint joint = jointOf(options.joint);
     if ((joint == synthetic::Joint::Cells) != (volume.lattice.joint == synthetic::Joint::Cells)) {
       throw Error(ErrorCode::InvalidArgument,
-                  "--joint " + options.joint + " doesn't go with the association of " + sidecar);
+                  "--joint " + options.joint + " contradicts the association of " + sidecar);
     }
     volume.lattice.joint = joint;
   }
@@ -188,7 +188,7 @@ std::vector<Block> fieldBlocks(const std::string& name, const DecompositionOptio
   if (copies != glm::ivec3(1)) {
     if (options.joint.empty()) lattice.joint = synthetic::Joint::Cells;
     if (lattice.joint != synthetic::Joint::Cells)
-      throw Error(ErrorCode::InvalidArgument, "copies take cell data, --joint cells", "--copies");
+      throw Error(ErrorCode::InvalidArgument, "copies require cell data, --joint cells", "--copies");
   }
   lattice.spacing = spacingOf(lattice);
   synthetic::Lattice all = lattice;
@@ -212,15 +212,16 @@ void addCameraOptions(CLI::App& command, CameraOptions& options, const std::stri
   const auto addVector = [&](const char* name, std::vector<double>& value, const char* description) {
     return command.add_option(name, value, description)->expected(3)->type_name("X Y Z")->group(viewGroup);
   };
-  addVector("--position", options.position, "the camera's place, world");
-  addVector("--focal-point", options.focalPoint, "what it looks at, world");
-  addVector("--view-up", options.viewUp, "what is up in the picture");
-  CLI::Option* angle =
-      command.add_option("--view-angle", options.viewAngle, "vertical, degrees; perspective projection")
-          ->group(viewGroup);
+  addVector("--position", options.position, "the camera's position in world space");
+  addVector("--focal-point", options.focalPoint, "the point that the camera looks at, in world space");
+  addVector("--view-up", options.viewUp, "the direction that is up in the picture");
+  CLI::Option* angle = command
+                           .add_option("--view-angle", options.viewAngle,
+                                       "vertical angle in degrees, for perspective projection")
+                           ->group(viewGroup);
   command
       .add_option("--parallel-scale", options.parallelScale,
-                  "half the picture's height in world units; parallel projection")
+                  "half the picture's height in world units, for parallel projection")
       ->excludes(angle)
       ->group(viewGroup);
 }
@@ -242,7 +243,7 @@ Camera chosenCamera(const CameraOptions& options, const Camera& otherwise) {
 }
 
 void addViewOptions(CLI::App& command, ViewOptions& options) {
-  addCameraOptions(command, options.camera, "on an orbit from which the whole scene is seen");
+  addCameraOptions(command, options.camera, "on an orbit that shows the whole scene");
   const auto orbit = [&](CLI::Option* option) {
     option->excludes("--camera")->excludes("--position")->group(viewGroup);
     return option;
@@ -251,9 +252,9 @@ void addViewOptions(CLI::App& command, ViewOptions& options) {
             .add_option("--azimuth", options.orbit.azimuth,
                         "degrees around the scene's centre, about --view-up")
             ->capture_default_str());
-  orbit(
-      command.add_option("--elevation", options.orbit.elevation, "degrees above it")->capture_default_str());
-  orbit(command.add_option("--zoom", options.orbit.zoom, "> 1 goes nearer")
+  orbit(command.add_option("--elevation", options.orbit.elevation, "degrees above the centre")
+            ->capture_default_str());
+  orbit(command.add_option("--zoom", options.orbit.zoom, "> 1 moves closer")
             ->check(requirePositive)
             ->capture_default_str());
   orbit(command.add_flag("--parallel", options.parallel, "parallel projection of the whole scene"))
@@ -303,7 +304,7 @@ void addSettingsOptions(CLI::App& command, GenerateSettings& settings, QualityUs
 void addLightsOption(CLI::App& command, QualityOptions& options) {
   command
       .add_option("--lights", options.lights,
-                  "with --shade: kit, ParaView's five lights; headlight, one that shines along each ray")
+                  "with --shade: kit, ParaView's five lights; headlight, a light along each ray")
       ->check(CLI::IsMember({"kit", "headlight"}))
       ->type_name("NAME")
       ->capture_default_str()
@@ -313,7 +314,7 @@ void addLightsOption(CLI::App& command, QualityOptions& options) {
 void addRegionOptions(CLI::App& command, QualityOptions& options) {
   command
       .add_option("--crop", options.crop,
-                  "shows only what's in a box, in world coordinates: lowest and highest x, y and z")
+                  "show only the inside of a box in world coordinates: lowest and highest x, y and z")
       ->expected(6)
       ->type_name("X")
       ->group(qualityGroup);
@@ -324,8 +325,8 @@ void addBlendingOptions(CLI::App& command, QualityOptions& options) {
   command
       .add_option(
           "--blend", options.blend,
-          "how a ray's scalars become a pixel: composite; maximum or minimum, the colour and opacity of "
-          "that scalar; isosurface, those of each isovalue on the ray. A VDI holds composite alone")
+          "how a ray's scalars become a pixel: composite; maximum or minimum, with that scalar's colour and "
+          "opacity; isosurface, with those of each isovalue on the ray. A VDI holds only composite")
       ->type_name("NAME")
       ->capture_default_str()
       ->group(qualityGroup);
@@ -350,8 +351,8 @@ Region makeRegion(const QualityOptions& options) {
 void addClipOption(CLI::App& command, std::vector<double>& numbers, const char* group) {
   command
       .add_option("--clip", numbers,
-                  "shows only the side of a plane to which its normal points: a point and the normal; up to "
-                  "six planes")
+                  "show only the side of a plane to which its normal points: a point and the normal, for "
+                  "up to six planes")
       ->type_size(6)
       ->expected(1, static_cast<int>(maxClipPlanes))
       ->type_name("X Y Z NX NY NZ")
@@ -375,7 +376,7 @@ void addTransferFunctionOptions(CLI::App& command, QualityOptions& options) {
     presets += "\n  " + info.name + ": " + info.description;
   command
       .add_option("--transfer-function", options.transferFunction,
-                  "a JSON file whose name ends in .json (docs/raw-volumes.md), or one of these, stretched "
+                  "a JSON file, whose name ends in .json (docs/raw-volumes.md), or one of these, stretched "
                   "over the data's range:" +
                       presets)
       ->type_name("NAME|FILE")
@@ -384,8 +385,8 @@ void addTransferFunctionOptions(CLI::App& command, QualityOptions& options) {
   command
       .add_option(
           "--unit-distance", options.unitDistance,
-          "world units of material that have the transfer function's opacity; default: the file's, or "
-          "a fiftieth of the scene's diagonal")
+          "length in world units over which material has the transfer function's opacity; default: the "
+          "file's, or a fiftieth of the scene's diagonal")
       ->check(requirePositive)
       ->group(qualityGroup);
 }
@@ -393,7 +394,7 @@ void addTransferFunctionOptions(CLI::App& command, QualityOptions& options) {
 }  // namespace
 
 void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse use) {
-  command.add_option("--resolution", options.resolution, "lists, that is pixels")
+  command.add_option("--resolution", options.resolution, "number of lists, which are pixels")
       ->type_name("WxH")
       ->capture_default_str()
       ->group(qualityGroup);
@@ -408,8 +409,9 @@ void addReconstructionOption(CLI::App& command, std::string& name) {
   command
       .add_option(
           "--reconstruction", name,
-          "between lists: sheared, where faces lean as neighbouring lists suggest; smooth, which blends two "
-          "lists; or constant, as in the paper. The first is truest, the last fastest on a CPU")
+          "reconstruction between lists: sheared, in which faces lean as neighbouring lists suggest; smooth, "
+          "which blends two lists; constant, as in the paper. Sheared is the most accurate, constant the "
+          "fastest on a CPU")
       ->type_name("NAME")
       ->capture_default_str();
 }

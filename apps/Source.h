@@ -36,21 +36,21 @@ struct DecompositionOptions {
 };
 void addDecompositionOptions(CLI::App& command, DecompositionOptions& options);
 
-/// The blocks of a procedural field that `rank` of `ranks` holds, made by its device. Copies of the field
-/// share memory. Throws Error.
+/// Makes the blocks of a procedural field that `rank` of `ranks` holds, on the rank's device.
+/// Copies of the field share memory. Throws Error.
 std::vector<Block> fieldBlocks(const std::string& field, const DecompositionOptions& options,
                                const std::shared_ptr<gpu::Device>& device, int rank, int ranks);
 /// The blocks of a raw volume, with the sidecar's size and type. Throws Error.
 std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOptions& options, int rank,
                              int ranks);
-/// The name of such blocks' scalars in a VDI's file: the field's name, or the sidecar's file name without its
-/// extension. Throws Error.
+/// The name of the blocks' scalars in a VDI's file: the field's name, or the sidecar's file name
+/// without extension. Throws Error.
 ScalarArray fieldArray(const std::string& field, const DecompositionOptions& options);
 ScalarArray rawArray(const std::string& sidecar);
 /// "name: description" of each field, for --help.
 std::string fieldsHelp();
 
-/// A camera given by its properties; the others come from a file or another camera.
+/// A camera's given properties. The others come from a file or another camera.
 struct CameraOptions {
   std::string file;
   std::vector<double> position;    // 3, or none
@@ -60,7 +60,7 @@ struct CameraOptions {
   std::optional<double> parallelScale;
 };
 void addCameraOptions(CLI::App& command, CameraOptions& options, const std::string& otherwise);
-/// `otherwise`, or the file's camera, with the given properties replaced.
+/// Returns the file's camera, or `otherwise` without a file, with the given properties.
 Camera chosenCamera(const CameraOptions& options, const Camera& otherwise);
 
 /// A viewpoint on an orbit around the scene, unless the camera is given.
@@ -74,7 +74,7 @@ Camera makeCamera(const ViewOptions& options, const Scene& scene);
 
 struct QualityOptions {
   std::string resolution = "640x360";
-  /// What the table of settings has; the other members hold the rest. makeSettings puts both together.
+  /// The settings of the table. The other members hold the rest, and makeSettings combines both.
   GenerateSettings settings{.samplesPerVoxel = automaticRate};
   std::string lights = "kit";
   std::vector<double> crop;  // 6, or none
@@ -84,17 +84,17 @@ struct QualityOptions {
   std::string transferFunction = "three-hues";  // a preset or a file
   std::optional<double> unitDistance;
 };
-/// Several: the command itself chooses the supersegments and algorithms to run.
+/// Several: the command chooses numbers of supersegments and algorithms itself.
 enum class QualityUse { One, Several };
 void addQualityOptions(CLI::App& command, QualityOptions& options, QualityUse use = QualityUse::One);
 GenerateSettings makeSettings(const QualityOptions& options);
-/// Presets are stretched over the data's range and have a unit distance of a fiftieth of the scene's
+/// Presets stretch over the data's range. Their unit distance is a fiftieth of the scene's
 /// diagonal.
 TransferFunction makeTransferFunction(const QualityOptions& options, const Scene& scene,
                                       const ScalarRange& range);
 
-/// Adds the option for planes that clip a volume or a view of a VDI: six numbers each, a point and the
-/// normal.
+/// Adds the option for planes that clip a volume or a view of a VDI: six numbers each, a point and
+/// the normal.
 void addClipOption(CLI::App& command, std::vector<double>& numbers, const char* group);
 std::vector<ClipPlane> makeClipPlanes(const std::vector<double>& numbers);
 

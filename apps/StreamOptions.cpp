@@ -25,7 +25,7 @@ stream::ClientOptions clientOf(const std::string& from, const std::string& token
   options.url = stream::parseUrl(from);
   if (options.url.token.empty()) options.url.token = stream::givenToken(tokenFile);
   if (options.url.token.empty()) {
-    throw Error(ErrorCode::InvalidArgument, "the link has no token: see --token-file",
+    throw Error(ErrorCode::InvalidArgument, "the link has no token; use --token-file",
                 options.url.authority());
   }
   return options;
@@ -34,7 +34,7 @@ stream::ClientOptions clientOf(const std::string& from, const std::string& token
 void addTokenOption(CLI::App& command, std::string& file, const std::string& otherwise) {
   command
       .add_option("--token-file", file,
-                  "file whose first line is the token, as VDI_TOKEN in the environment; " + otherwise)
+                  "file whose first line is the token, which may also be in VDI_TOKEN; " + otherwise)
       ->type_name("FILE");
 }
 
@@ -47,8 +47,8 @@ double bytesPerSecond(const std::string& rate) {
   const double number = std::strtod(rate.c_str(), &end);
   const auto unit = units.find(end);
   if (end == rate.c_str() || unit == units.end() || !std::isfinite(number) || number <= 0.0) {
-    throw Error(ErrorCode::InvalidArgument, "a rate is a number > 0 with kbit, Mbit, Gbit, kB, MB or GB",
-                rate);
+    throw Error(ErrorCode::InvalidArgument,
+                "a rate is a number > 0 followed by kbit, Mbit, Gbit, kB, MB or GB", rate);
   }
   return number * unit->second;
 }

@@ -11,16 +11,16 @@ class App;
 
 namespace vdi::apps {
 
-/// Where frames come from: a link, whose token may be in the file or in VDI_TOKEN, or a command for `sh -c`
-/// that runs `vdi serve --stdio`. Throws Error{InvalidArgument} for a link without a token, and as
-/// givenToken.
+/// The source of frames. It is a link, whose token may be in the file or in VDI_TOKEN, or a command
+/// for `sh -c` that runs `vdi serve --stdio`. Throws Error{InvalidArgument} for a link without a
+/// token, and as givenToken.
 stream::ClientOptions clientOf(const std::string& from, const std::string& tokenFile);
 
 /// Adds --token-file.
 void addTokenOption(CLI::App& command, std::string& file, const std::string& otherwise);
 
-/// Bytes a second of "100Mbit", "1Gbit" or "5MB", with decimal prefixes; 0 for an empty text. Throws
-/// Error{InvalidArgument} for texts that requireRate rejects.
+/// Converts "100Mbit", "1Gbit" or "5MB" to bytes per second, with decimal prefixes; an empty text
+/// to 0. Throws Error{InvalidArgument} for texts that requireRate rejects.
 double bytesPerSecond(const std::string& rate);
 /// A check for CLI11: empty, or the reason why the text is not a rate.
 std::string requireRate(const std::string& text);

@@ -36,7 +36,7 @@ struct Outcome {
   std::string message;  // empty: no error, or another rank reports it
 };
 
-/// Returns a line for each environment variable for users.
+/// Returns a line for each environment variable that users may set.
 std::string environmentHelp() {
   std::string text;
   for (const vdi::EnvironmentVariable& variable : vdi::environmentVariables()) {
@@ -50,7 +50,7 @@ std::string firstLine(std::string_view text) {
   return std::string(text.substr(0, text.find('\n')));
 }
 
-/// Printed text may still be buffered, and fail to reach a full disk, for example.
+/// Flushes printed text. Writing it may fail, for example on a full disk.
 void requirePrinted() {
   std::cout.flush();
   if (std::cout && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
@@ -78,16 +78,15 @@ void requireEqualArguments(const vdi::comm::Communicator& world, int argc, char*
 Outcome runTool(int argc, char** argv) {
   const vdi::comm::Communicator world = vdi::comm::Communicator::world();
   CLI::App app(
-      "Volumetric Depth Images: small, view-dependent pictures with depth that can be seen from new "
+      "Volumetric Depth Images: small, view-dependent pictures with depth, for viewing from new "
       "viewpoints",
       "vdi");
   app.formatter(std::make_shared<vdi::apps::HelpFormatter>());  // inherited by subcommands
   app.require_subcommand(1);
   app.set_version_flag("--version", fmt::format("vdi {} ({})", VDI_VERSION, buildCommit));
   app.footer("Environment variables:\n" + environmentHelp() +
-             "vdi info --devices lists the devices. Exit status: 0, 1 for a failure, 2 for a command line "
-             "that makes "
-             "no sense.");
+             "vdi info --devices lists the devices. The exit status is 0 for success, 1 for a failure, and 2 "
+             "for a wrong command line.");
   vdi::apps::Job job;
   vdi::apps::addGenerate(app, job);
   vdi::apps::addRender(app, job);
@@ -108,7 +107,7 @@ Outcome runTool(int argc, char** argv) {
     requireEqualArguments(world, argc, argv);
     if (world.size() > 1 && !job.collective) {
       throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                       "this subcommand works on one rank; generate and bench work on several");
+                       "this subcommand runs on one rank; only generate and bench run on several");
     }
     job.run(world);
     requirePrinted();
@@ -127,8 +126,9 @@ void say(const std::string& message) {
   fmt::print(stderr, "vdi: {}\n", message);
 }
 
-/// All ranks end with the worst status, and the lowest one with a message prints it. A rank that failed while
-/// others still work ends them after a while, because they may wait for it in a call that it never makes.
+/// All ranks end with the worst status, and the lowest rank with a message prints it. A rank that
+/// failed ends the others after a while, because they may wait for it in a call that it never
+/// makes.
 int leaveTogether(const Outcome& mine) {
   constexpr auto patience = std::chrono::seconds(20);
   int rank = 0;
@@ -153,15 +153,17 @@ int leaveTogether(const Outcome& mine) {
   return -minimum[1];
 }
 
-/// The next opened file would get the number of a closed standard stream, and printed text would end up in
-/// it. Each closed stream gets a descriptor that does not support its purpose, so that printing fails.
+/// The next opened file would get the number of a closed standard stream, and printed text would
+/// end up in it. Each closed stream gets a descriptor that doesn't support its purpose, so printing
+/// fails.
 void occupyStandardStreams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(stream, F_GETFD) < 0) (void)::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
   }
 }
 
-/// Launchers set these variables. A single process needs no MPI, whose start takes seconds on some machines.
+/// Launchers set these variables. A single process needs no MPI, whose start takes seconds on some
+/// machines.
 bool startedByMpi() {
   constexpr std::array signs{"OMPI_COMM_WORLD_SIZE", "PMIX_RANK",    "PMI_RANK",    "PMI_SIZE",
                              "MPI_LOCALNRANKS",      "SLURM_PROCID", "PALS_RANKID", "ALPS_APP_PE"};

@@ -32,7 +32,7 @@ std::string keyOf(const json& row) {
     if (row.contains(field)) key.append(key.empty() ? 0 : 1, ' ').append(row[field].dump());
   }
   if (row.contains("margin") && row["margin"] != 0.0) key += " margin " + row["margin"].dump();
-  // One suite has rows of several rank counts. Otherwise, files of different counts may be compared.
+  // One suite has rows of several rank counts. Files of the other suites may differ in rank count.
   if (row.contains("scaling") && row.contains("ranks")) key += " on " + row["ranks"].dump();
   return key;
 }
@@ -85,7 +85,7 @@ int compareBenches(const std::filesystem::path& before, const std::filesystem::p
     if (figure(found->second, "truth_rate") != figure(row, "truth_rate")) continue;
     if (wasSsim >= 0.0 && isSsim >= 0.0 && isSsim < wasSsim - 0.002) tell(key, "ssim", wasSsim, isSsim);
   }
-  fmt::print(out, "{} rows compared, {} figures got worse{}\n", compared, worse,
+  fmt::print(out, "{} rows compared, {} figures became worse{}\n", compared, worse,
              sameDevice ? "" : "; the devices differ, so times are compared as multiples of DVR");
   if (compared == 0)
     throw Error(ErrorCode::InvalidArgument, "the files have no rows in common", after.string());

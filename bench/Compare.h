@@ -6,10 +6,11 @@
 
 namespace vdi::bench {
 
-/// Matches the rows of both files by data set, algorithm, N_S, size and angles, and prints a line for each
-/// figure that got worse: times by more than 10 % and by more than both spreads, stored bytes by more than 5
-/// %, SSIM by more than 0.002 if both had a truth of one rate. Returns the number of worse figures. Files of
-/// different devices are compared in time as ratios to their own DVR. Throws Error: Io, Format.
+/// Matches the rows of both files by data set, algorithm, N_S, size and angles. Prints a line for
+/// each figure that became worse: times by more than 10 % and by more than both spreads, stored
+/// bytes by more than 5 %, SSIM by more than 0.002 if both files have the same truth rate. Returns
+/// the number of worse figures. Times of different devices are compared as ratios to their own DVR.
+/// Throws Error: Io, Format.
 int compareBenches(const std::filesystem::path& before, const std::filesystem::path& after, std::FILE* out);
 
 }  // namespace vdi::bench

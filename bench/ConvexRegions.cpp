@@ -40,7 +40,7 @@ std::optional<SeparatingPlanes> SeparatingPlanes::between(std::span<const Box> b
     (boxes[i].empty() ? none : root.boxes).push_back(static_cast<int>(i));
   planes.nodes_.push_back(std::move(root));
   if (!planes.split(0, boxes, tolerance)) return std::nullopt;
-  // Empty boxes fit any leaf: the first one takes them.
+  // Empty boxes fit any leaf. The first leaf takes them.
   for (Node& node : planes.nodes_) {
     if (node.lower != 0) continue;
     node.boxes.insert(node.boxes.end(), none.begin(), none.end());
@@ -49,8 +49,8 @@ std::optional<SeparatingPlanes> SeparatingPlanes::between(std::span<const Box> b
   return planes;
 }
 
-/// Boxes sorted by their lower faces are separable before a box that begins beyond the ends of all before it.
-/// Takes the separation closest to the middle.
+/// A plane separates boxes, sorted by their lower faces, before each box that begins beyond the
+/// ends of all earlier ones. Chooses the plane closest to the middle.
 bool SeparatingPlanes::split(std::size_t node, std::span<const Box> boxes, double tolerance) {
   std::vector<int> mine = std::move(nodes_[node].boxes);
   nodes_[node].boxes.clear();

@@ -1,5 +1,5 @@
-// Boxes separated by planes, and their order for a camera. Compositing of whole pictures needs it; VDIs do
-// not.
+// Boxes separated by planes, and their order for a camera. Compositing of whole pictures needs that
+// order. VDIs don't.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,8 @@ namespace vdi::bench {
 /// Planes that separate boxes one by one.
 class SeparatingPlanes {
  public:
-  /// Returns nullopt if there are boxes that no plane orthogonal to an axis separates without cutting one by
-  /// more than `tolerance`. Empty boxes do not count.
+  /// Returns nullopt if there are boxes that no plane orthogonal to an axis separates without
+  /// cutting one by more than `tolerance`. Ignores empty boxes.
   static std::optional<SeparatingPlanes> between(std::span<const Box> boxes, double tolerance);
 
   /// Indices of all boxes, such that no ray of the camera meets a box before an earlier one.
@@ -36,8 +36,8 @@ class SeparatingPlanes {
   std::vector<Node> nodes_;
 };
 
-/// Cuts a box of `size` steps into `parts` boxes of nearly equal size, always across the longest axis: the
-/// leaves of a k-d tree. Some are empty if there are too few steps.
+/// Cuts a box of `size` steps into `parts` boxes of nearly equal size, always across the longest
+/// axis: the leaves of a k-d tree. Some are empty if there are too few steps.
 std::vector<IndexBox> kdCuts(const glm::ivec3& size, int parts);
 
 }  // namespace vdi::bench

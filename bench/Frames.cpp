@@ -18,7 +18,7 @@ struct StageSource {
   double RankReport::*device;  // null: not reported
 };
 
-/// By FrameStage. A new device time of the reports is named here, and nowhere else.
+/// By FrameStage. Only this table names the reports' device times.
 constexpr std::array<StageSource, frameStages> sources{
     {{"generate", &RankReport::generateSeconds, &RankReport::generateDeviceSeconds},
      {"distribute", &RankReport::distributeSeconds, nullptr},
@@ -110,7 +110,7 @@ double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInp
     return generator.start(input.camera.azimuth(360.0 * frame / orbit), input.function, input.settings);
   };
   clock.run();
-  {  // two, because memory for two VDIs is in use at a time
+  {  // two frames, because two VDIs use memory at a time
     VdiFrame first = start(orbit - 2);
     generator.finish(start(orbit - 1));
     generator.finish(std::move(first));
@@ -224,7 +224,7 @@ void addFigures(json& row, const FrameFigures& figures) {
   for (std::size_t i = 0; i < frameStages; ++i) {
     const StageTimes& stage = figures.stages[i];
     const bool ran = several || i == static_cast<std::size_t>(FrameStage::Generate);
-    // For generation, generate_ms is the device's time for compatibility: the row has it already.
+    // generate_ms is the device's time, for compatibility. The row has it already.
     if (i != static_cast<std::size_t>(FrameStage::Generate))
       row[std::string(sources[i].name) + "_ms"] = ran ? json(stage.wall.slowest) : json(nullptr);
     if (!ran) continue;

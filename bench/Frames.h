@@ -1,4 +1,5 @@
-// Measures whole frames: each stage over all ranks, VDIs per second, and volume rendering of the same scene.
+// Measures whole frames: each stage over all ranks, VDIs per second, and volume rendering of the
+// same scene.
 #pragma once
 
 #include <array>
@@ -29,7 +30,7 @@ struct RankTimes {
 
 struct StageTimes {
   RankTimes wall;
-  std::optional<RankTimes> device;  // without transfers; none: not reported
+  std::optional<RankTimes> device;  // without transfers; nullopt: not reported
 };
 
 /// In the order of a frame.
@@ -39,22 +40,22 @@ inline constexpr std::size_t frameStages = 4;
 /// Figures of making a VDI: medians over the repeats, on the root; other ranks have zeros.
 struct FrameFigures {
   int ranks = 1;
-  Spread wall;  // ms, on the root's host, from all ranks ready until the VDI is there
+  Spread wall;  // ms, on the root's host, from all ranks being ready to the VDI
   std::array<StageTimes, frameStages> stages;
-  std::uint64_t subSupersegments = 0;                 // of all ranks, in the last frame
-  std::uint64_t bytesSent = 0;                        // of all ranks, in the last frame
+  std::uint64_t subSupersegments = 0;                 // sum over all ranks, in the last frame
+  std::uint64_t bytesSent = 0;                        // sum over all ranks, in the last frame
   Spread volumeRendering;                             // a picture by renderVolume; ms, measured as `wall`
-  std::array<StageTimes, frameStages> pictureStages;  // of these
+  std::array<StageTimes, frameStages> pictureStages;  // stages of these pictures
   Spread shown;  // a VDI, and its picture on the root's host; ms, measured as `wall`
   std::optional<double> vdisPerSecond;
   int orbitFrames = 0;  // frames made for vdisPerSecond
 
-  /// Takes over the figures from a log of renderVolume's pictures.
+  /// Sets the figures of renderVolume's pictures from a log.
   void takePictures(const FrameFigures& pictures);
   const StageTimes& stage(FrameStage which) const { return stages[static_cast<std::size_t>(which)]; }
 };
 
-/// Wall-clock milliseconds of a collective call, from when all ranks are ready.
+/// Wall-clock milliseconds of a collective call, from the moment when all ranks are ready.
 template <typename Work>
 double readyMs(const comm::Communicator& comm, Work work) {
   comm.barrier();
@@ -64,7 +65,7 @@ double readyMs(const comm::Communicator& comm, Work work) {
 /// Collects the reports of repeated frames.
 class FrameLog {
  public:
-  /// `reports` are VdiGenerator::reports(); on ranks without reports nothing is noted.
+  /// `reports` are VdiGenerator::reports(). Ranks without reports collect nothing.
   void add(double wallMs, const std::vector<RankReport>& reports);
   /// Figures of the last `repeats` frames added.
   FrameFigures figures(std::size_t repeats) const;
@@ -87,28 +88,32 @@ struct FrameInput {
   GenerateSettings settings;
 };
 
-/// VDIs per second on the root's host, each started before the last one is finished: `frames` >= 1 of them
-/// after two warm-up frames, on an orbit of 20 viewpoints around the focal point that begins at the input's
-/// camera. Collective; other ranks' results are meaningless.
+/// Returns VDIs per second on the root's host. Makes two warm-up frames and then `frames` >= 1
+/// VDIs, each started before the former one is finished. The viewpoints lie on an orbit of 20
+/// around the focal point, which begins at the input's camera. Collective; other ranks' results are
+/// meaningless.
 double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInput& input, int frames);
 
-/// Milliseconds from a camera to a picture of a VDI on the root's host (VdiGenerator::show), repeated after a
-/// warm-up. The root's renderer uses `device`, the generator's. Collective.
+/// Measures the milliseconds from a camera to a picture of a VDI on the root's host
+/// (VdiGenerator::show), after a warm-up. The root's renderer uses `device`, which is the
+/// generator's. Collective.
 Spread measureShown(VdiGenerator& generator, const std::shared_ptr<gpu::Device>& device, ClockRaiser& clock,
                     const FrameInput& input, int repeats);
 
-/// Measures repeated frames and pictures, after a warm-up of each, and vdisPerSecond if `orbitFrames` is not
-/// 0; and measureShown. Collective.
+/// Measures repeated frames and pictures, each after a warm-up; vdisPerSecond, if `orbitFrames` is
+/// not 0; and measureShown. Collective.
 FrameFigures measureFrames(VdiGenerator& generator, const std::shared_ptr<gpu::Device>& device,
                            ClockRaiser& clock, const FrameInput& input, int repeats, int orbitFrames);
 
-/// Lines for a table, each with a line end: every stage, if there are several ranks, and the whole frame.
+/// Lines for a table, each with a line end: each stage, if there are several ranks, and the whole
+/// frame.
 std::string stageLines(const FrameFigures& figures);
 
 /// Adds a VDI's settings to a row.
 void addSettings(nlohmann::json& row, const GenerateSettings& settings);
 
-/// Adds the figures to a row. null: not measured, or no such stage on one rank.
+/// Adds the figures to a row. null stands for a figure that wasn't measured, or for a stage that
+/// one rank lacks.
 void addFigures(nlohmann::json& row, const FrameFigures& figures);
 
 }  // namespace vdi::bench

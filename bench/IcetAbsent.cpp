@@ -1,4 +1,4 @@
-// Replaces IcetCompositor.cpp in a tool without IceT.
+// Replaces IcetCompositor.cpp in a tool built without IceT.
 #include "bench/IcetCompositor.h"
 #include "vdi/core/Error.h"
 

@@ -15,7 +15,7 @@ namespace vdi::bench {
 struct IcetCompositor::State {
   explicit State(int handle) : communicator(icetCreateMPICommunicator(MPI_Comm_f2c(handle))) {
     context = icetCreateContext(communicator);
-    icetDestroyMPICommunicator(communicator);  // the context has a duplicate
+    icetDestroyMPICommunicator(communicator);  // the context keeps a duplicate
   }
   ~State() { icetDestroyContext(context); }
   State(const State&) = delete;
@@ -37,7 +37,7 @@ std::span<const glm::vec4> IcetCompositor::composite(const Image& image, const P
                                                      const std::vector<int>& frontToBack) {
   static_assert(sizeof(glm::vec4) == 4 * sizeof(IceTFloat));
   icetSetContext(state_->context);
-  icetDiagnostics(ICET_DIAG_OFF);  // it would print; the code below queries errors
+  icetDiagnostics(ICET_DIAG_OFF);  // stops IceT from printing; the code below queries errors
   icetResetTiles();
   icetAddTile(0, 0, image.width, image.height, 0);
   icetSetColorFormat(ICET_IMAGE_COLOR_RGBA_FLOAT);
@@ -55,7 +55,7 @@ std::span<const glm::vec4> IcetCompositor::composite(const Image& image, const P
       icetCompositeImage(image.rgba.data(), nullptr, viewport.data(), nullptr, nullptr, background.data());
   icetGetIntegerv(ICET_BYTES_SENT, &state_->bytesSent);
   if (const IceTEnum error = icetGetError(); error != ICET_NO_ERROR)
-    throw Error(ErrorCode::Communication, fmt::format("IceT failed with its code {:#x}", error));
+    throw Error(ErrorCode::Communication, fmt::format("IceT failed with code {:#x}", error));
   IceTInt rank = 0;
   icetGetIntegerv(ICET_RANK, &rank);
   if (rank != 0) return {};

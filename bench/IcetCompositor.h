@@ -1,4 +1,4 @@
-// Wraps IceT: composites whole pictures of ranks whose volumes are convex.
+// Wraps IceT, which composites whole pictures of ranks with convex volumes.
 #pragma once
 
 #include <cstdint>
@@ -19,20 +19,20 @@ struct PixelBox {
 
 class IcetCompositor {
  public:
-  /// Whether the tool was built with IceT. Without it, no compositor can be made.
+  /// Whether the tool was built with IceT. Without IceT the constructor throws.
   static bool available();
 
-  /// `handle` is MPI_Comm_c2f of the ranks' communicator, which is duplicated. Collective. Throws
-  /// Error{InvalidArgument} without IceT.
+  /// `handle` is MPI_Comm_c2f of the ranks' communicator. Duplicates the communicator. Collective.
+  /// Throws Error{InvalidArgument} without IceT.
   explicit IcetCompositor(int handle);
   ~IcetCompositor();
   IcetCompositor(const IcetCompositor&) = delete;
   IcetCompositor& operator=(const IcetCompositor&) = delete;
 
-  /// Blends the ranks' pictures, all of one size, in the order of `frontToBack`, which contains every rank
-  /// once. Pixels outside `drawn` count as transparent. Returns the whole picture on rank 0, premultiplied,
-  /// row 0 at the bottom, valid until the next call; on other ranks nothing. Collective. Throws
-  /// Error{Communication} for IceT's errors, on that rank alone.
+  /// Blends the ranks' pictures, all of one size, in the order of `frontToBack`, which contains
+  /// each rank once. Pixels outside `drawn` count as transparent. Rank 0 gets the whole picture,
+  /// premultiplied, row 0 at the bottom, valid until the next call. Other ranks get nothing.
+  /// Collective. Throws Error{Communication} for IceT's errors, only on the failing rank.
   std::span<const glm::vec4> composite(const Image& image, const PixelBox& drawn,
                                        const std::vector<int>& frontToBack);
   /// Bytes that this rank sent in the last composite, as IceT counts them.

@@ -49,7 +49,7 @@ comm::Communicator RankGroup::communicator() const {
 
 int RankGroup::handle() const {
   assert(member_);
-  if (!mpi_) throw Error(ErrorCode::InvalidArgument, "this needs MPI: start it with mpirun");
+  if (!mpi_) throw Error(ErrorCode::InvalidArgument, "this requires MPI: start it with mpirun");
   return handle_;
 }
 

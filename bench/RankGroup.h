@@ -1,12 +1,12 @@
-// A part of the ranks that mpirun started, for measurements with fewer ranks.
+// Some of the ranks that mpirun started, for measurements on fewer ranks.
 #pragma once
 
 #include "vdi/comm/Communicator.h"
 
 namespace vdi::bench {
 
-/// The first ranks of MPI_COMM_WORLD, or the single rank without MPI. The constructor is collective over all
-/// of `world`, which has MPI_COMM_WORLD's ranks. Destroy it before MPI is finalised.
+/// The first ranks of MPI_COMM_WORLD, or the single rank without MPI. The constructor is collective
+/// over `world`, which has MPI_COMM_WORLD's ranks. Destroy it before MPI is finalised.
 class RankGroup {
  public:
   /// 1 <= size <= world.size(). Throws Error{Communication}.
@@ -16,10 +16,10 @@ class RankGroup {
   RankGroup& operator=(const RankGroup&) = delete;
 
   bool member() const { return member_; }
-  /// Collective over the members; only they may call it.
+  /// Collective over the members. Only members may call it.
   comm::Communicator communicator() const;
-  /// MPI_Comm_c2f of the members' communicator, which the group owns. Throws Error{InvalidArgument} without
-  /// MPI.
+  /// MPI_Comm_c2f of the members' communicator, which the group owns. Throws Error{InvalidArgument}
+  /// without MPI.
   int handle() const;
 
  private:
@@ -28,8 +28,8 @@ class RankGroup {
   int handle_ = 0;
 };
 
-/// A sleeping barrier of all ranks of MPI_COMM_WORLD: ranks without work leave the cores to those that are
-/// measured. Returns at once without MPI. Throws Error{Communication}.
+/// A barrier of all ranks of MPI_COMM_WORLD. Ranks without work sleep in it and leave the cores to
+/// the measured ones. Returns at once without MPI. Throws Error{Communication}.
 void waitForAll();
 
 }  // namespace vdi::bench

@@ -30,7 +30,7 @@ std::string textOf(const glm::ivec3& sizes) {
   return fmt::format("{}x{}x{}", sizes.x, sizes.y, sizes.z);
 }
 
-/// 1, 2, 4 ... and all ranks, or the requested counts; ascending.
+/// The requested counts, or 1, 2, 4 ... and all ranks, ascending.
 std::vector<int> rankCounts(const BenchOptions& options, int ranks) {
   std::vector<int> counts = options.rankCounts;
   if (!counts.empty()) {
@@ -59,7 +59,8 @@ struct Setup {
   glm::ivec3 blocks{1};
 };
 
-/// In weak scaling, blocks are as large as those of the fixed volume, with at least one for each rank.
+/// In weak scaling, blocks are as large as those of the fixed volume, with at least one for each
+/// rank.
 Setup setupOf(const BenchOptions& options, const DataSet& set, const std::string& scaling,
               const std::string& layout, int ranks) {
   Setup setup{set, scaling, layout, ranks};
@@ -86,7 +87,8 @@ std::string tableHead() {
       "gather", "frame", "faster", "VDIs/s", "more", "DVR", "sent", "M subs");
 }
 
-/// One rank's figures of the same volume, layout and settings, for the ratios of other rank counts.
+/// One rank's figures for a volume, layout and settings. Rows of other rank counts have ratios to
+/// them.
 struct OneRank {
   double frameMs = 0.0;
   std::optional<double> vdisPerSecond;
@@ -98,7 +100,7 @@ class RankSuite {
             std::FILE* table)
       : options_(options), world_(world), device_(std::move(device)), clock_(device_), table_(table) {}
 
-  /// A generator is made once for each rank count, so this is the outermost loop: shaders take seconds to
+  /// The outermost loop makes a generator for each rank count, because shaders take seconds to
   /// compile on a CPU.
   std::vector<json> rows() {
     if (world_.rank() == 0) fmt::print(table_, "{}\n", tableHead());
@@ -254,7 +256,8 @@ void requireSoundRanks(const BenchOptions& options, int ranks) {
   for (const int count : options.rankCounts) {
     if (count < 1 || count > ranks) {
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("{} ranks can't be measured, {} were started", count, ranks), "--rank-counts");
+                  fmt::format("can't measure {} ranks, because only {} were started", count, ranks),
+                  "--rank-counts");
     }
   }
 }

@@ -51,7 +51,7 @@ synthetic::Lattice commonLattice(const comm::Communicator& comm, const std::vect
     one = one && maximum[Spacing + a] + maximum[MinusSpacing + a] <= 1e-6 * maximum[Spacing + a];
   if (!one) {
     throw Error(ErrorCode::InvalidArgument,
-                "blocks of several spacings, types or associations can't be redistributed");
+                "can't redistribute blocks of several spacings, types or associations");
   }
   lattice.type = static_cast<ScalarType>(static_cast<std::uint32_t>(maximum[Type]));
   lattice.joint = maximum[Cells] != none ? synthetic::Joint::Cells : synthetic::Joint::SharedPoints;
@@ -69,13 +69,14 @@ synthetic::Lattice commonLattice(const comm::Communicator& comm, const std::vect
 
 /// The lattice indices of a block's stored values.
 IndexBox placeOf(const synthetic::Lattice& lattice, const Block& block) {
-  const double corner =
-      lattice.joint == synthetic::Joint::Cells ? 0.5 : 0.0;  // lattices of cells begin half a spacing earlier
+  const double corner = lattice.joint == synthetic::Joint::Cells
+                            ? 0.5
+                            : 0.0;  // a lattice of cells begins half a spacing earlier
   const glm::ivec3 first(glm::round((block.origin - lattice.origin) / lattice.spacing - corner));
   return {first, first + block.dims};
 }
 
-/// Copies the values of `part` from an array of those of `source` to one of those of `target`.
+/// Copies the values of `part` from an array that covers `source` to one that covers `target`.
 void copyValues(const IndexBox& part, const IndexBox& source, const std::byte* from, const IndexBox& target,
                 std::byte* to, std::size_t bytes) {
   const glm::ivec3 size = part.size();
@@ -88,7 +89,7 @@ void copyValues(const IndexBox& part, const IndexBox& source, const std::byte* f
   });
 }
 
-/// The unit of messages: a rank never gets more than 2^31 of them, whatever their size.
+/// The unit of messages. A rank never receives more than 2^31 units.
 constexpr std::size_t granule = 64;
 
 std::size_t padded(std::size_t bytes) {
@@ -102,7 +103,7 @@ Redistributed redistribute(const comm::Communicator& comm, const std::vector<Blo
   const synthetic::Lattice lattice = commonLattice(comm, blocks);
   const std::size_t bytes = sizeOf(lattice.type);
   const bool cells = lattice.joint == synthetic::Joint::Cells;
-  // Points at cuts are shared, so cells are divided, as in decompose.
+  // Divides cells, as decompose does, because boxes share the points at cuts.
   const std::vector<IndexBox> cuts = kdCuts(cells ? lattice.size : lattice.size - 1, comm.size());
   const auto valuesOf = [&](int rank) {
     IndexBox box = cuts[static_cast<std::size_t>(rank)];

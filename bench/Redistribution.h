@@ -1,4 +1,4 @@
-// Moves blocks to ranks that own one box each, which compositing of whole pictures requires.
+// Moves values so that each rank owns one box. Compositing of whole pictures requires that.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,11 @@ struct Redistributed {
   std::uint64_t bytesSent = 0;  // from this rank to others
 };
 
-/// Cuts the lattice of all ranks' blocks at the planes of a k-d tree, into one box for each rank, and sends
-/// each rank its values through MPI. Blocks own the boxes that Block::fromPoints and fromCells define, and
-/// have their own values; extra layers, patches and masks of the given blocks are dropped. Collective. Throws
-/// Error{InvalidArgument} on all ranks for blocks that do not share one lattice and scalar type.
+/// Cuts the lattice of all ranks' blocks at the planes of a k-d tree into one box for each rank,
+/// and sends each rank its values through MPI. The resulting blocks own the boxes that
+/// Block::fromPoints and fromCells define, and have their own values. Extra layers, patches and
+/// masks of the given blocks are dropped. Collective. Throws Error{InvalidArgument} on all ranks
+/// for blocks that do not share one lattice and scalar type.
 Redistributed redistribute(const comm::Communicator& comm, const std::vector<Block>& blocks);
 
 }  // namespace vdi::bench

@@ -23,7 +23,7 @@ Box boxOf(const std::vector<Block>& blocks) {
   return box;
 }
 
-/// Returns every rank's box, on every rank.
+/// Returns all ranks' boxes on each rank.
 std::vector<Box> boxesOf(const comm::Communicator& comm, const Box& mine) {
   const comm::Gathered all = comm.allGather(std::as_bytes(std::span(&mine, 1)), sizeof(Box));
   std::vector<Box> boxes(static_cast<std::size_t>(comm.size()));
@@ -50,9 +50,10 @@ std::uint64_t sumOf(const comm::Communicator& comm, std::uint64_t value) {
   return sum[0];
 }
 
-/// A generator of one rank takes the extent of that rank's blocks for the scene, and places samples
-/// accordingly. So if the rank's box does not reach a corner of the whole scene, a block of one value does.
-/// Its volume is too small for any sample; but faces closer than a thousandth of a spacing would become one.
+/// A generator of one rank takes the extent of that rank's blocks as the scene and places samples
+/// in it. Therefore a block of one value marks each corner of the whole scene that the rank's box
+/// doesn't reach. Its volume is too small for any sample. It isn't smaller, because faces closer
+/// than a thousandth of a spacing would become one.
 std::vector<Block> cornerBlocks(const Scene& scene, const Box& mine, ScalarType type) {
   const double thin = 0.004 * scene.minSpacing;
   const std::shared_ptr<std::byte[]> zero(new std::byte[sizeOf(type)]());
@@ -70,10 +71,10 @@ std::vector<Block> cornerBlocks(const Scene& scene, const Box& mine, ScalarType 
   return corners;
 }
 
-/// The pixels that may show a box: all of them if it reaches behind the camera.
+/// The pixels that may show a box; all pixels if it reaches behind the camera.
 PixelBox pixelsOf(const Box& box, const FrameInput& input) {
   const glm::ivec2 whole(input.settings.width, input.settings.height);
-  if (box.empty()) return {glm::ivec2(0), glm::ivec2(1)};  // IceT requires at least one
+  if (box.empty()) return {glm::ivec2(0), glm::ivec2(1)};  // IceT requires at least one pixel
   const View view(input.camera, whole.x, whole.y);
   glm::dvec2 minimum(whole);
   glm::dvec2 maximum(0.0);
@@ -112,7 +113,7 @@ void IcetRival::setBlocks(const std::vector<Block>& blocks, const Scene& scene, 
     const double off =
         std::max(glm::length(spanned.lo - scene.bounds.lo), glm::length(spanned.hi - scene.bounds.hi));
     if (!(off <= 1e-3 * scene.minSpacing) && !scene.bounds.empty())
-      throw Error(ErrorCode::InvalidArgument, "the rival's scene isn't ours");
+      throw Error(ErrorCode::InvalidArgument, "the rival's scene differs from the generator's");
   });
 }
 

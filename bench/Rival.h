@@ -1,4 +1,5 @@
-// Volume rendering composited by IceT, of the same volume, camera and devices, for comparison with VDIs.
+// Volume rendering composited by IceT, for comparison with VDIs of the same volume, camera and
+// devices.
 #pragma once
 
 #include <cstdint>
@@ -24,31 +25,34 @@ namespace vdi::bench {
 
 /// Figures on the root; times are ms, medians over the repeats.
 struct RivalFigures {
-  Spread frame;                 // on the root's host, from all ranks ready until the picture is there
+  Spread frame;                 // on the root's host, from all ranks being ready to the picture
   double renderMs = 0.0;        // part of the frame: the ranks' own pictures; slowest rank
   double compositeMs = 0.0;     // part of the frame: IceT; slowest rank
-  std::uint64_t bytesSent = 0;  // by IceT, of all ranks, in one frame
-  /// Time to make the ranks' volumes convex; none: they already were.
+  std::uint64_t bytesSent = 0;  // sent by IceT in one frame, sum over all ranks
+  /// Time to make the ranks' volumes convex; nullopt: they were.
   std::optional<double> redistributeMs;
-  std::uint64_t redistributedBytes = 0;  // of all ranks
-  double maxDifference = 0.0;            // of a channel, from our picture, in 1/255
+  std::uint64_t redistributedBytes = 0;  // sum over all ranks
+  double maxDifference = 0.0;            // largest difference of a channel from our picture, in 1/255
 };
 
-/// Every function is collective. Each rank casts rays through its own blocks into a picture of floats, by a
-/// generator of one rank that uses the samples of the whole scene. IceT blends these in order of visibility.
-/// If planes do not separate the ranks' blocks, the blocks are redistributed first.
+/// All functions are collective. Each rank casts rays through its own blocks into a picture of
+/// floats, with a generator of one rank that uses the whole scene's samples. IceT blends the
+/// pictures in order of visibility. If planes don't separate the ranks' blocks, the blocks are
+/// redistributed first.
 class IcetRival {
  public:
-  /// `handle` is MPI_Comm_c2f of the communicator's ranks. Throws Error{InvalidArgument} without IceT.
+  /// `handle` is MPI_Comm_c2f of the communicator's ranks. Throws Error{InvalidArgument} without
+  /// IceT.
   IcetRival(std::shared_ptr<gpu::Device> device, comm::Communicator comm, int handle);
 
-  /// Sets this rank's blocks, the same as `generator` has; `scene` is the generator's. Times `repeats`
-  /// redistributions.
+  /// Sets this rank's blocks, which are those of `generator`; `scene` is the generator's. Times
+  /// `repeats` redistributions.
   void setBlocks(const std::vector<Block>& blocks, const Scene& scene, int repeats);
   /// Frees the device's memory.
   void dropBlocks();
 
-  /// `ours` is the root's picture of the same input by VdiGenerator::renderVolume; other ranks' is ignored.
+  /// `ours` is the root's picture of the same input by VdiGenerator::renderVolume; other ranks' is
+  /// ignored.
   RivalFigures measure(ClockRaiser& clock, const FrameInput& input, int repeats,
                        const std::optional<Image>& ours);
 
@@ -63,9 +67,9 @@ class IcetRival {
 
   comm::Communicator comm_;
   IcetCompositor compositor_;
-  VdiGenerator own_;  // for this rank alone
+  VdiGenerator own_;  // generator of this rank alone
   std::optional<SeparatingPlanes> planes_;
-  Box box_;  // of this rank's blocks
+  Box box_;  // bounds of this rank's blocks
   std::optional<Image> image_;
   RivalFigures redistribution_;  // the redistribution's figures only
 };

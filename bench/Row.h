@@ -1,4 +1,4 @@
-// One row of `vdi bench`: a view of a VDI, with the figures of making and seeing it.
+// One row of `vdi bench`: a view of a VDI, with the figures of making and viewing it.
 #pragma once
 
 #include <cstddef>
@@ -15,10 +15,10 @@
 
 namespace vdi::bench {
 
-/// Times of bringing a data set's values to the device.
+/// Times to bring a data set's values to the device.
 struct UploadTimes {
   double milliseconds = 0.0;
-  std::optional<double> stepMs;  // a frame beside the next step's upload; none: no memory for two volumes
+  std::optional<double> stepMs;  // a frame during the next step's upload; nullopt: no memory for two volumes
 };
 
 /// Volume rendering at the sampling rate of the VDIs.
@@ -40,7 +40,7 @@ struct GenerationFigures {
   std::size_t storedBytes = 0;
 };
 
-/// Figures of seeing the VDI, and its accuracy.
+/// Figures of viewing the VDI, and its accuracy.
 struct ViewFigures {
   Spread device;               // ms
   Spread frame;                // ms
@@ -52,7 +52,7 @@ struct BenchRow {
   std::string dataset;
   GenerateSettings settings;
   Reconstruction reconstruction{};
-  double truthRate = 0.0;     // samples per voxel of the volume rendering to which both views are compared
+  double truthRate = 0.0;     // samples per voxel of the truth, with which both views are compared
   double viewDegrees = 0.0;   // from the original viewpoint to the VDI's, around the scene
   double angleDegrees = 0.0;  // from the VDI's viewpoint to this view
   UploadTimes upload;
@@ -64,7 +64,7 @@ struct BenchRow {
 
 std::string tableHead();
 std::string tableLine(const BenchRow& row);
-/// null: not measured, or infinite.
+/// null stands for a figure that wasn't measured or is infinite.
 nlohmann::json toJson(const BenchRow& row);
 
 }  // namespace vdi::bench

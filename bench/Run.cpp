@@ -31,13 +31,13 @@ double frameSeconds(const RankReport& r) {
   return r.generateSeconds + r.distributeSeconds + r.compositeSeconds + r.gatherSeconds;
 }
 
-/// One VDI of a data set, and the figures of making it. Only the root has it.
+/// A VDI of a data set, and the figures of making it. Only the root has both.
 struct Made {
   std::optional<Vdi> vdi;
   GenerationFigures figures;
 };
 
-/// The reference of a VDI's views from one place. Only the root has the picture.
+/// The truth for a VDI's views from one viewpoint. Only the root has the picture.
 struct Truth {
   Camera camera;
   double angle = 0.0;
@@ -49,7 +49,8 @@ ImageDifference differenceOf(const io::Picture& a, const io::Picture& b) {
   return compare(a.rgb, b.rgb, a.width, a.height, 3);
 }
 
-/// Collective, like the generator: every rank runs the same stages, and the root collects the figures.
+/// Collective, like the generator. Each rank runs the same stages, and the root collects the
+/// figures.
 class Bench {
  public:
   Bench(const BenchOptions& options, const comm::Communicator& world, std::shared_ptr<gpu::Device> device)
@@ -84,7 +85,7 @@ class Bench {
     blocks.clear();
     if (root()) {
       fmt::print(table_, "{}: upload {:.1f} ms", set.name, upload_.milliseconds);
-      if (upload_.stepMs) fmt::print(table_, "; a frame beside the next upload {:.1f} ms", *upload_.stepMs);
+      if (upload_.stepMs) fmt::print(table_, "; a frame during the next upload {:.1f} ms", *upload_.stepMs);
       fmt::print(table_, "\n");
     }
     for (int view = 0; view < options_.views; ++view) measureView(set, 360.0 * view / options_.views);
@@ -161,7 +162,7 @@ class Bench {
     return slowest(generator_.reports(), [](const RankReport& r) { return r.generateDeviceSeconds; });
   }
 
-  /// Without the warm-up's values.
+  /// Leaves out the warm-up's values.
   std::vector<double> lastOf(const std::vector<double>& values) const {
     return {values.end() - options_.repeats, values.end()};
   }
@@ -234,7 +235,7 @@ class Bench {
     return made;
   }
 
-  /// Measures a view, on the root.
+  /// Measures a view on the root.
   ViewFigures seen(const Truth& truth, const Shot& shot, VdiRenderer& renderer) {
     ViewFigures figures;
     ImageBytes image;
@@ -287,10 +288,10 @@ class Bench {
   std::shared_ptr<gpu::Device> device_;
   ClockRaiser clock_;
   VdiGenerator generator_;
-  std::optional<RankGroup> all_;  // for the rival
+  std::optional<RankGroup> all_;  // the rival's ranks
   std::optional<IcetRival> rival_;
-  std::optional<RivalFigures> rivalFigures_;  // of the current viewpoint
-  UploadTimes upload_;                        // of the current data set
+  std::optional<RivalFigures> rivalFigures_;  // figures of the current viewpoint
+  UploadTimes upload_;                        // times of the current data set
   std::FILE* table_ = nullptr;
   std::vector<BenchRow> rows_;
 };

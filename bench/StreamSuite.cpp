@@ -45,16 +45,16 @@ using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
-/// Viewpoints of the VDIs that are streamed one after the other.
+/// The viewpoints of the streamed VDIs, in their order.
 constexpr int viewpoints = 4;
 
-/// A folder of this process, removed at the end.
+/// A folder of this process. The destructor removes it.
 class Folder {
  public:
   Folder() {
     std::string name = (std::filesystem::temp_directory_path() / "vdi-bench-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr)
-      throw Error(ErrorCode::Io, "can't make a folder: " + std::generic_category().message(errno), name);
+      throw Error(ErrorCode::Io, "can't create a folder: " + std::generic_category().message(errno), name);
     path_ = name;
   }
   ~Folder() {
@@ -69,14 +69,14 @@ class Folder {
   std::filesystem::path path_;
 };
 
-/// The beginnings of frames and the times at which their pictures were there.
+/// The times at which frames began and at which their pictures were complete.
 class Log {
  public:
   void begin(std::uint32_t frame) {
     const std::scoped_lock lock(mutex_);
     begun_[frame] = Clock::now();
   }
-  /// `busy`: seconds that the viewer took.
+  /// `busy` is the viewer's time in seconds.
   void seen(std::uint32_t frame, bool isFull, double busy) {
     const Clock::time_point now = Clock::now();
     const std::scoped_lock lock(mutex_);
@@ -100,7 +100,7 @@ class Log {
     double fullPerSecond = 0.0;
     std::size_t frames = 0;
     Spread age;   // seconds from a frame's beginning to its first picture
-    Spread busy;  // seconds that the viewer took for a level
+    Spread busy;  // seconds of the viewer for a level
   };
   Figures figures() const {
     const std::scoped_lock lock(mutex_);
@@ -119,7 +119,7 @@ class Log {
   mutable std::mutex mutex_;
   std::map<std::uint32_t, Clock::time_point> begun_;
   std::pair<std::uint32_t, bool> last_{~std::uint32_t{0}, false};
-  std::vector<Clock::time_point> arrivals_;  // of frames, in whatever level came first
+  std::vector<Clock::time_point> arrivals_;  // times of frames' first levels
   std::vector<double> ages_;
   std::vector<double> busy_;
   std::size_t full_ = 0;
@@ -142,7 +142,7 @@ class Viewer {
   Viewer& operator=(const Viewer&) = delete;
 
   bool isConnected() const { return client_.standing().isConnected; }
-  /// Ends the viewer. Throws what its thread has thrown.
+  /// Ends the viewer. Rethrows an exception of its thread.
   void finish() {
     isEnding_ = true;
     done_.get();
@@ -174,7 +174,7 @@ class Viewer {
   std::future<void> done_;  // the last member: its destructor waits for the thread
 };
 
-/// Waits until `isDone`, ten seconds at most.
+/// Waits until `isDone`, for ten seconds at most.
 template <typename IsDone>
 void waitUntil(IsDone isDone) {
   constexpr std::chrono::seconds most{10};
@@ -212,7 +212,7 @@ class StreamSuite {
   }
 
  private:
-  /// What a viewer sees of one level.
+  /// A viewer's figures for one level.
   struct LevelFigures {
     double mebibytes = 0.0;
     double ssim = 0.0;
@@ -300,7 +300,8 @@ class StreamSuite {
         start + std::chrono::duration_cast<Clock::duration>(Seconds(options_.period / 1000.0 * index)));
   }
 
-  /// The ranks make each VDI when it is due, and the root publishes it, as the extractor VDIStream does.
+  /// The ranks make each VDI when it is due. The root publishes it, as the extractor VDIStream
+  /// does.
   void sendLive(const Sent& sent, const GenerateSettings& settings) {
     Log log;
     std::optional<stream::Server> server;
@@ -333,7 +334,7 @@ class StreamSuite {
     });
   }
 
-  /// Files appear in a folder that is followed, as `vdi serve` does.
+  /// Files appear in a folder, which the server follows as `vdi serve` does.
   void sendFiles(const Sent& sent, const GenerateSettings& settings,
                  const std::vector<std::vector<std::byte>>& files) {
     const Folder folder;
@@ -420,7 +421,8 @@ void requireSoundStream(const BenchOptions& options) {
   }
   if (!(options.period >= 0.0) || !std::isfinite(options.period))
     throw Error(ErrorCode::InvalidArgument, "must be finite and at least 0", "--period");
-  if (options.frames < 2) throw Error(ErrorCode::InvalidArgument, "the suite needs at least 2", "--frames");
+  if (options.frames < 2)
+    throw Error(ErrorCode::InvalidArgument, "the suite requires at least 2", "--frames");
 }
 
 std::vector<json> runStream(const BenchOptions& options, const comm::Communicator& world,

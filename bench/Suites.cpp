@@ -7,8 +7,8 @@ namespace vdi::bench {
 
 namespace {
 
-/// The paper's configurations (its section 6), with fields of the same size, type and character as its data
-/// sets, and named after them.
+/// The paper's configurations (its section 6). The fields have the size, type and character of its
+/// data sets, and their names.
 std::vector<DataSet> suiteSets(const std::string& suite) {
   if (suite == "paper") {
     return {{"kingsnake-like", "coil", "", "1024x1024x795", "u8"},

@@ -23,9 +23,9 @@ struct BenchOptions {
   std::vector<std::uint32_t> supersegments;  // empty: 25, or the suite's
   int views = 0;                             // 0: 1, or the suite's
   int repeats = 5;
-  int frames = 20;  // on the orbit that counts VDIs per second; 0: not measured
+  int frames = 20;  // on the orbit for VDIs per second; 0: not measured
   std::string reconstruction = toString(Reconstruction::Smooth);  // as in moving windows
-  double truthRate = 8.0;  // samples per voxel of the volume rendering to which all views are compared
+  double truthRate = 8.0;  // samples per voxel of the truth, with which all views are compared
   std::string suite;       // empty, or a name that suiteNames() has
   std::string rival;       // empty, or icet
   std::string output;
@@ -34,22 +34,22 @@ struct BenchOptions {
   std::vector<std::string> scalings{"strong", "weak"};
   std::vector<std::string> layouts{"slabs", "interleaved", "random"};
   std::vector<int> rankCounts;  // empty: 1, 2, 4 ... and all
-  std::string sizePerRank;      // of weak scaling; empty: half of deal.size on each axis
+  std::string sizePerRank;      // in weak scaling; empty: half of deal.size on each axis
   // For the suite `viewpoints`:
   int viewpoints = 100;
   double turn = 20.0;  // degrees
   std::vector<double> zooms{1.0, 4.0};
   std::vector<double> margins{0.0};
   std::vector<int> sets{1};
-  std::vector<std::string> listResolutions;  // for VDIs' pictures; empty: the views'
-  // For the suite `stream`, which takes `turn` and `frames` too:
-  std::vector<std::string> rates{"1Gbit", "100Mbit"};  // of bytes to the viewer
+  std::vector<std::string> listResolutions;  // of VDIs' pictures; empty: the views'
+  // For the suite `stream`, which uses `turn` and `frames`, too:
+  std::vector<std::string> rates{"1Gbit", "100Mbit"};  // to the viewer
   double period = 33.0;                                // milliseconds between two frames
 };
 
 struct DataSet {
   std::string name;
-  std::string field;  // or, if empty:
+  std::string field;  // empty: `raw` is set
   std::string raw;    // sidecar
   std::string size;
   std::string type;
@@ -57,25 +57,26 @@ struct DataSet {
 
 const std::vector<std::string>& suiteNames();
 
-/// The suite of different rank counts, which has no data sets of its own.
+/// The suite that varies the number of ranks. It has no data sets of its own.
 inline constexpr const char* ranksSuite = "ranks";
-/// The suite of viewpoints around the scene, which has no data sets of its own.
+/// The suite of viewpoints around the scene. It has no data sets of its own.
 inline constexpr const char* viewpointsSuite = "viewpoints";
-/// The suite of frames on their way to a viewer, which has no data sets of its own.
+/// The suite of frames on their way to a viewer. It has no data sets of its own.
 inline constexpr const char* streamSuite = "stream";
 
 /// Completes the options with the suite's values, or with the defaults without a suite.
 void applySuite(BenchOptions& options);
 
-/// The suite's data sets (those that --fields names), or the raw volumes and fields of the options.
+/// The suite's data sets, of which --fields may choose some, or the options' raw volumes and
+/// fields.
 std::vector<DataSet> dataSets(const BenchOptions& options);
 
 /// Settings of a VDI. Bisection gets List, the only budget that it supports.
 GenerateSettings benchSettings(const BenchOptions& options, const std::string& algorithm,
                                std::uint32_t supersegments);
 
-/// Collective: this rank's blocks of the data set, with its size and type if it names them. All ranks throw
-/// if one does.
+/// Returns this rank's blocks of the data set, with the data set's size and type if it has them.
+/// Collective: if one rank throws, all do.
 std::vector<Block> blocksOf(const DataSet& set, const BenchOptions& options,
                             const std::shared_ptr<gpu::Device>& device, const comm::Communicator& world);
 

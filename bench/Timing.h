@@ -1,4 +1,4 @@
-// Times of repeated runs, on a GPU with a raised clock.
+// Measures repeated runs on a GPU with a raised clock.
 #pragma once
 
 #include <chrono>
@@ -22,7 +22,7 @@ struct Spread {
 /// Requires at least one value.
 Spread spreadOf(std::vector<double> values);
 
-/// Spread of the milliseconds that `measure` returns, after a warm-up run.
+/// The spread of the milliseconds that `measure` returns, after a warm-up run.
 template <typename Measure>
 Spread repeated(int repeats, Measure measure) {
   measure();
@@ -39,8 +39,8 @@ double wallMs(Work work) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// A GPU lowers its clock to a fifth while the host works, and takes a second or two to raise it again. This
-/// gives the GPU work before a measured run. Does nothing on a CPU.
+/// Gives the GPU work before a measured run. A GPU lowers its clock to a fifth while the host
+/// works, and takes a second or two to raise it again. Does nothing on a CPU.
 class ClockRaiser {
  public:
   explicit ClockRaiser(const std::shared_ptr<gpu::Device>& device);

@@ -32,21 +32,21 @@ namespace {
 
 using nlohmann::json;
 
-/// DVR of this opacity counts as visible; rounding may remove less from an 8-bit picture.
+/// DVR of this opacity counts as visible. Fainter material may vanish by rounding to 8 bits.
 constexpr std::uint8_t visible = 2;
 
 glm::dvec3 fromFocal(const Camera& camera) {
   return camera.position - camera.focalPoint;
 }
 
-/// The camera at its distance from the focal point in the unit vector `direction`.
+/// The camera, moved to the unit vector `direction` from the focal point at its former distance.
 Camera seenFrom(const Camera& camera, const glm::dvec3& direction) {
   Camera moved = camera;
   moved.position = camera.focalPoint + glm::length(fromFocal(camera)) * direction;
   return moved;
 }
 
-/// Zooms as the mouse wheel does: in perspective, by moving closer.
+/// Zooms as the mouse wheel does. In perspective it moves the camera closer.
 Camera zoomed(const Camera& camera, double zoom) {
   Camera nearer = camera;
   nearer.position = camera.focalPoint + fromFocal(camera) / zoom;
@@ -58,8 +58,8 @@ bool isInside(const Box& box, const glm::dvec3& point) {
   return glm::all(glm::lessThan(box.lo, point)) && glm::all(glm::lessThan(point, box.hi));
 }
 
-/// `count` viewpoints at the camera's distance, evenly distributed over the sphere, none within `bounds`.
-/// They are the same on every machine.
+/// Returns `count` viewpoints at the camera's distance, evenly distributed over the sphere and
+/// outside `bounds`. They are the same on every machine.
 std::vector<Camera> randomCameras(const Camera& camera, const Box& bounds, int count, std::uint32_t seed) {
   std::mt19937_64 random(seed);  // the standard defines its numbers, unlike those of distributions
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
@@ -73,8 +73,7 @@ std::vector<Camera> randomCameras(const Camera& camera, const Box& bounds, int c
     if (!isInside(bounds, other.position)) cameras.push_back(other);
   }
   if (cameras.empty()) {
-    throw Error(ErrorCode::InvalidArgument, "zoomed in that far, all viewpoints are inside the scene",
-                "--zooms");
+    throw Error(ErrorCode::InvalidArgument, "all viewpoints are inside the scene at this zoom", "--zooms");
   }
   return cameras;
 }
@@ -84,7 +83,7 @@ std::vector<Camera> turnedCameras(const Camera& camera, double degrees) {
           apps::turned(camera, 0.0, degrees), apps::turned(camera, 0.0, -degrees)};
 }
 
-/// The reference of views.
+/// The truth for views.
 struct ViewTruth {
   Camera camera;
   io::Picture picture;                // by volume rendering at the rate of --truth-rate
@@ -103,7 +102,7 @@ double missingOf(const ViewTruth& truth, std::span<const glm::u8vec4> pixels) {
   return static_cast<double>(missing) / static_cast<double>(pixels.size());
 }
 
-/// Kinds of viewpoints: all around, or turned a little.
+/// The kinds of viewpoints: all around, or turned a little.
 struct Views {
   std::string name;
   std::vector<ViewTruth> truths;
@@ -115,7 +114,7 @@ struct Trueness {
   std::vector<double> missing;  // share of the picture that is visible in DVR but not in the VDI
 };
 
-/// Weights of the set's VDIs in a view, by index; they add up to 1.
+/// The weights of the set's VDIs in a view, by index. They add up to 1.
 using Shares = std::vector<std::pair<std::size_t, float>>;
 
 Shares nearestOf(const std::vector<Camera>& set, const Camera& view, const Box& bounds) {
@@ -126,8 +125,8 @@ Shares nearestOf(const std::vector<Camera>& set, const Camera& view, const Box& 
   return {{nearest, 1.0F}};
 }
 
-/// Blends the two VDIs with the smallest angles. The second one's weight goes to 0 where the third one
-/// replaces it. A view from a VDI's own viewpoint is that VDI's.
+/// Blends the two VDIs with the smallest angles. The second one's weight becomes 0 where the third
+/// one replaces it. From a VDI's own viewpoint, only that VDI is visible.
 Shares blendOf(const std::vector<Camera>& set, const Camera& view, const Box& bounds) {
   std::vector<std::pair<double, std::size_t>> byAngle;
   for (std::size_t i = 0; i < set.size(); ++i) byAngle.emplace_back(degreesBetween(bounds, set[i], view), i);
@@ -189,13 +188,13 @@ class ViewpointSuite {
   }
 
  private:
-  /// One set of VDIs, which only the root has.
+  /// One set of VDIs. Only the root has it.
   struct Made {
     std::vector<Camera> cameras;
     std::vector<std::unique_ptr<VdiRenderer>> renderers;
     std::size_t supersegments = 0;
     std::size_t storedBytes = 0;
-    double milliseconds = 0.0;  // for all of them
+    double milliseconds = 0.0;  // for all VDIs of the set
   };
 
   bool root() const { return world_.rank() == 0; }
@@ -286,7 +285,8 @@ class ViewpointSuite {
     return bytes;
   }
 
-  /// While the host compares a view, the device renders the next one, because an idle GPU lowers its clock.
+  /// The device renders the next view while the host compares one, because an idle GPU lowers its
+  /// clock.
   Trueness truenessOf(const Made& made, const Views& views, bool blends) {
     Trueness trueness;
     const Box& bounds = generator_.scene().bounds;

@@ -13,15 +13,16 @@
 
 namespace vdi::bench {
 
-/// Viewpoints of a set: `original`, and others at its distance around its focal point. 2: front and back; 4:
-/// a tetrahedron's corners; 6: front, back and four sides. Throws Error{InvalidArgument} for other counts.
+/// The viewpoints of a set: `original`, and others at its distance from its focal point. 2: front
+/// and back; 4: a tetrahedron's corners; 6: front, back and four sides. Throws
+/// Error{InvalidArgument} for other counts.
 std::vector<Camera> camerasOfSet(const Camera& original, int count);
 
-/// Checks everything that is known before the work starts. Throws Error.
+/// Checks the options before the work starts. Throws Error.
 void requireSoundViewpoints(const BenchOptions& options);
 
-/// Returns one row for each data set, zoom, kind of viewpoints, N_S, margin and set; writes a line to `table`
-/// as soon as each is known. Collective over `world`; the root gets the rows. Throws Error.
+/// Returns one row for each data set, zoom, kind of viewpoints, N_S, margin and set, and writes its
+/// line to `table` at once. Collective over `world`; the root gets the rows. Throws Error.
 std::vector<nlohmann::json> runViewpoints(const BenchOptions& options, const comm::Communicator& world,
                                           const std::shared_ptr<gpu::Device>& device, std::FILE* table);
 

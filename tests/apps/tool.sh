@@ -89,7 +89,7 @@ for blend in maximum minimum "isosurface --isovalues 0.3 0.5 0.7"; do
   python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] > 0.999, r" || fail "$blend: ranks differ"
   works "compare" "$vdi" compare --json blend_one.png need_dvr.png
   python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] < 0.98, r" || fail "$blend: as composite"
-  refused 2 "composite blending alone" "$vdi" generate --field mixing "${small[@]}" --blend "${mode[@]}" -o x.vdi --dvr x.png
+  refused 2 "composite blending only" "$vdi" generate --field mixing "${small[@]}" --blend "${mode[@]}" -o x.vdi --dvr x.png
 done
 refused 2 "at least one isovalue" "$vdi" generate --field mixing "${small[@]}" --blend isosurface --dvr x.png
 refused 2 "need blend mode isosurface" "$vdi" generate --field mixing "${small[@]}" --isovalues 0.5 --dvr x.png
@@ -105,7 +105,7 @@ refused 1 "not a sound" "$vdi" export one.vdi broken.vdi -o page.html
 refused 1 "No such file" "$vdi" export one.vdi nowhere.vdi -o page.html
 cmp page.html again.html || fail "a page that can't be made replaces the old one"
 refused 1 "No space" "$vdi" export one.vdi -o /dev/full
-refused 2 "write over" "$vdi" export one.vdi -o one.vdi
+refused 2 "overwrite" "$vdi" export one.vdi -o one.vdi
 refused 2 "required" "$vdi" export -o page.html
 # Lists beyond the picture's edges: the picture stays, and what turning brings into view is there. At higher rates, rays
 # that are set up from another pixel round differently, and a pixel may be off by 1/255.
@@ -218,7 +218,7 @@ works "info" "$vdi" info late_4294967302.vdi
 grep -q "step 4294967302" out.txt || fail "a late step isn't itself"
 refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step=-1 -o x.vdi
 refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step 18446744073709551616 -o x.vdi
-refused 2 "beyond" "$vdi" generate --raw s0.json s1.json --step 18446744073709551615 -o x.vdi
+refused 2 "exceeds" "$vdi" generate --raw s0.json s1.json --step 18446744073709551615 -o x.vdi
 refused 2 "finite" "$vdi" generate --field sphere "${small[@]}" --time nan -o x.vdi
 
 # A viewpoint that shows nothing true is warned of, once each.
@@ -256,10 +256,10 @@ refused 1 "no-such-folder" "$vdi" bench --fields sphere --raw none.json -o no-su
 refused 2 "output: must name a file" "$vdi" generate --field sphere "${small[@]}" -o ""
 refused 2 "output: must name a file" timeout 60 "$vdi" bench --fields sphere "${small[@]}" -o ""
 refused 2 "angles" "$vdi" bench --fields sphere "${small[@]}" --angles 0 nan -o x.json
-refused 2 "flat would write over .* -o" "$vdi" generate --field sphere "${small[@]}" -o x.vdi --flat ./x.vdi
-refused 2 "would write over" "$vdi" render one.vdi -o one.vdi
-refused 2 "would write over" "$vdi" render one.vdi -o x.png --azimuth 20.00000001 20.00000002
-refused 2 "would write over the file of the raw" "$vdi" generate --raw v.json --flat v.raw
+refused 2 "flat would overwrite .* -o" "$vdi" generate --field sphere "${small[@]}" -o x.vdi --flat ./x.vdi
+refused 2 "would overwrite" "$vdi" render one.vdi -o one.vdi
+refused 2 "would overwrite" "$vdi" render one.vdi -o x.png --azimuth 20.00000001 20.00000002
+refused 2 "would overwrite the file of the raw" "$vdi" generate --raw v.json --flat v.raw
 works "into devices" "$vdi" generate --field sphere "${small[@]}" -o /dev/null --flat /dev/null
 [ -c /dev/null ] || fail "a device was replaced"
 refused 1 "nobody reads" timeout 60 "$vdi" render one.vdi -o pipe
@@ -304,14 +304,14 @@ cp one.vdi there/vdi_000003.vdi
 run='{"field": "V", "every_time": 0.5, "every_seconds": 9, "when": {"max": "p", "above": 2}, "max_share": 0.05,
   "cameras": [{"name": "a", "orbit": {}}, {"name": "b", "orbit": {}}], "output": "there/vdi_{timestep:06d}.vdi"'
 works "check" "$vdi" check "$run}"
-grep -q "every 0.5 of the simulation's time and every 9 s, if p's maximum is above 2, in 5 % of the wall" out.txt ||
+grep -q "every 0.5 of the simulation's time and every 9 s, if p's maximum is above 2, in at most 5 % of the wall" out.txt ||
   fail "check doesn't tell when frames are made"
 works "check" "$vdi" check '{"field": "V", "output": "there/vdi_{timestep:06d}.vdi"}'
-grep -q "there/vdi_000003.vdi is there already" out.txt || fail "check doesn't tell what is in the way"
+grep -q "there/vdi_000003.vdi exists already" out.txt || fail "check doesn't tell what is in the way"
 printf '{"field": "V",\n"when": {"max": "V"}}' >run.json
 refused 1 "/when: must have a bound, 'above' or 'below' .run.json, line 2." "$vdi" check run.json
 refused 1 "not a run's log .*odd.json" "$vdi" log odd.json
-refused 2 "would write over" "$vdi" log odd.json -o odd.json
+refused 2 "would overwrite" "$vdi" log odd.json -o odd.json
 mkfifo pipe.json
 refused 1 "pipe.json" timeout 10 "$vdi" check pipe.json
 refused 1 "none.json" "$vdi" check '{"field": "V", "colors": {"file": "none.json"}}'
