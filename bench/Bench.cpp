@@ -22,6 +22,7 @@
 #include "bench/Suites.h"
 #include "bench/ViewpointsSuite.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/io/Files.h"
 #include "vdi/synthetic/Fields.h"
 

@@ -20,6 +20,7 @@
 #include "bench/Timing.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/core/Viewpoint.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"

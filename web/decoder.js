@@ -4,15 +4,17 @@
 
 import {decodeVdi} from "./format.js";
 import {expandedSegments, headsOf} from "./heads.js";
+import {leaningOf} from "./slopes.js";
 import {unpack} from "./unpack.js";
 
 /** @typedef {import("./format.js").Header} Header */
 /** @typedef {import("./heads.js").Heads} Heads */
+/** @typedef {import("./slopes.js").Leaning} Leaning */
 
 /**
  * A decoded VDI in the renderer's form.
- * @typedef {Header & Heads & {code: {first: number, step: number}, segments: Uint32Array}}
- *     PreparedVdi
+ * @typedef {Header & Heads & {code: {first: number, step: number}, segments: Uint32Array,
+ *     leaning?: Leaning}} PreparedVdi
  */
 
 /**
@@ -20,7 +22,8 @@ import {unpack} from "./unpack.js";
  * @typedef {{file: Uint8Array} | {packed: string, size: number}} Encoded
  */
 
-/** @typedef {{id: number, vdi?: PreparedVdi, error?: string}} Answer */
+/** @typedef {{id: number, encoded?: Encoded, vdi?: PreparedVdi}} Question to decode the one, or to let the other lean */
+/** @typedef {{id: number, vdi?: PreparedVdi, leaning?: Leaning, error?: string}} Answer */
 
 /**
  * Lets the page handle events every 12 ms.
@@ -57,10 +60,20 @@ async function prepare(encoded, pause) {
 /** Runs the page's script in a worker. */
 export function serveDecoding() {
   const scope = /** @type {any} */ (globalThis);  // its type is in a library that conflicts with the DOM's
-  scope.onmessage = async (/** @type {MessageEvent<{id: number, encoded: Encoded}>} */ {data}) => {
+  let latest = -1;
+  /** @param {Question} question @returns {Promise<[Answer, Transferable[]]>} */
+  const answer = async ({id, encoded, vdi}) => {
+    if (encoded) {
+      const prepared = await prepare(encoded);
+      return [{id, vdi: prepared}, [prepared.heads.buffer, prepared.tiles.buffer, prepared.segments.buffer]];
+    }
+    const leaning = vdi && await leaningOf(vdi, politely(), () => latest === id);
+    return [{id, leaning}, leaning ? [leaning.slopes.buffer, leaning.heads.buffer, leaning.tiles.buffer] : []];
+  };
+  scope.onmessage = async (/** @type {MessageEvent<Question>} */ {data}) => {
+    latest = data.id;
     try {
-      const vdi = await prepare(data.encoded);
-      scope.postMessage({id: data.id, vdi}, [vdi.heads.buffer, vdi.tiles.buffer, vdi.segments.buffer]);
+      scope.postMessage(...await answer(data));
     } catch (error) {
       scope.postMessage({id: data.id, error: error instanceof Error ? error.message : String(error)});
     }
@@ -71,7 +84,7 @@ export function serveDecoding() {
 export class Decoder {
   /** @param {string} script the page's */
   constructor(script) {
-    /** @type {Map<number, {resolve: (vdi: PreparedVdi) => void, reject: (error: Error) => void}>} */
+    /** @type {Map<number, {resolve: (answer: Answer) => void, reject: (error: Error) => void}>} */
     this.asked = new Map();
     this.next = 0;
     /** Starts a worker and waits for its answer; undefined if the browser refuses workers. */
@@ -101,7 +114,7 @@ export class Decoder {
   take(answer) {
     const asked = this.asked.get(answer.id);
     this.asked.delete(answer.id);
-    if (answer.vdi) asked?.resolve(answer.vdi);
+    if (answer.error === undefined) asked?.resolve(answer);
     else asked?.reject(new Error(answer.error));
   }
 
@@ -120,11 +133,30 @@ export class Decoder {
    */
   async decode(encoded) {
     const worker = await this.worker;
+    const id = this.next++;
     if (!worker) return prepare(encoded, politely());
+    const {vdi} = await this.ask(worker, {id, encoded}, "file" in encoded ? [encoded.file.buffer] : []);
+    if (!vdi) throw new Error("the worker sent no VDI");
+    return vdi;
+  }
+
+  /**
+   * Finds how a VDI's supersegments lean. Throws Error.
+   * @param {PreparedVdi} vdi
+   * @returns {Promise<Leaning | undefined>} undefined if the decoder was asked for something else meanwhile
+   */
+  async lean(vdi) {
+    const worker = await this.worker;
+    const id = this.next++;
+    if (!worker) return leaningOf(vdi, politely(), () => this.next === id + 1);
+    return (await this.ask(worker, {id, vdi}, [])).leaning;
+  }
+
+  /** @param {Worker} worker @param {Question} question @param {Transferable[]} transfer @returns {Promise<Answer>} */
+  ask(worker, question, transfer) {
     return new Promise((resolve, reject) => {
-      const id = this.next++;
-      this.asked.set(id, {resolve, reject});
-      worker.postMessage({id, encoded}, "file" in encoded ? [encoded.file.buffer] : []);
+      this.asked.set(question.id, {resolve, reject});
+      worker.postMessage(question, transfer);
     });
   }
 }

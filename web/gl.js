@@ -55,7 +55,7 @@ const UPLOAD_BYTES = 2 << 20;  // bytes of one upload
  * Throws Error if the GPU can't hold it.
  * @param {WebGL2RenderingContext} gl
  * @param {Uint32Array} words
- * @param {2 | 4} perElement
+ * @param {1 | 2 | 4} perElement
  * @param {{rowShift: number, layerShift: number}} tiling
  * @returns {{texture: WebGLTexture | null, uploads: (() => void)[]}} call all uploads to complete
  *     the texture
@@ -66,7 +66,8 @@ export function makeArrayTexture(gl, words, perElement, tiling) {
   const rows = Math.max(1, Math.ceil(words.length / perElement / width));
   const layers = Math.ceil(rows / maxHeight);
   if (layers > gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS)) throw new Error("the VDI is too large for this GPU's textures");
-  const [internal, format] = perElement === 2 ? [gl.RG32UI, gl.RG_INTEGER] : [gl.RGBA32UI, gl.RGBA_INTEGER];
+  const [internal, format] = {1: [gl.R32UI, gl.RED_INTEGER], 2: [gl.RG32UI, gl.RG_INTEGER],
+                              4: [gl.RGBA32UI, gl.RGBA_INTEGER]}[perElement];
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
   gl.getError();

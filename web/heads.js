@@ -3,6 +3,7 @@
 // shaders/expand.comp.
 
 /** @typedef {import("./format.js").Vdi} Vdi */
+/** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 
 export const TILE = 8;
 export const LARGE_TILE = 64;
@@ -77,6 +78,40 @@ function tileMasks(heads, width, height) {
   return tiles;
 }
 
+/**
+ * The ends of a supersegment all over its list's pixel, where they lean.
+ * @typedef {object} Ends
+ * @property {number} front
+ * @property {number} back
+ * @property {number} reach how far they are from its own depths, in slopes
+ */
+
+const REACH_UNIT = 2;         // slopes
+export const COUNT_BITS = 24;  // of a head's second word, which has the reach above them
+
+/**
+ * Puts a supersegment's bins into a list's mask, which is two words of `heads`.
+ * @param {Uint32Array} heads
+ * @param {number} list
+ * @param {number} from first bin
+ * @param {number} to bin after the last
+ */
+function mark(heads, list, from, to) {
+  heads[4 * list + 2] |= lowBits(to) & ~lowBits(from);
+  heads[4 * list + 3] |= lowBits(to - WORD_BINS) & ~lowBits(from - WORD_BINS);
+}
+
+/**
+ * The bins of depths.
+ * @param {number} nearest
+ * @param {number} farthest
+ * @param {number} binScale
+ */
+function binning(nearest, farthest, binScale) {
+  return (/** @type {number} */ depth) =>
+    Math.min(Math.floor((Math.min(Math.max(depth, nearest), farthest) - nearest) * binScale), BINS - 1);
+}
+
 /** @param {Vdi} vdi @returns {Heads} */
 export function headsOf(vdi) {
   const {width, height, offsets} = vdi;
@@ -91,25 +126,64 @@ export function headsOf(vdi) {
   // In perspective the frusta of V_O's pixels meet in its eye, where depths say nothing.
   if (!vdi.camera.parallel) nearest = Math.max(nearest, farthest * 1e-6);
   const binScale = farthest > nearest ? BINS / (farthest - nearest) : 0;
-  const binOf = (/** @type {number} */ depth) =>
-    Math.min(Math.max(Math.floor((depth - nearest) * binScale), 0), BINS - 1);
+  const binOf = binning(nearest, farthest, binScale);
   const heads = new Uint32Array(4 * lists);
   for (let i = 0; i < lists; ++i) {
-    let low = 0, high = 0;
-    for (let s = offsets[i]; s < offsets[i + 1]; ++s) {
-      const from = binOf(front(s)), to = binOf(back(s)) + 1;
-      low |= lowBits(to) & ~lowBits(from);
-      high |= lowBits(to - WORD_BINS) & ~lowBits(from - WORD_BINS);
-    }
+    for (let s = offsets[i]; s < offsets[i + 1]; ++s) mark(heads, i, binOf(front(s)), binOf(back(s)) + 1);
     heads[4 * i] = offsets[i];
     heads[4 * i + 1] = offsets[i + 1] - offsets[i];
-    heads[4 * i + 2] = low;
-    heads[4 * i + 3] = high;
   }
   return {heads, tiles: tileMasks(heads, width, height), nearest, farthest, binScale};
 }
 
+/**
+ * The same for supersegments that lean.
+ * @param {PreparedVdi} vdi
+ * @param {(segment: number, list: number) => Ends} endsOf
+ */
+export function leaningHeads(vdi, endsOf) {
+  const binOf = binning(vdi.nearest, vdi.farthest, vdi.binScale);
+  const heads = new Uint32Array(vdi.heads.length);
+  for (let i = 0; i < heads.length / 4; ++i) {
+    const first = vdi.heads[4 * i], count = vdi.heads[4 * i + 1];
+    let most = 0;
+    for (let s = first; s < first + count; ++s) {
+      const {front, back, reach} = endsOf(s, i);
+      most = Math.max(most, reach);
+      mark(heads, i, binOf(front), binOf(back) + 1);
+    }
+    heads[4 * i] = first;
+    heads[4 * i + 1] = count + Math.ceil(most / REACH_UNIT) * 2 ** COUNT_BITS;
+  }
+  return {heads, tiles: tileMasks(heads, vdi.width, vdi.height)};
+}
+
 const MAX_OPTICAL_DEPTH = 65504;  // maxExtinction of vdi/core/TransferFunction.h
+
+/**
+ * Depths and optical depth of all supersegments in the shader's form.
+ * @param {PreparedVdi} vdi
+ */
+export function supersegmentsOf(vdi) {
+  const {segments, code} = vdi;
+  const count = segments.length / (vdi.compact ? 2 : 4);
+  const [fronts, backs, depths] = [new Float32Array(count), new Float32Array(count), new Float32Array(count)];
+  const floats = new Float32Array(segments.buffer, segments.byteOffset, segments.length);
+  const ofCode = Float32Array.from({length: 4096}, (_, i) => i === 0 ? 2 ** -20 : (2 ** (i * 16 / 4095) - 1) / 16);
+  for (let i = 0; i < count; ++i) {
+    if (vdi.compact) {
+      const [first, second] = [segments[2 * i], segments[2 * i + 1]];
+      fronts[i] = code.first + (first & 0x3fff) * code.step;
+      backs[i] = code.first + ((first >>> 14) & 0x3fff) * code.step;
+      depths[i] = ofCode[(first >>> 28) | ((second >>> 24) << 4)];
+    } else {
+      fronts[i] = floats[4 * i];
+      backs[i] = floats[4 * i + 1];
+      depths[i] = floats[4 * i + 2] * (backs[i] - fronts[i]);
+    }
+  }
+  return {fronts, backs, depths};
+}
 
 /**
  * Full supersegments in the shader's form, four words each: front, back, optical depth per unit of

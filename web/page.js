@@ -54,7 +54,7 @@ class Page {
   constructor() {
     this.darkScheme = window.matchMedia("(prefers-color-scheme: dark)");
     this.decoder = new Decoder(document.querySelector("script[type=module]")?.textContent ?? "");
-    this.viewer = new Viewer(/** @type {HTMLCanvasElement} */ (element("view")), tell);
+    this.viewer = new Viewer(/** @type {HTMLCanvasElement} */ (element("view")), tell, (vdi) => this.decoder.lean(vdi));
     /** @type {Source | undefined} */
     this.source = undefined;
     /** @type {LivePanel | undefined} */

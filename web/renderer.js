@@ -66,17 +66,21 @@ function outlineEnds(bounds, camera, inFront) {
               .flatMap((edge) => [...cornerOf(bounds, edge.from), ...cornerOf(bounds, edge.to)]);
 }
 
+/** @typedef {{vdi: PreparedVdi, textures: (WebGLTexture | null)[], uploads: (() => void)[]}} Loaded */
+
 /**
  * A VDI's textures, and the uploads that complete them. There are none while the context is lost.
  * @param {WebGL2RenderingContext} gl
  * @param {PreparedVdi} vdi
- * @returns {{vdi: PreparedVdi, textures: (WebGLTexture | null)[], uploads: (() => void)[]}}
+ * @returns {Loaded}
  */
 function texturesOf(gl, vdi) {
   if (gl.isContextLost()) return {vdi, textures: [], uploads: []};
   const tiling = tilingOf(gl);
-  /** @type {[Uint32Array, 2 | 4][]} */
-  const arrays = [[vdi.heads, 4], [vdi.segments, vdi.compact ? 2 : 4], [vdi.tiles, 2]];
+  const {heads, tiles} = vdi.leaning ?? vdi;
+  /** @type {[Uint32Array, 1 | 2 | 4][]} */
+  const arrays = [[heads, 4], [vdi.segments, vdi.compact ? 2 : 4], [tiles, 2]];
+  if (vdi.leaning) arrays.push([vdi.leaning.slopes, 1]);
   /** @type {ReturnType<typeof makeArrayTexture>[]} */
   const made = [];
   try {
@@ -123,7 +127,7 @@ export class Renderer {
     if (!gl) throw new Error("this browser has no WebGL2, and VDIs can't be shown without");
     this.gl = gl;
     this.canvas = canvas;
-    /** @type {ReturnType<typeof texturesOf> | undefined} */
+    /** @type {Loaded | undefined} */
     this.loaded = undefined;
     this.smooth = true;
     /** Counts contexts. Objects of former contexts are gone. */
@@ -182,15 +186,56 @@ export class Renderer {
   }
 
   /**
+   * Uploads how the supersegments of the VDI lean, from its `leaning`. Throws Error if the GPU can't
+   * hold it.
+   * @param {() => Promise<void> | undefined} pause as for setVdi
+   */
+  async setLeaning(pause) {
+    const {gl, loaded} = this;
+    const age = this.age;
+    const leaning = loaded?.vdi.leaning;
+    if (!loaded || !leaning || gl.isContextLost() || loaded.textures.length > 3) return;
+    this.programOf(loaded.vdi, true);
+    const tiling = tilingOf(gl);
+    /** @type {[Uint32Array, 1 | 2 | 4][]} */
+    const arrays = [[leaning.heads, 4], [leaning.tiles, 2], [leaning.slopes, 1]];
+    /** @type {ReturnType<typeof makeArrayTexture>[]} */
+    const made = [];
+    const drop = () => made.forEach(({texture}) => gl.deleteTexture(texture));
+    try {
+      for (const [words, perElement] of arrays) made.push(makeArrayTexture(gl, words, perElement, tiling));
+    } catch (error) {
+      drop();
+      throw error;
+    }
+    for (const upload of made.flatMap(({uploads}) => uploads)) {
+      upload();
+      await pause();
+      if (age !== this.age || loaded !== this.loaded) return drop();
+    }
+    const [heads, tiles, slopes] = made.map(({texture}) => texture);
+    const [oldHeads, segments, oldTiles] = loaded.textures;
+    loaded.textures = [heads, segments, tiles, slopes];
+    for (const texture of [oldHeads, oldTiles]) gl.deleteTexture(texture);
+  }
+
+  /** Whether pictures of the VDI can be sheared: it is known how its supersegments lean. */
+  canShear() {
+    return this.smooth && (this.loaded?.textures.length ?? 0) > 3;
+  }
+
+  /**
    * The program that renders a VDI.
    * @param {PreparedVdi} vdi
+   * @param {boolean} [sheared]
    */
-  programOf(vdi) {
-    const key = `${vdi.compact} ${this.smooth}`;
+  programOf(vdi, sheared = false) {
+    const key = `${vdi.compact} ${this.smooth} ${sheared}`;
     const known = this.programs?.get(key);
     if (known) return known;
     const {gl} = this;
-    const program = makeProgram(gl, WHOLE_PICTURE, traverseShader({...tilingOf(gl), compact: vdi.compact, smooth: this.smooth}));
+    const variant = {...tilingOf(gl), compact: vdi.compact, smooth: this.smooth, sheared};
+    const program = makeProgram(gl, WHOLE_PICTURE, traverseShader(variant));
     this.programs?.set(key, program);
     return program;
   }
@@ -202,8 +247,9 @@ export class Renderer {
    * @param {number} scale canvas pixels to one of the picture, >= 1
    * @param {number} firstRow
    * @param {number} endRow
+   * @param {boolean} [sheared] only if canShear()
    */
-  drawPicture(camera, scale, firstRow, endRow) {
+  drawPicture(camera, scale, firstRow, endRow, sheared = false) {
     const {gl, loaded, canvas, next} = this;
     if (!loaded || !next) return;
     const {width, height} = this.pictureSize(scale);
@@ -214,7 +260,7 @@ export class Renderer {
     gl.bindFramebuffer(gl.FRAMEBUFFER, next.framebuffer);
     gl.viewport(0, 0, width, height);
     gl.scissor(0, firstRow, width, endRow - firstRow);
-    const program = this.programOf(loaded.vdi);
+    const program = this.programOf(loaded.vdi, sheared);
     this.setRays(program, camera, scale);
     gl.activeTexture(gl.TEXTURE4);
     gl.bindTexture(gl.TEXTURE_2D, this.regions?.texture ?? null);
@@ -273,10 +319,17 @@ export class Renderer {
     const {vdi, textures} = loaded;
     const {program, uniform} = made;
     gl.useProgram(program);
-    ["heads", "segments", "tiles"].forEach((name, unit) => {
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D_ARRAY, textures[unit]);
-      gl.uniform1i(uniform(name), unit);
+    const {leaning} = vdi;
+    const step = vdi.compact ? vdi.code.step : 1;
+    if (leaning) {
+      gl.uniform1f(uniform("slopeUnit"), leaning.slopeUnit / step);
+      gl.uniform4fv(uniform("boxFaces"), leaning.faces.flat());
+    }
+    const units = [0, 1, 2, 5];  // pictures have the others
+    ["heads", "segments", "tiles", "slopes"].slice(0, textures.length).forEach((name, i) => {
+      gl.activeTexture(gl.TEXTURE0 + units[i]);
+      gl.bindTexture(gl.TEXTURE_2D_ARRAY, textures[i]);
+      gl.uniform1i(uniform(name), units[i]);
     });
     const {width, height} = this.pictureSize(scale);
     const rays = raysOf(camera, this.framedHeight(), vdi.camera);
@@ -286,7 +339,7 @@ export class Renderer {
     gl.uniform1f(uniform("nearest"), vdi.nearest);
     gl.uniform1f(uniform("farthest"), vdi.farthest);
     gl.uniform1f(uniform("binScale"), vdi.binScale);
-    gl.uniform2f(uniform("code"), vdi.compact ? vdi.code.first : 0, vdi.compact ? vdi.code.step : 1);
+    gl.uniform2f(uniform("code"), vdi.compact ? vdi.code.first : 0, step);
     gl.uniform3fv(uniform("rayOrigin"), [...rays.origin, ...rays.originRight, ...rays.originUp]);
     gl.uniform3fv(uniform("rayDirection"), [...rays.direction, ...rays.directionRight, ...rays.directionUp]);
     gl.uniform2f(uniform("pictureSize"), scale * width, scale * height);

@@ -20,7 +20,9 @@
 function keepingSome(load, mostBytes) {
   /** @type {Map<number, PreparedVdi>} */
   const kept = new Map();
-  const bytesOf = (/** @type {PreparedVdi} */ vdi) => vdi.segments.byteLength + vdi.heads.byteLength;
+  const bytesOf = (/** @type {PreparedVdi} */ vdi) =>
+    vdi.segments.byteLength + vdi.heads.byteLength +
+    (vdi.leaning ? vdi.leaning.slopes.byteLength + vdi.leaning.heads.byteLength : 0);
   return async (/** @type {number} */ frame) => {
     const vdi = kept.get(frame) ?? await load(frame);
     kept.delete(frame);

@@ -4,10 +4,13 @@
 // invocations of a workgroup do. Each ray finds its own tiles, the large ones first. A first pass
 // finds the regions whose rays meet nothing (cull.js).
 
+import {ON_FACE} from "./slopes.js";
+
 /**
  * @typedef {object} Variant the constants of a shader
  * @property {boolean} compact supersegments are codes of two words, otherwise expanded to four
  *     words
+ * @property {boolean} sheared Reconstruction::Sheared; needs smooth
  * @property {boolean} smooth Reconstruction::Smooth, otherwise Constant
  * @property {number} rowShift element i of an array lies at x = i mod 2^rowShift in row i >>
  *     rowShift
@@ -161,10 +164,16 @@ float shorteningAt(vec2 place) {
   return inversesqrt(1.0 + dot(offset, offset));
 }
 
-struct Part { float low; float high; float slant; };
+struct Part {
+  float low;
+  float high;
+  float slant;
+  vec2 begin;  // places in V_O's picture, from the list's centre; for sheared pictures
+  vec2 end;
+};
 
 Part partOf(Line line, vec2 fractions, float shortening) {
-  Part part = Part(at(line.depths, fractions.x), at(line.depths, fractions.y), raySlant * shortening);
+  Part part = Part(at(line.depths, fractions.x), at(line.depths, fractions.y), raySlant * shortening, vec2(0.0), vec2(0.0));
   if (!changesDepth(line)) {
     part.high = max(part.high, part.low + 1e-6 * farthest / code.y);
     part.slant *= (fractions.y - fractions.x) / (part.high - part.low);
@@ -177,17 +186,63 @@ vec2 metDepths(Words words) {
   return ascends ? depths : -depths.yx;
 }
 
+#if SHEARED
+uniform usampler2DArray slopes;
+uniform float slopeUnit;    // depth per list that a slope of 1 stands for, in codes or depths
+uniform vec4 boxFaces[6];   // the box is where dot(xyz, p) >= w, in V_O's view space
+
+// Slopes of front and back, along x and y each.
+vec4 slopesAt(int i) {
+  int bits = int(texelFetch(slopes, placeOf(i), 0).x);
+  return vec4(ivec4(bits << 24, bits << 16, bits << 8, bits) >> 24);
+}
+
+// Depths of the faces at an offset from the list's centre. A face of the box ends the ray itself.
+vec2 leaningDepths(Words words, vec4 leaning, vec2 offset) {
+  vec2 depths = depthsOf(words) + slopeUnit * vec2(dot(leaning.xy, offset), dot(leaning.zw, offset));
+  bvec4 onFace = equal(leaning, vec4(${ON_FACE}.0));
+  if (onFace.x && onFace.y) depths.x = -infinity;
+  if (onFace.z && onFace.w) depths.y = infinity;
+  return ascends ? depths : -depths.yx;
+}
+
+// Keeps the fractions of a part where a value that changes evenly is at least 0.
+void keepWhere(vec2 value, inout vec2 fractions) {
+  float crossing = value.x / (value.x - value.y);
+  if (value.x < 0.0) fractions.x = value.y < 0.0 ? 2.0 : max(fractions.x, crossing);
+  else if (value.y < 0.0) fractions.y = min(fractions.y, crossing);
+}
+
+// The change of depth along the part of the ray that lies within a supersegment.
+float leaningLength(Words words, int i, Part part) {
+  vec4 leaning = slopesAt(i);
+  vec2 begin = leaningDepths(words, leaning, part.begin);
+  vec2 end = leaningDepths(words, leaning, part.end);
+  vec2 fractions = vec2(0.0, 1.0);
+  keepWhere(vec2(part.low - begin.x, part.high - end.x), fractions);
+  keepWhere(vec2(begin.y - part.low, end.y - part.high), fractions);
+  return (fractions.y - fractions.x) * (part.high - part.low);
+}
+#endif
+
 // The light of the part of a list that a part of the ray meets, premultiplied. The list has at
 // least one supersegment. 'hint' is the place where the last intersection with a neighbouring list
 // ended, counted along the ray. Each supersegment is read once.
 vec4 intersectList(uvec4 head, Part part, inout int hint) {
-  int last = int(head.y) - 1;
+  int last = int(head.y & 0xffffffu) - 1;
+#if SHEARED
+  float reach = float(head.y >> 24) * 2.0 * slopeUnit;
+#else
+  const float reach = 0.0;
+#endif
+  float low = part.low - reach;
+  float high = part.high + reach;
   int step = ascends ? 1 : -1;
   int begin = int(head.x) + (ascends ? 0 : last);
   int place = min(hint, last);
   Words words = wordsAt(begin + place * step);
   vec2 depths = metDepths(words);
-  while (place > 0 && depths.x > part.low) {
+  while (place > 0 && depths.x > low) {
     --place;
     words = wordsAt(begin + place * step);
     depths = metDepths(words);
@@ -195,13 +250,17 @@ vec4 intersectList(uvec4 head, Part part, inout int hint) {
   vec3 light = vec3(0.0);
   float transmittance = 1.0;
   for (;;) {
+#if SHEARED
+    float length = leaningLength(words, begin + place * step, part);
+#else
     float length = min(depths.y, part.high) - max(depths.x, part.low);
+#endif
     if (length > 0.0) {
       float behind = transmittance * exp2(-length * part.slant * densityOf(words));
       light += (transmittance - behind) * colorOf(words);
       transmittance = behind;
     }
-    if (depths.y >= part.high || place >= last) break;
+    if (depths.y >= high || place >= last) break;
     ++place;
     words = wordsAt(begin + place * step);
     depths = metDepths(words);
@@ -233,7 +292,10 @@ vec4 alongLists(Ray ray, Line line, vec2 stretch) {
     uvec4 head = headAt(pixel);
     if (!(weight > 0.0) || !sharesBit(head.zw, mask)) continue;
     int hint = 0;
-    sum += weight * intersectList(head, partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5)), hint);
+    Part part = partOf(line, vec2(0.0, 1.0), shorteningAt(vec2(pixel) + 0.5));
+    part.begin = pictureAt(ray, stretch.x) - 0.5 - vec2(pixel);
+    part.end = pictureAt(ray, stretch.y) - 0.5 - vec2(pixel);
+    sum += weight * intersectList(head, part, hint);
   }
   return sum;
 }
@@ -267,8 +329,20 @@ vec4 intersectColumn(Line line, int column, vec2 edges, vec2 fractions, inout iv
   float shortening = shorteningAt(vec2(list) + 0.5);
 #if SMOOTH
   Part part = partOf(line, fractions, shortening);
+#if SHEARED
+  vec2 inOut = vec2(min(edges.x, edges.y), max(edges.x, edges.y));
+  vec2 along = line.start + line.direction * inOut - (float(column) + 0.5);
+  vec2 across = line.row + line.rows * inOut - (float(rows.x) + 0.5);
+  part.begin = line.byColumns ? vec2(along.x, across.x) : vec2(across.x, along.x);
+  part.end = line.byColumns ? vec2(along.y, across.y) : vec2(across.y, along.y);
+#endif
   vec4 light = vec4(0.0);
   if (meets) light = (1.0 - share) * intersectList(head, part, hints.x);
+#if SHEARED
+  vec2 step = float(rows.y - rows.x) * (line.byColumns ? vec2(0.0, 1.0) : vec2(1.0, 0.0));
+  part.begin -= step;
+  part.end -= step;
+#endif
   if (meetsOther) light += share * intersectList(otherHead, part, hints.y);
   return light;
 #else
@@ -362,6 +436,11 @@ void main() {
   Ray ray = Ray(rayOrigin[0] + uv.x * rayOrigin[1] + uv.y * rayOrigin[2],
                 rayDirection[0] + uv.x * rayDirection[1] + uv.y * rayDirection[2]);
   vec2 stretch = insideFrustum(ray);
+#if SHEARED
+  for (int i = 0; i < 6; ++i) {
+    clip(stretch, dot(boxFaces[i].xyz, ray.origin) - boxFaces[i].w, dot(boxFaces[i].xyz, ray.direction));
+  }
+#endif
   if (!(stretch.x < stretch.y)) return;
   Line line = lineOf(ray, stretch);
   ascends = line.bins.y >= 0.0;
@@ -410,6 +489,7 @@ ivec3 placeOf(int i) {
 /** @param {Variant} variant */
 export function traverseShader(variant) {
   return `${uniformsOf(variant)}#define SMOOTH ${variant.smooth ? 1 : 0}
+#define SHEARED ${variant.sheared ? 1 : 0}
 uniform sampler2D regions;     // regions of the picture that may show material (cull.js)
 ${variant.compact ? COMPACT_SEGMENTS : FULL_SEGMENTS}${RAYS}${INTERSECT}${TRAVERSE}${MAIN}`;
 }

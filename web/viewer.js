@@ -7,10 +7,12 @@ import {Renderer} from "./renderer.js";
 /** @typedef {import("./format.js").Camera} Camera */
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 /** @typedef {import("./renderer.js").Color} Color */
+/** @typedef {import("./slopes.js").Leaning} Leaning */
 
 const FRAME_MS = 33;       // time for a picture in motion
 const STRIP_MS = 40;       // time for a strip of a picture at rest
 const REST_MS = 150;       // the view rests after this time without motion
+const LEAN_MS = 300;       // and a VDI that has stayed so long is worth a sheared picture
 const LARGEST_SCALE = 8;
 
 export class Viewer {
@@ -18,11 +20,17 @@ export class Viewer {
    * Throws Error without WebGL2.
    * @param {HTMLCanvasElement} canvas
    * @param {(message: string) => void} tell
+   * @param {(vdi: PreparedVdi) => Promise<Leaning | undefined>} lean Decoder.lean
    */
-  constructor(canvas, tell) {
+  constructor(canvas, tell, lean) {
     this.renderer = new Renderer(canvas);
     this.canvas = canvas;
     this.tell = tell;
+    this.lean = lean;
+    this.shownAt = -Infinity;
+    this.isLeaning = false;
+    /** VDIs without sheared pictures, because the browser has too little memory for these. */
+    this.unleanable = new WeakSet();
     /** @type {Camera | undefined} */
     this.camera = undefined;
     /** @type {Color} */
@@ -71,7 +79,10 @@ export class Viewer {
    */
   async setVdi(vdi, isWanted) {
     const isShown = await this.renderer.setVdi(vdi, politely(), isWanted);
-    if (isShown) this.redraw();
+    if (isShown) {
+      this.shownAt = performance.now();
+      this.redraw();
+    }
     return isShown;
   }
 
@@ -155,7 +166,32 @@ export class Viewer {
     const isResting = performance.now() - this.movedAt > REST_MS;
     if (this.missing === "all") this.drawWhole(isResting);
     else if (this.missing === "detail" && isResting) this.drawStrip();
+    else if (this.awaitsLeaning()) void this.askLeaning(isResting);
     else if (this.missing === "nothing") return;
+    this.schedule();
+  }
+
+  /** Whether there will be a sheared picture instead of the present one. */
+  awaitsLeaning() {
+    const {loaded, smooth} = this.renderer;
+    return smooth && loaded !== undefined && !this.renderer.canShear() && !this.unleanable.has(loaded.vdi);
+  }
+
+  /** @param {boolean} isResting */
+  async askLeaning(isResting) {
+    const {renderer} = this;
+    const vdi = renderer.loaded?.vdi;
+    if (!vdi || this.isLeaning || !isResting || performance.now() - this.shownAt < LEAN_MS) return;
+    this.isLeaning = true;
+    try {
+      vdi.leaning ??= await this.lean(vdi);
+      if (renderer.loaded?.vdi === vdi) await renderer.setLeaning(politely());
+      // From its first row on, even if a smooth picture is drawn in part.
+      if (renderer.canShear() && this.missing !== "all") [this.missing, this.nextRow] = ["detail", 0];
+    } catch {
+      this.unleanable.add(vdi);  // its smooth picture stays
+    }
+    this.isLeaning = false;
     this.schedule();
   }
 
@@ -166,12 +202,13 @@ export class Viewer {
     const all = canvas.width * canvas.height * this.cost;
     const scale = all <= FRAME_MS ? 1 : Math.min(Math.ceil(Math.sqrt(all / FRAME_MS) * 4) / 4, LARGEST_SCALE);
     const {width, height} = renderer.pictureSize(scale);
-    renderer.drawPicture(this.camera, scale, 0, height);
+    const sheared = isResting && scale === 1 && renderer.canShear();
+    renderer.drawPicture(this.camera, scale, 0, height, sheared);
     renderer.finishPicture();
     this.refresh();
     this.watch(width * height);
     this.nextRow = 0;
-    this.missing = scale > 1 ? "detail" : "nothing";
+    this.missing = scale > 1 || (renderer.canShear() && !sheared) ? "detail" : "nothing";
     if (scale === 1 && isResting) this.onRest();
     if (scale === 1 && !isResting) setTimeout(() => this.onRest(), REST_MS);
   }
@@ -181,7 +218,7 @@ export class Viewer {
     if (!this.camera) return;
     const rows = Math.max(8, Math.floor(STRIP_MS / (this.cost * canvas.width)));
     const end = Math.min(this.nextRow + rows, canvas.height);
-    renderer.drawPicture(this.camera, 1, this.nextRow, end);
+    renderer.drawPicture(this.camera, 1, this.nextRow, end, renderer.canShear());
     this.watch(canvas.width * (end - this.nextRow));
     this.nextRow = end;
     if (end < canvas.height) return;
@@ -196,6 +233,11 @@ export class Viewer {
     return !this.isLost && this.missing === "nothing" && !this.pending;
   }
 
+  /** Whether it will also stay as it is. */
+  isFinal() {
+    return this.isWhole() && !this.awaitsLeaning();
+  }
+
   /**
    * The whole canvas as PNG.
    * @returns {Promise<Blob>}
@@ -203,7 +245,7 @@ export class Viewer {
   screenshot() {
     const {renderer, canvas} = this;
     if (!this.camera) return Promise.reject(new Error("there is no picture yet"));
-    renderer.drawPicture(this.camera, 1, 0, canvas.height);
+    renderer.drawPicture(this.camera, 1, 0, canvas.height, renderer.canShear());
     renderer.finishPicture();
     this.refresh();
     return new Promise((resolve, reject) => {

@@ -12,6 +12,7 @@
 #include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/SettingsTable.h"
 
 using namespace vdi;
 

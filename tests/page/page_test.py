@@ -25,8 +25,7 @@ def test_pictures(browser):
         bare(browser)
         start = camera_of(browser)
         angles = (0, 10, 30, 90)
-        vdi("render", f"{name}.vdi", "-o", f"{name}.png", "--resolution", f"{WIDTH}x{HEIGHT}", "--reconstruction", "smooth",
-            "--azimuth", *angles)
+        vdi("render", f"{name}.vdi", "-o", f"{name}.png", "--resolution", f"{WIDTH}x{HEIGHT}", "--azimuth", *angles)
         for degrees in angles:
             camera = azimuth(start, degrees)
             browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")

@@ -60,14 +60,19 @@ def bare(browser):
     whole(browser)
 
 
+def final(browser):
+    """The picture at rest, sheared."""
+    browser.wait("window.vdiPage && vdiPage.vdi && vdiPage.viewer.isFinal()")
+
+
 def shown(browser, name=None):
-    whole(browser)
+    final(browser)
     browser.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     path = os.path.join(PICTURES, name + ".png") if name else None
     return images.imread(io.BytesIO(browser.screenshot(path)))[..., :3]
 
 
-def rendered(file, camera, reconstruction="smooth"):
+def rendered(file, camera, reconstruction="sheared"):
     """What vdi render makes of it, from the page's camera."""
     words = {"position": camera["position"], "focal_point": camera["focalPoint"], "view_up": camera["viewUp"]}
     if camera["parallel"]:

@@ -14,6 +14,7 @@
 #include "tests/pipeline/OpticalBounds.h"
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vdi/reference/Reference.h"
 

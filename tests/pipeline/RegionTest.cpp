@@ -12,6 +12,7 @@
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vdi/reference/Reference.h"
 

@@ -55,9 +55,6 @@ struct GenerateSettings {
   bool operator==(const GenerateSettings&) const = default;
 };
 
-/// Throws Error{InvalidArgument} naming the field, its value and its range.
-void validate(const GenerateSettings& settings);
-
 /// The optical depth (-log2 of transmittance) at which a ray ends. It is infinite for a terminationOpacity of
 /// 1, although material of that opacity exists.
 float terminationOpticalDepth(const GenerateSettings& settings);

@@ -51,4 +51,8 @@ std::size_t indexOfSetting(std::string_view property);
 /// "--termination-opacity"
 std::string optionOf(const Setting& setting);
 
+/// Checks the settings of the table and the others. Throws Error{InvalidArgument} naming the setting, its
+/// value and its range.
+void validate(const GenerateSettings& settings);
+
 }  // namespace vdi

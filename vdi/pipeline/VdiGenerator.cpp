@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "vdi/core/Margin.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/pipeline/BandDownload.h"
 #include "vdi/pipeline/BandMaker.h"
 #include "vdi/pipeline/Extremes.h"

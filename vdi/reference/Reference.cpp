@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "vdi/core/Margin.h"
+#include "vdi/core/SettingsTable.h"
 #include "vdi/reference/Accumulator.h"
 #include "vdi/reference/Region.h"
 #include "vdi/reference/Shading.h"
