@@ -18,31 +18,38 @@ bool onAllRanks(vtkMultiProcessController* controller, bool here) {
   return all != 0;
 }
 
-Preparation::Preparation(vtkMultiProcessController* controller, vtkMTimeType time, Make make)
-    : Controller(controller), Time(time), Worker([this, work = std::move(make)] {
-        std::optional<vdi::comm::Funnel::Entry> carried;
-        if (this->hasRanks()) carried.emplace(this->Funnel);
-        try {
-          work(
-              [this](double done) {
-                this->Share = done;
-                return !this->Unwanted;
-              },
-              this->Output);
-          this->Good = true;
-        } catch (const std::exception&) {
-          this->Good = false;  // the update tries again, and says why if it can't either
-        }
-        this->Done = true;
-      }) {}
+Preparation::Preparation(std::shared_ptr<Volume> volume, vtkMTimeType time, Make make)
+    : Of(std::move(volume)),
+      Mine(*Of),
+      Time(time),
+      Worker([this, given = std::move(make)] { this->work(given); }) {}
 
 Preparation::~Preparation() {
   this->giveUp();
   while (this->hasRanks() && !this->Done) this->serve(std::chrono::milliseconds(10));
 }
 
-bool Preparation::hasRanks() const {
-  return this->Controller != nullptr && this->Controller->GetNumberOfProcesses() > 1;
+void Preparation::work(const Make& make) {
+  // Several ranks must all begin, or none may.
+  const auto isInVain = [this] { return this->Unwanted && !this->hasRanks(); };
+  if (this->Mine.awaitUnless(isInVain)) {
+    std::optional<vdi::comm::Funnel::Entry> carried;
+    if (this->hasRanks()) carried.emplace(this->Of->funnel());
+    try {
+      make(
+          *this->Of,
+          [this](double done) {
+            this->Share = done;
+            return !this->Unwanted;
+          },
+          this->Output);
+      this->Good = true;
+    } catch (const std::exception&) {
+      this->Good = false;  // the update tries again, and says why if it can't either
+    }
+  }
+  this->Mine.end();
+  this->Done = true;
 }
 
 int Preparation::percent() const {
@@ -59,8 +66,8 @@ Preparation::End Preparation::wait(const std::function<void()>& whileWaiting) {
     }
     whileWaiting();
   }
-  if (onAllRanks(this->Controller, this->Good)) return End::Good;
-  return onAllRanks(this->Controller, !this->Unwanted) ? End::Failed : End::GivenUp;
+  if (onAllRanks(this->Of->controller(), this->Good)) return End::Good;
+  return onAllRanks(this->Of->controller(), !this->Unwanted) ? End::Failed : End::GivenUp;
 }
 
 }  // namespace pv

@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "VDICollective.h"
+#include "VDIVolume.h"
 #include "vdi/core/Error.h"
 
 namespace pv {
@@ -48,6 +49,7 @@ namespace {
 struct Existing {
   std::mutex mutex;
   std::weak_ptr<vdi::gpu::Device> device;
+  std::weak_ptr<Volumes> volumes;
 };
 
 Existing& existing() {
@@ -65,6 +67,13 @@ std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank) {
     existing().device = device;
   }
   return device;
+}
+
+std::shared_ptr<Volumes> sharedVolumes() {
+  const std::scoped_lock lock(existing().mutex);
+  std::shared_ptr<Volumes> volumes = existing().volumes.lock();
+  if (!volumes) existing().volumes = volumes = std::make_shared<Volumes>();
+  return volumes;
 }
 
 }  // namespace pv

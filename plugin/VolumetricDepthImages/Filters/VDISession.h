@@ -1,4 +1,5 @@
-// What the filters of one process share: the Vulkan device, and the communicator behind a VTK controller.
+// What the filters of one process share: the Vulkan device, volumes on it, and the communicator behind a VTK
+// controller.
 #ifndef VDISession_h
 #define VDISession_h
 
@@ -11,6 +12,8 @@
 class vtkMultiProcessController;
 
 namespace pv {
+
+class Volumes;
 
 /// A communicator over the controller's MPI communicator (a duplicate: collective), or over this process
 /// alone when there's none.
@@ -28,6 +31,9 @@ bool isWatched(vtkMultiProcessController* controller);
 /// The process's device, made at the first call and kept while anybody holds it. Where that is lost, a new
 /// one. From any thread. Throws vdi::Error{DeviceUnavailable}.
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank);
+
+/// The process's volumes, kept while anybody holds it. From any thread.
+std::shared_ptr<Volumes> sharedVolumes();
 
 }  // namespace pv
 

@@ -41,6 +41,7 @@
 #include "VDISession.h"
 #include "VDITransferFunctions.h"
 #include "VDIValues.h"
+#include "VDIVolume.h"
 #include "vdi/core/BitCast.h"
 #include "vdi/core/Blending.h"
 #include "vdi/core/Error.h"
@@ -52,18 +53,7 @@
 
 vtkStandardNewMacro(vtkVDIGenerator);
 
-/// What tells one set of blocks from another.
-struct vtkVDIGenerator::Origin {
-  std::vector<std::uint64_t> Input;  // pv::identityOf
-  /// When what makes the input was modified: in situ, arrays are overwritten in place.
-  vtkMTimeType Upstream = 0;
-  std::optional<double> Time;  // none: the data have none
-  pv::ArrayChoice Choice;
-  bool FillGhosts = true;
-  bool operator==(const Origin&) const = default;
-};
-
-/// What a frame of given blocks depends on.
+/// What a frame depends on besides the volume.
 struct vtkVDIGenerator::Frame {
   vdi::Camera Camera;
   vdi::TransferFunction Function;
@@ -72,58 +62,35 @@ struct vtkVDIGenerator::Frame {
 
 /// What a view has asked for and hasn't got yet.
 struct vtkVDIGenerator::Request {
-  Origin Of;
-  std::vector<vdi::Block> Blocks;  // this rank's; they share their values with the input
-  vdi::Box Bounds;                 // of all ranks' blocks
-  double VoxelVolume = 0.0;        // of the smallest voxel of all ranks; 0 without any
-  vdi::ScalarArray Array;
+  pv::Load Load;
+  vdi::Box Bounds;  // of all ranks' blocks
 };
 
-/// What makes VDIs.
-struct vtkVDIGenerator::Maker {
-  std::unique_ptr<vdi::VdiGenerator> Generator;  // none until the first update
-  std::uint64_t Identity = 0;                    // of the generator: the same on all ranks, and no other's
-
-  Maker() = default;
-  /// Collective: with the process's device, which takes a while to be made.
-  explicit Maker(vdi::comm::Communicator comm) {
-    std::shared_ptr<vdi::gpu::Device> device;
-    comm.together([&] { device = pv::sharedDevice(comm.localRank()); });
-    const vdi::GeneratorOptions options = vdi::generatorOptionsFromEnvironment(comm);
-    this->Generator = std::make_unique<vdi::VdiGenerator>(std::move(device), std::move(comm), options);
-    const vdi::comm::Communicator& own = this->Generator->communicator();
-    std::array<std::uint64_t, 1> rootsAddress{
-        own.rank() == 0 ? reinterpret_cast<std::uintptr_t>(this->Generator.get()) : 0U};
-    own.allReduceMax(rootsAddress);
-    this->Identity = rootsAddress[0];
-  }
-};
-
-struct vtkVDIGenerator::Internals : Maker {
-  std::optional<Maker> Coming;  // made by the preparation's thread, and its own till it ends
-  std::optional<Origin> Shown;  // by the generator
+struct vtkVDIGenerator::Internals {
+  std::shared_ptr<pv::Volumes> Volumes = pv::sharedVolumes();
+  std::shared_ptr<pv::Volume> Volume;  // none until the first update; other filters may use it, too
+  /// Of the last VDI or picture. A preparation's thread writes these until it ends.
+  std::vector<vdi::RankReport> Reports;
+  std::string Device;
   /// The last frame failed. Data counts as newer than any output then: left to the executive, rank 0, whose
   /// empty output isn't what was asked for, would try again alone.
   bool Failed = false;
   pv::Failure Said;
   bool Held = false;
-  vtkNew<vtkVDIImageData> Made;  // the last output: VTK empties it before it asks for another one
-  std::optional<Origin> MadeOf;  // where Made is an output
-  vtkMTimeType Executed = 0;     // CurrentMTime of the last frame
-  bool Defers = false;           // DeferViews
-  int Views = 0;                 // of BeginView, without their EndView
-  std::optional<Request> Asked;  // by a view, which got an earlier output
-  vtkTimeStamp AskedTime;        // of the last EndView by which they got that, or of its replacement
-  bool InPlace = false;          // what is asked for can't be prepared
-  double VoxelVolume = 0.0;      // of the smallest voxel of all ranks; 0 without any
-  vdi::ScalarArray Array;        // of the generator's blocks
-  std::vector<double> Values;    // some of theirs; the root's
+  vtkNew<vtkVDIImageData> Made;      // the last output: VTK empties it before it asks for another one
+  std::optional<pv::Origin> MadeOf;  // where Made is an output
+  vtkMTimeType Executed = 0;         // CurrentMTime of the last frame
+  bool Defers = false;               // DeferViews
+  int Views = 0;                     // of BeginView, without their EndView
+  std::optional<Request> Asked;      // by a view, which got an earlier output
+  vtkTimeStamp AskedTime;            // of the last EndView by which they got that, or of its replacement
+  bool InPlace = false;              // what is asked for can't be prepared
   /// Of the map that stands in for none: the first frame's range, kept while the array is the same, or films
   /// would flicker.
   std::optional<vdi::ScalarRange> FirstRange;
   pv::ArrayChoice FirstChoice;
-  std::optional<Origin> PreparedFor;           // what is prepared
-  std::unique_ptr<pv::Preparation> Preparing;  // last: its thread uses the generator; who has one keeps off
+  std::optional<pv::Origin> PreparedFor;       // what is prepared
+  std::unique_ptr<pv::Preparation> Preparing;  // last: its thread uses the others
 
   /// Views haven't seen yet what replaces an earlier output.
   void Answer() {
@@ -131,15 +98,20 @@ struct vtkVDIGenerator::Internals : Maker {
     this->Asked.reset();
     this->AskedTime.Modified();
   }
-  /// Of the generator's blocks.
-  void Keep(const Origin& origin, const vdi::ScalarArray& array, double voxelVolume,
-            std::vector<double> values) {
-    this->VoxelVolume = voxelVolume;
-    this->Array = array;
-    this->Values = std::move(values);
-    this->Shown = origin;
-    if (this->FirstRange && !(this->FirstChoice == origin.Choice)) this->FirstRange.reset();
-    this->FirstChoice = origin.Choice;
+  /// Before a frame of that array.
+  void NoteChoice(const pv::ArrayChoice& choice) {
+    if (this->FirstRange && !(this->FirstChoice == choice)) this->FirstRange.reset();
+    this->FirstChoice = choice;
+  }
+  /// Whether the volume shows that, and goes on showing it.
+  bool Shows(const pv::Origin& origin) const {
+    if (!this->Volume || !this->Volume->targets(origin)) return false;
+    const std::shared_ptr<const pv::Shown> shown = this->Volume->shown();
+    return shown && shown->of == origin;
+  }
+  void TakeReports(const vdi::VdiGenerator& generator) {
+    this->Reports = generator.reports();
+    this->Device = generator.device().name();
   }
 };
 
@@ -153,6 +125,7 @@ vtkVDIGenerator::vtkVDIGenerator()
 
 vtkVDIGenerator::~vtkVDIGenerator() {
   this->SetReport(nullptr);
+  if (this->Internal->Volume) this->Internal->Volume->leave(this);
   // Who deletes the filter waits for the thread only where others' MPI does.
   if (this->GivesUpPreparation() && !this->Internal->Preparing->hasRanks())
     pv::retire(std::move(this->Internal));
@@ -267,10 +240,9 @@ double vtkVDIGenerator::GetSetting(const char* property) const {
 
 void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
   if (this->Controller == controller) return;
-  this->Controller = controller;
   this->DropPreparation();
-  this->Internal->Generator.reset();
-  this->Internal->Shown.reset();
+  this->UseVolume(nullptr);
+  this->Controller = controller;
   this->Modified();
 }
 
@@ -420,6 +392,13 @@ std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::str
   return text + "device of rank 0: " + device + "\n";
 }
 
+/// Gives the output the VDI, in whose coloring the array is missing.
+void giveVdi(vdi::Vdi& vdi, const pv::Shown& shown, vtkImageData* output) {
+  vdi.coloring->array = shown.array;
+  pv::setVdi(output, vdi);
+  pv::setShownValues(output, shown.array, shown.values);
+}
+
 std::string whatOf(const std::exception_ptr& failure) {
   try {
     std::rethrow_exception(failure);
@@ -445,12 +424,8 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
-  std::optional<double> time;
-  if (input != nullptr && input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP())) {
-    time = input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
-  }
   Internals& internal = *this->Internal;
-  const Origin origin = this->OriginOf(input, time);
+  const pv::Origin origin = this->OriginOf(input);
   const bool isHeld = internal.Held && !internal.Asked;
   // Who asks for other pieces of it, a writer on several ranks, gets what is there.
   const bool isMade = internal.MadeOf == origin && !internal.Failed &&
@@ -463,7 +438,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     this->Enter();
     if (pv::onAllRanks(this->Controller, isMade)) {
       output->ShallowCopy(internal.Made);
-      setTime(output, time);
+      setTime(output, origin.time);
       internal.Executed = executed;
       internal.Failed = false;
       internal.Answer();
@@ -520,16 +495,20 @@ void vtkVDIGenerator::SayFailure(const std::string& what) {
   if (isNew || pv::isWatched(this->Controller)) vtkErrorMacro(<< what);
 }
 
-/// Whether a rank has failed because it has lost its device: the generators are given up then, and new ones
-/// get devices that aren't lost. All ranks fail together where there's a generator, and all must call this
+/// Whether a rank has failed because it has lost its device: the volume is given up then, and the next one
+/// gets devices that aren't lost. All ranks fail together where there's a generator, and all must call this
 /// then, whatever each of them failed of.
 bool vtkVDIGenerator::DropLostDevice() {
-  if (!this->Internal->Generator) return false;
-  const vdi::VdiGenerator& generator = *this->Internal->Generator;
-  if (!generator.communicator().anyTogether([&] { return generator.device().isLost(); })) return false;
+  const std::shared_ptr<pv::Volume> volume = this->Internal->Volume;
+  if (!volume || !volume->isMade()) return false;
+  {
+    pv::Turn turn(*volume);
+    turn.await();
+    const vdi::VdiGenerator& generator = volume->generator();
+    if (!generator.communicator().anyTogether([&] { return generator.device().isLost(); })) return false;
+  }
   this->DropPreparation();
-  this->Internal->Generator.reset();
-  this->Internal->Shown.reset();
+  this->UseVolume(nullptr);
   return true;
 }
 
@@ -573,7 +552,7 @@ int vtkVDIGenerator::GetOutdated() {
 
 /// For a view that needn't wait: gives it an earlier output, and notes what it asks for. False where the VDI
 /// is to be made in place, or taken: it has just been prepared. Collective.
-bool vtkVDIGenerator::Defer(vtkDataObject* input, const Origin& origin, bool hasFailed,
+bool vtkVDIGenerator::Defer(vtkDataObject* input, const pv::Origin& origin, bool hasFailed,
                             vtkImageData* output) {
   Internals& internal = *this->Internal;
   // Without a map the colours need the range of the scalars, which is known once they're on the device.
@@ -587,39 +566,39 @@ bool vtkVDIGenerator::Defer(vtkDataObject* input, const Origin& origin, bool has
   }
   if (!this->Ask(input, origin)) return false;
   this->GiveEarlier(output);
-  setTime(output, origin.Time);
+  setTime(output, origin.time);
   return true;
 }
 
 /// Notes what Prepare is to make. False where the input is no good, which an update in place says.
 /// Collective.
-bool vtkVDIGenerator::Ask(vtkDataObject* input, const Origin& origin) {
+bool vtkVDIGenerator::Ask(vtkDataObject* input, const pv::Origin& origin) {
   Internals& internal = *this->Internal;
-  const bool isAsked = internal.Asked && internal.Asked->Of == origin;
+  const bool isAsked = internal.Asked && internal.Asked->Load.of == origin;
   if (pv::onAllRanks(this->Controller, isAsked)) return true;
   internal.Asked.reset();
-  Request request{.Of = origin, .Blocks = {}, .Bounds = {}, .Array = {}};
+  Request request{.Load = {.of = origin, .blocks = {}, .array = {}}, .Bounds = {}};
   bool isGood = true;
   try {
     requireInput(input);
-    pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.Choice);
-    request.Blocks = pv::blocksOf(input, origin.Choice);
+    pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.choice);
+    request.Load.blocks = pv::blocksOf(input, origin.choice);
   } catch (const vdi::Error&) {
     isGood = false;
   }
   if (!pv::onAllRanks(this->Controller, isGood)) return false;
-  const vdi::Box own = vdi::localScene(request.Blocks).bounds;
-  const double components = pv::componentsOf(input, origin.Choice);
+  const vdi::Box own = vdi::localScene(request.Load.blocks).bounds;
+  const double components = pv::componentsOf(input, origin.choice);
   std::array<double, 8> least{own.lo.x,  own.lo.y,  own.lo.z,    -own.hi.x,
-                              -own.hi.y, -own.hi.z, -components, -mostPerVolume(request.Blocks)};
+                              -own.hi.y, -own.hi.z, -components, -mostPerVolume(request.Load.blocks)};
   if (this->Controller != nullptr && this->Controller->GetNumberOfProcesses() > 1) {
     const std::array<double, 8> mine = least;
     this->Controller->AllReduce(mine.data(), least.data(), static_cast<vtkIdType>(least.size()),
                                 vtkCommunicator::MIN_OP);
   }
   request.Bounds = {{least[0], least[1], least[2]}, {-least[3], -least[4], -least[5]}};
-  request.Array = arrayOf(origin.Choice, static_cast<int>(-least[6]));
-  request.VoxelVolume = least[7] < 0.0 ? -1.0 / least[7] : 0.0;
+  request.Load.array = arrayOf(origin.choice, static_cast<int>(-least[6]));
+  request.Load.voxelVolume = least[7] < 0.0 ? -1.0 / least[7] : 0.0;
   internal.Asked = std::move(request);
   return true;
 }
@@ -641,68 +620,87 @@ void vtkVDIGenerator::GiveEarlier(vtkImageData* output) {
       pv::setBeingMade(output, this->Viewpoint(asked.Bounds), asked.Bounds);
   }
   // Views colour by the array that they ask for, and adapt its map to its range.
-  if (output->GetFieldData()->GetAbstractArray(asked.Array.name.c_str()) == nullptr) {
+  if (output->GetFieldData()->GetAbstractArray(asked.Load.array.name.c_str()) == nullptr) {
     const double* range = this->LookupTable->GetRange();
-    pv::setShownValues(output, asked.Array, std::array{range[0], range[1]});
+    pv::setShownValues(output, asked.Load.array, std::array{range[0], range[1]});
   }
 }
 
-vtkVDIGenerator::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input, std::optional<double> time) {
-  Origin origin;
+pv::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input) {
+  pv::Origin origin;
   if (vtkInformation* array = this->GetInputArrayInformation(0)) {
-    if (array->Has(vtkDataObject::FIELD_NAME())) origin.Choice.name = array->Get(vtkDataObject::FIELD_NAME());
+    if (array->Has(vtkDataObject::FIELD_NAME())) origin.choice.name = array->Get(vtkDataObject::FIELD_NAME());
     if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) {
-      origin.Choice.cells =
+      origin.choice.cells =
           array->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_CELLS;
     }
   }
-  origin.Choice.component = this->Component;
-  origin.FillGhosts = this->FillGhosts;
-  origin.Time = time;
-  if (input != nullptr) origin.Input = pv::identityOf(input);
+  origin.choice.component = this->Component;
+  origin.fillGhosts = this->FillGhosts;
+  if (input != nullptr) {
+    if (input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
+      origin.time = input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
+    origin.input = pv::identityOf(input);
+  }
   if (auto* upstream = vtkDemandDrivenPipeline::SafeDownCast(this->GetInputExecutive(0, 0)))
-    origin.Upstream = upstream->GetPipelineMTime();
+    origin.upstream = upstream->GetPipelineMTime();
   return origin;
 }
 
-/// Only where something changed: another camera or transfer function needs no upload.
-void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const Origin& origin) {
-  vdi::VdiGenerator& generator = *this->Internal->Generator;
-  const vdi::comm::Communicator& comm = generator.communicator();
+void vtkVDIGenerator::UseVolume(const std::shared_ptr<pv::Volume>& volume) {
+  std::shared_ptr<pv::Volume>& own = this->Internal->Volume;
+  if (own == volume) return;
+  if (own) own->leave(this);
+  own = volume;
+  if (!own) return;
+  own->join(this, [this](const pv::Origin& origin) {
+    return this->GetNumberOfInputConnections(0) > 0 &&
+           this->OriginOf(this->GetInputDataObject(0, 0)) == origin;
+  });
+}
+
+/// Takes the volume that shows this input to another filter, or one that can show it. Collective.
+void vtkVDIGenerator::ChooseVolume(const pv::Origin& origin) {
+  Internals& internal = *this->Internal;
+  this->UseVolume(internal.Volumes->choose(this->Controller, origin, internal.Volume, this));
+}
+
+/// Shows the input in the volume, of which the filter has the turn. Where another filter has done so, or only
+/// the camera or the transfer function has changed, nothing is uploaded. Collective.
+void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin) {
+  pv::Volume& volume = *this->Internal->Volume;
+  const vdi::comm::Communicator& comm = volume.generator().communicator();
   comm.together([&] { requireInput(input); });
   // What the ranks do next depends on these; the generator compares the rest.
-  comm.requireEqual(std::hash<std::string>()(origin.Choice.name), "SelectInputScalars, the array");
-  comm.requireEqual(origin.Choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells");
+  comm.requireEqual(std::hash<std::string>()(origin.choice.name), "SelectInputScalars, the array");
+  comm.requireEqual(origin.choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells");
   comm.requireEqual(static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component");
   comm.requireEqual(this->FillGhosts ? 1U : 0U, "FillGhosts");
   comm.requireEqual(this->PictureOnly ? 1U : 0U, "PictureOnly");
   comm.requireEqual(static_cast<std::uint64_t>(this->BlendMode), "BlendMode");
   comm.together([&] { static_cast<void>(this->CurrentBlending()); });  // before values are loaded in vain
-  std::array<std::uint64_t, 1> changed{this->Internal->Shown == origin ? 0U : 1U};
-  comm.allReduceMax(changed);
-  if (changed[0] == 0) return;
-  std::vector<vdi::Block> blocks;
+  if (!comm.anyTogether([&] { return !this->Internal->Shows(origin); })) return;
+  pv::Load load{.of = origin, .blocks = {}, .array = {}};
   comm.together([&] {
-    pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.Choice);
-    blocks = pv::blocksOf(input, origin.Choice);
+    pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.choice);
+    load.blocks = pv::blocksOf(input, origin.choice);
   });
   // Doubles that aren't negative are ordered as their bits are.
-  std::array<std::uint64_t, 2> largest{vdi::bit_cast<std::uint64_t>(mostPerVolume(blocks)),
-                                       static_cast<std::uint64_t>(pv::componentsOf(input, origin.Choice))};
+  std::array<std::uint64_t, 2> largest{vdi::bit_cast<std::uint64_t>(mostPerVolume(load.blocks)),
+                                       static_cast<std::uint64_t>(pv::componentsOf(input, origin.choice))};
   comm.allReduceMax(largest);
-  const double voxelVolume = largest[0] > 0 ? 1.0 / vdi::bit_cast<double>(largest[0]) : 0.0;
+  load.voxelVolume = largest[0] > 0 ? 1.0 / vdi::bit_cast<double>(largest[0]) : 0.0;
+  load.array = arrayOf(origin.choice, static_cast<int>(largest[1]));
   this->UpdateProgress(0.05);
-  this->Internal->Shown.reset();
-  const std::vector<vdi::Block> shown = blocks;  // the values are shared
-  generator.setBlocks(std::move(blocks), this->FillGhosts);
-  this->Internal->Keep(origin, arrayOf(origin.Choice, static_cast<int>(largest[1])), voxelVolume,
-                       pv::sampleOf(shown, generator.scalarRange(), comm));
+  volume.setTarget(origin);
+  volume.show(load);
 }
 
-vdi::ScalarRange vtkVDIGenerator::StandInRange() {
+vdi::ScalarRange vtkVDIGenerator::StandInRange(const pv::Shown& shown) {
   Internals& internal = *this->Internal;
+  internal.NoteChoice(shown.of.choice);
   if (internal.FirstRange) return *internal.FirstRange;
-  vdi::ScalarRange range = internal.Generator->scalarRange();
+  const vdi::ScalarRange range = shown.range;
   if (range.min < range.max) return *(internal.FirstRange = range);
   // Of nothing, or of one value everywhere: no range to keep.
   const double low = range.min <= range.max ? range.min : 0.0;
@@ -720,16 +718,16 @@ vdi::Camera vtkVDIGenerator::Viewpoint(const vdi::Box& bounds) const {
   return camera;
 }
 
-/// Where ranks come with generators that don't belong together, these are given up: new ones will.
+/// Where ranks come with volumes that don't belong together, these are given up: new ones will.
 void vtkVDIGenerator::Enter() {
   Internals& internal = *this->Internal;
-  const std::string name = internal.Generator ? fmt::format("{:x}", internal.Identity) : "a new one";
+  const std::string name =
+      internal.Volume ? fmt::format("{:x}", internal.Volume->identity()) : std::string("a new one");
   try {
     pv::enterCollective(this->Controller, "VolumetricDepthImage, " + name);
   } catch (const vdi::Error&) {
     this->DropPreparation();
-    internal.Generator.reset();
-    internal.Shown.reset();
+    this->UseVolume(nullptr);
     throw;
   }
 }
@@ -773,16 +771,16 @@ vdi::GenerateSettings vtkVDIGenerator::CurrentSettings() const {
 void vtkVDIGenerator::NoteMade(vtkImageData* output) {
   vtkFieldData* fields = output->GetFieldData();
   vtkDataArray* offsets = fields->GetArray("VDI.offsets");
-  const vdi::VdiGenerator& generator = *this->Internal->Generator;
-  if (offsets == nullptr || generator.reports().empty()) return;
+  const std::vector<vdi::RankReport>& reports = this->Internal->Reports;
+  if (offsets == nullptr || reports.empty()) return;
   const vtkIdType lists = offsets->GetNumberOfTuples() - 1;
   vdi::MadeVdi made{.settings = this->CurrentSettings(),
                     .lists = static_cast<std::uint64_t>(lists),
                     .supersegments = static_cast<std::uint64_t>(offsets->GetTuple1(lists))};
   made.settings.precision =
       fields->GetArray("VDI.codes") != nullptr ? vdi::Precision::Compact : vdi::Precision::Full;
-  made.settings.samplesPerVoxel = generator.reports().front().samplesPerVoxel;
-  for (const vdi::RankReport& report : generator.reports()) {
+  made.settings.samplesPerVoxel = reports.front().samplesPerVoxel;
+  for (const vdi::RankReport& report : reports) {
     made.castSeconds = std::max(made.castSeconds, report.generateSeconds);
     made.listSeconds =
         std::max(made.listSeconds, report.distributeSeconds + report.compositeSeconds + report.gatherSeconds);
@@ -831,14 +829,11 @@ bool vtkVDIGenerator::GivesUpPreparation() {
 
 /// Collective.
 void vtkVDIGenerator::DropPreparation() {
-  Internals& internal = *this->Internal;
-  internal.Preparing.reset();
-  if (internal.Coming) static_cast<Maker&>(internal) = std::move(*internal.Coming);
-  internal.Coming.reset();
+  this->Internal->Preparing.reset();
 }
 
 /// Whether what is under way, or there, is what the update asks for.
-bool vtkVDIGenerator::IsPrepared(const Origin& origin) const {
+bool vtkVDIGenerator::IsPrepared(const pv::Origin& origin) const {
   const Internals& internal = *this->Internal;
   return internal.Preparing && !internal.Preparing->isGivenUp() &&
          internal.Preparing->time() == internal.Executed && internal.PreparedFor == origin;
@@ -848,20 +843,12 @@ void vtkVDIGenerator::Prepare() {
   Internals& internal = *this->Internal;
   this->DropPreparation();
   const bool isMade = !internal.Failed && internal.Executed == this->CurrentMTime() && !internal.Asked;
-  const bool isOfInput = internal.Asked || (internal.Shown && internal.Shown == internal.MadeOf);
-  bool can = !isMade && isOfInput && (internal.Asked || internal.Generator) && !this->PictureOnly;
+  const bool isOfInput = internal.Asked || (internal.MadeOf && internal.Shows(*internal.MadeOf));
+  bool can = !isMade && isOfInput && !this->PictureOnly;
   Frame frame;
-  const bool isAlone = this->Controller == nullptr || this->Controller->GetNumberOfProcesses() == 1;
   if (pv::onAllRanks(this->Controller, can)) {
     try {
-      // A thread must not free a communicator of several ranks, as it would where it can't make one.
-      if (!isAlone) this->MakeGenerator();
-      if (internal.Asked) {
-        frame = this->CurrentFrame(internal.Asked->Bounds, internal.Asked->VoxelVolume, {0.0, 1.0});
-      } else {
-        frame = this->CurrentFrame(internal.Generator->scene().bounds, internal.VoxelVolume,
-                                   this->StandInRange());
-      }
+      frame = internal.Asked ? this->AskedFrame() : this->ShownFrame(*internal.Volume->shown());
     } catch (const vdi::Error&) {
       can = false;  // said by the update that comes instead
     }
@@ -872,39 +859,53 @@ void vtkVDIGenerator::Prepare() {
     internal.InPlace = internal.Asked.has_value();
     return;
   }
-  std::optional<Request> request;  // of other blocks than the generator's
-  const bool isShown = !internal.Asked || internal.Shown == internal.Asked->Of;
-  if (!pv::onAllRanks(this->Controller, isShown)) request = internal.Asked;
-  internal.PreparedFor = internal.Asked ? internal.Asked->Of : *internal.Shown;
+  std::optional<pv::Load> load;  // of other blocks than the volume's
+  if (internal.Asked) load = internal.Asked->Load;
+  internal.PreparedFor = load ? load->of : *internal.MadeOf;
+  if (load) internal.Volume->setTarget(load->of);
   internal.Preparing = std::make_unique<pv::Preparation>(
-      this->Controller, this->CurrentMTime(),
-      [&internal, frame = std::move(frame), request = std::move(request), step = std::max(this->TimeStep, 0)](
-          const vdi::Progress& progress, vtkVDIImageData* output) {
-        if (!internal.Generator) internal.Coming.emplace(vdi::comm::Communicator::serial());
-        vdi::VdiGenerator& generator = internal.Coming ? *internal.Coming->Generator : *internal.Generator;
-        if (request) {
-          internal.Shown.reset();
-          generator.setBlocks(request->Blocks, request->Of.FillGhosts);
-          internal.Keep(request->Of, request->Array, request->VoxelVolume,
-                        pv::sampleOf(request->Blocks, generator.scalarRange(), generator.communicator()));
+      internal.Volume, this->CurrentMTime(),
+      [&internal, frame = std::move(frame), load = std::move(load), of = *internal.PreparedFor,
+       step = std::max(this->TimeStep, 0)](pv::Volume& volume, const vdi::Progress& progress,
+                                           vtkVDIImageData* output) {
+        volume.make();  // alone: several ranks have it
+        if (load) {
+          volume.show(*load);
+        } else {
+          volume.requireShown(of);
         }
+        internal.Reports.clear();
+        vdi::VdiGenerator& generator = volume.generator();
         std::optional<vdi::Vdi> vdi =
             generator.generate(frame.Camera, frame.Function, frame.Settings, progress);
+        internal.TakeReports(generator);
         if (!vdi) return;  // another rank has it
-        vdi->time = internal.Shown->Time.value_or(0.0);
+        vdi->time = of.time.value_or(0.0);
         vdi->timeStep = static_cast<std::uint64_t>(step);
-        vdi->coloring->array = internal.Array;
-        pv::setVdi(output, *vdi);
-        pv::setShownValues(output, internal.Array, internal.Values);
+        giveVdi(*vdi, *volume.shown(), output);
         findRanges(output->GetPointData());
         findRanges(output->GetFieldData());
         if (pv::isServer()) output->SetFile(pv::fileOf(*vdi));
       });
 }
 
-/// Makes sure that no thread uses the generator. True if `output` is what one has made of just this, for
-/// which an update that can't wait for its turn, a writer's, waits here. Collective.
-bool vtkVDIGenerator::TakePreparation(const Origin& origin, vtkImageData* output) {
+/// Of what a view has asked for, whose volume it chooses. Collective.
+vtkVDIGenerator::Frame vtkVDIGenerator::AskedFrame() {
+  const Request& asked = *this->Internal->Asked;
+  this->ChooseVolume(asked.Load.of);
+  // A thread must not make a communicator of several ranks.
+  if (this->Internal->Volume->hasRanks()) this->Internal->Volume->make();
+  this->Internal->NoteChoice(asked.Load.of.choice);
+  return this->CurrentFrame(asked.Bounds, asked.Load.voxelVolume, {0.0, 1.0});
+}
+
+vtkVDIGenerator::Frame vtkVDIGenerator::ShownFrame(const pv::Shown& shown) {
+  return this->CurrentFrame(shown.bounds, shown.voxelVolume, this->StandInRange(shown));
+}
+
+/// Makes sure that no thread of this filter uses the volume. True if `output` is what one has made of just
+/// this, for which an update that can't wait for its turn, a writer's, waits here. Collective.
+bool vtkVDIGenerator::TakePreparation(const pv::Origin& origin, vtkImageData* output) {
   Internals& internal = *this->Internal;
   const auto& preparing = internal.Preparing;
   if (!preparing) return false;
@@ -923,7 +924,7 @@ bool vtkVDIGenerator::TakePreparation(const Origin& origin, vtkImageData* output
   const bool isGood = end == pv::Preparation::End::Good;
   if (isGood) {
     output->ShallowCopy(preparing->output());
-    if (output->GetNumberOfPoints() > 0) setTime(output, origin.Time);
+    if (output->GetNumberOfPoints() > 0) setTime(output, origin.time);
   }
   this->DropPreparation();
   if (isGood) this->TakeReport();
@@ -931,49 +932,49 @@ bool vtkVDIGenerator::TakePreparation(const Origin& origin, vtkImageData* output
 }
 
 void vtkVDIGenerator::TakeReport() {
-  const vdi::VdiGenerator& generator = *this->Internal->Generator;
-  this->SetReport(
-      generator.reports().empty() ? "" : reportOf(generator.reports(), generator.device().name()).c_str());
+  const Internals& internal = *this->Internal;
+  this->SetReport(internal.Reports.empty() ? "" : reportOf(internal.Reports, internal.Device).c_str());
 }
 
-/// Collective.
-void vtkVDIGenerator::MakeGenerator() {
-  if (this->Internal->Generator) return;
-  static_cast<Maker&>(*this->Internal) = Maker(pv::communicatorOf(this->Controller));
-}
-
-void vtkVDIGenerator::Generate(vtkDataObject* input, const Origin& origin, vtkImageData* output) {
+void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, vtkImageData* output) {
   if (this->TakePreparation(origin, output)) return;
-  this->MakeGenerator();
-  vdi::VdiGenerator& generator = *this->Internal->Generator;
-  if (!(this->Internal->MadeOf == origin)) {
-    this->Internal->Made->Initialize();  // no need to have two in memory
-    this->Internal->MadeOf.reset();
+  Internals& internal = *this->Internal;
+  this->ChooseVolume(origin);
+  pv::Volume& volume = *internal.Volume;
+  pv::Turn turn(volume);
+  turn.await();
+  volume.make();
+  vdi::VdiGenerator& generator = volume.generator();
+  if (!(internal.MadeOf == origin)) {
+    internal.Made->Initialize();  // no need to have two in memory
+    internal.MadeOf.reset();
   }
   this->ShowBlocks(input, origin);
   this->UpdateProgress(0.1);
-  const auto [camera, function, settings] =
-      this->CurrentFrame(generator.scene().bounds, this->Internal->VoxelVolume, this->StandInRange());
+  const std::shared_ptr<const pv::Shown> shown = volume.shown();
+  const auto [camera, function, settings] = this->ShownFrame(*shown);
   const auto progress = [this](double done) {
     this->UpdateProgress(0.1 + 0.9 * done);
     return !this->CheckAbort();
   };
+  const auto takeReport = [&] {
+    internal.TakeReports(generator);
+    this->TakeReport();
+  };
   if (this->PictureOnly) {
     std::optional<vdi::Image> picture = generator.renderVolume(camera, function, settings, progress);
-    this->TakeReport();
+    takeReport();
     if (picture) {
       pv::setPicture(output, *picture, true);
-      pv::setPlace(output->GetFieldData(), camera, generator.scene().bounds);
+      pv::setPlace(output->GetFieldData(), camera, shown->bounds);
     }
   } else {
     std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
-    this->TakeReport();
+    takeReport();
     if (!vdi) return;
-    vdi->time = origin.Time.value_or(0.0);
+    vdi->time = origin.time.value_or(0.0);
     vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));
-    vdi->coloring->array = this->Internal->Array;
-    pv::setVdi(output, *vdi);
-    pv::setShownValues(output, this->Internal->Array, this->Internal->Values);
+    giveVdi(*vdi, *shown, output);
   }
-  setTime(output, origin.Time);
+  setTime(output, origin.time);
 }

@@ -31,6 +31,11 @@ struct Region;
 struct ScalarRange;
 struct Shading;
 }  // namespace vdi
+namespace pv {
+struct Origin;
+struct Shown;
+class Volume;
+}  // namespace pv
 class vtkMultiProcessController;
 class vtkPiecewiseFunction;
 class vtkScalarsToColors;
@@ -199,31 +204,32 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkVDIGenerator(const vtkVDIGenerator&) = delete;
   void operator=(const vtkVDIGenerator&) = delete;
 
-  struct Maker;
   struct Internals;
-  struct Origin;
   struct Frame;
   struct Request;
-  void MakeGenerator();
   bool ServesView() const;
-  bool IsPrepared(const Origin& origin) const;
-  bool Defer(vtkDataObject* input, const Origin& origin, bool hasFailed, vtkImageData* output);
-  bool Ask(vtkDataObject* input, const Origin& origin);
+  bool IsPrepared(const pv::Origin& origin) const;
+  bool Defer(vtkDataObject* input, const pv::Origin& origin, bool hasFailed, vtkImageData* output);
+  bool Ask(vtkDataObject* input, const pv::Origin& origin);
   void GiveEarlier(vtkImageData* output);
-  void Generate(vtkDataObject* input, const Origin& origin, vtkImageData* output);
+  void Generate(vtkDataObject* input, const pv::Origin& origin, vtkImageData* output);
   bool IsRoot() const;
   void Enter();
-  void ShowBlocks(vtkDataObject* input, const Origin& origin);
-  vdi::ScalarRange StandInRange();
+  void UseVolume(const std::shared_ptr<pv::Volume>& volume);
+  void ChooseVolume(const pv::Origin& origin);
+  void ShowBlocks(vtkDataObject* input, const pv::Origin& origin);
+  vdi::ScalarRange StandInRange(const pv::Shown& shown);
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
   Frame CurrentFrame(const vdi::Box& bounds, double voxelVolume, const vdi::ScalarRange& range);
+  Frame AskedFrame();
+  Frame ShownFrame(const pv::Shown& shown);
   vdi::Region CurrentRegion() const;
   vdi::Blending CurrentBlending() const;
   vtkMTimeType CurrentMTime();
-  Origin OriginOf(vtkDataObject* input, std::optional<double> time);
+  pv::Origin OriginOf(vtkDataObject* input);
   bool GivesUpPreparation();
   void DropPreparation();
-  bool TakePreparation(const Origin& origin, vtkImageData* output);
+  bool TakePreparation(const pv::Origin& origin, vtkImageData* output);
   void SayFailure(const std::string& what);
   void TakeReport();
   vdi::GenerateSettings CurrentSettings() const;
