@@ -13,17 +13,33 @@ from pvtest import *  # noqa: E402,F403
 LOSE = os.environ["VDI_TEST_LOSE_DEVICE"]
 if os.path.isdir(LOSE):
     os.rmdir(LOSE)
-image = simple.VolumetricDepthImage(Input=simple.Wavelet())
-image.SelectInputScalars = ["POINTS", "RTData"]
-image.Resolution = [160, 120]
-image.CameraPosition = [60, 45, 75]
-before = picture(image)
+wavelet = simple.Wavelet()
+
+
+def filter_at(*position):
+    image = simple.VolumetricDepthImage(Input=wavelet)
+    image.SelectInputScalars = ["POINTS", "RTData"]
+    image.Resolution = [160, 120]
+    image.CameraPosition = position
+    return image
+
+
+image, sharing = filter_at(60, 45, 75), filter_at(-60, 45, 75)
+before, before_of_other = picture(image), picture(sharing)
 check((before.max(axis=2) > 8).mean() > 0.03, "there is something to see")
 
 
-def made_anew(supersegments):
+def made_anew(supersegments, image=image):
     image.Supersegments = supersegments
     return picture(image)
+
+
+def report(image):
+    image.SMProxy.UpdatePropertyInformation()
+    return [line.split() for line in image.SMProxy.GetProperty("Report").GetElement(0).splitlines()[1:4]]
+
+
+memory = [float(row[-1]) for row in report(sharing)]
 
 
 open(LOSE, "w").close()
@@ -33,6 +49,11 @@ worst = np.abs(after.astype(int) - before).max()
 check(worst <= 1, "and the VDI is there in the same update, worst channel off by %d" % worst)
 worst = np.abs(made_anew(23).astype(int) - before).max()
 check(worst <= 1, "and so is the next one")
+worst = np.abs(made_anew(24, sharing).astype(int) - before_of_other).max()
+check(worst <= 1, "and that of a filter that shared the volume, worst channel off by %d" % worst)
+rows = report(sharing)
+check(np.all([float(row[3]) == 0 for row in rows]), "which shares the new one")
+check(np.all([float(row[-1]) <= 1.1 * was for row, was in zip(rows, memory)]), "and lets the old one go")
 
 os.mkdir(LOSE)
 try:

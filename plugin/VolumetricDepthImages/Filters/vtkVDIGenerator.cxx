@@ -103,11 +103,11 @@ struct vtkVDIGenerator::Internals {
     if (this->FirstRange && !(this->FirstChoice == choice)) this->FirstRange.reset();
     this->FirstChoice = choice;
   }
-  /// Whether the volume shows that, and goes on showing it.
-  bool Shows(const pv::Origin& origin) const {
-    if (!this->Volume || !this->Volume->targets(origin)) return false;
-    const std::shared_ptr<const pv::Shown> shown = this->Volume->shown();
-    return shown && shown->of == origin;
+  /// What the volume shows, if that is it and no turn that was taken changes it; else null.
+  std::shared_ptr<const pv::Shown> ShownOf(const pv::Origin& origin) const {
+    if (!this->Volume || !this->Volume->targets(origin)) return nullptr;
+    std::shared_ptr<const pv::Shown> shown = this->Volume->shown();
+    return shown && shown->of == origin ? shown : nullptr;
   }
   void TakeReports(const vdi::VdiGenerator& generator) {
     this->Reports = generator.reports();
@@ -679,7 +679,7 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin)
   comm.requireEqual(this->PictureOnly ? 1U : 0U, "PictureOnly");
   comm.requireEqual(static_cast<std::uint64_t>(this->BlendMode), "BlendMode");
   comm.together([&] { static_cast<void>(this->CurrentBlending()); });  // before values are loaded in vain
-  if (!comm.anyTogether([&] { return !this->Internal->Shows(origin); })) return;
+  if (!comm.anyTogether([&] { return this->Internal->ShownOf(origin) == nullptr; })) return;
   pv::Load load{.of = origin, .blocks = {}, .array = {}};
   comm.together([&] {
     pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.choice);
@@ -843,12 +843,12 @@ void vtkVDIGenerator::Prepare() {
   Internals& internal = *this->Internal;
   this->DropPreparation();
   const bool isMade = !internal.Failed && internal.Executed == this->CurrentMTime() && !internal.Asked;
-  const bool isOfInput = internal.Asked || (internal.MadeOf && internal.Shows(*internal.MadeOf));
-  bool can = !isMade && isOfInput && !this->PictureOnly;
+  const auto shown = internal.MadeOf ? internal.ShownOf(*internal.MadeOf) : nullptr;
+  bool can = !isMade && (internal.Asked || shown) && !this->PictureOnly;
   Frame frame;
   if (pv::onAllRanks(this->Controller, can)) {
     try {
-      frame = internal.Asked ? this->AskedFrame() : this->ShownFrame(*internal.Volume->shown());
+      frame = internal.Asked ? this->AskedFrame() : this->ShownFrame(*shown);
     } catch (const vdi::Error&) {
       can = false;  // said by the update that comes instead
     }
