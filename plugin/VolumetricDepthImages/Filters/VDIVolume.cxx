@@ -37,6 +37,7 @@ std::shared_ptr<Volume> firstOfAll(vtkMultiProcessController* controller,
                                    const std::vector<std::shared_ptr<Volume>>& mine) {
   if (isAlone(controller)) return mine.empty() ? nullptr : mine.front();
   std::vector<unsigned long long> identities;
+  identities.reserve(mine.size());
   for (const std::shared_ptr<Volume>& volume : mine) identities.push_back(volume->identity());
   unsigned long long count = identities.size();
   controller->Broadcast(&count, 1, 0);
@@ -47,6 +48,7 @@ std::shared_ptr<Volume> firstOfAll(vtkMultiProcessController* controller,
     return std::ranges::find(mine, identity, [](const auto& volume) { return volume->identity(); });
   };
   std::vector<int> here;
+  here.reserve(count);
   for (const unsigned long long identity : identities) here.push_back(find(identity) != mine.end() ? 1 : 0);
   std::vector<int> everywhere(count);
   controller->AllReduce(here.data(), everywhere.data(), static_cast<vtkIdType>(count),
