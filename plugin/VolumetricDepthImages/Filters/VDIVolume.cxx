@@ -23,15 +23,6 @@ bool isAlone(vtkMultiProcessController* controller) {
   return controller == nullptr || controller->GetNumberOfProcesses() == 1;
 }
 
-/// Collective: a number that no other object of the first rank has had.
-std::uint64_t newIdentity(vtkMultiProcessController* controller) {
-  vtkTimeStamp now;
-  now.Modified();
-  unsigned long long identity = now.GetMTime();
-  if (!isAlone(controller)) controller->Broadcast(&identity, 1, 0);
-  return identity;
-}
-
 /// Collective: the first one of rank 0's that all ranks have among theirs; null if there is none.
 std::shared_ptr<Volume> firstOfAll(vtkMultiProcessController* controller,
                                    const std::vector<std::shared_ptr<Volume>>& mine) {
@@ -60,14 +51,18 @@ std::shared_ptr<Volume> firstOfAll(vtkMultiProcessController* controller,
 
 }  // namespace
 
+std::uint64_t newIdentity(vtkMultiProcessController* controller) {
+  vtkTimeStamp now;
+  now.Modified();
+  unsigned long long identity = now.GetMTime();
+  if (!isAlone(controller)) controller->Broadcast(&identity, 1, 0);
+  return identity;
+}
+
 Volume::Volume(vtkMultiProcessController* controller, std::uint64_t identity)
-    : controller_(controller), identity_(identity) {}
+    : controller_(controller), hasRanks_(!isAlone(controller)), identity_(identity) {}
 
 Volume::~Volume() = default;
-
-bool Volume::hasRanks() const {
-  return !isAlone(controller_);
-}
 
 bool Volume::isMade() const {
   const std::scoped_lock lock(mutex_);
@@ -115,7 +110,7 @@ bool Volume::isWantedBesides(const void* user) const {
 
 void Volume::make() {
   if (this->isMade()) return;
-  vdi::comm::Communicator comm = communicatorOf(controller_);
+  vdi::comm::Communicator comm = hasRanks_ ? communicatorOf(controller_) : vdi::comm::Communicator::serial();
   std::shared_ptr<vdi::gpu::Device> device;
   comm.together([&] { device = sharedDevice(comm.localRank()); });
   const vdi::GeneratorOptions options = vdi::generatorOptionsFromEnvironment(comm);

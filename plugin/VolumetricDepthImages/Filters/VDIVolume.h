@@ -4,7 +4,6 @@
 #ifndef VDIVolume_h
 #define VDIVolume_h
 
-#include <vtkSmartPointer.h>
 #include <vtkType.h>
 
 #include <condition_variable>
@@ -58,11 +57,15 @@ struct Shown {
   std::vector<double> values;  // some of theirs; the root's
 };
 
+/// Collective on the controller's ranks: a number that no other object of the first rank has had.
+std::uint64_t newIdentity(vtkMultiProcessController* controller);
+
 /// Users take turns (Turn): who makes a VDI has the generator alone. Functions say who may call them: the
 /// main thread, whoever has the turn, or any thread. Collective ones are so on the controller's ranks.
 class Volume {
  public:
-  /// `identity`: the same on all ranks, and no other volume's on any of them.
+  /// The controller lives as long as there are users; null: there is this rank alone. `identity` is of
+  /// newIdentity.
   Volume(vtkMultiProcessController* controller, std::uint64_t identity);
   ~Volume();  // with several ranks in the main thread alone: it frees a communicator
   Volume(const Volume&) = delete;
@@ -71,7 +74,8 @@ class Volume {
   Volume& operator=(Volume&&) = delete;
 
   vtkMultiProcessController* controller() const { return controller_; }
-  bool hasRanks() const;
+  /// Whether there are several.
+  bool hasRanks() const { return hasRanks_; }
   std::uint64_t identity() const { return identity_; }
 
   // Any thread.
@@ -111,7 +115,8 @@ class Volume {
  private:
   friend class Turn;
 
-  vtkSmartPointer<vtkMultiProcessController> controller_;
+  vtkMultiProcessController* controller_;
+  bool hasRanks_;
   std::uint64_t identity_;
   std::map<const void*, std::function<bool(const Origin&)>> users_;
   vdi::comm::Funnel funnel_;

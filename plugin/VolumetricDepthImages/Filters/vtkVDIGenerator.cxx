@@ -69,6 +69,7 @@ struct vtkVDIGenerator::Request {
 struct vtkVDIGenerator::Internals {
   std::shared_ptr<pv::Volumes> Volumes = pv::sharedVolumes();
   std::shared_ptr<pv::Volume> Volume;  // none until the first update; other filters may use it, too
+  std::uint64_t Identity = 0;          // of the filter, with its first volume: the same on all ranks
   /// Of the last VDI or picture. A preparation's thread writes these until it ends.
   std::vector<vdi::RankReport> Reports;
   std::string Device;
@@ -242,6 +243,7 @@ void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
   if (this->Controller == controller) return;
   this->DropPreparation();
   this->UseVolume(nullptr);
+  this->Internal->Identity = 0;
   this->Controller = controller;
   this->Modified();
 }
@@ -662,6 +664,7 @@ void vtkVDIGenerator::UseVolume(const std::shared_ptr<pv::Volume>& volume) {
 /// Takes the volume that shows this input to another filter, or one that can show it. Collective.
 void vtkVDIGenerator::ChooseVolume(const pv::Origin& origin) {
   Internals& internal = *this->Internal;
+  if (internal.Identity == 0) internal.Identity = pv::newIdentity(this->Controller);
   this->UseVolume(internal.Volumes->choose(this->Controller, origin, internal.Volume, this));
 }
 
@@ -718,16 +721,17 @@ vdi::Camera vtkVDIGenerator::Viewpoint(const vdi::Box& bounds) const {
   return camera;
 }
 
-/// Where ranks come with volumes that don't belong together, these are given up: new ones will.
+/// Where ranks come with filters that don't belong together, they give up their volumes and start anew.
 void vtkVDIGenerator::Enter() {
   Internals& internal = *this->Internal;
   const std::string name =
-      internal.Volume ? fmt::format("{:x}", internal.Volume->identity()) : std::string("a new one");
+      internal.Identity != 0 ? fmt::format("{:x}", internal.Identity) : std::string("a new one");
   try {
     pv::enterCollective(this->Controller, "VolumetricDepthImage, " + name);
   } catch (const vdi::Error&) {
     this->DropPreparation();
     this->UseVolume(nullptr);
+    internal.Identity = 0;
     throw;
   }
 }
