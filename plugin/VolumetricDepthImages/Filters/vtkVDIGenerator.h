@@ -7,6 +7,10 @@
  * on rank 0: a vtkImageData of Resolution with the picture seen from the camera, and the VDI in its field
  * data (VDIImageData.h has the arrays); empty on other ranks. Collective: all ranks of the controller update
  * together; when one fails, all return 0, and all try again when asked again.
+ *
+ * Filters of one process whose input, array, component and ghost layers are the same share the volume on the
+ * device, and the memory in which VDIs are made (VDIVolume.h). They make their VDIs one after the other: an
+ * update in place waits for what others prepare.
  */
 #ifndef vtkVDIGenerator_h
 #define vtkVDIGenerator_h
