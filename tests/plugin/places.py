@@ -76,10 +76,12 @@ def outline(source, image, view, camera):
         middle = shown_as(display, view, kind)
         check(np.linalg.norm(middle - CENTER) < 1, "Reset Camera looks at the scene with {}: {}".format(kind, middle))
     display.SetRepresentationType("Outline")
-    display.Position = [50, 0, 0]  # as the VDI, it stays
+    # As the VDI, it stays. ParaView 5.13 renamed Position.
+    place = "Translation" if "Translation" in display.ListProperties() else "Position"
+    setattr(display, place, [50, 0, 0])
     look(view, camera)
     seen = screenshot(view, "outline")
-    display.Position = [0, 0, 0]
+    setattr(display, place, [0, 0, 0])
     simple.Hide(image, view)
     own = simple.Show(source, view)
     own.SetRepresentationType("Outline")
