@@ -18,7 +18,7 @@ for file in usr/bin/{vdi,paraview.conf} usr/include/pv-vdi/vdi_catalyst.{h,f90} 
   "usr/bin/$(cat root/usr/bin/paraview.conf)"; do
   [ -e "root/$file" ] || { echo "FAILED: it has no $file"; exit 1; }
 done
-PYTHONPATH=root/usr/lib/python3/dist-packages "$python" -c "import pv_vdi.catalyst as c; c._load()" \
+PYTHONPATH=root/usr/lib/python3/dist-packages "$python" -B -c "import pv_vdi.catalyst as c; c._load()" \
   || { echo "FAILED: its Python package can't be imported"; exit 1; }
 if grep -rlF "$build" root; then
   echo "FAILED: the build folder's path is in these files"
