@@ -4,6 +4,7 @@
 #include <vtkCollection.h>
 #include <vtkLight.h>
 #include <vtkLightCollection.h>
+#include <vtkPVDataInformation.h>
 #include <vtkRenderer.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
@@ -15,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "plugin/VolumetricDepthImages/ParaViewVersions.h"
 #include "vdi/core/Blending.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
@@ -107,6 +109,20 @@ bool areDefault(const std::vector<vdi::Light>& lights) {
          });
 }
 
+/// What the scale and the origin of a cropped volume apply to (pv::cropsByExtent). ParaView says nothing
+/// useful of the extent of several data sets, so the box of those comes from their bounds in each version.
+vdi::Box wholeToCrop(vtkPVDataInformation* data) {
+  std::array<double, 6> b{};
+  data->GetBounds(b.data());
+  const bool hasExtent = data->DataSetTypeIsA("vtkImageData") || data->DataSetTypeIsA("vtkRectilinearGrid");
+  if (cropsByExtent && hasExtent) {
+    std::array<int, 6> extent{};
+    data->GetExtent(extent.data());
+    std::copy(extent.begin(), extent.end(), b.begin());
+  }
+  return {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
+}
+
 }  // namespace
 
 void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view) {
@@ -132,16 +148,18 @@ void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* vi
     vtkSMPropertyHelper(filter, "Ambient").Set(vtkSMPropertyHelper(shown, "Ambient").GetAsDouble());
 }
 
-void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& bounds) {
-  if (!isVolume(shown) || !isOn(shown, "UseCropping") || bounds.empty()) return;
+void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, vtkPVDataInformation* data) {
+  if (!isVolume(shown) || !isOn(shown, "UseCropping") || data == nullptr) return;
+  const vdi::Box whole = wholeToCrop(data);
+  if (whole.empty()) return;
   const vtkSMPropertyHelper origin(shown, "CroppingOrigin");
   const vtkSMPropertyHelper scale(shown, "CroppingScale");
   std::array<double, 6> box{};
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<unsigned int>(axis);
     const std::size_t place = 2 * static_cast<std::size_t>(axis);
-    box[place] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * bounds.lo[axis];
-    box[place + 1] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * bounds.hi[axis];
+    box[place] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * whole.lo[axis];
+    box[place + 1] = origin.GetAsDouble(i) + scale.GetAsDouble(i) * whole.hi[axis];
   }
   vtkSMPropertyHelper(filter, "Cropping").Set(1);
   vtkSMPropertyHelper(filter, "CroppingBox").Set(box.data(), 6);

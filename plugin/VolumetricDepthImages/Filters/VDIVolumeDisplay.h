@@ -4,9 +4,7 @@
 
 #include <string>
 
-namespace vdi {
-struct Box;
-}
+class vtkPVDataInformation;
 class vtkSMProxy;
 class vtkSMRenderViewProxy;
 
@@ -19,8 +17,9 @@ void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* vi
 /// Sets Lights of `filter` to the view's, unless these are the default ones and nothing is set.
 void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view);
 
-/// Sets Cropping and CroppingBox where `shown` is shown as a cropped volume of those bounds.
-void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& bounds);
+/// Sets Cropping and CroppingBox where `shown` is shown as a cropped volume: the box that ParaView draws.
+/// `data`: what is shown; null: nothing.
+void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, vtkPVDataInformation* data);
 
 /// Sets BlendMode and IsosurfaceValues of `filter` where `shown` is shown as a volume in a blend mode that it
 /// has.

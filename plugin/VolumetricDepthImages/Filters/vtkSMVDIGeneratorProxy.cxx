@@ -284,11 +284,9 @@ void vtkSMVDIGeneratorProxy::TakeArrayFromView() {
 }
 
 int vtkSMVDIGeneratorProxy::ComponentsOf(const std::string& name, int association) {
-  const vtkSMPropertyHelper input(this, "Input");
-  auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
-  if (source == nullptr) return 0;
-  vtkPVArrayInformation* array =
-      source->GetDataInformation(input.GetOutputPort())->GetArrayInformation(name.c_str(), association);
+  vtkPVDataInformation* data = this->InputInformation();
+  if (data == nullptr) return 0;
+  vtkPVArrayInformation* array = data->GetArrayInformation(name.c_str(), association);
   return array != nullptr ? array->GetNumberOfComponents() : 0;
 }
 
@@ -305,7 +303,7 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   if (view == nullptr) return;
   this->TakeUnitDistance();
   pv::takeShading(this, shown, view);
-  pv::takeCropping(this, shown, this->InputBounds());
+  pv::takeCropping(this, shown, this->InputInformation());
   pv::takeBlending(this, shown);
   if (const std::string issue = pv::blendModeIssue(shown); !issue.empty()) vtkWarningMacro(<< issue);
   if (isPlaced(view) && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
@@ -353,12 +351,17 @@ std::string vtkSMVDIGeneratorProxy::WhyNot(vtkSMViewProxy* view) {
   return {};
 }
 
-vdi::Box vtkSMVDIGeneratorProxy::InputBounds() {
+vtkPVDataInformation* vtkSMVDIGeneratorProxy::InputInformation() {
   const vtkSMPropertyHelper input(this, "Input");
   auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
-  if (source == nullptr) return {};
+  return source != nullptr ? source->GetDataInformation(input.GetOutputPort()) : nullptr;
+}
+
+vdi::Box vtkSMVDIGeneratorProxy::InputBounds() {
+  vtkPVDataInformation* data = this->InputInformation();
+  if (data == nullptr) return {};
   double b[6];
-  source->GetDataInformation(input.GetOutputPort())->GetBounds(b);
+  data->GetBounds(b);
   return {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
 }
 

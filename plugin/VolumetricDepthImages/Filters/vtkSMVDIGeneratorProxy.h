@@ -35,6 +35,7 @@ namespace vdi {
 struct Box;
 struct VdiEstimate;
 }  // namespace vdi
+class vtkPVDataInformation;
 class vtkSMRenderViewProxy;
 class vtkSMViewProxy;
 
@@ -100,6 +101,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkSMViewProxy* ActiveView();
   /// The active view, if it's one to take from; null otherwise.
   vtkSMRenderViewProxy* ViewToTakeFrom();
+  /// Null: there is no input.
+  vtkPVDataInformation* InputInformation();
   vdi::Box InputBounds();
   /// How the view shows the input; null if it never has.
   vtkSMProxy* RepresentationIn(vtkSMViewProxy* view);
