@@ -221,6 +221,12 @@ class Window:
         self.session = Session()
         environment = dict(self.session.environment, HOME=home, QT_LINUX_ACCESSIBILITY_ALWAYS_ON="1", LC_ALL="C.UTF-8")
         environment.pop("PV_PLUGIN_CONFIG_FILE", None)  # ParaView loads at once what is named there
+        if sys.version_info >= (3, 13):
+            # With that Python, Debian's ParaView 5.13 ends with a fault where its Script Editor finds pygments, but not the
+            # formatter of its own that isn't a part of it.
+            with open(os.path.join(home, "pygments.py"), "w") as file:
+                file.write("raise ImportError\n")
+            environment["PYTHONPATH"] = home
         self.log = open(os.path.join(self.output, "paraview.log"), "w+")
         self.process = subprocess.Popen(["paraview", "--disable-registry", *self.arguments], env=environment,
                                         cwd=self.folder, stdout=self.log, stderr=subprocess.STDOUT)
@@ -384,8 +390,9 @@ class Window:
     def edit_colors(self):
         """Opens the editor of the VDI's colour map; the point of the screen where the last one of the opacity is."""
         self.click("Edit Color Map and Opacity")
-        left, top, width, _ = self.find(COLOR_EDITOR, "dialog").box
-        return left + width - 56, top + 199
+        button = self.find("Rescale to data range", within=self.find(COLOR_EDITOR, "dialog"))  # it's left of that
+        left, top, _, _ = button.box
+        return left - 7, top + 8
 
     def is_making(self, panel):
         """Whether the panel says that the VDI is made anew. Looked for there alone: a small one is soon made."""
@@ -485,7 +492,7 @@ class Window:
                 continue
 
             def is_loaded():
-                texts = list(self.widgets(self.find(side, "panel")))
+                texts = list(self.widgets(self.find(side, "panel"), hidden=True))  # the list may have to be scrolled
                 rows = {widget.box[1] for widget in texts if widget.name == name}
                 return any(widget.name == "Loaded" and widget.box[1] in rows for widget in texts)
 
