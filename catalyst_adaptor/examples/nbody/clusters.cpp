@@ -1,0 +1,152 @@
+// Two star clusters that fall into each other: gravity summed directly over all pairs.
+//
+//     mpirun -n 4 clusters [vdi.json]
+//
+// Writes clusters.raw, the last positions. Without vdi.json nothing is drawn, and the result is the
+// same, bit by bit. The adaptor takes values on lattices and no particles, so this program spreads
+// the stars' mass over cells itself (cloud in cell), each rank over a slab of its own that has
+// nothing to do with the stars it moves.
+#include <mpi.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace {
+
+constexpr int stars = 600;
+constexpr int steps = 60;
+constexpr int cells = 32;  // of the lattice, per axis
+constexpr double size = 4.0;
+constexpr double spacing = size / cells;
+constexpr double timeStep = 0.02;
+constexpr double mass = 1.0 / stars;
+
+using Vector = std::array<double, 3>;
+
+/// From -1 to 1, the same numbers on all ranks and all machines.
+double random() {
+  static std::uint64_t state = 1;
+  state = state * 6364136223846793005U + 1442695040888963407U;
+  return static_cast<double>(state >> 11U) / static_cast<double>(1ULL << 52U) - 1.0;
+}
+
+void place(std::vector<Vector>& positions, std::vector<Vector>& velocities) {
+  for (int star = 0; star < stars; ++star) {
+    const double side = star < stars / 2 ? -1.0 : 1.0;
+    Vector p{};
+    do {
+      for (double& x : p) x = random();
+    } while (p[0] * p[0] + p[1] * p[1] + p[2] * p[2] > 1.0);
+    const double radius = 0.35 * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) + 0.1;
+    positions.push_back({side * 0.8 + radius * p[0], side * 0.2 + radius * p[1], radius * p[2]});
+    velocities.push_back({-side * 0.4 - 0.8 * p[1], 0.8 * p[0], side * 0.1});
+  }
+}
+
+/// In the stars' order, whichever rank sums, so that the last bits are the same on any number of
+/// ranks.
+Vector acceleration(const std::vector<Vector>& positions, const Vector& at) {
+  Vector sum{};
+  for (const Vector& other : positions) {
+    const Vector d{other[0] - at[0], other[1] - at[1], other[2] - at[2]};
+    const double square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + 0.05 * 0.05;
+    const double factor = mass / (square * std::sqrt(square));
+    for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += factor * d[axis];
+  }
+  return sum;
+}
+
+/// The mass per volume in layers [first, last) of the lattice. All stars are known here. A code
+/// whose ranks know only their own adds the others' shares: MPI_Reduce_scatter of the lattice, or
+/// messages.
+void deposit(const std::vector<Vector>& positions, int first, int last, std::vector<double>& density) {
+  density.assign(static_cast<std::size_t>(cells) * cells * static_cast<std::size_t>(last - first), 0.0);
+  for (const Vector& position : positions) {
+    std::array<int, 3> cell{};
+    Vector share{};  // of the cell above
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double at = (position[axis] + size / 2) / spacing - 0.5;
+      cell[axis] = static_cast<int>(std::floor(at));
+      share[axis] = at - cell[axis];
+    }
+    for (int corner = 0; corner < 8; ++corner) {
+      const std::array<int, 3> up{corner & 1, corner >> 1 & 1, corner >> 2};
+      double weight = mass / (spacing * spacing * spacing);
+      for (std::size_t axis = 0; axis < 3; ++axis) weight *= up[axis] != 0 ? share[axis] : 1.0 - share[axis];
+      const int x = cell[0] + up[0];
+      const int y = cell[1] + up[1];
+      const int z = cell[2] + up[2];
+      if (x < 0 || x >= cells || y < 0 || y >= cells || z < first || z >= last) continue;
+      density[static_cast<std::size_t>(((z - first) * cells + y) * cells + x)] += weight;
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  MPI_Init(&argc, &argv);
+  int rank = 0;
+  int ranks = 1;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  std::vector<int> counts;  // numbers of each rank: 3 a star
+  std::vector<int> starts;
+  for (int i = 0; i < ranks; ++i) {
+    starts.push_back(3 * (stars * i / ranks));
+    counts.push_back(3 * (stars * (i + 1) / ranks) - starts.back());
+  }
+  std::vector<Vector> positions;
+  std::vector<Vector> velocities;
+  place(positions, velocities);
+
+  vdi_catalyst* vdi = nullptr;
+  int code = VDI_CATALYST_OK;
+  const int first = cells * rank / ranks;
+  const int last = cells * (rank + 1) / ranks;
+  if (argc > 1) {
+    code = vdi_catalyst_initialize_json(MPI_Comm_c2f(MPI_COMM_WORLD), argv[1], &vdi);
+    const vdi_catalyst_block block = {{cells, cells, last - first},
+                                      {0, 0, 0},
+                                      {0, 0, 0},
+                                      {-size / 2, -size / 2, -size / 2 + first * spacing},
+                                      {spacing, spacing, spacing}};
+    if (code == VDI_CATALYST_OK) code = vdi_catalyst_set_blocks(vdi, 1, &block);
+  }
+  std::vector<double> density;
+  const auto own = static_cast<std::size_t>(rank);
+  for (int step = 1; step <= steps; ++step) {
+    for (int i = starts[own] / 3; i < (starts[own] + counts[own]) / 3; ++i) {
+      const auto star = static_cast<std::size_t>(i);
+      const Vector pull = acceleration(positions, positions[star]);
+      for (std::size_t axis = 0; axis < 3; ++axis) velocities[star][axis] += timeStep * pull[axis];
+    }
+    for (int i = starts[own] / 3; i < (starts[own] + counts[own]) / 3; ++i) {
+      const auto star = static_cast<std::size_t>(i);
+      for (std::size_t axis = 0; axis < 3; ++axis) positions[star][axis] += timeStep * velocities[star][axis];
+    }
+    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DOUBLE, positions.data(), counts.data(), starts.data(), MPI_DOUBLE,
+                   MPI_COMM_WORLD);
+    // Steps without a frame don't pay for the lattice.
+    if (vdi == nullptr || code != VDI_CATALYST_OK || vdi_catalyst_wants(vdi, step, step * timeStep) == 0)
+      continue;
+    deposit(positions, first, last, density);
+    const void* values = density.data();
+    code = vdi_catalyst_set_array(vdi, "density", VDI_CATALYST_F64, VDI_CATALYST_CELLS, &values);
+    if (code == VDI_CATALYST_OK) code = vdi_catalyst_execute(vdi, step, step * timeStep);
+  }
+  if (vdi != nullptr) vdi_catalyst_finalize(vdi);
+
+  MPI_File file = MPI_FILE_NULL;
+  MPI_File_open(MPI_COMM_WORLD, "clusters.raw", MPI_MODE_CREATE | MPI_MODE_WRONLY, MPI_INFO_NULL, &file);
+  MPI_File_write_at_all(file, starts[own] * static_cast<MPI_Offset>(sizeof(double)),
+                        positions[static_cast<std::size_t>(starts[own] / 3)].data(), counts[own], MPI_DOUBLE,
+                        MPI_STATUS_IGNORE);
+  MPI_File_close(&file);
+  MPI_Finalize();
+  return code == VDI_CATALYST_OK ? 0 : 3;
+}
