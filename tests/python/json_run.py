@@ -36,6 +36,8 @@ with Catalyst(MPI.COMM_WORLD, json=run) as catalyst:
     catalyst.set_blocks([Block(cells=(N, N, N), spacing=(1 / N,) * 3)])
     values = np.zeros((N, N, N))
     catalyst.set_array("V", [values])
+    catalyst.set_array("cell", [np.arange(N ** 3).reshape(N, N, N)])  # of int64
+    catalyst.set_array("unsigned", [np.zeros((N, N, N), np.uint64)])
     for step in range(21):
         values[...] = np.sin(5 * x)[:, None, None] * np.cos(4 * x)[None, :, None] * (x + 0.01 * step)
         assert catalyst.wants(step) == (step % 10 == 0), step

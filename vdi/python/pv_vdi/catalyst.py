@@ -28,7 +28,8 @@ __all__ = ["Block", "Catalyst", "CatalystError"]
 BAD_ARGUMENT, ENGINE, SCRIPT = 1, 2, 3  # CatalystError.code
 
 _TYPES = {np.dtype(name): number
-          for number, name in enumerate(["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"])}
+          for number, name in enumerate(["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64", "int64",
+                                         "uint64"])}
 _POINTS, _CELLS = 0, 1
 
 
