@@ -113,9 +113,13 @@ contains
   pure function noise(x, y, z) result(value)
     integer, intent(in) :: x, y, z
     real(c_double) :: value
-    integer :: hashed
-    hashed = modulo(x * 31 + y * 577 + z * 2791, 443)**2
-    value = 1.0d-4 * (modulo(7919 * hashed, 2001) - 1000)
+    integer(c_int64_t) :: hash
+    integer :: round
+    hash = x + n * (y + n * z)
+    do round = 1, 4
+      hash = modulo(hash * hash + 12345, 2147483647_c_int64_t)
+    end do
+    value = 0.2d0 * hash / 2147483647 - 0.1d0
   end function
 
   subroutine write_result()

@@ -81,7 +81,8 @@ void deposit(const std::vector<Vector>& positions, int first, int last, std::vec
       const int y = cell[1] + up[1];
       const int z = cell[2] + up[2];
       if (x < 0 || x >= cells || y < 0 || y >= cells || z < first || z >= last) continue;
-      density[static_cast<std::size_t>(((z - first) * cells + y) * cells + x)] += weight;
+      const int index = ((z - first) * cells + y) * cells + x;
+      density[static_cast<std::size_t>(index)] += weight;
     }
   }
 }

@@ -1,6 +1,6 @@
 /* A drop that a vortex carries around, on p4est's octree with a value per leaf, finer in the drop.
  *
- *     mpirun -n 4 tracer [vdi.json]
+ *     mpirun -n 4 tracer LEVELS [vdi.json]   the finest leaves are 1 / 2^LEVELS wide, say 5
  *
  * Writes tracer.raw, the amounts of the last leaves in p4est's order. Without vdi.json nothing is
  * drawn, and the result is the same, bit by bit. Amounts are whole numbers of tiny portions, so none
@@ -10,15 +10,17 @@
 #include <p8est_extended.h>
 #include <p8est_ghost.h>
 #include <p8est_iterate.h>
+#include <stdlib.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
 
-enum { STEPS = 40, COARSEST = 3, FINEST = 5, ADAPT = 4 };
+enum { STEPS = 40, COARSEST = 2, ADAPT = 4 };
 
 typedef struct {
   int64_t amount, change;
 } Leaf;
 
+static int finest;
 static const double portion = 1e-15, time_step = 1.0 / 128;
 
 static double edge(const p8est_quadrant_t* q) {
@@ -66,7 +68,7 @@ static int are_empty(p8est_t* forest, p4est_topidx_t tree, p8est_quadrant_t* q[]
 }
 
 static void adapt(p8est_t* forest) {
-  p8est_refine_ext(forest, 0, FINEST, is_full, NULL, pass_on);
+  p8est_refine_ext(forest, 0, finest, is_full, NULL, pass_on);
   p8est_coarsen_ext(forest, 0, 0, are_empty, NULL, pass_on);
   p8est_balance_ext(forest, P8EST_CONNECT_FULL, NULL, pass_on);
   p8est_partition(forest, 1,
@@ -83,7 +85,7 @@ static void flow(p8est_iter_face_info_t* info, void* ghosts) {
     int own[2], lower = 0;
     for (int s = 0; s < 2; ++s) {
       const p8est_iter_face_side_t* side = &sides[s];
-      const int hangs = side->is_hanging;
+      const int hangs = side->is_hanging != 0;
       q[s] = hangs ? side->is.hanging.quad[i] : side->is.full.quad;
       own[s] = !(hangs ? side->is.hanging.is_ghost[i] : side->is.full.is_ghost);
       const p4est_locidx_t id = hangs ? side->is.hanging.quadid[i] : side->is.full.quadid;
@@ -166,12 +168,13 @@ int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
   sc_init(MPI_COMM_WORLD, 0, 0, NULL, SC_LP_ERROR);
   p4est_init(NULL, SC_LP_ERROR);
+  finest = argc > 1 ? atoi(argv[1]) : 5;
   p8est_connectivity_t* cube = p8est_connectivity_new_unitcube();
-  p8est_t* forest = p8est_new_ext(MPI_COMM_WORLD, cube, 0, FINEST, 1, sizeof(Leaf), fill, NULL);
+  p8est_t* forest = p8est_new_ext(MPI_COMM_WORLD, cube, 0, finest, 1, sizeof(Leaf), fill, NULL);
   adapt(forest);
   vdi_catalyst* vdi = NULL;
   int code = 0;
-  if (argc > 1) code = vdi_catalyst_initialize_json(MPI_Comm_c2f(MPI_COMM_WORLD), argv[1], &vdi);
+  if (argc > 2) code = vdi_catalyst_initialize_json(MPI_Comm_c2f(MPI_COMM_WORLD), argv[2], &vdi);
   for (int step = 1; step <= STEPS; ++step) {
     if (step % ADAPT == 0) adapt(forest);
     advance(forest);

@@ -12,21 +12,21 @@
 
 #include "catalyst_adaptor/vdi_catalyst.h"
 
-enum { STEPS = 400 };
+enum { STEPS = 600 };
 
 typedef struct {
   PetscScalar u, v;
 } Cell;
 
-static const double spacing = 0.5, time_step = 0.015;
+static const double spacing = 0.8, time_step = 0.02;
 
 static void start(const DMDALocalInfo* box, Cell*** next) {
   for (int z = box->zs; z < box->zs + box->zm; ++z) {
     for (int y = box->ys; y < box->ys + box->ym; ++y) {
       for (int x = box->xs; x < box->xs + box->xm; ++x) {
-        /* A front that ends within the medium and curls there; behind it the medium recovers. */
-        next[z][y][x].u = 2 * x < box->mx && 4 * y + z > 2 * box->my ? 1.0 : 0.0;
-        next[z][y][x].v = 4 * x < box->mx ? 0.5 : 0.0;
+        /* Excited on one side and tired below: the front's edge curls. It is askew: the scroll bends. */
+        next[z][y][x].u = 4 * x + z < 3 * box->mx - box->mx / 2 ? 1.0 : 0.0;
+        next[z][y][x].v = 2 * y < box->my ? 0.4 : 0.0;
       }
     }
   }
