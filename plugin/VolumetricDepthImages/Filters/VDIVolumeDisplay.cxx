@@ -114,8 +114,7 @@ bool areDefault(const std::vector<vdi::Light>& lights) {
 vdi::Box wholeToCrop(vtkPVDataInformation* data) {
   std::array<double, 6> b{};
   data->GetBounds(b.data());
-  const bool hasExtent = data->DataSetTypeIsA("vtkImageData") || data->DataSetTypeIsA("vtkRectilinearGrid");
-  if (cropsByExtent && hasExtent) {
+  if (cropsByExtent && (data->DataSetTypeIsA("vtkImageData") || data->DataSetTypeIsA("vtkRectilinearGrid"))) {
     std::array<int, 6> extent{};
     data->GetExtent(extent.data());
     std::copy(extent.begin(), extent.end(), b.begin());
