@@ -69,18 +69,13 @@ function outlineEnds(bounds, camera, inFront) {
 /** @typedef {{vdi: PreparedVdi, textures: (WebGLTexture | null)[], uploads: (() => void)[]}} Loaded */
 
 /**
- * A VDI's textures, and the uploads that complete them. There are none while the context is lost.
+ * Textures of arrays, with as many words per element as stated, and the uploads that complete them.
+ * Throws Error if the GPU can't hold all of them.
  * @param {WebGL2RenderingContext} gl
- * @param {PreparedVdi} vdi
- * @returns {Loaded}
+ * @param {[Uint32Array, 1 | 2 | 4][]} arrays
  */
-function texturesOf(gl, vdi) {
-  if (gl.isContextLost()) return {vdi, textures: [], uploads: []};
+function makeTextures(gl, arrays) {
   const tiling = tilingOf(gl);
-  const {heads, tiles} = vdi.leaning ?? vdi;
-  /** @type {[Uint32Array, 1 | 2 | 4][]} */
-  const arrays = [[heads, 4], [vdi.segments, vdi.compact ? 2 : 4], [tiles, 2]];
-  if (vdi.leaning) arrays.push([vdi.leaning.slopes, 1]);
   /** @type {ReturnType<typeof makeArrayTexture>[]} */
   const made = [];
   try {
@@ -89,7 +84,22 @@ function texturesOf(gl, vdi) {
     for (const {texture} of made) gl.deleteTexture(texture);
     throw error;
   }
-  return {vdi, textures: made.map(({texture}) => texture), uploads: made.flatMap(({uploads}) => uploads)};
+  return {textures: made.map(({texture}) => texture), uploads: made.flatMap(({uploads}) => uploads)};
+}
+
+/**
+ * A VDI's textures, and the uploads that complete them. There are none while the context is lost.
+ * @param {WebGL2RenderingContext} gl
+ * @param {PreparedVdi} vdi
+ * @returns {Loaded}
+ */
+function texturesOf(gl, vdi) {
+  if (gl.isContextLost()) return {vdi, textures: [], uploads: []};
+  const {heads, tiles} = vdi.leaning ?? vdi;
+  /** @type {[Uint32Array, 1 | 2 | 4][]} */
+  const arrays = [[heads, 4], [vdi.segments, vdi.compact ? 2 : 4], [tiles, 2]];
+  if (vdi.leaning) arrays.push([vdi.leaning.slopes, 1]);
+  return {vdi, ...makeTextures(gl, arrays)};
 }
 
 /**
@@ -196,24 +206,13 @@ export class Renderer {
     const leaning = loaded?.vdi.leaning;
     if (!loaded || !leaning || gl.isContextLost() || loaded.textures.length > 3) return;
     this.programOf(loaded.vdi, true);
-    const tiling = tilingOf(gl);
-    /** @type {[Uint32Array, 1 | 2 | 4][]} */
-    const arrays = [[leaning.heads, 4], [leaning.tiles, 2], [leaning.slopes, 1]];
-    /** @type {ReturnType<typeof makeArrayTexture>[]} */
-    const made = [];
-    const drop = () => made.forEach(({texture}) => gl.deleteTexture(texture));
-    try {
-      for (const [words, perElement] of arrays) made.push(makeArrayTexture(gl, words, perElement, tiling));
-    } catch (error) {
-      drop();
-      throw error;
-    }
-    for (const upload of made.flatMap(({uploads}) => uploads)) {
+    const {textures, uploads} = makeTextures(gl, [[leaning.heads, 4], [leaning.tiles, 2], [leaning.slopes, 1]]);
+    for (const upload of uploads) {
       upload();
       await pause();
-      if (age !== this.age || loaded !== this.loaded) return drop();
+      if (age !== this.age || loaded !== this.loaded) return textures.forEach((texture) => gl.deleteTexture(texture));
     }
-    const [heads, tiles, slopes] = made.map(({texture}) => texture);
+    const [heads, tiles, slopes] = textures;
     const [oldHeads, segments, oldTiles] = loaded.textures;
     loaded.textures = [heads, segments, tiles, slopes];
     for (const texture of [oldHeads, oldTiles]) gl.deleteTexture(texture);

@@ -13,15 +13,6 @@ from pvtest import *  # noqa: E402,F403
 CAMERAS = [[140, 45, 75], [60, 120, -90], [-20, 30, 150]]
 ARRAYS = ["VDI.codes", "VDI.offsets", "VDI.parameters"]
 
-STEPS = """
-executive, info = self.GetExecutive(), self.GetOutputInformation(0)
-info.Remove(executive.TIME_STEPS())
-for step in range(3):
-    info.Append(executive.TIME_STEPS(), float(step))
-info.Remove(executive.TIME_RANGE())
-info.Append(executive.TIME_RANGE(), 0.0)
-info.Append(executive.TIME_RANGE(), 2.0)
-"""
 # Two arrays, the first of which changes with time.
 VALUES = """
 from numpy import sqrt

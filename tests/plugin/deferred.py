@@ -4,7 +4,7 @@ blocks included; everybody else gets the one that was asked for. On any number o
 import time
 
 import numpy as np
-from pvtest import check, finish, set_colors, simple
+from pvtest import STEPS, check, finish, set_colors, simple
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 
@@ -45,15 +45,6 @@ def release_and_render(image, view):
     simple.Render(view)
 
 
-STEPS = """
-executive, info = self.GetExecutive(), self.GetOutputInformation(0)
-info.Remove(executive.TIME_STEPS())
-for step in range(3):
-    info.Append(executive.TIME_STEPS(), float(step))
-info.Remove(executive.TIME_RANGE())
-info.Append(executive.TIME_RANGE(), 0.0)
-info.Append(executive.TIME_RANGE(), 2.0)
-"""
 SCALED = """
 time = self.GetOutputInformation(0).Get(self.GetExecutive().UPDATE_TIME_STEP())
 output.PointData.append(inputs[0].PointData["RTData"] * (1.0 - 0.3 * time), "RTData")

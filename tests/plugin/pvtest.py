@@ -58,6 +58,17 @@ for number, image in enumerate(blocks):
     output.SetBlock(number, image)
 """
 
+# A ProgrammableFilter's RequestInformationScript: the time steps 0, 1 and 2.
+STEPS = """
+executive, info = self.GetExecutive(), self.GetOutputInformation(0)
+info.Remove(executive.TIME_STEPS())
+for step in range(3):
+    info.Append(executive.TIME_STEPS(), float(step))
+info.Remove(executive.TIME_RANGE())
+info.Append(executive.TIME_RANGE(), 0.0)
+info.Append(executive.TIME_RANGE(), 2.0)
+"""
+
 
 def vdi_in_page(page, path):
     """The .vdi file that is inside a page (docs/adr/the-page-is-one-file.md), written to `path`."""
