@@ -42,8 +42,8 @@ struct Shading {
 /// A difference between two values below this share of them counts as rounding.
 inline constexpr double leastGradient = 1e-6;
 
-/// If shading is on, throws Error{InvalidArgument} for lights that are not valid. The table of settings checks
-/// the rest.
+/// If shading is on, throws Error{InvalidArgument} for lights that are not valid. The table of settings
+/// checks the rest.
 void validate(const Shading& shading);
 
 /// Unit vector in world space; zero for a light at the eye.
