@@ -17,8 +17,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Across a VDI with few lists. Rough pictures on a CPU are hardly larger. The second is for views from
-/// nearer, which show a part of the lists alone.
+/// Lists across a thinned VDI. Rough pictures on a CPU are hardly larger. The second level serves views from
+/// nearer, which show only some of the lists.
 constexpr std::array<int, VDIBuffers::thinLevels> thinWidths{160, 320};
 
 }  // namespace
@@ -36,10 +36,11 @@ void VDIBuffers::clear() {
   renderers_ = std::make_shared<Renderers>();
   hasVdi_ = false;
   isEmpty_ = false;
+  ++version_;
 }
 
 void VDIBuffers::load(vtkDataObject* piece) {
-  // What makes the piece fills the same object again with the next VDI, but not its arrays.
+  // The next VDI comes in the same data object, but in other arrays.
   waiting_ = vtkSmartPointer<vtkFieldData>::New();
   waiting_->ShallowCopy(piece->GetFieldData());
   if (!job_.valid()) this->startNext();
@@ -80,7 +81,7 @@ VDIBuffers::Loaded VDIBuffers::loaded(vtkFieldData* fields, Renderers& renderers
   return result;
 }
 
-/// None where the whole VDI has hardly more.
+/// Loads a VDI of about `width` lists in a row; returns no lists if the whole VDI has hardly more.
 VDIBuffers::Thin VDIBuffers::loadThin(const vdi::Vdi& vdi, int width,
                                       std::unique_ptr<vdi::VdiRenderer>& renderer) {
   const int factor = vdi.width / width;
@@ -93,6 +94,7 @@ VDIBuffers::Thin VDIBuffers::loadThin(const vdi::Vdi& vdi, int width,
 
 void VDIBuffers::takeOne() {
   still_.drop();
+  ++version_;
   isEmpty_ = false;
   try {
     const Loaded result = job_.get();
@@ -137,7 +139,7 @@ bool VDIBuffers::take(Clock::duration wait) {
     try {
       this->takeOne();
     } catch (...) {
-      if (isNewest) throw;  // nobody asks for that one any more
+      if (isNewest) throw;  // a newer piece makes up for an older one's fault
     }
     hasTaken = true;
   }

@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <future>
 #include <memory>
 #include <optional>
@@ -20,11 +21,11 @@ class vtkFieldData;
 
 namespace pv {
 
-/// Of one thread, that of the views; makes others to load.
+/// Belongs to the views' thread and starts others that load.
 class VDIBuffers {
  public:
   VDIBuffers() = default;
-  ~VDIBuffers();  // waits for what is being loaded, as clear does
+  ~VDIBuffers();  // waits for a load that is under way, as clear does
   VDIBuffers(const VDIBuffers&) = delete;
   VDIBuffers& operator=(const VDIBuffers&) = delete;
   VDIBuffers(VDIBuffers&&) = delete;
@@ -33,37 +34,41 @@ class VDIBuffers {
   /// Starts to load the VDI of a piece (VDIPiece.h). While an earlier one is being loaded the piece waits, in
   /// the place of one that waits already.
   void load(vtkDataObject* piece);
-  /// Shows what has been loaded since, and starts what waits; returns whether there was anything. Waits for
-  /// the newest piece as long as that; beyond, the last one is shown. Throws vdi::Error for a VDI that isn't
-  /// sound, for a problem, and where the device doesn't do it; then nothing is shown.
+  /// Shows the newest VDI that has been loaded, starts to load a piece that waits, and returns whether the
+  /// VDI changed. Waits at most `wait` for the newest piece, then goes on showing the last one. Throws
+  /// vdi::Error for a VDI that isn't sound, for a piece with a problem, and for a device that fails; then
+  /// nothing is shown.
   bool take(std::chrono::steady_clock::duration wait);
-  /// Whether something newer than what is shown is on its way, and whether `take` would show it at once.
+  /// Whether a newer VDI than the one shown is being loaded, and whether `take` would show it at once.
   bool isLoading() const { return job_.valid(); }
   bool hasLoaded() const;
   /// Shows nothing and gives the device back.
   void clear();
 
   bool hasVdi() const { return hasVdi_; }
-  /// There's a VDI that shows nothing, in place of one.
+  /// Whether the VDI that has come has no supersegments. Then hasVdi is false.
   bool isEmpty() const { return isEmpty_; }
+  /// Counts the changes of what is shown.
+  std::uint64_t version() const { return version_; }
   /// World bounds as VTK has them.
   const std::array<double, 6>& bounds() const { return bounds_; }
-  /// Of all lists, where there's a VDI.
+  /// V_O, where there is a VDI.
   const std::optional<vdi::View>& viewpoint() const { return viewpoint_; }
-  /// There's a VDI.
+  /// The renderer of all lists. There must be a VDI.
   vdi::VdiRenderer& renderer() { return *renderers_->whole; }
-  /// The same VDI with fewer lists, for rough pictures, and how many of them there are and in a row. Levels
-  /// are from few to more. No lists: there's no such level, for the device is no CPU, or the VDI has hardly
-  /// more lists itself.
+  /// The same VDI with fewer lists, for rough pictures: their number, in all and as a share of a row. Later
+  /// levels have more lists. A level without lists doesn't exist: the device is no CPU, or the VDI itself has
+  /// hardly more.
   static constexpr std::size_t thinLevels = 2;
   struct Thin {
     std::size_t lists = 0;
-    double share = 1.0;  // of the lists in a row
+    double share = 1.0;
   };
   const Thin& thin(std::size_t level) const { return thins_.at(level); }
   vdi::VdiRenderer& thinRenderer(std::size_t level) { return *renderers_->thins.at(level); }
   bool isOnCpu() const { return renderers_->isOnCpu; }
-  /// The picture of that VDI that is made beside the frames: goes with the VDI. Who renders drops it first.
+  /// The picture that is made beside the frames. It goes with the VDI. Before the views' thread renders, it
+  /// must drop the picture.
   VDIStill& still() { return still_; }
 
  private:
@@ -78,7 +83,7 @@ class VDIBuffers {
     std::array<double, 6> bounds{};
     std::optional<vdi::View> viewpoint;
     std::array<Thin, thinLevels> thins{};
-    std::optional<vdi::Vdi> tooLarge;  // for a second buffer
+    std::optional<vdi::Vdi> tooLarge;  // the device has no memory for a second buffer
   };
   static Loaded loaded(vtkFieldData* fields, Renderers& renderers);
   static Thin loadThin(const vdi::Vdi& vdi, int width, std::unique_ptr<vdi::VdiRenderer>& renderer);
@@ -88,13 +93,14 @@ class VDIBuffers {
   std::shared_ptr<Renderers> renderers_ = std::make_shared<Renderers>();
   bool hasVdi_ = false;
   bool isEmpty_ = false;
+  std::uint64_t version_ = 0;
   std::array<double, 6> bounds_{};
   std::optional<vdi::View> viewpoint_;
   std::array<Thin, thinLevels> thins_{};
   std::future<Loaded> job_;
-  vtkSmartPointer<vtkFieldData> loading_;  // the job's; goes on this thread
+  vtkSmartPointer<vtkFieldData> loading_;  // read by the job, released on this thread
   vtkSmartPointer<vtkFieldData> waiting_;
-  VDIStill still_;  // behind the renderers that it uses
+  VDIStill still_;  // declared after the renderers that it uses, so that it is destroyed before them
 };
 
 }  // namespace pv

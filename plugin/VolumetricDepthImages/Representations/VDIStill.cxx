@@ -16,12 +16,12 @@ double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// What a thread that wants to use the renderer may wait for.
+/// Longest wait of a thread that wants the renderer.
 constexpr double stripSeconds = 0.03;
-/// How long a picture leaves the processor to others, and how often it looks whether that's over.
+/// Length of a pause, and time between two looks whether the pause is over.
 constexpr std::chrono::milliseconds restTime{500};
 constexpr std::chrono::milliseconds restStep{5};
-/// Of rows: the renderer takes tiles of so many.
+/// Rows of the renderer's tiles.
 constexpr int tileRows = 8;
 
 }  // namespace
@@ -35,7 +35,7 @@ void VDIStill::start(vdi::VdiRenderer& renderer, StillView view) {
 }
 
 void VDIStill::make(vdi::VdiRenderer& renderer) {
-  Clock::time_point start = Clock::now();  // as if it hadn't rested
+  Clock::time_point start = Clock::now();  // moved on by each pause
   const auto width = static_cast<std::size_t>(view_.size.x);
   const bool hasObjects = std::any_of(view_.window.begin(), view_.window.end(), isObject);
   std::vector<float> ends(hasObjects ? view_.window.size() : 0);
@@ -59,7 +59,7 @@ void VDIStill::make(vdi::VdiRenderer& renderer) {
                                                        vdi::Alpha::Premultiplied, view_.reconstruction);
     std::copy(strip.rgba.begin(), strip.rgba.end(), pixels_.begin() + static_cast<std::ptrdiff_t>(first));
     row += rows;
-    // The next rows may take longer than these, as where the picture's bottom shows nothing.
+    // The next rows may take longer than these: the picture's bottom may show nothing.
     const double fitting = stripSeconds / std::max(secondsSince(stripStart), 1e-4) * rows;
     const double most = 2.0 * std::max(rows, tileRows);
     rows = static_cast<int>(std::clamp(fitting, 1.0 * tileRows, most)) / tileRows * tileRows;

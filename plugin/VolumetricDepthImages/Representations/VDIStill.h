@@ -1,4 +1,4 @@
-// The picture of a VDI in full, made beside the window's thread.
+// A full picture of a VDI, made beside the views' thread.
 #ifndef VDIStill_h
 #define VDIStill_h
 
@@ -14,7 +14,7 @@
 
 namespace pv {
 
-/// What a picture is of.
+/// All that a full picture of a VDI depends on, besides the VDI.
 struct StillView {
   ViewMatrices matrices;
   glm::ivec2 size;
@@ -24,8 +24,8 @@ struct StillView {
   bool operator==(const StillView&) const = default;
 };
 
-/// A picture that is made row by row on a thread: `drop` waits for a few rows at most. Of one thread, that of
-/// the views. The renderer is the picture's as long as it's being made.
+/// A picture that a thread makes row by row, so that `drop` waits for a few rows at most. The views' thread
+/// makes all calls. While the picture is being made, nothing else may use its renderer.
 class VDIStill {
  public:
   VDIStill() = default;
@@ -35,19 +35,19 @@ class VDIStill {
   VDIStill(VDIStill&&) = delete;
   VDIStill& operator=(VDIStill&&) = delete;
 
-  /// Starts to make it, in place of any other. `renderer` has a VDI, and lives until `drop`.
+  /// Drops the picture and starts another. `renderer` has a VDI and lives until `drop`.
   void start(vdi::VdiRenderer& renderer, StillView view);
-  /// Whether it's the one of this view, done or not.
+  /// Whether the picture shows this view, done or not.
   bool isOf(const StillView& view) const { return has_ && view == view_; }
   bool isBeingMade() const;
   bool isDone() const { return has_ && !this->isBeingMade(); }
-  bool isSeen() const { return isSeen_; }  // `picture` was asked for
-  /// Of one that's done: premultiplied colours as renderBytes gives them, and how long they took. Throws what
-  /// rendering threw, once; then there's none any more.
+  bool isSeen() const { return isSeen_; }  // `picture` was called
+  /// Premultiplied colours as renderBytes gives them, and the seconds that they took; waits for the thread.
+  /// Rethrows once what rendering threw, and drops the picture then.
   std::span<const glm::u8vec4> picture();
   double seconds() const { return seconds_; }
   void drop();
-  /// Leaves the processor to the window for half a second, where it's being made.
+  /// Pauses the thread for half a second, so that the window gets the processor.
   void rest();
 
  private:

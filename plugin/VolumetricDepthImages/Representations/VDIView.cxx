@@ -1,6 +1,9 @@
 #include "VDIView.h"
 
+#include <vtkMatrix3x3.h>
 #include <vtkMatrix4x4.h>
+#include <vtkOpenGLCamera.h>
+#include <vtkRenderer.h>
 
 #include <algorithm>
 #include <cassert>
@@ -10,6 +13,32 @@
 #include "vdi/core/Parallel.h"
 
 namespace pv {
+
+namespace {
+
+ViewMatrices matricesOf(vtkRenderer* renderer) {
+  vtkMatrix4x4* worldToView = nullptr;
+  vtkMatrix4x4* viewToClip = nullptr;
+  vtkMatrix4x4* worldToClip = nullptr;
+  vtkMatrix3x3* normals = nullptr;
+  auto* camera = vtkOpenGLCamera::SafeDownCast(renderer->GetActiveCamera());
+  camera->GetKeyMatrices(renderer, worldToView, normals, viewToClip, worldToClip);
+  return {worldToView, viewToClip};
+}
+
+}  // namespace
+
+vdi::Box boxOf(const double* bounds) {
+  return {{bounds[0], bounds[2], bounds[4]}, {bounds[1], bounds[3], bounds[5]}};
+}
+
+Viewport viewportOf(vtkRenderer* renderer) {
+  Viewport port;
+  renderer->GetTiledSizeAndOrigin(&port.size.x, &port.size.y, &port.corner.x, &port.corner.y);
+  return port;
+}
+
+ViewMatrices::ViewMatrices(vtkRenderer* renderer) : ViewMatrices(matricesOf(renderer)) {}
 
 ViewMatrices::ViewMatrices(vtkMatrix4x4* worldToView, vtkMatrix4x4* viewToClip) {
   // Transposed: element (i, j) is row j, column i.

@@ -4,50 +4,32 @@
 #include <vtkFieldData.h>
 #include <vtkInformation.h>
 #include <vtkInformationObjectBaseVectorKey.h>
-#include <vtkMath.h>
-#include <vtkMatrix3x3.h>
-#include <vtkMatrix4x4.h>
-#include <vtkNew.h>
 #include <vtkObjectFactory.h>
-#include <vtkOpenGLCamera.h>
-#include <vtkOpenGLError.h>
-#include <vtkOpenGLFramebufferObject.h>
-#include <vtkOpenGLQuadHelper.h>
 #include <vtkOpenGLRenderPass.h>
 #include <vtkOpenGLRenderWindow.h>
-#include <vtkOpenGLShaderCache.h>
-#include <vtkOpenGLState.h>
-#include <vtkPropCollection.h>
 #include <vtkRenderer.h>
-#include <vtkShaderProgram.h>
-#include <vtkTextureObject.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cmath>
-#include <limits>
+#include <cstdint>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "VDIBuffers.h"
+#include "VDIFramePolicy.h"
 #include "VDIImageData.h"
-#include "VDIMessage.h"
+#include "VDINotices.h"
+#include "VDIPainter.h"
 #include "VDIPiece.h"
-#include "VDISession.h"
 #include "VDIStill.h"
 #include "VDIView.h"
-#include "plugin/VolumetricDepthImages/ParaViewVersions.h"
-#include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Viewpoint.h"
 #include "vdi/pipeline/VdiRenderer.h"
-
-#include VDI_VTK_OPENGL
 
 vtkStandardNewMacro(vtkVDIProp);
 
@@ -59,202 +41,65 @@ double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// For a VDI that's being loaded.
+/// Longest wait of a deferred frame for a VDI that is being loaded.
 constexpr std::chrono::milliseconds shortWait{30};
 constexpr std::chrono::hours untilDone{24 * 365};
 
-constexpr const char* pictureShader = R"(//VTK::System::Dec
-//VTK::Output::Dec
-in vec2 texCoord;
-uniform sampler2D picture;
-uniform float opacity;
-void main() { gl_FragData[0] = opacity * texture(picture, texCoord); }
-)";
-
-/// At the far plane, but for a few steps of a depth buffer of 24 bits: as far as anybody sees, background.
-constexpr const char* depthShader = R"(//VTK::System::Dec
-//VTK::Output::Dec
-in vec2 texCoord;
-void main() {
-  gl_FragData[0] = vec4(texCoord, 0.0, 0.0);  // isn't written
-  gl_FragDepth = 1.0 - 4.0 / 16777216.0;
-}
-)";
-
-/// A renderer's part of its window, in pixels.
-struct Viewport {
-  glm::ivec2 size{0};
-  glm::ivec2 corner{0};
-};
-
-Viewport viewportOf(vtkRenderer* renderer) {
-  Viewport port;
-  renderer->GetTiledSizeAndOrigin(&port.size.x, &port.size.y, &port.corner.x, &port.corner.y);
-  return port;
-}
-
-pv::ViewMatrices matricesOf(vtkRenderer* renderer) {
-  vtkMatrix4x4* worldToView = nullptr;
-  vtkMatrix4x4* viewToClip = nullptr;
-  vtkMatrix4x4* worldToClip = nullptr;
-  vtkMatrix3x3* normals = nullptr;
-  auto* camera = vtkOpenGLCamera::SafeDownCast(renderer->GetActiveCamera());
-  camera->GetKeyMatrices(renderer, worldToView, normals, viewToClip, worldToClip);
-  return {worldToView, viewToClip};
-}
-
-/// The depth buffer of what is being drawn to. Not vtkRenderWindow::GetZbufferData, which reads the window's:
-/// passes draw elsewhere.
-void readDepths(vtkOpenGLRenderWindow* window, const Viewport& port, std::vector<float>& depths) {
-  depths.resize(static_cast<std::size_t>(port.size.x) * static_cast<std::size_t>(port.size.y));
-  GLint samples = 0;
-  glGetIntegerv(GL_SAMPLES, &samples);
-  if (samples > 1) {
-    window->GetZbufferData(port.corner.x, port.corner.y, port.corner.x + port.size.x - 1,
-                           port.corner.y + port.size.y - 1, depths.data());
-    return;
+/// nullopt where drawing would fail, and says why itself.
+std::optional<vdi::View> viewOf(vtkRenderer* renderer) {
+  const glm::ivec2 size = pv::viewportOf(renderer).size;
+  if (size.x < 1 || size.y < 1) return std::nullopt;
+  try {
+    return pv::ViewMatrices(renderer).view(size.x, size.y);
+  } catch (const vdi::Error&) {
+    return std::nullopt;
   }
-  // Past vtkOpenGLState, which binds its own objects only: what it knows holds again in the end.
-  GLint drawn = 0;
-  GLint read = 0;
-  glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &drawn);
-  glGetIntegerv(GL_READ_FRAMEBUFFER_BINDING, &read);
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, static_cast<GLuint>(drawn));
-  window->GetState()->vtkglPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(port.corner.x, port.corner.y, port.size.x, port.size.y, GL_DEPTH_COMPONENT, GL_FLOAT,
-               depths.data());
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, static_cast<GLuint>(read));
 }
 
-/// Of bounds as VTK has them.
-vdi::Box boxOf(const double* bounds) {
-  return {{bounds[0], bounds[2], bounds[4]}, {bounds[1], bounds[3], bounds[5]}};
-}
+/// A piece in a viewport: the same again would fail again.
+struct Attempt {
+  vtkMTimeType piece = 0;
+  glm::ivec2 size{0};
 
-bool drawsOnCpu() {
-  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  return name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
-}
+  bool operator==(const Attempt&) const = default;
+};
 
 }  // namespace
-
-/// How long an interactive frame takes: what it takes anyway, and by the pixel of the VDI's picture.
-class vtkVDIProp::Pace {
- public:
-  void Measure(double seconds, double renderSeconds, double pixels) {
-    this->Blend(this->Anyway, seconds - renderSeconds);
-    this->Blend(this->PerPixel, renderSeconds / pixels);
-  }
-  /// For `rate` frames a second. Half of the time is for the VDI at least.
-  std::optional<double> Pixels(double rate) const {
-    if (!this->PerPixel) return std::nullopt;
-    return std::max(1.0 / rate - this->Anyway.value_or(0.0), 0.5 / rate) / *this->PerPixel;
-  }
-  std::optional<double> Seconds(double pixels) const {
-    if (!this->PerPixel) return std::nullopt;
-    return pixels * *this->PerPixel;
-  }
-  /// A guess from a frame that wasn't interactive.
-  void Guess(double renderSeconds, double pixels) {
-    if (!this->PerPixel) this->PerPixel = renderSeconds / pixels;
-  }
-
- private:
-  static void Blend(std::optional<double>& mean, double value) {
-    mean = mean ? 0.5 * (*mean + value) : value;
-  }
-  std::optional<double> Anyway;
-  std::optional<double> PerPixel;
-};
-
-/// How a picture of the VDI is made.
-struct vtkVDIProp::Form {
-  glm::ivec2 size;
-  std::optional<std::size_t> thin;  // of few lists: the level of them
-};
 
 struct vtkVDIProp::Internals {
   pv::VDIBuffers Buffers;
   vtkSmartPointer<vtkDataObject> Piece;
   vtkMTimeType PieceTime = 0;
-  bool IsBeingMade = false;  // there is no VDI in the piece yet
-  bool HasJustCome = false;  // the first VDI, after such a piece
+  bool IsBeingMade = false;  // the piece announces a VDI
+  bool HasJustCome = false;  // the first VDI after such a piece
   Frame NextFrame = Frame::Whole;
-  bool IsBehind = false;           // the window is
-  bool IsRecovering = false;       // until a frame has been drawn on the new device as it's to be
-  vtkMTimeType FailedTime = 0;     // of the piece that has failed to be drawn
-  glm::ivec2 FailedSize{0};        // in a viewport of that size
-  vtkMTimeType RoughTime = 0;      // of the piece whose picture in full loses every device
-  glm::ivec2 RoughSize{0};         // in a viewport of that size
-  std::array<double, 6> Bounds{};  // as long as GetBounds' result is used
+  bool IsBehind = false;           // the window shows less than it will
+  bool IsRecovering = false;       // until a new device has drawn a final frame
+  Attempt Failed;                  // couldn't be drawn
+  Attempt Rough;                   // its full picture loses every device
+  std::array<double, 6> Bounds{};  // what GetBounds returned last
+  bool IsPeeled = false;           // this frame peels volumes
 
-  bool IsPeeled = false;  // volumes are, in this frame
-
-  vtkNew<vtkVDIMessage> Message;
-  std::string Obstacle;
-  std::string Problem;
-  std::string Notice;  // nothing is wrong
-  vtkVDIMessage::Place NoticePlace = vtkVDIMessage::Place::Middle;
+  pv::VDINotices Notices;
   std::string Said;  // as an error
-  vtkNew<vtkVDIMessage> AngleMessage;
-  std::string Angle;
 
-  vtkNew<vtkTextureObject> Texture;
-  std::unique_ptr<vtkOpenGLQuadHelper> Quad;
-  std::unique_ptr<vtkOpenGLQuadHelper> DepthQuad;
-  std::vector<float> Window;  // depth buffer
-  std::vector<float> Ends;
+  pv::VDIPainter Painter;
+  pv::VDIFramePolicy Policy;
+  std::vector<float> Ends;  // depth where each pixel's ray ends at an object
+  bool WasSmooth = false;   // the renderer smooths edges, except in this frame
 
-  Pace Whole;                                          // of the VDI with all its lists
-  std::array<Pace, pv::VDIBuffers::thinLevels> Thins;  // and with few of them
-  double Reduction = 1.0;  // pixels of the viewport on a pixel's side, in interactive frames
-  bool WasSmooth = false;  // the renderer's edges were to be smoothed, and aren't in this frame
+  /// The view whose full picture the texture has, and the VDI. None: the picture is rough or a thread's.
+  std::optional<pv::StillView> Textured;
+  std::uint64_t TexturedVersion = 0;
 
-  /// Whether the next frame leaves what takes long to a later one.
-  bool DefersIn(vtkRenderWindow* window, const glm::ivec2& port) {
-    constexpr double longTime = 0.05;  // seconds
-    if (this->NextFrame != Frame::Deferred || window->GetStereoRender() != 0) return false;
-    return this->Whole.Seconds(static_cast<double>(port.x) * port.y)
-               .value_or(this->Buffers.isOnCpu() ? 2.0 * longTime : 0.0) > longTime;
+  /// Whether the next frame leaves a slow picture to a later one.
+  bool DefersIn(vtkRenderWindow* window, const glm::ivec2& port) const {
+    return this->NextFrame == Frame::Deferred && window->GetStereoRender() == 0 &&
+           this->Policy.takesLong(this->Buffers, port);
   }
-  /// Of few lists, but of enough for what the view shows of the VDI; none: of all.
-  std::optional<std::size_t> ThinLevelFor(const vdi::View& view) {
-    constexpr double leastAcross = 100.0;
-    const double across =
-        vdi::listsAcross(boxOf(this->Buffers.bounds().data()), *this->Buffers.viewpoint(), view);
-    for (std::size_t level = 0; level < pv::VDIBuffers::thinLevels; ++level) {
-      const pv::VDIBuffers::Thin& thin = this->Buffers.thin(level);
-      const bool isLast = level + 1 == pv::VDIBuffers::thinLevels;
-      if (thin.lists > 0 && (isLast || across * thin.share >= leastAcross)) return level;
-    }
-    return std::nullopt;
-  }
-  Form InteractiveForm(const pv::ViewMatrices& matrices, const glm::ivec2& port, double rate) {
-    const double all = static_cast<double>(port.x) * port.y;
-    Form form{port, std::nullopt};
-    double pixels = this->Whole.Pixels(rate).value_or(0.0);
-    const std::optional<std::size_t> thin = this->ThinLevelFor(matrices.view(port.x, port.y));
-    const double fewLists = thin ? static_cast<double>(this->Buffers.thin(*thin).lists) : 0.0;
-    if (thin && pixels < std::min(all, 2.0 * fewLists)) {
-      // The lists between would hardly be seen.
-      form.thin = thin;
-      pixels = this->Thins.at(*thin).Pixels(rate).value_or(fewLists);
-    }
-    constexpr double coarsest = 8.0;  // beyond that, little is recognised
-    const double wanted = std::sqrt(std::clamp(all / std::max(pixels, 1.0), 1.0, coarsest * coarsest));
-    // What changes from frame to frame would flicker.
-    const double ratio = wanted / this->Reduction;
-    if (ratio < 0.8 || ratio > 1.25 || wanted == 1.0) this->Reduction = wanted;
-    form.size = glm::max(glm::ivec2(glm::ceil(glm::dvec2(port) / this->Reduction)), 1);
-    return form;
-  }
-
-  void ShowMessage(bool isVisible) {
-    const std::string& problem = this->Obstacle.empty() ? this->Problem : this->Obstacle;
-    const std::string& text = problem.empty() ? this->Notice : problem;
-    this->Message->Show(isVisible ? text : std::string(),
-                        problem.empty() ? this->NoticePlace : vtkVDIMessage::Place::Middle);
-    this->AngleMessage->Show(isVisible ? this->Angle : std::string(), vtkVDIMessage::Place::Bottom);
+  bool HasTexture(vtkRenderWindow* window, const pv::StillView& view) const {
+    return this->Textured == view && this->TexturedVersion == this->Buffers.version() &&
+           this->Painter.hasPicture(window);
   }
 };
 
@@ -267,32 +112,31 @@ void vtkVDIProp::PrintSelf(ostream& os, vtkIndent indent) {
   os << indent << "Reconstruction: " << this->Reconstruction << "\n"
      << indent << "FrameRate: " << this->FrameRate << "\n"
      << indent << "Opacity: " << this->Opacity << "\n"
-     << indent << "Problem: " << this->Internal->Problem << "\n";
+     << indent << "Problem: " << this->Internal->Notices.problem() << "\n";
 }
 
 void vtkVDIProp::SetVisibility(vtkTypeBool visible) {
   this->Superclass::SetVisibility(visible);
   if (visible == 0) this->Internal->IsBehind = false;
-  this->Internal->ShowMessage(visible != 0);
+  this->Internal->Notices.show(visible != 0);
 }
 
 vtkTextActor* vtkVDIProp::GetMessageActor() {
-  return this->Internal->Message;
+  return this->Internal->Notices.message();
 }
 
 vtkTextActor* vtkVDIProp::GetAngleActor() {
-  return this->Internal->AngleMessage;
+  return this->Internal->Notices.angleMessage();
 }
 
 void vtkVDIProp::SetObstacle(const std::string& text) {
-  if (this->Internal->Obstacle == text) return;
-  this->Internal->Obstacle = text;
-  this->Internal->ShowMessage(this->GetVisibility() != 0);
+  this->Internal->Notices.setObstacle(text);
+  this->Internal->Notices.show(this->GetVisibility() != 0);
 }
 
 void vtkVDIProp::Say(const std::string& text) {
-  this->Internal->Problem = text;
-  this->Internal->ShowMessage(this->GetVisibility() != 0);
+  this->Internal->Notices.setProblem(text);
+  this->Internal->Notices.show(this->GetVisibility() != 0);
   if (text.empty() || text == this->Internal->Said) return;
   this->Internal->Said = text;
   if (!pv::isSaidUpstream(text)) vtkErrorMacro(<< text);
@@ -323,8 +167,8 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
     this->Take(frame == Frame::Deferred && hasFrame ? shortWait : untilDone);
   }
   if (!internal.Buffers.isLoading()) internal.HasJustCome = false;
-  // Whatever is drawn, or isn't as where the camera looks away. A picture of the window that's taken
-  // meanwhile doesn't show in it.
+  // Holds even if the camera looks away and nothing is drawn. A whole frame is a picture that is saved
+  // meanwhile; the window doesn't show it.
   if (frame != Frame::Whole) internal.IsBehind = frame == Frame::Deferred && internal.Buffers.isLoading();
 }
 
@@ -332,66 +176,24 @@ void vtkVDIProp::LookAround(vtkObject* renderer, unsigned long, void*) {
   Internals& internal = *this->Internal;
   auto* own = vtkRenderer::SafeDownCast(renderer);
   if (own == nullptr || own->GetSelector() != nullptr || this->GetVisibility() == 0) return;
-  internal.Notice.clear();
-  internal.Angle.clear();
-  if (!this->IsCaptured) {
-    this->NoteViewpoint(own);
-    this->NoteAngle(own);
-  }
-  internal.ShowMessage(true);
-}
-
-/// None where drawing says what is wrong with it.
-std::optional<vdi::View> vtkVDIProp::ViewOf(vtkRenderer* renderer) {
-  const glm::ivec2 size = viewportOf(renderer).size;
-  if (size.x < 1 || size.y < 1) return std::nullopt;
-  try {
-    return matricesOf(renderer).view(size.x, size.y);
-  } catch (const vdi::Error&) {
-    return std::nullopt;
-  }
-}
-
-/// What's to be said of the VDI's viewpoint, or of the view's. That the view is turned far isn't, but by a
-/// small line (NoteAngle): a VDI with all of its scene looks right from all around. Nor that there are cut
-/// edges, which are seen.
-void vtkVDIProp::NoteViewpoint(vtkRenderer* renderer) {
-  Internals& internal = *this->Internal;
-  internal.NoticePlace = vtkVDIMessage::Place::Middle;
-  if (internal.IsBeingMade || internal.HasJustCome) {
-    internal.Notice = "The VDI is being made.";
-    return;
-  }
-  if (internal.Buffers.isEmpty()) {
-    internal.Notice =
+  internal.Notices.clear();
+  const std::optional<vdi::View> view = this->IsCaptured ? std::nullopt : viewOf(own);
+  if (this->IsCaptured) {
+    // Saved pictures have no notices.
+  } else if (internal.IsBeingMade || internal.HasJustCome) {
+    internal.Notices.note("The VDI is being made.");
+  } else if (internal.Buffers.isEmpty()) {
+    internal.Notices.note(
         "This VDI shows nothing: from its viewpoint nothing of its scene is seen, or all of it is "
-        "transparent.";
-    return;
+        "transparent.");
+  } else if (view) {
+    const bool isFiltered = internal.Piece != nullptr && pv::isFiltered(internal.Piece->GetFieldData());
+    internal.Notices.noteViewpoint(own, *view, this, isFiltered);
   }
-  const std::optional<vdi::View> view = this->ViewOf(renderer);
-  if (!view) return;
-  const std::optional<vdi::ViewpointIssue> issue = this->IssueIn(*view);
-  if (!issue || !this->IsFirst(renderer, *view, *issue)) return;
-  switch (*issue) {
-    case vdi::ViewpointIssue::SeesNothing:
-      if (this->IsBlank(renderer, *view)) internal.Notice = "The VDI is out of sight: press Reset Camera.";
-      break;
-    case vdi::ViewpointIssue::FarAway:
-      if (this->IsBlank(renderer, *view))
-        internal.Notice = "The VDI is too small to be seen from here: press Reset Camera.";
-      break;
-    case vdi::ViewpointIssue::Inside:
-      internal.NoticePlace = vtkVDIMessage::Place::Top;
-      internal.Notice = pv::isFiltered(internal.Piece->GetFieldData())
-                            ? "From inside, this VDI is rough: press Regenerate From This View."
-                            : "From inside, this VDI is rough: press Reset Camera.";
-      break;
-    case vdi::ViewpointIssue::FarBeside:
-      break;
-  }
+  if (view) internal.Notices.noteAngle(own, *view, this);
+  internal.Notices.show(true);
 }
 
-/// Where it's in sight, and to be seen.
 bool vtkVDIProp::IsShown() {
   return this->GetVisibility() != 0 && this->Opacity > 0.0 && this->Internal->Buffers.hasVdi() &&
          this->Internal->Piece != nullptr;
@@ -400,80 +202,16 @@ bool vtkVDIProp::IsShown() {
 std::optional<vdi::ViewpointIssue> vtkVDIProp::IssueIn(const vdi::View& view) {
   const pv::VDIBuffers& buffers = this->Internal->Buffers;
   if (!this->IsShown()) return std::nullopt;
-  return vdi::viewpointIssue(boxOf(buffers.bounds().data()), *buffers.viewpoint(), view);
+  return vdi::viewpointIssue(pv::boxOf(buffers.bounds().data()), *buffers.viewpoint(), view);
 }
 
-/// Where the VDI is seen, from outside, and is to say it.
 std::optional<double> vtkVDIProp::AngleIn(const vdi::View& view) {
   const Internals& internal = *this->Internal;
-  if (!this->SaysAngle || !internal.Obstacle.empty() || !this->IsShown()) return std::nullopt;
+  if (!this->SaysAngle || !internal.Notices.obstacle().empty() || !this->IsShown()) return std::nullopt;
   if (this->IssueIn(view).value_or(vdi::ViewpointIssue::FarBeside) != vdi::ViewpointIssue::FarBeside)
     return std::nullopt;
-  return vdi::degreesBetween(boxOf(internal.Buffers.bounds().data()), internal.Buffers.viewpoint()->camera(),
-                             view.camera());
-}
-
-void vtkVDIProp::NoteAngle(vtkRenderer* renderer) {
-  const std::optional<vdi::View> view = this->ViewOf(renderer);
-  const std::optional<double> own = view ? this->AngleIn(*view) : std::nullopt;
-  if (!own || *own <= vdi::besideDegrees) return;
-  bool isAlone = true;
-  bool isBefore = true;  // the VDIs that have been looked at come first
-  vtkPropCollection* props = renderer->GetViewProps();
-  vtkCollectionSimpleIterator at;
-  props->InitTraversal(at);
-  while (vtkProp* prop = props->GetNextProp(at)) {
-    auto* other = vtkVDIProp::SafeDownCast(prop);
-    isBefore = isBefore && other != this;
-    const std::optional<double> angle =
-        other != nullptr && other != this ? other->AngleIn(*view) : std::nullopt;
-    if (!angle) continue;
-    isAlone = false;
-    if (*angle > *own || (*angle == *own && isBefore)) return;
-  }
-  const std::string degrees = std::to_string(std::lround(*own)) + "\u00b0";
-  this->Internal->Angle =
-      isAlone ? degrees + " from the VDI's viewpoint" : "up to " + degrees + " from the VDIs' viewpoints";
-}
-
-/// Whether nothing else is seen in the view.
-bool vtkVDIProp::IsBlank(vtkRenderer* renderer, const vdi::View& view) {
-  vtkPropCollection* props = renderer->GetViewProps();
-  vtkCollectionSimpleIterator at;
-  props->InitTraversal(at);
-  while (vtkProp* prop = props->GetNextProp(at)) {
-    if (prop == this || prop->GetVisibility() == 0 || !prop->GetUseBounds()) continue;
-    std::optional<vdi::ViewpointIssue> issue;
-    if (auto* other = vtkVDIProp::SafeDownCast(prop)) {
-      if (!other->IsShown()) continue;
-      issue = other->IssueIn(view);
-    } else {
-      const double* bounds = prop->GetBounds();
-      if (bounds == nullptr || vtkMath::AreBoundsInitialized(bounds) == 0) continue;
-      vdi::Box box = boxOf(bounds);
-      constexpr double beyond = std::numeric_limits<double>::max();
-      for (int axis = 0; axis < 3; ++axis) {  // flat ones aren't empty
-        box.lo[axis] = std::nextafter(box.lo[axis], -beyond);
-        box.hi[axis] = std::nextafter(box.hi[axis], beyond);
-      }
-      issue = vdi::viewpointIssue(box, view, view);
-    }
-    if (issue != vdi::ViewpointIssue::SeesNothing && issue != vdi::ViewpointIssue::FarAway) return false;
-  }
-  return true;
-}
-
-/// Whether no VDI before this one has the same to say.
-bool vtkVDIProp::IsFirst(vtkRenderer* renderer, const vdi::View& view, vdi::ViewpointIssue issue) {
-  vtkPropCollection* props = renderer->GetViewProps();
-  vtkCollectionSimpleIterator at;
-  props->InitTraversal(at);
-  while (vtkProp* prop = props->GetNextProp(at)) {
-    if (prop == this) return true;
-    auto* other = vtkVDIProp::SafeDownCast(prop);
-    if (other != nullptr && other->IssueIn(view) == issue) return false;
-  }
-  return true;
+  return vdi::degreesBetween(pv::boxOf(internal.Buffers.bounds().data()),
+                             internal.Buffers.viewpoint()->camera(), view.camera());
 }
 
 bool vtkVDIProp::IsBehind() const {
@@ -499,7 +237,7 @@ void vtkVDIProp::Take(Clock::duration wait) {
   }
 }
 
-/// Where the device was lost: shows the VDI on a new one, and returns true. A lost device stays lost.
+/// If the device was lost, loads the VDI on a new one and returns true. A lost device stays lost.
 bool vtkVDIProp::Recover(const vdi::Error& error) {
   Internals& internal = *this->Internal;
   if (error.code() != vdi::ErrorCode::DeviceFailure || internal.IsRecovering || internal.Piece == nullptr)
@@ -525,7 +263,7 @@ void vtkVDIProp::Fail(const std::exception& error) {
       case vdi::ErrorCode::OutOfMemory:
         help = "The VDI can't be shown: ";
         break;
-      default:  // says it all
+      default:  // the error's own text is enough
         break;
     }
   }
@@ -540,18 +278,16 @@ double* vtkVDIProp::GetBounds() {
 }
 
 void vtkVDIProp::ReleaseGraphicsResources(vtkWindow* window) {
-  this->Internal->Quad.reset();
-  this->Internal->DepthQuad.reset();
-  this->Internal->Texture->ReleaseGraphicsResources(window);
+  this->Internal->Painter.release(window);
   this->Superclass::ReleaseGraphicsResources(window);
 }
 
 int vtkVDIProp::RenderOpaqueGeometry(vtkViewport* viewport) {
-  // Edges are smoothed next, before volumes. On a CPU that takes five times as long as all else of a frame.
+  // VTK smooths edges before it draws volumes. On a CPU that takes five times as long as the rest of a frame.
   auto* renderer = vtkRenderer::SafeDownCast(viewport);
-  if (renderer == nullptr || !renderer->GetUseFXAA() || !drawsOnCpu()) return 0;
+  if (renderer == nullptr || !renderer->GetUseFXAA() || !pv::drawsOnCpu()) return 0;
   Internals& internal = *this->Internal;
-  const bool isRough = internal.DefersIn(renderer->GetRenderWindow(), viewportOf(renderer).size)
+  const bool isRough = internal.DefersIn(renderer->GetRenderWindow(), pv::viewportOf(renderer).size)
                            ? !internal.Buffers.still().isDone()
                            : internal.NextFrame == Frame::Interactive;
   if (!isRough) return 0;
@@ -585,9 +321,8 @@ int vtkVDIProp::DrawIn(vtkViewport* viewport) {
   auto* renderer = vtkRenderer::SafeDownCast(viewport);
   auto* window = renderer ? vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow()) : nullptr;
   if (window == nullptr || renderer->GetSelector() != nullptr) return 0;
-  const Viewport port = viewportOf(renderer);
-  if (this->MarksDepth) this->MarkDepth(window);
-  if (!internal.Buffers.hasVdi() || !internal.Obstacle.empty()) return 0;
+  if (this->MarksDepth) internal.Painter.markDepth(window);
+  if (!internal.Buffers.hasVdi() || !internal.Notices.obstacle().empty()) return 0;
   try {
     bool isFinal = false;
     try {
@@ -601,58 +336,40 @@ int vtkVDIProp::DrawIn(vtkViewport* viewport) {
   } catch (const std::exception& error) {
     internal.Buffers.clear();
     this->Fail(error);
-    if (internal.FailedTime != internal.PieceTime || internal.FailedSize != port.size)
-      internal.Piece = nullptr;  // once more with the next frame
-    internal.FailedTime = internal.PieceTime;
-    internal.FailedSize = port.size;
+    const Attempt attempt{internal.PieceTime, pv::viewportOf(renderer).size};
+    if (internal.Failed != attempt) internal.Piece = nullptr;  // the next frame tries once more
+    internal.Failed = attempt;
     return 0;
   }
 }
 
-void vtkVDIProp::MarkDepth(vtkOpenGLRenderWindow* window) {
-  vtkOpenGLState* state = window->GetState();
-  vtkOpenGLState::ScopedglEnableDisable testsDepth(state, GL_DEPTH_TEST);
-  vtkOpenGLState::ScopedglDepthMask writesDepth(state);
-  vtkOpenGLState::ScopedglColorMask writesColor(state);
-  vtkOpenGLState::ScopedglDepthFunc depthFunction(state);
-  state->vtkglEnable(GL_DEPTH_TEST);
-  state->vtkglDepthFunc(GL_LESS);
-  state->vtkglDepthMask(GL_TRUE);
-  state->vtkglColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-  std::unique_ptr<vtkOpenGLQuadHelper>& quad = this->Internal->DepthQuad;
-  if (!quad) {
-    quad = std::make_unique<vtkOpenGLQuadHelper>(window, nullptr, depthShader, "");
-  } else {
-    window->GetShaderCache()->ReadyShaderProgram(quad->Program);
-  }
-  quad->Render();
-}
-
-/// Returns whether that's what this frame is to show in the end.
+/// Returns whether the frame shows what it is to show in the end.
 bool vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   Internals& internal = *this->Internal;
-  const Viewport port = viewportOf(renderer);
+  const pv::Viewport port = pv::viewportOf(renderer);
   if (port.size.x < 1 || port.size.y < 1) return true;
-  const pv::ViewMatrices matrices = matricesOf(renderer);
-  readDepths(window, port, internal.Window);
-  if (internal.DefersIn(window, port.size)) {
-    return this->DrawDeferred(
-        window,
-        {matrices, port.size, static_cast<vdi::Reconstruction>(this->Reconstruction), internal.Window});
-  }
+  pv::StillView view{
+      pv::ViewMatrices(renderer), port.size, static_cast<vdi::Reconstruction>(this->Reconstruction), {}};
+  pv::readDepths(window, port, view.window);
+  if (internal.DefersIn(window, port.size)) return this->DrawDeferred(window, std::move(view));
   internal.Buffers.still().drop();
-  const Form form = internal.NextFrame == Frame::Interactive
-                        ? internal.InteractiveForm(matrices, port.size, this->FrameRate)
-                        : Form{port.size, std::nullopt};
-  this->DrawNow(window, matrices, port.size, form);
+  if (internal.NextFrame == Frame::Interactive) {
+    this->DrawRough(window, view);
+  } else if (internal.HasTexture(window, view)) {  // other objects of the view have changed
+    internal.Painter.draw(window, this->Opacity);
+  } else {
+    this->DrawNow(window, view, {view.size, std::nullopt});
+    internal.Textured = std::move(view);
+    internal.TexturedVersion = internal.Buffers.version();
+  }
   return true;
 }
 
 bool vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view) {
   Internals& internal = *this->Internal;
   pv::VDIStill& still = internal.Buffers.still();
-  if (internal.RoughTime == internal.PieceTime && internal.RoughSize == view.size) {
-    still.drop();  // of another size
+  if (internal.Rough == Attempt{internal.PieceTime, view.size}) {
+    still.drop();  // its size may be another
     this->DrawRough(window, view);
     return true;
   }
@@ -665,20 +382,22 @@ bool vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view)
       this->StayRough(window, view, error);
       return true;
     }
-    this->ShowPicture(window, view.size, picture);
-    internal.Whole.Guess(still.seconds(), static_cast<double>(view.window.size()));
+    internal.Textured.reset();
+    internal.Painter.load(window, view.size, picture);
+    internal.Painter.draw(window, this->Opacity);
+    internal.Policy.guess({view.size, std::nullopt}, still.seconds());
     return true;
   }
-  if (still.isOf(view) && internal.Texture->GetHandle() != 0) {
-    this->ShowTexture(window);  // the rough one
+  if (still.isOf(view) && internal.Painter.hasPicture(window)) {
+    internal.Painter.draw(window, this->Opacity);  // the rough one
     internal.IsBehind = true;
     return false;
   }
-  // Where no frame is as the one before, what is made beside them is never right.
+  // If each frame differs from the last one, a thread's picture comes too late for any of them.
   const bool isUseless = still.isDone() && !still.isSeen();
   still.drop();
   if (isUseless) {
-    this->DrawNow(window, view.matrices, view.size, {view.size, std::nullopt});
+    this->DrawNow(window, view, {view.size, std::nullopt});
     return true;
   }
   this->DrawRough(window, view);
@@ -687,89 +406,52 @@ bool vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view)
   return false;
 }
 
-/// Where the picture in full has lost two devices in a row: on and on it would lose them.
+/// Gives up a full picture that has lost two devices in a row, and would lose more.
 void vtkVDIProp::StayRough(vtkOpenGLRenderWindow* window, const pv::StillView& view,
                            const vdi::Error& error) {
   Internals& internal = *this->Internal;
   internal.IsRecovering = false;
   if (!this->Recover(error)) throw vdi::Error(error);
-  internal.RoughTime = internal.PieceTime;
-  internal.RoughSize = view.size;
+  internal.Rough = {internal.PieceTime, view.size};
   this->DrawRough(window, view);
   this->Say(std::string("The VDI is shown with few pixels, for its picture in full can't be made: ") +
             error.what());
 }
 
 void vtkVDIProp::DrawRough(vtkOpenGLRenderWindow* window, const pv::StillView& view) {
-  this->DrawNow(window, view.matrices, view.size,
-                this->Internal->InteractiveForm(view.matrices, view.size, this->FrameRate));
+  Internals& internal = *this->Internal;
+  const vdi::View whole = view.matrices.view(view.size.x, view.size.y);
+  this->DrawNow(window, view,
+                internal.Policy.interactive(internal.Buffers, whole, view.size, this->FrameRate));
 }
 
-void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& matrices,
-                         const glm::ivec2& portSize, const Form& form) {
+void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::StillView& view,
+                         const pv::PictureForm& form) {
   Internals& internal = *this->Internal;
+  internal.Textured.reset();
   const Clock::time_point start = Clock::now();
   const glm::ivec2& size = form.size;
-  const bool hasObjects = std::any_of(internal.Window.begin(), internal.Window.end(), pv::isObject);
+  const bool hasObjects = std::any_of(view.window.begin(), view.window.end(), pv::isObject);
   internal.Ends.resize(hasObjects ? static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) : 0);
-  if (hasObjects) pv::depthsOf(matrices, internal.Window, portSize, size, internal.Ends);
+  if (hasObjects) pv::depthsOf(view.matrices, view.window, view.size, size, internal.Ends);
 
   vdi::VdiRenderer& views =
       form.thin ? internal.Buffers.thinRenderer(*form.thin) : internal.Buffers.renderer();
-  auto reconstruction = static_cast<vdi::Reconstruction>(this->Reconstruction);
-  // Faces lean at rest alone, for speed. A thinned VDI lacks the lists in which a surface goes on.
+  vdi::Reconstruction reconstruction = view.reconstruction;
+  // Leaning faces take longer, so moving frames do without. A thinned VDI lacks the lists in which a surface
+  // goes on.
   if (form.thin || internal.NextFrame == Frame::Interactive)
     reconstruction = std::min(reconstruction, vdi::Reconstruction::Smooth);
   const Clock::time_point renderStart = Clock::now();
-  const vdi::ImageBytes picture = views.renderBytes(matrices.view(size.x, size.y), internal.Ends,
+  const vdi::ImageBytes picture = views.renderBytes(view.matrices.view(size.x, size.y), internal.Ends,
                                                     vdi::Alpha::Premultiplied, reconstruction);
   const double renderSeconds = secondsSince(renderStart);
-  this->ShowPicture(window, size, picture.rgba);
+  internal.Painter.load(window, size, picture.rgba);
+  internal.Painter.draw(window, this->Opacity);
 
-  const double pixels = static_cast<double>(size.x) * size.y;
-  Pace& pace = form.thin ? internal.Thins.at(*form.thin) : internal.Whole;
   if (internal.NextFrame == Frame::Whole) {
-    pace.Guess(renderSeconds, pixels);
+    internal.Policy.guess(form, renderSeconds);
   } else {
-    pace.Measure(secondsSince(start), renderSeconds, pixels);
+    internal.Policy.measure(form, secondsSince(start), renderSeconds);
   }
-}
-
-void vtkVDIProp::ShowPicture(vtkOpenGLRenderWindow* window, const glm::ivec2& size,
-                             std::span<const glm::u8vec4> picture) {
-  vtkTextureObject* texture = this->Internal->Texture;
-  texture->SetContext(window);
-  texture->SetMinificationFilter(vtkTextureObject::Linear);
-  texture->SetMagnificationFilter(vtkTextureObject::Linear);
-  texture->SetWrapS(vtkTextureObject::ClampToEdge);
-  texture->SetWrapT(vtkTextureObject::ClampToEdge);
-  // VTK's call takes a pointer to what it only reads.
-  texture->Create2DFromRaw(static_cast<unsigned int>(size.x), static_cast<unsigned int>(size.y), 4,
-                           VTK_UNSIGNED_CHAR, const_cast<glm::u8vec4*>(picture.data()));
-  this->ShowTexture(window);
-}
-
-void vtkVDIProp::ShowTexture(vtkOpenGLRenderWindow* window) {
-  vtkOpenGLState* state = window->GetState();
-  vtkOpenGLState::ScopedglEnableDisable blends(state, GL_BLEND);
-  vtkOpenGLState::ScopedglEnableDisable testsDepth(state, GL_DEPTH_TEST);
-  vtkOpenGLState::ScopedglDepthMask writesDepth(state);
-  vtkOpenGLState::ScopedglBlendFuncSeparate blendFunction(state);
-  state->vtkglEnable(GL_BLEND);
-  state->vtkglDisable(GL_DEPTH_TEST);
-  state->vtkglDepthMask(GL_FALSE);
-  state->vtkglBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  std::unique_ptr<vtkOpenGLQuadHelper>& quad = this->Internal->Quad;
-  if (!quad) {
-    quad = std::make_unique<vtkOpenGLQuadHelper>(window, nullptr, pictureShader, "");
-  } else {
-    window->GetShaderCache()->ReadyShaderProgram(quad->Program);
-  }
-  vtkTextureObject* texture = this->Internal->Texture;
-  texture->Activate();
-  quad->Program->SetUniformi("picture", texture->GetTextureUnit());
-  quad->Program->SetUniformf("opacity", static_cast<float>(this->Opacity));
-  quad->Render();
-  texture->Deactivate();
-  vtkOpenGLCheckErrorMacro("failed to draw the VDI");
 }

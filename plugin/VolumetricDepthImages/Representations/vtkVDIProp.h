@@ -2,15 +2,16 @@
  * @class vtkVDIProp
  * @brief draws a Volumetric Depth Image among the objects of an OpenGL renderer
  *
- * Drawn with the volumes: after all opaque geometry, which hides what lies behind it, and blended over it.
- * Where volumes are peeled together with translucent geometry, after that, too.
- * While it's interactive, it has as few pixels as it takes to be drawn FrameRate times a second, but one for
- * each 64 of the window's at least; and a VDI
- * that comes is loaded beside the frames, which go on showing the one before. The same holds for deferred
- * frames, beside which the picture in full is made.
+ * The prop is drawn with the volumes: after all opaque geometry, which hides what lies behind it, and blended
+ * over it. Where VTK peels volumes together with translucent geometry, the VDI comes after both.
  *
- * What goes wrong is said in the view (MessageActor) and, once, as an error; the rest of the picture is
- * drawn. How far the view is turned from the VDI's viewpoint is said, too (AngleActor).
+ * Interactive frames have as few pixels as it takes to draw the prop FrameRate times a second
+ * (VDIFramePolicy). They go on showing the last VDI while the next one is loaded. The same holds for deferred
+ * frames, beside which a thread makes the full picture (VDIStill). A VDI that is as in the frame before costs
+ * no rendering: its picture is still in the texture (VDIPainter).
+ *
+ * The view shows what goes wrong (MessageActor), and the prop reports it once as an error. The rest of the
+ * picture is drawn. The view also shows how far it is turned from the VDI's viewpoint (AngleActor).
  */
 #ifndef vtkVDIProp_h
 #define vtkVDIProp_h
@@ -19,10 +20,8 @@
 
 #include <chrono>
 #include <exception>
-#include <glm/fwd.hpp>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 
 #include "vtkVolumetricDepthImagesRepresentationsModule.h"
@@ -38,7 +37,7 @@ class View;
 enum class ViewpointIssue;
 }  // namespace vdi
 namespace pv {
-class ViewMatrices;
+struct PictureForm;
 struct StillView;
 }  // namespace pv
 
@@ -49,46 +48,52 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   enum class Frame {
-    Interactive,  // may be rough and show the VDI before
-    Deferred,     // likewise, and another one is asked for as soon as HasMore; where it's quick, it's whole
+    Interactive,  // may be rough and show the last VDI
+    Deferred,     // likewise, and the caller renders again once HasMore; whole where that is quick
     Whole,
   };
-  /// For the frames to come: `piece` is what pv::packVdi made, or nullptr. If they're to be whole, its VDI is
-  /// on the device when this returns; else that or the last one before is shown. The same again costs
-  /// nothing.
+  /// Prepares for the frames to come. `piece` is what pv::packVdi made, or nullptr. For whole frames, its VDI
+  /// is on the device when this returns; for others, that or the last one is shown. The same piece again
+  /// costs nothing.
   void Prepare(vtkDataObject* piece, Frame frame);
-  /// Whether the last frame was deferred and lacks something that is being made, and whether that is there.
+  /// Whether the last frame was deferred and lacks something that is being made.
   bool IsBehind() const;
+  /// Whether that has been made, so that another frame would show it.
   bool HasMore() const;
-  /// Lets what is made beside the frames leave the processor to the window for a moment.
+  /// Pauses what is made beside the frames for a moment, so that the window gets the processor.
   void Rest();
-  /// Says `text` in place of the VDI, which isn't drawn while there's a text.
+  /// Shows `text` in place of the VDI; an empty text shows the VDI again.
   void SetObstacle(const std::string& text);
-  /// Says why there's nothing to see; in a renderer of the same size that draws after this prop's.
+  /// Says why there is nothing to see. Belongs to a renderer of the same size that draws after the prop's.
   vtkTextActor* GetMessageActor();
-  /// Says by how many degrees the view is turned; there, too. Of several VDIs, the one that is turned
-  /// farthest says it for all.
+  /// Says by how many degrees the view is turned; in that renderer, too. Of several VDIs, the one whose view
+  /// is turned farthest says it for all.
   vtkTextActor* GetAngleActor();
-  /// For an observer of StartEvent of the renderer that has this prop: props that it doesn't see aren't
-  /// drawn.
+  /// Observes StartEvent of the renderer that has this prop: VTK doesn't draw props that it doesn't see.
   void LookAround(vtkObject* renderer, unsigned long event, void* data);
 
-  /// Whether pixels in front of which nothing opaque was drawn get a depth just short of the background's.
-  /// IceT, compositing by depth, drops them otherwise, colour and all. Default off.
+  /// Whether the VDI can be seen at all.
+  bool IsShown();
+  /// Why the view shows little or nothing of the VDI; nullopt where it isn't shown, too.
+  std::optional<vdi::ViewpointIssue> IssueIn(const vdi::View& view);
+  /// Degrees between the view and V_O, where the VDI is to say them and is seen from outside.
+  std::optional<double> AngleIn(const vdi::View& view);
+
+  /// Whether pixels of the background get a depth just short of the background's. IceT composites by depth
+  /// and drops the background's pixels otherwise, with the VDI's colours. Default off.
   vtkSetMacro(MarksDepth, bool);
 
   /// vdi::Reconstruction: 2 (default) also leans the faces of supersegments, 1 blends neighbouring lists, 0
-  /// shows each as it is.
+  /// shows each list as it is.
   vtkSetClampMacro(Reconstruction, int, 0, 2);
   vtkGetMacro(Reconstruction, int);
-  /// Of the VDI's part in interactive frames, per second.
+  /// Interactive frames a second that the VDI's part of a frame allows.
   vtkSetClampMacro(FrameRate, double, 1.0, 1000.0);
   vtkGetMacro(FrameRate, double);
-  /// Of its picture as a whole, beside that of the VDI. Default 1.
+  /// Multiplies the picture's opacity. Default 1.
   vtkSetClampMacro(Opacity, double, 0.0, 1.0);
   vtkGetMacro(Opacity, double);
-  /// Whether the frames to come are for a picture that is taken. Where nothing is wrong but the viewpoint, of
-  /// the VDI or of the view, others alone say so. Default off.
+  /// Whether the frames to come are saved as pictures, which have no notices, only faults. Default off.
   vtkSetMacro(IsCaptured, bool);
   /// Whether the frames to come say how far the view is turned. Default off.
   vtkSetMacro(SaysAngle, bool);
@@ -108,28 +113,13 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   vtkVDIProp(const vtkVDIProp&) = delete;
   void operator=(const vtkVDIProp&) = delete;
 
-  class Pace;
-  struct Form;
   struct Internals;
-  bool IsShown();
-  std::optional<vdi::ViewpointIssue> IssueIn(const vdi::View& view);
-  bool IsBlank(vtkRenderer* renderer, const vdi::View& view);
-  bool IsFirst(vtkRenderer* renderer, const vdi::View& view, vdi::ViewpointIssue issue);
-  std::optional<double> AngleIn(const vdi::View& view);
-  std::optional<vdi::View> ViewOf(vtkRenderer* renderer);
-  void NoteViewpoint(vtkRenderer* renderer);
-  void NoteAngle(vtkRenderer* renderer);
   int DrawIn(vtkViewport* viewport);
   bool Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window);
   bool DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view);
   void StayRough(vtkOpenGLRenderWindow* window, const pv::StillView& view, const vdi::Error& error);
   void DrawRough(vtkOpenGLRenderWindow* window, const pv::StillView& view);
-  void DrawNow(vtkOpenGLRenderWindow* window, const pv::ViewMatrices& matrices, const glm::ivec2& portSize,
-               const Form& form);
-  void ShowPicture(vtkOpenGLRenderWindow* window, const glm::ivec2& size,
-                   std::span<const glm::u8vec4> picture);
-  void ShowTexture(vtkOpenGLRenderWindow* window);
-  void MarkDepth(vtkOpenGLRenderWindow* window);
+  void DrawNow(vtkOpenGLRenderWindow* window, const pv::StillView& view, const pv::PictureForm& form);
   void Take(std::chrono::steady_clock::duration wait);
   bool Recover(const vdi::Error& error);
   void Fail(const std::exception& error);

@@ -1,0 +1,128 @@
+#include "VDINotices.h"
+
+#include <vtkMath.h>
+#include <vtkPropCollection.h>
+#include <vtkRenderer.h>
+
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "VDIView.h"
+#include "vdi/core/Box.h"
+#include "vdi/core/Viewpoint.h"
+#include "vtkVDIProp.h"
+
+namespace pv {
+
+namespace {
+
+/// Calls `visit` for the renderer's props until it returns false; returns whether it never did.
+template <typename Visit>
+bool visitProps(vtkRenderer* renderer, Visit visit) {
+  vtkPropCollection* props = renderer->GetViewProps();
+  vtkCollectionSimpleIterator at;
+  props->InitTraversal(at);
+  while (vtkProp* prop = props->GetNextProp(at)) {
+    if (!visit(prop)) return false;
+  }
+  return true;
+}
+
+/// Why the view shows little or nothing of a prop; nullopt for props that it shows.
+std::optional<vdi::ViewpointIssue> issueOf(vtkProp* prop, const vdi::View& view) {
+  const double* bounds = prop->GetBounds();
+  if (bounds == nullptr || vtkMath::AreBoundsInitialized(bounds) == 0)
+    return vdi::ViewpointIssue::SeesNothing;
+  vdi::Box box = boxOf(bounds);
+  constexpr double beyond = std::numeric_limits<double>::max();
+  for (int axis = 0; axis < 3; ++axis) {  // a flat object isn't an empty box
+    box.lo[axis] = std::nextafter(box.lo[axis], -beyond);
+    box.hi[axis] = std::nextafter(box.hi[axis], beyond);
+  }
+  return vdi::viewpointIssue(box, view, view);
+}
+
+/// Whether the view shows nothing but this VDI.
+bool isBlank(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* own) {
+  return visitProps(renderer, [&](vtkProp* prop) {
+    if (prop == own || prop->GetVisibility() == 0 || !prop->GetUseBounds()) return true;
+    auto* other = vtkVDIProp::SafeDownCast(prop);
+    if (other != nullptr && !other->IsShown()) return true;
+    const std::optional<vdi::ViewpointIssue> issue =
+        other != nullptr ? other->IssueIn(view) : issueOf(prop, view);
+    return issue == vdi::ViewpointIssue::SeesNothing || issue == vdi::ViewpointIssue::FarAway;
+  });
+}
+
+/// Whether no VDI before this one has the same issue.
+bool isFirst(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* own, vdi::ViewpointIssue issue) {
+  bool isBefore = true;
+  return visitProps(renderer, [&](vtkProp* prop) {
+    isBefore = isBefore && prop != own;
+    auto* other = isBefore ? vtkVDIProp::SafeDownCast(prop) : nullptr;
+    return other == nullptr || other->IssueIn(view) != issue;
+  });
+}
+
+}  // namespace
+
+void VDINotices::clear() {
+  notice_.clear();
+  angle_.clear();
+}
+
+void VDINotices::note(const std::string& text, vtkVDIMessage::Place place) {
+  notice_ = text;
+  noticePlace_ = place;
+}
+
+void VDINotices::noteViewpoint(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop,
+                               bool isFiltered) {
+  const std::optional<vdi::ViewpointIssue> issue = prop->IssueIn(view);
+  if (!issue || !isFirst(renderer, view, prop, *issue)) return;
+  switch (*issue) {
+    case vdi::ViewpointIssue::SeesNothing:
+      if (isBlank(renderer, view, prop)) this->note("The VDI is out of sight: press Reset Camera.");
+      break;
+    case vdi::ViewpointIssue::FarAway:
+      if (isBlank(renderer, view, prop))
+        this->note("The VDI is too small to be seen from here: press Reset Camera.");
+      break;
+    case vdi::ViewpointIssue::Inside:
+      this->note(isFiltered ? "From inside, this VDI is rough: press Regenerate From This View."
+                            : "From inside, this VDI is rough: press Reset Camera.",
+                 vtkVDIMessage::Place::Top);
+      break;
+    case vdi::ViewpointIssue::FarBeside:
+      break;
+  }
+}
+
+void VDINotices::noteAngle(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop) {
+  const std::optional<double> own = prop->AngleIn(view);
+  if (!own || *own <= vdi::besideDegrees) return;
+  bool isAlone = true;
+  bool isBefore = true;  // of VDIs at the same angle the renderer's first one speaks
+  const bool isFarthest = visitProps(renderer, [&](vtkProp* each) {
+    auto* other = vtkVDIProp::SafeDownCast(each);
+    isBefore = isBefore && other != prop;
+    const std::optional<double> angle =
+        other != nullptr && other != prop ? other->AngleIn(view) : std::nullopt;
+    isAlone = isAlone && !angle;
+    return !angle || (*angle <= *own && !(*angle == *own && isBefore));
+  });
+  if (!isFarthest) return;
+  const std::string degrees = std::to_string(std::lround(*own)) + "\u00b0";
+  angle_ =
+      isAlone ? degrees + " from the VDI's viewpoint" : "up to " + degrees + " from the VDIs' viewpoints";
+}
+
+void VDINotices::show(bool isVisible) {
+  const std::string& fault = obstacle_.empty() ? problem_ : obstacle_;
+  message_->Show(isVisible ? (fault.empty() ? notice_ : fault) : std::string(),
+                 fault.empty() ? noticePlace_ : vtkVDIMessage::Place::Middle);
+  angleMessage_->Show(isVisible ? angle_ : std::string(), vtkVDIMessage::Place::Bottom);
+}
+
+}  // namespace pv

@@ -1,0 +1,59 @@
+// What a view says about its VDIs.
+#ifndef VDINotices_h
+#define VDINotices_h
+
+#include <vtkNew.h>
+
+#include <string>
+
+#include "VDIMessage.h"
+
+class vtkRenderer;
+class vtkVDIProp;
+
+namespace vdi {
+class View;
+}
+
+namespace pv {
+
+/// The texts of one VDI. An obstacle hides a problem, and a problem hides a notice.
+class VDINotices {
+ public:
+  vtkVDIMessage* message() { return message_; }
+  vtkVDIMessage* angleMessage() { return angleMessage_; }
+
+  /// Why the VDI isn't drawn although nothing is wrong with it.
+  void setObstacle(const std::string& text) { obstacle_ = text; }
+  const std::string& obstacle() const { return obstacle_; }
+  /// What went wrong.
+  void setProblem(const std::string& text) { problem_ = text; }
+  const std::string& problem() const { return problem_; }
+
+  /// Each frame begins without notices.
+  void clear();
+  void note(const std::string& text, vtkVDIMessage::Place place = vtkVDIMessage::Place::Middle);
+  /// Notes what is wrong with the VDI's viewpoint or with the view, unless another VDI of the renderer says
+  /// it. Angles and cut edges are no faults: a VDI with all of its scene looks right from all around.
+  /// `isFiltered`: the user can make the VDI anew.
+  void noteViewpoint(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop, bool isFiltered);
+  /// Notes how far the view is turned from the VDI's viewpoint. The VDI that is farthest from its own says
+  /// it for all VDIs of the renderer.
+  void noteAngle(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop);
+
+  /// Shows the texts, or none.
+  void show(bool isVisible);
+
+ private:
+  vtkNew<vtkVDIMessage> message_;
+  vtkNew<vtkVDIMessage> angleMessage_;
+  std::string obstacle_;
+  std::string problem_;
+  std::string notice_;
+  vtkVDIMessage::Place noticePlace_ = vtkVDIMessage::Place::Middle;
+  std::string angle_;
+};
+
+}  // namespace pv
+
+#endif
