@@ -16,9 +16,8 @@
 #include <set>
 #include <vector>
 
-#include "VDIBlocks.h"
+#include "VDILoad.h"
 #include "vdi/comm/Funnel.h"
-#include "vdi/core/Block.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Coloring.h"
 #include "vdi/core/ScalarRange.h"
@@ -27,25 +26,6 @@
 class vtkMultiProcessController;
 
 namespace pv {
-
-/// What tells one set of blocks from another.
-struct Origin {
-  std::vector<std::uint64_t> input;  // identityOf
-  /// When what makes the input was modified: in situ, arrays are overwritten in place.
-  vtkMTimeType upstream = 0;
-  std::optional<double> time;  // none: the data have none
-  ArrayChoice choice;
-  bool fillGhosts = true;
-  bool operator==(const Origin&) const = default;
-};
-
-/// This rank's blocks of an origin, which share their values with the input.
-struct Load {
-  Origin of;
-  std::vector<vdi::Block> blocks;
-  vdi::ScalarArray array;
-  double voxelVolume = 0.0;  // of the smallest voxel of all ranks; 0 without any
-};
 
 /// What is known of the blocks that a volume shows, of all ranks.
 struct Shown {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>  // fmt::join
-#include <vtkCommunicator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
@@ -12,13 +11,11 @@
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
 #include <vtkMultiProcessController.h>
-#include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkPiecewiseFunction.h>
 #include <vtkPointData.h>
 #include <vtkScalarsToColors.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
-#include <vtkTimeStamp.h>
 
 #include <algorithm>
 #include <array>
@@ -30,22 +27,22 @@
 #include <utility>
 #include <vector>
 
-#include "VDIArrays.h"
 #include "VDIBlocks.h"
 #include "VDIFailure.h"
 #include "VDIImageData.h"
 #include "VDILastVdi.h"
+#include "VDILoad.h"
 #include "VDIPlace.h"
 #include "VDIPreparation.h"
+#include "VDIRegeneration.h"
+#include "VDIReport.h"
 #include "VDIRetire.h"
 #include "VDISession.h"
 #include "VDITransferFunctions.h"
 #include "VDIValues.h"
 #include "VDIVolume.h"
-#include "vdi/core/BitCast.h"
 #include "vdi/core/Blending.h"
 #include "vdi/core/Error.h"
-#include "vdi/core/Scene.h"
 #include "vdi/core/SettingsTable.h"
 #include "vdi/core/UnitDistance.h"
 #include "vdi/pipeline/VdiGenerator.h"
@@ -60,51 +57,26 @@ struct vtkVDIGenerator::Frame {
   vdi::GenerateSettings Settings;
 };
 
-/// What a view has asked for and hasn't got yet.
-struct vtkVDIGenerator::Request {
-  pv::Load Load;
-  vdi::Box Bounds;  // of all ranks' blocks
-};
-
 struct vtkVDIGenerator::Internals {
   std::shared_ptr<pv::Volumes> Volumes = pv::sharedVolumes();
   std::shared_ptr<pv::Volume> Volume;  // none until the first update; other filters may use it, too
   std::uint64_t Identity = 0;          // of the filter, with its first volume: the same on all ranks
-  /// Of the last VDI or picture. A preparation's thread writes these until it ends.
+  /// Reports of the last VDI or picture. A preparation's thread writes them until it ends.
   std::vector<vdi::RankReport> Reports;
   std::string Device;
-  /// The last frame failed. Data counts as newer than any output then: left to the executive, rank 0, whose
-  /// empty output isn't what was asked for, would try again alone.
-  bool Failed = false;
   pv::Failure Said;
-  bool Held = false;
-  vtkNew<vtkVDIImageData> Made;      // the last output: VTK empties it before it asks for another one
-  std::optional<pv::Origin> MadeOf;  // where Made is an output
-  vtkMTimeType Executed = 0;         // CurrentMTime of the last frame
-  bool Defers = false;               // DeferViews
-  int Views = 0;                     // of BeginView, without their EndView
-  std::optional<Request> Asked;      // by a view, which got an earlier output
-  vtkTimeStamp AskedTime;            // of the last EndView by which they got that, or of its replacement
-  bool InPlace = false;              // what is asked for can't be prepared
-  /// Of the map that stands in for none: the first frame's range, kept while the array is the same, or films
+  /// Range of the map that stands in for none: the first frame's, kept while the array is the same, or films
   /// would flicker.
   std::optional<vdi::ScalarRange> FirstRange;
   pv::ArrayChoice FirstChoice;
-  std::optional<pv::Origin> PreparedFor;       // what is prepared
-  std::unique_ptr<pv::Preparation> Preparing;  // last: its thread uses the others
+  pv::Regeneration Regeneration;  // last member, because its thread uses the others
 
-  /// Views haven't seen yet what replaces an earlier output.
-  void Answer() {
-    if (!this->Asked) return;
-    this->Asked.reset();
-    this->AskedTime.Modified();
-  }
-  /// Before a frame of that array.
+  /// Called before each frame, with its array.
   void NoteChoice(const pv::ArrayChoice& choice) {
     if (this->FirstRange && !(this->FirstChoice == choice)) this->FirstRange.reset();
     this->FirstChoice = choice;
   }
-  /// What the volume shows, if that is it and no turn that was taken changes it; else null.
+  /// What the volume shows, if it is this and no turn that was taken changes it; else null.
   std::shared_ptr<const pv::Shown> ShownOf(const pv::Origin& origin) const {
     if (!this->Volume || !this->Volume->targets(origin)) return nullptr;
     std::shared_ptr<const pv::Shown> shown = this->Volume->shown();
@@ -114,6 +86,7 @@ struct vtkVDIGenerator::Internals {
     this->Reports = generator.reports();
     this->Device = generator.device().name();
   }
+  pv::Preparation::Make Maker(Frame frame, std::optional<pv::Load> load, const pv::Origin& origin, int step);
 };
 
 vtkVDIGenerator::vtkVDIGenerator()
@@ -127,9 +100,9 @@ vtkVDIGenerator::vtkVDIGenerator()
 vtkVDIGenerator::~vtkVDIGenerator() {
   this->SetReport(nullptr);
   if (this->Internal->Volume) this->Internal->Volume->leave(this);
-  // Who deletes the filter waits for the thread only where others' MPI does.
-  if (this->GivesUpPreparation() && !this->Internal->Preparing->hasRanks())
-    pv::retire(std::move(this->Internal));
+  // The destructor joins the thread only when other ranks take part.
+  pv::Regeneration& regeneration = this->Internal->Regeneration;
+  if (regeneration.giveUp() && !regeneration.preparesOnRanks()) pv::retire(std::move(this->Internal));
 }
 
 bool vtkVDIGenerator::IsRoot() const {
@@ -241,7 +214,7 @@ double vtkVDIGenerator::GetSetting(const char* property) const {
 
 void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
   if (this->Controller == controller) return;
-  this->DropPreparation();
+  this->Internal->Regeneration.drop();
   this->UseVolume(nullptr);
   this->Internal->Identity = 0;
   this->Controller = controller;
@@ -249,13 +222,7 @@ void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
 }
 
 vtkMTimeType vtkVDIGenerator::GetMTime() {
-  const Internals& internal = *this->Internal;
-  // What a view has got is good enough for views, until it's replaced, and for nobody else.
-  const bool isGoodEnough = internal.Asked && this->ServesView();
-  const vtkMTimeType asked = isGoodEnough ? 0 : internal.AskedTime.GetMTime();
-  if (internal.Held && (isGoodEnough || !internal.Asked)) return std::max(internal.Executed, asked);
-  if (internal.Failed) this->Modified();
-  return std::max(this->CurrentMTime(), asked);
+  return this->Internal->Regeneration.time(this->CurrentMTime(), this->ServesView());
 }
 
 vtkMTimeType vtkVDIGenerator::CurrentMTime() {
@@ -321,15 +288,8 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
 
 namespace {
 
-/// In situ, a script's misspelt channel is a source without data.
-void requireInput(vtkDataObject* input) {
-  if (input != nullptr && std::strcmp(input->GetClassName(), "vtkDataObject") != 0) return;
-  throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                   "the input has no data; in a Catalyst script, TrivialProducer(registrationName=...) names "
-                   "what the simulation hands over, \"grid\" for vdi_catalyst");
-}
-
-/// Arrays keep their ranges, which ParaView asks for after an update: half a second for a large VDI.
+/// Finds the ranges that ParaView asks for after an update, and that arrays keep. A large VDI takes half a
+/// second.
 void findRanges(vtkFieldData* fields) {
   for (int i = 0; i < fields->GetNumberOfArrays(); ++i) {
     vtkDataArray* array = fields->GetArray(i);
@@ -343,7 +303,7 @@ void findRanges(vtkFieldData* fields) {
   }
 }
 
-/// As the input's: data without a time stay so.
+/// Gives the output the input's time, or none.
 void setTime(vtkImageData* output, std::optional<double> time) {
   if (time) {
     output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), *time);
@@ -358,45 +318,12 @@ vdi::Image nothingOf(int width, int height) {
   return nothing;
 }
 
-/// How many of the smallest voxels there are in a unit of volume; 0 without any.
-double mostPerVolume(const std::vector<vdi::Block>& blocks) {
-  double most = 0.0;
-  for (const vdi::Block& block : blocks) {
-    const double volume = block.spacing.x * block.spacing.y * block.spacing.z;
-    if (volume > 0.0) most = std::max(most, 1.0 / volume);
-  }
-  return most;
-}
-
-/// `components`: what the array has on those ranks that have it; 0: on none.
-vdi::ScalarArray arrayOf(const pv::ArrayChoice& choice, int components) {
-  const int count = std::max(components, 1);
-  return {.name = choice.name,
-          .cells = choice.cells,
-          .components = count,
-          .component = count > 1 ? choice.component : 0};
-}
-
-std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
-  std::string text =
-      "rank  blocks  volume MiB  upload s  generate s  distribute s  composite s  gather s  sent MiB  device "
-      "MiB\n";
-  for (std::size_t i = 0; i < reports.size(); ++i) {
-    const vdi::RankReport& r = reports[i];
-    constexpr double mib = 1024.0 * 1024.0;
-    text += fmt::format(
-        "{:4}  {:6}  {:10.1f}  {:8.3f}  {:10.3f}  {:12.3f}  {:11.3f}  {:8.3f}  {:8.2f}  {:10.1f}\n", i,
-        r.blocks, static_cast<double>(r.volumeBytes) / mib, r.uploadSeconds, r.generateSeconds,
-        r.distributeSeconds, r.compositeSeconds, r.gatherSeconds, static_cast<double>(r.bytesSent) / mib,
-        static_cast<double>(r.deviceBytes) / mib);
-  }
-  if (!reports.empty()) text += fmt::format("samples per voxel: {:g}\n", reports.front().samplesPerVoxel);
-  return text + "device of rank 0: " + device + "\n";
-}
-
-/// Gives the output the VDI, in whose coloring the array is missing.
-void giveVdi(vdi::Vdi& vdi, const pv::Shown& shown, vtkImageData* output) {
+/// Completes the VDI by what is known of its blocks and gives it to the output.
+void giveVdi(vdi::Vdi& vdi, const pv::Shown& shown, const pv::Origin& origin, int step,
+             vtkImageData* output) {
   vdi.coloring->array = shown.array;
+  vdi.time = origin.time.value_or(0.0);
+  vdi.timeStep = static_cast<std::uint64_t>(std::max(step, 0));
   pv::setVdi(output, vdi);
   pv::setShownValues(output, shown.array, shown.values);
 }
@@ -426,34 +353,29 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
-  Internals& internal = *this->Internal;
+  pv::Regeneration& regeneration = this->Internal->Regeneration;
   const pv::Origin origin = this->OriginOf(input);
-  const bool isHeld = internal.Held && !internal.Asked;
-  // Who asks for other pieces of it, a writer on several ranks, gets what is there.
-  const bool isMade = internal.MadeOf == origin && !internal.Failed &&
-                      (isHeld || internal.Executed == this->CurrentMTime()) &&
-                      (internal.Made->GetNumberOfPoints() > 0 || !this->IsRoot());
-  const vtkMTimeType executed = std::exchange(internal.Executed, this->CurrentMTime());
-  const bool hasFailed = std::exchange(internal.Failed, true);
+  // A writer on several ranks asks for another piece of the output that is there.
+  const bool isMade = regeneration.isMade(origin, this->CurrentMTime()) &&
+                      (regeneration.made()->GetNumberOfPoints() > 0 || !this->IsRoot());
+  const pv::Regeneration::Last last = regeneration.begin(this->CurrentMTime());
   std::exception_ptr failure;
   try {
     this->Enter();
     if (pv::onAllRanks(this->Controller, isMade)) {
-      output->ShallowCopy(internal.Made);
+      output->ShallowCopy(regeneration.made());
       setTime(output, origin.time);
-      internal.Executed = executed;
-      internal.Failed = false;
-      internal.Answer();
-      if (!(internal.PreparedFor == origin)) this->GivesUpPreparation();
+      regeneration.keep(last);
+      regeneration.answer();
+      regeneration.giveUpOther(origin);
       return 1;
     }
-    if (this->Defer(input, origin, hasFailed, output)) {
-      internal.Executed = executed;
-      internal.Failed = false;
+    if (this->Defer(input, origin, last.hasFailed, output)) {
+      regeneration.keep(last);
       return 1;
     }
-    internal.Answer();
-    internal.InPlace = false;
+    regeneration.answer();
+    regeneration.setInPlace(false);
     this->Generate(input, origin, output);
   } catch (const std::exception&) {
     failure = std::current_exception();
@@ -473,8 +395,8 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   if (failure) {
     output->Initialize();
     if (isCancellation(failure)) {
-      // As ParaView's filters: it's not tried again until something changes.
-      internal.Failed = false;
+      // Like ParaView's own filters, this one doesn't try again until something changes.
+      regeneration.cancel();
       this->SetAbortOutput(false);  // or the executive empties the output
       this->KeepEarlier(output);
       return 1;
@@ -482,12 +404,10 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     this->SayFailure(whatOf(failure));
     return 0;
   }
-  internal.Made->ShallowCopy(output);
-  internal.MadeOf = origin;
-  this->NoteMade(output);
-  internal.Failed = false;
-  internal.Said.isOver();
-  internal.Executed = this->CurrentMTime();  // a map's table has been built
+  this->Internal->Said.isOver();
+  if (const auto made = pv::madeOf(output, this->CurrentSettings(), this->Internal->Reports))
+    std::ranges::copy(pv::numbersOf(*made), this->LastVdi);
+  regeneration.finish(output, origin, this->CurrentMTime());  // later: a map's table has been built
   return 1;
 }
 
@@ -497,9 +417,8 @@ void vtkVDIGenerator::SayFailure(const std::string& what) {
   if (isNew || pv::isWatched(this->Controller)) vtkErrorMacro(<< what);
 }
 
-/// Whether a rank has failed because it has lost its device: the volume is given up then, and the next one
-/// gets devices that aren't lost. All ranks fail together where there's a generator, and all must call this
-/// then, whatever each of them failed of.
+/// If a rank has lost its device, gives up the volume, so that the next one gets another device, and returns
+/// true. Collective: with a generator, all ranks fail together, whatever the cause on each.
 bool vtkVDIGenerator::DropLostDevice() {
   const std::shared_ptr<pv::Volume> volume = this->Internal->Volume;
   if (!volume || !volume->isMade()) return false;
@@ -509,62 +428,62 @@ bool vtkVDIGenerator::DropLostDevice() {
     const vdi::VdiGenerator& generator = volume->generator();
     if (!generator.communicator().anyTogether([&] { return generator.device().isLost(); })) return false;
   }
-  this->DropPreparation();
+  this->Internal->Regeneration.drop();
   this->UseVolume(nullptr);
   return true;
 }
 
-/// What an abort leaves on rank 0: the picture that was there, or one that shows nothing.
+/// Gives rank 0, after an abort, the picture that was there, or one that shows nothing.
 void vtkVDIGenerator::KeepEarlier(vtkImageData* output) {
   if (!this->IsRoot()) return;
   const auto [width, height] = this->PictureSize();
+  vtkImageData* made = this->Internal->Regeneration.made();
   int size[3];
-  this->Internal->Made->GetDimensions(size);
+  made->GetDimensions(size);
   if (size[0] == width && size[1] == height) {
-    output->ShallowCopy(this->Internal->Made);
+    output->ShallowCopy(made);
   } else {
     pv::setPicture(output, nothingOf(width, height), false);
   }
 }
 
 bool vtkVDIGenerator::ServesView() const {
-  return this->Internal->Views > 0 && this->Internal->Defers && !this->PictureOnly;
+  return this->Internal->Regeneration.defersView() && !this->PictureOnly;
 }
 
 void vtkVDIGenerator::DeferViews() {
-  this->Internal->Defers = true;
+  this->Internal->Regeneration.deferViews(true);
 }
 
 void vtkVDIGenerator::DeferNoViews() {
-  this->Internal->Defers = false;
+  this->Internal->Regeneration.deferViews(false);
 }
 
 void vtkVDIGenerator::BeginView() {
-  ++this->Internal->Views;
+  this->Internal->Regeneration.beginView();
 }
 
 void vtkVDIGenerator::EndView() {
-  --this->Internal->Views;
-  if (this->Internal->Asked) this->Internal->AskedTime.Modified();
+  this->Internal->Regeneration.endView();
 }
 
 int vtkVDIGenerator::GetOutdated() {
-  return this->Internal->Asked ? 1 : 0;
+  return this->Internal->Regeneration.asked() ? 1 : 0;
 }
 
-/// For a view that needn't wait: gives it an earlier output, and notes what it asks for. False where the VDI
-/// is to be made in place, or taken: it has just been prepared. Collective.
+/// Gives a view that needn't wait an earlier output, and notes what it asks for. Returns false where the VDI
+/// must be made in place, or has just been prepared. Collective.
 bool vtkVDIGenerator::Defer(vtkDataObject* input, const pv::Origin& origin, bool hasFailed,
                             vtkImageData* output) {
-  Internals& internal = *this->Internal;
-  // Without a map the colours need the range of the scalars, which is known once they're on the device.
-  const bool can = this->ServesView() && !hasFailed && !internal.InPlace && this->LookupTable != nullptr;
+  pv::Regeneration& regeneration = this->Internal->Regeneration;
+  // Without a map, the colours need the range of the scalars, which is known once they are on the device.
+  const bool can =
+      this->ServesView() && !hasFailed && !regeneration.isInPlace() && this->LookupTable != nullptr;
   if (!pv::onAllRanks(this->Controller, can)) return false;
-  const auto& preparing = internal.Preparing;
-  if (pv::onAllRanks(this->Controller, this->IsPrepared(origin))) {
-    if (!pv::onAllRanks(this->Controller, !preparing->isDone())) return false;
-  } else {
-    this->GivesUpPreparation();
+  if (!regeneration.isPrepared(origin, this->Controller)) {
+    regeneration.giveUp();
+  } else if (regeneration.isPreparationDone(this->Controller)) {
+    return false;
   }
   if (!this->Ask(input, origin)) return false;
   this->GiveEarlier(output);
@@ -572,59 +491,46 @@ bool vtkVDIGenerator::Defer(vtkDataObject* input, const pv::Origin& origin, bool
   return true;
 }
 
-/// Notes what Prepare is to make. False where the input is no good, which an update in place says.
+/// Notes what Prepare is to make. Returns false for an input that is no good; an update in place says why.
 /// Collective.
 bool vtkVDIGenerator::Ask(vtkDataObject* input, const pv::Origin& origin) {
-  Internals& internal = *this->Internal;
-  const bool isAsked = internal.Asked && internal.Asked->Load.of == origin;
-  if (pv::onAllRanks(this->Controller, isAsked)) return true;
-  internal.Asked.reset();
-  Request request{.Load = {.of = origin, .blocks = {}, .array = {}}, .Bounds = {}};
+  pv::Regeneration& regeneration = this->Internal->Regeneration;
+  const std::optional<pv::Request>& asked = regeneration.asked();
+  if (pv::onAllRanks(this->Controller, asked && asked->load.of == origin)) return true;
+  regeneration.forgetAsked();
+  pv::Request request;
   bool isGood = true;
   try {
-    requireInput(input);
-    pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.choice);
-    request.Load.blocks = pv::blocksOf(input, origin.choice);
+    request.load = pv::loadOf(input, this->GetInputAlgorithm(0, 0), origin);
   } catch (const vdi::Error&) {
     isGood = false;
   }
   if (!pv::onAllRanks(this->Controller, isGood)) return false;
-  const vdi::Box own = vdi::localScene(request.Load.blocks).bounds;
-  const double components = pv::componentsOf(input, origin.choice);
-  std::array<double, 8> least{own.lo.x,  own.lo.y,  own.lo.z,    -own.hi.x,
-                              -own.hi.y, -own.hi.z, -components, -mostPerVolume(request.Load.blocks)};
-  if (this->Controller != nullptr && this->Controller->GetNumberOfProcesses() > 1) {
-    const std::array<double, 8> mine = least;
-    this->Controller->AllReduce(mine.data(), least.data(), static_cast<vtkIdType>(least.size()),
-                                vtkCommunicator::MIN_OP);
-  }
-  request.Bounds = {{least[0], least[1], least[2]}, {-least[3], -least[4], -least[5]}};
-  request.Load.array = arrayOf(origin.choice, static_cast<int>(-least[6]));
-  request.Load.voxelVolume = least[7] < 0.0 ? -1.0 / least[7] : 0.0;
-  internal.Asked = std::move(request);
+  request.bounds = pv::complete(request.load, input, this->Controller);
+  regeneration.ask(std::move(request));
   return true;
 }
 
-/// What views get instead of what isn't made yet: the VDI that was made last, in a picture of the announced
-/// size; without one, nothing, at its place.
+/// Gives a view the last VDI, in a picture of the announced size, in place of one that isn't made yet;
+/// without any, a picture of nothing at its place.
 void vtkVDIGenerator::GiveEarlier(vtkImageData* output) {
   if (!this->IsRoot()) return;
-  const Internals& internal = *this->Internal;
-  const Request& asked = *internal.Asked;
-  output->ShallowCopy(internal.Made);
+  pv::Regeneration& regeneration = this->Internal->Regeneration;
+  const pv::Request& asked = *regeneration.asked();
+  output->ShallowCopy(regeneration.made());
   const auto [width, height] = this->PictureSize();
   int size[3];
   output->GetDimensions(size);
   if (size[0] != width || size[1] != height) {
     output->GetPointData()->Initialize();
     pv::setPicture(output, nothingOf(width, height), false);
-    if (internal.Made->GetNumberOfPoints() == 0)
-      pv::setBeingMade(output, this->Viewpoint(asked.Bounds), asked.Bounds);
+    if (regeneration.made()->GetNumberOfPoints() == 0)
+      pv::setBeingMade(output, this->Viewpoint(asked.bounds), asked.bounds);
   }
   // Views colour by the array that they ask for, and adapt its map to its range.
-  if (output->GetFieldData()->GetAbstractArray(asked.Load.array.name.c_str()) == nullptr) {
+  if (output->GetFieldData()->GetAbstractArray(asked.load.array.name.c_str()) == nullptr) {
     const double* range = this->LookupTable->GetRange();
-    pv::setShownValues(output, asked.Load.array, std::array{range[0], range[1]});
+    pv::setShownValues(output, asked.load.array, std::array{range[0], range[1]});
   }
 }
 
@@ -661,19 +567,19 @@ void vtkVDIGenerator::UseVolume(const std::shared_ptr<pv::Volume>& volume) {
   });
 }
 
-/// Takes the volume that shows this input to another filter, or one that can show it. Collective.
+/// Uses the volume in which another filter shows this input, or one that can show it. Collective.
 void vtkVDIGenerator::ChooseVolume(const pv::Origin& origin) {
   Internals& internal = *this->Internal;
   if (internal.Identity == 0) internal.Identity = pv::newIdentity(this->Controller);
   this->UseVolume(internal.Volumes->choose(this->Controller, origin, internal.Volume, this));
 }
 
-/// Shows the input in the volume, of which the filter has the turn. Where another filter has done so, or only
-/// the camera or the transfer function has changed, nothing is uploaded. Collective.
+/// Shows the input in the volume, whose turn the filter has. Uploads nothing where another filter has done
+/// so, or where only the camera or the transfer function has changed. Collective.
 void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin) {
   pv::Volume& volume = *this->Internal->Volume;
   const vdi::comm::Communicator& comm = volume.generator().communicator();
-  comm.together([&] { requireInput(input); });
+  comm.together([&] { pv::requireInput(input); });
   // What the ranks do next depends on these; the generator compares the rest.
   comm.requireEqual(std::hash<std::string>()(origin.choice.name), "SelectInputScalars, the array");
   comm.requireEqual(origin.choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells");
@@ -683,17 +589,9 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin)
   comm.requireEqual(static_cast<std::uint64_t>(this->BlendMode), "BlendMode");
   comm.together([&] { static_cast<void>(this->CurrentBlending()); });  // before values are loaded in vain
   if (!comm.anyTogether([&] { return this->Internal->ShownOf(origin) == nullptr; })) return;
-  pv::Load load{.of = origin, .blocks = {}, .array = {}};
-  comm.together([&] {
-    pv::requireArray(input, this->GetInputAlgorithm(0, 0), origin.choice);
-    load.blocks = pv::blocksOf(input, origin.choice);
-  });
-  // Doubles that aren't negative are ordered as their bits are.
-  std::array<std::uint64_t, 2> largest{vdi::bit_cast<std::uint64_t>(mostPerVolume(load.blocks)),
-                                       static_cast<std::uint64_t>(pv::componentsOf(input, origin.choice))};
-  comm.allReduceMax(largest);
-  load.voxelVolume = largest[0] > 0 ? 1.0 / vdi::bit_cast<double>(largest[0]) : 0.0;
-  load.array = arrayOf(origin.choice, static_cast<int>(largest[1]));
+  pv::Load load;
+  comm.together([&] { load = pv::loadOf(input, this->GetInputAlgorithm(0, 0), origin); });
+  pv::complete(load, input, this->Controller);
   this->UpdateProgress(0.05);
   volume.setTarget(origin);
   volume.show(load);
@@ -705,7 +603,7 @@ vdi::ScalarRange vtkVDIGenerator::StandInRange(const pv::Shown& shown) {
   if (internal.FirstRange) return *internal.FirstRange;
   const vdi::ScalarRange range = shown.range;
   if (range.min < range.max) return *(internal.FirstRange = range);
-  // Of nothing, or of one value everywhere: no range to keep.
+  // Without values, or with one value everywhere, there is no range to keep.
   const double low = range.min <= range.max ? range.min : 0.0;
   return {low, low + 1.0};
 }
@@ -721,7 +619,7 @@ vdi::Camera vtkVDIGenerator::Viewpoint(const vdi::Box& bounds) const {
   return camera;
 }
 
-/// Where ranks come with filters that don't belong together, they give up their volumes and start anew.
+/// Ranks that come with filters that don't belong together give up their volumes and start anew.
 void vtkVDIGenerator::Enter() {
   Internals& internal = *this->Internal;
   const std::string name =
@@ -729,7 +627,7 @@ void vtkVDIGenerator::Enter() {
   try {
     pv::enterCollective(this->Controller, "VolumetricDepthImage, " + name);
   } catch (const vdi::Error&) {
-    this->DropPreparation();
+    internal.Regeneration.drop();
     this->UseVolume(nullptr);
     internal.Identity = 0;
     throw;
@@ -741,8 +639,8 @@ std::array<int, 2> vtkVDIGenerator::PictureSize() const {
   return {this->Resolution[0], this->Resolution[1]};
 }
 
-/// Of blocks in these bounds and the properties and maps as they are. `range`: of the map that stands in for
-/// none.
+/// The frame of blocks in these bounds, with the properties and maps as they are. `range` is that of the map
+/// that stands in for none.
 vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame(const vdi::Box& bounds, double voxelVolume,
                                                      const vdi::ScalarRange& range) {
   double unit = this->ScalarOpacityUnitDistance;
@@ -771,173 +669,113 @@ vdi::GenerateSettings vtkVDIGenerator::CurrentSettings() const {
   return settings;
 }
 
-/// For the estimate of the next one. The properties are as they were when it was made.
-void vtkVDIGenerator::NoteMade(vtkImageData* output) {
-  vtkFieldData* fields = output->GetFieldData();
-  vtkDataArray* offsets = fields->GetArray("VDI.offsets");
-  const std::vector<vdi::RankReport>& reports = this->Internal->Reports;
-  if (offsets == nullptr || reports.empty()) return;
-  const vtkIdType lists = offsets->GetNumberOfTuples() - 1;
-  vdi::MadeVdi made{.settings = this->CurrentSettings(),
-                    .lists = static_cast<std::uint64_t>(lists),
-                    .supersegments = static_cast<std::uint64_t>(offsets->GetTuple1(lists))};
-  made.settings.precision =
-      fields->GetArray("VDI.codes") != nullptr ? vdi::Precision::Compact : vdi::Precision::Full;
-  made.settings.samplesPerVoxel = reports.front().samplesPerVoxel;
-  for (const vdi::RankReport& report : reports) {
-    made.castSeconds = std::max(made.castSeconds, report.generateSeconds);
-    made.listSeconds =
-        std::max(made.listSeconds, report.distributeSeconds + report.compositeSeconds + report.gatherSeconds);
-  }
-  std::ranges::copy(pv::numbersOf(made), this->LastVdi);
-}
-
 void vtkVDIGenerator::Hold() {
-  this->Internal->Held = true;
-  this->GivesUpPreparation();
+  this->Internal->Regeneration.hold();
 }
 
 void vtkVDIGenerator::Release() {
-  Internals& internal = *this->Internal;
-  internal.Held = false;
+  pv::Regeneration& regeneration = this->Internal->Regeneration;
   const vtkMTimeType time = this->CurrentMTime();
-  if (internal.Executed == time && !internal.Asked) return;
-  // An output that was asked for meanwhile, and stayed as it was, is younger than what was modified.
+  if (!regeneration.release(time)) return;
+  // An update may have kept the held output, which is younger than the properties then.
   this->Modified();
-  if (internal.Preparing && internal.Preparing->time() == time)
-    internal.Preparing->setTime(this->CurrentMTime());
+  regeneration.carryOver(time, this->CurrentMTime());
 }
 
 int vtkVDIGenerator::GetHeld() {
-  return this->Internal->Held ? 1 : 0;
+  return this->Internal->Regeneration.isHeld() ? 1 : 0;
 }
 
 int vtkVDIGenerator::GetPreparation() {
-  const auto& preparing = this->Internal->Preparing;
-  return preparing ? preparing->percent() : -1;
+  return this->Internal->Regeneration.percent();
 }
 
 void vtkVDIGenerator::ServePreparation() {
-  const auto& preparing = this->Internal->Preparing;
   constexpr std::chrono::milliseconds most{15};  // the window waits for that
-  if (preparing && preparing->hasRanks() && !preparing->isDone()) preparing->serve(most);
+  this->Internal->Regeneration.serve(most);
 }
 
-/// Tells the thread that it's unwanted. False where nothing is under way.
-bool vtkVDIGenerator::GivesUpPreparation() {
-  const auto& preparing = this->Internal->Preparing;
-  if (!preparing || preparing->isDone()) return false;
-  preparing->giveUp();
-  return true;
-}
-
-/// Collective.
-void vtkVDIGenerator::DropPreparation() {
-  this->Internal->Preparing.reset();
-}
-
-/// Whether what is under way, or there, is what the update asks for.
-bool vtkVDIGenerator::IsPrepared(const pv::Origin& origin) const {
-  const Internals& internal = *this->Internal;
-  return internal.Preparing && !internal.Preparing->isGivenUp() &&
-         internal.Preparing->time() == internal.Executed && internal.PreparedFor == origin;
+/// What a preparation's thread does. `load`: blocks of `origin` that the volume doesn't show yet.
+pv::Preparation::Make vtkVDIGenerator::Internals::Maker(Frame frame, std::optional<pv::Load> load,
+                                                        const pv::Origin& origin, int step) {
+  return [this, frame = std::move(frame), load = std::move(load), origin, step](
+             pv::Volume& volume, const vdi::Progress& progress, vtkVDIImageData* output) {
+    volume.make();  // does nothing on several ranks, where AskedFrame has done it
+    if (load) {
+      volume.show(*load);
+    } else {
+      volume.requireShown(origin);
+    }
+    this->Reports.clear();
+    vdi::VdiGenerator& generator = volume.generator();
+    std::optional<vdi::Vdi> vdi = generator.generate(frame.Camera, frame.Function, frame.Settings, progress);
+    this->TakeReports(generator);
+    if (!vdi) return;  // another rank has it
+    giveVdi(*vdi, *volume.shown(), origin, step, output);
+    findRanges(output->GetPointData());
+    findRanges(output->GetFieldData());
+    if (pv::isServer()) output->SetFile(pv::fileOf(*vdi));
+  };
 }
 
 void vtkVDIGenerator::Prepare() {
   Internals& internal = *this->Internal;
-  this->DropPreparation();
-  const bool isMade = !internal.Failed && internal.Executed == this->CurrentMTime() && !internal.Asked;
-  const auto shown = internal.MadeOf ? internal.ShownOf(*internal.MadeOf) : nullptr;
-  bool can = !isMade && (internal.Asked || shown) && !this->PictureOnly;
+  pv::Regeneration& regeneration = internal.Regeneration;
+  regeneration.drop();
+  const std::optional<pv::Request>& asked = regeneration.asked();
+  const auto shown = regeneration.madeOf() ? internal.ShownOf(*regeneration.madeOf()) : nullptr;
+  bool can = !regeneration.isCurrent(this->CurrentMTime()) && (asked || shown) && !this->PictureOnly;
   Frame frame;
   if (pv::onAllRanks(this->Controller, can)) {
     try {
-      frame = internal.Asked ? this->AskedFrame() : this->ShownFrame(*shown);
+      frame = asked ? this->AskedFrame() : this->ShownFrame(*shown);
     } catch (const vdi::Error&) {
-      can = false;  // said by the update that comes instead
+      can = false;  // the update that comes instead says why
     }
   } else {
     can = false;
   }
   if (!pv::onAllRanks(this->Controller, can)) {
-    internal.InPlace = internal.Asked.has_value();
+    regeneration.setInPlace(asked.has_value());
     return;
   }
-  std::optional<pv::Load> load;  // of other blocks than the volume's
-  if (internal.Asked) load = internal.Asked->Load;
-  internal.PreparedFor = load ? load->of : *internal.MadeOf;
-  if (load) internal.Volume->setTarget(load->of);
-  internal.Preparing = std::make_unique<pv::Preparation>(
-      internal.Volume, this->CurrentMTime(),
-      [&internal, frame = std::move(frame), load = std::move(load), of = *internal.PreparedFor,
-       step = std::max(this->TimeStep, 0)](pv::Volume& volume, const vdi::Progress& progress,
-                                           vtkVDIImageData* output) {
-        volume.make();  // alone: several ranks have it
-        if (load) {
-          volume.show(*load);
-        } else {
-          volume.requireShown(of);
-        }
-        internal.Reports.clear();
-        vdi::VdiGenerator& generator = volume.generator();
-        std::optional<vdi::Vdi> vdi =
-            generator.generate(frame.Camera, frame.Function, frame.Settings, progress);
-        internal.TakeReports(generator);
-        if (!vdi) return;  // another rank has it
-        vdi->time = of.time.value_or(0.0);
-        vdi->timeStep = static_cast<std::uint64_t>(step);
-        giveVdi(*vdi, *volume.shown(), output);
-        findRanges(output->GetPointData());
-        findRanges(output->GetFieldData());
-        if (pv::isServer()) output->SetFile(pv::fileOf(*vdi));
-      });
+  std::optional<pv::Load> load;  // blocks that the volume doesn't show yet
+  if (asked) load = asked->load;
+  const pv::Origin origin = load ? load->of : *regeneration.madeOf();
+  if (load) internal.Volume->setTarget(origin);
+  regeneration.prepare(internal.Volume, origin, this->CurrentMTime(),
+                       internal.Maker(std::move(frame), std::move(load), origin, this->TimeStep));
 }
 
-/// Of what a view has asked for, whose volume it chooses. Collective.
+/// The frame that a view has asked for. Chooses its volume. Collective.
 vtkVDIGenerator::Frame vtkVDIGenerator::AskedFrame() {
-  const Request& asked = *this->Internal->Asked;
-  this->ChooseVolume(asked.Load.of);
+  const pv::Request& asked = *this->Internal->Regeneration.asked();
+  this->ChooseVolume(asked.load.of);
   // A thread must not make a communicator of several ranks.
   if (this->Internal->Volume->hasRanks()) this->Internal->Volume->make();
-  this->Internal->NoteChoice(asked.Load.of.choice);
-  return this->CurrentFrame(asked.Bounds, asked.Load.voxelVolume, {0.0, 1.0});
+  this->Internal->NoteChoice(asked.load.of.choice);
+  return this->CurrentFrame(asked.bounds, asked.load.voxelVolume, {0.0, 1.0});
 }
 
 vtkVDIGenerator::Frame vtkVDIGenerator::ShownFrame(const pv::Shown& shown) {
   return this->CurrentFrame(shown.bounds, shown.voxelVolume, this->StandInRange(shown));
 }
 
-/// Makes sure that no thread of this filter uses the volume. True if `output` is what one has made of just
-/// this, for which an update that can't wait for its turn, a writer's, waits here. Collective.
+/// Makes sure that no thread of this filter uses the volume. Returns whether `output` is what one has made of
+/// just this; an update that can't wait for its turn, such as a writer's, waits here. Collective.
 bool vtkVDIGenerator::TakePreparation(const pv::Origin& origin, vtkImageData* output) {
-  Internals& internal = *this->Internal;
-  const auto& preparing = internal.Preparing;
-  if (!preparing) return false;
-  if (!pv::onAllRanks(this->Controller, this->IsPrepared(origin))) {
-    this->DropPreparation();
-    return false;
-  }
-  const pv::Preparation::End end = preparing->wait([&] {
-    this->UpdateProgress(preparing->share());
-    if (this->CheckAbort()) preparing->giveUp();
-  });
-  if (end == pv::Preparation::End::GivenUp) {
-    this->DropPreparation();
-    throw vdi::Error(vdi::ErrorCode::Cancelled, "it was aborted");
-  }
-  const bool isGood = end == pv::Preparation::End::Good;
-  if (isGood) {
-    output->ShallowCopy(preparing->output());
-    if (output->GetNumberOfPoints() > 0) setTime(output, origin.time);
-  }
-  this->DropPreparation();
-  if (isGood) this->TakeReport();
-  return isGood;
+  const auto goesOn = [this](double share) {
+    this->UpdateProgress(share);
+    return !this->CheckAbort();
+  };
+  if (!this->Internal->Regeneration.take(origin, this->Controller, output, goesOn)) return false;
+  if (output->GetNumberOfPoints() > 0) setTime(output, origin.time);
+  this->TakeReport();
+  return true;
 }
 
 void vtkVDIGenerator::TakeReport() {
-  const Internals& internal = *this->Internal;
-  this->SetReport(internal.Reports.empty() ? "" : reportOf(internal.Reports, internal.Device).c_str());
+  this->SetReport(pv::reportOf(this->Internal->Reports, this->Internal->Device).c_str());
 }
 
 void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, vtkImageData* output) {
@@ -949,10 +787,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, v
   turn.await();
   volume.make();
   vdi::VdiGenerator& generator = volume.generator();
-  if (!(internal.MadeOf == origin)) {
-    internal.Made->Initialize();  // no need to have two in memory
-    internal.MadeOf.reset();
-  }
+  internal.Regeneration.dropOther(origin);
   this->ShowBlocks(input, origin);
   this->UpdateProgress(0.1);
   const std::shared_ptr<const pv::Shown> shown = volume.shown();
@@ -976,9 +811,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, v
     std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
     takeReport();
     if (!vdi) return;
-    vdi->time = origin.time.value_or(0.0);
-    vdi->timeStep = static_cast<std::uint64_t>(std::max(this->TimeStep, 0));
-    giveVdi(*vdi, *shown, output);
+    giveVdi(*vdi, *shown, origin, this->TimeStep, output);
   }
   setTime(output, origin.time);
 }

@@ -210,9 +210,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   struct Internals;
   struct Frame;
-  struct Request;
   bool ServesView() const;
-  bool IsPrepared(const pv::Origin& origin) const;
   bool Defer(vtkDataObject* input, const pv::Origin& origin, bool hasFailed, vtkImageData* output);
   bool Ask(vtkDataObject* input, const pv::Origin& origin);
   void GiveEarlier(vtkImageData* output);
@@ -231,13 +229,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vdi::Blending CurrentBlending() const;
   vtkMTimeType CurrentMTime();
   pv::Origin OriginOf(vtkDataObject* input);
-  bool GivesUpPreparation();
-  void DropPreparation();
   bool TakePreparation(const pv::Origin& origin, vtkImageData* output);
   void SayFailure(const std::string& what);
   void TakeReport();
   vdi::GenerateSettings CurrentSettings() const;
-  void NoteMade(vtkImageData* output);
   void KeepEarlier(vtkImageData* output);
   bool DropLostDevice();
   std::array<int, 2> PictureSize() const;

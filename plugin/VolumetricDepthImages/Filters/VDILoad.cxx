@@ -1,0 +1,64 @@
+#include "VDILoad.h"
+
+#include <vtkAlgorithm.h>
+#include <vtkCommunicator.h>
+#include <vtkDataObject.h>
+#include <vtkMultiProcessController.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+#include "VDIArrays.h"
+#include "vdi/core/Error.h"
+#include "vdi/core/Scene.h"
+
+namespace pv {
+
+namespace {
+
+/// Number of the smallest voxels in a unit of volume; 0 without blocks.
+double mostPerVolume(const std::vector<vdi::Block>& blocks) {
+  double most = 0.0;
+  for (const vdi::Block& block : blocks) {
+    const double volume = block.spacing.x * block.spacing.y * block.spacing.z;
+    if (volume > 0.0) most = std::max(most, 1.0 / volume);
+  }
+  return most;
+}
+
+}  // namespace
+
+void requireInput(vtkDataObject* input) {
+  if (input != nullptr && std::strcmp(input->GetClassName(), "vtkDataObject") != 0) return;
+  throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                   "the input has no data; in a Catalyst script, TrivialProducer(registrationName=...) names "
+                   "what the simulation hands over, \"grid\" for vdi_catalyst");
+}
+
+Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin) {
+  requireInput(input);
+  requireArray(input, upstream, origin.choice);
+  return {.of = origin, .blocks = blocksOf(input, origin.choice), .array = {}};
+}
+
+vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* controller) {
+  const vdi::Box own = vdi::localScene(load.blocks).bounds;
+  const double components = componentsOf(input, load.of.choice);
+  std::array<double, 8> least{own.lo.x,  own.lo.y,  own.lo.z,    -own.hi.x,
+                              -own.hi.y, -own.hi.z, -components, -mostPerVolume(load.blocks)};
+  if (controller != nullptr && controller->GetNumberOfProcesses() > 1) {
+    const std::array<double, 8> mine = least;
+    controller->AllReduce(mine.data(), least.data(), static_cast<vtkIdType>(least.size()),
+                          vtkCommunicator::MIN_OP);
+  }
+  const int count = std::max(static_cast<int>(-least[6]), 1);  // 0: no rank has the array
+  load.array = {.name = load.of.choice.name,
+                .cells = load.of.choice.cells,
+                .components = count,
+                .component = count > 1 ? load.of.choice.component : 0};
+  load.voxelVolume = least[7] < 0.0 ? -1.0 / least[7] : 0.0;
+  return {{least[0], least[1], least[2]}, {-least[3], -least[4], -least[5]}};
+}
+
+}  // namespace pv

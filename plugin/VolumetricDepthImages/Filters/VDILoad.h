@@ -1,0 +1,50 @@
+// The blocks that a filter brings to a volume on the device.
+#ifndef VDILoad_h
+#define VDILoad_h
+
+#include <vtkType.h>
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "VDIBlocks.h"
+#include "vdi/core/Block.h"
+#include "vdi/core/Box.h"
+#include "vdi/core/Coloring.h"
+
+class vtkAlgorithm;
+class vtkDataObject;
+class vtkMultiProcessController;
+
+namespace pv {
+
+/// What tells one set of blocks from another.
+struct Origin {
+  std::vector<std::uint64_t> input;  // identityOf
+  /// Modification time of the pipeline above the filter: in situ, arrays are overwritten in place.
+  vtkMTimeType upstream = 0;
+  std::optional<double> time;  // none: the data have none
+  ArrayChoice choice;
+  bool fillGhosts = true;
+  bool operator==(const Origin&) const = default;
+};
+
+/// This rank's blocks of an origin, which share their values with the input, and what they mean.
+struct Load {
+  Origin of;
+  std::vector<vdi::Block> blocks;
+  vdi::ScalarArray array;    // the same on all ranks
+  double voxelVolume = 0.0;  // smallest of all ranks' voxels; 0 without any
+};
+
+/// Throws vdi::Error where there is no input. In situ, a script's misspelt channel is one.
+void requireInput(vtkDataObject* input);
+/// This rank's blocks. `upstream` makes the input. Throws vdi::Error for an input that has no such blocks.
+Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin);
+/// Collective: fills in the load's array and voxel volume, and returns the bounds of all ranks' blocks.
+vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* controller);
+
+}  // namespace pv
+
+#endif

@@ -1,0 +1,25 @@
+// What a filter tells of its last VDI.
+#ifndef VDIReport_h
+#define VDIReport_h
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vdi/core/Estimate.h"
+#include "vdi/pipeline/Reports.h"
+
+class vtkImageData;
+
+namespace pv {
+
+/// Time and memory, a line per rank; empty without reports.
+std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device);
+/// The VDI in the image, made with these settings, from which the next one is estimated; nullopt for an image
+/// without a VDI and without reports.
+std::optional<vdi::MadeVdi> madeOf(vtkImageData* image, const vdi::GenerateSettings& settings,
+                                   const std::vector<vdi::RankReport>& reports);
+
+}  // namespace pv
+
+#endif
