@@ -23,7 +23,7 @@ vtkDataSetAttributes* attributesOf(vtkImageData* image, bool cells) {
   return cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
 }
 
-/// Without ghost marks, which nobody wants to see.
+/// The arrays' names, without ghost marks.
 std::string namesOf(vtkDataSetAttributes* attributes) {
   std::string names;
   for (int i = 0; i < attributes->GetNumberOfArrays(); ++i) {
@@ -68,7 +68,7 @@ void requireArrayOf(vtkDataObject* leaf, const ArrayChoice& choice) {
 }  // namespace
 
 void requireArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice) {
-  // What the source itself made.
+  // Looks at the source's own output.
   if (producer != nullptr && producer->IsA("vtkPVPostFilter") != 0 &&
       producer->GetNumberOfInputConnections(0) > 0) {
     if (vtkDataObject* original = producer->GetInputDataObject(0, 0)) data = original;

@@ -1,4 +1,4 @@
-// Whether a data set has the array that was asked for.
+// Checks that a data set has the requested array.
 #ifndef VDIArrays_h
 #define VDIArrays_h
 
@@ -9,10 +9,11 @@ class vtkDataObject;
 
 namespace pv {
 
-/// Throws vdi::Error{InvalidArgument}, with the arrays that there are, unless all images of `data` have the
-/// array of the choice where it's asked for. `producer` is what made `data`: ParaView puts a filter behind
-/// each source that makes cell arrays of point arrays and the other way round when asked for them, by
-/// averaging; such an array isn't accepted. Other data than images is left to blocksOf.
+/// Throws vdi::Error{InvalidArgument}, which lists the existing arrays, unless all images of `data` have the
+/// chosen array on the chosen points or cells. `producer` has made `data`. Downstream of each source,
+/// ParaView puts a filter that averages cell arrays from point arrays, and point arrays from cell arrays, on
+/// request; such an array isn't accepted. The function ignores data that are no images; blocksOf rejects
+/// them.
 void requireArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice);
 
 }  // namespace pv

@@ -31,7 +31,8 @@ struct TypedArray {
   vtkSmartPointer<vtkDataArray> array;  // contiguous, one component
 };
 
-/// The library's type for a VTK type of that size; false for 64-bit integers and what isn't a number.
+/// Finds the library's type for a VTK type of the same size. Returns false for 64-bit integers and types that
+/// aren't numbers.
 bool scalarTypeOf(int vtkType, vdi::ScalarType& type) {
   switch (vtkType) {
     case VTK_UNSIGNED_CHAR:
@@ -107,7 +108,7 @@ TypedArray typed(vtkDataArray* array, int component) {
   return result;
 }
 
-/// Throws where values would be read that aren't there.
+/// Throws if the array has fewer values than the lattice.
 void requireLength(vtkDataArray* array, const glm::ivec3& values, const std::string& block) {
   const vtkIdType needed = vtkIdType{values.x} * values.y * values.z;
   if (array->GetNumberOfTuples() >= needed) return;
@@ -118,7 +119,7 @@ void requireLength(vtkDataArray* array, const glm::ivec3& values, const std::str
               block);
 }
 
-/// Where an image's cells lie.
+/// The lattice of an image's cells.
 struct Lattice {
   glm::dvec3 origin;  // lower corner of the first cell
   glm::dvec3 spacing;
@@ -126,7 +127,7 @@ struct Lattice {
   glm::ivec3 cells;
 };
 
-/// The image's flags, null if there are none. Throws if there are fewer than the image has points or cells.
+/// The image's flags; null if there are none. Throws if the image has more points or cells than flags.
 const unsigned char* flagsOf(vtkUnsignedCharArray* ghosts, const glm::ivec3& values,
                              const std::string& block) {
   if (ghosts == nullptr) return nullptr;
@@ -134,10 +135,10 @@ const unsigned char* flagsOf(vtkUnsignedCharArray* ghosts, const glm::ivec3& val
   return ghosts->GetPointer(0);
 }
 
-/// What an image's vtkGhostType says of its cells and of the values on its lattice.
+/// The cells and values that an image's vtkGhostType excludes.
 struct Blanking {
-  std::vector<vdi::IndexBox> own;     // cells that are drawn, as disjoint boxes
-  std::vector<vdi::IndexBox> masked;  // values that mean nothing
+  std::vector<vdi::IndexBox> own;     // drawn cells, as disjoint boxes
+  std::vector<vdi::IndexBox> masked;  // meaningless values
 };
 
 constexpr unsigned char cellsNotDrawn = vtkDataSetAttributes::DUPLICATECELL |
@@ -145,8 +146,9 @@ constexpr unsigned char cellsNotDrawn = vtkDataSetAttributes::DUPLICATECELL |
 constexpr unsigned char cellsWithoutMeaning =
     vtkDataSetAttributes::REFINEDCELL | vtkDataSetAttributes::HIDDENCELL;
 
-/// A cell is drawn unless it's somebody else's, refined or hidden, or one of its points is hidden, as VTK has
-/// it. A point that only such refined and hidden cells touch means nothing, nor does a hidden one.
+/// By VTK's rules, a cell isn't drawn if it is a duplicate, refined or hidden, or if one of its points is
+/// hidden. A point's value is meaningless if the point is hidden, or if all cells around it are refined or
+/// hidden.
 Blanking blankingOf(vtkImageData* image, const Lattice& lattice, bool ofCells, const std::string& block) {
   const vdi::IndexBox cells{glm::ivec3(0), lattice.cells};
   const vdi::IndexBox points{glm::ivec3(0), lattice.points};
@@ -227,7 +229,7 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
   const auto& [origin, spacing, points, cells] = lattice;
   requireLength(array, choice.cells ? cells : points, name);
   const TypedArray scalars = typed(array, choice.component);
-  // The deleter's copy of the smart pointer is what keeps the array alive.
+  // The deleter's copy of the smart pointer keeps the array alive.
   const std::shared_ptr<const void> keepAlive(
       scalars.array->GetVoidPointer(0), [array = scalars.array](const void*) mutable { array = nullptr; });
   Blanking blanking = blankingOf(image, lattice, choice.cells, name);
@@ -238,7 +240,7 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
   if (!blanking.masked.empty())
     block.masked = std::make_shared<std::vector<vdi::IndexBox>>(std::move(blanking.masked));
   for (const vdi::IndexBox& box : blanking.own) {
-    // A lattice that is one point thick has no cell there, and so owns nothing.
+    // A lattice that is one point thick has no cell along that axis, and so owns nothing there.
     for (int axis = 0; axis < 3; ++axis) {
       if (points[axis] == 1) continue;
       block.owned.lo[axis] = origin[axis] + box.lo[axis] * spacing[axis];
@@ -263,7 +265,7 @@ void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, const std::string& 
   addImage(image, choice, name, blocks);
 }
 
-/// Filters that pass a data set on give it a new time of modification, its arrays keep theirs.
+/// A filter that passes a data set on gives it a new time of modification; the arrays keep theirs.
 void addIdentity(vtkDataObject* leaf, std::vector<std::uint64_t>& identity) {
   auto* image = vtkImageData::SafeDownCast(leaf);
   if (image == nullptr) {
@@ -332,7 +334,7 @@ std::vector<std::uint64_t> identityOf(vtkDataObject* data) {
     addIdentity(data, identity);
     return identity;
   }
-  // Of AMR also which parts of a level are those of another.
+  // The time of AMR data covers which parts of a level other levels refine.
   if (vtkOverlappingAMR::SafeDownCast(data) != nullptr) identity.push_back(data->GetMTime());
   const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
   for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {

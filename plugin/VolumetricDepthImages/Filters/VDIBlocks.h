@@ -1,4 +1,4 @@
-// VTK data sets as the library knows them.
+// Conversion of VTK data sets to the library's blocks.
 #ifndef VDIBlocks_h
 #define VDIBlocks_h
 
@@ -12,27 +12,29 @@ class vtkDataObject;
 
 namespace pv {
 
-/// Which scalars of a data set.
+/// The scalars of a data set that a VDI shows.
 struct ArrayChoice {
   std::string name;
-  bool cells = false;  // of cells, else of points
+  bool cells = false;  // an array of cells, else of points
   int component = 0;   // -1: magnitude
   bool operator==(const ArrayChoice&) const = default;
 };
 
-/// The blocks of an image, or of all images of a composite data set. Scalars are shared, not copied, where
-/// VTK has them contiguous with one component and of a type that the library knows. Cells that vtkGhostType
-/// calls duplicate, refined or hidden aren't owned, nor those with a hidden point; values of refined and
-/// hidden ones are masked. Levels of AMR data come as they are: the finest owns what they share once the
-/// blocks of all ranks meet. Throws vdi::Error{InvalidArgument}: a data set that isn't vtkImageData, a
-/// rotated image, a missing array, one or a vtkGhostType that's shorter than the image.
+/// The blocks of an image, or of all images of a composite data set. A block shares its scalars with VTK
+/// where they are contiguous, have one component and a type that the library knows; otherwise it has a copy.
+/// A block doesn't own cells that vtkGhostType marks as duplicate, refined or hidden, nor cells with a hidden
+/// point. It masks the values of refined and hidden ones. Levels of AMR data stay as they are: once the
+/// blocks of all ranks meet, the finest level owns the overlap. Throws vdi::Error{InvalidArgument} for a data
+/// set other than vtkImageData, a rotated image, a missing array, and an array or a vtkGhostType that is
+/// shorter than the image.
 std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice);
 
-/// How many components the array of the choice has in the data set; 0 where there is no such array.
+/// The number of components of the chosen array in the data set; 0 if there is no such array.
 int componentsOf(vtkDataObject* data, const ArrayChoice& choice);
 
-/// Numbers that are others whenever blocksOf would give other blocks, by VTK's rule that who changes an array
-/// calls its Modified: places of all images, which arrays they have, and when these were modified.
+/// Numbers that change whenever blocksOf would give other blocks: the places of all images, their arrays, and
+/// the arrays' times of modification. They rely on VTK's rule that code which changes an array calls its
+/// Modified.
 std::vector<std::uint64_t> identityOf(vtkDataObject* data);
 
 }  // namespace pv

@@ -1,8 +1,10 @@
-// How a collective operation asks before it starts, where somebody watches over the ranks' scripts.
+// The question that a collective operation asks before it starts, where an observer watches over the ranks'
+// scripts.
 //
-// A script that ends on one rank while the others go on leaves them in a collective that it never enters. Who
-// can tell (catalyst_adaptor) observes `event` on the global vtkMultiProcessController; where nobody does,
-// entries are granted. Free of VTK and MPI: shared with catalyst_adaptor, which doesn't link the plugin.
+// A script that ends on one rank while the others go on leaves them in a collective operation that it never
+// enters. catalyst_adaptor can tell, and observes `event` on the global vtkMultiProcessController. Without an
+// observer, every entry is granted. This header is free of VTK and MPI, because catalyst_adaptor shares it
+// and doesn't link the plugin.
 #ifndef VDICollective_h
 #define VDICollective_h
 
@@ -14,8 +16,8 @@ namespace pv {
 struct CollectiveEntry {
   static constexpr unsigned long event = 1000 + 5642;  // vtkCommand::UserEvent and any number
 
-  std::string operation;  // the same on all ranks, or none may enter
-  std::string refusal;    // why not to enter, from the observer; "": enter
+  std::string operation;  // its name, the same on all ranks; if names differ, no rank may enter
+  std::string refusal;    // the observer's reason against entering; "": enter
 };
 
 }  // namespace pv

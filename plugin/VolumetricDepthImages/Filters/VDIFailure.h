@@ -1,5 +1,5 @@
-// How a filter that fails says so: once. Views and pipelines ask again and again for what they don't get, and
-// each time VTK's executive adds that the algorithm has returned failure.
+// A filter's failure, reported once. Views and pipelines repeat their requests to a filter that fails, and
+// VTK's executive adds each time that the algorithm has returned failure.
 #ifndef VDIFailure_h
 #define VDIFailure_h
 
@@ -14,8 +14,8 @@ namespace pv {
 
 class Failure {
  public:
-  /// Whether `text` hasn't been said yet of `filter` since it was right last. From then on its executive
-  /// keeps quiet of failures; all else it says as before.
+  /// Whether `text` is new: the filter hasn't reported it since it last succeeded. From the first call on,
+  /// the filter's executive no longer reports that a request failed. It reports all other errors as before.
   bool isNew(vtkAlgorithm* filter, const std::string& text);
   void isOver() { text_.clear(); }
 

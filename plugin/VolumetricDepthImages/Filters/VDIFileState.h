@@ -1,4 +1,4 @@
-// What tells that a file isn't what it was.
+// The state of a file, by which a reader sees that the file has changed.
 #ifndef VDIFileState_h
 #define VDIFileState_h
 
@@ -17,7 +17,7 @@ struct FileState {
   bool operator==(const FileState&) const = default;
 };
 
-/// None if there's no such file.
+/// Nullopt if there is no such file.
 inline std::optional<FileState> stateOf(const std::string& name) {
   std::error_code error;
   FileState state;

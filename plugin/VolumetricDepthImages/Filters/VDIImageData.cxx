@@ -45,7 +45,7 @@ auto* addField(vtkFieldData* fields, const char* name, int components, vtkIdType
   return array->GetPointer(0);
 }
 
-/// Memory of what's shown of the image: four bytes a pixel.
+/// Adds the image's colours, 4 bytes a pixel, and returns their memory.
 unsigned char* addColors(vtkImageData* image, std::size_t pixels) {
   vtkNew<vtkUnsignedCharArray> colors;
   colors->SetName("RGBA");
@@ -55,7 +55,7 @@ unsigned char* addColors(vtkImageData* image, std::size_t pixels) {
   return colors->GetPointer(0);
 }
 
-/// ParaView's lists of arrays don't offer it.
+/// Hides the array from ParaView's lists of arrays.
 void hide(vtkAbstractArray* array) {
   array->GetInformation()->Set(vtkAbstractArray::GUI_HIDE(), 1);
 }
@@ -68,7 +68,8 @@ void addDepth(vtkImageData* image, std::span<const float> depths) {
   image->GetPointData()->AddArray(array);
 }
 
-/// The field array of that name, type and number of components; throws if it's there in another shape.
+/// The field array with this name, type and number of components. Throws if it is missing or has another
+/// shape.
 template <typename Array>
 Array* field(vtkFieldData* fields, const char* name, int components, vtkIdType tuples) {
   auto* array = Array::SafeDownCast(fields->GetAbstractArray(name));

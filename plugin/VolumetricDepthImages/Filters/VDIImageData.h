@@ -1,23 +1,23 @@
-// A VDI as standard VTK data: an image with the flat picture, and the VDI beside it in field data. Writers,
+// A VDI as standard VTK data: an image of the flat picture, with the VDI in its field data. Writers,
 // extractors, Live and pipelines then work as with any image.
 //   point data  RGBA               unsigned char [h][w], 4 components, straight colour (VTK blends with
-//                                  alpha), row 0 at the bottom; w, h: the picture's
+//                                  alpha), row 0 at the bottom; w, h: the picture's size
 //               SupersegmentCount  unsigned int [h][w]
-//               Depth              float [h][w], of RenderVDI only
-//   field data  VDI.size           unsigned int [2]: columns and rows of lists, the margin's included
+//               Depth              float [h][w], from RenderVDI only
+//   field data  VDI.size           unsigned int [2]: columns and rows of lists, with the margin
 //               VDI.margin         unsigned int [2]: vdi::Vdi::margin
 //               VDI.offsets        unsigned int [lists + 1]
 //               VDI.supersegments  full precision: float [n][6]: front, back, red, green, blue, opacity
 //               VDI.codes          compact: unsigned int [n][2], vdi::CompactSupersegment
 //               VDI.depthCode      compact: float [2], vdi::DepthCode
 //               VDI.camera         double [12]: position, focal point, view-up, view angle, parallel
-//                                  projection, scale; of pictures without a VDI, too (VDIPlace.h)
-//               VDI.bounds         double [6] as VTK: xmin, xmax, ymin, ...; likewise
+//                                  projection, scale; pictures without a VDI have it, too (VDIPlace.h)
+//               VDI.bounds         double [6] in VTK's order, xmin, xmax, ymin, ...; pictures have it, too
 //               VDI.parameters     double [4]: N_S, sample step, time, time step
-//               (the array's name) double [n]: some of the values shown (VDIValues.h)
-//               VDI.isBeingMade    string [1]: there is no VDI yet; of what views get meanwhile alone
-//               VDI.waiting        string [1]: why there is no VDI so far; the image has no points then
-//               VDI.coloring       string [1]: vdi::Coloring, as vdi::io::metadataText; absent where unknown
+//               (the array's name) double [n]: some of the values that the VDI shows (VDIValues.h)
+//               VDI.isBeingMade    string [1]: only views get this image, while the VDI is being made
+//               VDI.waiting        string [1]: the reason why there is no VDI yet; the image has no points
+//               VDI.coloring       string [1]: vdi::Coloring, as vdi::io::metadataText; absent if unknown
 #ifndef VDIImageData_h
 #define VDIImageData_h
 
@@ -40,35 +40,34 @@ class vtkUnsignedCharArray;
 
 namespace pv {
 
-/// For RequestInformation: tells the pipeline of a picture with RGBA and this whole extent. Ranks without a
-/// picture announce an empty one, which keeps the pipeline from asking them for more again and again.
+/// For RequestInformation: announces a picture with RGBA and this whole extent. A rank without a picture
+/// announces an empty extent, so that the pipeline doesn't ask it for more again and again.
 void announcePicture(vtkInformation* output, const int (&extent)[6]);
-/// Makes `image` w x h x 1 with RGBA and Depth. `picture` is straight.
+/// Makes `image` w x h x 1 with RGBA and Depth. `picture` has straight colours.
 void setPicture(vtkImageData* image, const vdi::ImageBytes& picture);
 /// Makes `image` w x h x 1 with RGBA, and Depth if `withDepth`.
 void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth);
 /// The flat picture of the VDI and the VDI itself.
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi);
-/// The same, of a flat picture that's there already (vdi::flatten).
+/// The same for a flat picture that exists already (vdi::flatten).
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat);
-/// Says, and tells of field data, that there's no VDI because it is being made. Bounds and camera are those
-/// that it will have.
+/// Marks the image, whose VDI is being made. Bounds and camera are those of the VDI to come.
 void setBeingMade(vtkImageData* image, const vdi::Camera& camera, const vdi::Box& bounds);
 bool isBeingMade(vtkFieldData* fields);
-/// Says of an image without points why there's no VDI so far.
+/// Gives an image without points the reason why there is no VDI yet.
 void setWaiting(vtkImageData* image, const std::string& why);
-/// That reason; empty: none is given.
+/// The reason that setWaiting gave; empty if there is none.
 std::string waitingIn(vtkFieldData* fields);
-/// The bytes of its .vdi file. From any thread.
+/// The bytes of the VDI's .vdi file. Any thread may call it.
 vtkSmartPointer<vtkUnsignedCharArray> fileOf(const vdi::Vdi& vdi);
-/// Whether the image carries one, sound or not.
+/// Whether the image carries a VDI, sound or not.
 bool hasVdi(vtkImageData* image);
-/// What the colours of the VDI mean that the field data carry; nothing where that is unknown or not sound.
+/// The meaning of the colours of the VDI in the field data; nullopt if it is unknown or not sound.
 std::optional<vdi::Coloring> coloringOf(vtkFieldData* fields);
-/// False if the data object carries no VDI (what a rank other than the root has). Throws vdi::Error{Format}
-/// for one that isn't sound.
+/// Returns false if the data object carries no VDI, as on ranks other than the root. Throws
+/// vdi::Error{Format} for a VDI that isn't sound.
 bool getVdi(vtkDataObject* data, vdi::Vdi& vdi);
-/// The same of an image's field data. From any thread: makes no VTK object.
+/// The same for an image's field data. Any thread may call it: it makes no VTK object.
 bool getVdi(vtkFieldData* fields, vdi::Vdi& vdi);
 
 }  // namespace pv

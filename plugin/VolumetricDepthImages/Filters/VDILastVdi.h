@@ -1,5 +1,4 @@
-// What a filter's last VDI was, as the numbers by which its client learns of it: the next one is estimated
-// from that.
+// A filter's last VDI as numbers, which the client receives. From them it estimates the next VDI.
 #ifndef VDILastVdi_h
 #define VDILastVdi_h
 
@@ -13,7 +12,7 @@
 
 namespace pv {
 
-/// All 0 where there is none.
+/// All 0 if there is no VDI.
 using LastVdiNumbers = std::array<double, vdi::settingCount + 6>;
 
 inline LastVdiNumbers numbersOf(const vdi::MadeVdi& made) {

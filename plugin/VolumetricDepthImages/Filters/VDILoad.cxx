@@ -17,7 +17,7 @@ namespace pv {
 
 namespace {
 
-/// Number of the smallest voxels in a unit of volume; 0 without blocks.
+/// The number of the smallest voxels that fill a unit of volume; 0 without blocks.
 double mostPerVolume(const std::vector<vdi::Block>& blocks) {
   double most = 0.0;
   for (const vdi::Block& block : blocks) {

@@ -19,28 +19,30 @@ class vtkMultiProcessController;
 
 namespace pv {
 
-/// What tells one set of blocks from another.
+/// The identity of a set of blocks. Two filters with the same origin show the same blocks.
 struct Origin {
   std::vector<std::uint64_t> input;  // identityOf
   /// Modification time of the pipeline above the filter: in situ, arrays are overwritten in place.
   vtkMTimeType upstream = 0;
-  std::optional<double> time;  // none: the data have none
+  std::optional<double> time;  // none: the data have no time
   ArrayChoice choice;
   bool fillGhosts = true;
   bool operator==(const Origin&) const = default;
 };
 
-/// This rank's blocks of an origin, which share their values with the input, and what they mean.
+/// This rank's blocks of an origin, and the meaning of their values. The blocks share the values with the
+/// input.
 struct Load {
   Origin of;
   std::vector<vdi::Block> blocks;
   vdi::ScalarArray array;    // the same on all ranks
-  double voxelVolume = 0.0;  // smallest of all ranks' voxels; 0 without any
+  double voxelVolume = 0.0;  // that of all ranks' smallest voxel; 0 without voxels
 };
 
-/// Throws vdi::Error where there is no input. In situ, a script's misspelt channel is one.
+/// Throws vdi::Error if there is no input. In situ, a misspelt channel in a script has that effect.
 void requireInput(vtkDataObject* input);
-/// This rank's blocks. `upstream` makes the input. Throws vdi::Error for an input that has no such blocks.
+/// Returns this rank's blocks. `upstream` makes the input. Throws vdi::Error for an input without such
+/// blocks.
 Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin);
 /// Collective: fills in the load's array and voxel volume, and returns the bounds of all ranks' blocks.
 vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* controller);

@@ -1,7 +1,7 @@
-// How parameters of a simulation come to who steers it, and changed values back.
+// The exchange of a simulation's parameters with the code that steers it.
 //
 // A simulation declares its parameters to catalyst_adaptor, which observes `event` on the global
-// vtkMultiProcessController. Free of VTK and MPI, as VDICollective.h.
+// vtkMultiProcessController. This header is free of VTK and MPI, as VDICollective.h is.
 #ifndef VDIParameters_h
 #define VDIParameters_h
 
@@ -11,7 +11,7 @@
 
 namespace pv {
 
-/// Call data of the event. Not collective: who invokes it does so with the same changes on all ranks.
+/// Call data of the event. Invoking it isn't collective, but all ranks invoke it with the same changes.
 struct ParameterExchange {
   static constexpr unsigned long event = 1000 + 5643;  // vtkCommand::UserEvent and any number
 
@@ -23,8 +23,9 @@ struct ParameterExchange {
     double high = 0.0;
   };
 
-  std::map<std::string, double> changes;  // for the observer, by name; within bounds
-  std::vector<Parameter> parameters;      // from the observer, after the changes, as they were declared
+  std::map<std::string, double> changes;  // for the observer: new values by name, within bounds
+  // from the observer: the parameters after the changes, in the order of declaration
+  std::vector<Parameter> parameters;
 };
 
 }  // namespace pv

@@ -23,7 +23,7 @@ double* addNumbers(vtkFieldData* fields, const char* name, vtkIdType count) {
   return array->GetPointer(0);
 }
 
-/// Null where they aren't there, or aren't as many.
+/// Null if the array is missing, or if its count differs.
 const double* numbersIn(vtkFieldData* fields, const char* name, vtkIdType count) {
   auto* array = fields != nullptr ? vtkDoubleArray::SafeDownCast(fields->GetAbstractArray(name)) : nullptr;
   return array != nullptr && array->GetNumberOfValues() == count ? array->GetPointer(0) : nullptr;

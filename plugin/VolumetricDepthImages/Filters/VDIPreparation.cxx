@@ -30,7 +30,7 @@ Preparation::~Preparation() {
 }
 
 void Preparation::work(const Make& make) {
-  // Several ranks must all begin, or none may.
+  // Either all ranks begin or none does.
   const auto isInVain = [this] { return this->Unwanted && !this->hasRanks(); };
   if (this->Mine.awaitUnless(isInVain)) {
     std::optional<vdi::comm::Funnel::Entry> carried;
@@ -45,7 +45,7 @@ void Preparation::work(const Make& make) {
           this->Output);
       this->Good = true;
     } catch (const std::exception&) {
-      this->Good = false;  // the update tries again, and says why if it can't either
+      this->Good = false;  // the update tries again, and reports the reason if it fails, too
     }
   }
   this->Mine.end();

@@ -19,18 +19,19 @@ class vtkMultiProcessController;
 
 namespace pv {
 
-/// On several ranks all functions that say so are collective: ParaView's servers have MPI for one thread
-/// alone, which carries out what the others ask for, and only while it's in `serve` or one of these.
+/// On several ranks, a function is collective if its comment states it. ParaView's servers allow MPI on one
+/// thread alone. That thread carries out the operations of the others, and only while it is in `serve` or in
+/// a collective function of this class.
 class Preparation {
  public:
-  /// Makes the VDI and leaves it in `output`. It has the volume's turn, obeys `progress`, and throws when it
-  /// can't.
+  /// Makes the VDI and leaves it in `output`. It has the volume's turn, obeys `progress`, and throws if it
+  /// can't make the VDI.
   using Make = std::function<void(Volume& volume, const vdi::Progress& progress, vtkVDIImageData* output)>;
 
-  /// Collective: takes the volume's next turn and starts the thread. The volume's controller has the ranks.
-  /// `time`: of the maps and properties that it's made of, on this rank.
+  /// Collective: takes the volume's next turn and starts the thread. The ranks are those of the volume's
+  /// controller. `time` is the modification time of the maps and properties in use, on this rank.
   Preparation(std::shared_ptr<Volume> volume, vtkMTimeType time, Make make);
-  /// Collective: gives it up, and waits for the thread.
+  /// Collective: gives the VDI up, and waits for the thread.
   ~Preparation();
   Preparation(const Preparation&) = delete;
   Preparation& operator=(const Preparation&) = delete;
@@ -42,19 +43,19 @@ class Preparation {
   bool hasRanks() const { return Of->hasRanks(); }
   /// Whether this rank's thread has nothing left to do.
   bool isDone() const { return Done; }
-  /// Percent of it; 100 when it's there, -1 when it was given up or went wrong.
+  /// The progress in percent: 100 once the VDI is there, -1 after it was given up or failed.
   int percent() const;
-  /// The thread hears late that it's unwanted, once a band. One rank's word is enough.
+  /// Asks the thread to stop. The thread checks this once a band. One rank's call is enough.
   void giveUp() { Unwanted = true; }
   bool isGivenUp() const { return Unwanted; }
-  /// Of several ranks: carries on what they do together, in the turns before this one, too. Doesn't wait for
-  /// other ranks.
+  /// With several ranks: carries out what the ranks' threads do together, in this turn and in those before
+  /// it. Doesn't wait for other ranks.
   void serve(std::chrono::milliseconds most) { Of->serve(most); }
 
   enum class End { Good, GivenUp, Failed };
-  /// Collective: waits for the end, which is the same for all ranks. Calls `whileWaiting` now and then.
+  /// Collective: waits for the end, which is the same on all ranks. Calls `whileWaiting` now and then.
   End wait(const std::function<void()>& whileWaiting);
-  /// After a good end.
+  /// Valid after a good end.
   vtkVDIImageData* output() { return Output; }
   double share() const { return Share; }
 
@@ -67,12 +68,13 @@ class Preparation {
   std::atomic<double> Share{0.0};
   std::atomic<bool> Unwanted{false};
   std::atomic<bool> Done{false};
-  vtkNew<vtkVDIImageData> Output;  // the thread's until Done
-  bool Good = false;               // likewise
-  std::jthread Worker;             // last: joined before the rest goes
+  vtkNew<vtkVDIImageData> Output;  // belongs to the thread until Done
+  bool Good = false;               // belongs to the thread until Done
+  // last member, so that the thread is joined before the others are destroyed
+  std::jthread Worker;
 };
 
-/// Collective: whether it's true on all ranks of the controller; null: there's this one.
+/// Collective: whether `here` is true on all ranks of the controller. Null stands for this rank alone.
 bool onAllRanks(vtkMultiProcessController* controller, bool here);
 
 }  // namespace pv

@@ -24,7 +24,7 @@ namespace pv {
 
 namespace {
 
-/// Of each component, and of the squares of the tuples' lengths.
+/// The ranges of each component, and of the squares of the tuples' lengths.
 template <typename T, std::size_t N>
 struct Ranges {
   std::array<T, N> low;

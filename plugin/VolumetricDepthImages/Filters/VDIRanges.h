@@ -1,4 +1,4 @@
-// Ranges of the arrays of a VDI, found fast.
+// Fast computation of the ranges of a VDI's arrays.
 #ifndef VDIRanges_h
 #define VDIRanges_h
 
@@ -6,9 +6,9 @@ class vtkDataArray;
 
 namespace pv {
 
-/// Finds the ranges of an array of unsigned char, unsigned int or float and leaves them with it, as if VTK
-/// had found them: ParaView asks for them after each update, and VTK takes 30 times as long, on one core. All
-/// values must be finite. To be called again when values change.
+/// Finds the ranges of an array of unsigned char, unsigned int or float, and stores them with the array as
+/// VTK would. ParaView asks for them after each update, and VTK takes 30 times as long on one core. All
+/// values must be finite. Call it again when values change.
 void rememberRanges(vtkDataArray* array);
 
 }  // namespace pv

@@ -31,11 +31,11 @@ void Regeneration::endView() {
 void Regeneration::answer() {
   if (!asked_) return;
   asked_.reset();
-  askedTime_.Modified();  // views haven't seen what replaces the earlier output
+  askedTime_.Modified();  // views haven't seen the output that replaces the earlier one
 }
 
 vtkMTimeType Regeneration::time(vtkMTimeType now, bool forView) {
-  // An earlier output is good enough for views until it is replaced, and for nobody else.
+  // An earlier output is good enough for views alone, until it is replaced.
   const bool isGoodEnough = asked_ && forView;
   const vtkMTimeType asked = isGoodEnough ? 0 : askedTime_.GetMTime();
   if (isHeld_ && (isGoodEnough || !asked_)) return std::max(executed_, asked);

@@ -1,4 +1,4 @@
-// What a filter tells of its last VDI.
+// A filter's report about its last VDI.
 #ifndef VDIReport_h
 #define VDIReport_h
 
@@ -13,10 +13,10 @@ class vtkImageData;
 
 namespace pv {
 
-/// Time and memory, a line per rank; empty without reports.
+/// Time and memory, one line per rank; empty without reports.
 std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device);
-/// The VDI in the image, made with these settings, from which the next one is estimated; nullopt for an image
-/// without a VDI and without reports.
+/// Figures of the VDI in the image, which was made with these settings. The next VDI is estimated from them.
+/// Nullopt for an image without a VDI, and without reports.
 std::optional<vdi::MadeVdi> madeOf(vtkImageData* image, const vdi::GenerateSettings& settings,
                                    const std::vector<vdi::RankReport>& reports);
 

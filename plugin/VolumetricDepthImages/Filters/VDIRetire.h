@@ -1,4 +1,4 @@
-// Things that wait for a thread when they're destroyed, let go without waiting.
+// Release of objects whose destructors wait for a thread.
 #ifndef VDIRetire_h
 #define VDIRetire_h
 
@@ -6,7 +6,8 @@
 
 namespace pv {
 
-/// Lets go of `thing` on a thread of its own. The process waits for that when it ends.
+/// Releases `thing` on another thread, so that the caller doesn't wait. Before the process ends, it waits for
+/// that thread.
 void retire(std::shared_ptr<void> thing);
 
 }  // namespace pv

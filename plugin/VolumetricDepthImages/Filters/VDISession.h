@@ -1,5 +1,5 @@
-// What the filters of one process share: the Vulkan device, volumes on it, and the communicator behind a VTK
-// controller.
+// Objects that the filters of one process share: the Vulkan device, the volumes on it, and the communicator
+// of a VTK controller.
 #ifndef VDISession_h
 #define VDISession_h
 
@@ -15,24 +15,24 @@ namespace pv {
 
 class Volumes;
 
-/// A communicator over the controller's MPI communicator (a duplicate: collective), or over this process
-/// alone when there's none.
+/// A communicator over a duplicate of the controller's MPI communicator (collective), or over this process
+/// alone if the controller has none, or one process.
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller);
 
-/// Whether this process is a server's: what it makes is shown in another one.
+/// Whether this process belongs to a server, so that another process shows its output.
 bool isServer();
 
-/// To be called on all ranks before a collective operation: throws vdi::Error{RemoteRank} where another rank
-/// won't enter (VDICollective.h).
+/// Call it on all ranks before a collective operation. Throws vdi::Error{RemoteRank} if another rank won't
+/// enter (VDICollective.h).
 void enterCollective(vtkMultiProcessController* controller, const std::string& operation);
 /// Whether a simulation's adaptor watches over such operations.
 bool isWatched(vtkMultiProcessController* controller);
 
-/// The process's device, made at the first call and kept while anybody holds it. Where that is lost, a new
-/// one. From any thread. Throws vdi::Error{DeviceUnavailable}.
+/// The process's device. The first call makes it, and it lives as long as a caller holds it. If the device is
+/// lost, the function makes a new one. Any thread may call it. Throws vdi::Error{DeviceUnavailable}.
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank);
 
-/// The process's volumes, kept while anybody holds it. From any thread.
+/// The process's volumes, which live as long as a caller holds them. Any thread may call it.
 std::shared_ptr<Volumes> sharedVolumes();
 
 }  // namespace pv

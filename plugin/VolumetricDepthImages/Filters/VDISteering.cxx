@@ -36,7 +36,7 @@ using vdi::stream::Wish;
 
 constexpr std::chrono::milliseconds waitingPause{50};
 
-/// The ranks that have clients of their own; null where there is one client.
+/// The controller of the ranks if each has a client of its own; null if there is one client.
 vtkMultiProcessController* Ranks() {
   auto* const controller = vtkMultiProcessController::GetGlobalController();
   const bool areMany = controller != nullptr && controller->GetNumberOfProcesses() > 1 &&
@@ -49,7 +49,7 @@ bool IsRoot() {
   return ranks == nullptr || ranks->GetLocalProcessId() == 0;
 }
 
-/// The filter that makes the VDIs of this input; null if none does.
+/// The filter that makes this proxy's VDIs; null if there is none.
 vtkSMProxy* GeneratorOf(vtkSMProxy* consumer) {
   constexpr int farthest = 16;
   for (int i = 0; i < farthest && consumer != nullptr; ++i) {
@@ -60,7 +60,7 @@ vtkSMProxy* GeneratorOf(vtkSMProxy* consumer) {
   return nullptr;
 }
 
-/// Those of these that this ParaView has.
+/// The names of the offered presets that this ParaView has.
 std::vector<std::string> Presets() {
   std::vector<std::string> names;
   for (const char* const name :
@@ -94,8 +94,8 @@ void SetCamera(vtkSMProxy* generator, const vdi::Camera& camera) {
 
 void SetColours(vtkSMProxy* generator, const Wish& wish) {
   vtkSMProxy* const colours = FunctionOf(generator, "LookupTable");
-  if (colours == nullptr) return;  // then viewers aren't offered any
-  // The range stays, and the opacities do.
+  if (colours == nullptr) return;  // without colours, viewers aren't offered any
+  // A preset changes neither the range nor the opacities.
   constexpr bool toCurrentRange = true;
   if (wish.preset) vtkSMTransferFunctionProxy::ApplyPreset(colours, wish.preset->c_str(), toCurrentRange);
   for (vtkSMProxy* const function : {colours, FunctionOf(generator, "ScalarOpacityFunction")}) {
@@ -132,7 +132,7 @@ vdi::stream::GeneratorControls ControlsOf(vtkSMProxy* generator) {
   return controls;
 }
 
-/// Appends a line. Returns what went wrong; "": nothing did.
+/// Appends a line. Returns the reason if it fails, and "" otherwise.
 std::string Log(const std::string& path, const std::string& line) {
   if (path.empty()) return {};
   std::FILE* const file = std::fopen(path.c_str(), "ae");
@@ -142,7 +142,7 @@ std::string Log(const std::string& path, const std::string& line) {
   return fmt::format("can't log what viewers change to {}: {}", path, std::strerror(errno));
 }
 
-/// The first rank's text.
+/// Returns the first rank's text on all ranks. Collective.
 std::string OnAllRanks(std::string text) {
   auto* const ranks = Ranks();
   if (ranks == nullptr) return text;
@@ -168,7 +168,7 @@ void Steering::Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor
   if (auto* const ranks = Ranks()) enterCollective(ranks, "steering of VDIStream");
   vtkSMProxy* const generator = GeneratorOf(writer);
   const bool isRoot = IsRoot();
-  std::string trouble;  // told when no other rank waits for this one
+  std::string trouble;  // reported at the end, when no other rank waits for this one
   if (isRoot) this->Tell(server, generator);
   do {
     const std::chrono::milliseconds patience = this->IsPaused ? waitingPause : std::chrono::milliseconds(0);
@@ -176,7 +176,7 @@ void Steering::Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor
     if (isRoot) {
       request = server->TakeRequest(patience);
     } else {
-      std::this_thread::sleep_for(patience);  // a broadcast would take all of a core while it waits
+      std::this_thread::sleep_for(patience);  // a broadcast would busy a core while it waits
     }
     const std::string text = OnAllRanks(request ? vdi::stream::textOf(request->wish) : "");
     if (text.empty()) continue;
@@ -192,7 +192,7 @@ void Steering::Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor
       if (trouble.empty()) trouble = failure;
     }
     if (!ChangesVDI(wish)) continue;
-    this->SinceLast = this->Period;  // whoever asks for a view needn't wait for a long period
+    this->SinceLast = this->Period;  // a viewer who asks for a change needn't wait for a long period
     if (this->IsPaused) writer->UpdatePipeline(extractor->GetTime());
   } while (this->IsPaused);
   if (!trouble.empty()) throw vdi::Error(vdi::ErrorCode::Io, trouble);

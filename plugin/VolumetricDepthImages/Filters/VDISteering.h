@@ -1,4 +1,4 @@
-// What viewers of a VDIStream ask for, done on all ranks at the same step.
+// Execution of the wishes of a VDIStream's viewers, on all ranks at the same step.
 #ifndef VDISteering_h
 #define VDISteering_h
 
@@ -13,18 +13,18 @@ struct Wish;
 
 namespace pv {
 
-/// Belongs to an extractor that steers. Each rank that has a client of its own (Catalyst, pvbatch
-/// --symmetric) has one; elsewhere the only client has. The rank that serves is the first, and asks in vain
-/// before it serves.
+/// Part of an extractor that steers. Each rank with a client of its own (Catalyst, pvbatch --symmetric) has
+/// one; otherwise only the single client has. The first rank serves. Before it serves, its requests for
+/// wishes return nothing.
 class Steering {
  public:
-  /// Whether the VDI of a step is to be made, going by the period. To be called once for each step.
+  /// Whether the period requires a VDI for this step. Call it once for each step.
   bool IsDue();
-  /// After a step's VDI has been published: takes what viewers have asked for and applies it on all ranks, to
-  /// be in force from the next step on. While the simulation is to wait, it waits in here, and makes the
-  /// step's VDI anew when a viewer changes it. Collective over the clients. Throws vdi::Error: RemoteRank
-  /// where another rank doesn't come along, InvalidArgument where the server is in another process than the
-  /// client, Io for the log.
+  /// Call it after a step's VDI has been published. It takes the viewers' wishes and applies them on all
+  /// ranks; they are in force from the next step on. While viewers pause the simulation, it waits here, and
+  /// makes the step's VDI anew when a viewer changes it. Collective over the clients. Throws vdi::Error:
+  /// RemoteRank if another rank doesn't take part, InvalidArgument if server and client are different
+  /// processes, Io for the log.
   void Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor);
 
  private:
@@ -32,7 +32,7 @@ class Steering {
   void Tell(vtkVDIStreamWriter* server, vtkSMProxy* generator) const;
 
   int Period = 1;
-  int SinceLast = 0;  // steps since a VDI was made
+  int SinceLast = 0;  // number of steps since the last VDI
   bool IsPaused = false;
 };
 

@@ -16,15 +16,15 @@ namespace {
 
 struct Place {
   double x = 0.0;
-  glm::dvec3 value{0.0};  // a colour; an opacity has it in each component
+  glm::dvec3 value{0.0};  // a colour, or an opacity in each component
 };
 
 struct ControlPoint {
   Place place;
-  bool linear = false;  // up to the next one
+  bool linear = false;  // straight up to the next point
 };
 
-/// A function of VTK: from control point to control point by a rule of its own, constant beyond them.
+/// A function of VTK. It follows a rule of its own between control points, and is constant beyond them.
 class Curve {
  public:
   Curve() = default;
@@ -33,8 +33,8 @@ class Curve {
   virtual ~Curve() = default;
 
   virtual std::vector<ControlPoint> points() const = 0;
-  /// `count` >= 1 places from `first` to `last`; the logarithms of x are evenly spaced where the function
-  /// goes by them.
+  /// Returns `count` >= 1 places from `first` to `last`, evenly spaced, or with evenly spaced logarithms if
+  /// the function has a logarithmic scale.
   virtual std::vector<Place> sampled(double first, double last, std::size_t count) const = 0;
   virtual double tolerance() const { return 1e-3; }
 };
@@ -62,7 +62,7 @@ class ColorCurve : public Curve {
     return points;
   }
   std::vector<Place> sampled(double first, double last, std::size_t count) const override {
-    // Not GetColor, which looks discrete values and categories up.
+    // GetColor won't do: it looks up discrete values and categories.
     std::vector<double> table(3 * count);
     function_->GetTable(first, last, static_cast<int>(count), table.data());
     std::vector<Place> places;
@@ -117,13 +117,13 @@ double difference(const glm::dvec3& a, const glm::dvec3& b) {
   return std::max({apart.x, apart.y, apart.z});
 }
 
-/// Whether `first` and `last` are so far apart that places between them can be told apart.
+/// Whether double precision can tell places between `first` and `last` apart.
 bool isWide(double first, double last) {
   return 1e-6 * (last - first) > 1e-13 * std::max(std::abs(first), std::abs(last));
 }
 
-/// Samples a stretch without control points in it. What jumps is sampled again where it does, and is a step
-/// in the end.
+/// Samples a stretch without control points. It samples more finely around jumps, and in the end represents a
+/// jump by a step.
 void addSamples(const Curve& curve, double first, double last, std::size_t count, int levels,
                 std::vector<Place>& places) {
   constexpr std::size_t finer = 17;
@@ -144,7 +144,7 @@ void addSamples(const Curve& curve, double first, double last, std::size_t count
   }
 }
 
-/// Leaves out places that are on the straight line between others.
+/// Leaves out places on the straight line between others.
 void simplify(std::vector<Place>& places, double tolerance) {
   std::vector<Place> kept;
   const auto isStraight = [&](std::size_t first, std::size_t last) {
@@ -165,13 +165,12 @@ void simplify(std::vector<Place>& places, double tolerance) {
   places = std::move(kept);
 }
 
-/// From one control point to the next, both included.
+/// The places from one control point to the next, both included.
 std::vector<Place> placesBetween(const Curve& curve, const ControlPoint& from, const Place& to,
                                  std::size_t count) {
   constexpr int levels = 3;
   const double first = from.place.x;
-  const double inset =
-      1e-6 * (to.x - first);  // what VTK has at a control point itself isn't what it has beside it
+  const double inset = 1e-6 * (to.x - first);  // VTK's value at a control point differs from those beside it
   std::vector<Place> places{from.place};
   if (!from.linear && isWide(first, to.x)) {
     std::vector<Place> samples;
@@ -179,7 +178,7 @@ std::vector<Place> placesBetween(const Curve& curve, const ControlPoint& from, c
     const bool sound = std::all_of(samples.begin(), samples.end(), [](const Place& place) {
       return std::isfinite(place.x) && std::isfinite(place.value.x + place.value.y + place.value.z);
     });
-    if (sound) {  // logarithms of what isn't positive are not
+    if (sound) {  // logarithms are finite only for positive numbers
       samples.front().x = first;
       samples.back().x = to.x;
       places.insert(places.end(), samples.begin(), samples.end());
@@ -190,14 +189,13 @@ std::vector<Place> placesBetween(const Curve& curve, const ControlPoint& from, c
   return places;
 }
 
-/// Where the function jumps at its ends, the jump is put a little outside: scalars at the ends aren't touched
-/// by it.
+/// Puts a jump at the function's ends a little outside, so that scalars at the ends aren't affected.
 void addJumpsAtEnds(const Curve& curve, std::vector<Place>& places) {
   const Place first = places.front();
   const Place last = places.back();
   const double width = last.x - first.x;
   const double gap = width > 0.0 ? width / 512.0 : std::max(1e-3 * std::abs(first.x), 1e-6);
-  const double gapBelow = first.x > 0.0 ? std::min(gap, 0.5 * first.x) : gap;  // logarithms
+  const double gapBelow = first.x > 0.0 ? std::min(gap, 0.5 * first.x) : gap;  // positive, for logarithms
   const glm::dvec3 below = curve.sampled(first.x - gapBelow, first.x - gapBelow, 1).front().value;
   const glm::dvec3 above = curve.sampled(last.x + gap, last.x + gap, 1).front().value;
   if (difference(below, first.value) > curve.tolerance()) {
@@ -210,7 +208,7 @@ void addJumpsAtEnds(const Curve& curve, std::vector<Place>& places) {
   }
 }
 
-/// Straight lines between these places are the function.
+/// The places between which straight lines form the function.
 std::vector<Place> placesOf(const Curve& curve) {
   constexpr std::size_t samplesInAll = 16384;
   constexpr std::size_t fewest = 9;
@@ -235,7 +233,7 @@ std::vector<vdi::ColorNode> colorNodes(const std::vector<Place>& places) {
   return nodes;
 }
 
-/// A map of another kind: looked up at evenly spaced scalars.
+/// Samples a map of another kind at evenly spaced scalars.
 std::vector<vdi::ColorNode> colorNodes(vtkScalarsToColors* map) {
   constexpr int samples = 1024;
   const double* range = map->GetRange();

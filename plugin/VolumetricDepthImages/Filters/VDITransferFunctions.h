@@ -1,4 +1,4 @@
-// ParaView's colour maps and opacity functions as the library knows them.
+// Conversion of ParaView's colour maps and opacity functions to the library's transfer functions.
 #ifndef VDITransferFunctions_h
 #define VDITransferFunctions_h
 
@@ -10,13 +10,13 @@ class vtkScalarsToColors;
 namespace pv {
 
 /// The transfer function that ParaView's representation Volume shows. That is the function through the
-/// control points, in the map's colour space: Volume knows neither discrete values (NumberOfTableValues) nor
+/// control points, in the map's colour space. Volume ignores discrete values (NumberOfTableValues) and
 /// categories (InterpretValuesAsCategories), which are for surfaces. Colours and opacities are within 1/1000
-/// of VTK's; steps stay steps. Beyond the control points, and for infinite values, it is what VTK has there,
-/// such as the colours above and below the range.
+/// of VTK's; steps stay steps. Beyond the control points, and for infinite values, the result has VTK's
+/// values, such as the colours above and below the range.
 ///
-/// Without a colour map: "Cool to Warm" over [low, high]. Without an opacity function: the colour map's own
-/// if it has one, else a ramp from 0 to 1. `unitDistance`: in world units.
+/// Without a colour map, it is "Cool to Warm" over [low, high]. Without an opacity function, it is the colour
+/// map's own if it has one, else a ramp from 0 to 1. `unitDistance` is in world units.
 vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity,
                                          double low, double high, double unitDistance);
 

@@ -30,8 +30,8 @@ bool isMasked(const vdi::Block& block, std::size_t index) {
                      [&at](const vdi::IndexBox& box) { return box.contains(at); });
 }
 
-/// One of each `step` values, at a place among them that differs from one to the next, so that no pattern of
-/// rows is met again and again.
+/// Takes one of each `step` values. Its place among them differs from one `step` to the next, so that the
+/// sample follows no pattern of rows.
 std::vector<double> sampleOf(std::span<const vdi::Block> blocks, std::uint64_t step) {
   constexpr double golden = 0.6180339887498949;
   std::vector<double> values;
@@ -69,7 +69,7 @@ std::vector<double> sampleOf(std::span<const vdi::Block> blocks, const vdi::Scal
 }
 
 void setShownValues(vtkImageData* image, const vdi::ScalarArray& array, std::span<const double> values) {
-  // The VDI's own arrays are beside it.
+  // The names of the VDI's own arrays are taken.
   if (array.name.empty() || array.name.starts_with("VDI.") || values.empty()) return;
   vtkNew<vtkDoubleArray> shown;
   shown->SetName(array.name.c_str());

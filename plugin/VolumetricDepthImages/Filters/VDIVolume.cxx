@@ -23,7 +23,7 @@ bool isAlone(vtkMultiProcessController* controller) {
   return controller == nullptr || controller->GetNumberOfProcesses() == 1;
 }
 
-/// Collective: the first one of rank 0's that all ranks have among theirs; null if there is none.
+/// Collective: the first of rank 0's volumes that every rank has among its own; null if there is none.
 std::shared_ptr<Volume> firstOfAll(vtkMultiProcessController* controller,
                                    const std::vector<std::shared_ptr<Volume>>& mine) {
   if (isAlone(controller)) return mine.empty() ? nullptr : mine.front();

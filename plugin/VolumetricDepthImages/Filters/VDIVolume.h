@@ -1,6 +1,6 @@
-// A volume on the device. The filters of one input share it: its blocks are uploaded once, and all VDIs of
-// them are made with the same pipelines, in the same memory. What belongs to one viewpoint stays with the
-// filter: properties, transfer function, the VDI itself.
+// A volume on the device. The filters of one input share it: its blocks are uploaded once, and all their VDIs
+// are made with the same pipelines, in the same memory. A filter keeps what belongs to one viewpoint:
+// properties, transfer function, the VDI itself.
 #ifndef VDIVolume_h
 #define VDIVolume_h
 
@@ -27,34 +27,35 @@ class vtkMultiProcessController;
 
 namespace pv {
 
-/// What is known of the blocks that a volume shows, of all ranks.
+/// Facts about the blocks of all ranks that a volume shows.
 struct Shown {
   Origin of;
   vdi::Box bounds;
   vdi::ScalarRange range;
   double voxelVolume = 0.0;
   vdi::ScalarArray array;
-  std::vector<double> values;  // some of theirs; the root's
+  std::vector<double> values;  // a sample of the blocks' values, on the root
 };
 
 /// Collective on the controller's ranks: a number that no other object of the first rank has had.
 std::uint64_t newIdentity(vtkMultiProcessController* controller);
 
-/// Users take turns (Turn): who makes a VDI has the generator alone. Functions say who may call them: the
-/// main thread, whoever has the turn, or any thread. Collective ones are so on the controller's ranks.
+/// Users take turns (Turn): the user that makes a VDI has the generator alone. Each group of functions names
+/// its allowed callers: the main thread, the holder of the turn, or any thread. Collective functions are so
+/// on the controller's ranks.
 class Volume {
  public:
-  /// The controller lives as long as there are users; null: there is this rank alone. `identity` is of
-  /// newIdentity.
+  /// The controller must live as long as there are users; null stands for this rank alone. `identity` comes
+  /// from newIdentity.
   Volume(vtkMultiProcessController* controller, std::uint64_t identity);
-  ~Volume();  // with several ranks in the main thread alone: it frees a communicator
+  ~Volume();  // call it on the main thread if there are several ranks: it frees a communicator
   Volume(const Volume&) = delete;
   Volume& operator=(const Volume&) = delete;
   Volume(Volume&&) = delete;
   Volume& operator=(Volume&&) = delete;
 
   vtkMultiProcessController* controller() const { return controller_; }
-  /// Whether there are several.
+  /// Whether the volume has several ranks.
   bool hasRanks() const { return hasRanks_; }
   std::uint64_t identity() const { return identity_; }
 
@@ -63,32 +64,32 @@ class Volume {
   bool isMade() const;
   /// Whether this rank's device was lost; it stays so.
   bool isLost() const;
-  /// Null while nothing is shown. What it points to never changes.
+  /// The shown blocks; null if there are none. The object never changes.
   std::shared_ptr<const Shown> shown() const;
-  /// Whether that is shown, or will be at the end of the turns that were taken; false after a failure.
+  /// Whether the volume shows `origin`, or will at the end of the turns taken so far; false after a failure.
   bool targets(const Origin& origin) const;
 
   // Main thread.
-  /// What the next turn shows.
+  /// Sets what the next turn shows.
   void setTarget(const Origin& origin);
-  /// A user, until it leaves. `wants` tells whether it would make its next VDI of these blocks. Doesn't keep
-  /// the user alive.
+  /// Registers a user until it leaves. `wants` tells whether the user would make its next VDI from these
+  /// blocks. The volume doesn't keep the user alive.
   void join(const void* user, std::function<bool(const Origin&)> wants);
   void leave(const void* user);
-  /// Whether another user wants what is shown, or will be.
+  /// Whether another user wants the blocks that the volume shows or will show.
   bool isWantedBesides(const void* user) const;
-  /// Makes the generator unless there is one, with the process's device. Collective on several ranks; there
-  /// the first user calls it, since no other thread may make a communicator. Alone, it needs the turn.
-  /// Throws vdi::Error on all ranks.
+  /// Makes the generator unless it exists, with the process's device. On several ranks it is collective, and
+  /// the main thread calls it, because no other thread may make a communicator. On one rank, the caller needs
+  /// the turn. Throws vdi::Error on all ranks.
   void make();
-  /// Carries on what the thread that has the turn does together with other ranks. Returns after `most`.
+  /// Carries out what the thread with the turn does together with other ranks. Returns after `most`.
   void serve(std::chrono::milliseconds most) { funnel_.serve(most); }
 
-  // Whoever has the turn.
+  // The holder of the turn.
   vdi::VdiGenerator& generator() { return *generator_; }
-  /// Collective: uploads the blocks, unless they are shown on all ranks. After a throw nothing is shown.
+  /// Collective: uploads the blocks, unless all ranks show them. After a throw the volume shows nothing.
   void show(const Load& load);
-  /// Collective: throws on all ranks where any doesn't show that.
+  /// Collective: throws on all ranks if any rank shows other blocks.
   void requireShown(const Origin& origin);
   vdi::comm::Funnel& funnel() { return funnel_; }
 
@@ -101,12 +102,12 @@ class Volume {
   std::map<const void*, std::function<bool(const Origin&)>> users_;
   vdi::comm::Funnel funnel_;
   std::unique_ptr<vdi::VdiGenerator> generator_;
-  mutable std::mutex mutex_;  // of all that follows
+  mutable std::mutex mutex_;  // guards the members below
   std::shared_ptr<vdi::gpu::Device> device_;
   std::shared_ptr<const Shown> shown_;
   std::optional<Origin> target_;
   std::uint64_t lastTurn_ = 0;
-  std::set<std::uint64_t> turns_;  // that haven't ended
+  std::set<std::uint64_t> turns_;  // turns that haven't ended
   std::condition_variable turnEnded_;
 };
 
@@ -114,17 +115,17 @@ class Volume {
 /// on all ranks: the main thread takes them.
 class Turn {
  public:
-  explicit Turn(Volume& volume);  // must outlive the turn
+  explicit Turn(Volume& volume);  // the volume must outlive the turn
   ~Turn() { this->end(); }
   Turn(const Turn&) = delete;
   Turn& operator=(const Turn&) = delete;
   Turn(Turn&&) = delete;
   Turn& operator=(Turn&&) = delete;
 
-  /// Main thread: waits until all earlier turns have ended, and serves them.
+  /// On the main thread: waits until all earlier turns have ended, and serves them.
   void await();
-  /// Another thread: likewise, while the main thread serves. Asks `isUnwanted` now and then, and returns
-  /// false once that is so.
+  /// On another thread: waits for the earlier turns while the main thread serves. Calls `isUnwanted` now and
+  /// then, and returns false once it returns true.
   bool awaitUnless(const std::function<bool()>& isUnwanted);
   void end();
 
@@ -135,13 +136,13 @@ class Turn {
   std::uint64_t number_;
 };
 
-/// The volumes of the process's filters, which it doesn't keep alive. Main thread.
+/// The volumes of the process's filters. It doesn't keep them alive. Only the main thread uses it.
 class Volumes {
  public:
-  /// Collective: a volume that shows `origin`, or will, and whose device isn't lost: `own`, or another
-  /// filter's, the same on all ranks. Where there is none: `own` if nobody else wants what it shows, so that
-  /// the next blocks take the place of the last ones; else a new one. `own`, null if there is none, is that
-  /// of `user`.
+  /// Collective: chooses a volume with a working device that shows `origin` or will show it: `own`, or
+  /// another filter's, the same on all ranks. If there is none, it returns `own` if no other user wants its
+  /// blocks, so that the next blocks replace the last ones; otherwise it makes a new volume. `own` is the
+  /// volume of `user`, or null.
   std::shared_ptr<Volume> choose(vtkMultiProcessController* controller, const Origin& origin,
                                  const std::shared_ptr<Volume>& own, const void* user);
 

@@ -30,7 +30,7 @@ glm::dvec3 vectorOf(const double* v) {
   return {v[0], v[1], v[2]};
 }
 
-/// Whether the representation shows volumes just now, and can say how.
+/// Whether the representation shows a volume now, and has the property that tells it.
 bool isVolume(vtkSMProxy* shown) {
   if (shown == nullptr || shown->GetProperty("Representation") == nullptr) return false;
   const char* kind = vtkSMPropertyHelper(shown, "Representation").GetAsString();
@@ -48,7 +48,7 @@ enum VolumeBlend {
   Slice
 };
 
-/// Of a property that some kinds of volumes don't have.
+/// Whether a property is on that only some kinds of volumes have.
 bool isOn(vtkSMProxy* shown, const char* name) {
   return shown->GetProperty(name) != nullptr && vtkSMPropertyHelper(shown, name).GetAsInt() != 0;
 }
@@ -70,7 +70,7 @@ bool isPlainHeadlight(const std::vector<vtkLight*>& lights) {
          lights.front()->GetIntensity() == 1.0;
 }
 
-/// Towards the light, in the camera's axes.
+/// The direction towards the light, in the camera's axes.
 glm::dvec3 directionOf(vtkLight* light, vtkCamera* camera) {
   if (light->LightTypeIsHeadlight() != 0) return {0.0, 0.0, 1.0};
   const glm::dvec3 towards = vectorOf(light->GetPosition()) - vectorOf(light->GetFocalPoint());
@@ -97,7 +97,7 @@ std::vector<vdi::Light> lightsOf(vtkSMRenderViewProxy* view) {
   return lights;
 }
 
-/// Whether they're ParaView's light kit as new views have it, in whatever order.
+/// Whether the lights are the light kit of ParaView's new views, in any order.
 bool areDefault(const std::vector<vdi::Light>& lights) {
   const std::vector<vdi::Light> kit = vdi::lightKit();
   constexpr double tolerance = 1e-4;
@@ -109,8 +109,8 @@ bool areDefault(const std::vector<vdi::Light>& lights) {
          });
 }
 
-/// What the scale and the origin of a cropped volume apply to (pv::cropsByExtent). ParaView says nothing
-/// useful of the extent of several data sets, so the box of those comes from their bounds in each version.
+/// The box to which the scale and the origin of a cropped volume apply (pv::cropsByExtent). ParaView has no
+/// useful extent for several data sets, so their box comes from their bounds in each version.
 vdi::Box wholeToCrop(vtkPVDataInformation* data) {
   std::array<double, 6> b{};
   data->GetBounds(b.data());

@@ -1,4 +1,5 @@
-// What ParaView's display properties of a volume, and the lights of a view, mean for VolumetricDepthImage.
+// Translation of a volume's display properties in ParaView, and of a view's lights, to properties of
+// VolumetricDepthImage.
 #ifndef VDIVolumeDisplay_h
 #define VDIVolumeDisplay_h
 
@@ -10,23 +11,23 @@ class vtkSMRenderViewProxy;
 
 namespace pv {
 
-/// Sets Shade, Diffuse and Ambient of `filter`, a VolumetricDepthImage, where `shown` is shown as a shaded
-/// volume; null: it isn't shown. Volumes reflect ambient light only where a single headlight shines.
+/// Sets Lights of `filter`, and Shade, Diffuse and Ambient if `shown` shows a shaded volume; null means that
+/// it isn't shown. Volumes reflect ambient light only under a single headlight.
 void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* view);
 
-/// Sets Lights of `filter` to the view's, unless these are the default ones and nothing is set.
+/// Sets Lights of `filter` to the view's, or clears Lights if the view has the default ones.
 void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view);
 
-/// Sets Cropping and CroppingBox where `shown` is shown as a cropped volume: the box that ParaView draws.
-/// `data`: what is shown; null: nothing.
+/// Sets Cropping and CroppingBox if `shown` shows a cropped volume: to the box that ParaView draws. `data`
+/// describes the shown data; null means that there are none.
 void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, vtkPVDataInformation* data);
 
-/// Sets BlendMode and IsosurfaceValues of `filter` where `shown` is shown as a volume in a blend mode that it
+/// Sets BlendMode and IsosurfaceValues of `filter` if `shown` shows a volume in a blend mode that the filter
 /// has.
 void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown);
 
-/// What to tell a user whose volume is shown in a blend mode that the filter doesn't have; empty where it has
-/// it.
+/// The message for a user whose view shows the volume in a blend mode that the filter lacks; empty if the
+/// filter has it.
 std::string blendModeIssue(vtkSMProxy* shown);
 
 }  // namespace pv

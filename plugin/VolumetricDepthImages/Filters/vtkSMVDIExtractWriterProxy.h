@@ -1,6 +1,6 @@
 /**
  * @class vtkSMVDIExtractWriterProxy
- * @brief the extractor of .vdi files: passes on the number of the step
+ * @brief the extractor of .vdi files: it passes on the number of the step
  */
 #ifndef vtkSMVDIExtractWriterProxy_h
 #define vtkSMVDIExtractWriterProxy_h

@@ -47,7 +47,7 @@
 
 namespace {
 
-/// A function's control points: `values` numbers each, the first of them the place.
+/// A function's control points: `values` numbers each, the first of them its place.
 struct ControlPoints {
   std::vector<double> numbers;
   std::size_t values = 4;
@@ -55,7 +55,7 @@ struct ControlPoints {
   std::size_t size() const { return numbers.size() / values; }
   double place(std::size_t i) const { return numbers[i * values]; }
 
-  /// Whether it's `preset`, whose places count from its first to its last, moved to [0, 1].
+  /// Whether the points are those of `preset`, whose first and last places are moved to 0 and 1.
   bool isNormalized(const Json::Value& preset) const {
     if (preset.size() != numbers.size() || size() < 2 || place(0) != 0.0 || place(size() - 1) != 1.0)
       return false;
@@ -71,8 +71,8 @@ struct ControlPoints {
   }
 };
 
-/// Whether somebody has set the control points of a colour map (`RGBPoints`) or opacity function (`Points`):
-/// they are neither ParaView's own nor those of a preset on [0, 1], which wait for a range.
+/// Whether a user has set the control points of a colour map (`RGBPoints`) or opacity function (`Points`).
+/// Otherwise they are ParaView's own, or those of a preset on [0, 1], which wait for a range.
 bool IsSetExplicitly(vtkSMProxy* function, const char* property) {
   vtkSMProperty* points = function->GetProperty(property);
   if (points == nullptr || points->IsValueDefault()) return false;
@@ -85,8 +85,8 @@ bool IsSetExplicitly(vtkSMProxy* function, const char* property) {
   return true;
 }
 
-/// Whether a function is still without a range. One that somebody has set is said to have one, so that
-/// ParaView's own views leave it alone as well.
+/// Whether a function has no range yet. If a user has set its points, this marks the range as initialized, so
+/// that ParaView's own views leave the function alone, too.
 bool WaitsForRange(vtkSMProxy* function, const char* property) {
   vtkSMPropertyHelper initialized(function, "ScalarRangeInitialized", true);
   if (initialized.GetAsInt() != 0) return false;
@@ -96,7 +96,7 @@ bool WaitsForRange(vtkSMProxy* function, const char* property) {
   return false;
 }
 
-/// A flag is set while this lives.
+/// Sets a flag for the lifetime of this object.
 class Set {
  public:
   explicit Set(bool& flag) : Flag(flag) { this->Flag = true; }
@@ -108,8 +108,9 @@ class Set {
   bool& Flag;
 };
 
-/// Where each rank has a client of its own (pvbatch --symmetric, Catalyst), each knows the range of its own
-/// data only. False where another rank doesn't come along, which the update that follows says.
+/// Widens the range over the ranks if each has a client of its own (pvbatch --symmetric, Catalyst), which
+/// knows the range of its own data only. Returns false if another rank doesn't take part; the next update
+/// reports that.
 bool WidenOverRanks(double range[2]) {
   vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
   if (!vtkProcessModule::GetProcessModule()->GetSymmetricMPIMode() || controller == nullptr) return true;
@@ -132,7 +133,7 @@ vdi::Camera cameraOf(vtkCamera* camera) {
           camera->GetViewAngle(),        camera->GetParallelProjection() != 0, camera->GetParallelScale()};
 }
 
-/// Whether somebody has placed the view's camera: it isn't where new views have it.
+/// Whether a user has placed the view's camera: it isn't where new views have it.
 bool isPlaced(vtkSMRenderViewProxy* view) {
   vtkSMProxy* initial =
       view->GetSessionProxyManager()->GetPrototypeProxy(view->GetXMLGroup(), view->GetXMLName());
@@ -144,8 +145,8 @@ bool isPlaced(vtkSMRenderViewProxy* view) {
          !isInitial("CameraFocalPoint", camera->GetFocalPoint());
 }
 
-/// The view's size; larger ones are brought down to as many pixels as 1920 x 1080 has, for a VDI's time and
-/// size grow with them.
+/// The view's size, reduced to at most as many pixels as 1920 x 1080 has, because a VDI's time and size grow
+/// with them.
 std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
   constexpr double maximum = 1920.0 * 1080.0;
   const vtkSMPropertyHelper size(view, "ViewSize");
@@ -165,7 +166,7 @@ vtkStandardNewMacro(vtkSMVDIGeneratorProxy);
 void vtkSMVDIGeneratorProxy::UpdatePipeline() {
   this->TakeWhatIsNotSet(std::nullopt);
   const bool isForView = this->UpdatesForView;
-  // A view that got something earlier has left the proxy as updated, and the superclass would do nothing.
+  // A view that got an earlier output has left the proxy as updated, and the superclass would do nothing.
   if (!isForView && this->IsOutdated()) this->MarkDirty(this);
   if (isForView) this->InvokeCommand("BeginView");
   this->Superclass::UpdatePipeline();
@@ -211,16 +212,16 @@ vtkSMVDIGeneratorProxy::Subject vtkSMVDIGeneratorProxy::CurrentSubject() {
   return subject;
 }
 
-/// After the first update.
+/// Lets map, component and unit distance follow the array and the input after the first update.
 void vtkSMVDIGeneratorProxy::FollowArray() {
   const Subject now = this->CurrentSubject();
-  if (!this->Shown) this->Shown = now;  // of a state file
+  if (!this->Shown) this->Shown = now;  // after a state file was loaded
   if (now == *this->Shown || now.Input == nullptr) return;
   const Set choosing(this->Choosing);
   const Subject before = std::exchange(*this->Shown, now);
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what goes with the array");
   if (now.Input != before.Input || now.Port != before.Port) this->TakeUnitDistance();
-  // A component that the other array doesn't have was meant for the one before.
+  // A component that the new array lacks belonged to the old one.
   if (now.Array != before.Array && now.Component == before.Component && now.Component > 0 &&
       now.Component >= this->ComponentsOf(now.Array, now.Association)) {
     vtkSMPropertyHelper(this, "Component").Set(-1);
@@ -228,7 +229,7 @@ void vtkSMVDIGeneratorProxy::FollowArray() {
   }
   if (this->HasMapOf(before.Array)) {
     vtkSMPropertyHelper(this, "LookupTable").RemoveAllValues();
-    this->Chosen.clear();  // where there is no range yet, the next update chooses
+    this->Chosen.clear();  // without a range yet, the next update chooses
     this->ChooseLookupTable(std::nullopt, true);
   }
   this->Superclass::UpdateVTKObjects();
@@ -239,7 +240,7 @@ bool vtkSMVDIGeneratorProxy::HasMapOf(const std::string& name) {
   vtkSMProxy* map = table.GetNumberOfElements() > 0 ? table.GetAsProxy() : nullptr;
   if (map == nullptr) return false;
   if (map == this->ChosenMap) return true;
-  // A state file's.
+  // A map from a state file.
   const char* registered = this->GetSessionProxyManager()->GetProxyName("lookup_tables", map);
   return registered != nullptr && !name.empty() && std::string_view(registered).starts_with(name + ".");
 }
@@ -275,7 +276,7 @@ void vtkSMVDIGeneratorProxy::TakeArrayFromView() {
   const std::string name = colored.GetInputArrayNameToProcess() ? colored.GetInputArrayNameToProcess() : "";
   if (name.empty() || (association != vtkDataObject::POINT && association != vtkDataObject::CELL)) return;
   vtkSMPropertyHelper(this, "SelectInputScalars").SetInputArrayToProcess(association, name.c_str());
-  // A map that hasn't been told otherwise colours vectors by their magnitude.
+  // By default a map colours vectors by their magnitude.
   vtkSMProxy* map = vtkSMPropertyHelper(shown, "LookupTable", true).GetAsProxy();
   if (map == nullptr || this->ComponentsOf(name, association) < 2) return;
   const bool byComponent = vtkSMPropertyHelper(map, "VectorMode").GetAsInt() == vtkScalarsToColors::COMPONENT;
@@ -317,7 +318,7 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   this->UpdateVTKObjects();
 }
 
-/// That of the volume in the active view; without one, 0, unless somebody has set it.
+/// Takes the unit distance of the volume in the active view, or 0 if there is none, unless a user has set it.
 void vtkSMVDIGeneratorProxy::TakeUnitDistance() {
   vtkSMPropertyHelper unit(this, "ScalarOpacityUnitDistance");
   const double set = unit.GetAsDouble();
@@ -410,7 +411,7 @@ std::optional<vdi::VdiEstimate> vtkSMVDIGeneratorProxy::EstimateToCome() {
     return vtkSMUncheckedPropertyHelper(this, name).GetAsDouble(i);
   };
   if (number("PictureOnly") != 0.0) return std::nullopt;
-  vdi::GenerateSettings settings;  // with the size of a filter that takes nothing from a view
+  vdi::GenerateSettings settings;  // has the size of a filter that takes nothing from a view
   const int width = static_cast<int>(number("Resolution", 0));
   const int height = static_cast<int>(number("Resolution", 1));
   vtkSMRenderViewProxy* view = this->Taken ? nullptr : this->ViewToTakeFrom();
@@ -433,7 +434,7 @@ void vtkSMVDIGeneratorProxy::PrepareUpstream(vtkSMProxy* proxy, std::optional<do
   if (proxy == nullptr) return;
   for (unsigned int i = 0; i < proxy->GetNumberOfProducers(); ++i) {
     vtkSMProxy* producer = proxy->GetProducerProxy(i);
-    if (vtkSMSourceProxy::SafeDownCast(producer) == nullptr) continue;  // not maps and the like
+    if (vtkSMSourceProxy::SafeDownCast(producer) == nullptr) continue;  // skips maps and the like
     PrepareUpstream(producer, time);
     if (auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(producer)) {
       generator->TakeWhatIsNotSet(time);
@@ -468,13 +469,13 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time, bool 
   vtkSMProxy* opacity = vtkSMPropertyHelper(map, "ScalarOpacityFunction", true).GetAsProxy();
   if (opacity == nullptr) opacity = manager->GetOpacityTransferFunction(name, this->GetSessionProxyManager());
   const bool another = this->NameComponent(map, name, scalars.GetAsInt(3)) && anew;
-  // What nobody has used yet is still on [0, 1]: give it the array's range, as a representation does.
+  // A function that has not been used yet is still on [0, 1]. It gets the array's range, as in a
+  // representation.
   const bool mapWaits = WaitsForRange(map, "RGBPoints") || another;
   const bool opacityWaits = opacity != nullptr && (WaitsForRange(opacity, "Points") || another);
   if (mapWaits || opacityWaits) {
     double range[2];
-    if (!this->RangeOfScalars(name, scalars.GetAsInt(3), time, range))
-      return;  // not now: there are no data yet
+    if (!this->RangeOfScalars(name, scalars.GetAsInt(3), time, range)) return;  // there are no data yet
     if (mapWaits) vtkSMTransferFunctionProxy::RescaleTransferFunction(map, range[0], range[1]);
     if (opacityWaits) vtkSMTransferFunctionProxy::RescaleTransferFunction(opacity, range[0], range[1]);
   }
@@ -484,9 +485,9 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time, bool 
   this->ChosenMap = map;
 }
 
-/// Has the map say in legends which component of the array it's for, unless the view shows the input by it:
-/// true if it said something else, and may be given that component's range as ParaView's own choice of a
-/// component gives it.
+/// Makes the map's legends name the component, unless the view shows the input by this map. Returns true if
+/// that changed the map and the map may be rescaled: then it gets the component's range, as when ParaView
+/// itself chooses a component.
 bool vtkSMVDIGeneratorProxy::NameComponent(vtkSMProxy* map, const std::string& name, int association) {
   const int component = vtkSMPropertyHelper(this, "Component").GetAsInt();
   if (this->ComponentsOf(name, association) < 2 || map->GetProperty("VectorMode") == nullptr) return false;
@@ -526,7 +527,7 @@ bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, s
     }
     vtkPVDataInformation* data = source->GetDataInformation(input.GetOutputPort());
     if (vtkPVArrayInformation* array = data->GetArrayInformation(name, association)) {
-      // The filter's component; one that isn't there is an error of the filter's.
+      // The filter's component. The filter reports one that doesn't exist.
       const int wanted = vtkSMPropertyHelper(this, "Component").GetAsInt();
       const int components = array->GetNumberOfComponents();
       const int component = components == 1 ? 0 : std::clamp(wanted, -1, components - 1);

@@ -2,23 +2,22 @@
  * @class vtkSMVDIGeneratorProxy
  * @brief gives VolumetricDepthImage what the active view shows: viewpoint, size, colour map and opacity
  *
- * What isn't set at the first update is taken from the active view, if that is a render view that shows its
- * input or whose camera somebody has placed: the camera where position and focal point are the same,
- * Resolution where it is 0 0, ScalarOpacityUnitDistance where it is 0, Shade, Diffuse and Ambient where the
- * view shows it as a shaded volume, Cropping and CroppingBox where it shows it as a cropped one, BlendMode
- * and IsosurfaceValues where it shows it as a volume, Lights.
- * Traces and state files have these values. Proxies that a state file makes take nothing.
+ * At the first update, the proxy takes unset properties from the active view, if that is a render view that
+ * shows the input, or whose camera a user has placed: the camera if position and focal point are the same,
+ * Resolution if it is 0 0, ScalarOpacityUnitDistance if it is 0, Shade, Diffuse and Ambient if the view shows
+ * a shaded volume, Cropping and CroppingBox if it shows a cropped one, BlendMode and IsosurfaceValues if it
+ * shows a volume, and Lights. Traces and state files have these values. Proxies that a state file makes take
+ * nothing.
  *
- * When nobody has set LookupTable, the proxy takes ParaView's colour map for the chosen array, the one that a
- * representation of the input uses in the active view, or would use, with its opacity function. A user who
- * sets another one, or none after that, is left alone. A map or opacity function that is still as ParaView
- * made it, or holds a preset on [0, 1], gets the range that the array has then, once; control points that
- * somebody has set stay where they are.
+ * If LookupTable has never been set, the proxy takes ParaView's colour map for the chosen array: the one that
+ * a representation of the input uses in the active view, or would use, with its opacity function. The proxy
+ * doesn't replace a map that a user sets later, nor fill a property that a user empties. If a map or opacity
+ * function is still as ParaView made it, or holds a preset on [0, 1], the proxy rescales it once to the
+ * array's range at that time. Control points that a user has set stay.
  *
  * After the first update, another array, component or input takes its own map as soon as it is sent
- * (UpdateVTKObjects), so that whatever updates the filter next, a view or a writer, finds it. The map of the
- * array before is replaced, and no other one. Another input brings its unit distance, unless somebody has
- * set one.
+ * (UpdateVTKObjects). So the next update finds it, whether it is a view's or a writer's. The proxy replaces
+ * only the map of the previous array. Another input brings its unit distance, unless a user has set one.
  */
 #ifndef vtkSMVDIGeneratorProxy_h
 #define vtkSMVDIGeneratorProxy_h
@@ -47,45 +46,48 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   void UpdatePipeline() override;
   void UpdatePipeline(double time) override;
 
-  /// Whether UpdatePipeline is for a view, which needn't wait for a VDI where views are deferred
-  /// (vtkVDIGenerator::DeferViews). Default off: who updates the filter gets its VDI.
+  /// Whether UpdatePipeline is for a view, which needn't wait for a VDI if views are deferred
+  /// (vtkVDIGenerator::DeferViews). Off by default: then each update waits for its VDI.
   vtkSetMacro(UpdatesForView, bool);
 
   void UpdateVTKObjects() override;
   int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
 
-  /// The array by which the active view colours the input, with its component. For who makes the proxy by
-  /// hand: ParaView has given it a default by then, which can't be told from what a script has set.
+  /// Takes the array by which the active view colours the input, with its component. Call it when a user
+  /// makes the proxy in the window: ParaView has given the property a default by then, and the proxy can't
+  /// tell it from a script's choice.
   void TakeArrayFromView();
 
-  /// Lets the next update be the first once more, for whoever takes that back.
+  /// Makes the next update count as the first again, when a user takes the first one back.
   void Forget();
 
-  /// The view, or a comparative view's root view; null if that is no render view.
+  /// The view, or a comparative view's root view; null if it is no render view.
   static vtkSMRenderViewProxy* RenderViewOf(vtkSMProxy* view);
-  /// Sets the camera properties of `proxy`, one with a viewpoint (VolumetricDepthImage, RenderVDI), to the
-  /// camera of `view`, for UpdateVTKObjects to send.
+  /// Sets the camera properties of `proxy`, which has a viewpoint (VolumetricDepthImage, RenderVDI), to the
+  /// camera of `view`. UpdateVTKObjects sends them.
   static void SetCamera(vtkSMProxy* proxy, vtkSMRenderViewProxy* view);
-  /// Why no viewpoint can be had from the view; empty where one can.
+  /// The reason why the view gives no viewpoint; empty if it gives one.
   static std::string WhyNot(vtkSMViewProxy* view);
-  /// Likewise of a viewpoint for this filter's volume, which the view has to see.
+  /// The same for a viewpoint of this filter's volume, which the view must show.
   std::string WhyNotFrom(vtkSMViewProxy* view);
-  /// Sets camera and Resolution to the view's, and traces it. The result is empty, or why the view can't be
-  /// used; nothing is set then.
+  /// Sets camera and Resolution to the view's, and traces it. Returns "", or the reason why the view can't be
+  /// used; then it sets nothing.
   std::string SetViewpoint(vtkSMViewProxy* view);
-  /// By how many degrees the view sees the middle of the input from elsewhere than the camera that's set.
+  /// The angle in degrees, at the middle of the input, between the view's camera and the camera that is set.
   double DegreesFrom(vtkSMRenderViewProxy* view);
 
-  /// Of the VDI that the panel's numbers ask for, applied or not; none with PictureOnly. Asks the server.
+  /// The estimate for the VDI that the panel's numbers describe, applied or not; nullopt with PictureOnly.
+  /// Asks the server.
   std::optional<vdi::VdiEstimate> EstimateToCome();
 
-  /// Whether views show something earlier than what they have asked for. Asks the server.
+  /// Whether views show an earlier output than the one they asked for. Asks the server.
   bool IsOutdated();
-  /// Ends that the filter is held (vtkVDIGenerator::Hold), and that it shows something earlier, for whoever
-  /// needs the VDI of the maps and properties as they are.
+  /// Releases a held filter (vtkVDIGenerator::Hold), and ends that it shows an earlier output. Call it before
+  /// an update that needs the VDI of the current maps and properties.
   void ReleaseNow();
-  /// For proxies behind it that are updated without it: writers, extractors, RenderVDI. Lets all generators
-  /// upstream of `proxy` take what isn't set, and releases them. Collective where each rank has a client.
+  /// For writers, extractors and RenderVDI, which update the filters upstream of them without the filters'
+  /// proxies. Lets all generators upstream of `proxy` take what isn't set, and releases them. Collective if
+  /// each rank has a client.
   static void PrepareUpstream(vtkSMProxy* proxy, std::optional<double> time);
 
  protected:
@@ -99,31 +101,31 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   void TakeWhatIsNotSet(std::optional<double> time);
   void TakeFromView();
   vtkSMViewProxy* ActiveView();
-  /// The active view, if it's one to take from; null otherwise.
+  /// The active view if the proxy may take properties from it; null otherwise.
   vtkSMRenderViewProxy* ViewToTakeFrom();
-  /// Null: there is no input.
+  /// Null if there is no input.
   vtkPVDataInformation* InputInformation();
   vdi::Box InputBounds();
-  /// How the view shows the input; null if it never has.
+  /// The view's representation of the input; null if there is none.
   vtkSMProxy* RepresentationIn(vtkSMViewProxy* view);
-  /// Of the input's array; 0 if it isn't there.
+  /// The number of components of the input's array; 0 if the array is missing.
   int ComponentsOf(const std::string& name, int association);
-  /// `time`: that of the update which is to come, if it has one. `anew`: the map that is set was for
-  /// something else.
+  /// `time` is that of the next update, if it has one. With `anew`, the map that is set belongs to another
+  /// array, component or input.
   void ChooseLookupTable(std::optional<double> time, bool anew);
   void FollowArray();
   void TakeUnitDistance();
-  /// Whether the map that is set is that of the array, and nobody's choice.
+  /// Whether the map that is set belongs to the array, and isn't a user's choice.
   bool HasMapOf(const std::string& name);
   bool NameComponent(vtkSMProxy* map, const std::string& name, int association);
-  /// By which the active view colours the input by that array; null if it doesn't.
+  /// The map by which the active view colours the input by that array; null if it doesn't.
   vtkSMProxy* MapInView(const std::string& name, int association);
-  /// Of the input's array, over all ranks; false if there's none.
+  /// The range of the input's array over all ranks. Returns false if there is none.
   bool RangeOfScalars(const char* name, int association, std::optional<double> time, double range[2]);
 
-  /// What a map is chosen for.
+  /// The data that a map is chosen for.
   struct Subject {
-    vtkSMProxy* Input = nullptr;  // compared only
+    vtkSMProxy* Input = nullptr;  // compared, never followed
     unsigned int Port = 0;
     std::string Array;
     int Association = 0;
@@ -133,12 +135,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   Subject CurrentSubject();
 
   bool UpdatesForView = false;
-  bool Taken = false;                       // what the view has
-  bool Choosing = false;                    // in ChooseLookupTable or FollowArray
+  bool Taken = false;                       // whether the proxy has taken the view's properties
+  bool Choosing = false;                    // true within ChooseLookupTable and FollowArray
   std::string Chosen;                       // the array whose map this proxy has set
   vtkWeakPointer<vtkSMProxy> ChosenMap;     // that map
-  std::optional<Subject> Shown;             // that the last map was for
-  std::optional<double> TakenUnitDistance;  // from a view
+  std::optional<Subject> Shown;             // the subject of the last map
+  std::optional<double> TakenUnitDistance;  // taken from a view
 };
 
 #endif

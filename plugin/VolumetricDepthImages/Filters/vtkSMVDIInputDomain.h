@@ -1,9 +1,9 @@
 /**
  * @class vtkSMVDIInputDomain
- * @brief accepts what carries a Volumetric Depth Image (VDIImageData.h)
+ * @brief accepts inputs that carry a Volumetric Depth Image (VDIImageData.h)
  *
- * XML element VDIInputDomain, of input properties. Nothing is known of a source before its first update; it
- * isn't accepted then, so that menus offer what can be used.
+ * This is the XML element VDIInputDomain, for input properties. It rejects a source before its first update,
+ * when nothing is known of its output, so that menus offer only usable filters.
  */
 #ifndef vtkSMVDIInputDomain_h
 #define vtkSMVDIInputDomain_h

@@ -1,8 +1,8 @@
 /**
  * @class vtkSMVDIRendererProxy
- * @brief lets the generators behind a RenderVDI choose their colour maps before it is updated
+ * @brief lets the generators upstream of a RenderVDI choose their colour maps before it is updated
  *
- * A filter updates what is behind it without asking the proxies there (vtkSMVDIGeneratorProxy).
+ * A filter updates the filters upstream of it without their proxies (vtkSMVDIGeneratorProxy).
  */
 #ifndef vtkSMVDIRendererProxy_h
 #define vtkSMVDIRendererProxy_h

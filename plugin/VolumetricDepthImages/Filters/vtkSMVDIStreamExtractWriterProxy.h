@@ -1,8 +1,8 @@
 /**
  * @class vtkSMVDIStreamExtractWriterProxy
- * @brief the extractor VDIStream: writes no files, but hands each VDI to vtkVDIStreamWriter
+ * @brief the extractor VDIStream, which hands each VDI to vtkVDIStreamWriter and writes no files
  *
- * With the property Steer of its writer, what viewers ask for is done after each step (VDISteering.h).
+ * If its writer's property Steer is on, it carries out the viewers' wishes after each step (VDISteering.h).
  */
 #ifndef vtkSMVDIStreamExtractWriterProxy_h
 #define vtkSMVDIStreamExtractWriterProxy_h

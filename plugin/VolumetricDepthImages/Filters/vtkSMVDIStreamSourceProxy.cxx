@@ -19,7 +19,7 @@ void vtkSMVDIStreamSourceProxy::SetPropertyModifiedFlag(const char* name, int fl
 
 void vtkSMVDIStreamSourceProxy::TakeToken() {
   const vtkSMPropertyHelper property(this, "URL");
-  if (property.GetNumberOfElements() == 0) return;  // while the proxy is made
+  if (property.GetNumberOfElements() == 0) return;  // the proxy is being made
   const char* text = property.GetAsString();
   const std::string url = text != nullptr ? text : "";
   if (url == this->Address) return;
@@ -28,7 +28,7 @@ void vtkSMVDIStreamSourceProxy::TakeToken() {
   std::string token;
   try {
     if (hash != std::string::npos) token = vdi::stream::parseUrl(url).token;
-  } catch (const vdi::Error&) {  // the source says what is wrong with the rest of it
+  } catch (const vdi::Error&) {  // the source reports what is wrong with the URL
   }
   if (hash != std::string::npos) this->Tokens[this->Address] = token;
   this->IsTokenSent = false;

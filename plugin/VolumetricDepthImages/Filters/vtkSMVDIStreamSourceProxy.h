@@ -1,10 +1,10 @@
 /**
  * @class vtkSMVDIStreamSourceProxy
- * @brief the source VDIStream: keeps the token of a link apart from its URL
+ * @brief the source VDIStream, which keeps the token of a link apart from its URL
  *
- * States, traces and settings have the property URL, so this takes the token that a pasted link brings out
- * of it at once, and sends it to the source by itself. No property has it, for a trace would write it down.
- * The tokens of earlier links are kept: undo and redo bring back their addresses alone.
+ * States, traces and settings have the property URL. So this proxy removes the token from a pasted link at
+ * once, and sends it to the source by itself. The token is no property, because a trace would write it down.
+ * The proxy keeps the tokens of earlier links, because undo and redo bring back their addresses alone.
  */
 #ifndef vtkSMVDIStreamSourceProxy_h
 #define vtkSMVDIStreamSourceProxy_h
@@ -35,9 +35,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIStreamSourceProxy : public vtkSMSo
 
   void TakeToken();
 
-  std::string Address;                        // URL as it was last
-  std::map<std::string, std::string> Tokens;  // of addresses
-  bool IsTokenSent = true;                    // that of Address
+  std::string Address;                        // the last URL, without its token
+  std::map<std::string, std::string> Tokens;  // by address
+  bool IsTokenSent = true;                    // whether the source has the token of Address
 };
 
 #endif

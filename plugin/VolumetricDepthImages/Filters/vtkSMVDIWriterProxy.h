@@ -1,8 +1,8 @@
 /**
  * @class vtkSMVDIWriterProxy
- * @brief lets the generators behind a .vdi file choose their colour maps before it's written
+ * @brief lets the generators upstream of a .vdi file's writer choose their colour maps before it writes
  *
- * A writer updates what is behind it without asking the proxies there (vtkSMVDIGeneratorProxy).
+ * A writer updates the filters upstream of it without their proxies (vtkSMVDIGeneratorProxy).
  */
 #ifndef vtkSMVDIWriterProxy_h
 #define vtkSMVDIWriterProxy_h

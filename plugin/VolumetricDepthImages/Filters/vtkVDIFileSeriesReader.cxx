@@ -26,7 +26,8 @@
 
 vtkStandardNewMacro(vtkVDIFileSeriesReader);
 
-/// What the series needs of a file's header; numbers only, for it travels as such.
+/// The part of a file's header that the series needs. It consists of numbers only, so that it can be
+/// broadcast.
 struct vtkVDIFileSeriesReader::Header {
   double IsKnown = 0.0;
   double Time = 0.0;
@@ -62,8 +63,8 @@ std::array<double, 12> numbersOf(const vdi::Camera& camera) {
           parallelScale};
 }
 
-/// The time at `index` on the line through two of the times that are known: the ones around it, or else the
-/// nearest two. With one known time they are 1 apart.
+/// The time at `index` on the line through two known times: those around it, or else the nearest two. With
+/// one known time, steps are 1 apart.
 double timeBetween(const std::map<std::size_t, double>& known, std::size_t index) {
   auto right = known.lower_bound(index);
   if (right != known.end() && right->first == index) return right->second;
@@ -82,7 +83,7 @@ vtkVDIFileSeriesReader::vtkVDIFileSeriesReader() : Headers(new Known) {}
 
 vtkVDIFileSeriesReader::~vtkVDIFileSeriesReader() = default;
 
-/// A file that hasn't changed isn't opened again, and one that can't be read any more keeps what it had.
+/// Opens only files that have changed. A file that is no longer readable keeps its last header.
 std::vector<vtkVDIFileSeriesReader::Header> vtkVDIFileSeriesReader::ReadHeaders() {
   std::vector<Header> headers(this->GetNumberOfFileNames());
   for (std::size_t i = 0; i < headers.size(); ++i) {
@@ -101,7 +102,7 @@ std::vector<vtkVDIFileSeriesReader::Header> vtkVDIFileSeriesReader::ReadHeaders(
                             ? vdi::io::metadataText(*header.coloring, header.time, header.timeStep)
                             : std::string();
         file.State = state;
-      } catch (const vdi::Error&) {  // the reader says so when it's its turn
+      } catch (const vdi::Error&) {  // the reader reports it when it reads the file
         file.State.reset();
       }
     }
@@ -177,6 +178,6 @@ int vtkVDIFileSeriesReader::RequestData(vtkInformation* request, vtkInformationV
     this->LastStep = step;
   }
   this->LastIndex = index;
-  // The reader has said why. A failure would make the pipeline repeat that in many lines.
+  // The reader has reported the cause. A failure would make the pipeline repeat that in many lines.
   return count > 1 ? 1 : result;
 }

@@ -2,11 +2,11 @@
  * @class vtkVDIFileSeriesReader
  * @brief reads .vdi files as the time steps of one series
  *
- * A step's time is the one in its file. Where two files have the same time, as those of one data set from
- * several viewpoints have, the steps are counted instead, from 0. A file that can't be read costs its own
- * step: it has the time that it had when it could be, or one between its neighbours'. Who goes from step to
- * step finds the next one read already. Information is collective: rank 0 reads the headers, all have their
- * times.
+ * A step's time is the one in its file. If two files have the same time, as VDIs of one data set from several
+ * viewpoints have, the reader counts the steps from 0 instead. A file that can't be read costs only its own
+ * step. The step has the file's last known time, or a time between those of its neighbours. Once a caller
+ * moves on by the same number of steps twice, the reader prefetches the next one. RequestInformation is
+ * collective: rank 0 reads the headers, and all ranks get their times.
  */
 #ifndef vtkVDIFileSeriesReader_h
 #define vtkVDIFileSeriesReader_h
@@ -24,13 +24,13 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
   static vtkVDIFileSeriesReader* New();
   vtkTypeMacro(vtkVDIFileSeriesReader, vtkFileSeriesReader);
 
-  /// Where the first file that can be read was made from, after UpdateInformation: position, focal point,
-  /// view-up, view angle, whether the projection is parallel, and parallel scale, as vtkCamera has them.
-  /// Zeros if none can be read.
+  /// The viewpoint of the first readable file, after UpdateInformation: position, focal point, view-up, view
+  /// angle, whether the projection is parallel, and parallel scale, as vtkCamera has them. Zeros if no file
+  /// is readable.
   vtkGetVectorMacro(Viewpoint, double, 12);
 
-  /// What the colours of the VDI mean that was read last, or that the first file has: vdi::io::metadataText;
-  /// empty where the file doesn't say. On rank 0.
+  /// The meaning of the colours (vdi::io::metadataText) of the VDI that was read last, or of the first file
+  /// before that; empty if the file doesn't have it. On rank 0.
   const char* GetColoring() const { return this->Coloring.c_str(); }
 
  protected:
@@ -49,11 +49,11 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
   std::vector<Header> ReadHeaders();
   void ShareHeaders(std::vector<Header>& headers);
 
-  std::unique_ptr<Known> Headers;  // of rank 0's files, from earlier
+  std::unique_ptr<Known> Headers;  // what earlier reads found in rank 0's files
   double Viewpoint[12] = {};
   std::string Coloring;
-  vtkIdType LastIndex = -1;  // of the file that was read last
-  vtkIdType LastStep = 0;    // to it from the one before, in [0, count)
+  vtkIdType LastIndex = -1;  // index of the file that was read last
+  vtkIdType LastStep = 0;    // difference of the last two indices, in [0, count)
 };
 
 #endif

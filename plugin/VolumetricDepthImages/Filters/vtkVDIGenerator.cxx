@@ -50,7 +50,7 @@
 
 vtkStandardNewMacro(vtkVDIGenerator);
 
-/// What a frame depends on besides the volume.
+/// The inputs of a frame besides the volume: its viewpoint, colours and settings.
 struct vtkVDIGenerator::Frame {
   vdi::Camera Camera;
   vdi::TransferFunction Function;
@@ -59,24 +59,24 @@ struct vtkVDIGenerator::Frame {
 
 struct vtkVDIGenerator::Internals {
   std::shared_ptr<pv::Volumes> Volumes = pv::sharedVolumes();
-  std::shared_ptr<pv::Volume> Volume;  // none until the first update; other filters may use it, too
-  std::uint64_t Identity = 0;          // of the filter, with its first volume: the same on all ranks
+  std::shared_ptr<pv::Volume> Volume;  // null before the first update; other filters may share it
+  std::uint64_t Identity = 0;          // the filter's, from its first volume on; the same on all ranks
   /// Reports of the last VDI or picture. A preparation's thread writes them until it ends.
   std::vector<vdi::RankReport> Reports;
   std::string Device;
   pv::Failure Said;
-  /// Range of the map that stands in for none: the first frame's, kept while the array is the same, or films
-  /// would flicker.
+  /// The range of the default map. It stays that of the first frame while the array stays the same, so that
+  /// films don't flicker.
   std::optional<vdi::ScalarRange> FirstRange;
   pv::ArrayChoice FirstChoice;
   pv::Regeneration Regeneration;  // last member, because its thread uses the others
 
-  /// Called before each frame, with its array.
+  /// Call it before each frame with the frame's array.
   void NoteChoice(const pv::ArrayChoice& choice) {
     if (this->FirstRange && !(this->FirstChoice == choice)) this->FirstRange.reset();
     this->FirstChoice = choice;
   }
-  /// What the volume shows, if it is this and no turn that was taken changes it; else null.
+  /// The shown blocks if the volume shows this origin and no later turn changes it; else null.
   std::shared_ptr<const pv::Shown> ShownOf(const pv::Origin& origin) const {
     if (!this->Volume || !this->Volume->targets(origin)) return nullptr;
     std::shared_ptr<const pv::Shown> shown = this->Volume->shown();
@@ -180,7 +180,7 @@ void vtkVDIGenerator::RemoveAllIsosurfaceValues() {
   this->Modified();
 }
 
-/// Throws vdi::Error where a VDI can't hold it.
+/// Throws vdi::Error if a VDI can't hold this blending.
 vdi::Blending vtkVDIGenerator::CurrentBlending() const {
   vdi::Blending blending;
   blending.mode = static_cast<vdi::BlendMode>(this->BlendMode);
@@ -233,8 +233,8 @@ vtkMTimeType vtkVDIGenerator::CurrentMTime() {
 }
 
 int vtkVDIGenerator::FillInputPortInformation(int, vtkInformation* info) {
-  // Any data object: RequestData says clearly what it can't take, and composite ones come whole instead of
-  // leaf by leaf.
+  // The input may be any data object. RequestData rejects with a clear message, and a composite data set
+  // comes whole instead of leaf by leaf.
   info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject");
   return 1;
 }
@@ -263,8 +263,8 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
   vtkInformation* info = inputs[0]->GetInformationObject(0);
   const int rank = this->Controller ? this->Controller->GetLocalProcessId() : 0;
   const int ranks = this->Controller ? this->Controller->GetNumberOfProcesses() : 1;
-  // Cell data needs a neighbour's cells to interpolate up to the common face; points on the face are both
-  // blocks' anyway.
+  // Cell data need a neighbour's cells to interpolate up to the common face. Both blocks have the points on
+  // that face.
   int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
   if (vtkInformation* array = this->GetInputArrayInformation(0)) {
     if (array->Has(vtkDataObject::FIELD_ASSOCIATION()))
@@ -274,22 +274,21 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
   info->Set(Pipeline::UPDATE_PIECE_NUMBER(), rank);
   info->Set(Pipeline::UPDATE_NUMBER_OF_PIECES(), ranks);
   info->Set(Pipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), ghosts);
-  // The whole extent, of which the source makes this rank's piece: it splits the extent that it's asked for.
+  // Asks for the whole extent. The source splits it and makes this rank's piece of it.
   if (info->Has(Pipeline::WHOLE_EXTENT())) {
     int whole[6];
     info->Get(Pipeline::WHOLE_EXTENT(), whole);
     info->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
   } else {
-    info->Remove(
-        Pipeline::UPDATE_EXTENT());  // the picture's, of which a composite's sources would be asked for
+    info->Remove(Pipeline::UPDATE_EXTENT());  // the picture's, for which a composite's sources would be asked
   }
   return 1;
 }
 
 namespace {
 
-/// Finds the ranges that ParaView asks for after an update, and that arrays keep. A large VDI takes half a
-/// second.
+/// Computes the ranges that ParaView asks for after an update. The arrays store them. It takes half a second
+/// for a large VDI.
 void findRanges(vtkFieldData* fields) {
   for (int i = 0; i < fields->GetNumberOfArrays(); ++i) {
     vtkDataArray* array = fields->GetArray(i);
@@ -303,7 +302,7 @@ void findRanges(vtkFieldData* fields) {
   }
 }
 
-/// Gives the output the input's time, or none.
+/// Sets the output's time to the input's, or removes it.
 void setTime(vtkImageData* output, std::optional<double> time) {
   if (time) {
     output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), *time);
@@ -318,7 +317,7 @@ vdi::Image nothingOf(int width, int height) {
   return nothing;
 }
 
-/// Completes the VDI by what is known of its blocks and gives it to the output.
+/// Completes the VDI with the facts about its blocks, and moves it to the output.
 void giveVdi(vdi::Vdi& vdi, const pv::Shown& shown, const pv::Origin& origin, int step,
              vtkImageData* output) {
   vdi.coloring->array = shown.array;
@@ -355,7 +354,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   output->Initialize();
   pv::Regeneration& regeneration = this->Internal->Regeneration;
   const pv::Origin origin = this->OriginOf(input);
-  // A writer on several ranks asks for another piece of the output that is there.
+  // On several ranks, a writer asks for another piece of the output that is there already.
   const bool isMade = regeneration.isMade(origin, this->CurrentMTime()) &&
                       (regeneration.made()->GetNumberOfPoints() > 0 || !this->IsRoot());
   const pv::Regeneration::Last last = regeneration.begin(this->CurrentMTime());
@@ -407,7 +406,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   this->Internal->Said.isOver();
   if (const auto made = pv::madeOf(output, this->CurrentSettings(), this->Internal->Reports))
     std::ranges::copy(pv::numbersOf(*made), this->LastVdi);
-  regeneration.finish(output, origin, this->CurrentMTime());  // later: a map's table has been built
+  regeneration.finish(output, origin, this->CurrentMTime());  // the time has grown: a map has built its table
   return 1;
 }
 
@@ -471,8 +470,8 @@ int vtkVDIGenerator::GetOutdated() {
   return this->Internal->Regeneration.asked() ? 1 : 0;
 }
 
-/// Gives a view that needn't wait an earlier output, and notes what it asks for. Returns false where the VDI
-/// must be made in place, or has just been prepared. Collective.
+/// Gives an earlier output to a view that needn't wait, and notes its request. Returns false if the VDI must
+/// be made in place, or has just been prepared. Collective.
 bool vtkVDIGenerator::Defer(vtkDataObject* input, const pv::Origin& origin, bool hasFailed,
                             vtkImageData* output) {
   pv::Regeneration& regeneration = this->Internal->Regeneration;
@@ -491,8 +490,8 @@ bool vtkVDIGenerator::Defer(vtkDataObject* input, const pv::Origin& origin, bool
   return true;
 }
 
-/// Notes what Prepare is to make. Returns false for an input that is no good; an update in place says why.
-/// Collective.
+/// Notes the request that Prepare will fulfil. Returns false for an unusable input; an update in place
+/// reports why. Collective.
 bool vtkVDIGenerator::Ask(vtkDataObject* input, const pv::Origin& origin) {
   pv::Regeneration& regeneration = this->Internal->Regeneration;
   const std::optional<pv::Request>& asked = regeneration.asked();
@@ -511,8 +510,8 @@ bool vtkVDIGenerator::Ask(vtkDataObject* input, const pv::Origin& origin) {
   return true;
 }
 
-/// Gives a view the last VDI, in a picture of the announced size, in place of one that isn't made yet;
-/// without any, a picture of nothing at its place.
+/// Gives a view the last VDI in place of the requested one, in a picture of the announced size. Without a
+/// last VDI, it gives an empty picture at the place of the requested one.
 void vtkVDIGenerator::GiveEarlier(vtkImageData* output) {
   if (!this->IsRoot()) return;
   pv::Regeneration& regeneration = this->Internal->Regeneration;
@@ -527,7 +526,7 @@ void vtkVDIGenerator::GiveEarlier(vtkImageData* output) {
     if (regeneration.made()->GetNumberOfPoints() == 0)
       pv::setBeingMade(output, this->Viewpoint(asked.bounds), asked.bounds);
   }
-  // Views colour by the array that they ask for, and adapt its map to its range.
+  // Views colour by the requested array, and fit its map to its range.
   if (output->GetFieldData()->GetAbstractArray(asked.load.array.name.c_str()) == nullptr) {
     const double* range = this->LookupTable->GetRange();
     pv::setShownValues(output, asked.load.array, std::array{range[0], range[1]});
@@ -567,27 +566,28 @@ void vtkVDIGenerator::UseVolume(const std::shared_ptr<pv::Volume>& volume) {
   });
 }
 
-/// Uses the volume in which another filter shows this input, or one that can show it. Collective.
+/// Uses the volume in which another filter shows this input, or a volume that can show it. Collective.
 void vtkVDIGenerator::ChooseVolume(const pv::Origin& origin) {
   Internals& internal = *this->Internal;
   if (internal.Identity == 0) internal.Identity = pv::newIdentity(this->Controller);
   this->UseVolume(internal.Volumes->choose(this->Controller, origin, internal.Volume, this));
 }
 
-/// Shows the input in the volume, whose turn the filter has. Uploads nothing where another filter has done
-/// so, or where only the camera or the transfer function has changed. Collective.
+/// Shows the input in the volume. The filter must have its turn. Uploads nothing if another filter has done
+/// so, or if only the camera or the transfer function has changed. Collective.
 void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin) {
   pv::Volume& volume = *this->Internal->Volume;
   const vdi::comm::Communicator& comm = volume.generator().communicator();
   comm.together([&] { pv::requireInput(input); });
-  // What the ranks do next depends on these; the generator compares the rest.
+  // The ranks' next steps depend on these values. The generator compares the others.
   comm.requireEqual(std::hash<std::string>()(origin.choice.name), "SelectInputScalars, the array");
   comm.requireEqual(origin.choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells");
   comm.requireEqual(static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component");
   comm.requireEqual(this->FillGhosts ? 1U : 0U, "FillGhosts");
   comm.requireEqual(this->PictureOnly ? 1U : 0U, "PictureOnly");
   comm.requireEqual(static_cast<std::uint64_t>(this->BlendMode), "BlendMode");
-  comm.together([&] { static_cast<void>(this->CurrentBlending()); });  // before values are loaded in vain
+  // throws before values are loaded in vain
+  comm.together([&] { static_cast<void>(this->CurrentBlending()); });
   if (!comm.anyTogether([&] { return this->Internal->ShownOf(origin) == nullptr; })) return;
   pv::Load load;
   comm.together([&] { load = pv::loadOf(input, this->GetInputAlgorithm(0, 0), origin); });
@@ -612,14 +612,16 @@ vdi::Camera vtkVDIGenerator::Viewpoint(const vdi::Box& bounds) const {
   const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
   vdi::Camera camera{vector(this->CameraPosition), vector(this->CameraFocalPoint), vector(this->CameraViewUp),
                      this->CameraViewAngle,        this->CameraParallelProjection, this->CameraParallelScale};
-  const bool usable = this->CameraViewAngle > 0.0 && this->CameraViewAngle < 180.0;  // else View says so
+  // vdi::View reports the angle otherwise
+  const bool usable = this->CameraViewAngle > 0.0 && this->CameraViewAngle < 180.0;
   if (camera.position != camera.focalPoint || !usable) return camera;
   camera = vdi::Camera::framing(bounds, {0.0, 0.0, -1.0}, camera.viewUp, camera.viewAngle);
   camera.parallelProjection = this->CameraParallelProjection;
   return camera;
 }
 
-/// Ranks that come with filters that don't belong together give up their volumes and start anew.
+/// Enters an update on all ranks. If the ranks' filters don't belong together, all give up their volumes and
+/// start anew.
 void vtkVDIGenerator::Enter() {
   Internals& internal = *this->Internal;
   const std::string name =
@@ -639,8 +641,8 @@ std::array<int, 2> vtkVDIGenerator::PictureSize() const {
   return {this->Resolution[0], this->Resolution[1]};
 }
 
-/// The frame of blocks in these bounds, with the properties and maps as they are. `range` is that of the map
-/// that stands in for none.
+/// The frame for blocks in these bounds, with the current properties and maps. `range` is that of the default
+/// map.
 vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame(const vdi::Box& bounds, double voxelVolume,
                                                      const vdi::ScalarRange& range) {
   double unit = this->ScalarOpacityUnitDistance;
@@ -677,7 +679,7 @@ void vtkVDIGenerator::Release() {
   pv::Regeneration& regeneration = this->Internal->Regeneration;
   const vtkMTimeType time = this->CurrentMTime();
   if (!regeneration.release(time)) return;
-  // An update may have kept the held output, which is younger than the properties then.
+  // An update may have kept the held output, and is younger than the properties then.
   this->Modified();
   regeneration.carryOver(time, this->CurrentMTime());
 }
@@ -691,16 +693,17 @@ int vtkVDIGenerator::GetPreparation() {
 }
 
 void vtkVDIGenerator::ServePreparation() {
-  constexpr std::chrono::milliseconds most{15};  // the window waits for that
+  constexpr std::chrono::milliseconds most{15};  // the window waits that long
   this->Internal->Regeneration.serve(most);
 }
 
-/// What a preparation's thread does. `load`: blocks of `origin` that the volume doesn't show yet.
+/// Returns the function that a preparation's thread runs. `load` has the blocks of `origin` if the volume
+/// doesn't show them yet.
 pv::Preparation::Make vtkVDIGenerator::Internals::Maker(Frame frame, std::optional<pv::Load> load,
                                                         const pv::Origin& origin, int step) {
   return [this, frame = std::move(frame), load = std::move(load), origin, step](
              pv::Volume& volume, const vdi::Progress& progress, vtkVDIImageData* output) {
-    volume.make();  // does nothing on several ranks, where AskedFrame has done it
+    volume.make();  // does nothing on several ranks, because AskedFrame has done it
     if (load) {
       volume.show(*load);
     } else {
@@ -730,7 +733,7 @@ void vtkVDIGenerator::Prepare() {
     try {
       frame = asked ? this->AskedFrame() : this->ShownFrame(*shown);
     } catch (const vdi::Error&) {
-      can = false;  // the update that comes instead says why
+      can = false;  // the next update reports why
     }
   } else {
     can = false;
@@ -747,7 +750,7 @@ void vtkVDIGenerator::Prepare() {
                        internal.Maker(std::move(frame), std::move(load), origin, this->TimeStep));
 }
 
-/// The frame that a view has asked for. Chooses its volume. Collective.
+/// The frame that a view has asked for. Also chooses its volume. Collective.
 vtkVDIGenerator::Frame vtkVDIGenerator::AskedFrame() {
   const pv::Request& asked = *this->Internal->Regeneration.asked();
   this->ChooseVolume(asked.load.of);
@@ -761,8 +764,8 @@ vtkVDIGenerator::Frame vtkVDIGenerator::ShownFrame(const pv::Shown& shown) {
   return this->CurrentFrame(shown.bounds, shown.voxelVolume, this->StandInRange(shown));
 }
 
-/// Makes sure that no thread of this filter uses the volume. Returns whether `output` is what one has made of
-/// just this; an update that can't wait for its turn, such as a writer's, waits here. Collective.
+/// Ends the use of the volume by this filter's thread. Returns whether the thread has made exactly this
+/// output. An update that can't wait for its turn, such as a writer's, waits here. Collective.
 bool vtkVDIGenerator::TakePreparation(const pv::Origin& origin, vtkImageData* output) {
   const auto goesOn = [this](double share) {
     this->UpdateProgress(share);

@@ -2,15 +2,16 @@
  * @class vtkVDIGenerator
  * @brief makes a Volumetric Depth Image (VDI) of a distributed volume
  *
- * Input: vtkImageData, or images in vtkPartitionedDataSet(Collection), vtkMultiBlockDataSet,
- * vtkOverlappingAMR or vtkNonOverlappingAMR. Each rank brings the blocks it has, in any arrangement. Output
- * on rank 0: a vtkImageData of Resolution with the picture seen from the camera, and the VDI in its field
- * data (VDIImageData.h has the arrays); empty on other ranks. Collective: all ranks of the controller update
- * together; when one fails, all return 0, and all try again when asked again.
+ * The input is vtkImageData, or images in vtkPartitionedDataSet(Collection), vtkMultiBlockDataSet,
+ * vtkOverlappingAMR or vtkNonOverlappingAMR. Each rank brings the blocks that it has, in any arrangement. On
+ * rank 0, the output is a vtkImageData of size Resolution with the picture from the camera, and with the VDI
+ * in its field data (VDIImageData.h describes the arrays). On other ranks it is empty. Updates are
+ * collective: all ranks of the controller update together. When one fails, all return 0, and all try again at
+ * the next request.
  *
- * Filters of one process whose input, array, component and ghost layers are the same share the volume on the
+ * Filters of one process with the same input, array, component and ghost layers share the volume on the
  * device, and the memory in which VDIs are made (VDIVolume.h). They make their VDIs one after the other: an
- * update in place waits for what others prepare.
+ * update in place waits for the other filters' preparations.
  */
 #ifndef vtkVDIGenerator_h
 #define vtkVDIGenerator_h
@@ -52,8 +53,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   ///@{
   /**
-   * Colour map; its scalar opacity function is used unless SetScalarOpacityFunction gave another one. None:
-   * "Cool to Warm" over the range that the scalars have at the first frame of that array.
+   * The colour map. Its scalar opacity function is used unless SetScalarOpacityFunction gave another one.
+   * Without a map, the filter uses "Cool to Warm" over the range of the scalars in the array's first frame.
    */
   void SetLookupTable(vtkScalarsToColors* table);
   void SetScalarOpacityFunction(vtkPiecewiseFunction* function);
@@ -61,21 +62,23 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   ///@{
   /**
-   * Distance over which the opacity function holds, in world units; 0 (default): the scene's diagonal by the
-   * cube root of the number of voxels in it, as ParaView's volume representation starts with.
+   * The distance over which the opacity function holds, in world units. 0 (default) stands for the scene's
+   * diagonal divided by the cube root of the number of its voxels, the initial value of ParaView's volume
+   * representation.
    */
   vtkSetClampMacro(ScalarOpacityUnitDistance, double, 0.0, VTK_DOUBLE_MAX);
   vtkGetMacro(ScalarOpacityUnitDistance, double);
   ///@}
 
-  /// Component of a multi-component array; -1 (default): magnitude.
+  /// The component of a multi-component array; -1 (default): the magnitude.
   vtkSetMacro(Component, int);
-  /// Lists of the VDI's picture: columns and rows. 0 0 (default): 1280 x 720.
+  /// The columns and rows of lists in the VDI's picture. 0 0 (default): 1280 x 720.
   vtkSetVector2Macro(Resolution, int);
   ///@{
   /**
-   * The settings of vdi/core/SettingsTable.h, which has their ranges and defaults. Names are enumerators:
-   * vdi::Algorithm, vdi::Budget and vdi::Precision. A value out of range fails the next update.
+   * The settings of vdi/core/SettingsTable.h, which has their ranges and defaults. Algorithm, Budget and
+   * Precision are the enumerators of vdi::Algorithm, vdi::Budget and vdi::Precision. With a value out of
+   * range, the next update fails.
    */
   void SetMargin(double share) { this->SetSetting("Margin", share); }
   void SetSupersegments(int most) { this->SetSetting("Supersegments", most); }
@@ -88,23 +91,24 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void SetShade(bool shade) { this->SetSetting("Shade", shade ? 1.0 : 0.0); }
   void SetAmbient(double share) { this->SetSetting("Ambient", share); }
   void SetDiffuse(double share) { this->SetSetting("Diffuse", share); }
-  /// By one of these names, which must be in the table.
+  /// Sets a setting by its name, which must be in the table.
   void SetSetting(const char* property, double value);
   double GetSetting(const char* property) const;
   ///@}
   ///@{
   /**
-   * The lights of Shade, at most 8, which move with the viewpoint; none: ParaView's light kit as a new view
-   * has it.
+   * The lights of Shade, at most 8, which move with the viewpoint. Without any, the filter uses the light kit
+   * of ParaView's new views.
    */
-  /// Its direction in the camera's axes and its colour: vdi::Light.
+  /// Adds a light by its direction in the camera's axes and its colour (vdi::Light).
   void AddLight(double right, double up, double back, double red, double green, double blue);
   void RemoveAllLights();
   ///@}
   ///@{
   /**
-   * What is shown of the volume: vdi::Region. With Cropping (default off) what is in the box, in world
-   * coordinates, lowest and highest x, y and z. And the sides of the planes to which their normals point.
+   * The shown part of the volume (vdi::Region): with Cropping (default off), the part in the box, given by
+   * the lowest and highest x, y and z in world coordinates. Of each plane, the side to which its normal
+   * points is shown.
    */
   vtkSetMacro(Cropping, bool);
   vtkGetMacro(Cropping, bool);
@@ -116,29 +120,29 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   ///@}
   ///@{
   /**
-   * How the scalars along a ray become a pixel, an enumerator of vdi::BlendMode: 0 (default) composite, 1
-   * maximum intensity, 2 minimum intensity, 3 isosurfaces of the IsosurfaceValues. A VDI holds composite
-   * blending alone: an update with another mode fails unless PictureOnly is on.
+   * The rule by which the scalars along a ray become a pixel, an enumerator of vdi::BlendMode: 0 (default)
+   * composite, 1 maximum intensity, 2 minimum intensity, 3 isosurfaces of the IsosurfaceValues. A VDI holds
+   * composite blending alone: with another mode, an update fails unless PictureOnly is on.
    */
   vtkSetClampMacro(BlendMode, int, 0, 3);
   vtkGetMacro(BlendMode, int);
   void AddIsosurfaceValue(double value);
   void RemoveAllIsosurfaceValues();
   ///@}
-  /// Exchange ghost layers where blocks lack them.
+  /// Whether ranks exchange ghost layers that blocks lack.
   vtkSetMacro(FillGhosts, bool);
 
-  /// Plain volume rendering of the blocks, right for any arrangement and in any blend mode, without a VDI
-  /// beside the picture; default off.
+  /// Whether the filter makes a picture by plain volume rendering, correct for any arrangement of blocks and
+  /// in any blend mode, but no VDI; default off.
   vtkSetMacro(PictureOnly, bool);
   /// The simulation's step, kept in the VDI.
   vtkSetMacro(TimeStep, int);
 
   ///@{
   /**
-   * The viewpoint V_O, as vtkCamera has it. Where position and focal point are the same, as they are unless
-   * set, the camera looks along -z at the whole scene, as vtkRenderer::ResetCamera places it; view-up, angle
-   * and projection are used then too, the parallel scale isn't.
+   * The viewpoint V_O, as vtkCamera has it. While position and focal point are the same, as they are by
+   * default, the camera looks along -z at the whole scene, as vtkRenderer::ResetCamera places it. It uses
+   * view-up, angle and projection then, too, but not the parallel scale.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);
@@ -150,21 +154,22 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   void SetController(vtkMultiProcessController* controller);
 
-  /// Time and memory of the last frame, a line per rank; empty on ranks other than 0.
+  /// Time and memory of the last frame, one line per rank; empty on ranks other than 0.
   vtkGetStringMacro(Report);
-  /// What the last VDI was and took, as pv::numbersOf gives it; all 0 without one, and on ranks other than 0.
+  /// The last VDI's properties and costs, as pv::numbersOf gives them; all 0 without one, and on ranks other
+  /// than 0.
   vtkGetVectorMacro(LastVdi, double, 17);
 
   ///@{
   /**
-   * How a window gets a new VDI without waiting for it. After Hold, changed maps and properties don't make
-   * the output out of date, until Release; another input still does. What Prepare has begun is given up: once
-   * GetPreparation says that it has ended, another Prepare waits for nothing. Prepare starts to make the VDI
-   * of the properties and maps as they are now, in a thread of its own, unless the output is that already,
-   * and of the input that a view has asked for last. On several ranks it gets on while somebody calls
-   * ServePreparation again and again, which takes some milliseconds, on all of them. The update after Release
-   * takes that VDI, or waits for it, if nothing has changed since, and makes one otherwise. Collective, but
-   * for Hold and Release.
+   * These functions give a window a new VDI without waiting. After Hold, changed maps and properties don't
+   * make the output out of date until Release; another input still does. Hold also gives up a running
+   * preparation: once GetPreparation reports its end, another Prepare waits for nothing. Prepare starts a
+   * thread that makes the VDI of the current properties and maps, and of the input that a view has asked for
+   * last; it does nothing if that is the output already. On several ranks, the preparation makes progress
+   * while all of them call ServePreparation again and again, which takes some milliseconds each. The update
+   * after Release takes the prepared VDI, or waits for it, if nothing has changed since, and makes one
+   * otherwise. All functions but Hold and Release are collective.
    */
   void Hold();
   void Prepare();
@@ -174,12 +179,13 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   ///@}
   ///@{
   /**
-   * How a window's views do without waiting for what isn't made yet. Between BeginView and EndView the output
-   * is updated for a view. After DeferViews such an update makes nothing: it gives the VDI that was made
-   * last, or a picture of nothing that says so (pv::isBeingMade), and GetOutdated is true until the output is
-   * what was asked for. Prepare then makes that, new blocks included. All other updates make it in place or
-   * wait for the preparation, and so do a view's where Prepare can't make it, with PictureOnly, without a
-   * colour map, and after a failure. DeferNoViews ends it (default). To be called on all ranks.
+   * With these functions, a window's views don't wait for a VDI. Between BeginView and EndView, an update is
+   * for a view. After DeferViews such an update makes nothing: it gives the last VDI, or an empty picture
+   * that is marked as being made (pv::isBeingMade), and GetOutdated is true until the output is the requested
+   * one. A call of Prepare then makes the requested one, new blocks included. All other updates make the
+   * output in place or wait for the preparation. A view's update does so, too, if Prepare can't make the
+   * output: with PictureOnly, without a colour map, and after a failure. DeferNoViews ends the deferral
+   * (default). Call these functions on all ranks.
    */
   void DeferViews();
   void DeferNoViews();
@@ -187,8 +193,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void EndView();
   int GetOutdated();
   ///@}
-  /// Of what Prepare has begun, in percent; 100 when it's there. -1: nothing is prepared, because nothing was
-  /// begun, it was given up or went wrong, or it can't be: before the first update, and with PictureOnly.
+  /// The preparation's progress in percent, 100 once its output is there. -1 if there is no preparation: none
+  /// was begun, it was given up, it failed, or it is impossible (before the first update, and with
+  /// PictureOnly).
   int GetPreparation();
 
   vtkMTimeType GetMTime() override;

@@ -1,9 +1,9 @@
 /**
  * @class vtkVDIImageData
- * @brief the image that carries a VDI: its bounds are those of the scene
+ * @brief the image that carries a VDI, with the bounds of the VDI's scene
  *
- * VDIImageData.h says what the image holds. Its points are a flat picture, a unit apart. Where it is in the
- * world, for views, axes and the information panel, is where the VDI's scene is.
+ * VDIImageData.h describes the image's contents. Its points are a flat picture, a unit apart. Its bounds,
+ * which views, axes and the information panel use, are those of the VDI's scene.
  */
 #ifndef vtkVDIImageData_h
 #define vtkVDIImageData_h
@@ -22,13 +22,13 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIImageData : public vtkImageData {
   static vtkVDIImageData* New();
   vtkTypeMacro(vtkVDIImageData, vtkImageData);
 
-  /// Those of vtkImageData where there's no VDI with a scene in it.
+  /// Computes vtkImageData's bounds if the image has no VDI with a scene.
   void ComputeBounds() override;
 
   ///@{
   /**
-   * The bytes of the .vdi file of what the image carries, made ahead for who sends it to another process.
-   * Null where there are none, or once the image carries another VDI. Copies of the image share them.
+   * The bytes of the .vdi file with the image's VDI, encoded ahead for sending to another process. Null if
+   * there are none, or once the image carries another VDI. Copies of the image share them.
    */
   void SetFile(vtkUnsignedCharArray* file);
   vtkUnsignedCharArray* GetFile();
@@ -37,7 +37,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIImageData : public vtkImageData {
   void ShallowCopy(vtkDataObject* source) override;
   void DeepCopy(vtkDataObject* source) override;
 
-  /// For vtkDemandDrivenPipeline::REQUEST_DATA_OBJECT: makes one the first output.
+  /// For vtkDemandDrivenPipeline::REQUEST_DATA_OBJECT: makes a vtkVDIImageData the first output.
   static void MakeOutput(vtkInformationVector* outputs);
 
  protected:
@@ -52,7 +52,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIImageData : public vtkImageData {
   vtkAbstractArray* Offsets();
 
   vtkSmartPointer<vtkUnsignedCharArray> File;
-  vtkSmartPointer<vtkAbstractArray> FileIsOf;  // the VDI's offsets
+  vtkSmartPointer<vtkAbstractArray> FileIsOf;  // the offsets of the VDI that File encodes
 };
 
 #endif

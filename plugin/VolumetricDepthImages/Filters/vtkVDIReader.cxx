@@ -41,7 +41,7 @@ struct vtkVDIReader::Contents {
 
 struct vtkVDIReader::Ahead {
   std::string Name;
-  std::optional<pv::FileState> State;  // before it's read
+  std::optional<pv::FileState> State;  // before the read
   std::future<Contents> Job;
 };
 
@@ -68,7 +68,7 @@ vtkVDIReader::Contents vtkVDIReader::Read() {
     } else {
       try {
         return ahead->Job.get();
-      } catch (const std::exception&) {  // what's wrong is said by whoever was asked for it
+      } catch (const std::exception&) {  // reading it again reports the error
       }
     }
   }
@@ -147,7 +147,7 @@ int vtkVDIReader::RequestData(vtkInformation*, vtkInformationVector**, vtkInform
     this->Said.clear();
   } catch (const std::exception& error) {
     output->Initialize();
-    // The pipeline asks again and again for what it doesn't get.
+    // The pipeline repeats requests that fail, so each error is reported once.
     if (this->Said != error.what()) vtkErrorMacro(<< error.what());
     this->Said = error.what();
     return 0;

@@ -2,9 +2,9 @@
  * @class vtkVDIReader
  * @brief reads a .vdi file
  *
- * Output as vtkVDIGenerator's: a vtkImageData with the flat picture and the VDI in field data, on rank 0;
- * empty elsewhere. docs/format.md describes the file. Series of files become time steps by
- * vtkFileSeriesReader.
+ * The output is like vtkVDIGenerator's: a vtkImageData with the flat picture and the VDI in field data on
+ * rank 0; empty on other ranks. docs/format.md describes the file. vtkVDIFileSeriesReader turns a series of
+ * files into time steps.
  */
 #ifndef vtkVDIReader_h
 #define vtkVDIReader_h
@@ -27,12 +27,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
   vtkSetFilePathMacro(FileName);
   vtkGetFilePathMacro(FileName);
 
-  /// 1 if the file starts as a .vdi file does.
+  /// Returns 1 if the file starts as a .vdi file does.
   int CanReadFile(const char* name);
 
-  /// Reads that file on another thread, so that it's there when it's asked for next, unless it has changed by
-  /// then. One at a time: the one before is dropped, without waiting for it. On rank 0; elsewhere there's
-  /// nothing to read.
+  /// Starts to read that file on another thread. The next read of this name takes the result, unless the file
+  /// has changed by then. There is one prefetch at a time: a new one drops the last without waiting for it.
+  /// Does nothing on ranks other than 0.
   void Prefetch(const std::string& name);
 
   struct Announced {
@@ -40,7 +40,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
     int Width = 0;
     int Height = 0;
   };
-  /// What's known of files by their names, so that they needn't be there to be announced, nor on all ranks.
+  /// Sets the facts about files by name, so that a file can be announced without being read, on all ranks.
   void SetSeries(std::map<std::string, Announced> series) { this->Series = std::move(series); }
 
  protected:
@@ -63,7 +63,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIReader : public vtkImageAlgorithm {
   char* FileName = nullptr;
   std::unique_ptr<Ahead> Next;
   std::map<std::string, Announced> Series;
-  std::string Said;  // of what went wrong last
+  std::string Said;  // the last error's text
 };
 
 #endif

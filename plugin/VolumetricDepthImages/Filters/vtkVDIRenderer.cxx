@@ -20,13 +20,14 @@
 vtkStandardNewMacro(vtkVDIRenderer);
 
 struct vtkVDIRenderer::Internals {
-  std::unique_ptr<vdi::VdiRenderer> Renderer;  // none until there's a VDI
-  vtkDataObject* Uploaded = nullptr;           // whose VDI the renderer has; compared, never followed
+  std::unique_ptr<vdi::VdiRenderer> Renderer;  // null before the first VDI
+  // the input whose VDI the renderer has; compared, never followed
+  vtkDataObject* Uploaded = nullptr;
   vtkMTimeType UploadedTime = 0;
-  vtkDataObject* Other = nullptr;     // the input without a VDI of which was told; compared, never followed
-  std::optional<vdi::View> Original;  // its viewpoint, of all lists
+  vtkDataObject* Other = nullptr;     // the last reported input without a VDI; compared, never followed
+  std::optional<vdi::View> Original;  // the VDI's viewpoint, with all its lists
   vdi::Box Bounds;
-  std::optional<vdi::ViewpointIssue> Warned;  // of the last picture
+  std::optional<vdi::ViewpointIssue> Warned;  // the issue of the last picture
   int Width = 0;
   int Height = 0;
 };
@@ -77,7 +78,7 @@ int vtkVDIRenderer::RequestInformation(vtkInformation*, vtkInformationVector** i
 
 int vtkVDIRenderer::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs,
                                         vtkInformationVector*) {
-  // A VDI is one thing: always all of it.
+  // A VDI can't be split into pieces.
   using Pipeline = vtkStreamingDemandDrivenPipeline;
   vtkInformation* info = inputs[0]->GetInformationObject(0);
   info->Set(Pipeline::UPDATE_PIECE_NUMBER(), 0);
@@ -96,8 +97,8 @@ int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs,
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
   if (this->IsOther(vtkDataObject::GetData(inputs[0]))) {
-    // A picture of nothing, of the size that was announced: a failure would be tried, and told, again and
-    // again.
+    // Gives an empty picture of the announced size. The pipeline would repeat a request that failed, and its
+    // message.
     int extent[6];
     outputs->GetInformationObject(0)->Get(vtkStreamingDemandDrivenPipeline::WHOLE_EXTENT(), extent);
     output->SetExtent(extent);
@@ -124,7 +125,7 @@ int vtkVDIRenderer::RequestData(vtkInformation*, vtkInformationVector** inputs,
   return 1;
 }
 
-/// Whether `input` has data but no VDI, which is said once.
+/// Whether `input` has data but no VDI. Reports that once.
 bool vtkVDIRenderer::IsOther(vtkDataObject* input) {
   auto* image = vtkImageData::SafeDownCast(input);
   if (image == nullptr || image->GetNumberOfPoints() == 0 || pv::hasVdi(image)) {

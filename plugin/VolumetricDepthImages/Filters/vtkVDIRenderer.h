@@ -3,8 +3,8 @@
  * @brief renders a Volumetric Depth Image from a viewpoint
  *
  * Input: the output of vtkVDIGenerator or vtkVDIReader. Output: a vtkImageData with point data RGBA and Depth
- * (view-space depth of what's seen first, infinity where there's nothing). Runs where the VDI is, on rank 0;
- * empty on other ranks.
+ * (view-space depth of the nearest visible material, infinity where there is none). It renders on rank 0,
+ * which has the VDI; the output of other ranks is empty.
  */
 #ifndef vtkVDIRenderer_h
 #define vtkVDIRenderer_h
@@ -29,10 +29,11 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
 
   ///@{
   /**
-   * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off), and where position and
-   * focal point are the same, as they are unless set, the VDI's own is used, turned by Azimuth degrees as
-   * vtkCamera::Azimuth does: about its focal point, around its view-up as set. A viewpoint that shows nothing
-   * true (vdi::ViewpointIssue) gets a warning, unless the picture before had the same.
+   * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off), and while position and
+   * focal point are the same, as they are by default, the filter uses the VDI's own viewpoint. It turns that
+   * by Azimuth degrees as vtkCamera::Azimuth does: about the focal point, around the view-up as set. The
+   * filter warns of a viewpoint that can't show the VDI truly (vdi::ViewpointIssue), unless it has warned of
+   * the same for the picture before.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);
@@ -44,7 +45,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   vtkSetMacro(Azimuth, double);
   ///@}
 
-  /// Of the picture; 0 0: the VDI's.
+  /// Width and height of the picture; 0 0: those of the VDI.
   vtkSetVector2Macro(Resolution, int);
 
   /// vdi::Reconstruction: 2 (default) also leans the faces of supersegments, 1 blends neighbouring lists, 0
@@ -52,7 +53,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   vtkSetClampMacro(Reconstruction, int, 0, 2);
 
   ///@{
-  /// What is seen lies on the sides of these planes to which their normals point; at most 6.
+  /// The picture shows what lies on the sides of these planes to which their normals point; at most 6.
   void AddClippingPlane(double originX, double originY, double originZ, double normalX, double normalY,
                         double normalZ);
   void RemoveAllClippingPlanes();

@@ -56,13 +56,13 @@ const char* nameOf(vdi::stream::Phase phase) {
 
 }  // namespace
 
-/// A VDI that has come, with its flat picture.
+/// A received VDI with its flat picture.
 struct vtkVDIStreamReader::Frame {
   vdi::Vdi Vdi;
   vdi::Image Flat;
-  std::string Session;       // of the server
-  std::uint32_t Number = 0;  // in that
-  bool IsFull = false;       // no finer level follows
+  std::string Session;       // the server's session
+  std::uint32_t Number = 0;  // the frame's number in the session
+  bool IsFull = false;       // true if no finer level follows
 
   Frame(const vdi::stream::Received& received)
       : Vdi(vdi::io::decode(received.file)),
@@ -71,13 +71,13 @@ struct vtkVDIStreamReader::Frame {
         Number(received.level.frame),
         IsFull(received.level.level + 1 == received.level.levels) {}
 
-  /// Whether they differ in their level at most.
+  /// Whether both are the same VDI, at any level.
   bool IsSameAs(const Frame& other) const {
     return this->Session == other.Session && this->Number == other.Number;
   }
 };
 
-/// A connection, and a thread that decodes what comes. It makes no VTK object.
+/// A connection, and a thread that decodes the received frames. It makes no VTK object.
 class vtkVDIStreamReader::Link {
  public:
   explicit Link(vdi::stream::ClientOptions options)
@@ -90,13 +90,13 @@ class vtkVDIStreamReader::Link {
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  /// Null: none has come.
+  /// The newest received VDI; null before the first.
   std::shared_ptr<const Frame> Newest() const {
     const std::scoped_lock lock(this->Mutex);
     return this->Last;
   }
 
-  /// Until there is a whole VDI, there can't be one, or so much time is over.
+  /// Waits until there is a whole VDI, or there can't be one, but no longer than this.
   void WaitForFirst(double seconds) const {
     std::unique_lock lock(this->Mutex);
     this->Changed.wait_for(lock, std::chrono::duration<double>(seconds),
@@ -108,13 +108,14 @@ class vtkVDIStreamReader::Link {
     return this->Count;
   }
 
-  /// Why there is no use in trying again; empty: there is.
+  /// The reason why trying again is useless; empty if it isn't.
   std::string Failure() const {
     const std::scoped_lock lock(this->Mutex);
     return this->Failed;
   }
 
-  /// While it is on and there's a whole VDI to keep, or two coarse ones, the server is asked for no more.
+  /// While the pause is on, and a whole VDI or two coarse ones have come, the client asks the server for no
+  /// more.
   void SetPause(bool pause) {
     const std::scoped_lock lock(this->Mutex);
     this->IsPaused = pause;
@@ -157,7 +158,7 @@ class vtkVDIStreamReader::Link {
     }
   }
 
-  /// What is damaged costs its own frame.
+  /// Keeps a received VDI. A damaged one costs only its own frame.
   void Keep(const vdi::stream::Received& received) {
     std::shared_ptr<const Frame> frame;
     std::string damage;
@@ -176,11 +177,11 @@ class vtkVDIStreamReader::Link {
   }
 
   const std::string Authority;
-  mutable std::mutex Mutex;  // for the next six
+  mutable std::mutex Mutex;  // guards the members up to IsPaused
   mutable std::condition_variable Changed;
   std::shared_ptr<const Frame> Last;
   std::string Failed;
-  std::string Damaged;  // why the newest VDI can't be shown
+  std::string Damaged;  // reason why the newest VDI can't be shown
   int Count = 0;
   bool IsPaused = false;
   std::atomic<bool> IsEnding = false;
@@ -236,7 +237,7 @@ void vtkVDIStreamReader::SetPause(bool pause) {
   this->Pause = pause;
   if (!this->Connected) return;
   this->Connected->SetPause(pause);
-  if (!pause) ++this->EarlierArrivals;  // one that the pause has kept out is to be taken
+  if (!pause) ++this->EarlierArrivals;  // the pause may have kept out a VDI, which Take can show now
 }
 
 void vtkVDIStreamReader::Take() {
@@ -262,7 +263,7 @@ const char* vtkVDIStreamReader::GetConnection() {
   return this->Connection.c_str();
 }
 
-/// Trouble says why it couldn't.
+/// Connects, or puts the reason why it can't into Trouble.
 void vtkVDIStreamReader::Connect() {
   this->Trouble.clear();
   try {

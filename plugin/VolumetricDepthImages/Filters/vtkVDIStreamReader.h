@@ -1,11 +1,11 @@
 /**
  * @class vtkVDIStreamReader
- * @brief the newest VDI that a server offers
+ * @brief shows the newest VDI that a server offers
  *
- * Output as vtkVDIReader's: a vtkImageData with the flat picture and the VDI in field data, on rank 0; empty
- * elsewhere. Before there is one, the image has no points and says why (pv::setWaiting). Rank 0 connects at
- * the first update (vdi/stream/Client.h) and receives and decodes on threads of its own; nothing here is
- * collective. A frame that has come is shown after Take.
+ * The output is like vtkVDIReader's: a vtkImageData with the flat picture and the VDI in field data on rank
+ * 0; empty on other ranks. Before the first VDI, the image has no points and gives the reason
+ * (pv::setWaiting). Rank 0 connects at the first update (vdi/stream/Client.h), and receives and decodes on
+ * threads of its own; nothing here is collective. The filter shows a new frame after Take.
  */
 #ifndef vtkVDIStreamReader_h
 #define vtkVDIStreamReader_h
@@ -25,37 +25,37 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamReader : public vtkImageAlgori
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   ///@{
-  /// Of the connection, which the next update makes anew after a change.
-  void SetURL(const char* url);      // without a token
-  void SetToken(const char* token);  // "": that of TokenFile, or else of the environment
+  /// Settings of the connection. After a change, the next update connects anew.
+  void SetURL(const char* url);      // the link without its token
+  void SetToken(const char* token);  // "": the token of TokenFile, or else of the environment
   void SetTokenFile(const char* file);
-  void SetAuthority(const char* file);  // PEM: certificates to trust beside the system's
+  void SetAuthority(const char* file);  // a PEM file of certificates to trust beside the system's
   ///@}
 
-  /// Seconds that an update waits for a first VDI, no longer than the server can be reached.
+  /// The time in seconds that an update waits for the first VDI, as long as the server can be reached.
   vtkSetClampMacro(Patience, double, 0.0, 3600.0);
   vtkGetMacro(Patience, double);
 
   ///@{
-  /// Keep the VDI that is shown, in full if the rest of it comes, and let the server send nothing more. Where
-  /// none is shown, the first one is kept. Makes nothing new by itself.
+  /// Keeps the shown VDI, in full if the rest of it comes, and lets the server send nothing more. If none is
+  /// shown, the first one is kept. It starts no update.
   void SetPause(bool pause);
   vtkGetMacro(Pause, bool);
   ///@}
 
-  /// Shows the newest VDI that has come from the next update on, unless Pause is on.
+  /// Makes the next update show the newest VDI, unless Pause is on.
   void Take();
 
-  /// How many there have been of what Take may have an effect on: VDIs of all connections, failures for good
-  /// and ends of Pause. Never decreases. 0 on other ranks.
+  /// The number of events after which Take may change the output: VDIs of all connections, final failures and
+  /// ends of Pause. It never decreases, and is 0 on other ranks.
   int GetArrivals();
-  /// For the user, such as "127.0.0.1:8080: live", and "Shown: step 120, time 6" on a second line where a VDI
-  /// is. Without the token.
+  /// The state of the connection for the user, such as "127.0.0.1:8080: live", and "Shown: step 120, time 6"
+  /// on a second line if there is a VDI. It has no token.
   const char* GetConnection();
 
-  /// Where the VDI shown was made from, as vtkVDIFileSeriesReader has it; zeros without one.
+  /// The viewpoint of the shown VDI, as in vtkVDIFileSeriesReader; zeros without one.
   vtkGetVectorMacro(Viewpoint, double, 12);
-  /// What its colours mean: vdi::io::metadataText; empty where that is unknown.
+  /// The meaning of its colours (vdi::io::metadataText); empty if it is unknown.
   const char* GetColoring() const { return this->Coloring.c_str(); }
 
  protected:
@@ -85,9 +85,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamReader : public vtkImageAlgori
   bool Pause = false;
 
   std::shared_ptr<Link> Connected;     // on rank 0, from the first update on
-  std::shared_ptr<const Frame> Shown;  // null: none so far
-  std::string Trouble;                 // why there can't be a connection
-  int EarlierArrivals = 0;             // beside Connected's
+  std::shared_ptr<const Frame> Shown;  // null before the first VDI
+  std::string Trouble;                 // reason why there can't be a connection
+  int EarlierArrivals = 0;             // those of earlier connections and of ends of Pause
   std::string Connection;
   pv::Failure Failure;
   double Viewpoint[12] = {};

@@ -29,7 +29,7 @@ std::string textOf(const char* value) {
 
 }  // namespace
 
-/// The publisher hands its last frame over before the server ends.
+/// The members' order lets the publisher hand its last frame over before the server ends.
 struct vtkVDIStreamWriter::Service {
   Service(vdi::stream::ServerOptions options, bool isSteered)
       : Server(Steered(std::move(options), isSteered)), Publisher(Server) {}
@@ -40,11 +40,11 @@ struct vtkVDIStreamWriter::Service {
       };
     return options;
   }
-  vdi::stream::Wishes Wishes;  // of which the server's thread knows
+  vdi::stream::Wishes Wishes;  // the server's thread uses it
   vdi::stream::Server Server;
   vdi::stream::Publisher Publisher;
   std::unique_ptr<vdi::stream::SecretFile> Link;
-  std::string Told;  // of the publisher's trouble
+  std::string Told;  // the last reported trouble of the publisher
 };
 
 vtkStandardNewMacro(vtkVDIStreamWriter);
@@ -90,7 +90,7 @@ void vtkVDIStreamWriter::Start() {
   const std::string link = given.empty() ? service->Server.link() : service->Server.address();
   const std::string file = textOf(this->LinkFile);
   if (!file.empty()) service->Link = std::make_unique<vdi::stream::SecretFile>(file, link);
-  // The token stays out of logs. It's in the file, or known.
+  // The token stays out of logs. The user has it in the file or chose it.
   fmt::print(stderr, "VDIStream: serving at {}{}\n", service->Server.address(),
              file.empty() ? "" : "; the link is in " + file);
   this->Running = std::move(service);

@@ -3,8 +3,8 @@
  * @brief offers the VDI of its input to viewers over the network
  *
  * Input: the output of vtkVDIGenerator or vtkVDIReader. The rank that has the VDI starts a server
- * (vdi/stream/Server.h) when it writes for the first time, and ends it when this object goes; other ranks do
- * nothing. Writing copies the VDI and waits for neither its encoding nor a viewer.
+ * (vdi/stream/Server.h) at the first write, and the destructor ends it; other ranks do nothing. Writing
+ * copies the VDI and waits for neither its encoding nor a viewer.
  */
 #ifndef vtkVDIStreamWriter_h
 #define vtkVDIStreamWriter_h
@@ -31,10 +31,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   ///@{
-  /// Of the server: changes count until it has started.
-  vtkSetStringMacro(Host);  // whose address it listens at
+  /// Settings of the server. Changes after its start have no effect.
+  vtkSetStringMacro(Host);  // the server listens at this host's address
   vtkGetStringMacro(Host);
-  vtkSetMacro(Port, int);  // 0: one that is free
+  vtkSetMacro(Port, int);  // 0: a free port
   vtkGetMacro(Port, int);
   vtkSetFilePathMacro(TokenFile);  // none: VDI_TOKEN of the environment, or a new token
   vtkGetFilePathMacro(TokenFile);
@@ -42,11 +42,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   vtkGetFilePathMacro(LinkFile);
   vtkSetMacro(Rate, double);  // Mbit a second to each viewer; 0: no limit
   vtkGetMacro(Rate, double);
-  vtkSetFilePathMacro(Certificate);  // PEM, with Key: TLS
+  vtkSetFilePathMacro(Certificate);  // PEM; with Key, the server uses TLS
   vtkGetFilePathMacro(Certificate);
   vtkSetFilePathMacro(Key);
   vtkGetFilePathMacro(Key);
-  vtkSetMacro(Steer, bool);  // whether viewers may ask for changes, which an extractor makes (VDISteering.h)
+  // whether viewers may ask for changes, which an extractor carries out (VDISteering.h)
+  vtkSetMacro(Steer, bool);
   vtkGetMacro(Steer, bool);
   vtkBooleanMacro(Steer, bool);
   ///@}
@@ -58,10 +59,11 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   vtkSetMacro(TimeStep, int);
 
 #ifndef __VTK_WRAP__
-  /// What viewers have asked for since this was called last. Waits so long at most; none: nothing, or the
-  /// server hasn't started or lets nobody steer.
+  /// The viewers' request since the last call. Waits for it no longer than `patience`. Nullopt if there is
+  /// none, before the server has started, and without Steer.
   std::optional<vdi::stream::Request> TakeRequest(std::chrono::milliseconds patience);
-  /// What viewers may ask for, and what is in force. Without effect before the server has started.
+  /// Tells viewers what they may ask for, and the values in force. Has no effect before the server has
+  /// started.
   void SetControls(const vdi::stream::Controls& controls);
 #endif
 
