@@ -17,8 +17,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Lists across a thinned VDI. Rough pictures on a CPU are hardly larger. The second level serves views from
-/// nearer, which show only some of the lists.
+/// The lists across a thinned VDI. Rough pictures on a CPU are hardly larger. The second level serves nearer
+/// views, which show only some of the lists.
 constexpr std::array<int, VDIBuffers::thinLevels> thinWidths{160, 320};
 
 }  // namespace
@@ -139,7 +139,7 @@ bool VDIBuffers::take(Clock::duration wait) {
     try {
       this->takeOne();
     } catch (...) {
-      if (isNewest) throw;  // a newer piece makes up for an older one's fault
+      if (isNewest) throw;  // a newer piece replaces the faulty one
     }
     hasTaken = true;
   }

@@ -31,13 +31,13 @@ class VDIBuffers {
   VDIBuffers(VDIBuffers&&) = delete;
   VDIBuffers& operator=(VDIBuffers&&) = delete;
 
-  /// Starts to load the VDI of a piece (VDIPiece.h). While an earlier one is being loaded the piece waits, in
-  /// the place of one that waits already.
+  /// Starts to load the VDI of a piece (VDIPiece.h). While an earlier one is being loaded, the piece waits,
+  /// and replaces a piece that waits already.
   void load(vtkDataObject* piece);
-  /// Shows the newest VDI that has been loaded, starts to load a piece that waits, and returns whether the
-  /// VDI changed. Waits at most `wait` for the newest piece, then goes on showing the last one. Throws
-  /// vdi::Error for a VDI that isn't sound, for a piece with a problem, and for a device that fails; then
-  /// nothing is shown.
+  /// Shows the newest VDI that has been loaded, starts to load a waiting piece, and returns whether the VDI
+  /// changed. Waits at most `wait` for the newest piece, then goes on showing the last one. Throws vdi::Error
+  /// for a VDI that isn't sound, for a piece with a problem, and for a device that fails; then nothing is
+  /// shown.
   bool take(std::chrono::steady_clock::duration wait);
   /// Whether a newer VDI than the one shown is being loaded, and whether `take` would show it at once.
   bool isLoading() const { return job_.valid(); }
@@ -46,13 +46,13 @@ class VDIBuffers {
   void clear();
 
   bool hasVdi() const { return hasVdi_; }
-  /// Whether the VDI that has come has no supersegments. Then hasVdi is false.
+  /// Whether the loaded VDI has no supersegments. Then hasVdi is false.
   bool isEmpty() const { return isEmpty_; }
-  /// Counts the changes of what is shown.
+  /// The number of changes of the shown VDI.
   std::uint64_t version() const { return version_; }
   /// World bounds as VTK has them.
   const std::array<double, 6>& bounds() const { return bounds_; }
-  /// V_O, where there is a VDI.
+  /// V_O; nullopt without a VDI.
   const std::optional<vdi::View>& viewpoint() const { return viewpoint_; }
   /// The renderer of all lists. There must be a VDI.
   vdi::VdiRenderer& renderer() { return *renderers_->whole; }

@@ -59,11 +59,11 @@ PictureForm VDIFramePolicy::interactive(VDIBuffers& buffers, const vdi::View& vi
   const std::optional<std::size_t> thin = thinLevelFor(buffers, view);
   const double fewLists = thin ? static_cast<double>(buffers.thin(*thin).lists) : 0.0;
   if (thin && pixels < std::min(all, 2.0 * fewLists)) {
-    // So few pixels would hardly show the lists between.
+    // So few pixels would miss most of the lists.
     form.thin = thin;
     pixels = thins_.at(*thin).pixels(rate).value_or(fewLists);
   }
-  constexpr double coarsest = 8.0;  // larger pixels show little that anybody recognises
+  constexpr double coarsest = 8.0;  // larger pixels show hardly anything recognisable
   const double wanted = std::sqrt(std::clamp(all / std::max(pixels, 1.0), 1.0, coarsest * coarsest));
   // A size that changed from frame to frame would flicker.
   const double ratio = wanted / reduction_;

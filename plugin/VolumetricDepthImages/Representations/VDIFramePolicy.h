@@ -1,4 +1,4 @@
-// How rough the frames of a moving VDI are.
+// The choice of how rough the frames of a moving VDI are.
 #ifndef VDIFramePolicy_h
 #define VDIFramePolicy_h
 
@@ -15,7 +15,7 @@ class View;
 
 namespace pv {
 
-/// What a picture is rendered with.
+/// The size and the lists with which a picture is rendered.
 struct PictureForm {
   glm::ivec2 size;                  // pixels
   std::optional<std::size_t> thin;  // level of VDIBuffers::thin; none: all lists
@@ -28,13 +28,13 @@ class VDIFramePolicy {
   PictureForm interactive(VDIBuffers& buffers, const vdi::View& view, const glm::ivec2& port, double rate);
   /// Whether a window's still frame would wait too long for a picture of all lists.
   bool takesLong(const VDIBuffers& buffers, const glm::ivec2& port) const;
-  /// Learns from a frame of an orbit, of which rendering the VDI took `renderSeconds`.
+  /// Learns from a frame of an orbit. Rendering the VDI took `renderSeconds` of its time.
   void measure(const PictureForm& form, double seconds, double renderSeconds);
-  /// Learns from a picture that was no frame of an orbit, if nothing better is known.
+  /// Learns from a picture outside an orbit, if nothing better is known.
   void guess(const PictureForm& form, double renderSeconds);
 
  private:
-  /// Time of a frame: a part that it takes anyway, and a part by the pixel of the VDI's picture.
+  /// The time of a frame: a constant part, and a part per pixel of the VDI's picture.
   class Pace {
    public:
     void measure(double seconds, double renderSeconds, double pixels);

@@ -14,7 +14,7 @@ vtkStandardNewMacro(vtkVDIMessage);
 
 namespace {
 
-// In pixels, of fontSize points at 72 dots per inch.
+// Sizes in pixels, for fontSize points at 72 dots per inch.
 constexpr int fontSize = 16;
 constexpr int smallFontSize = 12;
 constexpr double letterWidth = 9.0;
@@ -22,7 +22,7 @@ constexpr double smallLetterWidth = 6.5;
 constexpr double lineHeight = 18.0;
 constexpr double gap = 12.0;
 
-/// In lines of at most `columns`, broken at blanks.
+/// Breaks the text at blanks into lines of at most `columns` letters.
 std::string wrapped(const std::string& text, std::size_t columns) {
   std::string lines;
   std::size_t column = 0;
@@ -70,7 +70,7 @@ void vtkVDIMessage::PutIn(vtkViewport* viewport) {
   int height = 0;
   renderer->GetTiledSize(&width, &height);
   if (width < 1 || height < 1) return;
-  // VTK 9.1 goes on using the shaders of what was drawn before, which go when another view is closed.
+  // VTK 9.1 keeps the shaders of the last drawing, which are deleted when another view is closed.
   if (this->IsNew) this->ReleaseGraphicsResources(renderer->GetVTKWindow());
   this->IsNew = false;
   const bool isSmall = this->At == Place::Bottom;

@@ -1,4 +1,4 @@
-// What views say of a VDI.
+// The texts that views show about a VDI.
 #ifndef VDIMessage_h
 #define VDIMessage_h
 
@@ -14,11 +14,11 @@ class vtkVDIMessage : public vtkTextActor {
   vtkTypeMacro(vtkVDIMessage, vtkTextActor);
 
   enum class Place {
-    Middle,  // of the height: in place of a picture
-    Top,     // over a picture
-    Bottom   // over a picture, small, and in the middle of its width
+    Middle,  // at half the height, in place of a picture
+    Top,     // over a picture, at its upper edge
+    Bottom   // over a picture, small, and centred at its lower edge
   };
-  /// Shown when it's not empty.
+  /// Shows the text, or nothing if it is empty.
   void Show(const std::string& text, Place place);
   int RenderOpaqueGeometry(vtkViewport* viewport) override;
 
@@ -34,7 +34,7 @@ class vtkVDIMessage : public vtkTextActor {
 
   std::string Text;
   Place At = Place::Middle;
-  bool IsNew = false;  // since it was drawn
+  bool IsNew = false;  // it has not been drawn since it changed
 };
 
 #endif

@@ -29,7 +29,7 @@ bool visitProps(vtkRenderer* renderer, Visit visit) {
   return true;
 }
 
-/// Why the view shows little or nothing of a prop; nullopt for props that it shows.
+/// The reason why the view shows little or nothing of a prop; nullopt if it shows the prop.
 std::optional<vdi::ViewpointIssue> issueOf(vtkProp* prop, const vdi::View& view) {
   const double* bounds = prop->GetBounds();
   if (bounds == nullptr || vtkMath::AreBoundsInitialized(bounds) == 0)
@@ -103,7 +103,7 @@ void VDINotices::noteAngle(vtkRenderer* renderer, const vdi::View& view, vtkVDIP
   const std::optional<double> own = prop->AngleIn(view);
   if (!own || *own <= vdi::besideDegrees) return;
   bool isAlone = true;
-  bool isBefore = true;  // of VDIs at the same angle the renderer's first one speaks
+  bool isBefore = true;  // among VDIs at the same angle, the renderer's first one shows it
   const bool isFarthest = visitProps(renderer, [&](vtkProp* each) {
     auto* other = vtkVDIProp::SafeDownCast(each);
     isBefore = isBefore && other != prop;

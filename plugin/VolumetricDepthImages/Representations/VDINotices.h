@@ -1,4 +1,4 @@
-// What a view says about its VDIs.
+// The notices and faults that a view shows about its VDIs.
 #ifndef VDINotices_h
 #define VDINotices_h
 
@@ -23,22 +23,22 @@ class VDINotices {
   vtkVDIMessage* message() { return message_; }
   vtkVDIMessage* angleMessage() { return angleMessage_; }
 
-  /// Why the VDI isn't drawn although nothing is wrong with it.
+  /// The reason why the VDI isn't drawn although nothing is wrong with it.
   void setObstacle(const std::string& text) { obstacle_ = text; }
   const std::string& obstacle() const { return obstacle_; }
-  /// What went wrong.
+  /// The description of an error.
   void setProblem(const std::string& text) { problem_ = text; }
   const std::string& problem() const { return problem_; }
 
   /// Each frame begins without notices.
   void clear();
   void note(const std::string& text, vtkVDIMessage::Place place = vtkVDIMessage::Place::Middle);
-  /// Notes what is wrong with the VDI's viewpoint or with the view, unless another VDI of the renderer says
+  /// Notes what is wrong with the VDI's viewpoint or with the view, unless another VDI of the renderer notes
   /// it. Angles and cut edges are no faults: a VDI with all of its scene looks right from all around.
   /// `isFiltered`: the user can make the VDI anew.
   void noteViewpoint(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop, bool isFiltered);
-  /// Notes how far the view is turned from the VDI's viewpoint. The VDI that is farthest from its own says
-  /// it for all VDIs of the renderer.
+  /// Notes how far the view is turned from the VDI's viewpoint. The VDI with the largest angle notes it for
+  /// all VDIs of the renderer.
   void noteAngle(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop);
 
   /// Shows the texts, or none.

@@ -29,7 +29,8 @@ uniform float opacity;
 void main() { gl_FragData[0] = opacity * texture(picture, texCoord); }
 )";
 
-/// A few steps of a 24-bit depth buffer short of the far plane, where nobody sees a difference.
+/// The depth is a few steps of a 24-bit depth buffer short of the far plane, where the difference is
+/// invisible.
 constexpr const char* depthShader = R"(//VTK::System::Dec
 //VTK::Output::Dec
 in vec2 texCoord;
@@ -39,7 +40,8 @@ void main() {
 }
 )";
 
-/// Makes the quad at its first use; VTK's cache may have another program ready at later ones.
+/// Makes the quad at its first use. Later it makes the quad's program current, because VTK's cache may have
+/// another one ready.
 void ready(std::unique_ptr<vtkOpenGLQuadHelper>& quad, vtkOpenGLRenderWindow* window, const char* shader) {
   if (!quad) {
     quad = std::make_unique<vtkOpenGLQuadHelper>(window, nullptr, shader, "");
@@ -59,7 +61,8 @@ void readDepths(vtkOpenGLRenderWindow* window, const Viewport& port, std::vector
                            port.corner.y + port.size.y - 1, depths.data());
     return;
   }
-  // vtkOpenGLState binds only framebuffers of VTK. These calls go past it and leave what it knows.
+  // vtkOpenGLState binds only VTK's framebuffers. These calls bypass it, and restore the binding that it
+  // knows.
   GLint drawn = 0;
   GLint read = 0;
   glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &drawn);

@@ -20,7 +20,7 @@ namespace pv {
 struct Viewport;
 
 /// Reads the depth buffer of the framebuffer that is being drawn to, [size.y][size.x] of `port`.
-/// vtkRenderWindow::GetZbufferData reads the window's own, while render passes draw to others.
+/// vtkRenderWindow::GetZbufferData reads the window's own, but render passes draw to others.
 void readDepths(vtkOpenGLRenderWindow* window, const Viewport& port, std::vector<float>& depths);
 
 /// Whether OpenGL in this thread's context is Mesa's software renderer.

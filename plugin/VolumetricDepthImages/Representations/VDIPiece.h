@@ -1,10 +1,12 @@
-// A VDI on its way to where it is drawn: what ParaView's delivery carries between processes. Field data of a
-// vtkPolyData with one point, for without points nothing is sent:
+// A VDI on its way to the process that draws it, in the form in which ParaView delivers it. It is the field
+// data of a vtkPolyData with one point, because ParaView sends nothing without points:
 //   within a process  the arrays of the VDI's image (VDIImageData.h), shared with it
 //   between two       VDI.file: unsigned char [n], a .vdi file
-// and VDI.problem: a string, instead of either where there's no VDI to show;
-//     VDI.isBeingMade: likewise, where it's being made;
-//     VDI.filter: an empty string, where the pipeline has the filter that has made it.
+// Instead of these, the piece has
+//     VDI.problem: a string, if there is no VDI to show;
+//     VDI.isBeingMade: a string, if the VDI is being made.
+// It also has
+//     VDI.filter: an empty string, if the pipeline has the filter that made the VDI.
 #ifndef VDIPiece_h
 #define VDIPiece_h
 
@@ -19,27 +21,28 @@ class vtkPolyData;
 
 namespace pv {
 
-/// The problem where the VDI's filter or reader has failed, which says why as an error.
+/// The problem after the VDI's filter or reader has failed. That reports the reason as an error.
 constexpr const char* failedUpstream = "There is no VDI to show: what makes it has failed.";
 
-/// How the problem begins where a source waits for a VDI (VDI.waiting).
+/// The beginning of the problem while a source waits for a VDI (VDI.waiting).
 constexpr const char* noneYet = "There is no VDI to show yet: ";
-/// Whether it's one of these two, which a view shows and doesn't repeat as an error.
+/// Whether it is one of these two problems. A view shows them, but doesn't repeat them as errors.
 bool isSaidUpstream(const std::string& problem);
 
-/// Makes `piece` nothing, as ranks and clients without a VDI have it.
+/// Empties `piece`, for ranks and clients without a VDI.
 void packNothing(vtkPolyData* piece);
-/// Makes `piece` a problem.
+/// Makes `piece` carry a problem.
 void packProblem(const std::string& text, vtkPolyData* piece);
-/// Makes `piece` the VDI of `data`, or a problem. `crosses`: it leaves the process.
+/// Makes `piece` carry the VDI of `data`, or a problem. `crosses`: the piece leaves the process.
 void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece);
-/// Says, and tells of a piece's field data, that the VDI can be made anew: by a filter of the pipeline.
+/// Marks a piece whose VDI a filter of the pipeline can make anew.
 void markFiltered(vtkPolyData* piece);
 bool isFiltered(vtkFieldData* fields);
-/// World bounds as VTK has them, of a piece's field data, where it has a VDI with a scene in it.
+/// Gets the world bounds, in VTK's order, from a piece's field data. Returns false if it has no VDI with a
+/// scene.
 bool boundsOf(vtkFieldData* fields, double bounds[6]);
-/// Of a piece's field data; from any thread. nullopt where it's another rank's VDI, or none. Throws
-/// vdi::Error for one that isn't sound, and for a problem.
+/// Returns the VDI in a piece's field data; nullopt if there is none, or another rank has it. Any thread may
+/// call it. Throws vdi::Error for a VDI that isn't sound, and for a problem.
 std::optional<vdi::Vdi> unpackVdi(vtkFieldData* fields);
 
 }  // namespace pv

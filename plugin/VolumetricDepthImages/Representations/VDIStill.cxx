@@ -16,9 +16,9 @@ double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Longest wait of a thread that wants the renderer.
+/// The longest time that another thread waits for the renderer.
 constexpr double stripSeconds = 0.03;
-/// Length of a pause, and time between two looks whether the pause is over.
+/// The length of a pause, and the time between two checks whether it is over.
 constexpr std::chrono::milliseconds restTime{500};
 constexpr std::chrono::milliseconds restStep{5};
 /// Rows of the renderer's tiles.

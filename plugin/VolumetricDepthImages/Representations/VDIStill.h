@@ -14,7 +14,7 @@
 
 namespace pv {
 
-/// All that a full picture of a VDI depends on, besides the VDI.
+/// The inputs of a full picture of a VDI, besides the VDI.
 struct StillView {
   ViewMatrices matrices;
   glm::ivec2 size;

@@ -41,7 +41,7 @@ Viewport viewportOf(vtkRenderer* renderer) {
 ViewMatrices::ViewMatrices(vtkRenderer* renderer) : ViewMatrices(matricesOf(renderer)) {}
 
 ViewMatrices::ViewMatrices(vtkMatrix4x4* worldToView, vtkMatrix4x4* viewToClip) {
-  // Transposed: element (i, j) is row j, column i.
+  // The matrices are transposed: element (i, j) is row j, column i.
   const auto toView = [&](int row, int column) { return worldToView->GetElement(column, row); };
   const auto toClip = [&](int row, int column) { return viewToClip->GetElement(column, row); };
   const glm::dvec3 right{toView(0, 0), toView(0, 1), toView(0, 2)};
@@ -52,10 +52,12 @@ ViewMatrices::ViewMatrices(vtkMatrix4x4* worldToView, vtkMatrix4x4* viewToClip) 
   camera_.viewUp = up;
   camera_.parallelProjection = toClip(3, 3) != 0.0;
   const glm::dvec2 scale{toClip(0, 0), toClip(1, 1)};
-  // Of clip coordinates at depth 1, where view-space z is -1; the same anywhere if parallel.
+  // The middle of clip coordinates at depth 1, where view-space z is -1. In parallel projection it is the
+  // same at any depth.
   const glm::dvec2 middle = camera_.parallelProjection ? glm::dvec2(toClip(0, 3), toClip(1, 3))
                                                        : -glm::dvec2(toClip(0, 2), toClip(1, 2));
-  // Where x and y of clip coordinates meet in view space: beside its origin for the eyes of a stereo picture.
+  // The eye, where the lines of constant x and y of clip coordinates meet. In a stereo picture it lies beside
+  // the origin of view space.
   if (!camera_.parallelProjection) {
     const glm::dvec2 eye = -glm::dvec2(toClip(0, 3), toClip(1, 3)) / scale;
     camera_.position += eye.x * right + eye.y * up;
@@ -72,7 +74,7 @@ vdi::View ViewMatrices::view(int width, int height) const {
 }
 
 vdi::View ViewMatrices::rows(const glm::ivec2& size, int first, int count) const {
-  const double height = (plane_.high.y - plane_.low.y) / size.y;  // of a pixel
+  const double height = (plane_.high.y - plane_.low.y) / size.y;  // a pixel's
   vdi::ImagePlane plane = plane_;
   plane.low.y = plane_.low.y + height * first;
   plane.high.y = plane_.low.y + height * (first + count);
@@ -82,7 +84,7 @@ vdi::View ViewMatrices::rows(const glm::ivec2& size, int first, int count) const
 float ViewMatrices::depthOf(float window) const {
   if (!isObject(window)) return std::numeric_limits<float>::infinity();
   const double clip = 2.0 * window - 1.0;
-  // z of clip coordinates is depthOffset - depthScale * depth; by perspective it's divided by depth.
+  // z of clip coordinates is depthOffset - depthScale * depth; in perspective it is divided by depth.
   const double depth =
       camera_.parallelProjection ? (depthOffset_ - clip) / depthScale_ : depthOffset_ / (clip + depthScale_);
   return static_cast<float>(depth);

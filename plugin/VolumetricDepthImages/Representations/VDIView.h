@@ -1,4 +1,4 @@
-// What VTK's camera, bounds and depth buffer mean to a renderer of VDIs.
+// VTK's camera, bounds and depth buffer in the form that a renderer of VDIs takes.
 #ifndef VDIView_h
 #define VDIView_h
 
@@ -36,14 +36,15 @@ class ViewMatrices {
   ViewMatrices() = default;
   /// The view of the renderer's active camera.
   explicit ViewMatrices(vtkRenderer* renderer);
-  /// As vtkOpenGLCamera::GetKeyMatrices gives them, transposed: world to view, view to clip coordinates.
+  /// Takes the transposed matrices of vtkOpenGLCamera::GetKeyMatrices: world to view, view to clip
+  /// coordinates.
   ViewMatrices(vtkMatrix4x4* worldToView, vtkMatrix4x4* viewToClip);
 
   /// Throws as vdi::View does.
   vdi::View view(int width, int height) const;
-  /// The view of `count` rows, from row `first` on, of a picture of that size.
+  /// The view of `count` rows, from row `first` on, of a picture of this size.
   vdi::View rows(const glm::ivec2& size, int first, int count) const;
-  /// Depth along the view axis of a value of the depth buffer, in [0, 1]; infinity for the background.
+  /// The depth along the view axis for a value of the depth buffer in [0, 1]; infinity for the background.
   float depthOf(float window) const;
 
   bool operator==(const ViewMatrices&) const = default;

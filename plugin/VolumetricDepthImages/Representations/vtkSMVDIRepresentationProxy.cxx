@@ -35,7 +35,7 @@ vtkSMProxy* proxyOf(vtkSMProxy* owner, const char* property) {
   return helper.GetNumberOfElements() > 0 ? helper.GetAsProxy() : nullptr;
 }
 
-/// Makes the maps those of the file: nodes in RGB, and none that ParaView would move.
+/// Gives the maps the file's nodes, in RGB, and keeps ParaView from moving them.
 void setMaps(vtkSMProxy* colors, vtkSMProxy* opacities, const vdi::Coloring& coloring) {
   std::vector<double> points;
   for (const vdi::ColorNode& node : coloring.function.colors)
@@ -65,7 +65,7 @@ void setMaps(vtkSMProxy* colors, vtkSMProxy* opacities, const vdi::Coloring& col
 bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
   const bool isOwn = type != nullptr && type == ownType;
   if (this->GetUsingScalarColoring()) this->DropLegend();
-  // The superclass colours slices by an array.
+  // It skips the superclass, which colours slices by an array.
   // NOLINTNEXTLINE(bugprone-parent-virtual-call)
   const bool result = this->vtkSMRepresentationProxy::SetRepresentationType(type);
   if (isOwn) this->TakeLegend(nullptr);
@@ -74,7 +74,7 @@ bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
 
 void vtkSMVDIRepresentationProxy::ViewUpdated(vtkSMProxy* view) {
   if (vtkSMPropertyHelper(this, "Representation").GetAsString() == ownType) this->TakeLegend(view);
-  // A comparative view copies the representation before its type is set, and links the copies from then on.
+  // A comparative view copies the representation before its type is set, and links only later changes.
   if (!this->TypeIsLinked) {
     this->TypeIsLinked = true;
     this->GetProperty("Representation")->Modified();
@@ -82,7 +82,7 @@ void vtkSMVDIRepresentationProxy::ViewUpdated(vtkSMProxy* view) {
   this->Superclass::ViewUpdated(view);
 }
 
-/// Only what is shown as a VDI is coloured by field data of its.
+/// Whether the representation has a legend. Only the representation VDI is coloured by field data.
 bool vtkSMVDIRepresentationProxy::HasLegend() {
   return this->GetUsingScalarColoring() &&
          vtkSMPropertyHelper(this, "ColorArrayName").GetInputArrayAssociation() == vtkDataObject::FIELD;
@@ -118,10 +118,10 @@ vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfFile(vt
   try {
     coloring = vdi::io::coloringIn(text);
   } catch (const vdi::Error&) {
-    return {};  // of a server of another version
+    return {};  // from a server of another version
   }
   if (coloring.array.name.empty()) return {};
-  // ParaView's name for the maps of one representation alone.
+  // The name that ParaView gives to maps of a single representation.
   const std::string key = std::string("Separate_") + this->GetGlobalIDAsString() + "_" + coloring.array.name;
   vtkNew<vtkSMTransferFunctionManager> manager;
   vtkSMSessionProxyManager* proxies = this->GetSessionProxyManager();
@@ -134,7 +134,8 @@ vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfFile(vt
   return {coloring.array.name, colors, opacities};
 }
 
-/// `view`: where it is shown, if that is known; a legend that's there is replaced by the new map's.
+/// Takes the legend of the input. If the old map has a bar in `view`, the new map's bar replaces it. `view`
+/// may be null.
 void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
   const Legend legend = this->LegendOfInput();
   if (legend.Colors == nullptr) {
@@ -191,7 +192,7 @@ bool vtkSMVDIRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime(con
 }
 
 void vtkSMVDIRepresentationProxy::SetPropertyModifiedFlag(const char* name, int flag) {
-  // The superclass connects the selection.
+  // It skips the superclass, which connects the selection.
   // NOLINTNEXTLINE(bugprone-parent-virtual-call)
   this->vtkSMRepresentationProxy::SetPropertyModifiedFlag(name, flag);
 }

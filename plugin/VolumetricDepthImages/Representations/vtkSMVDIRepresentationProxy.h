@@ -2,13 +2,15 @@
  * @class vtkSMVDIRepresentationProxy
  * @brief shows a VDI, with the legend of its colours and without a selection
  *
- * While the representation is VDI, ParaView takes it for coloured by the array that the VDI was made of, with
- * the filter's maps: toolbar, colour editor and scalar bars then act on these. Nothing is coloured by them
- * here, for a VDI has its colours. The data have values of that name (VDIValues.h), which ranges and
- * histograms are of. An opened file brings maps of its own, whose editing changes the legend alone.
+ * While the representation is VDI, ParaView takes the VDI as coloured by the array that it was made of, with
+ * the filter's maps. Toolbar, colour editor and scalar bars then act on these maps. They don't colour
+ * anything here, because a VDI has its colours already. The data have values with the array's name
+ * (VDIValues.h), which give ranges and histograms. An opened file brings maps of its own; editing them
+ * changes the legend alone.
  *
- * ParaView sends to the client what is selected of the data, with all field data even where that's nothing:
- * the VDI's arrays as they are, which takes longer than all else of a new VDI. A VDI has nothing to select.
+ * ParaView sends the selected part of the data to the client, with all field data even if the selection is
+ * empty. These are the VDI's arrays as they are, and sending them takes longer than the rest of a new VDI. So
+ * this proxy offers no selection: a VDI has nothing to select.
  */
 #ifndef vtkSMVDIRepresentationProxy_h
 #define vtkSMVDIRepresentationProxy_h
@@ -29,7 +31,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
   void ViewUpdated(vtkSMProxy* view) override;
 
   using vtkSMPVRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime;
-  /// Of the filter's input, whose time steps needn't become VDIs for that.
+  /// Takes the range over time from the filter's input, so that time steps needn't become VDIs for it.
   bool RescaleTransferFunctionToDataRangeOverTime(const char* arrayname, int attribute_type) override;
 
  protected:
@@ -42,7 +44,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
   vtkSMVDIRepresentationProxy(const vtkSMVDIRepresentationProxy&) = delete;
   void operator=(const vtkSMVDIRepresentationProxy&) = delete;
 
-  /// What ParaView takes the VDI for coloured by.
+  /// The array and the maps by which ParaView takes the VDI as coloured.
   struct Legend {
     std::string Array;
     vtkSMProxy* Colors = nullptr;
@@ -54,8 +56,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
   void DropLegend();
   bool HasLegend();
 
-  bool TypeIsLinked = false;  // with the copies of a comparative view
-  std::string FileColoring;   // that the maps of an opened file were last made of
+  bool TypeIsLinked = false;  // whether the type is linked with the copies in a comparative view
+  std::string FileColoring;   // the text from which the maps of an opened file were last made
 };
 
 #endif

@@ -13,7 +13,7 @@ vtkStandardNewMacro(vtkVDIForViews);
 
 namespace {
 
-/// Brackets what it asks for upstream.
+/// Brackets each request upstream.
 class Executive : public vtkCompositeDataPipeline {
  public:
   static Executive* New();

@@ -1,9 +1,9 @@
 /**
  * @class vtkVDIForViews
- * @brief passes data on to what a view shows, and says upstream that they are for a view
+ * @brief passes data on to the parts of a view, and tells the filter upstream that they are for a view
  *
- * Each representation in a view updates its input by itself, the axes of a data set as well. vtkVDIGenerator
- * may have no VDI yet for those that needn't wait (vtkVDIGenerator::DeferViews), but for them alone.
+ * Each representation in a view updates its input by itself, and the axes of a data set do, too.
+ * vtkVDIGenerator may give those an earlier VDI (vtkVDIGenerator::DeferViews), but no other consumers.
  */
 #ifndef vtkVDIForViews_h
 #define vtkVDIForViews_h
@@ -20,10 +20,10 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIForViews : public vtk
   static vtkVDIForViews* New();
   vtkTypeMacro(vtkVDIForViews, vtkPassInputTypeAlgorithm);
 
-  /// The filter upstream of an algorithm, which can make the VDI anew; null where there's none.
+  /// The filter upstream of an algorithm that can make the VDI anew; null if there is none.
   static vtkVDIGenerator* GeneratorOf(vtkAlgorithm* algorithm);
 
-  /// While it exists, that filter is updated for a view.
+  /// While it exists, updates of that filter are for a view.
   class Bracket {
    public:
     explicit Bracket(vtkAlgorithm* algorithm);

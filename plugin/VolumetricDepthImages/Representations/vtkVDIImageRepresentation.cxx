@@ -19,7 +19,7 @@ void vtkVDIImageRepresentation::AddRepresentation(const char* key, vtkPVDataRepr
     this->Superclass::AddRepresentation(key, representation);
 }
 
-/// Null for null, as where the input is taken away.
+/// Returns null for null, which takes the input away.
 vtkAlgorithmOutput* vtkVDIImageRepresentation::PassOn(vtkAlgorithmOutput* input) {
   this->Passing->SetInputConnection(input);
   return input != nullptr ? this->Passing->GetOutputPort() : nullptr;

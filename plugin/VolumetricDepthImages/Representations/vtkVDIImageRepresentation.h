@@ -1,8 +1,8 @@
 /**
  * @class vtkVDIImageRepresentation
- * @brief what the output of VolumetricDepthImage and of the reader can be shown as
+ * @brief the representation of the outputs of VolumetricDepthImage and of the reader
  *
- * That is a VDI, the box of its volume, and its flat picture. ParaView's other representations would show the
+ * It shows a VDI, the box of its volume, or its flat picture. ParaView's other representations would show the
  * pixels of the flat picture, a unit apart, somewhere in the world.
  */
 #ifndef vtkVDIImageRepresentation_h
@@ -22,11 +22,11 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIImageRepresentation
   vtkTypeMacro(vtkVDIImageRepresentation, vtkPVCompositeRepresentation);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  /// Takes those of this module only. The XML has others, too: those of its base.
+  /// Takes only this module's representations. The XML also has those of its base.
   void AddRepresentation(const char* key, vtkPVDataRepresentation* representation) override;
 
   ///@{
-  /// The axes that it has get their input through vtkVDIForViews.
+  /// The representation's axes get their input through vtkVDIForViews.
   void SetInputConnection(int port, vtkAlgorithmOutput* input) override;
   void SetInputConnection(vtkAlgorithmOutput* input) override;
   void AddInputConnection(int port, vtkAlgorithmOutput* input) override;

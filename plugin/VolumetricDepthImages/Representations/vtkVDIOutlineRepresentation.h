@@ -2,7 +2,7 @@
  * @class vtkVDIOutlineRepresentation
  * @brief shows the box of the volume that a Volumetric Depth Image was made of
  *
- * ParaView's own outline of the image that carries a VDI is that of its flat picture's pixels.
+ * ParaView's own outline of the image that carries a VDI would frame the flat picture's pixels.
  */
 #ifndef vtkVDIOutlineRepresentation_h
 #define vtkVDIOutlineRepresentation_h
@@ -23,7 +23,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIOutlineRepresentation
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   using vtkOutlineRepresentation::GetInternalOutputPort;
-  /// Of the box's corners, in place of the input's copy.
+  /// The output with the box's corners, in place of the input's copy.
   vtkAlgorithmOutput* GetInternalOutputPort(int port, int connection) override;
 
  protected:
@@ -36,7 +36,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIOutlineRepresentation
   vtkVDIOutlineRepresentation(const vtkVDIOutlineRepresentation&) = delete;
   void operator=(const vtkVDIOutlineRepresentation&) = delete;
 
-  vtkNew<vtkPolyData> Corners;  // the box's lowest and highest, or none
+  vtkNew<vtkPolyData> Corners;  // the box's lowest and highest corner, or none
   vtkNew<vtkTrivialProducer> Producer;
 };
 

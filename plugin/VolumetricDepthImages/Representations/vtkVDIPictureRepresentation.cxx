@@ -34,7 +34,7 @@ namespace {
 constexpr const char* colorsName = "RGBA";
 constexpr const char* sizeName = "VDI.pictureSize";
 
-/// Of a picture with these corners, from the lower left one counterclockwise.
+/// Makes the rectangle of a picture with these corners, counterclockwise from the lower left one.
 void makeRectangle(const std::array<glm::dvec3, 4>& corners, vtkPolyData* rectangle) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
@@ -101,7 +101,7 @@ int vtkVDIPictureRepresentation::RequestData(vtkInformation* request, vtkInforma
   return this->Superclass::RequestData(request, inputs, outputs);
 }
 
-/// Nothing on ranks without the picture.
+/// Packs the picture and its rectangle. Packs nothing on ranks without the picture.
 void vtkVDIPictureRepresentation::Pack(vtkDataObject* input) {
   auto* image = vtkImageData::SafeDownCast(input);
   if (image == nullptr || image->GetNumberOfPoints() == 0) return;

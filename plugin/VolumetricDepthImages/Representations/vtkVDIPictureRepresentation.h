@@ -1,10 +1,10 @@
 /**
  * @class vtkVDIPictureRepresentation
- * @brief shows the flat picture of a Volumetric Depth Image where it is in the world
+ * @brief shows the flat picture of a Volumetric Depth Image at its place in the world
  *
  * Input: the output of vtkVDIGenerator, with or without a VDI, or of vtkVDIReader. The picture is a rectangle
- * that stands in the middle of the scene (pv::cornersOf), across the direction in which the VDI's viewpoint
- * looks, with the picture's own colours and opacity. Seen from the viewpoint it is the VDI's picture.
+ * in the middle of the scene (pv::cornersOf), perpendicular to the viewing direction of the VDI's viewpoint,
+ * with the picture's own colours and opacity. Seen from the viewpoint, it is the VDI's picture.
  */
 #ifndef vtkVDIPictureRepresentation_h
 #define vtkVDIPictureRepresentation_h
@@ -32,7 +32,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIPictureRepresentation
 
   int ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in, vtkInformation* out) override;
   void SetVisibility(bool visible) override;
-  /// Of the picture as a whole, beside its own. Default 1.
+  /// Multiplies the picture's own opacity. Default 1.
   void SetOpacity(double opacity);
 
  protected:

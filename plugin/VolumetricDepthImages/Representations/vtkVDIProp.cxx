@@ -41,11 +41,11 @@ double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Longest wait of a deferred frame for a VDI that is being loaded.
+/// The longest time that a deferred frame waits for a VDI being loaded.
 constexpr std::chrono::milliseconds shortWait{30};
 constexpr std::chrono::hours untilDone{24 * 365};
 
-/// nullopt where drawing would fail, and says why itself.
+/// The renderer's view; nullopt if drawing would fail, which reports the reason itself.
 std::optional<vdi::View> viewOf(vtkRenderer* renderer) {
   const glm::ivec2 size = pv::viewportOf(renderer).size;
   if (size.x < 1 || size.y < 1) return std::nullopt;
@@ -56,7 +56,7 @@ std::optional<vdi::View> viewOf(vtkRenderer* renderer) {
   }
 }
 
-/// A piece in a viewport: the same again would fail again.
+/// A piece in a viewport, after which the same piece and viewport would fail again.
 struct Attempt {
   vtkMTimeType piece = 0;
   glm::ivec2 size{0};
@@ -70,25 +70,26 @@ struct vtkVDIProp::Internals {
   pv::VDIBuffers Buffers;
   vtkSmartPointer<vtkDataObject> Piece;
   vtkMTimeType PieceTime = 0;
-  bool IsBeingMade = false;  // the piece announces a VDI
-  bool HasJustCome = false;  // the first VDI after such a piece
+  bool IsBeingMade = false;  // the piece announces a VDI to come
+  bool HasJustCome = false;  // the piece is the first VDI after such an announcement
   Frame NextFrame = Frame::Whole;
   bool IsBehind = false;           // the window shows less than it will
-  bool IsRecovering = false;       // until a new device has drawn a final frame
-  Attempt Failed;                  // couldn't be drawn
-  Attempt Rough;                   // its full picture loses every device
-  std::array<double, 6> Bounds{};  // what GetBounds returned last
+  bool IsRecovering = false;       // true until a new device has drawn a final frame
+  Attempt Failed;                  // the last attempt that couldn't be drawn
+  Attempt Rough;                   // the attempt whose full picture loses every device
+  std::array<double, 6> Bounds{};  // the last result of GetBounds
   bool IsPeeled = false;           // this frame peels volumes
 
   pv::VDINotices Notices;
-  std::string Said;  // as an error
+  std::string Said;  // the last text reported as an error
 
   pv::VDIPainter Painter;
   pv::VDIFramePolicy Policy;
-  std::vector<float> Ends;  // depth where each pixel's ray ends at an object
+  std::vector<float> Ends;  // depth at which each pixel's ray ends at an object
   bool WasSmooth = false;   // the renderer smooths edges, except in this frame
 
-  /// The view whose full picture the texture has, and the VDI. None: the picture is rough or a thread's.
+  /// The view and the VDI whose full picture is in the texture. Nullopt if that picture is rough or was made
+  /// by a thread.
   std::optional<pv::StillView> Textured;
   std::uint64_t TexturedVersion = 0;
 
@@ -167,7 +168,7 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
     this->Take(frame == Frame::Deferred && hasFrame ? shortWait : untilDone);
   }
   if (!internal.Buffers.isLoading()) internal.HasJustCome = false;
-  // Holds even if the camera looks away and nothing is drawn. A whole frame is a picture that is saved
+  // This holds even if the camera looks away and nothing is drawn. A whole frame is a picture that is saved
   // meanwhile; the window doesn't show it.
   if (frame != Frame::Whole) internal.IsBehind = frame == Frame::Deferred && internal.Buffers.isLoading();
 }
@@ -343,7 +344,7 @@ int vtkVDIProp::DrawIn(vtkViewport* viewport) {
   }
 }
 
-/// Returns whether the frame shows what it is to show in the end.
+/// Draws the frame. Returns whether the frame is final.
 bool vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   Internals& internal = *this->Internal;
   const pv::Viewport port = pv::viewportOf(renderer);
@@ -369,7 +370,7 @@ bool vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view)
   Internals& internal = *this->Internal;
   pv::VDIStill& still = internal.Buffers.still();
   if (internal.Rough == Attempt{internal.PieceTime, view.size}) {
-    still.drop();  // its size may be another
+    still.drop();  // its size may have changed
     this->DrawRough(window, view);
     return true;
   }
@@ -389,7 +390,7 @@ bool vtkVDIProp::DrawDeferred(vtkOpenGLRenderWindow* window, pv::StillView view)
     return true;
   }
   if (still.isOf(view) && internal.Painter.hasPicture(window)) {
-    internal.Painter.draw(window, this->Opacity);  // the rough one
+    internal.Painter.draw(window, this->Opacity);  // the texture has the rough picture
     internal.IsBehind = true;
     return false;
   }

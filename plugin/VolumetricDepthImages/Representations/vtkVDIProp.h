@@ -6,12 +6,12 @@
  * over it. Where VTK peels volumes together with translucent geometry, the VDI comes after both.
  *
  * Interactive frames have as few pixels as it takes to draw the prop FrameRate times a second
- * (VDIFramePolicy). They go on showing the last VDI while the next one is loaded. The same holds for deferred
- * frames, beside which a thread makes the full picture (VDIStill). A VDI that is as in the frame before costs
- * no rendering: its picture is still in the texture (VDIPainter).
+ * (VDIFramePolicy). They show the last VDI while the next one is being loaded. Deferred frames do both, too,
+ * while a thread makes the full picture beside them (VDIStill). If neither the VDI nor the view has changed
+ * since the frame before, the prop renders nothing: the picture is still in the texture (VDIPainter).
  *
- * The view shows what goes wrong (MessageActor), and the prop reports it once as an error. The rest of the
- * picture is drawn. The view also shows how far it is turned from the VDI's viewpoint (AngleActor).
+ * The view shows errors (MessageActor), and the prop reports each once. The rest of the picture is drawn. The
+ * view also shows how far it is turned from the VDI's viewpoint (AngleActor).
  */
 #ifndef vtkVDIProp_h
 #define vtkVDIProp_h
@@ -49,34 +49,37 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
 
   enum class Frame {
     Interactive,  // may be rough and show the last VDI
-    Deferred,     // likewise, and the caller renders again once HasMore; whole where that is quick
+    Deferred,     // as Interactive, and the caller renders again once HasMore; whole if that is quick
     Whole,
   };
   /// Prepares for the frames to come. `piece` is what pv::packVdi made, or nullptr. For whole frames, its VDI
-  /// is on the device when this returns; for others, that or the last one is shown. The same piece again
-  /// costs nothing.
+  /// is on the device when this returns; other frames show it or the last one. The same piece again costs
+  /// nothing.
   void Prepare(vtkDataObject* piece, Frame frame);
   /// Whether the last frame was deferred and lacks something that is being made.
   bool IsBehind() const;
-  /// Whether that has been made, so that another frame would show it.
+  /// Whether the missing part is ready, so that another frame would show it.
   bool HasMore() const;
-  /// Pauses what is made beside the frames for a moment, so that the window gets the processor.
+  /// Pauses the threads beside the frames for a moment, so that the window gets the processor.
   void Rest();
   /// Shows `text` in place of the VDI; an empty text shows the VDI again.
   void SetObstacle(const std::string& text);
-  /// Says why there is nothing to see. Belongs to a renderer of the same size that draws after the prop's.
+  /// The actor with the reason why there is nothing to see. Add it to a renderer of the same size that draws
+  /// after the prop's.
   vtkTextActor* GetMessageActor();
-  /// Says by how many degrees the view is turned; in that renderer, too. Of several VDIs, the one whose view
-  /// is turned farthest says it for all.
+  /// The actor with the angle in degrees by which the view is turned. Add it to that renderer, too. Among
+  /// several VDIs, the one with the largest angle shows it for all.
   vtkTextActor* GetAngleActor();
-  /// Observes StartEvent of the renderer that has this prop: VTK doesn't draw props that it doesn't see.
+  /// Observes StartEvent of the prop's renderer, because VTK doesn't draw props outside the view.
   void LookAround(vtkObject* renderer, unsigned long event, void* data);
 
   /// Whether the VDI can be seen at all.
   bool IsShown();
-  /// Why the view shows little or nothing of the VDI; nullopt where it isn't shown, too.
+  /// The reason why the view shows little or nothing of the VDI; nullopt if it shows enough, or the VDI isn't
+  /// shown.
   std::optional<vdi::ViewpointIssue> IssueIn(const vdi::View& view);
-  /// Degrees between the view and V_O, where the VDI is to say them and is seen from outside.
+  /// The angle in degrees between the view and V_O; nullopt if the VDI isn't to show it, or isn't seen from
+  /// outside.
   std::optional<double> AngleIn(const vdi::View& view);
 
   /// Whether pixels of the background get a depth just short of the background's. IceT composites by depth
@@ -87,15 +90,15 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// shows each list as it is.
   vtkSetClampMacro(Reconstruction, int, 0, 2);
   vtkGetMacro(Reconstruction, int);
-  /// Interactive frames a second that the VDI's part of a frame allows.
+  /// The rate of interactive frames, in frames a second, for which the prop chooses its pixels.
   vtkSetClampMacro(FrameRate, double, 1.0, 1000.0);
   vtkGetMacro(FrameRate, double);
   /// Multiplies the picture's opacity. Default 1.
   vtkSetClampMacro(Opacity, double, 0.0, 1.0);
   vtkGetMacro(Opacity, double);
-  /// Whether the frames to come are saved as pictures, which have no notices, only faults. Default off.
+  /// Whether the frames to come are saved as pictures, which show faults but no notices. Default off.
   vtkSetMacro(IsCaptured, bool);
-  /// Whether the frames to come say how far the view is turned. Default off.
+  /// Whether the frames to come show how far the view is turned. Default off.
   vtkSetMacro(SaysAngle, bool);
 
   void SetVisibility(vtkTypeBool visible) override;

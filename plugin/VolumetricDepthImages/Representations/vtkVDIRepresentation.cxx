@@ -38,26 +38,27 @@ bool isRoot() {
   return controller == nullptr || controller->GetLocalProcessId() == 0;
 }
 
-/// Whether there are a client and a server, which both can draw; the same on both.
+/// Whether there are a client and a server. Both can draw, and both get the same answer.
 bool hasServer() {
   if (pv::isServer()) return true;
   auto* session = vtkPVSession::SafeDownCast(vtkProcessModule::GetProcessModule()->GetSession());
   return session != nullptr && session->GetController(vtkPVSession::RENDER_SERVER_ROOT) != nullptr;
 }
 
-/// Whether there are ranks without a client: all of them always draw, and IceT puts their pictures together.
+/// Whether there are several ranks without a client. All of them always draw, and IceT composites their
+/// pictures.
 bool drawsOnRanks() {
   vtkProcessModule* module = vtkProcessModule::GetProcessModule();
   return vtkProcessModule::GetProcessType() == vtkProcessModule::PROCESS_BATCH &&
          module->GetNumberOfLocalPartitions() > 1;
 }
 
-/// Whether views are windows. pvbatch and simulations have them for pictures alone.
+/// Whether views are windows. In pvbatch and in simulations, views are for pictures alone.
 bool hasWindows() {
   return vtkProcessModule::GetProcessType() == vtkProcessModule::PROCESS_CLIENT;
 }
 
-/// Offsets of the VDI that the data set carries; null where there's none.
+/// The offsets of the VDI in the data set; null if there is none.
 vtkAbstractArray* offsetsOf(vtkDataObject* data) {
   vtkFieldData* fields = data != nullptr ? data->GetFieldData() : nullptr;
   return fields != nullptr ? fields->GetAbstractArray("VDI.offsets") : nullptr;
@@ -73,14 +74,14 @@ bool showsVolumes(vtkPVRenderView* view) {
   return false;
 }
 
-/// Whether the view draws where the VDI isn't. Volumes insist on that; on ranks without a client they are
-/// wrong when all data are on the first one.
+/// Whether the view draws on ranks that don't have the VDI. Volumes require that. On ranks without a client,
+/// volumes are wrong when all data are on the first rank.
 bool drawsVolumesOnRanks(vtkPVRenderView* view) {
   return hasServer() ? view->GetUseDistributedRenderingForRender() : drawsOnRanks() && showsVolumes(view);
 }
 
-/// Whether to ask that the view is drawn at the client. Who asks first gets it, and a volume that doesn't
-/// isn't seen at all.
+/// Whether to ask that the client draws the view. The first representation that asks decides, and a volume
+/// that needs the ranks would be invisible then.
 bool wantsClient(vtkPVRenderView* view) {
   return hasServer() && view != nullptr && !showsVolumes(view);
 }
@@ -128,7 +129,7 @@ void vtkVDIRepresentation::SetVisibility(bool visible) {
 }
 
 int vtkVDIRepresentation::FillInputPortInformation(int, vtkInformation* info) {
-  // Anything: what's no VDI gets a message, and composite data come whole.
+  // Accepts anything: data without a VDI get a message, and composite data come whole.
   info->Set(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkDataObject");
   info->Set(vtkAlgorithm::INPUT_IS_OPTIONAL(), 1);
   return 1;
@@ -141,14 +142,15 @@ int vtkVDIRepresentation::RequestData(vtkInformation* request, vtkInformationVec
     vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
     vtkAbstractArray* offsets = offsetsOf(input);
     this->HasPacked = true;
-    // The same again, as where the next VDI is being made, isn't sent and loaded once more.
+    // Skips a VDI that is packed already, for example while the next one is being made. It would be sent and
+    // loaded again.
     if (offsets != nullptr && offsets == this->PackedOf)
       return this->Superclass::RequestData(request, inputs, outputs);
     pv::packVdi(input, pv::isServer(), this->Piece);
     if (vtkVDIForViews::GeneratorOf(this) != nullptr) pv::markFiltered(this->Piece);
     this->PackedOf = offsets;
   } else {
-    pv::packNothing(this->Piece);  // clients have no input, other ranks no VDI
+    pv::packNothing(this->Piece);  // clients have no input, and other ranks have no VDI
   }
   this->HasPacked = true;
   this->Piece->Modified();
@@ -165,7 +167,7 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
   }
   auto* view = vtkPVRenderView::SafeDownCast(in->Get(vtkPVView::VIEW()));
   if (updates && !this->HasPacked && isRoot() && view != nullptr && !view->IsCached(this)) {
-    // The input's update has failed. What it was before isn't what is asked for.
+    // The input's update has failed. Its earlier data aren't the requested ones.
     pv::packProblem(pv::failedUpstream, this->Piece);
     this->PackedOf = nullptr;
     view->ClearCache(this);
@@ -179,7 +181,7 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
     double bounds[6];
     if (pv::boundsOf(this->Piece->GetFieldData(), bounds))
       vtkPVRenderView::SetGeometryBounds(in, this, bounds);
-    // Objects are drawn where the VDI is, all of them.
+    // The process with the VDI draws all objects.
     if (wantsClient(view)) vtkPVRenderView::SetRequiresDistributedRendering(in, this, false);
     if (drawsOnRanks()) vtkPVRenderView::SetForceDataDistributionMode(in, vtkMPIMoveData::COLLECT);
   } else if (request == vtkPVView::REQUEST_UPDATE_LOD()) {
@@ -202,13 +204,13 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
 }
 
 bool vtkVDIRepresentation::IsCaptured(vtkRenderWindow* window) {
-  // Who takes pictures of a window does without swapping its buffers.
+  // A window swaps no buffers while a picture is taken of it.
   return window->GetSwapBuffers() == 0;
 }
 
 void vtkVDIRepresentation::DeferStillFrames(vtkPVRenderView* view) {
   if (defersStillFrames(view)) return;
-  std::erase(deferringViews(), nullptr);  // those that have gone
+  std::erase(deferringViews(), nullptr);  // views that no longer exist
   deferringViews().emplace_back(view);
 }
 
@@ -222,15 +224,15 @@ vtkVDIProp::Frame vtkVDIRepresentation::FrameOf(vtkPVRenderView* view) {
                                                                          : vtkVDIProp::Frame::Whole;
 }
 
-/// Whether the next frame may be rough and late: one of those while the camera moves. Time steps that come
-/// then ask for still ones.
+/// Whether the next frame may be rough and late, because the camera is moving. Time steps during that time
+/// ask for still frames.
 bool vtkVDIRepresentation::IsInteractive(vtkPVRenderView* view) {
   vtkRenderWindowInteractor* interactor = view->GetInteractor();
   if (interactor != this->Interactor) {
     this->ForgetInteractor();
     this->Interactor = interactor;
     if (interactor != nullptr) {
-      constexpr float first = 1.0F;  // others draw the still frame when they hear of the end
+      constexpr float first = 1.0F;  // runs before other observers, which draw the still frame at the end
       this->Observers = {
           interactor->AddObserver(vtkCommand::StartInteractionEvent, this, &vtkVDIRepresentation::Drag),
           interactor->AddObserver(vtkCommand::EndInteractionEvent, this, &vtkVDIRepresentation::Drop, first)};
@@ -241,7 +243,7 @@ bool vtkVDIRepresentation::IsInteractive(vtkPVRenderView* view) {
     this->LastInteractive = now;
     return true;
   }
-  // Who holds the camera without moving it gets the frame in full.
+  // A user who holds the camera without moving it gets the full frame.
   constexpr std::chrono::seconds rest{2};
   return this->IsDragged && now - this->LastInteractive < rest;
 }

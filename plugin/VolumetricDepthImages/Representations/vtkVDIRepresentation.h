@@ -2,10 +2,10 @@
  * @class vtkVDIRepresentation
  * @brief shows a Volumetric Depth Image in render views
  *
- * Input: the output of vtkVDIGenerator or vtkVDIReader. The VDI goes to where pictures are shown, the client
- * or the root, and is drawn there (vtkVDIProp): moving the camera moves no data. Other objects of the view
- * are drawn there, too, for colours alone can't be merged by depth. Where another representation insists on
- * being drawn on all ranks (ParaView's Volume does), there's a message instead of the VDI.
+ * Input: the output of vtkVDIGenerator or vtkVDIReader. The VDI goes to the process that shows pictures, the
+ * client or the root, and is drawn there (vtkVDIProp): moving the camera moves no data. The view's other
+ * objects are drawn there, too, because colours alone can't be merged by depth. If another representation
+ * must be drawn on all ranks, as ParaView's Volume must, a message replaces the VDI.
  */
 #ifndef vtkVDIRepresentation_h
 #define vtkVDIRepresentation_h
@@ -35,20 +35,20 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   int ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in, vtkInformation* out) override;
   void SetVisibility(bool visible) override;
 
-  /// Whether what is rendered next is for a picture that somebody takes of the window, and no frame of it.
+  /// Whether the next rendering is for a picture that is taken of the window, and not for one of its frames.
   static bool IsCaptured(vtkRenderWindow* window);
-  /// From now on still frames of that view's window are deferred (vtkVDIProp::Frame), for somebody renders it
-  /// again as soon as there's more. Pictures that are taken of a window are whole.
+  /// Defers still frames of that view's window from now on (vtkVDIProp::Frame). The caller must render the
+  /// view again as soon as there is more. Pictures that are taken of a window are whole.
   static void DeferStillFrames(vtkPVRenderView* view);
-  /// Of no view any more.
+  /// Ends that for all views.
   static void DeferNoStillFrames();
 
-  /// As vtkVDIProp has them.
+  /// Properties of vtkVDIProp.
   void SetReconstruction(int reconstruction);
   void SetFrameRate(double rate);
   void SetOpacity(double opacity);
-  /// Whether windows say how far the view is turned from the VDI's viewpoint. Default on. Pictures that are
-  /// taken don't.
+  /// Whether windows show how far the view is turned from the VDI's viewpoint. Default on. Pictures that are
+  /// taken of a window don't show it.
   vtkSetMacro(SaysAngle, bool);
 
  protected:
@@ -70,16 +70,16 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   void Drop();
   void ForgetInteractor();
 
-  vtkNew<vtkPolyData> Piece;                  // pv::packVdi
-  bool HasPacked = false;                     // in the update that's going on
+  vtkNew<vtkPolyData> Piece;                  // made by pv::packVdi
+  bool HasPacked = false;                     // within the current update
   vtkWeakPointer<vtkAbstractArray> PackedOf;  // offsets of the VDI in the piece
   vtkNew<vtkVDIProp> Prop;
 
-  vtkWeakPointer<vtkRenderWindowInteractor> Interactor;  // the view's, observed
+  vtkWeakPointer<vtkRenderWindowInteractor> Interactor;  // the view's interactor, which this observes
   std::array<unsigned long, 2> Observers{};
-  unsigned long StartObserver = 0;  // of the view's renderer
+  unsigned long StartObserver = 0;  // observer of the view's renderer
   bool SaysAngle = true;
-  bool IsDragged = false;  // the camera is, by mouse
+  bool IsDragged = false;  // the user drags the camera
   std::chrono::steady_clock::time_point LastInteractive;
 };
 
