@@ -1,6 +1,7 @@
 #pragma once
-// What differs between the ParaViews from 5.11 to 6.x, by what they have rather than by their numbers where
-// that tells. The CMake half is cmake/ParaViewVersions.cmake. No other file asks for a version.
+// The differences among the versions of ParaView from 5.11 to 6.x. The code tests features rather than
+// version numbers where it can. The CMake half is cmake/ParaViewVersions.cmake. No other file asks for a
+// version.
 
 #include <vtkPVVersion.h>
 #include <vtkType.h>
@@ -9,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-// OpenGL's functions: VTK loads them by glad from 9.5 on, by GLEW before.
+// OpenGL's functions. VTK loads them with glad from 9.5 on, and with GLEW before.
 #if __has_include(<vtk_glad.h>)
 #define VDI_VTK_OPENGL <vtk_glad.h>
 #else
@@ -18,13 +19,15 @@
 
 namespace pv {
 
-/// What of an image or rectilinear grid a volume's CroppingScale and CroppingOrigin turn into the box that
-/// ParaView draws: its bounds up to 5.12; from 5.13 on its whole extent, each index taken for a coordinate.
+/// Whether CroppingScale and CroppingOrigin apply to the whole extent of an image or rectilinear grid, with
+/// each index taken as a coordinate, as from ParaView 5.13 on. Up to 5.12 they apply to its bounds. The
+/// result is the box that ParaView draws.
 inline constexpr bool cropsByExtent =
     std::pair(PARAVIEW_VERSION_MAJOR, PARAVIEW_VERSION_MINOR) >= std::pair(5, 13);
 
-/// Starts ParaView's in situ engine, Helper being vtkInSituInitializationHelper, on the communicator of this
-/// Fortran handle. Collective. ParaView 6 takes folders of Python modules too; none are given, as before.
+/// Starts ParaView's in situ engine on the communicator of this Fortran handle. Helper is
+/// vtkInSituInitializationHelper. Collective. ParaView 6 also takes folders of Python modules; this passes
+/// none.
 template <class Helper>
 void initializeInSitu(vtkTypeUInt64 communicator) {
   if constexpr (requires { Helper::Initialize(communicator, std::vector<std::string>{}); }) {

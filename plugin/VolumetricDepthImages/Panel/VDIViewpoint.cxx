@@ -47,7 +47,7 @@ void lookFrom(const ViewpointNumbers& viewpoint, vtkSMRenderViewProxy* view) {
   view->UpdateVTKObjects();
 }
 
-/// A VDI is truest from its viewpoint, and may be seen from there alone: ParaView's own choice is to look
+/// A VDI is truest from its viewpoint, and may be visible only from there. ParaView's default camera looks
 /// along z.
 void lookFromViewpointOf(pqPipelineSource* source) {
   pqView* view = pqActiveObjects::instance().activeView();

@@ -60,7 +60,7 @@ void pqCameraFromViewWidget::copyCamera() {
     source->renderAllViews();
 }
 
-/// The line goes once its reason has: the view is another one, or back in 3-D mode.
+/// Clears the line once its reason is gone: another view is active, or the view is back in 3-D mode.
 void pqCameraFromViewWidget::lookAgain() {
   pqView* view = pqActiveObjects::instance().activeView();
   const std::string why = vtkSMVDIGeneratorProxy::WhyNot(view != nullptr ? view->getViewProxy() : nullptr);

@@ -1,5 +1,5 @@
-// Property widget `vdi_camera_from_view`: a button that sets a RenderVDI's camera to the active view's, and a
-// line that says why it can't.
+// The property widget `vdi_camera_from_view`: a button that sets a RenderVDI's camera to the active view's,
+// and a line with the reason why it can't.
 #ifndef pqCameraFromViewWidget_h
 #define pqCameraFromViewWidget_h
 
@@ -20,7 +20,7 @@ class pqCameraFromViewWidget : public pqPropertyWidget {
   Q_SLOT void lookAgain();
 
   QLabel* Line;
-  QTimer Looking;  // while the line says why it can't be
+  QTimer Looking;  // runs while the line shows a reason
 };
 
 #endif

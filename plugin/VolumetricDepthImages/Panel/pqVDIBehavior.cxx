@@ -31,7 +31,7 @@ namespace {
 bool isLoadedOn(pqServer* server) {
   vtkPVPluginsInformation* plugins =
       vtkSMProxyManager::GetProxyManager()->GetPluginManager()->GetRemoteInformation(server->session());
-  if (plugins == nullptr) return true;  // not known yet
+  if (plugins == nullptr) return true;  // the plugins aren't known yet
   for (unsigned int i = 0; i < plugins->GetNumberOfPlugins(); ++i) {
     if (std::string_view(plugins->GetPluginName(i)) == "VolumetricDepthImages" && plugins->GetPluginLoaded(i))
       return true;
@@ -49,7 +49,7 @@ void pqVDIBehavior::startup() {
   for (pqPipelineSource* source : model->findItems<pqPipelineSource*>()) this->sourceAdded(source);
   this->connect(pqApplicationCore::instance()->getObjectBuilder(), &pqObjectBuilder::filterCreated, this,
                 &pqVDIBehavior::filterCreated);
-  // Queued: behind those who load plugins for a new server.
+  // Queued, so that it runs after the code that loads plugins for a new server.
   this->connect(model, &pqServerManagerModel::serverAdded, this, &pqVDIBehavior::lookAtServers,
                 Qt::QueuedConnection);
   this->connect(pqApplicationCore::instance()->getPluginManager(), &pqPluginManager::pluginsUpdated, this,
@@ -57,7 +57,7 @@ void pqVDIBehavior::startup() {
   this->lookAtServers();
 }
 
-/// By hand, from the menu.
+/// A user has made the filter from the menu.
 void pqVDIBehavior::filterCreated(pqPipelineSource* source) {
   auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(source->getProxy());
   if (generator == nullptr) return;
@@ -83,14 +83,14 @@ void pqVDIBehavior::lookAtServers() {
 }
 
 void pqVDIBehavior::shutdown() {
-  // Not at the very end with this, when the list of views that it empties has gone.
+  // Deletes it here, because at this object's end the list of views that it empties no longer exists.
   delete this->findChild<pqVDIStillFrames*>();
-  // What it made belongs to the sources.
+  // The sources own what this object made.
   pqApplicationCore* core = pqApplicationCore::instance();
   if (core == nullptr) return;
   for (QObject* sender : std::initializer_list<QObject*>{
            core->getServerManagerModel(), core->getPluginManager(), core->getObjectBuilder()}) {
-    if (sender != nullptr) sender->disconnect(this);  // some have gone by then
+    if (sender != nullptr) sender->disconnect(this);  // some no longer exist
   }
 }
 
@@ -99,8 +99,9 @@ void pqVDIBehavior::sourceAdded(pqPipelineSource* source) {
   const std::string_view name(source->getProxy()->GetXMLName());
   if (name == "VDIStream") new pqVDIStreamFollower(source);
   if ((name != "VDIReader" && name != "VDIStream") || pqApplicationCore::instance()->isLoadingState())
-    return;  // a state has its camera
-  // Only what's applied by hand: scripts set their cameras. The panels may be younger than this.
+    return;  // a state brings its camera
+  // Listens only to Apply in the panel, because scripts set their cameras. The panels may be younger than
+  // this object.
   QWidget* window = pqCoreUtilities::mainWidget();
   if (window == nullptr) return;
   for (pqPropertiesPanel* panel : window->findChildren<pqPropertiesPanel*>()) {
@@ -112,7 +113,7 @@ void pqVDIBehavior::sourceAdded(pqPipelineSource* source) {
 void pqVDIBehavior::applied(pqProxy* proxy) {
   auto* source = qobject_cast<pqPipelineSource*>(proxy);
   if (source == nullptr || this->Opened.removeAll(source) == 0) return;
-  // Behind what ParaView does then: it shows the source and resets the camera.
+  // Runs after ParaView has shown the source and reset the camera.
   QTimer::singleShot(0, source, [source] {
     if (auto* follower = pqVDIStreamFollower::of(source->getProxy())) {
       follower->lookFromViewpoint();

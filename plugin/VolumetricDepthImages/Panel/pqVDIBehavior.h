@@ -1,6 +1,6 @@
-// Started with the plugin: gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator, has still
-// frames deferred, has views follow each VDIStream, looks at what the user has opened from where it was made,
-// and tells of servers that lack the plugin.
+// Starts with the plugin. It gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator, has still
+// frames deferred, has views follow each VDIStream, moves the view to the viewpoint of what the user opens,
+// and warns of servers that lack the plugin.
 #ifndef pqVDIBehavior_h
 #define pqVDIBehavior_h
 
@@ -26,7 +26,7 @@ class pqVDIBehavior : public QObject {
   Q_SLOT void lookAtServers();
 
   QList<QPointer<pqPipelineSource>> Opened;  // readers that haven't been applied yet
-  QList<QPointer<pqServer>> Lacking;         // servers that lack the plugin, of which was told
+  QList<QPointer<pqServer>> Lacking;         // servers that lack the plugin, after the warning
 };
 
 #endif

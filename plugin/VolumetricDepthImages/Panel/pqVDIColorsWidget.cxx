@@ -24,9 +24,9 @@
 
 namespace {
 
-/// To where it hides as little of the active view as the screen allows: left, right, below or above it. It
-/// gets no higher than the space below the view's upper edge, or it would hide the main window's menus and
-/// its own title bar. The window manager gives it a frame like the main window's.
+/// Moves the dialog to where it hides as little of the active view as the screen allows: left, right, below
+/// or above it. The dialog gets no higher than the space below the view's upper edge. Otherwise it would hide
+/// the main window's menus and its own title bar. The window manager gives it a frame like the main window's.
 void moveBesideView(QDialog* dialog) {
   pqView* active = pqActiveObjects::instance().activeView();
   const QWidget* widget = active != nullptr ? active->widget() : nullptr;
@@ -72,8 +72,8 @@ pqVDIColorsWidget::pqVDIColorsWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget*
   this->connect(this->Button, &QPushButton::clicked, this, &pqVDIColorsWidget::edit);
   pqCoreUtilities::connect(proxy->GetProperty("LookupTable"), vtkCommand::ModifiedEvent, this,
                            SLOT(mapChanged()));
-  // Before the dialog is there, so that these come before its own: ParaView's editor takes it for granted
-  // that something is shown in the active view.
+  // Connects before the dialog exists, so that this runs before the dialog's own slots: ParaView's editor
+  // assumes that the active view shows something.
   const pqActiveObjects& active = pqActiveObjects::instance();
   this->connect(&active, QOverload<pqDataRepresentation*>::of(&pqActiveObjects::representationChanged), this,
                 &pqVDIColorsWidget::closeWhereNothingIsShown);
@@ -107,12 +107,12 @@ void pqVDIColorsWidget::keepMaps(vtkSMProxy* map) {
     auto copy = vtkSmartPointer<vtkSMProxy>::Take(
         each->GetSessionProxyManager()->NewProxy(each->GetXMLGroup(), each->GetXMLName()));
     if (copy == nullptr) continue;
-    copy->Copy(each);  // of the client's alone: it's never sent
+    copy->Copy(each);  // a copy on the client alone; it is never sent
     this->Kept.emplace_back(each, copy);
   }
 }
 
-/// Cancel: the editor applies what is done in it at once.
+/// Undoes the edits on Cancel, because the editor applies each at once.
 void pqVDIColorsWidget::restore() {
   BEGIN_UNDO_SET(tr("Cancel Color Edits"));
   for (const auto& [map, copy] : this->Kept) {
@@ -125,7 +125,7 @@ void pqVDIColorsWidget::restore() {
 
 void pqVDIColorsWidget::edit() {
   vtkSMProxy* map = vtkSMPropertyHelper(this->proxy(), "LookupTable").GetAsProxy();
-  if (map == nullptr) return;  // the button is off then
+  if (map == nullptr) return;  // the button is disabled
   const bool shown = pqActiveObjects::instance().activeRepresentation() != nullptr;
   this->Line->setVisible(!shown);
   if (!shown) return;
@@ -136,12 +136,12 @@ void pqVDIColorsWidget::edit() {
     dialog->setApplyChangesImmediately(true);
     dialog->setEnableSearchBar(true);
     dialog->setAttribute(Qt::WA_DeleteOnClose);
-    // A VDI is made of functions of one value.
+    // A VDI uses transfer functions of one value.
     if (auto* planar = dialog->findChild<QCheckBox*>("Use2DTransferFunction")) planar->hide();
     this->connect(dialog, &QDialog::rejected, this, &pqVDIColorsWidget::restore);
     this->keepMaps(map);
     this->Dialog = dialog;
-    dialog->show();  // which gives it its size
+    dialog->show();  // showing the dialog gives it its size
     moveBesideView(dialog);
   }
   this->Dialog->show();

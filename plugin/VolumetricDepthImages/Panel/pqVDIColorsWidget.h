@@ -1,4 +1,4 @@
-// Property widget `vdi_colors`: a button that opens the colour map and the opacity function of a
+// The property widget `vdi_colors`: a button that opens the colour map and the opacity function of a
 // VolumetricDepthImage.
 #ifndef pqVDIColorsWidget_h
 #define pqVDIColorsWidget_h
@@ -32,7 +32,7 @@ class pqVDIColorsWidget : public pqPropertyWidget {
   QPushButton* Button;
   QLabel* Line;
   QPointer<QDialog> Dialog;
-  /// Maps that the dialog edits, and copies of them as they were when it was opened.
+  /// The maps that the dialog edits, and copies of them from before it opened.
   std::vector<std::pair<vtkSmartPointer<vtkSMProxy>, vtkSmartPointer<vtkSMProxy>>> Kept;
 };
 

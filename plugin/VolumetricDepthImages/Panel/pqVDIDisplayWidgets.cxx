@@ -13,7 +13,7 @@
 
 namespace {
 
-/// Properties of ParaView's representations that a VDI heeds no more.
+/// The properties of ParaView's representations that have no effect on a VDI.
 constexpr std::array<std::string_view, 26> idle{"Ambient",
                                                 "AmbientColor",
                                                 "Diffuse",
@@ -56,7 +56,7 @@ bool isIdle(pqPropertyWidget* widget) {
 
 pqVDIHiddenDecorator::pqVDIHiddenDecorator(pqPropertyWidget* parent)
     : pqPropertyWidgetDecorator(nullptr, parent) {
-  // When it's shown as something else, the panel asks again.
+  // When the representation changes, the panel asks again.
   pqCoreUtilities::connect(parent->proxy()->GetProperty("Representation"), vtkCommand::ModifiedEvent, this,
                            SIGNAL(visibilityChanged()));
 }

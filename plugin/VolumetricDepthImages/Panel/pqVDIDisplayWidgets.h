@@ -1,4 +1,4 @@
-// Has the display panel hide what does nothing to a VDI: lights and places are in it already.
+// Makes the display panel hide properties without effect on a VDI, which has its lights and place already.
 #ifndef pqVDIDisplayWidgets_h
 #define pqVDIDisplayWidgets_h
 
@@ -6,7 +6,7 @@
 #include <pqPropertyWidgetInterface.h>
 #include <QObject>
 
-/// Of a widget of the display panel: hidden while the representation is VDI.
+/// Hides a widget of the display panel while the representation is VDI.
 class pqVDIHiddenDecorator : public pqPropertyWidgetDecorator {
   Q_OBJECT
 
@@ -16,7 +16,7 @@ class pqVDIHiddenDecorator : public pqPropertyWidgetDecorator {
   bool canShowWidget(bool showAdvanced) const override;
 };
 
-/// ParaView asks it for the decorators of each widget of its panels.
+/// ParaView asks it for the decorators of each widget in its panels.
 class pqVDIDisplayWidgets : public QObject, public pqPropertyWidgetInterface {
   Q_OBJECT
   Q_INTERFACES(pqPropertyWidgetInterface)

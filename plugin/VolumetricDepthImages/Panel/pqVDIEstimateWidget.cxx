@@ -52,7 +52,7 @@ pqVDIEstimateWidget::pqVDIEstimateWidget(vtkSMProxy* proxy, vtkSMProperty*, QWid
   layout->setContentsMargins(0, 0, 0, 0);
   this->Line->setObjectName("EstimateLine");
   this->Line->setWordWrap(true);
-  // With room for what it may say: it moves nothing under the mouse.
+  // The line keeps room for its longest text, so that nothing moves under the mouse.
   this->Line->setMinimumHeight(2 * this->Line->fontMetrics().lineSpacing());
   layout->addWidget(this->Line);
   this->Soon.setInterval(soonMilliseconds);
@@ -66,7 +66,7 @@ pqVDIEstimateWidget::pqVDIEstimateWidget(vtkSMProxy* proxy, vtkSMProperty*, QWid
       pqCoreUtilities::connect(property, event, &this->Soon, SLOT(start()));
   }
   pqCoreUtilities::connect(proxy, vtkCommand::UpdateDataEvent, &this->Soon, SLOT(start()));
-  // Whose size the first Apply takes.
+  // The first Apply takes the active view's size.
   this->connect(&pqActiveObjects::instance(), &pqActiveObjects::viewChanged, &this->Soon,
                 QOverload<>::of(&QTimer::start));
   if (auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(proxy)))

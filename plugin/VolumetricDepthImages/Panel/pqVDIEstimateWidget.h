@@ -1,5 +1,5 @@
-// Property widget `vdi_estimate`: a line with the size of the VDI that the panel's numbers ask for, and with
-// the time that it will take, before Apply.
+// The property widget `vdi_estimate`: a line with the size of the VDI that the panel's numbers describe, and
+// with the time that it will take, before Apply.
 #ifndef pqVDIEstimateWidget_h
 #define pqVDIEstimateWidget_h
 
@@ -19,7 +19,7 @@ class pqVDIEstimateWidget : public pqPropertyWidget {
   Q_SLOT void estimate();
 
   QLabel* Line;
-  QTimer Soon;  // several numbers change at once
+  QTimer Soon;  // waits, because several numbers change at once
 };
 
 #endif

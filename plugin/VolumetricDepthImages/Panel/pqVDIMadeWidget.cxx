@@ -34,7 +34,7 @@ QString point(const double* numbers) {
   return QString("(%1, %2, %3)").arg(number(numbers[0]), number(numbers[1]), number(numbers[2]));
 }
 
-/// Files of older versions don't say it.
+/// The meaning of the VDI's colours; nullopt for files of older versions, which lack it.
 std::optional<vdi::Coloring> coloringOf(vtkSMProxy* reader) {
   reader->UpdatePropertyInformation(reader->GetProperty("Coloring"));
   const char* said = vtkSMPropertyHelper(reader, "Coloring").GetAsString();
@@ -42,7 +42,7 @@ std::optional<vdi::Coloring> coloringOf(vtkSMProxy* reader) {
   try {
     return vdi::io::coloringIn(said);
   } catch (const vdi::Error&) {
-    return std::nullopt;  // of a server of another version
+    return std::nullopt;  // from a server of another version
   }
 }
 
@@ -97,7 +97,7 @@ pqVDIMadeWidget::pqVDIMadeWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget* par
 
 pqVDIMadeWidget::~pqVDIMadeWidget() = default;
 
-/// Before the first Apply nothing has been read yet.
+/// Shows what is known of the VDI: nothing before the first Apply, which reads it.
 void pqVDIMadeWidget::read() {
   QStringList lines;
   if (const auto coloring = coloringOf(this->proxy())) lines << linesOf(*coloring);
@@ -114,7 +114,7 @@ void pqVDIMadeWidget::lookAsMade() {
       vtkSMVDIGeneratorProxy::RenderViewOf(active != nullptr ? active->getViewProxy() : nullptr);
   const auto viewpoint = pv::viewpointOf(this->proxy());
   if (view == nullptr || !viewpoint) return;
-  BEGIN_UNDO_EXCLUDE();  // as for ParaView's own buttons for the camera
+  BEGIN_UNDO_EXCLUDE();  // as ParaView's own buttons for the camera do
   {
     SM_SCOPED_TRACE(PropertiesModified).arg("proxy", view).arg("comment", "where the VDI was made from");
     pv::lookFrom(*viewpoint, view);

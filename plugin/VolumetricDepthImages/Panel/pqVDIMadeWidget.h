@@ -1,5 +1,5 @@
-// Property widget `vdi_made`, of the reader: what the file says of its VDI, and a button that moves the
-// active view's camera to where the VDI was made from.
+// The property widget `vdi_made` of the readers: properties of the VDI, and a button that moves the active
+// view's camera to the VDI's viewpoint.
 #ifndef pqVDIMadeWidget_h
 #define pqVDIMadeWidget_h
 

@@ -41,7 +41,7 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
       tr("Makes the VDI anew by itself, once the camera of this view rests more than Auto Angle away from "
          "where the VDI was made"));
   layout->addWidget(this->Auto);
-  // Below, and with room for a line: what comes and goes moves nothing under the mouse.
+  // The line stands below and always keeps its room, so that nothing moves under the mouse.
   this->Line->setObjectName("RegenerateLine");
   this->Line->setWordWrap(true);
   this->Line->setMinimumHeight(this->Line->fontMetrics().lineSpacing());
@@ -61,7 +61,7 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
 
 pqVDIRegenerateWidget::~pqVDIRegenerateWidget() = default;
 
-/// Apply of the panel, and of it alone: scripts don't come here.
+/// Runs at Apply in the panel alone: scripts don't call it.
 void pqVDIRegenerateWidget::apply() {
   this->pqPropertyWidget::apply();
   if (auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(this->proxy())))
@@ -70,13 +70,14 @@ void pqVDIRegenerateWidget::apply() {
 
 void pqVDIRegenerateWidget::regenerate() {
   auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(this->proxy()));
-  if (regenerator == nullptr) return;  // not a filter of the pipeline
+  if (regenerator == nullptr) return;  // it is no filter of the pipeline
   const QString why = regenerator->regenerate(pqActiveObjects::instance().activeView());
   this->Line->setText(why);
   if (!why.isEmpty()) this->Looking.start();
 }
 
-/// The line goes once its reason has: the view is another one, back in 3-D mode, or its camera has moved.
+/// Clears the line once its reason is gone: another view is active, the view is back in 3-D mode, or its
+/// camera has moved.
 void pqVDIRegenerateWidget::lookAgain() {
   auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(this->proxy());
   pqView* view = pqActiveObjects::instance().activeView();

@@ -1,6 +1,6 @@
-// Property widget `vdi_regenerate`: a button that makes the VDI anew from the active view, and a line that
-// says how far that is, or why it can't be; and a box that sets Auto at once, without Apply: it changes no
-// data.
+// The property widget `vdi_regenerate`. It has a button that makes the VDI anew from the active view, and a
+// line with the progress in percent, or with the reason why the view can't be used. A box sets Auto at once,
+// without Apply, because it changes no data.
 #ifndef pqVDIRegenerateWidget_h
 #define pqVDIRegenerateWidget_h
 
@@ -28,7 +28,7 @@ class pqVDIRegenerateWidget : public pqPropertyWidget {
 
   QLabel* Line;
   QCheckBox* Auto;
-  QTimer Looking;  // while the line says why it can't be
+  QTimer Looking;  // runs while the line shows a reason
 };
 
 #endif

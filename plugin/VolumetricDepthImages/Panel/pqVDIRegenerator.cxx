@@ -29,7 +29,7 @@ namespace {
 
 constexpr int lookMilliseconds = 40;
 constexpr int lookAtViewsMilliseconds = 250;
-/// How long an edit rests before the VDI is made anew.
+/// The time that an edit rests before the VDI is made anew.
 constexpr int editRestMilliseconds = 400;
 
 std::array<double, 10> numbersOf(vtkCamera* camera) {
@@ -124,7 +124,7 @@ bool pqVDIRegenerator::isShownIn(pqView* view) const {
   });
 }
 
-/// The first Apply has been undone: the next one is the first again.
+/// After an undo of the first Apply, the next Apply is the first one again.
 void pqVDIRegenerator::stateChanged() {
   if (this->Source->modifiedState() != pqProxy::UNINITIALIZED) {
     this->generator()->SetUpdatesForView(false);
@@ -134,12 +134,12 @@ void pqVDIRegenerator::stateChanged() {
   if (this->Now == State::Idle) return;
   this->Looking.stop();
   this->Now = State::Idle;
-  this->generator()->InvokeCommand("Hold");  // gives up what is made
+  this->generator()->InvokeCommand("Hold");  // gives the running preparation up
   this->generator()->InvokeCommand("Release");
   Q_EMIT this->progress(-1);
 }
 
-/// While an animation is played, views wait: no step would be shown otherwise.
+/// Lets views wait while an animation is playing. Otherwise they would show none of its steps.
 void pqVDIRegenerator::proxyAdded(pqProxy* proxy) {
   auto* scene = qobject_cast<pqAnimationScene*>(proxy);
   if (scene == nullptr) return;
@@ -156,12 +156,12 @@ void pqVDIRegenerator::viewAdded(pqView* view) {
   this->connect(view, &pqView::beginRender, this, &pqVDIRegenerator::beginRender);
   this->connect(view, &pqView::endRender, this, &pqVDIRegenerator::endRender);
   this->connect(view, &pqView::updateDataEvent, this, &pqVDIRegenerator::viewUpdated);
-  // The source says so before the view has it.
+  // The source signals a change before the view has it, so this listens to the view.
   this->connect(view, &pqView::representationAdded, this, &pqVDIRegenerator::lookWhetherViewsWait);
   this->connect(view, &pqView::representationRemoved, this, &pqVDIRegenerator::lookWhetherViewsWait);
 }
 
-/// Screenshots and frames of animations wait for the VDI that's being made.
+/// Lets screenshots and frames of animations wait for the VDI that is being made.
 void pqVDIRegenerator::beginRender() {
   auto* view = qobject_cast<pqView*>(this->sender());
   if (view == nullptr || !this->isShownIn(view)) return;
@@ -178,7 +178,7 @@ void pqVDIRegenerator::endRender() {
   this->lookWhetherViewsWait();
 }
 
-/// Those that show several values or time steps side by side, each of which needs a VDI of its own.
+/// The views that show several values or time steps side by side. Each of these needs a VDI of its own.
 QList<pqView*> pqVDIRegenerator::comparativeViews() const {
   QList<pqView*> views = this->Source->getViews();
   views.erase(std::remove_if(views.begin(), views.end(),
@@ -196,7 +196,7 @@ void pqVDIRegenerator::lookWhetherViewsWait() {
   this->generator()->InvokeCommand(defers ? "DeferViews" : "DeferNoViews");
 }
 
-/// The view may have asked for what isn't made yet.
+/// Starts a preparation if the view has asked for a VDI that isn't made yet.
 void pqVDIRegenerator::viewUpdated() {
   if (this->Now != State::Idle || !this->Defers) return;
   auto* view = qobject_cast<pqView*>(this->sender());
@@ -242,7 +242,7 @@ void pqVDIRegenerator::look() {
       this->finish();
       return;
     }
-    // What an earlier edit began has been given up, but takes a moment to end.
+    // The preparation of an earlier edit has been given up, but takes a moment to end.
     if (const int earlier = this->preparation(); earlier >= 0 && earlier < 100) return;
     this->generator()->InvokeCommand("Prepare");
     this->Now = State::Preparing;
@@ -262,7 +262,7 @@ void pqVDIRegenerator::finish() {
   this->Now = State::Idle;
   this->generator()->InvokeCommand("Release");
   this->generator()->MarkDirty(this->generator());
-  // They have kept what the filter gave them while it was held.
+  // These views have kept the held filter's output.
   for (pqView* view : this->comparativeViews()) view->getProxy()->MarkDirty(this->generator());
   Q_EMIT this->progress(-1);
   this->Source->renderAllViews();
@@ -296,7 +296,7 @@ vtkSMRenderViewProxy* pqVDIRegenerator::followedView() {
   return vtkSMVDIGeneratorProxy::RenderViewOf(this->AutoView->getViewProxy());
 }
 
-/// The view in which Auto is turned on is the one that it belongs to, until it's turned on again.
+/// Auto belongs to the view in which it is turned on, until it is turned on again.
 void pqVDIRegenerator::autoChanged() {
   this->Tried = false;
   const bool on = vtkSMPropertyHelper(this->generator(), "Auto").GetAsInt() != 0;
@@ -306,7 +306,7 @@ void pqVDIRegenerator::autoChanged() {
   this->setAutoView(on && active != nullptr && this->isShownIn(active) ? active : nullptr);
 }
 
-/// An undo has a say in where the VDI is made from, until the camera moves again.
+/// After an undo, Auto leaves the viewpoint alone until the camera moves again.
 void pqVDIRegenerator::leaveToUser() {
   vtkSMRenderViewProxy* view = this->followedView();
   if (view == nullptr) return;
@@ -325,7 +325,7 @@ void pqVDIRegenerator::lookAtViews() {
   const bool moves = camera != this->LastCamera;
   this->LastCamera = camera;
   if (moves) this->Tried = false;
-  // A button may be down for something else than the camera, Undo for example.
+  // The mouse may be pressed for something other than the camera, for example on Undo.
   if (moves || this->Tried || QApplication::mouseButtons() != Qt::NoButton) return;
   this->Tried = true;
   if (own->DegreesFrom(view) > vtkSMPropertyHelper(own, "AutoAngle").GetAsDouble())

@@ -1,10 +1,10 @@
-// Makes the VDI of one VolumetricDepthImage anew without making the window wait: after a colour map or
-// opacity function was edited, from a view's camera, and by itself where the filter's Auto is on.
+// Makes the VDI of one VolumetricDepthImage anew without making the window wait: after an edit of a colour
+// map or opacity function, from a view's camera, and by itself while the filter's Auto is on.
 //
-// While a map is being edited the filter is held: it shows what it has. Once the edit has rested and no mouse
-// button is down, a thread makes the new VDI, which takes the old one's place when it's there. Likewise where
-// a view asks for a VDI that isn't made yet, after Apply, Undo or with another time step: it goes on showing
-// what it has, unless a picture is taken of it, an animation is played, or it is a comparative view.
+// While a map is being edited, the filter is held: it shows its last VDI. Once the edit has rested and no
+// mouse button is down, a thread makes the new VDI, which then replaces the old one. The same happens when a
+// view asks for a VDI that isn't made yet, after Apply, Undo or with another time step. The view shows the
+// last VDI meanwhile, unless a picture is taken of it, an animation is playing, or it is a comparative view.
 #ifndef pqVDIRegenerator_h
 #define pqVDIRegenerator_h
 
@@ -27,22 +27,23 @@ class pqVDIRegenerator : public QObject {
   Q_OBJECT
 
  public:
-  /// `source` is a VolumetricDepthImage; owns this.
+  /// `source` is a VolumetricDepthImage, which owns this object.
   explicit pqVDIRegenerator(pqPipelineSource* source);
   ~pqVDIRegenerator() override;
 
-  /// The panel is about to apply: the update that comes is for a view.
+  /// Call it just before the panel applies: the next update is for a view.
   void applies();
-  /// From the camera of the view, at its size. The result is empty, or why that can't be.
+  /// Makes the VDI anew from the camera of the view, at its size. Returns "", or the reason why it can't.
   QString regenerate(pqView* view);
-  /// That of a proxy, null if it's none of a VolumetricDepthImage in the pipeline.
+  /// The regenerator of a proxy; null if the proxy is no VolumetricDepthImage in the pipeline.
   static pqVDIRegenerator* of(vtkSMVDIGeneratorProxy* proxy);
-  /// The view whose camera Auto follows: the active one when Auto was turned on. Where that one didn't show
-  /// the VDI, or has been closed, it's the first active one that does. Null if there has been none yet.
+  /// The view whose camera Auto follows: the view that was active when Auto was turned on. If that view
+  /// didn't show the VDI, or has been closed, it is the first active view that does; null before there is
+  /// one.
   pqView* autoView() const { return this->AutoView; }
 
  Q_SIGNALS:
-  /// Percent of the VDI that's being made; -1: none is.
+  /// The progress of the VDI being made in percent; -1 if there is none.
   void progress(int percent);
   void autoViewChanged();
 
@@ -68,7 +69,7 @@ class pqVDIRegenerator : public QObject {
   bool isShownIn(pqView* view) const;
   QList<pqView*> comparativeViews() const;
   void setAutoView(pqView* view);
-  /// That of autoView, if it shows the VDI; null otherwise.
+  /// The proxy of autoView, if that shows the VDI; null otherwise.
   vtkSMRenderViewProxy* followedView();
   int preparation();
   void hold(int restMilliseconds);
@@ -77,17 +78,17 @@ class pqVDIRegenerator : public QObject {
 
   pqPipelineSource* Source;
   State Now = State::Idle;
-  QTimer Looking;         // while something is under way
-  QTimer LookingAtViews;  // for Auto
-  QElapsedTimer Resting;  // since the last edit
-  qint64 Rest = 0;        // milliseconds that it has to
-  bool IsAuto = false;    // as Auto was when it changed last
+  QTimer Looking;         // runs unless Now is Idle
+  QTimer LookingAtViews;  // watches cameras for Auto
+  QElapsedTimer Resting;  // time since the last edit
+  qint64 Rest = 0;        // milliseconds that an edit must rest
+  bool IsAuto = false;    // the last value of Auto
   QPointer<pqView> AutoView;
   std::array<double, 10> LastCamera{};
-  bool Defers = false;      // views don't wait
-  bool IsPlaying = false;   // an animation is
-  bool IsCaptured = false;  // a picture is taken of a view
-  bool Tried = false;       // to make a VDI from where the camera rests, or it's left to the user
+  bool Defers = false;      // true if views don't wait
+  bool IsPlaying = false;   // an animation is playing
+  bool IsCaptured = false;  // a picture is being taken of a view
+  bool Tried = false;       // true once a VDI was begun for the camera at rest, or the user has decided
   struct Watched;
   std::vector<Watched> Maps;
 };

@@ -21,7 +21,7 @@ bool isVdiSelected() {
   return data != nullptr && data->GetArrayInformation("VDI.offsets", vtkDataObject::FIELD) != nullptr;
 }
 
-/// Where ParaView keeps what it begins with for images.
+/// The setting in which ParaView keeps the last extension for images.
 QString settingOfImages() {
   return QString("extensions/SaveDataExtension/%1").arg(VTK_IMAGE_DATA);
 }
@@ -47,7 +47,7 @@ bool pqVDISaveData::eventFilter(QObject* watched, QEvent* event) {
     if (auto* dialog = qobject_cast<pqFileDialog*>(watched)) {
       dialog->setRecentlyUsedExtension("*.vdi");
       const QVariant before = pqApplicationCore::instance()->settings()->value(settingOfImages());
-      // Behind ParaView, which notes the extension as soon as the dialog has ended.
+      // Runs after ParaView, which stores the extension as soon as the dialog has ended.
       this->connect(dialog, &QDialog::finished, this,
                     [this, before] { QTimer::singleShot(0, this, [before] { setForImages(before); }); });
     }

@@ -1,7 +1,6 @@
-// Has File > Save Data begin with .vdi files where a VDI is selected. ParaView begins with what was saved
-// last of the same type of data, at first .pvd, and a VDI's type is that of any image: a name without an
-// extension would write all of the VDI's arrays as they are. What ParaView begins with for other images
-// stays.
+// Makes File > Save Data offer .vdi files first if a VDI is selected. ParaView offers the extension last used
+// for the same type of data, at first .pvd, and a VDI has the type of any image. A name without an extension
+// would then write all of the VDI's arrays as they are. The first offer for other images stays.
 #ifndef pqVDISaveData_h
 #define pqVDISaveData_h
 
@@ -14,7 +13,7 @@ class pqVDISaveData : public QObject {
   explicit pqVDISaveData(QObject* parent);
 
  protected:
-  /// Of all objects: the dialog is ParaView's.
+  /// Watches all objects, because ParaView owns the dialog.
   bool eventFilter(QObject* watched, QEvent* event) override;
 };
 

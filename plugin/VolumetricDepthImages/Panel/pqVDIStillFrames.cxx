@@ -24,7 +24,7 @@ vtkPVRenderView* renderViewOf(pqView* view) {
   return vtkPVRenderView::SafeDownCast(view->getViewProxy()->GetClientSideView());
 }
 
-/// Those that the last frame has shown, or was to show.
+/// The VDIs that the last frame showed or was to show.
 std::vector<vtkVDIProp*> vdisOf(pqView* view) {
   std::vector<vtkVDIProp*> vdis;
   vtkPVRenderView* drawn = renderViewOf(view);
@@ -59,7 +59,7 @@ pqVDIStillFrames::pqVDIStillFrames(QObject* parent) : QObject(parent) {
   QApplication::instance()->installEventFilter(this);
 }
 
-/// On few cores a picture in full would take from the window what it needs for a click.
+/// Pauses full pictures at a click or a key. With few cores, they would take the processor from the window.
 bool pqVDIStillFrames::eventFilter(QObject* watched, QEvent* event) {
   switch (event->type()) {
     case QEvent::MouseButtonPress:

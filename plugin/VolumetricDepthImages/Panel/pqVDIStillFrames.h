@@ -1,5 +1,5 @@
-// Still frames in ParaView's window don't wait for VDIs (vtkVDIProp::Frame). This renders again when there is
-// more to show.
+// Renders still frames in ParaView's window again when there is more to show. These frames don't wait for
+// VDIs (vtkVDIProp::Frame).
 #ifndef pqVDIStillFrames_h
 #define pqVDIStillFrames_h
 
@@ -14,8 +14,8 @@ class pqVDIStillFrames : public QObject {
   Q_OBJECT
 
  public:
-  /// Of all render views there are and will be, until it goes. Not of the views in a comparative view, which
-  /// render without telling: these wait.
+  /// Serves all render views, present and future, until its end. Views within a comparative view render
+  /// without a signal, so they wait.
   explicit pqVDIStillFrames(QObject* parent);
   ~pqVDIStillFrames() override;
   bool eventFilter(QObject* watched, QEvent* event) override;

@@ -36,7 +36,7 @@ void pqVDIStreamFollower::lookFromViewpoint() {
 }
 
 void pqVDIStreamFollower::look() {
-  // A hand that turns the view isn't interrupted. A server that is at work would let this wait.
+  // Doesn't interrupt a hand that turns the view, and doesn't wait for a server at work.
   if (this->Source->modifiedState() == pqProxy::UNINITIALIZED ||
       QApplication::mouseButtons() != Qt::NoButton || this->Source->getServer()->isProgressPending())
     return;

@@ -1,5 +1,6 @@
-// Has the views show what a source VDIStream receives, and says how its connection is. The source's own
-// threads receive and decode; this asks from time to time whether there's something new, and never waits.
+// Makes the views show the VDIs that a source VDIStream receives, and reports the state of its connection.
+// The source's own threads receive and decode. This object asks from time to time for something new, and
+// never waits.
 #ifndef pqVDIStreamFollower_h
 #define pqVDIStreamFollower_h
 
@@ -14,15 +15,15 @@ class pqVDIStreamFollower : public QObject {
   Q_OBJECT
 
  public:
-  /// `source` is a VDIStream; owns this.
+  /// `source` is a VDIStream, which owns this object.
   explicit pqVDIStreamFollower(pqPipelineSource* source);
   ~pqVDIStreamFollower() override;
 
-  /// That of a proxy, null if it's no source of the pipeline.
+  /// The follower of a proxy; null if the proxy is no VDIStream of the pipeline.
   static pqVDIStreamFollower* of(vtkSMProxy* proxy);
-  /// What the source says of its connection; empty before the first Apply.
+  /// The state of the source's connection; empty before the first Apply.
   const QString& line() const { return this->Line; }
-  /// Has the active view look from where the VDI was made: now, or once the first one is there.
+  /// Moves the active view to the VDI's viewpoint: now, or once there is a first VDI.
   void lookFromViewpoint();
 
  Q_SIGNALS:
@@ -34,8 +35,8 @@ class pqVDIStreamFollower : public QObject {
   pqPipelineSource* Source;
   QTimer Looking;
   QString Line;
-  int Seen = 0;                // arrivals
-  bool WaitsForFirst = false;  // for the view to look from its viewpoint
+  int Seen = 0;                // arrivals seen so far
+  bool WaitsForFirst = false;  // a first VDI will move the view to its viewpoint
 };
 
 #endif

@@ -25,7 +25,7 @@ pqVDIStreamWidget::pqVDIStreamWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget*
   this->Pause->setToolTip(tr("Keeps the VDI that is shown; the server sends none meanwhile"));
   layout->addWidget(this->Pause);
   this->Line->setObjectName("StreamLine");
-  this->Line->setTextFormat(Qt::PlainText);  // it's in part a server's
+  this->Line->setTextFormat(Qt::PlainText);  // the text comes in part from a server
   this->Line->setWordWrap(true);
   this->Line->setTextInteractionFlags(Qt::TextSelectableByMouse);
   this->Line->setMinimumHeight(2 * this->Line->fontMetrics().lineSpacing());
@@ -40,8 +40,8 @@ pqVDIStreamWidget::pqVDIStreamWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget*
 
 pqVDIStreamWidget::~pqVDIStreamWidget() = default;
 
-/// The field of URL doesn't listen while it's applied, and a reset alone leaves its text. It shall show the
-/// link without its token.
+/// Shows the link without its token. The field of URL ignores changes during Apply, and a reset alone leaves
+/// its text.
 void pqVDIStreamWidget::apply() {
   pqPropertyWidget::apply();
   vtkSMProperty* url = this->proxy()->GetProperty("URL");

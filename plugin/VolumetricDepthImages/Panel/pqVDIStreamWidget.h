@@ -1,4 +1,4 @@
-// Property widget `vdi_stream`, of the source VDIStream: the state of its connection, and a box that sets
+// The property widget `vdi_stream` of the source VDIStream: the state of its connection, and a box that sets
 // Pause at once, without Apply.
 #ifndef pqVDIStreamWidget_h
 #define pqVDIStreamWidget_h

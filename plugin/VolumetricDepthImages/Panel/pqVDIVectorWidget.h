@@ -1,5 +1,5 @@
-// Property widget `vdi_vector`: the numbers of a vector below its label, over the whole width of the panel.
-// Beside the label, as ParaView has them, three of them are too narrow for six digits.
+// The property widget `vdi_vector`: the numbers of a vector below its label, over the whole width of the
+// panel. ParaView's own widget puts three numbers beside the label, too narrow for six digits.
 #ifndef pqVDIVectorWidget_h
 #define pqVDIVectorWidget_h
 
