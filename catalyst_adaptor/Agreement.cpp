@@ -19,11 +19,12 @@ Agreement::~Agreement() {
 
 Agreement::Meeting Agreement::meet(Place place, bool failed, std::int64_t operation) const {
   const auto at = static_cast<std::int64_t>(place);
-  // Maxima of x and -x, or ~x, are both ends.
+  // The maxima of x and -x, or of x and ~x, give both extremes of x.
   std::array<std::int64_t, 5> extremes{at, -at, failed ? 1 : 0, operation, ~operation};
   const int result = MPI_Allreduce(MPI_IN_PLACE, extremes.data(), static_cast<int>(extremes.size()),
                                    MPI_INT64_T, MPI_MAX, comm_);
-  if (result != MPI_SUCCESS) return {Place::StepOver, Place::StepOver, true, false};  // nobody to wait for
+  // MPI has failed, so there is no rank to wait for
+  if (result != MPI_SUCCESS) return {Place::StepOver, Place::StepOver, true, false};
   return {static_cast<Place>(-extremes[1]), static_cast<Place>(extremes[0]), extremes[2] != 0,
           extremes[3] == ~extremes[4]};
 }

@@ -1,4 +1,4 @@
-// Keeps ranks from waiting for one whose script has ended.
+// The agreement among ranks by which none waits for a rank whose script has ended.
 #pragma once
 
 #include <mpi.h>
@@ -8,10 +8,10 @@
 
 namespace vdi::catalyst {
 
-/// Ranks that run scripts meet here, on a communicator of their own: before each collective operation of ours
-/// (plugin/.../VDICollective.h), and where a part of a script has ended. A rank whose script fails goes on
-/// meeting until it has ended on all, so that those who want to enter an operation are told not to, instead
-/// of waiting there. All functions are collective in this sense: any of them meets any other.
+/// Ranks that run scripts meet here, on a communicator of their own: before each of our collective operations
+/// (plugin/.../VDICollective.h), and when a part of a script has ended. A rank whose script has failed keeps
+/// meeting until the part has ended on all ranks. So ranks that want to enter an operation are refused
+/// instead of waiting there. All functions are collective in this sense: any of them meets any other.
 class Agreement {
  public:
   /// Duplicates the communicator.
@@ -20,24 +20,25 @@ class Agreement {
   Agreement(const Agreement&) = delete;
   Agreement& operator=(const Agreement&) = delete;
 
-  /// Before an operation, that of the same name on all ranks. "": all enter; else why none does.
+  /// Call it before an operation, with the same name on all ranks. Returns "" if all ranks enter, else the
+  /// reason why none does.
   std::string enter(const std::string& operation);
-  /// What enter says where another rank's script has failed; that rank has more to tell.
+  /// The reason that `enter` returns if another rank's script has failed. That rank reports more.
   static constexpr const char* otherFailed = "another rank's script failed before this update";
 
-  /// A part of a script has ended here; returns once it has on all ranks. Whether it failed on any, or some
-  /// ranks have left the step without it.
+  /// Call it when a part of a script has ended here; it returns once the part has ended on all ranks. Returns
+  /// whether it failed on any rank, or other ranks have left the step already.
   bool leavePart(bool failed);
-  /// All scripts have ended here for this step; returns once they have on all ranks.
+  /// Call it when all scripts have ended here for this step; it returns once they have on all ranks.
   void leaveStep();
 
  private:
   enum class Place : std::int64_t { Entering, PartOver, StepOver };
   struct Meeting {
-    Place first;  // the least far of any rank
-    Place last;
+    Place first;  // place of the rank that is least far
+    Place last;   // place of the rank that is farthest
     bool failed;
-    bool same;  // operation
+    bool same;  // all ranks name the same operation
   };
   Meeting meet(Place place, bool failed, std::int64_t operation) const;
 

@@ -9,7 +9,7 @@ namespace vdi::catalyst {
 
 namespace {
 
-/// The first line, and the second where the first says only who speaks.
+/// The first line, or the first two if the first one only names the source.
 std::string firstLine(const std::string& text) {
   std::size_t end = text.find('\n');
   std::string line = text.substr(0, end);
@@ -20,7 +20,8 @@ std::string firstLine(const std::string& text) {
   return line + " " + text.substr(next, end == std::string::npos ? end : end - next);
 }
 
-/// By rank 0, on one line for what was printed before: a step whose files are missing is always told.
+/// Prints the error, on rank 0. Prints a repeated one in one line, and only for a step, because its files are
+/// missing.
 void print(Calls& self, std::optional<std::int64_t> step) {
   const bool again = self.error == self.printed;
   if (again && !step) return;
@@ -30,7 +31,7 @@ void print(Calls& self, std::optional<std::int64_t> step) {
   std::fprintf(stderr, "vdi_catalyst: %s%s\n", place.c_str(), text.c_str());
 }
 
-/// Of points, of which there are more than cells. Throws where VTK's counts would overflow.
+/// Throws if VTK's counts would overflow. It counts points, because there are more of them than cells.
 void requireCountable(const vdi_catalyst_block& block) {
   std::int64_t points = 1;
   constexpr std::int64_t maximum = std::int64_t{1} << 60;

@@ -1,4 +1,4 @@
-// What the calls of both engines have in common: arguments are checked, and a call ends alike on all ranks.
+// The code that both engines' calls share: it checks arguments, and gives all ranks the same result.
 #pragma once
 
 #include <mpi.h>
@@ -15,18 +15,18 @@
 
 namespace vdi::catalyst {
 
-/// The part of a handle that this needs.
+/// The part of a handle that these functions use.
 struct Calls {
   MPI_Comm comm = MPI_COMM_NULL;  // a duplicate of the simulation's
   std::string error;
-  std::string printed;  // so that what fails at every step is told in full once
+  std::string printed;  // the last printed text, so that a repeated failure is printed in full only once
 };
 
-/// What a failing call comes to: the highest code of any rank, and the text of the lowest rank that has it
-/// and something to say, on all ranks; rank 0 prints it. `step`: of execute.
+/// Collective: returns the highest code of any rank. On failure it stores the text of the lowest rank with
+/// that code and a text, on all ranks, and rank 0 prints it. `step` is given by execute.
 int conclude(Calls& self, int code, const std::string& text, std::optional<std::int64_t> step);
 
-/// Runs `work`, which returns nothing or what went wrong; that or an exception becomes `code`.
+/// Runs `work`, which returns nothing or the text of a failure. A failure or an exception becomes `code`.
 template <typename Work>
 int guarded(Calls& self, int code, Work work, std::optional<std::int64_t> step = std::nullopt) {
   std::optional<std::string> failure;
@@ -46,15 +46,15 @@ int guarded(Calls& self, int code, Work work, std::optional<std::int64_t> step =
   return conclude(self, failure ? code : VDI_CATALYST_OK, failure.value_or(""), step);
 }
 
-/// Throws std::invalid_argument with that text unless it is good.
+/// Throws std::invalid_argument with the text `what` unless `good`.
 inline void require(bool good, const char* what) {
   if (!good) throw std::invalid_argument(what);
 }
-/// Collective: throws std::invalid_argument with that text on all ranks if the ranks' values differ.
+/// Collective: throws std::invalid_argument with the text `what` on all ranks if the ranks' values differ.
 void requireEqual(MPI_Comm comm, std::int64_t value, const char* what);
-/// Throws std::invalid_argument with the reason for a block that can't be.
+/// Throws std::invalid_argument with the reason if the block is invalid.
 void checkBlock(const vdi_catalyst_block& block);
-/// Whether ParaView could count it.
+/// Whether ParaView can count this step.
 bool isStep(std::int64_t step);
 
 }  // namespace vdi::catalyst

@@ -1,4 +1,4 @@
-#include <vtkPython.h>  // before all others
+#include <vtkPython.h>  // Python requires it to be first
 
 #include "catalyst_adaptor/Engine.h"
 
@@ -39,13 +39,13 @@ namespace vdi::catalyst {
 namespace {
 
 constexpr const char* channel = "grid";
-std::atomic<bool> started = false;  // in this process, whether or not it went well
+std::atomic<bool> started = false;  // whether this process has started an engine, successfully or not
 
-/// Said by Debian's engine at each step; it concerns steering, which isn't used here.
+/// A part of an error that Debian's engine reports at each step. It concerns steering, which isn't used here.
 constexpr const char* harmless = "IOCatalystConduit";
 
-/// VTK's log, as long as it lives: keeps the first error, which is the caller's to report, and passes on the
-/// rest. Filters' errors reach no script and no return value: the log is the only place that has them all.
+/// Captures VTK's log during its lifetime. It keeps the first error, which the caller reports, and passes on
+/// the rest. Errors of filters reach no script and no return value: only the log has them all.
 class Log {
  public:
   Log() : before_(vtkLogger::GetCurrentVerbosityCutoff()) {
@@ -59,10 +59,10 @@ class Log {
   Log(const Log&) = delete;
   Log& operator=(const Log&) = delete;
 
-  /// ParaView's start chooses what's printed; this undoes it.
+  /// Undoes the choice of output that ParaView makes at its start.
   static void silenceOtherOutput() { vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF); }
 
-  /// Since the last call; "" if there was none.
+  /// The first error since the last call; "" if there was none.
   std::string takeFirstError() { return std::exchange(firstError_, {}); }
 
  private:
@@ -73,14 +73,15 @@ class Log {
     const std::string text = message.message;
     if (message.verbosity <= vtkLogger::VERBOSITY_ERROR) {
       if (text.find(harmless) != std::string::npos || !self.firstError_.empty()) return;
-      // An object's address tells a user nothing; some texts start on the next line.
+      // Removes an object's address, which tells a user nothing. Some texts start on the next line.
       static const std::regex address(R"( \((0x[0-9a-f]+|nullptr)\):\s*)");
       self.firstError_ = std::regex_replace(text, address, ": ", std::regex_constants::format_first_only);
       while (!self.firstError_.empty() && self.firstError_.back() == '\n') self.firstError_.pop_back();
       return;
     }
     auto* controller = vtkMultiProcessController::GetGlobalController();
-    if (controller != nullptr && controller->GetLocalProcessId() > 0) return;  // they'd say the same
+    // other ranks would print the same
+    if (controller != nullptr && controller->GetLocalProcessId() > 0) return;
     std::fprintf(stderr, "%s%s%s%s\n", message.preamble, message.indentation, message.prefix, text.c_str());
   }
 
@@ -88,16 +89,17 @@ class Log {
   std::string firstError_;
 };
 
-/// A Python pipeline that the engine goes on calling: the engine drops one that has failed once.
+/// A Python pipeline that never fails for the engine, because the engine drops a pipeline that has failed
+/// once.
 class Pipeline : public vtkInSituPipeline {
  public:
   static Pipeline* New();
   vtkTypeMacro(Pipeline, vtkInSituPipeline);
 
   void setScript(const std::string& script) { script_ = script; }
-  /// Whether its script runs; one that couldn't be loaded starts anew at the next step.
+  /// Whether its script is loaded. A script that couldn't be loaded starts anew at the next step.
   bool loaded() const { return python_ != nullptr; }
-  /// Of the last step.
+  /// Whether the last step failed.
   bool failed() const { return failed_; }
 
   bool Execute(int step, double time) override {
@@ -111,7 +113,7 @@ class Pipeline : public vtkInSituPipeline {
   }
 
   bool Finalize() override {
-    const auto python = std::exchange(python_, nullptr);  // once, whoever calls
+    const auto python = std::exchange(python_, nullptr);  // runs once, although two callers may call it
     return !python || python->Finalize();
   }
 
@@ -125,7 +127,7 @@ vtkStandardNewMacro(Pipeline);
 
 constexpr const char* agreementCapsule = "vdi::catalyst::Agreement";
 
-/// leave(failed) of script_guard.py: Agreement::leavePart.
+/// The function leave(failed) of script_guard.py, which calls Agreement::leavePart.
 PyObject* leave(PyObject* self, PyObject* failed) {
   auto* agreement = static_cast<Agreement*>(PyCapsule_GetPointer(self, agreementCapsule));
   const int truth = agreement != nullptr ? PyObject_IsTrue(failed) : -1;
@@ -135,7 +137,7 @@ PyObject* leave(PyObject* self, PyObject* failed) {
 
 PyMethodDef leaveMethod{"leave", leave, METH_O, nullptr};
 
-/// script_guard.py, installed.
+/// The installed module script_guard.py.
 class Guard {
  public:
   Guard(Agreement& agreement, const std::string& plugin) {
@@ -154,21 +156,21 @@ class Guard {
     throw std::runtime_error("ParaView's Python modules can't be imported; is python3-paraview installed?");
   }
 
-  /// What's wrong with a script, as far as that can be known before it runs; "" if nothing is.
+  /// Returns the fault of a script that is visible before it runs; "" if there is none.
   std::string check(const std::string& script) {
     const vtkPythonScopeGilEnsurer lock;
     const vtkSmartPyObject result(PyObject_CallMethod(module_, "check_script", "s", script.c_str()));
     return textOr("the script '" + script + "' can't be checked", result);
   }
 
-  /// What keeps our plugin from being loaded; "" if it is.
+  /// Loads our plugin. Returns the reason if it can't be loaded, and "" otherwise.
   std::string loadPlugin() {
     const vtkPythonScopeGilEnsurer lock;
     return textOr("the plugin can't be loaded",
                   vtkSmartPyObject(PyObject_CallMethod(module_, "load_plugin", nullptr)));
   }
 
-  /// Whether one of the scripts, all of them loaded, does anything at that step, or may.
+  /// Whether a script does anything at that step, or may do so. All scripts must be loaded.
   bool wants(int step, double time) {
     const vtkPythonScopeGilEnsurer lock;
     const vtkSmartPyObject result(PyObject_CallMethod(module_, "wants", "id", step, time));
@@ -176,7 +178,7 @@ class Guard {
     return !result || PyObject_IsTrue(result) != 0;
   }
 
-  /// After all scripts of a step.
+  /// Call it after all scripts of a step.
   void endStep() {
     const vtkPythonScopeGilEnsurer lock;
     const vtkSmartPyObject result(PyObject_CallMethod(module_, "end_step", nullptr));
@@ -194,7 +196,8 @@ class Guard {
   vtkSmartPyObject module_;
 };
 
-/// A duplicate for ParaView, in which a mismatch of messages is an error instead of the end.
+/// A duplicate of the communicator for ParaView. On it, a mismatch of messages is an error, and doesn't end
+/// the process.
 class ParaViewComm {
  public:
   explicit ParaViewComm(int fortranCommunicator) {
@@ -224,7 +227,7 @@ struct Engine::State {
   State& operator=(const State&) = delete;
 
   ParaViewComm comm;
-  Agreement agreement;  // apart from ParaView's messages, and from the caller's
+  Agreement agreement;  // its communicator is separate from ParaView's and the caller's
   Log log;
   Parameters parameters;
   vtkNew<vtkCallbackCommand> entry;
@@ -250,13 +253,13 @@ struct Engine::State {
 void Engine::State::start(const std::string& plugin) {
   using Helper = vtkInSituInitializationHelper;
   if (!Helper::IsPythonSupported()) throw std::runtime_error("this ParaView was built without Python");
-  vtkLogger::EnableUnsafeSignalHandler = false;  // SIGTERM and the like stay the simulation's
+  vtkLogger::EnableUnsafeSignalHandler = false;  // the simulation keeps handling SIGTERM and the like
   pv::initializeInSitu<Helper>(static_cast<vtkTypeUInt64>(MPI_Comm_c2f(comm.get())));
   Log::silenceOtherOutput();
   auto* manager = vtkSMProxyManager::GetProxyManager();
   auto* proxies = manager != nullptr ? manager->GetActiveSessionProxyManager() : nullptr;
   if (proxies == nullptr) throw std::runtime_error("ParaView's in situ engine doesn't start");
-  vtkPythonInterpreter::Initialize(0);  // 0: signals stay the simulation's
+  vtkPythonInterpreter::Initialize(0);  // 0: the simulation keeps handling signals
   guard.emplace(agreement, plugin);
   watchEntries();
   producer.TakeReference(vtkSMSourceProxy::SafeDownCast(proxies->NewProxy("sources", "PVTrivialProducer")));
@@ -293,7 +296,7 @@ void Engine::State::add(const std::vector<std::string>& scripts) {
   }
 }
 
-/// Of what ran on this rank since the log was last asked.
+/// The result of the scripts that ran on this rank since the log was last read.
 std::optional<std::string> Engine::State::result(bool good) {
   std::string error = log.takeFirstError();
   if (good && error.empty()) return std::nullopt;

@@ -1,5 +1,5 @@
-/* How libvdi_catalyst.so, which a simulation links, calls the engine that it loads: libvdi_catalyst_engine.so
- * for scripts, libvdi_catalyst_json.so for runs without one. */
+/* The functions through which libvdi_catalyst.so, which a simulation links, calls the engine that it loads:
+ * libvdi_catalyst_engine.so for scripts, libvdi_catalyst_json.so for runs without one. */
 #ifndef VDI_CATALYST_ENGINE_FUNCTIONS_H
 #define VDI_CATALYST_ENGINE_FUNCTIONS_H
 
@@ -9,8 +9,8 @@
 extern "C" {
 #endif
 
-/* One entry for each function of vdi_catalyst.h, with the same contract. An engine has one of the first two;
- * it gets a communicator that is one, and a null *catalyst. */
+/* One entry for each function of vdi_catalyst.h, with the same contract. An engine has one of the first two.
+ * That one gets a valid communicator, and a null *catalyst. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*initialize_json)(int32_t, const char*, vdi_catalyst**);
@@ -26,7 +26,7 @@ typedef struct vdi_catalyst_functions {
   const char* (*error)(const vdi_catalyst*);
 } vdi_catalyst_functions;
 
-/* An engine's only symbol. The version is in its name: a library of another version hasn't this symbol. */
+/* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
 #define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_4
 #define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_4"
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;

@@ -1,5 +1,5 @@
-/* libvdi_catalyst.so: what a simulation links. It is small, and loads an engine when it is initialised, so
- * that a simulation that doesn't use ParaView doesn't pay for it. */
+/* libvdi_catalyst.so, which a simulation links. It is small, and loads an engine when it is initialised. So a
+ * simulation that doesn't use ParaView doesn't pay for it. */
 #include <dlfcn.h>
 #include <fenv.h>
 #include <mpi.h>
@@ -11,14 +11,14 @@
 
 enum { MESSAGE_SIZE = 4096, PATH_SIZE = 2048 };
 
-/* What runs scripts, in ParaView, or what makes what a JSON text asks for. */
+/* An engine: it runs scripts in ParaView, or carries out a JSON text. */
 typedef struct vdi_engine {
   const char* file; /* in a folder beside this library */
   const char* needs;
-  const vdi_catalyst_functions* functions; /* null until it's loaded */
+  const vdi_catalyst_functions* functions; /* null until it is loaded */
 } vdi_engine;
 
-/* Like the loaded libraries themselves, there is one of each a process. */
+/* A process has one of each, as it has one of each loaded library. */
 static vdi_engine script_engine = {
     VDI_CATALYST_ENGINE_FILE,
     VDI_PARAVIEW
@@ -26,10 +26,11 @@ static vdi_engine script_engine = {
     "(LD_LIBRARY_PATH)",
     NULL};
 static vdi_engine json_engine = {VDI_CATALYST_JSON_FILE, "the Vulkan loader (Debian: libvulkan1)", NULL};
-/* The JSON engine's handle until it's finalized; others are the script engine's, which knows its own. */
+/* The JSON engine's handle until it is finalized. All other handles belong to the script engine, which knows
+ * its own. */
 static const vdi_catalyst* json_handle;
 
-/* 0 if this library's own place is unknown or too long. */
+/* Returns 0 if this library's own path is unknown or too long. */
 static int engine_path(const char* file, char path[PATH_SIZE]) {
   Dl_info self;
   if (dladdr((const void*)&script_engine, &self) == 0 || self.dli_fname == NULL) return 0;
@@ -39,7 +40,7 @@ static int engine_path(const char* file, char path[PATH_SIZE]) {
   return length < PATH_SIZE;
 }
 
-/* Loads the engine, unless it is. Returns 0, or 1 with what went wrong in `message`. */
+/* Loads the engine unless it is loaded. Returns 0, or 1 with the reason in `message`. */
 static int load_engine(vdi_engine* wanted, char message[MESSAGE_SIZE]) {
   if (wanted->functions != NULL) return 0;
   char path[PATH_SIZE];
@@ -47,7 +48,7 @@ static int load_engine(vdi_engine* wanted, char message[MESSAGE_SIZE]) {
     snprintf(message, MESSAGE_SIZE, "the engine can't be found: the path of libvdi_catalyst.so is unknown");
     return 1;
   }
-  /* Local: the symbols of the many libraries below it don't mix with the simulation's. */
+  /* RTLD_LOCAL keeps the symbols of the engine's many libraries apart from the simulation's. */
   void* library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
   wanted->functions = library != NULL ? dlsym(library, VDI_CATALYST_ENGINE_SYMBOL) : NULL;
   const char* reason = wanted->functions == NULL ? dlerror() : NULL;
@@ -59,7 +60,7 @@ static int load_engine(vdi_engine* wanted, char message[MESSAGE_SIZE]) {
   return 1;
 }
 
-/* MPI_COMM_NULL if MPI isn't running or the handle is none. */
+/* Returns MPI_COMM_NULL if MPI isn't running, or the handle is no communicator's. */
 static MPI_Comm communicator_of(int32_t fortran_handle) {
   int running = 0;
   int over = 0;
@@ -70,7 +71,7 @@ static MPI_Comm communicator_of(int32_t fortran_handle) {
   return comm != NULL ? comm : MPI_COMM_NULL; /* OpenMPI's answer to a wrong handle */
 }
 
-/* Whether a rank failed. Rank 0 prints the message of the lowest one that did. */
+/* Collective: returns whether a rank failed. Rank 0 prints the message of the lowest rank that did. */
 static int failed_anywhere(MPI_Comm comm, int failed, char message[MESSAGE_SIZE]) {
   int rank = 0;
   int size = 0;
@@ -122,7 +123,7 @@ int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json,
   return code;
 }
 
-/* What to call with this handle; null if nothing is. Without an engine there are no handles either. */
+/* The functions for this handle; null if none may be called. Without an engine there are no handles. */
 static const vdi_catalyst_functions* functions_of(const vdi_catalyst* catalyst) {
   int over = 0;
   MPI_Finalized(&over);
@@ -130,7 +131,8 @@ static const vdi_catalyst_functions* functions_of(const vdi_catalyst* catalyst) 
   return catalyst == json_handle ? json_engine.functions : script_engine.functions;
 }
 
-/* This and the next two functions run nothing but our own code, which changes no more than that. */
+/* This function and the next two run only our own code, which changes nothing but the floating-point
+ * environment. */
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
   const vdi_catalyst_functions* engine = functions_of(catalyst);
   if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
@@ -184,7 +186,7 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   return code;
 }
 
-/* Like vdi_catalyst_set_blocks, these run nothing but our own code. */
+/* Like vdi_catalyst_set_blocks, these functions run only our own code. */
 double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value, double low,
                                   double high) {
   const vdi_catalyst_functions* engine = functions_of(catalyst);

@@ -11,12 +11,13 @@ namespace vdi::catalyst {
 
 namespace {
 
-// As vdi/stream/Steering.h has them.
+// The limits of vdi/stream/Steering.h.
 constexpr std::size_t mostParameters = 64;
 constexpr std::size_t longestName = 64;
 constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
 
-/// Equal for equal declarations. Values may differ: the first rank's counts.
+/// A number that is equal for equal declarations. Values may differ between ranks, because the first rank's
+/// counts.
 std::int64_t fingerprintOf(const Parameter& parameter) {
   std::size_t hash = std::hash<std::string>()(parameter.name);
   for (const double number : {parameter.isWhole ? 1.0 : 0.0, parameter.low, parameter.high})
@@ -24,7 +25,7 @@ std::int64_t fingerprintOf(const Parameter& parameter) {
   return static_cast<std::int64_t>(hash >> 1U);
 }
 
-/// The value in force; none where something is wrong, which has been said.
+/// The value in force; nullopt after an error, which has been reported.
 std::optional<double> valueOf(Calls& self, Parameters& parameters, const char* name, Parameter parameter) {
   int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(name != nullptr, "a parameter needs a name");
@@ -53,7 +54,7 @@ void Parameters::check(const Parameter& parameter) {
   };
   if (!std::isfinite(parameter.low) || !std::isfinite(parameter.high)) fail("has bounds that aren't finite");
   if (!(parameter.low <= parameter.value && parameter.value <= parameter.high)) fail("is out of its bounds");
-  constexpr double largestWhole = 9007199254740992.0;  // of which a double has all
+  constexpr double largestWhole = 9007199254740992.0;  // doubles represent all whole numbers up to it
   if (parameter.isWhole && std::max(std::abs(parameter.low), std::abs(parameter.high)) > largestWhole)
     fail("has bounds beyond 2^53");
 }

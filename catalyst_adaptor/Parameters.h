@@ -20,22 +20,23 @@ struct Parameter {
 
 class Parameters {
  public:
-  /// Throws std::invalid_argument for one that can't be declared: its name, bounds, or a value out of them.
+  /// Throws std::invalid_argument for a parameter that can't be declared: because of its name or bounds, or a
+  /// value outside them.
   static void check(const Parameter& parameter);
 
-  /// The value in force: the parameter's own when its name is declared first. Throws std::invalid_argument
-  /// where there are too many, or one of this name is of the other type.
+  /// Returns the value in force, which is the parameter's own when its name is declared first. Throws
+  /// std::invalid_argument if there are too many parameters, or the name has another type already.
   double declare(const Parameter& parameter);
-  /// Sets what has been declared; values out of its bounds are the nearest that is not.
+  /// Sets declared parameters. A value outside the bounds becomes the nearest one inside.
   void set(const std::map<std::string, double>& values);
-  /// In the order of their declarations.
+  /// All parameters in the order of declaration.
   const std::vector<Parameter>& all() const { return all_; }
 
  private:
   std::vector<Parameter> all_;
 };
 
-/// What vdi_catalyst_parameter_f64 and _i64 do. Collective.
+/// These functions implement vdi_catalyst_parameter_f64 and _i64. Collective.
 double inForce(Calls& self, Parameters& parameters, const char* name, double value, double low, double high);
 std::int64_t inForce(Calls& self, Parameters& parameters, const char* name, std::int64_t value,
                      std::int64_t low, std::int64_t high);

@@ -7,8 +7,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* What scripts have set ("NAME=value") or taken away ("NAME"), null-terminated; null at first. Like the
- * environment itself, there is one a process. */
+/* The variables that scripts have set ("NAME=value") or removed ("NAME"), null-terminated; null at first.
+ * There is one list a process, as there is one environment. */
 static char** kept;
 
 static void complain(const char* what) {
@@ -26,7 +26,7 @@ static void free_all(char** variables) {
   free(variables);
 }
 
-/* Null if there's no memory. */
+/* Returns null if there is no memory. */
 static char** copy_of(char* const* variables) {
   const size_t count = count_of(variables);
   char** copy = calloc(count + 1, sizeof *copy);
@@ -39,12 +39,12 @@ static char** copy_of(char* const* variables) {
   return copy;
 }
 
-/* Of "NAME=value" and of "NAME". */
+/* The length of the name in "NAME=value" or "NAME". */
 static size_t name_length(const char* variable) {
   return strcspn(variable, "=");
 }
 
-/* The one of that name; null if there's none. */
+/* The variable of that name; null if there is none. */
 static char* find(char* const* variables, const char* name, size_t length) {
   for (size_t i = 0; variables != NULL && variables[i] != NULL; ++i) {
     if (name_length(variables[i]) == length && strncmp(variables[i], name, length) == 0) return variables[i];
@@ -52,8 +52,8 @@ static char* find(char* const* variables, const char* name, size_t length) {
   return NULL;
 }
 
-/* "NAME=value" sets a variable, "NAME" takes it away. Setting the value that a variable has changes nothing:
- * other threads may be reading the environment. */
+/* "NAME=value" sets a variable, "NAME" removes it. Leaves a variable alone that has the value already,
+ * because other threads may be reading the environment. */
 static void apply(const char* variable) {
   const size_t length = name_length(variable);
   const char* current = find(environ, variable, length);
@@ -76,7 +76,7 @@ static int add(char** list, const char* variable, size_t length) {
   return *end != NULL;
 }
 
-/* How to get from one environment to another, for apply_all; null if there's no memory. */
+/* The changes that lead from one environment to the other, for apply_all; null if there is no memory. */
 static char** difference(char* const* from, char* const* to) {
   char** list = calloc(count_of(from) + count_of(to) + 1, sizeof *list);
   int good = list != NULL;
@@ -100,7 +100,7 @@ static int same(char* const* a, char* const* b) {
 }
 
 static void restore_environment(char** before) {
-  if (before != NULL && same(before, environ)) { /* what's kept has changed nothing, or has gone */
+  if (before != NULL && same(before, environ)) { /* kept changes had no effect, or were undone */
     free_all(before);
     free_all(kept);
     kept = NULL;
@@ -118,7 +118,8 @@ static void restore_environment(char** before) {
   free_all(before);
 }
 
-/* Without changing it, if the system tells: another thread may be making a file. */
+/* Reads the umask. Doesn't change it for that if the system can tell it, because another thread may be making
+ * a file. */
 static mode_t current_umask(void) {
   char line[256];
   unsigned int mask = 0;
@@ -135,7 +136,7 @@ static mode_t current_umask(void) {
 
 static void save_signals(vdi_process_state* state) {
   for (int i = 1; i < VDI_SIGNALS; ++i) {
-    /* libc keeps some for itself and answers with an error. */
+    /* libc reserves some signals, for which it returns an error. */
     if (sigaction(i, NULL, &state->actions[i]) != 0) memset(&state->actions[i], 0, sizeof state->actions[i]);
   }
   pthread_sigmask(SIG_SETMASK, NULL, &state->blocked);
@@ -162,7 +163,7 @@ static void restore_signals(const vdi_process_state* state) {
   }
   pthread_sigmask(SIG_SETMASK, &state->blocked, NULL);
   stack_t stack;
-  /* A signal's handler can't change the stack that it runs on, and what it calls can't either. */
+  /* A signal's handler can't change the stack that it runs on, nor can the functions that it calls. */
   if ((state->signal_stack.ss_flags & SS_ONSTACK) == 0 && sigaltstack(NULL, &stack) == 0 &&
       (stack.ss_sp != state->signal_stack.ss_sp || stack.ss_flags != state->signal_stack.ss_flags))
     sigaltstack(&state->signal_stack, NULL);
@@ -191,7 +192,7 @@ static void restore_limits(const struct rlimit* limits) {
   for (int i = 0; i < RLIM_NLIMITS; ++i) {
     struct rlimit now;
     if (getrlimit((__rlimit_resource_t)i, &now) != 0 || now.rlim_cur == limits[i].rlim_cur) continue;
-    now.rlim_cur = limits[i].rlim_cur; /* a lower hard limit can't be raised again */
+    now.rlim_cur = limits[i].rlim_cur; /* a lowered hard limit can't be raised again */
     if (setrlimit((__rlimit_resource_t)i, &now) != 0) complain("a limit of resources");
   }
 }

@@ -1,6 +1,5 @@
-/* What belongs to the simulation's process as a whole and not to us: libraries that ParaView loads,
- * ParaView's start and scripts change it. Each call that may do so saves it first and restores it at its end.
- */
+/* The state of the process that belongs to the simulation. Libraries that ParaView loads, ParaView's start
+ * and scripts change it. Each call of ours that may do so saves it first, and restores it at its end. */
 #ifndef VDI_CATALYST_PROCESS_STATE_H
 #define VDI_CATALYST_PROCESS_STATE_H
 
@@ -13,25 +12,25 @@
 enum { VDI_SIGNALS = 65 };
 
 typedef struct vdi_process_state {
-  struct sigaction actions[VDI_SIGNALS]; /* by signal; [0] isn't used */
+  struct sigaction actions[VDI_SIGNALS]; /* by signal; [0] is unused */
   sigset_t blocked;                      /* of this thread */
   stack_t signal_stack;                  /* of this thread */
   fenv_t floating_point;                 /* of this thread: traps, rounding, flags, denormal numbers */
   locale_t thread_locale;
-  char* locale;       /* null: unknown, for want of memory */
-  char** environment; /* null-terminated copies; null: unknown, for want of memory */
+  char* locale;       /* null: unknown, because there was no memory */
+  char** environment; /* null-terminated copies; null: no memory */
   int folder;         /* a descriptor; -1: unknown */
   mode_t umask;
   struct rlimit limits[RLIM_NLIMITS];
 } vdi_process_state;
 
-/* Saves the process's state and makes that of the calls: the default floating-point environment, since what
- * simulations trap is ordinary in libraries; no end by SIGPIPE where the simulation has no handler for it;
- * and the environment variables that scripts set in the calls before. */
+/* Saves the process's state and sets the state for our calls. That is the default floating-point environment,
+ * because libraries do things that simulations trap. If the simulation has no handler for SIGPIPE, the signal
+ * is ignored. The environment gets the variables that scripts have set in earlier calls. */
 void vdi_process_state_save(vdi_process_state* state);
 
-/* Restores what differs from `state`, and frees what that holds. Environment variables that differ are kept
- * for the next call. Says on standard error what could not be restored. */
+/* Restores what differs from `state`, and frees the memory that it holds. Keeps changed environment variables
+ * for the next call. Reports on standard error what it could not restore. */
 void vdi_process_state_restore(vdi_process_state* state);
 
 #endif

@@ -1,4 +1,4 @@
-#include <Python.h>  // first, as it asks
+#include <Python.h>  // it requires to be first
 
 #include "catalyst_adaptor/ScriptEnvironment.h"
 
@@ -26,7 +26,7 @@ std::filesystem::path fileOf(Function* function) {
 
 std::string pluginFile() {
   if (const char* given = std::getenv("VDI_PLUGIN"); given != nullptr && *given != '\0') return given;
-  // This library lies in a folder of its own beside libvdi_catalyst.so, and plugins lie beside that one.
+  // This library lies in a folder of its own beside libvdi_catalyst.so. The plugins lie beside that.
   const auto plugin = fileOf(&pluginFile).parent_path().parent_path() / VDI_PLUGIN_FILE;
   std::error_code unreadable;
   if (!std::filesystem::exists(plugin, unreadable)) {
@@ -38,17 +38,17 @@ std::string pluginFile() {
 }
 
 void sharePython() {
-  // A program that is a Python itself can't be opened again, and needs not be.
+  // A Python program itself can't be opened again, and has no need to be.
   dlopen(fileOf(&Py_IsInitialized).c_str(), RTLD_NOW | RTLD_NOLOAD | RTLD_GLOBAL);
 }
 
-// In parentheses, for vtkPython.h has macros of these names that take no lock.
+// The parentheses avoid vtkPython.h's macros of these names, which take no lock.
 PythonLock::PythonLock() {
   if (Py_IsInitialized() != 0) before_ = (PyGILState_Ensure)();
 }
 
 PythonLock::~PythonLock() {
-  // ParaView's end is Python's too, if ParaView started it.
+  // ParaView's end is Python's end, too, if ParaView started it.
   if (before_ && Py_IsInitialized() != 0) (PyGILState_Release)(static_cast<PyGILState_STATE>(*before_));
 }
 

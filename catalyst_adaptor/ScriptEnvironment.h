@@ -1,4 +1,4 @@
-// What scripts expect of the process that runs them.
+// The process's environment as scripts expect it.
 #pragma once
 
 #include <optional>
@@ -6,17 +6,17 @@
 
 namespace vdi::catalyst {
 
-/// The path of our plugin for ParaView: what the environment variable VDI_PLUGIN names or, unless it is set,
-/// the one that was built or installed with this library. Throws std::runtime_error, naming the place looked
-/// at, where there is none.
+/// The path of our plugin for ParaView: the environment variable VDI_PLUGIN or, unless it is set, the plugin
+/// that was built or installed with this library. Throws std::runtime_error with the searched place if there
+/// is none.
 std::string pluginFile();
 
-/// Makes Python's symbols those of the whole process: extension modules don't link libpython, and a library
-/// that was loaded for itself alone keeps it to itself.
+/// Gives the whole process Python's symbols. Extension modules don't link libpython, and a library that
+/// loaded libpython privately keeps its symbols to itself.
 void sharePython();
 
-/// Python's lock, as long as it lives and where Python runs: a simulation in Python that calls through
-/// ctypes.CDLL has released it.
+/// Holds Python's lock during its lifetime if Python runs. A simulation in Python that calls through
+/// ctypes.CDLL has released the lock.
 class PythonLock {
  public:
   PythonLock();

@@ -12,18 +12,18 @@ namespace vdi::catalyst {
 
 namespace {
 
-/// Values along each axis that are copied before the next ones: where another axis is fastest, lines of the
-/// cache are used up before they go.
+/// The number of values along each axis that are copied as one tile. If another axis is fastest, a tile uses
+/// up lines of the cache before they are evicted.
 constexpr std::int64_t tile = 16;
 
-/// Whether a row, and the components of its values, have no gaps.
+/// Whether a row has no gaps, nor the components of its values.
 bool rowInOrder(const StridedValues& values) {
   const auto scalar = static_cast<std::int64_t>(values.scalarBytes);
   return (values.components == 1 || values.componentStride == scalar) &&
          (values.counts[0] == 1 || values.strides[0] == scalar * values.components);
 }
 
-/// `count` values of a row.
+/// Copies `count` values of a row.
 template <std::size_t scalarBytes>
 void copyRow(const StridedValues& values, std::int64_t count, const std::byte* from, std::byte* to) {
   for (std::int64_t x = 0; x < count; ++x) {
@@ -97,7 +97,7 @@ bool StridedValues::reachable() const {
 StridedArray::StridedArray(const StridedValues& values) : values_(values) {
   assert(values.reachable());
   const std::size_t bytes = static_cast<std::size_t>(values.scalars()) * values.scalarBytes;
-  // Not VTK's own allocation: where that fails, Debian's VTK ends the process.
+  // VTK's own allocation won't do: when it fails, Debian's VTK ends the process.
   memory_.reset(new (std::nothrow) std::byte[bytes]);
   if (!memory_) throw std::runtime_error("no memory to gather an array: " + std::to_string(bytes) + " bytes");
 }

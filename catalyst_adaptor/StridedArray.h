@@ -1,4 +1,4 @@
-// Values that the simulation keeps in an order of its own, gathered to where VTK can read them.
+// Copies of values from the simulation's own order in memory to the order that VTK reads.
 #pragma once
 
 #include <array>
@@ -12,28 +12,29 @@ namespace vdi::catalyst {
 /// + z * strides[2] + c * componentStride, in bytes. Strides may be 0 or negative.
 struct StridedValues {
   const std::byte* first = nullptr;
-  std::array<std::int64_t, 3> counts{};  // of values per axis, >= 1
+  std::array<std::int64_t, 3> counts{};  // number of values per axis, >= 1
   std::array<std::int64_t, 3> strides{};
   int components = 1;
   std::int64_t componentStride = 0;
   std::size_t scalarBytes = 1;  // 1, 2, 4 or 8
 
   std::int64_t scalars() const { return counts[0] * counts[1] * counts[2] * components; }
-  /// Whether they lie as VTK reads them: components side by side, x fastest, no gaps.
+  /// Whether the values lie in VTK's order: components side by side, x fastest, no gaps.
   bool inOrder() const;
-  /// Whether all of them have addresses that can be told from `first` in 63 bits.
+  /// Whether the offsets of all values from `first` fit into 63 bits.
   bool reachable() const;
 };
 
-/// Memory with the values in VTK's order.
+/// Memory that holds the values in VTK's order.
 class StridedArray {
  public:
-  /// Takes the memory. Throws std::runtime_error if there's none. `values` must be reachable.
+  /// Allocates the memory. Throws std::runtime_error if there is none. `values` must be reachable.
   explicit StridedArray(const StridedValues& values);
 
   /// Copies the values as they are now.
   void gather();
-  /// [z][y][x][component]; stays where it is as long as this object lives, also when that is moved.
+  /// The values, [z][y][x][component]. The address stays the same during this object's lifetime, even when
+  /// the object is moved.
   void* data() { return memory_.get(); }
 
  private:

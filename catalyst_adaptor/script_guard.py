@@ -1,12 +1,12 @@
-"""Stands between ParaView's engine and the scripts that it calls; libvdi_catalyst.so has it inside, as a module.
+"""Guards the scripts that ParaView's engine calls. libvdi_catalyst_engine.so contains this module as text.
 
-`install`, called once before the first script, wraps the functions through which the engine calls scripts:
-- left alone, the engine prints an exception to where nobody can collect it, and SystemExit ends the process;
+`install`, called once before the first script, wraps the functions through which the engine calls scripts, because:
+- the engine prints an exception where no caller can collect it, and SystemExit ends the process;
 - a script that fails on one rank must stop on all, or the others wait for it;
-- an exception belongs into VTK's log, where all other errors are found;
+- an exception belongs into VTK's log, which has all other errors;
 - a view that is drawn without a display ends the process (vtkXOpenGLRenderWindow aborts);
-- ParaView says once that the folder for extracts can't be made, and leaves out all extracts from then on;
-- what a script that can't be loaded has made by then stays, each time it's tried."""
+- ParaView reports once that the folder for extracts can't be made, and leaves out all extracts from then on;
+- a script that can't be loaded leaves its proxies behind, at each attempt."""
 
 import ast
 import contextlib
@@ -16,12 +16,12 @@ import sys
 import traceback
 
 
-disabled = []  # extractors, for this step
-modules = []  # of the scripts that are loaded
+disabled = []  # extractors that this step leaves out
+modules = []  # modules of the loaded scripts
 
 
 def end_step():
-    """To be called when the engine has run all scripts."""
+    """Call it when the engine has run all scripts."""
     set_enabled(disabled, True)
     disabled.clear()
 
@@ -31,8 +31,8 @@ plugin_file = ""
 
 @contextlib.contextmanager
 def plugin_named():
-    """Scripts find the plugin as os.environ["VDI_PLUGIN"]. Only this mapping has it, which here is written to past its
-    methods: these would change the environment of the process, which is the simulation's."""
+    """Gives scripts the plugin as os.environ["VDI_PLUGIN"]. This bypasses the mapping's methods, because these would
+    change the environment of the process, which is the simulation's."""
     variables = os.environ._data
     name = os.environ.encodekey("VDI_PLUGIN")
     before = variables.get(name)
@@ -47,7 +47,7 @@ def plugin_named():
 
 
 class ScriptFailed(Exception):
-    """Reported already."""
+    """A failure that has been reported already."""
 
 
 def check_script(path):
@@ -56,7 +56,7 @@ def check_script(path):
 
 
 def what_is_wrong_with(path):
-    """What's wrong with a script, as far as that can be known before it runs; "" if nothing is."""
+    """Returns the fault of a script that is visible before it runs; "" if there is none."""
     if not os.path.exists(path):
         return "the script '%s' isn't there" % path
     if not os.access(path, os.R_OK):
@@ -91,14 +91,14 @@ def check_plugin(script, argument):
         return ("the environment has no %s, which is to name the plugin that LoadPlugin loads, "
                 "VolumetricDepthImages.so" % error.args[0])
     except Exception:
-        return ""  # made from what only the script knows
+        return ""  # only the script can evaluate it
     if not isinstance(plugin, str):
         return ""
     return what_is_wrong_with_plugin(plugin)
 
 
 def what_is_wrong_with_plugin(plugin):
-    """"" if it can be loaded."""
+    """Returns the reason why the plugin can't be loaded; "" if it can."""
     if not os.path.isfile(plugin):
         return "the plugin '%s' isn't there" % plugin
     import ctypes
@@ -111,7 +111,7 @@ def what_is_wrong_with_plugin(plugin):
 
 def load_plugin():
     """Loads our plugin, so that `from paraview.simple import *` has its filters: scripts that ParaView writes by itself load
-    none. "" or what went wrong."""
+    none. Returns "" or the reason of a failure."""
     wrong = what_is_wrong_with_plugin(plugin_file)
     if wrong:
         return wrong
@@ -130,8 +130,8 @@ def text_of(error, skip):
 
 
 def install(leave, plugin):
-    """`leave(failed)`: waits until a part of a script has ended on all ranks; whether it failed on any. `plugin`: the path of
-    our plugin."""
+    """Wraps the engine's functions. `leave(failed)` waits until a part of a script has ended on all ranks, and returns whether
+    it failed on any. `plugin` is the path of our plugin."""
     global plugin_file
     plugin_file = plugin
     from paraview.catalyst import v2_internals
@@ -139,8 +139,8 @@ def install(leave, plugin):
 
     skip = (__name__, "<string>", v2_internals.__file__, "<frozen importlib", importlib.__file__)
     other_hook = sys.excepthook
-    folders = {}  # of extracts, by module
-    owners = {}  # modules' names, by extractors
+    folders = {}  # folders of extracts, by module
+    owners = {}  # modules' names, by extractor
     loading = {}
 
     def hook(kind, error, trace):
@@ -199,7 +199,8 @@ def install(leave, plugin):
             disabled.extend(drawn)
 
     def leave_out_same_files(due):
-        """All but those that would replace what another one writes in this step: these are told and left out."""
+        """Returns the extractors without those that would replace another one's file in this step; reports and disables
+        these."""
         writers = {}
         for extractor in due:
             folder = folders.get(owners.get(extractor.SMProxy, ""), "")
@@ -230,7 +231,7 @@ def install(leave, plugin):
 
 
 def registered_proxies():
-    """Of all groups: (group, name, proxy)."""
+    """Returns the set of (group, name, proxy) of all groups."""
     from paraview import servermanager
     iterator = servermanager.vtkSMProxyIterator()
     iterator.SetSessionProxyManager(servermanager.ProxyManager().SMProxyManager)
@@ -251,13 +252,13 @@ def forget_new_proxies(before):
     manager = servermanager.ProxyManager().SMProxyManager
     new = registered_proxies() - before
     for proxy in sorted({proxy for _, _, proxy in new}, key=lambda proxy: -proxy.GetGlobalID()):
-        controller.UnRegisterProxy(proxy)  # what hangs on it goes too
+        controller.UnRegisterProxy(proxy)  # its dependents go, too
     for group, name, proxy in registered_proxies() - before:
         manager.UnRegisterProxy(group, name, proxy)
 
 
 def set_time_step():
-    """For what a script saves by itself; extractors do it for theirs."""
+    """Gives the step to filters whose VDI a script saves by itself. Extractors give it to their own."""
     from paraview import servermanager
     from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
     for source in servermanager.ProxyManager().GetProxiesInGroup("sources").values():
@@ -266,12 +267,12 @@ def set_time_step():
 
 
 def wants(step, time):
-    """Whether the scripts, all of them loaded, do anything at this step, or may."""
+    """Whether the scripts do anything at this step, or may do so. All scripts must be loaded."""
     return any(hasattr(module, "catalyst_execute") for module in modules) or bool(due_extractors(step, time))
 
 
 def due_extractors(step=None, time=None):
-    """Those that the engine will call in this step, or in another one."""
+    """Returns the extractors that the engine will call in this step, or in the given one."""
     from paraview import servermanager
     from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
     controller = servermanager.vtkSMExtractsController()
@@ -318,8 +319,8 @@ def require_display(what):
 
 
 def extend_proxies():
-    """Without a display, views may be made and filled, as exported scripts do, but not drawn. VolumetricDepthImage has the
-    attribute Report, which ParaView makes of no property that only tells."""
+    """Lets scripts make and fill views without a display, as exported scripts do, but not draw them. Also gives
+    VolumetricDepthImage the attribute Report, because ParaView makes no attributes of information properties."""
     from paraview import servermanager
     if hasattr(servermanager.Proxy, "_vdi_guarded"):
         return

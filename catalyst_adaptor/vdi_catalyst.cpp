@@ -1,4 +1,5 @@
-// The C interface: checks arguments, keeps the ranks together, turns blocks into a vtkPartitionedDataSet.
+// The C interface for scripts. It checks arguments, keeps the ranks together, and turns blocks into a
+// vtkPartitionedDataSet.
 #include "catalyst_adaptor/vdi_catalyst.h"
 
 #include <mpi.h>
@@ -38,8 +39,8 @@
 struct vdi_catalyst : vdi::catalyst::Calls {
   std::unique_ptr<vdi::catalyst::Engine> engine;
   bool haveBlocks = false;
-  vtkSmartPointer<vtkPartitionedDataSet> grid;  // a partition a block
-  /// By association and name: the arrays that are gathered, of those blocks whose values aren't in order.
+  vtkSmartPointer<vtkPartitionedDataSet> grid;  // one partition per block
+  /// The arrays that are gathered, by association and name, for the blocks whose values aren't in order.
   std::map<std::pair<int, std::string>, std::vector<vdi::catalyst::StridedArray>> gathered;
 };
 
@@ -51,8 +52,8 @@ using vdi::catalyst::isStep;
 using vdi::catalyst::require;
 using vdi::catalyst::requireEqual;
 
-/// The handle that's alive: there's one engine in a process. What isn't it is a handle that was finalized,
-/// and mustn't be looked into.
+/// The living handle, of which a process has one at a time. Any other handle has been finalized, and must not
+/// be read.
 vdi_catalyst*& alive() {
   static vdi_catalyst* handle = nullptr;
   return handle;
@@ -67,7 +68,7 @@ void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
   for (int axis = 0; axis < 3; ++axis) any = any || block.ghost_lo[axis] > 0 || block.ghost_hi[axis] > 0;
   if (!any) return;
   const vtkIdType count = image->GetNumberOfCells();
-  // Not VTK's own allocation: where that fails, Debian's VTK ends the process.
+  // VTK's own allocation won't do: when it fails, Debian's VTK ends the process.
   std::unique_ptr<unsigned char[]> marks(new (std::nothrow) unsigned char[static_cast<std::size_t>(count)]);
   if (!marks) {
     throw std::runtime_error("no memory for the marks of a block's ghost cells: " + std::to_string(count) +
@@ -91,7 +92,7 @@ void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
   image->GetCellData()->AddArray(ghosts);
 }
 
-/// The values behind the pointers have changed, whether or not the pointers have.
+/// Tells VTK that the values have changed, whether or not the pointers to them have.
 void markModified(vtkPartitionedDataSet& grid) {
   for (unsigned int i = 0; i < grid.GetNumberOfPartitions(); ++i) {
     vtkDataSet* image = grid.GetPartition(i);
@@ -104,8 +105,8 @@ void markModified(vtkPartitionedDataSet& grid) {
   grid.Modified();
 }
 
-/// ParaView counts steps in an int, and files are named by it: another one would be lost, or replace another
-/// step's.
+/// Requires a step that fits ParaView's int, by which it counts steps and names files. Another step would be
+/// lost, or replace another step's files.
 void requireStep(const vdi_catalyst& self, std::int64_t step) {
   require(self.haveBlocks, "no blocks were given yet");
   if (isStep(step)) return;
@@ -143,15 +144,15 @@ int vtkTypeOf(int type) {
   }
 }
 
-/// Started by an initialize that failed later, because of a script for one; the next initialize takes it,
-/// since ParaView starts once in a process. Never deleted: at the process's end MPI is gone, which that
-/// takes.
+/// An engine whose vdi_catalyst_initialize failed after its start, for example because of a script. The next
+/// call takes it, because ParaView starts once in a process. It is never deleted: that needs MPI, which is
+/// gone at the process's end.
 vdi::catalyst::Engine*& spareEngine() {
   static vdi::catalyst::Engine* engine = nullptr;
   return engine;
 }
 
-/// The spare engine or a new one. All ranks find out whether they can before any of them starts.
+/// Takes the spare engine or a new one. All ranks check whether they can before any of them starts.
 int takeEngine(vdi_catalyst& self) {
   using vdi::catalyst::Engine;
   std::string plugin;
@@ -205,13 +206,13 @@ vtkIdType valuesOf(vtkDataSet& image, int association) {
   return association == VDI_CATALYST_CELLS ? image.GetNumberOfCells() : image.GetNumberOfPoints();
 }
 
-/// On the simulation's memory or ours, of `count` values.
+/// Makes an array of `count` values on the simulation's memory or ours.
 vtkSmartPointer<vtkDataArray> newArray(const char* name, int type, int components, const void* data,
                                        vtkIdType count) {
   auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtkTypeOf(type)));
   array->SetName(name);
   array->SetNumberOfComponents(components);
-  // VTK only reads through this pointer; `save` = 1 leaves the memory its owner's.
+  // VTK only reads through this pointer. `save` = 1 leaves the memory to its owner.
   array->SetVoidArray(const_cast<void*>(data), count * components, 1);
   return array;
 }
@@ -232,7 +233,7 @@ vdi::catalyst::StridedValues stridedValues(vtkDataSet& block, int type, int asso
   return values;
 }
 
-/// One named array of all blocks, until all ranks have theirs.
+/// One named array of all blocks, held until all ranks have theirs.
 class Arrays {
  public:
   void add(vtkSmartPointer<vtkDataArray> array) { arrays_.push_back(std::move(array)); }
@@ -247,7 +248,7 @@ class Arrays {
                              : image->GetPointData();
       attributes->AddArray(arrays_[i]);
     }
-    // Last: until now the grid has used what is replaced here.
+    // This comes last, because until now the grid has used the memory that is replaced here.
     if (gathered_.empty())
       self.gathered.erase({association, name});
     else
@@ -270,7 +271,7 @@ void gatherAll(vdi_catalyst& self) {
 int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
                             vdi_catalyst** catalyst) {
   const vdi::catalyst::PythonLock lock;
-  // Loader.c has seen to it that MPI runs, that the handle is a communicator's and that *catalyst is null.
+  // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
   auto self = std::make_unique<vdi_catalyst>();
   if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
     return VDI_CATALYST_BAD_ARGUMENT;

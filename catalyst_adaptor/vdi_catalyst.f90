@@ -1,5 +1,6 @@
-! vdi_catalyst.h for Fortran: compile this file with the simulation and `use vdi_catalyst`. The header has the
-! documentation; the handle is a type(c_ptr), strings end with c_null_char, arrays of pointers are arrays of c_loc(...).
+! The Fortran interface of vdi_catalyst.h: compile this file with the simulation and `use vdi_catalyst`. The header has
+! the documentation. The handle is a type(c_ptr), strings end with c_null_char, arrays of pointers are arrays of
+! c_loc(...).
 module vdi_catalyst
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int32_t, c_int64_t, c_ptr, c_size_t
   implicit none
@@ -140,7 +141,7 @@ module vdi_catalyst
 
 contains
 
-  ! A copy, as a Fortran string; of length 0 if there was no error.
+  ! Returns a copy of the error as a Fortran string, which has length 0 if there was no error.
   function vdi_catalyst_error(catalyst) result(text)
     type(c_ptr), intent(in) :: catalyst
     character(len=:), allocatable :: text

@@ -1,11 +1,11 @@
-/* What a simulation links to make VDIs of its volume, by ParaView's in situ engine and scripts, or by a JSON
- * text and without ParaView: C, no VTK, no MPI header.
+/* The interface that a simulation calls to make VDIs of its volume, by ParaView's in situ engine and scripts,
+ * or by a JSON text without ParaView. It is C and needs neither VTK nor an MPI header.
  *
- * Life of a run, on every rank of the communicator:
+ * The calls of a run, on every rank of the communicator:
  *
  *     vdi_catalyst_initialize(MPI_Comm_c2f(comm), 1, scripts, &catalyst);
  *     loop {
- *       feed = vdi_catalyst_parameter_f64(catalyst, "feed", 0.037, 0.0, 0.1);     what viewers may change
+ *       feed = vdi_catalyst_parameter_f64(catalyst, "feed", 0.037, 0.0, 0.1);     viewers may change it
  *       vdi_catalyst_set_blocks(catalyst, count, blocks);          when the blocks or their pointers change
  *       vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_POINTS, data);
  *       if (vdi_catalyst_wants(catalyst, step, time))               or at each step
@@ -13,32 +13,31 @@
  *     }
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
- * All functions are collective over the communicator. None ends the process: they return VDI_CATALYST_OK or a
- * code below, the same one on all ranks, and rank 0 prints a message to standard error. What repeats is
- * printed in full once; a step that fails is told each time, then in one line, for its files are missing.
- * After an error the next step works again, and blocks and arrays are those of before. Values are
- * used where they are: pointers must stay valid, and their data unchanged, until vdi_catalyst_execute
- * returns. The host holds copies of the layers beside blocks only, and of whole blocks where the scalar
- * types of blocks differ.
+ * All functions are collective over the communicator. None ends the process. They return VDI_CATALYST_OK or a
+ * code below, the same one on all ranks, and rank 0 prints a message to standard error. It prints a repeated
+ * message in full once. A step that fails again gets one line, because its files are missing. After an error,
+ * the next step works again, with the blocks and arrays from before. Values are used where they are: pointers
+ * must stay valid, and their data unchanged, until vdi_catalyst_execute returns. The host holds copies of
+ * only the layers beside blocks, and of whole blocks if the blocks' scalar types differ.
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
- * vtkPartitionedDataSet with one vtkImageData a block, under the name "grid":
- * TrivialProducer(registrationName="grid"). A script runs on all ranks, and what updates a pipeline is
- * collective. Where a rank's script ends or fails before an update of VolumetricDepthImage that the others
- * enter, or comes with another one, the update fails on all and so does the step. Only in ParaView's own
- * collective filters and views the others wait, as in any MPI program.
+ * vtkPartitionedDataSet with one vtkImageData per block, under the name "grid":
+ * TrivialProducer(registrationName="grid"). A script runs on all ranks, and updates of a pipeline are
+ * collective. If one rank's script ends or fails before an update of VolumetricDepthImage that the others
+ * enter, or enters a different one, the update fails on all ranks, and so does the step. Only in ParaView's
+ * own collective filters and views do the others wait, as in any MPI program.
  *
  * The process stays the simulation's. When a call returns, these are as before it: the handlers of signals,
  * the calling thread's signal mask and floating-point environment (traps, rounding, flags), the locale, the
- * environment variables, the working directory, the umask and the soft limits of resources. Scripts find the
- * variables that they have set again at the next step. While a call lasts, a signal finds the simulation's
- * handler, unless a script sets another one, and SIGPIPE is ignored where it would end the process.
+ * environment variables, the working directory, the umask and the soft limits of resources. At the next step,
+ * scripts find the variables again that they have set. During a call, a signal finds the simulation's
+ * handler, unless a script sets another one, and SIGPIPE is ignored if it would end the process.
  *
- * What still ends the process, since ParaView, Python or a library does it without asking: a script's
- * os._exit, os.abort or a crash in a module of its; memory that ParaView itself asks for in vain (Debian's
- * VTK aborts); an X server that goes away while a view is drawn (Xlib exits), and a view that is drawn
- * without a display past paraview.simple, by methods of its render window or SMProxy; a crash of a driver.
- */
+ * These events still end the process, because ParaView, Python or a library gives no choice: a script that
+ * calls os._exit or os.abort, or crashes in one of its modules; an allocation of ParaView's own that fails
+ * (Debian's VTK aborts); an X server that goes away while a view is drawn (Xlib exits); a view that is drawn
+ * without a display by methods of its render window or SMProxy instead of paraview.simple; a crash of a
+ * driver. */
 #ifndef VDI_CATALYST_H
 #define VDI_CATALYST_H
 
@@ -57,8 +56,8 @@ extern "C" {
 /* Results. */
 enum {
   VDI_CATALYST_OK = 0,
-  VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or beyond counting,
-                                    an unknown type, arrays before blocks, a step that's no int */
+  VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or too large to
+                                  * count, an unknown type, arrays before blocks, a step that is no int */
   VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process */
   VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
 };
@@ -77,21 +76,21 @@ enum {
   VDI_CATALYST_U64 = 9
 };
 
-/* Where values lie. */
+/* Associations of values. */
 enum { VDI_CATALYST_POINTS = 0, VDI_CATALYST_CELLS = 1 };
 
 /* One block of a uniform lattice. `cells` counts cells per axis, ghost cells included; point arrays have one
  * value more per axis. `origin` is the lower corner of the first cell, ghost or not. Values lie x fastest,
  * then y, then z.
  *
- * Neighbours are blocks of any rank and any spacing. They may share the points of their common face,
- * or end one cell apart (points), or meet at a face (cells). What a block needs of its neighbours'
- * values is exchanged, whether it has ghost layers or not. Its own ghost layers are used beside blocks
- * of equal spacing.
+ * Neighbours are blocks of any rank and any spacing. They may share the points of their common face, or end
+ * one cell apart (points), or meet at a face (cells). Ranks exchange the values that a block needs of its
+ * neighbours, whether it has ghost layers or not. Its own ghost layers are used beside blocks of equal
+ * spacing.
  *
- * Blocks of different spacing may overlap: the finest is shown. Blocks of equal spacing may not, except
- * for ghost layers announced as such. By more than a thousandth of a cell it is an error that names both
- * blocks. */
+ * Blocks of different spacing may overlap: the finest is shown. Blocks of equal spacing must not overlap,
+ * except by ghost layers announced as such. An overlap by more than a thousandth of a cell is an error that
+ * names both blocks. */
 typedef struct vdi_catalyst_block {
   int32_t cells[3];
   int32_t ghost_lo[3]; /* layers of ghost cells at the lower side of each axis */
@@ -104,94 +103,97 @@ typedef struct vdi_catalyst vdi_catalyst;
 
 /* Loads ParaView, starts the engine on a duplicate of the communicator (its Fortran handle), loads our plugin
  * and adds the scripts, the same on all ranks; they are loaded at the first step. Scripts need not load the
- * plugin: those that ParaView saves work as they are. They find its path in os.environ["VDI_PLUGIN"]: what
- * the environment says or, unless it is set, the plugin of this installation.
+ * plugin: those that ParaView saves work as they are. They find its path in os.environ["VDI_PLUGIN"]: the
+ * value of that environment variable or, unless it is set, the plugin of this installation.
  *
- * A script that is missing or isn't Python, and another plugin that's missing where it loads one (LoadPlugin
- * at its top level), are VDI_CATALYST_SCRIPT here. After a failure *catalyst is null, and the other
- * functions, given null, do nothing but return VDI_CATALYST_BAD_ARGUMENT. The process may try again on the
- * same ranks unless ParaView itself didn't start. Once this has succeeded, it can't be called again in the
- * process. */
+ * This returns VDI_CATALYST_SCRIPT if a script is missing or isn't Python, and if a script loads another
+ * plugin (LoadPlugin at its top level) that is missing. After a failure *catalyst is null, and the other
+ * functions, given null, only return VDI_CATALYST_BAD_ARGUMENT. The process may try again on the same ranks
+ * unless ParaView itself didn't start. After a success, the process can't call it again. */
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 
-/* Instead of vdi_catalyst_initialize: makes what a JSON text asks for, without scripts, ParaView or Python.
- * `json` is the text, or the name of a file with it; the first rank's counts, and it alone reads files.
- * "{\"field\": \"V\", \"every\": 10}" writes vdi_000010.vdi and so on of the array V.
+/* Replaces vdi_catalyst_initialize in runs without scripts, ParaView or Python, which a JSON text describes.
+ * `json` is the text, or the name of a file with it. The first rank's text counts, and that rank alone reads
+ * files. "{\"field\": \"V\", \"every\": 10}" writes vdi_000010.vdi and so on from the array V.
  * docs/vdi-run.schema.json has all fields; `vdi check FILE` finds mistakes before the run.
  *
- * The other functions are the same, but for these: a step may be any number from 0 on, blocks with ghost
- * layers take no more memory than others, and a frame that fails is VDI_CATALYST_SCRIPT. Of a text with a
- * mistake VDI_CATALYST_SCRIPT is returned here, and the place of the mistake is told. So it is where files of
- * another run exist and the text doesn't say what becomes of them. Without a Vulkan device it's
- * VDI_CATALYST_ENGINE. After a failure *catalyst is null. One such run can go on in a process at a time,
- * beside scripts or without them. */
+ * The other functions are the same, with these differences: a step may be any number from 0 on, blocks with
+ * ghost layers take no more memory than others, and a frame that fails is VDI_CATALYST_SCRIPT. For a mistake
+ * in the text, this function returns VDI_CATALYST_SCRIPT and reports its place. It does the same if files of
+ * another run exist and the text doesn't say how to treat them. Without a Vulkan device it returns
+ * VDI_CATALYST_ENGINE. After a failure *catalyst is null. A process can have one such run at a time, with or
+ * without scripts beside it. */
 VDI_CATALYST_API int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json,
                                                   vdi_catalyst** catalyst);
 
-/* This rank's blocks, none included; forgets all arrays. Blocks with ghost layers take a byte a cell. */
+/* Sets this rank's blocks, possibly none, and forgets all arrays. Blocks with ghost layers take a byte a
+ * cell. */
 VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count,
                                              const vdi_catalyst_block* blocks);
 
-/* The values of one named array: data[i] belongs to block i. Calling it again with the same name replaces the
- * pointers. */
+/* Sets the values of one named array: data[i] belongs to block i. Another call with the same name replaces
+ * the pointers. */
 VDI_CATALYST_API int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type,
                                             int32_t association, const void* const* data);
 
-/* Where the values of one block lie, in bytes: component c of value (x, y, z) at the block's pointer +
- * x * strides[0] + y * strides[1] + z * strides[2] + c * component_stride. So the pointer is to the block's
- * first value, wherever in an allocation that is: layers before it, and what is padded, are never read.
- * Strides may be 0 or negative, and need not be multiples of the scalar's size. */
+/* The layout of the values of one block, in bytes: component c of value (x, y, z) lies at the block's pointer
+ * + x * strides[0] + y * strides[1] + z * strides[2] + c * component_stride. So the pointer is to the block's
+ * first value, wherever in an allocation that is: layers before it, and padding, are never read. Strides may
+ * be 0 or negative, and need not be multiples of the scalar's size. */
 typedef struct vdi_catalyst_strides {
   int64_t strides[3];
-  int64_t component_stride; /* isn't used for one component */
+  int64_t component_stride; /* unused for one component */
 } vdi_catalyst_strides;
 
-/* As vdi_catalyst_set_array, for values that lie otherwise: interleaved with others, padded, z fastest, parts
- * of a larger allocation. strides[i] and data[i] belong to block i. With `components` > 1, from 1 to 16, an
- * array of vectors: VolumetricDepthImage shows their magnitude. For one component of vectors, pass its first
- * value's address and components = 1.
+/* As vdi_catalyst_set_array, for values in another layout: interleaved with others, padded, z fastest, or
+ * parts of a larger allocation. strides[i] and data[i] belong to block i. With `components` > 1, from 1 to
+ * 16, the array is one of vectors: VolumetricDepthImage shows their magnitude. For one component of vectors,
+ * pass its first value's address and components = 1.
  *
- * Values that lie as vdi_catalyst_set_array takes them, components side by side, are used where they are.
- * Others are copied to memory of ours by each vdi_catalyst_execute that a script wants; it is taken here. */
+ * Values in the layout of vdi_catalyst_set_array, with components side by side, are used where they are. Each
+ * vdi_catalyst_execute that a script wants copies the others to memory of ours, which this function
+ * allocates. */
 VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
                                                     int32_t association, int32_t components,
                                                     const void* const* data,
                                                     const vdi_catalyst_strides* strides);
 
-/* Whether a script will do anything at this step: 1 if so or if it can't be told, 0 if not, the same on all
- * ranks. Then the simulation need neither prepare its values nor call vdi_catalyst_execute. It's 1 where a
- * script wasn't loaded yet, as before the first step; where one defines catalyst_execute, which runs at each
- * step; and where the trigger of an extractor is due. Without a script it's 1 where a frame is due by step,
- * time or clock, whether or not the data and the share of wall time will let it be made, and at each step
- * where viewers may steer. 0 for a null or finalized handle and for a step that vdi_catalyst_execute
+/* Whether a script will do anything at this step: 1 if it will or that can't be known, 0 if not; the same on
+ * all ranks. After 0, the simulation need neither prepare its values nor call vdi_catalyst_execute. It is 1
+ * if a script isn't loaded yet, as before the first step; if a script defines catalyst_execute, which runs at
+ * each step; and if the trigger of an extractor is due. In a run without a script it is 1 if a frame is due
+ * by step, time or clock, whether or not the data and the share of wall time will permit it, and at each step
+ * if viewers may steer. It is 0 for a null or finalized handle and for a step that vdi_catalyst_execute
  * refuses. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 
-/* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX, since
- * ParaView counts and names files so; others are VDI_CATALYST_BAD_ARGUMENT each time. */
+/* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX,
+ * because ParaView counts and names files by such numbers. Other steps are VDI_CATALYST_BAD_ARGUMENT each
+ * time. */
 VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time);
 
-/* A number that viewers may change while the simulation runs, where a script lets them (VDIStream's Steer) or
- * a run without one ("steer" of its stream).
- * The first call declares it: its name, of 1 to 64 letters, digits, "_", "-" and "."; its value until a
- * viewer sets another; its bounds, both included. Each call returns the value in force, the first rank's on
- * all ranks. It changes in vdi_catalyst_execute alone, so all calls between two steps return the same one.
- * Later calls ignore value and bounds.
+/* A number that viewers may change while the simulation runs, if a script lets them (VDIStream's Steer) or a
+ * run without one does ("steer" of its stream). The first call declares its name, of 1 to 64 letters, digits,
+ * "_", "-" and "."; its value until a viewer sets another; and its bounds, both included. Each call returns
+ * the value in force, the first rank's on all ranks. Only vdi_catalyst_execute changes it, so all calls
+ * between two steps return the same value. Later calls ignore value and bounds.
  *
- * 64 parameters at most. Bounds of the second function lie within 2^53 of 0. The functions return `value` for
- * a null or finalized handle, and where vdi_catalyst_error says what's wrong: a name, bounds that aren't
- * finite, a value out of them, another type than before, or ranks that ask for different ones. */
+ * A run has 64 parameters at most. Bounds of the second function lie within 2^53 of 0. The functions return
+ * `value` for a null or finalized handle, and after an error, which vdi_catalyst_error describes: an invalid
+ * name, bounds that aren't finite, a value outside them, another type than before, or ranks that ask for
+ * different parameters. */
 VDI_CATALYST_API double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value,
                                                    double low, double high);
 VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int64_t value,
                                                     int64_t low, int64_t high);
 
-/* Ends the scripts and the engine and frees `catalyst`; a second call does nothing but return
- * VDI_CATALYST_BAD_ARGUMENT. So does one after MPI_Finalize, as all other functions then, and says so. */
+/* Ends the scripts and the engine, and frees `catalyst`. A second call only returns
+ * VDI_CATALYST_BAD_ARGUMENT. After MPI_Finalize this and all other functions do so, too, and this one prints
+ * a message. */
 VDI_CATALYST_API int vdi_catalyst_finalize(vdi_catalyst* catalyst);
 
-/* The text of the last error on this rank; "" if there was none. Valid until the next call. */
+/* The text of the last error on this rank; "" if there was none. It is valid until the next call. */
 VDI_CATALYST_API const char* vdi_catalyst_error(const vdi_catalyst* catalyst);
 
 #ifdef __cplusplus

@@ -24,7 +24,7 @@ bool isWide(int type) {
   return type == VDI_CATALYST_I64 || type == VDI_CATALYST_U64;
 }
 
-/// The library's types have the numbers of vdi_catalyst.h's; it has no 64-bit integers.
+/// The library's types have the numbers of vdi_catalyst.h. The library has no 64-bit integers.
 ScalarType scalarTypeOf(int type) {
   static_assert(static_cast<int>(ScalarType::U8) == VDI_CATALYST_U8 &&
                 static_cast<int>(ScalarType::I8) == VDI_CATALYST_I8 &&
@@ -45,7 +45,7 @@ double loadAny(int type, const std::byte* data, std::size_t index) {
                                   : static_cast<double>(static_cast<std::int64_t>(bits));
 }
 
-/// What a block reads, and what keeps it.
+/// The memory that a block reads, and its owner.
 struct Memory {
   const void* data = nullptr;
   std::shared_ptr<const void> keepAlive;
@@ -67,7 +67,7 @@ Block blockAt(const vdi_catalyst_block& b, bool cells, ScalarType type, Memory m
   return block;
 }
 
-/// Of each value, the only component or the magnitude of all; as doubles.
+/// Each value's only component, or the magnitude of all, as doubles.
 Memory asDoubles(const StridedValues& values, int type) {
   StridedArray array(values);
   array.gather();
@@ -205,8 +205,8 @@ std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int com
 
 bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const std::string& name,
                   std::optional<bool> given) {
-  // Ranks without blocks may not know, all others agree.
-  std::array<std::uint64_t, 2> kinds{0, 0};  // of points, of cells
+  // Ranks without blocks may not know the kind. All others agree on it.
+  std::array<std::uint64_t, 2> kinds{0, 0};  // whether a rank has it as an array of points, and of cells
   comm.together([&] {
     const std::optional<bool> cells = given ? given : fields.associationOf(name);
     if (cells) kinds[*cells ? 1 : 0] = 1;

@@ -1,4 +1,4 @@
-// The C interface of runs without a script: checks arguments, keeps the ranks together.
+// The C interface for runs without a script. It checks arguments and keeps the ranks together.
 #include <mpi.h>
 
 #include <chrono>
@@ -37,7 +37,7 @@ using vdi::catalyst::StridedValues;
 
 constexpr int maxComponents = 16;
 
-/// The handle that's alive. What isn't it is a handle that was finalized, and mustn't be looked into.
+/// The living handle. Any other handle has been finalized, and must not be read.
 vdi_catalyst*& alive() {
   static vdi_catalyst* handle = nullptr;
   return handle;
@@ -47,7 +47,8 @@ bool usable(const vdi_catalyst* catalyst) {
   return catalyst != nullptr && catalyst == alive();
 }
 
-/// As guarded, for work that fails on all ranks together: those that fail because of another one say nothing.
+/// Like `guarded`, for work that fails on all ranks together. Ranks that fail because of another rank report
+/// nothing.
 template <typename Work>
 int guardedTogether(vdi_catalyst& self, int code, Work work,
                     std::optional<std::int64_t> step = std::nullopt) {
@@ -64,14 +65,14 @@ int guardedTogether(vdi_catalyst& self, int code, Work work,
       step);
 }
 
-/// The root's text on all ranks.
+/// Returns the root's text on all ranks. Collective.
 std::string shared(const vdi::comm::Communicator& comm, const std::string& text) {
   const auto* const bytes = reinterpret_cast<const std::byte*>(text.data());
   const std::vector<std::byte> all = comm.broadcast({bytes, bytes + text.size()}, 0);
   return {reinterpret_cast<const char*>(all.data()), all.size()};
 }
 
-/// The run that rank 0 names. Rank 0 reads files; all others get their text.
+/// Reads the run that rank 0 names. Rank 0 reads the files, and all others get their text.
 class Reading {
  public:
   explicit Reading(vdi_catalyst& self)
@@ -127,7 +128,7 @@ int start(vdi_catalyst& self, const char* json) {
 }
 
 int initializeJson(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
-  // Loader.c has seen to it that MPI runs, that the handle is a communicator's and that *catalyst is null.
+  // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
   auto self = std::make_unique<vdi_catalyst>();
   if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
     return VDI_CATALYST_BAD_ARGUMENT;

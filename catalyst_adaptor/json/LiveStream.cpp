@@ -17,7 +17,7 @@
 
 namespace vdi::catalyst {
 
-/// The publisher hands its last frame over before the server ends.
+/// The members' order lets the publisher hand its last frame over before the server ends.
 struct LiveStream::Service {
   Service(stream::ServerOptions options, bool isSteered)
       : server(steered(std::move(options), isSteered)), publisher(server) {}
@@ -27,11 +27,11 @@ struct LiveStream::Service {
     return options;
   }
 
-  stream::Wishes wishes;  // of which the server's thread knows
+  stream::Wishes wishes;  // the server's thread uses it
   stream::Server server;
   stream::Publisher publisher;
   std::unique_ptr<stream::SecretFile> link;
-  std::string told;  // of the publisher's trouble
+  std::string told;  // the last reported trouble of the publisher
 };
 
 LiveStream::LiveStream(const config::RunStream& options) {
@@ -49,7 +49,7 @@ LiveStream::LiveStream(const config::RunStream& options) {
   const std::string link = given.empty() ? service_->server.link() : service_->server.address();
   const std::string& file = options.linkFile;
   if (!file.empty()) service_->link = std::make_unique<stream::SecretFile>(file, link);
-  // The token stays out of logs. It's in the file, or known.
+  // The token stays out of logs. The user has it in the file or chose it.
   fmt::print(stderr, "vdi_catalyst: serving at {}{}\n", service_->server.address(),
              file.empty() ? "" : "; the link is in " + file);
 }

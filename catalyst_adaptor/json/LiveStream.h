@@ -1,4 +1,4 @@
-// The frames of a run in browsers, as the extractor VDIStream shows them.
+// The stream of a run's frames to browsers, as the extractor VDIStream makes it.
 #pragma once
 
 #include <chrono>
@@ -14,23 +14,23 @@ namespace vdi::catalyst {
 
 class LiveStream {
  public:
-  /// Listens when it returns, and has said on standard error where. Throws Error as Server and givenToken do,
-  /// and Io if the link can't be written.
+  /// Starts the server, which listens when this returns, and prints its address to standard error. Throws
+  /// Error as Server and givenToken do, and Error{Io} if the link can't be written.
   explicit LiveStream(const config::RunStream& options);
-  /// Hands the last frame over before the server ends, and removes the link's file.
+  /// Hands the last frame over before it ends the server, and removes the link's file.
   ~LiveStream();
   LiveStream(const LiveStream&) = delete;
   LiveStream& operator=(const LiveStream&) = delete;
 
-  /// Never waits. Throws Error{Format} once for each new reason why a frame before couldn't be sent.
+  /// Never waits. Throws Error{Format} once for each new reason why an earlier frame couldn't be sent.
   void publish(std::shared_ptr<const Vdi> vdi);
-  /// Frames that viewers never got, for the next one came before they were encoded.
+  /// The number of frames that viewers never got, because the next one came before they were encoded.
   std::uint64_t dropped() const;
 
-  /// What viewers have asked for since this was called last. Waits so long at most; none: nothing, or the run
-  /// lets nobody steer.
+  /// The viewers' request since the last call. Waits for it no longer than `patience`. Nullopt if there is
+  /// none, or the run lets nobody steer.
   std::optional<stream::Request> takeRequest(std::chrono::milliseconds patience);
-  /// What viewers may ask for, and what is in force.
+  /// Tells viewers what they may ask for, and the values in force.
   void setControls(stream::Controls controls);
 
  private:

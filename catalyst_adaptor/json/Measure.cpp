@@ -14,12 +14,12 @@ namespace vdi::catalyst {
 
 namespace {
 
-/// Of the values that have been seen.
+/// Totals over the values seen so far.
 struct Totals {
   double max = -std::numeric_limits<double>::infinity();
   double min = std::numeric_limits<double>::infinity();
-  double sum = 0.0;     // of finite values times volumes
-  double volume = 0.0;  // of finite values
+  double sum = 0.0;     // sum of finite values times their volumes
+  double volume = 0.0;  // total volume of the finite values
 
   void take(double value, double extent) {
     if (std::isnan(value)) return;
@@ -40,13 +40,13 @@ struct Totals {
 template <typename Scalar>
 struct Load {
   double operator()(const std::byte* from) const {
-    Scalar value{};  // which may lie at any address
+    Scalar value{};  // copied, because the source may be unaligned
     std::memcpy(&value, from, sizeof value);
     return static_cast<double>(value);
   }
 };
 
-/// `visit` with an object that loads a value of the type.
+/// Calls `visit` with an object that loads a value of the type.
 template <typename Visit>
 void withLoad(int type, Visit visit) {
   switch (type) {
@@ -75,7 +75,7 @@ void withLoad(int type, Visit visit) {
 
 }  // namespace
 
-/// Goes over the values of a part.
+/// Goes through the values of a part.
 class Sweep {
  public:
   Sweep(const Measure::Part& part, const StridedValues& values, int component)
@@ -88,7 +88,7 @@ class Sweep {
     const std::size_t rows = part_.extents[1].size();
     const std::size_t slices = part_.extents[2].size();
     const std::size_t slice = rows * part_.extents[0].size();
-    constexpr std::size_t values = 100000;  // some 100 us
+    constexpr std::size_t values = 100000;  // these take some 100 us
     inParallel(slices, std::max<std::size_t>(1, values / slice), [&](std::size_t first, std::size_t last) {
       Totals mine;
       for (std::size_t k = first; k < last; ++k) {
@@ -127,12 +127,12 @@ class Sweep {
 
   const Measure::Part& part_;
   const StridedValues& values_;
-  int component_;  // -1: the magnitude of all
+  int component_;  // -1: the magnitude of all components
 };
 
-/// Nothing if it owns no value.
+/// The part of a block; nullopt if it owns no value.
 std::optional<Measure::Part> Measure::partOf(std::size_t index, const Block& block) {
-  constexpr double least = 1e-3;  // of a spacing: what faces that should be one may differ by
+  constexpr double least = 1e-3;  // share of a spacing by which coinciding faces may differ
   Part part;
   part.block = index;
   for (int axis = 0; axis < 3; ++axis) {

@@ -1,4 +1,4 @@
-// What a run's condition is about: the maximum, minimum or mean of a field, of all ranks.
+// The value that a run's condition tests: the maximum, minimum or mean of a field over all ranks.
 #pragma once
 
 #include <array>
@@ -13,21 +13,21 @@
 
 namespace vdi::catalyst {
 
-/// Reads values where they are, whatever their type and order, and copies none. Each place counts once: ghost
-/// layers don't, nor do values that finer blocks cover. In a mean each value counts as much as the volume
-/// that it stands for within what its block owns. A point on a face between two blocks thus counts half in
-/// each.
+/// Reads values of any type and order where they are, and copies none. Each place counts once: ghost layers
+/// and values that finer blocks cover are left out. A mean weights each value by the volume that it stands
+/// for within its block's owned part. So a point on a face between two blocks counts half in each.
 class Measure {
  public:
   explicit Measure(config::RunCondition condition) : condition_(std::move(condition)) {}
   const config::RunCondition& condition() const { return condition_; }
 
-  /// Collective. The maximum or minimum, or the mean for Mean and Change; nothing if no value counts. Throws
+  /// Collective: the maximum or minimum, or the mean for Mean and Change; nullopt if no value counts. Throws
   /// on all ranks as agreeOnCells and Fields::valuesOf do.
   std::optional<double> of(const comm::Communicator& comm, const Fields& fields);
 
  private:
-  /// A part of a block that it owns: along each axis, how much of each value's extent lies in it.
+  /// The part of a block that it owns: along each axis, the length of each value's extent that lies in it, in
+  /// world units.
   struct Part {
     std::size_t block = 0;
     std::array<std::int64_t, 3> first{};  // indices of values
@@ -38,7 +38,7 @@ class Measure {
 
   config::RunCondition condition_;
   std::vector<Part> parts_;
-  std::optional<std::uint64_t> version_;  // of the blocks whose parts these are
+  std::optional<std::uint64_t> version_;  // version of the blocks whose parts these are
   bool cells_ = false;
 
   friend class Sweep;

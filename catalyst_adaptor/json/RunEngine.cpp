@@ -44,7 +44,7 @@ void makeFolderOf(const std::filesystem::path& file) {
   if (error) throw Error(ErrorCode::Io, "can't make the folder: " + error.message(), folder.string());
 }
 
-/// 0 for a device.
+/// The size of a file in bytes; 0 for a device.
 std::uint64_t sizeOfFile(const std::string& file) {
   std::error_code error;
   const std::uintmax_t bytes = std::filesystem::file_size(file, error);
@@ -76,12 +76,12 @@ std::vector<const config::FilePattern*> patternsOf(const config::Run& run) {
 
 }  // namespace
 
-/// What the cameras of a step have in common.
+/// The data that the cameras of a step share.
 struct RunEngine::Frame {
   std::int64_t step = 0;
   double time = 0.0;
   double unitDistance = 1.0;
-  ScalarRange range;  // of the colours, unless the run has one
+  ScalarRange range;  // the colours' range, unless the run has one
   vdi::TimeStamp stamp;
 };
 
@@ -94,7 +94,7 @@ struct RunEngine::State {
     if (run.when) measure.emplace(*run.when);
   }
 
-  /// Collective.
+  /// Collective: makes the device and the generator.
   void start() {
     comm.together([&] { device = gpu::Device::create(gpu::requestFromEnvironment(comm.localRank())); });
     generator = std::make_unique<VdiGenerator>(device, comm::Communicator::fromMpi(fortranCommunicator),
@@ -117,15 +117,15 @@ struct RunEngine::State {
   config::Schedule schedule;
   config::Budget budget;
   std::optional<Measure> measure;
-  std::optional<double> meanNow;            // that decided on the step
-  std::optional<double> meanOfLast;         // frame
+  std::optional<double> meanNow;            // the mean that decided on this step
+  std::optional<double> meanOfLast;         // the mean at the last frame
   std::unique_ptr<runlog::RunLog> log;      // the root's
   std::unique_ptr<LiveStream> stream;       // the root's
   std::unique_ptr<io::CinemaIndex> cinema;  // the root's
   std::optional<RunSteering> steering;
-  std::optional<ScalarRange> firstRange;  // of the colours, unless the run has one
-  std::optional<Frame> frame;             // that the device has
-  bool isAskedFor = false;                // a viewer's view, to be shown at the next step
+  std::optional<ScalarRange> firstRange;  // the colours' range, unless the run has one
+  std::optional<Frame> frame;             // the frame whose values the device has
+  bool isAskedFor = false;                // a viewer waits for a view, which the next step shows
   bool hasToldOfBudget = false;
 };
 
@@ -137,7 +137,7 @@ RunEngine::RunEngine(int fortranCommunicator, config::Run run, std::optional<con
 
 RunEngine::~RunEngine() = default;
 
-/// The root's files and stream.
+/// Opens the root's files and stream.
 void RunEngine::start() {
   State& state = *state_;
   const bool isAnew = run_.existing == config::Existing::Overwrite;
@@ -175,7 +175,7 @@ bool RunEngine::isDue(std::int64_t step, double time) {
   return due;
 }
 
-/// Of a step at which a frame is due.
+/// Whether a due frame is to be made: by its condition and by the share of wall time. Collective.
 bool RunEngine::isToBeMade(const Fields& fields, std::int64_t step, double time) {
   State& state = *state_;
   if (state.measure) {
@@ -188,7 +188,7 @@ bool RunEngine::isToBeMade(const Fields& fields, std::int64_t step, double time)
     } else if (value) {
       holds = condition.holds(*value);
     }
-    // Sums may differ in their last bits.
+    // The ranks' sums may differ in their last bits.
     if (!state.asRootSays(holds)) return false;
   }
   if (!state.budget.isLimited() || state.asRootSays(state.budget.hasRoom(state.elapsed()))) return true;
@@ -215,7 +215,7 @@ void RunEngine::leaveOut(std::int64_t step, double time) {
 void RunEngine::execute(const Fields& fields, Parameters& parameters, std::int64_t step, double time,
                         double waited) {
   State& state = *state_;
-  state.frame.reset();  // values may be others
+  state.frame.reset();  // the values may have changed
   std::exception_ptr failure;
   bool isMade = false;
   try {
@@ -233,7 +233,7 @@ void RunEngine::execute(const Fields& fields, Parameters& parameters, std::int64
   if (state.steering) state.steering->requireLogged();
 }
 
-/// Where it is for the stream alone, the first camera's.
+/// Makes the frames of all cameras, or of the first one alone if they are for the stream only.
 void RunEngine::makeAll(const Fields& fields, std::int64_t step, double time, double waited,
                         bool isForFiles) {
   State& state = *state_;
@@ -247,7 +247,7 @@ void RunEngine::makeAll(const Fields& fields, std::int64_t step, double time, do
     std::exception_ptr failure;
     try {
       makeOne(fields, step, time, camera, isForFiles, frame);
-    } catch (const std::exception& error) {  // on all ranks, but with another exception on each
+    } catch (const std::exception& error) {  // thrown on all ranks, but not the same exception on each
       failure = std::current_exception();
       frame = recordOf(step, time, camera);
       frame.error = error.what();
@@ -259,7 +259,7 @@ void RunEngine::makeAll(const Fields& fields, std::int64_t step, double time, do
     }
     waits.clear();
     if (!first) first = failure;
-    if (!state.frame || !isForFiles) break;  // other cameras would fail as well
+    if (!state.frame || !isForFiles) break;  // other cameras would fail, too
   }
   state.budget.spend(std::chrono::duration<double>(Clock::now() - begin).count());
   if (isForFiles && !first) state.meanOfLast = state.meanNow;
@@ -273,7 +273,7 @@ void RunEngine::makeAll(const Fields& fields, std::int64_t step, double time, do
   if (first) std::rethrow_exception(first);
 }
 
-/// Collective, if the run has a log. Throws the failure, or the log's.
+/// Logs a frame. Collective if the run has a log. Rethrows `failure`, or throws the log's error.
 void RunEngine::record(runlog::FrameRecord& frame, const std::exception_ptr& failure,
                        const std::vector<double>& waits, Clock::time_point start) {
   if (!run_.log.any()) {
@@ -297,7 +297,7 @@ void RunEngine::record(runlog::FrameRecord& frame, const std::exception_ptr& fai
   });
 }
 
-/// What viewers ask for. While the simulation is to wait, a VDI for each view that they ask for.
+/// Takes the viewers' requests. While they pause the simulation, makes a VDI for each view that they ask for.
 void RunEngine::steer(const Fields& fields, Parameters& parameters, std::int64_t step, double time) {
   State& state = *state_;
   const Steered steered{run_, map_, state.schedule, state.firstRange, parameters};
@@ -321,7 +321,7 @@ void RunEngine::finish() {
   });
 }
 
-/// Collective: of each rank, on the root alone.
+/// Collective: returns each rank's time in milliseconds on the root, and nothing on other ranks.
 std::vector<double> RunEngine::millisecondsOfRanks(double seconds) const {
   const double milliseconds = 1e3 * seconds;
   const comm::Gathered all =
@@ -331,13 +331,13 @@ std::vector<double> RunEngine::millisecondsOfRanks(double seconds) const {
   return ranks;
 }
 
-/// Once more with another device if the first one was lost.
+/// Runs `work`, and runs it once more with another device if the first one was lost.
 template <typename Work>
 void RunEngine::tryTwice(Work work) {
   std::exception_ptr failure;
   try {
     work();
-  } catch (...) {  // on all ranks, but with another exception on each
+  } catch (...) {  // thrown on all ranks, but not the same exception on each
     failure = std::current_exception();
   }
   if (!failure) return;
@@ -407,7 +407,7 @@ void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog
   const bool isStreamed = run_.stream && &camera == run_.cameras.data();
   if (isForFiles && !run_.makesPictures() && !isStreamed) {
     if (!run_.vdi) return;
-    // No rank ever has the whole VDI.
+    // The ranks write the file together, so that no rank ever has the whole VDI.
     const std::filesystem::path file = run_.vdi->path(frame.step, camera.name);
     generator.write(file, from, function, run_.settings, frame.stamp);
     state.comm.together([&] {
@@ -428,7 +428,7 @@ void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog
   });
 }
 
-/// On the root, which has the VDI. What it takes is output, too.
+/// Saves and streams the VDI on the root, which has it. The time that it takes counts as output.
 void RunEngine::save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record) {
   const auto start = Clock::now();
   std::vector<RankReport> reports = state_->generator->reports();
@@ -448,7 +448,7 @@ void RunEngine::save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, 
   runlog::setReports(record, reports);
 }
 
-/// On the root.
+/// Writes the pictures. Called on the root.
 void RunEngine::writePictures(const Vdi& vdi, const config::RunCamera& camera, runlog::FrameRecord& record) {
   const auto picture = io::toPicture(flatten(vdi));
   if (run_.png) {
@@ -465,7 +465,7 @@ void RunEngine::writePictures(const Vdi& vdi, const config::RunCamera& camera, r
                        file.lexically_relative(run_.cinema->folder).generic_string()});
 }
 
-/// On the root: links to the step's files.
+/// Links the names of the latest files to the step's files. Called on the root.
 void RunEngine::noteLatest(const config::RunCamera& camera) const {
   if (!run_.latest) return;
   const std::string name = camera.name.empty() ? "latest" : "latest_" + camera.name;

@@ -1,4 +1,4 @@
-// Makes what a run asks for (vdi/config/Run.h) by vdi/pipeline, without ParaView and Python.
+// Carries out a run (vdi/config/Run.h) with vdi/pipeline, without ParaView and Python.
 #pragma once
 
 #include <chrono>
@@ -17,28 +17,27 @@
 
 namespace vdi::catalyst {
 
-/// All functions that don't say otherwise are collective. When one throws, it does so on all ranks, with
-/// Error{RemoteRank} or std::runtime_error where another rank has more to tell, and the next frame is tried
-/// anew.
+/// All functions are collective unless their comments say otherwise. When one throws, it throws on all ranks,
+/// with Error{RemoteRank} or std::runtime_error if another rank reports more. The next frame is tried anew.
 class RunEngine {
  public:
-  /// `map` is that of the colours' file, if the run names one. Finds the device, and starts the stream on the
-  /// first rank, so that what is wrong with either is known before the first step.
+  /// `map` comes from the colours' file, if the run names one. The constructor finds the device, and starts
+  /// the stream on the first rank, so that errors of either are known before the first step.
   RunEngine(int fortranCommunicator, config::Run run, std::optional<config::ColorMap> map);
   /// Hands the last frame over to the stream.
   ~RunEngine();
   RunEngine(const RunEngine&) = delete;
   RunEngine& operator=(const RunEngine&) = delete;
 
-  /// Whether the step may have a frame: what is due can be told here, what the data decide can't. Where only
-  /// the first rank can tell, the others answer no. Not collective.
+  /// Whether the step may have a frame. This depends on the schedule, but not on conditions on the data. If
+  /// only the first rank can tell, the others return false. Not collective.
   bool wants(std::int64_t step, double time) const;
-  /// Whether execute has anything to do at the step, equal on all ranks. Not collective.
+  /// Whether `execute` has anything to do at the step; equal on all ranks. Not collective.
   bool mayExecute(std::int64_t step, double time) const;
-  /// Makes the step's frames, if any, from the fields as they are now, and takes what viewers ask for.
-  /// `waited` is how many seconds this rank has waited for the others to begin the step.
+  /// Makes the step's frames, if any, from the current fields, and takes the viewers' requests. `waited` is
+  /// the time in seconds that this rank has waited for the others to begin the step.
   void execute(const Fields& fields, Parameters& parameters, std::int64_t step, double time, double waited);
-  /// Ends the log. No more frames.
+  /// Ends the log. No frames may follow.
   void finish();
 
  private:

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::chrono::milliseconds waitingPause{50};
 
-/// Another range for nodes that stand at values of the old one, as ParaView rescales functions.
+/// Moves nodes from the old range to another one, as ParaView rescales functions.
 void rescale(std::vector<OpacityNode>& nodes, const std::array<double, 2>& range) {
   if (nodes.empty()) return;
   const double first = nodes.front().x;
@@ -67,7 +67,7 @@ void RunSteering::apply(const stream::Wish& wish, const Steered& steered) {
     run.settings.height = (*wish.resolution)[1];
   }
   if (wish.supersegments) run.settings.supersegments = static_cast<std::uint32_t>(*wish.supersegments);
-  if (wish.preset) {  // the range stays, and opacities that the run names do
+  if (wish.preset) {  // keeps the range, and opacities that the run names
     if (!run.colors.range) run.colors.range = steered.range;
     run.colors.preset = *wish.preset;
     run.colors.file.clear();
@@ -82,7 +82,7 @@ void RunSteering::apply(const stream::Wish& wish, const Steered& steered) {
   isPaused_ = wish.paused.value_or(isPaused_);
 }
 
-/// On the first rank.
+/// Reports a request. Called on the first rank.
 void RunSteering::tell(const stream::Request& request, const std::string& log, std::int64_t step,
                        double time) {
   fmt::print(stderr, "vdi_catalyst: step {}: {} (viewer {})\n", step, stream::summaryOf(request.wish),
@@ -90,7 +90,7 @@ void RunSteering::tell(const stream::Request& request, const std::string& log, s
   if (log.empty()) return;
   try {
     appendLine(log, stream::logEntryOf(request, step, time));
-  } catch (const Error&) {  // told when no other rank waits for this one
+  } catch (const Error&) {  // reported at the end, when no other rank waits for this one
     trouble_ = std::current_exception();
   }
 }
@@ -111,7 +111,7 @@ bool RunSteering::take(const Steered& steered, std::int64_t step, double time) {
     if (stream_ != nullptr) {
       request = stream_->takeRequest(patience);
     } else {
-      std::this_thread::sleep_for(patience);  // a broadcast would take all of a core while it waits
+      std::this_thread::sleep_for(patience);  // a broadcast would busy a core while it waits
     }
     const std::string own = request ? stream::textOf(request->wish) : "";
     const auto* const bytes = reinterpret_cast<const std::byte*>(own.data());

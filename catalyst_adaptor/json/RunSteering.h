@@ -1,4 +1,4 @@
-// What viewers of a run's stream ask for, on all ranks after the same step.
+// Applies the requests of a stream's viewers on all ranks, after the same step.
 #pragma once
 
 #include <chrono>
@@ -17,22 +17,22 @@
 
 namespace vdi::catalyst {
 
-/// What viewers change: parts of the engine, equal on all ranks.
+/// The parts of the engine that viewers change, equal on all ranks.
 struct Steered {
   config::Run& run;
   std::optional<config::ColorMap>& map;
   config::Schedule& schedule;
-  const std::optional<ScalarRange>& range;  // of the colours where the run has none
+  const std::optional<ScalarRange>& range;  // range of the colours if the run has none
   Parameters& parameters;
 };
 
 class RunSteering {
  public:
-  /// `stream` is the first rank's, null on the others; both must outlive it.
+  /// `stream` is null on all ranks but the first. Both arguments must outlive this object.
   RunSteering(const comm::Communicator& comm, LiveStream* stream) : comm_(comm), stream_(stream) {}
 
-  /// Collective: applies what viewers have asked for since this was called last, waiting for it where the
-  /// simulation is to wait, and logs it as of this step. Returns whether the VDI is another one now.
+  /// Collective: applies the viewers' requests since the last call, and logs them with this step. While
+  /// viewers pause the simulation, it waits for more. Returns whether a request changes the VDI.
   bool take(const Steered& steered, std::int64_t step, double time);
   /// Collective: throws Error{Io} on all ranks if a line of the log couldn't be written since the last call.
   void requireLogged();
@@ -46,7 +46,7 @@ class RunSteering {
   const comm::Communicator& comm_;
   LiveStream* stream_;
   bool isPaused_ = false;
-  std::exception_ptr trouble_;  // of the log
+  std::exception_ptr trouble_;  // an error of the log
 };
 
 }  // namespace vdi::catalyst

@@ -1,10 +1,10 @@
-! Two phases that part, after Allen and Cahn, in Fortran with halos: d phi / dt = laplacian(phi) +
-! phi - phi**3, periodic.
+! Separation of two phases, after Allen and Cahn, in Fortran with halos: d phi / dt =
+! laplacian(phi) + phi - phi**3, periodic.
 !
 !     mpirun -n 4 phases [vdi.json]
 !
-! Writes phases.raw, the last phi. Without vdi.json nothing is drawn, and the result is the same,
-! bit by bit.
+! The program writes the last phi to phases.raw. Without vdi.json it draws nothing, and the result
+! has the same bits.
 program phases
   use, intrinsic :: iso_c_binding
   use mpi_f08
@@ -27,8 +27,8 @@ program phases
   call find_place()
   first = n * place / parts
   cells = n * (place + 1) / parts - first
-  ! Two layers of halo all around, and a padded first dimension, as codes have it for aligned
-  ! columns.
+  ! The array has two layers of halo all around, and a padded first dimension, as codes have it
+  ! for aligned columns.
   allocate(phi(1 - halo:cells(1) + halo + padding, 1 - halo:cells(2) + halo, &
                1 - halo:cells(3) + halo))
   allocate(rate(cells(1), cells(2), cells(3)))
@@ -64,8 +64,8 @@ contains
     call mpi_cart_coords(grid, rank, 3, place)
   end subroutine
 
-  ! The inside of phi, in place: its first value's address, and how many bytes the next one lies
-  ! apart on each axis.
+  ! Hands over the inside of phi in place: the address of its first value, and the distance in bytes
+  ! to the next value on each axis.
   subroutine hand_over()
     type(vdi_catalyst_block) :: block
     type(vdi_catalyst_strides) :: strides
@@ -83,7 +83,7 @@ contains
                                                     [c_loc(phi(1, 1, 1))], [strides]))
   end subroutine
 
-  ! Axis by axis; edges and corners aren't needed by this stencil, so they are left.
+  ! Exchanges halos axis by axis. The stencil needs no edges and corners, so these are left out.
   subroutine exchange()
     integer :: axis, below, above
     type(mpi_datatype) :: face
@@ -98,7 +98,7 @@ contains
     end do
   end subroutine
 
-  ! The layers from `from` on to the rank `to`, and its other neighbour's to those from `into` on.
+  ! Sends the layers from `from` on to the rank `to`, and receives those from `into` on of `source`.
   subroutine send(axis, from, to, into, source, face)
     integer, intent(in) :: axis, from, to, into, source
     type(mpi_datatype), intent(in) :: face
@@ -109,7 +109,7 @@ contains
                       phi(b(1), b(2), b(3)), 1, face, source, axis, grid, mpi_status_ignore)
   end subroutine
 
-  ! From -0.1 to 0.1, the same whichever rank has the cell.
+  ! A number from -0.1 to 0.1, the same on whichever rank has the cell.
   pure function noise(x, y, z) result(value)
     integer, intent(in) :: x, y, z
     real(c_double) :: value

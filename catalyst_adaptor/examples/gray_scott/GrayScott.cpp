@@ -22,9 +22,9 @@ struct Options {
   std::vector<std::string> scripts;
 };
 
-/// The blocks of this rank as the adaptor takes them: cell data with one layer of ghost cells all around,
-/// except at the faces of the domain, where periodic neighbours aren't neighbours in space. The halo is there
-/// all the same, so the ghost layer is announced and merely lies outside.
+/// The blocks of this rank as the adaptor takes them: cell data with one layer of ghost cells all around. At
+/// the faces of the domain, periodic neighbours aren't neighbours in space. The halo exists there, too, so
+/// the ghost layer is announced and merely lies outside.
 std::vector<vdi_catalyst_block> describe(const gray_scott::Simulation& simulation, int size) {
   std::vector<vdi_catalyst_block> blocks;
   const int n = simulation.cellsPerBlock();
@@ -43,7 +43,7 @@ std::vector<vdi_catalyst_block> describe(const gray_scott::Simulation& simulatio
   return blocks;
 }
 
-/// F and k are viewers' to change, where a script lets them.
+/// Takes F and k from viewers, if a script lets them change these.
 void takeRates(vdi_catalyst* catalyst, const gray_scott::Parameters& given,
                gray_scott::Simulation& simulation) {
   const double feed = vdi_catalyst_parameter_f64(catalyst, "feed", given.feed, 0.0, largestRate);
@@ -122,7 +122,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     result = rank == 0 ? app.exit(error) : static_cast<int>(error.get_exit_code());
   } catch (const std::exception& error) {
-    // Thrown for its arguments, which are equal on all ranks.
+    // The simulation throws for its arguments, which are equal on all ranks.
     if (rank == 0) std::fprintf(stderr, "gray_scott: %s\n", error.what());
     result = 2;
   }

@@ -134,8 +134,8 @@ int Simulation::ownerOf(const std::array<int, 3>& at) const {
   return owners_[static_cast<std::size_t>(indexOf(at))];
 }
 
-/// One axis after the other, each time with the halo of the axes before: edges and corners arrive by way of
-/// faces.
+/// Exchanges one axis after the other, each with the halo of the axes before, so that edges and corners
+/// arrive through faces.
 void Simulation::exchangeHalos() {
   for (int axis = 0; axis < 3; ++axis) exchangeAxis(axis);
 }
@@ -146,7 +146,7 @@ void Simulation::exchangeAxis(int axis) {
   std::vector<std::pair<Block*, Face>> recipients;
   std::vector<MPI_Request> requests;
   const std::size_t maximum = blocks_.size() * 2;
-  out.reserve(maximum);  // the addresses that MPI was given must hold
+  out.reserve(maximum);  // MPI's addresses must stay valid
   in.reserve(maximum);
   for (Block& block : blocks_) {
     for (const bool above : {false, true}) {
@@ -159,7 +159,7 @@ void Simulation::exchangeAxis(int axis) {
         unpack(blocks_[static_cast<std::size_t>(localNeighbour)], {axis, !above}, values.data());
         continue;
       }
-      // A message is known by the block that it goes to and the side of that block.
+      // The target block and its side identify a message.
       const int size = static_cast<int>(values.size());
       out.push_back(std::move(values));
       in.emplace_back(out.back().size());

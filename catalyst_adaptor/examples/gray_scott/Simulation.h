@@ -30,14 +30,14 @@ struct Block {
   std::vector<float> nextV;
 };
 
-/// Blocks are numbered along a Morton curve and dealt to the ranks one after the other, so each rank's region
-/// is scattered all over the domain: far from convex, as decompositions that balance load are.
+/// The simulation numbers blocks along a Morton curve, and deals them to the ranks one after the other. So
+/// each rank's region is scattered all over the domain, far from convex, as after load balancing.
 class Simulation {
  public:
   Simulation(MPI_Comm comm, const Parameters& parameters);
 
   void step();
-  /// From the next step on. The same on all ranks.
+  /// Sets rates from the next step on. They must be the same on all ranks.
   void setRates(double feed, double kill);
 
   int cellsPerBlock() const { return n_; }  // per axis, without halo
@@ -67,8 +67,8 @@ class Simulation {
   Parameters parameters_;
   int n_;
   int rank_ = 0;
-  std::vector<int> owners_;      // of all blocks
-  std::vector<int> localIndex_;  // of all blocks; -1: another rank's
+  std::vector<int> owners_;      // by block
+  std::vector<int> localIndex_;  // by block; -1: another rank's
   std::vector<Block> blocks_;
 };
 

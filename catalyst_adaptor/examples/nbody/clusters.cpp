@@ -2,10 +2,10 @@
 //
 //     mpirun -n 4 clusters [vdi.json]
 //
-// Writes clusters.raw, the last positions. Without vdi.json nothing is drawn, and the result is the
-// same, bit by bit. The adaptor takes values on lattices and no particles, so this program spreads
-// the stars' mass over cells itself (cloud in cell), each rank over a slab of its own that has
-// nothing to do with the stars it moves.
+// The program writes the last positions to clusters.raw. Without vdi.json it draws nothing, and the
+// result has the same bits. The adaptor takes values on lattices and no particles, so this program
+// spreads the stars' mass over cells itself (cloud in cell). Each rank does so for a slab of its own,
+// which is independent of the stars that it moves.
 #include <mpi.h>
 
 #include <array>
@@ -27,7 +27,7 @@ constexpr double mass = 1.0 / stars;
 
 using Vector = std::array<double, 3>;
 
-/// From -1 to 1, the same numbers on all ranks and all machines.
+/// Numbers from -1 to 1, the same on all ranks and all machines.
 double random() {
   static std::uint64_t state = 1;
   state = state * 6364136223846793005U + 1442695040888963407U;
@@ -47,8 +47,7 @@ void place(std::vector<Vector>& positions, std::vector<Vector>& velocities) {
   }
 }
 
-/// In the stars' order, whichever rank sums, so that the last bits are the same on any number of
-/// ranks.
+/// Sums in the stars' order on every rank, so that the last bits are the same on any number of ranks.
 Vector acceleration(const std::vector<Vector>& positions, const Vector& at) {
   Vector sum{};
   for (const Vector& other : positions) {
@@ -60,14 +59,14 @@ Vector acceleration(const std::vector<Vector>& positions, const Vector& at) {
   return sum;
 }
 
-/// The mass per volume in layers [first, last) of the lattice. All stars are known here. A code
-/// whose ranks know only their own adds the others' shares: MPI_Reduce_scatter of the lattice, or
-/// messages.
+/// Computes the mass per volume in layers [first, last) of the lattice. Each rank knows all stars
+/// here. If ranks know only their own stars, they must add the others' shares, by
+/// MPI_Reduce_scatter of the lattice or by messages.
 void deposit(const std::vector<Vector>& positions, int first, int last, std::vector<double>& density) {
   density.assign(static_cast<std::size_t>(cells) * cells * static_cast<std::size_t>(last - first), 0.0);
   for (const Vector& position : positions) {
     std::array<int, 3> cell{};
-    Vector share{};  // of the cell above
+    Vector share{};  // share of the upper cell
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double at = (position[axis] + size / 2) / spacing - 0.5;
       cell[axis] = static_cast<int>(std::floor(at));
@@ -95,7 +94,7 @@ int main(int argc, char** argv) {
   int ranks = 1;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
-  std::vector<int> counts;  // numbers of each rank: 3 a star
+  std::vector<int> counts;  // each rank's count of numbers: 3 a star
   std::vector<int> starts;
   for (int i = 0; i < ranks; ++i) {
     starts.push_back(3 * (stars * i / ranks));

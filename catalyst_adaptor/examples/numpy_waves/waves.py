@@ -1,9 +1,9 @@
-"""Sound that a slow sphere bends: the wave equation in NumPy, on slabs of z, one a rank.
+"""Refraction of sound by a slow sphere: the wave equation in NumPy, on slabs of z, one a rank.
 
     mpirun -n 4 python3 waves.py [vdi.json]
 
-Writes waves.npy, the last pressure. Without vdi.json nothing is drawn, and the result is the same,
-bit by bit.
+The program writes the last pressure to waves.npy. Without vdi.json it draws nothing, and the result
+has the same bits.
 """
 
 import sys
@@ -19,7 +19,7 @@ INSIDE = (slice(1, -1),) * 3
 
 
 def exchange(field):
-    """Fills the outer layers in z with the neighbours'; the others stay 0: walls."""
+    """Fills the outer layers in z with the neighbours' values; the others stay 0, as walls."""
     below = RANK - 1 if RANK > 0 else MPI.PROC_NULL
     above = RANK + 1 if RANK + 1 < RANKS else MPI.PROC_NULL
     COMM.Sendrecv(field[1], below, recvbuf=field[-1], source=above)

@@ -1,10 +1,10 @@
-/* A drop that a vortex carries around, on p4est's octree with a value per leaf, finer in the drop.
+/* Transport of a drop by a vortex, on p4est's octree with a value per leaf, finer in the drop.
  *
  *     mpirun -n 4 tracer LEVELS [vdi.json]   the finest leaves are 1 / 2^LEVELS wide, say 5
  *
- * Writes tracer.raw, the amounts of the last leaves in p4est's order. Without vdi.json nothing is
- * drawn, and the result is the same, bit by bit. Amounts are whole numbers of tiny portions, so none
- * is lost, and sums don't depend on the order in which p4est visits faces. */
+ * The program writes the amounts of the last leaves to tracer.raw, in p4est's order. Without vdi.json
+ * it draws nothing, and the result has the same bits. Amounts are whole numbers of tiny portions, so
+ * none is lost, and sums don't depend on the order in which p4est visits faces. */
 #include <math.h>
 #include <p8est_bits.h>
 #include <p8est_extended.h>
@@ -42,7 +42,7 @@ static void fill(p8est_t* forest, p4est_topidx_t tree, p8est_quadrant_t* q) {
   *(Leaf*)q->p.user_data = leaf;
 }
 
-/* Shares and sums: what doesn't divide by 8 goes to the first children. */
+/* Divides an amount among children, or sums theirs. The remainder by 8 goes to the first children. */
 static void pass_on(p8est_t* forest, p4est_topidx_t tree, int before, p8est_quadrant_t* old[], int after,
                     p8est_quadrant_t* new[]) {
   (void)forest, (void)tree;
@@ -72,10 +72,10 @@ static void adapt(p8est_t* forest) {
   p8est_coarsen_ext(forest, 0, 0, are_empty, NULL, pass_on);
   p8est_balance_ext(forest, P8EST_CONNECT_FULL, NULL, pass_on);
   p8est_partition(forest, 1,
-                  NULL); /* 1: siblings stay on one rank, or ranks would decide what is coarsened */
+                  NULL); /* 1: siblings stay on one rank, so that coarsening doesn't depend on ranks */
 }
 
-/* What passes through one face, upwind, between a leaf and one leaf or four on its other side. */
+/* Computes the upwind flow through one face, between a leaf and one leaf or four on its other side. */
 static void flow(p8est_iter_face_info_t* info, void* ghosts) {
   if (info->sides.elem_count < 2) return; /* a wall */
   const p8est_iter_face_side_t* sides = (const p8est_iter_face_side_t*)info->sides.array;

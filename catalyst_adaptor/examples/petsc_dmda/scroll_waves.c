@@ -4,9 +4,9 @@
  *
  *     mpirun -n 4 scroll_waves [vdi.json] [PETSc's options, such as -da_grid_x 64]
  *
- * Writes scroll_waves.bin, the last u and v. Without vdi.json nothing is drawn, and the result is
- * the same, bit by bit. A code that solves by TS calls vdi_catalyst_execute in the function that it
- * gives TSMonitorSet. */
+ * The program writes the last u and v to scroll_waves.bin. Without vdi.json it draws nothing, and the
+ * result has the same bits. A code that solves by TS calls vdi_catalyst_execute in the function that
+ * it gives TSMonitorSet. */
 #include <math.h>
 #include <petscdmda.h>
 
@@ -24,7 +24,8 @@ static void start(const DMDALocalInfo* box, Cell*** next) {
   for (int z = box->zs; z < box->zs + box->zm; ++z) {
     for (int y = box->ys; y < box->ys + box->ym; ++y) {
       for (int x = box->xs; x < box->xs + box->xm; ++x) {
-        /* Excited on one side and tired below: the front's edge curls. It is askew: the scroll bends. */
+        /* The medium is excited on one side and refractory below, so the front's edge curls. The front
+         * is askew, so the scroll bends. */
         next[z][y][x].u = 4 * x + z < 3 * box->mx - box->mx / 2 ? 1.0 : 0.0;
         next[z][y][x].v = 2 * y < box->my ? 0.4 : 0.0;
       }
@@ -49,8 +50,8 @@ static void advance(const DMDALocalInfo* box, Cell*** now, Cell*** next) {
   }
 }
 
-/* Both unknowns, as they lie in the local vector: interleaved, and with ghosts around, which aren't
- * handed over. PETSc sets no corners of a star's ghosts; the adaptor asks the neighbours itself. */
+/* Hands over both unknowns in place in the local vector: interleaved, and without the ghosts around
+ * them. PETSc sets no corners of a star's ghosts; the adaptor asks the neighbours itself. */
 static int hand_over(vdi_catalyst* vdi, const DMDALocalInfo* box, Cell*** now) {
   const int type = sizeof(PetscReal) == sizeof(double) ? VDI_CATALYST_F64 : VDI_CATALYST_F32;
   const vdi_catalyst_block block = {{box->xm, box->ym, box->zm},
@@ -83,7 +84,7 @@ int main(int argc, char** argv) {
   PetscCall(DMDAGetLocalInfo(grid, &box));
   PetscCall(DMCreateGlobalVector(grid, &global));
   PetscCall(DMCreateLocalVector(grid, &local));
-  PetscCall(VecSet(local, NAN)); /* corners stay so, and would be seen */
+  PetscCall(VecSet(local, NAN)); /* corners keep NAN, which would show */
   PetscCall(DMDAVecGetArray(grid, local, &now));
 
   vdi_catalyst* vdi = NULL;
