@@ -15,7 +15,7 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-/// Of daylight, D65.
+/// The white point of daylight, D65.
 constexpr glm::dvec3 white{0.9505, 1.0, 1.089};
 
 double toLinear(double c) {
@@ -35,7 +35,7 @@ glm::dvec3 toLab(const glm::dvec3& rgb) {
   return {116.0 * f(share.y) - 16.0, 500.0 * (f(share.x) - f(share.y)), 200.0 * (f(share.y) - f(share.z))};
 }
 
-/// Colours that are too bright for the screen are darkened, as VTK does.
+/// The sRGB colour of a CIELAB one. As VTK does, it darkens colours that are too bright for the screen.
 glm::dvec3 fromLab(const glm::dvec3& lab) {
   const double y = (lab.x + 16.0) / 116.0;
   const auto inverse = [](double t) { return t * t * t > 0.008856 ? t * t * t : (t - 16.0 / 116.0) / 7.787; };
@@ -70,7 +70,7 @@ glm::dvec3 fromMsh(const Msh& msh) {
                   msh.m * std::sin(msh.s) * std::sin(msh.h)});
 }
 
-/// The hue that an unsaturated colour of magnitude `m` needs for the path to `saturated` to look straight.
+/// The hue that an unsaturated colour of magnitude `m` needs for a straight-looking path to `saturated`.
 double hueTowards(const Msh& saturated, double m) {
   if (saturated.m >= m - 0.1) return saturated.h;
   const double spin =
@@ -85,7 +85,7 @@ glm::dvec3 divergingBetween(const glm::dvec3& first, const glm::dvec3& last, dou
   double apart = std::abs(a.h - b.h);
   while (apart > 2.0 * pi) apart -= 2.0 * pi;
   if (apart > pi) apart = 2.0 * pi - apart;
-  if (a.s > grey && b.s > grey && apart > 0.33 * pi) {  // white, or nearly, lies between different hues
+  if (a.s > grey && b.s > grey && apart > 0.33 * pi) {  // white or nearly white lies between different hues
     const double middle = std::max({a.m, b.m, 88.0});
     if (share < 0.5) {
       b = {middle, 0.0, 0.0};
@@ -146,7 +146,7 @@ glm::dvec3 between(Space space, const glm::dvec3& first, const glm::dvec3& last,
   return glm::mix(first, last, share);
 }
 
-/// The nodes of a map in that space as those of one that is linear in RGB.
+/// The nodes of a map in that space, converted to a map that is linear in RGB.
 std::vector<ColorNode> straightened(const std::vector<ColorNode>& nodes, Space space) {
   if (space == Space::Rgb) return nodes;
   constexpr std::size_t inAll = 8192;

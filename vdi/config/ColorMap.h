@@ -11,24 +11,27 @@
 
 namespace vdi::config {
 
-/// Straight lines between nodes, whose x ascend. Colours of a map that isn't linear in RGB are sampled.
+/// A piecewise linear map between nodes in ascending order of x. Colours of a map that isn't linear in RGB
+/// are sampled.
 struct ColorMap {
   std::vector<ColorNode> colors;       // at least two, not all at the same x
-  std::vector<OpacityNode> opacities;  // as many, or none where the preset has no opacities
+  std::vector<OpacityNode> opacities;  // at least two, or none if the preset has no opacities
 };
 
-/// Presets may be many in a file, and have a node for each of 256 colours.
+/// The limits of a preset file, which may have many presets with a node for each of 256 colours.
 inline constexpr JsonLimits presetLimits{
     .bytes = std::size_t{16} << 20, .depth = 16, .values = std::size_t{1} << 20};
 
-/// The preset of that name, or the file's only one if `name` is empty. Throws Error{Format}, with the place,
-/// for what isn't a preset, one of categories, and a colour space other than RGB, HSV, Lab, Diverging, Step.
+/// The preset of that name, or the file's only one if `name` is empty. Throws Error{Format} with the place
+/// for JSON that isn't a preset, a preset of categories, and a colour space other than RGB, HSV, Lab,
+/// Diverging and Step.
 ColorMap colorMapOf(std::string_view text, const std::string& file, const std::string& name);
 
 /// ParaView's "Cool to Warm", over [0, 1].
 ColorMap coolToWarm();
 
-/// The map with its first and last colour at the ends of `range`, which has a width; opacities likewise.
+/// The map with its first and last nodes, of colours and of opacities, moved to the ends of `range`, which
+/// has a width.
 ColorMap rescaled(ColorMap map, const ScalarRange& range);
 
 }  // namespace vdi::config

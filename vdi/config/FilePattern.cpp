@@ -24,7 +24,7 @@ int digitsOf(const std::string& format) {
   return static_cast<int>(digits);
 }
 
-/// The number that the text is; nothing for what isn't one, or has too many digits for a step.
+/// The text as a number; nullopt if it isn't one, or has too many digits for a step.
 std::optional<std::int64_t> stepOf(std::string_view text) {
   constexpr std::size_t mostDigits = 18;
   const std::size_t start = std::min(text.find_first_not_of('0'), text.size());
@@ -53,7 +53,7 @@ FilePattern::FilePattern(const std::string& text) : text_(text) {
     throw std::invalid_argument("isn't a file's name");
 }
 
-/// What stands before the step's number, and after it.
+/// The text before the step's number, and the text after it.
 std::pair<std::string, std::string> FilePattern::around(const std::string& camera) const {
   std::string text = text_;
   const std::size_t mark = text.find(cameraMark);
@@ -80,7 +80,7 @@ std::filesystem::path FilePattern::path(std::int64_t step, const std::string& ca
 }
 
 std::optional<std::filesystem::path> FilePattern::firstExisting(const std::string& camera) const {
-  // The step may be in a folder's name: the part of the path with the number is searched for.
+  // The step may be in a folder's name, so this searches for the part of the path with the number.
   const auto [front, back] = around(camera);
   const std::size_t slash = front.find_last_of('/');
   const std::string folder = slash == std::string::npos ? "." : front.substr(0, slash + 1);

@@ -1,4 +1,4 @@
-// Names of the files of a run's frames.
+// The pattern of the names of a run's files.
 #pragma once
 
 #include <cstdint>
@@ -9,19 +9,20 @@
 
 namespace vdi::config {
 
-/// A file's name with the step's number in it, as ParaView's extractors have it: "{timestep}", or
-/// "{timestep:06d}" for six digits at least. "{camera}" stands for a camera's name; where it is missing,
-/// names of cameras stand before the extension, after "_".
+/// A file's name with the step's number in it, in the syntax of ParaView's extractors: "{timestep}", or
+/// "{timestep:06d}" for at least six digits. "{camera}" stands for a camera's name. Without it, the camera's
+/// name stands before the extension, after "_".
 class FilePattern {
  public:
-  /// Throws std::invalid_argument with the reason: not just one number, other braces, no file's name.
+  /// Throws std::invalid_argument with the reason if there isn't exactly one number, there are other braces,
+  /// or the path has no file's name.
   explicit FilePattern(const std::string& text);
 
   bool namesCamera() const { return text_.find(cameraMark) != std::string::npos; }
-  /// `camera` is empty for a run's only one, which then has no name in the pattern either.
+  /// `camera` is empty for the run's only camera, whose name the pattern then lacks, too.
   std::filesystem::path path(std::int64_t step, const std::string& camera = "") const;
-  /// Of the files of this camera that exist, the one of the lowest step. Links, devices and folders of such a
-  /// name count. What lies in a folder that can't be read doesn't.
+  /// The existing file of this camera with the lowest step. Links, devices and folders with such names count.
+  /// Files in an unreadable folder don't.
   std::optional<std::filesystem::path> firstExisting(const std::string& camera = "") const;
 
  private:
@@ -29,7 +30,7 @@ class FilePattern {
   std::pair<std::string, std::string> around(const std::string& camera) const;
   std::string numberOf(std::int64_t step) const;
 
-  std::string text_;  // all of it
+  std::string text_;  // the whole pattern
   int digits_ = 1;
 };
 

@@ -28,19 +28,19 @@ namespace {
 
 constexpr std::size_t longestQuote = 60;
 
-/// What a message can show of a text.
+/// The part of a text that fits a message.
 std::string inQuotes(const std::string& text) {
   return "'" + (text.size() <= longestQuote ? text : text.substr(0, longestQuote) + "...") + "'";
 }
 
-/// The message is one line, whatever the document has in its texts.
+/// Throws an error whose message is one line, whatever texts the document has.
 [[noreturn]] void failAt(const std::string& document, std::size_t line, std::string what) {
   std::replace_if(
       what.begin(), what.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, '?');
   throw Error(ErrorCode::Format, what, fmt::format("{}, line {}", document, line));
 }
 
-/// Characters of a text; tells how many the parser has taken.
+/// An iterator over the characters of a text, which tells how many the parser has taken.
 class Characters {
  public:
   using iterator_category = std::input_iterator_tag;
@@ -100,7 +100,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
   bool parse_error(std::size_t, const std::string&, const nlohmann::json::exception& error) override {
-    // After "[json.exception...] parse error at line 1, column 2: ", which names the place once more.
+    // Drops "[json.exception...] parse error at line 1, column 2: ", which repeats the place.
     std::string what = error.what();
     const std::size_t start = what.find(": ");
     if (start != std::string::npos) what.erase(0, start + 2);
@@ -166,7 +166,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   std::size_t line_ = 1;
   std::size_t values_ = 0;
   std::vector<JsonNode> open_;
-  std::vector<std::set<std::string>> names_;  // so far, of each that is open
+  std::vector<std::set<std::string>> names_;  // the names so far, of each open object
   JsonNode root_;
 };
 

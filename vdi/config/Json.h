@@ -1,4 +1,4 @@
-// JSON that people write, read strictly: each mistake is told with its place.
+// A strict reader for JSON that people write. It reports each mistake with its place.
 #pragma once
 
 #include <cstddef>
@@ -11,17 +11,18 @@
 
 namespace vdi::config {
 
-/// What a document may have, so that a hostile one costs neither memory nor stack.
+/// The limits of a document, so that a hostile one exhausts neither memory nor stack.
 struct JsonLimits {
   std::size_t bytes = std::size_t{1} << 20;
-  std::size_t depth = 16;       // of values in values
-  std::size_t values = 100000;  // of any kind
+  std::size_t depth = 16;       // nesting of values
+  std::size_t values = 100000;  // values of any kind
 };
 
 struct JsonNode;
 
-/// A value in a document, which it keeps alive. Functions that return what it holds throw Error{Format} with
-/// the value's JSON pointer, and the document's name and the line as context, if it holds something else.
+/// A value in a document, which it keeps alive. Functions that return the value's content throw Error{Format}
+/// if it has another type. The error has the value's JSON pointer, and the document's name and the line as
+/// context.
 class JsonValue {
  public:
   bool isObject() const;
@@ -29,9 +30,9 @@ class JsonValue {
   bool isText() const;
   bool isFlag() const;
 
-  /// The value of a field; nothing if this object lacks it.
+  /// The value of a field; nullopt if this object lacks it.
   std::optional<JsonValue> find(std::string_view name) const;
-  /// The same; throws if it is missing.
+  /// The value of a field; throws if this object lacks it.
   JsonValue at(std::string_view name) const;
   /// Throws unless this is an object whose fields are all among `known`.
   void requireObject(const std::vector<std::string>& known) const;
@@ -53,16 +54,16 @@ class JsonValue {
   JsonValue child(const JsonNode& node, const std::string& step) const;
 
   std::shared_ptr<const JsonNode> node_;
-  std::shared_ptr<const std::string> document_;  // its name
+  std::shared_ptr<const std::string> document_;  // the document's name
   std::string pointer_;
 };
 
-/// `name` is the document's, for messages. Throws Error{Format}, with the line, for what isn't JSON, a field
-/// that an object has twice, and a document beyond the limits.
+/// Parses a document. Messages use its `name`. Throws Error{Format} with the line for text that isn't JSON, a
+/// field that an object has twice, and a document beyond the limits.
 JsonValue parseJson(std::string_view text, const std::string& name, const JsonLimits& limits = {});
 
-/// The text of a file. Throws Error: Io unless it is a regular file that can be read, Format if it is larger
-/// than the limit; it isn't read then.
+/// The text of a file. Throws Error{Io} unless it is a regular file that can be read. Throws Error{Format} if
+/// it is larger than the limit, and doesn't read it then.
 std::string readJsonText(const std::string& path, const JsonLimits& limits = {});
 
 }  // namespace vdi::config

@@ -20,8 +20,8 @@ const std::vector<PresetInfo>& transferFunctionPresets();
 TransferFunction presetTransferFunction(const std::string& name, const ScalarRange& range,
                                         double unitDistance);
 
-/// The function whose x of 0 and 1 come to lie at the ends of `range`; a range without width is widened to 1,
-/// an empty one becomes [0, 1].
+/// The function with x of 0 and 1 moved to the ends of `range`. A range without width is widened to 1, and an
+/// empty one becomes [0, 1].
 TransferFunction stretched(TransferFunction function, const ScalarRange& range);
 
 }  // namespace vdi::config

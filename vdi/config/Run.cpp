@@ -68,7 +68,7 @@ std::optional<std::filesystem::path> Run::firstExisting() const {
   std::error_code error;
   if (cinema && std::filesystem::exists(cinema->index(), error)) return cinema->index();
   for (const std::string& name : {log.json, log.text}) {
-    // What isn't a regular file is the log's own mistake.
+    // If it isn't a regular file, the log reports the mistake.
     if (!name.empty() && std::filesystem::is_regular_file(name, error) &&
         std::filesystem::file_size(name, error) > 0 && !error)
       return name;

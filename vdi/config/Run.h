@@ -1,4 +1,4 @@
-// What a simulation has made of its data without a script: the file that docs/vdi-run.schema.json describes.
+// The description of a run without a script: the file that docs/vdi-run.schema.json describes.
 #pragma once
 
 #include <cstdint>
@@ -21,52 +21,54 @@
 namespace vdi::config {
 
 struct RunColors {
-  std::string preset;                  // empty: the file's, or "Cool to Warm"
-  std::string file;                    // of ParaView's presets; empty: none
-  std::string name;                    // of the preset in the file; empty: its only one
-  std::optional<ScalarRange> range;    // nothing: of the first frame's values
-  std::vector<OpacityNode> opacities;  // x: values of the field; empty: the preset's, or from 0 to 1
-  std::optional<double> unitDistance;  // world; nothing: unitDistanceOf
+  std::string preset;                // empty: the file's, or "Cool to Warm"
+  std::string file;                  // a file of ParaView's presets; empty: none
+  std::string name;                  // the preset's name in the file; empty: its only preset
+  std::optional<ScalarRange> range;  // none: the range of the first frame's values
+  // x are values of the field; empty: the preset's, or a ramp from 0 to 1
+  std::vector<OpacityNode> opacities;
+  std::optional<double> unitDistance;  // world units; none: unitDistanceOf
 };
 
-/// An orbit around what the field's blocks cover.
+/// An orbit around the bounds of the field's blocks.
 struct RunOrbit {
   Orbit start;              // at step 0
   double turn = 0.0;        // degrees of azimuth, from one frame to the next
   double viewAngle = 30.0;  // degrees
 };
 
-/// With neither, it shows the whole scene along -z, as ParaView's filter has it.
+/// A run's camera. Without `fixed` and `orbit`, it shows the whole scene along -z, as ParaView's filter does.
 struct RunCamera {
-  std::string name;  // in files' names; empty: the run's only one
+  std::string name;  // its name in files' names; empty: the run's only camera
   std::optional<Camera> fixed;
   std::optional<RunOrbit> orbit;
 };
 
-/// What must hold of a field's values at a step of which a frame would be made. NaN doesn't count; infinite
-/// values count for Max and Min alone.
+/// A condition on a field's values that must hold at a step for a frame to be made. NaN doesn't count;
+/// infinite values count for Max and Min alone.
 struct RunCondition {
-  enum class Measure { Max, Min, Mean, Change };  // Change: how far the mean has moved since the last frame
+  // Change: the distance that the mean has moved since the last frame
+  enum class Measure { Max, Min, Mean, Change };
   Measure measure = Measure::Max;
   std::string field;
-  std::optional<bool> cells;  // as Run has them
+  std::optional<bool> cells;  // as in Run
   int component = -1;
-  std::optional<double> above;  // one of the two at least; both: above < below
+  std::optional<double> above;  // at least one of the two is set; both: above < below
   std::optional<double> below;
   bool holds(double value) const { return (!above || value > *above) && (!below || value < *below); }
 };
 
-/// What becomes of files of the run's names that exist when it starts.
+/// The treatment of files with the run's names that exist when it starts.
 enum class Existing { Refuse, Overwrite, Continue };
 
 struct RunStream {
   std::string host = "127.0.0.1";
-  std::uint16_t port = 0;                    // 0: one that is free
-  std::string tokenFile;                     // empty: VDI_TOKEN, or a token of its own
+  std::uint16_t port = 0;                    // 0: a free one
+  std::string tokenFile;                     // empty: VDI_TOKEN, or a new token
   std::string linkFile = "vdi-stream.link";  // empty: the link isn't stored
   std::string certificate;
   std::string key;
-  double megabits = 0.0;                           // a second, to each viewer; 0: no limit
+  double megabits = 0.0;                           // rate to each viewer in Mbit a second; 0: no limit
   bool steer = false;                              // viewers may change the run
   std::string steeringLog = "vdi-steering.jsonl";  // gets a line for each change; empty: none
 };
@@ -81,69 +83,71 @@ struct RunLogFiles {
 /// Pictures of all viewpoints as a Cinema database, whose index is io::CinemaIndex.
 struct RunCinema {
   std::filesystem::path folder;  // *.cdb
-  FilePattern pictures;          // in it
+  FilePattern pictures;          // in the folder
   std::filesystem::path index() const { return folder / "data.csv"; }
 };
 
 struct Run {
   std::string field;
-  std::optional<bool> cells;  // nothing: as the simulation hands the field over
-  int component = -1;         // of a field of vectors; -1: their magnitude
-  /// A frame is made when any of these three is due (Schedule), if `when` holds then.
-  std::int64_t every = 1;              // steps whose number it divides; 0: none
-  std::optional<double> everyTime;     // of the simulation
-  std::optional<double> everySeconds;  // of the wall clock
+  std::optional<bool> cells;  // none: as the simulation hands the field over
+  int component = -1;         // component of a field of vectors; -1: their magnitude
+  /// A frame is made when any of these three is due (Schedule), if `when` holds at that step.
+  std::int64_t every = 1;              // due at steps that it divides; 0: none
+  std::optional<double> everyTime;     // period in the simulation's time
+  std::optional<double> everySeconds;  // period in seconds of the wall clock
   std::optional<RunCondition> when;
-  std::optional<double> maxShare;  // of the run's wall time that making frames may take
+  std::optional<double> maxShare;  // share of the run's wall time that frames may take
   Existing existing = Existing::Refuse;
-  std::vector<RunCamera> cameras{{}};  // one at least; the first is the stream's
+  std::vector<RunCamera> cameras{{}};  // at least one; the first is the stream's
   RunColors colors;
   GenerateSettings settings;
   std::optional<FilePattern> vdi;
   std::optional<FilePattern> png;
   std::optional<RunCinema> cinema;
-  bool latest = false;  // latest.vdi and latest.png, beside the newest file, link it
+  bool latest = false;  // link latest.vdi and latest.png, beside the newest file, to it
   std::optional<RunStream> stream;
   RunLogFiles log;
 
   bool makesPictures() const { return png || cinema; }
-  /// Of an orbiting camera; turned on with the frames.
+  /// The place of an orbiting camera, which turns with the frames.
   Orbit orbitAt(const RunOrbit& orbit, std::int64_t step, double time) const;
-  /// `bounds` are the scene's.
+  /// The camera at a step. `bounds` are the scene's.
   Camera cameraAt(const RunCamera& camera, std::int64_t step, double time, const Box& bounds) const;
-  /// `map` is the colours' file's, if they name one; `range` is that of the first frame's values.
+  /// The transfer function. `map` comes from the colours' file, if they name one; `range` is that of the
+  /// first frame's values.
   TransferFunction transferFunction(const std::optional<ColorMap>& map, const ScalarRange& range,
                                     double unitDistance) const;
-  /// The first file of this run's names that exists: of frames, of the Cinema database, or a log that isn't
-  /// empty.
+  /// The first existing file with one of this run's names: of frames, of the Cinema database, or a log that
+  /// isn't empty.
   std::optional<std::filesystem::path> firstExisting() const;
 };
 
-/// Throws Error{Io}, which names the first such file and the ways out, if the run refuses files that exist.
+/// Throws Error{Io} if the run refuses existing files and there is one. The error names the first one and the
+/// remedies.
 void requireNothingInTheWay(const Run& run);
 
-/// The number of whole periods in a time, to within a millionth of a period.
+/// The number of whole periods in a time, accurate to a millionth of a period.
 double periodsIn(double time, double period);
 
 /// The names of all presets, the default one first.
 std::vector<std::string> presetNames();
 
-/// Throws Error{Format} with the place of the first mistake. `name` is the document's.
+/// Parses a run. Throws Error{Format} with the place of the first mistake. `name` is the document's.
 Run parseRun(std::string_view text, const std::string& name);
 
 /// The fields of each object in such a document, by the object's JSON pointer; "*" stands for an index.
 const std::map<std::string, std::vector<std::string>>& runFields();
 
-/// A run's text, and where it comes from.
+/// A run's text and its origin.
 struct RunText {
   std::string text;
-  std::string name;              // of the document, for messages
-  std::filesystem::path folder;  // to which the files that it reads are relative
+  std::string name;              // the document's name, for messages
+  std::filesystem::path folder;  // the files that it names are relative to this folder
 };
-/// `fileOrText` is the text itself if its first character that isn't blank is a brace, else a file's name.
-/// Throws Error as readJsonText.
+/// Reads a run's text. `fileOrText` is the text itself if its first character that isn't blank is a brace,
+/// else a file's name. Throws Error as readJsonText.
 RunText readRun(const std::string& fileOrText);
-/// The text of the colours' file; nothing if they name none. Throws Error as readJsonText.
+/// The text of the colours' file; nullopt if they name none. Throws Error as readJsonText.
 std::optional<std::string> readColorsFile(const Run& run, const RunText& source);
 
 }  // namespace vdi::config

@@ -1,4 +1,4 @@
-// Reads a run's JSON: each mistake is told with its place.
+// Reads a run's JSON, and reports each mistake with its place.
 #include <fmt/format.h>
 #include <fmt/ranges.h>  // fmt::join
 
@@ -31,7 +31,7 @@ glm::dvec3 vectorOf(const JsonValue& value) {
   return {v[0], v[1], v[2]};
 }
 
-/// A direction, which has a length that can be computed with.
+/// A direction whose length can be computed.
 glm::dvec3 directionOf(const JsonValue& value) {
   constexpr double extreme = 1e100;
   const glm::dvec3 direction = vectorOf(value);
@@ -47,7 +47,7 @@ void ifThere(const JsonValue& object, const char* name, Read read) {
   if (const std::optional<JsonValue> value = object.find(name)) read(*value);
 }
 
-/// Calls `check`; what it throws gets the value's place.
+/// Calls `check`, and adds the value's place to an error that it throws.
 template <typename Check>
 auto placed(const JsonValue& value, Check check) {
   try {
@@ -194,7 +194,7 @@ void readCameras(const JsonValue& document, Run& run) {
     }
     run.cameras = camerasOf(value);
   });
-  // Where an orbit is after a restart, the step or the time must tell.
+  // After a restart, the step or the time must determine an orbit's place.
   const bool turns = std::ranges::any_of(
       run.cameras, [](const RunCamera& camera) { return camera.orbit && camera.orbit->turn != 0.0; });
   const bool areCounted = !run.everySeconds && (run.every > 0) != run.everyTime.has_value();
@@ -439,7 +439,7 @@ void readSettings(const JsonValue& document, GenerateSettings& settings) {
 
 namespace {
 
-/// Of the whole document.
+/// The fields of the whole document.
 std::vector<std::string> documentFields() {
   std::vector<std::string> fields{"$schema",    "field",         "association", "component", "every",
                                   "every_time", "every_seconds", "when",        "max_share", "existing",

@@ -7,7 +7,7 @@ namespace vdi::config {
 bool Schedule::isDue(std::int64_t step, double time, double now) const {
   if (every_ > 0 && step % every_ == 0) return true;
   if (everySeconds_ && (!lastSeconds_ || now >= *lastSeconds_ + *everySeconds_)) return true;
-  // A simulation may go back in time, to its last checkpoint for one.
+  // A simulation may go back in time, for example to its last checkpoint.
   return everyTime_ && std::isfinite(time) && (!lastPeriod_ || periodsIn(time, *everyTime_) != *lastPeriod_);
 }
 

@@ -1,4 +1,4 @@
-// When a run's frames are due, and which of them its share of the wall time has room for.
+// The schedule of a run's frames, and the budget that its share of the wall time gives them.
 #pragma once
 
 #include <cstdint>
@@ -12,39 +12,40 @@ namespace vdi::config {
 /// - at steps that `every` divides;
 /// - at the first step at or after each multiple of `everyTime`, a millionth of it early at most, so that a
 ///   restart goes on with the same frames;
-/// - at the first step that comes `everySeconds` or more after the last such one.
-/// At the first step that is handed over, the last two are due.
+/// - at the first step that comes `everySeconds` or more after the last step that was due by this rule.
+/// At the simulation's first step, the last two conditions hold.
 class Schedule {
  public:
   explicit Schedule(const Run& run)
       : every_(run.every), everyTime_(run.everyTime), everySeconds_(run.everySeconds) {}
 
-  /// Whether only the first rank can tell: other ranks may have another clock, and another time.
+  /// Whether only the first rank can tell whether a frame is due: other ranks may have another clock, and
+  /// another time.
   bool needsRoot() const { return everyTime_ || everySeconds_; }
-  /// `now`: seconds of a clock that only rises. A time that isn't finite is never due.
+  /// `now` is in seconds of a monotonic clock. A time that isn't finite is never due.
   bool isDue(std::int64_t step, double time, double now) const;
-  /// A frame was due at this step, whether it has been made or not.
+  /// Notes that a frame was due at this step, whether or not it has been made.
   void begin(double time, double now);
-  /// From now on at steps that this divides, and at no others.
+  /// Makes frames due only at steps that `steps` divides, from now on.
   void setPeriod(std::int64_t steps);
-  /// Steps from frame to frame; 1 where steps don't tell.
+  /// The number of steps from frame to frame; 1 if steps don't matter.
   std::int64_t period() const { return every_ > 0 ? every_ : 1; }
 
  private:
   std::int64_t every_;  // 0: steps don't count
   std::optional<double> everyTime_;
   std::optional<double> everySeconds_;
-  std::optional<double> lastPeriod_;  // of times
+  std::optional<double> lastPeriod_;  // last period of `everyTime` with a frame
   std::optional<double> lastSeconds_;
 };
 
-/// Keeps the seconds that frames take below a share of the run's: a frame is left out unless there is room
-/// for one as long as the last. The first one is always made.
+/// Keeps the seconds that frames take below a share of the run's. A frame is left out unless there is room
+/// for one as long as the last. The first frame is always made.
 class Budget {
  public:
   explicit Budget(std::optional<double> share) : share_(share) {}
   bool isLimited() const { return share_.has_value(); }
-  /// `elapsed`: seconds since the run's start.
+  /// `elapsed` is in seconds since the run's start.
   bool hasRoom(double elapsed) const { return !share_ || spent_ + last_ <= *share_ * (elapsed + last_); }
   void spend(double seconds) {
     spent_ += seconds;
