@@ -25,9 +25,9 @@ BlendMode blendModeFromString(const std::string& name);
 
 inline constexpr std::size_t maxIsovalues = 16;
 
-/// As VTK's volume mapper has it: except in composite blending, a scalar has the opacity of the opacity
-/// function, whatever the unit distance. Isosurfaces are shaded if shading is on; extremes never are. NaN is
-/// no extreme, and crosses no isovalue.
+/// The blend mode and its isovalues, with the rules of VTK's volume mapper: except in composite blending, a
+/// scalar has the opacity of the opacity function, whatever the unit distance. Isosurfaces are shaded if
+/// shading is on; extremes never are. NaN is no extreme, and crosses no isovalue.
 struct Blending {
   BlendMode mode = BlendMode::Composite;
   std::vector<double> isovalues;  // Isosurface: 1 .. maxIsovalues, in any order
@@ -41,7 +41,7 @@ struct Isosurface {
   double position = 0.0;
   glm::vec4 material{0.0F};
 };
-/// Ascending; none unless the mode is Isosurface.
+/// The isosurfaces in ascending order; none unless the mode is Isosurface.
 std::vector<Isosurface> isosurfacesOf(const Blending& blending, const TransferTable& table);
 
 /// Throws Error{InvalidArgument} for isovalues that are missing, too many, not finite, or without use.

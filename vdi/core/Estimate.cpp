@@ -6,7 +6,7 @@ namespace vdi {
 
 namespace {
 
-/// With all of the margin that the settings ask for, also where the scene ends before it.
+/// The number of lists, with all of the requested margin, even where the scene ends before it.
 double listsOf(const GenerateSettings& settings) {
   const double share = 1.0 + 2.0 * settings.margin;
   return share * settings.width * share * settings.height;
@@ -16,7 +16,7 @@ double mostPerList(const GenerateSettings& settings) {
   return settings.supersegments * (settings.budget == Budget::Total ? settings.fill : 1.0);
 }
 
-/// Of a sample each, on all rays.
+/// The relative number of samples of all rays.
 double samplesOf(const GenerateSettings& settings, double automatic) {
   return listsOf(settings) *
          (settings.samplesPerVoxel == automaticRate ? automatic : settings.samplesPerVoxel);

@@ -39,7 +39,7 @@ struct GenerateSettings {
   std::uint32_t supersegments = 25;  // N_S, 1 .. maxSupersegments
   /// Total: lists have N_S on average, if they have that many samples; needs Algorithm::Merge.
   Budget budget = Budget::List;
-  double fill = 1.0;  // (0, 1]; with Budget::Total, the share to make of what N_S each would give
+  double fill = 1.0;  // (0, 1]; with Budget::Total, the made share of the supersegments that N_S each gives
   /// [1/64, 64]; or automaticRate: 1, 2 or 4, as the transfer function needs on the volume (SamplingRate.h).
   double samplesPerVoxel = 1.0;
   Algorithm algorithm = Algorithm::Merge;

@@ -38,7 +38,7 @@ class HostMemory {
   /// process removes the leftovers of dead processes. Does nothing and returns false after unlink, and for
   /// memory that is not shareable.
   bool publish();
-  /// Nobody can open the memory from now on; processes that have opened it keep it.
+  /// Prevents processes from opening the memory from now on. Processes that have opened it keep it.
   void unlink();
 
  private:

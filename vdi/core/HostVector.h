@@ -1,5 +1,5 @@
-// std::vector whose memory need not come from the heap: it may be pages that a device writes to, or that
-// several ranks share.
+// A std::vector whose memory need not come from the heap. It may consist of pages that a device writes to, or
+// that several ranks share.
 #pragma once
 
 #include <cstddef>

@@ -39,7 +39,7 @@ struct DepthLattice {
 /// [1/64, 64] or when a ray would need more than 2^24 samples.
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel);
 
-/// The distance beyond its owned box, in its spacings, to which a block has values where it has neighbours.
+/// The distance beyond its owned box, in its spacings, up to which a block with neighbours there has values.
 /// Gradients need that much: a voxel on each side of a sample's middle.
 inline constexpr double valueReach = 1.0;
 

@@ -1,6 +1,6 @@
-// The table of settings: what is the same for each of them is written once, and reads this table. Checks,
+// The table of settings. Code that treats all settings alike is written once and reads this table: checks,
 // the comparison between ranks, the options of the tool, the keys of JSON runs, and the properties of
-// ParaView's filter come from it.
+// ParaView's filter.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ struct Setting {
   double high = 1.0;
   bool excludesLow = false;                                     // (low, high]
   double automatic = std::numeric_limits<double>::quiet_NaN();  // a value beside the range, or none
-  /// Of Kind::Name: the name of an enumerator in [0, high], and the enumerator of a name. The latter throws
+  /// For Kind::Name: the name of an enumerator in [0, high], and the enumerator of a name. The latter throws
   /// Error{InvalidArgument} that lists the valid names.
   const char* (*nameOf)(double) = nullptr;
   double (*named)(const std::string&) = nullptr;
@@ -46,7 +46,7 @@ struct Setting {
 
 inline constexpr std::size_t settingCount = 11;
 std::span<const Setting, settingCount> settingsTable();
-/// By its property's name, which must be in the table.
+/// The index of a setting by its property's name, which must be in the table.
 std::size_t indexOfSetting(std::string_view property);
 /// "--termination-opacity"
 std::string optionOf(const Setting& setting);

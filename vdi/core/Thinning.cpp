@@ -55,7 +55,7 @@ Thinning thinningOf(const Vdi& vdi, int factor) {
   Thinning thinning;
   Vdi& few = thinning.few;
   few.camera = vdi.camera;
-  // The same height as all lists together.
+  // The thinned picture has the same height as all lists together.
   const double halfHeight = vdi.view().halfHeight();
   if (vdi.camera.parallelProjection) {
     few.camera.parallelScale = halfHeight;

@@ -12,7 +12,7 @@ namespace vdi {
 /// of the result take less time on a CPU, and are as coarse as pictures with that many fewer pixels.
 Vdi thinned(const Vdi& vdi, int factor);
 
-/// What thinned() does to a VDI, without its lists, for readers that do not have all of them at once.
+/// The effect of thinned() on a VDI, without lists, for readers that do not have all of them at once.
 struct Thinning {
   Vdi few;  // the thinned VDI, but for its lists; the depth code is that of the VDI given
   /// [few.height][few.width]: the list of the whole VDI that becomes this one, in ascending order; noList for
@@ -20,7 +20,7 @@ struct Thinning {
   std::vector<std::uint32_t> sources;
   static constexpr std::uint32_t noList = ~std::uint32_t{0};
 };
-/// Of `vdi`, all but the lists must be known.
+/// Finds the thinning. It needs all of `vdi` but the lists.
 Thinning thinningOf(const Vdi& vdi, int factor);
 
 }  // namespace vdi

@@ -60,7 +60,7 @@ struct Vdi {
 void validate(const Vdi& vdi);
 /// Checks everything but the lists: size, precision and depth code.
 void validateShape(const Vdi& vdi);
-/// Checks that there are width * height lists, and exactly as many supersegments as their offsets say.
+/// Checks that there are width * height lists, and that the number of supersegments matches their offsets.
 void validateEnds(const Vdi& vdi);
 /// Checks lists [first, last) alone, each of at most `budget` supersegments. Messages number them from
 /// `firstList` on.

@@ -9,7 +9,7 @@
 
 namespace vdi {
 
-/// Why a VDI shows little or nothing from a viewpoint.
+/// The reason why a VDI shows little or nothing from a viewpoint.
 enum class ViewpointIssue {
   SeesNothing,  // the scene, or what V_O saw of it, is outside the picture
   Inside,       // the camera is inside the scene and is not V_O: the part behind the camera is missing
@@ -34,8 +34,8 @@ std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const View& orig
 /// The angle, in degrees, between the directions in which `original` and `camera` see the scene's centre.
 double degreesBetween(const Box& bounds, const Camera& original, const Camera& camera);
 
-/// How many lists in a row are seen across the view, at the depth of the scene's centre: all of V_O's where
-/// both views see equally much, fewer in a view from nearer. 0 where the centre isn't in front of the view.
+/// The number of lists in a row across the view, at the depth of the scene's centre. It is V_O's number if
+/// both views see equally much, and smaller in a nearer view. 0 if the centre isn't in front of the view.
 double listsAcross(const Box& bounds, const View& original, const View& view);
 
 /// The issue in words, for a warning.
