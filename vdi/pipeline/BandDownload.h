@@ -9,7 +9,7 @@
 
 namespace vdi::detail {
 
-/// Downloads into memory of this process alone; when a band's lists are gone, the next band reuses their
+/// Downloads into memory of this process alone; once a band's lists are destroyed, the next band reuses their
 /// memory.
 class BandDownload {
  public:

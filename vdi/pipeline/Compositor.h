@@ -43,7 +43,7 @@ class Compositor {
   /// device goes on after this returns.
   void flatten(const DeviceLists& interleaved, const DepthCode& code, gpu::Buffer& colors,
                gpu::Buffer& depths);
-  /// Waits for the submitted work; then `lists` are complete. Throws what ListBuilder::finish throws.
+  /// Waits for the submitted work; then `lists` are complete. Throws as ListBuilder::finish does.
   void finish();
   /// Waits for the submitted work and drops it. For use after an error.
   void drop();

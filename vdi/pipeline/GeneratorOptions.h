@@ -1,4 +1,4 @@
-// How a VdiGenerator works. No option changes a VDI.
+// Options for the way a VdiGenerator works. No option changes a VDI.
 #pragma once
 
 #include <cstdint>

@@ -97,8 +97,9 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   return params;
 }
 
-/// One band on a GPU: the last rays of each band take a millisecond that no other work fills, which is more
-/// than the next band hides. Eight on a CPU device, so that progress shows and an abort takes effect.
+/// The number of bands. On a GPU it is one: the last rays of each band take a millisecond that no other work
+/// fills, which is more than the next band hides. On a CPU device it is eight, so that progress shows and an
+/// abort takes effect.
 std::uint32_t RayCaster::bandsWanted() const {
   constexpr std::uint32_t ofCpu = 8;
   constexpr std::uint32_t ofGpu = 1;
@@ -106,7 +107,8 @@ std::uint32_t RayCaster::bandsWanted() const {
   return device_->isCpu() ? ofCpu : ofGpu;
 }
 
-/// As many as memory allows, up to a share of the picture. A multiple of shared::countedStride, or all.
+/// The number of rows in a band: as many as memory allows, up to a share of the picture. It is a multiple of
+/// shared::countedStride, or all rows.
 std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytesPerPixel,
                                      std::uint32_t bands) const {
   const auto height = static_cast<std::uint64_t>(request.view.height());

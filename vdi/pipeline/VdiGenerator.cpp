@@ -36,8 +36,8 @@ bool hasDepthCode(const Scene& scene, const Camera& camera, const GenerateSettin
   return depthCodeFor(depthLattice(scene, view, settings.samplesPerVoxel)).step > 0.0F;
 }
 
-/// The settings' rate, or the least power of two times it at which samples are slabs: only these show what
-/// lies between two of them.
+/// The settings' rate, or the least power of two times it at which samples are slabs: only slabs show the
+/// values between two samples.
 double rateOfSlabs(const Scene& scene, const Camera& camera, const GenerateSettings& settings) {
   const View view = viewWithMargin(scene, camera, settings);
   double rate = settings.samplesPerVoxel;

@@ -70,9 +70,9 @@ class VdiGenerator {
   const Scene& scene() const;              // global
   const ScalarRange& scalarRange() const;  // global, finite values
 
-  /// Returns the VDI on rank 0, nullopt on the others. Its coloring has range and function; the caller, who
-  /// knows the array, adds that. Camera, transfer function and settings must be equal on all ranks (otherwise
-  /// all throw Error{InvalidArgument}). A scene that is empty or out of sight gives a VDI with empty lists.
+  /// Returns the VDI on rank 0, nullopt on the others. Its coloring has range and function; the caller knows
+  /// the array and adds it. Camera, transfer function and settings must be equal on all ranks (otherwise all
+  /// throw Error{InvalidArgument}). A scene that is empty or out of sight gives a VDI with empty lists.
   /// Devices write to the VDI's memory; once it is freed, the next frame reuses it.
   std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
                               const GenerateSettings& settings, const Progress& progress = {});

@@ -17,10 +17,10 @@
 
 namespace vdi::detail {
 
-/// The rank that writes what a rank other than the root has encoded.
+/// The rank that writes the chunks that a rank other than the root has encoded.
 enum class WrittenBy {
   Owner,  // the encoding rank, if it can open the file; else the root
-  Root    // as for hosts that lack the file's folder
+  Root    // the root writes, as for hosts that lack the file's folder
 };
 
 /// The file equals that of io::writeVdi for the whole VDI byte by byte, whichever ranks have which lists. It
