@@ -1,24 +1,31 @@
 // The devices of tests.
 #pragma once
 
+#include <array>
 #include <memory>
 
 #include "vdi/gpu/Device.h"
 
 namespace vdi::test {
 
-/// The environment's device, with the validation layers. `gpuPrograms`: does as a GPU does.
-inline std::shared_ptr<gpu::Device> makeDevice(bool gpuPrograms = false) {
-  gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
-  request.validation = true;
-  request.gpuPrograms = gpuPrograms;
-  return gpu::Device::create(request);
+/// What device() keeps. Main.cpp and MpiMain.cpp empty it before they return, because the validation layer
+/// frees state of its own at the program's exit, and can't close a device afterwards.
+inline std::array<std::shared_ptr<gpu::Device>, 2>& keptDevices() {
+  static std::array<std::shared_ptr<gpu::Device>, 2> kept;
+  return kept;
 }
 
-/// One for all tests of a program.
-inline std::shared_ptr<gpu::Device> device() {
-  static const std::shared_ptr<gpu::Device> instance = makeDevice();
-  return instance;
+/// The environment's device, with the validation layers, for all tests of a program. `gpuPrograms`: a second
+/// one, which does as a GPU does.
+inline std::shared_ptr<gpu::Device> device(bool gpuPrograms = false) {
+  std::shared_ptr<gpu::Device>& kept = keptDevices()[gpuPrograms ? 1 : 0];
+  if (kept == nullptr) {
+    gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
+    request.validation = true;
+    request.gpuPrograms = gpuPrograms;
+    kept = gpu::Device::create(request);
+  }
+  return kept;
 }
 
 }  // namespace vdi::test

@@ -4,10 +4,12 @@
 
 #define CATCH_CONFIG_RUNNER
 #include "tests/Catch.h"
+#include "tests/Devices.h"
 
 int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
   int result = Catch::Session().run(argc, argv);
+  vdi::test::keptDevices() = {};
   int worst = 0;
   MPI_Allreduce(&result, &worst, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
   MPI_Finalize();

@@ -80,7 +80,7 @@ void checkAgainstReference(VdiGenerator& generator, const Case& c) {
 }  // namespace
 
 TEST_CASE("blending: extremes and isosurfaces of the device are the reference's") {
-  for (const auto& device : {test::device(), test::makeDevice(true)}) {
+  for (const auto& device : {test::device(), test::device(true)}) {
     VdiGenerator generator(device, comm::Communicator::serial());
     checkAgainstReference(generator, {ScalarType::F32, Joint::SharedPoints, false, false});
     checkAgainstReference(generator, {ScalarType::U8, Joint::Cells, false, true});

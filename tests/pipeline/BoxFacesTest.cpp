@@ -69,7 +69,7 @@ TEST_CASE("box faces: views along them are the reference's, and nearer to the vo
     const auto vdi = generator.generate(camera, dense(), settings);
     Vdi open = *vdi;
     open.bounds = Box{};
-    for (const auto& device : {test::device(), test::makeDevice(true)}) {
+    for (const auto& device : {test::device(), test::device(true)}) {
       VdiRenderer renderer(device);
       VdiRenderer without(device);
       renderer.setVdi(*vdi);

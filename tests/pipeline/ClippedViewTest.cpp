@@ -42,7 +42,7 @@ std::size_t pixelsThatDiffer(const Image& a, const Image& b, float tolerance) {
 TEST_CASE("clipped views: those of the reference, from anywhere") {
   const std::vector<ClipPlane> planes{{{0.5, 0.5, 0.6}, {0.2, -0.3, -1.0}},
                                       {{0.3, 0.0, 0.0}, {2.0, 0.5, 0.0}}};
-  for (const auto& device : {test::device(), test::makeDevice(true)}) {
+  for (const auto& device : {test::device(), test::device(true)}) {
     VdiRenderer renderer(device);
     for (const bool parallel : {false, true}) {
       const Camera camera = test::oblique(parallel);

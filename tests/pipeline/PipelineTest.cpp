@@ -32,8 +32,7 @@ namespace {
 
 /// A second device, which runs the programs for GPUs.
 std::shared_ptr<gpu::Device> deviceAsGpu() {
-  static const std::shared_ptr<gpu::Device> instance = test::makeDevice(true);
-  return instance;
+  return device(true);
 }
 
 /// The blocks with the layers of values beyond their owned boxes that setBlocks also gives them.

@@ -41,7 +41,7 @@ Region boxAndPlanes() {
 }  // namespace
 
 TEST_CASE("region: DVR and lists of the device are the reference's") {
-  const std::vector<std::shared_ptr<gpu::Device>> devices{test::device(), test::makeDevice(true)};
+  const std::vector<std::shared_ptr<gpu::Device>> devices{test::device(), test::device(true)};
   for (const auto& device : devices) {
     VdiGenerator generator(device, comm::Communicator::serial());
     for (const bool parallel : {false, true}) {

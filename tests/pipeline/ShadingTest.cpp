@@ -51,7 +51,7 @@ float largestDifference(const Image& a, const Image& b) {
 }  // namespace
 
 TEST_CASE("shading: DVR and lists of the device are the reference's") {
-  const std::vector<std::shared_ptr<gpu::Device>> devices{test::device(), test::makeDevice(true)};
+  const std::vector<std::shared_ptr<gpu::Device>> devices{test::device(), test::device(true)};
   struct Case {
     ScalarType type;
     Joint joint;

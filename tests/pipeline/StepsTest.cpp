@@ -39,8 +39,7 @@ std::optional<Vdi> frame(VdiGenerator& generator, const TimeStep& step) {
 }
 
 /// The VDI of a generator that has only this step.
-std::optional<Vdi> frameAlone(const TimeStep& step) {
-  static VdiGenerator generator(device(), comm::Communicator::serial());
+std::optional<Vdi> frameAlone(VdiGenerator& generator, const TimeStep& step) {
   generator.setBlocks(step.blocks);
   return frame(generator, step);
 }
@@ -68,8 +67,9 @@ TEST_CASE("the next step's blocks don't change what's shown until advance, and t
       timeStep("coil", {18, 31, 20}, ScalarType::U16),  // new shapes, some of which need conversion
   };
   VdiGenerator generator(device(), comm::Communicator::serial());
+  VdiGenerator alone(device(), comm::Communicator::serial());
   generator.setBlocks(steps[0].blocks);
-  std::optional<Vdi> expected = frameAlone(steps[0]);
+  std::optional<Vdi> expected = frameAlone(alone, steps[0]);
   for (std::size_t i = 0; i + 1 < steps.size(); ++i) {
     INFO(i);
     const Scene shown = generator.scene();
@@ -79,7 +79,7 @@ TEST_CASE("the next step's blocks don't change what's shown until advance, and t
     CHECK(generator.scalarRange() == range);
     CHECK(equal(*frame(generator, steps[i]), *expected));
     generator.advance();
-    expected = frameAlone(steps[i + 1]);
+    expected = frameAlone(alone, steps[i + 1]);
     CHECK(equal(*frame(generator, steps[i + 1]), *expected));
   }
   CHECK(device()->validationMessages() == "");
@@ -138,7 +138,8 @@ TEST_CASE("the range of the shown step is that of its finite values") {
 TEST_CASE("steps that are never shown, and invalid ones, leave the shown one intact") {
   const TimeStep first = timeStep("turbulence", {26, 22, 24}, ScalarType::F32);
   const TimeStep second = timeStep("shells", {26, 22, 24}, ScalarType::F32);
-  const auto expected = frameAlone(first);
+  VdiGenerator alone(device(), comm::Communicator::serial());
+  const auto expected = frameAlone(alone, first);
   VdiGenerator generator(device(), comm::Communicator::serial());
   CHECK_THROWS_AS(generator.advance(), Error);  // no step was ever set
   generator.setBlocks(first.blocks);
