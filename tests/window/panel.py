@@ -259,7 +259,7 @@ def delete_while_making(window):
 
 
 def close_while_making(window):
-    window.menu("Filters", "Volumetric Depth Images", "Volumetric Depth Image")
+    window.search("Volumetric Depth Image")
     window.enter("Sampling Rate", 8)
     panel = window.find("Properties", "frame")
     window.click("Apply")

@@ -473,6 +473,19 @@ class Window:
         x, y, width, height = submenu.box
         return x + width + 40, y + height // 2 + height * names.index(name)
 
+    def search(self, name):
+        """Makes the source or filter of that name by Search, of the menus Sources and Filters. With Qt 6, these don't tell what
+        they show once the session was reset."""
+        def opened():  # a session that is still being reset closes it
+            self.key("ctrl+space")
+            time.sleep(1)
+            return self.text_that_begins(("Type to search.", "Press Enter to create"))
+
+        wait_for("search", opened)
+        self.type(name)
+        time.sleep(0.5)
+        self.key("Return")
+
     def open_file(self, path):
         """File ▸ Open; what is shown of it waits for Apply."""
         self.menu("File", "Open...")
