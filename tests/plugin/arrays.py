@@ -175,7 +175,7 @@ shown.RescaleTransferFunctionToDataRange(False, True)
 check(range_of(image.LookupTable) == [1000, 2000], "Rescale to data range %s" % range_of(image.LookupTable))
 table = image.LookupTable.SMProxy.ComputeDataHistogramTable(10)
 bins = np.array([table.GetColumn(1).GetValue(i) for i in range(table.GetNumberOfRows())])
-radius = np.sqrt(sum(a * a for a in np.meshgrid(*[np.linspace(-1, 1, 17)] * 3)) / 3)
+radius = np.sqrt(np.sum(np.square(np.meshgrid(*[np.linspace(-1, 1, 17)] * 3)), axis=0) / 3)
 expected = np.histogram(2000 - 1000 * radius, 10, (1000, 2000))[0]
 check(np.abs(bins / bins.sum() - expected / expected.sum()).max() < 0.03, "the histogram is that of the volume %s" % bins)
 image.SelectInputScalars = ["POINTS", "a"]
