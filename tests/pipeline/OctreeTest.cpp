@@ -2,6 +2,7 @@
 // points.
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <functional>
 #include <random>
 
@@ -36,9 +37,9 @@ Block withValues(Block block, const Field& field) {
   return block;
 }
 
-Block leafOf(bool cells, const Box& box, const Field& field) {
-  const glm::dvec3 spacing = box.size() / static_cast<double>(cellsPerLeaf);
-  const glm::ivec3 dims(cellsPerLeaf + (cells ? 0 : 1));
+Block leafOf(bool cells, const Box& box, const Field& field, int cellsPerAxis = cellsPerLeaf) {
+  const glm::dvec3 spacing = box.size() / static_cast<double>(cellsPerAxis);
+  const glm::ivec3 dims(cellsPerAxis + (cells ? 0 : 1));
   return withValues(cells ? Block::fromCells(dims, box.lo, spacing, ScalarType::F32, nullptr)
                           : Block::fromPoints(dims, box.lo, spacing, ScalarType::F32, nullptr),
                     field);
@@ -65,6 +66,18 @@ TransferFunction thinRamp() {
   function.opacities = {{0.0, 0.0}, {0.48, 0.0}, {0.52, 0.6}, {1.0, 0.6}};
   function.unitDistance = 0.05;
   return function;
+}
+
+/// One octant of the cube has `side`^3 cells, the others one each.
+std::vector<Box> cellsOfFineOctant(int side) {
+  std::vector<Box> cells;
+  const auto add = [&cells](const glm::ivec3& at, double size) {
+    cells.push_back({glm::dvec3(at) * size, glm::dvec3(at + 1) * size});
+  };
+  for (int i = 1; i < 8; ++i) add({i & 1, (i >> 1) & 1, i >> 2}, 0.5);
+  for (int i = 0; i < side * side * side; ++i)
+    add({i % side, i / side % side, i / (side * side)}, 0.5 / side);
+  return cells;
 }
 
 double linear(const glm::dvec3& p) {
@@ -120,4 +133,38 @@ TEST_CASE("an octree of cells with a thin ramp: the picture of the same octree o
       CHECK(difference.wrongShare <= scene.wrongShare);
     }
   }
+}
+
+TEST_CASE("10 000 blocks of one cell: the picture of few blocks, in time in proportion to their number",
+          "[ranks]") {
+  const comm::Communicator world = comm::Communicator::world();
+  VdiGenerator generator(device(), comm::Communicator::world());
+  const auto show = [&](const std::vector<Box>& boxes, const auto& cellsOf) {
+    std::vector<Block> mine;
+    for (auto i = static_cast<std::size_t>(world.rank()); i < boxes.size();
+         i += static_cast<std::size_t>(world.size()))
+      mine.push_back(leafOf(true, boxes[i], wave, cellsOf(i)));
+    const std::clock_t before = std::clock();
+    generator.setBlocks(std::move(mine));
+    return static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
+  };
+  const auto single = [](std::size_t) { return 1; };
+  const auto picture = [&] {
+    return generator.renderVolume(test::oblique(), thinRamp(), test::smallSettings(120, 90, 20));
+  };
+  constexpr int side = 22;
+  const std::vector<Box> few = cellsOfFineOctant(1);
+  show(few, [](std::size_t i) { return i < 7 ? 1 : side; });
+  const auto expected = picture();
+  const std::vector<Box> some = cellsOfFineOctant(side / 2);
+  const double secondsOfSome = show(some, single);
+  const std::vector<Box> many = cellsOfFineOctant(side);
+  CHECK(many.size() > 10000);
+  const double seconds = show(many, single);
+  std::printf("%d ranks: %zu blocks in %.3f s, %zu in %.3f s\n", world.size(), some.size(), secondsOfSome,
+              many.size(), seconds);
+  CHECK(seconds / static_cast<double>(many.size()) < 2.0 * secondsOfSome / static_cast<double>(some.size()));
+  const auto image = picture();
+  if (!image) return;
+  CHECK(differenceOf(*image, *expected).worst < 1.0);
 }

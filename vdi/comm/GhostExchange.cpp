@@ -15,6 +15,7 @@
 #include "vdi/comm/BeyondDomain.h"
 #include "vdi/comm/BlockDirectory.h"
 #include "vdi/comm/Indices.h"
+#include "vdi/comm/Remainder.h"
 #include "vdi/core/Scene.h"
 
 namespace vdi::comm {
@@ -63,18 +64,23 @@ void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
   boxes = std::move(rest);
 }
 
-/// A rank's request to another: for each value in `box` of a lattice, the sum over those of its samples that
-/// lie in `clip`, [lo, hi). A value's samples are the middles of its parts.
-struct Request {
+/// What a rank asks of another, or of itself: for each value in `box` of a lattice, the sum over those of its
+/// samples that lie in `clip`, [lo, hi). A value's samples are the middles of its parts. There may be
+/// hundreds a block.
+struct Question {
   std::int32_t grid;    // on the rank that answers
   std::int32_t round;   // in which it is answered
   std::int32_t copied;  // 1: copies of values, `shift` further in the answering grid
   glm::ivec3 shift;
   IndexBox box;
   glm::ivec3 parts;  // per axis
+  Box clip;
+};
+
+/// A question with the lattice that it is about.
+struct Request : Question {
   glm::dvec3 origin;
   glm::dvec3 spacing;
-  Box clip;
 
   double place(int axis, int index, int part) const {
     const double offset = (part + 0.5) / parts[axis] - 0.5;
@@ -235,7 +241,7 @@ class LayerExchange {
   void run() {
     std::vector<std::uint64_t> rounds(levels_.size() + firstCoarserRound, 0);
     for (const auto& asked : outgoing_) {
-      for (const Asked& one : asked) rounds[static_cast<std::size_t>(one.request.round)] = 1;
+      for (const Asked& one : asked) rounds[static_cast<std::size_t>(one.question.round)] = 1;
     }
     comm_.allReduceMax(rounds);
     if (std::count(rounds.begin(), rounds.end(), 1U) > 0) {
@@ -263,9 +269,9 @@ class LayerExchange {
   static constexpr std::int32_t firstCoarserRound = 2;
 
   struct Asked {
-    Request request;
-    std::size_t grid;
-    std::size_t wanted;
+    Question question;
+    std::int32_t grid;  // that asks
+    std::int32_t wanted;
   };
 
   void findLevels() {
@@ -273,6 +279,7 @@ class LayerExchange {
     std::sort(levels_.begin(), levels_.end(), std::greater<>());
     const auto same = [](double a, double b) { return b > 0.99 * a; };
     levels_.erase(std::unique(levels_.begin(), levels_.end(), same), levels_.end());
+    for (const BlockEntry& entry : directory_.entries()) levelNumbers_.push_back(levelNumber(entry));
   }
 
   std::int32_t levelNumber(const BlockEntry& entry) const {
@@ -341,58 +348,50 @@ class LayerExchange {
 
   /// Finds the blocks that have the values, the finest first.
   void askFor(std::size_t gridIndex, std::size_t wantedIndex) {
-    Grid& grid = grids_[gridIndex];
-    const Wanted& wanted = grid.wanted[wantedIndex];
+    const Grid& grid = grids_[gridIndex];
+    const bool keep = grid.wanted[wantedIndex].keep;
+    const IndexBox values = grid.wanted[wantedIndex].box;
     // The volume that the values stand for.
-    const Box volume{grid.block.origin + (glm::dvec3(wanted.box.lo) - 0.5) * grid.block.spacing,
-                     grid.block.origin + (glm::dvec3(wanted.box.hi) - 0.5) * grid.block.spacing};
+    const Box volume{grid.block.origin + (glm::dvec3(values.lo) - 0.5) * grid.block.spacing,
+                     grid.block.origin + (glm::dvec3(values.hi) - 0.5) * grid.block.spacing};
     // First the owners of a place, the finest first; within a level, blocks with a value there precede those
     // that only close a gap. Then blocks that store a value where nobody owns the place.
-    struct Claim {
-      bool stored;
-      std::int32_t level;
-      bool gap;
-      std::size_t donor;
-      Box box;
-      auto order() const { return std::tuple(stored, -level, gap, donor); }
-    };
-    std::vector<Claim> claims;
+    using Claim = std::tuple<std::int32_t, bool, std::size_t>;  // level, negative; closes a gap; donor
+    std::vector<Claim> owners;
+    std::vector<Claim> keepers;
     for (const std::size_t d : directory_.meeting(volume)) {
       const BlockEntry& donor = directory_.entries()[d];
       if (donor.rank == comm_.rank() && static_cast<std::size_t>(donor.grid) == gridIndex) continue;
-      // A margin, so that nothing is lost between faces and places that were computed differently.
-      const glm::dvec3 spare = latticeTolerance * glm::min(donor.spacing, grid.block.spacing);
-      const auto claim = [&](bool stored, bool gap, const Box& box) {
-        claims.push_back({stored, levelNumber(donor), gap, d, {box.lo - spare, box.hi + spare}});
-      };
-      claim(false, false, donor.asked);
-      if (donor.asked != donor.owned) claim(false, true, donor.owned);
-      if (!donor.masks && !wanted.keep) claim(true, false, donor.storedBox());
+      owners.emplace_back(-levelNumbers_[d], false, d);
+      if (donor.asked != donor.owned) owners.emplace_back(-levelNumbers_[d], true, d);
+      if (!donor.masks && !keep) keepers.emplace_back(-levelNumbers_[d], false, d);
     }
-    std::sort(claims.begin(), claims.end(),
-              [](const Claim& a, const Claim& b) { return a.order() < b.order(); });
-    std::vector<Box> left{volume};
-    for (const Claim& claim : claims) {
-      std::vector<Box> rest;
-      for (const Box& box : left) {
-        const Box common = box.intersection(claim.box);
-        if (!common.empty()) ask(gridIndex, wantedIndex, directory_.entries()[claim.donor], common);
-        const std::vector<Box> parts = without(box, claim.box);
-        rest.insert(rest.end(), parts.begin(), parts.end());
-      }
-      left = std::move(rest);
+    Remainder left(volume);
+    for (std::vector<Claim>* claims : {&owners, &keepers}) {
       if (left.empty()) break;
+      std::sort(claims->begin(), claims->end());
+      for (const auto& [level, gap, d] : *claims) {
+        const BlockEntry& donor = directory_.entries()[d];
+        const Box box = claims == &keepers ? donor.storedBox() : gap ? donor.owned : donor.asked;
+        // A margin, so that nothing is lost between faces and places that were computed differently.
+        const glm::dvec3 spare = latticeTolerance * glm::min(donor.spacing, grid.block.spacing);
+        left.subtract({box.lo - spare, box.hi + spare},
+                      [&](const Box& common) { ask(gridIndex, wantedIndex, d, common); });
+        if (left.empty()) break;
+      }
     }
   }
 
-  void ask(std::size_t gridIndex, std::size_t wantedIndex, const BlockEntry& donor, const Box& where) {
+  void ask(std::size_t gridIndex, std::size_t wantedIndex, std::size_t donorIndex, const Box& where) {
+    const BlockEntry& donor = directory_.entries()[donorIndex];
     Grid& grid = grids_[gridIndex];
     Wanted& wanted = grid.wanted[wantedIndex];
     const double ratio = donor.valueVolume() / grid.volume;
     const bool finer = ratio < 0.99;
     const bool coarser = ratio > 1.0 / 0.99;
-    Request request{donor.grid,        exactRound,         0,    glm::ivec3(0), wanted.box, glm::ivec3(1),
-                    grid.block.origin, grid.block.spacing, where};
+    Request request{{donor.grid, exactRound, 0, glm::ivec3(0), wanted.box, glm::ivec3(1), where},
+                    grid.block.origin,
+                    grid.block.spacing};
     if (grid.cells && finer) {
       const glm::dvec3 parts = glm::round(grid.block.spacing / donor.spacing);
       request.parts = glm::ivec3(glm::clamp(parts, glm::dvec3(1.0), glm::dvec3(maxParts)));
@@ -401,7 +400,8 @@ class LayerExchange {
     if (request.box.empty()) return;
     const bool coincides = findShift(request, donor);
     request.copied = coincides && request.parts == glm::ivec3(1) ? 1 : 0;
-    if (!coincides) request.round = coarser ? firstCoarserRound + levelNumber(donor) : interpolatedRound;
+    if (!coincides)
+      request.round = coarser ? firstCoarserRound + levelNumbers_[donorIndex] : interpolatedRound;
     wanted.asked.push_back(request.box);
     grid.asked.include(request.box);
     if (request.copied != 0) {
@@ -410,7 +410,8 @@ class LayerExchange {
       wanted.sums.assign(wanted.box.count(), 0.0);
       wanted.weights.assign(wanted.box.count(), 0.0);
     }
-    outgoing_[static_cast<std::size_t>(donor.rank)].push_back({request, gridIndex, wantedIndex});
+    outgoing_[static_cast<std::size_t>(donor.rank)].push_back(
+        {request, static_cast<std::int32_t>(gridIndex), static_cast<std::int32_t>(wantedIndex)});
   }
 
   /// Whether all samples lie at the donor's values.
@@ -505,13 +506,20 @@ class LayerExchange {
     });
   }
 
+  Request requestOf(const Asked& asked) const {
+    const Block& block = grids_[static_cast<std::size_t>(asked.grid)].block;
+    return {asked.question, block.origin, block.spacing};
+  }
+
+  /// Sends none to this rank itself.
   void sendRequests() {
     std::vector<Request> requests;
-    std::vector<std::uint64_t> counts;
+    std::vector<std::uint64_t> counts(outgoing_.size(), 0);
     comm_.together([&] {
-      for (const auto& asked : outgoing_) {
-        counts.push_back(asked.size());
-        for (const Asked& one : asked) requests.push_back(one.request);
+      for (std::size_t rank = 0; rank < outgoing_.size(); ++rank) {
+        if (static_cast<int>(rank) == comm_.rank()) continue;
+        counts[rank] = outgoing_[rank].size();
+        for (const Asked& one : outgoing_[rank]) requests.push_back(requestOf(one));
       }
     });
     incoming_ = comm_.allToAll(std::as_bytes(std::span(requests)), counts, sizeof(Request));
@@ -519,13 +527,14 @@ class LayerExchange {
 
   /// Answers travel in units of 8 bytes, and each begins at a unit.
   static constexpr std::size_t unit = 8;
-  static std::size_t answerBytes(const Request& request, ScalarType type) {
-    const std::size_t each = request.copied != 0 ? sizeOf(type) : sizeof(double);
-    return (request.box.count() * each + unit - 1) / unit * unit;
+  static std::size_t answerBytes(const Question& question, ScalarType type) {
+    const std::size_t each = question.copied != 0 ? sizeOf(type) : sizeof(double);
+    return (question.box.count() * each + unit - 1) / unit * unit;
   }
 
   void exchangeValues(std::int32_t round) {
     std::vector<std::byte> bytes;
+    std::vector<std::byte> own;
     std::vector<std::uint64_t> counts;
     comm_.together([&] {
       continueBeyondDomain();
@@ -539,16 +548,20 @@ class LayerExchange {
         }
         counts.push_back((bytes.size() - before) / unit);
       }
+      for (const Asked& asked : outgoing_[static_cast<std::size_t>(comm_.rank())]) {
+        if (asked.question.round == round) answer(requestOf(asked), own);
+      }
     });
     const Gathered answers = comm_.allToAll(bytes, counts, unit);
     comm_.together([&] {
-      for (std::size_t rank = 0; rank < outgoing_.size(); ++rank) {
-        const std::byte* from = answers.of(static_cast<int>(rank)).data();
-        for (const Asked& asked : outgoing_[rank]) {
-          if (asked.request.round != round) continue;
-          const Grid& grid = grids_[asked.grid];
-          take(asked, from);
-          from += answerBytes(asked.request, grid.block.type);
+      for (int rank = 0; rank < comm_.size(); ++rank) {
+        const std::byte* from = rank == comm_.rank() ? own.data() : answers.of(rank).data();
+        for (const Asked& asked : outgoing_[static_cast<std::size_t>(rank)]) {
+          if (asked.question.round != round) continue;
+          Grid& grid = grids_[static_cast<std::size_t>(asked.grid)];
+          const Request request = requestOf(asked);
+          take(request, grid, grid.wanted[static_cast<std::size_t>(asked.wanted)], from);
+          from += answerBytes(request, grid.block.type);
         }
       }
     });
@@ -608,10 +621,7 @@ class LayerExchange {
     });
   }
 
-  void take(const Asked& asked, const std::byte* from) {
-    Grid& grid = grids_[asked.grid];
-    Wanted& wanted = grid.wanted[asked.wanted];
-    const Request& request = asked.request;
+  static void take(const Request& request, const Grid& grid, Wanted& wanted, const std::byte* from) {
     const ScalarType type = grid.block.type;
     const std::size_t size = sizeOf(type);
     if (wanted.sums.empty()) {
@@ -646,7 +656,8 @@ class LayerExchange {
   const Communicator& comm_;
   const BlockDirectory& directory_;
   std::vector<Block>& blocks_;
-  std::vector<double> levels_;  // volumes of a value, descending
+  std::vector<double> levels_;              // volumes of a value, descending
+  std::vector<std::int32_t> levelNumbers_;  // of the directory's entries: indices of levels_
   std::vector<Grid> grids_;
   std::vector<std::vector<Asked>> outgoing_;  // by the rank that answers
   Gathered incoming_;                         // requests of other ranks

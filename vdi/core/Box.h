@@ -57,25 +57,31 @@ struct IndexBox {
   }
 };
 
-/// The part of `box` outside `hole`, as at most six disjoint boxes. Those below and above it in z are whole
-/// slices. Works for Box and IndexBox.
-template <typename AnyBox>
-std::vector<AnyBox> without(const AnyBox& box, const AnyBox& hole) {
+/// Calls visit(part) for the part of `box` outside `hole`, as at most six disjoint boxes. Those below and
+/// above it in z are whole slices. Works for Box and IndexBox.
+template <typename AnyBox, typename Visit>
+void forEachPartWithout(const AnyBox& box, const AnyBox& hole, Visit visit) {
   const AnyBox common = box.intersection(hole);
-  if (common.empty()) return {box};
-  std::vector<AnyBox> rest;
+  if (common.empty()) return visit(box);
   AnyBox middle = box;
   for (int axis = 2; axis >= 0; --axis) {
     AnyBox part = middle;
     part.hi[axis] = common.lo[axis];
-    if (!part.empty()) rest.push_back(part);
+    if (!part.empty()) visit(part);
     part = middle;
     part.lo[axis] = common.hi[axis];
-    if (!part.empty()) rest.push_back(part);
+    if (!part.empty()) visit(part);
     middle.lo[axis] = common.lo[axis];
     middle.hi[axis] = common.hi[axis];
   }
-  return rest;
+}
+
+/// These parts.
+template <typename AnyBox>
+std::vector<AnyBox> without(const AnyBox& box, const AnyBox& hole) {
+  std::vector<AnyBox> parts;
+  forEachPartWithout(box, hole, [&parts](const AnyBox& part) { parts.push_back(part); });
+  return parts;
 }
 
 /// Disjoint boxes that cover exactly the `open` cells (x fastest) of a lattice of `size`. Boxes grow along x,
