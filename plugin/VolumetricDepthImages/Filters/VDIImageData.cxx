@@ -128,6 +128,26 @@ void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth) 
   if (withDepth) addDepth(image, picture.depth);
 }
 
+vdi::Image pictureIn(vtkImageData* image) {
+  auto* const colors = vtkUnsignedCharArray::SafeDownCast(image->GetPointData()->GetArray("RGBA"));
+  const int* const size = image->GetDimensions();
+  if (colors == nullptr || colors->GetNumberOfComponents() != 4 || size[2] != 1) {
+    throw vdi::Error(
+        vdi::ErrorCode::InvalidArgument,
+        "the input has no picture; it takes what VolumetricDepthImage, RenderVDI or the VDI reader "
+        "make");
+  }
+  vdi::Image picture{size[0], size[1], {}, {}};
+  picture.rgba.resize(picture.pixelCount());
+  const unsigned char* from = colors->GetPointer(0);
+  for (glm::vec4& pixel : picture.rgba) {
+    const glm::vec4 straight = glm::vec4(from[0], from[1], from[2], from[3]) / 255.0F;
+    pixel = glm::vec4(glm::vec3(straight) * straight.a, straight.a);
+    from += 4;
+  }
+  return picture;
+}
+
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
   setVdi(image, vdi, vdi::flatten(vdi));
 }

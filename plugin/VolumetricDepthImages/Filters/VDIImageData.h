@@ -47,6 +47,9 @@ void announcePicture(vtkInformation* output, const int (&extent)[6]);
 void setPicture(vtkImageData* image, const vdi::ImageBytes& picture);
 /// Makes `image` w x h x 1 with RGBA, and Depth if `withDepth`.
 void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth);
+/// The picture that the image's RGBA hold, without depth. Throws vdi::Error{InvalidArgument} where it has
+/// none.
+vdi::Image pictureIn(vtkImageData* image);
 /// The flat picture of the VDI and the VDI itself.
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi);
 /// The same for a flat picture that exists already (vdi::flatten).

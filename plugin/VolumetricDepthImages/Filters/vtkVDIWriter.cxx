@@ -14,20 +14,23 @@
 
 #include "VDIImageData.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Image.h"
+#include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/page/Page.h"
 
 namespace {
 
-bool isPage(const std::filesystem::path& path) {
+/// The path's extension in lower case, with its dot.
+std::string extensionOf(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
-  return extension == ".html";
+  return extension;
 }
 
 void write(const std::filesystem::path& path, const vdi::Vdi& vdi) {
-  if (!isPage(path)) {
+  if (extensionOf(path) != ".html") {
     vdi::io::writeVdi(path, vdi);
     return;
   }
@@ -59,18 +62,24 @@ int vtkVDIWriter::FillInputPortInformation(int, vtkInformation* info) {
 void vtkVDIWriter::WriteData() {
   try {
     auto* image = vtkImageData::SafeDownCast(this->GetInput());
-    vdi::Vdi vdi;
-    if (!pv::getVdi(image, vdi)) {
-      if (image == nullptr || image->GetNumberOfPoints() == 0) return;  // another rank has it
-      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                       "the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
-    }
+    if (image == nullptr || image->GetNumberOfPoints() == 0) return;  // another rank has it
     if (this->FileName == nullptr || *this->FileName == '\0') {
       throw vdi::Error(vdi::ErrorCode::Io,
                        "no file name was given, or its pattern has a {field} of no value");
     }
+    const std::filesystem::path path(this->FileName);
+    if (extensionOf(path) == ".png") {
+      const glm::vec3 background(this->Background[0], this->Background[1], this->Background[2]);
+      vdi::io::writePng(path, vdi::io::toPicture(pv::pictureIn(image), background));
+      return;
+    }
+    vdi::Vdi vdi;
+    if (!pv::getVdi(image, vdi)) {
+      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                       "the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
+    }
     if (this->TimeStep >= 0) vdi.timeStep = static_cast<std::uint64_t>(this->TimeStep);
-    write(this->FileName, vdi);
+    write(path, vdi);
   } catch (const std::exception& error) {
     this->SetErrorCode(vtkErrorCode::CannotOpenFileError);
     vtkErrorMacro(<< error.what());

@@ -1,11 +1,13 @@
 /**
  * @class vtkVDIWriter
- * @brief writes the VDI of its input as a .vdi file, or as a page for browsers
+ * @brief writes the VDI of its input as a .vdi file or as a page for browsers, or its picture as PNG
  *
- * A file name that ends in .html gets a page with the VDI inside (vdi/page/Page.h).
+ * A file name that ends in .html gets a page with the VDI inside (vdi/page/Page.h), one that ends in .png the
+ * picture over Background.
  *
- * Input: the output of vtkVDIGenerator or vtkVDIReader. The rank that has the VDI writes, under a temporary
- * name that is renamed when the file is whole; other ranks do nothing.
+ * Input: the output of vtkVDIGenerator or vtkVDIReader; for pictures that of vtkVDIRenderer, too. The rank
+ * that has the VDI writes, under a temporary name that is renamed when the file is whole; other ranks do
+ * nothing.
  */
 #ifndef vtkVDIWriter_h
 #define vtkVDIWriter_h
@@ -26,6 +28,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIWriter : public vtkWriter {
   /// The simulation's step, kept in the file; -1 (default): the VDI's own.
   vtkSetMacro(TimeStep, int);
 
+  /// Of pictures: red, green and blue from 0 to 1; default: black.
+  vtkSetVector3Macro(Background, double);
+
  protected:
   vtkVDIWriter();
   ~vtkVDIWriter() override;
@@ -39,6 +44,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIWriter : public vtkWriter {
 
   char* FileName = nullptr;
   int TimeStep = -1;
+  double Background[3] = {0.0, 0.0, 0.0};
 };
 
 #endif
