@@ -314,7 +314,7 @@ def require_display(what):
     from paraview.modules.vtkRemotingViews import vtkPVRenderingCapabilitiesInformation as capabilities
     if not capabilities.GetLocalCapabilities() & capabilities.RENDERING:
         raise RuntimeError("%s needs a display to draw, and there is none (DISPLAY is %s): run the simulation under "
-                           "xvfb-run -a, or set DISPLAY; a VDI and its extractor need none"
+                           "xvfb-run -a, or set DISPLAY; the extractors VDI and VDIPicture need none"
                            % (what, os.environ.get("DISPLAY", "not set")))
 
 

@@ -2,8 +2,7 @@
 the array V at each step, and the first rank serves it. The file vdi-stream.link has the link to open.
 docs/live.md explains how to reach the first rank from another machine.
 
-The adaptor has loaded the plugin already. Copy this file and change array, range, camera and
-colours."""
+The adaptor has loaded the plugin already. Change array, range, camera and colours."""
 
 import os
 
@@ -31,8 +30,7 @@ image.CameraFocalPoint = [0.5, 0.5, 0.5]
 
 stream = CreateExtractor("VDIStream", image, registrationName="stream")
 stream.Writer.Port = 0  # any free port. A fixed one keeps the link's address from run to run
-# 1: whoever has the link may change viewpoint, colours, and the parameters that the simulation
-# declares.
+# 1: whoever has the link may change viewpoint, colours and the simulation's parameters.
 stream.Writer.Steer = int(os.environ.get("VDI_STEER", 0))
 stream.Writer.SteeringLog = os.path.join(os.environ.get("VDI_OUTPUT", "."), "vdi-steering.jsonl")
 stream.Writer.LinkFile = os.path.join(os.environ.get("VDI_OUTPUT", "."), "vdi-stream.link")

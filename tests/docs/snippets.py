@@ -1,60 +1,20 @@
-"""Runs or compiles the snippets of README.md and docs/*.md in C, Fortran, CMake, Python and JSON.
+"""Runs or compiles the snippets of README.md and the guides; recipes.py those of docs/recipes.md.
 
-Each such snippet needs a test below, and each test needs its snippet. The tests add the
-surroundings that a document's text describes, such as the simulation's variables. They change the
-snippets only in one port, which another program may hold, and in one number of steps.
+The tests add the surroundings that a document's text describes, such as the simulation's variables. They
+change the snippets only in one port, which another program may hold, and in one number of steps.
 
-Arguments: a part (core or paraview), the source folder, vdi. The environment has MPICC, MPIFORT,
-PVBATCH, PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
+The environment has MPICC, MPIFORT, PVBATCH, PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
 """
 
-import collections
-import glob
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
 
-PART, SOURCE, TOOL = sys.argv[1:4]
-LANGUAGES = ("c", "fortran", "cmake", "python", "json")
+from documents import SOURCE, TOOL, main, made, run, snippets, tests, write
+
 ADAPTOR = os.path.join(SOURCE, "catalyst_adaptor")
-BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.M | re.S)
-Test = collections.namedtuple("Test", "part document start function")
-TESTS = []
-
-
-def snippets():
-    """(document, text) of each fenced block in one of the languages."""
-    guides = sorted(glob.glob(os.path.join(SOURCE, "docs", "*.md")))
-    for path in [os.path.join(SOURCE, "README.md"), *guides]:
-        with open(path) as file:
-            for language, text in BLOCK.findall(file.read()):
-                if language in LANGUAGES:
-                    yield os.path.relpath(path, SOURCE), text
-
-
-def tests(part, document, start):
-    """Registers a function as the test of the document's snippet that begins with `start`."""
-    def register(function):
-        TESTS.append(Test(part, document, start, function))
-        return function
-    return register
-
-
-def run(*command, **options):
-    """Runs a command in the present folder. Throws with its output if it fails."""
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          timeout=200, **options)
-    line = " ".join(command)
-    assert done.returncode == 0, "%s: status %d\n%s" % (line, done.returncode, done.stdout)
-
-
-def write(name, text):
-    with open(name, "w") as file:
-        file.write(text)
 
 
 def vdi(*options):
@@ -207,12 +167,6 @@ with Catalyst(MPI.COMM_WORLD, ["script.py"]) as catalyst:
     run(sys.executable, "simulation.py", env=environment)
 
 
-def made(pattern):
-    """Sorted names of the files that a test has made, in any folder."""
-    paths = glob.glob(os.path.join("**", pattern), recursive=True)
-    return sorted(os.path.basename(path) for path in paths)
-
-
 @tests("paraview", "README.md", 'image = VolumetricDepthImage(Input=TrivialProducer')
 def script_in_short(text):
     in_situ("from paraview.simple import *\n" + text)
@@ -296,43 +250,6 @@ link = %r
 """ % (server.stdout.readline().strip(), text))
         finally:
             server.terminate()
-
-
-def fits(test, document, text):
-    return test.document == document and text.startswith(test.start)
-
-
-def passes(function, text):
-    """Runs a test in a folder of its own, and prints the result."""
-    folder = tempfile.mkdtemp()
-    os.chdir(folder)
-    try:
-        function(text)
-        print("passed  " + function.__name__, flush=True)
-        return True
-    except Exception as error:
-        print("FAILED  %s: %s\n%s" % (function.__name__, error, text), flush=True)
-        return False
-    finally:
-        os.chdir(SOURCE)
-        shutil.rmtree(folder)
-
-
-def main():
-    failures = 0
-    found = list(snippets())
-    for document, text in found:
-        fitting = [test for test in TESTS if fits(test, document, text)]
-        if len(fitting) != 1:
-            failures += 1
-            print("FAILED  %s has a snippet with %d tests:\n%s" % (document, len(fitting), text))
-        elif fitting[0].part == PART:
-            failures += not passes(fitting[0].function, text)
-    for test in TESTS:
-        if not any(fits(test, document, text) for document, text in found):
-            failures += 1
-            print("FAILED  %s has no snippet for %s" % (test.document, test.function.__name__))
-    sys.exit(failures > 0)
 
 
 main()

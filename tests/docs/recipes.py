@@ -1,0 +1,229 @@
+"""The recipes of docs/recipes.md: each has the text of a file in python_pipelines/, which runs.
+
+Several recipes share a run. The tests run the JSON files with fewer pixels. The environment has PVBATCH,
+PVPYTHON, MPIEXEC, SCREEN (what runs a command with a display), PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
+"""
+
+import atexit
+import csv
+import functools
+import json
+import os
+import shlex
+import shutil
+import sys
+import tempfile
+
+import skimage.io
+from documents import SOURCE, TOOL, main, made, run, tests, write
+
+RUNS = tempfile.mkdtemp()
+atexit.register(shutil.rmtree, RUNS)
+SIMULATION, PARAVIEW = (os.path.join(SOURCE, "tests", "docs", name) for name in ("recipe_simulation.py",
+                                                                                 "recipe_paraview.py"))
+
+
+def path_of(name):
+    return os.path.join(SOURCE, "python_pipelines", name)
+
+
+def text_of(path):
+    with open(path) as file:
+        return file.read()
+
+
+def recipe(name, runs):
+    """Registers a function as the test of a recipe's file. It is called in the folder in which `runs` has
+    run the recipe."""
+    recipe_text = text_of(path_of(name))
+
+    def register(function):
+        @tests("recipes", "docs/recipes.md", recipe_text)
+        @functools.wraps(function)
+        def test(text):
+            assert text == recipe_text, "the page has more than the file"
+            os.chdir(runs(name))
+            function()
+        return function
+    return register
+
+
+def run_on(ranks, *command):
+    """Without a display, in the present folder."""
+    environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+    run(os.environ["MPIEXEC"], "--oversubscribe", "-n", str(ranks), *command, env=environment)
+
+
+def folder_of(name):
+    path = os.path.join(RUNS, name)
+    os.makedirs(path, exist_ok=True)
+    return path
+
+
+@functools.cache
+def saved_state():
+    os.chdir(folder_of("state"))
+    run(os.environ["PVBATCH"], PARAVIEW, "state", path_of("save_state.py"))
+    return os.getcwd()
+
+
+@functools.cache
+def run_documents():
+    """All JSON files, one after the other in one program, on one rank for the test's time. The second run of
+    restart.json begins where a checkpoint of the first may have been."""
+    runs = []
+    for name, first, end in (("cameras.json", 0, 11), ("cinema.json", 0, 1), ("condition.json", 0, 31),
+                             ("budget.json", 0, 31), ("colors.json", 30, 31), ("restart.json", 0, 21),
+                             ("restart.json", 15, 41)):
+        folder = folder_of(name)
+        document = json.loads(text_of(path_of(name)))
+        document["resolution"] = [64, 36]
+        if name == "colors.json":
+            shutil.copy(os.path.join(saved_state(), document["colors"]["file"]), folder)
+        runs.append([folder, document, first, end])
+    os.chdir(RUNS)
+    write("runs.json", json.dumps(runs))
+    run_on(1, sys.executable, SIMULATION, "json", "runs.json")
+
+
+def of_documents(name):
+    run_documents()
+    return folder_of(name)
+
+
+@functools.cache
+def run_scripts():
+    """The scripts and the saved state, in one simulation on two ranks."""
+    scripts = [path_of("picture.py"), path_of("live.py"), os.path.join(saved_state(), "state.py")]
+    os.chdir(folder_of("scripts"))
+    run_on(2, sys.executable, SIMULATION, "scripts", *scripts)
+    return os.getcwd()
+
+
+def of_scripts(_):
+    return run_scripts()
+
+
+def picture(path):
+    """[y][x][3], of which something is to be seen."""
+    pixels = skimage.io.imread(path)[..., :3].astype(int)
+    share = (abs(pixels - pixels[0, 0]).max(axis=2) > 8).mean()
+    assert share > 0.01, "%s: %.3f of the pixels show something" % (path, share)
+    return pixels
+
+
+def differ(pictures):
+    for first, second in zip(pictures, pictures[1:]):
+        assert abs(first - second).max() > 16, "two pictures are the same"
+
+
+def events():
+    return [json.loads(line) for line in text_of("run.jsonl").splitlines()]
+
+
+@recipe("cameras.json", of_documents)
+def cameras():
+    for step in (0, 10):
+        names = ["%s/vdi_%06d" % (camera, step) for camera in ("front", "top", "near")]
+        assert all(os.path.getsize(name + ".vdi") > 0 for name in names)
+        differ([picture(name + ".png") for name in names])
+
+
+@recipe("cinema.json", of_documents)
+def cinema():
+    with open("views.cdb/data.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    places = {(float(row["phi"]), float(row["theta"])) for row in rows}
+    assert len(places) == 36 and {theta for _, theta in places} == {-30, 0, 30}, places
+    for row in rows:
+        picture(os.path.join("views.cdb", row["FILE"]))
+
+
+@recipe("condition.json", of_documents)
+def condition():
+    assert made("*") == ["hot_000020.vdi", "hot_000030.vdi"], made("*")
+
+
+@recipe("budget.json", of_documents)
+def budget():
+    told = [(event["event"], event["step"]) for event in events() if "step" in event]
+    assert told == [("frame", 0), ("left_out", 10), ("left_out", 20), ("left_out", 30)], told
+    assert made("*.vdi") == ["vdi_000000.vdi"], made("*.vdi")
+
+
+@recipe("colors.json", of_documents)
+def colors():
+    pixels = picture("colors_000030.png")
+    greenest = (pixels[..., 1] - pixels[..., [0, 2]].max(axis=2)).max()
+    assert greenest > 10, "viridis has green, Cool to Warm doesn't: %s" % greenest
+
+
+@recipe("restart.json", of_documents)
+def restart():
+    assert made("*.vdi") == ["vdi_%06d.vdi" % step for step in range(0, 41, 10)], made("*.vdi")
+    steps = [event["step"] for event in events() if event["event"] == "frame"]
+    assert steps == [0, 10, 20, 20, 30, 40], steps
+
+
+@recipe("picture.py", of_scripts)
+def picture_of_script():
+    for step in (0, 5):
+        differ([picture("%s_%06d.png" % (name, step)) for name in ("front", "turned")])
+    assert (picture("front_000000.png")[0, 0] == 255).all(), "the background is white"
+
+
+@recipe("live.py", of_scripts)
+def live():
+    """tests/stream/simulation_test.py looks at what viewers get."""
+    assert text_of("link").startswith("http://127.0.0.1:"), text_of("link")
+    assert not os.path.exists("vdi-stream.link"), "the link ends with the run"
+
+
+@recipe("save_state.py", of_scripts)
+def state():
+    assert "VolumetricDepthImage(" in text_of(os.path.join(saved_state(), "state.py"))
+    assert made("state_*") == ["state_%06d.vdi" % step for step in (0, 5)], made("state_*")
+    run(TOOL, "render", "state_000005.vdi", "-o", "state.png")
+    picture("state.png")
+
+
+def of_grid(name):
+    os.chdir(folder_of(name))
+    run_on(2, sys.executable, SIMULATION, "grid", path_of(name))
+    return os.getcwd()
+
+
+@recipe("unstructured.py", of_grid)
+def unstructured():
+    run(TOOL, "render", "vdi_000030.vdi", "-o", "grid.png")
+    picture("grid.png")
+
+
+def of_part(name):
+    os.chdir(folder_of(name))
+    run_on(3, sys.executable, path_of(name))
+    return os.getcwd()
+
+
+@recipe("subcommunicator.py", of_part)
+def subcommunicator():
+    run(TOOL, "render", "part_000001.vdi", "-o", "part.png")
+    picture("part.png")
+
+
+def of_follow(name):
+    os.chdir(folder_of(name))
+    os.mkdir("later")
+    for step, field in ((0, "sphere"), (10, "turbulence")):
+        run(TOOL, "generate", "--field", field, "--size", "16x16x16", "--resolution", "64x36", "-o",
+            "later/a_%06d.vdi" % step)
+    run(*shlex.split(os.environ["SCREEN"]), os.environ["PVPYTHON"], PARAVIEW, "follow", path_of(name))
+    return os.getcwd()
+
+
+@recipe("follow.py", of_follow)
+def follow():
+    differ([picture("first.png"), picture("second.png")])
+
+
+main()
