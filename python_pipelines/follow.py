@@ -1,5 +1,5 @@
-"""Shows the newest .vdi file of a folder in a window, and each new one as it appears, until the window is
-closed. The mouse turns it meanwhile. Usage: pvpython follow.py FOLDER"""
+"""Shows the newest .vdi file of a folder in a window, and each new one as it appears, until the
+window is closed. The mouse turns it meanwhile. Usage: pvpython follow.py FOLDER"""
 
 import glob
 import os

@@ -1,5 +1,5 @@
-"""A Catalyst script that shows a running simulation in browsers. It makes a Volumetric Depth Image of
-the array V at each step, and the first rank serves it. The file vdi-stream.link has the link to open.
+"""A Catalyst script that shows a running simulation in browsers. It makes a VDI of the array V at
+each step, and the first rank serves it. The file vdi-stream.link has the link to open.
 docs/live.md explains how to reach the first rank from another machine.
 
 The adaptor has loaded the plugin already. Change array, range, camera and colours."""

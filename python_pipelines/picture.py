@@ -1,5 +1,5 @@
 """A Catalyst script that writes pictures of the array V as PNG at each step: from the VDI's own
-viewpoint and turned by 40 degrees. It needs neither a view nor a display, on any number of ranks."""
+viewpoint and turned by 40 degrees. It needs no view and no display, on any number of ranks."""
 
 from paraview import catalyst
 from paraview.simple import *  # noqa: F403

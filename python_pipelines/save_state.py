@@ -1,5 +1,5 @@
-"""Saves a Catalyst script of a sample of the simulation's data, as ParaView's window does by *File, Save
-Catalyst State*. Usage: pvbatch save_state.py SAMPLE STATE, for example sample.vti and state.py."""
+"""Saves a Catalyst script of a sample of the simulation's data, as ParaView's window does by *File,
+Save Catalyst State*. Usage: pvbatch save_state.py SAMPLE STATE, say sample.vti and state.py."""
 
 import sys
 

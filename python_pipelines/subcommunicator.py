@@ -1,5 +1,5 @@
-"""A simulation on all ranks but the last, which does something else meanwhile. The ranks that simulate
-make the VDIs. Usage: mpirun -n 3 python3 subcommunicator.py"""
+"""A simulation on all ranks but the last, which does something else meanwhile. The ranks that
+simulate make the VDIs. Usage: mpirun -n 3 python3 subcommunicator.py"""
 
 import numpy as np
 from mpi4py import MPI
@@ -13,7 +13,8 @@ part = world.Split(color=int(is_simulating), key=world.rank)
 if is_simulating:
     run = {"field": "V", "resolution": [640, 360], "output": "part_{timestep:06d}.vdi"}
     with Catalyst(part, json=run) as catalyst:
-        catalyst.set_blocks([Block(cells=(N, N, N), origin=(part.rank, 0, 0), spacing=(1 / N,) * 3)])
+        block = Block(cells=(N, N, N), origin=(part.rank, 0, 0), spacing=(1 / N,) * 3)
+        catalyst.set_blocks([block])
         values = np.linspace(0, 1, N ** 3).reshape(N, N, N)
         catalyst.set_array("V", [values])
         for step in range(2):

@@ -1,5 +1,5 @@
-"""A Catalyst script for simulations that hand unstructured grids to ParaView's Catalyst by an adaptor
-of their own. Resample To Image makes a lattice of the grid, of which a VDI is written at each step."""
+"""A Catalyst script for simulations that hand unstructured grids to ParaView's Catalyst by an
+adaptor of their own. Resample To Image makes a lattice of the grid, and a VDI is made of that."""
 
 from paraview import catalyst
 from paraview.simple import *  # noqa: F403
