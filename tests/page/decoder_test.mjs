@@ -1,4 +1,5 @@
 // The page's decoder on sound, damaged and hostile files: it decodes, or throws FormatError. $1: vdi.
+// VDI_FUZZ_SECONDS=600 goes on with other damage for so long.
 import {execFileSync} from "node:child_process";
 import {mkdtempSync, readFileSync, rmSync} from "node:fs";
 import {tmpdir} from "node:os";
@@ -103,6 +104,35 @@ async function testDamage(/** @type {string} */ name, /** @type {Uint8Array} */ 
   if (seen.size < 12) fail(`${name}: damage gave only ${[...seen].join("; ")}`);
 }
 
+/** Damage of any kind, most of it under right checksums, for as long as VDI_FUZZ_SECONDS says. */
+async function fuzz(/** @type {Uint8Array[]} */ files) {
+  const end = performance.now() + 1000 * Number(process.env.VDI_FUZZ_SECONDS ?? 1);
+  let rounds = 0, sound = 0, most = 0;
+  for (; performance.now() < end; ++rounds) {
+    let bytes = files[random(files.length)].slice();
+    for (let changes = 1 + random(4); changes > 0; --changes) {
+      const at = random(2) === 0 ? random(bytes.length) : random(Math.min(bytes.length, 400));
+      const piece = Uint8Array.from({length: random(12)}, () => [0, 1, 127, 128, 255, random(256)][random(6)]);
+      const kind = random(6);
+      if (kind === 0) bytes = Uint8Array.from([...bytes.subarray(0, at), ...bytes.subarray(at + piece.length)]);
+      else if (kind === 1) bytes = Uint8Array.from([...bytes.subarray(0, at), ...piece, ...bytes.subarray(at)]);
+      else if (kind === 2) bytes.set(piece.subarray(0, bytes.length - at), at);
+      else bytes[at] ^= 1 << random(8);
+      if (bytes.length < 300) break;
+    }
+    if (random(8) > 0 && bytes.length >= 240) seal(bytes);
+    try {
+      if (await outcome(bytes) === "sound") ++sound;
+    } catch (error) {
+      fail(`round ${rounds}: ${error}`);
+      return;
+    }
+    if (rounds % 100 === 0) most = Math.max(most, process.memoryUsage().rss);
+  }
+  console.log(`${rounds} damaged files, ${sound} of them sound; ${most >> 20} MiB at most`);
+  if (sound === 0 || sound === rounds || most > 1 << 30) fail("fuzzing");
+}
+
 const METADATA = {
   array: {name: "speed ü", association: "points", components: 1, component: 0}, range: [0.5, 11], time: 0, timeStep: 0,
   transferFunction: {colors: [[0, 0, 0, 1], [6, 0, 1, 0], [12, 1, 0, 0]], opacities: [[0, 0], [12, 1]], unitDistance: 1},
@@ -139,15 +169,18 @@ async function testMetadata(/** @type {Uint8Array} */ file) {
 
 const small = ["--size", "12x10x8", "--resolution", "24x18", "--supersegments", "4"];
 const kinds = {compact: [], full: ["--precision", "full"], margin: ["--margin", "0.5", "--zoom", "2"]};
+const files = [];
 for (const [name, more] of Object.entries(kinds)) {
   const file = join(folder, `${name}.vdi`);
   execFileSync(vdi, ["generate", "--field", "turbulence", ...small, ...more, "-o", file], {stdio: "ignore"});
   const bytes = new Uint8Array(readFileSync(file));
+  files.push(bytes);
   await testDamage(name, bytes);
   if (name === "compact" && bytes[8] !== 3) await testMetadata(bytes);
 }
 testChecksum();
 testLz4();
+await fuzz(files);
 rmSync(folder, {recursive: true});
 console.log(failures === 0 ? "all well" : `${failures} failures`);
 process.exit(failures === 0 ? 0 : 1);

@@ -1,5 +1,9 @@
 // The page's end of the stream on sound, damaged and hostile messages, without a network. What comes in goes to the
-// decoder of messages, or to a connection over sockets that are objects of this test.
+// decoder of messages, or to a connection over sockets that are objects of this test. VDI_FUZZ_SECONDS=600 goes on with
+// other damage for so long.
+import {setFlagsFromString} from "node:v8";
+import {runInNewContext} from "node:vm";
+
 import {Live, rateOf} from "../../web/live.js";
 import {LevelAssembler, StreamError, extendedSeries, serverMessageOf} from "../../web/messages.js";
 
@@ -76,8 +80,10 @@ function testTexts() {
     const text = typeof message === "string" ? message : JSON.stringify(message);
     check(outcome(() => serverMessageOf(text)) === "refused", `${text.slice(0, 100)} is taken`);
   }
-  const sound = [level, welcome, {type: "state", state: "live", viewers: 1}, {type: "error", cause: "why"}].map((m) => JSON.stringify(m));
-  for (let round = 0; round < 20000; ++round) {
+  const sound = [level, welcome, steering, {type: "state", state: "live", viewers: 1},
+                 {type: "error", cause: "why"}].map((m) => JSON.stringify(m));
+  const end = performance.now() + 1000 * Number(process.env.VDI_FUZZ_SECONDS ?? 0);
+  for (let round = 0; round < 20000 || performance.now() < end; ++round) {
     const text = [...sound[round % sound.length]];
     for (let i = 0; i < 1 + round % 3; ++i) {
       const at = random(text.length);
@@ -264,8 +270,40 @@ async function testSeries() {
   live.close();
 }
 
+/** Frames leave no memory behind, however many come. */
+async function testManyFrames() {
+  setFlagsFromString("--expose-gc");
+  const collect = runInNewContext("gc");
+  const used = async () => {
+    for (let i = 0; i < 3; ++i) {
+      await soon(30);
+      collect();
+    }
+    const {heapUsed, arrayBuffers} = process.memoryUsage();
+    return heapUsed + arrayBuffers;
+  };
+  const {live, sockets, shown} = connection();
+  sockets[0].open();
+  sockets[0].text({...welcome, series: null});
+  const end = performance.now() + 1000 * Number(process.env.VDI_FUZZ_SECONDS ?? 0);
+  let before = 0, frame = 0;
+  for (; frame < 2000 || performance.now() < end; ++frame) {
+    const bytes = 100000;
+    sockets[0].text({...level, frame, bytes});
+    sockets[0].bytes(part(frame, 0, 0, new Uint8Array(bytes)));
+    sockets[0].sent.length = shown.length = 0;
+    if (frame % 100 === 0) await soon(6);
+    if (frame === 500) before = await used();
+  }
+  const growth = await used() - before;
+  console.log(`${frame} frames: ${growth >> 10} KiB more`);
+  check(growth < 1 << 20, "frames leave memory behind");
+  live.close();
+}
+
 testTexts();
 testParts();
+await testManyFrames();
 await testConnection();
 await testSeries();
 check(Math.abs(rateOf(10000, [{at: 8000, bytes: 1000}, {at: 9000, bytes: 3000}, {at: 1000, bytes: 1e9}]) - 2000) < 1, "the rate");

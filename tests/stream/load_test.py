@@ -1,5 +1,6 @@
-"""What clients that come in great numbers, or slowly, cost `vdi serve`. Arguments: vdi, how many connections one after
-another (10000). It prints the server's memory, threads and open files before and after."""
+"""What clients that come in great numbers, or slowly, and many frames cost `vdi serve`. Arguments: vdi, how many connections
+one after another (10000), how many frames (1000). It prints the server's memory, threads and open files before and after."""
+import os
 import pathlib
 import selectors
 import socket
@@ -13,6 +14,7 @@ from tool import PATIENCE, Server, make, until
 from viewer import Closed, Viewer
 
 count = int(sys.argv[1]) if len(sys.argv) > 1 else 10000
+frame_count = int(sys.argv[2]) if len(sys.argv) > 2 else 1000
 failures = []
 
 
@@ -70,6 +72,12 @@ def vanishing(server):
     viewer.close()
 
 
+def viewer_of(server):
+    viewer = Viewer(server.port, PATIENCE)
+    viewer.hello(server.token)
+    return viewer
+
+
 def one_after_another(server):
     kinds = [page, stranger, visitor, silent, abrupt, vanishing]
     for number in range(60):
@@ -85,7 +93,7 @@ def one_after_another(server):
     print("%d connections in %.1f s: %.1f MiB, %d threads, %d files before; %.1f, %d, %d after" %
           (count, seconds, *before, *after))
     check(after[0] - before[0] < 16, "connections leave no memory behind")
-    check(after[1:] == before[1:], "no threads and no files")
+    check(after[1] == before[1] and after[2] <= before[2], "no threads and no files")
 
 
 def at_once(server):
@@ -162,6 +170,31 @@ def slowly(server):
     check(standing(server)[0] - before[0] < 16, "they leave no memory behind")
 
 
+def frames(server, file, live):
+    """They appear one after the other. One viewer takes them, one takes nothing."""
+    levels = viewer_of(server).levels()
+    stalled = viewer_of(server)
+    before = None
+    data = file.read_bytes()
+    for number in range(frame_count + 200):
+        if number == 200:  # after buffers have grown
+            before = standing(server)
+        (live / "part").write_bytes(data)
+        os.rename(live / "part", live / f"{number:06}.vdi")
+        if next(levels)[1] != data:
+            check(False, f"frame {number}")
+        if number >= 4:
+            os.remove(live / f"{number - 4:06}.vdi")
+    after = standing(server)
+    print("%d frames: %.1f MiB, %d threads, %d files before; %.1f, %d, %d after" % (frame_count, *before, *after))
+    check(after[0] - before[0] < 4 + frame_count / 1000, "frames leave no memory behind")
+    check(after[1:] == before[1:], "no threads and no files")
+    for announced, got in stalled.levels():
+        if announced["frame"] == frame_count + 199:
+            break
+    check(got == data, "who stalled has the newest one in the end")
+
+
 with tempfile.TemporaryDirectory() as folder:
     made = pathlib.Path(folder) / "small.vdi"
     make(made, "24x24x24", "48x32", 6)
@@ -170,6 +203,15 @@ with tempfile.TemporaryDirectory() as folder:
         one_after_another(running)
         at_once(running)
         slowly(running)
+        check(running.end() == 0, "the server ends in order")
+        check(running.said() == "", "and had nothing to complain about")
+    finally:
+        running.close()
+    appearing = pathlib.Path(folder) / "live"
+    appearing.mkdir()
+    running = Server(appearing)
+    try:
+        frames(running, made, appearing)
         check(running.end() == 0, "the server ends in order")
         check(running.said() == "", "and had nothing to complain about")
     finally:

@@ -1,5 +1,6 @@
 """`vdi serve` and `vdi receive` as users run them. Argument: vdi."""
 import os
+import resource
 import shutil
 import socket
 import subprocess
@@ -126,6 +127,30 @@ class ServeTest(ServedFolder):
         for path in ("/small0.vdi", "//etc/passwd", "/../small0.vdi", "/%2e%2e/", "/stream", "/index.html", "/?"):
             self.assertEqual(server.get(path)[0].status, 404, path)
 
+    def test_a_head_without_an_end(self):
+        server = self.serve(self.made / "small0.vdi")
+        for line in (b"GET /", b"GET / HTTP/1.1\r\nX: "):
+            endless = socket.create_connection(("127.0.0.1", server.port), PATIENCE)
+            self.addCleanup(endless.close)
+            endless.sendall(line)
+            sent = 0
+            with self.assertRaises(ConnectionError):
+                while True:
+                    sent += endless.send(b"x" * 1000)
+                    self.assertLess(sent, 1 << 26)
+        self.assertEqual(server.get("/")[0].status, 200)
+        self.assertEqual(server.end(), 0)
+
+    def test_a_full_disk(self):
+        server = self.serve(self.made / "large.vdi")
+        done = subprocess.run([VDI, "receive", server.link, "-o", self.folder / "got"], capture_output=True, text=True,
+                              timeout=PATIENCE, check=False, restore_signals=False,  # SIGXFSZ stays ignored
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)))
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        self.assertEqual(list((self.folder / "got").iterdir()), [])
+        self.assertEqual(server.end(), 0)
+
     def test_origins(self):
         server = self.serve(self.made / "small0.vdi", "--origin", "https://desk.example")
         for origin in ("https://desk.example", f"http://127.0.0.1:{server.port}"):
@@ -214,25 +239,29 @@ class ServeTest(ServedFolder):
         self.assertGreater(announced["dropped"], 0)
         self.assertEqual(server.end(), 0)
 
-    def test_a_killed_server_is_found_again(self):
+    def test_a_server_killed_in_mid_frame_is_found_again(self):
         self.appear("small0", "a.vdi")
         token = self.folder / "token"
         token.write_text("t" * 32)
-        server = self.serve(self.live, "--token-file", token)
+        server = self.serve(self.live, "--token-file", token, "--rate", "400kbit")  # too little for a large one
         got = self.folder / "got"
         recorder = subprocess.Popen([VDI, "receive", server.address, "--token-file", token, "-o", got, "--frames", "2",
                                      "--patience", str(PATIENCE)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                     text=True)
         self.addCleanup(recorder.kill)
         until((got / "vdi_000000.vdi").exists, "the first frame")
+        self.appear("large", "b.vdi")
+        witness = self.view(server)
+        witness.hello(token.read_text())
+        while not isinstance(part := witness.message(), tuple) or part[0] != 1:
+            pass
         server.kill()
         until(lambda: "" != recorder.stderr.readline(), "a line on the lost connection")
         os.remove(self.live / "a.vdi")
-        self.appear("small1", "b.vdi")
         again = self.serve(self.live, "--token-file", token, "--port", server.port)
         self.assertEqual(recorder.wait(PATIENCE), 0)
         recorder.stderr.close()
-        self.assertEqual((got / "vdi_000001.vdi").read_bytes(), self.bytes_of("small1"))
+        self.assertEqual((got / "vdi_000001.vdi").read_bytes(), self.bytes_of("large"))
         again.end()
         done = receive(again.address, "--token-file", token, "--patience", "0.5")
         self.assertEqual(done.returncode, 1)
