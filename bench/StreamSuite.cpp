@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <nlohmann/json.hpp>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -18,6 +19,7 @@
 #include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "apps/Cameras.h"
 #include "apps/FrameFiles.h"
@@ -33,6 +35,7 @@
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vdi/pipeline/VdiRenderer.h"
 #include "vdi/stream/Client.h"
+#include "vdi/stream/Frame.h"
 #include "vdi/stream/Publisher.h"
 #include "vdi/stream/Server.h"
 #include "vdi/stream/Token.h"
@@ -183,6 +186,33 @@ void waitUntil(IsDone isDone) {
   while (!isDone() && Clock::now() < end) std::this_thread::sleep_for(pause);
 }
 
+/// Viewers that decode nothing: six take what comes, one takes nothing, and one can vanish.
+class Crowd {
+ public:
+  explicit Crowd(const std::string& link) {
+    constexpr std::size_t takers = 6;
+    for (std::size_t i = 0; i < takers + 2; ++i)
+      clients_.push_back(std::make_unique<stream::Client>(apps::clientOf(link, "")));
+    for (const auto& client : clients_) waitUntil([&client] { return client->standing().isConnected; });
+    for (std::size_t i = 0; i < takers; ++i)
+      done_.push_back(std::async(std::launch::async, [this, &client = *clients_[i]] { take(client); }));
+  }
+  ~Crowd() { isEnding_ = true; }
+  Crowd(const Crowd&) = delete;
+  Crowd& operator=(const Crowd&) = delete;
+  void loseOne() { clients_.pop_back(); }
+
+ private:
+  void take(stream::Client& client) const {
+    constexpr std::chrono::milliseconds patience{20};
+    while (!isEnding_) (void)client.next(patience);
+  }
+
+  std::vector<std::unique_ptr<stream::Client>> clients_;
+  std::atomic<bool> isEnding_{false};
+  std::vector<std::future<void>> done_;  // the last member: its destructor waits for the threads
+};
+
 class StreamSuite {
  public:
   StreamSuite(const BenchOptions& options, const comm::Communicator& world,
@@ -197,10 +227,11 @@ class StreamSuite {
 
   std::vector<json> rows() {
     if (root()) {
-      fmt::print(table_,
-                 "{:<16} {:<7} {:>3} {:<8} {:>9} {:>10} {:>9} {:>9} {:>10} {:>10} {:>8} {:>8} {:>8}\n",
-                 "data set", "way", "N_S", "rate", "full MiB", "coarse MiB", "SSIM full", "SSIM crse",
-                 "frames/s", "full/s", "age ms", "oldest", "view ms");
+      fmt::print(
+          table_,
+          "{:<16} {:<7} {:>3} {:<8} {:>9} {:>10} {:>9} {:>9} {:>10} {:>10} {:>8} {:>8} {:>8} {:>9} {:>6}\n",
+          "data set", "way", "N_S", "rate", "full MiB", "coarse MiB", "SSIM full", "SSIM crse", "frames/s",
+          "full/s", "age ms", "oldest", "view ms", "encode ms", "crowd");
     }
     for (const DataSet& set : dataSets(options_)) {
       setBlocks(set);
@@ -223,6 +254,9 @@ class StreamSuite {
     std::string rate;
     LevelFigures full;
     LevelFigures coarse;
+    double encodeMs = 0.0;  // all levels
+    double stepMs = 0.0;    // a VDI made and published, without viewers
+    double crowdStepMs = 0.0;
   };
 
   bool root() const { return world_.rank() == 0; }
@@ -256,8 +290,14 @@ class StreamSuite {
         sent.full = figuresOf(*vdi, files.back().size(), *truth, settings);
         const Vdi coarse = thinned(*vdi, stream::coarseFactor);
         sent.coarse = figuresOf(coarse, io::encode(coarse).size(), *truth, settings);
+        sent.encodeMs = repeated(options_.repeats, [&vdi] {
+                          return wallMs([&vdi] {
+                            stream::encodeFrame(*vdi, 0, Clock::now(), [](const auto&) { return true; });
+                          });
+                        }).median;
       });
     }
+    measureSteps(sent, settings);
     for (const std::string& rate : options_.rates) {
       sent.rate = rate;
       sent.way = "live";
@@ -298,6 +338,38 @@ class StreamSuite {
   void waitFor(Clock::time_point start, int index) const {
     std::this_thread::sleep_until(
         start + std::chrono::duration_cast<Clock::duration>(Seconds(options_.period / 1000.0 * index)));
+  }
+
+  /// Steps one after the other, by turns with eight viewers and with none. One of the eight takes nothing,
+  /// one vanishes.
+  void measureSteps(Sent& sent, const GenerateSettings& settings) {
+    constexpr int turns = 6;
+    std::optional<stream::Server> server;
+    std::optional<stream::Publisher> publisher;
+    world_.together([&] {
+      if (!root()) return;
+      server.emplace(serverOptions(""));
+      publisher.emplace(*server);
+    });
+    clock_.run();
+    std::array<std::vector<double>, 2> times;
+    for (int turn = 0; turn < turns; ++turn) {
+      const bool isCrowded = turn % 2 == 1;
+      std::optional<Crowd> crowd;
+      world_.together([&] {
+        if (root() && isCrowded) crowd.emplace(server->link());
+      });
+      for (int i = 0; i < options_.frames; ++i) {
+        if (crowd && i == options_.frames / 2) crowd->loseOne();
+        times[isCrowded ? 1 : 0].push_back(wallMs([&] {
+          std::optional<Vdi> vdi = generator_.generate(
+              cameras_[static_cast<std::size_t>(i) % cameras_.size()], function_, settings);
+          if (vdi) publisher->publish(std::make_shared<const Vdi>(std::move(*vdi)));
+        }));
+      }
+    }
+    sent.stepMs = spreadOf(times[0]).median;
+    sent.crowdStepMs = spreadOf(times[1]).median;
   }
 
   /// The ranks make each VDI when it is due. The root publishes it, as the extractor VDIStream
@@ -372,11 +444,11 @@ class StreamSuite {
     const double milliseconds = 1000.0;
     fmt::print(table_,
                "{:<16} {:<7} {:>3} {:<8} {:>9.2f} {:>10.2f} {:>9.4f} {:>9.4f} {:>10.1f} {:>10.1f} {:>8.0f} "
-               "{:>8.0f} {:>8.1f}\n",
+               "{:>8.0f} {:>8.1f} {:>9.1f} {:>6.3f}\n",
                sent.dataset, sent.way, settings.supersegments, sent.rate, sent.full.mebibytes,
                sent.coarse.mebibytes, sent.full.ssim, sent.coarse.ssim, figures.framesPerSecond,
                figures.fullPerSecond, figures.age.median * milliseconds, figures.age.maximum * milliseconds,
-               figures.busy.median * milliseconds);
+               figures.busy.median * milliseconds, sent.encodeMs, sent.crowdStepMs / sent.stepMs);
     std::fflush(table_);
     json row{{"dataset", sent.dataset},
              {"way", sent.way},
@@ -391,6 +463,9 @@ class StreamSuite {
              {"view_ms", figures.busy.median * milliseconds},
              {"full_mib", sent.full.mebibytes},
              {"coarse_mib", sent.coarse.mebibytes},
+             {"encode_ms", sent.encodeMs},
+             {"step_ms", sent.stepMs},
+             {"crowd_step_ratio", sent.crowdStepMs / sent.stepMs},
              {"ssim_full", sent.full.ssim},
              {"ssim_coarse", sent.coarse.ssim},
              {"turn", options_.turn},
