@@ -1,14 +1,13 @@
 // Documents cut, spliced and altered at random: each is refused with its place, or gives a run that can be
 // made. VDI_FUZZ_SECONDS goes on for so long.
 #include <algorithm>
-#include <chrono>
-#include <cstdlib>
 #include <random>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "tests/Catch.h"
+#include "tests/FuzzTime.h"
 #include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
 #include "vdi/core/Error.h"
@@ -118,13 +117,11 @@ void readMap(const std::string& text) {
 
 TEST_CASE("documents altered at random are refused or can be made") {
   std::mt19937 random(7);
-  const char* given = std::getenv("VDI_FUZZ_SECONDS");
-  const std::chrono::duration<double> enough(given != nullptr ? std::strtod(given, nullptr) : 0.0);
-  const auto start = std::chrono::steady_clock::now();
+  const test::FuzzTime time(0.0);
   constexpr int atLeast = 20000;
   int refused = 0;
   int all = 0;
-  while (all < atLeast || std::chrono::steady_clock::now() - start < enough) {
+  while (all < atLeast || !time.isOver()) {
     ++all;
     if (isRefused(mutated(runs, random), readAndMake)) ++refused;
     if (isRefused(mutated(presets, random), readMap)) ++refused;

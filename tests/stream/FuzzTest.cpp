@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "tests/Catch.h"
+#include "tests/FuzzTime.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/stream/Assembly.h"
@@ -39,20 +40,7 @@ using test::Noise;
 
 const std::string token(32, 't');
 constexpr std::size_t mebibyte = std::size_t{1} << 20;
-
-class Deadline {
- public:
-  Deadline() {
-    constexpr double usual = 2.0;
-    const char* const given = std::getenv("VDI_FUZZ_SECONDS");
-    const std::chrono::duration<double> time(given != nullptr ? std::atof(given) : usual);
-    end_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(time);
-  }
-  bool hasCome() const { return Clock::now() >= end_; }
-
- private:
-  Clock::time_point end_;
-};
+constexpr double usualSeconds = 2.0;
 
 /// Bytes of a message, with up to four changes.
 std::string changed(std::string bytes, Noise& noise) {
@@ -109,8 +97,35 @@ std::string changed(std::string bytes, Noise& noise) {
   return bytes;
 }
 
+Controls controls() {
+  Controls result;
+  result.generator = GeneratorControls{{640, 360}, 25, std::array{0.0, 0.5}, {"X Ray", "Cool to Warm"}};
+  result.parameters = {{"feed", false, 0.03, 0.0, 0.1}, {"steps", true, 3.0, 1.0, 9.0}};
+  return result;
+}
+
+/// What a viewer that drives asks for. Some of it is out of bounds.
+Wish wishOf(Noise& noise) {
+  const auto chance = [&noise] { return noise.below(3) == 0; };
+  Wish wish;
+  if (chance()) {
+    wish.camera.emplace();
+    wish.camera->position = {noise.unit(), noise.unit(), 2.0 + noise.unit()};
+    wish.camera->parallelProjection = chance();
+  }
+  if (chance()) wish.resolution = {static_cast<int>(1 + noise.below(2000)), 360};
+  if (chance()) wish.supersegments = 1 + static_cast<int>(noise.below(30));
+  if (chance()) wish.range = {noise.unit() - 1.0, noise.unit() + 1e-3};
+  if (chance()) wish.preset = chance() ? "none" : "X Ray";
+  if (chance()) wish.period = 1 + static_cast<int>(noise.below(20));
+  if (chance()) wish.paused = chance();
+  if (chance()) wish.parameters["feed"] = 0.15 * noise.unit();
+  if (chance()) wish.parameters["steps"] = noise.below(12);
+  return wish;
+}
+
 FromViewer viewersMessage(Noise& noise) {
-  switch (noise.below(8)) {
+  switch (noise.below(14)) {
     case 0: {
       Hello hello;
       hello.token = noise.below(8) == 0 ? "wrong" : token;
@@ -124,6 +139,15 @@ FromViewer viewersMessage(Noise& noise) {
       return Pause{};
     case 3:
       return Resume{};
+    case 4:
+    case 5:
+      return Drive{};
+    case 6:
+      return Release{};
+    case 7:
+    case 8:
+    case 9:
+      return Steer{wishOf(noise)};
     default:
       return Ack{noise.below(50), noise.below(3), noise.bits()};
   }
@@ -174,7 +198,9 @@ std::vector<Message> conversation() {
   options.token = token;
   options.mostViewers = 1;
   options.show = [](std::uint32_t) {};
+  options.steer = [](std::uint32_t, const Wish&) {};
   Hub hub(options);
+  hub.setControls(controls());
   hub.append(seriesOf(3));
   Viewer viewer(hub, [] {});
   Hello hello;
@@ -231,7 +257,7 @@ std::vector<Message> changed(std::vector<Message> messages, Noise& noise) {
 
 std::vector<std::byte> bytesOf(const std::string& text) {
   std::vector<std::byte> bytes(text.size());
-  std::memcpy(bytes.data(), text.data(), text.size());
+  std::transform(text.begin(), text.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
   return bytes;
 }
 
@@ -285,10 +311,16 @@ TEST_CASE("damaged messages of viewers harm nobody") {
   options.show = [](std::uint32_t) {};
   std::uint64_t sent = 0;
   std::uint64_t refused = 0;
-  const Deadline deadline;
-  for (std::uint64_t seed = 1; !deadline.hasCome(); ++seed) {
+  std::uint64_t steered = 0;
+  options.steer = [&steered](std::uint32_t, const Wish& wish) {
+    REQUIRE(objectionTo(wish, controls()).empty());
+    ++steered;
+  };
+  const test::FuzzTime time(usualSeconds);
+  for (std::uint64_t seed = 1; !time.isOver(); ++seed) {
     Noise noise(seed);
     Hub hub(options);
+    hub.setControls(controls());
     hub.append(seriesOf(4));
     Clock::time_point now = Clock::now();
     std::vector<std::unique_ptr<Viewer>> viewers;
@@ -305,7 +337,8 @@ TEST_CASE("damaged messages of viewers harm nobody") {
       if (noise.below(30) == 0) hub.miss({noise.below(5), "gone"});
       const std::size_t which = noise.below(static_cast<std::uint32_t>(viewers.size()));
       Viewer& viewer = *viewers[which];
-      const std::string text = changed(textOf(viewersMessage(noise)), noise);
+      const std::string sound = textOf(viewersMessage(noise));
+      const std::string text = noise.below(3) == 0 ? sound : changed(sound, noise);
       if (!understood<FromViewer>(text, viewerMessage)) ++refused;
       viewer.receive(text, now);
       bool isGone = noise.below(40) == 0;
@@ -328,14 +361,15 @@ TEST_CASE("damaged messages of viewers harm nobody") {
   }
   CHECK(sent > mebibyte);
   CHECK(refused > 1000);
+  CHECK(steered > 0);
 }
 
 TEST_CASE("damaged messages of a server give whole levels or an error") {
   const std::vector<Message> good = conversation();
   std::uint64_t wholes = 0;
   std::uint64_t refused = 0;
-  const Deadline deadline;
-  for (std::uint64_t seed = 1; !deadline.hasCome(); ++seed) {
+  const test::FuzzTime time(usualSeconds);
+  for (std::uint64_t seed = 1; !time.isOver(); ++seed) {
     Noise noise(seed);
     Assembly assembly;
     try {
@@ -371,7 +405,7 @@ TEST_CASE("damaged bytes on a connection end that connection alone") {
   server.publish(frameOf(2));
   std::uint64_t answers = 0;
   std::uint64_t seed = 1;
-  for (const Deadline deadline; !deadline.hasCome(); ++seed) {
+  for (const test::FuzzTime time(usualSeconds); !time.isOver(); ++seed) {
     Noise noise(seed);
     std::array<int, 2> ends{};
     REQUIRE(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0);
@@ -410,8 +444,8 @@ TEST_CASE("a server that sends damaged messages ends a client with one error") {
   std::uint64_t wholes = 0;
   std::uint64_t refused = 0;
   std::uint64_t lost = 0;
-  const Deadline deadline;
-  for (std::uint64_t seed = 1; !deadline.hasCome(); ++seed) {
+  const test::FuzzTime time(usualSeconds);
+  for (std::uint64_t seed = 1; !time.isOver(); ++seed) {
     Noise noise(seed);
     Client client(options);
     websocket::stream<tcp::socket> socket(acceptor.accept());

@@ -3,11 +3,13 @@
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/x509v3.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <fstream>
 
 #include "tests/Catch.h"
+#include "tests/FuzzTime.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/stream/Client.h"
@@ -47,6 +49,13 @@ Received nextOf(Client& client) {
   std::optional<Received> received = client.next(patience);
   REQUIRE(received);
   return *std::move(received);
+}
+
+[[maybe_unused]] std::size_t residentBytes() {
+  std::size_t all = 0;
+  std::size_t resident = 0;
+  std::ifstream("/proc/self/statm") >> all >> resident;
+  return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
 }
 
 /// A key and a certificate of its own for that name.
@@ -133,6 +142,26 @@ TEST_CASE("publishing waits for no encoder") {
   while (nextOf(client).level.step != 99) {
   }
 }
+
+#ifndef __SANITIZE_ADDRESS__  // it keeps freed memory for a while
+TEST_CASE("frames leave no memory behind") {
+  constexpr std::uint64_t atFirst = 200;  // until buffers have grown
+  constexpr std::uint64_t atLeast = 500;
+  constexpr std::size_t enough = std::size_t{8} << 20;
+  Server server(options());
+  Client client(clientOf(server));
+  Publisher publisher(server);
+  std::size_t before = 0;
+  const test::FuzzTime time(0.0);
+  for (std::uint64_t step = 1; step < atLeast || !time.isOver(); ++step) {
+    publisher.publish(vdiOfStep(step, 80));
+    while (nextOf(client).level.step != step) {
+    }
+    if (step == atFirst) before = residentBytes();
+    if (step > atFirst) REQUIRE(residentBytes() < before + enough);
+  }
+}
+#endif
 
 TEST_CASE("the last VDI is sent before the end") {
   Server server(options());

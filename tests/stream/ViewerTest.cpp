@@ -167,6 +167,28 @@ TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
   CHECK(std::get<Viewer::Farewell>(end).code == Close::Stalled);
 }
 
+TEST_CASE("a series of any length comes in parts") {
+  Hub hub(limited(mebibyte));
+  Series series;
+  series.times.resize(2 * seriesEntries + 5);
+  series.steps.resize(series.times.size());
+  hub.append(series);
+  Connected viewer(hub);
+  std::vector<std::size_t> parts;
+  for (;;) {
+    const Viewer::Outgoing next = viewer.viewer.next(start);
+    const auto* const text = std::get_if<std::string>(&next);
+    if (text == nullptr) break;
+    const FromServer news = serverMessage(*text);
+    if (const auto* const welcome = std::get_if<Welcome>(&news)) parts.push_back(welcome->series->size());
+    const auto* const part = std::get_if<SeriesPart>(&news);
+    if (part == nullptr) continue;
+    CHECK(part->from == parts.size() * seriesEntries);
+    parts.push_back(part->entries.size());
+  }
+  CHECK(parts == std::vector<std::size_t>{seriesEntries, seriesEntries, 5});
+}
+
 TEST_CASE("those who look at different frames of a series are within the bound too") {
   Levels levels;
   Hub::Options options = limited(30 * mebibyte);
