@@ -96,7 +96,7 @@ class Pipeline : public vtkInSituPipeline {
   static Pipeline* New();
   vtkTypeMacro(Pipeline, vtkInSituPipeline);
 
-  void setScript(const std::string& script) { script_ = script; }
+  void setScript(const Script& script) { script_ = script; }
   /// Whether its script is loaded. A script that couldn't be loaded starts anew at the next step.
   bool loaded() const { return python_ != nullptr; }
   /// Whether the last step failed.
@@ -105,7 +105,8 @@ class Pipeline : public vtkInSituPipeline {
   bool Execute(int step, double time) override {
     if (!python_) {
       vtkNew<vtkInSituPipelinePython> python;
-      python->SetFileName(script_.c_str());
+      python->SetFileName(script_.file.c_str());
+      python->SetArguments(script_.arguments);
       if (python->Initialize()) python_ = python;
     }
     failed_ = !python_ || !python_->Execute(step, time);
@@ -118,7 +119,7 @@ class Pipeline : public vtkInSituPipeline {
   }
 
  private:
-  std::string script_;
+  Script script_;
   bool failed_ = false;
   vtkSmartPointer<vtkInSituPipelinePython> python_;
 };
@@ -246,7 +247,7 @@ struct Engine::State {
   }
   void start(const std::string& plugin);
   void watchEntries();
-  void add(const std::vector<std::string>& scripts);
+  void add(const std::vector<Script>& scripts);
   std::optional<std::string> result(bool good);
 };
 
@@ -287,8 +288,8 @@ void Engine::State::watchEntries() {
   controller->AddObserver(pv::ParameterExchange::event, exchange);
 }
 
-void Engine::State::add(const std::vector<std::string>& scripts) {
-  for (const std::string& script : scripts) {
+void Engine::State::add(const std::vector<Script>& scripts) {
+  for (const Script& script : scripts) {
     vtkNew<Pipeline> pipeline;
     pipeline->setScript(script);
     vtkInSituInitializationHelper::AddPipeline(pipeline);
@@ -334,7 +335,7 @@ void Engine::loadPlugin() {
   if (!wrong.empty()) throw std::runtime_error(wrong);
 }
 
-void Engine::add(const std::vector<std::string>& scripts) {
+void Engine::add(const std::vector<Script>& scripts) {
   state_->add(scripts);
 }
 

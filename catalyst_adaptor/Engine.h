@@ -14,6 +14,12 @@ class vtkDataObject;
 
 namespace vdi::catalyst {
 
+/// A Python file, and what get_args() of paraview.catalyst returns in it.
+struct Script {
+  std::string file;
+  std::vector<std::string> arguments;
+};
+
 /// A process has one engine, because ParaView can't be started twice. All functions are collective unless
 /// their comments say otherwise, and except `check`.
 class Engine {
@@ -37,7 +43,7 @@ class Engine {
   /// Loads our plugin. Call it before scripts run. Throws std::runtime_error if it can't be loaded.
   void loadPlugin();
   /// Adds scripts, which run at each step in this order.
-  void add(const std::vector<std::string>& scripts);
+  void add(const std::vector<Script>& scripts);
 
   /// Whether a script does anything at this step, or may do so. Not collective.
   bool wants(int step, double time) const;

@@ -2,6 +2,7 @@
 
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     vdi_catalyst_initialize,
+    vdi_catalyst_initialize_pipelines,
     nullptr,
     vdi_catalyst_set_blocks,
     vdi_catalyst_set_array,

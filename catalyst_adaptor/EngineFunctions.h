@@ -9,10 +9,11 @@
 extern "C" {
 #endif
 
-/* One entry for each function of vdi_catalyst.h, with the same contract. An engine has one of the first two.
- * That one gets a valid communicator, and a null *catalyst. */
+/* One entry for each function of vdi_catalyst.h, with the same contract. An engine has the first two or the
+ * third. Those get a valid communicator, and a null *catalyst. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
+  int (*initialize_pipelines)(int32_t, int32_t, const vdi_catalyst_pipeline*, vdi_catalyst**);
   int (*initialize_json)(int32_t, const char*, vdi_catalyst**);
   int (*set_blocks)(vdi_catalyst*, int32_t, const vdi_catalyst_block*);
   int (*set_array)(vdi_catalyst*, const char*, int32_t, int32_t, const void* const*);
@@ -27,8 +28,8 @@ typedef struct vdi_catalyst_functions {
 } vdi_catalyst_functions;
 
 /* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
-#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_4
-#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_4"
+#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_5
+#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_5"
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 
 #ifdef __cplusplus

@@ -110,6 +110,20 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
   return code;
 }
 
+int vdi_catalyst_initialize_pipelines(int32_t fortran_communicator, int32_t script_count,
+                                      const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
+  if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
+  *catalyst = NULL;
+  vdi_process_state state;
+  vdi_process_state_save(&state);
+  int code = prepare(&script_engine, fortran_communicator);
+  if (code == VDI_CATALYST_OK)
+    code =
+        script_engine.functions->initialize_pipelines(fortran_communicator, script_count, scripts, catalyst);
+  vdi_process_state_restore(&state);
+  return code;
+}
+
 int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
   if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   *catalyst = NULL;

@@ -173,20 +173,40 @@ int takeEngine(vdi_catalyst& self) {
   });
 }
 
-std::vector<std::string> pathsOf(int32_t count, const char* const* scripts) {
-  require(count >= 0 && (count == 0 || scripts != nullptr), "no scripts given");
-  std::vector<std::string> paths;
+using vdi::catalyst::Script;
+
+std::vector<Script> scriptsOf(int32_t count, const char* const* files) {
+  require(count >= 0 && (count == 0 || files != nullptr), "no scripts given");
+  std::vector<Script> scripts;
   for (int i = 0; i < count; ++i) {
-    require(scripts[i] != nullptr, "a script's path is null");
-    paths.emplace_back(scripts[i]);
+    require(files[i] != nullptr, "a script's path is null");
+    scripts.push_back({files[i], {}});
   }
-  return paths;
+  return scripts;
 }
 
-void sayIfNothingIsMade(const vdi_catalyst& self, const std::vector<std::string>& paths) {
+std::vector<Script> scriptsOf(int32_t count, const vdi_catalyst_pipeline* given) {
+  require(count >= 0 && (count == 0 || given != nullptr), "no scripts given");
+  std::vector<Script> scripts;
+  for (int i = 0; i < count; ++i) {
+    const vdi_catalyst_pipeline& one = given[i];
+    require(one.file != nullptr, "a script's path is null");
+    require(one.argument_count >= 0 && (one.argument_count == 0 || one.arguments != nullptr),
+            "no arguments given");
+    Script& script = scripts.emplace_back();
+    script.file = one.file;
+    for (int a = 0; a < one.argument_count; ++a) {
+      require(one.arguments[a] != nullptr, "a script's argument is null");
+      script.arguments.emplace_back(one.arguments[a]);
+    }
+  }
+  return scripts;
+}
+
+void sayIfNothingIsMade(const vdi_catalyst& self, const std::vector<Script>& scripts) {
   int rank = 0;
   MPI_Comm_rank(self.comm, &rank);
-  if (rank == 0 && paths.empty())
+  if (rank == 0 && scripts.empty())
     std::fprintf(stderr, "vdi_catalyst: no scripts were given, so no step will make anything\n");
 }
 
@@ -266,18 +286,18 @@ void gatherAll(vdi_catalyst& self) {
   }
 }
 
-}  // namespace
-
-int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
-                            vdi_catalyst** catalyst) {
+/// `given`: the files alone, or with arguments.
+template <typename Given>
+int initialize(int32_t fortran_communicator, int32_t script_count, const Given* given,
+               vdi_catalyst** catalyst) {
   const vdi::catalyst::PythonLock lock;
   // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
   auto self = std::make_unique<vdi_catalyst>();
   if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
     return VDI_CATALYST_BAD_ARGUMENT;
   MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
-  std::vector<std::string> paths;
-  int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { paths = pathsOf(script_count, scripts); });
+  std::vector<Script> scripts;
+  int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { scripts = scriptsOf(script_count, given); });
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
       requireEqual(self->comm, script_count, "the ranks give different numbers of scripts");
@@ -286,20 +306,33 @@ int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, 
   if (code == VDI_CATALYST_OK) code = takeEngine(*self);
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_SCRIPT, [&] {
-      for (const std::string& path : paths) self->engine->check(path);
+      for (const Script& script : scripts) self->engine->check(script.file);
     });
   }
   if (code == VDI_CATALYST_OK)
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine->loadPlugin(); });
-  if (code == VDI_CATALYST_OK) code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { self->engine->add(paths); });
+  if (code == VDI_CATALYST_OK)
+    code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { self->engine->add(scripts); });
   if (code != VDI_CATALYST_OK) {
     spareEngine() = self->engine.release();
     MPI_Comm_free(&self->comm);
     return code;
   }
-  sayIfNothingIsMade(*self, paths);
+  sayIfNothingIsMade(*self, scripts);
   *catalyst = alive() = self.release();
   return VDI_CATALYST_OK;
+}
+
+}  // namespace
+
+int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
+                            vdi_catalyst** catalyst) {
+  return initialize(fortran_communicator, script_count, scripts, catalyst);
+}
+
+int vdi_catalyst_initialize_pipelines(int32_t fortran_communicator, int32_t script_count,
+                                      const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
+  return initialize(fortran_communicator, script_count, scripts, catalyst);
 }
 
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {

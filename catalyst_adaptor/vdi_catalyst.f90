@@ -36,6 +36,12 @@ module vdi_catalyst
     real(c_double) :: spacing(3) = 1
   end type
 
+  type, bind(c) :: vdi_catalyst_pipeline
+    type(c_ptr) :: file
+    integer(c_int32_t) :: argument_count = 0
+    type(c_ptr) :: arguments
+  end type
+
   type, bind(c) :: vdi_catalyst_strides
     integer(c_int64_t) :: strides(3) = 0
     integer(c_int64_t) :: component_stride = 0
@@ -47,6 +53,14 @@ module vdi_catalyst
       import :: c_int, c_int32_t, c_ptr
       integer(c_int32_t), value :: communicator, script_count
       type(c_ptr), intent(in) :: scripts(*)
+      type(c_ptr), intent(out) :: catalyst
+      integer(c_int) :: code
+    end function
+
+    function vdi_catalyst_initialize_pipelines(communicator, script_count, scripts, catalyst) bind(c) result(code)
+      import :: c_int, c_int32_t, c_ptr, vdi_catalyst_pipeline
+      integer(c_int32_t), value :: communicator, script_count
+      type(vdi_catalyst_pipeline), intent(in) :: scripts(*)
       type(c_ptr), intent(out) :: catalyst
       integer(c_int) :: code
     end function

@@ -113,6 +113,18 @@ typedef struct vdi_catalyst vdi_catalyst;
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 
+/* A script with arguments: what paraview.catalyst.get_args() returns in it. */
+typedef struct vdi_catalyst_pipeline {
+  const char* file;
+  int32_t argument_count;
+  const char* const* arguments;
+} vdi_catalyst_pipeline;
+
+/* As vdi_catalyst_initialize, for scripts with arguments. */
+VDI_CATALYST_API int vdi_catalyst_initialize_pipelines(int32_t fortran_communicator, int32_t script_count,
+                                                       const vdi_catalyst_pipeline* scripts,
+                                                       vdi_catalyst** catalyst);
+
 /* Replaces vdi_catalyst_initialize in runs without scripts, ParaView or Python, which a JSON text describes.
  * `json` is the text, or the name of a file with it. The first rank's text counts, and that rank alone reads
  * files. "{\"field\": \"V\", \"every\": 10}" writes vdi_000010.vdi and so on from the array V.

@@ -258,6 +258,6 @@ const char* error(const vdi_catalyst* catalyst) {
 }  // namespace
 
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    nullptr, initializeJson, setBlocks,    setArray, setArrayStrided, wants,
-    execute, parameterF64,   parameterI64, finalize, error,
+    nullptr, nullptr, initializeJson, setBlocks,    setArray, setArrayStrided,
+    wants,   execute, parameterF64,   parameterI64, finalize, error,
 };

@@ -1,6 +1,6 @@
 /* A simulation whose values lie in other orders than VTK's: the script compares each array with "plain",
- * which has the same values in order. Its argument is the script. Exit status 0 if all went well and the
- * array that lies in order was used where it is: the script writes to it. */
+ * which has the same values in order and is the script's argument. The program's is the script. Exit status 0
+ * if all went well and the array that lies in order was used where it is: the script writes to it. */
 #include <limits.h>
 #include <mpi.h>
 #include <stdio.h>
@@ -106,9 +106,14 @@ int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  const char* scripts[] = {argc > 1 ? argv[1] : ""};
+  const char* const arguments[] = {"--compare", "plain"};
+  vdi_catalyst_pipeline script = {NULL, 2, arguments};
   vdi_catalyst* catalyst = NULL;
-  expect("initialize", 0, vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, scripts, &catalyst));
+  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
+  expect("no script", VDI_CATALYST_BAD_ARGUMENT,
+         vdi_catalyst_initialize_pipelines(comm, 1, &script, &catalyst));
+  script.file = argc > 1 ? argv[1] : "";
+  expect("initialize", 0, vdi_catalyst_initialize_pipelines(comm, 1, &script, &catalyst));
   const vdi_catalyst_block block = {
       {NX, NY, NZ}, {0, 0, 0}, {0, 0, 0}, {(double)rank * NX, 0.0, 0.0}, {1.0, 1.0, 1.0}};
   expect("set_blocks", 0, vdi_catalyst_set_blocks(catalyst, 1, &block));

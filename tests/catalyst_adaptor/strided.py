@@ -8,6 +8,7 @@ from paraview import catalyst
 from paraview.simple import *  # noqa: F403
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
+_, compared = catalyst.get_args()  # --compare NAME
 grid = TrivialProducer(registrationName="grid")
 image = VolumetricDepthImage(Input=grid)
 image.SelectInputScalars = ["CELLS", "z fastest"]
@@ -30,7 +31,7 @@ def catalyst_execute(info):
     def values(name):
         return vtk_to_numpy(block.GetCellData().GetArray(name))
 
-    plain = values("plain")
+    plain = values(compared)
     if plain[0] < 1000 * info.timestep or plain.size != 20 * 17 * 18:
         raise RuntimeError("the values aren't this step's")
     for name in ("in order", "interleaved", "padded", "z fastest", "with halo", "backwards", "packed"):
