@@ -1,0 +1,55 @@
+// The uniform grids of a Catalyst channel, as vdi_catalyst.h takes them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "catalyst_adaptor/catalyst2/Node.h"
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace vdi::catalyst {
+
+/// This rank's blocks and arrays. The values stay where the simulation has them, but for vectors whose
+/// components lie at uneven distances: these are copied side by side.
+class Grid {
+ public:
+  /// Of the same kind on all ranks and in all blocks, or they aren't shown. Association, components, name.
+  using Key = std::tuple<std::int32_t, std::int32_t, std::string>;
+  struct Array {
+    std::int32_t type = VDI_CATALYST_F64;
+    std::vector<const void*> data;              // of each block
+    std::vector<vdi_catalyst_strides> strides;  // of each block
+  };
+
+  /// Takes the place of what was there before. `data`: a domain, or any number of them, in lists or objects;
+  /// nothing: no blocks. Returns whether blocks, arrays and the places of all values are those of before.
+  /// Throws std::invalid_argument for what isn't a uniform grid in three dimensions.
+  bool read(const std::optional<Node>& data);
+
+  const std::vector<vdi_catalyst_block>& blocks() const { return blocks_; }
+  /// Only those that all blocks have.
+  const std::map<Key, Array>& arrays() const { return arrays_; }
+  /// The names of the others.
+  const std::vector<std::string>& leftOut() const { return leftOut_; }
+
+ private:
+  void leaveOutPartial();
+  void addDomains(const Node& node, int depth);
+  void addDomain(const Node& domain);
+  void addField(const Node& field, const vdi_catalyst_block& block);
+  const std::byte* copySideBySide(const std::vector<Leaf>& components);
+
+  std::vector<vdi_catalyst_block> blocks_;
+  std::map<Key, Array> arrays_;
+  std::vector<std::string> leftOut_;
+  /// Kept from step to step, so that values that are copied lie where they lay before.
+  std::vector<std::vector<std::byte>> copies_;
+  std::size_t copiesUsed_ = 0;
+};
+
+}  // namespace vdi::catalyst

@@ -1,0 +1,102 @@
+// The five functions that Catalyst calls. No exception leaves them.
+#include <catalyst.h>
+#include <catalyst_stub.h>
+#include <mpi.h>
+
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <stdexcept>
+
+#include "catalyst_adaptor/catalyst2/Node.h"
+#include "catalyst_adaptor/catalyst2/Session.h"
+#include "catalyst_adaptor/vdi_catalyst.h"
+#include "catalyst_impl_vdi.h"
+
+namespace {
+
+using vdi::catalyst::Node;
+using vdi::catalyst::Session;
+
+/// There is one of each loaded library in a process, and Catalyst hands no handle through.
+std::unique_ptr<Session>& session() {
+  static std::unique_ptr<Session> one;
+  return one;
+}
+
+/// 100 for what can't be taken, as ParaView's implementation; 102 and 103 for VDI_CATALYST_ENGINE and
+/// _SCRIPT. Catalyst's own codes are lower.
+catalyst_status statusOf(int code) {
+  if (code == VDI_CATALYST_OK) return catalyst_status_ok;
+  constexpr int first = 100;
+  return static_cast<catalyst_status>(code == VDI_CATALYST_BAD_ARGUMENT ? first : first + code);
+}
+
+/// `work` returns a code of vdi_catalyst.h.
+template <typename Work>
+catalyst_status run(const conduit_node* params, Work work) {
+  try {
+    if (params == nullptr) throw std::invalid_argument("a node is null");
+    return statusOf(work(Node(params, "")));
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "vdi_catalyst: %s\n", error.what());
+  } catch (...) {
+    std::fprintf(stderr, "vdi_catalyst: an unknown exception\n");
+  }
+  return statusOf(VDI_CATALYST_BAD_ARGUMENT);
+}
+
+/// As ParaView's implementation takes it: a Fortran handle, or all ranks of the simulation.
+MPI_Comm communicatorOf(const Node& params) {
+  int running = 0;
+  int over = 0;
+  MPI_Initialized(&running);
+  MPI_Finalized(&over);
+  if (running == 0 || over != 0) throw std::runtime_error("MPI isn't running");
+  const auto handle = params.find("catalyst/mpi_comm");
+  if (!handle) return MPI_COMM_WORLD;
+  MPI_Comm comm = MPI_Comm_f2c(static_cast<MPI_Fint>(handle->whole()));
+  // OpenMPI's answer to a wrong handle is a null pointer.
+  if (comm == MPI_Comm{} || comm == MPI_COMM_NULL) handle->refuse("is no communicator's Fortran handle");
+  return comm;
+}
+
+}  // namespace
+
+catalyst_status catalyst_initialize_vdi(const conduit_node* params) {
+  return run(params, [](const Node& node) {
+    if (session()) throw std::runtime_error("catalyst_initialize was called before; finalize first");
+    auto own = std::make_unique<Session>(communicatorOf(node));
+    const int code = own->initialize(node);
+    if (code == VDI_CATALYST_OK) session() = std::move(own);
+    return code;
+  });
+}
+
+catalyst_status catalyst_execute_vdi(const conduit_node* params) {
+  // catalyst_initialize has told why there's none.
+  if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
+  return run(params, [](const Node& node) { return session()->execute(node); });
+}
+
+catalyst_status catalyst_results_vdi(conduit_node* params) {
+  if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
+  return run(params, [&](const Node&) { return session()->results(params); });
+}
+
+catalyst_status catalyst_finalize_vdi(const conduit_node*) {
+  if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
+  const int code = session()->finalize();
+  session().reset();
+  return statusOf(code);
+}
+
+catalyst_status catalyst_about_vdi(conduit_node* params) {
+  return run(params, [&](const Node&) {
+    if (catalyst_stub_about(params) != catalyst_status_ok) return VDI_CATALYST_BAD_ARGUMENT;
+    conduit_node_set_path_char8_str(params, "catalyst/implementation", "vdi");
+    conduit_node_set_path_int32(params, "catalyst/use_mpi", 1);
+    conduit_node_set_path_char8_str(params, "catalyst/vdi/version", VDI_VERSION);
+    return VDI_CATALYST_OK;
+  });
+}

@@ -1,0 +1,57 @@
+// What a simulation hands over through Catalyst, read with care: nothing need be as it should.
+#pragma once
+
+#include <catalyst.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vdi::catalyst {
+
+/// The numbers of a leaf, where the simulation has them.
+struct Leaf {
+  std::int32_t type = 0;  // of vdi_catalyst.h
+  std::size_t scalarBytes = 1;
+  const std::byte* first = nullptr;
+  std::int64_t count = 0;
+  std::int64_t stride = 0;  // in bytes
+
+  /// 0 <= index < count.
+  double at(std::int64_t index) const;
+  /// Of integers.
+  std::int64_t wholeAt(std::int64_t index) const;
+};
+
+/// A node of Conduit's, which must outlive this. All but has and find throw std::invalid_argument, with the
+/// node's path, where the node isn't what is asked for.
+class Node {
+ public:
+  Node(const conduit_node* node, std::string path);
+
+  bool has(const std::string& path) const;
+  std::optional<Node> find(const std::string& path) const;
+  Node at(const std::string& path) const;
+  /// None where it's a leaf or empty.
+  std::vector<Node> children() const;
+
+  const std::string& path() const { return path_; }
+  std::string name() const;
+  bool isText() const;
+  bool isWhole() const;
+  bool isNumber() const;
+  std::string text() const;
+  std::int64_t whole() const;
+  double number() const;
+  Leaf leaf() const;
+
+  [[noreturn]] void refuse(const std::string& why) const;
+
+ private:
+  conduit_node* node_;
+  std::string path_;
+};
+
+}  // namespace vdi::catalyst

@@ -1,0 +1,71 @@
+// One use of Catalyst, from initialize to finalize: what the simulation hands over goes to vdi_catalyst.h.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "catalyst_adaptor/Calls.h"
+#include "catalyst_adaptor/catalyst2/Grid.h"
+#include "catalyst_adaptor/catalyst2/Node.h"
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace vdi::catalyst {
+
+/// What catalyst_initialize is given.
+struct Settings {
+  struct Script {
+    std::string file;
+    std::vector<std::string> arguments;
+  };
+  struct Parameter {
+    std::string name;
+    bool isWhole = false;
+    double value = 0.0;
+    double low = 0.0;
+    double high = 0.0;
+  };
+  std::vector<Script> scripts;
+  std::optional<std::string> json;  // a run without a script
+  std::string channel;              // "": "grid", or the only one
+  std::vector<Parameter> parameters;
+};
+
+/// All calls are collective and return a code of vdi_catalyst.h, the same on all ranks. Rank 0 has told the
+/// reason then.
+class Session {
+ public:
+  explicit Session(MPI_Comm comm);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  int initialize(const Node& params);
+  int execute(const Node& params);
+  /// Fills in catalyst/vdi.
+  int results(conduit_node* params);
+  int finalize();
+
+ private:
+  int start();
+  int declareParameters();
+  int handOver(std::int64_t step, const Node& params);
+  int setArrays();
+  /// Of all ranks, or throws std::invalid_argument where none has one.
+  std::optional<Node> channelOf(const Node& params) const;
+  double valueOf(const Settings::Parameter& parameter);
+
+  Calls calls_;
+  Settings settings_;
+  vdi_catalyst* catalyst_ = nullptr;
+  Grid grid_;
+  bool handedOver_ = false;        // the grid as it is, on all ranks
+  std::set<std::string> leftOut_;  // that were told
+  std::int64_t made_ = 0;          // steps
+  std::int64_t failed_ = 0;
+};
+
+}  // namespace vdi::catalyst

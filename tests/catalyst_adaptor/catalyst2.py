@@ -1,0 +1,80 @@
+"""Runs a simulation through Catalyst 2's implementation vdi, and through the adaptor itself: the same files, bit by bit.
+
+    catalyst2.py same LAYOUT LAUNCHER... PROGRAM
+    catalyst2.py script LAUNCHER... PROGRAM
+    catalyst2.py bad LAUNCHER... PROGRAM
+
+In a folder of its own below the present one. CATALYST_IMPLEMENTATION_PATHS is in the environment.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+RUN = {"field": "V", "every": 2, "resolution": [64, 48], "colors": {"range": [0.1, 1.0]},
+       "orbit": {"azimuth": 30, "elevation": 20}}
+SAYS = ["has neither scripts nor vdi/json",
+        "catalyst has scripts and a run without a script",
+        "catalyst/pipelines are ParaView's own",
+        "catalyst/mpi_comm is no communicator's Fortran handle",
+        "catalyst_initialize was called before",
+        "step 0: rank 2: catalyst/channels/grid/data/coordsets/coords/type is 'rectilinear'; this implementation takes uniform",
+        "step 1: rank 0: catalyst/channels/grid/data/topologies/topo/type is 'unstructured'; ",
+        "dims/k is 1: a block needs 2 points per axis",
+        "dims/k isn't a whole number",
+        "coords isn't one: spacing must be finite and > 0",
+        "fields/V has 7 values, and not ",
+        "fields/V leads beyond its ",
+        "fields/V has no association 'vertex' or 'element'",
+        "step 8: rank 2: catalyst/channels/grid/data/fields/ascent_ghosts marks cells that aren't whole layers",
+        "catalyst/channels/grid/type is 'particles'; ",
+        "catalyst/state/time isn't a number",
+        "the ranks give different steps",
+        "steps count from 0",
+        "catalyst/channels has no channel"]
+
+
+def run(folder, *command):
+    """What the command says, in a new folder."""
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=100,
+                          env=dict(os.environ, CATALYST_IMPLEMENTATION_NAME="vdi"))
+    print(done.stdout)
+    assert done.returncode == 0, "%s: status %d" % (command[-3:], done.returncode)
+    return done.stdout
+
+
+def files(folder):
+    found = {name: open(os.path.join(folder, name), "rb").read() for name in os.listdir(folder) if name.endswith(".vdi")}
+    assert all(len(content) > 5000 for content in found.values()), {name: len(found[name]) for name in found}
+    return found
+
+
+def same(layout, *program):
+    folder = "catalyst2_%s_%s" % (layout, program[-2])
+    run(folder + "/native", *program, "native", layout, json.dumps(RUN))
+    run(folder + "/catalyst", *program, "catalyst", layout, json.dumps(RUN))
+    made = files(folder + "/catalyst")
+    assert sorted(made) == ["vdi_000000.vdi", "vdi_000002.vdi"], sorted(made)
+    assert made["vdi_000000.vdi"] != made["vdi_000002.vdi"], "nothing has changed from step to step"
+    assert made == files(folder + "/native"), "the files differ"
+
+
+def script(*program):
+    here = os.path.dirname(os.path.abspath(__file__))
+    says = run("catalyst2_script", *program, "catalyst", "mesh", os.path.join(here, "catalyst2_script.py"), "--name", "made")
+    assert says.count("the field 'mine' is left out") == 1
+    assert sorted(files("catalyst2_script")) == ["made_0.vdi", "made_1.vdi", "made_2.vdi"]
+
+
+def bad(*program):
+    says = run("catalyst2_bad", *program, "bad", json.dumps(dict(RUN, every=1)))
+    for text in SAYS:
+        assert text in says, "it doesn't say: " + text
+    assert len(files("catalyst2_bad")) == 1
+
+
+{"same": same, "script": script, "bad": bad}[sys.argv[1]](*sys.argv[2:])
