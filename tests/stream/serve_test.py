@@ -82,7 +82,10 @@ class ServeTest(ServedFolder):
         part = viewer.text_message("series")
         self.assertEqual((part["from"], part["steps"]), (2, [4]))
         viewer.send(type="resume")
-        self.assertEqual(next(levels)[0]["frame"], 2)
+        frames = [next(levels)[0]["frame"]]
+        if frames == [1]:  # the series names a frame a moment before that is the newest
+            frames.append(next(levels)[0]["frame"])
+        self.assertEqual(frames[-1], 2)
         viewer.send(type="show", index=9)
         self.assertEqual(viewer.end(), 4400)
 
