@@ -370,7 +370,9 @@ class LayerExchange {
     for (std::vector<Claim>* claims : {&owners, &keepers}) {
       if (left.empty()) break;
       std::sort(claims->begin(), claims->end());
-      for (const auto& [level, gap, d] : *claims) {
+      for (const Claim& claim : *claims) {
+        const auto [level, gap, index] = claim;
+        const std::size_t d = index;  // a lambda must not capture a structured binding
         const BlockEntry& donor = directory_.entries()[d];
         const Box box = claims == &keepers ? donor.storedBox() : gap ? donor.owned : donor.asked;
         // A margin, so that nothing is lost between faces and places that were computed differently.
