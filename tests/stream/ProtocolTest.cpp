@@ -233,7 +233,7 @@ TEST_CASE("damaged messages are read or refused") {
 }
 
 TEST_CASE("levels are put together from parts in order alone") {
-  HostVector<std::byte> file(chunkBytes + 1000);
+  std::vector<std::byte> file(chunkBytes + 1000);
   test::Noise noise(3);
   for (std::byte& b : file) b = static_cast<std::byte>(noise.below(256));
   const std::span<const std::byte> all(file);

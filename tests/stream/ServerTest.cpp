@@ -99,7 +99,7 @@ TEST_CASE("what is published arrives") {
     const Received received = nextOf(client);
     CHECK(received.level.step == step);
     CHECK(received.level.levels == 1);
-    CHECK(received.file == io::encodeUncleared(*vdi));
+    CHECK(received.file == io::encode(*vdi));
   }
   CHECK(client.standing().state.phase == Phase::Live);
   CHECK(server.status().frames == 3);
@@ -221,7 +221,7 @@ TEST_CASE("encrypted, for those who trust the certificate") {
   ClientOptions trusting = clientOf(server);
   trusting.authority = path("cert.pem");
   Client client(trusting);
-  CHECK(nextOf(client).file == io::encodeUncleared(*vdi));
+  CHECK(nextOf(client).file == io::encode(*vdi));
   Client stranger(clientOf(server));
   CHECK(test::errorOf([&] { stranger.next(patience); }).code() == ErrorCode::Io);
 

@@ -30,7 +30,7 @@ class Levels {
     made->levelCount = 2;
     for (const std::size_t bytes : {coarseBytes, fullBytes}) {
       made->levels.push_back(
-          std::make_shared<EncodedLevel>(EncodedLevel{vdi::HostVector<std::byte>(bytes), 1, 1}));
+          std::make_shared<EncodedLevel>(EncodedLevel{std::vector<std::byte>(bytes), 1, 1}));
       all_.push_back(made->levels.back());
     }
     return made;

@@ -252,7 +252,7 @@ std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode&
   const std::uint64_t size = expandedBytes(listCount, count, Coding::precision);
   if (size > LZ4_MAX_INPUT_SIZE) throw Error(ErrorCode::Io, "too many supersegments in one chunk of lists");
 
-  HostVector<std::byte> plain(size);
+  std::vector<std::byte> plain(size);
   std::byte* const lengths = plain.data() + Coding::codeBytes;
   std::byte* const columnData = lengths + listCount * sizeof(std::uint32_t);
   if constexpr (Coding::codeBytes > 0) std::memcpy(plain.data(), &code, Coding::codeBytes);
@@ -273,12 +273,13 @@ std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode&
     }
   }
 
-  HostVector<std::byte> packed(static_cast<std::size_t>(LZ4_compressBound(static_cast<int>(size))));
+  std::vector<std::byte> packed(static_cast<std::size_t>(LZ4_compressBound(static_cast<int>(size))));
   const int packedSize = LZ4_compress_default(reinterpret_cast<const char*>(plain.data()),
                                               reinterpret_cast<char*>(packed.data()), static_cast<int>(size),
                                               static_cast<int>(packed.size()));
   assert(packedSize > 0);  // the buffer fits any result
-  return {packed.begin(), packed.begin() + packedSize};
+  packed.resize(static_cast<std::size_t>(packedSize));
+  return packed;
 }
 
 template <typename Segment>
@@ -288,7 +289,7 @@ DepthCode unpackLists(std::span<const std::byte> packed, std::uint32_t before, s
   const std::size_t count = segments.size();
   const std::uint64_t size = expandedBytes(ends.size(), count, Coding::precision);
   assert(canExpandTo(packed.size(), size));
-  HostVector<std::byte> plain(size);
+  std::vector<std::byte> plain(size);
   const int got =
       LZ4_decompress_safe(reinterpret_cast<const char*>(packed.data()), reinterpret_cast<char*>(plain.data()),
                           static_cast<int>(packed.size()), static_cast<int>(size));

@@ -522,43 +522,26 @@ std::vector<std::byte> encodeTail(const Vdi& vdi) {
   return bytes;
 }
 
-template <typename Bytes>
-Bytes encodeAs(const Vdi& vdi) {
+std::vector<std::byte> encode(const Vdi& vdi) {
   requireSoundHeader(vdi);
   validateShape(vdi);
   validateEnds(vdi);
-  std::vector<EncodedChunk> chunks;
   std::vector<ChunkEntry> table;
-  std::vector<std::size_t> places;
-  std::size_t size = headBytes(vdi.listCount());
-  const auto keep = [&](EncodedChunk chunk) {
+  std::vector<std::byte> bytes(headBytes(vdi.listCount()));
+  const auto append = [&](const EncodedChunk& chunk) {
     table.push_back(chunk.entry);
-    places.push_back(size);
-    size += chunk.bytes.size();
-    chunks.push_back(std::move(chunk));
+    bytes.insert(bytes.end(), chunk.bytes.begin(), chunk.bytes.end());
   };
   std::visit(
       [&](const auto& lists) {
-        encodeChunks(lists, 0, lists.listCount(), 0, vdi.budget, vdi.depthCode, keep);
+        encodeChunks(lists, 0, lists.listCount(), 0, vdi.budget, vdi.depthCode, append);
       },
       vdi.lists);
   const std::vector<std::byte> head = encodeHead(vdi, table);
-  const std::vector<std::byte> tail = encodeTail(vdi);
-  Bytes bytes(size + tail.size());
   std::copy(head.begin(), head.end(), bytes.begin());
-  eachInParallel(chunks.size(), [&](std::size_t i) {
-    std::memcpy(bytes.data() + places[i], chunks[i].bytes.data(), chunks[i].bytes.size());
-  });
-  std::copy(tail.begin(), tail.end(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+  const std::vector<std::byte> tail = encodeTail(vdi);
+  bytes.insert(bytes.end(), tail.begin(), tail.end());
   return bytes;
-}
-
-std::vector<std::byte> encode(const Vdi& vdi) {
-  return encodeAs<std::vector<std::byte>>(vdi);
-}
-
-HostVector<std::byte> encodeUncleared(const Vdi& vdi) {
-  return encodeAs<HostVector<std::byte>>(vdi);
 }
 
 Vdi decode(std::span<const std::byte> bytes) {

@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "vdi/core/HostVector.h"
 #include "vdi/core/Vdi.h"
 
 namespace vdi::io {
@@ -23,8 +22,6 @@ struct VdiFileInfo {
 /// Encodes a VDI without loss in its precision, with LZ4 and checksums. Deterministic: equal VDIs give equal
 /// bytes on every machine (little-endian). Throws Error{Format} for a VDI that decode would refuse.
 std::vector<std::byte> encode(const Vdi& vdi);
-/// The same in memory that isn't cleared before, which on many cores takes longer than the encoding itself.
-HostVector<std::byte> encodeUncleared(const Vdi& vdi);
 /// Throws Error{Format} for bytes that are truncated, altered, of another version or encoding, or whose
 /// header or chunk table asks for more memory than the chunks can expand to (before that is allocated; they
 /// expand 255 times at most). The result has passed validate(Vdi).

@@ -7,8 +7,8 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "vdi/core/HostVector.h"
 #include "vdi/stream/Protocol.h"
 
 namespace vdi::stream {
@@ -16,7 +16,7 @@ namespace vdi::stream {
 /// A whole level, as it came: a .vdi file that hasn't been looked at yet.
 struct Received {
   Level level;
-  HostVector<std::byte> file;
+  std::vector<std::byte> file;
   std::string
       missing;  // why there's no file of a frame that was asked for; of `level` there's the frame alone
   std::string session;  // whose frame it is; Client fills it in
@@ -37,7 +37,7 @@ class Assembly {
 
  private:
   std::optional<Level> level_;
-  HostVector<std::byte> file_;
+  std::vector<std::byte> file_;
 };
 
 }  // namespace vdi::stream

@@ -15,7 +15,7 @@ std::uint32_t levelCountOf(std::uint64_t bytesInMemory) {
 }
 
 /// Adds a level to the frame, and returns the frame as it is then.
-FramePtr addLevel(Frame& frame, HostVector<std::byte> bytes, const Vdi& size) {
+FramePtr addLevel(Frame& frame, std::vector<std::byte> bytes, const Vdi& size) {
   frame.levels.push_back(
       std::make_shared<EncodedLevel>(EncodedLevel{std::move(bytes), size.width, size.height}));
   return std::make_shared<Frame>(frame);
@@ -29,18 +29,18 @@ void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
   Frame frame{id, vdi.timeStep, vdi.time, made, levelCountOf(bytes), {}};
   if (frame.levelCount > 1) {
     const Vdi coarse = thinned(vdi, coarseFactor);
-    if (!take(addLevel(frame, io::encodeUncleared(coarse), coarse))) return;
+    if (!take(addLevel(frame, io::encode(coarse), coarse))) return;
   }
-  (void)take(addLevel(frame, io::encodeUncleared(vdi), vdi));
+  (void)take(addLevel(frame, io::encode(vdi), vdi));
 }
 
-void passFrame(HostVector<std::byte> file, std::uint32_t id, Clock::time_point made,
+void passFrame(std::vector<std::byte> file, std::uint32_t id, Clock::time_point made,
                const std::function<void(FramePtr)>& take) {
   const io::VdiFileInfo info = io::decodeInfo(file);
   Frame frame{id, info.header.timeStep, info.header.time, made, levelCountOf(info.expandedBytes), {}};
   if (frame.levelCount > 1) {
     const Vdi coarse = io::decodeThinned(file, coarseFactor);  // checks all of the file
-    take(addLevel(frame, io::encodeUncleared(coarse), coarse));
+    take(addLevel(frame, io::encode(coarse), coarse));
   } else {
     static_cast<void>(io::decode(file));
   }

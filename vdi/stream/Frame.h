@@ -8,7 +8,6 @@
 #include <memory>
 #include <vector>
 
-#include "vdi/core/HostVector.h"
 #include "vdi/core/Vdi.h"
 
 namespace vdi::stream {
@@ -16,8 +15,8 @@ namespace vdi::stream {
 using Clock = std::chrono::steady_clock;
 
 struct EncodedLevel {
-  HostVector<std::byte> bytes;  // of a .vdi file
-  int width = 0;                // lists, margin included
+  std::vector<std::byte> bytes;  // of a .vdi file
+  int width = 0;                 // lists, margin included
   int height = 0;
 };
 
@@ -45,7 +44,7 @@ void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
                  const std::function<bool(FramePtr)>& take);
 /// The same of a VDI's file, whose bytes become the last level as they are. All of the file is checked before
 /// `take` gets anything, but never expanded as a whole, and `take` gets all levels. Throws as io::decode.
-void passFrame(HostVector<std::byte> file, std::uint32_t id, Clock::time_point made,
+void passFrame(std::vector<std::byte> file, std::uint32_t id, Clock::time_point made,
                const std::function<void(FramePtr)>& take);
 
 }  // namespace vdi::stream
