@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <mutex>
 
 #include "vdi/gpu/Device.h"
 
@@ -16,8 +17,10 @@ inline std::array<std::shared_ptr<gpu::Device>, 2>& keptDevices() {
 }
 
 /// The environment's device, with the validation layers, for all tests of a program. `gpuPrograms`: a second
-/// one, which does as a GPU does.
+/// one, which does as a GPU does. Thread-safe.
 inline std::shared_ptr<gpu::Device> device(bool gpuPrograms = false) {
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
   std::shared_ptr<gpu::Device>& kept = keptDevices()[gpuPrograms ? 1 : 0];
   if (kept == nullptr) {
     gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
