@@ -19,7 +19,8 @@ colors = GetColorTransferFunction("V")
 colors.ApplyPreset("Cool to Warm (Extended)")
 colors.RescaleTransferFunction(*RANGE)
 opacities = GetOpacityTransferFunction("V")
-opacities.Points = [RANGE[0], 0.0, 0.5, 0.0, RANGE[1], 1.0, 0.5, 0.0]  # value, opacity, midpoint, sharpness
+# value, opacity, midpoint, sharpness
+opacities.Points = [RANGE[0], 0.0, 0.5, 0.0, RANGE[1], 1.0, 0.5, 0.0]
 for function in (colors, opacities):
     function.ScalarRangeInitialized = 1  # keeps ParaView's views from moving it to the data's range
 image.LookupTable = colors

@@ -25,7 +25,7 @@ Settings::Script scriptOf(const Node& node) {
   return script;
 }
 
-Settings::Parameter parameterOf(const Node& node) {
+Parameter parameterOf(const Node& node) {
   const Node value = node.at("value");
   const auto numberOf = [&](const char* path) {
     constexpr double largestWhole = 0x1p53;  // as vdi_catalyst_parameter_i64 takes them
@@ -130,7 +130,7 @@ int Session::start() {
                                            &catalyst_);
 }
 
-double Session::valueOf(const Settings::Parameter& one) {
+double Session::valueOf(const Parameter& one) {
   if (!one.isWhole)
     return vdi_catalyst_parameter_f64(catalyst_, one.name.c_str(), one.value, one.low, one.high);
   const auto whole = [](double number) { return static_cast<std::int64_t>(number); };
@@ -139,7 +139,7 @@ double Session::valueOf(const Settings::Parameter& one) {
 }
 
 int Session::declareParameters() {
-  for (const Settings::Parameter& parameter : settings_.parameters) {
+  for (const Parameter& parameter : settings_.parameters) {
     valueOf(parameter);
     if (*vdi_catalyst_error(catalyst_) != '\0') return VDI_CATALYST_BAD_ARGUMENT;
   }
@@ -236,7 +236,7 @@ int Session::setArrays() {
 int Session::results(conduit_node* params) {
   conduit_node_set_path_int64(params, "catalyst/vdi/steps", made_);
   conduit_node_set_path_int64(params, "catalyst/vdi/failed", failed_);
-  for (const Settings::Parameter& parameter : settings_.parameters) {
+  for (const Parameter& parameter : settings_.parameters) {
     const double value = valueOf(parameter);
     const std::string path = "catalyst/vdi/parameters/" + parameter.name;
     if (parameter.isWhole) {

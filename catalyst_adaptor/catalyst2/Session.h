@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "catalyst_adaptor/Calls.h"
+#include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/catalyst2/Grid.h"
 #include "catalyst_adaptor/catalyst2/Node.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
@@ -20,13 +21,6 @@ struct Settings {
   struct Script {
     std::string file;
     std::vector<std::string> arguments;
-  };
-  struct Parameter {
-    std::string name;
-    bool isWhole = false;
-    double value = 0.0;
-    double low = 0.0;
-    double high = 0.0;
   };
   std::vector<Script> scripts;
   std::optional<std::string> json;  // a run without a script
@@ -56,7 +50,7 @@ class Session {
   int setArrays();
   /// Of all ranks, or throws std::invalid_argument where none has one.
   std::optional<Node> channelOf(const Node& params) const;
-  double valueOf(const Settings::Parameter& parameter);
+  double valueOf(const Parameter& parameter);
 
   Calls calls_;
   Settings settings_;

@@ -112,6 +112,12 @@ def picture(path):
     return pixels
 
 
+def picture_of(vdi):
+    """That of a .vdi file from its viewpoint."""
+    run(TOOL, "render", vdi, "-o", "picture.png")
+    return picture("picture.png")
+
+
 def differ(pictures):
     for first, second in zip(pictures, pictures[1:]):
         assert abs(first - second).max() > 16, "two pictures are the same"
@@ -183,8 +189,7 @@ def live():
 def state():
     assert "VolumetricDepthImage(" in text_of(os.path.join(saved_state(), "state.py"))
     assert made("state_*") == ["state_%06d.vdi" % step for step in (0, 5)], made("state_*")
-    run(TOOL, "render", "state_000005.vdi", "-o", "state.png")
-    picture("state.png")
+    picture_of("state_000005.vdi")
 
 
 def of_grid(name):
@@ -195,8 +200,7 @@ def of_grid(name):
 
 @recipe("unstructured.py", of_grid)
 def unstructured():
-    run(TOOL, "render", "vdi_000030.vdi", "-o", "grid.png")
-    picture("grid.png")
+    picture_of("vdi_000030.vdi")
 
 
 def of_part(name):
@@ -207,8 +211,7 @@ def of_part(name):
 
 @recipe("subcommunicator.py", of_part)
 def subcommunicator():
-    run(TOOL, "render", "part_000001.vdi", "-o", "part.png")
-    picture("part.png")
+    picture_of("part_000001.vdi")
 
 
 def of_follow(name):

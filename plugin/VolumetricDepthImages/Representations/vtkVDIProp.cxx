@@ -85,8 +85,9 @@ struct vtkVDIProp::Internals {
 
   pv::VDIPainter Painter;
   pv::VDIFramePolicy Policy;
-  std::vector<float> Ends;  // depth at which each pixel's ray ends at an object
-  bool WasSmooth = false;   // the renderer smooths edges, except in this frame
+  std::vector<float> Window;  // memory of a depth buffer, which frames of an orbit use again
+  std::vector<float> Ends;    // depth at which each pixel's ray ends at an object
+  bool WasSmooth = false;     // the renderer smooths edges, except in this frame
 
   /// The view and the VDI whose full picture is in the texture. Nullopt if that picture is rough or was made
   /// by a thread.
@@ -178,10 +179,12 @@ void vtkVDIProp::LookAround(vtkObject* renderer, unsigned long, void*) {
   auto* own = vtkRenderer::SafeDownCast(renderer);
   if (own == nullptr || own->GetSelector() != nullptr || this->GetVisibility() == 0) return;
   internal.Notices.clear();
-  const std::optional<vdi::View> view = this->IsCaptured ? std::nullopt : viewOf(own);
-  if (this->IsCaptured) {
-    // Saved pictures have no notices.
-  } else if (internal.IsBeingMade || internal.HasJustCome) {
+  if (this->IsCaptured) {  // saved pictures have no notices
+    internal.Notices.show(true);
+    return;
+  }
+  const std::optional<vdi::View> view = viewOf(own);
+  if (internal.IsBeingMade || internal.HasJustCome) {
     internal.Notices.note("The VDI is being made.");
   } else if (internal.Buffers.isEmpty()) {
     internal.Notices.note(
@@ -349,20 +352,24 @@ bool vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   Internals& internal = *this->Internal;
   const pv::Viewport port = pv::viewportOf(renderer);
   if (port.size.x < 1 || port.size.y < 1) return true;
-  pv::StillView view{
-      pv::ViewMatrices(renderer), port.size, static_cast<vdi::Reconstruction>(this->Reconstruction), {}};
+  pv::StillView view{pv::ViewMatrices(renderer), port.size,
+                     static_cast<vdi::Reconstruction>(this->Reconstruction), std::move(internal.Window)};
   pv::readDepths(window, port, view.window);
   if (internal.DefersIn(window, port.size)) return this->DrawDeferred(window, std::move(view));
   internal.Buffers.still().drop();
-  if (internal.NextFrame == Frame::Interactive) {
-    this->DrawRough(window, view);
-  } else if (internal.HasTexture(window, view)) {  // other objects of the view have changed
-    internal.Painter.draw(window, this->Opacity);
-  } else {
+  const bool isInteractive = internal.NextFrame == Frame::Interactive;
+  if (!isInteractive && !internal.HasTexture(window, view)) {
     this->DrawNow(window, view, {view.size, std::nullopt});
     internal.Textured = std::move(view);
     internal.TexturedVersion = internal.Buffers.version();
+    return true;
   }
+  if (isInteractive) {
+    this->DrawRough(window, view);
+  } else {
+    internal.Painter.draw(window, this->Opacity);
+  }
+  internal.Window = std::move(view.window);
   return true;
 }
 
