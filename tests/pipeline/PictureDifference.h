@@ -1,4 +1,4 @@
-// The difference between two pictures, in 1/255.
+// Differences between two pictures, in 1/255.
 #pragma once
 
 #include <algorithm>
@@ -13,6 +13,16 @@ struct Difference {
   double worst = 0.0;       // in 1/255, over all channels
   double wrongShare = 0.0;  // share of the object's pixels off by more than 16
 };
+
+/// The largest one over all channels and pixels.
+inline float largestDifference(const Image& a, const Image& b) {
+  REQUIRE(a.rgba.size() == b.rgba.size());
+  float worst = 0.0F;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i) {
+    for (int c = 0; c < 4; ++c) worst = std::max(worst, std::abs(a.rgba[i][c] - b.rgba[i][c]));
+  }
+  return worst * 255.0F;
+}
 
 /// Requires that the object covers a tenth of the picture.
 inline Difference differenceOf(const Image& image, const Image& truth) {

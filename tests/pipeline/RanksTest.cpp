@@ -9,6 +9,7 @@
 
 #include "tests/Catch.h"
 #include "tests/Scenes.h"
+#include "tests/pipeline/PictureDifference.h"
 #include "vdi/comm/Funnel.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
@@ -24,15 +25,6 @@ namespace {
 std::shared_ptr<gpu::Device> device() {
   static const std::shared_ptr<gpu::Device> instance = gpu::Device::create(gpu::requestFromEnvironment(0));
   return instance;
-}
-
-float largestDifference(const Image& a, const Image& b) {
-  REQUIRE(a.rgba.size() == b.rgba.size());
-  float worst = 0.0F;
-  for (std::size_t i = 0; i < a.rgba.size(); ++i) {
-    for (int c = 0; c < 4; ++c) worst = std::max(worst, std::abs(a.rgba[i][c] - b.rgba[i][c]));
-  }
-  return worst * 255.0F;
 }
 
 bool anythingSeen(const Image& image) {
@@ -101,10 +93,10 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one", "[ranks]") {
 
     many.setBlocks(decomposed.mine);
     auto volume = many.renderVolume(camera, function, settings);
-    if (root) CHECK(largestDifference(*volume, *truth) < 1.0F);
+    if (root) CHECK(test::largestDifference(*volume, *truth) < 1.0F);
     volume.reset();  // the next one reuses its memory
     volume = many.renderVolume(camera, function, settings);
-    if (root) CHECK(largestDifference(*volume, *truth) < 1.0F);
+    if (root) CHECK(test::largestDifference(*volume, *truth) < 1.0F);
     for (const Algorithm algorithm : {Algorithm::Merge, Algorithm::Bisection}) {
       INFO(toString(algorithm));
       GenerateSettings own = settings;
@@ -113,9 +105,9 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one", "[ranks]") {
       CHECK(vdi.has_value() == root);
       if (!root) continue;
       CHECK_NOTHROW(validate(*vdi));
-      CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
+      CHECK(test::largestDifference(flatten(*vdi), *truth) < 1.0F);
       renderer.setVdi(*vdi);
-      CHECK(largestDifference(renderer.render(camera, settings.width, settings.height), *truth) < 1.0F);
+      CHECK(test::largestDifference(renderer.render(camera, settings.width, settings.height), *truth) < 1.0F);
       CHECK(many.reports().size() == static_cast<std::size_t>(world.size()));
     }
   }
@@ -148,13 +140,13 @@ TEST_CASE("an automatic sampling rate: the one that the function needs, and the 
     if (world.rank() == 0) {
       CHECK(many.reports().front().samplesPerVoxel == rate);
       CHECK(anythingSeen(*expected));
-      CHECK(largestDifference(*expected, *together) < 2.0F);
-      CHECK(largestDifference(*expected, flatten(*vdi)) < 2.0F);
+      CHECK(test::largestDifference(*expected, *together) < 2.0F);
+      CHECK(test::largestDifference(*expected, flatten(*vdi)) < 2.0F);
     }
     // The picture equals that at the explicit rate.
     settings.samplesPerVoxel = rate;
     const std::optional<Image> numbered = one.renderVolume(test::oblique(), function, settings);
-    CHECK(largestDifference(*expected, *numbered) == 0.0F);
+    CHECK(test::largestDifference(*expected, *numbered) == 0.0F);
     return rate;
   };
   CHECK(rates(steep) > 1.0);
@@ -191,11 +183,11 @@ TEST_CASE("shaded: the picture and VDI of N ranks are those of one", "[ranks]") 
       if (!root) continue;
       const auto truth = one.renderVolume(camera, function, settings);
       REQUIRE(anythingSeen(*truth));
-      CHECK(largestDifference(*volume, *truth) < 1.0F);
+      CHECK(test::largestDifference(*volume, *truth) < 1.0F);
       const auto alone = one.generate(camera, function, settings);
       // Colours clipped at 1 are rounded once more on each side.
-      CHECK(largestDifference(flatten(*vdi), flatten(*alone)) < (diffuse < 1.0 ? 2.0F : 2.5F));
-      if (diffuse < 1.0) CHECK(largestDifference(flatten(*vdi), *truth) < 1.5F);
+      CHECK(test::largestDifference(flatten(*vdi), flatten(*alone)) < (diffuse < 1.0 ? 2.0F : 2.5F));
+      if (diffuse < 1.0) CHECK(test::largestDifference(flatten(*vdi), *truth) < 1.5F);
     }
   }
 }
@@ -219,15 +211,15 @@ TEST_CASE("a margin on N ranks: the lists of one rank, and its picture") {
   many.show(root ? &renderer : nullptr, camera, test::threeHues(0.8), settings);
   if (root) {
     const Image shown = renderer.render(camera, settings.width, settings.height);
-    CHECK(largestDifference(shown, flatten(*vdi)) < 1.0F);
+    CHECK(test::largestDifference(shown, flatten(*vdi)) < 1.0F);
     one.setBlocks(whole.mine);
     Vdi alone = *one.generate(camera, test::threeHues(0.8), settings);
     CHECK(vdi->margin == glm::ivec2(16, 12));
     CHECK(vdi->margin == alone.margin);
     const Image picture = *one.renderVolume(camera, test::threeHues(0.8), settings);
-    CHECK(largestDifference(flatten(*vdi), picture) < 1.0F);
+    CHECK(test::largestDifference(flatten(*vdi), picture) < 1.0F);
     vdi->margin = alone.margin = glm::ivec2(0);  // then all lists belong to the picture
-    CHECK(largestDifference(flatten(*vdi), flatten(alone)) < 1.5F);
+    CHECK(test::largestDifference(flatten(*vdi), flatten(alone)) < 1.5F);
   }
   settings.margin = world.rank() == 1 ? 0.25 : 0.5;
   if (world.size() > 1) CHECK_THROWS_AS(many.generate(camera, test::threeHues(0.8), settings), Error);
@@ -251,7 +243,7 @@ TEST_CASE(
     const auto vdi = generator.generate(test::oblique(), test::threeHues(0.8), settings);
     if (world.rank() != 0) continue;
     CHECK_NOTHROW(validate(*vdi));
-    CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
+    CHECK(test::largestDifference(flatten(*vdi), *truth) < 1.0F);
     const auto count = static_cast<double>(vdi->supersegmentCount());
     CHECK(count / static_cast<double>(equal->supersegmentCount()) == Approx(fill).epsilon(0.05));
   }
@@ -374,9 +366,9 @@ TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of o
   one.setBlocks(whole.mine);
   const auto truth = one.renderVolume(test::oblique(), test::threeHues(0.8), settings);
   REQUIRE(anythingSeen(*truth));
-  CHECK(largestDifference(*volume, *truth) < 1.0F);
+  CHECK(test::largestDifference(*volume, *truth) < 1.0F);
   CHECK_NOTHROW(validate(*vdi));
-  CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
+  CHECK(test::largestDifference(flatten(*vdi), *truth) < 1.0F);
 }
 
 TEST_CASE("all ranks together send little more than one rank makes") {
@@ -414,8 +406,8 @@ TEST_CASE("a large picture in bands, most of which are empty: the picture of one
   one.setBlocks(whole.mine);
   const auto truth = one.renderVolume(camera, test::threeHues(0.8), settings);
   CHECK(vdi->supersegmentCount() > 100);
-  CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
-  CHECK(largestDifference(*volume, *truth) < 1.0F);
+  CHECK(test::largestDifference(flatten(*vdi), *truth) < 1.0F);
+  CHECK(test::largestDifference(*volume, *truth) < 1.0F);
 }
 
 TEST_CASE("tiny pictures: more ranks than rows and pixels", "[ranks]") {
@@ -628,7 +620,7 @@ TEST_CASE("the next step, while this one is shown: all ranks advance, or none do
   VdiGenerator generator(device(), comm::Communicator::world());
   const auto requireShown = [&](const std::optional<Image>& truth) {
     const auto vdi = generator.generate(test::oblique(), function, settings);
-    if (vdi) CHECK(largestDifference(flatten(*vdi), *truth) < 1.0F);
+    if (vdi) CHECK(test::largestDifference(flatten(*vdi), *truth) < 1.0F);
   };
   generator.setBlocks(first.mine);
   generator.setNextBlocks(second.mine);

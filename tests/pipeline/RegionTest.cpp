@@ -9,6 +9,7 @@
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "tests/pipeline/Integral.h"
+#include "tests/pipeline/PictureDifference.h"
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
@@ -21,15 +22,6 @@ using synthetic::Joint;
 using synthetic::Layout;
 
 namespace {
-
-float largestDifference(const Image& a, const Image& b) {
-  REQUIRE(a.rgba.size() == b.rgba.size());
-  float worst = 0.0F;
-  for (std::size_t i = 0; i < a.rgba.size(); ++i) {
-    for (int c = 0; c < 4; ++c) worst = std::max(worst, std::abs(a.rgba[i][c] - b.rgba[i][c]));
-  }
-  return worst * 255.0F;
-}
 
 Region boxAndPlanes() {
   Region region;
@@ -59,10 +51,10 @@ TEST_CASE("region: DVR and lists of the device are the reference's") {
       const Image expected =
           reference::renderVolume(frame, comm::exchangeGhosts(comm::Communicator::serial(), decomposed.mine));
       const auto image = generator.renderVolume(camera, function, settings);
-      CHECK(largestDifference(*image, expected) < 0.5F);
+      CHECK(test::largestDifference(*image, expected) < 0.5F);
       const auto vdi = generator.generate(camera, function, settings);
       CHECK_NOTHROW(validate(*vdi));
-      CHECK(largestDifference(flatten(*vdi), expected) < 1.5F);
+      CHECK(test::largestDifference(flatten(*vdi), expected) < 1.5F);
       CHECK(vdi->bounds == generator.scene().bounds.intersection(*settings.region.box));
     }
   }
@@ -96,8 +88,8 @@ TEST_CASE("region: a box on the lattice shows the volume of the values in it") {
     const auto all = generator.renderVolume(camera, function, settings);
     settings.region.box = cut.owned;
     const auto cropped = generator.renderVolume(camera, function, settings);
-    CHECK(largestDifference(*cropped, *expected) < 2.0F);
-    CHECK(largestDifference(*all, *expected) > 60.0F);
+    CHECK(test::largestDifference(*cropped, *expected) < 2.0F);
+    CHECK(test::largestDifference(*all, *expected) > 60.0F);
     // Six planes give the same as the box.
     settings.region = {};
     for (int axis = 0; axis < 3; ++axis) {
@@ -107,7 +99,7 @@ TEST_CASE("region: a box on the lattice shows the volume of the values in it") {
       settings.region.planes.push_back({glm::dvec3(last), -normal});
     }
     const auto clipped = generator.renderVolume(camera, function, settings);
-    CHECK(largestDifference(*clipped, *cropped) < 1.0F);
+    CHECK(test::largestDifference(*clipped, *cropped) < 1.0F);
     settings.region = {};
   }
 }

@@ -14,6 +14,7 @@
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "tests/pipeline/Integral.h"
+#include "tests/pipeline/PictureDifference.h"
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
@@ -37,15 +38,6 @@ Shading headlight(double ambient = 0.0, double diffuse = 1.0) {
 
 Shading kit() {
   return {.on = true};
-}
-
-float largestDifference(const Image& a, const Image& b) {
-  REQUIRE(a.rgba.size() == b.rgba.size());
-  float worst = 0.0F;
-  for (std::size_t i = 0; i < a.rgba.size(); ++i) {
-    for (int c = 0; c < 4; ++c) worst = std::max(worst, std::abs(a.rgba[i][c] - b.rgba[i][c]));
-  }
-  return worst * 255.0F;
 }
 
 }  // namespace
@@ -80,14 +72,14 @@ TEST_CASE("shading: DVR and lists of the device are the reference's") {
       const auto blocks = comm::exchangeGhosts(comm::Communicator::serial(), decomposed.mine);
       const Image expected = reference::renderVolume(frame, blocks);
       const auto image = generator.renderVolume(camera, function, settings);
-      CHECK(largestDifference(*image, expected) < 1.5F);
+      CHECK(test::largestDifference(*image, expected) < 1.5F);
       const auto vdi = generator.generate(camera, function, settings);
-      CHECK(largestDifference(flatten(*vdi), expected) < 1.5F);
+      CHECK(test::largestDifference(flatten(*vdi), expected) < 1.5F);
       // The picture differs from the unshaded one.
       GenerateSettings plain = settings;
       plain.shading.on = false;
       const auto unlit = generator.renderVolume(camera, function, plain);
-      CHECK(largestDifference(*unlit, expected) > 30.0F);
+      CHECK(test::largestDifference(*unlit, expected) > 30.0F);
     }
   }
 }
