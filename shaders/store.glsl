@@ -14,8 +14,9 @@ struct OpticalSegment {
   float opticalDepth;
 };
 
-// The form to use; the compiler removes the code of the other.
-layout(constant_id = 2) const bool compactForm = false;
+// The encoding to use, by its number in vdi/core/Encoding.h; the compiler removes the code of the others.
+layout(constant_id = 2) const uint encoding = 0u;
+const bool compactForm = encoding == 1u;
 
 float opticalDepthOfCode(uint code) {
   return code == 0u ? 9.5367431640625e-7 : (exp2(exactFloat(code) * (16.0 / 4095.0)) - 1.0) / 16.0;

@@ -47,7 +47,8 @@ struct StoredForm {
 };
 
 #ifdef __cplusplus
-inline uint isCompact(const StoredForm& form) { return form.depthStep > 0.0F ? 1 : 0; }
+// The encoding's number, for the constant `encoding` of store.glsl.
+inline uint encodingOf(const StoredForm& form) { return form.depthStep > 0.0F ? 1 : 0; }
 // preSegmentsFrom and segmentsFrom use these sizes.
 static_assert(sizeof(StoredPreSegment) == 32 && sizeof(Segment) == 24);
 #endif

@@ -32,7 +32,7 @@ TEST_CASE("estimate: without a VDI it is of typically filled lists, and without 
   CHECK_FALSE(estimate.seconds.has_value());
   CHECK(estimate.bytesInMemory == Approx(lists * (4.0 + 8.0 * 25.0 * typicalFill)));
   CHECK(estimate.mostBytesInMemory == Approx(lists * (4.0 + 8.0 * 25.0)));
-  CHECK(estimate.bytesAsFile == Approx(lists * 25.0 * typicalFill * packedBytes(Precision::Compact)));
+  CHECK(estimate.bytesAsFile == Approx(lists * 25.0 * typicalFill * typicalFileBytes(Precision::Compact)));
   // The data sets of docs/benchmarks.md, of which 20 to 82 MiB are stored.
   CHECK(estimate.bytesAsFile > 20.0 * 1048576.0);
   CHECK(estimate.bytesAsFile < 82.0 * 1048576.0);

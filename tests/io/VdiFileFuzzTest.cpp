@@ -240,7 +240,7 @@ TEST_CASE("a packed chunk's expanded size is known without expanding it") {
        {test::plausibleVdi(20, 15, 5), test::noisyVdi(20, 15, 5), test::plausibleVdi(1, 1, 1)}) {
     const auto lists = vdi.listCount();
     const std::vector<std::byte> packed = io::detail::packLists(test::full(vdi), {}, 0, lists);
-    const std::uint64_t expanded = io::detail::expandedBytes(lists, vdi.supersegmentCount(), Precision::Full);
+    const std::uint64_t expanded = chunkBytes(lists, vdi.supersegmentCount(), Precision::Full);
     CHECK(io::detail::announcedBytes(packed) == expanded);
     std::size_t same = 0;
     for (std::size_t length = 0; length < packed.size(); ++length) {

@@ -45,7 +45,7 @@ VdiEstimate estimateOf(const GenerateSettings& settings, const std::optional<Mad
   supersegments = std::min(supersegments, most);
   estimate.bytesInMemory = bytesInMemory(lists, supersegments, settings.precision);
   estimate.mostBytesInMemory = bytesInMemory(lists, most, settings.precision);
-  estimate.bytesAsFile = supersegments * packedBytes(settings.precision);
+  estimate.bytesAsFile = supersegments * typicalFileBytes(settings.precision);
   return estimate;
 }
 

@@ -5,17 +5,16 @@
 #include <cstdint>
 #include <optional>
 
+#include "vdi/core/Encoding.h"
 #include "vdi/core/GenerateSettings.h"
-#include "vdi/core/Supersegment.h"
 
 namespace vdi {
 
 /// The bytes of lists with so many supersegments in all. `Number` is the type of the counts.
 template <typename Number>
 constexpr Number bytesInMemory(Number lists, Number supersegments, Precision precision) {
-  const std::size_t each =
-      precision == Precision::Compact ? sizeof(CompactSupersegment) : sizeof(Supersegment);
-  return lists * static_cast<Number>(sizeof(std::uint32_t)) + supersegments * static_cast<Number>(each);
+  return lists * static_cast<Number>(sizeof(std::uint32_t)) +
+         supersegments * static_cast<Number>(segmentBytes(precision));
 }
 
 /// Settings and figures of a finished VDI.
@@ -38,11 +37,6 @@ struct VdiEstimate {
 /// The share of N_S that lists hold in an unknown volume. In nine scenes it was 0.05 to 0.26
 /// (docs/benchmarks.md, "How much is stored").
 constexpr double typicalFill = 0.15;
-
-/// The bytes that a supersegment takes in a file, on average.
-constexpr double packedBytes(Precision precision) {
-  return precision == Precision::Compact ? 5.5 : 14.5;
-}
 
 /// Estimates a VDI. If `last` is a VDI of the same volume and transfer function, its supersegments are scaled
 /// with the numbers of lists and N_S; otherwise lists hold typicalFill. The time for casting scales with the

@@ -9,10 +9,10 @@ namespace vdi {
 
 namespace {
 
-/// Flattens the lists from column and row `margin` on. `value` converts a supersegment to floats.
-template <typename Segment, typename Value>
-void flattenLists(const ListsOf<Segment>& lists, int listsWide, const glm::ivec2& margin, Value value,
-                  Image& image) {
+/// Flattens the lists from column and row `margin` on.
+template <typename Segment>
+void flattenLists(const ListsOf<Segment>& lists, const DepthCode& code, int listsWide,
+                  const glm::ivec2& margin, Image& image) {
   constexpr float opaque = 0.999999F;
   constexpr std::size_t minimum = 4096;  // lists
   inParallel(image.pixelCount(), minimum, [&](std::size_t first, std::size_t last) {
@@ -23,11 +23,11 @@ void flattenLists(const ListsOf<Segment>& lists, int listsWide, const glm::ivec2
       const std::span<const Segment> list = lists.list(row * static_cast<std::size_t>(listsWide) + column);
       glm::vec4 sum(0.0F);
       for (auto segment = list.begin(); segment != list.end() && sum.a < opaque; ++segment) {
-        const Supersegment& s = value(*segment);
+        const Supersegment& s = expanded(*segment, code);
         sum += (1.0F - sum.a) * glm::vec4(s.red, s.green, s.blue, s.opacity);
       }
       image.rgba[i] = sum;
-      image.depth[i] = list.empty() ? Image::noDepth : value(list.front()).front;
+      image.depth[i] = list.empty() ? Image::noDepth : expanded(list.front(), code).front;
     }
   });
 }
@@ -39,15 +39,8 @@ Image flatten(const Vdi& vdi) {
   Image image{size.x, size.y, {}, {}};
   image.rgba.resize(image.pixelCount());
   image.depth.resize(image.pixelCount());
-  if (const auto* compact = std::get_if<CompactLists>(&vdi.lists)) {
-    flattenLists(
-        *compact, vdi.width, vdi.margin,
-        [&](const CompactSupersegment& s) { return expanded(s, vdi.depthCode); }, image);
-  } else {
-    flattenLists(
-        std::get<SupersegmentLists>(vdi.lists), vdi.width, vdi.margin,
-        [](const Supersegment& s) -> const Supersegment& { return s; }, image);
-  }
+  std::visit([&](const auto& lists) { flattenLists(lists, vdi.depthCode, vdi.width, vdi.margin, image); },
+             vdi.lists);
   return image;
 }
 

@@ -86,6 +86,10 @@ float opacityOf(float opticalDepth);
 float opticalDepthOf(float opacity);
 
 Supersegment expanded(const CompactSupersegment& segment, const DepthCode& code);
+/// The supersegment itself, so that callers need not tell the precisions apart.
+inline const Supersegment& expanded(const Supersegment& segment, const DepthCode& /*code*/) {
+  return segment;
+}
 
 /// Compact lists: list i is segments[offsets[i] .. offsets[i + 1]), front to back, disjoint.
 template <typename Segment>
@@ -104,5 +108,8 @@ using SupersegmentLists = ListsOf<Supersegment>;
 using CompactLists = ListsOf<CompactSupersegment>;
 
 SupersegmentLists expanded(const CompactLists& lists, const DepthCode& code);
+inline const SupersegmentLists& expanded(const SupersegmentLists& lists, const DepthCode& /*code*/) {
+  return lists;
+}
 
 }  // namespace vdi

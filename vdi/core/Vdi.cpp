@@ -50,15 +50,12 @@ void validateList(std::span<const CompactSupersegment> list, std::uint64_t numbe
 }  // namespace
 
 Supersegment Vdi::supersegment(std::size_t index) const {
-  if (const auto* compact = std::get_if<CompactLists>(&lists)) {
-    return expanded(compact->segments[index], depthCode);
-  }
-  return std::get<SupersegmentLists>(lists).segments[index];
+  return std::visit([&](const auto& l) -> Supersegment { return expanded(l.segments[index], depthCode); },
+                    lists);
 }
 
 SupersegmentLists Vdi::expandedLists() const {
-  if (const auto* compact = std::get_if<CompactLists>(&lists)) return expanded(*compact, depthCode);
-  return std::get<SupersegmentLists>(lists);
+  return std::visit([&](const auto& l) -> SupersegmentLists { return expanded(l, depthCode); }, lists);
 }
 
 void validateShape(const Vdi& vdi) {
@@ -69,12 +66,11 @@ void validateShape(const Vdi& vdi) {
     fail(fmt::format("a margin of {} and {} of {} x {} lists", vdi.margin.x, vdi.margin.y, vdi.width,
                      vdi.height));
   }
-  const bool compact = vdi.precision() == Precision::Compact;
   const DepthCode& code = vdi.depthCode;
   const bool usable = code.step > 0.0F && code.first >= 0.0F &&
                       std::isfinite(code.depthOf(DepthCode::largest)) &&
                       code.depthOf(DepthCode::largest) > code.depthOf(DepthCode::largest - 1);
-  if (compact ? !usable : code != DepthCode{}) {
+  if (hasDepthCode(vdi.precision()) ? !usable : code != DepthCode{}) {
     fail(fmt::format("{} supersegments with depths from {} in steps of {}", toString(vdi.precision()),
                      code.first, code.step));
   }
@@ -94,8 +90,11 @@ void validateLists(const ListsOf<Segment>& lists, std::size_t first, std::size_t
   for (std::size_t i = first; i < last; ++i) validateList(lists.list(i), firstList + (i - first));
 }
 
-template void validateLists(const SupersegmentLists&, std::size_t, std::size_t, std::uint64_t, std::uint32_t);
-template void validateLists(const CompactLists&, std::size_t, std::size_t, std::uint64_t, std::uint32_t);
+#define VDI_VALIDATE_LISTS(Segment)                                                             \
+  template void validateLists(const ListsOf<Segment>&, std::size_t, std::size_t, std::uint64_t, \
+                              std::uint32_t);
+VDI_EACH_ENCODING(VDI_VALIDATE_LISTS)
+#undef VDI_VALIDATE_LISTS
 
 void validateEnds(const Vdi& vdi) {
   const std::size_t lists = static_cast<std::size_t>(vdi.width) * static_cast<std::size_t>(vdi.height);

@@ -10,6 +10,7 @@
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Coloring.h"
+#include "vdi/core/Encoding.h"
 #include "vdi/core/Supersegment.h"
 
 namespace vdi {
@@ -28,17 +29,15 @@ struct Vdi {
   double sampleStep = 0.0;   // depth interval of one sample (DepthLattice::step)
   double time = 0.0;         // simulation time, 0 when unknown
   std::uint64_t timeStep = 0;
-  std::optional<Coloring> coloring;                     // meaning of the colours, if known
-  DepthCode depthCode;                                  // of compact lists; all 0 otherwise
-  std::variant<SupersegmentLists, CompactLists> lists;  // width * height lists
+  std::optional<Coloring> coloring;  // meaning of the colours, if known
+  DepthCode depthCode;               // of compact lists; all 0 otherwise
+  AnyLists lists;                    // width * height lists
 
   /// Size of the requested picture: all lists but the margin's.
   glm::ivec2 pictureSize() const { return glm::ivec2(width, height) - 2 * margin; }
   /// The view of all lists.
   View view() const { return View::withMargin(camera, pictureSize().x, pictureSize().y, margin); }
-  Precision precision() const {
-    return std::holds_alternative<CompactLists>(lists) ? Precision::Compact : Precision::Full;
-  }
+  Precision precision() const { return static_cast<Precision>(lists.index()); }
   const HostVector<std::uint32_t>& offsets() const {  // exclusive prefix sum, [listCount() + 1]
     return std::visit([](const auto& l) -> const HostVector<std::uint32_t>& { return l.offsets; }, lists);
   }

@@ -79,7 +79,7 @@ ComputePipeline& CastPass::pipelineFor(const Program& program) {
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
   PipelineSet& pipelines = program.lanesPerRay > 1 ? lanePipelines_ : pipelines_;
   ComputePipeline& pipeline =
-      pipelines.with({program.program, static_cast<std::uint32_t>(pageCount), program.compact,
+      pipelines.with({program.program, static_cast<std::uint32_t>(pageCount), program.encoding,
                       program.samplesAhead, program.lanesPerRay, program.cutAtGaps ? 1U : 0U,
                       program.byNeed ? 1U : 0U, volume_->mayBeInfinite() ? 1U : 0U,
                       volume_->reachesBeyondTable() ? 1U : 0U, program.shaded ? 1U : 0U, program.blendMode});
@@ -106,7 +106,7 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
                                 : writes                            ? shared::castProgramWritePreSegments
                                                                     : shared::castProgramCountPreSegments;
   // Only the search itself stores supersegments.
-  const std::uint32_t compact = program == shared::castProgramSearch ? isCompact(band.form) : 0;
+  const std::uint32_t encoding = program == shared::castProgramSearch ? encodingOf(band.form) : 0;
   const shared::CastConstants constants{writes ? shared::castModeWrite : shared::castModeSearch,
                                         band.firstRow, band.lastRow};
   const bool counts = program == shared::castProgramCountPreSegments ||
@@ -119,7 +119,7 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   pipelines_.update(commands, params);
   // Counted samples need not be adjacent.
   const std::uint32_t ahead = stride > 1 ? 1 : samplesAhead_;
-  commands.dispatch(pipelineFor({program, compact, lanes, ahead, band.cutAtGaps, params.level >= 0.0F,
+  commands.dispatch(pipelineFor({program, encoding, lanes, ahead, band.cutAtGaps, params.level >= 0.0F,
                                  params.shaded != 0, params.blendMode}),
                     constants, groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
 }

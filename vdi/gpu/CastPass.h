@@ -55,8 +55,8 @@ class CastPass {
  private:
   /// Specialisation of cast.comp, besides the number of pages.
   struct Program {
-    std::uint32_t program = 0;  // shared::castProgram...
-    std::uint32_t compact = 0;
+    std::uint32_t program = 0;   // shared::castProgram...
+    std::uint32_t encoding = 0;  // its number
     std::uint32_t lanesPerRay = 1;
     std::uint32_t samplesAhead = 1;
     bool cutAtGaps = false;

@@ -36,7 +36,7 @@ ExpandPass::ExpandPass(std::shared_ptr<Device> device) : pipelines_(std::move(de
 void ExpandPass::record(Commands& commands, const shared::ExpandConstants& constants) {
   const std::uint64_t count = invocations(constants);
   if (count == 0) return;
-  commands.dispatchMany(pipelines_.with({0, 0, isCompact(constants.form)}), constants, count,
+  commands.dispatchMany(pipelines_.with({0, 0, encodingOf(constants.form)}), constants, count,
                         shared::expandGroup);
 }
 

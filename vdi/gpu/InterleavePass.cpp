@@ -17,7 +17,7 @@ InterleavePass::InterleavePass(std::shared_ptr<Device> device)
     : pipelines_(std::move(device), interleaveInfo()) {}
 
 void InterleavePass::record(Commands& commands, const shared::InterleaveConstants& constants) {
-  commands.dispatch(pipelines_.with({0, 0, isCompact(constants.form)}), constants,
+  commands.dispatch(pipelines_.with({0, 0, encodingOf(constants.form)}), constants,
                     groupsFor(constants.listCount, shared::compositeGroup));
 }
 

@@ -60,7 +60,7 @@ void ReducePass::record(Commands& commands, shared::ReduceConstants constants, c
   }
   if (alone) commands.dispatch(alone_, constants, groupsFor(constants.listCount, shared::reduceGroup));
   commands.barrier();
-  commands.dispatch(store_.with({0, 0, isCompact(constants.form), constants.fitting != 0 ? 1U : 0U}),
+  commands.dispatch(store_.with({0, 0, encodingOf(constants.form), constants.fitting != 0 ? 1U : 0U}),
                     constants, groupsFor(constants.listCount, shared::storeGroup));
 }
 

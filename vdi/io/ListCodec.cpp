@@ -39,8 +39,6 @@ struct Context {
 /// point would make the file depend on the host program's rounding mode.
 struct FullCoding {
   using Segment = Supersegment;
-  static constexpr Precision precision = Precision::Full;
-  static constexpr std::size_t codeBytes = 0;
   static constexpr std::array<std::size_t, columns> bytes{4, 4, 4, 4, 4, 4};
 
   struct Fields {
@@ -95,8 +93,7 @@ struct FullCoding {
 /// opacity; their residuals are differences modulo 256.
 struct CompactCoding {
   using Segment = CompactSupersegment;
-  static constexpr Precision precision = Precision::Compact;
-  static constexpr std::size_t codeBytes = sizeof(DepthCode);  // at the start of the chunk
+  /// Codes of 14 or 12 bits take two bytes, which LZ4 nearly undoes.
   static constexpr std::array<std::size_t, columns> bytes{2, 2, 2, 1, 1, 1};
 
   struct Fields {
@@ -141,7 +138,31 @@ struct CompactCoding {
 };
 
 template <typename Segment>
-using CodingOf = std::conditional_t<std::is_same_v<Segment, Supersegment>, FullCoding, CompactCoding>;
+struct CodingFor;
+template <>
+struct CodingFor<Supersegment> {
+  using Type = FullCoding;
+};
+template <>
+struct CodingFor<CompactSupersegment> {
+  using Type = CompactCoding;
+};
+template <typename Segment>
+using CodingOf = typename CodingFor<Segment>::Type;
+
+constexpr std::size_t sumOf(const std::array<std::size_t, columns>& bytes) {
+  std::size_t sum = 0;
+  for (const std::size_t each : bytes) sum += each;
+  return sum;
+}
+#define VDI_CHECK_CODING(Segment) \
+  static_assert(sumOf(CodingOf<Segment>::bytes) == EncodingOf<Segment>::chunkBytes);
+VDI_EACH_ENCODING(VDI_CHECK_CODING)
+#undef VDI_CHECK_CODING
+
+/// Bytes of the depth code at the start of a chunk.
+template <typename Segment>
+constexpr std::size_t codeBytes = EncodingOf<Segment>::hasDepthCode ? sizeof(DepthCode) : 0;
 
 /// Visits the supersegments of a chunk in order, with the index in the chunk of the one that predicts each.
 class Traversal {
@@ -249,13 +270,13 @@ std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode&
   const std::size_t begin = lists.offsets[first];
   const std::size_t count = lists.offsets[last] - begin;
   const std::span<const Segment> segments = std::span(lists.segments).subspan(begin, count);
-  const std::uint64_t size = expandedBytes(listCount, count, Coding::precision);
+  const std::uint64_t size = chunkBytes(listCount, count, EncodingOf<Segment>::precision);
   if (size > LZ4_MAX_INPUT_SIZE) throw Error(ErrorCode::Io, "too many supersegments in one chunk of lists");
 
   std::vector<std::byte> plain(size);
-  std::byte* const lengths = plain.data() + Coding::codeBytes;
+  std::byte* const lengths = plain.data() + codeBytes<Segment>;
   std::byte* const columnData = lengths + listCount * sizeof(std::uint32_t);
-  if constexpr (Coding::codeBytes > 0) std::memcpy(plain.data(), &code, Coding::codeBytes);
+  std::memcpy(plain.data(), &code, codeBytes<Segment>);
   Traversal traversal;
   std::size_t index = 0;
   for (std::size_t i = 0; i < listCount; ++i) {
@@ -287,7 +308,7 @@ DepthCode unpackLists(std::span<const std::byte> packed, std::uint32_t before, s
                       std::span<Segment> segments) {
   using Coding = CodingOf<Segment>;
   const std::size_t count = segments.size();
-  const std::uint64_t size = expandedBytes(ends.size(), count, Coding::precision);
+  const std::uint64_t size = chunkBytes(ends.size(), count, EncodingOf<Segment>::precision);
   assert(canExpandTo(packed.size(), size));
   std::vector<std::byte> plain(size);
   const int got =
@@ -295,10 +316,10 @@ DepthCode unpackLists(std::span<const std::byte> packed, std::uint32_t before, s
                           static_cast<int>(packed.size()), static_cast<int>(size));
   if (got < 0 || static_cast<std::uint64_t>(got) != size) fail("it doesn't decompress to its size");
 
-  const std::byte* const lengths = plain.data() + Coding::codeBytes;
+  const std::byte* const lengths = plain.data() + codeBytes<Segment>;
   const std::byte* const columnData = lengths + ends.size() * sizeof(std::uint32_t);
   DepthCode code;
-  if constexpr (Coding::codeBytes > 0) std::memcpy(&code, plain.data(), Coding::codeBytes);
+  std::memcpy(&code, plain.data(), codeBytes<Segment>);
   Traversal traversal;
   std::size_t index = 0;
   for (std::size_t i = 0; i < ends.size(); ++i) {
@@ -321,12 +342,12 @@ DepthCode unpackLists(std::span<const std::byte> packed, std::uint32_t before, s
   return code;
 }
 
-template std::vector<std::byte> packLists(const SupersegmentLists&, const DepthCode&, std::size_t,
-                                          std::size_t);
-template std::vector<std::byte> packLists(const CompactLists&, const DepthCode&, std::size_t, std::size_t);
-template DepthCode unpackLists(std::span<const std::byte>, std::uint32_t, std::span<std::uint32_t>,
-                               std::span<Supersegment>);
-template DepthCode unpackLists(std::span<const std::byte>, std::uint32_t, std::span<std::uint32_t>,
-                               std::span<CompactSupersegment>);
+#define VDI_LIST_CODEC(Segment)                                                                       \
+  template std::vector<std::byte> packLists(const ListsOf<Segment>&, const DepthCode&, std::size_t,   \
+                                            std::size_t);                                             \
+  template DepthCode unpackLists(std::span<const std::byte>, std::uint32_t, std::span<std::uint32_t>, \
+                                 std::span<Segment>);
+VDI_EACH_ENCODING(VDI_LIST_CODEC)
+#undef VDI_LIST_CODEC
 
 }  // namespace vdi::io::detail

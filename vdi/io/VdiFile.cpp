@@ -34,8 +34,6 @@ constexpr std::uint32_t plainVersion = 1;   // neither margin nor metadata
 constexpr std::uint32_t marginVersion = 2;  // a margin; written only if there is one
 constexpr std::uint32_t metadataVersion =
     3;  // metadata and maybe a margin; written only if there is metadata
-// Encodings have the numbers of Precision.
-static_assert(static_cast<int>(Precision::Full) == 0 && static_cast<int>(Precision::Compact) == 1);
 constexpr std::uint32_t flagParallel = 1;
 constexpr std::uint32_t knownFlags = flagParallel;
 
@@ -197,7 +195,7 @@ Vdi vdiOf(const Header& header) {
   vdi.camera.viewAngle = header.viewAngle;
   vdi.camera.parallelScale = header.parallelScale;
   vdi.camera.parallelProjection = (header.flags & flagParallel) != 0;
-  if (precisionOf(header) == Precision::Compact) vdi.lists = CompactLists();
+  vdi.lists = noLists(precisionOf(header));
   requireSoundHeader(vdi);
   return vdi;
 }
@@ -215,9 +213,9 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   }
   if (header.headerBytes != sizeof(Header)) fail(fmt::format("its header has {} bytes", header.headerBytes));
   if (header.headerChecksum != checksumOf(header)) fail("the header's checksum is wrong");
-  if (header.encoding > static_cast<std::uint32_t>(Precision::Compact)) {
-    fail(fmt::format("its supersegments have encoding {}, this program reads encodings 0 and 1",
-                     header.encoding));
+  if (!isEncoding(header.encoding)) {
+    fail(fmt::format("its supersegments have encoding {}, this program reads encodings 0 to {}",
+                     header.encoding, std::variant_size_v<AnyLists> - 1));
   }
   const bool hasMargin = header.marginX != 0 || header.marginY != 0;
   if ((header.flags & ~knownFlags) != 0 || (hasMargin && header.version == plainVersion))
@@ -299,8 +297,7 @@ std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> b
     next.checksum = entry.checksum;
     next.listCount = std::min<std::uint64_t>(header.listsPerChunk, lists - next.firstList);
     next.supersegmentCount = entry.supersegmentCount;
-    const std::uint64_t expanded =
-        detail::expandedBytes(next.listCount, next.supersegmentCount, precisionOf(header));
+    const std::uint64_t expanded = chunkBytes(next.listCount, next.supersegmentCount, precisionOf(header));
     if (!detail::canExpandTo(next.packedBytes, expanded) ||
         next.supersegmentCount > next.listCount * header.budget) {
       fail(fmt::format("chunk {} can't hold {} supersegments in {} bytes", chunks.size(),
@@ -323,8 +320,7 @@ void requireSound(const Chunk& chunk, std::span<const std::byte> packed, Precisi
   if (chunk.checksum != checksumOf(packed)) {
     fail(fmt::format("the checksum of the chunk from list {} on is wrong", chunk.firstList));
   }
-  if (detail::announcedBytes(packed) !=
-      detail::expandedBytes(chunk.listCount, chunk.supersegmentCount, precision)) {
+  if (detail::announcedBytes(packed) != chunkBytes(chunk.listCount, chunk.supersegmentCount, precision)) {
     fail(fmt::format("the chunk from list {} on doesn't hold {} supersegments", chunk.firstList,
                      chunk.supersegmentCount));
   }
@@ -482,10 +478,11 @@ void encodeChunks(const ListsOf<Segment>& lists, std::size_t first, std::size_t 
   }
 }
 
-template void encodeChunks(const SupersegmentLists&, std::size_t, std::size_t, std::uint64_t, std::uint32_t,
-                           const DepthCode&, const std::function<void(EncodedChunk)>&);
-template void encodeChunks(const CompactLists&, std::size_t, std::size_t, std::uint64_t, std::uint32_t,
-                           const DepthCode&, const std::function<void(EncodedChunk)>&);
+#define VDI_ENCODE_CHUNKS(Segment)                                                             \
+  template void encodeChunks(const ListsOf<Segment>&, std::size_t, std::size_t, std::uint64_t, \
+                             std::uint32_t, const DepthCode&, const std::function<void(EncodedChunk)>&);
+VDI_EACH_ENCODING(VDI_ENCODE_CHUNKS)
+#undef VDI_ENCODE_CHUNKS
 
 std::uint64_t headBytes(std::uint64_t lists) {
   return sizeof(Header) + chunksOf(lists) * sizeof(ChunkEntry);

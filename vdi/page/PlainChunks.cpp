@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 
+#include "vdi/core/Encoding.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/io/VdiParts.h"
@@ -55,7 +56,7 @@ void appendLiterals(std::vector<std::byte>& to, std::span<const std::byte> plain
 
 std::vector<std::byte> withPlainChunks(std::span<const std::byte> file) {
   static_cast<void>(io::decode(file));  // from here on all lengths hold
-  const bool compact = numberAt<std::uint32_t>(file, encodingAt) == 1;
+  const auto precision = static_cast<Precision>(numberAt<std::uint32_t>(file, encodingAt));
   const std::uint64_t lists =
       std::uint64_t{numberAt<std::uint32_t>(file, widthAt)} * numberAt<std::uint32_t>(file, heightAt);
   const std::uint64_t perChunk = numberAt<std::uint32_t>(file, listsPerChunkAt);
@@ -69,8 +70,7 @@ std::vector<std::byte> withPlainChunks(std::span<const std::byte> file) {
     const std::size_t entryAt = headerBytes + c * sizeof(io::ChunkEntry);
     auto entry = numberAt<io::ChunkEntry>(file, entryAt);
     const std::uint64_t listCount = std::min(perChunk, lists - c * perChunk);
-    plain.resize(compact ? 8 + 4 * listCount + 9 * std::uint64_t{entry.supersegmentCount}
-                         : 4 * listCount + 24 * std::uint64_t{entry.supersegmentCount});
+    plain.resize(chunkBytes(listCount, entry.supersegmentCount, precision));
     if (LZ4_decompress_safe(reinterpret_cast<const char*>(file.data() + from),
                             reinterpret_cast<char*>(plain.data()), static_cast<int>(entry.packedBytes),
                             static_cast<int>(plain.size())) != static_cast<int>(plain.size())) {

@@ -33,7 +33,8 @@ ListsOf<Segment> BandDownload::get(const DeviceLists& band) {
   return lists;
 }
 
-template ListsOf<Supersegment> BandDownload::get(const DeviceLists&);
-template ListsOf<CompactSupersegment> BandDownload::get(const DeviceLists&);
+#define VDI_BAND_DOWNLOAD(Segment) template ListsOf<Segment> BandDownload::get(const DeviceLists&);
+VDI_EACH_ENCODING(VDI_BAND_DOWNLOAD)
+#undef VDI_BAND_DOWNLOAD
 
 }  // namespace vdi::detail

@@ -100,7 +100,8 @@ void ListDownload<Segment>::downloadOffsets() {
   memory_.commands.submitAndWait();
 }
 
-template class ListDownload<Supersegment>;
-template class ListDownload<CompactSupersegment>;
+#define VDI_LIST_DOWNLOAD(Segment) template class ListDownload<Segment>;
+VDI_EACH_ENCODING(VDI_LIST_DOWNLOAD)
+#undef VDI_LIST_DOWNLOAD
 
 }  // namespace vdi::detail

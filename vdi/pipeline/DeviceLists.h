@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "vdi/core/Supersegment.h"
+#include "vdi/core/Encoding.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Memory.h"
 #include "vdi/gpu/ScanPass.h"
@@ -19,15 +19,15 @@ constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
 /// Compact lists as in ListsOf, in device memory that the next ones reuse.
 struct DeviceLists {
   gpu::Buffer offsets;   // u32 [listCount + 1], exclusive prefix sum
-  gpu::Buffer segments;  // [count], CompactSupersegments or Supersegments
+  gpu::Buffer segments;  // [count], of an encoding's type
   std::uint32_t listCount = 0;
   std::uint64_t count = 0;
   gpu::Submission written;  // other queues wait for this
 };
 
-/// Bytes of one supersegment: compact lists have a depth code.
+/// Bytes of one supersegment of lists with this depth code.
 inline std::uint64_t segmentBytes(const DepthCode& code) {
-  return precisionOf(code) == Precision::Compact ? sizeof(CompactSupersegment) : sizeof(Supersegment);
+  return vdi::segmentBytes(precisionOf(code));
 }
 
 /// Empty lists whose memory comes from `pool`.

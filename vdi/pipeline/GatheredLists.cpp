@@ -101,7 +101,8 @@ ListsOf<Segment> GatheredLists<Segment>::finish() {
   return std::move(lists_);
 }
 
-template class GatheredLists<Supersegment>;
-template class GatheredLists<CompactSupersegment>;
+#define VDI_GATHERED_LISTS(Segment) template class GatheredLists<Segment>;
+VDI_EACH_ENCODING(VDI_GATHERED_LISTS)
+#undef VDI_GATHERED_LISTS
 
 }  // namespace vdi::detail

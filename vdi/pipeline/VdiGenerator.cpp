@@ -369,9 +369,9 @@ VdiFrame VdiGenerator::start(const Camera& camera, const TransferFunction& trans
   const auto frame = std::make_shared<VdiFrame::State>();
   flight.frame = frame;
   frame->vdi = s.headerOf(*prepared, camera, settings);
-  std::unique_ptr<detail::VdiSink> sink = precisionOf(frame->vdi.depthCode) == Precision::Compact
-                                              ? s.hostSink<CompactSupersegment>(flight, frame->vdi)
-                                              : s.hostSink<Supersegment>(flight, frame->vdi);
+  std::unique_ptr<detail::VdiSink> sink =
+      withSegment(precisionOf(frame->vdi.depthCode),
+                  [&]<typename Segment>() { return s.hostSink<Segment>(flight, frame->vdi); });
   s.frame([&] { s.makeLists(*prepared, settings, frame->vdi, flight.owned, *sink, progress); });
   frame->sink = std::move(sink);
   frame->report = s.mine;
@@ -404,13 +404,11 @@ WrittenVdi VdiGenerator::write(const std::filesystem::path& path, const Camera& 
   header.time = stamp.time;
   header.timeStep = stamp.step;
   header.coloring->array = stamp.array;
-  const auto writeWith = [&](auto&& sink) {
+  return withSegment(precisionOf(header.depthCode), [&]<typename Segment>() {
+    detail::FileSink<Segment> sink(s.comm, root, path, *s.bandDownload);
     s.wholeVdi(*prepared, settings, header, sink, progress);
     return sink.written();
-  };
-  if (precisionOf(header.depthCode) == Precision::Compact)
-    return writeWith(detail::FileSink<CompactSupersegment>(s.comm, root, path, *s.bandDownload));
-  return writeWith(detail::FileSink<Supersegment>(s.comm, root, path, *s.bandDownload));
+  });
 }
 
 void VdiGenerator::show(VdiRenderer* renderer, const Camera& camera, const TransferFunction& transferFunction,

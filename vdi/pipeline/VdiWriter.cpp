@@ -383,7 +383,8 @@ WrittenVdi VdiWriter<Segment>::finish() {
   return written;
 }
 
-template class VdiWriter<Supersegment>;
-template class VdiWriter<CompactSupersegment>;
+#define VDI_WRITER(Segment) template class VdiWriter<Segment>;
+VDI_EACH_ENCODING(VDI_WRITER)
+#undef VDI_WRITER
 
 }  // namespace vdi::detail
