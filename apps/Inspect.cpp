@@ -56,8 +56,9 @@ std::string shownOf(const ScalarArray& array) {
   if (array.name.empty()) return "an array without a name";
   std::string what = fmt::format("{} of {}", array.name, array.cells ? "cells" : "points");
   if (array.components > 1)
-    what += array.component < 0 ? ", its magnitude"
-                                : fmt::format(", component {} of {}", array.component, array.components);
+    what += array.component == phase ? ", its phase"
+            : array.component < 0    ? ", its magnitude"
+                                     : fmt::format(", component {} of {}", array.component, array.components);
   return what;
 }
 

@@ -87,6 +87,14 @@ void checkBlock(const vdi_catalyst_block& block) {
   requireCountable(block);
 }
 
+void checkOffset(const char* name, std::int32_t association, const double* offset) {
+  require(name != nullptr && *name != '\0', "an array needs a name");
+  require(association == VDI_CATALYST_POINTS || association == VDI_CATALYST_CELLS, "unknown association");
+  require(offset != nullptr, "no offset given");
+  for (int axis = 0; axis < 3; ++axis)
+    require(std::abs(offset[axis]) <= 1.0, "an array's offset must be at most a cell");  // false for NaN
+}
+
 bool isStep(std::int64_t step) {
   return step >= 0 && step <= std::numeric_limits<int>::max();
 }

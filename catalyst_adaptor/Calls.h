@@ -54,6 +54,8 @@ inline void require(bool good, const char* what) {
 void requireEqual(MPI_Comm comm, std::int64_t value, const char* what);
 /// Throws std::invalid_argument with the reason if the block is invalid.
 void checkBlock(const vdi_catalyst_block& block);
+/// Throws std::invalid_argument with the reason if an array can't have the name, association or offset.
+void checkOffset(const char* name, std::int32_t association, const double* offset);
 /// Whether ParaView can count this step.
 bool isStep(std::int64_t step);
 

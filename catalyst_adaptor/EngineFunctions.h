@@ -19,6 +19,7 @@ typedef struct vdi_catalyst_functions {
   int (*set_array)(vdi_catalyst*, const char*, int32_t, int32_t, const void* const*);
   int (*set_array_strided)(vdi_catalyst*, const char*, int32_t, int32_t, int32_t, const void* const*,
                            const vdi_catalyst_strides*);
+  int (*set_array_offset)(vdi_catalyst*, const char*, int32_t, const double*);
   int (*wants)(vdi_catalyst*, int64_t, double);
   int (*execute)(vdi_catalyst*, int64_t, double);
   double (*parameter_f64)(vdi_catalyst*, const char*, double, double, double);
@@ -28,8 +29,8 @@ typedef struct vdi_catalyst_functions {
 } vdi_catalyst_functions;
 
 /* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
-#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_5
-#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_5"
+#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_6
+#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_6"
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 
 #ifdef __cplusplus

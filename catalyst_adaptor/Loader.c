@@ -145,7 +145,7 @@ static const vdi_catalyst_functions* functions_of(const vdi_catalyst* catalyst) 
   return catalyst == json_handle ? json_engine.functions : script_engine.functions;
 }
 
-/* This function and the next two run only our own code, which changes nothing but the floating-point
+/* This function and the next three run only our own code, which changes nothing but the floating-point
  * environment. */
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
   const vdi_catalyst_functions* engine = functions_of(catalyst);
@@ -176,6 +176,17 @@ int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int
   fenv_t floating_point;
   feholdexcept(&floating_point);
   const int code = engine->set_array_strided(catalyst, name, type, association, components, data, strides);
+  fesetenv(&floating_point);
+  return code;
+}
+
+int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name, int32_t association,
+                                  const double* offset) {
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
+  fenv_t floating_point;
+  feholdexcept(&floating_point);
+  const int code = engine->set_array_offset(catalyst, name, association, offset);
   fesetenv(&floating_point);
   return code;
 }

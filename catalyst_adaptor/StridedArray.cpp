@@ -1,20 +1,19 @@
 #include "catalyst_adaptor/StridedArray.h"
 
-#include <algorithm>
 #include <cassert>
-#include <cstring>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
 #include <limits>
 #include <new>
 #include <stdexcept>
 #include <string>
 
+#include "vdi/core/Strides.h"
+
 namespace vdi::catalyst {
 
 namespace {
-
-/// The number of values along each axis that are copied as one tile. If another axis is fastest, a tile uses
-/// up lines of the cache before they are evicted.
-constexpr std::int64_t tile = 16;
 
 /// Whether a row has no gaps, nor the components of its values.
 bool rowInOrder(const StridedValues& values) {
@@ -23,52 +22,11 @@ bool rowInOrder(const StridedValues& values) {
          (values.counts[0] == 1 || values.strides[0] == scalar * values.components);
 }
 
-/// Copies `count` values of a row.
-template <std::size_t scalarBytes>
-void copyRow(const StridedValues& values, std::int64_t count, const std::byte* from, std::byte* to) {
-  for (std::int64_t x = 0; x < count; ++x) {
-    for (int c = 0; c < values.components; ++c) {
-      std::memcpy(to, from + x * values.strides[0] + c * values.componentStride, scalarBytes);
-      to += scalarBytes;
-    }
-  }
-}
-
-template <std::size_t scalarBytes>
-void copyAll(const StridedValues& values, std::byte* to) {
-  const std::int64_t nx = values.counts[0];
-  const std::int64_t ny = values.counts[1];
-  const std::int64_t nz = values.counts[2];
-  const std::int64_t valueBytes = static_cast<std::int64_t>(scalarBytes) * values.components;
-  const bool wholeRows = rowInOrder(values);
-  const std::int64_t tileX = wholeRows ? nx : tile;
-  const auto copy = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
-    const std::byte* from =
-        values.first + x * values.strides[0] + y * values.strides[1] + z * values.strides[2];
-    std::byte* place = to + ((z * ny + y) * nx + x) * valueBytes;
-    const std::int64_t count = std::min(tileX, nx - x);
-    if (wholeRows) {
-      std::memcpy(place, from, static_cast<std::size_t>(count * valueBytes));
-    } else {
-      copyRow<scalarBytes>(values, count, from, place);
-    }
-  };
-  for (std::int64_t firstZ = 0; firstZ < nz; firstZ += tile) {
-    for (std::int64_t firstY = 0; firstY < ny; firstY += tile) {
-      for (std::int64_t x = 0; x < nx; x += tileX) {
-        for (std::int64_t z = firstZ; z < std::min(firstZ + tile, nz); ++z) {
-          for (std::int64_t y = firstY; y < std::min(firstY + tile, ny); ++y) copy(x, y, z);
-        }
-      }
-    }
-  }
-}
-
 }  // namespace
 
 bool StridedValues::inOrder() const {
   std::int64_t next = static_cast<std::int64_t>(scalarBytes) * components;
-  bool in = rowInOrder(*this);
+  bool in = rowInOrder(*this) && reinterpret_cast<std::uintptr_t>(first) % scalarBytes == 0;
   for (std::size_t axis = 1; axis < 3; ++axis) {
     next *= counts[axis - 1];
     in = in && (counts[axis] == 1 || strides[axis] == next);
@@ -103,15 +61,19 @@ StridedArray::StridedArray(const StridedValues& values) : values_(values) {
 }
 
 void StridedArray::gather() {
-  switch (values_.scalarBytes) {
-    case 1:
-      return copyAll<1>(values_, memory_.get());
-    case 2:
-      return copyAll<2>(values_, memory_.get());
-    case 4:
-      return copyAll<4>(values_, memory_.get());
-    default:
-      return copyAll<8>(values_, memory_.get());
+  const auto scalar = static_cast<std::int64_t>(values_.scalarBytes);
+  const ByteStrides from{values_.strides[0], values_.strides[1], values_.strides[2]};
+  glm::ivec3 size(values_.counts[0], values_.counts[1], values_.counts[2]);
+  if (rowInOrder(values_)) {
+    size.x *= values_.components;
+    copyStrided(values_.first, {scalar, from.y, from.z}, memory_.get(), packedStrides(size, values_.scalarBytes),
+                size, values_.scalarBytes);
+    return;
+  }
+  const ByteStrides to = packedStrides(size, values_.scalarBytes) * std::int64_t{values_.components};
+  for (int c = 0; c < values_.components; ++c) {
+    copyStrided(values_.first + c * values_.componentStride, from, memory_.get() + c * scalar, to, size,
+                values_.scalarBytes);
   }
 }
 

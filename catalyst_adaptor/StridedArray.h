@@ -1,4 +1,4 @@
-// Copies of values from the simulation's own order in memory to the order that VTK reads.
+// Values in the simulation's own order in memory, and copies of them in the order that VTK reads.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ struct StridedValues {
   std::size_t scalarBytes = 1;  // 1, 2, 4 or 8
 
   std::int64_t scalars() const { return counts[0] * counts[1] * counts[2] * components; }
-  /// Whether the values lie in VTK's order: components side by side, x fastest, no gaps.
+  /// Whether the values are an array in VTK's order: components side by side, x fastest, no gaps, aligned.
   bool inOrder() const;
   /// Whether the offsets of all values from `first` fit into 63 bits.
   bool reachable() const;
@@ -33,8 +33,7 @@ class StridedArray {
 
   /// Copies the values as they are now.
   void gather();
-  /// The values, [z][y][x][component]. The address stays the same during this object's lifetime, even when
-  /// the object is moved.
+  /// The values, [z][y][x][component]. The address stays the same during this object's lifetime.
   void* data() { return memory_.get(); }
 
  private:

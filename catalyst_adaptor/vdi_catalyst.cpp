@@ -19,6 +19,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <glm/glm.hpp>
 #include <limits>
 #include <map>
 #include <memory>
@@ -35,13 +36,20 @@
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/ScriptEnvironment.h"
 #include "catalyst_adaptor/StridedArray.h"
+#include "catalyst_adaptor/StridedDataArray.h"
 
 struct vdi_catalyst : vdi::catalyst::Calls {
   std::unique_ptr<vdi::catalyst::Engine> engine;
   bool haveBlocks = false;
   vtkSmartPointer<vtkPartitionedDataSet> grid;  // one partition per block
-  /// The arrays that are gathered, by association and name, for the blocks whose values aren't in order.
-  std::map<std::pair<int, std::string>, std::vector<vdi::catalyst::StridedArray>> gathered;
+  /// The arrays of `grid` by association and name, one entry for each block. A block that lacks the array has a
+  /// null `first`.
+  struct Array {
+    int type = VDI_CATALYST_F64;
+    std::vector<vdi::catalyst::StridedValues> blocks;
+  };
+  std::map<std::pair<int, std::string>, Array> arrays;
+  std::map<std::pair<int, std::string>, glm::dvec3> offsets;  // in cells; none: 0
 };
 
 namespace {
@@ -218,22 +226,56 @@ void requireArray(const vdi_catalyst& self, const char* name, int association, c
   require(association == VDI_CATALYST_POINTS || association == VDI_CATALYST_CELLS, "unknown association");
   const unsigned int count = self.grid->GetNumberOfPartitions();
   require(count == 0 || data != nullptr, "an array without data");
-  for (unsigned int i = 0; i < count; ++i)
-    require(data[i] != nullptr, "an array without data for one of the blocks");
 }
 
 vtkIdType valuesOf(vtkDataSet& image, int association) {
   return association == VDI_CATALYST_CELLS ? image.GetNumberOfCells() : image.GetNumberOfPoints();
 }
 
-/// Makes an array of `count` values on the simulation's memory or ours.
-vtkSmartPointer<vtkDataArray> newArray(const char* name, int type, int components, const void* data,
-                                       vtkIdType count) {
-  auto array = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(vtkTypeOf(type)));
+/// Calls `visit` with a number of the type that VTK has for it.
+template <typename Visit>
+auto withNumber(int type, Visit visit) {
+  switch (type) {
+    case VDI_CATALYST_U8:
+      return visit(static_cast<unsigned char>(0));
+    case VDI_CATALYST_I8:
+      return visit(static_cast<signed char>(0));
+    case VDI_CATALYST_U16:
+      return visit(static_cast<unsigned short>(0));
+    case VDI_CATALYST_I16:
+      return visit(static_cast<short>(0));
+    case VDI_CATALYST_U32:
+      return visit(0U);
+    case VDI_CATALYST_I32:
+      return visit(0);
+    case VDI_CATALYST_F32:
+      return visit(0.0F);
+    case VDI_CATALYST_I64:
+      return visit(vtkTypeInt64{0});
+    case VDI_CATALYST_U64:
+      return visit(vtkTypeUInt64{0});
+    default:
+      return visit(0.0);
+  }
+}
+
+/// Makes an array on the simulation's memory.
+vtkSmartPointer<vtkDataArray> newArray(const char* name, int type,
+                                       const vdi::catalyst::StridedValues& values, const glm::dvec3& offset) {
+  vtkSmartPointer<vtkDataArray> array;
+  if (values.inOrder() && offset == glm::dvec3(0.0)) {
+    array.TakeReference(vtkDataArray::CreateDataArray(vtkTypeOf(type)));
+    array->SetNumberOfComponents(values.components);
+    // VTK only reads through this pointer. `save` = 1 leaves the memory to its owner.
+    array->SetVoidArray(const_cast<std::byte*>(values.first), static_cast<vtkIdType>(values.scalars()), 1);
+  } else {
+    withNumber(type, [&](auto number) {
+      const auto strided = vtkSmartPointer<vdi::catalyst::StridedDataArray<decltype(number)>>::New();
+      strided->set(values, offset);
+      array = strided;
+    });
+  }
   array->SetName(name);
-  array->SetNumberOfComponents(components);
-  // VTK only reads through this pointer. `save` = 1 leaves the memory to its owner.
-  array->SetVoidArray(const_cast<void*>(data), count * components, 1);
   return array;
 }
 
@@ -253,37 +295,65 @@ vdi::catalyst::StridedValues stridedValues(vtkDataSet& block, int type, int asso
   return values;
 }
 
-/// One named array of all blocks, held until all ranks have theirs.
-class Arrays {
- public:
-  void add(vtkSmartPointer<vtkDataArray> array) { arrays_.push_back(std::move(array)); }
-  const void* addGathered(const vdi::catalyst::StridedValues& values) {
-    return gathered_.emplace_back(values).data();
-  }
-  void putInto(vdi_catalyst& self, const char* name, int association) {
-    for (unsigned int i = 0; i < arrays_.size(); ++i) {
-      vtkDataSet* image = self.grid->GetPartition(i);
-      auto* attributes = association == VDI_CATALYST_CELLS
-                             ? static_cast<vtkDataSetAttributes*>(image->GetCellData())
-                             : image->GetPointData();
-      attributes->AddArray(arrays_[i]);
+vdi_catalyst_strides stridesInOrder(vtkDataSet& block, int type, int association) {
+  const vdi_catalyst_strides none{};
+  const auto values = stridedValues(block, type, association, 1, nullptr, none);
+  const auto scalar = static_cast<std::int64_t>(values.scalarBytes);
+  return {{scalar, scalar * values.counts[0], scalar * values.counts[0] * values.counts[1]}, scalar};
+}
+
+/// VTK's arrays of all blocks; null for a block that lacks the array.
+std::vector<vtkSmartPointer<vtkDataArray>> arraysOf(const char* name, const vdi_catalyst::Array& array,
+                                                    const glm::dvec3& offset) {
+  std::vector<vtkSmartPointer<vtkDataArray>> made;
+  for (const vdi::catalyst::StridedValues& values : array.blocks)
+    made.push_back(values.first != nullptr ? newArray(name, array.type, values, offset) : nullptr);
+  return made;
+}
+
+void putIntoGrid(vdi_catalyst& self, const char* name, int association,
+                 const std::vector<vtkSmartPointer<vtkDataArray>>& arrays) {
+  for (unsigned int i = 0; i < arrays.size(); ++i) {
+    vtkDataSet* image = self.grid->GetPartition(i);
+    auto* attributes = association == VDI_CATALYST_CELLS
+                           ? static_cast<vtkDataSetAttributes*>(image->GetCellData())
+                           : image->GetPointData();
+    if (arrays[i] != nullptr) {
+      attributes->AddArray(arrays[i]);
+    } else {
+      attributes->RemoveArray(name);
     }
-    // This comes last, because until now the grid has used the memory that is replaced here.
-    if (gathered_.empty())
-      self.gathered.erase({association, name});
-    else
-      self.gathered[{association, name}] = std::move(gathered_);
   }
+}
 
- private:
-  std::vector<vtkSmartPointer<vtkDataArray>> arrays_;
-  std::vector<vdi::catalyst::StridedArray> gathered_;
-};
+glm::dvec3 offsetOf(const vdi_catalyst& self, const char* name, int association) {
+  const auto found = self.offsets.find({association, name});
+  return found != self.offsets.end() ? found->second : glm::dvec3(0.0);
+}
 
-void gatherAll(vdi_catalyst& self) {
-  for (auto& [key, arrays] : self.gathered) {
-    for (vdi::catalyst::StridedArray& array : arrays) array.gather();
-  }
+/// `strides` is null for values in order.
+int setAnyArray(vdi_catalyst& self, const char* name, int type, int association, int components,
+                const void* const* data, const vdi_catalyst_strides* strides) {
+  vdi_catalyst::Array array{type, {}};
+  std::vector<vtkSmartPointer<vtkDataArray>> made;
+  const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    requireArray(self, name, association, data);
+    require(components >= 1 && components <= maxComponents, "the number of components must be 1 to 16");
+    (void)vtkTypeOf(type);
+    for (unsigned int i = 0; i < self.grid->GetNumberOfPartitions(); ++i) {
+      vtkDataSet& image = *self.grid->GetPartition(i);
+      const vdi_catalyst_strides given =
+          strides != nullptr ? strides[i] : stridesInOrder(image, type, association);
+      const auto values = stridedValues(image, type, association, components, data[i], given);
+      require(values.first == nullptr || values.reachable(), "strides that lead beyond the address space");
+      array.blocks.push_back(values);
+    }
+    made = arraysOf(name, array, offsetOf(self, name, association));
+  });
+  if (code != VDI_CATALYST_OK) return code;
+  putIntoGrid(self, name, association, made);
+  self.arrays[{association, name}] = std::move(array);
+  return code;
 }
 
 /// `given`: the files alone, or with arguments.
@@ -355,7 +425,8 @@ int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_cat
   });
   if (code != VDI_CATALYST_OK) return code;  // all ranks keep the blocks that they have
   catalyst->grid = grid;
-  catalyst->gathered.clear();
+  catalyst->arrays.clear();
+  catalyst->offsets.clear();
   catalyst->haveBlocks = true;
   return code;
 }
@@ -364,16 +435,7 @@ int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t typ
                            const void* const* data) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const vdi::catalyst::PythonLock lock;
-  Arrays arrays;
-  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    requireArray(*catalyst, name, association, data);
-    for (unsigned int i = 0; i < catalyst->grid->GetNumberOfPartitions(); ++i) {
-      const vtkIdType count = valuesOf(*catalyst->grid->GetPartition(i), association);
-      arrays.add(newArray(name, type, 1, data[i], count));
-    }
-  });
-  if (code == VDI_CATALYST_OK) arrays.putInto(*catalyst, name, association);
-  return code;
+  return setAnyArray(*catalyst, name, type, association, 1, data, nullptr);
 }
 
 int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
@@ -381,22 +443,28 @@ int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int
                                    const vdi_catalyst_strides* strides) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const vdi::catalyst::PythonLock lock;
-  Arrays arrays;
+  const bool isMissing = strides == nullptr && catalyst->grid->GetNumberOfPartitions() > 0;
+  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT,
+                           [&] { require(!isMissing, "a strided array without strides"); });
+  if (code != VDI_CATALYST_OK) return code;
+  return setAnyArray(*catalyst, name, type, association, components, data, strides);
+}
+
+int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name, int32_t association,
+                                  const double offset[3]) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi::catalyst::PythonLock lock;
+  std::vector<vtkSmartPointer<vtkDataArray>> made;
   const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    requireArray(*catalyst, name, association, data);
-    require(components >= 1 && components <= maxComponents, "the number of components must be 1 to 16");
-    const unsigned int count = catalyst->grid->GetNumberOfPartitions();
-    require(count == 0 || strides != nullptr, "a strided array without strides");
-    for (unsigned int i = 0; i < count; ++i) {
-      vtkDataSet* image = catalyst->grid->GetPartition(i);
-      const auto values = stridedValues(*image, type, association, components, data[i], strides[i]);
-      require(values.reachable(), "strides that lead beyond the address space");
-      const void* first = data[i];
-      if (!values.inOrder()) first = arrays.addGathered(values);
-      arrays.add(newArray(name, type, components, first, valuesOf(*image, association)));
-    }
+    require(catalyst->haveBlocks, "an offset was given before blocks");
+    vdi::catalyst::checkOffset(name, association, offset);
+    const auto array = catalyst->arrays.find({association, name});
+    if (array != catalyst->arrays.end())
+      made = arraysOf(name, array->second, {offset[0], offset[1], offset[2]});
   });
-  if (code == VDI_CATALYST_OK) arrays.putInto(*catalyst, name, association);
+  if (code != VDI_CATALYST_OK) return code;
+  catalyst->offsets[{association, name}] = {offset[0], offset[1], offset[2]};
+  putIntoGrid(*catalyst, name, association, made);
   return code;
 }
 
@@ -422,8 +490,6 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   const int result = guarded(
       *catalyst, VDI_CATALYST_SCRIPT,
       [&] {
-        if (!catalyst->gathered.empty() && catalyst->engine->wants(static_cast<int>(step), time))
-          gatherAll(*catalyst);
         markModified(*catalyst->grid);
         return catalyst->engine->execute(catalyst->grid, static_cast<int>(step), time);
       },

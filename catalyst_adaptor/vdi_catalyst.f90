@@ -102,6 +102,15 @@ module vdi_catalyst
       integer(c_int) :: code
     end function
 
+    function vdi_catalyst_set_array_offset(catalyst, name, association, offset) bind(c) result(code)
+      import :: c_char, c_double, c_int, c_int32_t, c_ptr
+      type(c_ptr), value :: catalyst
+      character(kind=c_char), intent(in) :: name(*)
+      integer(c_int32_t), value :: association
+      real(c_double), intent(in) :: offset(3)
+      integer(c_int) :: code
+    end function
+
     function vdi_catalyst_wants(catalyst, step, time) bind(c) result(wants)
       import :: c_double, c_int, c_int64_t, c_ptr
       type(c_ptr), value :: catalyst

@@ -57,7 +57,7 @@ extern "C" {
 enum {
   VDI_CATALYST_OK = 0,
   VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or too large to
-                                  * count, an unknown type, arrays before blocks, a step that is no int */
+                                  * count, an unknown type, arrays before blocks, an offset beyond a cell, a step that is no int */
   VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process */
   VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
 };
@@ -144,8 +144,9 @@ VDI_CATALYST_API int vdi_catalyst_initialize_json(int32_t fortran_communicator, 
 VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count,
                                              const vdi_catalyst_block* blocks);
 
-/* Sets the values of one named array: data[i] belongs to block i. Another call with the same name replaces
- * the pointers. */
+/* Sets the values of one named array: data[i] belongs to block i, and is null if the block lacks the array.
+ * Such a block is no part of a picture of the array. An array that all blocks of all ranks lack is an error
+ * once it is to be shown. Another call with the same name replaces the pointers. */
 VDI_CATALYST_API int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type,
                                             int32_t association, const void* const* data);
 
@@ -160,16 +161,25 @@ typedef struct vdi_catalyst_strides {
 
 /* As vdi_catalyst_set_array, for values in another layout: interleaved with others, padded, z fastest, or
  * parts of a larger allocation. strides[i] and data[i] belong to block i. With `components` > 1, from 1 to
- * 16, the array is one of vectors: VolumetricDepthImage shows their magnitude. For one component of vectors,
- * pass its first value's address and components = 1.
+ * 16, the array is one of vectors, of which a run shows the magnitude, a component, or the phase of two
+ * components, the real and the imaginary part. For one component alone, pass its first value's address and
+ * components = 1.
  *
- * Values in the layout of vdi_catalyst_set_array, with components side by side, are used where they are. Each
- * vdi_catalyst_execute that a script wants copies the others to memory of ours, which this function
- * allocates. */
+ * Values are read where they are, in any layout: a run without scripts never copies them on the host, nor
+ * does VolumetricDepthImage in a script. @OTHERS@ */
 VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
                                                     int32_t association, int32_t components,
                                                     const void* const* data,
                                                     const vdi_catalyst_strides* strides);
+
+/* Lets the values of an array lie beside the points or the middles of cells, by offset[axis] cells along each
+ * axis, from -1 to 1: those of staggered grids. The offset is the same on all ranks. For example, values of
+ * cells with the offset {-0.5, 0, 0} lie on the lower x faces of their cells. Blocks stay where they are;
+ * beyond a block's values, its neighbours' count, and at the domain's end the last ones go on. An offset goes
+ * with the association and the name, may come before its array, and is forgotten by vdi_catalyst_set_blocks.
+ * In scripts, VolumetricDepthImage follows it, and ParaView's own filters don't know it. */
+VDI_CATALYST_API int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name,
+                                                   int32_t association, const double offset[3]);
 
 /* Whether a script will do anything at this step: 1 if it will or that can't be known, 0 if not; the same on
  * all ranks. After 0, the simulation need neither prepare its values nor call vdi_catalyst_execute. It is 1

@@ -145,7 +145,7 @@ function coloringOf(json) {
   const array = json?.array, map = json?.transferFunction, range = json?.range;
   const whole = (/** @type {unknown} */ value, /** @type {number} */ least) => Number.isInteger(value) && Number(value) >= least;
   if (typeof array?.name !== "string" || !["points", "cells"].includes(array.association) || !whole(array.components, 1) ||
-      !whole(array.component, -1) || array.component >= array.components)
+      !whole(array.component, -2) || array.component >= array.components || (array.component === -2 && array.components !== 2))
     fail("its metadata don't describe the array");
   if (range !== undefined && !(Array.isArray(range) && range.length === 2 && range.every(Number.isFinite)))
     fail("the range in its metadata isn't two numbers");

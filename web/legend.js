@@ -35,6 +35,7 @@ function titleOf(coloring) {
   const {name, components, component} = coloring.array;
   if (name === "") return "Value";
   if (components === 1) return name;
+  if (component === -2) return `${name}, phase`;
   if (component < 0) return `${name}, magnitude`;
   return `${name}, ${components <= 3 ? "XYZ"[component] : component}`;
 }

@@ -1,9 +1,6 @@
 #include "catalyst_adaptor/json/Fields.h"
 
-#include <cmath>
-#include <cstring>
-#include <memory>
-#include <new>
+#include <array>
 #include <stdexcept>
 #include <utility>
 
@@ -20,91 +17,55 @@ glm::dvec3 vectorOf(const double (&v)[3]) {
   return {v[0], v[1], v[2]};
 }
 
-bool isWide(int type) {
-  return type == VDI_CATALYST_I64 || type == VDI_CATALYST_U64;
+/// The library's types have the numbers of vdi_catalyst.h.
+ComponentType componentTypeOf(int type) {
+  static_assert(static_cast<int>(ComponentType::U8) == VDI_CATALYST_U8 &&
+                static_cast<int>(ComponentType::I8) == VDI_CATALYST_I8 &&
+                static_cast<int>(ComponentType::U16) == VDI_CATALYST_U16 &&
+                static_cast<int>(ComponentType::I16) == VDI_CATALYST_I16 &&
+                static_cast<int>(ComponentType::U32) == VDI_CATALYST_U32 &&
+                static_cast<int>(ComponentType::I32) == VDI_CATALYST_I32 &&
+                static_cast<int>(ComponentType::F32) == VDI_CATALYST_F32 &&
+                static_cast<int>(ComponentType::F64) == VDI_CATALYST_F64 &&
+                static_cast<int>(ComponentType::I64) == VDI_CATALYST_I64 &&
+                static_cast<int>(ComponentType::U64) == VDI_CATALYST_U64);
+  return static_cast<ComponentType>(type);
 }
 
-/// The library's types have the numbers of vdi_catalyst.h. The library has no 64-bit integers.
-ScalarType scalarTypeOf(int type) {
-  static_assert(static_cast<int>(ScalarType::U8) == VDI_CATALYST_U8 &&
-                static_cast<int>(ScalarType::I8) == VDI_CATALYST_I8 &&
-                static_cast<int>(ScalarType::U16) == VDI_CATALYST_U16 &&
-                static_cast<int>(ScalarType::I16) == VDI_CATALYST_I16 &&
-                static_cast<int>(ScalarType::U32) == VDI_CATALYST_U32 &&
-                static_cast<int>(ScalarType::I32) == VDI_CATALYST_I32 &&
-                static_cast<int>(ScalarType::F32) == VDI_CATALYST_F32 &&
-                static_cast<int>(ScalarType::F64) == VDI_CATALYST_F64);
-  return static_cast<ScalarType>(type);
-}
-
-double loadAny(int type, const std::byte* data, std::size_t index) {
-  if (!isWide(type)) return loadValue(scalarTypeOf(type), data, index);
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, data + index * sizeof bits, sizeof bits);
-  return type == VDI_CATALYST_U64 ? static_cast<double>(bits)
-                                  : static_cast<double>(static_cast<std::int64_t>(bits));
-}
-
-/// The memory that a block reads, and its owner.
-struct Memory {
-  const void* data = nullptr;
-  std::shared_ptr<const void> keepAlive;
-};
-
-Memory gathered(const StridedValues& values) {
-  const auto array = std::make_shared<StridedArray>(values);
-  array->gather();
-  return {array->data(), array};
-}
-
-Block blockAt(const vdi_catalyst_block& b, bool cells, ScalarType type, Memory memory) {
+/// The block's place and its owned box, with values of which only the address `data` is known.
+Block blockAt(const vdi_catalyst_block& b, bool cells, const glm::dvec3& offset, const void* data) {
   const GhostLayers ghosts{vectorOf(b.ghost_lo), vectorOf(b.ghost_hi)};
   const glm::ivec3 counts = vectorOf(b.cells) + (cells ? 0 : 1);
-  Block block =
-      cells ? Block::fromCells(counts, vectorOf(b.origin), vectorOf(b.spacing), type, memory.data, ghosts)
-            : Block::fromPoints(counts, vectorOf(b.origin), vectorOf(b.spacing), type, memory.data, ghosts);
-  block.keepAlive = std::move(memory.keepAlive);
+  const glm::dvec3 spacing = vectorOf(b.spacing);
+  Block block = cells ? Block::fromCells(counts, vectorOf(b.origin), spacing, ScalarType::U8, data, ghosts)
+                      : Block::fromPoints(counts, vectorOf(b.origin), spacing, ScalarType::U8, data, ghosts);
+  block.origin += offset * spacing;
   return block;
 }
 
-/// Each value's only component, or the magnitude of all, as doubles.
-Memory asDoubles(const StridedValues& values, int type) {
-  StridedArray array(values);
-  array.gather();
-  const auto* from = static_cast<const std::byte*>(array.data());
-  const auto components = static_cast<std::size_t>(values.components);
-  const auto count = static_cast<std::size_t>(values.scalars()) / components;
-  std::shared_ptr<double[]> doubles(new (std::nothrow) double[count]);
-  if (!doubles) {
-    throw std::runtime_error(
-        "no memory for the shown values of an array: " + std::to_string(count * sizeof(double)) + " bytes");
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    if (components == 1) {
-      doubles[i] = loadAny(type, from, i);
-      continue;
-    }
-    double sum = 0.0;
-    for (std::size_t c = 0; c < components; ++c) {
-      const double value = loadAny(type, from, i * components + c);
-      sum += value * value;
-    }
-    doubles[i] = std::sqrt(sum);
-  }
-  return {doubles.get(), doubles};
+ComponentArray arrayOf(const StridedValues& values, int type) {
+  return {values.first,
+          {values.strides[0], values.strides[1], values.strides[2]},
+          componentTypeOf(type),
+          values.components,
+          values.componentStride};
+}
+
+std::string kindOf(bool cells) {
+  return cells ? "cells" : "points";
 }
 
 }  // namespace
 
 std::size_t bytesOf(int type) {
-  if (isWide(type)) return sizeof(std::uint64_t);
-  if (type < VDI_CATALYST_U8 || type > VDI_CATALYST_F64) throw std::invalid_argument("unknown scalar type");
-  return sizeOf(scalarTypeOf(type));
+  if (type < VDI_CATALYST_U8 || type > VDI_CATALYST_U64) throw std::invalid_argument("unknown scalar type");
+  return sizeOf(componentTypeOf(type));
 }
 
 void Fields::setBlocks(std::vector<vdi_catalyst_block> blocks) {
   blocks_ = std::move(blocks);
   arrays_.clear();
+  offsets_.clear();
   ++version_;
 }
 
@@ -125,7 +86,18 @@ StridedValues Fields::inOrder(const vdi_catalyst_block& block, int type, bool ce
 }
 
 void Fields::setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values) {
-  arrays_[{cells, name}] = {type, std::move(values)};
+  Array& array = arrays_[{cells, name}];
+  array.type = type;
+  array.values = std::move(values);
+}
+
+void Fields::setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset) {
+  offsets_[{cells, name}] = {offset[0], offset[1], offset[2]};
+}
+
+glm::dvec3 Fields::offsetOf(const std::string& name, bool cells) const {
+  const auto found = offsets_.find({cells, name});
+  return found != offsets_.end() ? found->second : glm::dvec3(0.0);
 }
 
 const Fields::Array* Fields::find(const std::string& name, bool cells) const {
@@ -162,43 +134,41 @@ Fields::Values Fields::valuesOf(const std::string& name, bool cells, int compone
   if (blocks_.empty()) return {};
   const Array* array = find(name, cells);
   if (array == nullptr) {
-    throw std::runtime_error("there is no array '" + name + "' of " + (cells ? "cells" : "points") +
+    throw std::runtime_error("there is no array '" + name + "' of " + kindOf(cells) +
                              "; the arrays are: " + names());
   }
-  for (const StridedValues& values : array->values) {
-    if (values.components > 1 && component >= values.components) {
-      throw std::runtime_error("there is no component " + std::to_string(component) + ", '" + name +
-                               "' has " + std::to_string(values.components));
-    }
+  const int components = componentsOf(name, cells);
+  if (component == phase && components != 2) {
+    throw std::runtime_error("a phase is of two components, real and imaginary; '" + name + "' has " +
+                             std::to_string(components));
+  }
+  if (components > 1 && component >= components) {
+    throw std::runtime_error("there is no component " + std::to_string(component) + ", '" + name + "' has " +
+                             std::to_string(components));
   }
   return {array->type, array->values};
 }
 
-std::vector<Block> Fields::placesOf(bool cells) const {
+std::vector<Block> Fields::placesOf(const std::string& name, bool cells) const {
+  const Values all = valuesOf(name, cells, magnitude);
+  const glm::dvec3 offset = offsetOf(name, cells);
   std::vector<Block> places;
-  for (const vdi_catalyst_block& block : blocks_)
-    places.push_back(blockAt(block, cells, ScalarType::U8, {&block, nullptr}));
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (all.blocks[i].first != nullptr) places.push_back(blockAt(blocks_[i], cells, offset, &blocks_[i]));
+  }
   return places;
 }
 
 std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int component) const {
-  std::vector<Block> blocks;
   const Values all = valuesOf(name, cells, component);
+  const glm::dvec3 offset = offsetOf(name, cells);
+  std::vector<Block> blocks;
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    StridedValues values = all.blocks[i];
-    if (values.components > 1 && component >= 0) {
-      values.first += component * values.componentStride;
-      values.components = 1;
-    }
-    const bool isConverted = values.components > 1 || isWide(all.type);
-    Memory memory{values.first, nullptr};
-    if (isConverted) {
-      memory = asDoubles(values, all.type);
-    } else if (!values.inOrder()) {
-      memory = gathered(values);
-    }
-    const ScalarType type = isConverted ? ScalarType::F64 : scalarTypeOf(all.type);
-    blocks.push_back(blockAt(blocks_[i], cells, type, std::move(memory)));
+    const StridedValues& values = all.blocks[i];
+    if (values.first == nullptr) continue;
+    Block& block = blocks.emplace_back(blockAt(blocks_[i], cells, offset, values.first));
+    // Of an array without components there is but one to choose.
+    showComponent(block, arrayOf(values, all.type), values.components > 1 ? component : magnitude);
   }
   return blocks;
 }
@@ -216,7 +186,13 @@ bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const st
     throw Error(ErrorCode::InvalidArgument,
                 "ranks have '" + name + "' of cells and of points: 'association' must name one");
   }
-  return kinds[1] > 0;
+  const bool cells = kinds[1] > 0;
+  std::array<std::uint64_t, 2> counts{fields.blocks().size(), 0};
+  comm.together([&] { counts[1] = fields.placesOf(name, cells).size(); });
+  comm.allReduceSum(counts);
+  if (counts[0] > 0 && counts[1] == 0)
+    throw Error(ErrorCode::InvalidArgument, "all blocks lack the array '" + name + "' of " + kindOf(cells));
+  return cells;
 }
 
 }  // namespace vdi::catalyst

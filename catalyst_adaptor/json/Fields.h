@@ -15,6 +15,7 @@
 #include "vdi/comm/Communicator.h"
 #include "vdi/core/Block.h"
 #include "vdi/core/Coloring.h"
+#include "vdi/core/ComponentValues.h"
 
 namespace vdi::catalyst {
 
@@ -22,7 +23,7 @@ namespace vdi::catalyst {
 /// vdi_catalyst.h.
 class Fields {
  public:
-  /// Replaces the blocks, and forgets all arrays.
+  /// Replaces the blocks, and forgets all arrays and offsets.
   void setBlocks(std::vector<vdi_catalyst_block> blocks);
   const std::vector<vdi_catalyst_block>& blocks() const { return blocks_; }
   /// A number that each setBlocks changes; equal on all ranks.
@@ -31,8 +32,11 @@ class Fields {
   /// The layout of a block's values in order: x fastest, components side by side, no gaps.
   StridedValues inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
                         const void* data) const;
-  /// Sets an array's values, one entry for each block.
+  /// Sets an array's values, one entry for each block, with the same number of components. Blocks that lack the
+  /// array have a null `first`.
   void setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
+  /// Lets the values of that array lie `offset` cells beside the points or the middles of cells.
+  void setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset);
 
   /// Whether the array of that name is one of cells; nullopt if this rank has neither blocks nor such an
   /// array. Throws std::runtime_error if arrays of both kinds have the name, or none has it.
@@ -41,20 +45,19 @@ class Fields {
   std::string names() const;
 
   int componentsOf(const std::string& name, bool cells) const;  // 1 without blocks
-  /// An array's values where the simulation has them, one for each block.
+  /// An array's values where the simulation has them, one for each block; null where a block lacks them.
   struct Values {
     int type = VDI_CATALYST_F64;
     std::span<const StridedValues> blocks;
   };
   /// The values of an array, which must exist unless there are no blocks. `component` is one of the array's,
-  /// or -1 for all. Throws std::runtime_error if there is no such array or component.
+  /// `magnitude` or `phase`. Throws std::runtime_error if there is no such array or component.
   Values valuesOf(const std::string& name, bool cells, int component) const;
-  /// The blocks without values: each has its place, the box that it owns, and the layout of its values. Their
-  /// `data` are distinct addresses that must not be read.
-  std::vector<Block> placesOf(bool cells) const;
-  /// The blocks with the values of an existing array. Blocks read the values where they are, unless these are
-  /// out of order, 64-bit integers, or a magnitude. Throws std::runtime_error if there is no such component,
-  /// or no memory.
+  /// The blocks that have the array, without its values: each has its place, the box that it owns, and the
+  /// number of its values. Their `data` are the addresses of this object's blocks. Throws as valuesOf does.
+  std::vector<Block> placesOf(const std::string& name, bool cells) const;
+  /// The blocks that have the array, with its values. They read these where they are; nothing is copied. Throws
+  /// as valuesOf does.
   std::vector<Block> blocksOf(const std::string& name, bool cells, int component) const;
 
  private:
@@ -62,18 +65,22 @@ class Fields {
     int type = VDI_CATALYST_F64;
     std::vector<StridedValues> values;
   };
+  using Key = std::pair<bool, std::string>;  // whether it is one of cells, and the name
   const Array* find(const std::string& name, bool cells) const;
+  glm::dvec3 offsetOf(const std::string& name, bool cells) const;
 
   std::vector<vdi_catalyst_block> blocks_;
   std::uint64_t version_ = 0;
-  std::map<std::pair<bool, std::string>, Array> arrays_;  // by whether it is one of cells, and name
+  std::map<Key, Array> arrays_;
+  std::map<Key, glm::dvec3> offsets_;  // in cells; none: 0
 };
 
 /// The bytes of a scalar. Throws std::invalid_argument for a type that vdi_catalyst.h doesn't have.
 std::size_t bytesOf(int type);
 
 /// Collective: whether the array of that name is one of cells, unless `given` tells. Throws on all ranks as
-/// Fields::associationOf does, and Error{InvalidArgument} if ranks differ.
+/// Fields::associationOf and valuesOf do, and Error{InvalidArgument} if ranks differ, or if all blocks lack the
+/// array.
 bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const std::string& name,
                   std::optional<bool> given);
 

@@ -171,12 +171,11 @@ int setAnyArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t 
     const std::vector<vdi_catalyst_block>& blocks = catalyst->fields.blocks();
     require(blocks.empty() || data != nullptr, "an array without data");
     for (std::size_t i = 0; i < blocks.size(); ++i) {
-      require(data[i] != nullptr, "an array without data for one of the blocks");
       StridedValues values = catalyst->fields.inOrder(blocks[i], type, cells, components, data[i]);
       for (std::size_t axis = 0; axis < 3 && strides != nullptr; ++axis)
         values.strides[axis] = strides[i].strides[axis];
       if (strides != nullptr && components > 1) values.componentStride = strides[i].component_stride;
-      require(values.reachable(), "strides that lead beyond the address space");
+      require(values.first == nullptr || values.reachable(), "strides that lead beyond the address space");
       all.push_back(values);
     }
   });
@@ -198,6 +197,17 @@ int setArrayStrided(vdi_catalyst* catalyst, const char* name, int32_t type, int3
                            [&] { require(!isMissing, "a strided array without strides"); });
   if (code != VDI_CATALYST_OK) return code;
   return setAnyArray(catalyst, name, type, association, components, data, strides);
+}
+
+int setArrayOffset(vdi_catalyst* catalyst, const char* name, int32_t association, const double* offset) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(catalyst->haveBlocks, "an offset was given before blocks");
+    vdi::catalyst::checkOffset(name, association, offset);
+  });
+  if (code != VDI_CATALYST_OK) return code;
+  catalyst->fields.setOffset(name, association == VDI_CATALYST_CELLS, {offset[0], offset[1], offset[2]});
+  return code;
 }
 
 int wants(vdi_catalyst* catalyst, int64_t step, double time) {
@@ -258,6 +268,6 @@ const char* error(const vdi_catalyst* catalyst) {
 }  // namespace
 
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    nullptr, nullptr, initializeJson, setBlocks,    setArray, setArrayStrided,
+    nullptr, nullptr, initializeJson, setBlocks,    setArray, setArrayStrided, setArrayOffset,
     wants,   execute, parameterF64,   parameterI64, finalize, error,
 };

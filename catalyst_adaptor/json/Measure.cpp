@@ -117,6 +117,7 @@ class Sweep {
   template <typename Loader>
   double valueAt(Loader load, const std::byte* at) const {
     if (component_ >= 0) return load(at + component_ * values_.componentStride);
+    if (component_ == phase) return std::atan2(load(at + values_.componentStride), load(at));
     double squares = 0.0;
     for (int c = 0; c < values_.components; ++c) {
       const double value = load(at + c * values_.componentStride);
@@ -127,7 +128,7 @@ class Sweep {
 
   const Measure::Part& part_;
   const StridedValues& values_;
-  int component_;  // -1: the magnitude of all components
+  int component_;  // or magnitude, or phase
 };
 
 /// The part of a block; nullopt if it owns no value.
@@ -152,10 +153,15 @@ std::optional<Measure::Part> Measure::partOf(std::size_t index, const Block& blo
 }
 
 void Measure::findParts(const comm::Communicator& comm, const Fields& fields, bool cells) {
-  if (version_ == fields.version() && cells_ == cells) return;
-  version_.reset();
   std::vector<Block> places;
-  comm.together([&] { places = fields.placesOf(cells); });
+  std::vector<glm::dvec3> origins;
+  const bool areNew = comm.anyTogether([&] {
+    places = fields.placesOf(condition_.field, cells);
+    for (const Block& place : places) origins.push_back(place.origin);
+    return version_ != fields.version() || cells_ != cells || origins_ != origins;
+  });
+  if (!areNew) return;
+  version_.reset();
   places = comm::settleOwnership(comm, std::move(places));
   comm.together([&] {
     parts_.clear();
@@ -167,6 +173,7 @@ void Measure::findParts(const comm::Communicator& comm, const Fields& fields, bo
   });
   version_ = fields.version();
   cells_ = cells;
+  origins_ = std::move(origins);
 }
 
 std::optional<double> Measure::of(const comm::Communicator& comm, const Fields& fields) {

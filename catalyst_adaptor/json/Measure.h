@@ -38,8 +38,10 @@ class Measure {
 
   config::RunCondition condition_;
   std::vector<Part> parts_;
-  std::optional<std::uint64_t> version_;  // version of the blocks whose parts these are
+  /// The blocks whose parts these are: their version, kind of values, and places of first values.
+  std::optional<std::uint64_t> version_;
   bool cells_ = false;
+  std::vector<glm::dvec3> origins_;
 
   friend class Sweep;
 };

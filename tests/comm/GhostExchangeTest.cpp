@@ -2,6 +2,7 @@
 #include <span>
 
 #include "tests/Catch.h"
+#include "tests/Layouts.h"
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/synthetic/Decomposition.h"
 
@@ -87,6 +88,79 @@ TEST_CASE("blocks of a whole lattice get their neighbours' values, and all of sp
       glm::dvec3(lattice.size - (joint == synthetic::Joint::Cells ? 0 : 1)) * lattice.spacing;
   world.allReduceSum(std::span(&volume, 1));
   CHECK(volume == Approx(extent.x * extent.y * extent.z));
+}
+
+TEST_CASE("values get around in any layout, also where ranks' types differ") {
+  const Communicator world = Communicator::world();
+  const auto joint = GENERATE(synthetic::Joint::Gap, synthetic::Joint::Cells);
+  const bool mixed = GENERATE(false, true);
+  synthetic::Lattice lattice{{13, 9, 11}, {-3.0, 1e3, 0.1}, {0.1, 2.0, 1.0 / 3.0}, ScalarType::F32, joint};
+  if (mixed && world.rank() % 2 == 1) lattice.type = ScalarType::U16;
+  const std::vector<Block> before = decomposed(lattice, {3, 2, 4}, synthetic::Layout::Random, world);
+  for (const test::Layout& layout : test::layouts()) {
+    INFO(layout.name);
+    std::vector<Block> laidOut = before;
+    for (Block& block : laidOut) block = test::laidOut(block, layout);
+    const std::vector<Block> after = comm::exchangeGhosts(world, laidOut);
+    REQUIRE(after.size() == before.size());
+    for (std::size_t i = 0; i < after.size(); ++i) {
+      checkValues(lattice, after[i]);
+      if (!mixed) CHECK(after[i].data == laidOut[i].data);
+    }
+  }
+}
+
+TEST_CASE("blocks of one address that differ by strides are blocks of their own") {
+  const Communicator world = Communicator::world();
+  std::vector<float> values(2 * 27);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i);
+  std::vector<Block> blocks;
+  if (world.rank() == 0) {
+    for (int b = 0; b < 2; ++b) {
+      blocks.push_back(Block::fromCells(glm::ivec3(3), {3.0 * b, 0.0, 0.0}, glm::dvec3(1.0), ScalarType::F32,
+                                        values.data()));
+    }
+    blocks[1].setStrides({8, 24, 72});
+  }
+  const std::vector<Block> after = comm::exchangeGhosts(world, blocks);
+  if (world.rank() != 0) return;
+  CHECK(valueAt(after[0], 3, 1, 1) == 2.0 * (3 + 9));  // the other block's first
+  CHECK(valueAt(after[1], -1, 1, 1) == 2.0 + 3 + 9);
+}
+
+TEST_CASE("values beside cells' middles come from the neighbours, too") {
+  const Communicator world = Communicator::world();
+  const auto offset = GENERATE(glm::dvec3(-0.5, 0.0, 0.0), glm::dvec3(0.0, -0.5, -0.5), glm::dvec3(0.5),
+                               glm::dvec3(0.25, -1.0, 0.0));
+  const synthetic::Lattice lattice{{12, 10, 8}, {1.0, -2.0, 0.0}, {0.5, 1.0, 2.0}, ScalarType::F64,
+                                   synthetic::Joint::Cells};
+  std::vector<Block> before = decomposed(lattice, {3, 2, 2}, synthetic::Layout::Random, world);
+  for (Block& block : before) block.origin += offset * block.spacing;
+  const std::vector<Block> after = comm::exchangeGhosts(world, before);
+  // The lattice's values, where they lie.
+  const glm::dvec3 first = lattice.origin + (0.5 + offset) * lattice.spacing;
+  const glm::dvec3 last = first + glm::dvec3(lattice.size - 1) * lattice.spacing;
+  REQUIRE(after.size() == before.size());
+  for (const Block& block : after) {
+    int wrong = 0;
+    int missing = 0;
+    forEachValue(block.extended(), [&](const glm::ivec3& at) {
+      const glm::dvec3 place = placeOf(block, at);
+      const glm::dvec3 index = (place - first) / lattice.spacing;
+      if (glm::any(glm::lessThan(index, glm::dvec3(-0.01)))) return;
+      if (glm::any(glm::greaterThan(place, last + 0.01 * lattice.spacing))) return;
+      wrong += valueAt(block, at.x, at.y, at.z) == marker(glm::ivec3(glm::round(index))) ? 0 : 1;
+    });
+    // All values around the owned box that there are.
+    for (int axis = 0; axis < 3; ++axis) {
+      const double lo = placeOf(block, block.extended().lo)[axis];
+      const double hi = placeOf(block, block.extended().hi - 1)[axis];
+      missing += lo <= std::max(block.owned.lo[axis], first[axis]) + 1e-9 ? 0 : 1;
+      missing += hi >= std::min(block.owned.hi[axis], last[axis]) - 1e-9 ? 0 : 1;
+    }
+    CHECK(wrong == 0);
+    CHECK(missing == 0);
+  }
 }
 
 TEST_CASE("a missing corner is filled with the nearest own value") {

@@ -30,14 +30,16 @@ bool isOfCells(const Block& block) {
 
 std::vector<BlockEntry> entriesOf(std::span<const Block> blocks, int rank) {
   std::vector<BlockEntry> entries;
-  using Key = std::tuple<const void*, std::array<double, 6>, std::array<int, 3>>;
+  using Key = std::tuple<const void*, std::array<double, 6>, std::array<int, 3>, std::array<std::int64_t, 3>>;
   std::map<Key, std::int32_t> grids;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const Block& b = blocks[i];
     if (b.owned.empty()) continue;
+    const ByteStrides strides = b.strides.value_or(ByteStrides(0));
     const Key key{b.data,
                   {b.origin.x, b.origin.y, b.origin.z, b.spacing.x, b.spacing.y, b.spacing.z},
-                  {b.dims.x, b.dims.y, b.dims.z}};
+                  {b.dims.x, b.dims.y, b.dims.z},
+                  {strides.x, strides.y, strides.z}};
     const auto grid = grids.try_emplace(key, static_cast<std::int32_t>(grids.size())).first->second;
     entries.push_back({b.origin, b.spacing, b.owned, b.owned, b.dims, rank, static_cast<std::int32_t>(i),
                        grid, isOfCells(b), b.masked && !b.masked->empty()});

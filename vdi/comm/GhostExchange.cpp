@@ -171,11 +171,28 @@ class Sampler {
       if ((*patch)->box.contains(at))
         return loadValue(block_.type, (*patch)->values.get(), (*patch)->box.position(at));
     }
-    return loadValue(block_.type, block_.data, block_.stored().position(at));
+    return storedValueAt(block_, at);
   }
   const Block& block_;
   std::vector<const Patch*> patches_;
 };
+
+/// The stored values as an array of the type.
+std::shared_ptr<const void> convertedTo(ScalarType type, const Block& block) {
+  const std::shared_ptr<std::byte[]> values(new std::byte[block.valueCount() * sizeOf(type)]);
+  const Tiling tiles = block.tilesOf(block.stored());
+  TileBuffer buffer;
+  for (std::size_t i = 0; i < tiles.count(); ++i) {
+    const IndexBox tile = tiles[i];
+    block.copyTo(tile, buffer.bytes.data());
+    std::size_t next = 0;
+    forEachIndex(tile, [&](const glm::ivec3& at) {
+      const double value = loadValue(block.type, buffer.bytes.data(), next++);
+      storeValue(type, values.get(), block.stored().position(at), value);
+    });
+  }
+  return {values, values.get()};
+}
 
 /// Converts all blocks of all ranks to the one type that represents all of their values.
 void makeTypesOne(const Communicator& comm, std::vector<Block>& blocks) {
@@ -187,19 +204,19 @@ void makeTypesOne(const Communicator& comm, std::vector<Block>& blocks) {
   const bool wide = has(ScalarType::U32) || has(ScalarType::I32) || has(ScalarType::F64);
   const ScalarType common = wide ? ScalarType::F64 : ScalarType::F32;
   comm.together([&] {
-    std::map<std::pair<const void*, std::size_t>, std::shared_ptr<const void>> known;
+    using Key = std::tuple<const void*, std::array<int, 3>, std::array<std::int64_t, 3>>;
+    std::map<Key, std::shared_ptr<const void>> known;
     for (Block& block : blocks) {
       if (block.type == common) continue;
-      std::shared_ptr<const void>& copy = known[{block.data, block.valueCount()}];
-      if (!copy) {
-        const std::shared_ptr<std::byte[]> values(new std::byte[block.valueCount() * sizeOf(common)]);
-        for (std::size_t i = 0; i < block.valueCount(); ++i)
-          storeValue(common, values.get(), i, loadValue(block.type, block.data, i));
-        copy = std::shared_ptr<const void>(values, values.get());
-      }
+      const ByteStrides strides = block.strides.value_or(ByteStrides(0));
+      std::shared_ptr<const void>& copy = known[{
+          block.data, {block.dims.x, block.dims.y, block.dims.z}, {strides.x, strides.y, strides.z}}];
+      if (!copy) copy = convertedTo(common, block);
       block.type = common;
       block.data = copy.get();
       block.keepAlive = copy;
+      block.strides.reset();
+      block.computed = nullptr;
     }
   });
 }
@@ -489,7 +506,6 @@ class LayerExchange {
   static void fillWithOwn(const Grid& grid, Wanted& wanted) {
     const std::size_t size = sizeOf(grid.block.type);
     const IndexBox stored = grid.block.stored();
-    const auto* from = static_cast<const std::byte*>(grid.block.data);
     std::byte* to = wanted.values.get();
     forEachIndex(wanted.box, [&](const glm::ivec3& at) {
       glm::ivec3 best = glm::clamp(at, stored.lo, stored.hi - 1);
@@ -503,7 +519,7 @@ class LayerExchange {
           best = nearest;
         }
       }
-      std::memcpy(to, from + stored.position(best) * size, size);
+      grid.block.copyTo({best, best + 1}, to);
       to += size;
     });
   }
@@ -575,13 +591,7 @@ class LayerExchange {
     bytes.resize(begin + answerBytes(request, grid.block.type));
     std::byte* to = bytes.data() + begin;
     if (request.copied != 0) {
-      const std::size_t size = sizeOf(grid.block.type);
-      const std::size_t row = static_cast<std::size_t>(request.box.size().x) * size;
-      const auto* from = static_cast<const std::byte*>(grid.block.data);
-      forEachRow(request.box, [&](const glm::ivec3& at) {
-        std::memcpy(to, from + grid.block.stored().position(at + request.shift) * size, row);
-        to += row;
-      });
+      grid.block.copyTo({request.box.lo + request.shift, request.box.hi + request.shift}, to);
       return;
     }
     const Sampler sampler(grid.block, request.clip);

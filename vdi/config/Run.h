@@ -90,7 +90,7 @@ struct RunCinema {
 struct Run {
   std::string field;
   std::optional<bool> cells;  // none: as the simulation hands the field over
-  int component = -1;         // component of a field of vectors; -1: their magnitude
+  int component = -1;         // of a field of vectors: a component, or magnitude or phase (ComponentValues.h)
   /// A frame is made when any of these three is due (Schedule), if `when` holds at that step.
   std::int64_t every = 1;              // due at steps that it divides; 0: none
   std::optional<double> everyTime;     // period in the simulation's time

@@ -12,6 +12,7 @@
 
 #include "vdi/config/Json.h"
 #include "vdi/config/Run.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/SettingsTable.h"
 
@@ -203,8 +204,9 @@ void readCameras(const JsonValue& document, Run& run) {
 
 int componentOf(const JsonValue& value) {
   constexpr std::int64_t last = 15;
-  if (value.isText() && value.text() == "magnitude") return -1;
-  if (value.isText()) value.fail("must be a number from 0 on, or 'magnitude'");
+  if (value.isText() && value.text() == "magnitude") return magnitude;
+  if (value.isText() && value.text() == "phase") return phase;
+  if (value.isText()) value.fail("must be a number from 0 on, 'magnitude' or 'phase'");
   return static_cast<int>(value.whole(0, last));
 }
 

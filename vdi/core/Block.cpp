@@ -131,6 +131,32 @@ void storeValue(ScalarType type, void* data, std::size_t index, double value) {
   });
 }
 
+void Block::setStrides(const ByteStrides& bytes) {
+  const bool aligned = reinterpret_cast<std::uintptr_t>(data) % sizeOf(type) == 0;
+  strides.reset();
+  if (!aligned || !arePacked(bytes, dims, sizeOf(type))) strides = bytes;
+}
+
+void Block::copyTo(const IndexBox& box, void* to) const {
+  assert(!box.empty() && box == box.intersection(stored()));
+  if (computed) return computed->read(box, to);
+  const std::size_t bytes = sizeOf(type);
+  const ByteStrides from = strides.value_or(packedStrides(dims, bytes));
+  copyStrided(static_cast<const std::byte*>(data) + offsetOf(box.lo, from), from, to,
+              packedStrides(box.size(), bytes), box.size(), bytes);
+}
+
+Tiling Block::tilesOf(const IndexBox& box) const {
+  return {box, !computed && (!strides || strides->x == static_cast<std::int64_t>(sizeOf(type)))};
+}
+
+double storedValueAt(const Block& block, const glm::ivec3& at) {
+  if (block.isPacked()) return loadValue(block.type, block.data, block.stored().position(at));
+  alignas(double) std::array<std::byte, sizeof(double)> value{};
+  block.copyTo({at, at + 1}, value.data());
+  return loadValue(block.type, value.data(), 0);
+}
+
 double valueAt(const Block& block, int i, int j, int k) {
   const glm::ivec3 at{i, j, k};
   assert(block.extended().contains(at));
@@ -138,8 +164,7 @@ double valueAt(const Block& block, int i, int j, int k) {
   for (auto patch = patches.rbegin(); patch != patches.rend(); ++patch) {
     if (patch->box.contains(at)) return loadValue(block.type, patch->values.get(), patch->box.position(at));
   }
-  assert(block.stored().contains(at));
-  return loadValue(block.type, block.data, block.stored().position(at));
+  return storedValueAt(block, at);
 }
 
 void ScalarRange::include(const ScalarRange& other) {
@@ -163,10 +188,33 @@ ScalarRange finiteRangeOf(ScalarType type, const void* data, std::size_t count) 
   });
 }
 
+/// The range of stored values that are no array, tile by tile.
+ScalarRange finiteRangeOfTiles(const Block& block) {
+  const Tiling tiles = block.tilesOf(block.stored());
+  constexpr std::size_t minimum = 64;
+  std::mutex mutex;
+  ScalarRange range;
+  inParallel(tiles.count(), minimum, [&](std::size_t first, std::size_t last) {
+    TileBuffer buffer;
+    ScalarRange part;
+    for (std::size_t i = first; i < last; ++i) {
+      const IndexBox tile = tiles[i];
+      block.copyTo(tile, buffer.bytes.data());
+      withTyped(block.type, static_cast<const void*>(buffer.bytes.data()), [&](const auto* values) {
+        part.include(finiteRangeOf(std::span(values, tile.count())));
+      });
+    }
+    const std::lock_guard lock(mutex);
+    range.include(part);
+  });
+  return range;
+}
+
 }  // namespace
 
 ScalarRange finiteRange(const Block& block) {
-  ScalarRange range = finiteRangeOf(block.type, block.data, block.valueCount());
+  ScalarRange range = block.isPacked() ? finiteRangeOf(block.type, block.data, block.valueCount())
+                                       : finiteRangeOfTiles(block);
   for (const Patch& patch : block.patchList())
     range.include(finiteRangeOf(block.type, patch.values.get(), patch.box.count()));
   return range;
@@ -182,26 +230,28 @@ ValueSizes valueSizesOf(std::span<const Block> blocks) {
   ValueSizes sizes;
   for (const Block& block : blocks) {
     const double minimum = limitsOf(block.type).minimum;
-    withTyped(block.type, block.data, [&](const auto* values) {
-      using T = std::remove_cvref_t<decltype(*values)>;
-      const std::size_t count = block.valueCount();
-      if constexpr (!std::is_floating_point_v<T>) {
-        sizes.usable = true;
-      } else {
-        constexpr std::size_t atOnce = 4096;
-        for (std::size_t first = 0; first < count && !sizes.usable; first += atOnce) {
+    const Tiling tiles = block.tilesOf(block.stored());
+    TileBuffer buffer;
+    for (std::size_t i = 0; i < tiles.count() && !sizes.usable; ++i) {
+      const IndexBox tile = tiles[i];
+      block.copyTo(tile, buffer.bytes.data());
+      withTyped(block.type, static_cast<const void*>(buffer.bytes.data()), [&](const auto* values) {
+        using T = std::remove_cvref_t<decltype(*values)>;
+        if constexpr (!std::is_floating_point_v<T>) {
+          sizes.usable = true;
+        } else {
           bool usable = false;
           bool tooSmall = false;
-          for (std::size_t i = first; i < std::min(first + atOnce, count); ++i) {
-            const T size = std::abs(values[i]);
+          for (const T value : std::span(values, tile.count())) {
+            const T size = std::abs(value);
             usable |= size >= static_cast<T>(minimum) && size <= std::numeric_limits<T>::max();
             tooSmall |= size > T{0} && size < static_cast<T>(minimum);
           }
           sizes.usable |= usable;
           sizes.tooSmall |= tooSmall;
         }
-      }
-    });
+      });
+    }
     if (sizes.usable) break;
   }
   return sizes;
@@ -245,6 +295,7 @@ void validate(std::span<const Block> blocks) {
           context);
     }
     if (block.data == nullptr) throw Error(ErrorCode::InvalidArgument, "a block without data", context);
+    assert(!block.strides || !block.computed);
   }
 }
 

@@ -1,16 +1,19 @@
 // Blocks: the pieces of volume that a rank holds.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "vdi/core/Box.h"
 #include "vdi/core/ScalarRange.h"
+#include "vdi/core/Strides.h"
 
 namespace vdi {
 
@@ -44,6 +47,20 @@ struct Patch {
   std::shared_ptr<const void> values;  // [size.z][size.y][size.x], x fastest, of the block's scalar type
 };
 
+/// Stored values that are computed whenever they are read, so that no array of them exists.
+class ComputedValues {
+ public:
+  ComputedValues() = default;
+  virtual ~ComputedValues() = default;
+  ComputedValues(const ComputedValues&) = delete;
+  ComputedValues& operator=(const ComputedValues&) = delete;
+  ComputedValues(ComputedValues&&) = delete;
+  ComputedValues& operator=(ComputedValues&&) = delete;
+  /// Writes the values of a box, [size.z][size.y][size.x], x fastest, of the block's type, to memory that is
+  /// aligned for them. Any thread may call it, and several may at once. Throws nothing.
+  virtual void read(const IndexBox& box, void* to) const = 0;
+};
+
 /// One axis-aligned lattice of scalars. Values are interpolated trilinearly between lattice points and
 /// clamped beyond the outermost ones. `owned` says which samples belong to this block. The owned boxes of all
 /// blocks of all ranks must not overlap (they are half-open, so touching is fine), unless their spacings
@@ -55,6 +72,9 @@ struct Patch {
 ///
 /// Several blocks may share data, each owning a part of it; then they share extra and patches too.
 ///
+/// Stored values are an array, packed at `data`, unless `strides` or `computed` is set, which excludes the
+/// other. Readers call copyTo, which treats all three alike, or take the array if isPacked says so.
+///
 /// Ownership of memory: the core reads `data` and never copies it on the host. `keepAlive`, if set, owns it.
 struct Block {
   glm::ivec3 dims{0};       // stored values per axis, ghost layers included; each >= 1
@@ -62,13 +82,17 @@ struct Block {
   glm::dvec3 spacing{1.0};  // world distance of neighbouring values, > 0
   Box owned{};              // world; half-open
   ScalarType type = ScalarType::F32;
-  const void* data = nullptr;  // [dims.z][dims.y][dims.x], x fastest, native byte order
+  /// The first value, in native byte order. Packed, the values are [dims.z][dims.y][dims.x], x fastest, and
+  /// `data` is aligned for the type. Computed ones don't lie there; then it tells blocks apart by their values.
+  const void* data = nullptr;
   std::shared_ptr<const void> keepAlive{};
   GhostLayers extra{};                                  // layers of values beyond the stored ones, >= 0
   std::shared_ptr<const std::vector<Patch>> patches{};  // null: none
   /// Stored values without meaning, such as those of hidden points and refined cells. Where interpolation
   /// would mix them with other values, the exchange of ghost layers replaces them. Null: none.
   std::shared_ptr<const std::vector<IndexBox>> masked{};
+  std::optional<ByteStrides> strides{};  // where the values lie from `data` on; any alignment
+  std::shared_ptr<const ComputedValues> computed{};
 
   IndexBox stored() const { return {glm::ivec3(0), dims}; }
   IndexBox extended() const { return {-extra.lo, dims + extra.hi}; }
@@ -80,6 +104,14 @@ struct Block {
            static_cast<std::size_t>(dims.z);
   }
   std::size_t byteCount() const { return valueCount() * sizeOf(type); }
+  bool isPacked() const { return !strides && !computed; }
+  /// Lets the values lie at these strides, which are dropped if the values are packed and aligned.
+  void setStrides(const ByteStrides& bytes);
+  /// Copies the stored values of a box within stored(), [size.z][size.y][size.x], to memory that is aligned for
+  /// them.
+  void copyTo(const IndexBox& box, void* to) const;
+  /// Tiles of a box within stored(): as large as copyTo should copy at a time, to a buffer that is reused.
+  Tiling tilesOf(const IndexBox& box) const;
 
   /// Point data: `origin` is the position of the first stored point. The block owns the volume from the first
   /// to the last non-ghost point.
@@ -91,9 +123,16 @@ struct Block {
                          ScalarType type, const void* data, const GhostLayers& ghosts = {});
 };
 
+/// Memory for the values of a tile of Block::tilesOf, of any type.
+struct TileBuffer {
+  alignas(64) std::array<std::byte, Tiling::values * sizeof(double)> bytes;
+};
+
 /// Value (i, j, k) of a block as double, indices in block.extended(). Slow: for tests, reference
 /// code and metadata.
 double valueAt(const Block& block, int i, int j, int k);
+/// The same of the stored values, which patches may override; indices in block.stored().
+double storedValueAt(const Block& block, const glm::ivec3& at);
 
 /// Value number `index` of an array of the type.
 double loadValue(ScalarType type, const void* data, std::size_t index);

@@ -14,7 +14,7 @@ struct ScalarArray {
   std::string name;    // UTF-8; empty when unknown
   bool cells = false;  // cell data; else point data
   int components = 1;  // of the array, >= 1
-  int component = 0;   // the one shown, < components; -1: the magnitude
+  int component = 0;   // the one shown, < components; or magnitude, or phase (ComponentValues.h)
   bool operator==(const ScalarArray&) const = default;
 };
 

@@ -118,12 +118,16 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
   std::vector<VolumePiece> pieces;
   std::vector<PieceRange> piecesOf;  // of each block
   // Blocks that share values (the parts of a box with holes) share their pieces.
-  std::map<std::tuple<const void*, const void*, double, double, double>, PieceRange> known;
+  using Key = std::tuple<const void*, std::array<std::int64_t, 3>, const void*, std::array<double, 3>>;
+  std::map<Key, PieceRange> known;
   for (const Block& block : step.blocks) {
     PieceRange range;
     if (!block.owned.empty()) {
-      const std::tuple key(block.data, static_cast<const void*>(block.patches.get()), block.origin.x,
-                           block.origin.y, block.origin.z);
+      const ByteStrides strides = block.strides.value_or(ByteStrides(0));
+      const Key key{block.data,
+                    {strides.x, strides.y, strides.z},
+                    block.patches.get(),
+                    {block.origin.x, block.origin.y, block.origin.z}};
       const auto [place, isNew] = known.try_emplace(key);
       if (isNew) {
         const std::vector<VolumePiece> parts = cutToPieces(*device_, block);

@@ -31,15 +31,39 @@ float filterable(float texel) {
   return std::isinf(texel) ? std::copysign(infinite, texel) : texel;
 }
 
-bool anyInfinite(std::span<const float> values) {
-  constexpr std::size_t atOnce = 4096;
-  for (std::size_t first = 0; first < values.size(); first += atOnce) {
+/// Whether some of the stored values in `part` of a block of f32 are infinite.
+bool anyInfinite(const Block& block, const IndexBox& part) {
+  const Tiling tiles = block.tilesOf(part);
+  TileBuffer buffer;
+  for (std::size_t i = 0; i < tiles.count(); ++i) {
+    const IndexBox tile = tiles[i];
+    block.copyTo(tile, buffer.bytes.data());
     bool found = false;
-    for (const float value : values.subspan(first, std::min(atOnce, values.size() - first)))
+    for (const float value : std::span(reinterpret_cast<const float*>(buffer.bytes.data()), tile.count()))
       found |= std::isinf(value);
     if (found) return true;
   }
   return false;
+}
+
+/// The distances of rows and slices, in values and in rows.
+struct Pitches {
+  int row = 0;
+  int rows = 0;
+};
+
+/// Nothing if the block's values don't lie in rows and slices as a device copies them.
+std::optional<Pitches> pitchesOf(const Block& block) {
+  if (block.isPacked()) return Pitches{block.dims.x, block.dims.y};
+  if (block.computed) return std::nullopt;
+  const ByteStrides& strides = *block.strides;
+  const auto bytes = static_cast<std::int64_t>(sizeOf(block.type));
+  constexpr std::int64_t most = 1 << 30;
+  if (strides.x != bytes || strides.y % bytes != 0 || strides.y < bytes * block.dims.x ||
+      strides.y / bytes > most || strides.z % strides.y != 0 || strides.z / strides.y < block.dims.y ||
+      strides.z / strides.y > most)
+    return std::nullopt;
+  return Pitches{static_cast<int>(strides.y / bytes), static_cast<int>(strides.z / strides.y)};
 }
 
 /// `count` values as texels. The unsigned integer formats shift signed values up. The float format is
@@ -51,6 +75,7 @@ void convertRow(const void* from, std::size_t first, std::size_t count, std::byt
   for (std::size_t i = 0; i < count; ++i) texels[i] = convert(values[i]);
 }
 
+/// Writes `count` values, from number `first` of the array `data` on.
 void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap& values, std::size_t first,
               std::size_t count, std::byte* to) {
   const auto relative = [&values](auto value) {
@@ -90,41 +115,70 @@ void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap
   }
 }
 
-/// An array of source values for texels.
-struct Source {
-  IndexBox box;  // in the block's indices
-  const void* values;
+/// Texels of a box, in a block's indices, tightly packed.
+class TexelBox {
+ public:
+  TexelBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) : piece_(piece), box_(box), to_(to) {}
+  const IndexBox& box() const { return box_; }
+
+  /// Writes the part of an array of values, of the box `of`, that lies in `part`.
+  void writeArray(const void* values, const IndexBox& of, const IndexBox& part) const {
+    for (int z = part.lo.z; z < part.hi.z; ++z) {
+      for (int y = part.lo.y; y < part.hi.y; ++y) {
+        const glm::ivec3 at(part.lo.x, y, z);
+        writeRow(piece_.block->type, values, piece_.format, piece_.values, of.position(at),
+                 static_cast<std::size_t>(part.size().x),
+                 to_ + box_.position(at) * texelBytes(piece_.format));
+      }
+    }
+  }
+  /// Writes the stored values in `part`, which is a few rows of a few slices.
+  void writeStored(const IndexBox& part) const {
+    const Block& block = *piece_.block;
+    if (block.isPacked()) return writeArray(block.data, block.stored(), part);
+    const Tiling tiles = block.tilesOf(part);
+    TileBuffer buffer;
+    for (std::size_t i = 0; i < tiles.count(); ++i) {
+      const IndexBox tile = tiles[i];
+      block.copyTo(tile, buffer.bytes.data());
+      writeArray(buffer.bytes.data(), tile, tile);
+    }
+  }
+
+ private:
+  const VolumePiece& piece_;
+  IndexBox box_;
+  std::byte* to_;
 };
 
 /// Writes texels of `box`, in the block's indices, tightly packed: the stored values, covered by the patches.
 void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
   const Block& block = *piece.block;
-  std::vector<Source> sources{{block.stored(), block.data}};
-  for (const Patch& patch : block.patchList()) sources.push_back({patch.box, patch.values.get()});
-  std::erase_if(sources, [&](const Source& source) { return source.box.intersection(box).empty(); });
-  const std::uint64_t bytes = texelBytes(piece.format);
+  const TexelBox texels(piece, box, to);
+  std::vector<const Patch*> patches;
+  for (const Patch& patch : block.patchList()) {
+    if (!patch.box.intersection(box).empty()) patches.push_back(&patch);
+  }
+  // Threads take whole bars of rows and slices, so that no tile is divided.
+  constexpr int side = Tiling::side;
   const glm::ivec3 size = box.size();
+  const auto along = static_cast<std::size_t>((size.y + side - 1) / side);
+  const auto bars = along * static_cast<std::size_t>((size.z + side - 1) / side);
   constexpr std::size_t atOnce = 1 << 20;  // bytes
-  const auto rows = static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
-  const std::size_t rowBytes = static_cast<std::size_t>(size.x) * bytes;
-  inParallel(rows, atOnce / std::max<std::size_t>(rowBytes, 1) + 1,
-             [&](std::size_t firstRow, std::size_t lastRow) {
-               const auto rowOf = [&](int y, int z) {
-                 return static_cast<std::size_t>(z - box.lo.z) * static_cast<std::size_t>(size.y) +
-                        static_cast<std::size_t>(y - box.lo.y);
-               };
-               for (const Source& source : sources) {
-                 const IndexBox part = source.box.intersection(box);
-                 for (int z = part.lo.z; z < part.hi.z; ++z) {
-                   for (int y = part.lo.y; y < part.hi.y; ++y) {
-                     if (rowOf(y, z) < firstRow || rowOf(y, z) >= lastRow) continue;
-                     writeRow(block.type, source.values, piece.format, piece.values,
-                              source.box.position({part.lo.x, y, z}), static_cast<std::size_t>(part.size().x),
-                              to + box.position({part.lo.x, y, z}) * bytes);
-                   }
-                 }
-               }
-             });
+  const std::size_t barBytes = static_cast<std::size_t>(size.x) * side * side * texelBytes(piece.format);
+  inParallel(bars, atOnce / barBytes + 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const glm::ivec3 lo =
+          box.lo + side * glm::ivec3(0, static_cast<int>(i % along), static_cast<int>(i / along));
+      const IndexBox bar{lo, glm::min(box.hi, lo + glm::ivec3(size.x, side, side))};
+      const IndexBox stored = block.stored().intersection(bar);
+      if (!stored.empty()) texels.writeStored(stored);
+      for (const Patch* patch : patches) {
+        const IndexBox part = patch->box.intersection(bar);
+        if (!part.empty()) texels.writeArray(patch->values.get(), patch->box, part);
+      }
+    }
+  });
 }
 
 /// Whether the block's values equal the texels of the piece's format.
@@ -159,25 +213,25 @@ void VolumeUpload::turnOver() {
 bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& page,
                                 std::vector<Buffer>& imported) {
   const Block& block = *piece.block;
-  const IndexBox stored = block.stored();
-  const IndexBox part = piece.box().intersection(stored);
+  const IndexBox part = piece.box().intersection(block.stored());
   if (part.empty() || usableCores() >= coresThatCopyFaster || !isTexels(piece) ||
       imported.size() == maxImports)
     return false;
+  const std::optional<Pitches> pitches = pitchesOf(block);
+  if (!pitches) return false;
   const std::uint64_t bytes = texelBytes(piece.format);
-  const std::uint64_t first = stored.position(part.lo) * bytes;
-  const std::uint64_t end = (stored.position(part.hi - 1) + 1) * bytes;
+  const IndexBox layout{glm::ivec3(0), {pitches->row, pitches->rows, block.dims.z}};
+  const std::uint64_t first = layout.position(part.lo) * bytes;
+  const std::uint64_t end = (layout.position(part.hi - 1) + 1) * bytes;
   if (end - first < minImport) return false;
-  if (block.type == ScalarType::F32 &&
-      anyInfinite({static_cast<const float*>(block.data) + first / bytes, (end - first) / bytes}))
-    return false;
-  std::optional<ImportedBuffer> source =
-      importHostMemory(device_, static_cast<const std::byte*>(block.data) + first, end - first);
+  const auto* data = static_cast<const std::byte*>(block.data);
+  if (block.type == ScalarType::F32 && anyInfinite(block, part)) return false;
+  std::optional<ImportedBuffer> source = importHostMemory(device_, data + first, end - first);
   if (!source || source->offset % bytes != 0) return false;
   filling().commands.copyToImage(
       source->buffer, source->offset, page, piece.place + glm::uvec3(part.lo - piece.first),
       glm::uvec3(part.size()),
-      {static_cast<std::uint32_t>(block.dims.x), static_cast<std::uint32_t>(block.dims.y)});
+      {static_cast<std::uint32_t>(pitches->row), static_cast<std::uint32_t>(pitches->rows)});
   imported.push_back(std::move(source->buffer));
   return true;
 }

@@ -13,8 +13,6 @@
 
 #include <string>
 
-#include "vdi/core/Error.h"
-
 namespace pv {
 
 namespace {
@@ -48,40 +46,49 @@ bool has(vtkDataSetAttributes* attributes, const std::string& name) {
   return whole != nullptr && whole->GetNumberOfComponents() > 1;
 }
 
-void requireArrayOf(vtkDataObject* leaf, const ArrayChoice& choice) {
+/// The blocks of a data set, those that have the array and those that lack it.
+struct Holders {
+  int with = 0;
+  std::string missing;  // says what the first block without the array has; empty if there is none
+};
+
+void count(vtkDataObject* leaf, const ArrayChoice& choice, Holders& holders) {
   auto* image = vtkImageData::SafeDownCast(leaf);
   if (image == nullptr || image->GetNumberOfPoints() == 0) return;
-  if (has(attributesOf(image, choice.cells), choice.name)) return;
+  if (has(attributesOf(image, choice.cells), choice.name)) {
+    ++holders.with;
+    return;
+  }
+  if (!holders.missing.empty()) return;
   const std::string wanted = choice.name.empty() ? "active scalars" : fmt::format("array '{}'", choice.name);
   const bool otherHas = !choice.name.empty() && has(attributesOf(image, !choice.cells), choice.name);
-  throw vdi::Error(
-      vdi::ErrorCode::InvalidArgument,
-      fmt::format("there is no {} of {}{}; of points there are: {}; of cells: {}", wanted,
-                  choice.cells ? "cells" : "points",
-                  otherHas ? fmt::format(" (SelectInputScalars = ['{}', '{}'] asks for the one of {})",
-                                         choice.cells ? "POINTS" : "CELLS", choice.name,
-                                         choice.cells ? "points" : "cells")
-                           : "",
-                  namesOf(image->GetPointData()), namesOf(image->GetCellData())));
+  holders.missing = fmt::format(
+      "there is no {} of {}{}; of points there are: {}; of cells: {}", wanted,
+      choice.cells ? "cells" : "points",
+      otherHas
+          ? fmt::format(" (SelectInputScalars = ['{}', '{}'] asks for the one of {})",
+                        choice.cells ? "POINTS" : "CELLS", choice.name, choice.cells ? "points" : "cells")
+          : "",
+      namesOf(image->GetPointData()), namesOf(image->GetCellData()));
 }
 
 }  // namespace
 
-void requireArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice) {
+std::string lackOf(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice) {
   // Looks at the source's own output.
   if (producer != nullptr && producer->IsA("vtkPVPostFilter") != 0 &&
       producer->GetNumberOfInputConnections(0) > 0) {
     if (vtkDataObject* original = producer->GetInputDataObject(0, 0)) data = original;
   }
-  auto* composite = vtkCompositeDataSet::SafeDownCast(data);
-  if (composite == nullptr) {
-    requireArrayOf(data, choice);
-    return;
+  Holders holders;
+  if (auto* composite = vtkCompositeDataSet::SafeDownCast(data)) {
+    const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem())
+      count(iterator->GetCurrentDataObject(), choice, holders);
+  } else {
+    count(data, choice, holders);
   }
-  const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
-  for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
-    requireArrayOf(iterator->GetCurrentDataObject(), choice);
-  }
+  return holders.with == 0 ? holders.missing : "";
 }
 
 }  // namespace pv

@@ -1,6 +1,8 @@
-// Checks that a data set has the requested array.
+// Whether a data set has the requested array.
 #ifndef VDIArrays_h
 #define VDIArrays_h
+
+#include <string>
 
 #include "VDIBlocks.h"
 
@@ -9,12 +11,11 @@ class vtkDataObject;
 
 namespace pv {
 
-/// Throws vdi::Error{InvalidArgument}, which lists the existing arrays, unless all images of `data` have the
-/// chosen array on the chosen points or cells. `producer` has made `data`. Downstream of each source,
-/// ParaView puts a filter that averages cell arrays from point arrays, and point arrays from cell arrays, on
-/// request; such an array isn't accepted. The function ignores data that are no images; blocksOf rejects
-/// them.
-void requireArray(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice);
+/// A message, with the existing arrays, if `data` has images and none of them has the chosen array on the
+/// chosen points or cells; else "". `producer` has made `data`. Downstream of each source, ParaView puts a
+/// filter that averages cell arrays from point arrays, and point arrays from cell arrays, on request; such an
+/// array doesn't count. The function ignores data that are no images; blocksOf rejects them.
+std::string lackOf(vtkDataObject* data, vtkAlgorithm* producer, const ArrayChoice& choice);
 
 }  // namespace pv
 

@@ -5,7 +5,6 @@
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
-#include <vtkDoubleArray.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
 #include <vtkOverlappingAMR.h>
@@ -15,8 +14,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <optional>
+#include <type_traits>
 
+#include "plugin/VolumetricDepthImages/StridedSource.h"
 #include "vdi/core/BitCast.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 
 namespace pv {
@@ -26,86 +30,75 @@ namespace {
 using vdi::Error;
 using vdi::ErrorCode;
 
-struct TypedArray {
-  vdi::ScalarType type;
-  vtkSmartPointer<vtkDataArray> array;  // contiguous, one component
+/// An array's values in memory, and their owner.
+struct Memory {
+  vdi::ComponentArray values;
+  glm::dvec3 offset{0.0};  // in cells
+  vtkSmartPointer<vtkDataArray> owner;
 };
 
-/// Finds the library's type for a VTK type of the same size. Returns false for 64-bit integers and types that
-/// aren't numbers.
-bool scalarTypeOf(int vtkType, vdi::ScalarType& type) {
+/// The library's type for a VTK type. Nothing for types that aren't numbers of 8 to 64 bits.
+std::optional<vdi::ComponentType> componentTypeOf(int vtkType, int bytes) {
+  using Type = vdi::ComponentType;
   switch (vtkType) {
-    case VTK_UNSIGNED_CHAR:
-      type = vdi::ScalarType::U8;
-      return true;
-    case VTK_CHAR:
-      type = std::is_signed_v<char> ? vdi::ScalarType::I8 : vdi::ScalarType::U8;
-      return true;
-    case VTK_SIGNED_CHAR:
-      type = vdi::ScalarType::I8;
-      return true;
-    case VTK_UNSIGNED_SHORT:
-      type = vdi::ScalarType::U16;
-      return true;
-    case VTK_SHORT:
-      type = vdi::ScalarType::I16;
-      return true;
-    case VTK_UNSIGNED_INT:
-      type = vdi::ScalarType::U32;
-      return true;
-    case VTK_INT:
-      type = vdi::ScalarType::I32;
-      return true;
     case VTK_FLOAT:
-      type = vdi::ScalarType::F32;
-      return true;
+      return Type::F32;
     case VTK_DOUBLE:
-      type = vdi::ScalarType::F64;
-      return true;
+      return Type::F64;
+    case VTK_CHAR:
+      return std::is_signed_v<char> ? Type::I8 : Type::U8;
+    case VTK_SIGNED_CHAR:
+      return Type::I8;
+    case VTK_UNSIGNED_CHAR:
+      return Type::U8;
+    case VTK_SHORT:
+      return Type::I16;
+    case VTK_UNSIGNED_SHORT:
+      return Type::U16;
+    case VTK_INT:
+    case VTK_LONG:
+    case VTK_LONG_LONG:
+    case VTK_ID_TYPE:
+      return bytes == 8 ? Type::I64 : Type::I32;
+    case VTK_UNSIGNED_INT:
+    case VTK_UNSIGNED_LONG:
+    case VTK_UNSIGNED_LONG_LONG:
+      return bytes == 8 ? Type::U64 : Type::U32;
     default:
-      return false;
+      return std::nullopt;
   }
 }
 
-vtkSmartPointer<vtkDataArray> magnitudeOf(vtkDataArray* array) {
-  auto result = vtkSmartPointer<vtkDoubleArray>::New();
-  result->SetNumberOfTuples(array->GetNumberOfTuples());
-  for (vtkIdType i = 0; i < array->GetNumberOfTuples(); ++i) {
-    double sum = 0.0;
-    for (int c = 0; c < array->GetNumberOfComponents(); ++c)
-      sum += array->GetComponent(i, c) * array->GetComponent(i, c);
-    result->SetValue(i, std::sqrt(sum));
+/// The values of a lattice of `counts`. Those without addresses are copied.
+Memory memoryOf(vtkDataArray* array, const glm::ivec3& counts) {
+  if (const auto* source = dynamic_cast<const StridedSource*>(array);
+      source != nullptr && source->counts() == counts)
+    return {source->memory(), source->offset(), array};
+  vtkSmartPointer<vtkDataArray> owner = array;
+  std::optional<vdi::ComponentType> type = componentTypeOf(array->GetDataType(), array->GetDataTypeSize());
+  if (!type || !array->HasStandardMemoryLayout()) {
+    owner = vtkSmartPointer<vtkDataArray>::Take(
+        vtkDataArray::CreateDataArray(type ? array->GetDataType() : VTK_DOUBLE));
+    owner->DeepCopy(array);
+    if (!type) type = vdi::ComponentType::F64;
   }
-  return result;
+  const auto scalar = static_cast<std::int64_t>(vdi::sizeOf(*type));
+  const int components = owner->GetNumberOfComponents();
+  return {{static_cast<const std::byte*>(owner->GetVoidPointer(0)),
+           vdi::packedStrides(counts, vdi::sizeOf(*type)) * std::int64_t{components}, *type, components, scalar},
+          glm::dvec3(0.0),
+          owner};
 }
 
-TypedArray typed(vtkDataArray* array, int component) {
-  TypedArray result{vdi::ScalarType::F64, array};
-  if (array->GetNumberOfComponents() > 1) {
-    if (component >= array->GetNumberOfComponents()) {
-      throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("there is no component {}, the array has {}", component,
-                              array->GetNumberOfComponents()),
-                  array->GetName());
-    }
-    if (component < 0) {
-      result.array = magnitudeOf(array);
-    } else {
-      auto one = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(array->GetDataType()));
-      one->SetNumberOfTuples(array->GetNumberOfTuples());
-      one->CopyComponent(0, array, component);
-      result.array = one;
-    }
-  }
-  const bool known = scalarTypeOf(result.array->GetDataType(), result.type);
-  if (!known || !result.array->HasStandardMemoryLayout()) {
-    const int type = known ? result.array->GetDataType() : VTK_DOUBLE;  // 64-bit integers as double
-    auto copy = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(type));
-    copy->DeepCopy(result.array);
-    result.array = copy;
-    scalarTypeOf(type, result.type);
-  }
-  return result;
+void requireComponent(vtkDataArray* array, int component) {
+  const int components = array->GetNumberOfComponents();
+  if (components == 1 || (component < components && component >= vdi::magnitude)) return;
+  if (component == vdi::phase && components == 2) return;
+  const std::string why =
+      component == vdi::phase
+          ? fmt::format("a phase is of two components, real and imaginary; the array has {}", components)
+          : fmt::format("there is no component {}, the array has {}", component, components);
+  throw Error(ErrorCode::InvalidArgument, why, array->GetName());
 }
 
 /// Throws if the array has fewer values than the lattice.
@@ -212,10 +205,7 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
       choice.cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
   vtkDataArray* array =
       choice.name.empty() ? attributes->GetScalars() : attributes->GetArray(choice.name.c_str());
-  if (array == nullptr) {
-    throw Error(ErrorCode::InvalidArgument,
-                fmt::format("a block has no {} array '{}'", choice.cells ? "cell" : "point", choice.name));
-  }
+  if (array == nullptr) return;  // the block lacks it
   int extent[6];
   image->GetExtent(extent);
   Lattice lattice;
@@ -228,15 +218,21 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
   lattice.cells = glm::max(lattice.points - 1, glm::ivec3(1));
   const auto& [origin, spacing, points, cells] = lattice;
   requireLength(array, choice.cells ? cells : points, name);
-  const TypedArray scalars = typed(array, choice.component);
-  // The deleter's copy of the smart pointer keeps the array alive.
-  const std::shared_ptr<const void> keepAlive(
-      scalars.array->GetVoidPointer(0), [array = scalars.array](const void*) mutable { array = nullptr; });
+  requireComponent(array, choice.component);
+  const glm::ivec3 counts = choice.cells ? cells : points;
+  const Memory memory = memoryOf(array, counts);
   Blanking blanking = blankingOf(image, lattice, choice.cells, name);
+  const void* const first = memory.values.first;
   vdi::Block block = choice.cells
-                         ? vdi::Block::fromCells(cells, origin, spacing, scalars.type, keepAlive.get())
-                         : vdi::Block::fromPoints(points, origin, spacing, scalars.type, keepAlive.get());
-  block.keepAlive = keepAlive;
+                         ? vdi::Block::fromCells(counts, origin, spacing, vdi::ScalarType::U8, first)
+                         : vdi::Block::fromPoints(counts, origin, spacing, vdi::ScalarType::U8, first);
+  block.origin += memory.offset * spacing;
+  const bool isOne = memory.values.components == 1;
+  vdi::showComponent(block, memory.values, isOne ? vdi::magnitude : choice.component);
+  // The deleter's copy of the smart pointer keeps the array alive.
+  block.keepAlive = std::shared_ptr<const void>(block.data, [array = memory.owner](const void*) mutable {
+    array = nullptr;
+  });
   if (!blanking.masked.empty())
     block.masked = std::make_shared<std::vector<vdi::IndexBox>>(std::move(blanking.masked));
   for (const vdi::IndexBox& box : blanking.own) {

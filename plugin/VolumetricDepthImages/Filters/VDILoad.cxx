@@ -38,19 +38,34 @@ void requireInput(vtkDataObject* input) {
 
 Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin) {
   requireInput(input);
-  requireArray(input, upstream, origin.choice);
-  return {.of = origin, .blocks = blocksOf(input, origin.choice), .array = {}};
+  return {.of = origin,
+          .blocks = blocksOf(input, origin.choice),
+          .array = {},
+          .lack = lackOf(input, upstream, origin.choice)};
 }
 
 vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* controller) {
   const vdi::Box own = vdi::localScene(load.blocks).bounds;
   const double components = componentsOf(input, load.of.choice);
-  std::array<double, 8> least{own.lo.x,  own.lo.y,  own.lo.z,    -own.hi.x,
-                              -own.hi.y, -own.hi.z, -components, -mostPerVolume(load.blocks)};
+  const bool lacksArray = !load.lack.empty();
+  std::array<double, 10> least{own.lo.x,
+                               own.lo.y,
+                               own.lo.z,
+                               -own.hi.x,
+                               -own.hi.y,
+                               -own.hi.z,
+                               -components,
+                               -mostPerVolume(load.blocks),
+                               lacksArray ? -1.0 : 0.0,
+                               load.blocks.empty() ? 0.0 : -1.0};
   if (controller != nullptr && controller->GetNumberOfProcesses() > 1) {
-    const std::array<double, 8> mine = least;
+    const auto mine = least;
     controller->AllReduce(mine.data(), least.data(), static_cast<vtkIdType>(least.size()),
                           vtkCommunicator::MIN_OP);
+  }
+  if (least[8] < 0.0 && least[9] == 0.0) {
+    if (lacksArray) throw vdi::Error(vdi::ErrorCode::InvalidArgument, load.lack);
+    throw vdi::Error(vdi::ErrorCode::RemoteRank, "other ranks' blocks lack the array");
   }
   const int count = std::max(static_cast<int>(-least[6]), 1);  // 0: no rank has the array
   load.array = {.name = load.of.choice.name,

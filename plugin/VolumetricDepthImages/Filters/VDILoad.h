@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "VDIBlocks.h"
@@ -37,6 +38,7 @@ struct Load {
   std::vector<vdi::Block> blocks;
   vdi::ScalarArray array;    // the same on all ranks
   double voxelVolume = 0.0;  // that of all ranks' smallest voxel; 0 without voxels
+  std::string lack;          // why this rank has no block with the array, if it has blocks
 };
 
 /// Throws vdi::Error if there is no input. In situ, a misspelt channel in a script has that effect.
@@ -44,7 +46,8 @@ void requireInput(vtkDataObject* input);
 /// Returns this rank's blocks. `upstream` makes the input. Throws vdi::Error for an input without such
 /// blocks.
 Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin);
-/// Collective: fills in the load's array and voxel volume, and returns the bounds of all ranks' blocks.
+/// Collective: fills in the load's array and voxel volume, and returns the bounds of all ranks' blocks. Throws
+/// vdi::Error on all ranks if there are blocks, but none with the array.
 vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* controller);
 
 }  // namespace pv

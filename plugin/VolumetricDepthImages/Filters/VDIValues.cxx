@@ -20,12 +20,15 @@ namespace {
 
 constexpr std::uint64_t mostValues = 4096;
 
-bool isMasked(const vdi::Block& block, std::size_t index) {
-  if (!block.masked) return false;
+glm::ivec3 placeOf(const vdi::Block& block, std::size_t index) {
   const auto width = static_cast<std::size_t>(block.dims.x);
   const auto height = static_cast<std::size_t>(block.dims.y);
-  const glm::ivec3 at(static_cast<int>(index % width), static_cast<int>(index / width % height),
-                      static_cast<int>(index / (width * height)));
+  return {static_cast<int>(index % width), static_cast<int>(index / width % height),
+          static_cast<int>(index / (width * height))};
+}
+
+bool isMasked(const vdi::Block& block, const glm::ivec3& at) {
+  if (!block.masked) return false;
   return std::any_of(block.masked->begin(), block.masked->end(),
                      [&at](const vdi::IndexBox& box) { return box.contains(at); });
 }
@@ -41,8 +44,9 @@ std::vector<double> sampleOf(std::span<const vdi::Block> blocks, std::uint64_t s
       const double share = static_cast<double>(++number) * golden;
       const auto place = static_cast<std::uint64_t>((share - std::floor(share)) * static_cast<double>(step));
       const std::size_t index = std::min<std::uint64_t>(first + place, block.valueCount() - 1);
-      const double value = vdi::loadValue(block.type, block.data, index);
-      if (std::isfinite(value) && !isMasked(block, index)) values.push_back(value);
+      const glm::ivec3 at = placeOf(block, index);
+      const double value = vdi::storedValueAt(block, at);
+      if (std::isfinite(value) && !isMasked(block, at)) values.push_back(value);
     }
   }
   return values;

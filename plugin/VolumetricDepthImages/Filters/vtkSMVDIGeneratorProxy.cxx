@@ -31,6 +31,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -40,6 +41,7 @@
 #include "VDIVolumeDisplay.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Estimate.h"
 #include "vdi/core/SettingsTable.h"
@@ -494,6 +496,7 @@ bool vtkSMVDIGeneratorProxy::NameComponent(vtkSMProxy* map, const std::string& n
   vtkSMPropertyHelper mode(map, "VectorMode");
   vtkSMPropertyHelper number(map, "VectorComponent");
   const bool isMagnitude = mode.GetAsInt() != vtkScalarsToColors::COMPONENT;
+  if (component == vdi::phase) return false;  // maps have no name for it
   if (component < 0 ? isMagnitude : !isMagnitude && number.GetAsInt() == component) return false;
   vtkSMProxy* shown = this->RepresentationIn(this->ActiveView());
   if (this->MapInView(name, association) == map && vtkSMPropertyHelper(shown, "Visibility").GetAsInt() != 0)
@@ -530,8 +533,13 @@ bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, s
       // The filter's component. The filter reports one that doesn't exist.
       const int wanted = vtkSMPropertyHelper(this, "Component").GetAsInt();
       const int components = array->GetNumberOfComponents();
-      const int component = components == 1 ? 0 : std::clamp(wanted, -1, components - 1);
-      array->GetComponentFiniteRange(component, range);
+      if (wanted == vdi::phase && components == 2) {
+        range[0] = -std::numbers::pi;
+        range[1] = std::numbers::pi;
+      } else {
+        const int component = components == 1 ? 0 : std::clamp(wanted, -1, components - 1);
+        array->GetComponentFiniteRange(component, range);
+      }
     }
   }
   return WidenOverRanks(range) && range[0] <= range[1];

@@ -505,7 +505,11 @@ bool vtkVDIGenerator::Ask(vtkDataObject* input, const pv::Origin& origin) {
     isGood = false;
   }
   if (!pv::onAllRanks(this->Controller, isGood)) return false;
-  request.bounds = pv::complete(request.load, input, this->Controller);
+  try {
+    request.bounds = pv::complete(request.load, input, this->Controller);
+  } catch (const vdi::Error&) {  // thrown on all ranks
+    return false;
+  }
   regeneration.ask(std::move(request));
   return true;
 }

@@ -19,6 +19,7 @@
 #include <string>
 
 #include "VDIViewpoint.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Metadata.h"
 #include "vtkSMVDIGeneratorProxy.h"
@@ -49,6 +50,7 @@ std::optional<vdi::Coloring> coloringOf(vtkSMProxy* reader) {
 QString nameOf(const vdi::ScalarArray& array) {
   QString name = QString::fromStdString(array.name);
   if (array.components < 2) return name;
+  if (array.component == vdi::phase) return QObject::tr("%1, phase").arg(name);
   return array.component < 0 ? QObject::tr("%1, magnitude").arg(name)
                              : QObject::tr("%1, component %2").arg(name).arg(array.component);
 }

@@ -70,6 +70,7 @@ def _load():
     library.vdi_catalyst_set_blocks.argtypes = [handle, ctypes.c_int32, ctypes.POINTER(_Block)]
     library.vdi_catalyst_set_array_strided.argtypes = [
         handle, text, ctypes.c_int32, ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(_Strides)]
+    library.vdi_catalyst_set_array_offset.argtypes = [handle, text, ctypes.c_int32, ctypes.c_double * 3]
     library.vdi_catalyst_wants.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_execute.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_parameter_f64.argtypes = [handle, text, ctypes.c_double, ctypes.c_double, ctypes.c_double]
@@ -80,6 +81,14 @@ def _load():
     library.vdi_catalyst_error.argtypes = [handle]
     library.vdi_catalyst_error.restype = text
     return library
+
+
+def _as_pairs(array):
+    """Complex numbers as their real and imaginary parts, along one axis more; other arrays as they are."""
+    if array is None or array.dtype.kind != "c":
+        return array
+    part = array.real
+    return np.lib.stride_tricks.as_strided(part, array.shape + (2,), array.strides + (part.dtype.itemsize,), writeable=False)
 
 
 class Catalyst:
@@ -116,32 +125,41 @@ class Catalyst:
         self._blocks = blocks
         self._kept = {}
 
-    def set_array(self, name, arrays, points=False):
-        """The values of one named array: arrays[i] belongs to block i. It is [z][y][x], or [z][y][x][component] for vectors, of
-        which the filter shows the magnitude. Values are of cells, or of points, of which a block has one more per axis.
+    def set_array(self, name, arrays, points=False, offset=None):
+        """The values of one named array: arrays[i] belongs to block i, and is None if the block lacks it. It is [z][y][x], or
+        [z][y][x][component] for vectors, of which a run shows the magnitude unless told otherwise. Complex numbers are vectors
+        of two. Values are of cells, or of points, of which a block has one more per axis. On staggered grids they lie `offset`
+        cells (x, y, z; -1 to 1) beside these.
 
-        Arrays are kept alive: change them in place between steps, or set others. Those that lie as a new array of NumPy's does
-        are used where they are; the engine copies others (slices, transposed ones, one field of several) at each step that a
-        script wants. Raises ValueError for a shape that the block doesn't have and for a type that the engine doesn't know."""
+        Arrays are kept alive: change them in place between steps, or set others. They are used where they are, whatever their
+        strides: slices, transposed ones, one field of several. Raises ValueError for a shape that the block doesn't have and
+        for a type that the engine doesn't know."""
         arrays = list(arrays)
         if len(arrays) != len(self._blocks):
             raise ValueError("%d arrays for %d blocks" % (len(arrays), len(self._blocks)))
-        types = {array.dtype for array in arrays} or {np.dtype("float64")}
+        # A view of complex numbers as pairs is no copy, and follows the values when these change.
+        views = [_as_pairs(array) for array in arrays]
+        present = [view for view in views if view is not None]
+        types = {view.dtype for view in present} or {np.dtype("float64")}
         if len(types) > 1 or not types <= set(_TYPES):
             raise ValueError("the values of '%s' are %s; they may be all of %s" % (
                 name, " and ".join(sorted(map(str, types))), ", ".join(map(str, _TYPES))))
-        components = {array.shape[3] if array.ndim == 4 else 1 for array in arrays} or {1}
-        for array, block in zip(arrays, self._blocks):
+        components = {view.shape[3] if view.ndim == 4 else 1 for view in present} or {1}
+        for view, block in zip(views, self._blocks):
             shape = tuple(count + bool(points) for count in reversed(block.cells))
-            if array.shape[:3] != shape or array.ndim > 4 or len(components) > 1:
-                raise ValueError("an array of '%s' is %s, its block has %s values [z][y][x]" % (name, array.shape, shape))
-        pointers = (ctypes.c_void_p * max(len(arrays), 1))(*(array.ctypes.data for array in arrays))
-        strides = (_Strides * max(len(arrays), 1))(
-            *(_Strides(array.strides[2::-1], array.strides[3] if array.ndim == 4 else 0) for array in arrays))
+            if view is not None and (view.shape[:3] != shape or view.ndim > 4 or len(components) > 1):
+                raise ValueError("an array of '%s' is %s, its block has %s values [z][y][x]" % (name, view.shape, shape))
+        pointers = (ctypes.c_void_p * max(len(views), 1))(*(None if view is None else view.ctypes.data for view in views))
+        strides = (_Strides * max(len(views), 1))(
+            *(_Strides() if view is None else _Strides(view.strides[2::-1], view.strides[3] if view.ndim == 4 else 0)
+              for view in views))
+        association = _POINTS if points else _CELLS
         self._check(self._library.vdi_catalyst_set_array_strided(
-            self._handle, name.encode(), _TYPES[types.pop()], _POINTS if points else _CELLS, components.pop(), pointers,
-            strides))
+            self._handle, name.encode(), _TYPES[types.pop()], association, components.pop(), pointers, strides))
         self._kept[name] = arrays
+        if offset is not None:
+            self._check(self._library.vdi_catalyst_set_array_offset(
+                self._handle, name.encode(), association, (ctypes.c_double * 3)(*offset)))
 
     def wants(self, step, time=0.0):
         """Whether a script will do anything at this step, the same on all ranks; if not, there is no need to call execute."""

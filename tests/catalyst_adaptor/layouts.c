@@ -1,0 +1,164 @@
+/* A simulation whose field lies in memory as real codes' fields do. Arguments: a JSON text or the name of a
+ * script, the cells along each axis, the layouts' names, which are the arrays' names too, separated by
+ * commas, and the number of steps. Each rank has a slab along x. All bytes that belong to no value are NaN.
+ * The process takes the same memory for any one layout, so that what the adaptor takes can be seen. It prints
+ * the bytes of the field. Exit status 0 if all went well. */
+#include <math.h>
+#include <mpi.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+enum { PAD = 5, MOST = 16 };
+
+/* One array: cell (x, y, z) lies at first + x * strides[0] + ... */
+typedef struct {
+  const char* name;
+  int type;
+  int components;
+  vdi_catalyst_strides strides;
+  char* first;
+  double offset[3];
+  int is_partial; /* odd ranks lack it */
+} array;
+
+static char* pool = NULL;
+static size_t used = 0;
+static size_t capacity = 0;
+
+static char* take(int64_t bytes) {
+  char* memory = pool + used;
+  used += (size_t)(bytes + 63) / 64 * 64;
+  if (used > capacity) abort();
+  return memory;
+}
+
+/* `cells`: of the rank's block. */
+static array lay(const char* name, const int32_t* cells) {
+  array a = {name, VDI_CATALYST_F32, 1, {{0, 0, 0}, 0}, NULL, {0.0, 0.0, 0.0}, 0};
+  const int64_t nx = cells[0];
+  const int64_t ny = cells[1];
+  const int64_t nz = cells[2];
+  int64_t unit = sizeof(float);
+  if (strcmp(name, "dof2") == 0) unit = 2 * sizeof(float); /* the second of two unknowns, as of a DMDA */
+  if (strcmp(name, "complex") == 0 || strcmp(name, "pair") == 0) {
+    a.type = VDI_CATALYST_F64;
+    a.components = 2;
+    a.strides.component_stride = sizeof(double);
+    unit = 2 * sizeof(double);
+  }
+  if (strcmp(name, "angle") == 0) a.type = VDI_CATALYST_F64, unit = sizeof(double);
+  if (strcmp(name, "integers") == 0) a.type = VDI_CATALYST_I64, unit = sizeof(int64_t);
+  if (strcmp(name, "integers_as_f64") == 0) a.type = VDI_CATALYST_F64, unit = sizeof(double);
+  if (strcmp(name, "staggered") == 0) a.offset[0] = -0.5;
+  a.is_partial = strcmp(name, "partial") == 0;
+  const int64_t row = strcmp(name, "padded") == 0 ? nx + PAD : nx; /* the leading extent of a Fortran array */
+  if (strcmp(name, "z_fastest") == 0) {                            /* as Meep's */
+    a.strides.strides[2] = unit;
+    a.strides.strides[1] = nz * unit;
+    a.strides.strides[0] = ny * nz * unit;
+    a.first = take(nx * ny * nz * unit);
+  } else {
+    a.strides.strides[0] = unit;
+    a.strides.strides[1] = row * unit;
+    a.strides.strides[2] = row * ny * unit;
+    a.first = take(row * ny * nz * unit);
+  }
+  if (strcmp(name, "dof2") == 0) a.first += sizeof(float);
+  return a;
+}
+
+/* The field, in a domain of unit size, at a time. */
+static double field(double x, double y, double z, double t) {
+  return sin(9.0 * x + t) * cos(7.0 * y) + 0.5 * sin(8.0 * z - 0.5 * t);
+}
+
+static void store(const array* a, const int32_t* at, double value) {
+  char* to = a->first;
+  for (int axis = 0; axis < 3; ++axis) to += at[axis] * a->strides.strides[axis];
+  const float f32 = (float)value;
+  const int64_t i64 = (int64_t)(1e12 * value);
+  double f64[2] = {value, 0.0};
+  if (a->components == 2) f64[0] = 2.0 * cos(value), f64[1] = 2.0 * sin(value);
+  if (strcmp(a->name, "angle") == 0) f64[0] = atan2(2.0 * sin(value), 2.0 * cos(value));
+  if (strcmp(a->name, "integers_as_f64") == 0) f64[0] = (double)i64;
+  if (a->type == VDI_CATALYST_F32) memcpy(to, &f32, sizeof f32);
+  if (a->type == VDI_CATALYST_F64) memcpy(to, f64, (size_t)a->components * sizeof(double));
+  if (a->type == VDI_CATALYST_I64) memcpy(to, &i64, sizeof i64);
+}
+
+int main(int argc, char** argv) {
+  MPI_Init(&argc, &argv);
+  if (argc != 5) MPI_Abort(MPI_COMM_WORLD, 2);
+  const char* folder = getenv("VDI_OUTPUT");
+  if (folder != NULL && chdir(folder) != 0) MPI_Abort(MPI_COMM_WORLD, 3);
+  int rank = 0;
+  int ranks = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  const int n = atoi(argv[2]);
+  const int32_t first = rank * n / ranks;
+  const int32_t cells[3] = {(rank + 1) * n / ranks - first, n, n};
+
+  array arrays[MOST];
+  int count = 0;
+  int names = 1;
+  for (const char* c = argv[3]; *c != '\0'; ++c) names += *c == ',';
+  capacity = (size_t)names * (2 * sizeof(double) * (size_t)(cells[0] + PAD) * (size_t)n * (size_t)n + 64);
+  pool = malloc(capacity);
+  if (pool == NULL) MPI_Abort(MPI_COMM_WORLD, 4);
+  memset(pool, 0xFF, capacity);
+  for (char* name = strtok(argv[3], ","); name != NULL && count < MOST; name = strtok(NULL, ","))
+    arrays[count++] = lay(name, cells);
+
+  const size_t length = strlen(argv[1]);
+  const int is_script = length > 3 && strcmp(argv[1] + length - 3, ".py") == 0;
+  const char* scripts[] = {argv[1]};
+  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
+  vdi_catalyst* catalyst = NULL;
+  int wrong = (is_script ? vdi_catalyst_initialize(comm, 1, scripts, &catalyst)
+                         : vdi_catalyst_initialize_json(comm, argv[1], &catalyst)) != VDI_CATALYST_OK;
+  const double h = 1.0 / n;
+  const vdi_catalyst_block block = {
+      {cells[0], n, n}, {0, 0, 0}, {0, 0, 0}, {first * h, 0.0, 0.0}, {h, h, h}};
+  wrong += vdi_catalyst_set_blocks(catalyst, 1, &block) != VDI_CATALYST_OK;
+  for (int i = 0; i < count; ++i) {
+    const void* data[] = {arrays[i].is_partial && rank % 2 == 1 ? NULL : arrays[i].first};
+    wrong += vdi_catalyst_set_array_offset(catalyst, arrays[i].name, VDI_CATALYST_CELLS, arrays[i].offset) !=
+             VDI_CATALYST_OK;
+    wrong += vdi_catalyst_set_array_strided(catalyst, arrays[i].name, arrays[i].type, VDI_CATALYST_CELLS,
+                                            arrays[i].components, data, &arrays[i].strides) != VDI_CATALYST_OK;
+  }
+  const double far[] = {0.0, 1.5, 0.0};
+  const double none[] = {0.0, NAN, 0.0};
+  wrong += vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, far) != VDI_CATALYST_BAD_ARGUMENT;
+  wrong += vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, none) != VDI_CATALYST_BAD_ARGUMENT;
+  wrong += vdi_catalyst_set_array_offset(catalyst, "V", 7, arrays[0].offset) != VDI_CATALYST_BAD_ARGUMENT;
+  wrong += vdi_catalyst_set_array_offset(catalyst, "", VDI_CATALYST_CELLS, none) != VDI_CATALYST_BAD_ARGUMENT;
+  wrong += vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, NULL) != VDI_CATALYST_BAD_ARGUMENT;
+
+  for (int step = 0; step < atoi(argv[4]); ++step) {
+    for (int i = 0; i < count; ++i) {
+      for (int32_t z = 0; z < n; ++z) {
+        for (int32_t y = 0; y < n; ++y) {
+          for (int32_t x = 0; x < cells[0]; ++x) {
+            const int32_t at[3] = {x, y, z};
+            store(&arrays[i], at,
+                  field((first + x + 0.5 + arrays[i].offset[0]) * h, (y + 0.5) * h, (z + 0.5) * h, 0.3 * step));
+          }
+        }
+      }
+    }
+    wrong += vdi_catalyst_execute(catalyst, step, 0.1 * step) != VDI_CATALYST_OK;
+  }
+  wrong += vdi_catalyst_finalize(catalyst) != VDI_CATALYST_OK;
+  if (rank == 0) printf("%zu\n", (size_t)cells[0] * (size_t)n * (size_t)n * sizeof(float));
+  free(pool);
+  MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
+  if (wrong != 0 && rank == 0) fprintf(stderr, "FAILED: %d calls\n", wrong);
+  MPI_Finalize();
+  return wrong == 0 ? 0 : 1;
+}

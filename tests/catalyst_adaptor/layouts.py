@@ -1,0 +1,59 @@
+"""A field in the layouts of real codes: its pictures are the same as those of an array in order, and none of them is copied on
+the host. Arguments: the case (same, ranks, memory), and the program layouts.c with its launcher."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+case, *simulation = sys.argv[1:]
+LAYOUTS = ["packed", "dof2", "z_fastest", "padded"]
+CAMERA = {"position": [2.6, 2.0, 3.1], "focal_point": [0.5, 0.5, 0.5]}
+RANGE = {"range": [-1.5, 1.5], "opacities": [[-1.5, 0.0], [0.3, 0.05], [1.5, 0.8]]}
+
+
+def run(field, cells, steps=1, launcher=None, **document):
+    """Returns the pictures, what the first step's record says, and the bytes of the field."""
+    document = {"field": field, "camera": CAMERA, "colors": RANGE, "resolution": [80, 60], "existing": "overwrite",
+                "output": {"png": "v_{timestep}.png"}, "log": "run.jsonl", **document}
+    process = subprocess.run([*(launcher or simulation), json.dumps(document), str(cells), field, str(steps)],
+                             env={**os.environ, "VDI_OUTPUT": os.getcwd()}, capture_output=True, text=True, timeout=200)
+    print(process.stderr)
+    assert process.returncode == 0, (field, process.returncode)
+    frames = [record for record in map(json.loads, open("run.jsonl")) if record["event"] == "frame"]
+    assert len(frames) == steps, frames
+    pictures = [open("v_%d.png" % step, "rb").read() for step in range(steps)]
+    return pictures, frames, int(process.stdout.split()[-1])
+
+
+def same():
+    expected = run("packed", 30, 2)[0]
+    assert expected[0] != expected[1]
+    for layout in LAYOUTS[1:]:
+        assert run(layout, 30, 2)[0] == expected, layout
+    # The phase of complex numbers is the array of their angles, and their magnitude is 2 everywhere.
+    assert run("complex", 30, component="phase")[0] == run("angle", 30)[0]
+    assert run("complex", 30)[0] != run("angle", 30)[0]
+    wide = {"range": [-1.5e12, 1.5e12], "opacities": [[-1.5e12, 0.0], [0.3e12, 0.05], [1.5e12, 0.8]]}
+    assert run("integers", 30, colors=wide)[0] == run("integers_as_f64", 30, colors=wide)[0]
+    assert run("staggered", 30)[0] != expected[:1]
+
+
+def memory():
+    """A copy would take the field's bytes once more."""
+    peaks, uploads = {}, {}
+    for layout in LAYOUTS:
+        _, frames, size = run(layout, 160, 3)
+        peaks[layout] = frames[-1]["host_peak_bytes"]
+        uploads[layout] = min(frame["stages"]["upload"]["slowest"] for frame in frames)
+    for layout in LAYOUTS:
+        print("%s: %.1f MiB more than packed, of a field of %.1f MiB; upload %.1f ms, %.2f of packed" % (
+            layout, (peaks[layout] - peaks["packed"]) / 2 ** 20, size / 2 ** 20, uploads[layout],
+            uploads[layout] / uploads["packed"]))
+        assert peaks[layout] - peaks["packed"] < size / 4, layout
+
+
+with tempfile.TemporaryDirectory() as folder:
+    os.chdir(folder)
+    {"same": same, "memory": memory}[case]()

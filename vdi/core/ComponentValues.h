@@ -1,0 +1,50 @@
+// Scalars of arrays that a Block can't hold as they are: vectors, complex numbers, 64-bit integers.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "vdi/core/Block.h"
+
+namespace vdi {
+
+/// The types of an array's components: those of ScalarType, with the same numbers, and two more.
+enum class ComponentType : std::uint32_t {
+  U8 = 0,
+  I8 = 1,
+  U16 = 2,
+  I16 = 3,
+  U32 = 4,
+  I32 = 5,
+  F32 = 6,
+  F64 = 7,
+  I64 = 8,
+  U64 = 9
+};
+
+/// In place of a component's number, as in ScalarArray::component.
+constexpr int magnitude = -1;  // of all components
+constexpr int phase = -2;      // of two, real and imaginary: from -pi to pi, 0 for the number 0
+
+/// An array of vectors. Component c of value (x, y, z) lies at `first` + x * strides.x + y * strides.y + z *
+/// strides.z + c * componentStride, in bytes.
+struct ComponentArray {
+  const std::byte* first = nullptr;
+  ByteStrides strides{0};
+  ComponentType type = ComponentType::F64;
+  int components = 1;
+  std::int64_t componentStride = 0;
+};
+
+/// The size of a component.
+std::size_t sizeOf(ComponentType type);
+/// Component `index` of an array of components as double. The address may be unaligned.
+double loadComponent(ComponentType type, const void* data, std::size_t index);
+
+/// Lets the block show `component` of the array, whose values are where the block has its own. They are read
+/// where they lie, which must be until the block is gone: one component of a ScalarType as it is, all else as
+/// f64 that are computed when they are read. `component` is a number below array.components, `magnitude`, or
+/// `phase` with two components; of a single component, `magnitude` is the component itself.
+void showComponent(Block& block, const ComponentArray& array, int component);
+
+}  // namespace vdi
