@@ -92,7 +92,7 @@ void checkOffset(const char* name, std::int32_t association, const double* offse
   require(association == VDI_CATALYST_POINTS || association == VDI_CATALYST_CELLS, "unknown association");
   require(offset != nullptr, "no offset given");
   for (int axis = 0; axis < 3; ++axis)
-    require(std::abs(offset[axis]) <= 1.0, "an array's offset must be at most a cell");  // false for NaN
+    require(std::abs(offset[axis]) <= 0.5, "an array's offset must be at most half a cell");  // false for NaN
 }
 
 bool isStep(std::int64_t step) {

@@ -66,8 +66,8 @@ void StridedArray::gather() {
   glm::ivec3 size(values_.counts[0], values_.counts[1], values_.counts[2]);
   if (rowInOrder(values_)) {
     size.x *= values_.components;
-    copyStrided(values_.first, {scalar, from.y, from.z}, memory_.get(), packedStrides(size, values_.scalarBytes),
-                size, values_.scalarBytes);
+    copyStrided(values_.first, {scalar, from.y, from.z}, memory_.get(),
+                packedStrides(size, values_.scalarBytes), size, values_.scalarBytes);
     return;
   }
   const ByteStrides to = packedStrides(size, values_.scalarBytes) * std::int64_t{values_.components};

@@ -21,10 +21,10 @@
 
 namespace vdi::catalyst {
 
-/// VolumetricDepthImage reads the values where they are. So do those of ParaView's filters that ask for values
-/// one by one. A filter that asks for a pointer gets one to a copy, which is made at its first request after
-/// each Modified(), or to the values themselves if they are in order. The array can't be written: VTK's filters
-/// get ordinary arrays from NewInstance.
+/// VolumetricDepthImage reads the values where they are. So do those of ParaView's filters that ask for
+/// values one by one. A filter that asks for a pointer gets one to a copy, which is made at its first request
+/// after each Modified(), or to the values themselves if they are in order. The array can't be written: VTK's
+/// filters get ordinary arrays from NewInstance.
 template <typename T>
 class StridedDataArray : public vtkGenericDataArray<StridedDataArray<T>, T>, public pv::StridedSource {
   using Self = StridedDataArray<T>;
@@ -64,7 +64,8 @@ class StridedDataArray : public vtkGenericDataArray<StridedDataArray<T>, T>, pub
   }
   void GetTypedTuple(vtkIdType tuple, T* to) const {
     const std::byte* const from = addressOf(tuple);
-    for (int c = 0; c < values_.components; ++c) std::memcpy(to + c, from + c * values_.componentStride, sizeof(T));
+    for (int c = 0; c < values_.components; ++c)
+      std::memcpy(to + c, from + c * values_.componentStride, sizeof(T));
   }
   void SetTypedComponent(vtkIdType, int, T) { refuse(); }
   void SetValue(vtkIdType, T) { refuse(); }

@@ -42,8 +42,8 @@ struct vdi_catalyst : vdi::catalyst::Calls {
   std::unique_ptr<vdi::catalyst::Engine> engine;
   bool haveBlocks = false;
   vtkSmartPointer<vtkPartitionedDataSet> grid;  // one partition per block
-  /// The arrays of `grid` by association and name, one entry for each block. A block that lacks the array has a
-  /// null `first`.
+  /// The arrays of `grid` by association and name, one entry for each block. A block that lacks the array has
+  /// a null `first`.
   struct Array {
     int type = VDI_CATALYST_F64;
     std::vector<vdi::catalyst::StridedValues> blocks;
@@ -260,8 +260,8 @@ auto withNumber(int type, Visit visit) {
 }
 
 /// Makes an array on the simulation's memory.
-vtkSmartPointer<vtkDataArray> newArray(const char* name, int type,
-                                       const vdi::catalyst::StridedValues& values, const glm::dvec3& offset) {
+vtkSmartPointer<vtkDataArray> newArray(const char* name, int type, const vdi::catalyst::StridedValues& values,
+                                       const glm::dvec3& offset) {
   vtkSmartPointer<vtkDataArray> array;
   if (values.inOrder() && offset == glm::dvec3(0.0)) {
     array.TakeReference(vtkDataArray::CreateDataArray(vtkTypeOf(type)));

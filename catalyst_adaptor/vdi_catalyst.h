@@ -57,7 +57,8 @@ extern "C" {
 enum {
   VDI_CATALYST_OK = 0,
   VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or too large to
-                                  * count, an unknown type, arrays before blocks, an offset beyond a cell, a step that is no int */
+                                  * count, an unknown type, arrays before blocks, an offset beyond half a
+                                  * cell, a step that is no int */
   VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process */
   VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
 };
@@ -173,8 +174,8 @@ VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, cons
                                                     const vdi_catalyst_strides* strides);
 
 /* Lets the values of an array lie beside the points or the middles of cells, by offset[axis] cells along each
- * axis, from -1 to 1: those of staggered grids. The offset is the same on all ranks. For example, values of
- * cells with the offset {-0.5, 0, 0} lie on the lower x faces of their cells. Blocks stay where they are;
+ * axis, from -0.5 to 0.5: those of staggered grids. The offset is the same on all ranks. For example, values
+ * of cells with the offset {-0.5, 0, 0} lie on the lower x faces of their cells. Blocks stay where they are;
  * beyond a block's values, its neighbours' count, and at the domain's end the last ones go on. An offset goes
  * with the association and the name, may come before its array, and is forgotten by vdi_catalyst_set_blocks.
  * In scripts, VolumetricDepthImage follows it, and ParaView's own filters don't know it. */

@@ -2,15 +2,18 @@
 
 find_program(GLSLANG_VALIDATOR glslangValidator REQUIRED)
 find_program(SPIRV_VAL spirv-val REQUIRED)
+find_program(SPIRV_OPT spirv-opt REQUIRED)
 
-# vdi_embed_shaders(<target> <folder> [NAMESPACE <namespace>] SHADERS name ...): compiles
+# vdi_embed_shaders(<target> <folder> [NAMESPACE <namespace>] SHADERS name ... [PROGRAMS name count ...]): compiles
 # <folder>/<name>.comp for Vulkan 1.3, runs spirv-val on the result, and adds a source to the target
 # that defines
 #   std::span<const std::uint32_t> <namespace>::shaderCode(std::string_view name)
-# for those names. The default namespace is vdi::gpu. The build tracks includes: a changed header
+# for those names. A shader of PROGRAMS is compiled once for each number from 0 to count - 1, with PROGRAM defined to it, as
+# <name>_<number>, without the code of the other programs: Mesa takes several times as long to remove that. The default
+# namespace is vdi::gpu. The build tracks includes: a changed header
 # recompiles only the shaders that use it.
 function(vdi_embed_shaders target folder)
-  cmake_parse_arguments(PARSE_ARGV 2 arg "" "NAMESPACE" "SHADERS")
+  cmake_parse_arguments(PARSE_ARGV 2 arg "" "NAMESPACE" "SHADERS;PROGRAMS")
   set(namespace "${arg_NAMESPACE}")
   if(NOT namespace)
     set(namespace vdi::gpu)
@@ -20,18 +23,39 @@ function(vdi_embed_shaders target folder)
   set(table "")
   set(includes "")
   set(headers "")
-  foreach(name IN LISTS arg_SHADERS)
+  set(programs "")
+  while(arg_PROGRAMS)
+    list(POP_FRONT arg_PROGRAMS name count)
+    math(EXPR last "${count} - 1")
+    foreach(number RANGE ${last})
+      list(APPEND programs ${name}_${number})
+      set(program_of_${name}_${number} ${name} ${number})
+    endforeach()
+  endwhile()
+  foreach(name IN LISTS arg_SHADERS programs)
     set(source "${folder}/${name}.comp")
     set(header "${outputDir}/${name}.spv.h")
     set(spirv "${outputDir}/${name}.spv")
+    set(definition "")
+    set(removal "")
+    if(name IN_LIST programs)
+      list(GET program_of_${name} 0 shader)
+      list(GET program_of_${name} 1 number)
+      set(source "${folder}/${shader}.comp")
+      set(definition "-DPROGRAM=${number}")
+      # Passes that only remove code. Those that change it make modules that Mesa 22.3 doesn't compile, and Debian 12's
+      # --eliminate-dead-code-aggressive crashes.
+      set(removal COMMAND ${SPIRV_OPT} --target-env=vulkan1.3 --scalar-block-layout --eliminate-dead-branches
+                  --eliminate-dead-functions "${spirv}" -o "${spirv}")
+    endif()
     add_custom_command(
       OUTPUT "${spirv}"
-      COMMAND ${GLSLANG_VALIDATOR} --quiet -V --target-env vulkan1.3 "-I${folder}" --depfile "${spirv}.d" -o "${spirv}"
-              "${source}"
+      COMMAND ${GLSLANG_VALIDATOR} --quiet -V --target-env vulkan1.3 "-I${folder}" ${definition} --depfile "${spirv}.d" -o
+              "${spirv}" "${source}" ${removal}
       COMMAND ${SPIRV_VAL} --target-env vulkan1.3 --scalar-block-layout "${spirv}"
       DEPENDS "${source}"
       DEPFILE "${spirv}.d"
-      COMMENT "Shader ${name}.comp"
+      COMMENT "Shader ${name}"
       VERBATIM)
     add_custom_command(
       OUTPUT "${header}"

@@ -10,8 +10,8 @@
 
 // One-dimensional, so that the invocations that share a ray are adjacent in one subgroup.
 layout(local_size_x = castGroupX * castGroupY) in;
-// The program's purpose; the compiler removes the code of the others.
-layout(constant_id = 0) const uint castProgram = castProgramSearch;
+// The program's purpose. The build makes a module of each, without the code of the others.
+const uint castProgram = PROGRAM;
 layout(constant_id = 1) const uint pageCount = 1;
 // Adjacent invocations that share a ray while pre-segments are counted, because with few rays a GPU waits for
 // the longest. Each takes its share of the samples, and counts for its share of the tolerances.

@@ -7,7 +7,7 @@ layout(local_size_x = compositeGroup) in;
 layout(push_constant, scalar) uniform Push { CompositeConstants push; };
 layout(set = 0, binding = 1, scalar) uniform Params { CompositeParams params; };
 
-layout(constant_id = 0) const uint compositeProgram = compositeProgramSearch;
+const uint compositeProgram = PROGRAM;  // as in cast.comp
 layout(constant_id = 1) const bool byNeed = false;  // CompositeParams::level
 const bool fillsHistogram = compositeProgram == compositeProgramHistogram;
 const bool countsPreSegments = compositeProgram == compositeProgramCountPreSegments || fillsHistogram;

@@ -32,8 +32,8 @@ class Fields {
   /// The layout of a block's values in order: x fastest, components side by side, no gaps.
   StridedValues inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
                         const void* data) const;
-  /// Sets an array's values, one entry for each block, with the same number of components. Blocks that lack the
-  /// array have a null `first`.
+  /// Sets an array's values, one entry for each block, with the same number of components. Blocks that lack
+  /// the array have a null `first`.
   void setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
   /// Lets the values of that array lie `offset` cells beside the points or the middles of cells.
   void setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset);
@@ -56,8 +56,8 @@ class Fields {
   /// The blocks that have the array, without its values: each has its place, the box that it owns, and the
   /// number of its values. Their `data` are the addresses of this object's blocks. Throws as valuesOf does.
   std::vector<Block> placesOf(const std::string& name, bool cells) const;
-  /// The blocks that have the array, with its values. They read these where they are; nothing is copied. Throws
-  /// as valuesOf does.
+  /// The blocks that have the array, with its values. They read these where they are; nothing is copied.
+  /// Throws as valuesOf does.
   std::vector<Block> blocksOf(const std::string& name, bool cells, int component) const;
 
  private:
@@ -79,8 +79,8 @@ class Fields {
 std::size_t bytesOf(int type);
 
 /// Collective: whether the array of that name is one of cells, unless `given` tells. Throws on all ranks as
-/// Fields::associationOf and valuesOf do, and Error{InvalidArgument} if ranks differ, or if all blocks lack the
-/// array.
+/// Fields::associationOf and valuesOf do, and Error{InvalidArgument} if ranks differ, or if all blocks lack
+/// the array.
 bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const std::string& name,
                   std::optional<bool> given);
 

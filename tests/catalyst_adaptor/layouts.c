@@ -122,23 +122,25 @@ int main(int argc, char** argv) {
   int wrong = (is_script ? vdi_catalyst_initialize(comm, 1, scripts, &catalyst)
                          : vdi_catalyst_initialize_json(comm, argv[1], &catalyst)) != VDI_CATALYST_OK;
   const double h = 1.0 / n;
-  const vdi_catalyst_block block = {
-      {cells[0], n, n}, {0, 0, 0}, {0, 0, 0}, {first * h, 0.0, 0.0}, {h, h, h}};
+  const vdi_catalyst_block block = {{cells[0], n, n}, {0, 0, 0}, {0, 0, 0}, {first * h, 0.0, 0.0}, {h, h, h}};
   wrong += vdi_catalyst_set_blocks(catalyst, 1, &block) != VDI_CATALYST_OK;
   for (int i = 0; i < count; ++i) {
     const void* data[] = {arrays[i].is_partial && rank % 2 == 1 ? NULL : arrays[i].first};
     wrong += vdi_catalyst_set_array_offset(catalyst, arrays[i].name, VDI_CATALYST_CELLS, arrays[i].offset) !=
              VDI_CATALYST_OK;
-    wrong += vdi_catalyst_set_array_strided(catalyst, arrays[i].name, arrays[i].type, VDI_CATALYST_CELLS,
-                                            arrays[i].components, data, &arrays[i].strides) != VDI_CATALYST_OK;
+    wrong +=
+        vdi_catalyst_set_array_strided(catalyst, arrays[i].name, arrays[i].type, VDI_CATALYST_CELLS,
+                                       arrays[i].components, data, &arrays[i].strides) != VDI_CATALYST_OK;
   }
-  const double far[] = {0.0, 1.5, 0.0};
+  const double far[] = {0.0, 0.6, 0.0};
   const double none[] = {0.0, NAN, 0.0};
   wrong += vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, far) != VDI_CATALYST_BAD_ARGUMENT;
-  wrong += vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, none) != VDI_CATALYST_BAD_ARGUMENT;
+  wrong +=
+      vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, none) != VDI_CATALYST_BAD_ARGUMENT;
   wrong += vdi_catalyst_set_array_offset(catalyst, "V", 7, arrays[0].offset) != VDI_CATALYST_BAD_ARGUMENT;
   wrong += vdi_catalyst_set_array_offset(catalyst, "", VDI_CATALYST_CELLS, none) != VDI_CATALYST_BAD_ARGUMENT;
-  wrong += vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, NULL) != VDI_CATALYST_BAD_ARGUMENT;
+  wrong +=
+      vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, NULL) != VDI_CATALYST_BAD_ARGUMENT;
 
   for (int step = 0; step < atoi(argv[4]); ++step) {
     for (int i = 0; i < count; ++i) {
@@ -146,8 +148,9 @@ int main(int argc, char** argv) {
         for (int32_t y = 0; y < n; ++y) {
           for (int32_t x = 0; x < cells[0]; ++x) {
             const int32_t at[3] = {x, y, z};
-            store(&arrays[i], at,
-                  field((first + x + 0.5 + arrays[i].offset[0]) * h, (y + 0.5) * h, (z + 0.5) * h, 0.3 * step));
+            store(
+                &arrays[i], at,
+                field((first + x + 0.5 + arrays[i].offset[0]) * h, (y + 0.5) * h, (z + 0.5) * h, 0.3 * step));
           }
         }
       }

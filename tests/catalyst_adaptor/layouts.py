@@ -41,7 +41,8 @@ def same():
 
 
 def memory():
-    """A copy would take the field's bytes once more."""
+    """A copy would take the field's bytes once more. Without mpirun's binding to a core, where the device would read values in
+    order directly and those of other layouts from a staging buffer."""
     peaks, uploads = {}, {}
     for layout in LAYOUTS:
         _, frames, size = run(layout, 160, 3)

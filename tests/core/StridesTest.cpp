@@ -23,8 +23,8 @@ namespace {
 
 /// Values of all magnitudes, some of them not finite, in order.
 Block blockOf(ScalarType type, const glm::ivec3& dims, std::mt19937& random) {
-  const auto count = static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) *
-                     static_cast<std::size_t>(dims.z);
+  const auto count =
+      static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
   const std::shared_ptr<std::byte[]> values(new std::byte[count * sizeOf(type)]);
   std::uniform_real_distribution<double> value(-120.0, 120.0);
   for (std::size_t i = 0; i < count; ++i) storeValue(type, values.get(), i, value(random));
@@ -104,7 +104,8 @@ TEST_CASE("a stride of 0 repeats values") {
 
 TEST_CASE("strides that say that values are packed leave a block packed") {
   const std::vector<double> values(60, 1.0);
-  Block block = Block::fromPoints({4, 3, 5}, glm::dvec3(0.0), glm::dvec3(1.0), ScalarType::F64, values.data());
+  Block block =
+      Block::fromPoints({4, 3, 5}, glm::dvec3(0.0), glm::dvec3(1.0), ScalarType::F64, values.data());
   block.setStrides({8, 32, 96});
   CHECK(block.isPacked());
   block.setStrides({8, 32, 97});
@@ -143,21 +144,23 @@ TEST_CASE("random layouts read as packed ones do") {
 
 TEST_CASE("components are shown as they are, or as doubles that are computed") {
   const glm::ivec3 dims(21, 19, 17);
-  const auto count = static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) *
-                     static_cast<std::size_t>(dims.z);
+  const auto count =
+      static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z);
   Block block = Block::fromCells(dims, glm::dvec3(0.0), glm::dvec3(1.0), ScalarType::U8, nullptr);
   const IndexBox part{{1, 2, 3}, {20, 5, 17}};
 
   SECTION("of vectors") {
     std::vector<float> values(3 * count);
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>((i * 7919) % 1000) - 500.0F;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = static_cast<float>((i * 7919) % 1000) - 500.0F;
     std::vector<double> lengths(count);
     for (std::size_t i = 0; i < count; ++i) {
       double sum = 0.0;
       for (std::size_t c = 0; c < 3; ++c) sum += double(values[3 * i + c]) * double(values[3 * i + c]);
       lengths[i] = std::sqrt(sum);
     }
-    Block expected = Block::fromCells(dims, glm::dvec3(0.0), glm::dvec3(1.0), ScalarType::F64, lengths.data());
+    Block expected =
+        Block::fromCells(dims, glm::dvec3(0.0), glm::dvec3(1.0), ScalarType::F64, lengths.data());
     showComponent(block, arrayOf(values, dims, 3, ComponentType::F32), magnitude);
     CHECK(block.type == ScalarType::F64);
     requireSame(block, expected, part);

@@ -2,6 +2,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <numeric>
 #include <random>
@@ -10,11 +12,13 @@
 
 #include "tests/Catch.h"
 #include "tests/Devices.h"
+#include "tests/FuzzTime.h"
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/gpu/KdTree.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/PipelineCacheFile.h"
 #include "vdi/gpu/ReducePass.h"
 #include "vdi/gpu/ScanPass.h"
 #include "vdi/gpu/VulkanDevice.h"
@@ -368,4 +372,124 @@ TEST_CASE("host memory that starts and ends anywhere is imported without a copy,
                      back.mappedAs<std::uint32_t>().begin()));
   }
   CHECK(device()->validationMessages() == "");
+}
+
+namespace {
+
+/// Data as a driver's, for the key's device.
+std::vector<std::byte> cacheData(const PipelineCacheKey& key, std::size_t size) {
+  VkPipelineCacheHeaderVersionOne header{
+      sizeof header, VK_PIPELINE_CACHE_HEADER_VERSION_ONE, key.vendor, key.device, {}};
+  std::copy(key.cacheUuid.begin(), key.cacheUuid.end(), header.pipelineCacheUUID);
+  std::vector<std::byte> data(sizeof header + size, std::byte{7});
+  std::memcpy(data.data(), &header, sizeof header);
+  return data;
+}
+
+/// A new folder, which goes with this object.
+struct Folder {
+  std::filesystem::path path;
+  Folder() {
+    std::string name = (std::filesystem::temp_directory_path() / "vdi-cache-XXXXXX").string();
+    REQUIRE(mkdtemp(name.data()) != nullptr);
+    path = name;
+  }
+  ~Folder() { std::filesystem::remove_all(path); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  Folder(Folder&&) = delete;
+  Folder& operator=(Folder&&) = delete;
+  std::filesystem::path onlyFile() const {
+    return *std::filesystem::directory_iterator(path / "deep" / "er");
+  }
+};
+
+}  // namespace
+
+TEST_CASE("compiled shaders come back from their file, and only those of the same driver and device") {
+  const Folder folder;
+  PipelineCacheKey key{1, 2, 3, {4}, {5}};
+  const PipelineCacheFile file((folder.path / "deep" / "er").string(), key);
+  CHECK(file.read().empty());
+  const std::vector<std::byte> data = cacheData(key, 1000);
+  file.write(data);
+  CHECK(file.read() == data);
+  const std::vector<std::byte> longer = cacheData(key, 2000);
+  file.write(longer);
+  CHECK(file.read() == longer);
+  file.write(cacheData(key, 0));  // a header alone isn't kept
+  CHECK(file.read() == longer);
+  const std::array others{PipelineCacheKey{9, 2, 3, {4}, {5}}, PipelineCacheKey{1, 9, 3, {4}, {5}},
+                          PipelineCacheKey{1, 2, 9, {4}, {5}}, PipelineCacheKey{1, 2, 3, {9}, {5}},
+                          PipelineCacheKey{1, 2, 3, {4}, {9}}};
+  for (const PipelineCacheKey& other : others)
+    CHECK(PipelineCacheFile((folder.path / "deep" / "er").string(), other).read().empty());
+  // Another device's data under this name, as after a mistake of the user's.
+  PipelineCacheFile(folder.path.string(), others[3]).write(cacheData(others[3], 10));
+  std::filesystem::path foreign;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path)) {
+    if (entry.is_regular_file()) foreign = entry.path();
+  }
+  std::filesystem::copy_file(foreign, folder.onlyFile(), std::filesystem::copy_options::overwrite_existing);
+  CHECK(file.read().empty());
+}
+
+TEST_CASE("a folder that can't be written, or none, only means that nothing is kept") {
+  const Folder folder;
+  const PipelineCacheKey key{1, 2, 3, {4}, {5}};
+  std::ofstream(folder.path / "file") << "no folder";
+  for (const std::string& place :
+       {std::string(), (folder.path / "file").string(), std::string("/proc/none")}) {
+    const PipelineCacheFile file(place, key);
+    file.write(cacheData(key, 100));
+    CHECK(file.read().empty());
+  }
+  std::filesystem::create_directories(folder.path / "deep" / "er");
+  const PipelineCacheFile file((folder.path / "deep" / "er").string(), key);
+  file.write(cacheData(key, 100));
+  std::filesystem::remove(folder.onlyFile());
+  std::filesystem::create_directory(folder.path / "deep" / "er" / "x");
+  CHECK(file.read().empty());
+}
+
+TEST_CASE("damaged files of compiled shaders are ignored") {
+  const Folder folder;
+  const PipelineCacheKey key{1, 2, 3, {4}, {5}};
+  const PipelineCacheFile file((folder.path / "deep" / "er").string(), key);
+  file.write(cacheData(key, 500));
+  const std::filesystem::path path = folder.onlyFile();
+  std::vector<char> good(std::filesystem::file_size(path));
+  std::ifstream(path, std::ios::binary).read(good.data(), static_cast<std::streamsize>(good.size()));
+  std::mt19937 random(3);
+  const test::FuzzTime time(0.5);
+  do {
+    std::vector<char> bad = good;
+    const std::size_t at = random() % bad.size();
+    if (random() % 3 == 0) {
+      bad.resize(at);
+    } else {
+      bad[at] = static_cast<char>(bad[at] ^ static_cast<char>(1U << (random() % 8)));
+    }
+    std::ofstream(path, std::ios::binary).write(bad.data(), static_cast<std::streamsize>(bad.size()));
+    REQUIRE(file.read().empty());
+  } while (!time.isOver());
+}
+
+TEST_CASE("processes that write compiled shaders at once leave one's whole") {
+  const Folder folder;
+  const PipelineCacheKey key{1, 2, 3, {4}, {5}};
+  const PipelineCacheFile file((folder.path / "deep" / "er").string(), key);
+  file.write(cacheData(key, 100));
+  std::vector<std::thread> writers;
+  for (std::size_t i = 0; i < 4; ++i) {
+    writers.emplace_back([&, i] {
+      for (int round = 0; round < 20; ++round) file.write(cacheData(key, 10000 * (i + 1)));
+    });
+  }
+  int torn = 0;
+  for (int round = 0; round < 100; ++round) torn += file.read().empty() ? 1 : 0;
+  for (std::thread& writer : writers) writer.join();
+  CHECK(torn == 0);
+  CHECK(std::filesystem::directory_entry(folder.onlyFile()).is_regular_file());
+  CHECK(std::distance(std::filesystem::directory_iterator(folder.path / "deep" / "er"), {}) == 1);
 }

@@ -21,15 +21,16 @@ using synthetic::Joint;
 
 namespace {
 
-std::vector<Block> decomposed(const glm::ivec3& size, const glm::ivec3& blocks, Joint joint, ScalarType type) {
+std::vector<Block> decomposed(const glm::ivec3& size, const glm::ivec3& blocks, Joint joint,
+                              ScalarType type) {
   return test::decompose("turbulence", size, blocks, synthetic::Layout::OnOneRank, joint, type, 0, 1).mine;
 }
 
 CompactLists listsOf(const std::vector<Block>& blocks, ScalarType type) {
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   generator.setBlocks(blocks);
-  const std::optional<Vdi> vdi = generator.generate(
-      test::oblique(), test::threeHues(test::topOf(type) * 0.8), test::smallSettings(47, 35, 8));
+  const std::optional<Vdi> vdi = generator.generate(test::oblique(), test::threeHues(test::topOf(type) * 0.8),
+                                                    test::smallSettings(47, 35, 8));
   return std::get<CompactLists>(vdi->lists);
 }
 

@@ -209,8 +209,8 @@ void makeTypesOne(const Communicator& comm, std::vector<Block>& blocks) {
     for (Block& block : blocks) {
       if (block.type == common) continue;
       const ByteStrides strides = block.strides.value_or(ByteStrides(0));
-      std::shared_ptr<const void>& copy = known[{
-          block.data, {block.dims.x, block.dims.y, block.dims.z}, {strides.x, strides.y, strides.z}}];
+      std::shared_ptr<const void>& copy =
+          known[{block.data, {block.dims.x, block.dims.y, block.dims.z}, {strides.x, strides.y, strides.z}}];
       if (!copy) copy = convertedTo(common, block);
       block.type = common;
       block.data = copy.get();

@@ -147,7 +147,7 @@ void Block::copyTo(const IndexBox& box, void* to) const {
 }
 
 Tiling Block::tilesOf(const IndexBox& box) const {
-  return {box, !computed && (!strides || strides->x == static_cast<std::int64_t>(sizeOf(type)))};
+  return {box, strides ? fastestAxis(*strides) : 0};
 }
 
 double storedValueAt(const Block& block, const glm::ivec3& at) {
@@ -200,9 +200,8 @@ ScalarRange finiteRangeOfTiles(const Block& block) {
     for (std::size_t i = first; i < last; ++i) {
       const IndexBox tile = tiles[i];
       block.copyTo(tile, buffer.bytes.data());
-      withTyped(block.type, static_cast<const void*>(buffer.bytes.data()), [&](const auto* values) {
-        part.include(finiteRangeOf(std::span(values, tile.count())));
-      });
+      withTyped(block.type, static_cast<const void*>(buffer.bytes.data()),
+                [&](const auto* values) { part.include(finiteRangeOf(std::span(values, tile.count()))); });
     }
     const std::lock_guard lock(mutex);
     range.include(part);

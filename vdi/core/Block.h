@@ -83,7 +83,8 @@ struct Block {
   Box owned{};              // world; half-open
   ScalarType type = ScalarType::F32;
   /// The first value, in native byte order. Packed, the values are [dims.z][dims.y][dims.x], x fastest, and
-  /// `data` is aligned for the type. Computed ones don't lie there; then it tells blocks apart by their values.
+  /// `data` is aligned for the type. Computed ones don't lie there; then it tells blocks apart by their
+  /// values.
   const void* data = nullptr;
   std::shared_ptr<const void> keepAlive{};
   GhostLayers extra{};                                  // layers of values beyond the stored ones, >= 0
@@ -107,10 +108,10 @@ struct Block {
   bool isPacked() const { return !strides && !computed; }
   /// Lets the values lie at these strides, which are dropped if the values are packed and aligned.
   void setStrides(const ByteStrides& bytes);
-  /// Copies the stored values of a box within stored(), [size.z][size.y][size.x], to memory that is aligned for
-  /// them.
+  /// Copies the stored values of a box within stored(), [size.z][size.y][size.x], to memory that is aligned
+  /// for them.
   void copyTo(const IndexBox& box, void* to) const;
-  /// Tiles of a box within stored(): as large as copyTo should copy at a time, to a buffer that is reused.
+  /// Tiles of a box: as large as copyTo should copy at a time, to a buffer that is reused.
   Tiling tilesOf(const IndexBox& box) const;
 
   /// Point data: `origin` is the position of the first stored point. The block owns the volume from the first

@@ -81,8 +81,8 @@ std::vector<Node> withAtMost(const std::vector<Node>& nodes, double tolerance) {
 
 void validate(const Coloring& coloring) {
   const ScalarArray& array = coloring.array;
-  if (array.components < 1 || array.component < phase ||
-      array.component >= array.components || (array.component == phase && array.components != 2))
+  if (array.components < 1 || array.component < phase || array.component >= array.components ||
+      (array.component == phase && array.components != 2))
     failColoring(fmt::format("component {} of {}", array.component, array.components));
   const auto [low, high] = coloring.range;
   if (low <= high ? !std::isfinite(low) || !std::isfinite(high) : coloring.range != ScalarRange())

@@ -34,7 +34,7 @@ class Computation : public ComputedValues {
   Computation(const ComponentArray& array, int component) : array_(array), component_(component) {}
 
   void read(const IndexBox& box, void* to) const override {
-    const Tiling tiles(box, array_.strides.x == static_cast<std::int64_t>(sizeOf(array_.type)));
+    const Tiling tiles(box, fastestAxis(array_.strides));
     const ByteStrides strides = packedStrides(box.size(), sizeof(double));
     for (std::size_t i = 0; i < tiles.count(); ++i) {
       const IndexBox tile = tiles[i];

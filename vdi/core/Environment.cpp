@@ -17,6 +17,8 @@ namespace {
 
 constexpr std::array table{
     EnvironmentVariable{"VDI_BANDS", "a whole number from 1 on", "In how many bands a frame is made", false},
+    EnvironmentVariable{"VDI_CACHE", "a folder, or 'off'",
+                        "Where compiled shaders are kept from run to run, instead of ~/.cache/pv-vdi", true},
     EnvironmentVariable{"VDI_CATALYST_ENGINE", "a file",
                         "The in situ engine that the Catalyst adaptor loads, instead of the installed one",
                         true},
@@ -71,6 +73,15 @@ bool environmentFlag(const char* name) {
   if (!text || *text == "0") return false;
   if (*text != "1") refuseEnvironment(name, *text);
   return true;
+}
+
+std::string cacheFolder() {
+  if (const std::optional<std::string> given = environmentText("VDI_CACHE"))
+    return *given == "off" ? "" : *given;
+  const char* const caches = std::getenv("XDG_CACHE_HOME");
+  if (caches != nullptr && *caches == '/') return std::string(caches) + "/pv-vdi";
+  const char* const home = std::getenv("HOME");
+  return home != nullptr && *home == '/' ? std::string(home) + "/.cache/pv-vdi" : "";
 }
 
 void refuseEnvironment(const char* name, std::string_view value) {

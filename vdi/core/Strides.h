@@ -36,20 +36,28 @@ inline std::int64_t offsetOf(const glm::ivec3& at, const ByteStrides& strides) {
   return at.x * strides.x + at.y * strides.y + at.z * strides.z;
 }
 
-/// Divides a box of values into tiles. The values of one, gathered, stay in the cache beside the core, and its
-/// shape uses up the lines of the cache that it reads, whichever axis is the fastest.
+/// The axis along which neighbours are nearest to each other; x if that is as good as another one.
+inline int fastestAxis(const ByteStrides& strides) {
+  const ByteStrides size = glm::abs(strides);
+  if (size.x <= size.y && size.x <= size.z) return 0;
+  return size.y <= size.z ? 1 : 2;
+}
+
+/// Divides a box of values into tiles. The values of one, gathered, stay in the cache beside the core. A tile
+/// is long along the axis on which its values lie side by side, where memory is read fastest, and has whole
+/// lines of the cache along x, for the writer.
 class Tiling {
  public:
-  static constexpr int side = 16;  // where x isn't the fastest axis
-  static constexpr int values = side * side * side;  // at most, in a tile
+  static constexpr int width = 16;     // along x, where another axis is the fastest
+  static constexpr int values = 4096;  // at most, in a tile
 
-  /// `contiguous`: neighbours along x lie side by side.
-  Tiling(const IndexBox& box, bool contiguous) : box_(box), tile_(side) {
+  Tiling(const IndexBox& box, int fastest) : box_(box), tile_(1) {
     const glm::ivec3 size = box.size();
-    if (contiguous) {
-      tile_.x = std::clamp(size.x, 1, values);
-      tile_.y = std::clamp(values / tile_.x, 1, side);
-      tile_.z = std::clamp(values / (tile_.x * tile_.y), 1, side);
+    tile_.x = std::clamp(size.x, 1, fastest == 0 ? values : width);
+    if (fastest != 0) tile_[fastest] = std::clamp(size[fastest], 1, values / tile_.x);
+    for (const int axis : {1, 2}) {
+      if (axis != fastest)
+        tile_[axis] = std::clamp(values / (tile_.x * tile_.y * tile_.z), 1, std::max(size[axis], 1));
     }
     count_ = glm::u64vec3((size + tile_ - 1) / tile_);
   }
@@ -93,7 +101,7 @@ void copyTile(const std::byte* from, const ByteStrides& fromStrides, std::byte* 
 template <std::size_t bytes>
 void copyTiles(const std::byte* from, const ByteStrides& fromStrides, std::byte* to,
                const ByteStrides& toStrides, const glm::ivec3& size) {
-  const Tiling tiling({glm::ivec3(0), size}, false);
+  const Tiling tiling({glm::ivec3(0), size}, fastestAxis(fromStrides));
   for (std::size_t i = 0; i < tiling.count(); ++i) {
     const IndexBox tile = tiling[i];
     copyTile<bytes>(from + offsetOf(tile.lo, fromStrides), fromStrides, to + offsetOf(tile.lo, toStrides),
@@ -112,7 +120,8 @@ inline void copyStrided(const void* from, const ByteStrides& fromStrides, void* 
   if (size.x == 1 || (fromStrides.x == bytes && toStrides.x == bytes)) {
     for (int z = 0; z < size.z; ++z) {
       for (int y = 0; y < size.y; ++y) {
-        std::memcpy(target + y * toStrides.y + z * toStrides.z, source + y * fromStrides.y + z * fromStrides.z,
+        std::memcpy(target + y * toStrides.y + z * toStrides.z,
+                    source + y * fromStrides.y + z * fromStrides.z,
                     static_cast<std::size_t>(size.x) * valueBytes);
       }
     }

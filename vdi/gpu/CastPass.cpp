@@ -71,7 +71,7 @@ CastPass::CastPass(const std::shared_ptr<Device>& device)
       lanesPerRay_(device->runsGpuPrograms() ? std::clamp(device->limits().subgroupSize, 1U, maxLanesPerRay)
                                              : 1),
       sampler_(device),
-      pipelines_(device, castInfo()),
+      pipelines_(device, castInfo(), true),
       lanePipelines_(pipelines_, sharingPipelineInfo()) {}
 
 ComputePipeline& CastPass::pipelineFor(const Program& program) {

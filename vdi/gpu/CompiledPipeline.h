@@ -22,7 +22,7 @@ namespace vdi::gpu {
 std::span<const std::uint32_t> shaderCode(std::string_view name);
 
 struct ComputePipelineInfo {
-  std::string_view shader;  // name without ".comp", for shaderCode
+  std::string_view shader;  // name for shaderCode
   std::span<const std::uint32_t>
       code;  // SPIR-V to use instead if it is not empty; needed during construction only
   std::uint32_t pushConstantBytes = 0;  // at most 128

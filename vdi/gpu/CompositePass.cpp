@@ -15,7 +15,7 @@ ComputePipelineInfo compositeInfo() {
 }  // namespace
 
 CompositePass::CompositePass(std::shared_ptr<Device> device)
-    : pipelines_(std::move(device), compositeInfo()) {}
+    : pipelines_(std::move(device), compositeInfo(), true) {}
 
 void CompositePass::record(Commands& commands, const shared::CompositeParams& params, Work work,
                            Algorithm algorithm) {

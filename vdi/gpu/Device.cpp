@@ -31,7 +31,7 @@ struct Device::State {
   explicit State(const DeviceRequest& request)
       : instance(request.validation),
         candidate(choose(instance, request)),
-        vulkan(instance, candidate),
+        vulkan(instance, candidate, request.cacheFolder),
         cpu(candidate.summary.type == DeviceType::Cpu),
         gpuPrograms(!cpu || request.gpuPrograms) {}
 

@@ -9,6 +9,7 @@ DeviceRequest requestFromEnvironment(int localRank) {
   request.localRank = localRank;
   request.selector = environmentText("VDI_DEVICE").value_or("");
   request.validation = environmentFlag("VDI_VALIDATION");
+  request.cacheFolder = cacheFolder();
   return request;
 }
 

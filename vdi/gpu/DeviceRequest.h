@@ -20,9 +20,12 @@ struct DeviceRequest {
   std::uint32_t maxImageDimension3D = 0;
   /// False: behaves as a device that cannot import the process's memory, to test the alternative.
   bool importsHostMemory = true;
+  /// The folder that keeps compiled shaders from run to run; empty: none does.
+  std::string cacheFolder;
 };
 
-/// The request from the environment: VDI_DEVICE is the selector, and VDI_VALIDATION=1 enables validation.
+/// The request from the environment: VDI_DEVICE is the selector, VDI_VALIDATION=1 enables validation, and
+/// VDI_CACHE is the cache's folder.
 DeviceRequest requestFromEnvironment(int localRank);
 
 }  // namespace vdi::gpu

@@ -2,20 +2,24 @@
 
 #include <algorithm>
 #include <cassert>
+#include <string>
 #include <utility>
 
 #include "vdi/gpu/Commands.h"
 
 namespace vdi::gpu {
 
-PipelineSet::PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common)
-    : device_(std::move(device)), common_(std::move(common)) {
+PipelineSet::PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common, bool hasPrograms)
+    : device_(std::move(device)), common_(std::move(common)), hasPrograms_(hasPrograms) {
   if (common_.uniformBytes == 0) return;
   uniforms_ = std::make_shared<const Buffer>(device_, common_.uniformBytes, MemoryKind::DeviceLocal);
 }
 
 PipelineSet::PipelineSet(const PipelineSet& updated, ComputePipelineInfo common)
-    : device_(updated.device_), common_(std::move(common)), uniforms_(updated.uniforms_) {
+    : device_(updated.device_),
+      common_(std::move(common)),
+      hasPrograms_(updated.hasPrograms_),
+      uniforms_(updated.uniforms_) {
   assert(common_.uniformBytes == updated.common_.uniformBytes);
 }
 
@@ -37,6 +41,9 @@ ComputePipeline& PipelineSet::with(const std::vector<std::uint32_t>& specializat
   if (!pipeline) {
     ComputePipelineInfo info = common_;
     info.specialization = specialization;
+    std::string program(common_.shader);
+    if (hasPrograms_) program += "_" + std::to_string(specialization.front());
+    info.shader = program;
     pipeline = std::make_unique<ComputePipeline>(device_, info);
     if (uniforms_) pipeline->bindUniforms(*uniforms_);
   }

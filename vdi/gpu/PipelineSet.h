@@ -18,9 +18,10 @@ class Commands;
 /// Pipelines of one shader that differ in specialisation, each made at its first use.
 class PipelineSet {
  public:
-  /// `common` is the info without the specialisation.
-  PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common);
-  /// Shares the uniforms of another set, which updates them.
+  /// `common` is the info without the specialisation. `hasPrograms`: the shader is one of PROGRAMS in
+  /// CMakeLists.txt, and the first word of a specialisation, constant 0, is the program's number.
+  PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common, bool hasPrograms = false);
+  /// Shares the uniforms of another set, which updates them, and has programs if that does.
   PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);
   ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
   /// Sets the uniforms that all pipelines have for the commands recorded next; records nothing if they have
@@ -36,6 +37,7 @@ class PipelineSet {
 
   std::shared_ptr<Device> device_;
   ComputePipelineInfo common_;
+  bool hasPrograms_ = false;
   std::shared_ptr<const Buffer> uniforms_;  // shared by all pipelines; null without uniforms
   std::vector<std::byte> updated_;          // the values of the last update
   const Commands* updatedBy_ = nullptr;     // the commands that recorded it

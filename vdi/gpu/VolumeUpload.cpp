@@ -115,67 +115,40 @@ void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap
   }
 }
 
-/// Texels of a box, in a block's indices, tightly packed.
-class TexelBox {
- public:
-  TexelBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) : piece_(piece), box_(box), to_(to) {}
-  const IndexBox& box() const { return box_; }
-
-  /// Writes the part of an array of values, of the box `of`, that lies in `part`.
-  void writeArray(const void* values, const IndexBox& of, const IndexBox& part) const {
-    for (int z = part.lo.z; z < part.hi.z; ++z) {
-      for (int y = part.lo.y; y < part.hi.y; ++y) {
-        const glm::ivec3 at(part.lo.x, y, z);
-        writeRow(piece_.block->type, values, piece_.format, piece_.values, of.position(at),
-                 static_cast<std::size_t>(part.size().x),
-                 to_ + box_.position(at) * texelBytes(piece_.format));
-      }
-    }
-  }
-  /// Writes the stored values in `part`, which is a few rows of a few slices.
-  void writeStored(const IndexBox& part) const {
-    const Block& block = *piece_.block;
-    if (block.isPacked()) return writeArray(block.data, block.stored(), part);
-    const Tiling tiles = block.tilesOf(part);
-    TileBuffer buffer;
-    for (std::size_t i = 0; i < tiles.count(); ++i) {
-      const IndexBox tile = tiles[i];
-      block.copyTo(tile, buffer.bytes.data());
-      writeArray(buffer.bytes.data(), tile, tile);
-    }
-  }
-
- private:
-  const VolumePiece& piece_;
-  IndexBox box_;
-  std::byte* to_;
-};
-
 /// Writes texels of `box`, in the block's indices, tightly packed: the stored values, covered by the patches.
 void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
   const Block& block = *piece.block;
-  const TexelBox texels(piece, box, to);
+  const std::uint64_t bytes = texelBytes(piece.format);
   std::vector<const Patch*> patches;
   for (const Patch& patch : block.patchList()) {
     if (!patch.box.intersection(box).empty()) patches.push_back(&patch);
   }
-  // Threads take whole bars of rows and slices, so that no tile is divided.
-  constexpr int side = Tiling::side;
-  const glm::ivec3 size = box.size();
-  const auto along = static_cast<std::size_t>((size.y + side - 1) / side);
-  const auto bars = along * static_cast<std::size_t>((size.z + side - 1) / side);
-  constexpr std::size_t atOnce = 1 << 20;  // bytes
-  const std::size_t barBytes = static_cast<std::size_t>(size.x) * side * side * texelBytes(piece.format);
-  inParallel(bars, atOnce / barBytes + 1, [&](std::size_t first, std::size_t last) {
+  // Writes the part of an array of values, of the box `of`, that lies in `part`.
+  const auto writeArray = [&](const void* values, const IndexBox& of, const IndexBox& part) {
+    for (int z = part.lo.z; z < part.hi.z; ++z) {
+      for (int y = part.lo.y; y < part.hi.y; ++y) {
+        const glm::ivec3 at(part.lo.x, y, z);
+        writeRow(block.type, values, piece.format, piece.values, of.position(at),
+                 static_cast<std::size_t>(part.size().x), to + box.position(at) * bytes);
+      }
+    }
+  };
+  const Tiling tiles = block.tilesOf(box);
+  constexpr std::size_t minimum = 64;  // these take some 100 us
+  inParallel(tiles.count(), minimum, [&](std::size_t first, std::size_t last) {
+    TileBuffer buffer;
     for (std::size_t i = first; i < last; ++i) {
-      const glm::ivec3 lo =
-          box.lo + side * glm::ivec3(0, static_cast<int>(i % along), static_cast<int>(i / along));
-      const IndexBox bar{lo, glm::min(box.hi, lo + glm::ivec3(size.x, side, side))};
-      const IndexBox stored = block.stored().intersection(bar);
-      if (!stored.empty()) texels.writeStored(stored);
+      const IndexBox tile = tiles[i];
+      const IndexBox stored = block.stored().intersection(tile);
+      if (!stored.empty() && block.isPacked()) {
+        writeArray(block.data, block.stored(), stored);
+      } else if (!stored.empty()) {
+        block.copyTo(stored, buffer.bytes.data());
+        writeArray(buffer.bytes.data(), stored, stored);
+      }
       for (const Patch* patch : patches) {
-        const IndexBox part = patch->box.intersection(bar);
-        if (!part.empty()) texels.writeArray(patch->values.get(), patch->box, part);
+        const IndexBox part = patch->box.intersection(tile);
+        if (!part.empty()) writeArray(patch->values.get(), patch->box, part);
       }
     }
   });

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <new>
+#include <vector>
+
 #include "vdi/core/Error.h"
 #include "vdi/gpu/DeviceCandidate.h"
 #include "vdi/gpu/Instance.h"
@@ -55,8 +58,11 @@ VkDevice makeDevice(const DeviceCandidate& chosen) {
 
 }  // namespace
 
-VulkanDevice::VulkanDevice(const Instance& instance, const DeviceCandidate& chosen)
-    : name_(chosen.summary.name), device_(makeDevice(chosen)) {
+VulkanDevice::VulkanDevice(const Instance& instance, const DeviceCandidate& chosen,
+                           const std::string& cacheFolder)
+    : name_(chosen.summary.name),
+      device_(makeDevice(chosen)),
+      cacheFile_(cacheFolder, pipelineCacheKeyOf(chosen.handle)) {
   queue(QueueKind::Compute).family = chosen.computeFamily;
   queue(QueueKind::Transfer).family = chosen.transferFamily;
   vkGetPhysicalDeviceMemoryProperties(chosen.handle, &memory_);
@@ -86,14 +92,30 @@ void VulkanDevice::setUp() {
     vkGetDeviceQueue(device_, queue.family, 0, &queue.handle);
     check(vkCreateSemaphore(device_, &semaphoreInfo, nullptr, &queue.done), "vkCreateSemaphore");
   }
-  const VkPipelineCacheCreateInfo cacheInfo{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO, nullptr, 0, 0,
-                                            nullptr};
+  const std::vector<std::byte> cached = cacheFile_.read();
+  cachedBytes_ = cached.size();
+  const VkPipelineCacheCreateInfo cacheInfo{VK_STRUCTURE_TYPE_PIPELINE_CACHE_CREATE_INFO, nullptr, 0,
+                                            cached.size(), cached.data()};
   check(vkCreatePipelineCache(device_, &cacheInfo, nullptr, &cache_), "vkCreatePipelineCache");
 }
 
 VulkanDevice::~VulkanDevice() {
   vkDeviceWaitIdle(device_);
+  if (!lost_) saveCache();
   release();
+}
+
+/// Keeps compiled shaders if there are others than those that the file had.
+void VulkanDevice::saveCache() const noexcept {
+  try {
+    std::size_t bytes = 0;
+    if (vkGetPipelineCacheData(device_, cache_, &bytes, nullptr) != VK_SUCCESS || bytes == cachedBytes_)
+      return;
+    std::vector<std::byte> data(bytes);
+    if (vkGetPipelineCacheData(device_, cache_, &bytes, data.data()) == VK_SUCCESS)
+      cacheFile_.write(std::span(data).first(bytes));
+  } catch (const std::bad_alloc&) {  // the next run compiles again
+  }
 }
 
 void VulkanDevice::release() noexcept {

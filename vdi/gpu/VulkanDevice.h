@@ -13,6 +13,7 @@
 #include <string>
 
 #include "vdi/gpu/CompiledPipeline.h"
+#include "vdi/gpu/PipelineCacheFile.h"
 
 namespace vdi::gpu {
 
@@ -26,8 +27,9 @@ enum class QueueKind { Compute, Transfer };
 class VulkanDevice {
  public:
   /// Opens the device with every feature that the candidate's limits and Device::create promise. The instance
-  /// must outlive it. Throws Error{DeviceUnavailable} if the device cannot be opened.
-  VulkanDevice(const Instance& instance, const DeviceCandidate& chosen);
+  /// must outlive it. Compiled shaders come from the cache's folder, and go there at the end. Throws
+  /// Error{DeviceUnavailable} if the device cannot be opened.
+  VulkanDevice(const Instance& instance, const DeviceCandidate& chosen, const std::string& cacheFolder);
   ~VulkanDevice();  // waits until the device is idle
   VulkanDevice(const VulkanDevice&) = delete;
   VulkanDevice& operator=(const VulkanDevice&) = delete;
@@ -81,6 +83,7 @@ class VulkanDevice {
   const Queue& queue(QueueKind kind) const { return queues_[static_cast<std::size_t>(kind)]; }
   Queue& queue(QueueKind kind) { return queues_[static_cast<std::size_t>(kind)]; }
   void setUp();
+  void saveCache() const noexcept;
   void release() noexcept;
   void setNameOf(VkObjectType type, std::uint64_t handle, const std::string& name) const;
   void checkForLoss(VkResult result, const char* call) const;
@@ -90,6 +93,8 @@ class VulkanDevice {
   std::array<Queue, 2> queues_;  // by kind
   std::mutex queueMutex_;
   mutable std::atomic<bool> lost_ = false;
+  PipelineCacheFile cacheFile_;
+  std::size_t cachedBytes_ = 0;  // that the file had
   VkPipelineCache cache_ = VK_NULL_HANDLE;
   CompiledPipelines compiled_;
   VkPhysicalDeviceMemoryProperties memory_{};

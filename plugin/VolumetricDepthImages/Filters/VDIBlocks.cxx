@@ -84,10 +84,11 @@ Memory memoryOf(vtkDataArray* array, const glm::ivec3& counts) {
   }
   const auto scalar = static_cast<std::int64_t>(vdi::sizeOf(*type));
   const int components = owner->GetNumberOfComponents();
-  return {{static_cast<const std::byte*>(owner->GetVoidPointer(0)),
-           vdi::packedStrides(counts, vdi::sizeOf(*type)) * std::int64_t{components}, *type, components, scalar},
-          glm::dvec3(0.0),
-          owner};
+  return {
+      {static_cast<const std::byte*>(owner->GetVoidPointer(0)),
+       vdi::packedStrides(counts, vdi::sizeOf(*type)) * std::int64_t{components}, *type, components, scalar},
+      glm::dvec3(0.0),
+      owner};
 }
 
 void requireComponent(vtkDataArray* array, int component) {
@@ -230,9 +231,8 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
   const bool isOne = memory.values.components == 1;
   vdi::showComponent(block, memory.values, isOne ? vdi::magnitude : choice.component);
   // The deleter's copy of the smart pointer keeps the array alive.
-  block.keepAlive = std::shared_ptr<const void>(block.data, [array = memory.owner](const void*) mutable {
-    array = nullptr;
-  });
+  block.keepAlive = std::shared_ptr<const void>(
+      block.data, [array = memory.owner](const void*) mutable { array = nullptr; });
   if (!blanking.masked.empty())
     block.masked = std::make_shared<std::vector<vdi::IndexBox>>(std::move(blanking.masked));
   for (const vdi::IndexBox& box : blanking.own) {

@@ -46,8 +46,8 @@ void requireInput(vtkDataObject* input);
 /// Returns this rank's blocks. `upstream` makes the input. Throws vdi::Error for an input without such
 /// blocks.
 Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin);
-/// Collective: fills in the load's array and voxel volume, and returns the bounds of all ranks' blocks. Throws
-/// vdi::Error on all ranks if there are blocks, but none with the array.
+/// Collective: fills in the load's array and voxel volume, and returns the bounds of all ranks' blocks.
+/// Throws vdi::Error on all ranks if there are blocks, but none with the array.
 vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* controller);
 
 }  // namespace pv

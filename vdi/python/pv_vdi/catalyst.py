@@ -129,7 +129,7 @@ class Catalyst:
         """The values of one named array: arrays[i] belongs to block i, and is None if the block lacks it. It is [z][y][x], or
         [z][y][x][component] for vectors, of which a run shows the magnitude unless told otherwise. Complex numbers are vectors
         of two. Values are of cells, or of points, of which a block has one more per axis. On staggered grids they lie `offset`
-        cells (x, y, z; -1 to 1) beside these.
+        cells (x, y, z; -0.5 to 0.5) beside these.
 
         Arrays are kept alive: change them in place between steps, or set others. They are used where they are, whatever their
         strides: slices, transposed ones, one field of several. Raises ValueError for a shape that the block doesn't have and

@@ -1,0 +1,44 @@
+// Compiled shaders on disk, for the next run.
+#pragma once
+
+#include <vulkan/vulkan.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace vdi::gpu {
+
+/// The driver and device whose data a file has. Another version's are another file's.
+struct PipelineCacheKey {
+  std::uint32_t vendor = 0;
+  std::uint32_t device = 0;
+  std::uint32_t driverVersion = 0;
+  std::array<std::uint8_t, VK_UUID_SIZE> cacheUuid{};
+  std::array<std::uint8_t, VK_UUID_SIZE> driverUuid{};
+};
+PipelineCacheKey pipelineCacheKeyOf(VkPhysicalDevice device);
+
+/// A file of `folder`. None of the functions throws: a cache that can't be read or written only costs time.
+/// Several processes may read and write at once: a reader finds one writer's whole data, or none.
+class PipelineCacheFile {
+ public:
+  /// An empty folder: there is no file.
+  PipelineCacheFile(std::string folder, const PipelineCacheKey& key);
+
+  /// Data for VkPipelineCacheCreateInfo. Empty unless the file is this user's own, whole, and the key's.
+  std::vector<std::byte> read() const noexcept;
+  /// Replaces the file, and makes the folder. Does nothing if `data` are nothing but Vulkan's header, as
+  /// drivers give that keep compiled shaders themselves, or not at all.
+  void write(std::span<const std::byte> data) const noexcept;
+
+ private:
+  std::string folder_;
+  std::string path_;
+  PipelineCacheKey key_;
+};
+
+}  // namespace vdi::gpu
