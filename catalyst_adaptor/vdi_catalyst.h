@@ -167,7 +167,9 @@ typedef struct vdi_catalyst_strides {
  * components = 1.
  *
  * Values are read where they are, in any layout: a run without scripts never copies them on the host, nor
- * does VolumetricDepthImage in a script. @OTHERS@ */
+ * does VolumetricDepthImage in a script. A filter of
+ * ParaView's that asks for a pointer to values in another layout than that of vdi_catalyst_set_array gets a
+ * copy, made then. */
 VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
                                                     int32_t association, int32_t components,
                                                     const void* const* data,

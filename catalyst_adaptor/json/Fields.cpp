@@ -1,5 +1,6 @@
 #include "catalyst_adaptor/json/Fields.h"
 
+#include <algorithm>
 #include <array>
 #include <stdexcept>
 #include <utility>
@@ -127,7 +128,10 @@ std::optional<bool> Fields::associationOf(const std::string& name) const {
 
 int Fields::componentsOf(const std::string& name, bool cells) const {
   const Array* array = find(name, cells);
-  return array != nullptr && !array->values.empty() ? array->values.front().components : 1;
+  if (array == nullptr) return 1;
+  const auto has = [](const StridedValues& values) { return values.first != nullptr; };
+  const auto found = std::ranges::find_if(array->values, has);
+  return found != array->values.end() ? found->components : 1;
 }
 
 Fields::Values Fields::valuesOf(const std::string& name, bool cells, int component) const {
@@ -138,7 +142,9 @@ Fields::Values Fields::valuesOf(const std::string& name, bool cells, int compone
                              "; the arrays are: " + names());
   }
   const int components = componentsOf(name, cells);
-  if (component == phase && components != 2) {
+  const bool isHere =
+      std::ranges::any_of(array->values, [](const StridedValues& values) { return values.first != nullptr; });
+  if (isHere && component == phase && components != 2) {
     throw std::runtime_error("a phase is of two components, real and imaginary; '" + name + "' has " +
                              std::to_string(components));
   }

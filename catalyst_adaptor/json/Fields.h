@@ -44,7 +44,7 @@ class Fields {
   /// The names of all arrays, for messages: "cells 'V', points 'p'".
   std::string names() const;
 
-  int componentsOf(const std::string& name, bool cells) const;  // 1 without blocks
+  int componentsOf(const std::string& name, bool cells) const;  // 1 without blocks that have it
   /// An array's values where the simulation has them, one for each block; null where a block lacks them.
   struct Values {
     int type = VDI_CATALYST_F64;

@@ -58,7 +58,7 @@ static int set(vdi_catalyst* catalyst, const char* name, int type, int component
                                         &strides);
 }
 
-static void set_arrays(vdi_catalyst* catalyst) {
+static void set_arrays(vdi_catalyst* catalyst, int rank) {
   const int f64 = VDI_CATALYST_F64;
   const void* data[] = {plain};
   expect("plain", 0, vdi_catalyst_set_array(catalyst, "plain", f64, VDI_CATALYST_CELLS, data));
@@ -71,6 +71,12 @@ static void set_arrays(vdi_catalyst* catalyst) {
   expect("padded", 0,
          set(catalyst, "padded", f64, 1, padded, SIZE, (NX + PAD) * SIZE, (NX + PAD) * NY * SIZE, 0));
   expect("z fastest", 0, set(catalyst, "z fastest", f64, 1, z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
+  expect("untouched", 0, set(catalyst, "untouched", f64, 1, z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
+  expect("partial", 0,
+         set(catalyst, "partial", f64, 1, rank == 1 ? NULL : z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
+  expect("shifted", 0, set(catalyst, "shifted", f64, 1, z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
+  const double offset[] = {-0.5, 0.0, 0.0};
+  expect("offset", 0, vdi_catalyst_set_array_offset(catalyst, "shifted", VDI_CATALYST_CELLS, offset));
   expect("with halo", 0,
          set(catalyst, "with halo", f64, 1, &with_halo[HALO][HALO][HALO], SIZE, (NX + 2 * HALO) * SIZE,
              (int64_t)(NX + 2 * HALO) * (NY + 2 * HALO) * SIZE, 0));
@@ -96,7 +102,6 @@ static void set_bad_arrays(vdi_catalyst* catalyst) {
   expect("components that overflow", bad, set(catalyst, "plain", f64, 3, plain, SIZE, SIZE, SIZE, INT64_MAX));
   expect("no components", bad, set(catalyst, "plain", f64, 0, plain, SIZE, SIZE, SIZE, 0));
   expect("too many components", bad, set(catalyst, "plain", f64, 17, plain, SIZE, SIZE, SIZE, 0));
-  expect("no data", bad, set(catalyst, "plain", f64, 1, NULL, SIZE, SIZE, SIZE, 0));
   const void* data[] = {plain};
   expect("no strides", bad,
          vdi_catalyst_set_array_strided(catalyst, "plain", f64, VDI_CATALYST_CELLS, 1, data, NULL));
@@ -117,7 +122,7 @@ int main(int argc, char** argv) {
   const vdi_catalyst_block block = {
       {NX, NY, NZ}, {0, 0, 0}, {0, 0, 0}, {(double)rank * NX, 0.0, 0.0}, {1.0, 1.0, 1.0}};
   expect("set_blocks", 0, vdi_catalyst_set_blocks(catalyst, 1, &block));
-  set_arrays(catalyst);
+  set_arrays(catalyst, rank);
   set_bad_arrays(catalyst);
   for (int step = 1; step <= 2; ++step) {
     simulate(rank, step);

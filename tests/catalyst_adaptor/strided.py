@@ -1,5 +1,5 @@
 """Compares the arrays of strided.c with one that has the same values in order, writes to the one that is used where it is, and
-makes a VDI of one that isn't."""
+makes VDIs of some, which are the same, without copies of their values."""
 
 import os
 
@@ -11,8 +11,15 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 _, compared = catalyst.get_args()  # --compare NAME
 grid = TrivialProducer(registrationName="grid")
 image = VolumetricDepthImage(Input=grid)
-image.SelectInputScalars = ["CELLS", "z fastest"]
+image.SelectInputScalars = ["CELLS", "untouched"]
 image.Resolution = [64, 48]
+others = {name: VolumetricDepthImage(Input=grid, Resolution=[64, 48]) for name in (compared, "partial", "shifted")}
+for name, other in others.items():
+    other.SelectInputScalars = ["CELLS", name]
+    other.CameraPosition, other.CameraFocalPoint = [60, 50, 70], [20, 8, 9]
+    other.LookupTable, other.ScalarOpacityFunction = GetColorTransferFunction("all"), GetOpacityTransferFunction("all")
+image.CameraPosition, image.CameraFocalPoint = [60, 50, 70], [20, 8, 9]
+image.LookupTable, image.ScalarOpacityFunction = GetColorTransferFunction("all"), GetOpacityTransferFunction("all")
 extractor = CreateExtractor("VDI", image, registrationName="vdi")
 extractor.Writer.FileName = "vdi_{timestep:06d}.vdi"
 options = catalyst.Options()
@@ -24,9 +31,26 @@ def check(name, values, wanted):
         raise RuntimeError("the array '%s' has %s, not %s" % (name, values[:5], wanted[:5]))
 
 
+def lists(filter):
+    """The VDI's arrays, which the first rank has."""
+    output = filter.GetClientSideObject().GetOutputDataObject(0)
+    fields = output.GetFieldData()
+    names = [fields.GetArrayName(i) for i in range(fields.GetNumberOfArrays())]
+    return {name: vtk_to_numpy(fields.GetArray(name)).tobytes() for name in names if name in ("VDI.offsets", "VDI.codes", "VDI.depthCode")}
+
+
 def catalyst_execute(info):
     grid.UpdatePipeline(info.time)
     block = grid.GetClientSideObject().GetOutputDataObject(0).GetPartition(0)
+    image.UpdatePipeline(info.time)
+    for other in others.values():
+        other.UpdatePipeline(info.time)
+    for name in ("untouched", "partial", "shifted"):
+        array = block.GetCellData().GetArray(name)
+        if array is not None and array.GetActualMemorySize() != 0:
+            raise RuntimeError("the filter has copied '%s'" % name)
+    if lists(image) != lists(others[compared]):
+        raise RuntimeError("the VDI differs from that of values in order")
 
     def values(name):
         return vtk_to_numpy(block.GetCellData().GetArray(name))
