@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <tuple>
@@ -144,6 +145,28 @@ std::vector<std::size_t> BoxTree::meeting(const Box& box) const {
   }
   std::sort(found.begin(), found.end());
   return found;
+}
+
+std::optional<std::size_t> BoxTree::containing(const glm::dvec3& point) const {
+  const auto holds = [&point](const Box& box) {
+    return glm::all(glm::lessThanEqual(box.lo, point)) && glm::all(glm::lessThan(point, box.hi));
+  };
+  // Each level halves the boxes, so few nodes are open at a time.
+  std::array<std::size_t, 2 * std::numeric_limits<std::size_t>::digits> open{};
+  std::size_t count = nodes_.empty() ? 0 : 1;
+  while (count > 0) {
+    const Node& node = nodes_[open[--count]];
+    if (!holds(node.bounds)) continue;
+    if (node.lower != 0) {
+      open[count++] = node.lower;
+      open[count++] = node.upper;
+      continue;
+    }
+    for (std::size_t i = node.first; i < node.last; ++i) {
+      if (holds(boxes_[order_[i]])) return order_[i];
+    }
+  }
+  return std::nullopt;
 }
 
 BlockDirectory::BlockDirectory(const Communicator& comm, std::span<const Block> mine, bool closeGaps) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -48,6 +49,8 @@ class BoxTree {
   explicit BoxTree(std::vector<Box> boxes);
   /// Indices of the boxes that meet `box`, faces included, ascending.
   std::vector<std::size_t> meeting(const Box& box) const;
+  /// Index of a box that contains the point, boxes being half-open; nullopt if there is none.
+  std::optional<std::size_t> containing(const glm::dvec3& point) const;
 
  private:
   struct Node {

@@ -31,6 +31,7 @@ _TYPES = {np.dtype(name): number
           for number, name in enumerate(["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64", "int64",
                                          "uint64"])}
 _POINTS, _CELLS = 0, 1
+_SUM, _DENSITY = 0, 1
 
 
 class CatalystError(RuntimeError):
@@ -62,6 +63,45 @@ class _Strides(ctypes.Structure):
     _fields_ = [("strides", ctypes.c_int64 * 3), ("component_stride", ctypes.c_int64)]
 
 
+class _Particles(ctypes.Structure):
+    _fields_ = [("count", ctypes.c_int64), ("kind", ctypes.c_int32), ("position_type", ctypes.c_int32),
+                ("positions", ctypes.c_void_p * 3), ("position_stride", ctypes.c_int64),
+                ("weights", ctypes.c_void_p), ("weight_stride", ctypes.c_int64),
+                ("lengths", ctypes.c_void_p), ("length_stride", ctypes.c_int64),
+                ("weight_type", ctypes.c_int32), ("length_type", ctypes.c_int32)]
+
+
+def _columns(positions):
+    """The columns x, y and z, which share type and stride."""
+    if isinstance(positions, np.ndarray):
+        if positions.ndim != 2 or positions.shape[1] != 3:
+            raise ValueError("positions are %s, not [particle][3]" % (positions.shape,))
+        columns = [positions[:, axis] for axis in range(3)]
+    else:
+        columns = [np.asarray(column) for column in positions]
+        if len(columns) != 3 or any(column.ndim != 1 for column in columns):
+            raise ValueError("positions are neither one array [particle][3] nor three of x, y and z")
+    if len({(column.dtype, column.shape, column.strides) for column in columns}) > 1:
+        raise ValueError("the columns of positions differ in type, length or stride")
+    return columns
+
+
+def _numbers(what, given, count):
+    """The array of one number for each particle, and its stride; 0 for one number for all."""
+    array = np.asarray(given)
+    if array.ndim > 1 or (array.ndim == 1 and len(array) != count):
+        raise ValueError("%s are %s, for %d particles" % (what, array.shape, count))
+    if array.dtype not in (np.dtype("float32"), np.dtype("float64")):
+        array = array.astype("float64") if array.ndim == 0 else array
+    return array, array.strides[0] if array.ndim == 1 else 0
+
+
+def _float_type(what, dtype):
+    if dtype not in (np.dtype("float32"), np.dtype("float64")):
+        raise ValueError("%s are %s; they may be float32 or float64" % (what, dtype))
+    return _TYPES[dtype]
+
+
 def _load():
     library = ctypes.CDLL(os.path.join(os.path.dirname(os.path.abspath(__file__)), LIBRARY))
     handle, text = ctypes.c_void_p, ctypes.c_char_p
@@ -71,6 +111,7 @@ def _load():
     library.vdi_catalyst_set_array_strided.argtypes = [
         handle, text, ctypes.c_int32, ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(_Strides)]
     library.vdi_catalyst_set_array_offset.argtypes = [handle, text, ctypes.c_int32, ctypes.c_double * 3]
+    library.vdi_catalyst_set_particles.argtypes = [handle, text, ctypes.POINTER(_Particles)]
     library.vdi_catalyst_wants.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_execute.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_parameter_f64.argtypes = [handle, text, ctypes.c_double, ctypes.c_double, ctypes.c_double]
@@ -160,6 +201,30 @@ class Catalyst:
         if offset is not None:
             self._check(self._library.vdi_catalyst_set_array_offset(
                 self._handle, name.encode(), association, (ctypes.c_double * 3)(*offset)))
+
+    def set_particles(self, name, positions, weights=None, lengths=None, density=False):
+        """Makes an array of cells of this rank's particles, which may lie in blocks of any rank: their weight in each cell, or
+        with `density` that divided by the cell's volume. `positions` is [particle][3], or three arrays x, y and z. `weights`
+        (1 unless given) and smoothing lengths `lengths` (cloud in cell unless given) are an array each, or a number for all.
+        vdi_catalyst.h has the rules.
+
+        Arrays are kept alive and used where they are: change them in place between steps, or set others when their number
+        changes. Raises ValueError for shapes that don't fit and for types other than float32 and float64."""
+        columns = _columns(positions)
+        count = len(columns[0])
+        made = _Particles(count, _DENSITY if density else _SUM, _float_type("positions", columns[0].dtype),
+                          (ctypes.c_void_p * 3)(*(column.ctypes.data for column in columns)), columns[0].strides[0])
+        kept = [columns]
+        if weights is not None:
+            array, made.weight_stride = _numbers("weights", weights, count)
+            made.weights, made.weight_type = array.ctypes.data, _float_type("weights", array.dtype)
+            kept.append(array)
+        if lengths is not None:
+            array, made.length_stride = _numbers("lengths", lengths, count)
+            made.lengths, made.length_type = array.ctypes.data, _float_type("lengths", array.dtype)
+            kept.append(array)
+        self._check(self._library.vdi_catalyst_set_particles(self._handle, name.encode(), made))
+        self._kept[name] = kept
 
     def wants(self, step, time=0.0):
         """Whether a script will do anything at this step, the same on all ranks; if not, there is no need to call execute."""

@@ -1,0 +1,325 @@
+#include "vdi/pipeline/ParticleRouting.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <numbers>
+
+namespace vdi::detail {
+
+namespace shared = gpu::shared;
+
+namespace {
+
+/// Faces, and cells of two blocks, that are this near to each other coincide, in cells.
+constexpr double coincidence = 1e-6;
+
+/// A particle that meets more cells of a block than this is sent in layers, so that no invocation runs long.
+constexpr double mostCells = 1 << 20;
+
+constexpr double farthestCell = 1 << 30;
+
+double volumeOf(const Box& box) {
+  const glm::dvec3 size = box.size();
+  return size.x * size.y * size.z;
+}
+
+double largestOf(const glm::dvec3& v) {
+  return std::max({v.x, v.y, v.z});
+}
+
+/// The cubic spline in three dimensions, times h^3 (vdi/core/Particles.h).
+double splineAt(double q) {
+  const double outer = std::max(2.0 - q, 0.0);
+  const double inner = std::max(1.0 - q, 0.0);
+  return (0.25 * outer * outer * outer - inner * inner * inner) / std::numbers::pi;
+}
+
+/// The length that two intervals share.
+double overlap(double lo, double hi, double otherLo, double otherHi) {
+  return std::max(std::min(hi, otherHi) - std::max(lo, otherLo), 0.0);
+}
+
+}  // namespace
+
+/// Indices count parts of cells from the block's lower corner.
+struct ParticleRouting::Cells {
+  glm::ivec3 parts{1};  // of a cell, per axis
+  glm::dvec3 spacing;   // of the parts
+  glm::dvec3 at;        // the particle's position
+  glm::dvec3 reach;     // of the particle
+  IndexBox all;         // parts that the particle meets, inside the block or not
+  IndexBox stored;      // those inside
+
+  Cells(const Spread& spread, const Place& place) {
+    if (spread.h > 0.0) {
+      parts = glm::ivec3(glm::clamp(glm::round(place.spacing / spread.owner->spacing), glm::dvec3(1.0),
+                                    glm::dvec3(mostKernelParts)));
+    }
+    spacing = place.spacing / glm::dvec3(parts);
+    at = (spread.position - place.lower) / spacing;
+    reach = spread.bounds().size() * 0.5 / spacing;
+    const glm::dvec3 limit(farthestCell);
+    all = {glm::ivec3(glm::clamp(glm::floor(at - reach), -limit, limit)),
+           glm::ivec3(glm::clamp(glm::floor(at + reach), -limit, limit)) + 1};
+    stored = all.intersection({glm::ivec3(0), place.cells * parts});
+  }
+  /// How many parts the particle meets; a double, because a long kernel's number exceeds 64 bits.
+  double count() const {
+    const glm::dvec3 size(all.size());
+    return size.x * size.y * size.z;
+  }
+  /// Cells that lie in `all`, in the world.
+  Box box(const Place& place) const {
+    return {place.lower + glm::dvec3(all.lo) * spacing, place.lower + glm::dvec3(all.hi) * spacing};
+  }
+};
+
+ParticleRouting::ParticleRouting(const comm::Communicator& comm, const std::vector<Block>& mine)
+    : directory_(comm, mine, false) {
+  comm.together([&] {
+    Box all;
+    for (const comm::BlockEntry& entry : directory_.entries()) {
+      places_.push_back(
+          {entry.origin - 0.5 * entry.spacing, entry.spacing, entry.dims, entry.rank, entry.block});
+      all.include(entry.owned);
+    }
+    constexpr double flat = 1e6;
+    longest_ = flat * glm::length(all.size());
+  });
+  findOwned(comm);
+  comm.together([&] {
+    findLattices();
+    findNear();
+  });
+}
+
+/// Each rank finds what its own blocks own, and tells the others.
+void ParticleRouting::findOwned(const comm::Communicator& comm) {
+  const std::vector<comm::OwnParts> parts = comm::settleOverlaps(comm, directory_);
+  std::vector<OwnedBox> mine;
+  comm.together([&] {
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      for (const Box& box : parts[i].boxes) mine.push_back({box, directory_.firstMine() + i});
+    }
+  });
+  const comm::Gathered all = comm.allGather(std::as_bytes(std::span(mine)), sizeof(OwnedBox));
+  comm.together([&] {
+    owned_.resize(all.bytes.size() / sizeof(OwnedBox));
+    if (!owned_.empty()) std::memcpy(owned_.data(), all.bytes.data(), all.bytes.size());
+    std::vector<Box> boxes;
+    for (const OwnedBox& one : owned_) {
+      places_[one.place].owned.push_back(one.box);
+      boxes.push_back(one.box);
+    }
+    ownedTree_ = std::make_unique<comm::BoxTree>(std::move(boxes));
+  });
+}
+
+/// Blocks that are found to be of different lattices, although they coincide, only cost time.
+void ParticleRouting::findLattices() {
+  using Key = std::array<double, 6>;
+  std::map<Key, std::size_t> lattices;
+  for (Place& place : places_) {
+    Key key{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<std::size_t>(axis);
+      key[i] = static_cast<double>(static_cast<float>(place.spacing[axis]));
+      const double cells = (place.lower[axis] - places_.front().lower[axis]) / place.spacing[axis];
+      // From above -1/2 to 1/2 of a cell, since both ends are the same place.
+      key[i + 3] = std::round((cells - std::ceil(cells - 0.5)) / (2.0 * coincidence));
+    }
+    place.lattice = lattices.try_emplace(key, lattices.size()).first->second;
+  }
+}
+
+void ParticleRouting::findNear() {
+  for (Place& place : places_) {
+    Box around;
+    for (const Box& box : place.owned) around.include(box);
+    if (around.empty()) continue;
+    place.near = directory_.meeting({around.lo - 0.5 * place.spacing, around.hi + 0.5 * place.spacing});
+  }
+}
+
+std::vector<std::size_t> ParticleRouting::placesIn(const Box& box) const {
+  return directory_.meeting(box);
+}
+
+void ParticleRouting::route(const Particles& particles, std::size_t first, std::size_t last, int exponent,
+                            std::vector<RoutedParticle>& routed, ParticleCounts& counts) const {
+  for (std::size_t i = first; i < last; ++i) {
+    const std::optional<Spread> spread = spreadOf(particles, i, counts);
+    if (spread) send(*spread, exponent, routed);
+  }
+}
+
+/// Returns nullopt for a particle that is left out.
+std::optional<ParticleRouting::Spread> ParticleRouting::spreadOf(const Particles& particles,
+                                                                 std::size_t index,
+                                                                 ParticleCounts& counts) const {
+  ++counts.given;
+  Spread spread{
+      nullptr,
+      {particles.positions[0].at(index), particles.positions[1].at(index), particles.positions[2].at(index)},
+      particles.weights ? particles.weights.at(index) : 1.0,
+      0.0};
+  const glm::dvec3& p = spread.position;
+  if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z) || !std::isfinite(spread.weight)) {
+    ++counts.notFinite;
+    return std::nullopt;
+  }
+  const std::optional<std::size_t> found = ownedTree_->containing(p);
+  if (!found) {
+    ++counts.outside;
+    return std::nullopt;
+  }
+  spread.owner = &places_[owned_[*found].place];
+  if (!particles.lengths) return spread;
+  const double h = particles.lengths.at(index);
+  if (!std::isfinite(h) || !(h > 0.0)) {
+    ++counts.badLength;
+  } else if (h >= shortestKernel * largestOf(spread.owner->spacing)) {
+    spread.h = std::min(h, longest_);
+  }
+  return spread;
+}
+
+/// Whether the particle meets only cells of its owner's lattice, all of them owned by some block.
+bool ParticleRouting::isWithinOneLattice(const Spread& spread, std::span<const std::size_t> places) const {
+  const Place& owner = *spread.owner;
+  const Box met = Cells(spread, owner).box(owner);
+  const glm::dvec3 slack = coincidence * owner.spacing;
+  bool isAlone = true;
+  double covered = 0.0;
+  for (const std::size_t i : places) {
+    const Place& place = places_[i];
+    const Box common = place.stored().intersection(met);
+    if (!glm::all(glm::greaterThan(common.hi - common.lo, slack))) continue;
+    if (place.lattice != owner.lattice) return false;
+    isAlone = isAlone && &place == &owner;
+    for (const Box& box : place.owned) covered += volumeOf(box.intersection(met));
+  }
+  if (isAlone && owner.owned.size() == 1) {
+    const Box& box = owner.owned.front();
+    return glm::all(glm::greaterThanEqual(met.lo, box.lo - slack)) &&
+           glm::all(glm::lessThanEqual(met.hi, box.hi + slack));
+  }
+  return covered >= (1.0 - coincidence) * volumeOf(met);
+}
+
+/// The sum of the particle's shares over all owned cells.
+double ParticleRouting::sumOf(const Spread& spread, std::span<const std::size_t> places) const {
+  double sum = 0.0;
+  std::array<std::vector<double>, 3> shares;  // of each part, by its index in the range
+  for (const std::size_t i : places) {
+    const Place& place = places_[i];
+    const Cells cells(spread, place);
+    const IndexBox& range = cells.stored;
+    if (range.empty()) continue;
+    const glm::dvec3 step = spread.h > 0.0 ? cells.spacing / spread.h : glm::dvec3(1.0);
+    for (const Box& owned : place.owned) {
+      if (!cells.box(place).intersection(owned).empty()) {
+        for (int axis = 0; axis < 3; ++axis) {
+          std::vector<double>& along = shares[static_cast<std::size_t>(axis)];
+          along.clear();
+          for (int part = range.lo[axis]; part < range.hi[axis]; ++part) {
+            // The share of the part's cell that is owned; a cloud has one part a cell.
+            const double lower =
+                place.lower[axis] + (part / cells.parts[axis]) * place.spacing[axis];  // rounds down: >= 0
+            double share = overlap(lower, lower + place.spacing[axis], owned.lo[axis], owned.hi[axis]) /
+                           place.spacing[axis];
+            if (!(spread.h > 0.0)) {
+              share *= overlap(part, part + 1.0, cells.at[axis] - cells.reach[axis],
+                               cells.at[axis] + cells.reach[axis]) /
+                       (2.0 * cells.reach[axis]);
+            }
+            along.push_back(share);
+          }
+        }
+        if (!(spread.h > 0.0)) {
+          double product = 1.0;
+          for (const std::vector<double>& along : shares) {
+            double total = 0.0;
+            for (const double share : along) total += share;
+            product *= total;
+          }
+          sum += product;
+          continue;
+        }
+        double total = 0.0;
+        for (int z = range.lo.z; z < range.hi.z; ++z) {
+          const double shareZ = shares[2][static_cast<std::size_t>(z - range.lo.z)];
+          for (int y = range.lo.y; y < range.hi.y; ++y) {
+            const double shareYZ = shareZ * shares[1][static_cast<std::size_t>(y - range.lo.y)];
+            if (!(shareYZ > 0.0)) continue;
+            for (int x = range.lo.x; x < range.hi.x; ++x) {
+              const glm::dvec3 away = (glm::dvec3(x, y, z) + 0.5 - cells.at) * step;
+              total +=
+                  shareYZ * shares[0][static_cast<std::size_t>(x - range.lo.x)] * splineAt(glm::length(away));
+            }
+          }
+        }
+        sum += total * step.x * step.y * step.z;
+      }
+    }
+  }
+  return sum;
+}
+
+void ParticleRouting::send(Spread spread, int exponent, std::vector<RoutedParticle>& routed) const {
+  std::vector<std::size_t> found;
+  if (spread.h > 0.0) found = placesIn(spread.bounds());
+  std::span<const std::size_t> places = spread.h > 0.0 ? std::span(found) : std::span(spread.owner->near);
+  double sum = 1.0;
+  bool isSummed = spread.h > 0.0 && Cells(spread, *spread.owner).count() > mostCells;
+  if (isSummed || !isWithinOneLattice(spread, places)) {
+    isSummed = true;
+    sum = sumOf(spread, places);
+    if (spread.h > 0.0 && sum < leastKernelSum) {
+      spread.h = 0.0;
+      places = spread.owner->near;
+      sum = isWithinOneLattice(spread, places) ? 1.0 : sumOf(spread, places);
+    }
+  }
+  for (const std::size_t i : places) {
+    const Place& place = places_[i];
+    const Cells cells(spread, place);
+    if (cells.stored.empty()) continue;
+    const glm::dvec3 cell = glm::floor(cells.at);
+    double weight = spread.weight / sum;
+    RoutedParticle one{};
+    one.rank = place.rank;
+    shared::DepositParticle& particle = one.particle;
+    if (!(spread.h > 0.0)) {
+      particle.mode = shared::depositModeCloud;
+      particle.size = glm::vec3(2.0 * cells.reach);
+    } else {
+      const glm::dvec3 step = cells.spacing / spread.h;
+      particle.size = glm::vec3(step);
+      particle.mode = isSummed ? shared::depositModeShares : shared::depositModeKernel;
+      // A hidden cell that is larger than its parts allow must not exceed the sums' range.
+      constexpr double most = 64.0;
+      if (isSummed) weight *= std::min(step.x * step.y * step.z / std::numbers::pi, most);
+    }
+    particle.cellX = static_cast<int>(cell.x);
+    particle.cellY = static_cast<int>(cell.y);
+    particle.cellZ = static_cast<int>(cell.z);
+    particle.within = glm::vec3(cells.at - cell);
+    particle.weight = static_cast<float>(std::ldexp(weight, exponent));
+    const glm::uvec3 parts(cells.parts - 1);
+    particle.parts = parts.x | parts.y << 10U | parts.z << 20U;
+    particle.block = static_cast<std::uint32_t>(place.block);
+    const glm::dvec3 size(cells.stored.size());
+    const int layers = static_cast<int>(std::clamp(mostCells / (size.x * size.y), 1.0, size.z));
+    for (int z = cells.stored.lo.z; z < cells.stored.hi.z; z += layers) {
+      particle.firstZ = z;
+      particle.lastZ = std::min(z + layers, cells.stored.hi.z);
+      routed.push_back(one);
+    }
+  }
+}
+
+}  // namespace vdi::detail

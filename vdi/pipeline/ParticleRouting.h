@@ -1,0 +1,85 @@
+// Finds the blocks on which each particle is deposited. Not part of the library's interface.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "shaders/shared/deposit.h"
+#include "vdi/comm/BlockDirectory.h"
+#include "vdi/comm/Communicator.h"
+#include "vdi/core/Block.h"
+#include "vdi/core/Particles.h"
+
+namespace vdi::detail {
+
+/// A particle on its way to a block.
+struct RoutedParticle {
+  std::int32_t rank;
+  gpu::shared::DepositParticle particle;
+};
+
+/// The places of all ranks' blocks, as every rank knows them.
+class ParticleRouting {
+ public:
+  /// Collective. Throws as comm::settleOverlaps does.
+  ParticleRouting(const comm::Communicator& comm, const std::vector<Block>& mine);
+
+  /// Appends an entry for each particle of [first, last) and each block that it meets, and counts particles
+  /// that are left out. Weights are multiplied by 2^`exponent`. Several threads may call it at once.
+  void route(const Particles& particles, std::size_t first, std::size_t last, int exponent,
+             std::vector<RoutedParticle>& routed, ParticleCounts& counts) const;
+
+ private:
+  /// A block of any rank.
+  struct Place {
+    glm::dvec3 lower;  // corner of the first stored cell
+    glm::dvec3 spacing;
+    glm::ivec3 cells;
+    std::int32_t rank;
+    std::int32_t block;               // index on its rank
+    std::size_t lattice = 0;          // equal for blocks whose cells continue each other
+    std::vector<Box> owned{};         // disjoint
+    std::vector<std::size_t> near{};  // places that a cloud around a position in `owned` may meet
+
+    Box stored() const { return {lower, lower + glm::dvec3(cells) * spacing}; }
+  };
+  /// How a particle spreads.
+  struct Spread {
+    const Place* owner;
+    glm::dvec3 position;
+    double weight;
+    double h;  // 0: cloud in cell
+
+    Box bounds() const {
+      const glm::dvec3 reach = h > 0.0 ? glm::dvec3(2.0 * h) : 0.5 * owner->spacing;
+      return {position - reach, position + reach};
+    }
+  };
+  /// A block's cells, or their equal parts, around a particle.
+  struct Cells;
+
+  void findOwned(const comm::Communicator& comm);
+  void findLattices();
+  void findNear();
+  std::optional<Spread> spreadOf(const Particles& particles, std::size_t index, ParticleCounts& counts) const;
+  std::vector<std::size_t> placesIn(const Box& box) const;
+  bool isWithinOneLattice(const Spread& spread, std::span<const std::size_t> places) const;
+  double sumOf(const Spread& spread, std::span<const std::size_t> places) const;
+  void send(Spread spread, int exponent, std::vector<RoutedParticle>& routed) const;
+
+  struct OwnedBox {
+    Box box;
+    std::uint64_t place;
+  };
+  comm::BlockDirectory directory_;
+  std::vector<Place> places_;  // as the directory's entries
+  std::vector<OwnedBox> owned_;
+  std::unique_ptr<comm::BoxTree> ownedTree_;  // of owned_
+  double longest_ = 0.0;                      // beyond this h the kernel is flat over all blocks
+};
+
+}  // namespace vdi::detail
