@@ -12,6 +12,7 @@
 #include <type_traits>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "vdi/core/Error.h"
 
 namespace vdi::catalyst {
 
@@ -44,6 +45,23 @@ int guarded(Calls& self, int code, Work work, std::optional<std::int64_t> step =
     failure = "an unknown exception";
   }
   return conclude(self, failure ? code : VDI_CATALYST_OK, failure.value_or(""), step);
+}
+
+/// Like `guarded`, for work that fails on all ranks together. Ranks that fail because of another rank report
+/// nothing.
+template <typename Work>
+int guardedTogether(Calls& self, int code, Work work, std::optional<std::int64_t> step = std::nullopt) {
+  return guarded(
+      self, code,
+      [&]() -> std::optional<std::string> {
+        try {
+          work();
+          return std::nullopt;
+        } catch (const Error& error) {
+          return error.code() == ErrorCode::RemoteRank ? "" : error.what();
+        }
+      },
+      step);
 }
 
 /// Throws std::invalid_argument with the text `what` unless `good`.

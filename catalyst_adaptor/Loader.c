@@ -191,6 +191,17 @@ int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name, int3
   return code;
 }
 
+int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
+                               const vdi_catalyst_particles* particles) {
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
+  fenv_t floating_point;
+  feholdexcept(&floating_point);
+  const int code = engine->set_particles(catalyst, name, particles);
+  fesetenv(&floating_point);
+  return code;
+}
+
 int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
   const vdi_catalyst_functions* engine = functions_of(catalyst);
   if (engine == NULL) return 0;

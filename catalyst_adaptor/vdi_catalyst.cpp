@@ -34,6 +34,7 @@
 #include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/Engine.h"
 #include "catalyst_adaptor/Parameters.h"
+#include "catalyst_adaptor/ParticleArrays.h"
 #include "catalyst_adaptor/ScriptEnvironment.h"
 #include "catalyst_adaptor/StridedArray.h"
 #include "catalyst_adaptor/StridedDataArray.h"
@@ -50,12 +51,18 @@ struct vdi_catalyst : vdi::catalyst::Calls {
   };
   std::map<std::pair<int, std::string>, Array> arrays;
   std::map<std::pair<int, std::string>, glm::dvec3> offsets;  // in cells; none: 0
+  std::vector<vdi_catalyst_block> blocks;
+  std::uint64_t blocksVersion = 0;  // changes with the blocks; equal on all ranks
+  std::map<std::string, vdi::catalyst::ParticleArray> particles;     // of the same names on all ranks
+  std::map<std::string, vdi::catalyst::Deposits::Values> deposited;  // the memory of arrays made of them
+  std::unique_ptr<vdi::catalyst::DeviceDeposits> deposits;
 };
 
 namespace {
 
 using vdi::catalyst::checkBlock;
 using vdi::catalyst::guarded;
+using vdi::catalyst::guardedTogether;
 using vdi::catalyst::isStep;
 using vdi::catalyst::require;
 using vdi::catalyst::requireEqual;
@@ -353,7 +360,40 @@ int setAnyArray(vdi_catalyst& self, const char* name, int type, int association,
   if (code != VDI_CATALYST_OK) return code;
   putIntoGrid(self, name, association, made);
   self.arrays[{association, name}] = std::move(array);
+  if (association == VDI_CATALYST_CELLS) {
+    self.particles.erase(name);
+    self.deposited.erase(name);
+  }
   return code;
+}
+
+/// Makes the arrays of all particles. Collective.
+void depositAll(vdi_catalyst& self, std::int64_t step) {
+  if (!self.deposits)
+    self.deposits = std::make_unique<vdi::catalyst::DeviceDeposits>(MPI_Comm_c2f(self.comm));
+  for (const auto& [name, particles] : self.particles) {
+    vdi::catalyst::Deposits::Values values =
+        self.deposits->make(name, particles, self.blocksVersion, self.blocks, step);
+    for (unsigned int i = 0; i < self.grid->GetNumberOfPartitions(); ++i) {
+      vtkDataSet* image = self.grid->GetPartition(i);
+      const auto inOrder = stridedValues(*image, VDI_CATALYST_F32, VDI_CATALYST_CELLS, 1, values[i].get(),
+                                         stridesInOrder(*image, VDI_CATALYST_F32, VDI_CATALYST_CELLS));
+      image->GetCellData()->AddArray(newArray(name.c_str(), VDI_CATALYST_F32, inOrder,
+                                              offsetOf(self, name.c_str(), VDI_CATALYST_CELLS)));
+    }
+    // This comes last, because until now the grid has used the memory that is replaced here.
+    self.deposited[name] = std::move(values);
+  }
+}
+
+/// Makes the arrays of all particles if a script will do anything at the step.
+int depositIfWanted(vdi_catalyst& self, std::int64_t step, double time) {
+  if (self.particles.empty()) return VDI_CATALYST_OK;
+  int wanted = self.engine->wants(static_cast<int>(step), time) ? 1 : 0;
+  MPI_Allreduce(MPI_IN_PLACE, &wanted, 1, MPI_INT, MPI_MAX, self.comm);
+  if (wanted == 0) return VDI_CATALYST_OK;
+  return guardedTogether(
+      self, VDI_CATALYST_SCRIPT, [&] { depositAll(self, step); }, step);
 }
 
 /// `given`: the files alone, or with arguments.
@@ -427,6 +467,10 @@ int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_cat
   catalyst->grid = grid;
   catalyst->arrays.clear();
   catalyst->offsets.clear();
+  catalyst->blocks.assign(blocks, blocks + count);
+  ++catalyst->blocksVersion;
+  catalyst->particles.clear();
+  catalyst->deposited.clear();
   catalyst->haveBlocks = true;
   return code;
 }
@@ -468,6 +512,31 @@ int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name, int3
   return code;
 }
 
+int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
+                               const vdi_catalyst_particles* particles) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const vdi::catalyst::PythonLock lock;
+  vdi::catalyst::ParticleArray array;
+  int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(catalyst->haveBlocks, "particles were given before blocks");
+    require(name != nullptr && *name != '\0', "an array needs a name");
+    array = vdi::catalyst::particleArrayOf(particles);
+  });
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+      requireEqual(catalyst->comm, vdi::catalyst::identityOf(name, array.kind),
+                   "the ranks give particles of different names or kinds");
+    });
+  }
+  if (code != VDI_CATALYST_OK) return code;
+  for (unsigned int i = 0; i < catalyst->grid->GetNumberOfPartitions(); ++i)
+    catalyst->grid->GetPartition(i)->GetCellData()->RemoveArray(name);
+  catalyst->arrays.erase({VDI_CATALYST_CELLS, name});
+  catalyst->deposited.erase(name);
+  catalyst->particles[name] = array;
+  return code;
+}
+
 int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return 0;
   const vdi::catalyst::PythonLock lock;
@@ -486,6 +555,8 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
         *catalyst, VDI_CATALYST_BAD_ARGUMENT,
         [&] { requireEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
   }
+  if (code != VDI_CATALYST_OK) return code;
+  code = depositIfWanted(*catalyst, step, time);
   if (code != VDI_CATALYST_OK) return code;
   const int result = guarded(
       *catalyst, VDI_CATALYST_SCRIPT,
@@ -516,6 +587,7 @@ int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
   const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(), nullptr));
   int code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { return self->engine->finish(); });
   self->grid = nullptr;
+  self->deposits.reset();
   const int ended = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine.reset(); });
   if (code == VDI_CATALYST_OK) code = ended;
   MPI_Comm_free(&self->comm);

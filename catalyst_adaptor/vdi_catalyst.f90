@@ -2,9 +2,11 @@
 ! the documentation. The handle is a type(c_ptr), strings end with c_null_char, arrays of pointers are arrays of
 ! c_loc(...).
 module vdi_catalyst
-  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int32_t, c_int64_t, c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int32_t, c_int64_t, c_null_ptr, c_ptr, &
+    c_size_t
   implicit none
-  private :: c_char, c_double, c_f_pointer, c_int, c_int32_t, c_int64_t, c_ptr, c_size_t
+  private :: c_char, c_double, c_f_pointer, c_int, c_int32_t, c_int64_t, c_null_ptr, c_ptr, &
+    c_size_t
   private :: error_in_c, length_in_c
 
   enum, bind(c)
@@ -45,6 +47,24 @@ module vdi_catalyst
   type, bind(c) :: vdi_catalyst_strides
     integer(c_int64_t) :: strides(3) = 0
     integer(c_int64_t) :: component_stride = 0
+  end type
+
+  integer(c_int32_t), parameter :: vdi_catalyst_sum = 0
+  integer(c_int32_t), parameter :: vdi_catalyst_density = 1
+
+  ! Without weights or lengths, their pointers stay c_null_ptr.
+  type, bind(c) :: vdi_catalyst_particles
+    integer(c_int64_t) :: count = 0
+    integer(c_int32_t) :: kind = vdi_catalyst_sum
+    integer(c_int32_t) :: position_type = vdi_catalyst_f64
+    type(c_ptr) :: positions(3) = c_null_ptr
+    integer(c_int64_t) :: position_stride = 8
+    type(c_ptr) :: weights = c_null_ptr
+    integer(c_int64_t) :: weight_stride = 8
+    type(c_ptr) :: lengths = c_null_ptr
+    integer(c_int64_t) :: length_stride = 8
+    integer(c_int32_t) :: weight_type = vdi_catalyst_f64
+    integer(c_int32_t) :: length_type = vdi_catalyst_f64
   end type
 
   interface
@@ -108,6 +128,14 @@ module vdi_catalyst
       character(kind=c_char), intent(in) :: name(*)
       integer(c_int32_t), value :: association
       real(c_double), intent(in) :: offset(3)
+      integer(c_int) :: code
+    end function
+
+    function vdi_catalyst_set_particles(catalyst, name, particles) bind(c) result(code)
+      import :: c_char, c_int, c_ptr, vdi_catalyst_particles
+      type(c_ptr), value :: catalyst
+      character(kind=c_char), intent(in) :: name(*)
+      type(vdi_catalyst_particles), intent(in) :: particles
       integer(c_int) :: code
     end function
 

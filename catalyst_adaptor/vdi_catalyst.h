@@ -8,6 +8,7 @@
  *       feed = vdi_catalyst_parameter_f64(catalyst, "feed", 0.037, 0.0, 0.1);     viewers may change it
  *       vdi_catalyst_set_blocks(catalyst, count, blocks);          when the blocks or their pointers change
  *       vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_POINTS, data);
+ *       vdi_catalyst_set_particles(catalyst, "density", &particles);     makes an array of cells of them
  *       if (vdi_catalyst_wants(catalyst, step, time))               or at each step
  *         vdi_catalyst_execute(catalyst, step, time);
  *     }
@@ -18,7 +19,8 @@
  * message in full once. A step that fails again gets one line, because its files are missing. After an error,
  * the next step works again, with the blocks and arrays from before. Values are used where they are: pointers
  * must stay valid, and their data unchanged, until vdi_catalyst_execute returns. The host holds copies of
- * only the layers beside blocks, and of whole blocks if the blocks' scalar types differ.
+ * only the layers beside blocks, and of whole blocks if the blocks' scalar types differ. Arrays made of
+ * particles take 4 bytes a cell.
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData per block, under the name "grid":
@@ -183,6 +185,63 @@ VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, cons
  * In scripts, VolumetricDepthImage follows it, and ParaView's own filters don't know it. */
 VDI_CATALYST_API int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name,
                                                    int32_t association, const double offset[3]);
+
+/* The value of a cell that particles are deposited on. */
+enum {
+  VDI_CATALYST_SUM = 0,    /* the weight in the cell */
+  VDI_CATALYST_DENSITY = 1 /* the weight in the cell, divided by its volume */
+};
+
+/* A rank's particles, possibly none. Particle i has its coordinate along an axis at positions[axis] +
+ * i * position_stride bytes, its weight at weights + i * weight_stride, and its smoothing length h at
+ * lengths + i * length_stride. Strides may be negative, and need not be multiples of the number's size.
+ * A weight_stride or length_stride of 0 means that all particles have the first number. Types are
+ * VDI_CATALYST_F32 or VDI_CATALYST_F64. Interleaved doubles x, y, z have positions {p, p + 1, p + 2} and
+ * stride 24. */
+typedef struct vdi_catalyst_particles {
+  int64_t count;
+  int32_t kind; /* VDI_CATALYST_SUM or VDI_CATALYST_DENSITY, the same on all ranks */
+  int32_t position_type;
+  const void* positions[3];
+  int64_t position_stride;
+  const void* weights; /* null: each particle weighs 1 */
+  int64_t weight_stride;
+  const void* lengths; /* null: cloud in cell for all particles */
+  int64_t length_stride;
+  int32_t weight_type;
+  int32_t length_type;
+} vdi_catalyst_particles;
+
+/* Makes an array of cells, of type VDI_CATALYST_F32, of particles. Scripts, runs without one and their
+ * conditions find it under `name`, which is the same on all ranks, as they find other arrays. It is made anew
+ * in each vdi_catalyst_execute that needs it, of the particles as they are then. So pointers must stay valid
+ * until that returns, but need no call at each step. set_array for cells of the same name replaces the
+ * particles, as these replace such an array, and vdi_catalyst_set_blocks forgets them.
+ *
+ * Particles may lie in blocks of any rank. The spacing of the block that owns the position, which is the
+ * finest one there, decides how far a particle's weight spreads:
+ *
+ * - Without smoothing length, cloud in cell: the weight fills a box of the spacing's size around the
+ *   position. Each cell gets the share of the box that lies in it.
+ * - With a smoothing length h, the cubic spline M4 with support 2 h in three dimensions (Monaghan 1992),
+ * taken at the centres of cells. If h is below 0.75 of the spacing's largest component, cloud in cell: there
+ * both spread equally wide, and a shorter kernel could miss all centres.
+ *
+ * No weight is lost: the shares of each particle are divided by their sum over all cells that blocks own.
+ * Near a face of the domain, the weight that would lie beyond it thus goes to the cells on this side. Ghost
+ * cells get the values of their owners, and cells that finer blocks hide the mean of what hides them. The
+ * result is the same for any distribution of blocks and particles over ranks, to within rounding to f32.
+ *
+ * Particles outside all blocks (blocks own their lower faces, not their upper ones), and those whose position
+ * or weight isn't finite, are left out. Those whose h is NaN, infinite, 0 or negative are deposited by cloud
+ * in cell. Rank 0 prints a line with their numbers the first time that there are such particles of a name.
+ * Values beyond the range of f32 make vdi_catalyst_execute fail with VDI_CATALYST_SCRIPT.
+ *
+ * This returns VDI_CATALYST_BAD_ARGUMENT for a negative count, null positions, unknown types, strides that
+ * lead beyond the address space, and names or kinds that differ between ranks. With scripts, the first
+ * deposit opens a Vulkan device of its own; without one, vdi_catalyst_execute returns VDI_CATALYST_SCRIPT. */
+VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
+                                                const vdi_catalyst_particles* particles);
 
 /* Whether a script will do anything at this step: 1 if it will or that can't be known, 0 if not; the same on
  * all ranks. After 0, the simulation need neither prepare its values nor call vdi_catalyst_execute. It is 1

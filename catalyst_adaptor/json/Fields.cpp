@@ -67,6 +67,8 @@ void Fields::setBlocks(std::vector<vdi_catalyst_block> blocks) {
   blocks_ = std::move(blocks);
   arrays_.clear();
   offsets_.clear();
+  particles_.clear();
+  deposits_.clear();
   ++version_;
 }
 
@@ -90,6 +92,9 @@ void Fields::setArray(const std::string& name, bool cells, int type, std::vector
   Array& array = arrays_[{cells, name}];
   array.type = type;
   array.values = std::move(values);
+  if (!cells) return;
+  particles_.erase(name);
+  deposits_.erase(name);
 }
 
 void Fields::setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset) {
@@ -101,22 +106,54 @@ glm::dvec3 Fields::offsetOf(const std::string& name, bool cells) const {
   return found != offsets_.end() ? found->second : glm::dvec3(0.0);
 }
 
+void Fields::setParticles(const std::string& name, ParticleArray particles) {
+  arrays_.erase({true, name});
+  deposits_.erase(name);
+  particles_[name] = particles;
+}
+
+const ParticleArray* Fields::particlesOf(const std::string& name) const {
+  const auto found = particles_.find(name);
+  return found != particles_.end() ? &found->second : nullptr;
+}
+
+void Fields::setDeposit(const std::string& name, Deposits::Values values) {
+  std::vector<StridedValues> all;
+  for (std::size_t i = 0; i < blocks_.size(); ++i)
+    all.push_back(inOrder(blocks_[i], VDI_CATALYST_F32, true, 1, values[i].get()));
+  arrays_[{true, name}] = {VDI_CATALYST_F32, std::move(all)};
+  deposits_[name] = std::move(values);
+}
+
+void Fields::dropDeposits() {
+  for (const auto& [name, values] : deposits_) arrays_.erase({true, name});
+  deposits_.clear();
+}
+
 const Fields::Array* Fields::find(const std::string& name, bool cells) const {
   const auto found = arrays_.find({cells, name});
   return found != arrays_.end() ? &found->second : nullptr;
 }
 
+bool Fields::has(const std::string& name, bool cells) const {
+  return find(name, cells) != nullptr || (cells && particles_.contains(name));
+}
+
 std::string Fields::names() const {
   std::string names;
-  for (const auto& [key, array] : arrays_)
-    names +=
-        (names.empty() ? "" : ", ") + std::string(key.first ? "cells" : "points") + " '" + key.second + "'";
+  const auto add = [&names](const char* what, const std::string& name) {
+    names += (names.empty() ? "" : ", ") + std::string(what) + " '" + name + "'";
+  };
+  for (const auto& [key, array] : arrays_) {
+    if (!key.first || !particles_.contains(key.second)) add(key.first ? "cells" : "points", key.second);
+  }
+  for (const auto& [name, array] : particles_) add("cells", name);
   return names.empty() ? "none" : names;
 }
 
 std::optional<bool> Fields::associationOf(const std::string& name) const {
-  const bool ofCells = find(name, true) != nullptr;
-  const bool ofPoints = find(name, false) != nullptr;
+  const bool ofCells = has(name, true);
+  const bool ofPoints = has(name, false);
   if (ofCells && ofPoints)
     throw std::runtime_error("there are arrays '" + name +
                              "' of cells and of points: 'association' must name one");

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "catalyst_adaptor/ParticleArrays.h"
 #include "catalyst_adaptor/StridedArray.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 #include "vdi/comm/Communicator.h"
@@ -33,10 +34,20 @@ class Fields {
   StridedValues inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
                         const void* data) const;
   /// Sets an array's values, one entry for each block, with the same number of components. Blocks that lack
-  /// the array have a null `first`.
+  /// the array have a null `first`. An array of cells replaces particles of that name.
   void setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
   /// Lets the values of that array lie `offset` cells beside the points or the middles of cells.
   void setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset);
+
+  /// Sets the particles of which an array of cells is to be made. It replaces such an array of that name.
+  void setParticles(const std::string& name, ParticleArray particles);
+  /// The particles of that name; null if there are none. All ranks have particles of the same names.
+  const ParticleArray* particlesOf(const std::string& name) const;
+  /// Sets the values that were made of the particles, one entry for each block; `dropDeposits` drops them
+  /// all.
+  void setDeposit(const std::string& name, Deposits::Values values);
+  bool hasDeposit(const std::string& name) const { return deposits_.contains(name); }
+  void dropDeposits();
 
   /// Whether the array of that name is one of cells; nullopt if this rank has neither blocks nor such an
   /// array. Throws std::runtime_error if arrays of both kinds have the name, or none has it.
@@ -68,11 +79,14 @@ class Fields {
   using Key = std::pair<bool, std::string>;  // whether it is one of cells, and the name
   const Array* find(const std::string& name, bool cells) const;
   glm::dvec3 offsetOf(const std::string& name, bool cells) const;
+  bool has(const std::string& name, bool cells) const;
 
   std::vector<vdi_catalyst_block> blocks_;
   std::uint64_t version_ = 0;
   std::map<Key, Array> arrays_;
   std::map<Key, glm::dvec3> offsets_;  // in cells; none: 0
+  std::map<std::string, ParticleArray> particles_;
+  std::map<std::string, Deposits::Values> deposits_;  // the memory of arrays made of particles
 };
 
 /// The bytes of a scalar. Throws std::invalid_argument for a type that vdi_catalyst.h doesn't have.

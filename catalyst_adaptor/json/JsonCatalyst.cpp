@@ -14,11 +14,11 @@
 #include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/EngineFunctions.h"
 #include "catalyst_adaptor/Parameters.h"
+#include "catalyst_adaptor/ParticleArrays.h"
 #include "catalyst_adaptor/json/Fields.h"
 #include "catalyst_adaptor/json/RunEngine.h"
 #include "vdi/comm/Communicator.h"
 #include "vdi/config/Json.h"
-#include "vdi/core/Error.h"
 
 struct vdi_catalyst : vdi::catalyst::Calls {
   std::unique_ptr<vdi::catalyst::RunEngine> engine;
@@ -31,6 +31,7 @@ namespace {
 
 using vdi::catalyst::checkBlock;
 using vdi::catalyst::guarded;
+using vdi::catalyst::guardedTogether;
 using vdi::catalyst::require;
 using vdi::catalyst::requireEqual;
 using vdi::catalyst::StridedValues;
@@ -45,24 +46,6 @@ vdi_catalyst*& alive() {
 
 bool usable(const vdi_catalyst* catalyst) {
   return catalyst != nullptr && catalyst == alive();
-}
-
-/// Like `guarded`, for work that fails on all ranks together. Ranks that fail because of another rank report
-/// nothing.
-template <typename Work>
-int guardedTogether(vdi_catalyst& self, int code, Work work,
-                    std::optional<std::int64_t> step = std::nullopt) {
-  return guarded(
-      self, code,
-      [&]() -> std::optional<std::string> {
-        try {
-          work();
-          return std::nullopt;
-        } catch (const vdi::Error& error) {
-          return error.code() == vdi::ErrorCode::RemoteRank ? "" : error.what();
-        }
-      },
-      step);
 }
 
 /// Returns the root's text on all ranks. Collective.
@@ -210,6 +193,24 @@ int setArrayOffset(vdi_catalyst* catalyst, const char* name, int32_t association
   return code;
 }
 
+int setParticles(vdi_catalyst* catalyst, const char* name, const vdi_catalyst_particles* particles) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  vdi::catalyst::ParticleArray array;
+  int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(catalyst->haveBlocks, "particles were given before blocks");
+    require(name != nullptr && *name != '\0', "an array needs a name");
+    array = vdi::catalyst::particleArrayOf(particles);
+  });
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+      requireEqual(catalyst->comm, vdi::catalyst::identityOf(name, array.kind),
+                   "the ranks give particles of different names or kinds");
+    });
+  }
+  if (code == VDI_CATALYST_OK) catalyst->fields.setParticles(name, array);
+  return code;
+}
+
 int wants(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return 0;
   int wanted = catalyst->engine->wants(step, time) ? 1 : 0;
@@ -268,6 +269,6 @@ const char* error(const vdi_catalyst* catalyst) {
 }  // namespace
 
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    nullptr, nullptr, initializeJson, setBlocks,    setArray, setArrayStrided, setArrayOffset,
-    wants,   execute, parameterF64,   parameterI64, finalize, error,
+    nullptr,      nullptr, initializeJson, setBlocks,    setArray,     setArrayStrided, setArrayOffset,
+    setParticles, wants,   execute,        parameterF64, parameterI64, finalize,        error,
 };

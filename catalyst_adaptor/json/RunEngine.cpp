@@ -99,6 +99,9 @@ struct RunEngine::State {
     comm.together([&] { device = gpu::Device::create(gpu::requestFromEnvironment(comm.localRank())); });
     generator = std::make_unique<VdiGenerator>(device, comm::Communicator::fromMpi(fortranCommunicator),
                                                generatorOptionsFromEnvironment(comm));
+    auto fresh = std::make_unique<Deposits>(device, comm);
+    if (deposits) fresh->continueTelling(*deposits);
+    deposits = std::move(fresh);
   }
   bool isRoot() const { return comm.rank() == 0; }
   /// Collective: the root's answer on all ranks.
@@ -114,6 +117,7 @@ struct RunEngine::State {
   Clock::time_point begin = Clock::now();
   std::shared_ptr<gpu::Device> device;
   std::unique_ptr<VdiGenerator> generator;
+  std::unique_ptr<Deposits> deposits;
   config::Schedule schedule;
   config::Budget budget;
   std::optional<Measure> measure;
@@ -175,11 +179,22 @@ bool RunEngine::isDue(std::int64_t step, double time) {
   return due;
 }
 
+/// Makes the array of that name if it is one of particles and this step doesn't have it yet. Collective.
+void RunEngine::deposit(Fields& fields, const std::string& name, std::int64_t step) {
+  const ParticleArray* array = fields.particlesOf(name);
+  if (array == nullptr || fields.hasDeposit(name)) return;
+  Deposits& deposits = *state_->deposits;
+  deposits.setBlocks(fields.version(), fields.blocks());
+  Deposits::Values values = deposits.make(name, *array, step);
+  state_->comm.together([&] { fields.setDeposit(name, std::move(values)); });
+}
+
 /// Whether a due frame is to be made: by its condition and by the share of wall time. Collective.
-bool RunEngine::isToBeMade(const Fields& fields, std::int64_t step, double time) {
+bool RunEngine::isToBeMade(Fields& fields, std::int64_t step, double time) {
   State& state = *state_;
   if (state.measure) {
     const config::RunCondition& condition = state.measure->condition();
+    tryTwice([&] { deposit(fields, condition.field, step); });
     const std::optional<double> value = state.measure->of(state.comm, fields);
     bool holds = value.has_value();
     if (condition.measure == config::RunCondition::Measure::Change) {
@@ -212,10 +227,11 @@ void RunEngine::leaveOut(std::int64_t step, double time) {
   });
 }
 
-void RunEngine::execute(const Fields& fields, Parameters& parameters, std::int64_t step, double time,
+void RunEngine::execute(Fields& fields, Parameters& parameters, std::int64_t step, double time,
                         double waited) {
   State& state = *state_;
   state.frame.reset();  // the values may have changed
+  fields.dropDeposits();
   std::exception_ptr failure;
   bool isMade = false;
   try {
@@ -229,13 +245,13 @@ void RunEngine::execute(const Fields& fields, Parameters& parameters, std::int64
   }
   state.isAskedFor = false;
   if (state.steering) steer(fields, parameters, step, time);
+  fields.dropDeposits();
   if (failure) std::rethrow_exception(failure);
   if (state.steering) state.steering->requireLogged();
 }
 
 /// Makes the frames of all cameras, or of the first one alone if they are for the stream only.
-void RunEngine::makeAll(const Fields& fields, std::int64_t step, double time, double waited,
-                        bool isForFiles) {
+void RunEngine::makeAll(Fields& fields, std::int64_t step, double time, double waited, bool isForFiles) {
   State& state = *state_;
   const auto begin = Clock::now();
   std::vector<double> waits;
@@ -298,7 +314,7 @@ void RunEngine::record(runlog::FrameRecord& frame, const std::exception_ptr& fai
 }
 
 /// Takes the viewers' requests. While they pause the simulation, makes a VDI for each view that they ask for.
-void RunEngine::steer(const Fields& fields, Parameters& parameters, std::int64_t step, double time) {
+void RunEngine::steer(Fields& fields, Parameters& parameters, std::int64_t step, double time) {
   State& state = *state_;
   const Steered steered{run_, map_, state.schedule, state.firstRange, parameters};
   while (state.steering->take(steered, step, time)) {
@@ -348,7 +364,7 @@ void RunEngine::tryTwice(Work work) {
   work();
 }
 
-void RunEngine::makeOne(const Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
+void RunEngine::makeOne(Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
                         bool isForFiles, runlog::FrameRecord& record) {
   tryTwice([&] {
     record = recordOf(step, time, camera);
@@ -358,10 +374,11 @@ void RunEngine::makeOne(const Fields& fields, std::int64_t step, double time, co
 }
 
 /// Gives the device the step's values.
-void RunEngine::prepare(const Fields& fields, std::int64_t step, double time) {
+void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   State& state = *state_;
   const comm::Communicator& comm = state.comm;
   const bool cells = agreeOnCells(comm, fields, run_.field, run_.cells);
+  if (cells) deposit(fields, run_.field, step);
   std::vector<Block> blocks;
   comm.together([&] { blocks = fields.blocksOf(run_.field, cells, run_.component); });
   double mostPerVolume = 0.0;

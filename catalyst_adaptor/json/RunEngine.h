@@ -6,6 +6,7 @@
 #include <exception>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "catalyst_adaptor/Parameters.h"
@@ -35,8 +36,9 @@ class RunEngine {
   /// Whether `execute` has anything to do at the step; equal on all ranks. Not collective.
   bool mayExecute(std::int64_t step, double time) const;
   /// Makes the step's frames, if any, from the current fields, and takes the viewers' requests. `waited` is
-  /// the time in seconds that this rank has waited for the others to begin the step.
-  void execute(const Fields& fields, Parameters& parameters, std::int64_t step, double time, double waited);
+  /// the time in seconds that this rank has waited for the others to begin the step. Particles become arrays
+  /// for this time, if a frame or its condition needs them.
+  void execute(Fields& fields, Parameters& parameters, std::int64_t step, double time, double waited);
   /// Ends the log. No frames may follow.
   void finish();
 
@@ -46,17 +48,18 @@ class RunEngine {
   using Clock = std::chrono::steady_clock;
   void start();
   bool isDue(std::int64_t step, double time);
-  bool isToBeMade(const Fields& fields, std::int64_t step, double time);
+  void deposit(Fields& fields, const std::string& name, std::int64_t step);
+  bool isToBeMade(Fields& fields, std::int64_t step, double time);
   void leaveOut(std::int64_t step, double time);
-  void makeAll(const Fields& fields, std::int64_t step, double time, double waited, bool isForFiles);
-  void makeOne(const Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
+  void makeAll(Fields& fields, std::int64_t step, double time, double waited, bool isForFiles);
+  void makeOne(Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
                bool isForFiles, runlog::FrameRecord& record);
   void record(runlog::FrameRecord& record, const std::exception_ptr& failure,
               const std::vector<double>& waits, Clock::time_point start);
-  void steer(const Fields& fields, Parameters& parameters, std::int64_t step, double time);
+  void steer(Fields& fields, Parameters& parameters, std::int64_t step, double time);
   template <typename Work>
   void tryTwice(Work work);
-  void prepare(const Fields& fields, std::int64_t step, double time);
+  void prepare(Fields& fields, std::int64_t step, double time);
   void deliver(const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record);
   void save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record);
   void writePictures(const Vdi& vdi, const config::RunCamera& camera, runlog::FrameRecord& record);

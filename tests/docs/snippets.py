@@ -51,6 +51,11 @@ def c_parameter(text):
     compile_c("vdi_catalyst* catalyst", "double feed;\n" + text + "(void)feed;\n")
 
 
+@tests("core", "docs/catalyst-guide.md", "vdi_catalyst_particles stars")
+def c_particles(text):
+    compile_c("vdi_catalyst* catalyst, int64_t count, const double* positions, const double* masses", text)
+
+
 @tests("core", "docs/catalyst-guide.md", "type(c_ptr) :: vdi")
 def fortran(text):
     declaration, statements = text.split("\n", 1)
@@ -204,6 +209,23 @@ def simulation_in_python(text):
           + text.replace("range(100)", "range(11)"))
     run(sys.executable, "snippet.py")
     assert len(made("*.vdi")) == 2, made("*.vdi")
+
+
+@tests("paraview", "docs/python.md", "catalyst.set_particles")
+def particles_in_python(text):
+    write("snippet.py", """import numpy as np
+from mpi4py import MPI
+from pv_vdi.catalyst import Block, Catalyst
+
+positions = np.random.default_rng(1).uniform(0, 1, (500, 3))
+masses = np.ones(500)
+with Catalyst(MPI.COMM_WORLD, json={"field": "density", "resolution": [48, 32]}) as catalyst:
+    catalyst.set_blocks([Block((8, 8, 8), spacing=(1 / 8,) * 3)])
+    %s
+    catalyst.execute(0)
+""" % text)
+    run(sys.executable, "snippet.py")
+    assert made("*.vdi") == ["vdi_000000.vdi"], made("*.vdi")
 
 
 def pvbatch(script):

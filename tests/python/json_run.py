@@ -27,6 +27,30 @@ def refused(code, **what):
     raise AssertionError("it's taken: %s" % what)
 
 
+def refused_particles(catalyst):
+    """Particles whose shapes or types don't fit."""
+    good = np.zeros((5, 3))
+    for arguments in [(np.zeros((5, 2)),), (np.zeros(15),), (np.zeros((5, 3), np.int32),), ((good[:, 0], good[:, 1]),),
+                      ((good[:, 0], good[:, 1], good[:4, 2]),), ((good[:, 0], good[:, 1], np.zeros(5)),),
+                      (good, np.zeros(4)), (good, np.zeros(5, np.int64)), (good, None, np.zeros((5, 1)))]:
+        try:
+            catalyst.set_particles("density", *arguments)
+        except ValueError:
+            continue
+        raise AssertionError("they're taken: %s" % (arguments,))
+
+
+def shown(positions, weights, lengths, density):
+    """The VDI of a deposit of these particles."""
+    file = "particles.vdi"
+    with Catalyst(MPI.COMM_WORLD, json={"field": "particles", "resolution": [48, 32], "output": file,
+                                        "existing": "overwrite"}) as catalyst:
+        catalyst.set_blocks([Block(cells=(N, N, N), spacing=(1 / N,) * 3)])
+        catalyst.set_particles("particles", positions, weights, lengths, density)
+        catalyst.execute(0)
+    return pv_vdi.read(file)
+
+
 refused(SCRIPT, json={"field": "V", "evry": 10})
 refused(SCRIPT, json="none.json")
 run = {"field": "V", "every": 10, "resolution": [48, 32], "stream": {"link_file": "link"},
@@ -43,6 +67,7 @@ with Catalyst(MPI.COMM_WORLD, json=run) as catalyst:
         assert catalyst.wants(step) == (step % 10 == 0), step
         catalyst.execute(step, 0.1 * step)
     refused(ENGINE, json=run)
+    refused_particles(catalyst)
     link = open("link").read().strip()
     assert os.stat("link").st_mode & 0o777 == 0o600
     # Not one of the ranks.
@@ -62,3 +87,14 @@ assert open(received[0], "rb").read() == open("v_020.vdi", "rb").read(), "what's
 with Catalyst(MPI.COMM_WORLD, json={"field": "V"}) as catalyst:
     catalyst.set_blocks([])
     assert catalyst.wants(1)
+
+# Particles: one array or three, of any stride, weights and lengths for each or for all.
+places = np.random.default_rng(3).uniform(0.2, 0.8, (2000, 3))
+expected = shown(places, np.full(2000, 0.5), np.full(2000, 0.1), True)
+assert len(expected.segments) > 500
+wide = np.zeros((2000, 8), np.float64)
+wide[:, 1:4] = places
+for other in (shown(wide[:, 1:4], 0.5, 0.1, True), shown(tuple(np.asfortranarray(places).T), 0.5, np.full(2000, 0.1), True)):
+    assert (other.segments == expected.segments).all()
+summed = shown(places, 0.5 * N ** 3, 0.1, False).metadata["array"]
+assert summed["name"] == "particles" and summed == expected.metadata["array"], (summed, expected.metadata["array"])

@@ -3,9 +3,8 @@
 //     mpirun -n 4 clusters [vdi.json]
 //
 // The program writes the last positions to clusters.raw. Without vdi.json it draws nothing, and the
-// result has the same bits. The adaptor takes values on lattices and no particles, so this program
-// spreads the stars' mass over cells itself (cloud in cell). Each rank does so for a slab of its own,
-// which is independent of the stars that it moves.
+// result has the same bits. Each rank hands over the stars that it moves, and a slab of a lattice, which
+// is independent of them. The adaptor makes the density in the cells of all slabs.
 #include <mpi.h>
 
 #include <array>
@@ -59,33 +58,6 @@ Vector acceleration(const std::vector<Vector>& positions, const Vector& at) {
   return sum;
 }
 
-/// Computes the mass per volume in layers [first, last) of the lattice. Each rank knows all stars
-/// here. If ranks know only their own stars, they must add the others' shares, by
-/// MPI_Reduce_scatter of the lattice or by messages.
-void deposit(const std::vector<Vector>& positions, int first, int last, std::vector<double>& density) {
-  density.assign(static_cast<std::size_t>(cells) * cells * static_cast<std::size_t>(last - first), 0.0);
-  for (const Vector& position : positions) {
-    std::array<int, 3> cell{};
-    Vector share{};  // share of the upper cell
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double at = (position[axis] + size / 2) / spacing - 0.5;
-      cell[axis] = static_cast<int>(std::floor(at));
-      share[axis] = at - cell[axis];
-    }
-    for (int corner = 0; corner < 8; ++corner) {
-      const std::array<int, 3> up{corner & 1, corner >> 1 & 1, corner >> 2};
-      double weight = mass / (spacing * spacing * spacing);
-      for (std::size_t axis = 0; axis < 3; ++axis) weight *= up[axis] != 0 ? share[axis] : 1.0 - share[axis];
-      const int x = cell[0] + up[0];
-      const int y = cell[1] + up[1];
-      const int z = cell[2] + up[2];
-      if (x < 0 || x >= cells || y < 0 || y >= cells || z < first || z >= last) continue;
-      const int index = ((z - first) * cells + y) * cells + x;
-      density[static_cast<std::size_t>(index)] += weight;
-    }
-  }
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -104,6 +76,8 @@ int main(int argc, char** argv) {
   std::vector<Vector> velocities;
   place(positions, velocities);
 
+  const auto own = static_cast<std::size_t>(rank);
+
   vdi_catalyst* vdi = nullptr;
   int code = VDI_CATALYST_OK;
   const int first = cells * rank / ranks;
@@ -116,9 +90,17 @@ int main(int argc, char** argv) {
                                       {-size / 2, -size / 2, -size / 2 + first * spacing},
                                       {spacing, spacing, spacing}};
     if (code == VDI_CATALYST_OK) code = vdi_catalyst_set_blocks(vdi, 1, &block);
+    const double* mine = positions[static_cast<std::size_t>(starts[own] / 3)].data();
+    vdi_catalyst_particles particles{};
+    particles.count = counts[own] / 3;
+    particles.kind = VDI_CATALYST_DENSITY;
+    particles.position_type = VDI_CATALYST_F64;
+    for (std::size_t axis = 0; axis < 3; ++axis) particles.positions[axis] = mine + axis;
+    particles.position_stride = sizeof(Vector);
+    particles.weights = &mass;  // a stride of 0: all stars have this mass
+    particles.weight_type = VDI_CATALYST_F64;
+    if (code == VDI_CATALYST_OK) code = vdi_catalyst_set_particles(vdi, "density", &particles);
   }
-  std::vector<double> density;
-  const auto own = static_cast<std::size_t>(rank);
   for (int step = 1; step <= steps; ++step) {
     for (int i = starts[own] / 3; i < (starts[own] + counts[own]) / 3; ++i) {
       const auto star = static_cast<std::size_t>(i);
@@ -131,13 +113,8 @@ int main(int argc, char** argv) {
     }
     MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_DOUBLE, positions.data(), counts.data(), starts.data(), MPI_DOUBLE,
                    MPI_COMM_WORLD);
-    // Steps without a frame don't pay for the lattice.
-    if (vdi == nullptr || code != VDI_CATALYST_OK || vdi_catalyst_wants(vdi, step, step * timeStep) == 0)
-      continue;
-    deposit(positions, first, last, density);
-    const void* values = density.data();
-    code = vdi_catalyst_set_array(vdi, "density", VDI_CATALYST_F64, VDI_CATALYST_CELLS, &values);
-    if (code == VDI_CATALYST_OK) code = vdi_catalyst_execute(vdi, step, step * timeStep);
+    // The stars' memory is the same at each step, so there is nothing to hand over again.
+    if (vdi != nullptr && code == VDI_CATALYST_OK) code = vdi_catalyst_execute(vdi, step, step * timeStep);
   }
   if (vdi != nullptr) vdi_catalyst_finalize(vdi);
 

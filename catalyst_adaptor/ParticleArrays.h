@@ -1,0 +1,81 @@
+// The particles that a simulation hands over, and the arrays of cells that both engines make of them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "catalyst_adaptor/vdi_catalyst.h"
+#include "vdi/comm/Communicator.h"
+#include "vdi/core/Block.h"
+#include "vdi/core/Particles.h"
+#include "vdi/gpu/Device.h"
+#include "vdi/pipeline/ParticleDepositor.h"
+
+namespace vdi::catalyst {
+
+/// Particles under a name, on the simulation's memory.
+struct ParticleArray {
+  Particles particles;
+  DepositKind kind = DepositKind::Sum;
+};
+
+/// Throws std::invalid_argument with the reason if they are invalid.
+ParticleArray particleArrayOf(const vdi_catalyst_particles* given);
+
+/// A number for requireEqual: equal on two ranks if name and kind are.
+std::int64_t identityOf(const char* name, DepositKind kind);
+
+/// Deposits particles on a run's blocks.
+class Deposits {
+ public:
+  using Values = std::vector<std::shared_ptr<float[]>>;
+
+  /// The device and the communicator must outlive this object.
+  Deposits(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm)
+      : comm_(comm), depositor_(std::move(device), comm) {}
+
+  /// Collective: this rank's blocks, unless `version` is that of the last call. Throws as
+  /// ParticleDepositor::setBlocks does.
+  void setBlocks(std::uint64_t version, std::span<const vdi_catalyst_block> blocks);
+  /// Collective: the values of each of this rank's blocks. Throws as ParticleDepositor::deposit does. `step`
+  /// is told with the numbers of particles that are left out.
+  Values make(const std::string& name, const ParticleArray& array, std::int64_t step);
+  /// Takes over what another object has told already.
+  void continueTelling(const Deposits& other) { told_ = other.told_; }
+
+ private:
+  void tell(const std::string& name, const ParticleCounts& counts, std::int64_t step);
+
+  const comm::Communicator& comm_;
+  ParticleDepositor depositor_;
+  std::optional<std::uint64_t> version_;
+  std::map<std::string, unsigned> told_;  // by name: a bit for each kind of particles told of
+};
+
+/// Deposits on a device of their own, which the first one opens.
+class DeviceDeposits {
+ public:
+  /// Collective: duplicates the communicator.
+  explicit DeviceDeposits(int fortranCommunicator);
+
+  /// Collective. Throws on all ranks as Deposits does, and Error{DeviceUnavailable}. If the device was lost,
+  /// it opens another one.
+  Deposits::Values make(const std::string& name, const ParticleArray& array, std::uint64_t version,
+                        std::span<const vdi_catalyst_block> blocks, std::int64_t step);
+
+ private:
+  void open();
+
+  comm::Communicator comm_;
+  std::shared_ptr<gpu::Device> device_;
+  std::unique_ptr<Deposits> deposits_;
+};
+
+}  // namespace vdi::catalyst
