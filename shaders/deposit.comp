@@ -45,44 +45,47 @@ float shareAt(DepositParticle particle, ivec3 offset) {
   return spline(length((first + 0.5 - particle.within) * particle.size));
 }
 
+// Goes to the next cell of the box, x fastest.
+ivec3 next(ivec3 at, ivec3 lo, ivec3 hi) {
+  at.x += 1;
+  bool rowEnds = at.x == hi.x;
+  at.x = rowEnds ? lo.x : at.x;
+  at.y += rowEnds ? 1 : 0;
+  bool layerEnds = at.y == hi.y;
+  at.y = layerEnds ? lo.y : at.y;
+  at.z += layerEnds ? 1 : 0;
+  return at;
+}
+
+float sumOfShares(DepositParticle particle) {
+  vec3 reach = 2.0 / particle.size;
+  ivec3 lo = ivec3(floor(particle.within - reach));
+  ivec3 hi = ivec3(floor(particle.within + reach)) + 1;
+  float sum = 0.0;
+  for (ivec3 at = lo; at.z < hi.z; at = next(at, lo, hi)) sum += shareAt(particle, at);
+  return sum;
+}
+
+// One loop instead of nested ones: lanes of a CPU device, whose boxes differ, run as often as the largest
+// box has cells, and lavapipe ends all loops of an invocation after 65535 passes.
 void main() {
   uint index = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * depositGroup;
   if (index >= push.count) return;
   DepositParticle particle = push.particles.at[index];
   DepositBlock block = push.blocks.at[particle.block];
-  bool isCloud = particle.mode == depositModeCloud;
-  vec3 reach = isCloud ? 0.5 * particle.size : 2.0 / particle.size;
-  const vec3 farthest = vec3(1073741824.0);
-  ivec3 lo = ivec3(max(floor(particle.within - reach), -farthest));
-  ivec3 hi = ivec3(min(floor(particle.within + reach), farthest)) + 1;
-
   float weight = particle.weight;
-  if (particle.mode == depositModeKernel) {
-    float sum = 0.0;
-    for (int z = lo.z; z < hi.z; ++z) {
-      for (int y = lo.y; y < hi.y; ++y) {
-        for (int x = lo.x; x < hi.x; ++x) sum += shareAt(particle, ivec3(x, y, z));
-      }
-    }
-    weight /= sum;
-  }
+  if (particle.mode == depositModeKernel) weight /= sumOfShares(particle);
 
   ivec3 cell = ivec3(particle.cellX, particle.cellY, particle.cellZ);
   ivec3 parts = ivec3(particle.parts & 1023u, (particle.parts >> 10) & 1023u, particle.parts >> 20) + 1;
-  ivec3 cells = ivec3(block.cellsX, block.cellsY, block.cellsZ);
-  lo = max(lo, -cell);
-  hi = min(hi, cells * parts - cell);
-  lo.z = max(lo.z, particle.firstZ - cell.z);
-  hi.z = min(hi.z, particle.lastZ - cell.z);
-  for (int z = lo.z; z < hi.z; ++z) {
-    uint64_t layer = uint64_t((cell.z + z) / parts.z) * uint64_t(block.cellsX) * uint64_t(block.cellsY);
-    DepositSums sums = DepositSums(block.sums + 8ul * layer);
-    for (int y = lo.y; y < hi.y; ++y) {
-      uint row = uint((cell.y + y) / parts.y) * block.cellsX;
-      for (int x = lo.x; x < hi.x; ++x) {
-        float share = shareAt(particle, ivec3(x, y, z));
-        if (share > 0.0) add(sums, row + uint((cell.x + x) / parts.x), weight * share);
-      }
+  ivec3 lo = ivec3(particle.firstX, particle.firstY, particle.firstZ);
+  ivec3 hi = ivec3(particle.lastX, particle.lastY, particle.lastZ);
+  uint64_t layer = uint64_t(block.cellsX) * uint64_t(block.cellsY);
+  for (ivec3 at = lo; at.z < hi.z; at = next(at, lo, hi)) {
+    float share = shareAt(particle, at - cell);
+    if (share > 0.0) {
+      uvec3 to = uvec3(at / parts);
+      add(DepositSums(block.sums + 8ul * layer * to.z), to.y * block.cellsX + to.x, weight * share);
     }
   }
 }

@@ -24,7 +24,12 @@ struct DepositParticle {
   uint parts;    // per axis, less 1: 10 bits each, x lowest
   uint block;    // index of DepositBlock
   uint mode;
-  int firstZ;  // deposits only in cells [firstZ, lastZ) along z, counted as cellZ
+  // The cells, all of them stored, on which to deposit: from first to below last, counted as the position.
+  int firstX;
+  int firstY;
+  int firstZ;
+  int lastX;
+  int lastY;
   int lastZ;
 };
 

@@ -233,6 +233,18 @@ TEST_CASE("faults of particles are counted over all ranks, and no particles are 
   CHECK(depositor.deposit(set.particles(), DepositKind::Sum).counts.outside == 4 * ranks);
 }
 
+TEST_CASE("a kernel over more cells than an invocation goes through at once", "[ranks]") {
+  const comm::Communicator world = comm::Communicator::world();
+  ParticleSet all{{{0.31, 0.52, 0.43}, {0.9, 0.1, 0.5}}, {1.0, 2.5}, {1.7, 0.8}};
+  const Shared shared({cellsIn(cube, glm::dvec3(1.0 / 110))}, std::move(all), world, 4);
+  const reference::Deposit expected =
+      reference::deposit(shared.blocks, shared.set.particles(), DepositKind::Density);
+  const DepositedArray made = depositOn(world, shared.myBlocks(), shared.mySet, DepositKind::Density);
+  for (std::size_t i = 0; i < shared.mine.size(); ++i) {
+    CHECK(differenceOf(made.values[i].get(), expected.values[0], largestOf(expected.values)) < 1e-4);
+  }
+}
+
 TEST_CASE("weights of any magnitude, but values beyond those of f32 are an error on all ranks", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   const std::vector<Block> blocks =
@@ -275,12 +287,13 @@ TEST_CASE("blocks of one spacing that overlap are an error on all ranks", "[rank
 TEST_CASE("millions of particles in one cell, and particles per second", "[ranks]") {
   const comm::Communicator world = comm::Communicator::world();
   constexpr std::size_t count = 2'000'000;
-  const Box cell{glm::dvec3(0.50), glm::dvec3(0.51)};
+  const Box cell{glm::dvec3(0.50), glm::dvec3(0.51)};  // in a corner where eight blocks meet
   const auto share = count / static_cast<std::size_t>(world.size());
-  const ParticleSet crowded = randomParticles(share, cell, 0.0, static_cast<std::uint32_t>(world.rank() + 1));
-  const ParticleSet spread = randomParticles(share, cube, 0.0, static_cast<std::uint32_t>(world.rank() + 1));
-  ParticleSet kernels = spread;
-  kernels.lengths.assign(share, 0.03);
+  const auto seed = static_cast<std::uint32_t>(world.rank() + 1);
+  const ParticleSet crowded = randomParticles(share, cell, 0.0, seed);
+  const ParticleSet spread = randomParticles(share / 4, cube, 0.0, seed);
+  ParticleSet kernels = randomParticles(share / 200, cube, 1.0, seed);
+  kernels.lengths.assign(kernels.positions.size(), 0.03);
   const std::vector<Block> blocks = test::latticeIn(cube, 50, {2, 2, 2});
   std::vector<Block> mine;
   for (std::size_t i = static_cast<std::size_t>(world.rank()); i < blocks.size();
@@ -314,7 +327,7 @@ TEST_CASE("millions of particles in one cell, and particles per second", "[ranks
     for (std::size_t i = 0; i < few; ++i) some.add(set, i);
     const double onHost =
         seconds([&] { (void)reference::deposit(blocks, some.particles(), DepositKind::Sum); });
-    const double perSecond = static_cast<double>(share) / onDevice;
+    const double perSecond = static_cast<double>(set.positions.size()) / onDevice;
     const double ofReference = static_cast<double>(few) / onHost;
     std::printf("%s: %.3g particles per second, the reference %.3g, ratio %.3g\n", name, perSecond,
                 ofReference, perSecond / ofReference);

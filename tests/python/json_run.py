@@ -42,13 +42,13 @@ def refused_particles(catalyst):
 
 def shown(positions, weights, lengths, density):
     """The VDI of a deposit of these particles."""
-    file = "particles.vdi"
+    file = "particles_{timestep}.vdi"
     with Catalyst(MPI.COMM_WORLD, json={"field": "particles", "resolution": [48, 32], "output": file,
                                         "existing": "overwrite"}) as catalyst:
         catalyst.set_blocks([Block(cells=(N, N, N), spacing=(1 / N,) * 3)])
         catalyst.set_particles("particles", positions, weights, lengths, density)
         catalyst.execute(0)
-    return pv_vdi.read(file)
+    return pv_vdi.read("particles_0.vdi")
 
 
 refused(SCRIPT, json={"field": "V", "evry": 10})

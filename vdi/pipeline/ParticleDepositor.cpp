@@ -25,13 +25,30 @@ using gpu::shared::DepositParticle;
 
 namespace {
 
-/// A rank's particles are sent this many at a time, which bounds the memory.
-constexpr std::size_t particlesAtOnce = std::size_t{1} << 18;
-/// So many entries are given to the device at a time: 60 bytes each.
+/// So many entries are given to the device at a time: 76 bytes each.
 constexpr std::size_t entriesAtOnce = std::size_t{1} << 18;
 
-/// The total of the weights' magnitudes of all ranks is at most 2^totalBits units of the sums. Shares of a
-/// weight are at most 16 times it at the domain's faces, 64 times it in hidden cells.
+/// A rank sends about so many entries at a time, and takes up so many particles for it. This bounds the
+/// memory of a rank that gets them from all.
+std::size_t sentAtOnce(int ranks) {
+  constexpr std::size_t received = std::size_t{1} << 21;
+  constexpr std::size_t least = std::size_t{1} << 12;
+  return std::clamp(received / static_cast<std::size_t>(ranks), least, entriesAtOnce);
+}
+
+/// Particles [first, last) that are still to be routed.
+struct Range {
+  std::size_t first;
+  std::size_t last;
+};
+
+/// An invocation goes through so many cells at most, and twice through those of a kernel. Lavapipe ends an
+/// invocation's loops after 65535 passes. On a GPU the bound keeps dispatches short.
+constexpr double mostCellsOnCpu = 1 << 14;
+constexpr double mostCellsOnGpu = 1 << 20;
+
+/// The total of the weights' magnitudes of all ranks is at most 2^totalBits units of the sums. A cell's share
+/// of a weight is at most 64 times it, and more than 1 only in ghost and hidden cells.
 constexpr int totalBits = 55;
 
 /// The exponent of the sums' unit: a power of two, so that the number of ranks hardly changes it.
@@ -71,34 +88,42 @@ std::shared_ptr<float[]> newValues(std::size_t count) {
 
 struct ParticleDepositor::State {
   State(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& communicator)
-      : comm(communicator), pass(device) {}
+      : comm(communicator), mostCells(device->isCpu() ? mostCellsOnCpu : mostCellsOnGpu), pass(device) {}
 
   std::vector<DepositParticle> exchange(std::vector<RoutedParticle> routed) const;
-  std::vector<RoutedParticle> route(const Particles& particles, std::size_t first, std::size_t last,
-                                    int exponent, ParticleCounts& counts) const;
+  std::vector<RoutedParticle> route(const Particles& particles, std::vector<Range>& left, int exponent,
+                                    ParticleCounts& counts) const;
   void add(std::span<const DepositParticle> particles);
   std::vector<std::shared_ptr<float[]>> values(DepositKind kind, int exponent);
 
   const comm::Communicator& comm;
+  double mostCells;
   gpu::DepositPass pass;
   std::vector<Block> blocks;
   std::optional<ParticleRouting> routing;
 };
 
-/// Routes particles on several threads.
-std::vector<RoutedParticle> ParticleDepositor::State::route(const Particles& particles, std::size_t first,
-                                                            std::size_t last, int exponent,
+/// Routes some of the particles that are left, on several threads.
+std::vector<RoutedParticle> ParticleDepositor::State::route(const Particles& particles,
+                                                            std::vector<Range>& left, int exponent,
                                                             ParticleCounts& counts) const {
   std::vector<RoutedParticle> all;
+  if (left.empty()) return all;
+  const std::size_t most = sentAtOnce(comm.size());
+  const Range now{left.back().first, std::min(left.back().last, left.back().first + most)};
+  left.back().first = now.last;
+  if (left.back().first == left.back().last) left.pop_back();
   std::mutex mutex;
   constexpr std::size_t least = 512;
-  inParallel(last - first, least, [&](std::size_t from, std::size_t to) {
+  inParallel(now.last - now.first, least, [&](std::size_t from, std::size_t to) {
     std::vector<RoutedParticle> mine;
     ParticleCounts more;
     mine.reserve(to - from);
-    routing->route(particles, first + from, first + to, exponent, mine, more);
+    const std::size_t last = now.first + to;
+    const std::size_t next = routing->route(particles, now.first + from, last, exponent, most, mine, more);
     const std::scoped_lock lock(mutex);
     all.insert(all.end(), mine.begin(), mine.end());
+    if (next < last) left.push_back({next, last});
     counts.given += more.given;
     counts.notFinite += more.notFinite;
     counts.outside += more.outside;
@@ -169,7 +194,9 @@ ParticleDepositor::~ParticleDepositor() = default;
 void ParticleDepositor::setBlocks(const std::vector<Block>& blocks) {
   State& state = *state_;
   state.routing.reset();
-  state.routing.emplace(state.comm, blocks);
+  std::array<double, 1> mostCells{state.mostCells};
+  state.comm.allReduceMin(mostCells);
+  state.routing.emplace(state.comm, blocks, static_cast<int>(mostCells[0]));
   state.blocks = blocks;
 }
 
@@ -177,20 +204,20 @@ DepositedArray ParticleDepositor::deposit(const Particles& particles, DepositKin
   State& state = *state_;
   const comm::Communicator& comm = state.comm;
   const int exponent = unitExponent(comm, particles);
-  std::array<std::uint64_t, 1> rounds{(particles.count + particlesAtOnce - 1) / particlesAtOnce};
-  comm.allReduceMax(rounds);
   comm.together([&] {
     std::vector<glm::ivec3> sizes;
     for (const Block& block : state.blocks) sizes.push_back(block.dims);
     state.pass.start(sizes);
   });
   ParticleCounts counts;
-  for (std::uint64_t round = 0; round < rounds[0]; ++round) {
+  std::vector<Range> left;
+  if (particles.count > 0) left.push_back({0, particles.count});
+  bool isMore = true;
+  while (isMore) {
     std::vector<RoutedParticle> routed;
-    comm.together([&] {
-      const std::size_t first = std::min(round * particlesAtOnce, particles.count);
-      const std::size_t last = std::min(first + particlesAtOnce, particles.count);
-      routed = state.route(particles, first, last, -exponent, counts);
+    isMore = comm.anyTogether([&] {
+      routed = state.route(particles, left, -exponent, counts);
+      return !left.empty();
     });
     const std::vector<DepositParticle> mine = state.exchange(std::move(routed));
     comm.together([&] { state.add(mine); });

@@ -24,8 +24,8 @@ struct DepositedArray {
 /// the same bit by bit when repeated. A contribution below 2^-55 of the total weight of all ranks may be
 /// lost.
 ///
-/// Memory: on the device 8 bytes a stored cell, and on the host 4, which the result keeps; during `deposit`
-/// also some 100 bytes for each of 2^18 particles, times the number of blocks that one meets.
+/// Memory: on the device 8 bytes a stored cell, and on the host 4, which the result keeps. During `deposit`,
+/// particles travel in parts that take some 500 MiB at most.
 class ParticleDepositor {
  public:
   /// The communicator must outlive this object.

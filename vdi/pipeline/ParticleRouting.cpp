@@ -16,9 +16,6 @@ namespace {
 /// Faces, and cells of two blocks, that are this near to each other coincide, in cells.
 constexpr double coincidence = 1e-6;
 
-/// A particle that meets more cells of a block than this is sent in layers, so that no invocation runs long.
-constexpr double mostCells = 1 << 20;
-
 constexpr double farthestCell = 1 << 30;
 
 double volumeOf(const Box& box) {
@@ -40,6 +37,24 @@ double splineAt(double q) {
 /// The length that two intervals share.
 double overlap(double lo, double hi, double otherLo, double otherHi) {
   return std::max(std::min(hi, otherHi) - std::max(lo, otherLo), 0.0);
+}
+
+/// Cuts a box into pieces of at most `most` cells: whole layers, rows or parts of rows.
+template <typename Visit>
+void forEachPiece(const IndexBox& box, int most, Visit visit) {
+  const glm::ivec3 size = box.size();
+  glm::ivec3 step;
+  step.x = std::min(size.x, most);
+  step.y = std::clamp(most / step.x, 1, size.y);
+  step.z = std::clamp(most / (step.x * step.y), 1, size.z);
+  for (int z = box.lo.z; z < box.hi.z; z += step.z) {
+    for (int y = box.lo.y; y < box.hi.y; y += step.y) {
+      for (int x = box.lo.x; x < box.hi.x; x += step.x) {
+        const glm::ivec3 lo(x, y, z);
+        visit(IndexBox{lo, glm::min(lo + step, box.hi)});
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -77,13 +92,16 @@ struct ParticleRouting::Cells {
   }
 };
 
-ParticleRouting::ParticleRouting(const comm::Communicator& comm, const std::vector<Block>& mine)
-    : directory_(comm, mine, false) {
+ParticleRouting::ParticleRouting(const comm::Communicator& comm, const std::vector<Block>& mine,
+                                 int mostCells)
+    : directory_(comm, mine, false), mostCells_(mostCells) {
   comm.together([&] {
     Box all;
     for (const comm::BlockEntry& entry : directory_.entries()) {
       places_.push_back(
           {entry.origin - 0.5 * entry.spacing, entry.spacing, entry.dims, entry.rank, entry.block});
+      Place& place = places_.back();
+      place.stored = {place.lower, place.lower + glm::dvec3(place.cells) * place.spacing};
       all.include(entry.owned);
     }
     constexpr double flat = 1e6;
@@ -144,16 +162,35 @@ void ParticleRouting::findNear() {
   }
 }
 
-std::vector<std::size_t> ParticleRouting::placesIn(const Box& box) const {
-  return directory_.meeting(box);
+/// Finds the blocks with cells among those that the particle meets.
+void ParticleRouting::findMet(const Spread& spread, std::vector<const Place*>& met) const {
+  const Place& owner = *spread.owner;
+  const Box box = Cells(spread, owner).box(owner);
+  const glm::dvec3 slack = coincidence * owner.spacing;
+  const auto find = [&](const std::vector<std::size_t>& among) {
+    met.clear();
+    for (const std::size_t i : among) {
+      const Box common = places_[i].stored.intersection(box);
+      if (glm::all(glm::greaterThan(common.hi - common.lo, slack))) met.push_back(&places_[i]);
+    }
+  };
+  if (spread.h > 0.0) {
+    find(directory_.meeting(box));
+  } else {
+    find(owner.near);
+  }
 }
 
-void ParticleRouting::route(const Particles& particles, std::size_t first, std::size_t last, int exponent,
-                            std::vector<RoutedParticle>& routed, ParticleCounts& counts) const {
-  for (std::size_t i = first; i < last; ++i) {
+std::size_t ParticleRouting::route(const Particles& particles, std::size_t first, std::size_t last,
+                                   int exponent, std::size_t enough, std::vector<RoutedParticle>& routed,
+                                   ParticleCounts& counts) const {
+  std::vector<const Place*> met;
+  std::size_t i = first;
+  for (; i < last && routed.size() < enough; ++i) {
     const std::optional<Spread> spread = spreadOf(particles, i, counts);
-    if (spread) send(*spread, exponent, routed);
+    if (spread) send(*spread, exponent, met, routed);
   }
+  return i;
 }
 
 /// Returns nullopt for a particle that is left out.
@@ -188,34 +225,29 @@ std::optional<ParticleRouting::Spread> ParticleRouting::spreadOf(const Particles
 }
 
 /// Whether the particle meets only cells of its owner's lattice, all of them owned by some block.
-bool ParticleRouting::isWithinOneLattice(const Spread& spread, std::span<const std::size_t> places) const {
+bool ParticleRouting::isWithinOneLattice(const Spread& spread, std::span<const Place* const> met) const {
   const Place& owner = *spread.owner;
-  const Box met = Cells(spread, owner).box(owner);
-  const glm::dvec3 slack = coincidence * owner.spacing;
-  bool isAlone = true;
-  double covered = 0.0;
-  for (const std::size_t i : places) {
-    const Place& place = places_[i];
-    const Box common = place.stored().intersection(met);
-    if (!glm::all(glm::greaterThan(common.hi - common.lo, slack))) continue;
-    if (place.lattice != owner.lattice) return false;
-    isAlone = isAlone && &place == &owner;
-    for (const Box& box : place.owned) covered += volumeOf(box.intersection(met));
-  }
-  if (isAlone && owner.owned.size() == 1) {
+  const Box cells = Cells(spread, owner).box(owner);
+  if (met.size() == 1 && owner.owned.size() == 1) {
+    const glm::dvec3 slack = coincidence * owner.spacing;
     const Box& box = owner.owned.front();
-    return glm::all(glm::greaterThanEqual(met.lo, box.lo - slack)) &&
-           glm::all(glm::lessThanEqual(met.hi, box.hi + slack));
+    return glm::all(glm::greaterThanEqual(cells.lo, box.lo - slack)) &&
+           glm::all(glm::lessThanEqual(cells.hi, box.hi + slack));
   }
-  return covered >= (1.0 - coincidence) * volumeOf(met);
+  double covered = 0.0;
+  for (const Place* place : met) {
+    if (place->lattice != owner.lattice) return false;
+    for (const Box& box : place->owned) covered += volumeOf(box.intersection(cells));
+  }
+  return covered >= (1.0 - coincidence) * volumeOf(cells);
 }
 
 /// The sum of the particle's shares over all owned cells.
-double ParticleRouting::sumOf(const Spread& spread, std::span<const std::size_t> places) const {
+double ParticleRouting::sumOf(const Spread& spread, std::span<const Place* const> met) const {
   double sum = 0.0;
   std::array<std::vector<double>, 3> shares;  // of each part, by its index in the range
-  for (const std::size_t i : places) {
-    const Place& place = places_[i];
+  for (const Place* one : met) {
+    const Place& place = *one;
     const Cells cells(spread, place);
     const IndexBox& range = cells.stored;
     if (range.empty()) continue;
@@ -269,27 +301,33 @@ double ParticleRouting::sumOf(const Spread& spread, std::span<const std::size_t>
   return sum;
 }
 
-void ParticleRouting::send(Spread spread, int exponent, std::vector<RoutedParticle>& routed) const {
-  std::vector<std::size_t> found;
-  if (spread.h > 0.0) found = placesIn(spread.bounds());
-  std::span<const std::size_t> places = spread.h > 0.0 ? std::span(found) : std::span(spread.owner->near);
+/// The share of a cell of the owner's size at the kernel's centre; 0 for a cloud.
+double ParticleRouting::peakOf(const Spread& spread) {
+  if (!(spread.h > 0.0)) return 0.0;
+  const glm::dvec3 size = spread.owner->spacing / spread.h;
+  return splineAt(0.0) * size.x * size.y * size.z;
+}
+
+/// `met` is memory that the calls share.
+void ParticleRouting::send(Spread spread, int exponent, std::vector<const Place*>& met,
+                           std::vector<RoutedParticle>& routed) const {
   double sum = 1.0;
-  bool isSummed = spread.h > 0.0 && Cells(spread, *spread.owner).count() > mostCells;
-  if (isSummed || !isWithinOneLattice(spread, places)) {
-    isSummed = true;
-    sum = sumOf(spread, places);
-    if (spread.h > 0.0 && sum < leastKernelSum) {
-      spread.h = 0.0;
-      places = spread.owner->near;
-      sum = isWithinOneLattice(spread, places) ? 1.0 : sumOf(spread, places);
-    }
+  findMet(spread, met);
+  const bool isLarge = spread.h > 0.0 && Cells(spread, *spread.owner).count() > mostCells_;
+  bool isSummed = isLarge || !isWithinOneLattice(spread, met);
+  if (isSummed) sum = sumOf(spread, met);
+  if (isSummed && sum < leastKernelSum * peakOf(spread)) {
+    spread.h = 0.0;
+    findMet(spread, met);
+    isSummed = !isWithinOneLattice(spread, met);
+    sum = isSummed ? sumOf(spread, met) : 1.0;
   }
-  for (const std::size_t i : places) {
-    const Place& place = places_[i];
+  for (const Place* to : met) {
+    const Place& place = *to;
     const Cells cells(spread, place);
     if (cells.stored.empty()) continue;
     const glm::dvec3 cell = glm::floor(cells.at);
-    double weight = spread.weight / sum;
+    double factor = 1.0 / sum;
     RoutedParticle one{};
     one.rank = place.rank;
     shared::DepositParticle& particle = one.particle;
@@ -302,23 +340,25 @@ void ParticleRouting::send(Spread spread, int exponent, std::vector<RoutedPartic
       particle.mode = isSummed ? shared::depositModeShares : shared::depositModeKernel;
       // A hidden cell that is larger than its parts allow must not exceed the sums' range.
       constexpr double most = 64.0;
-      if (isSummed) weight *= std::min(step.x * step.y * step.z / std::numbers::pi, most);
+      if (isSummed) factor = std::min(factor * step.x * step.y * step.z / std::numbers::pi, most);
     }
     particle.cellX = static_cast<int>(cell.x);
     particle.cellY = static_cast<int>(cell.y);
     particle.cellZ = static_cast<int>(cell.z);
     particle.within = glm::vec3(cells.at - cell);
-    particle.weight = static_cast<float>(std::ldexp(weight, exponent));
+    particle.weight = static_cast<float>(std::ldexp(spread.weight * factor, exponent));
     const glm::uvec3 parts(cells.parts - 1);
     particle.parts = parts.x | parts.y << 10U | parts.z << 20U;
     particle.block = static_cast<std::uint32_t>(place.block);
-    const glm::dvec3 size(cells.stored.size());
-    const int layers = static_cast<int>(std::clamp(mostCells / (size.x * size.y), 1.0, size.z));
-    for (int z = cells.stored.lo.z; z < cells.stored.hi.z; z += layers) {
-      particle.firstZ = z;
-      particle.lastZ = std::min(z + layers, cells.stored.hi.z);
+    forEachPiece(cells.stored, mostCells_, [&](const IndexBox& piece) {
+      particle.firstX = piece.lo.x;
+      particle.firstY = piece.lo.y;
+      particle.firstZ = piece.lo.z;
+      particle.lastX = piece.hi.x;
+      particle.lastY = piece.hi.y;
+      particle.lastZ = piece.hi.z;
       routed.push_back(one);
-    }
+    });
   }
 }
 

@@ -25,13 +25,16 @@ struct RoutedParticle {
 /// The places of all ranks' blocks, as every rank knows them.
 class ParticleRouting {
  public:
-  /// Collective. Throws as comm::settleOverlaps does.
-  ParticleRouting(const comm::Communicator& comm, const std::vector<Block>& mine);
+  /// Collective. An entry has `mostCells` cells at most, equal on all ranks. Throws as comm::settleOverlaps
+  /// does.
+  ParticleRouting(const comm::Communicator& comm, const std::vector<Block>& mine, int mostCells);
 
-  /// Appends an entry for each particle of [first, last) and each block that it meets, and counts particles
-  /// that are left out. Weights are multiplied by 2^`exponent`. Several threads may call it at once.
-  void route(const Particles& particles, std::size_t first, std::size_t last, int exponent,
-             std::vector<RoutedParticle>& routed, ParticleCounts& counts) const;
+  /// Appends an entry for each particle of [first, last) and each block that it meets, or several if it meets
+  /// many cells. Counts particles that are left out. Weights are multiplied by 2^`exponent`. Stops when
+  /// `routed` has `enough` entries, and returns the index of the first particle that is still to be routed.
+  /// Several threads may call it at once.
+  std::size_t route(const Particles& particles, std::size_t first, std::size_t last, int exponent,
+                    std::size_t enough, std::vector<RoutedParticle>& routed, ParticleCounts& counts) const;
 
  private:
   /// A block of any rank.
@@ -43,9 +46,8 @@ class ParticleRouting {
     std::int32_t block;               // index on its rank
     std::size_t lattice = 0;          // equal for blocks whose cells continue each other
     std::vector<Box> owned{};         // disjoint
+    Box stored{};                     // all cells
     std::vector<std::size_t> near{};  // places that a cloud around a position in `owned` may meet
-
-    Box stored() const { return {lower, lower + glm::dvec3(cells) * spacing}; }
   };
   /// How a particle spreads.
   struct Spread {
@@ -66,10 +68,12 @@ class ParticleRouting {
   void findLattices();
   void findNear();
   std::optional<Spread> spreadOf(const Particles& particles, std::size_t index, ParticleCounts& counts) const;
-  std::vector<std::size_t> placesIn(const Box& box) const;
-  bool isWithinOneLattice(const Spread& spread, std::span<const std::size_t> places) const;
-  double sumOf(const Spread& spread, std::span<const std::size_t> places) const;
-  void send(Spread spread, int exponent, std::vector<RoutedParticle>& routed) const;
+  void findMet(const Spread& spread, std::vector<const Place*>& met) const;
+  bool isWithinOneLattice(const Spread& spread, std::span<const Place* const> met) const;
+  double sumOf(const Spread& spread, std::span<const Place* const> met) const;
+  static double peakOf(const Spread& spread);
+  void send(Spread spread, int exponent, std::vector<const Place*>& met,
+            std::vector<RoutedParticle>& routed) const;
 
   struct OwnedBox {
     Box box;
@@ -79,7 +83,8 @@ class ParticleRouting {
   std::vector<Place> places_;  // as the directory's entries
   std::vector<OwnedBox> owned_;
   std::unique_ptr<comm::BoxTree> ownedTree_;  // of owned_
-  double longest_ = 0.0;                      // beyond this h the kernel is flat over all blocks
+  int mostCells_;
+  double longest_ = 0.0;  // beyond this h the kernel is flat over all blocks
 };
 
 }  // namespace vdi::detail

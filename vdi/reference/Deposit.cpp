@@ -156,7 +156,7 @@ Deposit deposit(std::span<const Block> blocks, const Particles& particles, Depos
       if (isGood && h >= shortestKernel * largest) spread.h = h;
     }
     double sum = sumOf(lattices, spread);
-    if (spread.h > 0.0 && sum < leastKernelSum) {
+    if (spread.h > 0.0 && sum < leastKernelSum * cubicSpline(0.0, spread.h) * owner->volume()) {
       spread.h = 0.0;
       sum = sumOf(lattices, spread);
     }
