@@ -9,8 +9,10 @@ Widgets are found by the text or tool tip that a screen reader would read (AT-SP
 xdotool, openbox, Xvfb, ImageMagick, dbus, at-spi2-core and python3-gi.
 """
 
+import html
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -25,6 +27,7 @@ import server  # noqa: E402
 
 SECONDS = 20.0  # that a widget may take to show up
 COLOR_EDITOR = "Color Map and Opacity of the VDI"  # its title
+DOCKS = ("frame", "panel")  # roles of dock widgets: the one up to Qt 6.8, and the one that forky's Qt has
 
 
 def wait_for(what, action, seconds=SECONDS):
@@ -86,8 +89,14 @@ class Session:
             self.address, flags.AUTHENTICATION_CLIENT | flags.MESSAGE_BUS_CONNECTION)
         for what in ("IsEnabled", "ScreenReaderEnabled"):
             enabled = GLib.Variant("(ssv)", ("org.a11y.Status", what, GLib.Variant("b", True)))
-            session.call_sync("org.a11y.Bus", "/org/a11y/bus", "org.freedesktop.DBus.Properties", "Set", enabled, None, 0,
-                              -1)
+            try:
+                session.call_sync("org.a11y.Bus", "/org/a11y/bus", "org.freedesktop.DBus.Properties", "Set", enabled, None,
+                                  0, -1)
+            except GLib.Error as error:
+                # Newer at-spi2-core has no ScreenReaderEnabled; IsEnabled is enough for Qt.
+                unknown = error.matches(Gio.dbus_error_quark(), Gio.DBusError.INVALID_ARGS)
+                if not unknown or what != "ScreenReaderEnabled":
+                    raise
         address = session.call_sync("org.a11y.Bus", "/org/a11y/bus", "org.a11y.Bus", "GetAddress", None, None, 0, -1)
         return Bus(address.unpack()[0])
 
@@ -139,7 +148,9 @@ class Widget:
 
     @property
     def tip(self):
-        return self._property("Description")
+        """Without marks: forky's ParaView has HTML in some."""
+        tip = self._property("Description")
+        return html.unescape(re.sub("<[^>]*>", "", tip)).strip() if tip.startswith("<html>") else tip
 
     @property
     def role(self):
@@ -288,7 +299,7 @@ class Window:
                 if node is not None and not hidden and not child.has(Widget.SHOWING):
                     continue
                 # Nothing to be clicked, and there are many of them.
-                closed = not hidden and (child.role == "combo box" or child.role == "frame" and child.box[0] < -100)
+                closed = not hidden and (child.role == "combo box" or child.role in DOCKS and child.box[0] < -100)
             except GLib.Error:
                 continue
             yield child
@@ -300,7 +311,7 @@ class Window:
         def look():
             for widget in self.widgets(within):
                 try:
-                    if role not in (None, widget.role):
+                    if role is not None and widget.role not in (DOCKS if role == "frame" else (role,)):
                         continue
                     if widget.name.split("\n")[0] == name or widget.tip.split("\n")[0] == name:
                         return widget
