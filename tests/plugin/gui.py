@@ -9,6 +9,14 @@ sys.path.insert(0, os.environ["VDI_TEST_SOURCE"])
 OUTPUT = os.environ["VDI_TEST_OUTPUT"]
 
 
+def screenshot(view, name):
+    import pvtest
+    from paraview import simple
+    path = os.path.join(OUTPUT, name)
+    simple.SaveScreenshot(path, view, ImageResolution=[480, 320])
+    return pvtest.read_png(path)
+
+
 def use():
     import pvtest
     from paraview import simple
@@ -36,9 +44,13 @@ def use():
     for proxy, what in ((image, "the filter's picture"), (rendered, "the VDI from 15 degrees")):
         shown = pvtest.picture(proxy)
         pvtest.check(shown is not None and shown.max() > 60 and shown.max(axis=2).std() > 10, what + " shows something")
-    simple.SaveScreenshot(os.path.join(OUTPUT, "gui_view.png"), view, ImageResolution=[480, 320])
-    view_picture = pvtest.read_png(os.path.join(OUTPUT, "gui_view.png"))
-    pvtest.check(view_picture.std() > 10, "Show puts the picture into the view")
+    shown = screenshot(view, "gui_view.png")
+    simple.Hide(image, view)
+    share = pvtest.wrong_share(shown, screenshot(view, "gui_empty.png"), shown)
+    print("the picture takes {:.2%} of the view".format(share))
+    pvtest.check(share > 0.01, "Show puts the picture into the view")
+    simple.Show(image, view)
+    simple.Render(view)
     return pvtest.failures
 
 
