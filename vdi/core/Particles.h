@@ -66,8 +66,8 @@ struct ParticleCounts {
 /// 0.5477 h, agree at 0.745. A shorter kernel could miss the centres of all cells.
 inline constexpr double shortestKernel = 0.75;
 
-/// A kernel is replaced by cloud in cell if its shares add up to less than this times the share that a cell of
-/// the owner's size would get at the kernel's centre. This happens only where the owner's cell is owned in
+/// A kernel is replaced by cloud in cell if its shares add up to less than this times the share that a cell
+/// of the owner's size would get at the kernel's centre. This happens only where the owner's cell is owned in
 /// small part, and no other centre is near.
 inline constexpr double leastKernelSum = 1.0 / 16.0;
 
