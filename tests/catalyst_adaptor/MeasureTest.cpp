@@ -204,3 +204,51 @@ TEST_CASE("NaN doesn't count, and infinite values count for the extremes alone")
   fields.setBlocks({});
   CHECK_FALSE(measured(Kind::Min, comm, fields));
 }
+
+TEST_CASE("blocks that lack the array don't count") {
+  const comm::Communicator world = comm::Communicator::world();
+  const std::vector<double> values(64, 2.0 + world.rank());
+  const auto blockAt = [&](double x) {
+    return vdi_catalyst_block{{4, 4, 4}, {0, 0, 0}, {0, 0, 0}, {x, 0.0, 4.0 * world.rank()}, {1.0, 1.0, 1.0}};
+  };
+  Fields fields;
+  fields.setBlocks({blockAt(0.0), blockAt(4.0)});
+  const auto in = [&](int block, const void* data) {
+    return fields.inOrder(fields.blocks()[static_cast<std::size_t>(block)], VDI_CATALYST_F64, true, 1, data);
+  };
+  fields.setArray("f", true, VDI_CATALYST_F64, {in(0, values.data()), in(1, nullptr)});
+  const double mean = 2.0 + 0.5 * (world.size() - 1);
+  CHECK(measured(Kind::Mean, world, fields).value() == Approx(mean));
+  // The parts follow when another block has it.
+  Measure measure(
+      {.measure = Kind::Mean, .field = "f", .cells = {}, .component = -1, .above = {}, .below = {}});
+  CHECK(measure.of(world, fields).value() == Approx(mean));
+  const std::vector<double> ones(64, 1.0);
+  fields.setArray("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, ones.data())});
+  CHECK(measure.of(world, fields).value() == Approx(1.0));
+  fields.setArray("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, nullptr)});
+  CHECK_THROWS(measure.of(world, fields));
+}
+
+TEST_CASE("a phase is measured, and an offset moves the parts that count") {
+  const comm::Communicator world = comm::Communicator::world();
+  std::vector<double> pairs;
+  for (int i = 0; i < 64; ++i) {
+    pairs.push_back(3.0 * std::cos(0.5));
+    pairs.push_back(3.0 * std::sin(0.5));
+  }
+  Fields fields;
+  fields.setBlocks({{{4, 4, 4}, {0, 0, 0}, {0, 0, 0}, {0.0, 0.0, 4.0 * world.rank()}, {1.0, 1.0, 1.0}}});
+  fields.setArray("f", true, VDI_CATALYST_F64,
+                  {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 2, pairs.data())});
+  CHECK(measured(Kind::Max, world, fields, phase).value() == Approx(0.5));
+  CHECK(measured(Kind::Max, world, fields, magnitude).value() == Approx(3.0));
+  std::vector<double> along;  // 0 to 3 along x
+  for (int i = 0; i < 64; ++i) along.push_back(i % 4);
+  fields.setArray("g", true, VDI_CATALYST_F64,
+                  {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 1, along.data())});
+  Measure mean({.measure = Kind::Mean, .field = "g", .cells = {}, .component = -1, .above = {}, .below = {}});
+  CHECK(mean.of(world, fields).value() == Approx(1.5));
+  fields.setOffset("g", true, {-0.5, 0.0, 0.0});
+  CHECK(mean.of(world, fields).value() == Approx(6.0 / 3.5));  // half of the first value's cell is inside
+}
