@@ -99,4 +99,13 @@ bool isStep(std::int64_t step) {
   return step >= 0 && step <= std::numeric_limits<int>::max();
 }
 
+void requireStep(std::int64_t step) {
+  if (isStep(step)) return;
+  const std::int64_t maximum = std::numeric_limits<int>::max();
+  throw std::invalid_argument(
+      "step " + std::to_string(step) + " isn't handed over: ParaView counts steps from 0 to " +
+      std::to_string(maximum) +
+      "; hand over a smaller number that goes on after a restart, or files of before are replaced");
+}
+
 }  // namespace vdi::catalyst

@@ -76,5 +76,8 @@ void checkBlock(const vdi_catalyst_block& block);
 void checkOffset(const char* name, std::int32_t association, const double* offset);
 /// Whether ParaView can count this step.
 bool isStep(std::int64_t step);
+/// Throws std::invalid_argument with the reason unless the step fits ParaView's int, by which it counts steps
+/// and names files. Another step would be lost, or replace another step's files.
+void requireStep(std::int64_t step);
 
 }  // namespace vdi::catalyst

@@ -9,16 +9,11 @@
 #include <vector>
 
 #include "catalyst_adaptor/Parameters.h"
+#include "catalyst_adaptor/Scripts.h"
 
 class vtkDataObject;
 
 namespace vdi::catalyst {
-
-/// A Python file, and what get_args() of paraview.catalyst returns in it.
-struct Script {
-  std::string file;
-  std::vector<std::string> arguments;
-};
 
 /// A process has one engine, because ParaView can't be started twice. All functions are collective unless
 /// their comments say otherwise, and except `check`.

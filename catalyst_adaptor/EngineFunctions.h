@@ -1,5 +1,6 @@
 /* The functions through which libvdi_catalyst.so, which a simulation links, calls the engine that it loads:
- * libvdi_catalyst_engine.so for scripts, libvdi_catalyst_json.so for runs without one. */
+ * libvdi_catalyst_engine.so for scripts, libvdi_catalyst_json.so for runs without one, and
+ * libvdi_catalyst_isolated.so for either in processes of their own. */
 #ifndef VDI_CATALYST_ENGINE_FUNCTIONS_H
 #define VDI_CATALYST_ENGINE_FUNCTIONS_H
 
@@ -9,12 +10,19 @@
 extern "C" {
 #endif
 
-/* One entry for each function of vdi_catalyst.h, with the same contract. An engine has the first two or the
- * third. Those get a valid communicator, and a null *catalyst. */
+/* One entry for each function of vdi_catalyst.h, with the same contract. An engine of scripts has the first
+ * two, one of JSON runs the next two, the isolated one the first three. All these get a valid communicator,
+ * and a null *catalyst. In the isolated engine they return VDI_CATALYST_NOT_ISOLATED, on all ranks, for a run
+ * that another engine has to carry out in this process.
+ *
+ * `go_on_with_json` is initialize_json for a run of which an earlier process has made a part: its files stay.
+ * `set_clock`, which may be null, sets the time in seconds, since the run's start, that counts as that of the
+ * next step. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*initialize_pipelines)(int32_t, int32_t, const vdi_catalyst_pipeline*, vdi_catalyst**);
   int (*initialize_json)(int32_t, const char*, vdi_catalyst**);
+  int (*go_on_with_json)(int32_t, const char*, vdi_catalyst**);
   int (*set_blocks)(vdi_catalyst*, int32_t, const vdi_catalyst_block*);
   int (*set_array)(vdi_catalyst*, const char*, int32_t, int32_t, const void* const*);
   int (*set_array_strided)(vdi_catalyst*, const char*, int32_t, int32_t, int32_t, const void* const*,
@@ -27,12 +35,21 @@ typedef struct vdi_catalyst_functions {
   int64_t (*parameter_i64)(vdi_catalyst*, const char*, int64_t, int64_t, int64_t);
   int (*finalize)(vdi_catalyst*);
   const char* (*error)(const vdi_catalyst*);
+  void (*set_clock)(vdi_catalyst*, double);
 } vdi_catalyst_functions;
 
 /* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
-#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_6
-#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_6"
+#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_7
+#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_7"
+enum { VDI_CATALYST_NOT_ISOLATED = -1 };
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
+
+/* libvdi_catalyst.so exports these for the program in which the isolated engine makes frames
+ * (isolated/process). They call the entries of these names of the engine for JSON, and set_clock does nothing
+ * for other runs. */
+VDI_CATALYST_API int vdi_catalyst_go_on_with_json(int32_t fortran_communicator, const char* json,
+                                                  vdi_catalyst** catalyst);
+VDI_CATALYST_API void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds);
 
 #ifdef __cplusplus
 }

@@ -4,6 +4,7 @@
 #include <fenv.h>
 #include <mpi.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "catalyst_adaptor/EngineFunctions.h"
@@ -11,7 +12,7 @@
 
 enum { MESSAGE_SIZE = 4096, PATH_SIZE = 2048 };
 
-/* An engine: it runs scripts in ParaView, or carries out a JSON text. */
+/* An engine: it runs scripts in ParaView, or carries out a JSON text, here or in another process. */
 typedef struct vdi_engine {
   const char* file; /* in a folder beside this library */
   const char* needs;
@@ -26,8 +27,13 @@ static vdi_engine script_engine = {
     "(LD_LIBRARY_PATH)",
     NULL};
 static vdi_engine json_engine = {VDI_CATALYST_JSON_FILE, "the Vulkan loader (Debian: libvulkan1)", NULL};
-/* The JSON engine's handle until it is finalized. All other handles belong to the script engine, which knows
- * its own. */
+static vdi_engine isolated_engine = {VDI_CATALYST_ISOLATED_FILE, "no other package", NULL};
+
+/* The engine that a run has; null: none so far. */
+static vdi_engine* script_run;
+static vdi_engine* json_run;
+/* The JSON run's handle until it is finalized. All other handles belong to the run of scripts, whose engine
+ * knows its own. */
 static const vdi_catalyst* json_handle;
 
 /* Returns 0 if this library's own path is unknown or too long. */
@@ -86,63 +92,138 @@ static int failed_anywhere(MPI_Comm comm, int failed, char message[MESSAGE_SIZE]
 }
 
 /* Loads the engine on all ranks. Returns the code for the simulation. */
-static int prepare(vdi_engine* wanted, int32_t fortran_communicator) {
-  const MPI_Comm comm = communicator_of(fortran_communicator);
-  if (comm == MPI_COMM_NULL) {
-    fprintf(stderr, "vdi_catalyst: there is no MPI, or no communicator has this Fortran handle\n");
-    return VDI_CATALYST_BAD_ARGUMENT;
-  }
+static int prepare(vdi_engine* wanted, MPI_Comm comm) {
   char message[MESSAGE_SIZE] = "";
   const int failed = load_engine(wanted, message);
   return failed_anywhere(comm, failed, message) || failed ? VDI_CATALYST_ENGINE : VDI_CATALYST_OK;
 }
 
-int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
-                            vdi_catalyst** catalyst) {
+/* Collective: whether the first rank's environment says something about isolation. */
+static int names_isolation(MPI_Comm comm) {
+  const char* value = getenv("VDI_ISOLATION");
+  int names = value != NULL && *value != '\0';
+  MPI_Bcast(&names, 1, MPI_INT, 0, comm);
+  return names;
+}
+
+/* What a simulation initialises with: one of the three. */
+typedef struct vdi_given {
+  const char* const* scripts;
+  const vdi_catalyst_pipeline* pipelines;
+  int32_t count;
+  const char* json;
+  int kind; /* 0: scripts, 1: pipelines, 2: JSON, 3: JSON, to go on with */
+} vdi_given;
+
+static int initialize_with(const vdi_engine* engine, int32_t communicator, const vdi_given* given,
+                           vdi_catalyst** catalyst) {
+  switch (given->kind) {
+    case 0:
+      return engine->functions->initialize(communicator, given->count, given->scripts, catalyst);
+    case 1:
+      return engine->functions->initialize_pipelines(communicator, given->count, given->pipelines, catalyst);
+    case 2:
+      return engine->functions->initialize_json(communicator, given->json, catalyst);
+    default:
+      return engine->functions->go_on_with_json(communicator, given->json, catalyst);
+  }
+}
+
+/* Asks the isolated engine first, where it may have to do it. */
+static int initialize_some(int32_t communicator, const vdi_given* given, vdi_engine** run,
+                           vdi_catalyst** catalyst) {
+  const MPI_Comm comm = communicator_of(communicator);
+  if (comm == MPI_COMM_NULL) {
+    fprintf(stderr, "vdi_catalyst: there is no MPI, or no communicator has this Fortran handle\n");
+    return VDI_CATALYST_BAD_ARGUMENT;
+  }
+  /* The text of a run tells, too, which only that engine reads. A run that goes on refuses another one. */
+  const int goes_on = run == &json_run && json_handle != NULL;
+  vdi_engine* const own = run == &json_run ? &json_engine : &script_engine;
+  const int isolated =
+      goes_on ? *run == &isolated_engine : given->kind == 2 || (given->kind < 2 && names_isolation(comm));
+  vdi_engine* tried = isolated ? &isolated_engine : own;
+  int code = prepare(tried, comm);
+  if (code == VDI_CATALYST_OK) code = initialize_with(tried, communicator, given, catalyst);
+  if (code == VDI_CATALYST_NOT_ISOLATED) {
+    tried = own;
+    code = prepare(tried, comm);
+    if (code == VDI_CATALYST_OK) code = initialize_with(tried, communicator, given, catalyst);
+  }
+  if (code == VDI_CATALYST_OK) *run = tried;
+  return code;
+}
+
+static int initialize(int32_t communicator, const vdi_given* given, vdi_engine** run,
+                      vdi_catalyst** catalyst) {
   if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   *catalyst = NULL;
   vdi_process_state state;
   vdi_process_state_save(&state);
-  int code = prepare(&script_engine, fortran_communicator);
-  if (code == VDI_CATALYST_OK)
-    code = script_engine.functions->initialize(fortran_communicator, script_count, scripts, catalyst);
+  const int code = initialize_some(communicator, given, run, catalyst);
+  if (code == VDI_CATALYST_OK && run == &json_run) json_handle = *catalyst;
   vdi_process_state_restore(&state);
   return code;
+}
+
+int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
+                            vdi_catalyst** catalyst) {
+  const vdi_given given = {scripts, NULL, script_count, NULL, 0};
+  return initialize(fortran_communicator, &given, &script_run, catalyst);
 }
 
 int vdi_catalyst_initialize_pipelines(int32_t fortran_communicator, int32_t script_count,
                                       const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
-  if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  *catalyst = NULL;
-  vdi_process_state state;
-  vdi_process_state_save(&state);
-  int code = prepare(&script_engine, fortran_communicator);
-  if (code == VDI_CATALYST_OK)
-    code =
-        script_engine.functions->initialize_pipelines(fortran_communicator, script_count, scripts, catalyst);
-  vdi_process_state_restore(&state);
-  return code;
+  const vdi_given given = {NULL, scripts, script_count, NULL, 1};
+  return initialize(fortran_communicator, &given, &script_run, catalyst);
 }
 
 int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
-  if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  *catalyst = NULL;
-  vdi_process_state state;
-  vdi_process_state_save(&state);
-  int code = prepare(&json_engine, fortran_communicator);
-  if (code == VDI_CATALYST_OK)
-    code = json_engine.functions->initialize_json(fortran_communicator, json, catalyst);
-  if (code == VDI_CATALYST_OK) json_handle = *catalyst;
-  vdi_process_state_restore(&state);
-  return code;
+  const vdi_given given = {NULL, NULL, 0, json, 2};
+  return initialize(fortran_communicator, &given, &json_run, catalyst);
 }
 
-/* The functions for this handle; null if none may be called. Without an engine there are no handles. */
-static const vdi_catalyst_functions* functions_of(const vdi_catalyst* catalyst) {
+int vdi_catalyst_go_on_with_json(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
+  const vdi_given given = {NULL, NULL, 0, json, 3};
+  return initialize(fortran_communicator, &given, &json_run, catalyst);
+}
+
+/* The engine for this handle; null if none may be called. Without an engine there are no handles. */
+static const vdi_engine* engine_of(const vdi_catalyst* catalyst) {
   int over = 0;
   MPI_Finalized(&over);
   if (over || catalyst == NULL) return NULL;
-  return catalyst == json_handle ? json_engine.functions : script_engine.functions;
+  return catalyst == json_handle ? json_run : script_run;
+}
+
+static const vdi_catalyst_functions* functions_of(const vdi_catalyst* catalyst) {
+  const vdi_engine* engine = engine_of(catalyst);
+  return engine != NULL ? engine->functions : NULL;
+}
+
+/* The part of the process's state that a call may change, and that it restores. The isolated engine runs only
+ * our own code here, which changes nothing but the floating-point environment. */
+typedef struct vdi_saved {
+  int all;
+  vdi_process_state state;
+  fenv_t floating_point;
+} vdi_saved;
+
+static void save(const vdi_engine* engine, vdi_saved* saved) {
+  saved->all = engine != &isolated_engine;
+  if (saved->all) {
+    vdi_process_state_save(&saved->state);
+  } else {
+    feholdexcept(&saved->floating_point);
+  }
+}
+
+static void restore(vdi_saved* saved) {
+  if (saved->all) {
+    vdi_process_state_restore(&saved->state);
+  } else {
+    fesetenv(&saved->floating_point);
+  }
 }
 
 /* This function and the next three run only our own code, which changes nothing but the floating-point
@@ -203,23 +284,28 @@ int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
 }
 
 int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  const vdi_engine* engine = engine_of(catalyst);
   if (engine == NULL) return 0;
-  vdi_process_state state;
-  vdi_process_state_save(&state);
-  const int wants = engine->wants(catalyst, step, time);
-  vdi_process_state_restore(&state);
+  vdi_saved saved;
+  save(engine, &saved);
+  const int wants = engine->functions->wants(catalyst, step, time);
+  restore(&saved);
   return wants;
 }
 
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  const vdi_engine* engine = engine_of(catalyst);
   if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  vdi_process_state state;
-  vdi_process_state_save(&state);
-  const int code = engine->execute(catalyst, step, time);
-  vdi_process_state_restore(&state);
+  vdi_saved saved;
+  save(engine, &saved);
+  const int code = engine->functions->execute(catalyst, step, time);
+  restore(&saved);
   return code;
+}
+
+void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds) {
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine != NULL && engine->set_clock != NULL) engine->set_clock(catalyst, seconds);
 }
 
 /* Like vdi_catalyst_set_blocks, these functions run only our own code. */
@@ -248,7 +334,7 @@ int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
   int over = 0;
   MPI_Finalized(&over);
-  if (over && catalyst != NULL && (script_engine.functions != NULL || json_engine.functions != NULL))
+  if (over && catalyst != NULL && (script_run != NULL || json_run != NULL))
     fprintf(stderr, "vdi_catalyst: vdi_catalyst_finalize comes after MPI_Finalize, so nothing is ended\n");
   const vdi_catalyst_functions* engine = functions_of(catalyst);
   if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;

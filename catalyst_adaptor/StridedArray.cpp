@@ -52,29 +52,30 @@ bool StridedValues::reachable() const {
   return below <= address && above <= std::numeric_limits<std::uintptr_t>::max() - address;
 }
 
+void StridedValues::copyTo(std::byte* to) const {
+  const auto scalar = static_cast<std::int64_t>(scalarBytes);
+  const ByteStrides from{strides[0], strides[1], strides[2]};
+  glm::ivec3 size(counts[0], counts[1], counts[2]);
+  if (rowInOrder(*this)) {
+    size.x *= components;
+    copyStrided(first, {scalar, from.y, from.z}, to, packedStrides(size, scalarBytes), size, scalarBytes);
+    return;
+  }
+  const ByteStrides packed = packedStrides(size, scalarBytes) * std::int64_t{components};
+  for (int c = 0; c < components; ++c)
+    copyStrided(first + c * componentStride, from, to + c * scalar, packed, size, scalarBytes);
+}
+
 StridedArray::StridedArray(const StridedValues& values) : values_(values) {
   assert(values.reachable());
-  const std::size_t bytes = static_cast<std::size_t>(values.scalars()) * values.scalarBytes;
+  const std::size_t bytes = values.bytes();
   // VTK's own allocation won't do: when it fails, Debian's VTK ends the process.
   memory_.reset(new (std::nothrow) std::byte[bytes]);
   if (!memory_) throw std::runtime_error("no memory to gather an array: " + std::to_string(bytes) + " bytes");
 }
 
 void StridedArray::gather() {
-  const auto scalar = static_cast<std::int64_t>(values_.scalarBytes);
-  const ByteStrides from{values_.strides[0], values_.strides[1], values_.strides[2]};
-  glm::ivec3 size(values_.counts[0], values_.counts[1], values_.counts[2]);
-  if (rowInOrder(values_)) {
-    size.x *= values_.components;
-    copyStrided(values_.first, {scalar, from.y, from.z}, memory_.get(),
-                packedStrides(size, values_.scalarBytes), size, values_.scalarBytes);
-    return;
-  }
-  const ByteStrides to = packedStrides(size, values_.scalarBytes) * std::int64_t{values_.components};
-  for (int c = 0; c < values_.components; ++c) {
-    copyStrided(values_.first + c * values_.componentStride, from, memory_.get() + c * scalar, to, size,
-                values_.scalarBytes);
-  }
+  values_.copyTo(memory_.get());
 }
 
 }  // namespace vdi::catalyst

@@ -23,6 +23,9 @@ struct StridedValues {
   bool inOrder() const;
   /// Whether the offsets of all values from `first` fit into 63 bits.
   bool reachable() const;
+  std::size_t bytes() const { return static_cast<std::size_t>(scalars()) * scalarBytes; }
+  /// Copies the values, as they are now, in VTK's order: `to` has room for `bytes()`.
+  void copyTo(std::byte* to) const;
 };
 
 /// Memory that holds the values in VTK's order.

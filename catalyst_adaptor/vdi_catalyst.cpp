@@ -32,10 +32,11 @@
 #include <vector>
 
 #include "catalyst_adaptor/Calls.h"
+#include "catalyst_adaptor/Deposits.h"
 #include "catalyst_adaptor/Engine.h"
 #include "catalyst_adaptor/Parameters.h"
-#include "catalyst_adaptor/ParticleArrays.h"
 #include "catalyst_adaptor/ScriptEnvironment.h"
+#include "catalyst_adaptor/Scripts.h"
 #include "catalyst_adaptor/StridedArray.h"
 #include "catalyst_adaptor/StridedDataArray.h"
 
@@ -53,8 +54,8 @@ struct vdi_catalyst : vdi::catalyst::Calls {
   std::map<std::pair<int, std::string>, glm::dvec3> offsets;  // in cells; none: 0
   std::vector<vdi_catalyst_block> blocks;
   std::uint64_t blocksVersion = 0;  // changes with the blocks; equal on all ranks
-  std::map<std::string, vdi::catalyst::ParticleArray> particles;     // of the same names on all ranks
-  std::map<std::string, vdi::catalyst::Deposits::Values> deposited;  // the memory of arrays made of them
+  std::map<std::string, vdi::catalyst::ParticleArray> particles;    // of the same names on all ranks
+  std::map<std::string, vdi::catalyst::DepositedValues> deposited;  // the memory of arrays made of them
   std::unique_ptr<vdi::catalyst::DeviceDeposits> deposits;
 };
 
@@ -120,18 +121,6 @@ void markModified(vtkPartitionedDataSet& grid) {
   grid.Modified();
 }
 
-/// Requires a step that fits ParaView's int, by which it counts steps and names files. Another step would be
-/// lost, or replace another step's files.
-void requireStep(const vdi_catalyst& self, std::int64_t step) {
-  require(self.haveBlocks, "no blocks were given yet");
-  if (isStep(step)) return;
-  const std::int64_t maximum = std::numeric_limits<int>::max();
-  throw std::invalid_argument(
-      "step " + std::to_string(step) + " isn't handed over: ParaView counts steps from 0 to " +
-      std::to_string(maximum) +
-      "; hand over a smaller number that goes on after a restart, or files of before are replaced");
-}
-
 int vtkTypeOf(int type) {
   switch (type) {
     case VDI_CATALYST_U8:
@@ -189,34 +178,7 @@ int takeEngine(vdi_catalyst& self) {
 }
 
 using vdi::catalyst::Script;
-
-std::vector<Script> scriptsOf(int32_t count, const char* const* files) {
-  require(count >= 0 && (count == 0 || files != nullptr), "no scripts given");
-  std::vector<Script> scripts;
-  for (int i = 0; i < count; ++i) {
-    require(files[i] != nullptr, "a script's path is null");
-    scripts.push_back({files[i], {}});
-  }
-  return scripts;
-}
-
-std::vector<Script> scriptsOf(int32_t count, const vdi_catalyst_pipeline* given) {
-  require(count >= 0 && (count == 0 || given != nullptr), "no scripts given");
-  std::vector<Script> scripts;
-  for (int i = 0; i < count; ++i) {
-    const vdi_catalyst_pipeline& one = given[i];
-    require(one.file != nullptr, "a script's path is null");
-    require(one.argument_count >= 0 && (one.argument_count == 0 || one.arguments != nullptr),
-            "no arguments given");
-    Script& script = scripts.emplace_back();
-    script.file = one.file;
-    for (int a = 0; a < one.argument_count; ++a) {
-      require(one.arguments[a] != nullptr, "a script's argument is null");
-      script.arguments.emplace_back(one.arguments[a]);
-    }
-  }
-  return scripts;
-}
+using vdi::catalyst::scriptsOf;
 
 void sayIfNothingIsMade(const vdi_catalyst& self, const std::vector<Script>& scripts) {
   int rank = 0;
@@ -372,7 +334,7 @@ void depositAll(vdi_catalyst& self, std::int64_t step) {
   if (!self.deposits)
     self.deposits = std::make_unique<vdi::catalyst::DeviceDeposits>(MPI_Comm_c2f(self.comm));
   for (const auto& [name, particles] : self.particles) {
-    vdi::catalyst::Deposits::Values values =
+    vdi::catalyst::DepositedValues values =
         self.deposits->make(name, particles, self.blocksVersion, self.blocks, step);
     for (unsigned int i = 0; i < self.grid->GetNumberOfPartitions(); ++i) {
       vtkDataSet* image = self.grid->GetPartition(i);
@@ -549,7 +511,12 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const vdi::catalyst::PythonLock lock;
   int code = guarded(
-      *catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] { requireStep(*catalyst, step); }, step);
+      *catalyst, VDI_CATALYST_BAD_ARGUMENT,
+      [&] {
+        require(catalyst->haveBlocks, "no blocks were given yet");
+        vdi::catalyst::requireStep(step);
+      },
+      step);
   if (code == VDI_CATALYST_OK) {
     code = guarded(
         *catalyst, VDI_CATALYST_BAD_ARGUMENT,

@@ -39,7 +39,13 @@
  * calls os._exit or os.abort, or crashes in one of its modules; an allocation of ParaView's own that fails
  * (Debian's VTK aborts); an X server that goes away while a view is drawn (Xlib exits); a view that is drawn
  * without a display by methods of its render window or SMProxy instead of paraview.simple; a crash of a
- * driver. */
+ * driver.
+ *
+ * None of them does if frames are made in processes of their own: by "isolation" in a JSON text, or by
+ * VDI_ISOLATION=process in the first rank's environment. Then vdi_catalyst_execute copies the values of a
+ * wanted step, which the simulation may change when the call returns, and the frame is made meanwhile. The
+ * code of a frame that fails is returned by a later call, the same one on all ranks. If a process dies, all
+ * calls return VDI_CATALYST_ENGINE from then on, or processes start again (docs/catalyst-guide.md). */
 #ifndef VDI_CATALYST_H
 #define VDI_CATALYST_H
 
@@ -61,7 +67,8 @@ enum {
   VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or too large to
                                   * count, an unknown type, arrays before blocks, an offset beyond half a
                                   * cell, a step that is no int */
-  VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process */
+  VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process; the
+                            * processes that make the frames can't be started, or have died */
   VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
 };
 
@@ -248,7 +255,8 @@ VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const ch
  * if a script isn't loaded yet, as before the first step; if a script defines catalyst_execute, which runs at
  * each step; and if the trigger of an extractor is due. In a run without a script it is 1 if a frame is due
  * by step, time or clock, whether or not the data and the share of wall time will permit it, and at each step
- * if viewers may steer. It is 0 for a null or finalized handle and for a step that vdi_catalyst_execute
+ * if viewers may steer. Where scripts run in a process of its own, it is 1, too, while that is at work and
+ * hasn't told yet. It is 0 for a null or finalized handle and for a step that vdi_catalyst_execute
  * refuses. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 

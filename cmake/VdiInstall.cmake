@@ -57,7 +57,8 @@ if(VDI_BUILD_PARAVIEW)
     TARGETS vdi_catalyst
     EXPORT pv-vdi-catalyst-targets
     INCLUDES DESTINATION "${headerDir}")
-  install(TARGETS vdi_catalyst_engine vdi_catalyst_json DESTINATION "${CMAKE_INSTALL_LIBDIR}/pv-vdi")
+  install(TARGETS vdi_catalyst_engine vdi_catalyst_json vdi_catalyst_isolated vdi_catalyst_process
+          DESTINATION "${CMAKE_INSTALL_LIBDIR}/pv-vdi")
   install(FILES catalyst_adaptor/vdi_catalyst.h catalyst_adaptor/vdi_catalyst.f90 DESTINATION "${headerDir}")
   install(EXPORT pv-vdi-catalyst-targets NAMESPACE pv-vdi:: DESTINATION "${cmakeDir}")
   vdi_install_pkg_config(pv-vdi-catalyst)

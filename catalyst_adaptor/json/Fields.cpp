@@ -117,7 +117,7 @@ const ParticleArray* Fields::particlesOf(const std::string& name) const {
   return found != particles_.end() ? &found->second : nullptr;
 }
 
-void Fields::setDeposit(const std::string& name, Deposits::Values values) {
+void Fields::setDeposit(const std::string& name, DepositedValues values) {
   std::vector<StridedValues> all;
   for (std::size_t i = 0; i < blocks_.size(); ++i)
     all.push_back(inOrder(blocks_[i], VDI_CATALYST_F32, true, 1, values[i].get()));
@@ -161,6 +161,13 @@ std::optional<bool> Fields::associationOf(const std::string& name) const {
   if (!blocks_.empty())
     throw std::runtime_error("there is no array '" + name + "'; the arrays are: " + names());
   return std::nullopt;
+}
+
+std::vector<Fields::NamedArray> Fields::arrays() const {
+  std::vector<NamedArray> arrays;
+  for (const auto& [key, array] : arrays_)
+    arrays.push_back({key.second, key.first, array.type, offsetOf(key.second, key.first), array.values});
+  return arrays;
 }
 
 int Fields::componentsOf(const std::string& name, bool cells) const {

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "catalyst_adaptor/ParticleArrays.h"
+#include "catalyst_adaptor/ParticleArray.h"
 #include "catalyst_adaptor/StridedArray.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 #include "vdi/comm/Communicator.h"
@@ -45,7 +45,7 @@ class Fields {
   const ParticleArray* particlesOf(const std::string& name) const;
   /// Sets the values that were made of the particles, one entry for each block; `dropDeposits` drops them
   /// all.
-  void setDeposit(const std::string& name, Deposits::Values values);
+  void setDeposit(const std::string& name, DepositedValues values);
   bool hasDeposit(const std::string& name) const { return deposits_.contains(name); }
   void dropDeposits();
 
@@ -54,6 +54,18 @@ class Fields {
   std::optional<bool> associationOf(const std::string& name) const;
   /// The names of all arrays, for messages: "cells 'V', points 'p'".
   std::string names() const;
+
+  struct NamedArray {
+    std::string name;
+    bool cells = false;
+    int type = VDI_CATALYST_F64;
+    glm::dvec3 offset{0.0};                 // in cells
+    std::span<const StridedValues> blocks;  // one entry for each block; null `first` where a block lacks it
+  };
+  /// All arrays, where the simulation has their values.
+  std::vector<NamedArray> arrays() const;
+  /// All particles, by name.
+  const std::map<std::string, ParticleArray>& particles() const { return particles_; }
 
   int componentsOf(const std::string& name, bool cells) const;  // 1 without blocks that have it
   /// An array's values where the simulation has them, one for each block; null where a block lacks them.
@@ -86,7 +98,7 @@ class Fields {
   std::map<Key, Array> arrays_;
   std::map<Key, glm::dvec3> offsets_;  // in cells; none: 0
   std::map<std::string, ParticleArray> particles_;
-  std::map<std::string, Deposits::Values> deposits_;  // the memory of arrays made of particles
+  std::map<std::string, DepositedValues> deposits_;  // the memory of arrays made of particles
 };
 
 /// The bytes of a scalar. Throws std::invalid_argument for a type that vdi_catalyst.h doesn't have.

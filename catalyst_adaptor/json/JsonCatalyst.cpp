@@ -13,30 +13,23 @@
 
 #include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/EngineFunctions.h"
+#include "catalyst_adaptor/FieldCalls.h"
 #include "catalyst_adaptor/Parameters.h"
-#include "catalyst_adaptor/ParticleArrays.h"
-#include "catalyst_adaptor/json/Fields.h"
 #include "catalyst_adaptor/json/RunEngine.h"
 #include "vdi/comm/Communicator.h"
 #include "vdi/config/Json.h"
 
-struct vdi_catalyst : vdi::catalyst::Calls {
+struct vdi_catalyst : vdi::catalyst::FieldCalls {
   std::unique_ptr<vdi::catalyst::RunEngine> engine;
-  bool haveBlocks = false;
-  vdi::catalyst::Fields fields;
   vdi::catalyst::Parameters parameters;
 };
 
 namespace {
 
-using vdi::catalyst::checkBlock;
 using vdi::catalyst::guarded;
 using vdi::catalyst::guardedTogether;
 using vdi::catalyst::require;
 using vdi::catalyst::requireEqual;
-using vdi::catalyst::StridedValues;
-
-constexpr int maxComponents = 16;
 
 /// The living handle. Any other handle has been finalized, and must not be read.
 vdi_catalyst*& alive() {
@@ -61,7 +54,8 @@ class Reading {
   explicit Reading(vdi_catalyst& self)
       : self_(self), comm_(vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(self.comm))) {}
 
-  int read(const char* json) {
+  /// `isGoingOn`: the run's own earlier files stay.
+  int read(const char* json, bool isGoingOn) {
     int code = guarded(self_, VDI_CATALYST_BAD_ARGUMENT,
                        [&] { require(comm_.rank() != 0 || json != nullptr, "no JSON given"); });
     if (code != VDI_CATALYST_OK) return code;
@@ -74,6 +68,7 @@ class Reading {
     source_.text = shared(comm_, source_.text);
     code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
       run = vdi::config::parseRun(source_.text, source_.name);
+      if (isGoingOn) run.existing = vdi::config::Existing::Continue;
       if (comm_.rank() == 0) colors_ = vdi::config::readColorsFile(run, source_).value_or("");
     });
     if (code != VDI_CATALYST_OK) return code;
@@ -96,13 +91,13 @@ class Reading {
   std::string colors_;
 };
 
-int start(vdi_catalyst& self, const char* json) {
+int start(vdi_catalyst& self, const char* json, bool isGoingOn) {
   int code = guarded(self, VDI_CATALYST_ENGINE, [&] {
     require(alive() == nullptr, "a run by JSON goes on in this process; finalize it first");
   });
   if (code != VDI_CATALYST_OK) return code;
   Reading reading(self);
-  code = reading.read(json);
+  code = reading.read(json, isGoingOn);
   if (code != VDI_CATALYST_OK) return code;
   return guardedTogether(self, VDI_CATALYST_ENGINE, [&] {
     self.engine = std::make_unique<vdi::catalyst::RunEngine>(MPI_Comm_c2f(self.comm), std::move(reading.run),
@@ -110,13 +105,13 @@ int start(vdi_catalyst& self, const char* json) {
   });
 }
 
-int initializeJson(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
+int initializeAny(int32_t fortran_communicator, const char* json, bool isGoingOn, vdi_catalyst** catalyst) {
   // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
   auto self = std::make_unique<vdi_catalyst>();
   if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
     return VDI_CATALYST_BAD_ARGUMENT;
   MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
-  const int code = start(*self, json);
+  const int code = start(*self, json, isGoingOn);
   if (code == VDI_CATALYST_OK) {
     *catalyst = alive() = self.release();
   } else {
@@ -126,89 +121,43 @@ int initializeJson(int32_t fortran_communicator, const char* json, vdi_catalyst*
   return code;
 }
 
-int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  std::vector<vdi_catalyst_block> copies;
-  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
-    for (int i = 0; i < count; ++i) checkBlock(blocks[i]);
-    copies.assign(blocks, blocks + count);
-  });
-  if (code != VDI_CATALYST_OK) return code;  // all ranks keep the blocks that they have
-  catalyst->fields.setBlocks(std::move(copies));
-  catalyst->haveBlocks = true;
-  return code;
+int initializeJson(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
+  return initializeAny(fortran_communicator, json, false, catalyst);
 }
 
-/// `strides` is null for values in order.
-int setAnyArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
-                int32_t components, const void* const* data, const vdi_catalyst_strides* strides) {
-  std::vector<StridedValues> all;
-  const bool cells = association == VDI_CATALYST_CELLS;
-  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    require(catalyst->haveBlocks, "arrays were given before blocks");
-    require(name != nullptr && *name != '\0', "an array needs a name");
-    require(cells || association == VDI_CATALYST_POINTS, "unknown association");
-    require(components >= 1 && components <= maxComponents, "the number of components must be 1 to 16");
-    (void)vdi::catalyst::bytesOf(type);
-    const std::vector<vdi_catalyst_block>& blocks = catalyst->fields.blocks();
-    require(blocks.empty() || data != nullptr, "an array without data");
-    for (std::size_t i = 0; i < blocks.size(); ++i) {
-      StridedValues values = catalyst->fields.inOrder(blocks[i], type, cells, components, data[i]);
-      for (std::size_t axis = 0; axis < 3 && strides != nullptr; ++axis)
-        values.strides[axis] = strides[i].strides[axis];
-      if (strides != nullptr && components > 1) values.componentStride = strides[i].component_stride;
-      require(values.first == nullptr || values.reachable(), "strides that lead beyond the address space");
-      all.push_back(values);
-    }
-  });
-  if (code == VDI_CATALYST_OK) catalyst->fields.setArray(name, cells, type, std::move(all));
-  return code;
+int goOnWithJson(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
+  return initializeAny(fortran_communicator, json, true, catalyst);
+}
+
+void setClock(vdi_catalyst* catalyst, double seconds) {
+  if (usable(catalyst)) catalyst->engine->setClock(seconds);
+}
+
+int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  return vdi::catalyst::setBlocks(*catalyst, count, blocks);
 }
 
 int setArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
              const void* const* data) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  return setAnyArray(catalyst, name, type, association, 1, data, nullptr);
+  return vdi::catalyst::setArray(*catalyst, {name, type, association, 1}, data);
 }
 
 int setArrayStrided(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
                     int32_t components, const void* const* data, const vdi_catalyst_strides* strides) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  const bool isMissing = strides == nullptr && !catalyst->fields.blocks().empty();
-  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT,
-                           [&] { require(!isMissing, "a strided array without strides"); });
-  if (code != VDI_CATALYST_OK) return code;
-  return setAnyArray(catalyst, name, type, association, components, data, strides);
+  return vdi::catalyst::setArrayStrided(*catalyst, {name, type, association, components}, data, strides);
 }
 
 int setArrayOffset(vdi_catalyst* catalyst, const char* name, int32_t association, const double* offset) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    require(catalyst->haveBlocks, "an offset was given before blocks");
-    vdi::catalyst::checkOffset(name, association, offset);
-  });
-  if (code != VDI_CATALYST_OK) return code;
-  catalyst->fields.setOffset(name, association == VDI_CATALYST_CELLS, {offset[0], offset[1], offset[2]});
-  return code;
+  return vdi::catalyst::setArrayOffset(*catalyst, name, association, offset);
 }
 
 int setParticles(vdi_catalyst* catalyst, const char* name, const vdi_catalyst_particles* particles) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  vdi::catalyst::ParticleArray array;
-  int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    require(catalyst->haveBlocks, "particles were given before blocks");
-    require(name != nullptr && *name != '\0', "an array needs a name");
-    array = vdi::catalyst::particleArrayOf(particles);
-  });
-  if (code == VDI_CATALYST_OK) {
-    code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-      requireEqual(catalyst->comm, vdi::catalyst::identityOf(name, array.kind),
-                   "the ranks give particles of different names or kinds");
-    });
-  }
-  if (code == VDI_CATALYST_OK) catalyst->fields.setParticles(name, array);
-  return code;
+  return vdi::catalyst::setParticles(*catalyst, name, particles);
 }
 
 int wants(vdi_catalyst* catalyst, int64_t step, double time) {
@@ -269,6 +218,7 @@ const char* error(const vdi_catalyst* catalyst) {
 }  // namespace
 
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    nullptr,      nullptr, initializeJson, setBlocks,    setArray,     setArrayStrided, setArrayOffset,
-    setParticles, wants,   execute,        parameterF64, parameterI64, finalize,        error,
+    nullptr,         nullptr,        initializeJson, goOnWithJson, setBlocks, setArray,
+    setArrayStrided, setArrayOffset, setParticles,   wants,        execute,   parameterF64,
+    parameterI64,    finalize,       error,          setClock,
 };

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "catalyst_adaptor/Deposits.h"
 #include "catalyst_adaptor/json/LiveStream.h"
 #include "catalyst_adaptor/json/Measure.h"
 #include "catalyst_adaptor/json/RunSteering.h"
@@ -131,6 +132,7 @@ struct RunEngine::State {
   std::optional<Frame> frame;             // the frame whose values the device has
   bool isAskedFor = false;                // a viewer waits for a view, which the next step shows
   bool hasToldOfBudget = false;
+  std::optional<double> clock;  // the schedule's time in seconds, given for the next step
 };
 
 RunEngine::RunEngine(int fortranCommunicator, config::Run run, std::optional<config::ColorMap> map)
@@ -172,7 +174,7 @@ bool RunEngine::mayExecute(std::int64_t step, double time) const {
 
 bool RunEngine::isDue(std::int64_t step, double time) {
   State& state = *state_;
-  const double now = state.elapsed();
+  const double now = state.clock.value_or(state.elapsed());
   bool due = state.schedule.isDue(step, time, now);
   if (state.schedule.needsRoot()) due = state.asRootSays(due);
   if (due) state.schedule.begin(time, now);
@@ -185,7 +187,7 @@ void RunEngine::deposit(Fields& fields, const std::string& name, std::int64_t st
   if (array == nullptr || fields.hasDeposit(name)) return;
   Deposits& deposits = *state_->deposits;
   deposits.setBlocks(fields.version(), fields.blocks());
-  Deposits::Values values = deposits.make(name, *array, step);
+  DepositedValues values = deposits.make(name, *array, step);
   state_->comm.together([&] { fields.setDeposit(name, std::move(values)); });
 }
 
@@ -209,6 +211,10 @@ bool RunEngine::isToBeMade(Fields& fields, std::int64_t step, double time) {
   if (!state.budget.isLimited() || state.asRootSays(state.budget.hasRoom(state.elapsed()))) return true;
   leaveOut(step, time);
   return false;
+}
+
+void RunEngine::setClock(double seconds) {
+  state_->clock = seconds;
 }
 
 void RunEngine::leaveOut(std::int64_t step, double time) {

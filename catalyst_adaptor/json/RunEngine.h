@@ -39,6 +39,9 @@ class RunEngine {
   /// the time in seconds that this rank has waited for the others to begin the step. Particles become arrays
   /// for this time, if a frame or its condition needs them.
   void execute(Fields& fields, Parameters& parameters, std::int64_t step, double time, double waited);
+  /// Sets the clock by which the schedule decides on the next step, in seconds since the run's start, instead
+  /// of this process's own. Not collective; the first rank's counts.
+  void setClock(double seconds);
   /// Ends the log. No frames may follow.
   void finish();
 

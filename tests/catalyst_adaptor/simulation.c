@@ -4,7 +4,8 @@
  * VDI_TEST_THEN=SCRIPT: initialize with that script succeeds and is finalized.
  * VDI_TEST_WANTS=1010: what vdi_catalyst_wants says before each step.
  * VDI_TEST_LATE=1: finalize is called after MPI_Finalize.
- * VDI_TEST_GROWTH=KIB: the resident memory grows by less from a quarter of the steps to the last. */
+ * VDI_TEST_GROWTH=KIB: the resident memory grows by less from a quarter of the steps to the last.
+ * VDI_ISOLATION: the same in processes of their own. */
 #include <limits.h>
 #include <mpi.h>
 #include <stdio.h>
@@ -36,6 +37,35 @@ static int expect(int rank, const char* what, int wanted, int code) {
   if (code == wanted) return 0;
   fprintf(stderr, "rank %d: %s returned %d, not %d\n", rank, what, code, wanted);
   return 1;
+}
+
+/* In processes of their own, frames are made later. The code of one that failed comes from a later call. */
+static int is_late;
+static int has_failed; /* a frame was to fail */
+static int is_untold;  /* and no later call has returned that */
+
+static int expect_step(int rank, int wanted, int code) {
+  if (!is_late) return expect(rank, "execute", wanted, code);
+  int wrong = 0;
+  if (code != VDI_CATALYST_OK) wrong = expect(rank, "a call after a frame that fails", 1, has_failed);
+  if (code != VDI_CATALYST_OK) is_untold = 0;
+  if (wanted != VDI_CATALYST_OK) has_failed = is_untold = 1;
+  return wrong;
+}
+
+static int expect_end(int rank, int code) {
+  if (!has_failed) return expect(rank, "finalize", VDI_CATALYST_OK, code);
+  return is_untold ? expect(rank, "finalize after a frame that fails", 1, code != VDI_CATALYST_OK) : 0;
+}
+
+/* While a frame is made in another process, it may be unknown that a step isn't wanted. */
+static int wants_in_the_end(vdi_catalyst* catalyst, int step, int wanted) {
+  int wants = vdi_catalyst_wants(catalyst, step, 0.5 * step);
+  for (int i = 0; is_late && i < 600 && wants > wanted; ++i) {
+    usleep(100000);
+    wants = vdi_catalyst_wants(catalyst, step, 0.5 * step);
+  }
+  return wants;
 }
 
 static long resident_kib(void) {
@@ -108,10 +138,10 @@ static int run_steps(int rank, vdi_catalyst* catalyst, int argc, char** argv) {
       ++step;
       simulate(rank, step);
       if (wanted != NULL && wanted[step - 1] != '\0')
-        wrong +=
-            expect(rank, "wants", wanted[step - 1] - '0', vdi_catalyst_wants(catalyst, step, 0.5 * step));
+        wrong += expect(rank, "wants", wanted[step - 1] - '0',
+                        wants_in_the_end(catalyst, step, wanted[step - 1] - '0'));
       const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step);
-      wrong += expect(rank, "execute", atoi(argv[i]), code);
+      wrong += expect_step(rank, atoi(argv[i]), code);
       const int told = vdi_catalyst_error(catalyst)[0] != '\0';
       if (code != VDI_CATALYST_OK) wrong += expect(rank, "the error's text", 1, told);
       if (step == total / 4) before = resident_kib();
@@ -130,6 +160,7 @@ int main(int argc, char** argv) {
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   int wrong = 0;
   if (argc < 3) MPI_Abort(MPI_COMM_WORLD, 2);
+  is_late = getenv("VDI_ISOLATION") != NULL;
 
   vdi_catalyst* catalyst = NULL;
   const char* scripts[] = {argv[1]};
@@ -175,7 +206,7 @@ int main(int argc, char** argv) {
     return wrong == 0 ? 0 : 1;
   }
   wrong += expect(rank, "a step that is no int is wanted", 0, vdi_catalyst_wants(catalyst, 3000000000, 0.0));
-  wrong += expect(rank, "finalize", VDI_CATALYST_OK, vdi_catalyst_finalize(catalyst));
+  wrong += expect_end(rank, vdi_catalyst_finalize(catalyst));
   wrong += expect(rank, "a second finalize", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_finalize(catalyst));
   wrong +=
       expect(rank, "execute after it", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_execute(catalyst, 1, 0.0));

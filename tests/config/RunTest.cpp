@@ -158,7 +158,7 @@ TEST_CASE("everything at once") {
     "resolution": [320, 200], "supersegments": 12, "margin": 0.5, "sampling_rate": 2, "shade": true,
     "output": {"vdi": "a/{timestep}.vdi", "png": "b_{timestep:03d}.png", "cinema": "c.cdb", "latest": true},
     "when": {"mean": "p", "association": "cells", "component": 1, "above": -1, "below": 2},
-    "max_share": 0.05, "existing": "continue",
+    "max_share": 0.05, "existing": "continue", "isolation": {"restart": true, "patience": 20},
     "log": {"json": "run.jsonl", "text": "run.log"},
     "stream": {"host": "::1", "port": 8080, "token_file": "t", "link_file": "l", "certificate": "c", "key": "k",
                "megabits": 100, "steer": true, "steering_log": "s"}})",
@@ -191,6 +191,10 @@ TEST_CASE("everything at once") {
   CHECK_FALSE(run.when->holds(2.0));
   CHECK(run.maxShare == 0.05);
   CHECK(run.existing == config::Existing::Continue);
+  CHECK(run.isolation->restart);
+  CHECK(run.isolation->patience == 20.0);
+  CHECK_FALSE(parseRun(R"({"field": "V"})", "vdi.json").isolation);
+  CHECK(parseRun(R"({"field": "V", "isolation": "process"})", "vdi.json").isolation->patience == 300.0);
   const TransferFunction function = run.transferFunction(std::nullopt, {5.0, 6.0}, 7.0);
   CHECK(function.colors.back().x == 2.0);
   CHECK(function.opacities == std::vector<OpacityNode>{{0.0, 0.0}, {2.0, 0.5}});
@@ -237,6 +241,10 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("max_share": 0)", "/max_share: must be > 0");
   refusedField(R"("existing": "append")", "/existing: must be 'refuse', 'overwrite' or 'continue'");
   refusedField(R"("existing": true)", "/existing: must be a text");
+  refusedField(R"("isolation": "thread")", "/isolation: must be 'process', or an object");
+  refusedField(R"("isolation": {"restarts": true})", "/isolation/restarts: no such field");
+  refusedField(R"("isolation": {"restart": 1})", "/isolation/restart: must be");
+  refusedField(R"("isolation": {"patience": -1})", "/isolation/patience: must be from 0");
   refusedField(R"("association": "nodes")", "/association: must be 'cells' or 'points'");
   refusedField(R"("component": -1)", "/component");
   refusedField(R"("camera": {"position": [0, 0, 1]})", "/camera: the field 'focal_point' is missing");

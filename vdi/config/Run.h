@@ -80,6 +80,12 @@ struct RunLogFiles {
   bool any() const { return !json.empty() || !text.empty(); }
 };
 
+/// A run whose frames are made in processes of their own, one a rank.
+struct RunIsolation {
+  bool restart = false;     // processes that have died are started again
+  double patience = 300.0;  // seconds that the simulation waits for a frame; 0: it never waits
+};
+
 /// Pictures of all viewpoints as a Cinema database, whose index is io::CinemaIndex.
 struct RunCinema {
   std::filesystem::path folder;  // *.cdb
@@ -107,6 +113,7 @@ struct Run {
   bool latest = false;  // link latest.vdi and latest.png, beside the newest file, to it
   std::optional<RunStream> stream;
   RunLogFiles log;
+  std::optional<RunIsolation> isolation;  // none: frames are made in the simulation's processes
 
   bool makesPictures() const { return png || cinema; }
   /// The place of an orbiting camera, which turns with the frames.

@@ -409,6 +409,20 @@ std::optional<RunStream> streamOf(const JsonValue& value) {
   return stream;
 }
 
+RunIsolation isolationOf(const JsonValue& value) {
+  RunIsolation isolation;
+  if (value.isText()) {
+    if (value.text() != "process") value.fail("must be 'process', or an object");
+    return isolation;
+  }
+  value.requireObject(fieldsOf("/isolation"));
+  constexpr double longest = 1e6;
+  ifThere(value, "restart", [&](const JsonValue& restart) { isolation.restart = restart.flag(); });
+  ifThere(value, "patience",
+          [&](const JsonValue& seconds) { isolation.patience = seconds.number(0.0, longest); });
+  return isolation;
+}
+
 double numberOf(const JsonValue& value, const Setting& setting) {
   switch (setting.kind) {
     case Setting::Kind::Flag:
@@ -446,7 +460,7 @@ std::vector<std::string> documentFields() {
   std::vector<std::string> fields{"$schema",    "field",         "association", "component", "every",
                                   "every_time", "every_seconds", "when",        "max_share", "existing",
                                   "camera",     "cameras",       "orbit",       "colors",    "resolution",
-                                  "output",     "stream",        "log"};
+                                  "output",     "stream",        "log",         "isolation"};
   for (const Setting& setting : settingsTable()) fields.emplace_back(setting.key);
   return fields;
 }
@@ -466,6 +480,7 @@ const std::map<std::string, std::vector<std::string>>& runFields() {
        {"host", "port", "token_file", "link_file", "certificate", "key", "megabits", "steer",
         "steering_log"}},
       {"/log", {"json", "text"}},
+      {"/isolation", {"restart", "patience"}},
   };
   return fields;
 }
@@ -486,6 +501,7 @@ Run parseRun(std::string_view text, const std::string& name) {
   ifThere(document, "stream", [&](const JsonValue& value) { run.stream = streamOf(value); });
   ifThere(document, "output", [&](const JsonValue& value) { readOutput(value, run); });
   ifThere(document, "log", [&](const JsonValue& value) { run.log = logOf(value); });
+  ifThere(document, "isolation", [&](const JsonValue& value) { run.isolation = isolationOf(value); });
   if (run.cameras.size() > 1 && run.stream && !run.vdi && !run.makesPictures())
     document.fail("several viewpoints need an 'output': the stream shows the first alone");
   if (!run.vdi && !run.makesPictures() && !run.stream) run.vdi = FilePattern("vdi_{timestep:06d}.vdi");

@@ -1,4 +1,4 @@
-// The particles that a simulation hands over, and the arrays of cells that both engines make of them.
+// The arrays of cells that both engines make of the particles that a simulation hands over.
 #pragma once
 
 #include <cstddef>
@@ -11,32 +11,18 @@
 #include <utility>
 #include <vector>
 
+#include "catalyst_adaptor/ParticleArray.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 #include "vdi/comm/Communicator.h"
 #include "vdi/core/Block.h"
-#include "vdi/core/Particles.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/pipeline/ParticleDepositor.h"
 
 namespace vdi::catalyst {
 
-/// Particles under a name, on the simulation's memory.
-struct ParticleArray {
-  Particles particles;
-  DepositKind kind = DepositKind::Sum;
-};
-
-/// Throws std::invalid_argument with the reason if they are invalid.
-ParticleArray particleArrayOf(const vdi_catalyst_particles* given);
-
-/// A number for requireEqual: equal on two ranks if name and kind are.
-std::int64_t identityOf(const char* name, DepositKind kind);
-
 /// Deposits particles on a run's blocks.
 class Deposits {
  public:
-  using Values = std::vector<std::shared_ptr<float[]>>;
-
   /// The device and the communicator must outlive this object.
   Deposits(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm)
       : comm_(comm), depositor_(std::move(device), comm) {}
@@ -46,7 +32,7 @@ class Deposits {
   void setBlocks(std::uint64_t version, std::span<const vdi_catalyst_block> blocks);
   /// Collective: the values of each of this rank's blocks. Throws as ParticleDepositor::deposit does. `step`
   /// is told with the numbers of particles that are left out.
-  Values make(const std::string& name, const ParticleArray& array, std::int64_t step);
+  DepositedValues make(const std::string& name, const ParticleArray& array, std::int64_t step);
   /// Takes over what another object has told already.
   void continueTelling(const Deposits& other) { told_ = other.told_; }
 
@@ -67,8 +53,8 @@ class DeviceDeposits {
 
   /// Collective. Throws on all ranks as Deposits does, and Error{DeviceUnavailable}. If the device was lost,
   /// it opens another one.
-  Deposits::Values make(const std::string& name, const ParticleArray& array, std::uint64_t version,
-                        std::span<const vdi_catalyst_block> blocks, std::int64_t step);
+  DepositedValues make(const std::string& name, const ParticleArray& array, std::uint64_t version,
+                       std::span<const vdi_catalyst_block> blocks, std::int64_t step);
 
  private:
   void open();

@@ -1,14 +1,9 @@
-#include "catalyst_adaptor/ParticleArrays.h"
+#include "catalyst_adaptor/Deposits.h"
 
 #include <array>
 #include <cstdio>
 #include <exception>
-#include <functional>
-#include <limits>
-#include <stdexcept>
-#include <string_view>
 
-#include "catalyst_adaptor/Calls.h"
 #include "vdi/gpu/DeviceRequest.h"
 
 namespace vdi::catalyst {
@@ -22,56 +17,7 @@ glm::dvec3 vectorOf(const double (&v)[3]) {
   return {v[0], v[1], v[2]};
 }
 
-/// `what` names the numbers in messages.
-NumberColumn columnOf(const void* first, std::int64_t stride, std::int32_t type, std::int64_t count,
-                      const char* what) {
-  NumberColumn column;
-  column.first = static_cast<const std::byte*>(first);
-  column.stride = stride;
-  column.isDouble = type == VDI_CATALYST_F64;
-  if (type != VDI_CATALYST_F64 && type != VDI_CATALYST_F32)
-    throw std::invalid_argument(std::string("particles' ") + what + " must be of type f32 or f64");
-  std::int64_t reach = 0;
-  const bool isCountable = !__builtin_mul_overflow(count - 1, stride, &reach);
-  const auto address = reinterpret_cast<std::uintptr_t>(first);
-  constexpr std::uintptr_t room = std::numeric_limits<std::uintptr_t>::max() - sizeof(double);
-  const std::uintptr_t distance =
-      reach < 0 ? 0 - static_cast<std::uintptr_t>(reach) : static_cast<std::uintptr_t>(reach);
-  if (!isCountable || (reach < 0 ? distance > address : address > room || distance > room - address))
-    throw std::invalid_argument(std::string("the stride of particles' ") + what +
-                                " leads beyond the address space");
-  return column;
-}
-
 }  // namespace
-
-ParticleArray particleArrayOf(const vdi_catalyst_particles* given) {
-  require(given != nullptr, "no particles given");
-  require(given->count >= 0, "the number of particles can't be negative");
-  require(given->kind == VDI_CATALYST_SUM || given->kind == VDI_CATALYST_DENSITY,
-          "the kind of a particle array must be sum or density");
-  ParticleArray array;
-  array.kind = given->kind == VDI_CATALYST_DENSITY ? DepositKind::Density : DepositKind::Sum;
-  array.particles.count = static_cast<std::size_t>(given->count);
-  if (given->count == 0) return array;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    require(given->positions[axis] != nullptr, "particles without positions");
-    array.particles.positions[axis] = columnOf(given->positions[axis], given->position_stride,
-                                               given->position_type, given->count, "positions");
-  }
-  if (given->weights != nullptr)
-    array.particles.weights =
-        columnOf(given->weights, given->weight_stride, given->weight_type, given->count, "weights");
-  if (given->lengths != nullptr)
-    array.particles.lengths =
-        columnOf(given->lengths, given->length_stride, given->length_type, given->count, "lengths");
-  return array;
-}
-
-std::int64_t identityOf(const char* name, DepositKind kind) {
-  const std::size_t hash = std::hash<std::string_view>()(name);
-  return static_cast<std::int64_t>(hash ^ (kind == DepositKind::Density ? 1U : 0U));
-}
 
 void Deposits::setBlocks(std::uint64_t version, std::span<const vdi_catalyst_block> blocks) {
   if (version_ == version) return;
@@ -89,7 +35,7 @@ void Deposits::setBlocks(std::uint64_t version, std::span<const vdi_catalyst_blo
   version_ = version;
 }
 
-Deposits::Values Deposits::make(const std::string& name, const ParticleArray& array, std::int64_t step) {
+DepositedValues Deposits::make(const std::string& name, const ParticleArray& array, std::int64_t step) {
   DepositedArray made = depositor_.deposit(array.particles, array.kind);
   tell(name, made.counts, step);
   return made.values;
@@ -136,9 +82,9 @@ void DeviceDeposits::open() {
   deposits_ = std::move(fresh);
 }
 
-Deposits::Values DeviceDeposits::make(const std::string& name, const ParticleArray& array,
-                                      std::uint64_t version, std::span<const vdi_catalyst_block> blocks,
-                                      std::int64_t step) {
+DepositedValues DeviceDeposits::make(const std::string& name, const ParticleArray& array,
+                                     std::uint64_t version, std::span<const vdi_catalyst_block> blocks,
+                                     std::int64_t step) {
   if (!deposits_) open();
   const auto attempt = [&] {
     deposits_->setBlocks(version, blocks);

@@ -1,0 +1,98 @@
+#include "catalyst_adaptor/FieldCalls.h"
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "catalyst_adaptor/ParticleArray.h"
+#include "catalyst_adaptor/StridedArray.h"
+
+namespace vdi::catalyst {
+
+namespace {
+
+constexpr int maxComponents = 16;
+
+/// `strides` is null for values in order.
+int setAnyArray(FieldCalls& self, const GivenArray& array, const void* const* data,
+                const vdi_catalyst_strides* strides) {
+  std::vector<StridedValues> all;
+  const bool cells = array.association == VDI_CATALYST_CELLS;
+  const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(self.haveBlocks, "arrays were given before blocks");
+    require(array.name != nullptr && *array.name != '\0', "an array needs a name");
+    require(cells || array.association == VDI_CATALYST_POINTS, "unknown association");
+    require(array.components >= 1 && array.components <= maxComponents,
+            "the number of components must be 1 to 16");
+    (void)bytesOf(array.type);
+    const std::vector<vdi_catalyst_block>& blocks = self.fields.blocks();
+    require(blocks.empty() || data != nullptr, "an array without data");
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      StridedValues values = self.fields.inOrder(blocks[i], array.type, cells, array.components, data[i]);
+      for (std::size_t axis = 0; axis < 3 && strides != nullptr; ++axis)
+        values.strides[axis] = strides[i].strides[axis];
+      if (strides != nullptr && array.components > 1) values.componentStride = strides[i].component_stride;
+      require(values.first == nullptr || values.reachable(), "strides that lead beyond the address space");
+      all.push_back(values);
+    }
+  });
+  if (code == VDI_CATALYST_OK) self.fields.setArray(array.name, cells, array.type, std::move(all));
+  return code;
+}
+
+}  // namespace
+
+int setBlocks(FieldCalls& self, std::int32_t count, const vdi_catalyst_block* blocks) {
+  std::vector<vdi_catalyst_block> copies;
+  const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
+    for (int i = 0; i < count; ++i) checkBlock(blocks[i]);
+    copies.assign(blocks, blocks + count);
+  });
+  if (code != VDI_CATALYST_OK) return code;  // all ranks keep the blocks that they have
+  self.fields.setBlocks(std::move(copies));
+  self.haveBlocks = true;
+  return code;
+}
+
+int setArray(FieldCalls& self, const GivenArray& array, const void* const* data) {
+  return setAnyArray(self, array, data, nullptr);
+}
+
+int setArrayStrided(FieldCalls& self, const GivenArray& array, const void* const* data,
+                    const vdi_catalyst_strides* strides) {
+  const bool isMissing = strides == nullptr && !self.fields.blocks().empty();
+  const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT,
+                           [&] { require(!isMissing, "a strided array without strides"); });
+  if (code != VDI_CATALYST_OK) return code;
+  return setAnyArray(self, array, data, strides);
+}
+
+int setArrayOffset(FieldCalls& self, const char* name, std::int32_t association, const double* offset) {
+  const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(self.haveBlocks, "an offset was given before blocks");
+    checkOffset(name, association, offset);
+  });
+  if (code != VDI_CATALYST_OK) return code;
+  self.fields.setOffset(name, association == VDI_CATALYST_CELLS, {offset[0], offset[1], offset[2]});
+  return code;
+}
+
+int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particles* particles) {
+  ParticleArray array;
+  int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(self.haveBlocks, "particles were given before blocks");
+    require(name != nullptr && *name != '\0', "an array needs a name");
+    array = particleArrayOf(particles);
+  });
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+      requireEqual(self.comm, identityOf(name, array.kind),
+                   "the ranks give particles of different names or kinds");
+    });
+  }
+  if (code == VDI_CATALYST_OK) self.fields.setParticles(name, array);
+  return code;
+}
+
+}  // namespace vdi::catalyst

@@ -1,0 +1,34 @@
+// The calls by which a simulation hands over blocks and arrays, for engines that keep them in Fields.
+#pragma once
+
+#include <cstdint>
+
+#include "catalyst_adaptor/Calls.h"
+#include "catalyst_adaptor/json/Fields.h"
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace vdi::catalyst {
+
+struct FieldCalls : Calls {
+  bool haveBlocks = false;
+  Fields fields;
+};
+
+/// The arguments of an array that a simulation gives, not yet checked.
+struct GivenArray {
+  const char* name;
+  std::int32_t type;
+  std::int32_t association;
+  std::int32_t components;
+};
+
+/// These functions implement those of vdi_catalyst.h. Collective. After an error, blocks and arrays are as
+/// before.
+int setBlocks(FieldCalls& self, std::int32_t count, const vdi_catalyst_block* blocks);
+int setArray(FieldCalls& self, const GivenArray& array, const void* const* data);
+int setArrayStrided(FieldCalls& self, const GivenArray& array, const void* const* data,
+                    const vdi_catalyst_strides* strides);
+int setArrayOffset(FieldCalls& self, const char* name, std::int32_t association, const double* offset);
+int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particles* particles);
+
+}  // namespace vdi::catalyst

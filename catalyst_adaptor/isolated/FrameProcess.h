@@ -1,0 +1,95 @@
+// The process that makes a rank's frames, as the rank sees it.
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "catalyst_adaptor/isolated/Messages.h"
+#include "catalyst_adaptor/isolated/SharedPages.h"
+#include "catalyst_adaptor/isolated/Socket.h"
+#include "catalyst_adaptor/isolated/StepData.h"
+
+namespace vdi::catalyst {
+
+/// No function is collective, and none waits but for the time that it is given. Ranks learn of frames that
+/// are made at different moments: IsolatedRun makes them agree.
+class FrameProcess {
+ public:
+  using Milliseconds = std::chrono::milliseconds;
+
+  /// Expects the process under a socket's name. It gets `setup` when it comes. Throws std::runtime_error.
+  FrameProcess(const std::string& name, const Setup& setup);
+  /// Kills the process if it still runs.
+  ~FrameProcess();
+  FrameProcess(const FrameProcess&) = delete;
+  FrameProcess& operator=(const FrameProcess&) = delete;
+
+  /// Takes what the process has said. Waits for the first message no longer than `patience`.
+  void listen(Milliseconds patience);
+
+  bool hasCome() const { return socket_.isOpen(); }
+  /// The code of the process's initialising; nullopt until that has ended.
+  std::optional<int> startCode() const { return startCode_; }
+  /// Whether the process has ended, or will do so.
+  bool isGone() const { return isGone_; }
+  /// What has ended it, and what it was doing: "was killed by signal 9 (Killed) while it started".
+  std::string end() const;
+  /// Whether somebody has stopped the process, as by SIGSTOP.
+  bool isStopped() const;
+
+  /// How many of the steps that were handed over are done.
+  std::int64_t doneCount() const { return doneCount_; }
+  /// The result of the next step that is done. There must be one.
+  DoneNotice takeDone();
+  /// Makes room for a step's data in the next buffer, of two, which no step uses. Throws std::runtime_error.
+  void reserve(const StepWriter& data);
+  /// Hands a step over, by the buffer in which there is room.
+  void handOver(const StepWriter& data, StepNotice notice);
+
+  /// Whether scripts want the step; nullopt if that isn't known.
+  std::optional<bool> wants(std::int64_t step) const;
+  void ask(std::int64_t first);
+
+  void finish();
+  /// The code and text of finalizing; nullopt until that has ended.
+  struct Finish {
+    int code = 0;
+    std::string text;
+  };
+  const std::optional<Finish>& finished() const { return finished_; }
+  /// Waits for the process's end, which follows its finish.
+  void awaitEnd(Milliseconds patience);
+
+ private:
+  void take(Socket::Received& received);
+  std::string stage() const;
+  void kill();
+
+  Socket listener_;
+  Socket socket_;
+  SharedPages setup_;
+  std::optional<int> startCode_;
+  bool isGone_ = false;
+  std::optional<int> status_;  // the worker's, as waitpid has it
+  pid_t worker_ = 0;
+  std::int64_t handedOver_ = 0;
+  std::deque<std::int64_t> underWay_;  // steps
+  std::optional<std::int64_t> begun_;
+  std::int64_t doneCount_ = 0;
+  std::deque<DoneNotice> done_;  // not yet taken
+  std::array<SharedPages, 2> buffers_;
+  std::array<bool, 2> areKnown_{};  // whether the process has a buffer's pages
+  std::int64_t firstWanted_ = 0;
+  std::vector<std::uint8_t> wanted_;
+  bool isFinishing_ = false;
+  std::optional<Finish> finished_;
+};
+
+}  // namespace vdi::catalyst

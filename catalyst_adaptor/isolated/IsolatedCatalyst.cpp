@@ -1,0 +1,273 @@
+// The C interface for runs in processes of their own. It decides whether a run is one, checks arguments, and
+// keeps the ranks together.
+#include <mpi.h>
+
+#include <array>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "catalyst_adaptor/EngineFunctions.h"
+#include "catalyst_adaptor/FieldCalls.h"
+#include "catalyst_adaptor/Parameters.h"
+#include "catalyst_adaptor/Scripts.h"
+#include "catalyst_adaptor/isolated/IsolatedRun.h"
+#include "vdi/config/Json.h"
+#include "vdi/config/Run.h"
+#include "vdi/core/Environment.h"
+
+struct vdi_catalyst : vdi::catalyst::FieldCalls {
+  std::unique_ptr<vdi::catalyst::IsolatedRun> run;
+  bool isJson = false;
+};
+
+namespace {
+
+using vdi::catalyst::guarded;
+using vdi::catalyst::IsolatedOptions;
+using vdi::catalyst::require;
+using vdi::catalyst::Script;
+
+/// The living handles, of a run of scripts and of a JSON run. Any other handle has been finalized, and must
+/// not be read.
+vdi_catalyst*& alive(bool isJson) {
+  static std::array<vdi_catalyst*, 2> handles{};
+  return handles[isJson ? 1 : 0];
+}
+
+bool usable(const vdi_catalyst* catalyst) {
+  return catalyst != nullptr && (catalyst == alive(false) || catalyst == alive(true));
+}
+
+std::optional<double> patienceFromEnvironment() {
+  const std::optional<std::uint32_t> seconds = vdi::environmentCount("VDI_ISOLATION_PATIENCE", 0);
+  return seconds ? std::optional<double>(*seconds) : std::nullopt;
+}
+
+/// The first rank's answer: how the run is isolated, if at all. `given` is what its text says; the
+/// environment, where it says something, counts more.
+std::optional<vdi::config::RunIsolation> isolationOf(std::optional<vdi::config::RunIsolation> given) {
+  const std::optional<std::string> wish = vdi::environmentText("VDI_ISOLATION");
+  if (wish == "none") return std::nullopt;
+  if (wish && *wish != "process" && *wish != "restart") vdi::refuseEnvironment("VDI_ISOLATION", *wish);
+  if (wish && !given) given.emplace();
+  if (!given) return std::nullopt;
+  if (wish == "restart") given->restart = true;
+  given->patience = patienceFromEnvironment().value_or(given->patience);
+  return given;
+}
+
+/// Collective: the first rank's text on all ranks.
+std::string shared(MPI_Comm comm, std::string text) {
+  auto size = static_cast<int>(text.size());
+  MPI_Bcast(&size, 1, MPI_INT, 0, comm);
+  text.resize(static_cast<std::size_t>(size));
+  MPI_Bcast(text.data(), size, MPI_CHAR, 0, comm);
+  return text;
+}
+
+/// Collective: what the first rank finds out, on all ranks.
+class Decision {
+ public:
+  explicit Decision(vdi_catalyst& self) : self_(self) { MPI_Comm_rank(self.comm, &rank_); }
+
+  /// The code of a failure, VDI_CATALYST_NOT_ISOLATED, or VDI_CATALYST_OK.
+  int decide(const char* json, bool isJson, IsolatedOptions& options) {
+    std::string text;
+    std::string name;
+    std::optional<vdi::config::RunIsolation> isolation;
+    const int code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
+      if (rank_ != 0) return;
+      std::optional<vdi::config::Run> run;
+      if (isJson) {
+        // Another engine reports what's wrong with the text.
+        run = readable(json, text, name);
+        if (!run) return;
+      }
+      isolation = isolationOf(isJson ? run->isolation : std::nullopt);
+      options.launcher = vdi::environmentText("VDI_ISOLATION_LAUNCHER").value_or("");
+    });
+    if (code != VDI_CATALYST_OK) return code;
+    struct {
+      int isIsolated;
+      int restart;
+      double patience;
+    } answer{isolation ? 1 : 0, isolation && isolation->restart ? 1 : 0, isolation ? isolation->patience : 0};
+    MPI_Bcast(&answer, sizeof answer, MPI_BYTE, 0, self_.comm);
+    if (answer.isIsolated == 0) return VDI_CATALYST_NOT_ISOLATED;
+    options.isolation = {answer.restart != 0, answer.patience};
+    if (!isJson) return VDI_CATALYST_OK;
+    text = shared(self_.comm, std::move(text));
+    return guarded(self_, VDI_CATALYST_ENGINE,
+                   [&] { options.run = vdi::config::parseRun(text, "the JSON text"); });
+  }
+
+ private:
+  static std::optional<vdi::config::Run> readable(const char* json, std::string& text, std::string& name) {
+    if (json == nullptr) return std::nullopt;
+    try {
+      const vdi::config::JsonLimits limits;
+      vdi::config::RunText source = vdi::config::readRun({json, ::strnlen(json, limits.bytes + 1)});
+      text = std::move(source.text);
+      name = std::move(source.name);
+      return vdi::config::parseRun(text, name);
+    } catch (const std::exception&) {
+      return std::nullopt;
+    }
+  }
+
+  vdi_catalyst& self_;
+  int rank_ = 0;
+};
+
+/// `read` fills in the scripts or the text.
+template <typename Read>
+int initializeAny(int32_t fortran_communicator, const char* json, bool isJson, vdi_catalyst** catalyst,
+                  Read read) {
+  // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
+  auto self = std::make_unique<vdi_catalyst>();
+  self->isJson = isJson;
+  if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
+    return VDI_CATALYST_BAD_ARGUMENT;
+  MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
+  IsolatedOptions options;
+  int code = Decision(*self).decide(json, isJson, options);
+  if (code == VDI_CATALYST_OK) code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { read(options); });
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
+      require(alive(isJson) == nullptr, isJson
+                                            ? "a run by JSON goes on in this process; finalize it first"
+                                            : "a run of scripts goes on in this process; finalize it first");
+    });
+  }
+  if (code == VDI_CATALYST_OK) {
+    self->run = std::make_unique<vdi::catalyst::IsolatedRun>(*self, std::move(options));
+    code = self->run->start();
+  }
+  if (code == VDI_CATALYST_OK) {
+    *catalyst = alive(isJson) = self.release();
+  } else {
+    MPI_Comm_free(&self->comm);
+  }
+  return code;
+}
+
+int initializeJson(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
+  return initializeAny(fortran_communicator, json, true, catalyst, [&](IsolatedOptions& options) {
+    if (json != nullptr) options.json = json;
+  });
+}
+
+template <typename Given>
+int initializeScripts(int32_t fortran_communicator, int32_t script_count, const Given* given,
+                      vdi_catalyst** catalyst) {
+  return initializeAny(fortran_communicator, nullptr, false, catalyst, [&](IsolatedOptions& options) {
+    options.scripts = vdi::catalyst::scriptsOf(script_count, given);
+  });
+}
+
+int initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
+               vdi_catalyst** catalyst) {
+  return initializeScripts(fortran_communicator, script_count, scripts, catalyst);
+}
+
+int initializePipelines(int32_t fortran_communicator, int32_t script_count,
+                        const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
+  return initializeScripts(fortran_communicator, script_count, scripts, catalyst);
+}
+
+/// Throws if ParaView couldn't have the marks of the blocks' ghost cells.
+void requireMarks(int32_t count, const vdi_catalyst_block* blocks) {
+  for (int i = 0; i < count; ++i) {
+    const vdi_catalyst_block& block = blocks[i];
+    std::size_t cells = 1;
+    bool any = false;
+    for (int axis = 0; axis < 3; ++axis) {
+      cells *= static_cast<std::size_t>(block.cells[axis]);
+      any = any || block.ghost_lo[axis] > 0 || block.ghost_hi[axis] > 0;
+    }
+    if (!any) continue;
+    const std::unique_ptr<char[]> marks(new (std::nothrow) char[cells]);
+    if (!marks)
+      throw std::runtime_error("no memory for the marks of a block's ghost cells: " + std::to_string(cells) +
+                               " bytes");
+  }
+}
+
+int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  if (!catalyst->isJson) {
+    const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+      require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
+      for (int i = 0; i < count; ++i) vdi::catalyst::checkBlock(blocks[i]);
+      requireMarks(count, blocks);
+    });
+    if (code != VDI_CATALYST_OK) return code;
+  }
+  return vdi::catalyst::setBlocks(*catalyst, count, blocks);
+}
+
+int setArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
+             const void* const* data) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  return vdi::catalyst::setArray(*catalyst, {name, type, association, 1}, data);
+}
+
+int setArrayStrided(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
+                    int32_t components, const void* const* data, const vdi_catalyst_strides* strides) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  return vdi::catalyst::setArrayStrided(*catalyst, {name, type, association, components}, data, strides);
+}
+
+int setArrayOffset(vdi_catalyst* catalyst, const char* name, int32_t association, const double* offset) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  return vdi::catalyst::setArrayOffset(*catalyst, name, association, offset);
+}
+
+int setParticles(vdi_catalyst* catalyst, const char* name, const vdi_catalyst_particles* particles) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  return vdi::catalyst::setParticles(*catalyst, name, particles);
+}
+
+int wants(vdi_catalyst* catalyst, int64_t step, double time) {
+  return usable(catalyst) && catalyst->run->wants(step, time) ? 1 : 0;
+}
+
+int execute(vdi_catalyst* catalyst, int64_t step, double time) {
+  return usable(catalyst) ? catalyst->run->execute(step, time) : VDI_CATALYST_BAD_ARGUMENT;
+}
+
+double parameterF64(vdi_catalyst* catalyst, const char* name, double value, double low, double high) {
+  if (!usable(catalyst)) return value;
+  return vdi::catalyst::inForce(*catalyst, catalyst->run->parameters(), name, value, low, high);
+}
+
+int64_t parameterI64(vdi_catalyst* catalyst, const char* name, int64_t value, int64_t low, int64_t high) {
+  if (!usable(catalyst)) return value;
+  return vdi::catalyst::inForce(*catalyst, catalyst->run->parameters(), name, value, low, high);
+}
+
+int finalize(vdi_catalyst* catalyst) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(catalyst->isJson), nullptr));
+  const int code = self->run->finish();
+  self->run.reset();
+  MPI_Comm_free(&self->comm);
+  return code;
+}
+
+const char* error(const vdi_catalyst* catalyst) {
+  return usable(catalyst) ? catalyst->error.c_str() : "";
+}
+
+}  // namespace
+
+const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
+    initialize, initializePipelines, initializeJson, nullptr,      setBlocks,
+    setArray,   setArrayStrided,     setArrayOffset, setParticles, wants,
+    execute,    parameterF64,        parameterI64,   finalize,     error,
+    nullptr,
+};

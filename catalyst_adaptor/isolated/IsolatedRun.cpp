@@ -1,0 +1,381 @@
+#include "catalyst_adaptor/isolated/IsolatedRun.h"
+
+#include <dlfcn.h>
+#include <mpi.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+namespace vdi::catalyst {
+
+namespace {
+
+constexpr std::chrono::milliseconds tick(20);  // between two agreements while ranks wait
+constexpr double startLimit = 300.0;           // seconds in which processes start, or end a run
+constexpr double stopLimit = 2.0;              // seconds in which somebody may let stopped processes go on
+constexpr std::chrono::milliseconds endLimit(10000);
+
+/// Collective: the maximum of each number over the ranks.
+template <std::size_t count>
+std::array<std::int64_t, count> meet(MPI_Comm comm, std::array<std::int64_t, count> numbers) {
+  MPI_Allreduce(MPI_IN_PLACE, numbers.data(), static_cast<int>(count), MPI_INT64_T, MPI_MAX, comm);
+  return numbers;
+}
+
+/// The program that makes frames, which lies beside the library with this code.
+std::string programFile() {
+  Dl_info self;
+  if (dladdr(reinterpret_cast<const void*>(&programFile), &self) == 0 || self.dli_fname == nullptr)
+    throw std::runtime_error("the path of vdi_catalyst_process is unknown");
+  const auto file = std::filesystem::absolute(self.dli_fname).parent_path() / "vdi_catalyst_process";
+  if (access(file.c_str(), X_OK) != 0)
+    throw std::runtime_error(file.string() + " isn't there; it belongs to the adaptor");
+  return file.string();
+}
+
+mode_t currentUmask() {
+  const mode_t mask = umask(S_IRWXG | S_IRWXO);
+  umask(mask);
+  return mask;
+}
+
+/// Collective: the hosts of all ranks, on the first one.
+std::vector<std::string> hostsOf(MPI_Comm comm, int rank, int size) {
+  std::array<char, MPI_MAX_PROCESSOR_NAME> name{};
+  int length = 0;
+  MPI_Get_processor_name(name.data(), &length);
+  std::vector<char> all(rank == 0 ? name.size() * static_cast<std::size_t>(size) : 0);
+  const auto bytes = static_cast<int>(name.size());
+  MPI_Gather(name.data(), bytes, MPI_CHAR, all.data(), bytes, MPI_CHAR, 0, comm);
+  std::vector<std::string> hosts;
+  for (std::size_t at = 0; at < all.size(); at += name.size()) hosts.emplace_back(all.data() + at);
+  return hosts;
+}
+
+}  // namespace
+
+IsolatedRun::IsolatedRun(FieldCalls& self, IsolatedOptions options)
+    : self_(self), options_(std::move(options)) {
+  MPI_Comm_rank(self_.comm, &rank_);
+  MPI_Comm_size(self_.comm, &size_);
+  if (options_.run) schedule_.emplace(*options_.run);
+}
+
+IsolatedRun::~IsolatedRun() = default;
+
+int IsolatedRun::start() {
+  return launch(false);
+}
+
+Setup IsolatedRun::setupOf(bool isGoingOn) const {
+  Setup setup;
+  setup.rank = rank_;
+  setup.isJson = options_.run.has_value();
+  setup.isGoingOn = isGoingOn;
+  setup.hasText = options_.json.has_value();
+  setup.json = options_.json.value_or("");
+  for (const Script& script : options_.scripts) setup.scripts.push_back({script.file, script.arguments});
+  for (char** variable = environ; variable != nullptr && *variable != nullptr; ++variable)
+    setup.environment.emplace_back(*variable);
+  setup.folder = std::filesystem::current_path().string();
+  setup.umask = currentUmask();
+  return setup;
+}
+
+int IsolatedRun::launch(bool isGoingOn) {
+  handedOver_ = settled_ = 0;
+  tiredAt_.reset();
+  std::array<char, 64> name{};
+  if (rank_ == 0) std::snprintf(name.data(), name.size(), "%s", newSocketName().c_str());
+  MPI_Bcast(name.data(), static_cast<int>(name.size()), MPI_CHAR, 0, self_.comm);
+  const std::vector<std::string> hosts = hostsOf(self_.comm, rank_, size_);
+  int code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
+    process_ = std::make_unique<FrameProcess>(std::string(name.data()) + "-" + std::to_string(rank_),
+                                              setupOf(isGoingOn));
+  });
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
+      if (rank_ != 0) return;
+      const std::string program = programFile();
+      job_ = std::make_unique<Job>(
+          program,
+          commandOf(options_.launcher, hosts, {program, "serve", name.data(), std::to_string(size_)}));
+    });
+  }
+  if (code == VDI_CATALYST_OK) code = awaitStart();
+  if (code != VDI_CATALYST_OK) end();
+  return code;
+}
+
+int IsolatedRun::awaitStart() {
+  const auto progress = [&] { return process_->startCode().has_value() ? 1 : 0; };
+  const Wait result = wait(progress, 1, startLimit).first;
+  if (result == Wait::Over) return *process_->startCode();
+  return guarded(self_, VDI_CATALYST_ENGINE, [&]() -> std::optional<std::string> {
+    if (result == Wait::Tired) {
+      return process_->startCode() ? ""
+                                   : "the process that makes frames hasn't started in " +
+                                         std::to_string(static_cast<int>(startLimit)) + " s";
+    }
+    if (process_->isGone()) return "the process that makes frames " + process_->end();
+    if (!job_ || !job_->isOver(Milliseconds(0))) return "";
+    const std::string said = job_->said();
+    return "the processes that make frames didn't start; their launcher said: " +
+           (said.empty() ? "nothing" : said);
+  });
+}
+
+/// Waits until all ranks' progress, which only grows, has come to the goal. Returns the least progress, too.
+template <typename Progress>
+std::pair<IsolatedRun::Wait, std::int64_t> IsolatedRun::wait(Progress progress, std::int64_t goal,
+                                                             double limit) {
+  const auto begin = Clock::now();
+  auto lastRun = begin;
+  const auto since = [](Clock::time_point time) {
+    return std::chrono::duration<double>(Clock::now() - time).count();
+  };
+  for (;;) {
+    process_->listen(tick);
+    if (!process_->isStopped()) lastRun = Clock::now();
+    const bool isLate = rank_ == 0 && since(begin) > limit;
+    // A job that is over has lost the processes that haven't come, on whatever host.
+    const bool isLost = job_ && !process_->startCode() && job_->isOver(Milliseconds(0));
+    const std::int64_t mine = progress();
+    const bool isGone = (process_->isGone() || isLost) && mine < goal;
+    const auto [gone, behind, tired] =
+        meet<3>(self_.comm, {isGone ? 1 : 0, -mine, isLate || since(lastRun) > stopLimit ? 1 : 0});
+    if (-behind >= goal) return {Wait::Over, -behind};
+    if (gone != 0) return {Wait::Dead, -behind};
+    if (tired != 0) return {Wait::Tired, -behind};
+  }
+}
+
+/// Ends what is left of the processes, and reports the first rank's loss.
+int IsolatedRun::bury(std::optional<std::int64_t> step) {
+  const bool restarts = options_.isolation.restart && step;
+  std::string text;
+  if (process_->isGone()) {
+    text = "the process that makes frames " + process_->end() +
+           (restarts ? "; it starts again for the next frame"
+            : step   ? "; no more frames are made"
+                     : "");
+  }
+  end();
+  return conclude(self_, VDI_CATALYST_ENGINE, text, step);
+}
+
+void IsolatedRun::end() {
+  process_.reset();
+  job_.reset();
+}
+
+/// Takes the results of steps up to the given number, which all ranks have. Returns the worst code.
+int IsolatedRun::settle(std::int64_t done) {
+  int worst = VDI_CATALYST_OK;
+  for (; settled_ < done; ++settled_) {
+    const DoneNotice notice = process_->takeDone();
+    std::map<std::string, double> values;
+    for (std::size_t i = 0; i < notice.parameters.size(); ++i)
+      values[parameters_.all()[i].name] = notice.parameters[i];
+    parameters_.set(values);
+    if (notice.code < worst || notice.code == VDI_CATALYST_OK) continue;
+    worst = notice.code;
+    self_.error = notice.text;
+  }
+  return worst;
+}
+
+bool IsolatedRun::isLocallyWanted(std::int64_t step, double time, double now) const {
+  if (!schedule_) return !process_ || process_->wants(step).value_or(true);
+  if (isSteered()) return true;
+  return (rank_ == 0 || !schedule_->needsRoot()) && schedule_->isDue(step, time, now);
+}
+
+bool IsolatedRun::wants(std::int64_t step, double time) {
+  if (!process_ && !options_.isolation.restart) return false;
+  const bool isValid = schedule_ ? step >= 0 : isStep(step);
+  if (process_) process_->listen(Milliseconds(0));
+  const bool isUnknown = process_ && !schedule_ && isValid && !process_->wants(step);
+  const std::int64_t done = process_ ? process_->doneCount() : 0;
+  const bool wanted = isValid && isLocallyWanted(step, time, elapsed());
+  const auto answers = meet<3>(self_.comm, {wanted ? 1 : 0, isUnknown ? 1 : 0, -done});
+  // Idle processes can be asked. Before the first step, scripts aren't loaded.
+  const bool canAsk = answers[1] != 0 && -answers[2] == handedOver_ && handedOver_ > 0;
+  if (!canAsk) return answers[0] != 0;
+  process_->ask(step);
+  constexpr double patience = 5.0;
+  if (wait([&] { return process_->wants(step) ? 1 : 0; }, 1, patience).first != Wait::Over) return true;
+  return meet<1>(self_.comm, {*process_->wants(step) ? 1 : 0})[0] != 0;
+}
+
+/// Refuses steps that the engines refuse, and steps that differ.
+int IsolatedRun::checked(std::int64_t step) {
+  int code = guarded(
+      self_, VDI_CATALYST_BAD_ARGUMENT,
+      [&] {
+        require(self_.haveBlocks, "no blocks were given yet");
+        if (schedule_) {
+          require(step >= 0, "steps count from 0");
+        } else {
+          requireStep(step);
+        }
+      },
+      step);
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(
+        self_, VDI_CATALYST_BAD_ARGUMENT,
+        [&] { requireEqual(self_.comm, step, "the ranks give different steps"); }, step);
+  }
+  return code;
+}
+
+int IsolatedRun::execute(std::int64_t step, double time) {
+  if (!process_ && !options_.isolation.restart) return VDI_CATALYST_ENGINE;
+  if (process_) process_->listen(Milliseconds(0));
+  const double now = elapsed();
+  const bool isRefused = !self_.haveBlocks || (schedule_ ? step < 0 : !isStep(step));
+  const bool isGone = process_ && process_->isGone();
+  const auto [refused, highest, lowest, gone, behind, wanted] = meet<6>(
+      self_.comm, {isRefused ? 1 : 0, step, ~step, isGone ? 1 : 0, process_ ? -process_->doneCount() : 0,
+                   !isRefused && isLocallyWanted(step, time, now) ? 1 : 0});
+  if (refused != 0 || highest != ~lowest) return checked(step);
+  int code = VDI_CATALYST_OK;
+  if (gone != 0) {
+    code = bury(step);
+    if (!options_.isolation.restart) return code;
+  } else if (process_) {
+    code = settle(-behind);
+  }
+  if (wanted != 0) {
+    if (schedule_ && !isSteered()) schedule_->begin(time, now);
+    code = std::max(code, handOver(step, time, now));
+  }
+  if (code == VDI_CATALYST_OK) self_.printed.clear();
+  return code;
+}
+
+/// Hands a step over that is wanted.
+int IsolatedRun::handOver(std::int64_t step, double time, double now) {
+  int earlier = VDI_CATALYST_OK;
+  if (!process_) {
+    const int code = launch(true);
+    if (code != VDI_CATALYST_OK) return code;
+  }
+  if (handedOver_ - settled_ >= 2) {
+    if (tiredAt_ == settled_) return leaveOut(step);
+    const double patience =
+        isSteered() ? std::numeric_limits<double>::infinity() : options_.isolation.patience;
+    if (patience == 0.0) return leaveOut(step);
+    const auto [result, done] = wait([&] { return process_->doneCount(); }, handedOver_ - 1, patience);
+    if (result == Wait::Dead) {
+      const int code = bury(step);
+      return options_.isolation.restart ? std::max(code, handOver(step, time, now)) : code;
+    }
+    earlier = settle(done);
+    if (result == Wait::Tired) {
+      tiredAt_ = settled_;
+      return leaveOut(step);
+    }
+  }
+  std::optional<StepWriter> data;
+  const int code = guarded(
+      self_, VDI_CATALYST_SCRIPT,
+      [&] {
+        data.emplace(self_.fields.version(), self_.fields.blocks(), wantedFields(), parameters_.all());
+        process_->reserve(*data);
+      },
+      step);
+  if (code != VDI_CATALYST_OK) return code;
+  StepNotice notice;
+  notice.step = step;
+  notice.time = time;
+  notice.clock = now;
+  process_->handOver(*data, notice);
+  ++handedOver_;
+  return earlier;
+}
+
+/// A step for which there is no buffer. Without patience, that is as the run wants it.
+int IsolatedRun::leaveOut(std::int64_t step) {
+  ++leftOut_;
+  if (options_.isolation.patience == 0.0) {
+    if (!std::exchange(hasToldOfLeftOut_, true) && rank_ == 0) {
+      std::fprintf(stderr,
+                   "vdi_catalyst: step %lld: left out: two earlier steps' frames are still to be made; more "
+                   "such steps aren't told\n",
+                   static_cast<long long>(step));
+    }
+    return VDI_CATALYST_OK;
+  }
+  std::string text;
+  if (process_->isStopped()) {
+    text = "left out: somebody has stopped the process that makes frames";
+  } else if (process_->doneCount() == settled_) {
+    text = "left out: the process that makes frames has made none for long";
+  }
+  return conclude(self_, VDI_CATALYST_SCRIPT, text, step);
+}
+
+/// Scripts may use all fields, a JSON run those that it names.
+StepFields IsolatedRun::wantedFields() const {
+  StepFields all;
+  all.arrays = self_.fields.arrays();
+  for (const auto& [name, particles] : self_.fields.particles()) all.particles.emplace_back(name, particles);
+  if (!options_.run) return all;
+  std::vector<std::string> names{options_.run->field};
+  if (options_.run->when) names.push_back(options_.run->when->field);
+  const auto exists = [&](const std::string& name) {
+    return std::ranges::find(all.arrays, name, &Fields::NamedArray::name) != all.arrays.end() ||
+           self_.fields.particlesOf(name) != nullptr;
+  };
+  // The message about a missing array lists the others.
+  if (!std::ranges::all_of(names, exists)) return all;
+  const auto isUnnamed = [&](const std::string& name) {
+    return std::ranges::find(names, name) == names.end();
+  };
+  std::erase_if(all.arrays, [&](const Fields::NamedArray& array) { return isUnnamed(array.name); });
+  std::erase_if(all.particles, [&](const auto& particles) { return isUnnamed(particles.first); });
+  return all;
+}
+
+int IsolatedRun::finish() {
+  if (leftOut_ > 0 && rank_ == 0) {
+    std::fprintf(stderr,
+                 "vdi_catalyst: %lld frames were left out, because two earlier ones were to be made\n",
+                 static_cast<long long>(leftOut_));
+  }
+  if (!process_) return VDI_CATALYST_ENGINE;
+  process_->finish();
+  const double limit = std::max(options_.isolation.patience, startLimit);
+  const Wait result = wait([&] { return process_->finished() ? 1 : 0; }, 1, limit).first;
+  if (result == Wait::Dead) return bury(std::nullopt);
+  if (result == Wait::Tired) {
+    const bool isStopped = process_->isStopped();
+    const bool isFinished = process_->finished().has_value();
+    end();
+    return conclude(self_, VDI_CATALYST_ENGINE,
+                    isStopped    ? "somebody has stopped the process that makes frames; it is killed"
+                    : isFinished ? ""
+                                 : "the process that makes frames doesn't end the run; it is killed",
+                    std::nullopt);
+  }
+  int code = settle(handedOver_);
+  if (process_->finished()->code > code) {
+    code = process_->finished()->code;
+    self_.error = process_->finished()->text;
+  }
+  process_->awaitEnd(endLimit);
+  if (job_) (void)job_->isOver(endLimit);
+  end();
+  return code;
+}
+
+}  // namespace vdi::catalyst

@@ -1,0 +1,69 @@
+// What a rank of the simulation and the process that makes its frames say to each other.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "catalyst_adaptor/isolated/Packing.h"
+
+namespace vdi::catalyst {
+
+/// The first word of each message.
+enum class Say : std::uint32_t {
+  // From the simulation.
+  Hello,   // with stdout, stderr and the Setup's pages as descriptors
+  Step,    // see StepNotice; with the buffer's pages as descriptor if they are new
+  Ask,     // int64 first: which steps from there on will be wanted?
+  Finish,  // end the run
+  // From the process.
+  Worker,    // int32 process: the worker's number, from its supervisor
+  Started,   // int32 code: initialising has ended
+  Begun,     // int64 step: its frame is being made
+  Done,      // see DoneNotice
+  Wanted,    // int64 first, uint64 count, count bytes of 0 or 1: which steps scripts want
+  Finished,  // int32 code, text
+  Ended,     // int32 status of waitpid: the worker has ended, from its supervisor
+};
+
+/// The run, as the process's programs get it.
+struct Setup {
+  std::int32_t rank = 0;
+  bool isJson = false;
+  bool isGoingOn = false;  // an earlier process has made a part of the run
+  bool hasText = false;
+  std::string json;
+  struct Pipeline {
+    std::string file;
+    std::vector<std::string> arguments;
+  };
+  std::vector<Pipeline> scripts;
+  std::vector<std::string> environment;  // the rank's, "NAME=value"
+  std::string folder;                    // its working directory
+  std::uint32_t umask = 0;
+
+  void pack(Packer& packer) const;
+  static Setup unpack(Unpacker& unpacker);
+};
+
+struct StepNotice {
+  std::int64_t step = 0;
+  double time = 0.0;
+  double clock = 0.0;        // seconds since the run's start
+  std::uint32_t buffer = 0;  // 0 or 1
+  bool isNewBuffer = false;  // its pages come with this message
+};
+
+struct DoneNotice {
+  std::int64_t step = 0;
+  std::int32_t code = 0;
+  std::string text;
+  std::vector<double> parameters;  // the values in force, in the order of declaration
+};
+
+/// Whether the launcher of an MPI job sets such a variable ("NAME=value") for each of its processes. Those of
+/// the simulation's job must not reach another job; those of the other job must stay.
+bool isOfMpiJob(std::string_view variable);
+
+}  // namespace vdi::catalyst

@@ -1,0 +1,70 @@
+// Messages and descriptors between a rank of the simulation and the process that makes its frames.
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace vdi::catalyst {
+
+/// Closes a descriptor. -1: none.
+class Descriptor {
+ public:
+  Descriptor() = default;
+  explicit Descriptor(int number) : number_(number) {}
+  Descriptor(Descriptor&& other) noexcept : number_(other.release()) {}
+  Descriptor& operator=(Descriptor&& other) noexcept;
+  ~Descriptor();
+  int number() const { return number_; }
+  bool isOpen() const { return number_ >= 0; }
+  int release();
+
+ private:
+  int number_ = -1;
+};
+
+/// A name for sockets of one run that no other run has.
+std::string newSocketName();
+
+/// Whole messages, in order, within this host. No function throws or raises a signal when the other side is
+/// gone: sending fails, and receiving says so.
+class Socket {
+ public:
+  Socket() = default;
+  explicit Socket(Descriptor descriptor) : descriptor_(std::move(descriptor)) {}
+
+  /// Listens under a name that isn't one of the file system. Throws std::runtime_error.
+  static Socket listener(const std::string& name);
+  /// Connects to a listener of the same user; a closed socket if there is none.
+  static Socket connectTo(const std::string& name);
+  /// The next connection from a process of the same user; a closed socket if none comes within the time.
+  Socket accept(std::chrono::milliseconds patience) const;
+
+  /// Sends a message of at most `longest` bytes without waiting; returns whether that was possible.
+  bool send(std::span<const std::byte> message, std::span<const int> descriptors = {}) const;
+
+  enum class Result { Message, Nothing, Gone };
+  struct Received {
+    Result result = Result::Nothing;
+    std::vector<std::byte> message;
+    std::vector<Descriptor> descriptors;
+  };
+  /// The next message. Waits for it no longer than `patience`; a negative one waits for ever.
+  Received receive(std::chrono::milliseconds patience) const;
+
+  static constexpr std::size_t longest = 64 * 1024;
+  bool isOpen() const { return descriptor_.isOpen(); }
+  int number() const { return descriptor_.number(); }
+  void close() { descriptor_ = Descriptor(); }
+  /// The process that has connected; 0 if unknown.
+  pid_t peer() const;
+
+ private:
+  Descriptor descriptor_;
+};
+
+}  // namespace vdi::catalyst

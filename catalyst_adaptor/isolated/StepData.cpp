@@ -1,0 +1,185 @@
+#include "catalyst_adaptor/isolated/StepData.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include "catalyst_adaptor/isolated/Packing.h"
+
+namespace vdi::catalyst {
+
+namespace {
+
+constexpr std::uint64_t alignment = 4096;  // of each block's values, so that they are copied by whole lines
+
+std::uint64_t aligned(std::uint64_t offset) {
+  return (offset + alignment - 1) / alignment * alignment;
+}
+
+/// In place of an offset: the block lacks the array, or the particles have no such numbers.
+constexpr std::uint64_t none = ~std::uint64_t{0};
+
+int componentsOf(const Fields::NamedArray& array) {
+  for (const StridedValues& values : array.blocks) {
+    if (values.first != nullptr) return values.components;
+  }
+  return 1;
+}
+
+std::uint64_t bytesOf(const NumberColumn& column) {
+  return column.isDouble ? sizeof(double) : sizeof(float);
+}
+
+/// How many numbers the other process needs of a column.
+std::uint64_t countOf(const NumberColumn& column, std::size_t particles) {
+  return column.stride == 0 ? std::min<std::size_t>(particles, 1) : particles;
+}
+
+std::array<NumberColumn, 5> columnsOf(const vdi::Particles& particles) {
+  return {particles.positions[0], particles.positions[1], particles.positions[2], particles.weights,
+          particles.lengths};
+}
+
+void copyColumn(const NumberColumn& column, std::uint64_t count, std::byte* to) {
+  const std::uint64_t bytes = bytesOf(column);
+  for (std::uint64_t i = 0; i < count; ++i)
+    std::memcpy(to + i * bytes, column.first + static_cast<std::int64_t>(i) * column.stride, bytes);
+}
+
+}  // namespace
+
+StepWriter::StepWriter(std::uint64_t version, const std::vector<vdi_catalyst_block>& blocks,
+                       StepFields fields, const std::vector<Parameter>& parameters)
+    : fields_(std::move(fields)) {
+  // Offsets of values count from the end of the head, whose size isn't known before.
+  std::uint64_t end = 0;
+  Packer head;
+  head.put(version);
+  head.put(std::uint64_t{blocks.size()});
+  for (const vdi_catalyst_block& block : blocks) head.put(block);
+  const auto place = [&](std::uint64_t bytes) {
+    head.put(end);
+    offsets_.push_back(end);
+    end = aligned(end + bytes);
+  };
+  head.put(std::uint64_t{fields_.arrays.size()});
+  for (const Fields::NamedArray& array : fields_.arrays) {
+    head.putText(array.name);
+    head.put(array.cells);
+    head.put(std::int32_t{array.type});
+    head.put(std::int32_t{componentsOf(array)});
+    for (int axis = 0; axis < 3; ++axis) head.put(array.offset[axis]);
+    for (const StridedValues& values : array.blocks) {
+      if (values.first != nullptr) {
+        place(values.bytes());
+      } else {
+        head.put(none);
+      }
+    }
+  }
+  head.put(std::uint64_t{fields_.particles.size()});
+  for (const auto& [name, array] : fields_.particles) {
+    head.putText(name);
+    head.put(array.kind);
+    head.put(std::uint64_t{array.particles.count});
+    for (const NumberColumn& column : columnsOf(array.particles)) {
+      head.put(column.isDouble);
+      head.put(column.stride == 0);
+      if (column) {
+        place(countOf(column, array.particles.count) * bytesOf(column));
+      } else {
+        head.put(none);
+      }
+    }
+  }
+  head.put(std::uint64_t{parameters.size()});
+  for (const Parameter& parameter : parameters) {
+    head.putText(parameter.name);
+    head.put(parameter.isWhole);
+    head.put(parameter.value);
+    head.put(parameter.low);
+    head.put(parameter.high);
+  }
+  Packer size;
+  size.put(aligned(sizeof(std::uint64_t) + head.bytes().size()));
+  head_.assign(size.bytes().begin(), size.bytes().end());
+  head_.insert(head_.end(), head.bytes().begin(), head.bytes().end());
+  const std::uint64_t begin = aligned(head_.size());
+  for (std::uint64_t& offset : offsets_) offset += begin;
+  bytes_ = begin + end;
+}
+
+void StepWriter::write(std::span<std::byte> to) const {
+  assert(to.size() >= bytes_);
+  std::memcpy(to.data(), head_.data(), head_.size());
+  std::size_t next = 0;
+  for (const Fields::NamedArray& array : fields_.arrays) {
+    for (const StridedValues& values : array.blocks) {
+      if (values.first != nullptr) values.copyTo(to.data() + offsets_[next++]);
+    }
+  }
+  for (const auto& [name, array] : fields_.particles) {
+    for (const NumberColumn& column : columnsOf(array.particles)) {
+      if (column) copyColumn(column, countOf(column, array.particles.count), to.data() + offsets_[next++]);
+    }
+  }
+}
+
+StepData StepData::read(std::span<const std::byte> from) {
+  Unpacker head(from);
+  const auto begin = head.take<std::uint64_t>();
+  // What lies at the next offset; null if that is none.
+  const auto placed = [&]() -> const std::byte* {
+    const auto offset = head.take<std::uint64_t>();
+    if (offset == none) return nullptr;
+    // An array of no values may end the memory.
+    if (begin > from.size() || offset > from.size() - begin)
+      throw std::runtime_error("a step's values lie outside the shared memory");
+    return from.data() + begin + offset;
+  };
+  StepData step;
+  step.version = head.take<std::uint64_t>();
+  for (auto blocks = head.take<std::uint64_t>(); blocks > 0; --blocks)
+    step.blocks.push_back(head.take<vdi_catalyst_block>());
+  for (auto arrays = head.take<std::uint64_t>(); arrays > 0; --arrays) {
+    Array& array = step.arrays.emplace_back();
+    array.name = head.takeText();
+    array.cells = head.take<bool>();
+    array.type = head.take<std::int32_t>();
+    array.components = head.take<std::int32_t>();
+    for (double& offset : array.offset) offset = head.take<double>();
+    for (std::size_t i = 0; i < step.blocks.size(); ++i) array.blocks.push_back(placed());
+  }
+  for (auto particles = head.take<std::uint64_t>(); particles > 0; --particles) {
+    StepData::Particles& one = step.particles.emplace_back();
+    vdi_catalyst_particles& given = one.given;
+    one.name = head.takeText();
+    given.kind = head.take<DepositKind>() == DepositKind::Density ? VDI_CATALYST_DENSITY : VDI_CATALYST_SUM;
+    given.count = static_cast<std::int64_t>(head.take<std::uint64_t>());
+    const auto column = [&](const void*& first, std::int32_t& type, std::int64_t& stride) {
+      const auto isDouble = head.take<bool>();
+      const auto isOne = head.take<bool>();
+      type = isDouble ? VDI_CATALYST_F64 : VDI_CATALYST_F32;
+      stride = isOne ? 0 : static_cast<std::int64_t>(isDouble ? sizeof(double) : sizeof(float));
+      first = placed();
+    };
+    for (const void*& position : given.positions)
+      column(position, given.position_type, given.position_stride);
+    column(given.weights, given.weight_type, given.weight_stride);
+    column(given.lengths, given.length_type, given.length_stride);
+  }
+  for (auto parameters = head.take<std::uint64_t>(); parameters > 0; --parameters) {
+    Parameter& parameter = step.parameters.emplace_back();
+    parameter.name = head.takeText();
+    parameter.isWhole = head.take<bool>();
+    parameter.value = head.take<double>();
+    parameter.low = head.take<double>();
+    parameter.high = head.take<double>();
+  }
+  return step;
+}
+
+}  // namespace vdi::catalyst

@@ -1,0 +1,65 @@
+// A step's blocks, arrays, particles and parameters in memory that two processes share.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "catalyst_adaptor/Parameters.h"
+#include "catalyst_adaptor/ParticleArray.h"
+#include "catalyst_adaptor/json/Fields.h"
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace vdi::catalyst {
+
+/// What is to be handed over of a run's fields.
+struct StepFields {
+  std::vector<Fields::NamedArray> arrays;
+  std::vector<std::pair<std::string, ParticleArray>> particles;  // by name
+};
+
+/// Places a step's data. The simulation makes one for each step that it hands over.
+class StepWriter {
+ public:
+  /// The fields are those of blocks with this version's number.
+  StepWriter(std::uint64_t version, const std::vector<vdi_catalyst_block>& blocks, StepFields fields,
+             const std::vector<Parameter>& parameters);
+  std::uint64_t bytes() const { return bytes_; }
+  /// Copies all values, as they are now, and what describes them. `to` has room for `bytes()`.
+  void write(std::span<std::byte> to) const;
+
+ private:
+  StepFields fields_;
+  std::vector<std::uint64_t> offsets_;  // of each array's blocks that have it, then of particles' columns
+  std::vector<std::byte> head_;
+  std::uint64_t bytes_ = 0;
+};
+
+/// A step as the other process finds it.
+struct StepData {
+  struct Array {
+    std::string name;
+    bool cells = false;
+    std::int32_t type = VDI_CATALYST_F64;
+    std::int32_t components = 1;
+    double offset[3] = {};
+    std::vector<const void*> blocks;  // values in VTK's order; null where a block lacks the array
+  };
+  struct Particles {
+    std::string name;
+    vdi_catalyst_particles given{};
+  };
+  std::uint64_t version = 0;  // another number means other blocks
+  std::vector<vdi_catalyst_block> blocks;
+  std::vector<Array> arrays;
+  std::vector<Particles> particles;
+  std::vector<Parameter> parameters;
+
+  /// Reads what a StepWriter has written. Values stay in `from`. Throws std::runtime_error if it is damaged.
+  static StepData read(std::span<const std::byte> from);
+};
+
+}  // namespace vdi::catalyst

@@ -1,0 +1,216 @@
+#include "catalyst_adaptor/isolated/process/Worker.h"
+
+#include <mpi.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "catalyst_adaptor/EngineFunctions.h"
+#include "catalyst_adaptor/isolated/Messages.h"
+#include "catalyst_adaptor/isolated/SharedPages.h"
+#include "catalyst_adaptor/isolated/StepData.h"
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace vdi::catalyst {
+
+namespace {
+
+/// How many steps ahead scripts are asked whether they want them.
+constexpr std::int64_t stepsAhead = 1024;
+constexpr std::size_t longestText = 16384;
+
+class Worker {
+ public:
+  Worker(Socket socket, const Setup& setup) : socket_(std::move(socket)), setup_(setup) {
+    // The launcher may number its processes in another order than the simulation's.
+    MPI_Comm_split(MPI_COMM_WORLD, 0, setup.rank, &comm_);
+  }
+  ~Worker() { MPI_Comm_free(&comm_); }
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  int run() {
+    const int code = initialize();
+    Packer started;
+    started.put(Say::Started);
+    started.put(std::int32_t{code});
+    if (!socket_.send(started.bytes()) || code != VDI_CATALYST_OK) return 0;
+    for (;;) {
+      Socket::Received received = socket_.receive(std::chrono::milliseconds(-1));
+      if (received.result == Socket::Result::Gone) return 1;  // the supervisor kills this process, too
+      if (received.result == Socket::Result::Nothing) continue;
+      Unpacker message(received.message);
+      switch (message.take<Say>()) {
+        case Say::Step:
+          step(message.take<StepNotice>(), received);
+          break;
+        case Say::Ask:
+          tellWanted(message.take<std::int64_t>());
+          break;
+        case Say::Finish:
+          finish();
+          return 0;
+        default:
+          break;
+      }
+    }
+  }
+
+ private:
+  int initialize() {
+    const std::int32_t comm = MPI_Comm_c2f(comm_);
+    if (setup_.isJson) {
+      const char* text = setup_.hasText ? setup_.json.c_str() : nullptr;
+      return setup_.isGoingOn ? vdi_catalyst_go_on_with_json(comm, text, &catalyst_)
+                              : vdi_catalyst_initialize_json(comm, text, &catalyst_);
+    }
+    std::vector<std::vector<const char*>> arguments;
+    std::vector<vdi_catalyst_pipeline> pipelines;
+    for (const Setup::Pipeline& script : setup_.scripts) {
+      std::vector<const char*>& own = arguments.emplace_back();
+      for (const std::string& argument : script.arguments) own.push_back(argument.c_str());
+      pipelines.push_back({script.file.c_str(), static_cast<std::int32_t>(own.size()), own.data()});
+    }
+    return vdi_catalyst_initialize_pipelines(comm, static_cast<std::int32_t>(pipelines.size()),
+                                             pipelines.data(), &catalyst_);
+  }
+
+  void step(const StepNotice& notice, Socket::Received& received) {
+    Packer begun;
+    begun.put(Say::Begun);
+    begun.put(notice.step);
+    (void)socket_.send(begun.bytes());
+    SharedPages& buffer = buffers_.at(notice.buffer);
+    if (notice.isNewBuffer && !received.descriptors.empty())
+      buffer = SharedPages(std::move(received.descriptors.front()));
+    const StepData data = StepData::read(buffer.bytes());
+    int code = take(data);
+    if (code == VDI_CATALYST_OK) {
+      vdi_catalyst_set_clock(catalyst_, notice.clock);
+      code = vdi_catalyst_execute(catalyst_, notice.step, notice.time);
+    }
+    Packer done;
+    done.put(Say::Done);
+    done.put(notice.step);
+    done.put(std::int32_t{code});
+    done.putText(code == VDI_CATALYST_OK ? "" : errorText());
+    done.put(std::uint64_t{data.parameters.size()});
+    for (const Parameter& parameter : data.parameters) done.put(inForceNow(parameter));
+    (void)socket_.send(done.bytes());
+    if (!setup_.isJson) tellWanted(notice.step + 1);
+  }
+
+  /// Gives the engine the step's blocks, values and parameters.
+  int take(const StepData& data) {
+    int code = VDI_CATALYST_OK;
+    if (version_ != data.version) {
+      code = vdi_catalyst_set_blocks(catalyst_, static_cast<std::int32_t>(data.blocks.size()),
+                                     data.blocks.data());
+      if (code != VDI_CATALYST_OK) return code;
+      version_ = data.version;
+    }
+    for (const StepData::Array& array : data.arrays) {
+      const std::vector<vdi_catalyst_strides> strides = stridesOf(data.blocks, array);
+      code = vdi_catalyst_set_array_strided(catalyst_, array.name.c_str(), array.type,
+                                            array.cells ? VDI_CATALYST_CELLS : VDI_CATALYST_POINTS,
+                                            array.components, array.blocks.data(), strides.data());
+      if (code == VDI_CATALYST_OK) {
+        code = vdi_catalyst_set_array_offset(catalyst_, array.name.c_str(),
+                                             array.cells ? VDI_CATALYST_CELLS : VDI_CATALYST_POINTS,
+                                             array.offset);
+      }
+      if (code != VDI_CATALYST_OK) return code;
+    }
+    for (const StepData::Particles& particles : data.particles) {
+      code = vdi_catalyst_set_particles(catalyst_, particles.name.c_str(), &particles.given);
+      if (code != VDI_CATALYST_OK) return code;
+    }
+    for (const Parameter& parameter : data.parameters) (void)inForceNow(parameter);
+    return code;
+  }
+
+  /// The layout of values in order.
+  static std::vector<vdi_catalyst_strides> stridesOf(const std::vector<vdi_catalyst_block>& blocks,
+                                                     const StepData::Array& array) {
+    constexpr std::array<std::int64_t, 10> bytes{1, 1, 2, 2, 4, 4, 4, 8, 8, 8};  // by type
+    const std::int64_t scalar = bytes.at(static_cast<std::size_t>(array.type));
+    std::vector<vdi_catalyst_strides> all;
+    for (const vdi_catalyst_block& block : blocks) {
+      vdi_catalyst_strides strides{};
+      strides.component_stride = scalar;
+      std::int64_t next = scalar * array.components;
+      for (int axis = 0; axis < 3; ++axis) {
+        strides.strides[axis] = next;
+        next *= block.cells[axis] + (array.cells ? 0 : 1);
+      }
+      all.push_back(strides);
+    }
+    return all;
+  }
+
+  /// The parameter's value, which it has from the simulation when it is first asked for.
+  double inForceNow(const Parameter& parameter) {
+    const auto whole = [](double number) { return static_cast<std::int64_t>(number); };
+    if (parameter.isWhole) {
+      return static_cast<double>(vdi_catalyst_parameter_i64(catalyst_, parameter.name.c_str(),
+                                                            whole(parameter.value), whole(parameter.low),
+                                                            whole(parameter.high)));
+    }
+    return vdi_catalyst_parameter_f64(catalyst_, parameter.name.c_str(), parameter.value, parameter.low,
+                                      parameter.high);
+  }
+
+  void tellWanted(std::int64_t first) {
+    Packer message;
+    message.put(Say::Wanted);
+    message.put(first);
+    message.put(std::uint64_t{stepsAhead});
+    // The triggers by which scripts can refuse a step don't depend on the time.
+    for (std::int64_t i = 0; i < stepsAhead; ++i)
+      message.put(std::uint8_t(vdi_catalyst_wants(catalyst_, first + i, 0.0) != 0 ? 1 : 0));
+    (void)socket_.send(message.bytes());
+  }
+
+  void finish() {
+    const std::string before = errorText();
+    const int code = vdi_catalyst_finalize(catalyst_);
+    catalyst_ = nullptr;
+    Packer finished;
+    finished.put(Say::Finished);
+    finished.put(std::int32_t{code});
+    finished.putText(code == VDI_CATALYST_OK ? "" : before);
+    (void)socket_.send(finished.bytes());
+  }
+
+  std::string errorText() const { return std::string(vdi_catalyst_error(catalyst_)).substr(0, longestText); }
+
+  Socket socket_;
+  const Setup& setup_;
+  MPI_Comm comm_ = MPI_COMM_NULL;
+  vdi_catalyst* catalyst_ = nullptr;
+  std::array<SharedPages, 2> buffers_;
+  std::optional<std::uint64_t> version_;  // of the blocks that the engine has
+};
+
+}  // namespace
+
+int work(Socket socket, Descriptor setup) {
+  const SharedPages pages(std::move(setup));
+  Unpacker unpacker(pages.bytes());
+  const Setup run = Setup::unpack(unpacker);
+  int provided = 0;
+  if (MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided) != MPI_SUCCESS) return 1;
+  int status = 0;
+  {
+    Worker worker(std::move(socket), run);
+    status = worker.run();
+  }
+  MPI_Finalize();
+  return status;
+}
+
+}  // namespace vdi::catalyst

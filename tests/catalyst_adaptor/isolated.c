@@ -1,0 +1,201 @@
+/* A simulation of heat, whose steps are timed: a box of N x N x N cells of doubles a rank, side by side along
+ * x. Arguments: a JSON text, a script that ends in .py, or "-" for no library at all; the number of steps.
+ * Prints, on the first rank, a line for each step, "step NUMBER CODE MICROSECONDS BUSY", and "finalize CODE
+ * MICROSECONDS"; the time is that of the slowest rank. BUSY is 1 if the file VDI_TEST_BUSY isn't there
+ * before the step: a frame is under way. Exit status 0 if all ranks have the same codes.
+ * VDI_TEST_SIZE: N, 16 unless given. VDI_TEST_PAUSE: milliseconds after each step. VDI_TEST_REPEAT: how often
+ * the heat spreads in a step. VDI_TEST_KILL=STEP: kills this rank's worker, if this is the last rank, while
+ * that step is handed over. VDI_TEST_FILE_LIMIT: the
+ * last rank may make no larger files during the first three steps. */
+#define _GNU_SOURCE
+#include <dirent.h>
+#include <mpi.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+static int size = 16;
+static double* now;
+static double* next;
+
+static int number_of(const char* name, int usual) {
+  const char* value = getenv(name);
+  return value != NULL ? atoi(value) : usual;
+}
+
+static double* at(double* field, int x, int y, int z) {
+  const size_t side = (size_t)size + 2;
+  return field + ((size_t)z * side + (size_t)y) * side + (size_t)x;
+}
+
+static void spread(void) {
+  for (int z = 1; z <= size; ++z) {
+    for (int y = 1; y <= size; ++y) {
+      for (int x = 1; x <= size; ++x) {
+        const double sum = *at(now, x - 1, y, z) + *at(now, x + 1, y, z) + *at(now, x, y - 1, z) +
+                           *at(now, x, y + 1, z) + *at(now, x, y, z - 1) + *at(now, x, y, z + 1);
+        *at(next, x, y, z) = 0.4 * *at(now, x, y, z) + 0.1 * sum;
+      }
+    }
+  }
+  double* const old = now;
+  now = next;
+  next = old;
+}
+
+/* Whether a process is the worker of this simulation's rank: a worker with the same VDI_TEST_RUN. */
+static int is_mine(const char* process, int rank) {
+  char path[300];
+  static char text[1 << 20];
+  snprintf(path, sizeof path, "/proc/%s/environ", process);
+  FILE* file = fopen(path, "re");
+  if (file == NULL) return 0;
+  size_t count = fread(text, 1, sizeof text - 1, file);
+  fclose(file);
+  text[count] = '\0';
+  char run[100];
+  char own[100];
+  snprintf(run, sizeof run, "VDI_TEST_RUN=%s", getenv("VDI_TEST_RUN"));
+  snprintf(own, sizeof own, "OMPI_COMM_WORLD_RANK=%d", rank);
+  int found = 0;
+  for (const char* one = text; one < text + count; one += strlen(one) + 1)
+    found |= strcmp(one, run) == 0 ? 1 : strcmp(one, own) == 0 ? 2 : 0;
+  snprintf(path, sizeof path, "/proc/%s/cmdline", process);
+  file = fopen(path, "re");
+  if (file == NULL) return 0;
+  count = fread(text, 1, sizeof text - 1, file);
+  fclose(file);
+  text[count] = '\0';
+  const int is_worker =
+      strstr(text, "vdi_catalyst_process") != NULL && strcmp(text + strlen(text) + 1, "work") == 0;
+  int ranks = 1;
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  return is_worker && found == (ranks > 1 ? 3 : 1);
+}
+
+static pid_t worker_of(int rank) {
+  DIR* folder = opendir("/proc");
+  pid_t worker = 0;
+  for (const struct dirent* entry = readdir(folder); entry != NULL; entry = readdir(folder)) {
+    if (entry->d_name[0] >= '1' && entry->d_name[0] <= '9' && is_mine(entry->d_name, rank))
+      worker = (pid_t)atoi(entry->d_name);
+  }
+  closedir(folder);
+  return worker;
+}
+
+static void* kill_soon(void* worker) {
+  usleep(2000);
+  kill(*(const pid_t*)worker, SIGKILL);
+  return NULL;
+}
+
+static int differs(int code) {
+  int extremes[2] = {code, -code};
+  MPI_Allreduce(MPI_IN_PLACE, extremes, 2, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+  return extremes[0] != -extremes[1];
+}
+
+static long microseconds_since(double start) {
+  double spent = MPI_Wtime() - start;
+  MPI_Allreduce(MPI_IN_PLACE, &spent, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD);
+  return (long)(1e6 * spent);
+}
+
+int main(int argc, char** argv) {
+  MPI_Init(&argc, &argv);
+  int rank = 0;
+  int ranks = 1;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  if (argc != 3) MPI_Abort(MPI_COMM_WORLD, 2);
+  size = number_of("VDI_TEST_SIZE", size);
+  const int steps = atoi(argv[2]);
+  const int repeat = number_of("VDI_TEST_REPEAT", 1);
+  const int kill_step = number_of("VDI_TEST_KILL", -1);
+  const int pause = number_of("VDI_TEST_PAUSE", 0);
+  const char* busy = getenv("VDI_TEST_BUSY");
+  const size_t side = (size_t)size + 2;
+  now = calloc(side * side * side, sizeof *now);
+  next = calloc(side * side * side, sizeof *next);
+  if (now == NULL || next == NULL) MPI_Abort(MPI_COMM_WORLD, 3);
+  for (int z = 1; z <= size; ++z) {
+    for (int y = 1; y <= size; ++y) {
+      for (int x = 1; x <= size; ++x) {
+        const double dx = (x - 0.5) / size - 0.5;
+        const double dy = (y - 0.5) / size - 0.5;
+        const double dz = (z - 0.5) / size - 0.5;
+        *at(now, x, y, z) = 1.0 / (1.0 + 20.0 * (dx * dx + dy * dy + dz * dz));
+      }
+    }
+  }
+
+  vdi_catalyst* catalyst = NULL;
+  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
+  const size_t length = strlen(argv[1]);
+  const char* scripts[] = {argv[1]};
+  const int has_library = strcmp(argv[1], "-") != 0;
+  int wrong = 0;
+  if (has_library) {
+    const double start = MPI_Wtime();
+    const int code = length > 3 && strcmp(argv[1] + length - 3, ".py") == 0
+                         ? vdi_catalyst_initialize(comm, 1, scripts, &catalyst)
+                         : vdi_catalyst_initialize_json(comm, argv[1], &catalyst);
+    const long spent = microseconds_since(start);
+    if (rank == 0) printf("initialize %d %ld\n", code, spent);
+    wrong += differs(code);
+    const vdi_catalyst_block block = {
+        {size, size, size}, {0, 0, 0}, {0, 0, 0}, {rank, 0.0, 0.0}, {1.0 / size, 1.0 / size, 1.0 / size}};
+    wrong += differs(vdi_catalyst_set_blocks(catalyst, 1, &block));
+  }
+  const int file_limit = number_of("VDI_TEST_FILE_LIMIT", 0);
+  for (int step = 0; step < steps; ++step) {
+    if (file_limit > 0 && rank == ranks - 1 && (step == 0 || step == 3)) {
+      struct rlimit limit;
+      getrlimit(RLIMIT_FSIZE, &limit);
+      limit.rlim_cur = step == 0 ? (rlim_t)file_limit : limit.rlim_max;
+      setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    const int is_busy = busy != NULL && access(busy, F_OK) != 0;
+    pid_t worker = 0;
+    pthread_t killer;
+    MPI_Barrier(MPI_COMM_WORLD);
+    const double start = MPI_Wtime();
+    for (int i = 0; i < repeat; ++i) spread();
+    int code = 0;
+    if (has_library) {
+      const vdi_catalyst_strides strides = {
+          {sizeof *now, (int64_t)(side * sizeof *now), (int64_t)(side * side * sizeof *now)}, 0};
+      const void* data[] = {at(now, 1, 1, 1)};
+      vdi_catalyst_set_array_strided(catalyst, "T", VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data, &strides);
+      if (step == kill_step && rank == ranks - 1) {
+        worker = worker_of(rank);
+        if (worker == 0) fprintf(stderr, "rank %d has no worker\n", rank);
+        if (worker != 0) pthread_create(&killer, NULL, kill_soon, &worker);
+      }
+      if (vdi_catalyst_wants(catalyst, step, step)) code = vdi_catalyst_execute(catalyst, step, step);
+    }
+    const long spent = microseconds_since(start);
+    if (worker != 0) pthread_join(killer, NULL);
+    if (rank == 0) printf("step %d %d %ld %d\n", step, code, spent, is_busy);
+    wrong += differs(code);
+    if (pause > 0) usleep((useconds_t)pause * 1000);
+  }
+  if (has_library) {
+    const double start = MPI_Wtime();
+    const int code = vdi_catalyst_finalize(catalyst);
+    const long spent = microseconds_since(start);
+    if (rank == 0) printf("finalize %d %ld\n", code, spent);
+    wrong += differs(code);
+  }
+  free(now);
+  free(next);
+  MPI_Finalize();
+  return wrong == 0 ? 0 : 1;
+}

@@ -1,0 +1,207 @@
+"""Processes that make frames and die, stop, or find no room. Arguments: the case, vdi's folder of tests' libraries to load
+before (die_at), and the simulation with its launcher. Each case says what the simulation must have seen."""
+
+import glob
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import uuid
+
+case, preload, *simulation = sys.argv[1:]
+SMALL = {"field": "T", "resolution": [40, 30], "colors": {"range": [0, 1]}, "isolation": "process"}
+RANKS = int(simulation[simulation.index("-n") + 1]) if "-n" in simulation else 1
+LAST = RANKS - 1
+PATIENCE = 250
+ENGINE = 2
+SCRIPT = 3
+
+
+class Run:
+    """What a simulation has printed: the code of each step, the microseconds that it took, and lines of the adaptor."""
+
+    def __init__(self, what, steps, **environment):
+        text = what if isinstance(what, str) else json.dumps({**SMALL, **what})
+        self.name = uuid.uuid4().hex
+        start = time.monotonic()
+        process = subprocess.run([*simulation, text, str(steps)], env={**os.environ, "VDI_TEST_RUN": self.name, **environment},
+                                 capture_output=True, text=True, timeout=PATIENCE)
+        self.seconds = time.monotonic() - start
+        print(process.stdout, process.stderr, "%.1f s" % self.seconds, flush=True)
+        assert process.returncode == 0, process.returncode
+        self.lines = [line for line in process.stderr.splitlines() if line.startswith("vdi_catalyst: ")]
+        self.steps = [[int(word) for word in found] for found in
+                      re.findall(r"^step \d+ (\d+) (\d+) (\d+)$", process.stdout, re.M)]
+        self.codes = [step[0] for step in self.steps]
+        self.end = int(re.search(r"^finalize (\d+)", process.stdout, re.M).group(1))
+        assert len(self.codes) == steps, self.codes
+        assert not self.left_behind(), self.left_behind()
+
+    def left_behind(self):
+        """Processes of the run that are still there some seconds after it."""
+        for _ in range(100):
+            left = [path for path in glob.glob("/proc/[0-9]*/environ") if self.is_of_run(path)]
+            if not left:
+                return []
+            time.sleep(0.1)
+        return left
+
+    def is_of_run(self, path):
+        try:
+            with open(path, "rb") as file:
+                return b"VDI_TEST_RUN=" + self.name.encode() in file.read()
+        except OSError:
+            return False
+
+
+def dying(stage, how="kill", rank=None, **environment):
+    rank = LAST if rank is None else rank
+    return {"LD_PRELOAD": preload + ":libvulkan.so.1", "VDI_TEST_DIE": "%s:%d:%s" % (stage, rank, how), **environment}
+
+
+def made():
+    return sorted(glob.glob("*.vdi"))
+
+
+def one_line(run, pattern):
+    assert len(run.lines) == 1 and re.search(pattern, run.lines[0]), run.lines
+
+
+def dies(stage, during, how="kill", cause=r"was killed by signal 9 \(Killed\)"):
+    """One line, and then no more frames: all later calls say so at once."""
+    run = Run({}, 8, VDI_TEST_PAUSE="300", **dying(stage, how))
+    one_line(run, "rank %d: the process that makes frames %s while it %s.*no more frames" % (LAST, cause, during))
+    first = run.codes.index(ENGINE)
+    assert run.codes == first * [0] + (8 - first) * [ENGINE] or \
+        run.codes == first * [0] + [ENGINE] + (7 - first) * [0], run.codes
+    assert run.seconds < 60
+
+
+def start():
+    for stage, during in (("start", "started"), ("initialize", "started")):
+        process = subprocess.run([*simulation, json.dumps(SMALL), "1"], capture_output=True, text=True, timeout=PATIENCE,
+                                 env={**os.environ, **dying(stage, VDI_TEST_RUN="none")})
+        print(process.stdout, process.stderr)
+        lines = [line for line in process.stderr.splitlines() if line.startswith("vdi_catalyst: ")]
+        assert "initialize %d " % ENGINE in process.stdout and len(lines) == 1, lines
+        assert "while it %s" % during in lines[0], lines
+
+
+def waiting():
+    dies("waiting", "waited for a step")
+
+
+def taking():
+    dies("taking", "made the frame of step 0")
+
+
+def generating():
+    dies("generating", "made the frame of step 0", "exit", "ended with exit status 7")
+
+
+def writing():
+    dies("writing", "made the frame of step")
+    assert not [name for name in os.listdir(".") if name.endswith(".vdi") and os.path.getsize(name) == 0]
+
+
+def finalizing():
+    run = Run({"every": 4}, 8, **dying("finalizing"))
+    one_line(run, "rank %d: the process that makes frames was killed by signal 9 .* while it ended the run" % LAST)
+    assert set(run.codes) == {0} and run.end == ENGINE, run.codes
+    assert len(made()) == 2, made()
+
+
+def copying():
+    """The process dies while the simulation copies its values to it."""
+    run = Run({"every": 2}, 8, VDI_TEST_SIZE="96", VDI_TEST_KILL="4")
+    one_line(run, "rank %d: the process that makes frames was killed by signal 9 .*; no more frames" % LAST)
+    assert ENGINE in run.codes or run.end == ENGINE, run.codes
+
+
+def restart():
+    """A new process makes the next frame, and earlier frames stay."""
+    open("once", "w").close()
+    run = Run({"isolation": {"restart": True}, "log": "run.jsonl"}, 8, VDI_TEST_PAUSE="500",
+              **dying("writing", VDI_TEST_DIE_ONCE=os.path.abspath("once")))
+    one_line(run, "rank %d: the process .* was killed by signal 9 .*; it starts again for the next frame" % LAST)
+    assert run.codes.count(ENGINE) == 1 and set(run.codes) == {0, ENGINE} and run.end == 0, run.codes
+    assert not os.path.exists("once")
+    # At most the frame that was being made and the one after it are lost.
+    assert len(made()) >= 6 and made()[-1] == "vdi_000007.vdi", made()
+
+
+def stopped():
+    """Steps are left out while it is stopped, and the simulation goes on."""
+    run = Run({}, 10, **dying("writing", "stop"))
+    assert SCRIPT in run.codes and "left out: somebody has stopped the process" in run.lines[0], run.lines
+    first = run.codes.index(SCRIPT)
+    assert all(code == SCRIPT for code in run.codes[first:]), run.codes
+    assert all("again, left out" in line or "rank" in line for line in run.lines[1:]), run.lines
+    assert run.end == ENGINE and "it is killed" in run.lines[-1], run.lines
+    assert run.seconds < 60
+
+
+def impatient():
+    """Without patience, no step waits: frames are left out, and all others are there."""
+    run = Run({"isolation": {"patience": 0}, "resolution": [400, 300]}, 30)
+    assert set(run.codes) == {0} and run.end == 0, run.codes
+    told = [re.search(r"(\d+) frames were left out", line) for line in run.lines]
+    left_out = sum(int(found.group(1)) for found in told if found)
+    assert len(made()) + left_out == 30 and left_out > 0, (len(made()), left_out)
+    assert "left out: two earlier" in run.lines[0], run.lines
+
+
+def no_room():
+    """A rank that finds no memory to share fails the step on all, and tries the next."""
+    run = Run({"every": 2}, 6, VDI_TEST_SIZE="64", VDI_TEST_FILE_LIMIT="100000")
+    assert run.codes == [SCRIPT, 0, SCRIPT, 0, 0, 0] and run.end == 0 and made() == ["vdi_000004.vdi"], run.codes
+    assert "no room for 2 MiB of memory shared with the process" in run.lines[0] and "again" in run.lines[1], run.lines
+
+
+def launcher():
+    """A launcher that isn't there is told in one line, with what it says."""
+    for wish in ("no-such-launcher -n {ranks}", "false {hosts}"):
+        process = subprocess.run([*simulation, json.dumps(SMALL), "1"], capture_output=True, text=True, timeout=PATIENCE,
+                                 env={**os.environ, "VDI_ISOLATION_LAUNCHER": wish})
+        print(process.stdout, process.stderr)
+        lines = [line for line in process.stderr.splitlines() if line.startswith("vdi_catalyst: ")]
+        assert "initialize %d " % ENGINE in process.stdout and len(lines) == 1, lines
+        assert "their launcher said: " in lines[0], lines
+    assert "no-such-launcher" in subprocess.run(
+        [*simulation, json.dumps(SMALL), "1"], capture_output=True, text=True, timeout=PATIENCE,
+        env={**os.environ, "VDI_ISOLATION_LAUNCHER": "no-such-launcher"}).stderr
+
+
+def environment():
+    """The environment counts more than the text, and its values are checked."""
+    run = Run({"every": 2}, 3, VDI_ISOLATION="none", **dying("taking"))
+    assert run.codes == [0, 0, 0] and run.end == 0 and not run.lines, run.lines
+    process = subprocess.run([*simulation, json.dumps(SMALL), "1"], capture_output=True, text=True, timeout=PATIENCE,
+                             env={**os.environ, "VDI_ISOLATION": "thread"})
+    assert "VDI_ISOLATION is 'thread'; it may be process, restart or none" in process.stderr, process.stderr
+
+
+def ended():
+    """A simulation that is killed leaves no process behind."""
+    name = uuid.uuid4().hex
+    process = subprocess.Popen([*simulation, json.dumps(SMALL), "10000"], stdout=subprocess.PIPE, text=True,
+                               env={**os.environ, "VDI_TEST_RUN": name, "VDI_TEST_PAUSE": "100"}, start_new_session=True)
+    while not process.stdout.readline().startswith("step 2"):
+        assert process.poll() is None
+    run = Run.__new__(Run)
+    run.name = name
+    for path in glob.glob("/proc/[0-9]*/environ"):
+        if run.is_of_run(path) and "vdi_catalyst_process" not in os.readlink(os.path.dirname(path) + "/exe"):
+            if os.path.basename(os.readlink(os.path.dirname(path) + "/exe")) == os.path.basename(simulation[-1]):
+                os.kill(int(path.split("/")[2]), 9)
+    process.wait(timeout=30)
+    assert not run.left_behind(), run.left_behind()
+
+
+with tempfile.TemporaryDirectory() as folder:
+    os.chdir(folder)
+    globals()[case]()
+    os.chdir("/")
