@@ -348,9 +348,7 @@ StepFields IsolatedRun::wantedFields() const {
 
 int IsolatedRun::finish() {
   if (leftOut_ > 0 && rank_ == 0) {
-    std::fprintf(stderr,
-                 "vdi_catalyst: %lld frames were left out, because two earlier ones were to be made\n",
-                 static_cast<long long>(leftOut_));
+    std::fprintf(stderr, "vdi_catalyst: in all, %lld steps were left out\n", static_cast<long long>(leftOut_));
   }
   if (!process_) return VDI_CATALYST_ENGINE;
   process_->finish();
