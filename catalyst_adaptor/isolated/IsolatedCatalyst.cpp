@@ -29,7 +29,6 @@ namespace {
 using vdi::catalyst::guarded;
 using vdi::catalyst::IsolatedOptions;
 using vdi::catalyst::require;
-using vdi::catalyst::Script;
 
 /// The living handles, of a run of scripts and of a JSON run. Any other handle has been finalized, and must
 /// not be read.

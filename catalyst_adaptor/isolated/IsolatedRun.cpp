@@ -348,7 +348,8 @@ StepFields IsolatedRun::wantedFields() const {
 
 int IsolatedRun::finish() {
   if (leftOut_ > 0 && rank_ == 0) {
-    std::fprintf(stderr, "vdi_catalyst: in all, %lld steps were left out\n", static_cast<long long>(leftOut_));
+    std::fprintf(stderr, "vdi_catalyst: in all, %lld steps were left out\n",
+                 static_cast<long long>(leftOut_));
   }
   if (!process_) return VDI_CATALYST_ENGINE;
   process_->finish();

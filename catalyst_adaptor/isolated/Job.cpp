@@ -50,6 +50,7 @@ std::string hostsOf(const std::vector<std::string>& names) {
 
 std::vector<char*> pointersOf(const std::vector<std::string>& texts) {
   std::vector<char*> pointers;
+  pointers.reserve(texts.size() + 1);
   for (const std::string& text : texts) pointers.push_back(const_cast<char*>(text.c_str()));
   pointers.push_back(nullptr);
   return pointers;

@@ -56,7 +56,7 @@ class Socket {
   /// The next message. Waits for it no longer than `patience`; a negative one waits for ever.
   Received receive(std::chrono::milliseconds patience) const;
 
-  static constexpr std::size_t longest = 64 * 1024;
+  static constexpr std::size_t longest = 65536;
   bool isOpen() const { return descriptor_.isOpen(); }
   int number() const { return descriptor_.number(); }
   void close() { descriptor_ = Descriptor(); }

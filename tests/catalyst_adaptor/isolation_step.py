@@ -50,8 +50,8 @@ base = statistics.median(without)
 making = [time for time, busy in isolated[FRAME + 1:] if busy]
 between = [time for time, busy in isolated[FRAME + 1:] if not busy]
 handing = isolated[FRAME][0]
-print("64^3 doubles, %s: a step takes %.2f ms without the library, %.2f ms where it hands over, %.2f ms where a frame is made in "
-      "the simulation's process" % ("own cores" if OWN else "shared cores", base / 1e3, handing / 1e3, here[FRAME][0] / 1e3))
+print("64^3 doubles, %s: a step takes %.2f ms without the library, %.2f ms where it hands over, %.2f ms where a frame is made "
+      "in the simulation's process" % ("own cores" if OWN else "shared cores", base / 1e3, handing / 1e3, here[FRAME][0] / 1e3))
 for name, times in (("between frames", between), ("while a frame is made", making)):
     if times:
         print("%s: %.3f of the step without the library (%d steps)" % (name, statistics.median(times) / base, len(times)))

@@ -44,6 +44,7 @@ constexpr int life = 3;  // the descriptor by which Job sees whether the job is 
 
 std::vector<char*> pointersOf(std::vector<std::string>& texts) {
   std::vector<char*> pointers;
+  pointers.reserve(texts.size() + 1);
   for (std::string& text : texts) pointers.push_back(text.data());
   pointers.push_back(nullptr);
   return pointers;
