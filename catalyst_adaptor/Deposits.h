@@ -8,7 +8,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "catalyst_adaptor/ParticleArray.h"
@@ -24,8 +23,8 @@ namespace vdi::catalyst {
 class Deposits {
  public:
   /// The device and the communicator must outlive this object.
-  Deposits(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm)
-      : comm_(comm), depositor_(std::move(device), comm) {}
+  Deposits(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm)
+      : comm_(comm), depositor_(device, comm) {}
 
   /// Collective: this rank's blocks, unless `version` is that of the last call. Throws as
   /// ParticleDepositor::setBlocks does.

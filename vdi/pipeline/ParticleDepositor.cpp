@@ -186,7 +186,8 @@ std::vector<std::shared_ptr<float[]>> ParticleDepositor::State::values(DepositKi
   return all;
 }
 
-ParticleDepositor::ParticleDepositor(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm)
+ParticleDepositor::ParticleDepositor(const std::shared_ptr<gpu::Device>& device,
+                                     const comm::Communicator& comm)
     : state_(std::make_unique<State>(device, comm)) {}
 
 ParticleDepositor::~ParticleDepositor() = default;

@@ -29,7 +29,7 @@ struct DepositedArray {
 class ParticleDepositor {
  public:
   /// The communicator must outlive this object.
-  ParticleDepositor(std::shared_ptr<gpu::Device> device, const comm::Communicator& comm);
+  ParticleDepositor(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm);
   ~ParticleDepositor();
   ParticleDepositor(const ParticleDepositor&) = delete;
   ParticleDepositor& operator=(const ParticleDepositor&) = delete;
