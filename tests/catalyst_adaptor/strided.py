@@ -36,7 +36,8 @@ def lists(filter):
     output = filter.GetClientSideObject().GetOutputDataObject(0)
     fields = output.GetFieldData()
     names = [fields.GetArrayName(i) for i in range(fields.GetNumberOfArrays())]
-    return {name: vtk_to_numpy(fields.GetArray(name)).tobytes() for name in names if name in ("VDI.offsets", "VDI.codes", "VDI.depthCode")}
+    of_lists = [name for name in names if name in ("VDI.offsets", "VDI.codes", "VDI.depthCode")]
+    return {name: vtk_to_numpy(fields.GetArray(name)).tobytes() for name in of_lists}
 
 
 def catalyst_execute(info):
