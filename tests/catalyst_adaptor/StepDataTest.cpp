@@ -1,0 +1,144 @@
+// What a simulation hands over to the process that makes its frames arrives as it was.
+#include "catalyst_adaptor/isolated/StepData.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "catalyst_adaptor/ParticleArray.h"
+#include "catalyst_adaptor/json/Fields.h"
+#include "tests/Catch.h"
+
+using namespace vdi::catalyst;
+
+namespace {
+
+vdi_catalyst_block blockAt(double x, int cells) {
+  vdi_catalyst_block block{};
+  for (int axis = 0; axis < 3; ++axis) {
+    block.cells[axis] = cells;
+    block.spacing[axis] = 0.5;
+  }
+  block.origin[0] = x;
+  return block;
+}
+
+/// A step's bytes, aligned as pages are.
+struct Bytes {
+  explicit Bytes(const StepWriter& writer) : words((writer.bytes() + 7) / 8) {
+    writer.write(std::as_writable_bytes(std::span(words)));
+  }
+  std::span<const std::byte> all() const { return std::as_bytes(std::span(words)); }
+  std::vector<std::uint64_t> words;
+};
+
+template <typename Number>
+Number numberAt(const void* from, std::size_t index) {
+  Number number;
+  std::memcpy(&number, static_cast<const std::byte*>(from) + index * sizeof number, sizeof number);
+  return number;
+}
+
+}  // namespace
+
+TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles, parameters") {
+  Fields fields;
+  fields.setBlocks({blockAt(0.0, 2), blockAt(1.0, 3)});
+  // z fastest, the second component of two; the second block lacks the array.
+  const std::array<std::array<double, 2>, 8> interleaved{
+      {{0, 10}, {1, 11}, {2, 12}, {3, 13}, {4, 14}, {5, 15}, {6, 16}, {7, 17}}};
+  StridedValues values = fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 1, &interleaved[0][1]);
+  values.strides = {64, 32, 16};
+  const StridedValues missing = fields.inOrder(fields.blocks()[1], VDI_CATALYST_F64, true, 1, nullptr);
+  fields.setArray("E", true, VDI_CATALYST_F64, {values, missing});
+  fields.setOffset("E", true, {-0.5, 0.0, 0.25});
+
+  // Positions from the last to the first, one weight for all, no lengths.
+  const std::array<float, 6> positions{1, 2, 3, 4, 5, 6};
+  const double weight = 2.5;
+  vdi_catalyst_particles given{};
+  given.count = 2;
+  given.kind = VDI_CATALYST_DENSITY;
+  given.position_type = VDI_CATALYST_F32;
+  for (std::size_t axis = 0; axis < 3; ++axis) given.positions[axis] = &positions[3 + axis];
+  given.position_stride = -12;
+  given.weights = &weight;
+  given.weight_type = VDI_CATALYST_F64;
+  fields.setParticles("stars", particleArrayOf(&given));
+
+  StepFields step;
+  step.arrays = fields.arrays();
+  for (const auto& [name, particles] : fields.particles()) step.particles.emplace_back(name, particles);
+  const Bytes bytes(StepWriter(7, fields.blocks(), step, {{"feed", false, 0.5, 0.0, 1.0}}));
+  const StepData got = StepData::read(bytes.all());
+
+  CHECK(got.version == 7);
+  REQUIRE(got.blocks.size() == 2);
+  CHECK((got.blocks[1].cells[0] == 3 && got.blocks[1].origin[0] == 1.0));
+  REQUIRE(got.arrays.size() == 1);
+  const StepData::Array& array = got.arrays[0];
+  CHECK((array.name == "E" && array.cells && array.type == VDI_CATALYST_F64 && array.components == 1));
+  CHECK((array.offset[0] == -0.5 && array.offset[1] == 0.0 && array.offset[2] == 0.25));
+  REQUIRE(array.blocks.size() == 2);
+  CHECK(array.blocks[1] == nullptr);
+  for (std::size_t x = 0; x < 2; ++x) {
+    for (std::size_t y = 0; y < 2; ++y) {
+      for (std::size_t z = 0; z < 2; ++z) {
+        CHECK(numberAt<double>(array.blocks[0], (z * 2 + y) * 2 + x) ==
+              static_cast<double>(10 + (x * 2 + y) * 2 + z));
+      }
+    }
+  }
+
+  REQUIRE(got.particles.size() == 1);
+  const vdi_catalyst_particles& stars = got.particles[0].given;
+  CHECK((got.particles[0].name == "stars" && stars.count == 2 && stars.kind == VDI_CATALYST_DENSITY));
+  CHECK((stars.position_type == VDI_CATALYST_F32 && stars.position_stride == sizeof(float)));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    CHECK(numberAt<float>(stars.positions[axis], 0) == static_cast<float>(4 + axis));
+    CHECK(numberAt<float>(stars.positions[axis], 1) == static_cast<float>(1 + axis));
+  }
+  CHECK((stars.weight_stride == 0 && numberAt<double>(stars.weights, 0) == 2.5));
+  CHECK(stars.lengths == nullptr);
+  // The engine takes them as a simulation's.
+  CHECK_NOTHROW(particleArrayOf(&stars));
+
+  REQUIRE(got.parameters.size() == 1);
+  CHECK((got.parameters[0].name == "feed" && got.parameters[0].value == 0.5));
+}
+
+TEST_CASE("no particles, and no blocks, arrive as none") {
+  Fields fields;
+  fields.setBlocks({});
+  fields.setArray("E", true, VDI_CATALYST_F32, {});
+  vdi_catalyst_particles given{};
+  fields.setParticles("stars", particleArrayOf(&given));
+  StepFields step;
+  step.arrays = fields.arrays();
+  for (const auto& [name, particles] : fields.particles()) step.particles.emplace_back(name, particles);
+  const Bytes bytes(StepWriter(1, fields.blocks(), step, {}));
+  const StepData got = StepData::read(bytes.all());
+  REQUIRE(got.arrays.size() == 1);
+  CHECK(got.arrays[0].blocks.empty());
+  REQUIRE(got.particles.size() == 1);
+  CHECK(got.particles[0].given.count == 0);
+  CHECK_NOTHROW(particleArrayOf(&got.particles[0].given));
+}
+
+TEST_CASE("a step that is cut short is refused") {
+  Fields fields;
+  fields.setBlocks({blockAt(0.0, 2)});
+  const std::array<float, 8> numbers{};
+  fields.setArray("E", true, VDI_CATALYST_F32,
+                  {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, numbers.data())});
+  StepFields step;
+  step.arrays = fields.arrays();
+  const Bytes bytes(StepWriter(1, fields.blocks(), step, {}));
+  for (const std::size_t size : {0U, 7U, 20U, 100U}) {
+    CHECK_THROWS_AS(StepData::read(bytes.all().first(size)), std::runtime_error);
+  }
+}
