@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/Commands.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
 #include "vdi/gpu/Device.h"

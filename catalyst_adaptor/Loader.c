@@ -262,7 +262,7 @@ int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int
 }
 
 int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name, int32_t association,
-                                  const double* offset) {
+                                  const double offset[3]) {
   const vdi_catalyst_functions* engine = functions_of(catalyst);
   if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   fenv_t floating_point;

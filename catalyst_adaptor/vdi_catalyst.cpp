@@ -197,10 +197,6 @@ void requireArray(const vdi_catalyst& self, const char* name, int association, c
   require(count == 0 || data != nullptr, "an array without data");
 }
 
-vtkIdType valuesOf(vtkDataSet& image, int association) {
-  return association == VDI_CATALYST_CELLS ? image.GetNumberOfCells() : image.GetNumberOfPoints();
-}
-
 /// Calls `visit` with a number of the type that VTK has for it.
 template <typename Visit>
 auto withNumber(int type, Visit visit) {
