@@ -233,13 +233,13 @@ TEST_CASE("damaged messages are read or refused") {
 }
 
 TEST_CASE("levels are put together from parts in order alone") {
-  std::vector<std::byte> file(chunkBytes + 1000);
+  std::vector<std::byte> file(stream::chunkBytes + 1000);
   test::Noise noise(3);
   for (std::byte& b : file) b = static_cast<std::byte>(noise.below(256));
   const std::span<const std::byte> all(file);
   const Level level{5, 1, 2, file.size(), 10, 10, 0, 0.0, 0.0, 0};
-  const auto first = message({5, 1, 0, all.first(chunkBytes)});
-  const auto second = message({5, 1, chunkBytes, all.subspan(chunkBytes)});
+  const auto first = message({5, 1, 0, all.first(stream::chunkBytes)});
+  const auto second = message({5, 1, stream::chunkBytes, all.subspan(stream::chunkBytes)});
   const auto refuses = [](Assembly& assembly, const std::vector<std::byte>& m) {
     return test::errorOf([&] { assembly.add(m); }).code() == ErrorCode::Format;
   };
@@ -247,15 +247,15 @@ TEST_CASE("levels are put together from parts in order alone") {
   CHECK(refuses(assembly, first));  // none was begun
   assembly.begin(level, file.size());
   CHECK_FALSE(assembly.add(first));
-  CHECK(assembly.progress() == Ack{5, 1, chunkBytes});
+  CHECK(assembly.progress() == Ack{5, 1, stream::chunkBytes});
   CHECK(refuses(assembly, first));  // replayed
-  CHECK(refuses(assembly, message({4, 1, chunkBytes, all.subspan(chunkBytes)})));
-  CHECK(refuses(assembly, message({5, 0, chunkBytes, all.subspan(chunkBytes)})));
-  CHECK(refuses(assembly, message({5, 1, chunkBytes + 1, all.subspan(chunkBytes)})));
-  CHECK(refuses(assembly, message({5, 1, chunkBytes, all.first(1001)})));  // beyond the end
+  CHECK(refuses(assembly, message({4, 1, stream::chunkBytes, all.subspan(stream::chunkBytes)})));
+  CHECK(refuses(assembly, message({5, 0, stream::chunkBytes, all.subspan(stream::chunkBytes)})));
+  CHECK(refuses(assembly, message({5, 1, stream::chunkBytes + 1, all.subspan(stream::chunkBytes)})));
+  CHECK(refuses(assembly, message({5, 1, stream::chunkBytes, all.first(1001)})));  // beyond the end
   CHECK(refuses(assembly, {second.begin(), second.begin() + chunkHeadBytes}));
   CHECK(refuses(assembly, std::vector<std::byte>(3)));
-  CHECK(refuses(assembly, std::vector<std::byte>(chunkHeadBytes + chunkBytes + 1)));
+  CHECK(refuses(assembly, std::vector<std::byte>(chunkHeadBytes + stream::chunkBytes + 1)));
   const auto whole = assembly.add(second);
   REQUIRE(whole);
   CHECK(whole->file == file);
