@@ -200,11 +200,14 @@ Fields::Values Fields::valuesOf(const std::string& name, bool cells, int compone
 }
 
 std::vector<Block> Fields::placesOf(const std::string& name, bool cells) const {
-  const Values all = valuesOf(name, cells, magnitude);
+  // What particles become is an array of all blocks, even before it is made.
+  const bool isOfAll = find(name, cells) == nullptr && has(name, cells);
+  const Values all = isOfAll ? Values{} : valuesOf(name, cells, magnitude);
   const glm::dvec3 offset = offsetOf(name, cells);
   std::vector<Block> places;
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    if (all.blocks[i].first != nullptr) places.push_back(blockAt(blocks_[i], cells, offset, &blocks_[i]));
+    if (isOfAll || all.blocks[i].first != nullptr)
+      places.push_back(blockAt(blocks_[i], cells, offset, &blocks_[i]));
   }
   return places;
 }

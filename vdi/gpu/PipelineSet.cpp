@@ -42,7 +42,10 @@ ComputePipeline& PipelineSet::with(const std::vector<std::uint32_t>& specializat
     ComputePipelineInfo info = common_;
     info.specialization = specialization;
     std::string program(common_.shader);
-    if (hasPrograms_) program += "_" + std::to_string(specialization.front());
+    if (hasPrograms_) {
+      program.append("_").append(std::to_string(specialization.front()));
+      if (!device_->runsGpuPrograms()) program.append("_pruned");
+    }
     info.shader = program;
     pipeline = std::make_unique<ComputePipeline>(device_, info);
     if (uniforms_) pipeline->bindUniforms(*uniforms_);

@@ -19,7 +19,8 @@ class Commands;
 class PipelineSet {
  public:
   /// `common` is the info without the specialisation. `hasPrograms`: the shader is one of PROGRAMS in
-  /// CMakeLists.txt, and the first word of a specialisation, constant 0, is the program's number.
+  /// CMakeLists.txt, and the first word of a specialisation, constant 0, is the program's number. CPU devices
+  /// get the program without the code of the others, which they compile several times as fast.
   PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common, bool hasPrograms = false);
   /// Shares the uniforms of another set, which updates them, and has programs if that does.
   PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);
