@@ -259,8 +259,8 @@ double ParticleRouting::sumOf(const Spread& spread, std::span<const Place* const
           along.clear();
           for (int part = range.lo[axis]; part < range.hi[axis]; ++part) {
             // The share of the part's cell that is owned; a cloud has one part a cell.
-            const double lower =
-                place.lower[axis] + (part / cells.parts[axis]) * place.spacing[axis];  // rounds down: >= 0
+            const int cell = part / cells.parts[axis];  // rounds down: >= 0
+            const double lower = place.lower[axis] + cell * place.spacing[axis];
             double share = overlap(lower, lower + place.spacing[axis], owned.lo[axis], owned.hi[axis]) /
                            place.spacing[axis];
             if (!(spread.h > 0.0)) {
