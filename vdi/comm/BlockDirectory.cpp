@@ -152,7 +152,8 @@ std::optional<std::size_t> BoxTree::containing(const glm::dvec3& point) const {
     return glm::all(glm::lessThanEqual(box.lo, point)) && glm::all(glm::lessThan(point, box.hi));
   };
   // Each level halves the boxes, so few nodes are open at a time.
-  std::array<std::size_t, 2 * std::numeric_limits<std::size_t>::digits> open{};
+  constexpr std::size_t most = std::numeric_limits<std::size_t>::digits;
+  std::array<std::size_t, 2 * most> open{};
   std::size_t count = nodes_.empty() ? 0 : 1;
   while (count > 0) {
     const Node& node = nodes_[open[--count]];
