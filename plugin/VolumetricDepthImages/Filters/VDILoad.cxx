@@ -38,10 +38,10 @@ void requireInput(vtkDataObject* input) {
 
 Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin) {
   requireInput(input);
-  return {.of = origin,
-          .blocks = blocksOf(input, origin.choice),
-          .array = {},
-          .lack = lackOf(input, upstream, origin.choice)};
+  Load load{.of = origin, .blocks = {}, .array = {}, .lack = lackOf(input, upstream, origin.choice)};
+  // Otherwise ParaView has made the array from one of the other association, which isn't the one asked for.
+  if (load.lack.empty()) load.blocks = blocksOf(input, origin.choice);
+  return load;
 }
 
 vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* controller) {
