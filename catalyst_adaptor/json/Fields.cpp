@@ -40,7 +40,7 @@ Block blockAt(const vdi_catalyst_block& b, bool cells, const glm::dvec3& offset,
   const glm::dvec3 spacing = vectorOf(b.spacing);
   Block block = cells ? Block::fromCells(counts, vectorOf(b.origin), spacing, ScalarType::U8, data, ghosts)
                       : Block::fromPoints(counts, vectorOf(b.origin), spacing, ScalarType::U8, data, ghosts);
-  block.origin += offset * spacing;
+  block.moveValues(offset);
   return block;
 }
 

@@ -1,6 +1,7 @@
 /* A simulation whose field lies in memory as real codes' fields do. Arguments: a JSON text or the name of a
  * script, the cells along each axis, the layouts' names, which are the arrays' names too, separated by
- * commas, and the number of steps. Each rank has a slab along x. All bytes that belong to no value are NaN.
+ * commas, and the number of steps. Each rank has a part, as MPI_Dims_create says. All bytes that belong to no
+ * value are NaN.
  * The process takes the same memory for any one layout, so that what the adaptor takes can be seen. It prints
  * the bytes of the field. Exit status 0 if all went well. */
 #include <math.h>
@@ -54,6 +55,7 @@ static array lay(const char* name, const int32_t* cells) {
   if (strcmp(name, "integers") == 0) a.type = VDI_CATALYST_I64, unit = sizeof(int64_t);
   if (strcmp(name, "integers_as_f64") == 0) a.type = VDI_CATALYST_F64, unit = sizeof(double);
   if (strcmp(name, "staggered") == 0) a.offset[0] = -0.5;
+  if (strcmp(name, "staggered_thrice") == 0) a.offset[0] = -0.5, a.offset[1] = 0.5, a.offset[2] = -0.25;
   a.is_partial = strcmp(name, "partial") == 0;
   const int64_t row = strcmp(name, "padded") == 0 ? nx + PAD : nx; /* the leading extent of a Fortran array */
   if (strcmp(name, "z_fastest") == 0) {                            /* as Meep's */
@@ -100,14 +102,22 @@ int main(int argc, char** argv) {
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
   const int n = atoi(argv[2]);
-  const int32_t first = rank * n / ranks;
-  const int32_t cells[3] = {(rank + 1) * n / ranks - first, n, n};
+  int split[3] = {0, 0, 0};
+  MPI_Dims_create(ranks, 3, split);
+  const int32_t at_rank[3] = {rank % split[0], rank / split[0] % split[1], rank / split[0] / split[1]};
+  int32_t first[3];
+  int32_t cells[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    first[axis] = at_rank[axis] * n / split[axis];
+    cells[axis] = (at_rank[axis] + 1) * n / split[axis] - first[axis];
+  }
 
   array arrays[MOST];
   int count = 0;
   int names = 1;
   for (const char* c = argv[3]; *c != '\0'; ++c) names += *c == ',';
-  capacity = (size_t)names * (2 * sizeof(double) * (size_t)(cells[0] + PAD) * (size_t)n * (size_t)n + 64);
+  capacity = (size_t)names *
+             (2 * sizeof(double) * (size_t)(cells[0] + PAD) * (size_t)cells[1] * (size_t)cells[2] + 64);
   pool = malloc(capacity);
   if (pool == NULL) MPI_Abort(MPI_COMM_WORLD, 4);
   memset(pool, 0xFF, capacity);
@@ -122,7 +132,11 @@ int main(int argc, char** argv) {
   int wrong = (is_script ? vdi_catalyst_initialize(comm, 1, scripts, &catalyst)
                          : vdi_catalyst_initialize_json(comm, argv[1], &catalyst)) != VDI_CATALYST_OK;
   const double h = 1.0 / n;
-  const vdi_catalyst_block block = {{cells[0], n, n}, {0, 0, 0}, {0, 0, 0}, {first * h, 0.0, 0.0}, {h, h, h}};
+  const vdi_catalyst_block block = {{cells[0], cells[1], cells[2]},
+                                    {0, 0, 0},
+                                    {0, 0, 0},
+                                    {first[0] * h, first[1] * h, first[2] * h},
+                                    {h, h, h}};
   wrong += vdi_catalyst_set_blocks(catalyst, 1, &block) != VDI_CATALYST_OK;
   for (int i = 0; i < count; ++i) {
     const void* data[] = {arrays[i].is_partial && rank % 2 == 1 ? NULL : arrays[i].first};
@@ -144,13 +158,14 @@ int main(int argc, char** argv) {
 
   for (int step = 0; step < atoi(argv[4]); ++step) {
     for (int i = 0; i < count; ++i) {
-      for (int32_t z = 0; z < n; ++z) {
-        for (int32_t y = 0; y < n; ++y) {
+      for (int32_t z = 0; z < cells[2]; ++z) {
+        for (int32_t y = 0; y < cells[1]; ++y) {
           for (int32_t x = 0; x < cells[0]; ++x) {
             const int32_t at[3] = {x, y, z};
-            store(
-                &arrays[i], at,
-                field((first + x + 0.5 + arrays[i].offset[0]) * h, (y + 0.5) * h, (z + 0.5) * h, 0.3 * step));
+            store(&arrays[i], at,
+                  field((first[0] + x + 0.5 + arrays[i].offset[0]) * h,
+                        (first[1] + y + 0.5 + arrays[i].offset[1]) * h,
+                        (first[2] + z + 0.5 + arrays[i].offset[2]) * h, 0.3 * step));
           }
         }
       }
@@ -158,7 +173,7 @@ int main(int argc, char** argv) {
     wrong += vdi_catalyst_execute(catalyst, step, 0.1 * step) != VDI_CATALYST_OK;
   }
   wrong += vdi_catalyst_finalize(catalyst) != VDI_CATALYST_OK;
-  if (rank == 0) printf("%zu\n", (size_t)cells[0] * (size_t)n * (size_t)n * sizeof(float));
+  if (rank == 0) printf("%zu\n", (size_t)cells[0] * (size_t)cells[1] * (size_t)cells[2] * sizeof(float));
   free(pool);
   MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
   if (wrong != 0 && rank == 0) fprintf(stderr, "FAILED: %d calls\n", wrong);

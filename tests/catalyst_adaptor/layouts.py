@@ -1,11 +1,14 @@
 """A field in the layouts of real codes: its pictures are the same as those of an array in order, and none of them is copied on
 the host. Arguments: the case (same, ranks, memory), and the program layouts.c with its launcher."""
 
+import io
 import json
 import os
 import subprocess
 import sys
 import tempfile
+
+from skimage import io as images
 
 case, *simulation = sys.argv[1:]
 LAYOUTS = ["packed", "dof2", "z_fastest", "padded"]
@@ -40,6 +43,18 @@ def same():
     assert run("staggered", 30)[0] != expected[:1]
 
 
+def ranks():
+    """Values beside the middles of cells, where the corners of eight blocks meet: several ranks make the picture of one."""
+    for field in ("packed", "staggered", "staggered_thrice"):
+        alone = simulation[:-2] + ["1"] + simulation[-1:]
+        one, several = (images.imread(io.BytesIO(run(field, 32, launcher=launcher)[0][0])).astype(int)
+                        for launcher in (alone, simulation))
+        assert one.max() > 80, field
+        most = abs(one - several).max()
+        print("%s: ranks differ by at most %d/255" % (field, most))
+        assert most <= 2, field
+
+
 def memory():
     """A copy would take the field's bytes once more. Without mpirun's binding to a core, where the device would read values in
     order directly and those of other layouts from a staging buffer."""
@@ -57,4 +72,4 @@ def memory():
 
 with tempfile.TemporaryDirectory() as folder:
     os.chdir(folder)
-    {"same": same, "memory": memory}[case]()
+    {"same": same, "ranks": ranks, "memory": memory}[case]()

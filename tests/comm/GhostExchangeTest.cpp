@@ -1,5 +1,9 @@
 // Ghost layers: the values between disjoint blocks, wherever the neighbours are.
+#include <algorithm>
+#include <limits>
+#include <memory>
 #include <span>
+#include <vector>
 
 #include "tests/Catch.h"
 #include "tests/Layouts.h"
@@ -128,40 +132,68 @@ TEST_CASE("blocks of one address that differ by strides are blocks of their own"
   CHECK(valueAt(after[1], -1, 1, 1) == 2.0 + 3 + 9);
 }
 
-// Offsets along several axes: values where the edges of blocks meet may still be a neighbour's nearest one.
-TEST_CASE("values beside cells' middles come from the neighbours, too") {
+/// The block with a layer of NaN around it, which its simulation announces but never fills.
+Block withUnsetHalo(const Block& block, bool cells) {
+  const glm::ivec3 dims = block.dims + 2;
+  const auto values = std::make_shared<std::vector<double>>(
+      static_cast<std::size_t>(dims.x * dims.y * dims.z), std::numeric_limits<double>::quiet_NaN());
+  forEachValue(block.stored(), [&](const glm::ivec3& at) {
+    (*values)[IndexBox{glm::ivec3(0), dims}.position(at + 1)] = valueAt(block, at.x, at.y, at.z);
+  });
+  const glm::dvec3 corner = block.origin - (cells ? 1.5 : 1.0) * block.spacing;
+  const GhostLayers ghosts{glm::ivec3(1), glm::ivec3(1)};
+  Block wide = cells
+                   ? Block::fromCells(dims, corner, block.spacing, ScalarType::F64, values->data(), ghosts)
+                   : Block::fromPoints(dims, corner, block.spacing, ScalarType::F64, values->data(), ghosts);
+  wide.keepAlive = values;
+  return wide;
+}
+
+TEST_CASE("values beside points and cells' middles come from the blocks that own them") {
   const Communicator world = Communicator::world();
   const auto offset =
-      GENERATE(glm::dvec3(-0.5, 0.0, 0.0), glm::dvec3(0.0, 0.5, 0.0), glm::dvec3(0.0, 0.0, -0.5));
-  const synthetic::Lattice lattice{
-      {12, 10, 8}, {1.0, -2.0, 0.0}, {0.5, 1.0, 2.0}, ScalarType::F64, synthetic::Joint::Cells};
+      GENERATE(glm::dvec3(-0.5, 0.0, 0.0), glm::dvec3(0.0, 0.5, 0.0), glm::dvec3(-0.5, -0.5, 0.0),
+               glm::dvec3(0.5, 0.0, -0.5), glm::dvec3(-0.5), glm::dvec3(0.5), glm::dvec3(0.2, -0.5, -0.35));
+  const auto joint = GENERATE(synthetic::Joint::Cells, synthetic::Joint::SharedPoints);
+  const bool cells = joint == synthetic::Joint::Cells;
+  const bool halo = GENERATE(false, true);
+  const synthetic::Lattice lattice{{12, 10, 8}, {1.0, -2.0, 0.0}, {0.5, 1.0, 2.0}, ScalarType::F64, joint};
   std::vector<Block> before = decomposed(lattice, {3, 2, 2}, synthetic::Layout::Random, world);
-  for (Block& block : before) block.origin += offset * block.spacing;
+  for (Block& block : before) {
+    if (halo) block = withUnsetHalo(block, cells);
+    block.moveValues(offset);
+  }
   const std::vector<Block> after = comm::exchangeGhosts(world, before);
   // The lattice's values, where they lie.
-  const glm::dvec3 first = lattice.origin + (0.5 + offset) * lattice.spacing;
+  const glm::dvec3 first = lattice.origin + ((cells ? 0.5 : 0.0) + offset) * lattice.spacing;
   const glm::dvec3 last = first + glm::dvec3(lattice.size - 1) * lattice.spacing;
   REQUIRE(after.size() == before.size());
-  INFO("offset " << offset.x << ' ' << offset.y << ' ' << offset.z);
+  INFO("offset " << offset.x << ' ' << offset.y << ' ' << offset.z << ", halo " << halo << ", cells "
+                 << cells);
   for (const Block& block : after) {
     int wrong = 0;
     int missing = 0;
+    int beyond = 0;
     forEachValue(block.extended(), [&](const glm::ivec3& at) {
-      const glm::dvec3 place = placeOf(block, at);
-      const glm::dvec3 index = (place - first) / lattice.spacing;
-      if (glm::any(glm::lessThan(index, glm::dvec3(-0.01)))) return;
-      if (glm::any(glm::greaterThan(place, last + 0.01 * lattice.spacing))) return;
-      wrong += valueAt(block, at.x, at.y, at.z) == marker(glm::ivec3(glm::round(index))) ? 0 : 1;
+      const glm::dvec3 index = (placeOf(block, at) - first) / lattice.spacing;
+      if (glm::any(glm::lessThan(index, glm::dvec3(-0.01))) ||
+          glm::any(glm::greaterThan(index, glm::dvec3(lattice.size) - 0.99))) {
+        ++beyond;
+      } else {
+        wrong += valueAt(block, at.x, at.y, at.z) == marker(glm::ivec3(glm::round(index))) ? 0 : 1;
+      }
     });
-    // All values around the owned box that there are.
+    // All values that rays use around the owned box, as far as there are any.
     for (int axis = 0; axis < 3; ++axis) {
       const double lo = placeOf(block, block.extended().lo)[axis];
       const double hi = placeOf(block, block.extended().hi - 1)[axis];
-      missing += lo <= std::max(block.owned.lo[axis], first[axis]) + 1e-9 ? 0 : 1;
-      missing += hi >= std::min(block.owned.hi[axis], last[axis]) - 1e-9 ? 0 : 1;
+      const double reach = 0.99 * lattice.spacing[axis];
+      missing += lo <= std::max(block.owned.lo[axis] - reach, first[axis]) + 1e-9 ? 0 : 1;
+      missing += hi >= std::min(block.owned.hi[axis] + reach, last[axis]) - 1e-9 ? 0 : 1;
     }
     CHECK(wrong == 0);
     CHECK(missing == 0);
+    if (!halo) CHECK(beyond == 0);  // beyond the domain, the outermost values count
   }
 }
 

@@ -22,7 +22,7 @@ bool isOfCells(const Block& block) {
   int half = 0;
   for (int axis = 0; axis < 3; ++axis) {
     for (const double face : {block.owned.lo[axis], block.owned.hi[axis]}) {
-      const double place = (face - block.origin[axis]) / block.spacing[axis];
+      const double place = (face - block.origin[axis]) / block.spacing[axis] + block.offset[axis];
       half += std::abs(place - std::floor(place) - 0.5) < 0.25 ? 1 : 0;
     }
   }
@@ -42,8 +42,8 @@ std::vector<BlockEntry> entriesOf(std::span<const Block> blocks, int rank) {
                   {b.dims.x, b.dims.y, b.dims.z},
                   {strides.x, strides.y, strides.z}};
     const auto grid = grids.try_emplace(key, static_cast<std::int32_t>(grids.size())).first->second;
-    entries.push_back({b.origin, b.spacing, b.owned, b.owned, b.dims, rank, static_cast<std::int32_t>(i),
-                       grid, isOfCells(b), b.masked && !b.masked->empty()});
+    entries.push_back({b.origin, b.spacing, b.offset, b.owned, b.owned, b.dims, rank,
+                       static_cast<std::int32_t>(i), grid, isOfCells(b), b.masked && !b.masked->empty()});
   }
   return entries;
 }

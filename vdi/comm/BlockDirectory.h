@@ -21,6 +21,7 @@ inline constexpr double latticeTolerance = 1e-3;
 struct BlockEntry {
   glm::dvec3 origin;   // of the first stored value
   glm::dvec3 spacing;  // world
+  glm::dvec3 offset;   // of the values from points or the middles of cells, in spacings
   Box asked;           // the owned box that the caller set
   Box owned;           // with gaps closed and close faces made equal
   glm::ivec3 dims;     // stored values
@@ -31,6 +32,9 @@ struct BlockEntry {
   bool masks;          // some stored values have no meaning
 
   double valueVolume() const { return spacing.x * spacing.y * spacing.z; }
+  /// The part of a box that the block's values there stand for, in their places. Boxes of blocks that meet at
+  /// a face meet there, too, if the blocks have the same offset and spacing.
+  Box ofValues(const Box& box) const { return {box.lo + offset * spacing, box.hi + offset * spacing}; }
   /// The volume that the stored values stand for, ghost layers included.
   Box storedBox() const {
     const glm::dvec3 beyond = cells ? 0.5 * spacing : glm::dvec3(0.0);

@@ -40,10 +40,11 @@ glm::ivec3 indexOf(const glm::dvec3& index, const Block& block) {
   return glm::ivec3(glm::clamp(index, -beyond, glm::dvec3(block.dims) + beyond));
 }
 
-/// Values whose positions are in the box, faces included.
+/// Values of the box's points, those on its faces included, or of its cells.
 IndexBox valuesIn(const Box& box, const Block& block) {
-  return {indexOf(glm::ceil((box.lo - block.origin) / block.spacing - indexTolerance), block),
-          indexOf(glm::floor((box.hi - block.origin) / block.spacing + indexTolerance) + 1.0, block)};
+  const glm::dvec3 origin = block.origin - block.offset * block.spacing;
+  return {indexOf(glm::ceil((box.lo - origin) / block.spacing - indexTolerance), block),
+          indexOf(glm::floor((box.hi - origin) / block.spacing + indexTolerance) + 1.0, block)};
 }
 
 /// Values for interpolation in the box and up to `reach` beyond.
@@ -372,26 +373,34 @@ class LayerExchange {
     const Box volume{grid.block.origin + (glm::dvec3(values.lo) - 0.5) * grid.block.spacing,
                      grid.block.origin + (glm::dvec3(values.hi) - 0.5) * grid.block.spacing};
     // First the owners of a place, the finest first; within a level, blocks with a value there precede those
-    // that only close a gap. Then blocks that store a value where nobody owns the place.
-    using Claim = std::tuple<std::int32_t, bool, std::size_t>;  // level, negative; closes a gap; donor
+    // that only close a gap. Owners claim the places of their values. Offsets leave places between levels
+    // that no values stand for; the owners of the space have these. Then blocks that store a value where
+    // nobody owns the place.
+    enum class By { Values, Gap, Space };
+    using Claim = std::tuple<bool, std::int32_t, By, std::size_t>;  // Space; level, negative; by; donor
+    const bool hasOffset = grid.block.offset != glm::dvec3(0.0);
     std::vector<Claim> owners;
     std::vector<Claim> keepers;
     for (const std::size_t d : directory_.meeting(volume)) {
       const BlockEntry& donor = directory_.entries()[d];
       if (donor.rank == comm_.rank() && static_cast<std::size_t>(donor.grid) == gridIndex) continue;
-      owners.emplace_back(-levelNumbers_[d], false, d);
-      if (donor.asked != donor.owned) owners.emplace_back(-levelNumbers_[d], true, d);
-      if (!donor.masks && !keep) keepers.emplace_back(-levelNumbers_[d], false, d);
+      owners.emplace_back(false, -levelNumbers_[d], By::Values, d);
+      if (donor.asked != donor.owned) owners.emplace_back(false, -levelNumbers_[d], By::Gap, d);
+      if (hasOffset && levels_.size() > 1) owners.emplace_back(true, -levelNumbers_[d], By::Space, d);
+      if (!donor.masks && !keep) keepers.emplace_back(false, -levelNumbers_[d], By::Values, d);
     }
     Remainder left(volume);
     for (std::vector<Claim>* claims : {&owners, &keepers}) {
       if (left.empty()) break;
       std::sort(claims->begin(), claims->end());
       for (const Claim& claim : *claims) {
-        const auto [level, gap, index] = claim;
+        const auto [last, level, by, index] = claim;
         const std::size_t d = index;  // a lambda must not capture a structured binding
         const BlockEntry& donor = directory_.entries()[d];
-        const Box box = claims == &keepers ? donor.storedBox() : gap ? donor.owned : donor.asked;
+        const Box owned = by == By::Values ? donor.asked : donor.owned;
+        const Box box = claims == &keepers ? donor.storedBox()
+                        : by == By::Space  ? owned
+                                           : donor.ofValues(owned);
         // A margin, so that nothing is lost between faces and places that were computed differently.
         const glm::dvec3 spare = latticeTolerance * glm::min(donor.spacing, grid.block.spacing);
         left.subtract({box.lo - spare, box.hi + spare},

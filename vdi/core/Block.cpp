@@ -131,6 +131,11 @@ void storeValue(ScalarType type, void* data, std::size_t index, double value) {
   });
 }
 
+void Block::moveValues(const glm::dvec3& spacings) {
+  offset += spacings;
+  origin += spacings * spacing;
+}
+
 void Block::setStrides(const ByteStrides& bytes) {
   const bool aligned = reinterpret_cast<std::uintptr_t>(data) % sizeOf(type) == 0;
   strides.reset();

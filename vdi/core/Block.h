@@ -94,6 +94,8 @@ struct Block {
   std::shared_ptr<const std::vector<IndexBox>> masked{};
   std::optional<ByteStrides> strides{};  // where the values lie from `data` on; any alignment
   std::shared_ptr<const ComputedValues> computed{};
+  /// By how many spacings the values lie beside points or the middles of cells. `origin` includes it.
+  glm::dvec3 offset{0.0};
 
   IndexBox stored() const { return {glm::ivec3(0), dims}; }
   IndexBox extended() const { return {-extra.lo, dims + extra.hi}; }
@@ -106,6 +108,8 @@ struct Block {
   }
   std::size_t byteCount() const { return valueCount() * sizeOf(type); }
   bool isPacked() const { return !strides && !computed; }
+  /// Moves the values by so many spacings, as those of staggered grids lie. The block owns what it owned.
+  void moveValues(const glm::dvec3& spacings);
   /// Lets the values lie at these strides, which are dropped if the values are packed and aligned.
   void setStrides(const ByteStrides& bytes);
   /// Copies the stored values of a box within stored(), [size.z][size.y][size.x], to memory that is aligned

@@ -227,7 +227,7 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
   vdi::Block block = choice.cells
                          ? vdi::Block::fromCells(counts, origin, spacing, vdi::ScalarType::U8, first)
                          : vdi::Block::fromPoints(counts, origin, spacing, vdi::ScalarType::U8, first);
-  block.origin += memory.offset * spacing;
+  block.moveValues(memory.offset);
   const bool isOne = memory.values.components == 1;
   vdi::showComponent(block, memory.values, isOne ? vdi::magnitude : choice.component);
   // The deleter's copy of the smart pointer keeps the array alive.
