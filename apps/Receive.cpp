@@ -49,11 +49,11 @@ class Recorder {
   std::uint64_t count() const { return count_; }
 
   /// Reports a bad file and doesn't count it.
-  void take(const stream::Received& received) {
+  void take(stream::Received received) {
     const stream::Level& level = received.level;
     std::optional<Vdi> vdi;
     try {
-      vdi = io::decode(received.file);
+      vdi = received.decode();
     } catch (const Error& error) {
       fmt::print(stderr, "vdi: frame {} is damaged: {}\n", level.frame, error.what());
       return;
@@ -128,11 +128,12 @@ void receive(const ReceiveOptions& options) {
     connection = clientOf(options.command, "");
   }
   connection.authority = options.authority;
+  connection.decodes = options.folder.empty();
   Recorder recorder(options);
   stream::Client client(std::move(connection));
   SeriesWalk walk;
   while (options.frames == 0 || recorder.count() < options.frames) {
-    const std::optional<stream::Received> received = client.next(pause);
+    std::optional<stream::Received> received = client.next(pause);
     const stream::Client::Standing standing = client.standing();
     walk.begin(client, standing);
     if (walk.isDone(standing)) return;
@@ -149,7 +150,7 @@ void receive(const ReceiveOptions& options) {
       continue;
     }
     const bool isFull = received->level.level + 1 == received->level.levels;
-    if (isFull || options.isCoarse) recorder.take(*received);
+    if (isFull || options.isCoarse) recorder.take(*std::move(received));
     if (isFull) walk.advance(client, standing);
   }
 }

@@ -138,7 +138,7 @@ class Viewer {
         size_(size),
         reconstruction_(reconstruction),
         log_(log),
-        client_(apps::clientOf(link, "")),
+        client_(optionsOf(link)),
         done_(std::async(std::launch::async, [this] { view(); })) {}
   ~Viewer() { isEnding_ = true; }
   Viewer(const Viewer&) = delete;
@@ -152,13 +152,19 @@ class Viewer {
   }
 
  private:
+  static stream::ClientOptions optionsOf(const std::string& link) {
+    stream::ClientOptions options = apps::clientOf(link, "");
+    options.decodes = true;
+    return options;
+  }
+
   void view() {
     constexpr std::chrono::milliseconds patience{20};
     while (!isEnding_) {
-      const std::optional<stream::Received> received = client_.next(patience);
+      std::optional<stream::Received> received = client_.next(patience);
       if (!received) continue;
       const Clock::time_point start = Clock::now();
-      const Vdi vdi = io::decode(received->file);
+      const Vdi vdi = received->decode();
       renderer_.setVdi(vdi);
       (void)renderer_.renderBytes(apps::turned(vdi.camera, degrees_, 0.0), size_.x, size_.y,
                                   Alpha::Premultiplied, reconstruction_);

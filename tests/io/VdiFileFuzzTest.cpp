@@ -239,7 +239,8 @@ TEST_CASE("a packed chunk's expanded size is known without expanding it") {
   for (const Vdi& vdi :
        {test::plausibleVdi(20, 15, 5), test::noisyVdi(20, 15, 5), test::plausibleVdi(1, 1, 1)}) {
     const auto lists = vdi.listCount();
-    const std::vector<std::byte> packed = io::detail::packLists(test::full(vdi), {}, 0, lists);
+    io::detail::PackScratch scratch;
+    const std::vector<std::byte> packed = io::detail::packLists(test::full(vdi), {}, 0, lists, scratch);
     const std::uint64_t expanded = chunkBytes(lists, vdi.supersegmentCount(), Precision::Full);
     CHECK(io::detail::announcedBytes(packed) == expanded);
     std::size_t same = 0;
@@ -267,7 +268,8 @@ TEST_CASE("meaningless bytes are refused") {
 TEST_CASE("noise in place of packed lists is refused, or fills exactly the requested lists") {
   test::Noise noise(31);
   const Vdi vdi = test::plausibleVdi(20, 15, 5);
-  const std::vector<std::byte> sound = io::detail::packLists(test::full(vdi), {}, 0, 300);
+  io::detail::PackScratch scratch;
+  const std::vector<std::byte> sound = io::detail::packLists(test::full(vdi), {}, 0, 300, scratch);
   std::size_t refused = 0;
   for (int i = 0; i < 3000; ++i) {
     std::vector<std::byte> packed = sound;

@@ -10,6 +10,7 @@
 #include "vdi/core/Thinning.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/ListCodec.h"
+#include "vdi/io/VdiDecoder.h"
 #include "vdi/io/VdiFile.h"
 
 using namespace vdi;
@@ -122,6 +123,37 @@ TEST_CASE("a VDI survives encoding and decoding to the bit") {
     test::full(vdi).offsets = {0, 2, 2, 3, 4};
     CHECK(sameBits(io::decode(io::encode(vdi)), vdi));
   }
+}
+
+TEST_CASE("a file is decoded from pieces of any size") {
+  const bool compact = GENERATE(false, true);
+  const Vdi vdi = compact ? test::compact(test::noisyVdi(150, 140, 7)) : test::noisyVdi(150, 140, 7);
+  const std::vector<std::byte> bytes = io::encode(vdi);
+  const auto decodedFrom = [&](std::span<const std::byte> all, std::uint64_t announced, std::size_t most) {
+    test::Noise noise(most);
+    io::VdiDecoder decoder(announced);
+    while (!all.empty()) {
+      const std::size_t size = std::min<std::size_t>(
+          all.size(), most == 1 ? 1 : noise.below(static_cast<std::uint32_t>(most + 1)));
+      decoder.add(all.first(size));
+      all = all.subspan(size);
+    }
+    return decoder.finish();
+  };
+  for (const std::size_t most : {1, 100, 5000, 200000, 100000000})
+    CHECK(decodedFrom(bytes, bytes.size(), most) == vdi);
+  const auto fault = [&](std::span<const std::byte> all, std::uint64_t announced) {
+    return test::errorOf([&] { decodedFrom(all, announced, 5000); });
+  };
+  const std::span<const std::byte> all(bytes);
+  CHECK(fault(all.first(bytes.size() - 1), bytes.size()).code() == ErrorCode::Format);
+  CHECK(fault(all.first(100), bytes.size()).code() == ErrorCode::Format);
+  CHECK(fault({}, bytes.size()).code() == ErrorCode::Format);
+  CHECK(fault({}, 0).code() == ErrorCode::Format);
+  CHECK(fault(all, bytes.size() - 1).code() == ErrorCode::Format);
+  std::vector<std::byte> altered = bytes;
+  altered[2 * bytes.size() / 3] ^= std::byte{1};
+  CHECK_THAT(fault(altered, bytes.size()).what(), ContainsSubstring("checksum"));
 }
 
 TEST_CASE("a file is thinned without its other lists") {
@@ -423,7 +455,8 @@ TEST_CASE("files: written, read, and refused with their path") {
 
 TEST_CASE("unpackLists refuses anything but the requested lists and supersegments") {
   const Vdi vdi = test::noisyVdi(10, 10, 5);
-  const std::vector<std::byte> packed = io::detail::packLists(test::full(vdi), {}, 20, 60);
+  io::detail::PackScratch scratch;
+  const std::vector<std::byte> packed = io::detail::packLists(test::full(vdi), {}, 20, 60, scratch);
   const std::size_t count = test::full(vdi).offsets[60] - test::full(vdi).offsets[20];
   const auto unpack = [&](std::size_t lists, std::size_t segments) {
     SupersegmentLists back;

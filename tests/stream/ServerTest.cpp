@@ -11,6 +11,7 @@
 #include "tests/Catch.h"
 #include "tests/FuzzTime.h"
 #include "tests/io/Samples.h"
+#include "vdi/core/Thinning.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/stream/Client.h"
 #include "vdi/stream/Publisher.h"
@@ -126,6 +127,22 @@ TEST_CASE("a large VDI comes coarse, then in full") {
   CHECK(std::vector(found.begin(), found.end()) == std::vector(expected.begin(), expected.end()));
   const Received full = nextOf(client);
   CHECK(io::decode(full.file) == *vdi);
+}
+
+TEST_CASE("a client decodes VDIs while they arrive") {
+  Server server(options());
+  ClientOptions decoding = clientOf(server);
+  decoding.decodes = true;
+  Client client(decoding);
+  Publisher publisher(server);
+  const auto vdi = std::make_shared<const Vdi>(test::noisyVdi(700, 500, 12));  // of many parts
+  publisher.publish(vdi);
+  Received coarse = nextOf(client);
+  CHECK(coarse.level.level == 0);
+  CHECK(coarse.file.empty());
+  CHECK(coarse.decode() == thinned(*vdi, 3));
+  Received full = nextOf(client);
+  CHECK(full.decode() == *vdi);
 }
 
 TEST_CASE("publishing waits for no encoder") {

@@ -264,7 +264,7 @@ std::optional<std::uint64_t> announcedBytes(std::span<const std::byte> packed) {
 
 template <typename Segment>
 std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode& code, std::size_t first,
-                                 std::size_t last) {
+                                 std::size_t last, PackScratch& scratch) {
   using Coding = CodingOf<Segment>;
   const std::size_t listCount = last - first;
   const std::size_t begin = lists.offsets[first];
@@ -273,7 +273,8 @@ std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode&
   const std::uint64_t size = chunkBytes(listCount, count, EncodingOf<Segment>::precision);
   if (size > LZ4_MAX_INPUT_SIZE) throw Error(ErrorCode::Io, "too many supersegments in one chunk of lists");
 
-  std::vector<std::byte> plain(size);
+  HostVector<std::byte>& plain = scratch.plain;
+  plain.resize(size);  // all of which is written below
   std::byte* const lengths = plain.data() + codeBytes<Segment>;
   std::byte* const columnData = lengths + listCount * sizeof(std::uint32_t);
   std::memcpy(plain.data(), &code, codeBytes<Segment>);
@@ -294,13 +295,13 @@ std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode&
     }
   }
 
-  std::vector<std::byte> packed(static_cast<std::size_t>(LZ4_compressBound(static_cast<int>(size))));
+  HostVector<std::byte>& packed = scratch.packed;
+  packed.resize(static_cast<std::size_t>(LZ4_compressBound(static_cast<int>(size))));
   const int packedSize = LZ4_compress_default(reinterpret_cast<const char*>(plain.data()),
                                               reinterpret_cast<char*>(packed.data()), static_cast<int>(size),
                                               static_cast<int>(packed.size()));
   assert(packedSize > 0);  // the buffer fits any result
-  packed.resize(static_cast<std::size_t>(packedSize));
-  return packed;
+  return {packed.begin(), packed.begin() + packedSize};
 }
 
 template <typename Segment>
@@ -344,7 +345,7 @@ DepthCode unpackLists(std::span<const std::byte> packed, std::uint32_t before, s
 
 #define VDI_LIST_CODEC(Segment)                                                                       \
   template std::vector<std::byte> packLists(const ListsOf<Segment>&, const DepthCode&, std::size_t,   \
-                                            std::size_t);                                             \
+                                            std::size_t, PackScratch&);                               \
   template DepthCode unpackLists(std::span<const std::byte>, std::uint32_t, std::span<std::uint32_t>, \
                                  std::span<Segment>);
 VDI_EACH_ENCODING(VDI_LIST_CODEC)

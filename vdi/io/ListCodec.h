@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "vdi/core/Encoding.h"
+#include "vdi/core/HostVector.h"
 
 namespace vdi::io::detail {
 
@@ -19,11 +20,17 @@ bool canExpandTo(std::uint64_t packedBytes, std::uint64_t bytes);
 /// short.
 std::optional<std::uint64_t> announcedBytes(std::span<const std::byte> packed);
 
+/// Memory for one chunk at a time, which later ones use again.
+struct PackScratch {
+  HostVector<std::byte> plain;
+  HostVector<std::byte> packed;
+};
+
 /// Encodes lists [first, last), together with their code if they are compact. Lossless and deterministic.
 /// Throws Error{Io} for more than LZ4 takes at once (2 GiB).
 template <typename Segment>
 std::vector<std::byte> packLists(const ListsOf<Segment>& lists, const DepthCode& code, std::size_t first,
-                                 std::size_t last);
+                                 std::size_t last, PackScratch& scratch);
 
 /// Decodes a chunk into place and returns its depth code. ends[i] becomes `before` plus the supersegments of
 /// lists 0 .. i of the chunk. Throws Error{Format} unless the bytes have exactly ends.size() lists with

@@ -1,342 +1,46 @@
 #include "vdi/io/VdiFile.h"
 
-#include <fmt/format.h>
-#include <xxhash.h>
-
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cassert>
-#include <cmath>
 #include <cstring>
+#include <future>
 #include <optional>
-#include <type_traits>
 #include <utility>
 
-#include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Estimate.h"
+#include "vdi/core/InOrder.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/core/Thinning.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/ListCodec.h"
 #include "vdi/io/Metadata.h"
+#include "vdi/io/VdiDecoder.h"
+#include "vdi/io/VdiLayout.h"
 #include "vdi/io/VdiParts.h"
 
 namespace vdi::io {
 
+using detail::checksumOf;
+using detail::Chunk;
+using detail::decodeChunk;
+using detail::fail;
+using detail::Header;
+using detail::headerOf;
+using detail::kindJson;
+using detail::listsOf;
+using detail::MetadataHeader;
+using detail::metadataOffset;
+using detail::parseHeader;
+using detail::parseMetadata;
+using detail::parseTable;
+using detail::precisionOf;
+using detail::requireSound;
+using detail::requireSoundHeader;
+using detail::tableBytesOf;
+using detail::vdiOf;
+
 namespace {
-
-static_assert(std::endian::native == std::endian::little, "the .vdi file is read as it lies");
-
-constexpr std::array<char, 8> magicText{'V', 'D', 'I', '-', 'F', 'I', 'L', 'E'};
-constexpr std::uint32_t plainVersion = 1;   // neither margin nor metadata
-constexpr std::uint32_t marginVersion = 2;  // a margin; written only if there is one
-constexpr std::uint32_t metadataVersion =
-    3;  // metadata and maybe a margin; written only if there is metadata
-constexpr std::uint32_t flagParallel = 1;
-constexpr std::uint32_t knownFlags = flagParallel;
-
-/// docs/format.md has the table of fields.
-struct Header {
-  std::array<char, 8> magic;
-  std::uint32_t version;
-  std::uint32_t headerBytes;
-  std::uint32_t encoding;
-  std::uint32_t flags;
-  std::uint32_t width;
-  std::uint32_t height;
-  std::uint32_t budget;
-  std::uint32_t listsPerChunk;
-  std::uint32_t chunkCount;
-  std::uint16_t marginX;  // 0 in version 1
-  std::uint16_t marginY;
-  std::uint64_t supersegmentCount;
-  std::uint64_t dataBytes;
-  std::uint64_t timeStep;
-  double time;
-  double sampleStep;
-  double boundsLo[3];
-  double boundsHi[3];
-  double position[3];
-  double focalPoint[3];
-  double viewUp[3];
-  double viewAngle;
-  double parallelScale;
-  std::uint64_t tableChecksum;
-  std::uint64_t headerChecksum;
-};
-static_assert(offsetof(Header, version) == 8);
-static_assert(offsetof(Header, headerBytes) == 12);
-static_assert(offsetof(Header, encoding) == 16);
-static_assert(offsetof(Header, flags) == 20);
-static_assert(offsetof(Header, width) == 24);
-static_assert(offsetof(Header, height) == 28);
-static_assert(offsetof(Header, budget) == 32);
-static_assert(offsetof(Header, listsPerChunk) == 36);
-static_assert(offsetof(Header, chunkCount) == 40);
-static_assert(offsetof(Header, marginX) == 44);
-static_assert(offsetof(Header, marginY) == 46);
-static_assert(offsetof(Header, supersegmentCount) == 48);
-static_assert(offsetof(Header, dataBytes) == 56);
-static_assert(offsetof(Header, timeStep) == 64);
-static_assert(offsetof(Header, time) == 72);
-static_assert(offsetof(Header, sampleStep) == 80);
-static_assert(offsetof(Header, boundsLo) == 88);
-static_assert(offsetof(Header, boundsHi) == 112);
-static_assert(offsetof(Header, position) == 136);
-static_assert(offsetof(Header, focalPoint) == 160);
-static_assert(offsetof(Header, viewUp) == 184);
-static_assert(offsetof(Header, viewAngle) == 208);
-static_assert(offsetof(Header, parallelScale) == 216);
-static_assert(offsetof(Header, tableChecksum) == 224);
-static_assert(offsetof(Header, headerChecksum) == 232);
-static_assert(sizeof(Header) == 240);
-
-/// Precedes the metadata, which are the file's last part.
-struct MetadataHeader {
-  std::array<char, 4> kind;
-  std::uint32_t bytes;  // of the following text
-  std::uint64_t checksum;
-};
-static_assert(offsetof(MetadataHeader, bytes) == 4);
-static_assert(offsetof(MetadataHeader, checksum) == 8);
-static_assert(sizeof(MetadataHeader) == 16);
-constexpr std::array<char, 4> kindJson{'J', 'S', 'O', 'N'};
-
-static_assert(offsetof(ChunkEntry, packedBytes) == 4);
-static_assert(offsetof(ChunkEntry, checksum) == 8);
-static_assert(sizeof(ChunkEntry) == 16);
-
-[[noreturn]] void fail(const std::string& what) {
-  throw Error(ErrorCode::Format, "not a sound .vdi file: " + what);
-}
-
-std::uint64_t checksumOf(std::span<const std::byte> bytes) {
-  return XXH64(bytes.data(), bytes.size(), 0);
-}
-std::uint64_t checksumOf(std::span<const ChunkEntry> table) {
-  return checksumOf(std::as_bytes(table));
-}
-std::uint64_t checksumOf(const Header& header) {
-  return XXH64(&header, offsetof(Header, headerChecksum), 0);
-}
-
-Precision precisionOf(const Header& header) {
-  return static_cast<Precision>(header.encoding);
-}
-
-/// Checks what validate(Vdi) does not: a usable camera and finite numbers.
-void requireSoundHeader(const Vdi& vdi) {
-  try {
-    static_cast<void>(vdi.view());
-  } catch (const Error& error) {
-    fail(error.what());
-  }
-  bool numbers = std::isfinite(vdi.time) && std::isfinite(vdi.sampleStep) && vdi.sampleStep >= 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    numbers = numbers && !std::isnan(vdi.bounds.lo[axis]) && !std::isnan(vdi.bounds.hi[axis]);
-  }
-  if (!numbers) fail("time, sample step or bounds aren't numbers");
-  if (vdi.budget < 1) fail("a budget of no supersegments");
-}
-
-std::uint64_t listsOf(const Vdi& vdi) {
-  return static_cast<std::uint64_t>(vdi.width) * static_cast<std::uint64_t>(vdi.height);
-}
-
-/// The header without the fields that the chunks add.
-Header headerOf(const Vdi& vdi) {
-  Header header{};
-  header.magic = magicText;
-  header.version = vdi.coloring                  ? metadataVersion
-                   : vdi.margin == glm::ivec2(0) ? plainVersion
-                                                 : marginVersion;
-  header.headerBytes = sizeof(Header);
-  header.encoding = static_cast<std::uint32_t>(vdi.precision());
-  header.flags = vdi.camera.parallelProjection ? flagParallel : 0;
-  header.width = static_cast<std::uint32_t>(vdi.width);
-  header.height = static_cast<std::uint32_t>(vdi.height);
-  header.budget = vdi.budget;
-  header.listsPerChunk = listsPerChunk;
-  header.marginX = static_cast<std::uint16_t>(vdi.margin.x);  // validate guarantees that it fits
-  header.marginY = static_cast<std::uint16_t>(vdi.margin.y);
-  header.timeStep = vdi.timeStep;
-  header.time = vdi.time;
-  header.sampleStep = vdi.sampleStep;
-  for (int axis = 0; axis < 3; ++axis) {
-    header.boundsLo[axis] = vdi.bounds.lo[axis];
-    header.boundsHi[axis] = vdi.bounds.hi[axis];
-    header.position[axis] = vdi.camera.position[axis];
-    header.focalPoint[axis] = vdi.camera.focalPoint[axis];
-    header.viewUp[axis] = vdi.camera.viewUp[axis];
-  }
-  header.viewAngle = vdi.camera.viewAngle;
-  header.parallelScale = vdi.camera.parallelScale;
-  return header;
-}
-
-Vdi vdiOf(const Header& header) {
-  Vdi vdi;
-  vdi.width = static_cast<int>(header.width);
-  vdi.height = static_cast<int>(header.height);
-  vdi.margin = glm::ivec2(header.marginX, header.marginY);
-  vdi.budget = header.budget;
-  vdi.time = header.time;
-  vdi.timeStep = header.timeStep;
-  vdi.sampleStep = header.sampleStep;
-  for (int axis = 0; axis < 3; ++axis) {
-    vdi.bounds.lo[axis] = header.boundsLo[axis];
-    vdi.bounds.hi[axis] = header.boundsHi[axis];
-    vdi.camera.position[axis] = header.position[axis];
-    vdi.camera.focalPoint[axis] = header.focalPoint[axis];
-    vdi.camera.viewUp[axis] = header.viewUp[axis];
-  }
-  vdi.camera.viewAngle = header.viewAngle;
-  vdi.camera.parallelScale = header.parallelScale;
-  vdi.camera.parallelProjection = (header.flags & flagParallel) != 0;
-  vdi.lists = noLists(precisionOf(header));
-  requireSoundHeader(vdi);
-  return vdi;
-}
-
-/// The header of a file of `fileBytes` that begins with `start`. Version and encoding are checked before the
-/// checksum, so that the error names a file of a later version as such.
-Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
-  Header header{};
-  if (start.size() < sizeof(Header)) fail(fmt::format("{} bytes are too few for a header", fileBytes));
-  std::memcpy(&header, start.data(), sizeof(Header));
-  if (header.magic != magicText) fail("it doesn't start with VDI-FILE");
-  if (header.version < plainVersion || header.version > metadataVersion) {
-    fail(fmt::format("it has version {}, this program reads versions {} to {}", header.version, plainVersion,
-                     metadataVersion));
-  }
-  if (header.headerBytes != sizeof(Header)) fail(fmt::format("its header has {} bytes", header.headerBytes));
-  if (header.headerChecksum != checksumOf(header)) fail("the header's checksum is wrong");
-  if (!isEncoding(header.encoding)) {
-    fail(fmt::format("its supersegments have encoding {}, this program reads encodings 0 to {}",
-                     header.encoding, std::variant_size_v<AnyLists> - 1));
-  }
-  const bool hasMargin = header.marginX != 0 || header.marginY != 0;
-  if ((header.flags & ~knownFlags) != 0 || (hasMargin && header.version == plainVersion))
-    fail("it uses flags that this program doesn't know");
-  const auto goodSide = [](std::uint32_t side) { return side >= 1 && side <= View::maxSide; };
-  if (!goodSide(header.width) || !goodSide(header.height) || header.listsPerChunk == 0) {
-    fail(fmt::format("{} x {} lists in chunks of {}", header.width, header.height, header.listsPerChunk));
-  }
-  if (2U * header.marginX >= header.width || 2U * header.marginY >= header.height) {
-    fail(fmt::format("a margin of {} and {} of {} x {} lists", header.marginX, header.marginY, header.width,
-                     header.height));
-  }
-  const std::uint64_t chunks = chunksOf(std::uint64_t{header.width} * header.height, header.listsPerChunk);
-  if (chunks != header.chunkCount) {
-    fail(fmt::format("{} chunks, there should be {}", header.chunkCount, chunks));
-  }
-  const std::uint64_t frontBytes = sizeof(Header) + chunks * sizeof(ChunkEntry);
-  const bool hasMetadata = header.version == metadataVersion;
-  const std::uint64_t rest = frontBytes > fileBytes ? 0 : fileBytes - frontBytes;
-  if (frontBytes > fileBytes || header.dataBytes > rest || (!hasMetadata && header.dataBytes != rest)) {
-    fail(fmt::format("it has {} bytes, its header says {} + {}", fileBytes, frontBytes, header.dataBytes));
-  }
-  if (hasMetadata && (rest - header.dataBytes < sizeof(MetadataHeader) ||
-                      rest - header.dataBytes > sizeof(MetadataHeader) + maxMetadataBytes)) {
-    fail(fmt::format("{} bytes behind its chunks can't be metadata", rest - header.dataBytes));
-  }
-  return header;
-}
-
-/// Offset of the metadata in the file, or the file's end.
-std::uint64_t metadataOffset(const Header& header) {
-  return sizeof(Header) + header.chunkCount * sizeof(ChunkEntry) + header.dataBytes;
-}
-
-/// Parses the bytes from the end of the chunks to the end of the file.
-std::optional<Coloring> parseMetadata(const Header& header, std::span<const std::byte> bytes) {
-  if (header.version != metadataVersion) return std::nullopt;
-  MetadataHeader head{};
-  std::memcpy(&head, bytes.data(), sizeof(MetadataHeader));  // parseHeader has checked that it is there
-  const std::span<const std::byte> text = bytes.subspan(sizeof(MetadataHeader));
-  if (head.kind != kindJson) fail("its metadata aren't JSON");
-  if (head.bytes != text.size()) {
-    fail(fmt::format("there are {} bytes of metadata, they say {}", text.size(), head.bytes));
-  }
-  if (head.checksum != checksumOf(text)) fail("the metadata's checksum is wrong");
-  try {
-    return coloringIn({reinterpret_cast<const char*>(text.data()), text.size()});
-  } catch (const Error& error) {
-    fail(error.what());
-  }
-}
-
-std::uint64_t tableBytesOf(const Header& header) {
-  return header.chunkCount * sizeof(ChunkEntry);
-}
-
-/// A chunk's position in the file and in the VDI.
-struct Chunk {
-  std::uint64_t dataOffset;  // in the bytes after the table
-  std::uint64_t packedBytes;
-  std::uint64_t checksum;
-  std::uint64_t firstList;
-  std::uint64_t listCount;
-  std::uint64_t firstSupersegment;
-  std::uint64_t supersegmentCount;
-};
-
-/// Returns the table's chunks after checking that the file can hold their contents.
-std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> bytes) {
-  std::vector<ChunkEntry> table(header.chunkCount);
-  std::memcpy(table.data(), bytes.data(), tableBytesOf(header));
-  if (header.tableChecksum != checksumOf(table)) fail("the chunk table's checksum is wrong");
-  const std::uint64_t lists = std::uint64_t{header.width} * header.height;
-  std::vector<Chunk> chunks;
-  chunks.reserve(table.size());
-  Chunk next{};
-  for (const ChunkEntry& entry : table) {
-    next.packedBytes = entry.packedBytes;
-    next.checksum = entry.checksum;
-    next.listCount = std::min<std::uint64_t>(header.listsPerChunk, lists - next.firstList);
-    next.supersegmentCount = entry.supersegmentCount;
-    const std::uint64_t expanded = chunkBytes(next.listCount, next.supersegmentCount, precisionOf(header));
-    if (!detail::canExpandTo(next.packedBytes, expanded) ||
-        next.supersegmentCount > next.listCount * header.budget) {
-      fail(fmt::format("chunk {} can't hold {} supersegments in {} bytes", chunks.size(),
-                       next.supersegmentCount, next.packedBytes));
-    }
-    chunks.push_back(next);
-    next.dataOffset += next.packedBytes;
-    next.firstList += next.listCount;
-    next.firstSupersegment += next.supersegmentCount;
-  }
-  if (next.dataOffset != header.dataBytes) fail("the chunks don't add up to the data");
-  if (next.firstSupersegment != header.supersegmentCount || next.firstSupersegment > UINT32_MAX) {
-    fail("the chunks don't add up to the supersegments");
-  }
-  return chunks;
-}
-
-/// Checks, before memory is allocated, that the chunk is unaltered and expands to the size in the table.
-void requireSound(const Chunk& chunk, std::span<const std::byte> packed, Precision precision) {
-  if (chunk.checksum != checksumOf(packed)) {
-    fail(fmt::format("the checksum of the chunk from list {} on is wrong", chunk.firstList));
-  }
-  if (detail::announcedBytes(packed) != chunkBytes(chunk.listCount, chunk.supersegmentCount, precision)) {
-    fail(fmt::format("the chunk from list {} on doesn't hold {} supersegments", chunk.firstList,
-                     chunk.supersegmentCount));
-  }
-}
-
-/// Decodes a chunk into place (see detail::unpackLists, where `ends` and `segments` are explained) and
-/// returns the depth code of its supersegments.
-template <typename Segment>
-DepthCode decodeChunk(const Chunk& chunk, std::span<const std::byte> packed, std::uint64_t before,
-                      std::span<std::uint32_t> ends, std::span<Segment> segments) {
-  try {
-    return detail::unpackLists(packed, static_cast<std::uint32_t>(before), ends, segments);
-  } catch (const Error& error) {
-    fail(fmt::format("the chunk from list {} on: {}", chunk.firstList, error.what()));
-  }
-}
 
 /// The parts of a file in memory. Header, table, metadata and all checksums are sound.
 struct ParsedFile {
@@ -460,22 +164,20 @@ void encodeChunks(const ListsOf<Segment>& lists, std::size_t first, std::size_t 
                   std::uint32_t budget, const DepthCode& code,
                   const std::function<void(EncodedChunk)>& take) {
   assert(firstList % listsPerChunk == 0);
-  const auto encodeOne = [&](std::size_t begin) {
-    const std::size_t end = std::min<std::size_t>(begin + listsPerChunk, last);
-    validateLists(lists, begin, end, firstList + (begin - first), budget);
-    EncodedChunk chunk;
-    chunk.bytes = detail::packLists(lists, code, begin, end);
-    chunk.entry = {lists.offsets[end] - lists.offsets[begin], static_cast<std::uint32_t>(chunk.bytes.size()),
-                   checksumOf(chunk.bytes)};
-    return chunk;
+  const auto makeEncoder = [&] {
+    return [&, scratch = detail::PackScratch()](std::size_t index) mutable {
+      const std::size_t begin = first + index * listsPerChunk;
+      const std::size_t end = std::min<std::size_t>(begin + listsPerChunk, last);
+      validateLists(lists, begin, end, firstList + (begin - first), budget);
+      EncodedChunk chunk;
+      chunk.bytes = detail::packLists(lists, code, begin, end, scratch);
+      chunk.entry = {lists.offsets[end] - lists.offsets[begin],
+                     static_cast<std::uint32_t>(chunk.bytes.size()), checksumOf(chunk.bytes)};
+      return chunk;
+    };
   };
-  constexpr std::size_t atOnce = 64;
-  std::vector<EncodedChunk> chunks;
-  for (std::size_t begin = first; begin < last; begin += chunks.size() * listsPerChunk) {
-    chunks.resize(std::min<std::size_t>(atOnce, chunksOf(last - begin)));
-    eachInParallel(chunks.size(), [&](std::size_t i) { chunks[i] = encodeOne(begin + i * listsPerChunk); });
-    for (EncodedChunk& chunk : chunks) take(std::move(chunk));
-  }
+  constexpr std::size_t ahead = 64;
+  inOrder(chunksOf(last - first), ahead, makeEncoder, take);
 }
 
 #define VDI_ENCODE_CHUNKS(Segment)                                                             \
@@ -524,7 +226,11 @@ std::vector<std::byte> encode(const Vdi& vdi) {
   validateShape(vdi);
   validateEnds(vdi);
   std::vector<ChunkEntry> table;
-  std::vector<std::byte> bytes(headBytes(vdi.listCount()));
+  std::vector<std::byte> bytes;
+  // As many as the chunks take before LZ4. Pages that stay empty take no memory.
+  bytes.reserve(headBytes(vdi.listCount()) +
+                chunkBytes(vdi.listCount(), vdi.supersegmentCount(), vdi.precision()));
+  bytes.resize(headBytes(vdi.listCount()));
   const auto append = [&](const EncodedChunk& chunk) {
     table.push_back(chunk.entry);
     bytes.insert(bytes.end(), chunk.bytes.begin(), chunk.bytes.end());
@@ -542,29 +248,9 @@ std::vector<std::byte> encode(const Vdi& vdi) {
 }
 
 Vdi decode(std::span<const std::byte> bytes) {
-  ParsedFile file = parseFile(bytes);
-  Vdi& vdi = file.vdi;
-  std::visit(
-      [&](auto& lists) {
-        lists.offsets.resize(listsOf(vdi) + 1);
-        lists.segments.resize(file.chunks.back().firstSupersegment + file.chunks.back().supersegmentCount);
-        vdi.depthCode = decodeChunks(file, [&](std::size_t index) {
-          const Chunk& chunk = file.chunks[index];
-          return decodeChunk(
-              chunk, file.packed(chunk), chunk.firstSupersegment,
-              std::span(lists.offsets).subspan(chunk.firstList + 1, chunk.listCount),
-              std::span(lists.segments).subspan(chunk.firstSupersegment, chunk.supersegmentCount));
-        });
-        eachInParallel(file.chunks.size(), [&](std::size_t i) {
-          const Chunk& chunk = file.chunks[i];
-          validateLists(lists, chunk.firstList, chunk.firstList + chunk.listCount, chunk.firstList,
-                        vdi.budget);
-        });
-      },
-      vdi.lists);
-  validateShape(vdi);
-  validateEnds(vdi);
-  return std::move(vdi);
+  VdiDecoder decoder(bytes.size());
+  decoder.add(bytes);
+  return decoder.finish();
 }
 
 Vdi decodeThinned(std::span<const std::byte> bytes, int factor) {
@@ -593,11 +279,25 @@ void writeVdi(const std::filesystem::path& path, const Vdi& vdi) {
   writeAtomically(path, bytes);
 }
 
+/// Reads each piece while the one before is decoded.
 Vdi readVdi(const std::filesystem::path& path) {
+  constexpr std::uint64_t pieceBytes = std::uint64_t{16} << 20;
   const InputFile file(path);
+  const auto pieceAt = [&](std::uint64_t offset) {
+    const std::uint64_t count = std::min(pieceBytes, file.size() - offset);
+    return std::async(std::launch::async | std::launch::deferred,
+                      [&file, offset, count] { return file.read(offset, count); });
+  };
   return withPath(path, [&] {
-    static_cast<void>(readHeader(file));  // checks before it allocates memory for another file's bytes
-    return decode(file.readAll());
+    static_cast<void>(readHeader(file));  // another file's bytes aren't read
+    VdiDecoder decoder(file.size());
+    std::future<std::vector<std::byte>> next = pieceAt(0);
+    for (std::uint64_t offset = 0; offset < file.size(); offset += pieceBytes) {
+      const std::vector<std::byte> piece = next.get();
+      if (offset + pieceBytes < file.size()) next = pieceAt(offset + pieceBytes);
+      decoder.add(piece);
+    }
+    return decoder.finish();
   });
 }
 

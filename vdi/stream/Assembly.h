@@ -9,23 +9,30 @@
 #include <string_view>
 #include <vector>
 
+#include "vdi/stream/ArrivingVdi.h"
 #include "vdi/stream/Protocol.h"
 
 namespace vdi::stream {
 
-/// A whole level, as it came: a .vdi file that hasn't been looked at yet.
+/// A whole level: a .vdi file that hasn't been looked at yet, or its VDI.
 struct Received {
   Level level;
-  std::vector<std::byte> file;
+  std::vector<std::byte> file;  // empty if `vdi` is there instead
+  std::optional<ArrivingVdi> vdi;
   std::string
       missing;  // why there's no file of a frame that was asked for; of `level` there's the frame alone
   std::string session;  // whose frame it is; Client fills it in
+
+  /// The level's VDI; call it once. Throws Error{Format} for a damaged one.
+  Vdi decode();
 };
 
 /// What comes from one connection, in order. It takes memory for bytes that have come, not for those that are
 /// announced.
 class Assembly {
  public:
+  enum class Gives { Files, Vdis };
+  explicit Assembly(Gives gives = Gives::Files) : gives_(gives) {}
   /// The next level; what is there of the one before is forgotten. Throws Error{Format} while `level` has
   /// more than `mostBytes`.
   void begin(const Level& level, std::uint64_t mostBytes);
@@ -36,8 +43,11 @@ class Assembly {
   std::optional<Ack> progress() const;
 
  private:
+  Gives gives_;
   std::optional<Level> level_;
+  std::uint64_t bytes_ = 0;  // of it that have come
   std::vector<std::byte> file_;
+  std::optional<ArrivingVdi> vdi_;
 };
 
 }  // namespace vdi::stream

@@ -68,7 +68,7 @@ class Client::Impl {
     if (!wholes_.empty()) {
       Whole whole = std::move(wholes_.front());
       wholes_.pop_front();
-      waitingBytes_ -= whole.received.file.size();
+      waitingBytes_ -= whole.received.level.bytes;
       const Level& level = whole.received.level;
       const Ack ack{level.frame, level.level, level.bytes};
       asio::post(context_, [this, ack, connection = whole.connection] {
@@ -127,6 +127,10 @@ class Client::Impl {
                   options_.authority.string());
   }
 
+  Assembly newAssembly() const {
+    return Assembly(options_.decodes ? Assembly::Gives::Vdis : Assembly::Gives::Files);
+  }
+
   std::string name() const { return options_.command.empty() ? options_.url.authority() : "the command"; }
 
   void run() {
@@ -151,7 +155,7 @@ class Client::Impl {
     if (isEnding_) return;
     ++connection_;
     cause_.clear();
-    assembly_ = {};
+    assembly_ = newAssembly();
     LineEvents events{
         [this] { sayHello(); }, [this](std::string_view text) { guarded([&] { take(text); }); },
         [this](std::span<const std::byte> message) { guarded([&] { take(message); }); },
@@ -258,7 +262,7 @@ class Client::Impl {
 
   /// For next(), within bounds.
   void keep(Received received) {
-    const std::uint64_t bytes = received.file.size();
+    const std::uint64_t bytes = received.level.bytes;
     change([&] {
       const bool isTooMuch =
           wholes_.size() >= mostWaiting ||
@@ -318,7 +322,7 @@ class Client::Impl {
   asio::steady_timer end_{context_};
   asio::ssl::context tls_{asio::ssl::context::tls_client};
   std::shared_ptr<Line> line_;
-  Assembly assembly_;
+  Assembly assembly_ = newAssembly();
   std::uint64_t connection_ = 0;
   std::uint64_t acknowledged_ = 0;  // of the level under way
   std::string session_;

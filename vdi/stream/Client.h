@@ -24,6 +24,8 @@ struct ClientOptions {
   std::filesystem::path authority;
   /// A level of more bytes ends the connection.
   std::uint64_t mostLevelBytes = std::uint64_t{4} << 30;
+  /// Received has VDIs, which are decoded while they arrive, instead of files.
+  bool decodes = false;
   /// Gets lines for the user, such as why a connection was lost; from the client's thread.
   std::function<void(const std::string& line)> log;
 };

@@ -64,8 +64,8 @@ struct vtkVDIStreamReader::Frame {
   std::uint32_t Number = 0;  // the frame's number in the session
   bool IsFull = false;       // true if no finer level follows
 
-  Frame(const vdi::stream::Received& received)
-      : Vdi(vdi::io::decode(received.file)),
+  Frame(vdi::stream::Received&& received)
+      : Vdi(received.decode()),
         Flat(vdi::flatten(this->Vdi)),
         Session(received.session),
         Number(received.level.frame),
@@ -146,8 +146,8 @@ class vtkVDIStreamReader::Link {
     constexpr std::chrono::milliseconds look{50};
     while (!this->IsEnding) {
       try {
-        const std::optional<vdi::stream::Received> received = this->Client.next(look);
-        if (received && received->missing.empty()) this->Keep(*received);
+        std::optional<vdi::stream::Received> received = this->Client.next(look);
+        if (received && received->missing.empty()) this->Keep(*std::move(received));
       } catch (const std::exception& error) {
         const std::scoped_lock lock(this->Mutex);
         this->Failed = error.what();
@@ -159,11 +159,11 @@ class vtkVDIStreamReader::Link {
   }
 
   /// Keeps a received VDI. A damaged one costs only its own frame.
-  void Keep(const vdi::stream::Received& received) {
+  void Keep(vdi::stream::Received received) {
     std::shared_ptr<const Frame> frame;
     std::string damage;
     try {
-      frame = std::make_shared<const Frame>(received);
+      frame = std::make_shared<const Frame>(std::move(received));
     } catch (const vdi::Error& error) {
       damage = error.what();
     }
@@ -278,6 +278,7 @@ void vtkVDIStreamReader::Connect() {
                        "there is no token: paste the server's link as URL, or set Token File",
                        options.url.authority());
     options.authority = this->Authority;
+    options.decodes = true;
     this->Connected = std::make_shared<Link>(std::move(options));
     if (this->Pause) this->Connected->SetPause(true);
   } catch (const std::exception& error) {

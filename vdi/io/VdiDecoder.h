@@ -1,0 +1,36 @@
+// Decodes a .vdi file while its bytes arrive.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "vdi/core/Vdi.h"
+
+namespace vdi::io {
+
+/// Takes the bytes of a .vdi file in order, in pieces of any size, from a file or a network. A chunk of lists
+/// is decoded as soon as its bytes are complete, on several threads if a piece completes several chunks.
+/// Memory follows the bytes that have come, not those that are announced. Belongs to one thread at a time.
+class VdiDecoder {
+ public:
+  /// For a file of so many bytes.
+  explicit VdiDecoder(std::uint64_t fileBytes);
+  ~VdiDecoder();
+  VdiDecoder(VdiDecoder&&) noexcept;
+  VdiDecoder& operator=(VdiDecoder&&) noexcept;
+  VdiDecoder(const VdiDecoder&) = delete;
+  VdiDecoder& operator=(const VdiDecoder&) = delete;
+
+  /// The next bytes, which are not needed afterwards. A fault of theirs is thrown by finish.
+  void add(std::span<const std::byte> bytes);
+  /// Ends the decoder. Throws Error{Format} for bytes that io::decode refuses, and for missing ones.
+  Vdi finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace vdi::io

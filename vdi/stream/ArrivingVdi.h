@@ -1,0 +1,33 @@
+// A VDI that is decoded beside the thread that receives its bytes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "vdi/core/Vdi.h"
+#include "vdi/io/VdiDecoder.h"
+
+namespace vdi::stream {
+
+/// Belongs to one thread at a time. While bytes are being decoded, later ones wait, and are then decoded
+/// together, on as many cores as they keep busy.
+class ArrivingVdi {
+ public:
+  /// Of a .vdi file of so many bytes.
+  explicit ArrivingVdi(std::uint64_t fileBytes);
+  /// The next bytes, of which a copy is kept.
+  void add(std::span<const std::byte> bytes);
+  /// Waits for the rest of the decoding. Throws as io::VdiDecoder::finish. Call it once.
+  Vdi finish();
+
+ private:
+  std::shared_ptr<io::VdiDecoder> decoder_;  // the job's, too
+  std::vector<std::byte> waiting_;
+  std::future<void> job_;
+};
+
+}  // namespace vdi::stream
