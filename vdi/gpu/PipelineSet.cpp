@@ -36,18 +36,31 @@ void PipelineSet::updateBytes(Commands& commands, std::span<const std::byte> byt
   updatedBehind_ = commands.submissions();
 }
 
+template <typename Use>
+auto PipelineSet::withInfo(const std::vector<std::uint32_t>& specialization, Use use) const {
+  ComputePipelineInfo info = common_;
+  info.specialization = specialization;
+  std::string program(common_.shader);
+  if (hasPrograms_) {
+    program.append("_").append(std::to_string(specialization.front()));
+    if (!device_->runsGpuPrograms()) program.append("_pruned");
+  }
+  info.shader = program;
+  return use(info);
+}
+
+void PipelineSet::compile(const std::vector<std::uint32_t>& specialization) const {
+  withInfo(specialization, [this](const ComputePipelineInfo& info) {
+    return device_->vulkan().compiled(info, device_->limits().subgroupSize);
+  });
+}
+
 ComputePipeline& PipelineSet::with(const std::vector<std::uint32_t>& specialization) {
   std::unique_ptr<ComputePipeline>& pipeline = pipelines_[specialization];
   if (!pipeline) {
-    ComputePipelineInfo info = common_;
-    info.specialization = specialization;
-    std::string program(common_.shader);
-    if (hasPrograms_) {
-      program.append("_").append(std::to_string(specialization.front()));
-      if (!device_->runsGpuPrograms()) program.append("_pruned");
-    }
-    info.shader = program;
-    pipeline = std::make_unique<ComputePipeline>(device_, info);
+    pipeline = withInfo(specialization, [this](const ComputePipelineInfo& info) {
+      return std::make_unique<ComputePipeline>(device_, info);
+    });
     if (uniforms_) pipeline->bindUniforms(*uniforms_);
   }
   return *pipeline;

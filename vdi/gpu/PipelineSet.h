@@ -25,6 +25,9 @@ class PipelineSet {
   /// Shares the uniforms of another set, which updates them, and has programs if that does.
   PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);
   ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
+  /// Compiles a pipeline for the device, so that its first use won't wait. Any thread may call it beside the
+  /// other calls.
+  void compile(const std::vector<std::uint32_t>& specialization) const;
   /// Sets the uniforms that all pipelines have for the commands recorded next; records nothing if they have
   /// these values already. Uniforms are in device-local memory, where shaders read them as fast as constants;
   /// a GPU would fetch them from host memory again and again.
@@ -34,6 +37,9 @@ class PipelineSet {
   }
 
  private:
+  /// Calls use(info), for the info refers to a name that lasts no longer.
+  template <typename Use>
+  auto withInfo(const std::vector<std::uint32_t>& specialization, Use use) const;
   void updateBytes(Commands& commands, std::span<const std::byte> bytes);
 
   std::shared_ptr<Device> device_;

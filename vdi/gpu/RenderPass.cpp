@@ -33,7 +33,7 @@ struct Course {
 };
 
 Course courseOf(const shared::RenderParams& params, const shared::RenderRays& rays) {
-  if (!(rays.directionBase.z > 0.0F)) return {};
+  if (!(rays.directionBase.z > 0.0F)) return {};  // among them rays without a direction
   const bool parallel = params.parallel != 0;
   const auto placeAt = [&](float depth) {
     const float t = (depth - rays.originBase.z) / rays.directionBase.z;
@@ -115,6 +115,10 @@ std::vector<std::uint32_t> RenderPass::specialization(const shared::RenderParams
     pixelOrder = course.way.x == crossed ? shared::renderOrderColumns : shared::renderOrderRows;
   }
   return {smooth, lanesPerRay_, invocations, segmentsAtOnce, pixelOrder, form, sheared};
+}
+
+void RenderPass::compile(Reconstruction reconstruction, std::uint32_t form) const {
+  render_.compile(specialization({}, {}, reconstruction, form));
 }
 
 void RenderPass::record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,

@@ -29,6 +29,8 @@ class RenderPass {
   /// Call after a barrier. `params` lack the queue. `form` is one of shared::renderPicture....
   void record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,
               Reconstruction reconstruction, std::uint32_t form);
+  /// Compiles what most views need. Any thread may call it beside the other calls.
+  void compile(Reconstruction reconstruction, std::uint32_t form) const;
 
  private:
   std::vector<std::uint32_t> specialization(const shared::RenderParams& params,

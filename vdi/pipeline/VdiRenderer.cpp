@@ -201,6 +201,10 @@ ImageBytes VdiRenderer::renderBytes(const View& view, std::span<const float> end
   return state_->picture.bytes(view.width(), view.height());
 }
 
+void VdiRenderer::compile(Reconstruction reconstruction) const {
+  state_->pass.compile(reconstruction, shared::renderPictureBytes);
+}
+
 double VdiRenderer::renderMilliseconds() const {
   return state_->milliseconds;
 }

@@ -58,6 +58,9 @@ class VdiRenderer {
                Reconstruction reconstruction = defaultReconstruction);
   ImageBytes renderBytes(const View& view, std::span<const float> ends, Alpha alpha,
                          Reconstruction reconstruction = defaultReconstruction);
+  /// Compiles the device's program for renderBytes with premultiplied colours, unless it is compiled, so that
+  /// the first view with this reconstruction won't wait. Any thread may call it beside the other calls.
+  void compile(Reconstruction reconstruction) const;
   double renderMilliseconds() const;  // device time of the last render
 
   /// For VdiGenerator::show: a sink that shows lists made on the renderer's own device, without a detour

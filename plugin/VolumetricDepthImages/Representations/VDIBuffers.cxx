@@ -23,6 +23,13 @@ constexpr std::array<int, VDIBuffers::thinLevels> thinWidths{160, 320};
 
 }  // namespace
 
+/// Views at rest don't use the program of moving ones, which would be compiled at the first movement.
+void VDIBuffers::Renderers::compileForMovement() {
+  if (compiling.valid()) return;
+  compiling = std::async(std::launch::async,
+                         [renderer = whole.get()] { renderer->compile(vdi::Reconstruction::Smooth); });
+}
+
 VDIBuffers::~VDIBuffers() {
   this->clear();
 }
@@ -108,6 +115,7 @@ void VDIBuffers::takeOne() {
     } else if (hasVdi_) {
       renderers_->whole->showPrepared();
     }
+    if (hasVdi_) renderers_->compileForMovement();
     for (std::size_t level = 0; level < thinLevels; ++level) {
       if (thins_[level].lists > 0) renderers_->thins[level]->showPrepared();
     }

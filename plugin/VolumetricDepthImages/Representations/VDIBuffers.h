@@ -76,6 +76,8 @@ class VDIBuffers {
     std::unique_ptr<vdi::VdiRenderer> whole;
     std::array<std::unique_ptr<vdi::VdiRenderer>, thinLevels> thins;
     bool isOnCpu = false;
+    std::future<void> compiling;  // its destructor waits
+    void compileForMovement();
   };
   struct Loaded {
     bool hasVdi = false;
