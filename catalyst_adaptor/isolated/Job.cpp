@@ -23,7 +23,7 @@ namespace vdi::catalyst {
 namespace {
 
 #ifdef OPEN_MPI
-constexpr const char* usual = "mpirun --quiet --oversubscribe --bind-to none -np {ranks} --host {hosts}";
+constexpr const char* usual = "mpirun --oversubscribe --bind-to none -np {ranks} --host {hosts}";
 #else
 constexpr const char* usual = "mpirun -n {ranks} -hosts {hosts}";
 #endif
@@ -103,6 +103,9 @@ Job::Job(const std::string& program, const std::vector<std::string>& command) {
   for (char** variable = environ; variable != nullptr && *variable != nullptr; ++variable) {
     if (!isOfMpiJob(*variable)) environment.emplace_back(*variable);
   }
+  // What mpirun --quiet sets. Open MPI 5 has no such option.
+  environment.emplace_back("OMPI_MCA_orte_execute_quiet=1");
+  environment.emplace_back("PRTE_MCA_prte_execute_quiet=1");
 
   Spawning how;
   constexpr int life = 3;  // as the program expects it
