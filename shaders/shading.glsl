@@ -8,11 +8,12 @@
 // Whether colours are shaded; without shading its code costs nothing.
 layout(constant_id = 9) const bool shaded = false;
 
-// Zero also if one of the values is not finite.
+// Zero also if one of the values is not finite, and if the difference or its reciprocal is no normal float:
+// devices divide by such numbers as by zero or infinity.
 float differenceOf(float ahead, float behind) {
   float difference = ahead - behind;
-  float least = leastGradient * (abs(ahead) + abs(behind));
-  return abs(difference) > least && abs(difference) <= 3.0e38 ? difference : 0.0;
+  float least = max(leastGradient * (abs(ahead) + abs(behind)), 1.2e-38);
+  return abs(difference) > least && abs(difference) <= 8.0e37 ? difference : 0.0;
 }
 
 // Direction of the scalar's gradient at a place of the ray, by central differences over a voxel on each side;

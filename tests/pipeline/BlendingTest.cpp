@@ -63,8 +63,9 @@ void checkAgainstReference(VdiGenerator& generator, const Case& c) {
     const Image expected = reference::renderVolume(frame, blocks);
     const auto image = generator.renderVolume(camera, function, settings);
     const test::Off off = test::offBetween(*image, expected);
-    // A ray that just touches a surface crosses it or doesn't.
-    CHECK(off.pixels <= (blending.mode == BlendMode::Isosurface ? 0.005 : 0.0));
+    // A ray that just touches a surface crosses it or doesn't. The filters of GPUs have 8 bits.
+    const double touching = test::device()->isCpu() ? 0.005 : 0.015;
+    CHECK(off.pixels <= (blending.mode == BlendMode::Isosurface ? touching : 0.0));
     CHECK(off.mean < 0.3);
     CHECK(test::offBetween(*composite, expected).mean > 5.0);
     std::size_t otherDepths = 0;

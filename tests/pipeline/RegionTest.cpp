@@ -51,7 +51,7 @@ TEST_CASE("region: DVR and lists of the device are the reference's") {
       const Image expected =
           reference::renderVolume(frame, comm::exchangeGhosts(comm::Communicator::serial(), decomposed.mine));
       const auto image = generator.renderVolume(camera, function, settings);
-      CHECK(test::largestDifference(*image, expected) < 0.5F);
+      CHECK(test::largestDifference(*image, expected) < (device->isCpu() ? 0.5F : 1.5F));  // coarse filters
       const auto vdi = generator.generate(camera, function, settings);
       CHECK_NOTHROW(validate(*vdi));
       CHECK(test::largestDifference(flatten(*vdi), expected) < 1.5F);

@@ -154,6 +154,14 @@ void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
   });
 }
 
+/// Of the buffers that commands of the transfer queue copy from. A queue that does nothing but copying needs
+/// more than whole texels.
+std::uint64_t offsetAlignment(const Device& device) {
+  const VulkanDevice& vulkan = device.vulkan();
+  const bool onlyCopies = vulkan.queueFamily(QueueKind::Transfer) != vulkan.queueFamily(QueueKind::Compute);
+  return onlyCopies ? 4 : 1;
+}
+
 /// Whether the block's values equal the texels of the piece's format.
 bool isTexels(const VolumePiece& piece) {
   switch (piece.block->type) {
@@ -200,7 +208,7 @@ bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& pa
   const auto* data = static_cast<const std::byte*>(block.data);
   if (block.type == ScalarType::F32 && anyInfinite(block, part)) return false;
   std::optional<ImportedBuffer> source = importHostMemory(device_, data + first, end - first);
-  if (!source || source->offset % bytes != 0) return false;
+  if (!source || source->offset % std::max(bytes, offsetAlignment(*device_)) != 0) return false;
   filling().commands.copyToImage(
       source->buffer, source->offset, page, piece.place + glm::uvec3(part.lo - piece.first),
       glm::uvec3(part.size()),
