@@ -2,6 +2,7 @@
 
 #include <vtkDataObject.h>
 #include <vtkFieldData.h>
+#include <vtkInformation.h>
 #include <vtkInformationVector.h>
 #include <vtkMultiProcessController.h>
 #include <vtkObjectFactory.h>
@@ -164,6 +165,11 @@ int vtkVDIFileSeriesReader::RequestData(vtkInformation* request, vtkInformationV
                                         vtkInformationVector* outputs) {
   const int result = this->Superclass::RequestData(request, inputs, outputs);
   if (vtkDataObject* output = vtkDataObject::GetData(outputs)) {
+    // Files without times of their own have their indices' times. VTK 9.6 keeps data whose time is the
+    // requested one.
+    if (this->IgnoreReaderTime != 0)
+      output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(),
+                                    static_cast<double>(this->GetFileIndex()));
     auto* coloring = vtkStringArray::SafeDownCast(output->GetFieldData()->GetAbstractArray("VDI.coloring"));
     this->Coloring = coloring != nullptr ? coloring->GetValue(0) : std::string();
   }
