@@ -112,19 +112,21 @@ void Relay::pass(stream::Received received) {
   finish(id);
 }
 
-/// Adds a level to its frame, which it may begin.
+/// Adds a level to its frame, which it may begin. The other server leaves out levels that are too coarse for
+/// its line to here, so the first one that comes is this server's level 0.
 void Relay::add(stream::Received received) {
   const stream::Level& level = received.level;
   auto frame = std::make_shared<stream::Frame>();
-  if (level.level == 0) {
+  if (!current_ || current_->id != level.frame || level.level <= firstLevel_) {
+    firstLevel_ = level.level;
     frame->id = level.frame;
     frame->step = level.step;
     frame->time = level.time.value_or(std::numeric_limits<double>::quiet_NaN());
     constexpr double longestAge = 1e9;  // s
     const std::chrono::duration<double> age(std::clamp(level.age, 0.0, longestAge));
     frame->made = stream::Clock::now() - std::chrono::duration_cast<stream::Clock::duration>(age);
-    frame->levelCount = level.levels;
-  } else if (current_ && current_->id == level.frame && current_->levels.size() == level.level) {
+    frame->levelCount = level.levels - level.level;
+  } else if (current_->levels.size() == level.level - firstLevel_) {
     *frame = *current_;
   } else {
     current_.reset();

@@ -43,6 +43,7 @@ class Relay {
   std::size_t seriesPassed_ = 0;
   std::optional<stream::Phase> phase_;
   std::shared_ptr<const stream::Frame> current_;  // the frame that is arriving
+  std::uint32_t firstLevel_ = 0;                  // of current_, as the other server counts
   std::list<stream::FramePtr> whole_;             // the latest whole frames
   std::optional<std::uint32_t> newest_;
   std::optional<std::uint32_t> asked_;  // the wanted frame of the series

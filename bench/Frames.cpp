@@ -57,7 +57,7 @@ void addStageLines(std::string& text, const char* of, const std::array<StageTime
 
 void FrameLog::add(double wallMs, const std::vector<RankReport>& reports) {
   if (reports.empty()) return;
-  Frame frame;
+  FrameTimes frame;
   frame.wallMs = wallMs;
   for (std::size_t i = 0; i < frameStages; ++i) {
     frame.stages[i].wall = over(reports, sources[i].wall);
@@ -84,14 +84,14 @@ FrameFigures FrameLog::figures(std::size_t repeats) const {
     return spreadOf(std::move(values));
   };
   figures.ranks = ranks_;
-  figures.wall = middle([](const Frame& frame) { return frame.wallMs; });
+  figures.wall = middle([](const FrameTimes& frame) { return frame.wallMs; });
   for (std::size_t i = 0; i < frameStages; ++i) {
     StageTimes& stage = figures.stages[i];
-    stage.wall = {middle([i](const Frame& frame) { return frame.stages[i].wall.slowest; }).median,
-                  middle([i](const Frame& frame) { return frame.stages[i].wall.mean; }).median};
+    stage.wall = {middle([i](const FrameTimes& frame) { return frame.stages[i].wall.slowest; }).median,
+                  middle([i](const FrameTimes& frame) { return frame.stages[i].wall.mean; }).median};
     if (!frames_.back().stages[i].device) continue;
-    stage.device = {middle([i](const Frame& frame) { return frame.stages[i].device->slowest; }).median,
-                    middle([i](const Frame& frame) { return frame.stages[i].device->mean; }).median};
+    stage.device = {middle([i](const FrameTimes& frame) { return frame.stages[i].device->slowest; }).median,
+                    middle([i](const FrameTimes& frame) { return frame.stages[i].device->mean; }).median};
   }
   figures.subSupersegments = subSupersegments_;
   figures.bytesSent = bytesSent_;

@@ -71,11 +71,11 @@ class FrameLog {
   FrameFigures figures(std::size_t repeats) const;
 
  private:
-  struct Frame {
+  struct FrameTimes {
     double wallMs = 0.0;
     std::array<StageTimes, frameStages> stages;
   };
-  std::vector<Frame> frames_;
+  std::vector<FrameTimes> frames_;
   int ranks_ = 1;
   std::uint64_t subSupersegments_ = 0;
   std::uint64_t bytesSent_ = 0;

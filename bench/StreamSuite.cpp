@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -80,30 +81,31 @@ class Log {
     begun_[frame] = Clock::now();
   }
   /// `busy` is the viewer's time in seconds.
-  void seen(std::uint32_t frame, bool isFull, double busy) {
+  void seen(const stream::Level& level, double busy) {
     const Clock::time_point now = Clock::now();
+    const auto frame = static_cast<std::uint32_t>(level.step);
     const std::scoped_lock lock(mutex_);
-    if (frame == last_.first) {
-      last_.second = last_.second || isFull;
-    } else {
-      last_ = {frame, isFull};
+    if (frame != last_) {
+      last_ = frame;
       arrivals_.push_back(now);
       ages_.push_back(Seconds(now - begun_[frame]).count());
+      firstLevels_.push_back(level.level);
     }
-    if (isFull) ++full_;
+    if (level.level + 1 == level.levels) ++full_;
     busy_.push_back(busy);
   }
   bool hasSeen(std::uint32_t frame) const {
     const std::scoped_lock lock(mutex_);
-    return !arrivals_.empty() && last_.first >= frame;
+    return last_ && *last_ >= frame;
   }
 
   struct Figures {
     double framesPerSecond = 0.0;
     double fullPerSecond = 0.0;
     std::size_t frames = 0;
-    Spread age;   // seconds from a frame's beginning to its first picture
-    Spread busy;  // seconds of the viewer for a level
+    std::size_t firstLevel = 0;  // with which most frames began
+    Spread age;                  // seconds from a frame's beginning to its first picture
+    Spread busy;                 // seconds of the viewer for a level
   };
   Figures figures() const {
     const std::scoped_lock lock(mutex_);
@@ -114,6 +116,10 @@ class Log {
     figures.framesPerSecond = static_cast<double>(arrivals_.size() - 1) / seconds;
     figures.fullPerSecond = static_cast<double>(full_) / seconds;
     figures.age = spreadOf(ages_);
+    std::map<std::uint32_t, std::size_t> counts;
+    for (const std::uint32_t level : firstLevels_) ++counts[level];
+    const auto isRarer = [](const auto& one, const auto& other) { return one.second < other.second; };
+    figures.firstLevel = std::max_element(counts.begin(), counts.end(), isRarer)->first;
     figures.busy = spreadOf(busy_);
     return figures;
   }
@@ -121,8 +127,9 @@ class Log {
  private:
   mutable std::mutex mutex_;
   std::map<std::uint32_t, Clock::time_point> begun_;
-  std::pair<std::uint32_t, bool> last_{~std::uint32_t{0}, false};
+  std::optional<std::uint32_t> last_;
   std::vector<Clock::time_point> arrivals_;  // times of frames' first levels
+  std::vector<std::uint32_t> firstLevels_;
   std::vector<double> ages_;
   std::vector<double> busy_;
   std::size_t full_ = 0;
@@ -168,8 +175,7 @@ class Viewer {
       renderer_.setVdi(vdi);
       (void)renderer_.renderBytes(apps::turned(vdi.camera, degrees_, 0.0), size_.x, size_.y,
                                   Alpha::Premultiplied, reconstruction_);
-      log_.seen(static_cast<std::uint32_t>(received->level.step),
-                received->level.level + 1 == received->level.levels, Seconds(Clock::now() - start).count());
+      log_.seen(received->level, Seconds(Clock::now() - start).count());
     }
   }
 
@@ -233,11 +239,11 @@ class StreamSuite {
 
   std::vector<json> rows() {
     if (root()) {
-      fmt::print(
-          table_,
-          "{:<16} {:<7} {:>3} {:<8} {:>9} {:>10} {:>9} {:>9} {:>10} {:>10} {:>8} {:>8} {:>8} {:>9} {:>6}\n",
-          "data set", "way", "N_S", "rate", "full MiB", "coarse MiB", "SSIM full", "SSIM crse", "frames/s",
-          "full/s", "age ms", "oldest", "view ms", "encode ms", "crowd");
+      fmt::print(table_,
+                 "{:<16} {:<7} {:>3} {:<8} {:>9} {:>6} {:>9} {:>9} {:>10} {:>10} {:>10} {:>8} {:>8} {:>8} "
+                 "{:>9} {:>6}\n",
+                 "data set", "way", "N_S", "rate", "full MiB", "one in", "first MiB", "SSIM full",
+                 "SSIM first", "frames/s", "full/s", "age ms", "oldest", "view ms", "encode ms", "crowd");
     }
     for (const DataSet& set : dataSets(options_)) {
       setBlocks(set);
@@ -251,6 +257,7 @@ class StreamSuite {
  private:
   /// A viewer's figures for one level.
   struct LevelFigures {
+    int factor = 1;  // one list in so many of each row and column
     double mebibytes = 0.0;
     double ssim = 0.0;
   };
@@ -258,10 +265,9 @@ class StreamSuite {
     std::string dataset;
     std::string way;
     std::string rate;
-    LevelFigures full;
-    LevelFigures coarse;
-    double encodeMs = 0.0;  // all levels
-    double stepMs = 0.0;    // a VDI made and published, without viewers
+    std::vector<LevelFigures> levels;  // the coarsest first
+    double encodeMs = 0.0;             // all levels
+    double stepMs = 0.0;               // a VDI made and published, without viewers
     double crowdStepMs = 0.0;
   };
 
@@ -293,9 +299,10 @@ class StreamSuite {
         if (!root()) return;
         files.push_back(io::encode(*vdi));
         if (i > 0) return;
-        sent.full = figuresOf(*vdi, files.back().size(), *truth, settings);
-        const Vdi coarse = thinned(*vdi, stream::coarseFactor);
-        sent.coarse = figuresOf(coarse, io::encode(coarse).size(), *truth, settings);
+        const std::uint64_t expanded = io::decodeInfo(files.back()).expandedBytes;
+        for (const int factor : stream::coarseFactorsOf(expanded))
+          sent.levels.push_back(figuresOf(thinned(*vdi, factor), factor, *truth, settings));
+        sent.levels.push_back(figuresOf(*vdi, 1, *truth, settings));
         sent.encodeMs = repeated(options_.repeats, [&vdi] {
                           return wallMs([&vdi] {
                             stream::encodeFrame(*vdi, 0, Clock::now(), [](const auto&) { return true; });
@@ -315,14 +322,13 @@ class StreamSuite {
     }
   }
 
-  LevelFigures figuresOf(const Vdi& vdi, std::size_t bytes, const Image& truth,
-                         const GenerateSettings& settings) {
+  LevelFigures figuresOf(const Vdi& vdi, int factor, const Image& truth, const GenerateSettings& settings) {
     VdiRenderer renderer(device_);
     renderer.setVdi(vdi);
     const io::Picture seen =
         io::toPicture(renderer.renderBytes(apps::turned(cameras_.front(), options_.turn, 0.0), settings.width,
                                            settings.height, Alpha::Premultiplied, reconstruction_));
-    return {static_cast<double>(bytes) / (1 << 20),
+    return {factor, static_cast<double>(io::encode(vdi).size()) / (1 << 20),
             compare(seen.rgb, io::toPicture(truth).rgb, seen.width, seen.height, 3).ssim};
   }
 
@@ -446,14 +452,23 @@ class StreamSuite {
 
   static std::string name(int frame) { return fmt::format("{:06}.vdi", frame); }
 
+  static json levelsOf(const Sent& sent) {
+    json levels = json::array();
+    for (const LevelFigures& level : sent.levels)
+      levels.push_back({{"one_list_in", level.factor}, {"mib", level.mebibytes}, {"ssim", level.ssim}});
+    return levels;
+  }
+
   void addRow(const Sent& sent, const GenerateSettings& settings, const Log::Figures& figures) {
     const double milliseconds = 1000.0;
+    const LevelFigures& full = sent.levels.back();
+    const LevelFigures& first = sent.levels[figures.firstLevel];
     fmt::print(table_,
-               "{:<16} {:<7} {:>3} {:<8} {:>9.2f} {:>10.2f} {:>9.4f} {:>9.4f} {:>10.1f} {:>10.1f} {:>8.0f} "
-               "{:>8.0f} {:>8.1f} {:>9.1f} {:>6.3f}\n",
-               sent.dataset, sent.way, settings.supersegments, sent.rate, sent.full.mebibytes,
-               sent.coarse.mebibytes, sent.full.ssim, sent.coarse.ssim, figures.framesPerSecond,
-               figures.fullPerSecond, figures.age.median * milliseconds, figures.age.maximum * milliseconds,
+               "{:<16} {:<7} {:>3} {:<8} {:>9.2f} {:>6} {:>9.2f} {:>9.4f} {:>10.4f} {:>10.1f} {:>10.1f} "
+               "{:>8.0f} {:>8.0f} {:>8.1f} {:>9.1f} {:>6.3f}\n",
+               sent.dataset, sent.way, settings.supersegments, sent.rate, full.mebibytes, first.factor,
+               first.mebibytes, full.ssim, first.ssim, figures.framesPerSecond, figures.fullPerSecond,
+               figures.age.median * milliseconds, figures.age.maximum * milliseconds,
                figures.busy.median * milliseconds, sent.encodeMs, sent.crowdStepMs / sent.stepMs);
     std::fflush(table_);
     json row{{"dataset", sent.dataset},
@@ -467,13 +482,13 @@ class StreamSuite {
              {"age_ms", figures.age.median * milliseconds},
              {"oldest_ms", figures.age.maximum * milliseconds},
              {"view_ms", figures.busy.median * milliseconds},
-             {"full_mib", sent.full.mebibytes},
-             {"coarse_mib", sent.coarse.mebibytes},
+             {"levels", levelsOf(sent)},
+             {"first_level", figures.firstLevel},
              {"encode_ms", sent.encodeMs},
              {"step_ms", sent.stepMs},
              {"crowd_step_ratio", sent.crowdStepMs / sent.stepMs},
-             {"ssim_full", sent.full.ssim},
-             {"ssim_coarse", sent.coarse.ssim},
+             {"ssim_full", full.ssim},
+             {"ssim_first", first.ssim},
              {"turn", options_.turn},
              {"truth_rate", options_.truthRate},
              {"reconstruction", toString(reconstruction_)}};

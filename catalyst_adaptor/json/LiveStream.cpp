@@ -68,7 +68,7 @@ std::uint64_t LiveStream::dropped() const {
   return service_->publisher.dropped();
 }
 
-std::optional<stream::Request> LiveStream::takeRequest(std::chrono::milliseconds patience) {
+std::optional<stream::SteeringRequest> LiveStream::takeRequest(std::chrono::milliseconds patience) {
   return service_->wishes.take(patience);
 }
 

@@ -29,7 +29,7 @@ class LiveStream {
 
   /// The viewers' request since the last call. Waits for it no longer than `patience`. Nullopt if there is
   /// none, or the run lets nobody steer.
-  std::optional<stream::Request> takeRequest(std::chrono::milliseconds patience);
+  std::optional<stream::SteeringRequest> takeRequest(std::chrono::milliseconds patience);
   /// Tells viewers what they may ask for, and the values in force.
   void setControls(stream::Controls controls);
 

@@ -78,7 +78,7 @@ std::vector<const config::FilePattern*> patternsOf(const config::Run& run) {
 }  // namespace
 
 /// The data that the cameras of a step share.
-struct RunEngine::Frame {
+struct RunEngine::LoadedFrame {
   std::int64_t step = 0;
   double time = 0.0;
   double unitDistance = 1.0;
@@ -129,7 +129,7 @@ struct RunEngine::State {
   std::unique_ptr<io::CinemaIndex> cinema;  // the root's
   std::optional<RunSteering> steering;
   std::optional<ScalarRange> firstRange;  // the colours' range, unless the run has one
-  std::optional<Frame> frame;             // the frame whose values the device has
+  std::optional<LoadedFrame> frame;       // the frame whose values the device has
   bool isAskedFor = false;                // a viewer waits for a view, which the next step shows
   bool hasToldOfBudget = false;
   std::optional<double> clock;  // the schedule's time in seconds, given for the next step
@@ -399,7 +399,7 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   if (!state.firstRange && range.min < range.max) state.firstRange = range;
   const double voxelVolume = largest[0] > 0.0 ? 1.0 / largest[0] : 0.0;
   const int components = static_cast<int>(largest[1]);
-  Frame frame;
+  LoadedFrame frame;
   frame.step = step;
   frame.time = time;
   frame.range = state.firstRange.value_or(range);
@@ -416,7 +416,7 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
 void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record) {
   State& state = *state_;
   VdiGenerator& generator = *state.generator;
-  const Frame& frame = *state.frame;
+  const LoadedFrame& frame = *state.frame;
   const bool isRoot = state.isRoot();
   Camera from;
   TransferFunction function;

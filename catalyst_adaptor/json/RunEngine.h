@@ -47,7 +47,7 @@ class RunEngine {
 
  private:
   struct State;
-  struct Frame;
+  struct LoadedFrame;
   using Clock = std::chrono::steady_clock;
   void start();
   bool isDue(std::int64_t step, double time);

@@ -83,7 +83,7 @@ void RunSteering::apply(const stream::Wish& wish, const Steered& steered) {
 }
 
 /// Reports a request. Called on the first rank.
-void RunSteering::tell(const stream::Request& request, const std::string& log, std::int64_t step,
+void RunSteering::tell(const stream::SteeringRequest& request, const std::string& log, std::int64_t step,
                        double time) {
   fmt::print(stderr, "vdi_catalyst: step {}: {} (viewer {})\n", step, stream::summaryOf(request.wish),
              request.viewer);
@@ -105,7 +105,7 @@ bool RunSteering::take(const Steered& steered, std::int64_t step, double time) {
   comm_.together([&] {
     if (stream_ != nullptr) stream_->setControls(controlsOf(steered));
   });
-  std::optional<stream::Request> request;
+  std::optional<stream::SteeringRequest> request;
   while (true) {
     const std::chrono::milliseconds patience = isPaused_ ? waitingPause : std::chrono::milliseconds(0);
     if (stream_ != nullptr) {

@@ -41,7 +41,7 @@ class RunSteering {
  private:
   stream::Controls controlsOf(const Steered& steered) const;
   void apply(const stream::Wish& wish, const Steered& steered);
-  void tell(const stream::Request& request, const std::string& log, std::int64_t step, double time);
+  void tell(const stream::SteeringRequest& request, const std::string& log, std::int64_t step, double time);
 
   const comm::Communicator& comm_;
   LiveStream* stream_;

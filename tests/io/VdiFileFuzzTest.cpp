@@ -40,7 +40,8 @@ Outcome outcomeOf(std::span<const std::byte> bytes) {
   // A copy of exactly this size lets a sanitizer notice every byte read beyond it.
   const std::vector<std::byte> copy(bytes.begin(), bytes.end());
   const Outcome outcome = outcomeOfCall([&copy] { return io::decode(copy); });
-  return outcomeOfCall([&copy] { return io::decodeThinned(copy, 3); }) == outcome ? outcome : Outcome::Other;
+  const Outcome ofThinned = outcomeOfCall([&copy] { return io::decodeThinned(copy, {5, 3}).back(); });
+  return ofThinned == outcome ? outcome : Outcome::Other;
 }
 
 void put64(std::vector<std::byte>& bytes, std::size_t offset, std::uint64_t value) {

@@ -59,8 +59,8 @@ void checkAgainstReference(VdiGenerator& generator, const Case& c) {
   for (const Blending& blending : modes(top)) {
     INFO(toString(blending.mode) << ", " << toString(c.type));
     settings.blending = blending;
-    const reference::Frame frame(generator.scene(), camera, function, settings);
-    const Image expected = reference::renderVolume(frame, blocks);
+    const reference::RayInputs inputs(generator.scene(), camera, function, settings);
+    const Image expected = reference::renderVolume(inputs, blocks);
     const auto image = generator.renderVolume(camera, function, settings);
     const test::Off off = test::offBetween(*image, expected);
     // A ray that just touches a surface crosses it or doesn't. The filters of GPUs have 8 bits.
@@ -128,9 +128,9 @@ TEST_CASE("blending: extremes and isosurfaces in double precision") {
                                                         settings.height, 64, blending);
         REQUIRE(test::mostOpaque(expected) > 0.25F);
         INFO(toString(blending.mode) << ", " << toString(stretch.type));
-        const reference::Frame frame(generator.scene(), camera, function, settings);
+        const reference::RayInputs inputs(generator.scene(), camera, function, settings);
         for (const Image& seen :
-             {*generator.renderVolume(camera, function, settings), reference::renderVolume(frame, blocks)}) {
+             {*generator.renderVolume(camera, function, settings), reference::renderVolume(inputs, blocks)}) {
           const test::Off off = test::offBetween(seen, expected);
           // Surfaces have edges, and a pixel at an edge is all wrong or right.
           const bool edges = blending.mode == BlendMode::Isosurface;

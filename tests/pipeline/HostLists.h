@@ -73,7 +73,7 @@ ListsOf<Segment> download(const std::shared_ptr<gpu::Device>& device, const deta
 template <typename Segment>
 ListsOf<Segment> composite(const std::shared_ptr<gpu::Device>& device, detail::Compositor& compositor,
                            const std::vector<ListsOf<Segment>>& subLists,
-                           const detail::Compositor::Request& request) {
+                           const detail::Compositor::Options& request) {
   const HostSubLists parts(device, subLists);
   detail::DeviceLists merged;
   compositor.interleave(parts.parts(), request.code, merged);

@@ -37,17 +37,17 @@ TEST_CASE("merging and compositing on the device equal the reference") {
   GenerateSettings settings = test::smallSettings(40, 30, 6);
   settings.algorithm = algorithm;
   const Scene scene = localScene(decomposed.all);
-  const reference::Frame frame(scene, test::oblique(), function, settings);
+  const reference::RayInputs inputs(scene, test::oblique(), function, settings);
   std::vector<SupersegmentLists> subLists;
   for (std::size_t rank = 0; rank < 3; ++rank) {
     std::vector<Block> mine;
     for (std::size_t i = rank; i < decomposed.all.size(); i += 3) mine.push_back(decomposed.all[i]);
-    subLists.push_back(reference::generate(frame, mine, true));
+    subLists.push_back(reference::generate(inputs, mine, true));
   }
-  const SupersegmentLists expected = reference::composite(subLists, settings, frame.lattice.step);
+  const SupersegmentLists expected = reference::composite(subLists, settings, inputs.lattice.step);
   detail::Compositor compositor(device());
   const SupersegmentLists result =
-      test::composite(device(), compositor, subLists, {6, 6, frame.lattice.step, algorithm, {}});
+      test::composite(device(), compositor, subLists, {6, 6, inputs.lattice.step, algorithm, {}});
   CHECK(listsThatDiffer(result, expected) <= expected.listCount() / 50);
   // Device and host flatten interleaved lists to the picture of the composited ones.
   detail::DeviceLists merged;
@@ -75,16 +75,16 @@ TEST_CASE("merging and compositing on the device equal the reference") {
     CHECK((depth == front || std::abs(depth - front) < 1e-5F));
   }
   // Codes in, codes out, compared with the reference for the codes' values.
-  const DepthCode code = depthCodeFor(frame.lattice);
+  const DepthCode code = depthCodeFor(inputs.lattice);
   std::vector<CompactLists> subCodes;
   std::vector<SupersegmentLists> subValues;
   for (const SupersegmentLists& sub : subLists) {
     subCodes.push_back(reference::compacted(sub, code));
     subValues.push_back(expanded(subCodes.back(), code));
   }
-  const SupersegmentLists ofCodes = reference::composite(subValues, settings, frame.lattice.step);
+  const SupersegmentLists ofCodes = reference::composite(subValues, settings, inputs.lattice.step);
   const CompactLists codes =
-      test::composite(device(), compositor, subCodes, {6, 6, frame.lattice.step, algorithm, code});
+      test::composite(device(), compositor, subCodes, {6, 6, inputs.lattice.step, algorithm, code});
   CHECK(listsThatDiffer(expanded(codes, code), expanded(reference::compacted(ofCodes, code), code),
                         oneCode) <= expected.listCount() / 25);
   CHECK(device()->validationMessages() == "");
@@ -103,12 +103,12 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
   settings.samplesPerVoxel = supersegments == 200 ? 8.0 : 1.0;
   settings.precision = Precision::Full;
   const Scene scene = localScene(decomposed.all);
-  const reference::Frame frame(scene, test::oblique(), function, settings);
+  const reference::RayInputs inputs(scene, test::oblique(), function, settings);
   constexpr std::size_t ranks = 3;
   std::vector<std::vector<Block>> blocksOf(ranks);
   const std::vector<Block> all = withLayers(decomposed.all);
   for (std::size_t i = 0; i < all.size(); ++i) blocksOf[i * 7 % ranks].push_back(all[i]);
-  const std::vector<SupersegmentLists> expected = reference::generateTogether(frame, blocksOf);
+  const std::vector<SupersegmentLists> expected = reference::generateTogether(inputs, blocksOf);
 
   // Each rank's ray caster, and the sum as ranks would compute it.
   const bool asGpu = GENERATE(false, true);
@@ -117,8 +117,8 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
   std::vector<std::unique_ptr<detail::RayCaster>> casters;
   std::vector<detail::RayCaster::Cast> casts;
   std::vector<std::uint8_t> sum;
-  const detail::RayCaster::Request request{scene,    frame.view, frame.lattice, frame.table,
-                                           settings, true,       false,         {}};
+  const detail::RayCaster::Inputs request{scene,    inputs.view, inputs.lattice, inputs.table,
+                                          settings, true,        false,          {}};
   for (std::size_t r = 0; r < ranks; ++r) {
     casters.push_back(std::make_unique<detail::RayCaster>(own, 0));
     casters.back()->volume().setBlocks(blocksOf[r], scene);
@@ -171,10 +171,11 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   settings.fill = fill;
   const auto vdi = generator.generate(test::oblique(), function, settings);
   CHECK_NOTHROW(validate(*vdi));
-  const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
-  const SupersegmentLists expected = reference::generate(frame, withLayers(decomposed.mine), false);
+  const reference::RayInputs inputs(generator.scene(), test::oblique(), function, settings);
+  const SupersegmentLists expected = reference::generate(inputs, withLayers(decomposed.mine), false);
   CHECK(listsThatDiffer(vdi->expandedLists(), expected) <= expected.listCount() / 50);
-  CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, withLayers(decomposed.mine))) < 1.0F);
+  CHECK(largestDifference(flatten(*vdi), reference::renderVolume(inputs, withLayers(decomposed.mine))) <
+        1.0F);
   const double share =
       static_cast<double>(vdi->supersegmentCount()) / static_cast<double>(equal->supersegmentCount());
   CHECK(share == Approx(fill).epsilon(0.05));
@@ -186,19 +187,19 @@ TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists"
   // Composites three ranks' lists.
   settings.budget = Budget::List;
   settings.fill = 1.0;
-  const reference::Frame equalFrame(generator.scene(), test::oblique(), function, settings);
+  const reference::RayInputs equalInputs(generator.scene(), test::oblique(), function, settings);
   std::vector<SupersegmentLists> subLists;
   for (std::size_t rank = 0; rank < 3; ++rank) {
     std::vector<Block> mine;
     for (std::size_t i = rank; i < decomposed.all.size(); i += 3) mine.push_back(decomposed.all[i]);
-    subLists.push_back(reference::generate(equalFrame, mine, true));
+    subLists.push_back(reference::generate(equalInputs, mine, true));
   }
   settings.budget = Budget::Total;
   settings.fill = fill;
-  const SupersegmentLists composited = reference::composite(subLists, settings, frame.lattice.step);
+  const SupersegmentLists composited = reference::composite(subLists, settings, inputs.lattice.step);
   detail::Compositor compositor(device());
-  detail::Compositor::Request request{
-      5, maxPerList(5, Budget::Total), frame.lattice.step, Algorithm::Merge, {}};
+  detail::Compositor::Options request{
+      5, maxPerList(5, Budget::Total), inputs.lattice.step, Algorithm::Merge, {}};
   detail::DeviceLists merged;
   const test::HostSubLists parts(device(), subLists);
   compositor.interleave(parts.parts(), {}, merged);

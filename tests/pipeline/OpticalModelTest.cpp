@@ -40,8 +40,8 @@ void checkAll(const test::Stretch& stretch, Joint joint, bool parallel, bool som
       checkPicture(flatten(*generator.generate(camera, named.function, settings)), expected, named,
                    {bound.largest + 0.5, bound.mean + 0.1, bound.pixels});
       if (rate == 1.0 || !someOnly) {
-        const reference::Frame frame(generator.scene(), camera, named.function, settings);
-        checkPicture(reference::renderVolume(frame, blocks), expected, named, bound);
+        const reference::RayInputs inputs(generator.scene(), camera, named.function, settings);
+        checkPicture(reference::renderVolume(inputs, blocks), expected, named, bound);
       }
     }
   }

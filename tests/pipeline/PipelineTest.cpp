@@ -48,10 +48,10 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
       ScalarRange range;
       for (const Block& block : decomposed.mine) range.include(finiteRange(block));
       CHECK(generator.scalarRange() == range);
-      const reference::Frame frame(generator.scene(), camera, function, settings);
+      const reference::RayInputs inputs(generator.scene(), camera, function, settings);
 
       const auto image = generator.renderVolume(camera, function, settings);
-      const Image expected = reference::renderVolume(frame, withLayers(decomposed.mine));
+      const Image expected = reference::renderVolume(inputs, withLayers(decomposed.mine));
       CHECK(largestDifference(*image, expected) < 0.5F);
       CHECK(depthsThatDiffer(*image, expected, 1e-3F) <= image->depth.size() / 100);
 
@@ -60,8 +60,8 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
         INFO(toString(algorithm));
         GenerateSettings own = settings;
         own.algorithm = algorithm;
-        const reference::Frame ownFrame(generator.scene(), camera, function, own);
-        const SupersegmentLists lists = reference::generate(ownFrame, withLayers(decomposed.mine), false);
+        const reference::RayInputs ownInputs(generator.scene(), camera, function, own);
+        const SupersegmentLists lists = reference::generate(ownInputs, withLayers(decomposed.mine), false);
         CHECK(lists.segments.size() > lists.listCount());
         own.precision = Precision::Full;
         const auto full = generator.generate(camera, function, own);
@@ -120,8 +120,8 @@ TEST_CASE("a margin: the reference's lists around the picture, and no cut edge w
     CHECK(vdi.margin == marginOf(generator.scene(), camera, settings));
     CHECK(vdi.margin.x > 16);
     CHECK(vdi.pictureSize() == glm::ivec2(32, 24));
-    const reference::Frame frame(generator.scene(), camera, function, settings);
-    const SupersegmentLists lists = reference::generate(frame, withLayers(decomposed.mine), false);
+    const reference::RayInputs inputs(generator.scene(), camera, function, settings);
+    const SupersegmentLists lists = reference::generate(inputs, withLayers(decomposed.mine), false);
     CHECK(listsThatDiffer(vdi.expandedLists(), lists) <= lists.listCount() / byFilter<std::size_t>(50, 20));
     // The picture does not depend on the margin.
     const Image picture = *generator.renderVolume(camera, function, settings);
@@ -159,16 +159,16 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
     // The smaller the budget, the more samples count as one.
     settings.supersegments = top == 80.0 ? 6 : top == 30.0 ? 1 : 3;
     const TransferFunction function = test::threeHues(top);
-    const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
-    const Image expected = reference::renderVolume(frame, withLayers(decomposed.mine));
+    const reference::RayInputs inputs(generator.scene(), test::oblique(), function, settings);
+    const Image expected = reference::renderVolume(inputs, withLayers(decomposed.mine));
     CHECK(largestDifference(*generator.renderVolume(test::oblique(), function, settings), expected) <
           byFilter(0.5F, 2.0F));
     for (const Algorithm algorithm : algorithms) {
       INFO(toString(algorithm));
       GenerateSettings own = settings;
       own.algorithm = algorithm;
-      const reference::Frame ownFrame(generator.scene(), test::oblique(), function, own);
-      const SupersegmentLists lists = reference::generate(ownFrame, withLayers(decomposed.mine), false);
+      const reference::RayInputs ownInputs(generator.scene(), test::oblique(), function, own);
+      const SupersegmentLists lists = reference::generate(ownInputs, withLayers(decomposed.mine), false);
       const auto vdi = generator.generate(test::oblique(), function, own);
       CHECK(listsThatDiffer(vdi->expandedLists(), lists) <= lists.listCount() / 50);
     }
@@ -189,13 +189,13 @@ TEST_CASE("rays go on behind material of opacity 1, unless they must end") {
     INFO(termination);
     settings.terminationOpacity = termination;
     const auto vdi = generator.generate(test::oblique(), function, settings);
-    const reference::Frame frame(generator.scene(), test::oblique(), function, settings);
-    const SupersegmentLists expected = reference::generate(frame, withLayers(decomposed.mine), false);
+    const reference::RayInputs inputs(generator.scene(), test::oblique(), function, settings);
+    const SupersegmentLists expected = reference::generate(inputs, withLayers(decomposed.mine), false);
     CHECK(listsThatDiffer(vdi->expandedLists(), expected) <=
           expected.listCount() / byFilter<std::size_t>(50, 4));
     // A device reads values at the scene's faces up to 2/256 of a voxel inside (VolumeStore.cpp); opaque
     // material there shows the colour of exactly that place.
-    CHECK(largestDifference(flatten(*vdi), reference::renderVolume(frame, withLayers(decomposed.mine))) <
+    CHECK(largestDifference(flatten(*vdi), reference::renderVolume(inputs, withLayers(decomposed.mine))) <
           byFilter(2.0F, 4.0F));
     counts.push_back(vdi->supersegmentCount());
   }

@@ -47,9 +47,9 @@ TEST_CASE("region: DVR and lists of the device are the reference's") {
       settings.samplesPerVoxel = parallel ? 0.4 : 1.0;
       const Camera camera = test::oblique(parallel);
       generator.setBlocks(decomposed.mine);
-      const reference::Frame frame(generator.scene(), camera, function, settings);
-      const Image expected =
-          reference::renderVolume(frame, comm::exchangeGhosts(comm::Communicator::serial(), decomposed.mine));
+      const reference::RayInputs inputs(generator.scene(), camera, function, settings);
+      const Image expected = reference::renderVolume(
+          inputs, comm::exchangeGhosts(comm::Communicator::serial(), decomposed.mine));
       const auto image = generator.renderVolume(camera, function, settings);
       CHECK(test::largestDifference(*image, expected) < (device->isCpu() ? 0.5F : 1.5F));  // coarse filters
       const auto vdi = generator.generate(camera, function, settings);

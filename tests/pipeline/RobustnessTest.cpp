@@ -105,8 +105,8 @@ TEST_CASE("NaN is transparent, infinite scalars are beyond the transfer function
         const Camera camera =
             Camera::framing({glm::dvec3(0.0), glm::dvec3(1.0)}, {0.0, 0.0, side}, {0.0, 1.0, 0.0});
         const Image seen = *generator.renderVolume(camera, function, own);
-        const reference::Frame frame(generator.scene(), camera, function, own);
-        const Image expected = reference::renderVolume(frame, {&half, 1});
+        const reference::RayInputs inputs(generator.scene(), camera, function, own);
+        const Image expected = reference::renderVolume(inputs, {&half, 1});
         float worst = 0.0F;
         for (std::size_t i = 0; i < seen.rgba.size(); ++i) {
           const glm::vec4 apart = glm::abs(seen.rgba[i] - expected.rgba[i]);

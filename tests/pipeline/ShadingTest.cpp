@@ -68,9 +68,9 @@ TEST_CASE("shading: DVR and lists of the device are the reference's") {
       settings.shading = c.shading;
       const Camera camera = test::oblique(c.parallel);
       generator.setBlocks(decomposed.mine);
-      const reference::Frame frame(generator.scene(), camera, function, settings);
+      const reference::RayInputs inputs(generator.scene(), camera, function, settings);
       const auto blocks = comm::exchangeGhosts(comm::Communicator::serial(), decomposed.mine);
-      const Image expected = reference::renderVolume(frame, blocks);
+      const Image expected = reference::renderVolume(inputs, blocks);
       const auto image = generator.renderVolume(camera, function, settings);
       CHECK(test::largestDifference(*image, expected) < 1.5F);
       const auto vdi = generator.generate(camera, function, settings);

@@ -136,12 +136,12 @@ TEST_CASE("reference: sheared views of a surface a voxel wide are truer than smo
   vdi.camera = camera;
   vdi.width = settings.width;
   vdi.height = settings.height;
-  vdi.lists = reference::generate(reference::Frame(scene, camera, function, settings), blocks, false);
+  vdi.lists = reference::generate(reference::RayInputs(scene, camera, function, settings), blocks, false);
   GenerateSettings fine = settings;
   fine.samplesPerVoxel = 8.0;
   for (const double angle : {10.0, 30.0, 50.0}) {
     const Camera turned = camera.azimuth(angle);
-    const Image truth = reference::renderVolume(reference::Frame(scene, turned, function, fine), blocks);
+    const Image truth = reference::renderVolume(reference::RayInputs(scene, turned, function, fine), blocks);
     const auto errorOf = [&](Reconstruction reconstruction) {
       const Image seen =
           reference::render(vdi, View(turned, settings.width, settings.height), reconstruction);

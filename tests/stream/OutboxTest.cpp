@@ -170,6 +170,85 @@ TEST_CASE("a viewer slower than the frames sees whole ones") {
   CHECK(outbox.dropped() >= 30);
 }
 
+namespace {
+
+/// Offers frames of four levels for 20 s over a line, and returns how many were sent whole from each level
+/// on.
+std::map<std::uint32_t, int> firstLevels(double bytesPerSecond, double limit, Clock::duration period) {
+  const std::vector<std::size_t> sizes{mebibyte, 3 * mebibyte, 9 * mebibyte, 80 * mebibyte};
+  const FramePtr first = frameOf(0, sizes, 4);
+  Outbox outbox(limit);
+  Line line(outbox, bytesPerSecond);
+  Clock::time_point now = start;
+  std::uint32_t id = 0;
+  for (; now < start + 20s; ++id, now += period) {
+    auto frame = std::make_shared<Frame>(*first);
+    frame->id = id;
+    outbox.offer(std::move(frame), now);
+    line.run(now, now + period);
+  }
+  std::map<std::uint32_t, int> counts;
+  for (std::uint32_t frame = id / 4; frame < id; ++frame) {
+    std::uint32_t level = 0;
+    while (level < 4 && line.sent(frame, level) == 0) ++level;
+    if (level < 4 && line.sent(frame, level) == sizes[level]) ++counts[level];
+  }
+  return counts;
+}
+
+}  // namespace
+
+TEST_CASE("a line's rate decides with which level frames begin") {
+  const double megabit = 1e6 / 8.0;
+  const auto [rate, level, frames] = GENERATE_COPY(table<double, std::uint32_t, int>({
+      {5.0 * megabit, 0, 5},      // 1.7 s for the coarsest level, the only one that viewers get
+      {20.0 * megabit, 0, 25},    // .4 s; 1.3 s for the next one
+      {100.0 * megabit, 1, 40},   // .25 s
+      {1000.0 * megabit, 2, 90},  // .075 s
+      {9000.0 * megabit, 2, 90},  // never the whole VDI
+  }));
+  INFO(rate / megabit << " Mbit/s");
+  for (const bool isLimit : {false, true}) {
+    const auto counts = isLimit ? firstLevels(1e10, rate, 100ms) : firstLevels(rate, 0.0, 100ms);
+    REQUIRE(counts.size() == 1);
+    CHECK(counts.begin()->first == level);
+    CHECK(counts.begin()->second >= frames);
+  }
+}
+
+TEST_CASE("a rate that sways by a tenth doesn't change the level") {
+  Outbox outbox(0.0);
+  std::map<std::uint32_t, int> counts;
+  Clock::time_point now = start;
+  for (std::uint32_t id = 0; id < 200; ++id, now += 1s) {
+    const double rate = (id % 2 == 0 ? 0.95 : 1.05) * 5.0 * mebibyte;  // a second level takes about .2 s
+    outbox.offer(frameOf(id, {mebibyte / 5, mebibyte, 5 * mebibyte}, 3), now);
+    Line line(outbox, rate);
+    line.run(now, now + 900ms);
+    if (id >= 20) ++counts[line.sent(id, 0) > 0 ? 0 : 1];
+  }
+  CHECK(counts.size() == 1);
+}
+
+TEST_CASE("a finer level begins only where it ends before the next frame comes") {
+  Outbox outbox(0.0);
+  Line line(outbox, 10.0 * mebibyte);
+  Clock::time_point now = start;
+  std::size_t wasted = 0;
+  std::size_t finer = 0;
+  for (std::uint32_t id = 0; id < 20; ++id, now += 500ms) {
+    outbox.offer(frameOf(id, {4 * mebibyte, 2 * mebibyte, 4 * mebibyte}, 3), now);
+    line.run(now, now + 500ms);
+    if (id < 3) continue;
+    finer += line.sent(id, 1) == 2 * mebibyte ? 1 : 0;
+    wasted += line.sent(id, 2);
+  }
+  CHECK(finer == 17);
+  CHECK(wasted == 0);
+  line.run(now, now + 10s);
+  CHECK(line.sent(19, 2) == 4 * mebibyte);
+}
+
 TEST_CASE("a limit is kept") {
   const double limit = 1e6;
   Outbox outbox(limit);

@@ -182,7 +182,7 @@ TEST_CASE("what wasn't taken is merged, and the later wish wins") {
   second.paused = false;
   wishes.put(1, first);
   wishes.put(2, second);
-  const std::optional<Request> request = wishes.take(std::chrono::milliseconds(0));
+  const std::optional<SteeringRequest> request = wishes.take(std::chrono::milliseconds(0));
   REQUIRE(request);
   CHECK(request->viewer == 2);
   second.period = 5;

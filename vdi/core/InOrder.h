@@ -48,12 +48,10 @@ void inOrder(std::size_t count, std::size_t ahead, const MakeWorker& makeWorker,
     try {
       auto make = makeWorker();
       std::unique_lock lock(mutex);
-      while (!isEnding && next < count) {
-        if (mayMake()) {
-          makeNext(make, lock);
-        } else {
-          changed.wait(lock);
-        }
+      for (;;) {
+        changed.wait(lock, [&] { return isEnding || next == count || mayMake(); });
+        if (isEnding || next == count) return;
+        makeNext(make, lock);
       }
     } catch (...) {
       end();
@@ -61,9 +59,8 @@ void inOrder(std::size_t count, std::size_t ahead, const MakeWorker& makeWorker,
     }
   };
 
-  constexpr std::size_t maxThreads = 16;
   std::vector<std::future<void>> helpers;
-  const std::size_t threads = std::min({usableCores(), maxThreads, count});
+  const std::size_t threads = std::min({usableCores(), mostThreads, count});
   while (helpers.size() + 1 < threads)
     helpers.push_back(std::async(std::launch::async | std::launch::deferred, help));
   try {

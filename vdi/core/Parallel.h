@@ -16,15 +16,17 @@ namespace vdi {
 /// threads would only slow each other down.
 std::size_t usableCores();
 
+/// More threads than these only wait for the host's memory.
+inline constexpr std::size_t mostThreads = 16;
+
 /// Calls work(first, last) for ranges that make up [0, count), on several threads at once if each gets at
 /// least `minimum` elements. Choose `minimum` so that it takes some 100 us: starting a thread takes half of
 /// that. Returns when all work is done, and rethrows an exception of `work`. Where no thread can be started,
 /// the calling one does its part.
 template <typename Work>
 void inParallel(std::size_t count, std::size_t minimum, Work work) {
-  constexpr std::size_t maxThreads = 16;
   const std::size_t threads =
-      std::clamp<std::size_t>(count / minimum, 1, std::min(usableCores(), maxThreads));
+      std::clamp<std::size_t>(count / minimum, 1, std::min(usableCores(), mostThreads));
   const std::size_t share = (count + threads - 1) / threads;
   std::vector<std::future<void>> others;
   for (std::size_t first = share; first < count; first += share) {

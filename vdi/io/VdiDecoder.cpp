@@ -107,9 +107,7 @@ void VdiDecoder::State::decode(ListsOf<Segment>& lists, std::span<const Chunk> s
         std::span(lists.segments).subspan(chunk.firstSupersegment, chunk.supersegmentCount));
   });
   if (decoded == 0) vdi.depthCode = codes.front();
-  for (const DepthCode& code : codes) {
-    if (code != vdi.depthCode) detail::fail("its chunks have different depth codes");
-  }
+  detail::requireCode(vdi.depthCode, codes);
   eachInParallel(some.size(), [&](std::size_t i) {
     validateLists(lists, some[i].firstList, some[i].firstList + some[i].listCount, some[i].firstList,
                   vdi.budget);
@@ -132,6 +130,10 @@ void VdiDecoder::add(std::span<const std::byte> bytes) {
     state_->vdi = {};
     state_->pending = {};
   }
+}
+
+bool VdiDecoder::hasFailed() const {
+  return state_->failure != nullptr;
 }
 
 Vdi VdiDecoder::finish() {

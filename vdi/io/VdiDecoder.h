@@ -25,6 +25,8 @@ class VdiDecoder {
 
   /// The next bytes, which are not needed afterwards. A fault of theirs is thrown by finish.
   void add(std::span<const std::byte> bytes);
+  /// A fault was found: further bytes change nothing.
+  bool hasFailed() const;
   /// Ends the decoder. Throws Error{Format} for bytes that io::decode refuses, and for missing ones.
   Vdi finish();
 

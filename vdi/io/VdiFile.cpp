@@ -35,6 +35,7 @@ using detail::parseHeader;
 using detail::parseMetadata;
 using detail::parseTable;
 using detail::precisionOf;
+using detail::requireCode;
 using detail::requireSound;
 using detail::requireSoundHeader;
 using detail::tableBytesOf;
@@ -67,67 +68,81 @@ ParsedFile parseFile(std::span<const std::byte> bytes) {
   return file;
 }
 
-/// Calls decodeOne(index) for all chunks, on several threads, and returns the depth code that they share.
-template <typename DecodeOne>
-DepthCode decodeChunks(const ParsedFile& file, DecodeOne decodeOne) {
-  std::vector<DepthCode> codes(file.chunks.size());
-  eachInParallel(file.chunks.size(), [&](std::size_t i) { codes[i] = decodeOne(i); });
-  for (const DepthCode& code : codes) {
-    if (code != codes.front()) fail("its chunks have different depth codes");
-  }
-  return codes.front();
-}
-
-/// The lists of one chunk that are kept.
+/// Some lists of a file, which are taken from its chunks in any order, on several threads.
 template <typename Segment>
-struct KeptLists {
-  std::vector<Segment> segments;
-  std::vector<std::uint32_t> counts;
+class Selection {
+ public:
+  /// `sources`: lists of the file, in ascending order, between which there may be Thinning::noList.
+  Selection(const std::vector<std::uint32_t>& sources, std::size_t chunks)
+      : sources_(sources), wanted_(sources), kept_(chunks) {
+    wanted_.erase(std::remove(wanted_.begin(), wanted_.end(), Thinning::noList), wanted_.end());
+  }
+
+  /// Call it once for each chunk, whose lists `all` has.
+  void take(std::size_t index, const Chunk& chunk, const ListsOf<Segment>& all) {
+    Kept& kept = kept_[index];
+    auto source = std::lower_bound(wanted_.begin(), wanted_.end(), chunk.firstList);
+    for (; source != wanted_.end() && *source < chunk.firstList + chunk.listCount; ++source) {
+      const std::span<const Segment> list = all.list(*source - chunk.firstList);
+      kept.segments.insert(kept.segments.end(), list.begin(), list.end());
+      kept.counts.push_back(static_cast<std::uint32_t>(list.size()));
+    }
+  }
+
+  ListsOf<Segment> lists() const {
+    ListsOf<Segment> lists;
+    lists.offsets.reserve(sources_.size() + 1);
+    std::uint32_t end = 0;
+    std::size_t chunk = 0;
+    std::size_t place = 0;  // in the chunk
+    for (const std::uint32_t source : sources_) {
+      if (source != Thinning::noList) {
+        while (place == kept_[chunk].counts.size()) {
+          ++chunk;
+          place = 0;
+        }
+        end += kept_[chunk].counts[place++];
+      }
+      lists.offsets.push_back(end);
+    }
+    lists.segments.reserve(end);
+    for (const Kept& kept : kept_)
+      lists.segments.insert(lists.segments.end(), kept.segments.begin(), kept.segments.end());
+    return lists;
+  }
+
+ private:
+  struct Kept {
+    std::vector<Segment> segments;
+    std::vector<std::uint32_t> counts;  // of each list
+  };
+  const std::vector<std::uint32_t>& sources_;
+  std::vector<std::uint32_t> wanted_;
+  std::vector<Kept> kept_;  // by chunk
 };
 
-/// `sources`: lists of the file, in ascending order, between which there may be Thinning::noList.
+/// Fills the thinnings' lists and depth codes. Each chunk is expanded once.
 template <typename Segment>
-ListsOf<Segment> decodeSome(const ParsedFile& file, std::span<const std::uint32_t> sources, DepthCode& code) {
-  std::vector<std::uint32_t> wanted(sources.begin(), sources.end());
-  wanted.erase(std::remove(wanted.begin(), wanted.end(), Thinning::noList), wanted.end());
-  std::vector<KeptLists<Segment>> kept(file.chunks.size());
-  code = decodeChunks(file, [&](std::size_t index) {
+void decodeSome(const ParsedFile& file, std::vector<Thinning>& thinnings) {
+  std::vector<Selection<Segment>> selections;
+  for (const Thinning& thinning : thinnings) selections.emplace_back(thinning.sources, file.chunks.size());
+  std::vector<DepthCode> codes(file.chunks.size());
+  eachInParallel(file.chunks.size(), [&](std::size_t index) {
     const Chunk& chunk = file.chunks[index];
     ListsOf<Segment> all;
     all.offsets.resize(chunk.listCount + 1);
     all.offsets.front() = 0;
     all.segments.resize(chunk.supersegmentCount);
-    const DepthCode chunkCode =
+    codes[index] =
         decodeChunk(chunk, file.packed(chunk), 0, std::span(all.offsets).subspan(1), std::span(all.segments));
     validateLists(all, 0, chunk.listCount, chunk.firstList, file.vdi.budget);
-    auto source = std::lower_bound(wanted.begin(), wanted.end(), chunk.firstList);
-    for (; source != wanted.end() && *source < chunk.firstList + chunk.listCount; ++source) {
-      const std::span<const Segment> list = all.list(*source - chunk.firstList);
-      kept[index].segments.insert(kept[index].segments.end(), list.begin(), list.end());
-      kept[index].counts.push_back(static_cast<std::uint32_t>(list.size()));
-    }
-    return chunkCode;
+    for (Selection<Segment>& selection : selections) selection.take(index, chunk, all);
   });
-
-  ListsOf<Segment> lists;
-  lists.offsets.reserve(sources.size() + 1);
-  std::uint32_t end = 0;
-  std::size_t chunk = 0;
-  std::size_t place = 0;  // in the chunk
-  for (const std::uint32_t source : sources) {
-    if (source != Thinning::noList) {
-      while (place == kept[chunk].counts.size()) {
-        ++chunk;
-        place = 0;
-      }
-      end += kept[chunk].counts[place++];
-    }
-    lists.offsets.push_back(end);
+  requireCode(codes.front(), codes);
+  for (std::size_t i = 0; i < thinnings.size(); ++i) {
+    thinnings[i].few.depthCode = codes.front();
+    thinnings[i].few.lists = selections[i].lists();
   }
-  lists.segments.reserve(end);
-  for (const KeptLists<Segment>& part : kept)
-    lists.segments.insert(lists.segments.end(), part.segments.begin(), part.segments.end());
-  return lists;
 }
 
 VdiFileInfo infoOf(const Header& header, std::optional<Coloring> coloring, std::uint64_t fileBytes) {
@@ -253,19 +268,22 @@ Vdi decode(std::span<const std::byte> bytes) {
   return decoder.finish();
 }
 
-Vdi decodeThinned(std::span<const std::byte> bytes, int factor) {
+std::vector<Vdi> decodeThinned(std::span<const std::byte> bytes, const std::vector<int>& factors) {
   const ParsedFile file = parseFile(bytes);
-  Thinning thinning = thinningOf(file.vdi, factor);
-  Vdi& few = thinning.few;
+  std::vector<Thinning> thinnings;
+  for (const int factor : factors) thinnings.push_back(thinningOf(file.vdi, factor));
   std::visit(
       [&](const auto& lists) {
         using Lists = std::decay_t<decltype(lists)>;
-        using Segment = typename decltype(Lists::segments)::value_type;
-        few.lists = decodeSome<Segment>(file, thinning.sources, few.depthCode);
+        decodeSome<typename decltype(Lists::segments)::value_type>(file, thinnings);
       },
       file.vdi.lists);
-  validateShape(few);
-  return std::move(few);
+  std::vector<Vdi> results;
+  for (Thinning& thinning : thinnings) {
+    validateShape(thinning.few);
+    results.push_back(std::move(thinning.few));
+  }
+  return results;
 }
 
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes) {
@@ -279,7 +297,7 @@ void writeVdi(const std::filesystem::path& path, const Vdi& vdi) {
   writeAtomically(path, bytes);
 }
 
-/// Reads each piece while the one before is decoded.
+/// Reads each piece while the one before is decoded. Of another file only the first bytes are read.
 Vdi readVdi(const std::filesystem::path& path) {
   constexpr std::uint64_t pieceBytes = std::uint64_t{16} << 20;
   const InputFile file(path);
@@ -289,12 +307,14 @@ Vdi readVdi(const std::filesystem::path& path) {
                       [&file, offset, count] { return file.read(offset, count); });
   };
   return withPath(path, [&] {
-    static_cast<void>(readHeader(file));  // another file's bytes aren't read
     VdiDecoder decoder(file.size());
-    std::future<std::vector<std::byte>> next = pieceAt(0);
-    for (std::uint64_t offset = 0; offset < file.size(); offset += pieceBytes) {
-      const std::vector<std::byte> piece = next.get();
-      if (offset + pieceBytes < file.size()) next = pieceAt(offset + pieceBytes);
+    const std::uint64_t headBytes = std::min<std::uint64_t>(file.size(), sizeof(Header));
+    decoder.add(file.read(0, headBytes));
+    std::future<std::vector<std::byte>> next;
+    for (std::uint64_t offset = headBytes; !decoder.hasFailed() && offset < file.size();) {
+      const std::vector<std::byte> piece = next.valid() ? next.get() : pieceAt(offset).get();
+      offset += piece.size();
+      if (offset < file.size()) next = pieceAt(offset);
       decoder.add(piece);
     }
     return decoder.finish();

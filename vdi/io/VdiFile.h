@@ -26,9 +26,10 @@ std::vector<std::byte> encode(const Vdi& vdi);
 /// header or chunk table asks for more memory than the chunks can expand to (before that is allocated; they
 /// expand 255 times at most). The result has passed validate(Vdi).
 Vdi decode(std::span<const std::byte> bytes);
-/// Equals thinned(decode(bytes), factor) (vdi/core/Thinning.h), and throws as decode does, for bytes outside
-/// the lists that are kept too. Needs memory for the result only. `factor` is at least 1.
-Vdi decodeThinned(std::span<const std::byte> bytes, int factor);
+/// Equals thinned(decode(bytes), factor) for each of the factors (vdi/core/Thinning.h), and throws as decode
+/// does, for bytes outside the lists that are kept too. Needs memory for the result only. Each factor is at
+/// least 1.
+std::vector<Vdi> decodeThinned(std::span<const std::byte> bytes, const std::vector<int>& factors);
 /// Reads header, chunk table and metadata only; the lists must be present, but need not be valid.
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes);
 

@@ -210,4 +210,9 @@ void requireSound(const Chunk& chunk, std::span<const std::byte> packed, Precisi
   }
 }
 
+void requireCode(const DepthCode& shared, std::span<const DepthCode> chunks) {
+  const auto differs = [&shared](const DepthCode& code) { return code != shared; };
+  if (std::any_of(chunks.begin(), chunks.end(), differs)) fail("its chunks have different depth codes");
+}
+
 }  // namespace vdi::io::detail

@@ -139,6 +139,9 @@ std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> b
 /// Checks, before memory is allocated, that the chunk is unaltered and expands to the size in the table.
 void requireSound(const Chunk& chunk, std::span<const std::byte> packed, Precision precision);
 
+/// All chunks of a VDI have one depth code.
+void requireCode(const DepthCode& shared, std::span<const DepthCode> chunks);
+
 /// Decodes a chunk into place (see detail::unpackLists, where `ends` and `segments` are explained) and
 /// returns the depth code of its supersegments.
 template <typename Segment>

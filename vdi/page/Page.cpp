@@ -130,7 +130,7 @@ Shell shellOf(const std::string& title, std::string_view connect) {
   return shell;
 }
 
-std::string elementOf(const Frame& frame) {
+std::string elementOf(const PageFrame& frame) {
   constexpr std::size_t longestText = (std::size_t{1} << 29U) - 64;  // of a string in Chromium
   const std::vector<std::byte> plain = withPlainChunks(frame.file());
   const std::vector<std::byte> packed = deflated(plain);
@@ -159,8 +159,8 @@ class Writer {
 
 }  // namespace
 
-std::vector<Frame> framesOf(std::span<const std::filesystem::path> files) {
-  std::vector<Frame> frames;
+std::vector<PageFrame> framesOf(std::span<const std::filesystem::path> files) {
+  std::vector<PageFrame> frames;
   frames.reserve(files.size());
   for (const std::filesystem::path& path : files) {
     frames.push_back({path.filename().string(), [path] { return io::InputFile(path).readAll(); }});
@@ -168,12 +168,13 @@ std::vector<Frame> framesOf(std::span<const std::filesystem::path> files) {
   return frames;
 }
 
-void writePage(const std::filesystem::path& path, const std::string& title, std::span<const Frame> frames) {
+void writePage(const std::filesystem::path& path, const std::string& title,
+               std::span<const PageFrame> frames) {
   if (frames.empty()) throw Error(ErrorCode::InvalidArgument, "a page needs at least one VDI");
   const Shell shell = shellOf(title, "'none'");
   Writer writer(path);
   writer.write(shell.before);
-  for (const Frame& frame : frames) {
+  for (const PageFrame& frame : frames) {
     try {
       writer.write(elementOf(frame));
     } catch (const Error& error) {

@@ -24,11 +24,11 @@ void BandMaker::noteTimes(RankReport& report) const {
   report.writeSeconds = 1e-3 * caster_.times().write;
 }
 
-void BandMaker::makeAlone(const RayCaster::Request& request, const Progress& progress, VdiSink& sink,
+void BandMaker::makeAlone(const RayCaster::Inputs& inputs, const Progress& progress, VdiSink& sink,
                           RankReport& report) {
   Stopwatch watch;
   cancellable(comm_, progress, 0.95, [&](const RayCaster::Progress& advanced) {
-    RayCaster::Cast cast = caster_.begin(request);
+    RayCaster::Cast cast = caster_.begin(inputs);
     const Bands all{cast.height, cast.rowsPerBand};
     const auto firstList = [&](std::size_t band) {
       return std::uint64_t{all.first(band)} * cast.build.width;
@@ -92,11 +92,11 @@ void BandMaker::distribute(Slot& slot, const DepthCode& code, Stopwatch& watch, 
   report.distributeSeconds += watch.lap();
 }
 
-void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& progress,
-                          const OwnedSteps& steps, RankReport& report) {
+void BandMaker::makeOwned(const RayCaster::Inputs& inputs, const Progress& progress, const OwnedSteps& steps,
+                          RankReport& report) {
   Stopwatch watch;
   RayCaster::Cast cast;
-  comm_.together([&] { cast = caster_.begin(request); });
+  comm_.together([&] { cast = caster_.begin(inputs); });
   std::array<double, 1> rows{static_cast<double>(cast.rowsPerBand)};
   comm_.allReduceMin(rows);  // all ranks use the same bands
   const Bands all{cast.height, static_cast<std::uint32_t>(rows[0])};
@@ -127,13 +127,13 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
     });
     report.subSupersegments += slot.lists.count;
     report.generateSeconds += watch.lap();
-    distribute(slot, request.code, watch, report);
+    distribute(slot, inputs.code, watch, report);
     if (band > 0) {
       steps.pass(band - 1);
       watch.lap();  // excludes the step's own time
     }
     comm_.together([&] {
-      compositor_.interleave(slot.parts, request.code, merged_[band].interleaved);
+      compositor_.interleave(slot.parts, inputs.code, merged_[band].interleaved);
       steps.compose(band);
       slot.usedBy = compositor_.last();
     });
@@ -144,10 +144,10 @@ void BandMaker::makeOwned(const RayCaster::Request& request, const Progress& pro
 }
 
 /// Collective, with a total budget: the level that limits each list, from the histogram of all bands.
-float BandMaker::levelOfAll(const GenerateSettings& settings, const Compositor::Request& request) {
+float BandMaker::levelOfAll(const GenerateSettings& settings, const Compositor::Options& options) {
   SupersegmentHistogram histogram;
   comm_.together([&] {
-    for (const MergedBand& band : merged_) histogram += compositor_.histogram(band.interleaved, request);
+    for (const MergedBand& band : merged_) histogram += compositor_.histogram(band.interleaved, options);
   });
   comm_.allReduceSum(histogram.supersegments);
   comm_.allReduceSum(std::span(&histogram.equally, 1));
@@ -166,22 +166,25 @@ void BandMaker::addLast(const std::vector<OwnedLists>& owned, VdiSink& sink, Ran
   report.compositeDeviceSeconds = 1e-3 * compositor_.takeMilliseconds();
 }
 
-void BandMaker::makeComposited(const RayCaster::Request& request, const Progress& progress,
+void BandMaker::makeComposited(const RayCaster::Inputs& inputs, const Progress& progress,
                                std::vector<OwnedLists>& owned, const std::function<void()>& started,
                                VdiSink& sink, RankReport& report) {
-  const GenerateSettings& settings = request.settings;
-  Compositor::Request composite{settings.supersegments, maxPerList(settings.supersegments, settings.budget),
-                                request.lattice.step,   settings.algorithm,
-                                request.code,           -1.0F};
+  const GenerateSettings& settings = inputs.settings;
+  Compositor::Options composite{settings.supersegments,
+                                maxPerList(settings.supersegments, settings.budget),
+                                inputs.lattice.step,
+                                settings.algorithm,
+                                inputs.code,
+                                -1.0F};
   const auto compose = [&](std::size_t band) {
     owned.resize(merged_.size());
     owned[band].firstList = merged_[band].firstList;
     compositor_.composite(merged_[band].interleaved, composite, owned[band].lists);
   };
   const auto pass = [&](std::size_t band) { add(owned, band, sink, report); };
-  if (settings.budget == Budget::List) return makeOwned(request, progress, {started, compose, pass}, report);
+  if (settings.budget == Budget::List) return makeOwned(inputs, progress, {started, compose, pass}, report);
   const auto nothing = [](std::size_t) {};
-  makeOwned(request, progress, {started, nothing, nothing}, report);
+  makeOwned(inputs, progress, {started, nothing, nothing}, report);
   Stopwatch watch;
   composite.level = levelOfAll(settings, composite);
   for (std::size_t band = 0; band < merged_.size(); ++band) {
@@ -193,7 +196,7 @@ void BandMaker::makeComposited(const RayCaster::Request& request, const Progress
   report.compositeSeconds += watch.lap();
 }
 
-void BandMaker::makeFlat(const RayCaster::Request& request, const Progress& progress,
+void BandMaker::makeFlat(const RayCaster::Inputs& inputs, const Progress& progress,
                          std::vector<FlatBand>& flat, const std::function<void(std::size_t band)>& pass,
                          RankReport& report) {
   const auto flatten = [&](std::size_t band) {
@@ -204,23 +207,23 @@ void BandMaker::makeFlat(const RayCaster::Request& request, const Progress& prog
     compositor_.flatten(merged_[band].interleaved, {}, own.colors, own.depths);
     own.flattened = compositor_.last();
   };
-  makeOwned(request, progress, {[] {}, flatten, pass}, report);
+  makeOwned(inputs, progress, {[] {}, flatten, pass}, report);
 }
 
-void BandMaker::render(const RayCaster::Request& request, const Progress& progress, HostPool& pool,
+void BandMaker::render(const RayCaster::Inputs& inputs, const Progress& progress, HostPool& pool,
                        Image& image, RankReport& report) {
   Stopwatch watch;
   cancellable(comm_, progress, 0.95,
-              [&](const RayCaster::Progress& advanced) { caster_.render(request, advanced, pool, image); });
+              [&](const RayCaster::Progress& advanced) { caster_.render(inputs, advanced, pool, image); });
   report.generateSeconds = watch.lap();
   noteTimes(report);
 }
 
-void BandMaker::project(const RayCaster::Request& request, const Progress& progress, HostPool& pool,
+void BandMaker::project(const RayCaster::Inputs& inputs, const Progress& progress, HostPool& pool,
                         HostVector<std::uint64_t>& keys, RankReport& report) {
   Stopwatch watch;
   cancellable(comm_, progress, 0.95,
-              [&](const RayCaster::Progress& advanced) { caster_.project(request, advanced, pool, keys); });
+              [&](const RayCaster::Progress& advanced) { caster_.project(inputs, advanced, pool, keys); });
   report.generateSeconds = watch.lap();
   noteTimes(report);
 }

@@ -35,13 +35,13 @@ class BandMaker {
   Compositor& compositor() { return compositor_; }
 
   /// With one rank: makes the bands of a VDI's lists and adds them to the sink.
-  void makeAlone(const RayCaster::Request& request, const Progress& progress, VdiSink& sink,
+  void makeAlone(const RayCaster::Inputs& inputs, const Progress& progress, VdiSink& sink,
                  RankReport& report);
 
   /// Collective: makes the bands of a VDI's lists on their owners' devices, and adds all of them but the last
   /// one to the sink. Calls `started`, which is collective, while the first band is being made. `owned` gets
   /// this rank's lists of each band.
-  void makeComposited(const RayCaster::Request& request, const Progress& progress,
+  void makeComposited(const RayCaster::Inputs& inputs, const Progress& progress,
                       std::vector<OwnedLists>& owned, const std::function<void()>& started, VdiSink& sink,
                       RankReport& report);
   /// Collective: adds the last band of makeComposited to the sink.
@@ -58,14 +58,14 @@ class BandMaker {
   /// Collective: makes a flat picture from runs alone. It is the limit case of the paper's section 5.3: one
   /// supersegment a run, composited in order of depth. `pass`, which is collective, waits for a composited
   /// band (Compositor::finish) and sends it on; it is not called for the last band.
-  void makeFlat(const RayCaster::Request& request, const Progress& progress, std::vector<FlatBand>& flat,
+  void makeFlat(const RayCaster::Inputs& inputs, const Progress& progress, std::vector<FlatBand>& flat,
                 const std::function<void(std::size_t band)>& pass, RankReport& report);
 
   /// Renders one rank's volume to a picture: RayCaster::render.
-  void render(const RayCaster::Request& request, const Progress& progress, HostPool& pool, Image& image,
+  void render(const RayCaster::Inputs& inputs, const Progress& progress, HostPool& pool, Image& image,
               RankReport& report);
   /// Finds the extreme scalars of one rank's volume: RayCaster::project.
-  void project(const RayCaster::Request& request, const Progress& progress, HostPool& pool,
+  void project(const RayCaster::Inputs& inputs, const Progress& progress, HostPool& pool,
                HostVector<std::uint64_t>& keys, RankReport& report);
 
   /// Call when no frame is under way: the next frame uses the same memory as the last one after a restart.
@@ -112,10 +112,10 @@ class BandMaker {
     std::function<void(std::size_t band)> compose;  // submits the work on a merged band
     std::function<void(std::size_t band)> pass;     // collective; sends a composed band on
   };
-  void makeOwned(const RayCaster::Request& request, const Progress& progress, const OwnedSteps& steps,
+  void makeOwned(const RayCaster::Inputs& inputs, const Progress& progress, const OwnedSteps& steps,
                  RankReport& report);
   void add(const std::vector<OwnedLists>& owned, std::size_t band, VdiSink& sink, RankReport& report);
-  float levelOfAll(const GenerateSettings& settings, const Compositor::Request& request);
+  float levelOfAll(const GenerateSettings& settings, const Compositor::Options& options);
   void noteTimes(RankReport& report) const;
 
   const comm::Communicator& comm_;

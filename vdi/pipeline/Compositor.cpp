@@ -160,31 +160,31 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Dev
   }
 }
 
-void Compositor::apply(const DeviceLists& interleaved, const Request& request) {
-  settings_.step = static_cast<float>(request.sampleStep);
-  settings_.budget = request.budget;
-  settings_.maxPerList = request.maxPerList;
-  settings_.level = request.level;
-  settings_.form = storedForm(request.code);
+void Compositor::apply(const DeviceLists& interleaved, const Options& options) {
+  settings_.step = static_cast<float>(options.sampleStep);
+  settings_.budget = options.budget;
+  settings_.maxPerList = options.maxPerList;
+  settings_.level = options.level;
+  settings_.form = storedForm(options.code);
   settings_.interleaved = interleaved.segments.address();
   settings_.interleavedOffsets = interleaved.offsets.address();
   settings_.listCount = interleaved.listCount;
 }
 
-SupersegmentHistogram Compositor::histogram(const DeviceLists& interleaved, const Request& request) {
+SupersegmentHistogram Compositor::histogram(const DeviceLists& interleaved, const Options& options) {
   finish();
   if (interleaved.listCount == 0) return {};
-  apply(interleaved, request);
+  apply(interleaved, options);
   const SupersegmentHistogram histogram =
       histogram_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
         settings_.histogram = address;
-        compositePass_.record(commands, settings_, gpu::CompositePass::Work::Histogram, request.algorithm);
+        compositePass_.record(commands, settings_, gpu::CompositePass::Work::Histogram, options.algorithm);
       });
   noteTimes();
   return histogram;
 }
 
-void Compositor::composite(const DeviceLists& interleaved, const Request& request, DeviceLists& lists) {
+void Compositor::composite(const DeviceLists& interleaved, const Options& options, DeviceLists& lists) {
   lists.offsets.reserve(device_, (std::uint64_t{interleaved.listCount} + 1) * wordBytes,
                         MemoryKind::DeviceLocal);
   lists.segments.reserve(device_, 0, MemoryKind::DeviceLocal);
@@ -192,8 +192,8 @@ void Compositor::composite(const DeviceLists& interleaved, const Request& reques
   lists.count = 0;
   lists.written = {};
   if (interleaved.listCount == 0) return;
-  apply(interleaved, request);
-  const auto record = [this, settings = settings_, algorithm = request.algorithm](
+  apply(interleaved, options);
+  const auto record = [this, settings = settings_, algorithm = options.algorithm](
                           gpu::Commands& commands, const BandTargets& targets, bool write) {
     shared::CompositeParams params = settings;
     params.thresholds = targets.thresholds;
@@ -208,13 +208,13 @@ void Compositor::composite(const DeviceLists& interleaved, const Request& reques
     using Work = gpu::CompositePass::Work;
     compositePass_.record(commands, params, write ? Work::Write : Work::Count, algorithm);
   };
-  ListBuilder::Request build;
+  ListBuilder::Options build;
   build.width = interleaved.listCount;
   build.rows = 1;
-  build.algorithm = request.algorithm;
-  build.maxPerList = {request.maxPerList, true};
-  build.sampleStep = request.sampleStep;
-  build.code = request.code;
+  build.algorithm = options.algorithm;
+  build.maxPerList = {options.maxPerList, true};
+  build.sampleStep = options.sampleStep;
+  build.code = options.code;
   build.fitting = interleaved.segments.address();
   build.fittingOffsets = interleaved.offsets.address();
   builder_.start(build, record, lists);

@@ -19,7 +19,7 @@ class Compositor {
  public:
   explicit Compositor(std::shared_ptr<gpu::Device> device);
 
-  struct Request {
+  struct Options {
     std::uint32_t budget = 1;      // N_S
     std::uint32_t maxPerList = 1;  // N_S, or more with a level
     double sampleStep = 1.0;
@@ -35,10 +35,10 @@ class Compositor {
                   const ListBuilder::Behind& behind = {});
 
   /// The histogram of these lists. Waits for the submitted work.
-  SupersegmentHistogram histogram(const DeviceLists& interleaved, const Request& request);
+  SupersegmentHistogram histogram(const DeviceLists& interleaved, const Options& options);
   /// Makes lists of at most `maxPerList` supersegments. The device goes on after this returns; `interleaved`
   /// and `lists` must stay until `finish`.
-  void composite(const DeviceLists& interleaved, const Request& request, DeviceLists& lists);
+  void composite(const DeviceLists& interleaved, const Options& options, DeviceLists& lists);
   /// Composites each list to a pixel of the flat picture, as [listCount] glm::vec4 and [listCount] float. The
   /// device goes on after this returns.
   void flatten(const DeviceLists& interleaved, const DepthCode& code, gpu::Buffer& colors,
@@ -54,7 +54,7 @@ class Compositor {
   double takeMilliseconds();
 
  private:
-  void apply(const DeviceLists& interleaved, const Request& request);
+  void apply(const DeviceLists& interleaved, const Options& options);
   void receive(const Distributed& parts);
   void wait();
   void noteTimes();

@@ -19,7 +19,7 @@
 namespace vdi::detail {
 
 /// State of a VdiFrame, shared with its generator until the frame completes.
-struct Frame {
+struct FrameState {
   Vdi vdi;
   RankReport report;
   std::vector<RankReport> reports;
@@ -35,7 +35,7 @@ struct Flight {
   std::vector<OwnedLists> owned;  // one entry a band
   std::unique_ptr<Gather> gather;
   std::unique_ptr<DownloadMemory> downloads;
-  std::shared_ptr<Frame> frame;  // the frame that uses these resources, or did last
+  std::shared_ptr<FrameState> frame;  // the frame that uses these resources, or did last
   bool underWay() const { return frame && frame->sink; }
 };
 

@@ -39,17 +39,17 @@ std::uint64_t ListBuilder::bytesPerList(std::uint32_t maxCount, Algorithm algori
 
 /// Host work that may overlap the device's work for another builder.
 void ListBuilder::reserve() {
-  const Request& request = started_->request;
+  const Options& options = started_->options;
   DeviceLists& lists = *started_->lists;
-  const std::uint64_t words = (std::uint64_t{request.listCount()} + 1) * sizeof(std::uint32_t);
+  const std::uint64_t words = (std::uint64_t{options.listCount()} + 1) * sizeof(std::uint32_t);
   thresholds_.reserve(device_, words, MemoryKind::DeviceLocal);
   capacities_.reserve(device_, words, MemoryKind::DeviceLocal);
   lists.offsets.reserve(device_, words, MemoryKind::DeviceLocal);
-  lists.listCount = request.listCount();
+  lists.listCount = options.listCount();
   times_ = {};
-  if (request.algorithm == Algorithm::Bisection) return;
+  if (options.algorithm == Algorithm::Bisection) return;
   const std::uint64_t countedWords =
-      std::uint64_t{request.countedWidth()} * request.countedRows() * sizeof(std::uint32_t);
+      std::uint64_t{options.countedWidth()} * options.countedRows() * sizeof(std::uint32_t);
   preSegmentOffsets_.reserve(device_, words, MemoryKind::DeviceLocal);
   written_.reserve(device_, words, MemoryKind::DeviceLocal);
   countedTolerances_.reserve(device_, countedWords, MemoryKind::DeviceLocal);
@@ -60,12 +60,12 @@ void ListBuilder::reserve() {
   if (hasQuotas()) quotas_.reserve(device_, words, MemoryKind::DeviceLocal);
 }
 
-void ListBuilder::start(const Request& request, Record record, DeviceLists& lists, Behind behind,
+void ListBuilder::start(const Options& options, Record record, DeviceLists& lists, Behind behind,
                         const gpu::Submission& after) {
   commands_.wait();
-  started_ = Started{request, std::move(record), std::move(behind), &lists};
+  started_ = Started{options, std::move(record), std::move(behind), &lists};
   reserve();
-  if (request.algorithm == Algorithm::Bisection) {
+  if (options.algorithm == Algorithm::Bisection) {
     submitBisection(after);
   } else {
     submitMerging(From::Search, after);
@@ -92,7 +92,7 @@ void ListBuilder::finish() {
   if (started_->empty) {
     commands_.wait();
     started_->lists->count = 0;
-  } else if (started_->request.algorithm == Algorithm::Bisection) {
+  } else if (started_->options.algorithm == Algorithm::Bisection) {
     finishBisection();
   } else {
     finishMerging();
@@ -139,7 +139,7 @@ void ListBuilder::recordTotal(const gpu::Buffer& offsets, std::uint32_t listCoun
 
 /// Submits the search alone: the host allocates memory for its results.
 void ListBuilder::submitBisection(const gpu::Submission& after) {
-  const std::uint32_t listCount = started_->request.listCount();
+  const std::uint32_t listCount = started_->options.listCount();
   DeviceLists& lists = *started_->lists;
   BandTargets targets;
   targets.thresholds = thresholds_.address();
@@ -156,13 +156,13 @@ void ListBuilder::submitBisection(const gpu::Submission& after) {
 }
 
 void ListBuilder::finishBisection() {
-  const Request& request = started_->request;
+  const Options& options = started_->options;
   DeviceLists& lists = *started_->lists;
   commands_.wait();
   addTimes();
   scan_.requireNoOverflow();
   lists.count = totals_.mappedAs<std::uint32_t>()[segmentTotal];
-  lists.segments.reserve(device_, lists.count * segmentBytes(request.code), MemoryKind::DeviceLocal);
+  lists.segments.reserve(device_, lists.count * segmentBytes(options.code), MemoryKind::DeviceLocal);
   BandTargets targets;
   targets.thresholds = thresholds_.address();
   targets.capacities = capacities_.address();
@@ -182,8 +182,8 @@ void ListBuilder::finishBisection() {
 
 /// Finds tolerances and capacities of all lists.
 void ListBuilder::recordSearch() {
-  const Request& request = started_->request;
-  if (request.runsOnly) {
+  const Options& options = started_->options;
+  if (options.runsOnly) {
     commands_.fill(thresholds_, bit_cast<std::uint32_t>(std::numeric_limits<float>::max()));
     commands_.fill(capacities_, expectedRuns_);
     commands_.fill(quotas_, expectedRuns_ << 16U);
@@ -194,18 +194,18 @@ void ListBuilder::recordSearch() {
   constants.countedPreSegments = countedPreSegments_.address();
   constants.tolerances = thresholds_.address();
   constants.capacities = capacities_.address();
-  constants.width = request.width;
-  constants.rows = request.rows;
-  constants.countedWidth = request.countedWidth();
-  constants.countedRows = request.countedRows();
-  constants.strideShift = static_cast<std::uint32_t>(std::countr_zero(request.countedStride));
+  constants.width = options.width;
+  constants.rows = options.rows;
+  constants.countedWidth = options.countedWidth();
+  constants.countedRows = options.countedRows();
+  constants.strideShift = static_cast<std::uint32_t>(std::countr_zero(options.countedStride));
   commands_.mark("count");
-  if (request.agreed) {
-    constants.countedTolerances = request.agreed->tolerances;
-    constants.countedPreSegments = request.agreed->preSegments;
-    constants.countedQuotas = request.agreed->quotas;
+  if (options.agreed) {
+    constants.countedTolerances = options.agreed->tolerances;
+    constants.countedPreSegments = options.agreed->preSegments;
+    constants.countedQuotas = options.agreed->quotas;
     constants.quotas = quotas_.address();
-    constants.budget = request.agreed->budget;
+    constants.budget = options.agreed->budget;
   } else {
     BandTargets targets;
     targets.thresholds = countedTolerances_.address();
@@ -220,8 +220,8 @@ void ListBuilder::recordSearch() {
 
 /// Writes pre-segments, and the number of supersegments to keep of them.
 void ListBuilder::recordWrite() {
-  const Request& request = started_->request;
-  const std::uint32_t listCount = request.listCount();
+  const Options& options = started_->options;
+  const std::uint32_t listCount = options.listCount();
   DeviceLists& lists = *started_->lists;
   BandTargets targets;
   targets.thresholds = thresholds_.address();
@@ -238,13 +238,13 @@ void ListBuilder::recordWrite() {
   commands_.mark("write");
   started_->record(commands_, targets, true);
   scan_.record(commands_, left_, lists.offsets, listCount, segmentsFit_,
-               lists.segments.size() / segmentBytes(request.code), &preSegmentsFit_);
+               lists.segments.size() / segmentBytes(options.code), &preSegmentsFit_);
   recordTotal(preSegmentOffsets_, listCount, preSegmentTotal);
   recordTotal(lists.offsets, listCount, segmentTotal);
 }
 
 void ListBuilder::recordReduce() {
-  const Request& request = started_->request;
+  const Options& options = started_->options;
   const DeviceLists& lists = *started_->lists;
   shared::ReduceConstants constants{};
   constants.preSegments = preSegments_.address();
@@ -253,14 +253,14 @@ void ListBuilder::recordReduce() {
   constants.left = left_.address();
   constants.offsets = lists.offsets.address();
   constants.segments = lists.segments.address();
-  constants.fitting = request.fitting;
-  constants.fittingOffsets = request.fittingOffsets;
+  constants.fitting = options.fitting;
+  constants.fittingOffsets = options.fittingOffsets;
   constants.guard = segmentsFit_.address();
-  constants.step = static_cast<float>(request.sampleStep);
-  constants.listCount = request.listCount();
-  constants.form = storedForm(request.code);
+  constants.step = static_cast<float>(options.sampleStep);
+  constants.listCount = options.listCount();
+  constants.form = storedForm(options.code);
   commands_.mark("reduce");
-  reduce_.record(commands_, constants, request.maxPerList);
+  reduce_.record(commands_, constants, options.maxPerList);
 }
 
 /// Submits all steps at once. They use the memory for pre-segments and supersegments of the frame before; if
@@ -286,26 +286,26 @@ void ListBuilder::submitMerging(From from, const gpu::Submission& after) {
 std::uint32_t ListBuilder::runsToExpect(std::uint32_t most) const {
   constexpr std::uint64_t atLeast = 8;
   const std::uint64_t perRun =
-      std::uint64_t{started_->request.listCount()} * sizeof(shared::StoredPreSegment);
+      std::uint64_t{started_->options.listCount()} * sizeof(shared::StoredPreSegment);
   const std::uint64_t room = device_->limits().memoryBytes / 16 / perRun;
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(most + most / 4, std::max(room, atLeast)));
 }
 
 /// Allocates memory for the counted numbers and a quarter more; then steps must be submitted again.
 std::optional<ListBuilder::From> ListBuilder::againFrom(From from) {
-  const Request& request = started_->request;
+  const Options& options = started_->options;
   DeviceLists& lists = *started_->lists;
   const auto totals = totals_.mappedAs<std::uint32_t>();
   const auto status = statusReadback_.mappedAs<std::uint32_t>();
   const std::uint64_t preSegmentBytes = totals[preSegmentTotal] * sizeof(shared::StoredPreSegment);
-  const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(request.code);
+  const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(options.code);
   if (preSegments_.size() < preSegmentBytes) {
     preSegments_.reserve(device_, preSegmentBytes + preSegmentBytes / 4, MemoryKind::DeviceLocal);
     return From::Write;
   }
   if (hasQuotas() && status[shared::statusWrongLists] != 0 && from != From::Reduce) {
     // Lists that were not counted may have more runs than expected. They have reported their number.
-    if (request.runsOnly)
+    if (options.runsOnly)
       expectedRuns_ = std::max(expectedRuns_, runsToExpect(status[shared::statusMostRuns]));
     return From::Write;
   }

@@ -64,7 +64,7 @@ class ListBuilder {
   /// Records the dispatch of the algorithm's first step, or with `write` its second one.
   using Record = std::function<void(gpu::Commands&, const BandTargets&, bool write)>;
 
-  struct Request {
+  struct Options {
     std::uint32_t width = 0;  // lists in a row
     std::uint32_t rows = 0;
     bool rowBehind = false;           // another row follows the band's last one
@@ -102,7 +102,7 @@ class ListBuilder {
   using Behind = std::function<void(gpu::Commands&)>;
   /// Submits the steps and returns. `lists`, the data that `record` and `behind` refer to, and the request's
   /// buffers must stay until `finish`. `after` is the last submission that uses the lists' memory.
-  void start(const Request& request, Record record, DeviceLists& lists, Behind behind = {},
+  void start(const Options& options, Record record, DeviceLists& lists, Behind behind = {},
              const gpu::Submission& after = {});
   /// Waits. If the memory of the frame before was too small, submits steps again. Then `lists` are complete,
   /// compact or full as the code says. Throws Error{OutOfMemory} if the supersegments do not fit,
@@ -111,8 +111,8 @@ class ListBuilder {
   /// Starts lists that are all empty.
   void startEmpty(std::uint32_t listCount, DeviceLists& lists, const Behind& behind = {});
   /// Starts and finishes.
-  void build(const Request& request, const Record& record, DeviceLists& lists) {
-    start(request, record, lists);
+  void build(const Options& options, const Record& record, DeviceLists& lists) {
+    start(options, record, lists);
     finish();
   }
   /// The latest submission.
@@ -128,7 +128,7 @@ class ListBuilder {
   enum class From { Search, Write, Reduce };
   /// The work under way.
   struct Started {
-    Request request;
+    Options options;
     Record record;
     Behind behind;
     DeviceLists* lists = nullptr;
@@ -143,7 +143,7 @@ class ListBuilder {
   std::optional<From> againFrom(From from);
   void submitBisection(const gpu::Submission& after);
   void finishBisection();
-  bool hasQuotas() const { return started_->request.agreed || started_->request.runsOnly; }
+  bool hasQuotas() const { return started_->options.agreed || started_->options.runsOnly; }
   void recordTotal(const gpu::Buffer& offsets, std::uint32_t listCount, std::size_t which);
   std::uint32_t runsToExpect(std::uint32_t most) const;
   void submit();

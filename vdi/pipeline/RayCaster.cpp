@@ -69,9 +69,9 @@ std::byte* bytesOf(HostVector<T>& values) {
 
 }  // namespace
 
-shared::CastParams RayCaster::prepare(const Request& request) {
-  volume_.setTable(request.table, slabLength(request.lattice, request.table));
-  shared::CastParams params = gpu::castGeometry(request.scene, request.view, request.lattice);
+shared::CastParams RayCaster::prepare(const Inputs& inputs) {
+  volume_.setTable(inputs.table, slabLength(inputs.lattice, inputs.table));
+  shared::CastParams params = gpu::castGeometry(inputs.scene, inputs.view, inputs.lattice);
   params.bricks = volume_.bricks();
   params.nodes = volume_.nodes();
   const SlabTable& slabs = volume_.slabTable();
@@ -81,18 +81,18 @@ shared::CastParams RayCaster::prepare(const Request& request) {
   params.lastPosition = static_cast<float>(slabs.positions - 1);
   params.squarePerPosition = static_cast<float>(shared::slabStripStep) / params.lastPosition;
   params.stripRows = static_cast<float>(slabs.stripRows());
-  params.slabsPerDepth = static_cast<float>(1.0 / (request.table.unitDistance * slabs.length));
-  setRegion(params, request.settings.region, request.scene);
-  setLights(params, request.settings.shading, request.view);
-  setBlending(params, request.settings.blending, request.table);
+  params.slabsPerDepth = static_cast<float>(1.0 / (inputs.table.unitDistance * slabs.length));
+  setRegion(params, inputs.settings.region, inputs.scene);
+  setLights(params, inputs.settings.shading, inputs.view);
+  setBlending(params, inputs.settings.blending, inputs.table);
   params.cells = volume_.cells();
   params.ranges = volume_.cellRanges();
   params.nodeCount = volume_.nodeCount();
-  params.enough = terminationOpticalDepth(request.settings);
-  params.budget = request.settings.supersegments;
-  params.maxPerList = maxPerList(request.settings.supersegments, request.settings.budget);
+  params.enough = terminationOpticalDepth(inputs.settings);
+  params.budget = inputs.settings.supersegments;
+  params.maxPerList = maxPerList(inputs.settings.supersegments, inputs.settings.budget);
   params.level = -1.0F;
-  params.form = storedForm(request.code);
+  params.form = storedForm(inputs.code);
   if (!volume_.empty()) pass_.bind(volume_);
   return params;
 }
@@ -109,10 +109,10 @@ std::uint32_t RayCaster::bandsWanted() const {
 
 /// The number of rows in a band: as many as memory allows, up to a share of the picture. It is a multiple of
 /// shared::countedStride, or all rows.
-std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytesPerPixel,
+std::uint32_t RayCaster::rowsPerBand(const Inputs& inputs, std::uint64_t bytesPerPixel,
                                      std::uint32_t bands) const {
-  const auto height = static_cast<std::uint64_t>(request.view.height());
-  const std::uint64_t rowBytes = static_cast<std::uint64_t>(request.view.width()) * bytesPerPixel;
+  const auto height = static_cast<std::uint64_t>(inputs.view.height());
+  const std::uint64_t rowBytes = static_cast<std::uint64_t>(inputs.view.width()) * bytesPerPixel;
   // Volumes beyond half the device leave less memory, which lists, pre-segments and other frames share.
   const std::uint64_t memory = device_->limits().memoryBytes;
   const std::uint64_t left = memory - std::min(memory, volume_.texelBytesHeld());
@@ -120,7 +120,7 @@ std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytes
   // A list takes one invocation or more, in workgroups of 64, whose number every device allows.
   constexpr std::uint64_t maxLists = std::uint64_t{64} * 65535;
   const std::uint64_t stride = shared::countedStride;
-  const std::uint64_t most = maxLists / static_cast<std::uint64_t>(request.view.width()) / stride * stride;
+  const std::uint64_t most = maxLists / static_cast<std::uint64_t>(inputs.view.width()) / stride * stride;
   std::uint64_t rows = std::min({height, room / rowBytes, most});
   rows = std::min(rows, std::max<std::uint64_t>((height + bands - 1) / bands, 1));
   rows = (rows + shared::countedStride - 1) / shared::countedStride * shared::countedStride;
@@ -128,9 +128,9 @@ std::uint32_t RayCaster::rowsPerBand(const Request& request, std::uint64_t bytes
 }
 
 /// The level of the counted lists of the whole picture, which its bands must share.
-float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) {
-  const auto width = static_cast<std::uint32_t>(request.view.width());
-  const auto height = static_cast<std::uint32_t>(request.view.height());
+float RayCaster::levelOfNeed(shared::CastParams params, const Inputs& inputs) {
+  const auto width = static_cast<std::uint32_t>(inputs.view.width());
+  const auto height = static_cast<std::uint32_t>(inputs.view.height());
   const SupersegmentHistogram histogram =
       histogram_.take(commands_, [&](gpu::Commands& commands, std::uint64_t address) {
         params.histogram = address;
@@ -139,40 +139,38 @@ float RayCaster::levelOfNeed(shared::CastParams params, const Request& request) 
       });
   const double milliseconds = commands_.stageTimes().front().milliseconds;
   times_ += {milliseconds, milliseconds, 0.0};
-  return histogram.levelFor(request.settings.fill);
+  return histogram.levelFor(inputs.settings.fill);
 }
 
-RayCaster::Cast RayCaster::begin(const Request& request) {
+RayCaster::Cast RayCaster::begin(const Inputs& inputs) {
   Cast cast;
   times_ = {};
   assert(started_ == finished_);
   started_ = finished_ = 0;  // frames of one band use one builder's memory
-  cast.height = static_cast<std::uint32_t>(request.view.height());
-  cast.cutAtGaps = request.cutAtGaps;
-  cast.nothingThere = volume_.empty() || request.lattice.count == 0;
-  if (!cast.nothingThere) cast.params = prepare(request);
-  const std::uint32_t maxCount = maxPerList(request.settings.supersegments, request.settings.budget);
-  ListBuilder::Request& build = cast.build;
-  build.width = static_cast<std::uint32_t>(request.view.width());
-  build.runsOnly = request.runsOnly;
-  build.algorithm = request.runsOnly ? Algorithm::Merge : request.settings.algorithm;
+  cast.height = static_cast<std::uint32_t>(inputs.view.height());
+  cast.cutAtGaps = inputs.cutAtGaps;
+  cast.nothingThere = volume_.empty() || inputs.lattice.count == 0;
+  if (!cast.nothingThere) cast.params = prepare(inputs);
+  const std::uint32_t maxCount = maxPerList(inputs.settings.supersegments, inputs.settings.budget);
+  ListBuilder::Options& build = cast.build;
+  build.width = static_cast<std::uint32_t>(inputs.view.width());
+  build.runsOnly = inputs.runsOnly;
+  build.algorithm = inputs.runsOnly ? Algorithm::Merge : inputs.settings.algorithm;
   // With cuts at gaps, each list's runs must be counted, unless ranks agree on their counts.
-  cast.agreed = request.cutAtGaps && build.algorithm == Algorithm::Merge && !request.runsOnly;
+  cast.agreed = inputs.cutAtGaps && build.algorithm == Algorithm::Merge && !inputs.runsOnly;
   build.countedStride =
-      build.algorithm == Algorithm::Bisection && request.cutAtGaps ? 1 : shared::countedStride;
-  build.maxPerList = {request.runsOnly ? 1 : maxCount, !request.cutAtGaps};
-  build.sampleStep = request.lattice.step;
-  build.code = request.code;
-  cast.rowsPerBand =
-      rowsPerBand(request, ListBuilder::bytesPerList(maxCount, build.algorithm), bandsWanted());
+      build.algorithm == Algorithm::Bisection && inputs.cutAtGaps ? 1 : shared::countedStride;
+  build.maxPerList = {inputs.runsOnly ? 1 : maxCount, !inputs.cutAtGaps};
+  build.sampleStep = inputs.lattice.step;
+  build.code = inputs.code;
+  cast.rowsPerBand = rowsPerBand(inputs, ListBuilder::bytesPerList(maxCount, build.algorithm), bandsWanted());
   cast.params.countedStride = build.countedStride;
   cast.params.countedSamples =
-      build.countedStride > 1
-          ? shared::countedSamplesFor(request.lattice.count, request.settings.supersegments)
-          : 1;
+      build.countedStride > 1 ? shared::countedSamplesFor(inputs.lattice.count, inputs.settings.supersegments)
+                              : 1;
   // A list's need is known only when all ranks' parts of it are together: until then, parts get N_S each.
-  if (request.settings.budget == Budget::Total && !request.cutAtGaps && !cast.nothingThere) {
-    cast.params.level = levelOfNeed(cast.params, request);
+  if (inputs.settings.budget == Budget::Total && !inputs.cutAtGaps && !cast.nothingThere) {
+    cast.params.level = levelOfNeed(cast.params, inputs);
   }
   return cast;
 }
@@ -269,7 +267,7 @@ void RayCaster::startBand(Cast& cast, std::uint32_t firstRow, std::uint32_t last
                           const ListBuilder::Behind& behind, const gpu::Submission& after) {
   assert(started_ - finished_ < bandsAtOnce);
   ListBuilder& builder = builders_[started_ % bandsAtOnce];
-  ListBuilder::Request build = cast.build;
+  ListBuilder::Options build = cast.build;
   build.rows = lastRow - firstRow;
   build.rowBehind = lastRow < cast.height;
   if (cast.nothingThere) {
@@ -325,14 +323,14 @@ void RayCaster::drop() {
 }
 
 /// Casts the volume band after band, and brings each band's values of the arrays to the host.
-void RayCaster::castPixels(const Request& request, const Progress& progress, HostPool& pool,
+void RayCaster::castPixels(const Inputs& inputs, const Progress& progress, HostPool& pool,
                            std::span<const PixelArray> arrays) {
-  const auto width = static_cast<std::uint32_t>(request.view.width());
-  const auto height = static_cast<std::uint32_t>(request.view.height());
-  shared::CastParams params = prepare(request);
+  const auto width = static_cast<std::uint32_t>(inputs.view.width());
+  const auto height = static_cast<std::uint32_t>(inputs.view.height());
+  shared::CastParams params = prepare(inputs);
   std::uint64_t bytesPerPixel = 0;
   for (const PixelArray& array : arrays) bytesPerPixel += array.bytes;
-  const std::uint32_t band = rowsPerBand(request, bytesPerPixel, bandsWanted());
+  const std::uint32_t band = rowsPerBand(inputs, bytesPerPixel, bandsWanted());
   for (std::uint32_t row = 0; row < height; row += band) {
     const std::uint32_t end = std::min(height, row + band);
     const std::uint64_t first = std::uint64_t{row} * width;
@@ -359,9 +357,9 @@ void RayCaster::castPixels(const Request& request, const Progress& progress, Hos
   }
 }
 
-void RayCaster::render(const Request& request, const Progress& progress, HostPool& pool, Image& image) {
+void RayCaster::render(const Inputs& inputs, const Progress& progress, HostPool& pool, Image& image) {
   times_ = {};
-  if (volume_.empty() || request.lattice.count == 0) {
+  if (volume_.empty() || inputs.lattice.count == 0) {
     std::ranges::fill(image.rgba, glm::vec4(0.0F));
     std::ranges::fill(image.depth, Image::noDepth);
     return;
@@ -369,19 +367,19 @@ void RayCaster::render(const Request& request, const Progress& progress, HostPoo
   const std::array arrays{
       PixelArray{colors_, bytesOf(image.rgba), sizeof(glm::vec4), &shared::CastParams::colors},
       PixelArray{depths_, bytesOf(image.depth), sizeof(float), &shared::CastParams::depths}};
-  castPixels(request, progress, pool, arrays);
+  castPixels(inputs, progress, pool, arrays);
 }
 
-void RayCaster::project(const Request& request, const Progress& progress, HostPool& pool,
+void RayCaster::project(const Inputs& inputs, const Progress& progress, HostPool& pool,
                         HostVector<std::uint64_t>& keys) {
   times_ = {};
-  if (volume_.empty() || request.lattice.count == 0) {
+  if (volume_.empty() || inputs.lattice.count == 0) {
     std::ranges::fill(keys, 0);
     return;
   }
   const std::array arrays{
       PixelArray{extremes_, bytesOf(keys), sizeof(std::uint64_t), &shared::CastParams::extremes}};
-  castPixels(request, progress, pool, arrays);
+  castPixels(inputs, progress, pool, arrays);
 }
 
 }  // namespace vdi::detail

@@ -33,7 +33,7 @@ class RayCaster {
   /// The volume to cast through; set its blocks there.
   gpu::VolumeStore& volume() { return volume_; }
 
-  struct Request {
+  struct Inputs {
     const Scene& scene;
     const View& view;
     const DepthLattice& lattice;
@@ -49,14 +49,14 @@ class RayCaster {
   /// Lists of one frame, one per pixel, made band after band.
   struct Cast {
     gpu::shared::CastParams params{};
-    ListBuilder::Request build;  // without the band's rows
+    ListBuilder::Options build;  // without the band's rows
     bool cutAtGaps = false;
     bool nothingThere = false;
     std::uint32_t height = 0;
     std::uint32_t rowsPerBand = 1;  // as memory allows; a multiple of shared::countedStride, or all rows
     bool agreed = false;            // with other ranks
   };
-  Cast begin(const Request& request);
+  Cast begin(const Inputs& inputs);
   /// Merging with several ranks: writes this rank's counts of the counted lists, levelBytes of them, to a
   /// place in host memory. All ranks then add them up byte by byte (comm::ByteSum).
   void countLevels(Cast& cast, HostAccess& memory, std::uint64_t at);
@@ -88,10 +88,10 @@ class RayCaster {
   /// Waits for the submitted work and drops it. For use after an error.
   void drop();
   /// DVR: renders all pixels of `image`, which has the view's size and its memory from `pool`.
-  void render(const Request& request, const Progress& progress, HostPool& pool, Image& image);
+  void render(const Inputs& inputs, const Progress& progress, HostPool& pool, Image& image);
   /// Finds the extreme scalar of each pixel's ray, for a blend mode that projects: colorExtremes explains
   /// `keys`, which has the view's size and its memory from `pool`.
-  void project(const Request& request, const Progress& progress, HostPool& pool,
+  void project(const Inputs& inputs, const Progress& progress, HostPool& pool,
                HostVector<std::uint64_t>& keys);
   /// Times of the last frame, without transfers. A picture sets `all` only.
   const ListTimes& times() const { return times_; }
@@ -104,12 +104,12 @@ class RayCaster {
     std::uint64_t bytes;  // of a pixel
     std::uint64_t gpu::shared::CastParams::*address;
   };
-  void castPixels(const Request& request, const Progress& progress, HostPool& pool,
+  void castPixels(const Inputs& inputs, const Progress& progress, HostPool& pool,
                   std::span<const PixelArray> arrays);
-  gpu::shared::CastParams prepare(const Request& request);
-  float levelOfNeed(gpu::shared::CastParams params, const Request& request);
+  gpu::shared::CastParams prepare(const Inputs& inputs);
+  float levelOfNeed(gpu::shared::CastParams params, const Inputs& inputs);
   std::uint32_t bandsWanted() const;
-  std::uint32_t rowsPerBand(const Request& request, std::uint64_t bytesPerPixel, std::uint32_t bands) const;
+  std::uint32_t rowsPerBand(const Inputs& inputs, std::uint64_t bytesPerPixel, std::uint32_t bands) const;
 
   std::shared_ptr<gpu::Device> device_;
   std::uint32_t bands_;  // requested per frame; 0: as suits the device

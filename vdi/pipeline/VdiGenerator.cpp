@@ -51,7 +51,7 @@ double rateOfSlabs(const Scene& scene, const Camera& camera, const GenerateSetti
 
 }  // namespace
 
-struct VdiFrame::State : detail::Frame {};
+struct VdiFrame::State : detail::FrameState {};
 
 struct VdiGenerator::State {
   State(std::shared_ptr<gpu::Device> theDevice, comm::Communicator theComm, const GeneratorOptions& options)
@@ -132,8 +132,8 @@ struct VdiGenerator::State {
     return prepared;
   }
 
-  detail::RayCaster::Request requestOf(const Prepared& prepared, const GenerateSettings& settings,
-                                       const DepthCode& code, bool runsOnly = false) const {
+  detail::RayCaster::Inputs castInputsOf(const Prepared& prepared, const GenerateSettings& settings,
+                                         const DepthCode& code, bool runsOnly = false) const {
     return {steps->scene(), prepared.view,   prepared.lattice, prepared.table,
             settings,       comm.size() > 1, runsOnly,         code};
   }
@@ -156,7 +156,7 @@ struct VdiGenerator::State {
   }
 
   /// Collective: completes the frame, or makes it fail, on all ranks.
-  void complete(detail::Frame& unfinished) {
+  void complete(detail::FrameState& unfinished) {
     if (!unfinished.sink) return;
     try {
       frame([&] {
@@ -186,13 +186,13 @@ struct VdiGenerator::State {
   /// Collective: makes the VDI's lists and hands them to the sink; with several ranks, all but the last band.
   void makeLists(const Prepared& prepared, const GenerateSettings& settings, const Vdi& header,
                  std::vector<detail::OwnedLists>& owned, detail::VdiSink& sink, const Progress& progress) {
-    const detail::RayCaster::Request request = requestOf(prepared, settings, header.depthCode);
+    const detail::RayCaster::Inputs inputs = castInputsOf(prepared, settings, header.depthCode);
     sink.begin(header);
     if (comm.size() == 1) {
-      bands->makeAlone(request, progress, sink, mine);
+      bands->makeAlone(inputs, progress, sink, mine);
     } else {
       bands->makeComposited(
-          request, progress, owned, [this] { frames->addLastBands(); }, sink, mine);
+          inputs, progress, owned, [this] { frames->addLastBands(); }, sink, mine);
     }
   }
 
@@ -270,7 +270,7 @@ struct VdiGenerator::State {
       });
       mine.compositeSeconds += watch.lap();
     };
-    bands->makeFlat(requestOf(prepared, settings, {}, true), progress, flat, send, mine);
+    bands->makeFlat(castInputsOf(prepared, settings, {}, true), progress, flat, send, mine);
     send(flat.size() - 1);
     mine.compositeDeviceSeconds = 1e-3 * bands->compositor().takeMilliseconds();
     detail::Stopwatch watch;
@@ -283,7 +283,7 @@ struct VdiGenerator::State {
   void renderAlone(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress,
                    Image& image) {
     image = imageIn(settings);
-    bands->render(requestOf(prepared, settings, {}), progress, *pool, image, mine);
+    bands->render(castInputsOf(prepared, settings, {}), progress, *pool, image, mine);
   }
 
   /// Collective: renders the picture of the extreme scalars along the rays, on the root. Their order doesn't
@@ -294,7 +294,7 @@ struct VdiGenerator::State {
       extremes.resize(static_cast<std::size_t>(settings.width) * static_cast<std::size_t>(settings.height));
       if (comm.rank() == root) image = imageIn(settings);
     });
-    bands->project(requestOf(prepared, settings, {}), progress, *pool, extremes, mine);
+    bands->project(castInputsOf(prepared, settings, {}), progress, *pool, extremes, mine);
     detail::Stopwatch watch;
     comm.reduceMax(extremes, root);
     if (comm.rank() != root) mine.bytesSent += extremes.size() * sizeof(std::uint64_t);

@@ -28,10 +28,10 @@ struct SceneRay {
   glm::vec3 sample(std::uint32_t k) const { return at(middleOf(k)); }
 };
 
-SceneRay rayOf(const Frame& frame, int x, int y) {
-  const Ray ray = frame.view.rayThrough(x + 0.5, y + 0.5);
-  const glm::dvec3 start = ray.origin + frame.lattice.first * ray.direction - frame.scene.bounds.center();
-  return {glm::vec3(start), glm::vec3(ray.direction), static_cast<float>(frame.lattice.step)};
+SceneRay rayOf(const RayInputs& inputs, int x, int y) {
+  const Ray ray = inputs.view.rayThrough(x + 0.5, y + 0.5);
+  const glm::dvec3 start = ray.origin + inputs.lattice.first * ray.direction - inputs.scene.bounds.center();
+  return {glm::vec3(start), glm::vec3(ray.direction), static_cast<float>(inputs.lattice.step)};
 }
 
 struct OwnedBox {
@@ -101,16 +101,16 @@ struct SceneStretch {
 };
 
 /// Moves the middles of the ray's samples if it grazes the bounds.
-SceneStretch sceneStretch(const Frame& frame, SceneRay& ray) {
-  const Region& region = frame.settings.region;
-  const Box shown = boundsIn(region, frame.scene.bounds);
+SceneStretch sceneStretch(const RayInputs& inputs, SceneRay& ray) {
+  const Region& region = inputs.settings.region;
+  const Box shown = boundsIn(region, inputs.scene.bounds);
   OwnedBox box;
   for (int axis = 0; axis < 3; ++axis) {
-    box.lo[axis] = snapToScene(frame.scene, shown.lo[axis], axis);
-    box.hi[axis] = snapToScene(frame.scene, shown.hi[axis], axis);
+    box.lo[axis] = snapToScene(inputs.scene, shown.lo[axis], axis);
+    box.hi[axis] = snapToScene(inputs.scene, shown.hi[axis], axis);
   }
   float enter = 0.0F;
-  float leave = static_cast<float>(frame.lattice.count) * ray.step;
+  float leave = static_cast<float>(inputs.lattice.count) * ray.step;
   for (int axis = 0; axis < 3; ++axis) {
     if (ray.direction[axis] == 0.0F) continue;
     const float a = (box.lo[axis] - ray.start[axis]) / ray.direction[axis];
@@ -119,24 +119,24 @@ SceneStretch sceneStretch(const Frame& frame, SceneRay& ray) {
     leave = std::min(leave, std::max(a, b));
   }
   SceneStretch stretch;
-  stretch.samples = samplesIn(box, ray, frame.lattice.count);
+  stretch.samples = samplesIn(box, ray, inputs.lattice.count);
   if (!region.planes.empty()) {
     const RayPart part =
-        clipped(region.planes, frame.scene.bounds.center(), ray.start, ray.direction, {enter, leave});
+        clipped(region.planes, inputs.scene.bounds.center(), ray.start, ray.direction, {enter, leave});
     enter = part.enter;
     leave = part.leave;
-    stretch.samples = clippedSamples(stretch.samples, part, ray.step, frame.lattice.count);
+    stretch.samples = clippedSamples(stretch.samples, part, ray.step, inputs.lattice.count);
   }
   const bool grazes = stretch.samples.first >= stretch.samples.last && enter < leave;
   if (grazes) {
     const float middle = 0.5F * (enter + leave) / ray.step;
-    const std::uint32_t k = std::min(static_cast<std::uint32_t>(middle), frame.lattice.count - 1);
+    const std::uint32_t k = std::min(static_cast<std::uint32_t>(middle), inputs.lattice.count - 1);
     ray.middle = middle - static_cast<float>(k);
     stretch.samples = box.contains(ray.sample(k)) ? SampleRange{k, k + 1} : SampleRange{};
   }
   const float first = (static_cast<float>(stretch.samples.first) + 0.5F) * ray.step;
   const float last = (static_cast<float>(stretch.samples.last) - 0.5F) * ray.step;
-  const auto front = static_cast<float>(frame.lattice.first);
+  const auto front = static_cast<float>(inputs.lattice.first);
   stretch.enter = front + (grazes ? enter : std::clamp(enter, first - ray.step, first));
   stretch.leave = front + (grazes ? leave : std::clamp(leave, last, last + ray.step));
   stretch.leave = std::max(stretch.leave, stretch.enter + 0.001F * ray.step);
@@ -145,8 +145,8 @@ SceneStretch sceneStretch(const Frame& frame, SceneRay& ray) {
 
 }  // namespace
 
-Frame::Frame(const Scene& theScene, const Camera& camera, const TransferFunction& transferFunction,
-             const GenerateSettings& theSettings)
+RayInputs::RayInputs(const Scene& theScene, const Camera& camera, const TransferFunction& transferFunction,
+                     const GenerateSettings& theSettings)
     : scene(theScene),
       view(viewWithMargin(theScene, camera, theSettings)),
       lattice(depthLattice(theScene, view, theSettings.samplesPerVoxel)),
@@ -168,11 +168,11 @@ class SampledRay {
     const Block* block;
   };
 
-  SampledRay(const Frame& frame, std::span<const Block> blocks, int x, int y)
-      : frame_(frame), ray_(rayOf(frame, x, y)), scene_(sceneStretch(frame, ray_)) {
+  SampledRay(const RayInputs& inputs, std::span<const Block> blocks, int x, int y)
+      : inputs_(inputs), ray_(rayOf(inputs, x, y)), scene_(sceneStretch(inputs, ray_)) {
     for (const Block& block : blocks) {
       if (block.owned.empty()) continue;
-      SampleRange range = samplesIn(ownedBox(frame.scene, block), ray_, frame.lattice.count);
+      SampleRange range = samplesIn(ownedBox(inputs.scene, block), ray_, inputs.lattice.count);
       range = {std::max(range.first, scene_.samples.first), std::min(range.last, scene_.samples.last)};
       if (range.first < range.last) pieces_.push_back({range, &block});
     }
@@ -184,22 +184,22 @@ class SampledRay {
   const std::vector<Piece>& pieces() const { return pieces_; }
   const SampleRange& inScene() const { return scene_.samples; }
   float frontOf(std::uint32_t k) const {
-    return k == scene_.samples.first ? scene_.enter : static_cast<float>(frame_.lattice.frontOf(k));
+    return k == scene_.samples.first ? scene_.enter : static_cast<float>(inputs_.lattice.frontOf(k));
   }
   /// Of the last of some samples, the one before `end`.
   float backOf(std::uint32_t end) const {
-    return end == scene_.samples.last ? scene_.leave : static_cast<float>(frame_.lattice.frontOf(end));
+    return end == scene_.samples.last ? scene_.leave : static_cast<float>(inputs_.lattice.frontOf(end));
   }
   /// The places at which sample k is classified, its two ends or its middle.
-  float beginOf(std::uint32_t k) const { return frame_.slabs ? placeOf(k) : ray_.middleOf(k); }
-  float endOf(std::uint32_t k) const { return frame_.slabs ? placeOf(k + 1) : ray_.middleOf(k); }
-  float depthAt(float place) const { return static_cast<float>(frame_.lattice.first) + place * ray_.step; }
+  float beginOf(std::uint32_t k) const { return inputs_.slabs ? placeOf(k) : ray_.middleOf(k); }
+  float endOf(std::uint32_t k) const { return inputs_.slabs ? placeOf(k + 1) : ray_.middleOf(k); }
+  float depthAt(float place) const { return static_cast<float>(inputs_.lattice.first) + place * ray_.step; }
   /// The scalar at a place, as a position in the transfer table.
   double positionAt(float place, const Block& block) const {
-    return frame_.table.positionOf(interpolate(block, worldAt(place)));
+    return inputs_.table.positionOf(interpolate(block, worldAt(place)));
   }
   glm::vec3 lightOn(float place, const Block& block) const {
-    return lightAt(frame_.settings.shading, frame_.view, block, worldAt(place), ray_.direction);
+    return lightAt(inputs_.settings.shading, inputs_.view, block, worldAt(place), ray_.direction);
   }
   float middleOf(std::uint32_t k) const { return ray_.middleOf(k); }
   float lengthPerDepth() const { return glm::length(ray_.direction); }
@@ -207,14 +207,14 @@ class SampledRay {
  private:
   /// The begin of sample k: samples at the scene's faces are shorter or longer.
   float placeOf(std::uint32_t k) const {
-    const auto front = static_cast<float>(frame_.lattice.first);
+    const auto front = static_cast<float>(inputs_.lattice.first);
     if (k == scene_.samples.first) return (scene_.enter - front) / ray_.step;
     if (k == scene_.samples.last) return (scene_.leave - front) / ray_.step;
     return static_cast<float>(k);
   }
-  glm::dvec3 worldAt(float place) const { return glm::dvec3(ray_.at(place)) + frame_.scene.bounds.center(); }
+  glm::dvec3 worldAt(float place) const { return glm::dvec3(ray_.at(place)) + inputs_.scene.bounds.center(); }
 
-  const Frame& frame_;
+  const RayInputs& inputs_;
   SceneRay ray_;
   SceneStretch scene_;
   std::vector<Piece> pieces_;
@@ -226,36 +226,37 @@ struct Material {
   float opticalDepth = 0.0F;
 };
 
-Material slabMaterial(const Frame& frame, const SampledRay& ray, std::uint32_t k, const Block& block,
+Material slabMaterial(const RayInputs& inputs, const SampledRay& ray, std::uint32_t k, const Block& block,
                       float length) {
   const float slabsPerDepth =
-      ray.lengthPerDepth() / static_cast<float>(frame.table.unitDistance) / frame.slabTable.length;
+      ray.lengthPerDepth() / static_cast<float>(inputs.table.unitDistance) / inputs.slabTable.length;
   const Slab slab =
-      frame.slabTable.between(ray.positionAt(ray.beginOf(k), block), ray.positionAt(ray.endOf(k), block));
+      inputs.slabTable.between(ray.positionAt(ray.beginOf(k), block), ray.positionAt(ray.endOf(k), block));
   const float opticalDepth = std::min(slab.opticalDepth * slabsPerDepth * length, maxExtinction);
   glm::vec3 color = slab.color * opacityOf(opticalDepth);
-  if (frame.settings.shading.on && opticalDepth > 0.0F) color *= ray.lightOn(ray.middleOf(k), block);
+  if (inputs.settings.shading.on && opticalDepth > 0.0F) color *= ray.lightOn(ray.middleOf(k), block);
   return {color, opticalDepth};
 }
 
-Material isosurfaceMaterial(const Frame& frame, const SampledRay& ray, std::uint32_t k, const Block& block) {
+Material isosurfaceMaterial(const RayInputs& inputs, const SampledRay& ray, std::uint32_t k,
+                            const Block& block) {
   const float begin = ray.beginOf(k);
   const float end = ray.endOf(k);
-  const glm::vec4 seen =
-      crossed(frame.isosurfaces, ray.positionAt(begin, block), ray.positionAt(end, block), [&](double share) {
-        if (!frame.settings.shading.on) return glm::vec3(1.0F);
-        return ray.lightOn(glm::mix(begin, end, static_cast<float>(share)), block);
-      });
+  const glm::vec4 seen = crossed(inputs.isosurfaces, ray.positionAt(begin, block), ray.positionAt(end, block),
+                                 [&](double share) {
+                                   if (!inputs.settings.shading.on) return glm::vec3(1.0F);
+                                   return ray.lightOn(glm::mix(begin, end, static_cast<float>(share)), block);
+                                 });
   return {glm::vec3(seen), opticalDepthOf(seen.a)};
 }
 
 }  // namespace
 
-std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y,
+std::vector<Interval> castRay(const RayInputs& inputs, std::span<const Block> blocks, int x, int y,
                               std::uint32_t atOnce) {
-  const SampledRay ray(frame, blocks, x, y);
-  const float enough = terminationOpticalDepth(frame.settings);
-  const bool isosurfaces = frame.settings.blending.mode == BlendMode::Isosurface;
+  const SampledRay ray(inputs, blocks, x, y);
+  const float enough = terminationOpticalDepth(inputs.settings);
+  const bool isosurfaces = inputs.settings.blending.mode == BlendMode::Isosurface;
   std::vector<Interval> samples;
   float total = 0.0F;
   for (const SampledRay::Piece& piece : ray.pieces()) {
@@ -263,8 +264,8 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
     for (std::uint32_t k = first; k < piece.range.last; k += atOnce) {
       const float front = ray.frontOf(k);
       const float back = ray.backOf(std::min(k + atOnce, ray.inScene().last));
-      const Material material = isosurfaces ? isosurfaceMaterial(frame, ray, k, *piece.block)
-                                            : slabMaterial(frame, ray, k, *piece.block, back - front);
+      const Material material = isosurfaces ? isosurfaceMaterial(inputs, ray, k, *piece.block)
+                                            : slabMaterial(inputs, ray, k, *piece.block, back - front);
       const glm::vec3& color = material.color;
       samples.push_back({front, back, color.r, color.g, color.b, material.opticalDepth});
       total += material.opticalDepth;
@@ -274,10 +275,10 @@ std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks,
   return samples;
 }
 
-std::optional<Projection::Extreme> projectRay(const Frame& frame, std::span<const Block> blocks, int x,
+std::optional<Projection::Extreme> projectRay(const RayInputs& inputs, std::span<const Block> blocks, int x,
                                               int y) {
-  const SampledRay ray(frame, blocks, x, y);
-  Projection projection(frame.settings.blending.mode);
+  const SampledRay ray(inputs, blocks, x, y);
+  Projection projection(inputs.settings.blending.mode);
   for (const SampledRay::Piece& piece : ray.pieces()) {
     for (std::uint32_t k = piece.range.first; k < piece.range.last; ++k) {
       for (const float place : {ray.beginOf(k), ray.endOf(k)})
@@ -289,17 +290,17 @@ std::optional<Projection::Extreme> projectRay(const Frame& frame, std::span<cons
 
 namespace {
 
-void renderRay(const Frame& frame, std::span<const Block> blocks, int x, int y, glm::vec4& rgba,
+void renderRay(const RayInputs& inputs, std::span<const Block> blocks, int x, int y, glm::vec4& rgba,
                float& depth) {
-  if (frame.settings.blending.projects()) {
-    const auto extreme = projectRay(frame, blocks, x, y);
+  if (inputs.settings.blending.projects()) {
+    const auto extreme = projectRay(inputs, blocks, x, y);
     if (!extreme) return;
-    rgba = frame.table.materialAt(extreme->position);
+    rgba = inputs.table.materialAt(extreme->position);
     if (rgba.a > 0.0F) depth = extreme->depth;
     return;
   }
   Accumulator sum;
-  for (const Interval& sample : castRay(frame, blocks, x, y)) {
+  for (const Interval& sample : castRay(inputs, blocks, x, y)) {
     sum.add({sample.red, sample.green, sample.blue}, opacityOf(sample.opticalDepth), sample.front);
   }
   rgba = sum.rgba();
@@ -308,13 +309,13 @@ void renderRay(const Frame& frame, std::span<const Block> blocks, int x, int y, 
 
 }  // namespace
 
-Image renderVolume(const Frame& frame, std::span<const Block> blocks) {
-  Image image = blankImage(frame.view.width(), frame.view.height());
+Image renderVolume(const RayInputs& inputs, std::span<const Block> blocks) {
+  Image image = blankImage(inputs.view.width(), inputs.view.height());
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
       const auto pixel =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x);
-      renderRay(frame, blocks, x, y, image.rgba[pixel], image.depth[pixel]);
+      renderRay(inputs, blocks, x, y, image.rgba[pixel], image.depth[pixel]);
     }
   }
   return image;
@@ -335,27 +336,27 @@ int countedBehind(int i, int size) {
 
 }  // namespace
 
-SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bool cutAtGaps) {
-  SegmentRules rules{frame.settings.supersegments, static_cast<float>(frame.lattice.step), cutAtGaps};
-  const int width = frame.view.width();
-  const int height = frame.view.height();
+SupersegmentLists generate(const RayInputs& inputs, std::span<const Block> blocks, bool cutAtGaps) {
+  SegmentRules rules{inputs.settings.supersegments, static_cast<float>(inputs.lattice.step), cutAtGaps};
+  const int width = inputs.view.width();
+  const int height = inputs.view.height();
   SupersegmentLists lists;
-  const std::uint32_t atOnce = countedSamplesFor(frame.lattice.count, rules.budget);
+  const std::uint32_t atOnce = countedSamplesFor(inputs.lattice.count, rules.budget);
   // A rank's own lists get N_S each: a list's need is known only when all ranks' are together.
-  if (frame.settings.budget == Budget::Total && !cutAtGaps) {
+  if (inputs.settings.budget == Budget::Total && !cutAtGaps) {
     SupersegmentHistogram histogram;
     for (int y = 0; y < height; y += stride) {
       for (int x = 0; x < width; x += stride)
-        addTo(histogram, castRay(frame, blocks, x, y, atOnce), rules, atOnce);
+        addTo(histogram, castRay(inputs, blocks, x, y, atOnce), rules, atOnce);
     }
-    rules.level = histogram.levelFor(frame.settings.fill);
+    rules.level = histogram.levelFor(inputs.settings.fill);
   }
   const auto listToleranceAt = [&](int x, int y) {
-    return listToleranceOf(castRay(frame, blocks, x, y, atOnce), rules, atOnce);
+    return listToleranceOf(castRay(inputs, blocks, x, y, atOnce), rules, atOnce);
   };
   const auto listAt = [&](int x, int y) {
-    const std::vector<Interval> samples = castRay(frame, blocks, x, y);
-    if (frame.settings.algorithm == Algorithm::Bisection) return segmentByBisection(samples, rules);
+    const std::vector<Interval> samples = castRay(inputs, blocks, x, y);
+    if (inputs.settings.algorithm == Algorithm::Bisection) return segmentByBisection(samples, rules);
     if (cutAtGaps) return segmentByMerging(samples, rules);
     const int left = countedBefore(x);
     const int right = countedBehind(x, width);
@@ -377,13 +378,13 @@ SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bo
   return lists;
 }
 
-std::vector<SupersegmentLists> generateTogether(const Frame& frame,
+std::vector<SupersegmentLists> generateTogether(const RayInputs& inputs,
                                                 std::span<const std::vector<Block>> ranks) {
-  const std::uint32_t budget = maxPerList(frame.settings.supersegments, frame.settings.budget);
-  const SegmentRules rules{budget, static_cast<float>(frame.lattice.step), true};
-  const std::uint32_t atOnce = countedSamplesFor(frame.lattice.count, frame.settings.supersegments);
-  const int width = frame.view.width();
-  const int height = frame.view.height();
+  const std::uint32_t budget = maxPerList(inputs.settings.supersegments, inputs.settings.budget);
+  const SegmentRules rules{budget, static_cast<float>(inputs.lattice.step), true};
+  const std::uint32_t atOnce = countedSamplesFor(inputs.lattice.count, inputs.settings.supersegments);
+  const int width = inputs.view.width();
+  const int height = inputs.view.height();
   const int countedWidth = (width + stride - 1) / stride;
   const int countedHeight = (height + stride - 1) / stride;
   std::vector<std::vector<ListTolerance>> agreed(ranks.size());  // of each rank's counted lists
@@ -393,7 +394,7 @@ std::vector<SupersegmentLists> generateTogether(const Frame& frame,
       CountedLevels sum;
       for (const std::vector<Block>& blocks : ranks) {
         levels.push_back(
-            countedLevels(castRay(frame, blocks, x * stride, y * stride, atOnce), rules, atOnce));
+            countedLevels(castRay(inputs, blocks, x * stride, y * stride, atOnce), rules, atOnce));
         sum.shift = levels.back().shift;
         sum += levels.back();
       }
@@ -416,7 +417,7 @@ std::vector<SupersegmentLists> generateTogether(const Frame& frame,
         const ListTolerance counted[] = {at(left, below), at(right, below), at(left, above),
                                          at(right, above)};
         const auto list =
-            segmentByMerging(castRay(frame, ranks[r], x, y), rules, agreedToleranceBetween(counted, budget));
+            segmentByMerging(castRay(inputs, ranks[r], x, y), rules, agreedToleranceBetween(counted, budget));
         result[r].segments.insert(result[r].segments.end(), list.begin(), list.end());
         result[r].offsets.push_back(static_cast<std::uint32_t>(result[r].segments.size()));
       }

@@ -24,7 +24,7 @@
 namespace vdi::reference {
 
 /// Data that all rays of a frame share.
-struct Frame {
+struct RayInputs {
   Scene scene;  // of all ranks
   View view;
   DepthLattice lattice;
@@ -35,32 +35,32 @@ struct Frame {
   std::vector<Isosurface> isosurfaces;  // isosurfacesOf
 
   /// `view` includes the settings' margin, for pictures too. Throws as depthLattice, bake and View do.
-  Frame(const Scene& scene, const Camera& camera, const TransferFunction& transferFunction,
-        const GenerateSettings& settings);
+  RayInputs(const Scene& scene, const Camera& camera, const TransferFunction& transferFunction,
+            const GenerateSettings& settings);
 };
 
 /// The samples of the ray through the centre of pixel (x, y) that `blocks` own, front to back, including
 /// transparent ones, up to the one at which the ray reaches the termination opacity. `atOnce` takes only
 /// samples whose number is a multiple of it; each stands for that many. The blend mode is Composite or
 /// Isosurface.
-std::vector<Interval> castRay(const Frame& frame, std::span<const Block> blocks, int x, int y,
+std::vector<Interval> castRay(const RayInputs& inputs, std::span<const Block> blocks, int x, int y,
                               std::uint32_t atOnce = 1);
 
 /// The extreme scalar of the ray's samples that `blocks` own, at the places where samples are classified, if
 /// they have any. The blend mode is Maximum or Minimum.
-std::optional<Projection::Extreme> projectRay(const Frame& frame, std::span<const Block> blocks, int x,
+std::optional<Projection::Extreme> projectRay(const RayInputs& inputs, std::span<const Block> blocks, int x,
                                               int y);
 
 /// DVR: the ground truth, in any blend mode. Depth as in Image; that of an extreme is where it first occurs.
-Image renderVolume(const Frame& frame, std::span<const Block> blocks);
+Image renderVolume(const RayInputs& inputs, std::span<const Block> blocks);
 
 /// The (sub-)VDI of these blocks, one list per pixel. SegmentRules describes `cutAtGaps`; pass false if these
 /// are all blocks of the scene.
-SupersegmentLists generate(const Frame& frame, std::span<const Block> blocks, bool cutAtGaps);
+SupersegmentLists generate(const RayInputs& inputs, std::span<const Block> blocks, bool cutAtGaps);
 
 /// Merging: the sub-VDIs of several ranks that agree on one tolerance for each list; `ranks` has each rank's
 /// blocks.
-std::vector<SupersegmentLists> generateTogether(const Frame& frame,
+std::vector<SupersegmentLists> generateTogether(const RayInputs& inputs,
                                                 std::span<const std::vector<Block>> ranks);
 
 /// Interleaves the ranks' lists of each pixel by depth and segments them again to the budget (paper, section

@@ -10,41 +10,52 @@ namespace vdi::stream {
 
 namespace {
 
-std::uint32_t levelCountOf(std::uint64_t bytesInMemory) {
-  return bytesInMemory < smallBytes ? 1 : 2;
-}
-
-/// Adds a level to the frame, and returns the frame as it is then.
-FramePtr addLevel(Frame& frame, std::vector<std::byte> bytes, const Vdi& size) {
+void addLevel(Frame& frame, std::vector<std::byte> bytes, const Vdi& size) {
   frame.levels.push_back(
       std::make_shared<EncodedLevel>(EncodedLevel{std::move(bytes), size.width, size.height}));
-  return std::make_shared<Frame>(frame);
 }
 
 }  // namespace
 
+std::vector<int> coarseFactorsOf(std::uint64_t bytes) {
+  std::vector<int> factors;
+  std::uint64_t finer = bytes;
+  for (auto factor = coarseFactors.rbegin(); factor != coarseFactors.rend() && finer >= smallBytes;
+       ++factor) {
+    factors.insert(factors.begin(), *factor);
+    finer = bytes / (static_cast<std::uint64_t>(*factor) * static_cast<std::uint64_t>(*factor));
+  }
+  return factors;
+}
+
 void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
                  const std::function<bool(FramePtr)>& take) {
   const auto bytes = bytesInMemory<std::uint64_t>(vdi.listCount(), vdi.supersegmentCount(), vdi.precision());
-  Frame frame{id, vdi.timeStep, vdi.time, made, levelCountOf(bytes), {}};
-  if (frame.levelCount > 1) {
-    const Vdi coarse = thinned(vdi, coarseFactor);
-    if (!take(addLevel(frame, io::encode(coarse), coarse))) return;
+  const std::vector<int> factors = coarseFactorsOf(bytes);
+  Frame frame{id, vdi.timeStep, vdi.time, made, static_cast<std::uint32_t>(factors.size()) + 1, {}};
+  for (const int factor : factors) {
+    const Vdi coarse = thinned(vdi, factor);
+    addLevel(frame, io::encode(coarse), coarse);
   }
-  (void)take(addLevel(frame, io::encode(vdi), vdi));
+  if (!factors.empty() && !take(std::make_shared<Frame>(frame))) return;
+  addLevel(frame, io::encode(vdi), vdi);
+  (void)take(std::make_shared<Frame>(std::move(frame)));
 }
 
 void passFrame(std::vector<std::byte> file, std::uint32_t id, Clock::time_point made,
                const std::function<void(FramePtr)>& take) {
   const io::VdiFileInfo info = io::decodeInfo(file);
-  Frame frame{id, info.header.timeStep, info.header.time, made, levelCountOf(info.expandedBytes), {}};
-  if (frame.levelCount > 1) {
-    const Vdi coarse = io::decodeThinned(file, coarseFactor);  // checks all of the file
-    take(addLevel(frame, io::encode(coarse), coarse));
-  } else {
+  const std::vector<int> factors = coarseFactorsOf(info.expandedBytes);
+  Frame frame{
+      id, info.header.timeStep, info.header.time, made, static_cast<std::uint32_t>(factors.size()) + 1, {}};
+  if (factors.empty()) {
     static_cast<void>(io::decode(file));
+  } else {
+    // This checks all of the file.
+    for (const Vdi& coarse : io::decodeThinned(file, factors)) addLevel(frame, io::encode(coarse), coarse);
   }
-  take(addLevel(frame, std::move(file), info.header));
+  addLevel(frame, std::move(file), info.header);
+  take(std::make_shared<Frame>(std::move(frame)));
 }
 
 }  // namespace vdi::stream

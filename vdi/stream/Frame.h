@@ -1,6 +1,7 @@
 // A VDI as viewers get it: levels, each of which is a whole .vdi file.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -27,19 +28,23 @@ struct Frame {
   double time = 0.0;
   Clock::time_point made;
   std::uint32_t levelCount = 1;
-  /// Those that are encoded, the coarsest first: 1 to levelCount of them. The last of levelCount is the VDI.
+  /// Those that are encoded, the coarsest first: all but the last one, or all. The last of levelCount is the
+  /// VDI.
   std::vector<std::shared_ptr<const EncodedLevel>> levels;
 };
 using FramePtr = std::shared_ptr<const Frame>;
 
-/// Every third list of each row and of each column: the coarsest level.
-inline constexpr int coarseFactor = 3;
-/// A VDI of fewer bytes in memory has one level.
-inline constexpr std::size_t smallBytes = std::size_t{1} << 20;
+/// A coarse level keeps one list in so many of each row and of each column. The numbers are odd, so that the
+/// ray of a coarse pixel is one of the VDI's.
+inline constexpr std::array<int, 3> coarseFactors{9, 5, 3};
+/// A level of fewer bytes in memory is the coarsest.
+inline constexpr std::uint64_t smallBytes = std::uint64_t{1} << 20;
+/// Those of the coarse levels that a VDI of so many bytes in memory has, the coarsest first.
+std::vector<int> coarseFactorsOf(std::uint64_t bytes);
 
-/// Encodes a VDI, on all cores. `take` gets the frame when its first level is there and again with each other
-/// one, from the calling thread, as long as it returns true. Throws Error{Format} for a VDI that io::decode
-/// would refuse, and what `take` throws.
+/// Encodes a VDI, on all cores. `take` gets the frame when its coarse levels are there, and again with all of
+/// them if it returned true, from the calling thread. Throws Error{Format} for a VDI that io::decode would
+/// refuse, and what `take` throws.
 void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
                  const std::function<bool(FramePtr)>& take);
 /// The same of a VDI's file, whose bytes become the last level as they are. All of the file is checked before

@@ -18,6 +18,13 @@ constexpr double burstSeconds = 0.05;
 constexpr double newPeriodShare = 0.3;
 /// Without a frame for so many periods, no newer one is expected.
 constexpr double silentPeriods = 2.0;
+/// A frame may take so many seconds to its first picture, in the finest of its coarse levels. Each coarser
+/// one loses more of the picture, and is worth a longer wait by that factor.
+constexpr double patience = 0.2;
+constexpr double patienceGrowth = 2.5;
+/// A finer level than the last frame's must take a smaller share of its time: otherwise frames would become
+/// sharp and coarse by turns.
+constexpr double finerShare = 0.8;
 
 double secondsBetween(Clock::time_point from, Clock::time_point to) {
   return Seconds(to - from).count();
@@ -60,12 +67,13 @@ void Outbox::skip(FramePtr frame) {
 void Outbox::release() {
   if (!current_) return;
   if (current_ != newest_) {
-    if (nextLevel_ != 1 || !isUnderWay()) {
+    if (!isFirstUnderWay()) {
       current_.reset();
-    } else if (current_->levels.size() > 1) {
-      Frame coarse = *current_;
-      coarse.levels.resize(1);
-      current_ = std::make_shared<Frame>(std::move(coarse));
+    } else {
+      Frame first = *current_;
+      first.levels.resize(nextLevel_);
+      std::fill_n(first.levels.begin(), firstLevel_, nullptr);
+      current_ = std::make_shared<Frame>(std::move(first));
     }
   } else if (nextLevel_ == current_->levelCount && !isUnderWay() && !current_->levels.empty()) {
     Frame sent = *current_;  // which one that was counts, not what was in it
@@ -79,6 +87,7 @@ std::vector<std::shared_ptr<const EncodedLevel>> Outbox::held() const {
   if (newest_) levels = newest_->levels;
   if (current_ && current_ != newest_)
     levels.insert(levels.end(), current_->levels.begin(), current_->levels.end());
+  levels.erase(std::remove(levels.begin(), levels.end(), nullptr), levels.end());
   return levels;
 }
 
@@ -106,18 +115,31 @@ bool Outbox::isUnderWay() const {
 
 bool Outbox::isWorthBeginning(std::uint64_t bytes, Clock::time_point now,
                               std::optional<Clock::time_point>& retry) const {
-  if (period_ == 0.0 || rate() == 0.0 || static_cast<double>(bytes) / rate() <= period_) return true;
+  if (period_ == 0.0 || rate() == 0.0) return true;
+  if (after(now, static_cast<double>(bytes) / rate()) <= after(*offeredAt_, period_)) return true;
   const Clock::time_point silent = after(*offeredAt_, silentPeriods * period_);
   if (now >= silent) return true;
   retry = silent;
   return false;
 }
 
+std::uint32_t Outbox::firstLevelFor(const Frame& frame) const {
+  const std::size_t coarse = std::min<std::size_t>(frame.levels.size(), std::max(frame.levelCount, 2U) - 1);
+  if (rate() == 0.0) return 0;
+  double seconds = patience;
+  auto level = static_cast<std::uint32_t>(coarse - 1);
+  for (; level > 0; --level, seconds *= patienceGrowth) {
+    const double most = level > firstLevel_ ? finerShare * seconds : seconds;
+    if (static_cast<double>(frame.levels[level]->bytes.size()) <= most * rate()) break;
+  }
+  return level;
+}
+
 bool Outbox::begin(Clock::time_point now, std::optional<Clock::time_point>& retry) {
   if (isPaused_ || !newest_ || newest_->levels.empty()) return false;
   if (newest_ != current_) {
     current_ = newest_;
-    nextLevel_ = 0;
+    firstLevel_ = nextLevel_ = firstLevelFor(*current_);
   } else if (nextLevel_ >= current_->levels.size() ||
              !isWorthBeginning(current_->levels[nextLevel_]->bytes.size(), now, retry)) {
     return false;
@@ -149,8 +171,8 @@ Outbox::Next Outbox::next(Clock::time_point now) {
     allowance_ = std::min(allowance_ + earned, burst);
     allowedAt_ = now;
   }
-  // The coarsest level goes on in any case: a slow viewer would never see a whole one otherwise.
-  const bool goesOn = isUnderWay() && (newest_ == current_ || nextLevel_ == 1);
+  // The first level goes on in any case: a slow viewer would never see a whole one otherwise.
+  const bool goesOn = isUnderWay() && (newest_ == current_ || isFirstUnderWay());
   if (cap_ > 0.0 && allowance_ <= 0.0) {
     result.retry = after(now, -allowance_ / cap_ + 1e-4);
     return result;

@@ -1,5 +1,5 @@
 // What one viewer gets next. Newer frames take the place of older ones, and a viewer's acknowledgements say
-// how much may be under way to it. Knows time and bytes, but no network.
+// how much may be under way to it and with which level a frame begins. Knows time and bytes, but no network.
 #pragma once
 
 #include <cstdint>
@@ -69,8 +69,11 @@ class Outbox {
     std::uint64_t deliveredBefore;
   };
   bool isUnderWay() const;
+  bool isFirstUnderWay() const { return isUnderWay() && nextLevel_ == firstLevel_ + 1; }
   /// Turns to the level to begin now; nothing: there is none, or not before the time in `retry`.
   bool begin(Clock::time_point now, std::optional<Clock::time_point>& retry);
+  /// The level with which the frame begins for this viewer.
+  std::uint32_t firstLevelFor(const Frame& frame) const;
   bool isWorthBeginning(std::uint64_t bytes, Clock::time_point now,
                         std::optional<Clock::time_point>& retry) const;
   Part take(Clock::time_point now);
@@ -85,8 +88,9 @@ class Outbox {
 
   FramePtr newest_;  // offered last
   FramePtr current_;
-  std::uint32_t nextLevel_ = 0;  // of current_: the one to begin; the one before it may be under way
-  std::uint64_t offset_ = 0;     // in the level before nextLevel_
+  std::uint32_t firstLevel_ = 0;  // with which current_, or the frame before it, began
+  std::uint32_t nextLevel_ = 0;   // of current_: the one to begin; the one before it may be under way
+  std::uint64_t offset_ = 0;      // in the level before nextLevel_
   std::uint64_t dropped_ = 0;
   std::optional<Clock::time_point> offeredAt_;
   double period_ = 0.0;  // seconds between frames; 0: unknown

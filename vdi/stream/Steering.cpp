@@ -90,7 +90,7 @@ void Wishes::put(std::uint32_t viewer, const Wish& wish) {
   changed_.notify_all();
 }
 
-std::optional<Request> Wishes::take(std::chrono::milliseconds patience) {
+std::optional<SteeringRequest> Wishes::take(std::chrono::milliseconds patience) {
   std::unique_lock lock(mutex_);
   changed_.wait_for(lock, patience, [this] { return request_.has_value(); });
   return std::exchange(request_, std::nullopt);

@@ -74,7 +74,7 @@ std::string objectionTo(const Wish& wish, const Controls& controls);
 /// Adds a later wish, which wins.
 void merge(Wish& wish, const Wish& later);
 
-struct Request {
+struct SteeringRequest {
   std::uint32_t viewer = 0;  // who asked last
   Wish wish;                 // all that has been asked for since requests were taken last
 };
@@ -84,7 +84,7 @@ std::string textOf(const Wish& wish);
 /// Throws Error{Format} for what textOf hasn't made.
 Wish wishOf(std::string_view text);
 /// One object of JSON on one line, as the log has it: {"step":…,"time":…,"viewer":…,"steer":{…}}.
-std::string logEntryOf(const Request& request, std::int64_t step, double time);
+std::string logEntryOf(const SteeringRequest& request, std::int64_t step, double time);
 /// The wish in words for people, such as "feed = 0.04, a new viewpoint".
 std::string summaryOf(const Wish& wish);
 
@@ -94,12 +94,12 @@ class Wishes {
   /// Never waits.
   void put(std::uint32_t viewer, const Wish& wish);
   /// Waits so long at most; none: nothing was asked for.
-  std::optional<Request> take(std::chrono::milliseconds patience);
+  std::optional<SteeringRequest> take(std::chrono::milliseconds patience);
 
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::optional<Request> request_;
+  std::optional<SteeringRequest> request_;
 };
 
 }  // namespace vdi::stream

@@ -212,7 +212,7 @@ Wish wishOf(std::string_view text) {
   return wishIn(object);
 }
 
-std::string logEntryOf(const Request& request, std::int64_t step, double time) {
+std::string logEntryOf(const SteeringRequest& request, std::int64_t step, double time) {
   nlohmann::ordered_json entry{{"step", step}};
   entry["time"] = std::isfinite(time) ? nlohmann::ordered_json(time) : nlohmann::ordered_json();
   entry["viewer"] = request.viewer;

@@ -24,7 +24,7 @@ namespace pv {
 class Volume;
 
 /// A view's request that the filter hasn't answered yet.
-struct Request {
+struct ViewRequest {
   Load load;
   vdi::Box bounds;  // of all ranks' blocks
 };
@@ -50,8 +50,8 @@ class Regeneration {
   void endView();
   bool defersView() const { return defers_ && views_ > 0; }
   /// The request of a view that got an earlier output instead.
-  const std::optional<Request>& asked() const { return asked_; }
-  void ask(Request request) { asked_ = std::move(request); }
+  const std::optional<ViewRequest>& asked() const { return asked_; }
+  void ask(ViewRequest request) { asked_ = std::move(request); }
   void forgetAsked() { asked_.reset(); }
   /// The next output answers the request, and replaces the earlier one that views have got.
   void answer();
@@ -114,7 +114,7 @@ class Regeneration {
   bool isHeld_ = false;
   bool defers_ = false;
   int views_ = 0;  // number of beginView calls that lack their endView
-  std::optional<Request> asked_;
+  std::optional<ViewRequest> asked_;
   vtkTimeStamp askedTime_;  // time of the last endView that left asked_, or of the answer to asked_
   bool isInPlace_ = false;
   /// After a failure, the data count as newer than any output. Otherwise rank 0 would try again alone,

@@ -172,7 +172,7 @@ void Steering::Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor
   if (isRoot) this->Tell(server, generator);
   do {
     const std::chrono::milliseconds patience = this->IsPaused ? waitingPause : std::chrono::milliseconds(0);
-    std::optional<vdi::stream::Request> request;
+    std::optional<vdi::stream::SteeringRequest> request;
     if (isRoot) {
       request = server->TakeRequest(patience);
     } else {

@@ -51,7 +51,7 @@
 vtkStandardNewMacro(vtkVDIGenerator);
 
 /// The inputs of a frame besides the volume: its viewpoint, colours and settings.
-struct vtkVDIGenerator::Frame {
+struct vtkVDIGenerator::FrameInputs {
   vdi::Camera Camera;
   vdi::TransferFunction Function;
   vdi::GenerateSettings Settings;
@@ -86,7 +86,8 @@ struct vtkVDIGenerator::Internals {
     this->Reports = generator.reports();
     this->Device = generator.device().name();
   }
-  pv::Preparation::Make Maker(Frame frame, std::optional<pv::Load> load, const pv::Origin& origin, int step);
+  pv::Preparation::Make Maker(FrameInputs frame, std::optional<pv::Load> load, const pv::Origin& origin,
+                              int step);
 };
 
 vtkVDIGenerator::vtkVDIGenerator()
@@ -494,10 +495,10 @@ bool vtkVDIGenerator::Defer(vtkDataObject* input, const pv::Origin& origin, bool
 /// reports why. Collective.
 bool vtkVDIGenerator::Ask(vtkDataObject* input, const pv::Origin& origin) {
   pv::Regeneration& regeneration = this->Internal->Regeneration;
-  const std::optional<pv::Request>& asked = regeneration.asked();
+  const std::optional<pv::ViewRequest>& asked = regeneration.asked();
   if (pv::onAllRanks(this->Controller, asked && asked->load.of == origin)) return true;
   regeneration.forgetAsked();
-  pv::Request request;
+  pv::ViewRequest request;
   bool isGood = true;
   try {
     request.load = pv::loadOf(input, this->GetInputAlgorithm(0, 0), origin);
@@ -519,7 +520,7 @@ bool vtkVDIGenerator::Ask(vtkDataObject* input, const pv::Origin& origin) {
 void vtkVDIGenerator::GiveEarlier(vtkImageData* output) {
   if (!this->IsRoot()) return;
   pv::Regeneration& regeneration = this->Internal->Regeneration;
-  const pv::Request& asked = *regeneration.asked();
+  const pv::ViewRequest& asked = *regeneration.asked();
   output->ShallowCopy(regeneration.made());
   const auto [width, height] = this->PictureSize();
   int size[3];
@@ -647,14 +648,14 @@ std::array<int, 2> vtkVDIGenerator::PictureSize() const {
 
 /// The frame for blocks in these bounds, with the current properties and maps. `range` is that of the default
 /// map.
-vtkVDIGenerator::Frame vtkVDIGenerator::CurrentFrame(const vdi::Box& bounds, double voxelVolume,
-                                                     const vdi::ScalarRange& range) {
+vtkVDIGenerator::FrameInputs vtkVDIGenerator::CurrentFrame(const vdi::Box& bounds, double voxelVolume,
+                                                           const vdi::ScalarRange& range) {
   double unit = this->ScalarOpacityUnitDistance;
   if (unit <= 0.0) unit = vdi::unitDistanceOf(bounds, voxelVolume);
-  Frame frame{.Camera = this->Viewpoint(bounds),
-              .Function = pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min,
-                                                 range.max, unit),
-              .Settings = this->CurrentSettings()};
+  FrameInputs frame{.Camera = this->Viewpoint(bounds),
+                    .Function = pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction,
+                                                       range.min, range.max, unit),
+                    .Settings = this->CurrentSettings()};
   return frame;
 }
 
@@ -703,7 +704,7 @@ void vtkVDIGenerator::ServePreparation() {
 
 /// Returns the function that a preparation's thread runs. `load` has the blocks of `origin` if the volume
 /// doesn't show them yet.
-pv::Preparation::Make vtkVDIGenerator::Internals::Maker(Frame frame, std::optional<pv::Load> load,
+pv::Preparation::Make vtkVDIGenerator::Internals::Maker(FrameInputs frame, std::optional<pv::Load> load,
                                                         const pv::Origin& origin, int step) {
   return [this, frame = std::move(frame), load = std::move(load), origin, step](
              pv::Volume& volume, const vdi::Progress& progress, vtkVDIImageData* output) {
@@ -729,10 +730,10 @@ void vtkVDIGenerator::Prepare() {
   Internals& internal = *this->Internal;
   pv::Regeneration& regeneration = internal.Regeneration;
   regeneration.drop();
-  const std::optional<pv::Request>& asked = regeneration.asked();
+  const std::optional<pv::ViewRequest>& asked = regeneration.asked();
   const auto shown = regeneration.madeOf() ? internal.ShownOf(*regeneration.madeOf()) : nullptr;
   bool can = !regeneration.isCurrent(this->CurrentMTime()) && (asked || shown) && !this->PictureOnly;
-  Frame frame;
+  FrameInputs frame;
   if (pv::onAllRanks(this->Controller, can)) {
     try {
       frame = asked ? this->AskedFrame() : this->ShownFrame(*shown);
@@ -755,8 +756,8 @@ void vtkVDIGenerator::Prepare() {
 }
 
 /// The frame that a view has asked for. Also chooses its volume. Collective.
-vtkVDIGenerator::Frame vtkVDIGenerator::AskedFrame() {
-  const pv::Request& asked = *this->Internal->Regeneration.asked();
+vtkVDIGenerator::FrameInputs vtkVDIGenerator::AskedFrame() {
+  const pv::ViewRequest& asked = *this->Internal->Regeneration.asked();
   this->ChooseVolume(asked.load.of);
   // A thread must not make a communicator of several ranks.
   if (this->Internal->Volume->hasRanks()) this->Internal->Volume->make();
@@ -764,7 +765,7 @@ vtkVDIGenerator::Frame vtkVDIGenerator::AskedFrame() {
   return this->CurrentFrame(asked.bounds, asked.load.voxelVolume, {0.0, 1.0});
 }
 
-vtkVDIGenerator::Frame vtkVDIGenerator::ShownFrame(const pv::Shown& shown) {
+vtkVDIGenerator::FrameInputs vtkVDIGenerator::ShownFrame(const pv::Shown& shown) {
   return this->CurrentFrame(shown.bounds, shown.voxelVolume, this->StandInRange(shown));
 }
 

@@ -216,7 +216,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void operator=(const vtkVDIGenerator&) = delete;
 
   struct Internals;
-  struct Frame;
+  struct FrameInputs;
   bool ServesView() const;
   bool Defer(vtkDataObject* input, const pv::Origin& origin, bool hasFailed, vtkImageData* output);
   bool Ask(vtkDataObject* input, const pv::Origin& origin);
@@ -229,9 +229,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void ShowBlocks(vtkDataObject* input, const pv::Origin& origin);
   vdi::ScalarRange StandInRange(const pv::Shown& shown);
   vdi::Camera Viewpoint(const vdi::Box& bounds) const;
-  Frame CurrentFrame(const vdi::Box& bounds, double voxelVolume, const vdi::ScalarRange& range);
-  Frame AskedFrame();
-  Frame ShownFrame(const pv::Shown& shown);
+  FrameInputs CurrentFrame(const vdi::Box& bounds, double voxelVolume, const vdi::ScalarRange& range);
+  FrameInputs AskedFrame();
+  FrameInputs ShownFrame(const pv::Shown& shown);
   vdi::Region CurrentRegion() const;
   vdi::Blending CurrentBlending() const;
   vtkMTimeType CurrentMTime();

@@ -57,14 +57,14 @@ const char* nameOf(vdi::stream::Phase phase) {
 }  // namespace
 
 /// A received VDI with its flat picture.
-struct vtkVDIStreamReader::Frame {
+struct vtkVDIStreamReader::ReceivedVdi {
   vdi::Vdi Vdi;
   vdi::Image Flat;
   std::string Session;       // the server's session
   std::uint32_t Number = 0;  // the frame's number in the session
   bool IsFull = false;       // true if no finer level follows
 
-  Frame(vdi::stream::Received&& received)
+  ReceivedVdi(vdi::stream::Received&& received)
       : Vdi(received.decode()),
         Flat(vdi::flatten(this->Vdi)),
         Session(received.session),
@@ -72,7 +72,7 @@ struct vtkVDIStreamReader::Frame {
         IsFull(received.level.level + 1 == received.level.levels) {}
 
   /// Whether both are the same VDI, at any level.
-  bool IsSameAs(const Frame& other) const {
+  bool IsSameAs(const ReceivedVdi& other) const {
     return this->Session == other.Session && this->Number == other.Number;
   }
 };
@@ -91,7 +91,7 @@ class vtkVDIStreamReader::Link {
   Link& operator=(const Link&) = delete;
 
   /// The newest received VDI; null before the first.
-  std::shared_ptr<const Frame> Newest() const {
+  std::shared_ptr<const ReceivedVdi> Newest() const {
     const std::scoped_lock lock(this->Mutex);
     return this->Last;
   }
@@ -114,8 +114,8 @@ class vtkVDIStreamReader::Link {
     return this->Failed;
   }
 
-  /// While the pause is on, and a whole VDI or two coarse ones have come, the client asks the server for no
-  /// more.
+  /// While the pause is on, and a whole VDI or coarse levels of two frames have come, the client asks the
+  /// server for no more.
   void SetPause(bool pause) {
     const std::scoped_lock lock(this->Mutex);
     this->IsPaused = pause;
@@ -160,17 +160,18 @@ class vtkVDIStreamReader::Link {
 
   /// Keeps a received VDI. A damaged one costs only its own frame.
   void Keep(vdi::stream::Received received) {
-    std::shared_ptr<const Frame> frame;
+    std::shared_ptr<const ReceivedVdi> frame;
     std::string damage;
     try {
-      frame = std::make_shared<const Frame>(std::move(received));
+      frame = std::make_shared<const ReceivedVdi>(std::move(received));
     } catch (const vdi::Error& error) {
       damage = error.what();
     }
     const std::scoped_lock lock(this->Mutex);
     this->Damaged = damage;
     if (!frame) return;
-    if (this->IsPaused && (this->Last || frame->IsFull)) this->Client.pause();
+    const bool isEnough = frame->IsFull || (this->Last && !frame->IsSameAs(*this->Last));
+    if (this->IsPaused && isEnough) this->Client.pause();
     this->Last = std::move(frame);
     ++this->Count;
     this->Changed.notify_all();
@@ -179,7 +180,7 @@ class vtkVDIStreamReader::Link {
   const std::string Authority;
   mutable std::mutex Mutex;  // guards the members up to IsPaused
   mutable std::condition_variable Changed;
-  std::shared_ptr<const Frame> Last;
+  std::shared_ptr<const ReceivedVdi> Last;
   std::string Failed;
   std::string Damaged;  // reason why the newest VDI can't be shown
   int Count = 0;
@@ -242,7 +243,7 @@ void vtkVDIStreamReader::SetPause(bool pause) {
 
 void vtkVDIStreamReader::Take() {
   if (!this->Connected) return;
-  std::shared_ptr<const Frame> newest = this->Connected->Newest();
+  std::shared_ptr<const ReceivedVdi> newest = this->Connected->Newest();
   if (this->Pause && this->Shown && !newest->IsSameAs(*this->Shown)) newest = this->Shown;
   const std::string failure = this->Connected->Failure();
   if (newest == this->Shown && failure == this->Trouble) return;

@@ -74,7 +74,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamReader : public vtkImageAlgori
   void Change(std::string& setting, const char* text);
   void Connect();
 
-  struct Frame;
+  struct ReceivedVdi;
   class Link;
 
   std::string URL;
@@ -84,10 +84,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamReader : public vtkImageAlgori
   double Patience = 1.0;
   bool Pause = false;
 
-  std::shared_ptr<Link> Connected;     // on rank 0, from the first update on
-  std::shared_ptr<const Frame> Shown;  // null before the first VDI
-  std::string Trouble;                 // reason why there can't be a connection
-  int EarlierArrivals = 0;             // those of earlier connections and of ends of Pause
+  std::shared_ptr<Link> Connected;           // on rank 0, from the first update on
+  std::shared_ptr<const ReceivedVdi> Shown;  // null before the first VDI
+  std::string Trouble;                       // reason why there can't be a connection
+  int EarlierArrivals = 0;                   // those of earlier connections and of ends of Pause
   std::string Connection;
   pv::Failure Failure;
   double Viewpoint[12] = {};

@@ -96,7 +96,8 @@ void vtkVDIStreamWriter::Start() {
   this->Running = std::move(service);
 }
 
-std::optional<vdi::stream::Request> vtkVDIStreamWriter::TakeRequest(std::chrono::milliseconds patience) {
+std::optional<vdi::stream::SteeringRequest> vtkVDIStreamWriter::TakeRequest(
+    std::chrono::milliseconds patience) {
   if (!this->Running) return std::nullopt;
   return this->Running->Wishes.take(patience);
 }

@@ -20,7 +20,7 @@
 #ifndef __VTK_WRAP__
 namespace vdi::stream {
 struct Controls;
-struct Request;
+struct SteeringRequest;
 }  // namespace vdi::stream
 #endif
 
@@ -61,7 +61,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
 #ifndef __VTK_WRAP__
   /// The viewers' request since the last call. Waits for it no longer than `patience`. Nullopt if there is
   /// none, before the server has started, and without Steer.
-  std::optional<vdi::stream::Request> TakeRequest(std::chrono::milliseconds patience);
+  std::optional<vdi::stream::SteeringRequest> TakeRequest(std::chrono::milliseconds patience);
   /// Tells viewers what they may ask for, and the values in force. Has no effect before the server has
   /// started.
   void SetControls(const vdi::stream::Controls& controls);

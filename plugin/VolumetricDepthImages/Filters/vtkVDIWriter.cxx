@@ -35,7 +35,7 @@ void write(const std::filesystem::path& path, const vdi::Vdi& vdi) {
     return;
   }
   const std::string name = path.stem().string();
-  const std::vector<vdi::page::Frame> frames{{name, [&vdi] { return vdi::io::encode(vdi); }}};
+  const std::vector<vdi::page::PageFrame> frames{{name, [&vdi] { return vdi::io::encode(vdi); }}};
   vdi::page::writePage(path, name, frames);
 }
 

@@ -1,5 +1,5 @@
 // Renders still frames in ParaView's window again when there is more to show. These frames don't wait for
-// VDIs (vtkVDIProp::Frame).
+// VDIs (vtkVDIProp::FrameKind).
 #ifndef pqVDIStillFrames_h
 #define pqVDIStillFrames_h
 

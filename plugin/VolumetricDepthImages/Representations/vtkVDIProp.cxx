@@ -72,7 +72,7 @@ struct vtkVDIProp::Internals {
   vtkMTimeType PieceTime = 0;
   bool IsBeingMade = false;  // the piece announces a VDI to come
   bool HasJustCome = false;  // the piece is the first VDI after such an announcement
-  Frame NextFrame = Frame::Whole;
+  FrameKind NextFrame = FrameKind::Whole;
   bool IsBehind = false;           // the window shows less than it will
   bool IsRecovering = false;       // true until a new device has drawn a final frame
   Attempt Failed;                  // the last attempt that couldn't be drawn
@@ -96,7 +96,7 @@ struct vtkVDIProp::Internals {
 
   /// Whether the next frame leaves a slow picture to a later one.
   bool DefersIn(vtkRenderWindow* window, const glm::ivec2& port) const {
-    return this->NextFrame == Frame::Deferred && window->GetStereoRender() == 0 &&
+    return this->NextFrame == FrameKind::Deferred && window->GetStereoRender() == 0 &&
            this->Policy.takesLong(this->Buffers, port);
   }
   bool HasTexture(vtkRenderWindow* window, const pv::StillView& view) const {
@@ -144,7 +144,7 @@ void vtkVDIProp::Say(const std::string& text) {
   if (!pv::isSaidUpstream(text)) vtkErrorMacro(<< text);
 }
 
-void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
+void vtkVDIProp::Prepare(vtkDataObject* piece, FrameKind frame) {
   Internals& internal = *this->Internal;
   internal.NextFrame = frame;
   const vtkMTimeType time = piece != nullptr ? piece->GetMTime() : 0;
@@ -162,16 +162,17 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, Frame frame) {
       this->Say({});
     }
   }
-  if (frame == Frame::Interactive) {
+  if (frame == FrameKind::Interactive) {
     this->Take(std::chrono::seconds(0));
   } else {
     const bool hasFrame = internal.Buffers.hasVdi() || internal.HasJustCome;
-    this->Take(frame == Frame::Deferred && hasFrame ? shortWait : untilDone);
+    this->Take(frame == FrameKind::Deferred && hasFrame ? shortWait : untilDone);
   }
   if (!internal.Buffers.isLoading()) internal.HasJustCome = false;
   // This holds even if the camera looks away and nothing is drawn. A whole frame is a picture that is saved
   // meanwhile; the window doesn't show it.
-  if (frame != Frame::Whole) internal.IsBehind = frame == Frame::Deferred && internal.Buffers.isLoading();
+  if (frame != FrameKind::Whole)
+    internal.IsBehind = frame == FrameKind::Deferred && internal.Buffers.isLoading();
 }
 
 void vtkVDIProp::LookAround(vtkObject* renderer, unsigned long, void*) {
@@ -293,7 +294,7 @@ int vtkVDIProp::RenderOpaqueGeometry(vtkViewport* viewport) {
   Internals& internal = *this->Internal;
   const bool isRough = internal.DefersIn(renderer->GetRenderWindow(), pv::viewportOf(renderer).size)
                            ? !internal.Buffers.still().isDone()
-                           : internal.NextFrame == Frame::Interactive;
+                           : internal.NextFrame == FrameKind::Interactive;
   if (!isRough) return 0;
   renderer->SetUseFXAA(false);
   internal.WasSmooth = true;
@@ -357,7 +358,7 @@ bool vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   pv::readDepths(window, port, view.window);
   if (internal.DefersIn(window, port.size)) return this->DrawDeferred(window, std::move(view));
   internal.Buffers.still().drop();
-  const bool isInteractive = internal.NextFrame == Frame::Interactive;
+  const bool isInteractive = internal.NextFrame == FrameKind::Interactive;
   if (!isInteractive && !internal.HasTexture(window, view)) {
     this->DrawNow(window, view, {view.size, std::nullopt});
     internal.Textured = std::move(view);
@@ -448,7 +449,7 @@ void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::StillView& vie
   vdi::Reconstruction reconstruction = view.reconstruction;
   // Leaning faces take longer, so moving frames do without. A thinned VDI lacks the lists in which a surface
   // goes on.
-  if (form.thin || internal.NextFrame == Frame::Interactive)
+  if (form.thin || internal.NextFrame == FrameKind::Interactive)
     reconstruction = std::min(reconstruction, vdi::Reconstruction::Smooth);
   const Clock::time_point renderStart = Clock::now();
   const vdi::ImageBytes picture = views.renderBytes(view.matrices.view(size.x, size.y), internal.Ends,
@@ -457,7 +458,7 @@ void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::StillView& vie
   internal.Painter.load(window, size, picture.rgba);
   internal.Painter.draw(window, this->Opacity);
 
-  if (internal.NextFrame == Frame::Whole) {
+  if (internal.NextFrame == FrameKind::Whole) {
     internal.Policy.guess(form, renderSeconds);
   } else {
     internal.Policy.measure(form, secondsSince(start), renderSeconds);

@@ -47,7 +47,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   vtkTypeMacro(vtkVDIProp, vtkProp);
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
-  enum class Frame {
+  enum class FrameKind {
     Interactive,  // may be rough and show the last VDI
     Deferred,     // as Interactive, and the caller renders again once HasMore; whole if that is quick
     Whole,
@@ -55,7 +55,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// Prepares for the frames to come. `piece` is what pv::packVdi made, or nullptr. For whole frames, its VDI
   /// is on the device when this returns; other frames show it or the last one. The same piece again costs
   /// nothing.
-  void Prepare(vtkDataObject* piece, Frame frame);
+  void Prepare(vtkDataObject* piece, FrameKind frame);
   /// Whether the last frame was deferred and lacks something that is being made.
   bool IsBehind() const;
   /// Whether the missing part is ready, so that another frame would show it.

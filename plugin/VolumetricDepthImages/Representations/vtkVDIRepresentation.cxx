@@ -197,7 +197,8 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
     if (port != nullptr && view != nullptr) {
       this->Prop->SetIsCaptured(IsCaptured(view->GetRenderWindow()));
       this->Prop->SetSaysAngle(this->SaysAngle && hasWindows());
-      this->Prop->Prepare(port->GetProducer()->GetOutputDataObject(port->GetIndex()), this->FrameOf(view));
+      this->Prop->Prepare(port->GetProducer()->GetOutputDataObject(port->GetIndex()),
+                          this->FrameKindOf(view));
     }
   }
   return 1;
@@ -218,10 +219,10 @@ void vtkVDIRepresentation::DeferNoStillFrames() {
   deferringViews().clear();
 }
 
-vtkVDIProp::Frame vtkVDIRepresentation::FrameOf(vtkPVRenderView* view) {
-  if (this->IsInteractive(view)) return vtkVDIProp::Frame::Interactive;
-  return defersStillFrames(view) && !IsCaptured(view->GetRenderWindow()) ? vtkVDIProp::Frame::Deferred
-                                                                         : vtkVDIProp::Frame::Whole;
+vtkVDIProp::FrameKind vtkVDIRepresentation::FrameKindOf(vtkPVRenderView* view) {
+  if (this->IsInteractive(view)) return vtkVDIProp::FrameKind::Interactive;
+  return defersStillFrames(view) && !IsCaptured(view->GetRenderWindow()) ? vtkVDIProp::FrameKind::Deferred
+                                                                         : vtkVDIProp::FrameKind::Whole;
 }
 
 /// Whether the next frame may be rough and late, because the camera is moving. Time steps during that time

@@ -37,8 +37,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
 
   /// Whether the next rendering is for a picture that is taken of the window, and not for one of its frames.
   static bool IsCaptured(vtkRenderWindow* window);
-  /// Defers still frames of that view's window from now on (vtkVDIProp::Frame). The caller must render the
-  /// view again as soon as there is more. Pictures that are taken of a window are whole.
+  /// Defers still frames of that view's window from now on (vtkVDIProp::FrameKind). The caller must render
+  /// the view again as soon as there is more. Pictures that are taken of a window are whole.
   static void DeferStillFrames(vtkPVRenderView* view);
   /// Ends that for all views.
   static void DeferNoStillFrames();
@@ -64,7 +64,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   vtkVDIRepresentation(const vtkVDIRepresentation&) = delete;
   void operator=(const vtkVDIRepresentation&) = delete;
 
-  vtkVDIProp::Frame FrameOf(vtkPVRenderView* view);
+  vtkVDIProp::FrameKind FrameKindOf(vtkPVRenderView* view);
   bool IsInteractive(vtkPVRenderView* view);
   void Drag();
   void Drop();
