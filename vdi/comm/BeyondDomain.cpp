@@ -1,11 +1,15 @@
 #include "vdi/comm/BeyondDomain.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <optional>
 #include <utility>
 
 #include "vdi/comm/Indices.h"
+#include "vdi/comm/LocalValues.h"
 
 namespace vdi::comm {
 
@@ -20,61 +24,120 @@ double limitedDifference(double last, double before) {
   return std::clamp(next, -bound, 2.0 * bound) * (last > 0.0 ? 1.0 : -1.0);
 }
 
+/// Values that decide on the next one along an axis.
+constexpr int deciding = 3;
+
+/// Patches with the values around them that decide on their open places.
+struct Window {
+  IndexBox box;
+  std::array<std::ptrdiff_t, 3> strides{};  // of neighbours along each axis
+  LocalValues values;
+  std::vector<std::uint8_t> known;  // 0: still open, or masked
+};
+
 class Continuation {
  public:
   Continuation(const Block& block, std::span<const OpenPatch> patches) : block_(block), patches_(patches) {
-    for (const OpenPatch& patch : patches) {
-      std::vector<bool>& open = open_.emplace_back(patch.box.count(), false);
-      for (const IndexBox& box : patch.open)
-        forEachIndex(box, [&](const glm::ivec3& at) { open[patch.box.position(at)] = true; });
+    for (const IndexBox& box : windowsOf(block, patches)) addWindow(box);
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      const IndexBox& window = windowOf(i).box;
+      for (const IndexBox& box : patches[i].open) {
+        open_.reserve(open_.size() + box.count());
+        forEachRow(box, [&](glm::ivec3 at) {
+          std::size_t position = window.position(at);
+          for (; at.x < box.hi.x; ++at.x) open_.push_back({position++, static_cast<std::uint32_t>(i), at});
+        });
+      }
     }
+    filled_.reserve(open_.size());
   }
 
   /// Fills the open places next to known values. Returns false if there are none.
   bool advance() {
-    std::vector<Filled> filled;
-    for (std::size_t i = 0; i < patches_.size(); ++i) {
-      for (const IndexBox& box : patches_[i].open) {
-        forEachIndex(box, [&](const glm::ivec3& at) {
-          const std::size_t place = patches_[i].box.position(at);
-          if (!open_[i][place]) return;
-          if (const std::optional<double> value = continuedAt(at)) filled.push_back({i, place, *value});
-        });
+    filled_.clear();
+    const auto fill = [this](const Place& place) {
+      const std::optional<double> value = continuedAt(place);
+      if (value) filled_.push_back({place, *value});
+      return value.has_value();
+    };
+    std::erase_if(open_, fill);
+    // The values of a step depend on those of the steps before, not on each other.
+    for (const auto& [place, value] : filled_) {
+      const OpenPatch& patch = patches_[place.patch];
+      const std::size_t inPatch = patch.box.position(place.at);
+      storeValue(block_.type, patch.values, inPatch, value);
+      const double stored = loadValue(block_.type, patch.values, inPatch);
+      for (Window& window : windows_) {
+        if (!window.box.contains(place.at)) continue;
+        const std::size_t position = window.box.position(place.at);
+        window.values[position] = stored;
+        window.known[position] = 1;
       }
     }
-    for (const Filled& one : filled) {
-      storeValue(block_.type, patches_[one.patch].values, one.place, one.value);
-      open_[one.patch][one.place] = false;
-    }
-    return !filled.empty();
+    return !filled_.empty();
   }
 
  private:
-  struct Filled {
-    std::size_t patch;
-    std::size_t place;
-    double value;
+  /// There are many, so they are small.
+  struct Place {
+    std::size_t position;  // in the patch's window
+    std::uint32_t patch;
+    glm::ivec3 at;
   };
 
-  std::optional<double> known(const glm::ivec3& at) const {
-    if (!block_.extended().contains(at)) return std::nullopt;
-    for (std::size_t i = 0; i < patches_.size(); ++i) {
-      if (patches_[i].box.contains(at) && open_[i][patches_[i].box.position(at)]) return std::nullopt;
+  const Window& windowOf(std::size_t patch) const { return windows_[windows_.size() > 1 ? patch : 0]; }
+
+  /// One box for each patch, or one for all of them if that has fewer values. So the memory grows with the
+  /// patches, not with the block.
+  static std::vector<IndexBox> windowsOf(const Block& block, std::span<const OpenPatch> patches) {
+    std::vector<IndexBox> each;
+    IndexBox common;
+    std::size_t count = 0;
+    for (const OpenPatch& patch : patches) {
+      const IndexBox around{patch.box.lo - deciding, patch.box.hi + deciding};
+      each.push_back(around.intersection(block.extended()));
+      common.include(each.back());
+      count += each.back().count();
     }
-    const auto holds = [&at](const IndexBox& box) { return box.contains(at); };
-    if (block_.masked && std::any_of(block_.masked->begin(), block_.masked->end(), holds))
-      return std::nullopt;
-    return valueAt(block_, at.x, at.y, at.z);
+    return common.count() <= count ? std::vector<IndexBox>{common} : each;
+  }
+
+  void addWindow(const IndexBox& box) {
+    const glm::i64vec3 size = box.size();
+    Window& window = windows_.emplace_back();
+    window.box = box;
+    window.strides = {1, size.x, size.x * size.y};
+    window.values.gather(block_, box);
+    window.known.assign(window.values.size(), 1);
+    for (const OpenPatch& patch : patches_) {
+      for (const IndexBox& open : patch.open) markUnknown(window, open);
+    }
+    if (block_.masked) {
+      for (const IndexBox& masked : *block_.masked) markUnknown(window, masked);
+    }
+  }
+
+  static void markUnknown(Window& window, const IndexBox& box) {
+    const IndexBox common = box.intersection(window.box);
+    if (common.empty()) return;
+    forEachRow(common, [&](const glm::ivec3& at) {
+      std::memset(window.known.data() + window.box.position(at), 0,
+                  static_cast<std::size_t>(common.size().x));
+    });
   }
 
   /// The mean over the axes that lead to known values.
-  std::optional<double> continuedAt(const glm::ivec3& at) const {
-    const IndexBox stored = block_.stored();
+  std::optional<double> continuedAt(const Place& place) const {
+    const Window& window = windowOf(place.patch);
     double sum = 0.0;
     int count = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      if (at[axis] >= stored.lo[axis] && at[axis] < stored.hi[axis]) continue;
-      if (const auto value = continuedAlong(axis, at[axis] < stored.lo[axis] ? 1 : -1, at)) {
+      const int at = place.at[axis];
+      if (at >= 0 && at < block_.dims[axis]) continue;
+      const bool below = at < 0;
+      const int inward = below ? window.box.hi[axis] - 1 - at : at - window.box.lo[axis];
+      const std::ptrdiff_t stride = window.strides[static_cast<std::size_t>(axis)];
+      if (const auto value = continuedAlong(window, place.position, below ? stride : -stride, inward)) {
         sum += *value;
         ++count;
       }
@@ -82,22 +145,28 @@ class Continuation {
     return count > 0 ? std::optional(sum / count) : std::nullopt;
   }
 
-  /// `inward` is the step along the axis towards the stored values.
-  std::optional<double> continuedAlong(int axis, int inward, glm::ivec3 at) const {
-    at[axis] += inward;
-    const std::optional<double> nearest = known(at);
-    at[axis] += inward;
-    const std::optional<double> second = known(at);
-    at[axis] += inward;
-    const std::optional<double> third = known(at);
-    if (!nearest || !second || !third) return nearest;
-    const double difference = limitedDifference(*nearest - *second, *second - *third);
-    return std::isfinite(difference) ? *nearest + difference : *nearest;
+  /// `step` leads towards the stored values, where the window has `inward` more values.
+  static std::optional<double> continuedAlong(const Window& window, std::size_t position, std::ptrdiff_t step,
+                                              int inward) {
+    std::array<double, deciding> values{};
+    int count = 0;
+    while (count < std::min(inward, deciding)) {
+      position += static_cast<std::size_t>(step);
+      if (window.known[position] == 0) break;
+      values[static_cast<std::size_t>(count++)] = window.values[position];
+    }
+    if (count == 0) return std::nullopt;
+    const auto [nearest, second, third] = values;
+    if (count < deciding) return nearest;
+    const double difference = limitedDifference(nearest - second, second - third);
+    return std::isfinite(difference) ? nearest + difference : nearest;
   }
 
   const Block& block_;
   std::span<const OpenPatch> patches_;
-  std::vector<std::vector<bool>> open_;  // for each patch, the places still open
+  std::vector<Window> windows_;  // one for all patches, or one for each
+  std::vector<Place> open_;
+  std::vector<std::pair<Place, double>> filled_;  // by the current step
 };
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "vdi/comm/BlockDirectory.h"
 #include "vdi/comm/Indices.h"
 #include "vdi/comm/Remainder.h"
+#include "vdi/comm/Sampler.h"
 #include "vdi/core/Scene.h"
 
 namespace vdi::comm {
@@ -84,7 +85,7 @@ struct Request : Question {
   glm::dvec3 spacing;
 
   double place(int axis, int index, int part) const {
-    const double offset = (part + 0.5) / parts[axis] - 0.5;
+    const double offset = parts[axis] == 1 ? 0.0 : (part + 0.5) / parts[axis] - 0.5;
     return origin[axis] + (index + offset) * spacing[axis];
   }
   /// The parts [first, last) of value `index` along the axis whose samples are in the clip.
@@ -94,6 +95,20 @@ struct Request : Question {
     int last = first;
     while (last < parts[axis] && place(axis, index, last) < clip.hi[axis]) ++last;
     return {first, last};
+  }
+  /// Writes the places of the samples, per axis, that belong to `some` of the values and lie in the clip.
+  void placesIn(const IndexBox& some, std::array<SamplePlaces, 3>& samples) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      SamplePlaces& own = samples[static_cast<std::size_t>(axis)];
+      own.clear();
+      for (int index = some.lo[axis]; index < some.hi[axis]; ++index) {
+        for (int part = 0; part < parts[axis]; ++part) {
+          const double sample = place(axis, index, part);
+          if (sample >= clip.lo[axis] && sample < clip.hi[axis]) own.places.push_back(sample);
+        }
+        own.endValue();
+      }
+    }
   }
   /// Reduces the box to values with samples in the clip.
   void trim() {
@@ -134,48 +149,7 @@ struct Grid {
   std::vector<Wanted> wanted;
   IndexBox asked;               // bounds of all values that other blocks have
   std::vector<OpenPatch> open;  // places where values are continued beyond the domain's faces
-};
-
-/// Trilinear interpolation in a block's values around a place.
-class Sampler {
- public:
-  Sampler(const Block& block, const Box& where) : block_(block) {
-    const IndexBox near{glm::ivec3(glm::floor((where.lo - block.origin) / block.spacing)) - 1,
-                        glm::ivec3(glm::ceil((where.hi - block.origin) / block.spacing)) + 2};
-    for (const Patch& patch : block.patchList()) {
-      if (!patch.box.intersection(near).empty()) patches_.push_back(&patch);
-    }
-  }
-  double at(const glm::dvec3& place) const {
-    glm::dvec3 position = (place - block_.origin) / block_.spacing;
-    const glm::dvec3 whole = glm::round(position);
-    for (int axis = 0; axis < 3; ++axis) {
-      if (std::abs(position[axis] - whole[axis]) < latticeTolerance) position[axis] = whole[axis];
-    }
-    const glm::dvec3 base = glm::floor(position);
-    const glm::dvec3 share = position - base;
-    double sum = 0.0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const glm::ivec3 step{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
-      const glm::dvec3 weight = glm::mix(1.0 - share, share, glm::dvec3(step));
-      const double product = weight.x * weight.y * weight.z;
-      if (product > 0.0) sum += product * value(glm::ivec3(base) + step);
-    }
-    return sum;
-  }
-
- private:
-  double value(const glm::ivec3& index) const {
-    const IndexBox all = block_.extended();
-    const glm::ivec3 at = glm::clamp(index, all.lo, all.hi - 1);
-    for (auto patch = patches_.rbegin(); patch != patches_.rend(); ++patch) {
-      if ((*patch)->box.contains(at))
-        return loadValue(block_.type, (*patch)->values.get(), (*patch)->box.position(at));
-    }
-    return storedValueAt(block_, at);
-  }
-  const Block& block_;
-  std::vector<const Patch*> patches_;
+  bool stale = true;            // values have arrived since they were continued
 };
 
 /// The stored values as an array of the type.
@@ -268,7 +242,9 @@ class LayerExchange {
         if (rounds[round] != 0) exchangeValues(static_cast<std::int32_t>(round));
       }
     }
-    comm_.together([&] { continueBeyondDomain(); });
+    comm_.together([&] {
+      for (Grid& grid : grids_) continueBeyondDomain(grid);
+    });
     for (std::size_t i = directory_.firstMine(); i < directory_.lastMine(); ++i) {
       const BlockEntry& entry = directory_.entries()[i];
       Block& block = blocks_[static_cast<std::size_t>(entry.block)];
@@ -503,34 +479,53 @@ class LayerExchange {
     if (!open.empty()) grid.open.push_back({wanted.box, wanted.values.get(), std::move(open)});
   }
 
-  /// Other levels interpolate in these values, which depend on values that arrive, so this runs before each
-  /// round and after the last one.
-  void continueBeyondDomain() {
-    for (const Grid& grid : grids_) {
-      if (!grid.open.empty()) comm::continueBeyondDomain(grid.block, grid.open);
-    }
+  /// Other levels interpolate in these values, which depend on values that arrive. So this runs before values
+  /// beyond the stored ones are read, and after the last round.
+  static void continueBeyondDomain(Grid& grid) {
+    if (grid.stale && !grid.open.empty()) comm::continueBeyondDomain(grid.block, grid.open);
+    grid.stale = false;
   }
 
   /// Fills with the stored values that must stay, else with the nearest value that is the grid's own.
   static void fillWithOwn(const Grid& grid, Wanted& wanted) {
-    const std::size_t size = sizeOf(grid.block.type);
     const IndexBox stored = grid.block.stored();
-    std::byte* to = wanted.values.get();
-    forEachIndex(wanted.box, [&](const glm::ivec3& at) {
-      glm::ivec3 best = glm::clamp(at, stored.lo, stored.hi - 1);
-      if (!wanted.keep) {
-        int minimum = std::numeric_limits<int>::max();
-        for (const IndexBox& given : grid.given) {
-          const glm::ivec3 nearest = glm::clamp(at, given.lo, given.hi - 1);
-          const glm::ivec3 apart = glm::abs(nearest - at);
-          if (apart.x + apart.y + apart.z >= minimum) continue;
-          minimum = apart.x + apart.y + apart.z;
-          best = nearest;
-        }
+    const bool all = wanted.keep || grid.given.empty();
+    const std::span<const IndexBox> sources = all ? std::span(&stored, 1) : std::span(grid.given);
+    const std::size_t size = sizeOf(grid.block.type);
+    forEachRow(wanted.box, [&](const glm::ivec3& row) {
+      for (glm::ivec3 at = row; at.x < wanted.box.hi.x;) {
+        const IndexBox& source = nearestOf(sources, at);
+        IndexBox run{at, at + 1};
+        while (run.hi.x < wanted.box.hi.x && &nearestOf(sources, {run.hi.x, at.y, at.z}) == &source)
+          ++run.hi.x;
+        copyNearest(grid.block, source, run, wanted.values.get() + wanted.box.position(at) * size);
+        at.x = run.hi.x;
       }
-      grid.block.copyTo({best, best + 1}, to);
-      to += size;
     });
+  }
+
+  /// The first of those boxes that are nearest in steps along the axes.
+  static const IndexBox& nearestOf(std::span<const IndexBox> boxes, const glm::ivec3& at) {
+    if (boxes.size() == 1) return boxes.front();
+    const auto stepsTo = [&at](const IndexBox& box) {
+      const glm::ivec3 apart = glm::abs(glm::clamp(at, box.lo, box.hi - 1) - at);
+      return apart.x + apart.y + apart.z;
+    };
+    const auto isNearer = [&](const IndexBox& a, const IndexBox& b) { return stepsTo(a) < stepsTo(b); };
+    return *std::min_element(boxes.begin(), boxes.end(), isNearer);
+  }
+
+  /// Copies the values of `from` that are nearest to those of `run`, which differ in x.
+  static void copyNearest(const Block& block, const IndexBox& from, const IndexBox& run, std::byte* to) {
+    const glm::ivec3 first = glm::clamp(run.lo, from.lo, from.hi - 1);
+    const glm::ivec3 last = glm::clamp(run.hi - 1, from.lo, from.hi - 1);
+    const std::size_t size = sizeOf(block.type);
+    const auto placeOf = [&](int x) { return to + static_cast<std::size_t>(x - run.lo.x) * size; };
+    const int begin = std::clamp(first.x, run.lo.x, run.hi.x - 1);
+    const int end = begin + last.x + 1 - first.x;
+    block.copyTo({first, last + 1}, placeOf(begin));
+    for (int x = run.lo.x; x < begin; ++x) std::memcpy(placeOf(x), placeOf(begin), size);
+    for (int x = end; x < run.hi.x; ++x) std::memcpy(placeOf(x), placeOf(end - 1), size);
   }
 
   Request requestOf(const Asked& asked) const {
@@ -564,7 +559,6 @@ class LayerExchange {
     std::vector<std::byte> own;
     std::vector<std::uint64_t> counts;
     comm_.together([&] {
-      continueBeyondDomain();
       for (int rank = 0; rank < comm_.size(); ++rank) {
         const std::size_t before = bytes.size();
         const std::span<const std::byte> requests = incoming_.of(rank);
@@ -594,55 +588,31 @@ class LayerExchange {
     });
   }
 
-  void answer(const Request& request, std::vector<std::byte>& bytes) const {
-    const Grid& grid = grids_[static_cast<std::size_t>(request.grid)];
+  void answer(const Request& request, std::vector<std::byte>& bytes) {
+    Grid& grid = grids_[static_cast<std::size_t>(request.grid)];
     const std::size_t begin = bytes.size();
     bytes.resize(begin + answerBytes(request, grid.block.type));
-    std::byte* to = bytes.data() + begin;
+    std::byte* const to = bytes.data() + begin;
     if (request.copied != 0) {
       grid.block.copyTo({request.box.lo + request.shift, request.box.hi + request.shift}, to);
       return;
     }
-    const Sampler sampler(grid.block, request.clip);
-    std::array<std::vector<std::pair<int, int>>, 3> parts;
-    for (int axis = 0; axis < 3; ++axis) {
-      for (int i = request.box.lo[axis]; i < request.box.hi[axis]; ++i)
-        parts[static_cast<std::size_t>(axis)].push_back(request.partsIn(axis, i));
+    const Tiling tiles(request.box, 0);  // bounds the memory for gathered values
+    for (std::size_t i = 0; i < tiles.count(); ++i) {
+      const IndexBox tile = tiles[i];
+      request.placesIn(tile, places_);
+      sampler_.prepare(grid.block, places_);
+      if (sampler_.leavesStored()) continueBeyondDomain(grid);
+      sampler_.gather();
+      forEachIndex(tile, [&](const glm::ivec3& at) {
+        const double sum = sampler_.sum(at - tile.lo);
+        std::memcpy(to + request.box.position(at) * sizeof(sum), &sum, sizeof(sum));
+      });
     }
-    const auto partsAt = [&](int axis, int index) {
-      return parts[static_cast<std::size_t>(axis)][static_cast<std::size_t>(index - request.box.lo[axis])];
-    };
-    forEachIndex(request.box, [&](const glm::ivec3& at) {
-      const auto [x0, x1] = partsAt(0, at.x);
-      const auto [y0, y1] = partsAt(1, at.y);
-      const auto [z0, z1] = partsAt(2, at.z);
-      double sum = 0.0;
-      double infinite = 0.0;
-      int finite = 0;
-      for (int z = z0; z < z1; ++z) {
-        for (int y = y0; y < y1; ++y) {
-          for (int x = x0; x < x1; ++x) {
-            const double value =
-                sampler.at({request.place(0, at.x, x), request.place(1, at.y, y), request.place(2, at.z, z)});
-            if (std::isinf(value)) infinite += value;
-            if (!std::isfinite(value)) continue;
-            sum += value;
-            ++finite;
-          }
-        }
-      }
-      // Values that are not finite do not count in a mean. Without any finite value, the mean is infinite if
-      // all values but NaN are infinities of one sign.
-      const int count = (x1 - x0) * (y1 - y0) * (z1 - z0);
-      sum = finite > 0        ? sum * count / finite
-            : infinite != 0.0 ? infinite
-                              : std::numeric_limits<double>::quiet_NaN();
-      std::memcpy(to, &sum, sizeof(sum));
-      to += sizeof(sum);
-    });
   }
 
-  static void take(const Request& request, const Grid& grid, Wanted& wanted, const std::byte* from) {
+  void take(const Request& request, Grid& grid, Wanted& wanted, const std::byte* from) {
+    grid.stale = true;
     const ScalarType type = grid.block.type;
     const std::size_t size = sizeOf(type);
     if (wanted.sums.empty()) {
@@ -653,10 +623,14 @@ class LayerExchange {
       });
       return;
     }
-    const auto shareOf = [&request](int axis, int index) {
-      const auto [first, last] = request.partsIn(axis, index);
-      return static_cast<double>(last - first) / request.parts[axis];
-    };
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<double>& own = shares_[static_cast<std::size_t>(axis)];
+      own.clear();
+      for (int index = request.box.lo[axis]; index < request.box.hi[axis]; ++index) {
+        const auto [first, last] = request.partsIn(axis, index);
+        own.push_back(static_cast<double>(last - first) / request.parts[axis]);
+      }
+    }
     const double each = 1.0 / (static_cast<double>(request.parts.x) * request.parts.y * request.parts.z);
     std::size_t index = 0;
     forEachIndex(request.box, [&](const glm::ivec3& at) {
@@ -669,7 +643,8 @@ class LayerExchange {
       ++index;
       const std::size_t place = wanted.box.position(at);
       wanted.sums[place] += sum * each;
-      wanted.weights[place] += shareOf(0, at.x) * shareOf(1, at.y) * shareOf(2, at.z);
+      const glm::u64vec3 number(at - request.box.lo);
+      wanted.weights[place] += shares_[0][number.x] * shares_[1][number.y] * shares_[2][number.z];
       storeValue(type, wanted.values.get(), place, wanted.sums[place] / wanted.weights[place]);
     });
   }
@@ -680,8 +655,11 @@ class LayerExchange {
   std::vector<double> levels_;              // volumes of a value, descending
   std::vector<std::int32_t> levelNumbers_;  // of the directory's entries: indices of levels_
   std::vector<Grid> grids_;
-  std::vector<std::vector<Asked>> outgoing_;  // by the rank that answers
-  Gathered incoming_;                         // requests of other ranks
+  std::vector<std::vector<Asked>> outgoing_;   // by the rank that answers
+  Gathered incoming_;                          // requests of other ranks
+  std::array<SamplePlaces, 3> places_;         // memory for one answer at a time
+  std::array<std::vector<double>, 3> shares_;  // per axis, of an answer's values: those of their parts
+  Sampler sampler_;
 };
 
 }  // namespace

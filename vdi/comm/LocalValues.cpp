@@ -1,0 +1,98 @@
+#include "vdi/comm/LocalValues.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <span>
+
+namespace vdi::comm {
+
+namespace {
+
+template <typename T>
+void convertAs(const void* row, int first, std::span<const int> indices, double* to) {
+  const T* const from = static_cast<const T*>(row);
+  for (const int index : indices) *to++ = static_cast<double>(from[index - first]);
+}
+
+/// Value [0] of `row` has index `first`. The type decides once a row, not once a value.
+void convert(ScalarType type, const void* row, int first, std::span<const int> indices, double* to) {
+  switch (type) {
+    case ScalarType::U8:
+      return convertAs<std::uint8_t>(row, first, indices, to);
+    case ScalarType::I8:
+      return convertAs<std::int8_t>(row, first, indices, to);
+    case ScalarType::U16:
+      return convertAs<std::uint16_t>(row, first, indices, to);
+    case ScalarType::I16:
+      return convertAs<std::int16_t>(row, first, indices, to);
+    case ScalarType::U32:
+      return convertAs<std::uint32_t>(row, first, indices, to);
+    case ScalarType::I32:
+      return convertAs<std::int32_t>(row, first, indices, to);
+    case ScalarType::F32:
+      return convertAs<float>(row, first, indices, to);
+    case ScalarType::F64:
+      return convertAs<double>(row, first, indices, to);
+  }
+}
+
+}  // namespace
+
+/// Takes the values that lie in `box`. rowAt(lo, hi) returns those with indices from `lo` to before `hi`,
+/// which differ in x.
+template <typename RowAt>
+void LocalValues::take(ScalarType type, const IndexBox& box, const Indices& indices, RowAt rowAt) {
+  std::array<std::size_t, 3> first{};
+  std::array<std::size_t, 3> last{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<int>& own = indices[axis];
+    const auto numberOf = [&own](int index) {
+      return static_cast<std::size_t>(std::lower_bound(own.begin(), own.end(), index) - own.begin());
+    };
+    first[axis] = numberOf(box.lo[static_cast<int>(axis)]);
+    last[axis] = numberOf(box.hi[static_cast<int>(axis)]);
+    if (first[axis] >= last[axis]) return;
+  }
+  const std::span<const int> x = std::span(indices[0]).subspan(first[0], last[0] - first[0]);
+  for (std::size_t z = first[2]; z < last[2]; ++z) {
+    for (std::size_t y = first[1]; y < last[1]; ++y) {
+      const void* row = rowAt(glm::ivec3(x.front(), indices[1][y], indices[2][z]), x.back() + 1);
+      const std::size_t to = (z * indices[1].size() + y) * indices[0].size() + first[0];
+      convert(type, row, x.front(), x, values_.data() + to);
+    }
+  }
+}
+
+void LocalValues::gather(const Block& block, const Indices& indices) {
+  values_.resize(indices[0].size() * indices[1].size() * indices[2].size());
+  const auto takeArray = [&](const IndexBox& box, const void* array) {
+    const auto* const bytes = static_cast<const std::byte*>(array);
+    take(block.type, box, indices,
+         [&](const glm::ivec3& at, int) { return bytes + box.position(at) * sizeOf(block.type); });
+  };
+  if (block.isPacked()) {
+    takeArray(block.stored(), block.data);
+  } else {
+    takeCopies(block, indices);
+  }
+  for (const Patch& patch : block.patchList()) takeArray(patch.box, patch.values.get());
+}
+
+void LocalValues::takeCopies(const Block& block, const Indices& indices) {
+  row_.resize(static_cast<std::size_t>(block.dims.x));
+  take(block.type, block.stored(), indices, [&](const glm::ivec3& at, int end) -> const void* {
+    block.copyTo({at, {end, at.y + 1, at.z + 1}}, row_.data());
+    return row_.data();
+  });
+}
+
+void LocalValues::gather(const Block& block, const IndexBox& box) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    range_[axis].resize(static_cast<std::size_t>(box.size()[static_cast<int>(axis)]));
+    std::iota(range_[axis].begin(), range_[axis].end(), box.lo[static_cast<int>(axis)]);
+  }
+  gather(block, range_);
+}
+
+}  // namespace vdi::comm
