@@ -237,10 +237,10 @@ TEST_CASE("a finer level begins only where it ends before the next frame comes")
   std::size_t wasted = 0;
   std::size_t finer = 0;
   for (std::uint32_t id = 0; id < 20; ++id, now += 500ms) {
-    outbox.offer(frameOf(id, {4 * mebibyte, 2 * mebibyte, 4 * mebibyte}, 3), now);
+    outbox.offer(frameOf(id, {2 * mebibyte, 5 * mebibyte / 2, 4 * mebibyte}, 3), now);
     line.run(now, now + 500ms);
     if (id < 3) continue;
-    finer += line.sent(id, 1) == 2 * mebibyte ? 1 : 0;
+    finer += line.sent(id, 1) == 5 * mebibyte / 2 ? 1 : 0;
     wasted += line.sent(id, 2);
   }
   CHECK(finer == 17);

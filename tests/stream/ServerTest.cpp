@@ -137,12 +137,14 @@ TEST_CASE("a client decodes VDIs while they arrive") {
   Publisher publisher(server);
   const auto vdi = std::make_shared<const Vdi>(test::noisyVdi(700, 500, 12));  // of many parts
   publisher.publish(vdi);
-  Received coarse = nextOf(client);
-  CHECK(coarse.level.level == 0);
-  CHECK(coarse.file.empty());
-  CHECK(coarse.decode() == thinned(*vdi, 3));
-  Received full = nextOf(client);
-  CHECK(full.decode() == *vdi);
+  std::uint32_t level = 0;
+  for (const int factor : {9, 5, 3, 1}) {
+    Received received = nextOf(client);
+    CHECK(received.level.level == level++);
+    CHECK(received.level.levels == 4);
+    CHECK(received.file.empty());
+    CHECK(received.decode() == thinned(*vdi, factor));
+  }
 }
 
 TEST_CASE("publishing waits for no encoder") {
