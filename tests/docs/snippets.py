@@ -1,20 +1,42 @@
 """Runs or compiles the snippets of README.md and the guides; recipes.py those of docs/recipes.md.
 
 The tests add the surroundings that a document's text describes, such as the simulation's variables. They
-change the snippets only in one port, which another program may hold, and in one number of steps.
+change the snippets only in one port, which another program may hold, and in one number of steps. Snippets
+of which one builds on another share a run, because ParaView takes seconds to start and to draw.
 
 The environment has MPICC, MPIFORT, PVBATCH, PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
 """
 
+import atexit
+import functools
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
+import tempfile
 
 from documents import SOURCE, TOOL, main, made, run, snippets, tests, write
 
 ADAPTOR = os.path.join(SOURCE, "catalyst_adaptor")
+RUNS = tempfile.mkdtemp()
+atexit.register(shutil.rmtree, RUNS)
+
+
+def shared(function):
+    """Runs a function at most once, in a folder that stays. What decorates it returns the folder's path."""
+    @functools.cache
+    def run_once():
+        before, folder = os.getcwd(), os.path.join(RUNS, function.__name__)
+        os.mkdir(folder)
+        os.chdir(folder)
+        try:
+            function()
+        finally:
+            os.chdir(before)
+        return folder
+    return run_once
 
 
 def vdi(*options):
@@ -194,14 +216,22 @@ GUIDE = snippet("from paraview import catalyst")
 EXTRACTOR = snippet("stream = CreateExtractor").replace("8080", "0")
 
 
+STEERED = snippet("stream.Writer.Steer = 1")
+
+
+@shared
+def streamed():
+    in_situ(GUIDE + EXTRACTOR + STEERED + "assert (stream.Writer.Port, stream.Writer.Steer) == (0, 1)\n")
+
+
 @tests("paraview", "docs/live.md", "stream = CreateExtractor")
-def extractor_of_stream(text):
-    in_situ(GUIDE + EXTRACTOR + "assert stream.Writer.Port == 0\n")
+def extractor_of_stream(_):
+    streamed()
 
 
 @tests("paraview", "docs/live.md", "stream.Writer.Steer = 1")
-def steered_stream(text):
-    in_situ(GUIDE + EXTRACTOR + text + "assert stream.Writer.Steer == 1\n")
+def steered_stream(_):
+    streamed()
 
 
 @tests("paraview", "docs/python.md", "import numpy as np")
@@ -236,11 +266,25 @@ def pvbatch(script):
 
 WRITING = snippet("from paraview.simple import *\nLoadDistributed")
 SHOWING = snippet("reader = OpenDataFile")
+LOOKING = snippet("reader.SMProxy.UpdatePropertyInformation()")
+
+
+@shared
+def written():
+    pvbatch(WRITING)
+
+
+@shared
+def looked_at():
+    """The file that README.md's script writes, shown by another one."""
+    shutil.copy(os.path.join(written(), "wavelet.vdi"), ".")
+    loading = "".join(WRITING.splitlines(True)[:2])
+    pvbatch(loading + SHOWING + LOOKING + "assert list(view.CameraPosition) == [60, 45, 75]\n")
 
 
 @tests("paraview", "README.md", "from paraview.simple import *\nLoadDistributedPlugin")
-def script_with_filter(text):
-    pvbatch(text)
+def script_with_filter(_):
+    os.chdir(written())
     assert made("wavelet*") == ["wavelet.vdi", "wavelet_20.png"], made("wavelet*")
 
 
@@ -250,14 +294,14 @@ def plugin_of_a_client(text):
 
 
 @tests("paraview", "docs/user-guide.md", "reader = OpenDataFile")
-def shown_file(text):
-    pvbatch(WRITING + text)
+def shown_file(_):
+    os.chdir(looked_at())
     assert made("wavelet.png"), made("*")
 
 
 @tests("paraview", "docs/user-guide.md", "reader.SMProxy.UpdatePropertyInformation()")
-def own_viewpoint(text):
-    pvbatch(WRITING + SHOWING + text + "assert list(view.CameraPosition) == [60, 45, 75]\n")
+def own_viewpoint(_):
+    looked_at()
 
 
 @tests("paraview", "docs/live.md", "stream = VDIStream(URL=link)")
