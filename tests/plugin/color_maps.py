@@ -1,5 +1,6 @@
 """Every colour map that ParaView offers, and those that users make: the filter's picture, channel by channel, against the
-optical model in double precision (optical.py), and some of them against ParaView's own Volume."""
+optical model in double precision (optical.py), and some of them against ParaView's own Volume. The argument N leaves out all
+but each Nth of the maps that ParaView offers."""
 
 import os
 import sys
@@ -89,8 +90,9 @@ def text(numbers):
 def is_steep(scene):
     """Whether a 256th of the data's range has an eighth of all that a colour or an opacity can change."""
     stretch = optical.TABLE // 256
-    colors = optical.color_table(scene.colors.GetClientSideObject(), scene.low, scene.high)
-    opacity = optical.opacity_table(scene.opacity.GetClientSideObject(), scene.low, scene.high)
+    low, high = scene.rays.low, scene.rays.high  # as in the picture, whose tables these are
+    colors = optical.color_table(scene.colors.GetClientSideObject(), low, high)
+    opacity = optical.opacity_table(scene.opacity.GetClientSideObject(), low, high)
     return max(np.abs(table[stretch:] - table[:-stretch]).max() for table in (colors, opacity)) > 0.125
 
 
@@ -198,7 +200,7 @@ for number, (name, (case, lacks)) in enumerate({**CASES, **STEPS, **LOGARITHMIC}
     check((once.max(axis=(0, 1))[has] > 15).sum() == len(has), name + ": there is something to see")
     shown.append(np.vstack([once, expected]))
 write_png("color_maps.png", np.hstack(shown).round().astype(np.uint8))
-for number in range(PRESETS.GetNumberOfPresets()):
+for number in range(0, PRESETS.GetNumberOfPresets(), int(sys.argv[1])):
     name = PRESETS.GetPresetName(number)
     scene = scenes[number % len(scenes)]
     scene.reset()

@@ -2,6 +2,8 @@
 nothing with the product: no table of samples, no slabs, no blocks, no shader. Colours and opacities are asked from VTK's own
 functions."""
 
+import functools
+
 import numpy as np
 
 SAMPLES_PER_VOXEL = 64
@@ -80,7 +82,8 @@ class Rays:
         transparency = np.maximum(1.0 - opacity_table(opacity, self.low, self.high), 1e-300)
         depth = (-np.log(transparency) / unit_distance)[self.places(False)] * self.length
         behind = np.cumsum(depth, axis=1)
-        weight = np.exp(depth - behind) - np.exp(-behind)
+        through = np.exp(-behind)  # to the far end of each sample
+        weight = np.hstack([1.0 - through[:, :1], through[:, :-1] - through[:, 1:]])
         result = np.zeros(self.shape + (3,))
         result[self.hits] = np.einsum("rs,rsc->rc", weight, rgb)
         return 255.0 * result
@@ -90,15 +93,20 @@ def is_logarithmic(colors):
     return colors.GetScale() == 1 and colors.GetRange()[0] > 0  # VTK_CTF_LOG10
 
 
+@functools.lru_cache(2)
+def table_of(function, changed, low, high, components):
+    """What a function has at evenly spaced places. It was changed at `changed`, and the last tables are kept."""
+    table = np.zeros(components * TABLE)
+    function.GetTable(low, high, TABLE, table)
+    table.flags.writeable = False
+    return table
+
+
 def color_table(colors, low, high):
     """The colours from one scalar to another, as Volume asks for them: through the control points, without discrete values
     and categories. By VTK's rule at evenly spaced logarithms where the map is logarithmic, else at evenly spaced scalars."""
-    table = np.zeros(3 * TABLE)
-    colors.GetTable(low, high, TABLE, table)
-    return table.reshape(-1, 3)
+    return table_of(colors, colors.GetMTime(), low, high, 3).reshape(-1, 3)
 
 
 def opacity_table(opacity, low, high):
-    table = np.zeros(TABLE)
-    opacity.GetTable(low, high, TABLE, table)
-    return table
+    return table_of(opacity, opacity.GetMTime(), low, high, 1)
