@@ -8,7 +8,7 @@ import pvtest
 from paraview import simple
 from pvtest import check
 
-SIZE, CAMERA, CENTER = [480, 360], [2.2, 1.9, 2.4], [0.5, 0.5, 0.5]
+SIZE, CAMERA, CENTER = [320, 240], [2.2, 1.9, 2.4], [0.5, 0.5, 0.5]
 MODE = sys.argv[1]
 
 
@@ -54,7 +54,7 @@ if MODE == "compare":
 files = [os.path.join(pvtest.OUTPUT, "ranks_{}.vdi".format(step)) for step in range(3)]
 if MODE == "write":
     for step, file in enumerate(files):
-        image.CameraPosition, image.Resolution = [2.2, 1.9 + step, 2.4], [480 - 100 * step, 360]
+        image.CameraPosition, image.Resolution = [2.2, 1.9 + step, 2.4], [320 - 70 * step, 240]
         simple.SaveData(file, proxy=image)
 simple.Hide(image, view)
 reader = simple.OpenDataFile(files)

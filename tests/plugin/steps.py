@@ -18,7 +18,7 @@ FOLDER = os.path.join(pvtest.OUTPUT, "steps")
 KINDS, COUNT = 4, 20
 
 
-def make(kind, resolution="640x360", azimuth="0"):
+def make(kind, resolution="320x180", azimuth="0"):
     path = os.path.join(FOLDER, "kind_{}.vdi".format(kind))
     subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--seed", str(kind + 1), "--size", "32x32x32",
                     "--resolution", resolution, "--azimuth", azimuth, "-o", path], check=True, stdout=subprocess.DEVNULL)

@@ -60,7 +60,7 @@ for name, (kind, scale, as_cells, parallel_scale) in CASES.items():
     source, center = producer_of((brain * scale).astype(kind), spacing, as_cells)
     association = "CELLS" if as_cells else "POINTS"
     set_colors("brain", 20 * scale, 250 * scale, peak=0.6)
-    view = make_view([400, 400], list(center + [210, 170, 330]), list(center), parallel_scale)
+    view = make_view([240, 240], list(center + [210, 170, 330]), list(center), parallel_scale)
     ours = picture(vdi_filter(source, view, association, "brain", 4.0))
     theirs = paraview_volume(source, view, association, "brain", 4.0)
     similar = ssim(ours, theirs)
@@ -101,7 +101,7 @@ colors, opacity = set_colors("brain", 0, 1)
 colors.RGBPoints = [0, 0, 0, 1, 0.5, 0, 0.2, 1, 1, 0, 1, 0.3]
 opacity.Points = [0, 0, 0.5, 0, 0.1, 0, 0.5, 0, 1, 0.5, 0.5, 0]
 extent = 0.9 * np.linalg.norm(np.array(brain.shape[::-1]) * spacing)
-view = make_view([400, 400], list(center + extent * np.array([0.6, 0.5, 1.9])), list(center))
+view = make_view([240, 240], list(center + extent * np.array([0.6, 0.5, 1.9])), list(center))
 ours = picture(vdi_filter(source, view, "POINTS", "brain", 1.0))
 theirs = paraview_volume(source, view, "POINTS", "brain", 1.0)
 similar = ssim(ours, theirs)
@@ -139,7 +139,7 @@ for data, make in DATA.items():
         colors.RGBPoints = sum([[top * i / (count - 1)] + hue(i * (5 if count > 8 else 1) % count / count)
                                 for i in range(count)], [])
         opacity.Points = [0, 0, 0.5, 0, top / 2, middle, 0.5, 0, top, end, 0.5, 0]
-        view = make_view([240, 240], list(center + np.array([0.5, 0.4, 0.8]) * 1.6 * size), list(center))
+        view = make_view([160, 160], list(center + np.array([0.5, 0.4, 0.8]) * 1.6 * size), list(center))
         theirs = paraview_volume(source, view, "POINTS", "brain", 1.0)  # may stretch the function over the data
         fine = picture(vdi_filter(source, view, "POINTS", "brain", 1.0, SamplingRate=8, PictureOnly=1))
         check(fine.max() > 100, "%s %s: something is there" % (data, name))
