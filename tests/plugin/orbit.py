@@ -90,7 +90,7 @@ def recognisable():
 
 def memory():
     files = [make("orbit_{}.vdi".format(step), "--size", "24x24x24", "--resolution", size)
-             for step, size in enumerate(("200x150", "150x200", "180x180"))]
+             for step, size in enumerate(("100x75", "75x100", "90x90"))]
     reader = simple.OpenDataFile(files)
     view = shown(reader, [100, 75])
 
@@ -102,7 +102,7 @@ def memory():
             view.ViewTime = reader.TimestepValues[step % 3]
             simple.Render(view)
 
-    for work, count, what in ((orbits, 300, "frames of an orbit"), (steps, 30, "time steps")):
+    for work, count, what in ((orbits, 300, "frames of an orbit"), (steps, 60, "time steps")):
         work(count // 3)
         before = megabytes()
         work(count)
