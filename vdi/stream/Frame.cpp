@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "vdi/core/Estimate.h"
+#include "vdi/core/Parallel.h"
 #include "vdi/core/Thinning.h"
 #include "vdi/io/VdiFile.h"
 
@@ -10,9 +11,12 @@ namespace vdi::stream {
 
 namespace {
 
-void addLevel(Frame& frame, std::vector<std::byte> bytes, const Vdi& size) {
-  frame.levels.push_back(
-      std::make_shared<EncodedLevel>(EncodedLevel{std::move(bytes), size.width, size.height}));
+std::shared_ptr<const EncodedLevel> levelOf(std::vector<std::byte> bytes, const Vdi& size) {
+  return std::make_shared<EncodedLevel>(EncodedLevel{std::move(bytes), size.width, size.height});
+}
+
+std::shared_ptr<const EncodedLevel> levelOf(const Vdi& vdi) {
+  return levelOf(io::encode(vdi), vdi);
 }
 
 }  // namespace
@@ -33,12 +37,11 @@ void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
   const auto bytes = bytesInMemory<std::uint64_t>(vdi.listCount(), vdi.supersegmentCount(), vdi.precision());
   const std::vector<int> factors = coarseFactorsOf(bytes);
   Frame frame{id, vdi.timeStep, vdi.time, made, static_cast<std::uint32_t>(factors.size()) + 1, {}};
-  for (const int factor : factors) {
-    const Vdi coarse = thinned(vdi, factor);
-    addLevel(frame, io::encode(coarse), coarse);
-  }
+  // A coarse level has too few chunks to keep all cores busy, so all are made side by side.
+  frame.levels.resize(factors.size());
+  eachInParallel(factors.size(), [&](std::size_t i) { frame.levels[i] = levelOf(thinned(vdi, factors[i])); });
   if (!factors.empty() && !take(std::make_shared<Frame>(frame))) return;
-  addLevel(frame, io::encode(vdi), vdi);
+  frame.levels.push_back(levelOf(vdi));
   (void)take(std::make_shared<Frame>(std::move(frame)));
 }
 
@@ -52,9 +55,9 @@ void passFrame(std::vector<std::byte> file, std::uint32_t id, Clock::time_point 
     static_cast<void>(io::decode(file));
   } else {
     // This checks all of the file.
-    for (const Vdi& coarse : io::decodeThinned(file, factors)) addLevel(frame, io::encode(coarse), coarse);
+    for (const Vdi& coarse : io::decodeThinned(file, factors)) frame.levels.push_back(levelOf(coarse));
   }
-  addLevel(frame, std::move(file), info.header);
+  frame.levels.push_back(levelOf(std::move(file), info.header));
   take(std::make_shared<Frame>(std::move(frame)));
 }
 
