@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vdi/core/Error.h"
+#include "vdi/io/JsonText.h"
 
 namespace vdi::io {
 
@@ -110,24 +111,29 @@ Coloring coloringOf(const json& object) {
 std::string metadataText(const Coloring& coloring, double time, std::uint64_t timeStep) {
   validate(coloring);
   const auto& [array, range, function] = coloring;
-  json colors = json::array();
-  for (const ColorNode& node : function.colors)
-    colors.push_back({node.x, node.color.r, node.color.g, node.color.b});
-  json opacities = json::array();
-  for (const OpacityNode& node : function.opacities) opacities.push_back({node.x, node.opacity});
-  json object{{"array",
-               {{"name", array.name},
-                {"association", array.cells ? "cells" : "points"},
-                {"components", array.components},
-                {"component", array.component}}},
-              {"transferFunction",
-               {{"colors", std::move(colors)},
-                {"opacities", std::move(opacities)},
-                {"unitDistance", function.unitDistance}}},
-              {"time", time},
-              {"timeStep", timeStep}};
-  if (range.min <= range.max) object["range"] = {range.min, range.max};
-  std::string text = object.dump(-1, ' ', false, json::error_handler_t::replace);
+  std::vector<std::string> colors;
+  for (const ColorNode& node : function.colors) {
+    colors.push_back(
+        jsonListOf({jsonOf(node.x), jsonOf(node.color.r), jsonOf(node.color.g), jsonOf(node.color.b)}));
+  }
+  std::vector<std::string> opacities;
+  for (const OpacityNode& node : function.opacities)
+    opacities.push_back(jsonListOf({jsonOf(node.x), jsonOf(node.opacity)}));
+  JsonObject object;
+  object.add("array", JsonObject()
+                          .add("association", jsonOf(array.cells ? "cells" : "points"))
+                          .add("component", jsonOf(array.component))
+                          .add("components", jsonOf(array.components))
+                          .add("name", jsonOf(array.name))
+                          .text());
+  if (range.min <= range.max) object.add("range", jsonListOf({jsonOf(range.min), jsonOf(range.max)}));
+  object.add("time", jsonOf(time)).add("timeStep", jsonOf(timeStep));
+  object.add("transferFunction", JsonObject()
+                                     .add("colors", jsonListOf(colors))
+                                     .add("opacities", jsonListOf(opacities))
+                                     .add("unitDistance", jsonOf(function.unitDistance))
+                                     .text());
+  std::string text = object.text();
   if (text.size() > maxMetadataBytes) refuse(fmt::format("they would take {} bytes", text.size()));
   return text;
 }

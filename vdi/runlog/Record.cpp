@@ -11,11 +11,14 @@
 
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
+#include "vdi/io/JsonText.h"
 
 namespace vdi::runlog {
 
 namespace {
 
+using io::JsonObject;
+using io::jsonOf;
 using Json = nlohmann::ordered_json;
 
 constexpr double millisecondsPerSecond = 1e3;
@@ -38,11 +41,15 @@ double rounded(double milliseconds) {
   return std::round(milliseconds * millisecondsPerSecond) / millisecondsPerSecond;
 }
 
-Json stagesJson(const std::vector<StageTime>& times) {
-  Json object = Json::object();
-  for (const StageTime& stage : times)
-    object[stage.name] = {{"slowest", rounded(stage.slowest)}, {"mean", rounded(stage.mean)}};
-  return object;
+std::string stagesJson(const std::vector<StageTime>& times) {
+  JsonObject object;
+  for (const StageTime& stage : times) {
+    object.add(stage.name, JsonObject()
+                               .add("slowest", jsonOf(rounded(stage.slowest)))
+                               .add("mean", jsonOf(rounded(stage.mean)))
+                               .text());
+  }
+  return object.text();
 }
 
 std::vector<StageTime> stagesFrom(const Json& object) {
@@ -50,11 +57,6 @@ std::vector<StageTime> stagesFrom(const Json& object) {
   for (const auto& [name, stage] : object.items())
     times.push_back({name, stage.at("slowest").get<double>(), stage.at("mean").get<double>()});
   return times;
-}
-
-/// Names of files and fields may have any bytes.
-std::string dumped(const Json& object) {
-  return object.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 RunStart startFrom(const Json& line) {
@@ -185,40 +187,54 @@ void RunSummary::add(const FrameRecord& record) {
 }
 
 std::string jsonLine(const RunStart& start) {
-  return dumped(
-      {{"event", "start"}, {"field", start.field}, {"ranks", start.ranks}, {"unix_time", start.unixTime}});
+  return JsonObject()
+      .add("event", jsonOf("start"))
+      .add("field", jsonOf(start.field))
+      .add("ranks", jsonOf(start.ranks))
+      .add("unix_time", jsonOf(start.unixTime))
+      .text();
 }
 
 std::string jsonLine(const FrameRecord& record) {
-  Json line{{"event", "frame"}, {"step", record.step}, {"time", record.time}};
-  if (!record.camera.empty()) line["camera"] = record.camera;
-  line["ms"] = rounded(record.milliseconds);
-  line["stages"] = stagesJson(record.stages);
-  line["bytes_written"] = record.bytesWritten;
-  line["bytes_sent"] = record.bytesSent;
-  line["device_bytes"] = record.deviceBytes;
-  line["host_peak_bytes"] = record.hostPeakBytes;
-  line["dropped"] = record.dropped;
-  line["files"] = record.files;
-  if (!record.error.empty()) line["error"] = record.error;
-  return dumped(line);
+  JsonObject line;
+  line.add("event", jsonOf("frame")).add("step", jsonOf(record.step)).add("time", jsonOf(record.time));
+  if (!record.camera.empty()) line.add("camera", jsonOf(record.camera));
+  line.add("ms", jsonOf(rounded(record.milliseconds)));
+  line.add("stages", stagesJson(record.stages));
+  line.add("bytes_written", jsonOf(record.bytesWritten));
+  line.add("bytes_sent", jsonOf(record.bytesSent));
+  line.add("device_bytes", jsonOf(record.deviceBytes));
+  line.add("host_peak_bytes", jsonOf(record.hostPeakBytes));
+  line.add("dropped", jsonOf(record.dropped));
+  std::vector<std::string> files;
+  for (const std::string& file : record.files) files.push_back(jsonOf(file));
+  line.add("files", io::jsonListOf(files));
+  if (!record.error.empty()) line.add("error", jsonOf(record.error));
+  return line.text();
 }
 
 std::string jsonLine(const LeftOut& frame) {
-  return dumped({{"event", "left_out"}, {"step", frame.step}, {"time", frame.time}, {"cause", frame.cause}});
+  return JsonObject()
+      .add("event", jsonOf("left_out"))
+      .add("step", jsonOf(frame.step))
+      .add("time", jsonOf(frame.time))
+      .add("cause", jsonOf(frame.cause))
+      .text();
 }
 
 std::string jsonLine(const RunSummary& summary) {
-  return dumped({{"event", "end"},
-                 {"frames", summary.frames},
-                 {"failed", summary.failed},
-                 {"left_out", summary.leftOut},
-                 {"dropped", summary.dropped},
-                 {"bytes_written", summary.bytesWritten},
-                 {"seconds", rounded(summary.seconds)},
-                 {"waited_seconds", rounded(summary.waitedSeconds)},
-                 {"longest_ms", rounded(summary.longestMilliseconds)},
-                 {"stages", stagesJson(summary.stages)}});
+  return JsonObject()
+      .add("event", jsonOf("end"))
+      .add("frames", jsonOf(summary.frames))
+      .add("failed", jsonOf(summary.failed))
+      .add("left_out", jsonOf(summary.leftOut))
+      .add("dropped", jsonOf(summary.dropped))
+      .add("bytes_written", jsonOf(summary.bytesWritten))
+      .add("seconds", jsonOf(rounded(summary.seconds)))
+      .add("waited_seconds", jsonOf(rounded(summary.waitedSeconds)))
+      .add("longest_ms", jsonOf(rounded(summary.longestMilliseconds)))
+      .add("stages", stagesJson(summary.stages))
+      .text();
 }
 
 std::string textLine(const RunStart& start) {

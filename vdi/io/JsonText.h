@@ -1,0 +1,34 @@
+// JSON text for files that a run writes. It is put together from texts. nlohmann's objects and lists won't
+// do: their destructors allocate memory, and where that fails the process ends.
+#pragma once
+
+#include <concepts>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace vdi::io {
+
+/// These functions return a value's JSON. NaN and infinity are null.
+std::string jsonOf(double number);
+/// Bytes that are not UTF-8 become U+FFFD.
+std::string jsonOf(std::string_view text);
+template <std::integral Number>
+std::string jsonOf(Number number) {
+  return std::to_string(number);
+}
+/// The list of values that are JSON already.
+std::string jsonListOf(const std::vector<std::string>& values);
+
+/// A JSON object in one line, with its members in the order in which they were added.
+class JsonObject {
+ public:
+  /// `value` is JSON already.
+  JsonObject& add(std::string_view name, std::string_view value);
+  std::string text() const { return "{" + members_ + "}"; }
+
+ private:
+  std::string members_;
+};
+
+}  // namespace vdi::io
