@@ -65,11 +65,11 @@ struct VdiGenerator::State {
       steps = std::make_unique<detail::TimeSteps>(comm, bands->caster().volume());
       frames = std::make_unique<detail::Frames>(device, comm, transport, root);
       bandDownload = std::make_unique<detail::BandDownload>(device);
+      gone = std::make_exception_ptr(Error(ErrorCode::InvalidArgument, "the frame's generator has gone"));
     });
   }
   ~State() {
-    // Handles of frames may outlive the generator.
-    drop(std::make_exception_ptr(Error(ErrorCode::InvalidArgument, "the frame's generator has gone")));
+    drop(gone);      // handles of frames may outlive the generator
     pool->detach();  // VDIs may outlive this
   }
   State(const State&) = delete;
@@ -88,6 +88,7 @@ struct VdiGenerator::State {
   /// Settings and size of the last frame.
   std::optional<std::tuple<GenerateSettings, int, int>> lastKind;
   detail::Expectation expected;
+  std::exception_ptr gone;  // the error of frames that outlive this; made early, as a destructor can't fail
   RankReport mine;
   std::vector<RankReport> reports;
 
