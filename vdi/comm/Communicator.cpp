@@ -127,6 +127,26 @@ struct Communicator::State {
   int localRank = 0;
   std::vector<int> hostLeaders{0};  // [size]
 
+  /// Collective: takes the communicator over. If a rank lacks the memory, all throw.
+  static std::unique_ptr<State> on(OwnedComm& comm) {
+    std::unique_ptr<State> state;
+    std::exception_ptr error;
+    try {
+      state = std::make_unique<State>();
+      check(MPI_Comm_rank(comm.handle(), &state->rank), "MPI_Comm_rank");
+      check(MPI_Comm_size(comm.handle(), &state->size), "MPI_Comm_size");
+      state->hostLeaders.resize(static_cast<std::size_t>(state->size));
+    } catch (...) {
+      error = std::current_exception();
+    }
+    int failed = error ? 1 : 0;
+    check(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm.handle()), "MPI_Allreduce");
+    if (error) std::rethrow_exception(error);
+    if (failed != 0) throw Error(ErrorCode::RemoteRank, "another rank can't make a communicator");
+    std::swap(*state->owned.out(), *comm.out());
+    return state;
+  }
+
   MPI_Comm comm() const { return owned.handle(); }
   bool serial() const { return comm() == MPI_COMM_NULL; }
 
@@ -162,11 +182,10 @@ Communicator Communicator::fromMpi(int fortranHandle) {
   if (initialized == 0) throw Error(ErrorCode::Communication, "MPI isn't initialised");
   MPI_Comm given = MPI_Comm_f2c(fortranHandle);
   if (given == MPI_COMM_NULL) throw Error(ErrorCode::InvalidArgument, "not a communicator");
-  auto state = std::make_unique<State>();
-  check(MPI_Comm_dup(given, state->owned.out()), "MPI_Comm_dup");
-  check(MPI_Comm_set_errhandler(state->comm(), MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
-  check(MPI_Comm_rank(state->comm(), &state->rank), "MPI_Comm_rank");
-  check(MPI_Comm_size(state->comm(), &state->size), "MPI_Comm_size");
+  OwnedComm duplicate;
+  check(MPI_Comm_dup(given, duplicate.out()), "MPI_Comm_dup");
+  check(MPI_Comm_set_errhandler(duplicate.handle(), MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
+  std::unique_ptr<State> state = State::on(duplicate);
   OwnedComm node;
   check(MPI_Comm_split_type(state->comm(), MPI_COMM_TYPE_SHARED, state->rank, MPI_INFO_NULL, node.out()),
         "MPI_Comm_split_type");
@@ -183,7 +202,6 @@ Communicator Communicator::fromMpi(int fortranHandle) {
   check(MPI_Comm_split(node.handle(), host, state->rank, part.out()), "MPI_Comm_split");
   int leader = state->rank;
   check(MPI_Bcast(&leader, 1, MPI_INT, 0, part.handle()), "MPI_Bcast");
-  state->hostLeaders.resize(static_cast<std::size_t>(state->size));
   check(MPI_Allgather(&leader, 1, MPI_INT, state->hostLeaders.data(), 1, MPI_INT, state->comm()),
         "MPI_Allgather");
   Communicator made(std::move(state));
