@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <exception>
+#include <memory>
 #include <new>
 #include <optional>
 #include <stdexcept>
@@ -62,6 +63,24 @@ int guardedTogether(Calls& self, int code, Work work, std::optional<std::int64_t
         }
       },
       step);
+}
+
+/// Collective: makes a handle on a duplicate of the communicator, which the caller frees. On failure there is
+/// neither, on any rank.
+template <typename Handle>
+int makeHandle(std::int32_t fortranCommunicator, std::unique_ptr<Handle>& handle) {
+  Calls calls;  // reports that there is no memory for the handle
+  if (MPI_Comm_dup(MPI_Comm_f2c(fortranCommunicator), &calls.comm) != MPI_SUCCESS)
+    return VDI_CATALYST_BAD_ARGUMENT;
+  MPI_Comm_set_errhandler(calls.comm, MPI_ERRORS_RETURN);
+  const int code = guarded(calls, VDI_CATALYST_ENGINE, [&] { handle = std::make_unique<Handle>(); });
+  if (code == VDI_CATALYST_OK) {
+    handle->comm = calls.comm;
+  } else {
+    handle.reset();
+    MPI_Comm_free(&calls.comm);
+  }
+  return code;
 }
 
 /// Throws std::invalid_argument with the text `what` unless `good`.

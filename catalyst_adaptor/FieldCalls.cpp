@@ -16,7 +16,7 @@ constexpr int maxComponents = 16;
 /// `strides` is null for values in order.
 int setAnyArray(FieldCalls& self, const GivenArray& array, const void* const* data,
                 const vdi_catalyst_strides* strides) {
-  std::vector<StridedValues> all;
+  Fields::Change change;
   const bool cells = array.association == VDI_CATALYST_CELLS;
   const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(self.haveBlocks, "arrays were given before blocks");
@@ -27,6 +27,7 @@ int setAnyArray(FieldCalls& self, const GivenArray& array, const void* const* da
     (void)bytesOf(array.type);
     const std::vector<vdi_catalyst_block>& blocks = self.fields.blocks();
     require(blocks.empty() || data != nullptr, "an array without data");
+    std::vector<StridedValues> all;
     for (std::size_t i = 0; i < blocks.size(); ++i) {
       StridedValues values = self.fields.inOrder(blocks[i], array.type, cells, array.components, data[i]);
       for (std::size_t axis = 0; axis < 3 && strides != nullptr; ++axis)
@@ -35,8 +36,9 @@ int setAnyArray(FieldCalls& self, const GivenArray& array, const void* const* da
       require(values.first == nullptr || values.reachable(), "strides that lead beyond the address space");
       all.push_back(values);
     }
+    change = Fields::arrayChange(array.name, cells, array.type, std::move(all));
   });
-  if (code == VDI_CATALYST_OK) self.fields.setArray(array.name, cells, array.type, std::move(all));
+  if (code == VDI_CATALYST_OK) self.fields.set(std::move(change));
   return code;
 }
 
@@ -69,21 +71,24 @@ int setArrayStrided(FieldCalls& self, const GivenArray& array, const void* const
 }
 
 int setArrayOffset(FieldCalls& self, const char* name, std::int32_t association, const double* offset) {
+  Fields::Change change;
   const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(self.haveBlocks, "an offset was given before blocks");
     checkOffset(name, association, offset);
+    change = Fields::offsetChange(name, association == VDI_CATALYST_CELLS, {offset[0], offset[1], offset[2]});
   });
-  if (code != VDI_CATALYST_OK) return code;
-  self.fields.setOffset(name, association == VDI_CATALYST_CELLS, {offset[0], offset[1], offset[2]});
+  if (code == VDI_CATALYST_OK) self.fields.set(std::move(change));
   return code;
 }
 
 int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particles* particles) {
   ParticleArray array;
+  Fields::Change change;
   int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(self.haveBlocks, "particles were given before blocks");
     require(name != nullptr && *name != '\0', "an array needs a name");
     array = particleArrayOf(particles);
+    change = Fields::particlesChange(name, array);
   });
   if (code == VDI_CATALYST_OK) {
     code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
@@ -91,7 +96,7 @@ int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particle
                    "the ranks give particles of different names or kinds");
     });
   }
-  if (code == VDI_CATALYST_OK) self.fields.setParticles(name, array);
+  if (code == VDI_CATALYST_OK) self.fields.set(std::move(change));
   return code;
 }
 

@@ -299,12 +299,15 @@ glm::dvec3 offsetOf(const vdi_catalyst& self, const char* name, int association)
 /// `strides` is null for values in order.
 int setAnyArray(vdi_catalyst& self, const char* name, int type, int association, int components,
                 const void* const* data, const vdi_catalyst_strides* strides) {
-  vdi_catalyst::Array array{type, {}};
+  // Memory is allocated before the ranks agree, so that all of them have the array or none.
+  std::map<std::pair<int, std::string>, vdi_catalyst::Array> fresh;
   std::vector<vtkSmartPointer<vtkDataArray>> made;
   const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     requireArray(self, name, association, data);
     require(components >= 1 && components <= maxComponents, "the number of components must be 1 to 16");
     (void)vtkTypeOf(type);
+    vdi_catalyst::Array& array = fresh[{association, name}];
+    array.type = type;
     for (unsigned int i = 0; i < self.grid->GetNumberOfPartitions(); ++i) {
       vtkDataSet& image = *self.grid->GetPartition(i);
       const vdi_catalyst_strides given =
@@ -317,11 +320,13 @@ int setAnyArray(vdi_catalyst& self, const char* name, int type, int association,
   });
   if (code != VDI_CATALYST_OK) return code;
   putIntoGrid(self, name, association, made);
-  self.arrays[{association, name}] = std::move(array);
+  const auto& key = fresh.begin()->first;
+  self.arrays.erase(key);
   if (association == VDI_CATALYST_CELLS) {
-    self.particles.erase(name);
-    self.deposited.erase(name);
+    self.particles.erase(key.second);
+    self.deposited.erase(key.second);
   }
+  self.arrays.merge(fresh);
   return code;
 }
 
@@ -360,12 +365,11 @@ int initialize(int32_t fortran_communicator, int32_t script_count, const Given* 
                vdi_catalyst** catalyst) {
   const vdi::catalyst::PythonLock lock;
   // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
-  auto self = std::make_unique<vdi_catalyst>();
-  if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
-    return VDI_CATALYST_BAD_ARGUMENT;
-  MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
+  std::unique_ptr<vdi_catalyst> self;
+  int code = vdi::catalyst::makeHandle(fortran_communicator, self);
+  if (code != VDI_CATALYST_OK) return code;
   std::vector<Script> scripts;
-  int code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { scripts = scriptsOf(script_count, given); });
+  code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { scripts = scriptsOf(script_count, given); });
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
       requireEqual(self->comm, script_count, "the ranks give different numbers of scripts");
@@ -407,9 +411,11 @@ int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_cat
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const vdi::catalyst::PythonLock lock;
   const auto grid = vtkSmartPointer<vtkPartitionedDataSet>::New();
+  std::vector<vdi_catalyst_block> copies;
   const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
     for (int i = 0; i < count; ++i) checkBlock(blocks[i]);
+    copies.assign(blocks, blocks + count);
     grid->SetNumberOfPartitions(static_cast<unsigned int>(count));
     for (int i = 0; i < count; ++i) {
       const vdi_catalyst_block& block = blocks[i];
@@ -425,7 +431,7 @@ int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_cat
   catalyst->grid = grid;
   catalyst->arrays.clear();
   catalyst->offsets.clear();
-  catalyst->blocks.assign(blocks, blocks + count);
+  catalyst->blocks = std::move(copies);
   ++catalyst->blocksVersion;
   catalyst->particles.clear();
   catalyst->deposited.clear();
@@ -456,16 +462,19 @@ int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name, int3
                                   const double offset[3]) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const vdi::catalyst::PythonLock lock;
+  std::map<std::pair<int, std::string>, glm::dvec3> fresh;
   std::vector<vtkSmartPointer<vtkDataArray>> made;
   const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(catalyst->haveBlocks, "an offset was given before blocks");
     vdi::catalyst::checkOffset(name, association, offset);
+    fresh[{association, name}] = {offset[0], offset[1], offset[2]};
     const auto array = catalyst->arrays.find({association, name});
     if (array != catalyst->arrays.end())
       made = arraysOf(name, array->second, {offset[0], offset[1], offset[2]});
   });
   if (code != VDI_CATALYST_OK) return code;
-  catalyst->offsets[{association, name}] = {offset[0], offset[1], offset[2]};
+  catalyst->offsets.erase(fresh.begin()->first);
+  catalyst->offsets.merge(fresh);
   putIntoGrid(*catalyst, name, association, made);
   return code;
 }
@@ -475,10 +484,14 @@ int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const vdi::catalyst::PythonLock lock;
   vdi::catalyst::ParticleArray array;
+  std::map<std::string, vdi::catalyst::ParticleArray> fresh;
+  std::pair<int, std::string> replaced;
   int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(catalyst->haveBlocks, "particles were given before blocks");
     require(name != nullptr && *name != '\0', "an array needs a name");
     array = vdi::catalyst::particleArrayOf(particles);
+    fresh[name] = array;
+    replaced = {VDI_CATALYST_CELLS, name};
   });
   if (code == VDI_CATALYST_OK) {
     code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
@@ -489,9 +502,10 @@ int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
   if (code != VDI_CATALYST_OK) return code;
   for (unsigned int i = 0; i < catalyst->grid->GetNumberOfPartitions(); ++i)
     catalyst->grid->GetPartition(i)->GetCellData()->RemoveArray(name);
-  catalyst->arrays.erase({VDI_CATALYST_CELLS, name});
-  catalyst->deposited.erase(name);
-  catalyst->particles[name] = array;
+  catalyst->arrays.erase(replaced);
+  catalyst->deposited.erase(replaced.second);
+  catalyst->particles.erase(replaced.second);
+  catalyst->particles.merge(fresh);
   return code;
 }
 

@@ -59,13 +59,13 @@ std::optional<vdi::config::RunIsolation> isolationOf(std::optional<vdi::config::
   return given;
 }
 
-/// Collective: the first rank's text on all ranks.
-std::string shared(MPI_Comm comm, std::string text) {
+/// Collective: gives all ranks the first rank's text.
+int share(vdi_catalyst& self, std::string& text) {
   auto size = static_cast<int>(text.size());
-  MPI_Bcast(&size, 1, MPI_INT, 0, comm);
-  text.resize(static_cast<std::size_t>(size));
-  MPI_Bcast(text.data(), size, MPI_CHAR, 0, comm);
-  return text;
+  MPI_Bcast(&size, 1, MPI_INT, 0, self.comm);
+  const int code = guarded(self, VDI_CATALYST_ENGINE, [&] { text.resize(static_cast<std::size_t>(size)); });
+  if (code == VDI_CATALYST_OK) MPI_Bcast(text.data(), size, MPI_CHAR, 0, self.comm);
+  return code;
 }
 
 /// Collective: what the first rank finds out, on all ranks.
@@ -78,7 +78,7 @@ class Decision {
     std::string text;
     std::string name;
     std::optional<vdi::config::RunIsolation> isolation;
-    const int code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
+    int code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
       if (rank_ != 0) return;
       std::optional<vdi::config::Run> run;
       if (isJson) {
@@ -99,7 +99,8 @@ class Decision {
     if (answer.isIsolated == 0) return VDI_CATALYST_NOT_ISOLATED;
     options.isolation = {answer.restart != 0, answer.patience};
     if (!isJson) return VDI_CATALYST_OK;
-    text = shared(self_.comm, std::move(text));
+    code = share(self_, text);
+    if (code != VDI_CATALYST_OK) return code;
     return guarded(self_, VDI_CATALYST_ENGINE,
                    [&] { options.run = vdi::config::parseRun(text, "the JSON text"); });
   }
@@ -113,6 +114,8 @@ class Decision {
       text = std::move(source.text);
       name = std::move(source.name);
       return vdi::config::parseRun(text, name);
+    } catch (const std::bad_alloc&) {
+      throw;  // the text may be sound, and ask for isolation
     } catch (const std::exception&) {
       return std::nullopt;
     }
@@ -127,13 +130,12 @@ template <typename Read>
 int initializeAny(int32_t fortran_communicator, const char* json, bool isJson, vdi_catalyst** catalyst,
                   Read read) {
   // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
-  auto self = std::make_unique<vdi_catalyst>();
+  std::unique_ptr<vdi_catalyst> self;
+  int code = vdi::catalyst::makeHandle(fortran_communicator, self);
+  if (code != VDI_CATALYST_OK) return code;
   self->isJson = isJson;
-  if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
-    return VDI_CATALYST_BAD_ARGUMENT;
-  MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
   IsolatedOptions options;
-  int code = Decision(*self).decide(json, isJson, options);
+  code = Decision(*self).decide(json, isJson, options);
   if (code == VDI_CATALYST_OK) code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { read(options); });
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
@@ -143,9 +145,11 @@ int initializeAny(int32_t fortran_communicator, const char* json, bool isJson, v
     });
   }
   if (code == VDI_CATALYST_OK) {
-    self->run = std::make_unique<vdi::catalyst::IsolatedRun>(*self, std::move(options));
-    code = self->run->start();
+    code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
+      self->run = std::make_unique<vdi::catalyst::IsolatedRun>(*self, std::move(options));
+    });
   }
+  if (code == VDI_CATALYST_OK) code = self->run->start();
   if (code == VDI_CATALYST_OK) {
     *catalyst = alive(isJson) = self.release();
   } else {

@@ -88,28 +88,60 @@ StridedValues Fields::inOrder(const vdi_catalyst_block& block, int type, bool ce
   return values;
 }
 
+Fields::Change Fields::arrayChange(const std::string& name, bool cells, int type,
+                                   std::vector<StridedValues> values) {
+  Change change;
+  change.key_ = {cells, name};
+  change.array_[change.key_] = {type, std::move(values)};
+  return change;
+}
+
+Fields::Change Fields::offsetChange(const std::string& name, bool cells,
+                                    const std::array<double, 3>& offset) {
+  Change change;
+  change.key_ = {cells, name};
+  change.offset_[change.key_] = {offset[0], offset[1], offset[2]};
+  return change;
+}
+
+Fields::Change Fields::particlesChange(const std::string& name, const ParticleArray& particles) {
+  Change change;
+  change.key_ = {true, name};
+  change.particles_[name] = particles;
+  return change;
+}
+
+void Fields::set(Change change) noexcept {
+  const auto& [cells, name] = change.key_;
+  if (!change.offset_.empty()) {
+    offsets_.erase(change.key_);
+    offsets_.merge(change.offset_);
+    return;
+  }
+  arrays_.erase(change.key_);
+  if (cells) {
+    particles_.erase(name);
+    deposits_.erase(name);
+  }
+  arrays_.merge(change.array_);
+  particles_.merge(change.particles_);
+}
+
 void Fields::setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values) {
-  Array& array = arrays_[{cells, name}];
-  array.type = type;
-  array.values = std::move(values);
-  if (!cells) return;
-  particles_.erase(name);
-  deposits_.erase(name);
+  set(arrayChange(name, cells, type, std::move(values)));
 }
 
 void Fields::setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset) {
-  offsets_[{cells, name}] = {offset[0], offset[1], offset[2]};
+  set(offsetChange(name, cells, offset));
+}
+
+void Fields::setParticles(const std::string& name, const ParticleArray& particles) {
+  set(particlesChange(name, particles));
 }
 
 glm::dvec3 Fields::offsetOf(const std::string& name, bool cells) const {
   const auto found = offsets_.find({cells, name});
   return found != offsets_.end() ? found->second : glm::dvec3(0.0);
-}
-
-void Fields::setParticles(const std::string& name, ParticleArray particles) {
-  arrays_.erase({true, name});
-  deposits_.erase(name);
-  particles_[name] = particles;
 }
 
 const ParticleArray* Fields::particlesOf(const std::string& name) const {

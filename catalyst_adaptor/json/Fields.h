@@ -33,14 +33,21 @@ class Fields {
   /// The layout of a block's values in order: x fastest, components side by side, no gaps.
   StridedValues inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
                         const void* data) const;
-  /// Sets an array's values, one entry for each block, with the same number of components. Blocks that lack
-  /// the array have a null `first`. An array of cells replaces particles of that name.
-  void setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
+  /// What is to be set. Preparing it allocates all memory, so `set` can't fail: ranks first agree that all
+  /// have prepared it.
+  class Change;
+  /// An array's values, one entry for each block, with the same number of components. Blocks that lack the
+  /// array have a null `first`. An array of cells replaces particles of that name.
+  static Change arrayChange(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
   /// Lets the values of that array lie `offset` cells beside the points or the middles of cells.
-  void setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset);
+  static Change offsetChange(const std::string& name, bool cells, const std::array<double, 3>& offset);
+  /// The particles of which an array of cells is to be made. It replaces such an array of that name.
+  static Change particlesChange(const std::string& name, const ParticleArray& particles);
+  void set(Change change) noexcept;
 
-  /// Sets the particles of which an array of cells is to be made. It replaces such an array of that name.
-  void setParticles(const std::string& name, ParticleArray particles);
+  void setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
+  void setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset);
+  void setParticles(const std::string& name, const ParticleArray& particles);
   /// The particles of that name; null if there are none. All ranks have particles of the same names.
   const ParticleArray* particlesOf(const std::string& name) const;
   /// Sets the values that were made of the particles, one entry for each block; `dropDeposits` drops them
@@ -99,6 +106,15 @@ class Fields {
   std::map<Key, glm::dvec3> offsets_;  // in cells; none: 0
   std::map<std::string, ParticleArray> particles_;
   std::map<std::string, DepositedValues> deposits_;  // the memory of arrays made of particles
+};
+
+class Fields::Change {
+  friend class Fields;
+  Key key_;
+  // One of these has an entry, whose memory becomes that of the fields.
+  std::map<Key, Array> array_;
+  std::map<Key, glm::dvec3> offset_;
+  std::map<std::string, ParticleArray> particles_;
 };
 
 /// The bytes of a scalar. Throws std::invalid_argument for a type that vdi_catalyst.h doesn't have.

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -41,11 +42,15 @@ bool usable(const vdi_catalyst* catalyst) {
   return catalyst != nullptr && catalyst == alive();
 }
 
-/// Returns the root's text on all ranks. Collective.
-std::string shared(const vdi::comm::Communicator& comm, const std::string& text) {
-  const auto* const bytes = reinterpret_cast<const std::byte*>(text.data());
-  const std::vector<std::byte> all = comm.broadcast({bytes, bytes + text.size()}, 0);
-  return {reinterpret_cast<const char*>(all.data()), all.size()};
+/// Gives all ranks the root's text. Collective; fails on all ranks together.
+void share(const vdi::comm::Communicator& comm, std::string& text) {
+  std::vector<std::byte> bytes;
+  comm.together([&] {
+    const auto all = std::as_bytes(std::span(text));
+    bytes.assign(all.begin(), all.end());
+  });
+  bytes = comm.broadcast(std::move(bytes), 0);
+  comm.together([&] { text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size()); });
 }
 
 /// Reads the run that rank 0 names. Rank 0 reads the files, and all others get their text.
@@ -65,7 +70,8 @@ class Reading {
       source_ = vdi::config::readRun({json, ::strnlen(json, limits.bytes + 1)});
     });
     if (code != VDI_CATALYST_OK) return code;
-    source_.text = shared(comm_, source_.text);
+    code = guardedTogether(self_, VDI_CATALYST_ENGINE, [&] { share(comm_, source_.text); });
+    if (code != VDI_CATALYST_OK) return code;
     code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
       run = vdi::config::parseRun(source_.text, source_.name);
       if (isGoingOn) run.existing = vdi::config::Existing::Continue;
@@ -76,7 +82,8 @@ class Reading {
       if (comm_.rank() == 0) vdi::config::requireNothingInTheWay(run);
     });
     if (code != VDI_CATALYST_OK || run.colors.file.empty()) return code;
-    colors_ = shared(comm_, colors_);
+    code = guardedTogether(self_, VDI_CATALYST_ENGINE, [&] { share(comm_, colors_); });
+    if (code != VDI_CATALYST_OK) return code;
     return guarded(self_, VDI_CATALYST_SCRIPT,
                    [&] { map = vdi::config::colorMapOf(colors_, run.colors.file, run.colors.name); });
   }
@@ -96,22 +103,22 @@ int start(vdi_catalyst& self, const char* json, bool isGoingOn) {
     require(alive() == nullptr, "a run by JSON goes on in this process; finalize it first");
   });
   if (code != VDI_CATALYST_OK) return code;
-  Reading reading(self);
-  code = reading.read(json, isGoingOn);
+  std::optional<Reading> reading;
+  code = guardedTogether(self, VDI_CATALYST_ENGINE, [&] { reading.emplace(self); });
+  if (code == VDI_CATALYST_OK) code = reading->read(json, isGoingOn);
   if (code != VDI_CATALYST_OK) return code;
   return guardedTogether(self, VDI_CATALYST_ENGINE, [&] {
-    self.engine = std::make_unique<vdi::catalyst::RunEngine>(MPI_Comm_c2f(self.comm), std::move(reading.run),
-                                                             std::move(reading.map));
+    self.engine = std::make_unique<vdi::catalyst::RunEngine>(MPI_Comm_c2f(self.comm), std::move(reading->run),
+                                                             std::move(reading->map));
   });
 }
 
 int initializeAny(int32_t fortran_communicator, const char* json, bool isGoingOn, vdi_catalyst** catalyst) {
   // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
-  auto self = std::make_unique<vdi_catalyst>();
-  if (MPI_Comm_dup(MPI_Comm_f2c(fortran_communicator), &self->comm) != MPI_SUCCESS)
-    return VDI_CATALYST_BAD_ARGUMENT;
-  MPI_Comm_set_errhandler(self->comm, MPI_ERRORS_RETURN);
-  const int code = start(*self, json, isGoingOn);
+  std::unique_ptr<vdi_catalyst> self;
+  int code = vdi::catalyst::makeHandle(fortran_communicator, self);
+  if (code != VDI_CATALYST_OK) return code;
+  code = start(*self, json, isGoingOn);
   if (code == VDI_CATALYST_OK) {
     *catalyst = alive() = self.release();
   } else {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <new>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -53,6 +54,8 @@ template <typename Check>
 auto placed(const JsonValue& value, Check check) {
   try {
     return check();
+  } catch (const std::bad_alloc&) {
+    throw;  // no fault of the value
   } catch (const std::exception& error) {
     value.fail(error.what());
   }

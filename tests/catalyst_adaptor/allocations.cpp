@@ -1,0 +1,176 @@
+// A simulation whose memory runs out within the adaptor: of each call, some allocations of the adaptor's own
+// code fail, one at a time. The process goes on, the call says so or does without, and the next one works.
+#include <dlfcn.h>
+#include <mpi.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <new>
+#include <string>
+#include <string_view>
+
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace {
+
+std::atomic<std::int64_t> toGo{0};  // the allocation that fails; 0: none does
+std::atomic<bool> hasFailed = false;
+
+/// Whether the code at the address belongs to the adaptor, not to MPI or a driver.
+bool isAdaptors(const void* address) {
+  Dl_info info;
+  return ::dladdr(address, &info) != 0 && info.dli_fname != nullptr &&
+         std::string_view(info.dli_fname).find("libvdi_catalyst_") != std::string_view::npos;
+}
+
+void* allocated(std::size_t bytes, const void* caller) {
+  if (toGo > 0 && isAdaptors(caller) && --toGo == 0) {
+    hasFailed = true;
+    return nullptr;
+  }
+  return std::malloc(bytes > 0 ? bytes : 1);
+}
+
+void* allocatedOrThrown(std::size_t bytes, const void* caller) {
+  void* memory = allocated(bytes, caller);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+}  // namespace
+
+// The engines, which are loaded later, take these, because the program comes first.
+void* operator new(std::size_t bytes) {
+  return allocatedOrThrown(bytes, __builtin_return_address(0));
+}
+void* operator new[](std::size_t bytes) {
+  return allocatedOrThrown(bytes, __builtin_return_address(0));
+}
+void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept {
+  return allocated(bytes, __builtin_return_address(0));
+}
+void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept {
+  return allocated(bytes, __builtin_return_address(0));
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+void operator delete[](void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+
+namespace {
+
+constexpr int size = 8;
+constexpr const char* json =
+    R"({"field": "density_of_the_particles", "when": {"max": "V", "above": 0}, "resolution": [32, 24],
+        "output": {"vdi": "step_{timestep:06d}.vdi", "png": "step_{timestep:06d}.png", "latest": true},
+        "existing": "overwrite", "log": {"json": "run.jsonl", "text": "run.log"}})";
+vdi_catalyst* catalyst = nullptr;
+std::int64_t step = 0;
+int wrong = 0;
+int failures = 0;
+
+void expect(bool holds, const char* call, std::int64_t allocation, const char* what) {
+  if (holds) return;
+  ++wrong;
+  std::fprintf(stderr, "%s, allocation %lld: %s\n", call, static_cast<long long>(allocation), what);
+}
+
+/// Calls with one failing allocation, then with all. `growth` tells which one is next.
+template <typename Call>
+void tryAll(const char* name, double growth, Call call) {
+  for (std::int64_t n = 1;; n = static_cast<std::int64_t>(static_cast<double>(n) * growth) + 1) {
+    hasFailed = false;
+    toGo = n;
+    int code = VDI_CATALYST_OK;
+    try {
+      code = call();
+    } catch (...) {
+      expect(false, name, n, "an exception reached the simulation");
+    }
+    toGo = 0;
+    if (code != VDI_CATALYST_OK) {
+      ++failures;
+      expect(hasFailed, name, n, "it failed, although all memory was there");
+      if (catalyst != nullptr)
+        expect(*vdi_catalyst_error(catalyst) != '\0', name, n, "a failure without a text");
+      expect(call() == VDI_CATALYST_OK, name, n, "the next call failed, too");
+    }
+    if (!hasFailed) return;
+  }
+}
+
+int initialize() {
+  if (catalyst != nullptr) (void)vdi_catalyst_finalize(catalyst);
+  return vdi_catalyst_initialize_json(MPI_Comm_c2f(MPI_COMM_WORLD), json, &catalyst);
+}
+
+int execute() {
+  ++step;
+  const int code = vdi_catalyst_execute(catalyst, step, 0.5 * static_cast<double>(step));
+  const std::string number = std::to_string(1000000 + step).substr(1);
+  for (const char* end : {".vdi", ".png"}) {
+    const bool isThere = std::filesystem::remove("step_" + number + end);
+    expect(isThere || code != VDI_CATALYST_OK, "execute", step, "a file is missing in silence");
+  }
+  return code;
+}
+
+void setAll() {
+  static std::array<float, size * size * size> values;
+  static std::array<double, 30> places;
+  values.fill(1.0F);
+  values[0] = 0.5F;
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = 0.25 * static_cast<double>(i);
+  const vdi_catalyst_block block{{size, size, size}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 1, 1}};
+  tryAll("set_blocks", 1.0, [&] { return vdi_catalyst_set_blocks(catalyst, 1, &block); });
+  const void* const data = values.data();
+  tryAll("set_array", 1.0,
+         [&] { return vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_CELLS, &data); });
+  const std::array<double, 3> offset{0.25, 0.0, 0.0};
+  tryAll("set_array_offset", 1.0, [&] {
+    return vdi_catalyst_set_array_offset(catalyst, "an_array_of_a_longer_name", VDI_CATALYST_CELLS,
+                                         offset.data());
+  });
+  vdi_catalyst_particles particles{};
+  particles.count = 10;
+  particles.kind = VDI_CATALYST_DENSITY;
+  particles.position_type = VDI_CATALYST_F64;
+  particles.position_stride = 3 * sizeof(double);
+  for (std::size_t axis = 0; axis < 3; ++axis) particles.positions[axis] = places.data() + axis;
+  tryAll("set_particles", 1.0,
+         [&] { return vdi_catalyst_set_particles(catalyst, "density_of_the_particles", &particles); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  MPI_Init(&argc, &argv);
+  const char* folder = std::getenv("VDI_OUTPUT");
+  if (folder != nullptr && ::chdir(folder) != 0) MPI_Abort(MPI_COMM_WORLD, 2);
+  constexpr double few = 1.3;
+  tryAll("initialize", few, initialize);
+  setAll();
+  expect(execute() == VDI_CATALYST_OK, "the first step", 0, "it failed");
+  tryAll("execute", few, execute);
+  toGo = 5;
+  const int code = vdi_catalyst_finalize(catalyst);
+  toGo = 0;
+  expect(code == VDI_CATALYST_OK || code == VDI_CATALYST_ENGINE, "finalize", 1, "an unknown code");
+  expect(failures > 10, "all calls", failures, "too few failed");
+  std::fprintf(stderr, "%d calls failed for want of memory\n", failures);
+  MPI_Finalize();
+  return wrong == 0 ? 0 : 1;
+}
