@@ -132,8 +132,8 @@ void FrameFiles::leaveOut(const std::filesystem::path& file, const std::string& 
   incomplete.since = stream::Clock::now();
 }
 
-/// Logs each incomplete file once. A followed folder may hold files that are still being written.
-/// Those aren't logged yet.
+/// Logs each incomplete file once. In a followed folder such a file may still be being written, so it gets
+/// some time first.
 void FrameFiles::tellIncomplete() {
   const auto patience = follows() ? writingTime : std::chrono::seconds(0);
   for (auto& [file, incomplete] : incomplete_) {

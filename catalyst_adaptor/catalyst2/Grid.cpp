@@ -290,7 +290,7 @@ void Grid::addField(const Node& field, const vdi_catalyst_block& block) {
   }
   strides.component_stride = componentStride;
   Array& array = arrays_[{*association, static_cast<std::int32_t>(count), field.name()}];
-  // Of one type and in each block, or not at all: read takes out the others.
+  // An array must have one type and be in each block; read() takes out the others.
   if (array.data.size() + 1 != blocks_.size() || (!array.data.empty() && array.type != leaf.type)) return;
   array.type = leaf.type;
   array.data.push_back(first + elements.first * stride);

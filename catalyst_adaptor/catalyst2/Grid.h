@@ -18,7 +18,7 @@ namespace vdi::catalyst {
 /// components lie at uneven distances: these are copied side by side.
 class Grid {
  public:
-  /// Of the same kind on all ranks and in all blocks, or they aren't shown. Association, components, name.
+  /// Association, components, name. Arrays that differ in these between ranks or blocks aren't shown.
   using Key = std::tuple<std::int32_t, std::int32_t, std::string>;
   struct Array {
     std::int32_t type = VDI_CATALYST_F64;

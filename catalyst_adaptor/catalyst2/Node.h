@@ -21,7 +21,7 @@ struct Leaf {
 
   /// 0 <= index < count.
   double at(std::int64_t index) const;
-  /// Of integers.
+  /// The same for integers.
   std::int64_t wholeAt(std::int64_t index) const;
 };
 

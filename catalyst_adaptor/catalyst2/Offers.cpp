@@ -38,7 +38,7 @@ std::vector<char> bytesOf(const Grid& grid) {
   return bytes;
 }
 
-/// Those of all ranks, one after the other.
+/// The bytes of all ranks, one after the other.
 std::vector<char> gathered(MPI_Comm comm, const std::vector<char>& own) {
   int ranks = 0;
   MPI_Comm_size(comm, &ranks);

@@ -48,7 +48,7 @@ class Session {
   int declareParameters();
   int handOver(std::int64_t step, const Node& params);
   int setArrays();
-  /// Of all ranks, or throws std::invalid_argument where none has one.
+  /// This rank's channel, if it has one. Throws std::invalid_argument for several without a choice.
   std::optional<Node> channelOf(const Node& params) const;
   double valueOf(const Parameter& parameter);
 

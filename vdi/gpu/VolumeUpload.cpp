@@ -154,8 +154,8 @@ void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
   });
 }
 
-/// Of the buffers that commands of the transfer queue copy from. A queue that does nothing but copying needs
-/// more than whole texels.
+/// The alignment of offsets in the buffers from which the transfer queue copies. Whole texels aren't enough
+/// for a queue that does nothing but copying.
 std::uint64_t offsetAlignment(const Device& device) {
   const VulkanDevice& vulkan = device.vulkan();
   const bool onlyCopies = vulkan.queueFamily(QueueKind::Transfer) != vulkan.queueFamily(QueueKind::Compute);

@@ -13,8 +13,9 @@ namespace vdi {
 
 /// A rank's part of a deposit.
 struct DepositedArray {
-  /// Of each of the rank's blocks: [dims.z][dims.y][dims.x], x fastest. Ghost cells have their owners'
-  /// values, and cells that finer blocks hide have the mean of what hides them, so neither is to be added up.
+  /// One array for each of the rank's blocks: [dims.z][dims.y][dims.x], x fastest. Ghost cells have their
+  /// owners' values. Cells that finer blocks hide have the mean of the finer values. A sum over a block
+  /// counts both twice.
   std::vector<std::shared_ptr<float[]>> values;
   ParticleCounts counts;  // of all ranks
 };

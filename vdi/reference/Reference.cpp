@@ -186,7 +186,7 @@ class SampledRay {
   float frontOf(std::uint32_t k) const {
     return k == scene_.samples.first ? scene_.enter : static_cast<float>(inputs_.lattice.frontOf(k));
   }
-  /// Of the last of some samples, the one before `end`.
+  /// The back of the sample before `end`.
   float backOf(std::uint32_t end) const {
     return end == scene_.samples.last ? scene_.leave : static_cast<float>(inputs_.lattice.frontOf(end));
   }

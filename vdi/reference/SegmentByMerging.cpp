@@ -194,8 +194,8 @@ struct Costs {
   float limit() const { return sum / finite * 1.0001F; }
 };
 
-/// Of equal costs, those at even places count as cheaper, so that every other merger of a long series is made
-/// in one round.
+/// Equal costs at even places count as cheaper than those at odd ones, so that a round makes every other
+/// merger of a long series.
 bool isCheapest(const std::vector<float>& costs, std::size_t i) {
   const auto cheaperThan = [&](float other) { return i % 2 == 0 ? costs[i] <= other : costs[i] < other; };
   return (i == 0 || cheaperThan(costs[i - 1])) && (i + 1 == costs.size() || cheaperThan(costs[i + 1]));

@@ -20,7 +20,7 @@ struct StageTime {
   bool operator==(const StageTime&) const = default;
 };
 
-/// Of the milliseconds that each rank took; there is at least one.
+/// The slowest and the mean of the ranks' milliseconds, of which there is at least one.
 StageTime stageOf(std::string name, std::span<const double> milliseconds);
 
 /// upload, generate, distribute, composite, gather and output, in this order; `reports` are all ranks'.

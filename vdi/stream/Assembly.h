@@ -39,7 +39,7 @@ class Assembly {
   /// A binary message; gives the level that it completes. Throws Error{Format} for what isn't the next part
   /// of the level that was begun.
   std::optional<Received> add(std::span<const std::byte> message);
-  /// Of the level under way.
+  /// Acknowledges what has come of the level under way.
   std::optional<Ack> progress() const;
 
  private:

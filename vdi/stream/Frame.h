@@ -28,8 +28,7 @@ struct Frame {
   double time = 0.0;
   Clock::time_point made;
   std::uint32_t levelCount = 1;
-  /// Those that are encoded, the coarsest first: all but the last one, or all. The last of levelCount is the
-  /// VDI.
+  /// The encoded levels, the coarsest first: all coarse ones, or all. The last of levelCount is the VDI.
   std::vector<std::shared_ptr<const EncodedLevel>> levels;
 };
 using FramePtr = std::shared_ptr<const Frame>;
@@ -39,7 +38,7 @@ using FramePtr = std::shared_ptr<const Frame>;
 inline constexpr std::array<int, 3> coarseFactors{9, 5, 3};
 /// A level of fewer bytes in memory is the coarsest.
 inline constexpr std::uint64_t smallBytes = std::uint64_t{1} << 20;
-/// Those of the coarse levels that a VDI of so many bytes in memory has, the coarsest first.
+/// The coarse levels of a VDI of so many bytes in memory, the coarsest first.
 std::vector<int> coarseFactorsOf(std::uint64_t bytes);
 
 /// Encodes a VDI, on all cores. `take` gets the frame when its coarse levels are there, and again with all of

@@ -149,7 +149,7 @@ struct Refusal {
   std::string cause;
   bool operator==(const Refusal&) const = default;
 };
-/// Of a type that this program doesn't know: a newer server's.
+/// A message of a newer server, of a type that this program doesn't know.
 struct Unknown {
   bool operator==(const Unknown&) const = default;
 };

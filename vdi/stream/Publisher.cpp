@@ -10,7 +10,7 @@ namespace vdi::stream {
 
 namespace {
 
-/// Of this thread and those that it starts: Linux has a niceness for each thread.
+/// Lets this thread, and those that it starts, yield to others. Linux has a niceness for each thread.
 void giveWay() {
   constexpr int niceness = 10;
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), niceness);

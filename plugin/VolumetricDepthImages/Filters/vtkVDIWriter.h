@@ -28,7 +28,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIWriter : public vtkWriter {
   /// The simulation's step, kept in the file; -1 (default): the VDI's own.
   vtkSetMacro(TimeStep, int);
 
-  /// Of pictures: red, green and blue from 0 to 1; default: black.
+  /// The background of pictures: red, green and blue from 0 to 1; default: black.
   vtkSetVector3Macro(Background, double);
 
  protected:
