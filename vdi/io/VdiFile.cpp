@@ -125,6 +125,7 @@ class Selection {
 template <typename Segment>
 void decodeSome(const ParsedFile& file, std::vector<Thinning>& thinnings) {
   std::vector<Selection<Segment>> selections;
+  selections.reserve(thinnings.size());
   for (const Thinning& thinning : thinnings) selections.emplace_back(thinning.sources, file.chunks.size());
   std::vector<DepthCode> codes(file.chunks.size());
   eachInParallel(file.chunks.size(), [&](std::size_t index) {
@@ -271,6 +272,7 @@ Vdi decode(std::span<const std::byte> bytes) {
 std::vector<Vdi> decodeThinned(std::span<const std::byte> bytes, const std::vector<int>& factors) {
   const ParsedFile file = parseFile(bytes);
   std::vector<Thinning> thinnings;
+  thinnings.reserve(factors.size());
   for (const int factor : factors) thinnings.push_back(thinningOf(file.vdi, factor));
   std::visit(
       [&](const auto& lists) {
@@ -279,6 +281,7 @@ std::vector<Vdi> decodeThinned(std::span<const std::byte> bytes, const std::vect
       },
       file.vdi.lists);
   std::vector<Vdi> results;
+  results.reserve(thinnings.size());
   for (Thinning& thinning : thinnings) {
     validateShape(thinning.few);
     results.push_back(std::move(thinning.few));
