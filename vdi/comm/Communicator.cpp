@@ -118,6 +118,17 @@ class OwnedComm {
   MPI_Comm comm_ = MPI_COMM_NULL;
 };
 
+/// The exception of `work`; null if there is none.
+template <typename Work>
+std::exception_ptr errorOf(Work&& work) {
+  try {
+    std::forward<Work>(work)();
+  } catch (...) {
+    return std::current_exception();
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 struct Communicator::State {
@@ -130,15 +141,12 @@ struct Communicator::State {
   /// Collective: takes the communicator over. If a rank lacks the memory, all throw.
   static std::unique_ptr<State> on(OwnedComm& comm) {
     std::unique_ptr<State> state;
-    std::exception_ptr error;
-    try {
+    const std::exception_ptr error = errorOf([&] {
       state = std::make_unique<State>();
       check(MPI_Comm_rank(comm.handle(), &state->rank), "MPI_Comm_rank");
       check(MPI_Comm_size(comm.handle(), &state->size), "MPI_Comm_size");
       state->hostLeaders.resize(static_cast<std::size_t>(state->size));
-    } catch (...) {
-      error = std::current_exception();
-    }
+    });
     int failed = error ? 1 : 0;
     check(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm.handle()), "MPI_Allreduce");
     if (error) std::rethrow_exception(error);
@@ -367,20 +375,7 @@ std::vector<std::uint64_t> Communicator::allToAllWords(std::span<const std::uint
   return from;
 }
 
-namespace {
-
-/// The exception of `work`; null if there is none.
-template <typename Work>
-std::exception_ptr errorOf(Work&& work) {
-  try {
-    std::forward<Work>(work)();
-  } catch (...) {
-    return std::current_exception();
-  }
-  return nullptr;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 void Communicator::agree(const std::exception_ptr& mine) const {
   if (state_->serial()) {
