@@ -301,8 +301,8 @@ class StreamSuite {
         if (i > 0) return;
         const std::uint64_t expanded = io::decodeInfo(files.back()).expandedBytes;
         for (const int factor : stream::coarseFactorsOf(expanded))
-          sent.levels.push_back(figuresOf(thinned(*vdi, factor), factor, *truth, settings));
-        sent.levels.push_back(figuresOf(*vdi, 1, *truth, settings));
+          sent.levels.push_back(coarseFigures(*vdi, factor, *truth, settings));
+        sent.levels.push_back({1, mebibytesOf(files.back()), ssimOf(*vdi, *truth, settings)});
         sent.encodeMs = repeated(options_.repeats, [&vdi] {
                           return wallMs([&vdi] {
                             stream::encodeFrame(*vdi, 0, Clock::now(), [](const auto&) { return true; });
@@ -322,14 +322,23 @@ class StreamSuite {
     }
   }
 
-  LevelFigures figuresOf(const Vdi& vdi, int factor, const Image& truth, const GenerateSettings& settings) {
+  static double mebibytesOf(const std::vector<std::byte>& file) {
+    return static_cast<double>(file.size()) / (1 << 20);
+  }
+
+  double ssimOf(const Vdi& vdi, const Image& truth, const GenerateSettings& settings) {
     VdiRenderer renderer(device_);
     renderer.setVdi(vdi);
     const io::Picture seen =
         io::toPicture(renderer.renderBytes(apps::turned(cameras_.front(), options_.turn, 0.0), settings.width,
                                            settings.height, Alpha::Premultiplied, reconstruction_));
-    return {factor, static_cast<double>(io::encode(vdi).size()) / (1 << 20),
-            compare(seen.rgb, io::toPicture(truth).rgb, seen.width, seen.height, 3).ssim};
+    return compare(seen.rgb, io::toPicture(truth).rgb, seen.width, seen.height, 3).ssim;
+  }
+
+  LevelFigures coarseFigures(const Vdi& vdi, int factor, const Image& truth,
+                             const GenerateSettings& settings) {
+    const Vdi coarse = thinned(vdi, factor);
+    return {factor, mebibytesOf(io::encode(coarse)), ssimOf(coarse, truth, settings)};
   }
 
   stream::ServerOptions serverOptions(const std::string& rate) const {
