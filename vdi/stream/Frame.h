@@ -28,7 +28,8 @@ struct Frame {
   double time = 0.0;
   Clock::time_point made;
   std::uint32_t levelCount = 1;
-  /// The encoded levels, the coarsest first: all coarse ones, or all. The last of levelCount is the VDI.
+  /// The encoded levels, the coarsest first. The coarse ones come together, unless another server sends
+  /// them. The last of levelCount is the VDI.
   std::vector<std::shared_ptr<const EncodedLevel>> levels;
 };
 using FramePtr = std::shared_ptr<const Frame>;
