@@ -1,9 +1,12 @@
 #include "catalyst_adaptor/Calls.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <new>
+#include <string_view>
 
 namespace vdi::catalyst {
 
@@ -43,6 +46,27 @@ void requireCountable(const vdi_catalyst_block& block) {
   }
 }
 
+/// Collective: the speaker's text on all ranks. A rank without memory for all of it gets its beginning, and
+/// leaves no other waiting.
+std::string shared(MPI_Comm comm, std::string_view text, int speaker) {
+  auto length = static_cast<std::uint64_t>(text.size());
+  MPI_Bcast(&length, 1, MPI_UINT64_T, speaker, comm);
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  std::string all;
+  std::array<char, 1024> part{};
+  for (std::uint64_t done = 0; done < length; done += part.size()) {
+    const std::size_t count = std::min<std::uint64_t>(part.size(), length - done);
+    if (rank == speaker) text.copy(part.data(), count, done);
+    MPI_Bcast(part.data(), static_cast<int>(count), MPI_CHAR, speaker, comm);
+    try {
+      if (all.size() == done) all.append(part.data(), count);
+    } catch (const std::bad_alloc&) {
+    }
+  }
+  return all;
+}
+
 }  // namespace
 
 int conclude(Calls& self, int code, const std::string& text, std::optional<std::int64_t> step) {
@@ -57,13 +81,9 @@ int conclude(Calls& self, int code, const std::string& text, std::optional<std::
   int speaker = rank + size * (code != worst ? 2 : text.empty() ? 1 : 0);
   MPI_Allreduce(MPI_IN_PLACE, &speaker, 1, MPI_INT, MPI_MIN, self.comm);
   speaker %= size;
-  std::string message = rank == speaker ? text : "";
-  int length = static_cast<int>(message.size());
-  MPI_Bcast(&length, 1, MPI_INT, speaker, self.comm);
-  message.resize(static_cast<std::size_t>(length));
-  MPI_Bcast(message.data(), length, MPI_CHAR, speaker, self.comm);
-  if (message.empty()) message = "a script failed without saying why";
-  self.error = "rank " + std::to_string(speaker) + ": " + message;
+  const std::string message = shared(self.comm, text, speaker);
+  self.error = "rank " + std::to_string(speaker) + ": " +
+               (message.empty() ? "a script failed without saying why" : message);
   if (rank == 0) print(self, step);
   return worst;
 }

@@ -37,8 +37,8 @@ void Deposits::setBlocks(std::uint64_t version, std::span<const vdi_catalyst_blo
 
 DepositedValues Deposits::make(const std::string& name, const ParticleArray& array, std::int64_t step) {
   DepositedArray made = depositor_.deposit(array.particles, array.kind);
-  tell(name, made.counts, step);
-  return made.values;
+  comm_.together([&] { tell(name, made.counts, step); });
+  return std::move(made.values);
 }
 
 /// Tells of each kind of fault once, on rank 0.

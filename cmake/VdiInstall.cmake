@@ -25,7 +25,9 @@ install(
   DIRECTORY vdi/core vdi/io
   DESTINATION "${headerDir}/vdi"
   FILES_MATCHING PATTERN "*.h"
-  PATTERN ListCodec.h EXCLUDE)
+  PATTERN JsonText.h EXCLUDE
+  PATTERN ListCodec.h EXCLUDE
+  PATTERN VdiLayout.h EXCLUDE)
 install(FILES vdi/comm/Communicator.h vdi/comm/Transport.h DESTINATION "${headerDir}/vdi/comm")
 install(FILES vdi/gpu/Device.h vdi/gpu/DeviceLimits.h vdi/gpu/DeviceRequest.h
         DESTINATION "${headerDir}/vdi/gpu")

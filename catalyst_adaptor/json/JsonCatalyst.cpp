@@ -56,8 +56,7 @@ void share(const vdi::comm::Communicator& comm, std::string& text) {
 /// Reads the run that rank 0 names. Rank 0 reads the files, and all others get their text.
 class Reading {
  public:
-  explicit Reading(vdi_catalyst& self)
-      : self_(self), comm_(vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(self.comm))) {}
+  Reading(vdi_catalyst& self, const vdi::comm::Communicator& comm) : self_(self), comm_(comm) {}
 
   /// `isGoingOn`: the run's own earlier files stay.
   int read(const char* json, bool isGoingOn) {
@@ -93,7 +92,7 @@ class Reading {
 
  private:
   vdi_catalyst& self_;
-  vdi::comm::Communicator comm_;
+  const vdi::comm::Communicator& comm_;
   vdi::config::RunText source_;
   std::string colors_;
 };
@@ -103,14 +102,20 @@ int start(vdi_catalyst& self, const char* json, bool isGoingOn) {
     require(alive() == nullptr, "a run by JSON goes on in this process; finalize it first");
   });
   if (code != VDI_CATALYST_OK) return code;
+  std::optional<vdi::comm::Communicator> comm;
+  code = guardedTogether(self, VDI_CATALYST_ENGINE,
+                         [&] { comm = vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(self.comm)); });
+  if (code != VDI_CATALYST_OK) return code;
   std::optional<Reading> reading;
-  code = guardedTogether(self, VDI_CATALYST_ENGINE, [&] { reading.emplace(self); });
+  code = guarded(self, VDI_CATALYST_ENGINE, [&] { reading.emplace(self, *comm); });
   if (code == VDI_CATALYST_OK) code = reading->read(json, isGoingOn);
   if (code != VDI_CATALYST_OK) return code;
-  return guardedTogether(self, VDI_CATALYST_ENGINE, [&] {
-    self.engine = std::make_unique<vdi::catalyst::RunEngine>(MPI_Comm_c2f(self.comm), std::move(reading->run),
-                                                             std::move(reading->map));
+  code = guarded(self, VDI_CATALYST_ENGINE, [&] {
+    self.engine = std::make_unique<vdi::catalyst::RunEngine>(
+        MPI_Comm_c2f(self.comm), std::move(*comm), std::move(reading->run), std::move(reading->map));
   });
+  if (code != VDI_CATALYST_OK) return code;
+  return guardedTogether(self, VDI_CATALYST_ENGINE, [&] { self.engine->start(); });
 }
 
 int initializeAny(int32_t fortran_communicator, const char* json, bool isGoingOn, vdi_catalyst** catalyst) {

@@ -87,22 +87,21 @@ struct RunEngine::LoadedFrame {
 };
 
 struct RunEngine::State {
-  State(int handle, const config::Run& run)
-      : fortranCommunicator(handle),
-        comm(comm::Communicator::fromMpi(handle)),
-        schedule(run),
-        budget(run.maxShare) {
+  State(int handle, comm::Communicator own, const config::Run& run)
+      : fortranCommunicator(handle), comm(std::move(own)), schedule(run), budget(run.maxShare) {
     if (run.when) measure.emplace(*run.when);
   }
 
   /// Collective: makes the device and the generator.
   void start() {
-    comm.together([&] { device = gpu::Device::create(gpu::requestFromEnvironment(comm.localRank())); });
-    generator = std::make_unique<VdiGenerator>(device, comm::Communicator::fromMpi(fortranCommunicator),
-                                               generatorOptionsFromEnvironment(comm));
-    auto fresh = std::make_unique<Deposits>(device, comm);
-    if (deposits) fresh->continueTelling(*deposits);
-    deposits = std::move(fresh);
+    comm.together([&] {
+      device = gpu::Device::create(gpu::requestFromEnvironment(comm.localRank()));
+      auto fresh = std::make_unique<Deposits>(device, comm);
+      if (deposits) fresh->continueTelling(*deposits);
+      deposits = std::move(fresh);
+    });
+    const GeneratorOptions options = generatorOptionsFromEnvironment(comm);
+    generator.emplace(device, comm::Communicator::fromMpi(fortranCommunicator), options);
   }
   bool isRoot() const { return comm.rank() == 0; }
   /// Collective: the root's answer on all ranks.
@@ -117,7 +116,7 @@ struct RunEngine::State {
   comm::Communicator comm;
   Clock::time_point begin = Clock::now();
   std::shared_ptr<gpu::Device> device;
-  std::unique_ptr<VdiGenerator> generator;
+  std::optional<VdiGenerator> generator;
   std::unique_ptr<Deposits> deposits;
   config::Schedule schedule;
   config::Budget budget;
@@ -135,16 +134,21 @@ struct RunEngine::State {
   std::optional<double> clock;  // the schedule's time in seconds, given for the next step
 };
 
-RunEngine::RunEngine(int fortranCommunicator, config::Run run, std::optional<config::ColorMap> map)
-    : run_(std::move(run)), map_(std::move(map)), state_(std::make_unique<State>(fortranCommunicator, run_)) {
-  state_->start();
-  start();
-}
+RunEngine::RunEngine(int fortranCommunicator, comm::Communicator comm, config::Run run,
+                     std::optional<config::ColorMap> map)
+    : run_(std::move(run)),
+      map_(std::move(map)),
+      state_(std::make_unique<State>(fortranCommunicator, std::move(comm), run_)) {}
 
 RunEngine::~RunEngine() = default;
 
-/// Opens the root's files and stream.
 void RunEngine::start() {
+  state_->start();
+  open();
+}
+
+/// Opens the root's files and stream.
+void RunEngine::open() {
   State& state = *state_;
   const bool isAnew = run_.existing == config::Existing::Overwrite;
   state.comm.together([&] {
@@ -265,17 +269,19 @@ void RunEngine::makeAll(Fields& fields, std::int64_t step, double time, double w
   std::exception_ptr first;
   for (const config::RunCamera& camera : run_.cameras) {
     const auto start = Clock::now();
-    runlog::FrameRecord frame = recordOf(step, time, camera);
+    runlog::FrameRecord frame;
     std::exception_ptr failure;
     try {
       makeOne(fields, step, time, camera, isForFiles, frame);
-    } catch (const std::exception& error) {  // thrown on all ranks, but not the same exception on each
+    } catch (const std::exception&) {  // thrown on all ranks, but not the same exception on each
       failure = std::current_exception();
-      frame = recordOf(step, time, camera);
-      frame.error = error.what();
     }
     try {
-      record(frame, failure, waits, start);
+      const auto failed = [&](const char* error) {
+        frame = recordOf(step, time, camera);
+        frame.error = error;
+      };
+      record(frame, failure, failed, waits, start);
     } catch (...) {
       failure = std::current_exception();
     }
@@ -295,9 +301,11 @@ void RunEngine::makeAll(Fields& fields, std::int64_t step, double time, double w
   if (first) std::rethrow_exception(first);
 }
 
-/// Logs a frame. Collective if the run has a log. Rethrows `failure`, or throws the log's error.
+/// Logs a frame. Collective if the run has a log. Rethrows `failure`, or throws the log's error. `failed`
+/// turns the record into one of a failed frame.
 void RunEngine::record(runlog::FrameRecord& frame, const std::exception_ptr& failure,
-                       const std::vector<double>& waits, Clock::time_point start) {
+                       FunctionRef<void(const char* error)> failed, const std::vector<double>& waits,
+                       Clock::time_point start) {
   if (!run_.log.any()) {
     if (failure) std::rethrow_exception(failure);
     return;
@@ -305,6 +313,11 @@ void RunEngine::record(runlog::FrameRecord& frame, const std::exception_ptr& fai
   state_->comm.together([&] {
     if (failure && !state_->log) std::rethrow_exception(failure);
     if (!state_->log) return;
+    try {
+      if (failure) std::rethrow_exception(failure);
+    } catch (const std::exception& error) {
+      failed(error.what());
+    }
     const std::chrono::duration<double, std::milli> spent = Clock::now() - start;
     frame.milliseconds = (waits.empty() ? 0.0 : waits.front()) + spent.count();
     if (!failure && !waits.empty()) frame.stages.insert(frame.stages.begin(), runlog::stageOf("wait", waits));
@@ -348,8 +361,11 @@ std::vector<double> RunEngine::millisecondsOfRanks(double seconds) const {
   const double milliseconds = 1e3 * seconds;
   const comm::Gathered all =
       state_->comm.gather(std::as_bytes(std::span(&milliseconds, 1)), sizeof milliseconds, 0);
-  std::vector<double> ranks(all.bytes.size() / sizeof milliseconds);
-  if (!ranks.empty()) std::memcpy(ranks.data(), all.bytes.data(), all.bytes.size());
+  std::vector<double> ranks;
+  state_->comm.together([&] {
+    ranks.resize(all.bytes.size() / sizeof milliseconds);
+    if (!ranks.empty()) std::memcpy(ranks.data(), all.bytes.data(), all.bytes.size());
+  });
   return ranks;
 }
 
@@ -373,7 +389,7 @@ void RunEngine::tryTwice(Work work) {
 void RunEngine::makeOne(Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
                         bool isForFiles, runlog::FrameRecord& record) {
   tryTwice([&] {
-    record = recordOf(step, time, camera);
+    state_->comm.together([&] { record = recordOf(step, time, camera); });
     if (!state_->frame) prepare(fields, step, time);
     deliver(camera, isForFiles, record);
   });
@@ -386,11 +402,13 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   const bool cells = agreeOnCells(comm, fields, run_.field, run_.cells);
   if (cells) deposit(fields, run_.field, step);
   std::vector<Block> blocks;
-  comm.together([&] { blocks = fields.blocksOf(run_.field, cells, run_.component); });
-  double mostPerVolume = 0.0;
-  for (const Block& block : blocks)
-    mostPerVolume = std::max(mostPerVolume, 1.0 / (block.spacing.x * block.spacing.y * block.spacing.z));
-  std::array<double, 2> largest{mostPerVolume, static_cast<double>(fields.componentsOf(run_.field, cells))};
+  std::array<double, 2> largest{};  // the most values a volume, and components
+  comm.together([&] {
+    blocks = fields.blocksOf(run_.field, cells, run_.component);
+    for (const Block& block : blocks)
+      largest[0] = std::max(largest[0], 1.0 / (block.spacing.x * block.spacing.y * block.spacing.z));
+    largest[1] = static_cast<double>(fields.componentsOf(run_.field, cells));
+  });
   comm.allReduceMax(largest);
 
   VdiGenerator& generator = *state.generator;
@@ -404,12 +422,14 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   frame.time = time;
   frame.range = state.firstRange.value_or(range);
   frame.unitDistance = unitDistanceOf(generator.scene().bounds, voxelVolume);
-  frame.stamp = {time,
-                 static_cast<std::uint64_t>(step),
-                 {.name = run_.field,
-                  .cells = cells,
-                  .components = components,
-                  .component = components > 1 ? run_.component : 0}};
+  comm.together([&] {
+    frame.stamp = {time,
+                   static_cast<std::uint64_t>(step),
+                   {.name = run_.field,
+                    .cells = cells,
+                    .components = components,
+                    .component = components > 1 ? run_.component : 0}};
+  });
   state.frame = std::move(frame);
 }
 
@@ -420,7 +440,9 @@ void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog
   const bool isRoot = state.isRoot();
   Camera from;
   TransferFunction function;
+  std::filesystem::path file;  // of the VDI, if there is one
   state.comm.together([&] {
+    if (isForFiles && run_.vdi) file = run_.vdi->path(frame.step, camera.name);
     from = run_.cameraAt(camera, frame.step, frame.time, generator.scene().bounds);
     function = run_.transferFunction(map_, frame.range, frame.unitDistance);
     if (!isRoot || !isForFiles) return;
@@ -431,7 +453,6 @@ void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog
   if (isForFiles && !run_.makesPictures() && !isStreamed) {
     if (!run_.vdi) return;
     // The ranks write the file together, so that no rank ever has the whole VDI.
-    const std::filesystem::path file = run_.vdi->path(frame.step, camera.name);
     generator.write(file, from, function, run_.settings, frame.stamp);
     state.comm.together([&] {
       if (!isRoot) return;

@@ -13,6 +13,7 @@
 #include "catalyst_adaptor/json/Fields.h"
 #include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
+#include "vdi/core/FunctionRef.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/runlog/Record.h"
 
@@ -22,14 +23,18 @@ namespace vdi::catalyst {
 /// with Error{RemoteRank} or std::runtime_error if another rank reports more. The next frame is tried anew.
 class RunEngine {
  public:
-  /// `map` comes from the colours' file, if the run names one. The constructor finds the device, and starts
-  /// the stream on the first rank, so that errors of either are known before the first step.
-  RunEngine(int fortranCommunicator, config::Run run, std::optional<config::ColorMap> map);
+  /// Not collective. `comm` is a duplicate of `fortranCommunicator`. `map` comes from the colours' file, if
+  /// the run names one.
+  RunEngine(int fortranCommunicator, comm::Communicator comm, config::Run run,
+            std::optional<config::ColorMap> map);
   /// Hands the last frame over to the stream.
   ~RunEngine();
   RunEngine(const RunEngine&) = delete;
   RunEngine& operator=(const RunEngine&) = delete;
 
+  /// Call once, first. Finds the device, and starts the stream on the first rank, so that errors of either
+  /// are known before the first step.
+  void start();
   /// Whether the step may have a frame. This depends on the schedule, but not on conditions on the data. If
   /// only the first rank can tell, the others return false. Not collective.
   bool wants(std::int64_t step, double time) const;
@@ -49,7 +54,7 @@ class RunEngine {
   struct State;
   struct LoadedFrame;
   using Clock = std::chrono::steady_clock;
-  void start();
+  void open();
   bool isDue(std::int64_t step, double time);
   void deposit(Fields& fields, const std::string& name, std::int64_t step);
   bool isToBeMade(Fields& fields, std::int64_t step, double time);
@@ -58,7 +63,8 @@ class RunEngine {
   void makeOne(Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
                bool isForFiles, runlog::FrameRecord& record);
   void record(runlog::FrameRecord& record, const std::exception_ptr& failure,
-              const std::vector<double>& waits, Clock::time_point start);
+              FunctionRef<void(const char* error)> failed, const std::vector<double>& waits,
+              Clock::time_point start);
   void steer(Fields& fields, Parameters& parameters, std::int64_t step, double time);
   template <typename Work>
   void tryTwice(Work work);

@@ -113,13 +113,20 @@ bool RunSteering::take(const Steered& steered, std::int64_t step, double time) {
     } else {
       std::this_thread::sleep_for(patience);  // a broadcast would busy a core while it waits
     }
-    const std::string own = request ? stream::textOf(request->wish) : "";
-    const auto* const bytes = reinterpret_cast<const std::byte*>(own.data());
-    const std::vector<std::byte> text = comm_.broadcast({bytes, bytes + own.size()}, 0);
+    std::vector<std::byte> text;
+    comm_.together([&] {
+      const std::string own = request ? stream::textOf(request->wish) : "";
+      const auto* const bytes = reinterpret_cast<const std::byte*>(own.data());
+      text.assign(bytes, bytes + own.size());
+    });
+    text = comm_.broadcast(std::move(text), 0);
     if (text.empty() && isPaused_) continue;
     if (text.empty()) return false;
-    const stream::Wish wish = stream::wishOf({reinterpret_cast<const char*>(text.data()), text.size()});
-    apply(wish, steered);
+    stream::Wish wish;
+    comm_.together([&] {
+      wish = stream::wishOf({reinterpret_cast<const char*>(text.data()), text.size()});
+      apply(wish, steered);
+    });
     const bool changesVdi = wish.camera || wish.resolution || wish.supersegments || wish.range || wish.preset;
     comm_.together([&] {
       if (stream_ == nullptr) return;

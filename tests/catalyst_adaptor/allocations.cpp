@@ -1,5 +1,8 @@
-// A simulation whose memory runs out within the adaptor: of each call, some allocations of the adaptor's own
-// code fail, one at a time. The process goes on, the call says so or does without, and the next one works.
+// A simulation whose memory runs out within the adaptor, on its last rank: of each call, some allocations of
+// the adaptor's own code fail, one at a time. The process goes on, the call says so on all ranks or does
+// without, no rank is left waiting, and the next call works.
+//
+// catalyst_allocations [growth]: after allocation n it fails allocation growth * n + 1; 1.0 tries all.
 #include <dlfcn.h>
 #include <mpi.h>
 #include <unistd.h>
@@ -72,7 +75,6 @@ void operator delete[](void* memory, std::size_t) noexcept {
 
 namespace {
 
-constexpr int size = 8;
 constexpr const char* json =
     R"({"field": "density_of_the_particles", "when": {"max": "V", "above": 0}, "resolution": [32, 24],
         "output": {"vdi": "step_{timestep:06d}.vdi", "png": "step_{timestep:06d}.png", "latest": true},
@@ -81,6 +83,14 @@ vdi_catalyst* catalyst = nullptr;
 std::int64_t step = 0;
 int wrong = 0;
 int failures = 0;
+int rank = 0;
+int ranks = 1;
+
+bool onAnyRank(bool here) {
+  int any = here ? 1 : 0;
+  MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+  return any != 0;
+}
 
 void expect(bool holds, const char* call, std::int64_t allocation, const char* what) {
   if (holds) return;
@@ -93,7 +103,7 @@ template <typename Call>
 void tryAll(const char* name, double growth, Call call) {
   for (std::int64_t n = 1;; n = static_cast<std::int64_t>(static_cast<double>(n) * growth) + 1) {
     hasFailed = false;
-    toGo = n;
+    if (rank == ranks - 1) toGo = n;
     int code = VDI_CATALYST_OK;
     try {
       code = call();
@@ -101,6 +111,8 @@ void tryAll(const char* name, double growth, Call call) {
       expect(false, name, n, "an exception reached the simulation");
     }
     toGo = 0;
+    hasFailed = onAnyRank(hasFailed);
+    expect(onAnyRank(code != VDI_CATALYST_OK) == (code != VDI_CATALYST_OK), name, n, "some ranks succeeded");
     if (code != VDI_CATALYST_OK) {
       ++failures;
       expect(hasFailed, name, n, "it failed, although all memory was there");
@@ -121,7 +133,9 @@ int execute() {
   ++step;
   const int code = vdi_catalyst_execute(catalyst, step, 0.5 * static_cast<double>(step));
   const std::string number = std::to_string(1000000 + step).substr(1);
+  MPI_Barrier(MPI_COMM_WORLD);
   for (const char* end : {".vdi", ".png"}) {
+    if (rank != 0) break;
     const bool isThere = std::filesystem::remove("step_" + number + end);
     expect(isThere || code != VDI_CATALYST_OK, "execute", step, "a file is missing in silence");
   }
@@ -129,16 +143,22 @@ int execute() {
 }
 
 void setAll() {
+  // Blocks of two levels on each rank, so that ranks exchange layers within levels and between them.
+  constexpr int size = 8;
   static std::array<float, size * size * size> values;
   static std::array<double, 30> places;
   values.fill(1.0F);
   values[0] = 0.5F;
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = 0.25 * static_cast<double>(i);
-  const vdi_catalyst_block block{{size, size, size}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 1, 1}};
-  tryAll("set_blocks", 1.0, [&] { return vdi_catalyst_set_blocks(catalyst, 1, &block); });
-  const void* const data = values.data();
-  tryAll("set_array", 1.0,
-         [&] { return vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_CELLS, &data); });
+  const double z = rank * size;
+  const std::array<vdi_catalyst_block, 2> blocks{
+      {{{size, size, size}, {0, 0, 0}, {0, 0, 0}, {0, 0, z}, {1, 1, 1}},
+       {{size, size, size}, {0, 0, 0}, {0, 0, 0}, {size, 0, z}, {0.5, 0.5, 1}}}};
+  tryAll("set_blocks", 1.0, [&] { return vdi_catalyst_set_blocks(catalyst, blocks.size(), blocks.data()); });
+  const std::array<const void*, 2> data{values.data(), values.data()};
+  tryAll("set_array", 1.0, [&] {
+    return vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_CELLS, data.data());
+  });
   const std::array<double, 3> offset{0.25, 0.0, 0.0};
   tryAll("set_array_offset", 1.0, [&] {
     return vdi_catalyst_set_array_offset(catalyst, "an_array_of_a_longer_name", VDI_CATALYST_CELLS,
@@ -158,19 +178,22 @@ void setAll() {
 
 int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
   const char* folder = std::getenv("VDI_OUTPUT");
   if (folder != nullptr && ::chdir(folder) != 0) MPI_Abort(MPI_COMM_WORLD, 2);
-  constexpr double few = 1.3;
+  const double few = argc > 1 ? std::atof(argv[1]) : 1.3;
   tryAll("initialize", few, initialize);
   setAll();
   expect(execute() == VDI_CATALYST_OK, "the first step", 0, "it failed");
   tryAll("execute", few, execute);
-  toGo = 5;
+  if (rank == ranks - 1) toGo = 5;
   const int code = vdi_catalyst_finalize(catalyst);
   toGo = 0;
   expect(code == VDI_CATALYST_OK || code == VDI_CATALYST_ENGINE, "finalize", 1, "an unknown code");
   expect(failures > 10, "all calls", failures, "too few failed");
-  std::fprintf(stderr, "%d calls failed for want of memory\n", failures);
+  if (rank == 0) std::fprintf(stderr, "%d calls failed for want of memory\n", failures);
+  const bool isWrong = onAnyRank(wrong != 0);
   MPI_Finalize();
-  return wrong == 0 ? 0 : 1;
+  return isWrong ? 1 : 0;
 }

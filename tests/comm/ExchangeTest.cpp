@@ -97,7 +97,7 @@ TEST_CASE("every rank receives every rank's data for it, round after round") {
         outbox.memory->bytes()[outbox.at + piece.at + i] = valueOf(world.rank(), piece.to, i, round);
       }
     }
-    const std::vector<Exchange::Incoming> incoming = exchange.send(pieces);
+    const std::span<const Exchange::Incoming> incoming = exchange.send(pieces);
     std::size_t next = 0;
     for (int from = 0; from < world.size(); ++from) {
       if (from == world.rank() || bytesOf(from, world.rank(), round) == 0) continue;

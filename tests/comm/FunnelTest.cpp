@@ -72,7 +72,9 @@ std::vector<std::uint64_t> told(const Communicator& world) {
   keepBytes(world.gather(bytes, sizeof(std::uint64_t), 0).bytes);
   keep(world.allGatherWords(own = {rank, 5}));
   std::vector<std::uint64_t> toEach(size, rank);
-  keep(world.allToAllWords(toEach));
+  std::vector<std::uint64_t> fromEach(toEach.size());
+  world.allToAllWords(toEach, fromEach);
+  keep(fromEach);
   std::vector<std::uint64_t> counts(size, 1);
   keepBytes(world.allToAll(std::as_bytes(std::span(toEach)), counts, sizeof(std::uint64_t)).bytes);
   // Only the first and the last rank exchange messages, large ones; the others go on at once.
@@ -81,6 +83,7 @@ std::vector<std::uint64_t> told(const Communicator& world) {
     comm::Messages messages(world);
     std::vector<std::uint64_t> much(200000, rank);
     std::vector<std::uint64_t> received(much.size());
+    for (const auto& each : {much, received}) messages.reserve(std::as_bytes(std::span(each)).size());
     messages.receive(other, std::as_writable_bytes(std::span(received)));
     if (rank == 0) std::this_thread::sleep_for(20ms);
     messages.send(other, std::as_bytes(std::span(much)));

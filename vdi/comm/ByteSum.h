@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "vdi/comm/Exchange.h"
@@ -24,7 +25,7 @@ class ByteSum {
     std::uint64_t bytes = 0;
   };
   /// Collective: returns the sum, as stretches that cover it. They stay valid until the next begin.
-  std::vector<Stretch> add();
+  std::span<const Stretch> add();
 
  private:
   struct Bytes {
@@ -37,7 +38,9 @@ class ByteSum {
   const Communicator& comm_;
   Exchange scatter_;
   Exchange gather_;
-  Exchange::Place own_;  // this rank's bytes, replaced by sums
+  Exchange::Place own_;                     // this rank's bytes, replaced by sums
+  std::vector<Exchange::Outgoing> pieces_;  // with memory for one to each rank
+  std::vector<Stretch> stretches_;          // with memory for one of each rank
   std::uint64_t bytes_ = 0;
 };
 

@@ -46,17 +46,21 @@ class ElementType {
 
 constexpr std::uint64_t maxElements = std::numeric_limits<int>::max();
 
-/// Counts and displacements in MPI's form.
+/// Counts and displacements in MPI's form, by rank.
 struct Layout {
   std::vector<int> counts;
   std::vector<int> starts;
   std::uint64_t total = 0;
 
-  explicit Layout(std::span<const std::uint64_t> sizes) {
-    for (const std::uint64_t size : sizes) {
-      starts.push_back(static_cast<int>(std::min(total, maxElements)));
-      counts.push_back(static_cast<int>(std::min(size, maxElements)));
-      total += size;
+  explicit Layout(std::size_t ranks) : counts(ranks), starts(ranks) {}
+
+  /// Needs no memory.
+  void set(std::span<const std::uint64_t> sizes) {
+    total = 0;
+    for (std::size_t r = 0; r < sizes.size(); ++r) {
+      starts[r] = static_cast<int>(std::min(total, maxElements));
+      counts[r] = static_cast<int>(std::min(sizes[r], maxElements));
+      total += sizes[r];
     }
   }
   void requireFits() const {
@@ -69,6 +73,7 @@ struct Layout {
 
 Gathered emptyGathered(const Layout& layout, std::size_t elementBytes) {
   Gathered result;
+  result.offsets.reserve(layout.counts.size() + 1);
   result.bytes.resize(layout.total * elementBytes);
   result.offsets.push_back(0);
   for (const int count : layout.counts) {
@@ -137,6 +142,11 @@ struct Communicator::State {
   int size = 1;
   int localRank = 0;
   std::vector<int> hostLeaders{0};  // [size]
+  // Memory for collectives, which are called one at a time.
+  std::vector<std::uint64_t> sizes{0};  // [size]
+  Layout in{1};
+  Layout out{1};
+  std::vector<std::uint64_t> results{0, 0};  // [size][2]: of gatherTogether
 
   /// Collective: takes the communicator over. If a rank lacks the memory, all throw.
   static std::unique_ptr<State> on(OwnedComm& comm) {
@@ -145,7 +155,12 @@ struct Communicator::State {
       state = std::make_unique<State>();
       check(MPI_Comm_rank(comm.handle(), &state->rank), "MPI_Comm_rank");
       check(MPI_Comm_size(comm.handle(), &state->size), "MPI_Comm_size");
-      state->hostLeaders.resize(static_cast<std::size_t>(state->size));
+      const auto ranks = static_cast<std::size_t>(state->size);
+      state->hostLeaders.resize(ranks);
+      state->sizes.resize(ranks);
+      state->in = Layout(ranks);
+      state->out = Layout(ranks);
+      state->results.resize(2 * ranks);
     });
     int failed = error ? 1 : 0;
     check(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm.handle()), "MPI_Allreduce");
@@ -166,12 +181,20 @@ struct Communicator::State {
          static_cast<int>(values.size()), type, operation, comm());
   }
 
-  /// Returns every rank's value on every rank.
-  std::vector<std::uint64_t> allGatherSize(std::uint64_t mine) const {
-    std::vector<std::uint64_t> sizes(static_cast<std::size_t>(size));
-    call("MPI_Allgather", MPI_Allgather, MPI_Iallgather, &mine, 1, MPI_UINT64_T, sizes.data(), 1,
+  void allGather(std::span<const std::uint64_t> words, std::span<std::uint64_t> all) const {
+    const auto count = static_cast<int>(words.size());
+    call("MPI_Allgather", MPI_Allgather, MPI_Iallgather, words.data(), count, MPI_UINT64_T, all.data(), count,
          MPI_UINT64_T, comm());
-    return sizes;
+  }
+  void allToAll(std::span<const std::uint64_t> to, std::span<std::uint64_t> from) const {
+    const auto count = static_cast<int>(to.size() / static_cast<std::size_t>(size));
+    call("MPI_Alltoall", MPI_Alltoall, MPI_Ialltoall, to.data(), count, MPI_UINT64_T, from.data(), count,
+         MPI_UINT64_T, comm());
+  }
+  /// Lays `in` out for every rank's number of elements.
+  void layOut(std::uint64_t mine) {
+    allGather(std::span(&mine, 1), sizes);
+    in.set(sizes);
   }
 };
 
@@ -242,12 +265,15 @@ int Communicator::hostLeader(int rank) const {
 
 std::string Communicator::environment(const char* name) const {
   std::vector<std::byte> bytes;
-  if (const std::string value = rank() == 0 ? environmentText(name).value_or("") : ""; !value.empty()) {
+  together([&] {
+    const std::string value = rank() == 0 ? environmentText(name).value_or("") : "";
     const auto text = std::as_bytes(std::span(value));
     bytes.assign(text.begin(), text.end());
-  }
+  });
   bytes = broadcast(std::move(bytes), 0);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  std::string value;
+  together([&] { value.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size()); });
+  return value;
 }
 
 void Communicator::barrier() const {
@@ -279,8 +305,8 @@ void Communicator::reduceMax(std::span<std::uint64_t> values, int root) const {
        MPI_MAX, root, state_->comm());
 }
 
-// Memory is allocated under together() before each exchange: a rank with too little makes all fail, instead
-// of leaving the others waiting in a call that it never makes.
+// Memory is allocated under together() before each exchange, or with the communicator: a rank with too little
+// makes all fail, instead of leaving the others waiting in a call that it never makes.
 
 std::vector<std::byte> Communicator::broadcast(std::vector<std::byte> bytes, int root) const {
   assert(root >= 0 && root < size());
@@ -300,7 +326,8 @@ Gathered Communicator::allGather(std::span<const std::byte> bytes, std::size_t e
   assert(elementBytes > 0 && bytes.size() % elementBytes == 0);
   if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
   const std::uint64_t mine = bytes.size() / elementBytes;
-  const Layout layout(state_->allGatherSize(mine));
+  state_->layOut(mine);
+  const Layout& layout = state_->in;
   std::optional<ElementType> type;
   Gathered result;
   together([&] {
@@ -319,7 +346,8 @@ Gathered Communicator::gather(std::span<const std::byte> bytes, std::size_t elem
   assert(root >= 0 && root < size());
   if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
   const std::uint64_t mine = bytes.size() / elementBytes;
-  const Layout layout(state_->allGatherSize(mine));
+  state_->layOut(mine);
+  const Layout& layout = state_->in;
   std::optional<ElementType> type;
   Gathered result;
   together([&] {
@@ -337,11 +365,11 @@ Gathered Communicator::allToAll(std::span<const std::byte> bytes, std::span<cons
   assert(counts.size() == static_cast<std::size_t>(size()));
   assert(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}) * elementBytes == bytes.size());
   if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
-  std::vector<std::uint64_t> incoming(counts.size());
-  call("MPI_Alltoall", MPI_Alltoall, MPI_Ialltoall, counts.data(), 1, MPI_UINT64_T, incoming.data(), 1,
-       MPI_UINT64_T, state_->comm());
-  const Layout out(counts);
-  const Layout in(incoming);
+  state_->allToAll(counts, state_->sizes);
+  Layout& out = state_->out;
+  Layout& in = state_->in;
+  out.set(counts);
+  in.set(state_->sizes);
   std::optional<ElementType> type;
   Gathered result;
   together([&] {
@@ -358,24 +386,20 @@ Gathered Communicator::allToAll(std::span<const std::byte> bytes, std::span<cons
 
 std::vector<std::uint64_t> Communicator::allGatherWords(std::span<const std::uint64_t> words) const {
   if (state_->serial()) return {words.begin(), words.end()};
-  std::vector<std::uint64_t> all(words.size() * static_cast<std::size_t>(size()));
-  const auto count = static_cast<int>(words.size());
-  call("MPI_Allgather", MPI_Allgather, MPI_Iallgather, words.data(), count, MPI_UINT64_T, all.data(), count,
-       MPI_UINT64_T, state_->comm());
+  std::vector<std::uint64_t> all;
+  together([&] { all.resize(words.size() * static_cast<std::size_t>(size())); });
+  state_->allGather(words, all);
   return all;
 }
 
-std::vector<std::uint64_t> Communicator::allToAllWords(std::span<const std::uint64_t> wordsTo) const {
-  assert(wordsTo.size() % static_cast<std::size_t>(size()) == 0);
-  if (state_->serial()) return {wordsTo.begin(), wordsTo.end()};
-  std::vector<std::uint64_t> from(wordsTo.size());
-  const auto count = static_cast<int>(wordsTo.size() / static_cast<std::size_t>(size()));
-  call("MPI_Alltoall", MPI_Alltoall, MPI_Ialltoall, wordsTo.data(), count, MPI_UINT64_T, from.data(), count,
-       MPI_UINT64_T, state_->comm());
-  return from;
+void Communicator::allToAllWords(std::span<const std::uint64_t> to, std::span<std::uint64_t> from) const {
+  assert(to.size() % static_cast<std::size_t>(size()) == 0 && from.size() == to.size());
+  if (state_->serial()) {
+    std::copy(to.begin(), to.end(), from.begin());
+  } else {
+    state_->allToAll(to, from);
+  }
 }
-
-namespace {}  // namespace
 
 void Communicator::agree(const std::exception_ptr& mine) const {
   if (state_->serial()) {
@@ -397,11 +421,11 @@ void Communicator::failTogether(const std::exception_ptr& mine, int firstFailing
   throw Error(ErrorCode::RemoteRank, fmt::format("rank {} failed: {}", firstFailing, text.data()));
 }
 
-void Communicator::together(const std::function<void()>& work) const {
+void Communicator::together(FunctionRef<void()> work) const {
   agree(errorOf(work));
 }
 
-bool Communicator::anyTogether(const std::function<bool()>& work) const {
+bool Communicator::anyTogether(FunctionRef<bool()> work) const {
   if (state_->serial()) return work();
   bool mine = false;
   const std::exception_ptr error = errorOf([&] { mine = work(); });
@@ -412,29 +436,37 @@ bool Communicator::anyTogether(const std::function<bool()>& work) const {
   return least[1] == 0;
 }
 
-std::vector<std::uint64_t> Communicator::gatherTogether(const std::function<std::uint64_t()>& work) const {
+std::vector<std::uint64_t> Communicator::gatherTogether(FunctionRef<std::uint64_t()> work) const {
   if (state_->serial()) return {work()};
   std::array<std::uint64_t, 2> mine{};
-  const std::exception_ptr error = errorOf([&] { mine[1] = work(); });
-  mine[0] = error ? 1 : 0;
-  const std::vector<std::uint64_t> all = allGatherWords(mine);
   std::vector<std::uint64_t> values;
-  for (std::size_t r = 0; 2 * r < all.size(); ++r) {
-    if (all[2 * r] != 0) failTogether(error, static_cast<int>(r));
-    values.push_back(all[2 * r + 1]);
+  const std::exception_ptr error = errorOf([&] {
+    values.resize(static_cast<std::size_t>(size()));
+    mine[1] = work();
+  });
+  mine[0] = error ? 1 : 0;
+  const std::span<std::uint64_t> all = state_->results;
+  state_->allGather(mine, all);
+  for (int r = 0; r < size(); ++r) {
+    if (all[2 * static_cast<std::size_t>(r)] != 0) failTogether(error, r);
   }
+  for (std::size_t r = 0; r < values.size(); ++r) values[r] = all[2 * r + 1];
   return values;
 }
 
-void Communicator::requireEqual(std::uint64_t fingerprint, const std::string& what) const {
-  const Fingerprint print{fingerprint, what.c_str()};
-  requireEqual(std::span(&print, 1));
+void Communicator::requireEqual(std::uint64_t fingerprint, const char* what) const {
+  requireEqual([&] { return std::vector{Fingerprint{fingerprint, what}}; });
 }
 
-void Communicator::requireEqual(std::span<const Fingerprint> fingerprints) const {
+void Communicator::requireEqual(FunctionRef<std::vector<Fingerprint>()> work) const {
   // The maxima of x and ~x equal x and ~x on every rank only if all have the same x.
+  std::vector<Fingerprint> fingerprints;
   std::vector<std::uint64_t> extremes;
-  for (const Fingerprint& print : fingerprints) extremes.insert(extremes.end(), {print.value, ~print.value});
+  together([&] {
+    fingerprints = work();
+    for (const Fingerprint& print : fingerprints)
+      extremes.insert(extremes.end(), {print.value, ~print.value});
+  });
   allReduceMax(extremes);
   std::vector<const char*> different;
   for (std::size_t i = 0; i < fingerprints.size(); ++i) {
@@ -447,9 +479,9 @@ void Communicator::requireEqual(std::span<const Fingerprint> fingerprints) const
 
 /// The MPI requests of messages under way.
 struct Messages::State {
-  const Communicator& comm;
+  MPI_Comm comm;
+  std::uint64_t reserved = 0;
   std::vector<MPI_Request> requests;
-  MPI_Comm handle() const { return comm.state_->comm(); }
 };
 
 namespace {
@@ -460,22 +492,31 @@ constexpr int messageTag = 1;
 
 }  // namespace
 
-Messages::Messages(const Communicator& comm) : state_(std::make_unique<State>(State{comm, {}})) {}
+Messages::Messages(const Communicator& comm) : comm_(comm) {}
 
 Messages::~Messages() {
   // The memory of a message under way must stay, even while an exception unwinds the stack.
   try {
-    waitForAll(state_->requests);
+    wait();
   } catch (const Error&) {  // this error can be handled no better than the exception that is unwinding
   }
+}
+
+void Messages::reserve(std::uint64_t bytes) {
+  if (!state_) state_ = std::make_unique<State>(State{comm_.state_->comm(), 0, {}});
+  std::vector<MPI_Request>& requests = state_->requests;
+  state_->reserved += (bytes + largestMessage - 1) / largestMessage;
+  if (requests.capacity() < state_->reserved)
+    requests.reserve(std::max<std::uint64_t>(state_->reserved, 2 * requests.capacity()));
 }
 
 void Messages::send(int to, std::span<const std::byte> bytes) {
   for (std::uint64_t done = 0; done < bytes.size(); done += largestMessage) {
     const auto count = static_cast<int>(std::min<std::uint64_t>(largestMessage, bytes.size() - done));
+    assert(state_ && state_->requests.size() < state_->requests.capacity());
     state_->requests.push_back(MPI_REQUEST_NULL);
     callHere("MPI_Isend", [&] {
-      return MPI_Isend(bytes.data() + done, count, MPI_BYTE, to, messageTag, state_->handle(),
+      return MPI_Isend(bytes.data() + done, count, MPI_BYTE, to, messageTag, state_->comm,
                        &state_->requests.back());
     });
   }
@@ -484,16 +525,17 @@ void Messages::send(int to, std::span<const std::byte> bytes) {
 void Messages::receive(int from, std::span<std::byte> bytes) {
   for (std::uint64_t done = 0; done < bytes.size(); done += largestMessage) {
     const auto count = static_cast<int>(std::min<std::uint64_t>(largestMessage, bytes.size() - done));
+    assert(state_ && state_->requests.size() < state_->requests.capacity());
     state_->requests.push_back(MPI_REQUEST_NULL);
     callHere("MPI_Irecv", [&] {
-      return MPI_Irecv(bytes.data() + done, count, MPI_BYTE, from, messageTag, state_->handle(),
+      return MPI_Irecv(bytes.data() + done, count, MPI_BYTE, from, messageTag, state_->comm,
                        &state_->requests.back());
     });
   }
 }
 
 void Messages::wait() {
-  waitForAll(state_->requests);
+  if (state_) waitForAll(state_->requests);
 }
 
 }  // namespace vdi::comm

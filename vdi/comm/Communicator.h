@@ -4,11 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
-#include <functional>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "vdi/core/FunctionRef.h"
 
 namespace vdi::comm {
 
@@ -24,7 +25,10 @@ struct Gathered {
 };
 
 /// Owns a duplicate of an MPI communicator, or stands for one rank without MPI. Movable, not copyable. Every
-/// rank must call all functions marked collective in the same order. MPI errors become Error{Communication}.
+/// rank must call all functions marked collective in the same order, one thread at a time. MPI errors become
+/// Error{Communication}. If a rank lacks memory, the ranks agree on it before they communicate: a collective
+/// that throws on one rank throws on all. So must their callers, between collectives: whatever allocates
+/// belongs into together().
 class Communicator {
  public:
   /// One rank; never calls MPI.
@@ -66,7 +70,7 @@ class Communicator {
 
   // Exchanges of bytes, all collective. Elements of `elementBytes` each travel as one MPI datatype, so more
   // than 2 GiB is fine, as long as no rank sends or receives 2^31 elements or more in one call. If that limit
-  // is exceeded, or a rank lacks the memory, nothing is sent and every rank throws: a failing rank its own
+  // is exceeded, or a rank lacks the memory, no bytes are sent and every rank throws: a failing rank its own
   // error, the others Error{RemoteRank}.
 
   /// Returns the root's bytes on every rank; other ranks' `bytes` are ignored.
@@ -83,27 +87,27 @@ class Communicator {
 
   /// Returns every rank's `words` on every rank: [size][words.size()]. All ranks pass the same number.
   std::vector<std::uint64_t> allGatherWords(std::span<const std::uint64_t> words) const;
-  /// Sends n words to each rank, wordsTo: [size][n], and returns n words from each, [size][n].
-  std::vector<std::uint64_t> allToAllWords(std::span<const std::uint64_t> wordsTo) const;
+  /// Sends n words to each rank, to: [size][n], and stores those from each, from: [size][n].
+  void allToAllWords(std::span<const std::uint64_t> to, std::span<std::uint64_t> from) const;
 
   /// Collective: returns if no rank has an error. Otherwise every rank throws: a rank with an error rethrows
   /// its own, the others throw Error{RemoteRank} with the lowest failing rank's number and text.
   void agree(const std::exception_ptr& mine) const;
   /// Runs `work`, then calls agree() with its exception. Collective; `work` itself must not communicate.
-  void together(const std::function<void()>& work) const;
+  void together(FunctionRef<void()> work) const;
   /// together that also returns whether `work` was true on any rank, in the same message.
-  bool anyTogether(const std::function<bool()>& work) const;
+  bool anyTogether(FunctionRef<bool()> work) const;
   /// together that also returns the result of `work` on each rank, in the same message.
-  std::vector<std::uint64_t> gatherTogether(const std::function<std::uint64_t()>& work) const;
+  std::vector<std::uint64_t> gatherTogether(FunctionRef<std::uint64_t()> work) const;
   /// Collective: throws Error{InvalidArgument} on every rank if `fingerprint` differs between ranks; `what`
   /// names the compared value.
-  void requireEqual(std::uint64_t fingerprint, const std::string& what) const;
+  void requireEqual(std::uint64_t fingerprint, const char* what) const;
   struct Fingerprint {
     std::uint64_t value;
     const char* what;
   };
-  /// Compares several at once; the error names all that differ.
-  void requireEqual(std::span<const Fingerprint> fingerprints) const;
+  /// Compares several at once, which `work` returns as together's does; the error names all that differ.
+  void requireEqual(FunctionRef<std::vector<Fingerprint>()> work) const;
 
  private:
   friend class Messages;
@@ -118,20 +122,24 @@ class Communicator {
 /// which they were sent; both ranks must name the same sizes. Empty messages are not sent.
 class Messages {
  public:
-  explicit Messages(const Communicator& comm);
+  explicit Messages(const Communicator& comm);  // takes no memory
   ~Messages();
   Messages(const Messages&) = delete;
   Messages& operator=(const Messages&) = delete;
   Messages(Messages&&) = delete;
   Messages& operator=(Messages&&) = delete;
 
+  /// Takes the memory for one more message, sent or received, of so many bytes. Call it for each within
+  /// together(), before the first is sent: other ranks would wait for messages of a rank without memory.
+  void reserve(std::uint64_t bytes);
   void send(int to, std::span<const std::byte> bytes);
   void receive(int from, std::span<std::byte> bytes);
   void wait();
 
  private:
   struct State;
-  std::unique_ptr<State> state_;
+  const Communicator& comm_;
+  std::unique_ptr<State> state_;  // null: nothing is reserved
 };
 
 }  // namespace vdi::comm

@@ -37,7 +37,13 @@ std::string nameOf(std::span<const std::uint64_t> words) {
 
 }  // namespace
 
-Exchange::Exchange(const Communicator& comm, Transport transport) : comm_(comm), transport_(transport) {}
+Exchange::Exchange(const Communicator& comm, Transport transport)
+    : comm_(comm),
+      transport_(transport),
+      sent_(static_cast<std::size_t>(comm.size()) * headerWords),
+      received_(sent_.size()) {
+  incoming_.reserve(static_cast<std::size_t>(comm.size()));
+}
 
 bool Exchange::sharesMemoryWith(int rank) const {
   return window_ != nullptr && comm_.hostLeader(rank) == comm_.hostLeader(comm_.rank());
@@ -79,12 +85,14 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   const int leader = comm_.hostLeader(comm_.rank());
   window_.reset();
   outbox_ = {};
+  incoming_.clear();
   parts_.clear();
   everyHostShares_ = false;
   messages_ = true;
   // Half as much again, so that slow growth does not make a new window every frame; and as much as other
   // ranks have, because the load may move from one rank to another between frames.
-  std::vector<std::uint64_t> parts(sizes.begin(), sizes.end());
+  std::vector<std::uint64_t> parts;
+  comm_.together([&] { parts.assign(sizes.begin(), sizes.end()); });
   const std::uint64_t mean = std::accumulate(parts.begin(), parts.end(), std::uint64_t{0}) / parts.size();
   for (std::uint64_t& part : parts) part = aligned(std::max(part + part / 2, 2 * mean));
   std::uint64_t total = 0;
@@ -95,18 +103,20 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
     total += parts[static_cast<std::size_t>(r)];
   }
   std::string name;
-  if (comm_.rank() == leader) {
+  comm_.together([&] {
+    if (comm_.rank() != leader) return;
     try {
       window_ = HostMemory::shared(total);
       name = window_->name();
     } catch (const Error&) {  // too little shared memory: messages
     }
-  }
+  });
   const std::vector<std::uint64_t> names = comm_.allGatherWords(wordsOf(name));
   const std::size_t words = NameWords().size();
-  name = nameOf(std::span(names).subspan(static_cast<std::size_t>(leader) * words, words));
-  const std::vector<std::uint64_t> opened =
-      comm_.gatherTogether([&] { return openWindow(name, total) ? 1U : 0U; });
+  const std::vector<std::uint64_t> opened = comm_.gatherTogether([&] {
+    name = nameOf(std::span(names).subspan(static_cast<std::size_t>(leader) * words, words));
+    return openWindow(name, total) ? 1U : 0U;
+  });
   if (window_) window_->unlink();  // all ranks have tried to open it
   everyHostShares_ = std::ranges::all_of(opened, [](std::uint64_t has) { return has != 0; });
   bool hostShares = true;
@@ -133,48 +143,50 @@ void Exchange::putHeader(const Outgoing& piece, std::span<std::uint64_t> header)
   std::copy(words.begin(), words.end(), header.begin());
 }
 
-std::vector<Exchange::Incoming> Exchange::send(std::span<const Outgoing> pieces) {
-  std::vector<std::uint64_t> headers(static_cast<std::size_t>(comm_.size()) * headerWords, 0);
+std::span<const Exchange::Incoming> Exchange::send(std::span<const Outgoing> pieces) {
+  std::fill(sent_.begin(), sent_.end(), 0);
   for (const Outgoing& piece : pieces) {
     assert(piece.to != comm_.rank() && piece.to < comm_.size());
-    putHeader(piece,
-              std::span(headers).subspan(static_cast<std::size_t>(piece.to) * headerWords, headerWords));
+    putHeader(piece, std::span(sent_).subspan(static_cast<std::size_t>(piece.to) * headerWords, headerWords));
   }
   // With shared memory, the data is ready as soon as its header arrives, since headers are sent after the
   // data is written.
-  const std::vector<std::uint64_t> from = comm_.allToAllWords(headers);
-  std::vector<Incoming> incoming;
+  comm_.allToAllWords(sent_, received_);
+  incoming_.clear();
   for (int r = 0; r < comm_.size(); ++r)
-    addIncoming(r, &from[static_cast<std::size_t>(r) * headerWords], incoming);
-  return receive(pieces, std::move(incoming));
+    addIncoming(r, &received_[static_cast<std::size_t>(r) * headerWords]);
+  if (messages_) exchangeMessages(pieces);
+  return incoming_;
 }
 
 /// Adds the data that a header describes, if it can be read in place.
-void Exchange::addIncoming(int from, const std::uint64_t* header, std::vector<Incoming>& incoming) const {
+void Exchange::addIncoming(int from, const std::uint64_t* header) {
   if (header[1] == 0) return;
   const bool shared = sharesMemoryWith(from);
-  incoming.push_back(
+  incoming_.push_back(
       {from, {shared ? window_ : nullptr, shared ? header[0] : 0}, header[1], {header[2], header[3]}});
 }
 
-/// Receives the messages of ranks that share no memory with this one.
-std::vector<Exchange::Incoming> Exchange::receive(std::span<const Outgoing> pieces,
-                                                  std::vector<Incoming> incoming) {
-  if (!messages_) return incoming;
+/// Exchanges messages with the ranks that share no memory with this one.
+void Exchange::exchangeMessages(std::span<const Outgoing> pieces) {
+  Messages messages(comm_);
   comm_.together([&] {
     std::uint64_t messageBytes = 0;
-    for (Incoming& piece : incoming) {
+    for (Incoming& piece : incoming_) {
       if (piece.place.memory) continue;
       piece.place.at = messageBytes;
       messageBytes += aligned(piece.bytes);
+      messages.reserve(piece.bytes);
+    }
+    for (const Outgoing& piece : pieces) {
+      if (!sharesMemoryWith(piece.to)) messages.reserve(piece.bytes);
     }
     if (messageBytes > 0 && (!inbox_ || inbox_->bytes().size() < messageBytes)) {
       inbox_.reset();
       inbox_ = HostMemory::anonymous(messageBytes + messageBytes / 2);
     }
   });
-  Messages messages(comm_);
-  for (Incoming& piece : incoming) {
+  for (Incoming& piece : incoming_) {
     if (piece.place.memory) continue;
     piece.place.memory = inbox_;
     messages.receive(piece.from, inbox_->bytes().subspan(piece.place.at, piece.bytes));
@@ -184,7 +196,6 @@ std::vector<Exchange::Incoming> Exchange::receive(std::span<const Outgoing> piec
     messages.send(piece.to, outbox_.memory->bytes().subspan(outbox_.at + piece.at, piece.bytes));
   }
   messages.wait();
-  return incoming;
 }
 
 }  // namespace vdi::comm

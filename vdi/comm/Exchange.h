@@ -46,9 +46,9 @@ class Exchange {
     Note note{};
   };
   /// Collective: sends data in the outbox to other ranks, at most one piece to each. Returns the received
-  /// pieces, in rank order; they stay valid until the next outbox. Ranks without data for each other exchange
-  /// only a header.
-  std::vector<Incoming> send(std::span<const Outgoing> pieces);
+  /// pieces, in rank order; they and their data stay valid until the next outbox. Ranks without data for each
+  /// other exchange only a header.
+  std::span<const Incoming> send(std::span<const Outgoing> pieces);
 
   /// Whether this rank reads that rank's data in place.
   bool sharesMemoryWith(int rank) const;
@@ -58,8 +58,8 @@ class Exchange {
   void shareNewWindow(std::span<const std::uint64_t> sizes);
   bool openWindow(const std::string& name, std::uint64_t bytes);
   void putHeader(const Outgoing& piece, std::span<std::uint64_t> header) const;
-  void addIncoming(int from, const std::uint64_t* header, std::vector<Incoming>& incoming) const;
-  std::vector<Incoming> receive(std::span<const Outgoing> pieces, std::vector<Incoming> incoming);
+  void addIncoming(int from, const std::uint64_t* header);
+  void exchangeMessages(std::span<const Outgoing> pieces);
 
   const Communicator& comm_;
   Transport transport_;
@@ -71,6 +71,9 @@ class Exchange {
   bool everyHostShares_ = false;  // each host's ranks have a window
   bool messages_ = true;          // some pair of ranks has no window in common
   std::shared_ptr<HostMemory> inbox_;  // for messages
+  std::vector<std::uint64_t> sent_;    // headers: [size][headerWords]
+  std::vector<std::uint64_t> received_;
+  std::vector<Incoming> incoming_;  // with memory for one of each rank
 };
 
 }  // namespace vdi::comm

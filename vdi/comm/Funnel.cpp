@@ -58,7 +58,9 @@ struct Funnel::State {
   }
 };
 
-Funnel::Funnel() : state_(std::make_unique<State>()) {}
+Funnel::Funnel() : state_(std::make_unique<State>()) {
+  state_->requests.reserve(1);
+}
 Funnel::~Funnel() = default;
 
 Funnel::Entry::Entry(Funnel& funnel) : before_(current) {
@@ -115,11 +117,11 @@ void Operation::carry(const char* name) const {
 void waitForAll(std::vector<MPI_Request>& requests) {
   if (requests.empty()) return;  // there may be no MPI
   if (Operation::isCarried()) {
-    Operation{[&](std::vector<MPI_Request>& taken) {
+    const auto begin = [&](std::vector<MPI_Request>& taken) {
       taken.swap(requests);
       return MPI_SUCCESS;
-    }}.carry("MPI_Testall");
-    return;
+    };
+    return Operation{begin}.carry("MPI_Testall");
   }
   std::vector<MPI_Request> taken = std::exchange(requests, {});
   check(MPI_Waitall(static_cast<int>(taken.size()), taken.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");

@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -196,50 +197,53 @@ void makeTypesOne(const Communicator& comm, std::vector<Block>& blocks) {
   });
 }
 
-/// Replaces each block by the parts that it still owns.
-std::vector<Block> partsOf(const std::vector<OwnParts>& parts, std::vector<Block> blocks) {
+/// Collective: replaces each block by the parts that it still owns.
+std::vector<Block> partsOf(const Communicator& comm, const std::vector<OwnParts>& parts,
+                           std::vector<Block> blocks) {
   std::vector<Block> result;
-  std::size_t entry = 0;
-  for (Block& block : blocks) {
-    if (block.owned.empty()) {
-      result.push_back(std::move(block));
-      continue;
+  comm.together([&] {
+    std::size_t entry = 0;
+    for (Block& block : blocks) {
+      if (block.owned.empty()) {
+        result.push_back(std::move(block));
+        continue;
+      }
+      assert(entry < parts.size());
+      for (const Box& part : parts[entry++].boxes) result.emplace_back(block).owned = part;
     }
-    assert(entry < parts.size());
-    for (const Box& part : parts[entry++].boxes) result.emplace_back(block).owned = part;
-  }
+  });
   return result;
 }
 
 class LayerExchange {
  public:
+  /// Not collective; call within together().
   LayerExchange(const Communicator& comm, const BlockDirectory& directory, const std::vector<OwnParts>& parts,
                 std::vector<Block>& blocks)
       : comm_(comm),
         directory_(directory),
         blocks_(blocks),
         outgoing_(static_cast<std::size_t>(comm.size())) {
-    comm_.together([&] {
-      findLevels();
-      gatherGrids(parts);
-      for (std::size_t i = 0; i < grids_.size(); ++i) {
-        findWanted(grids_[i]);
-        for (std::size_t w = 0; w < grids_[i].wanted.size(); ++w) askFor(i, w);
-      }
-      for (std::size_t i = 0; i < grids_.size(); ++i) makePatches(i);
-    });
+    findLevels();
+    gatherGrids(parts);
+    for (std::size_t i = 0; i < grids_.size(); ++i) {
+      findWanted(grids_[i]);
+      for (std::size_t w = 0; w < grids_[i].wanted.size(); ++w) askFor(i, w);
+    }
+    for (std::size_t i = 0; i < grids_.size(); ++i) makePatches(i);
+    rounds_.resize(levels_.size() + firstCoarserRound);
+    for (const auto& asked : outgoing_) {
+      for (const Asked& one : asked) rounds_[static_cast<std::size_t>(one.question.round)] = 1;
+    }
   }
 
+  /// Collective.
   void run() {
-    std::vector<std::uint64_t> rounds(levels_.size() + firstCoarserRound, 0);
-    for (const auto& asked : outgoing_) {
-      for (const Asked& one : asked) rounds[static_cast<std::size_t>(one.question.round)] = 1;
-    }
-    comm_.allReduceMax(rounds);
-    if (std::count(rounds.begin(), rounds.end(), 1U) > 0) {
+    comm_.allReduceMax(rounds_);
+    if (std::count(rounds_.begin(), rounds_.end(), 1U) > 0) {
       sendRequests();
-      for (std::size_t round = 0; round < rounds.size(); ++round) {
-        if (rounds[round] != 0) exchangeValues(static_cast<std::int32_t>(round));
+      for (std::size_t round = 0; round < rounds_.size(); ++round) {
+        if (rounds_[round] != 0) exchangeValues(static_cast<std::int32_t>(round));
       }
     }
     comm_.together([&] {
@@ -536,8 +540,9 @@ class LayerExchange {
   /// Sends none to this rank itself.
   void sendRequests() {
     std::vector<Request> requests;
-    std::vector<std::uint64_t> counts(outgoing_.size(), 0);
+    std::vector<std::uint64_t> counts;
     comm_.together([&] {
+      counts.resize(outgoing_.size());
       for (std::size_t rank = 0; rank < outgoing_.size(); ++rank) {
         if (static_cast<int>(rank) == comm_.rank()) continue;
         counts[rank] = outgoing_[rank].size();
@@ -656,6 +661,7 @@ class LayerExchange {
   std::vector<std::int32_t> levelNumbers_;  // of the directory's entries: indices of levels_
   std::vector<Grid> grids_;
   std::vector<std::vector<Asked>> outgoing_;   // by the rank that answers
+  std::vector<std::uint64_t> rounds_;          // 1 for each in which a rank wants values
   Gathered incoming_;                          // requests of other ranks
   std::array<SamplePlaces, 3> places_;         // memory for one answer at a time
   std::array<std::vector<double>, 3> shares_;  // per axis, of an answer's values: those of their parts
@@ -667,15 +673,17 @@ class LayerExchange {
 std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> blocks) {
   const BlockDirectory directory(comm, blocks, false);
   const std::vector<OwnParts> parts = settleOverlaps(comm, directory);
-  return partsOf(parts, std::move(blocks));
+  return partsOf(comm, parts, std::move(blocks));
 }
 
 std::vector<Block> exchangeGhosts(const Communicator& comm, std::vector<Block> blocks) {
   makeTypesOne(comm, blocks);
   const BlockDirectory directory(comm, blocks, true);
   const std::vector<OwnParts> parts = settleOverlaps(comm, directory);
-  LayerExchange(comm, directory, parts, blocks).run();
-  return partsOf(parts, std::move(blocks));
+  std::optional<LayerExchange> layers;
+  comm.together([&] { layers.emplace(comm, directory, parts, blocks); });
+  layers->run();
+  return partsOf(comm, parts, std::move(blocks));
 }
 
 }  // namespace vdi::comm

@@ -9,32 +9,11 @@ namespace vdi::comm {
 
 namespace {
 
-template <typename T>
-void convertAs(const void* row, int first, std::span<const int> indices, double* to) {
-  const T* const from = static_cast<const T*>(row);
-  for (const int index : indices) *to++ = static_cast<double>(from[index - first]);
-}
-
 /// Value [0] of `row` has index `first`. The type decides once a row, not once a value.
 void convert(ScalarType type, const void* row, int first, std::span<const int> indices, double* to) {
-  switch (type) {
-    case ScalarType::U8:
-      return convertAs<std::uint8_t>(row, first, indices, to);
-    case ScalarType::I8:
-      return convertAs<std::int8_t>(row, first, indices, to);
-    case ScalarType::U16:
-      return convertAs<std::uint16_t>(row, first, indices, to);
-    case ScalarType::I16:
-      return convertAs<std::int16_t>(row, first, indices, to);
-    case ScalarType::U32:
-      return convertAs<std::uint32_t>(row, first, indices, to);
-    case ScalarType::I32:
-      return convertAs<std::int32_t>(row, first, indices, to);
-    case ScalarType::F32:
-      return convertAs<float>(row, first, indices, to);
-    case ScalarType::F64:
-      return convertAs<double>(row, first, indices, to);
-  }
+  withTyped(type, row, [&](const auto* from) {
+    for (const int index : indices) *to++ = static_cast<double>(from[index - first]);
+  });
 }
 
 }  // namespace

@@ -3,8 +3,9 @@
 
 #include <mpi.h>
 
-#include <functional>
 #include <vector>
+
+#include "vdi/core/FunctionRef.h"
 
 namespace vdi::comm {
 
@@ -14,7 +15,8 @@ void check(int result, const char* call);
 /// An MPI operation that a thread within a Funnel requests.
 struct Operation {
   /// Begins the operation, by calls that do not wait for other ranks, and adds the requests that complete it.
-  std::function<int(std::vector<MPI_Request>&)> begin;
+  /// One of them needs no memory.
+  FunctionRef<int(std::vector<MPI_Request>&)> begin;
 
   /// Whether this thread is within a Funnel.
   static bool isCarried();
@@ -27,16 +29,18 @@ struct Operation {
 template <typename Blocking, typename Starting, typename... Arguments>
 void call(const char* name, Blocking blocking, Starting starting, Arguments... arguments) {
   if (!Operation::isCarried()) return check(blocking(arguments...), name);
-  Operation{[&](std::vector<MPI_Request>& requests) {
+  const auto begin = [&](std::vector<MPI_Request>& requests) {
     return starting(arguments..., &requests.emplace_back(MPI_REQUEST_NULL));
-  }}.carry(name);
+  };
+  Operation{begin}.carry(name);
 }
 
 /// Calls an operation that waits for no other rank; `function` returns MPI's result.
 template <typename Function>
 void callHere(const char* name, const Function& function) {
   if (!Operation::isCarried()) return check(function(), name);
-  Operation{[&](std::vector<MPI_Request>&) { return function(); }}.carry(name);
+  const auto begin = [&](std::vector<MPI_Request>&) { return function(); };
+  Operation{begin}.carry(name);
 }
 
 /// Waits until all requests are complete.

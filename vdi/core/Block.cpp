@@ -23,34 +23,6 @@ namespace {
 constexpr std::array<std::pair<const char*, std::size_t>, 8> scalarTypes{
     {{"u8", 1}, {"i8", 1}, {"u16", 2}, {"i16", 2}, {"u32", 4}, {"i32", 4}, {"f32", 4}, {"f64", 8}}};
 
-/// Calls `function` with the data as a pointer to its own type.
-template <typename Void, typename Function>
-auto withTyped(ScalarType type, Void* data, Function function) {
-  const auto as = [&](auto zero) {
-    using T = std::conditional_t<std::is_const_v<Void>, const decltype(zero), decltype(zero)>;
-    return function(static_cast<T*>(data));
-  };
-  switch (type) {
-    case ScalarType::U8:
-      return as(std::uint8_t{});
-    case ScalarType::I8:
-      return as(std::int8_t{});
-    case ScalarType::U16:
-      return as(std::uint16_t{});
-    case ScalarType::I16:
-      return as(std::int16_t{});
-    case ScalarType::U32:
-      return as(std::uint32_t{});
-    case ScalarType::I32:
-      return as(std::int32_t{});
-    case ScalarType::F32:
-      return as(float{});
-    case ScalarType::F64:
-      break;
-  }
-  return as(double{});
-}
-
 /// Written so that compilers vectorise it. This runs for every value of every step; a loop with a branch and
 /// one pair of bounds would take several times as long as the upload.
 template <typename T>

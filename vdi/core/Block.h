@@ -13,26 +13,10 @@
 
 #include "vdi/core/Box.h"
 #include "vdi/core/ScalarRange.h"
+#include "vdi/core/ScalarType.h"
 #include "vdi/core/Strides.h"
 
 namespace vdi {
-
-/// The enumerators index the table of names in Block.cpp.
-enum class ScalarType : std::uint32_t {
-  U8 = 0,
-  I8 = 1,
-  U16 = 2,
-  I16 = 3,
-  U32 = 4,
-  I32 = 5,
-  F32 = 6,
-  F64 = 7
-};
-
-std::size_t sizeOf(ScalarType type);
-const char* toString(ScalarType type);  // "u8" ... "f64"
-/// Throws Error{InvalidArgument} for a name that toString does not produce.
-ScalarType scalarTypeFromString(const std::string& name);
 
 /// Number of layers of stored values beyond the owned ones, per axis and side.
 struct GhostLayers {

@@ -65,11 +65,13 @@ void BandMaker::agreeOnLists(RayCaster::Cast& cast) {
     accesses_.tidy();
     caster_.countLevels(cast, accesses_.of(own.memory), own.at);
   });
-  std::vector<RayCaster::LevelSum> sum;
-  for (const comm::ByteSum::Stretch& stretch : levelSum_.add()) {
-    sum.push_back({&accesses_.of(stretch.place.memory), stretch.place.at, stretch.first, stretch.bytes});
-  }
-  comm_.together([&] { caster_.agree(cast, sum); });
+  const std::span<const comm::ByteSum::Stretch> stretches = levelSum_.add();
+  comm_.together([&] {
+    std::vector<RayCaster::LevelSum> sum;
+    for (const comm::ByteSum::Stretch& stretch : stretches)
+      sum.push_back({&accesses_.of(stretch.place.memory), stretch.place.at, stretch.first, stretch.bytes});
+    caster_.agree(cast, sum);
+  });
 }
 
 /// The owners of a band's lists, equal on all ranks. `weights` are the ranks' agreed weights of the whole
@@ -102,7 +104,6 @@ void BandMaker::makeOwned(const RayCaster::Inputs& inputs, const Progress& progr
   const Bands all{cast.height, static_cast<std::uint32_t>(rows[0])};
   agreeOnLists(cast);
   std::vector<std::uint32_t> weights;
-  merged_.resize(all.count());
   const auto start = [&](std::size_t band) {
     Slot& slot = slotOf(band);
     slot.owned = ownershipOf(cast, all, band, weights);
@@ -114,6 +115,7 @@ void BandMaker::makeOwned(const RayCaster::Inputs& inputs, const Progress& progr
     caster_.startBand(cast, all.first(band), all.last(band), slot.lists, behind, slot.usedBy);
   };
   comm_.together([&] {
+    merged_.resize(all.count());
     if (cast.agreed) weights = caster_.agreedWeights(cast);
     start(0);
   });
@@ -167,8 +169,8 @@ void BandMaker::addLast(const std::vector<OwnedLists>& owned, VdiSink& sink, Ran
 }
 
 void BandMaker::makeComposited(const RayCaster::Inputs& inputs, const Progress& progress,
-                               std::vector<OwnedLists>& owned, const std::function<void()>& started,
-                               VdiSink& sink, RankReport& report) {
+                               std::vector<OwnedLists>& owned, FunctionRef<void()> started, VdiSink& sink,
+                               RankReport& report) {
   const GenerateSettings& settings = inputs.settings;
   Compositor::Options composite{settings.supersegments,
                                 maxPerList(settings.supersegments, settings.budget),
@@ -197,7 +199,7 @@ void BandMaker::makeComposited(const RayCaster::Inputs& inputs, const Progress& 
 }
 
 void BandMaker::makeFlat(const RayCaster::Inputs& inputs, const Progress& progress,
-                         std::vector<FlatBand>& flat, const std::function<void(std::size_t band)>& pass,
+                         std::vector<FlatBand>& flat, FunctionRef<void(std::size_t band)> pass,
                          RankReport& report) {
   const auto flatten = [&](std::size_t band) {
     flat.resize(merged_.size());
@@ -207,7 +209,8 @@ void BandMaker::makeFlat(const RayCaster::Inputs& inputs, const Progress& progre
     compositor_.flatten(merged_[band].interleaved, {}, own.colors, own.depths);
     own.flattened = compositor_.last();
   };
-  makeOwned(inputs, progress, {[] {}, flatten, pass}, report);
+  const auto started = [] {};
+  makeOwned(inputs, progress, {started, flatten, pass}, report);
 }
 
 void BandMaker::render(const RayCaster::Inputs& inputs, const Progress& progress, HostPool& pool,

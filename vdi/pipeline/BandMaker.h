@@ -6,7 +6,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "vdi/comm/Communicator.h"
 #include "vdi/comm/Exchange.h"
 #include "vdi/comm/Ownership.h"
+#include "vdi/core/FunctionRef.h"
 #include "vdi/pipeline/Compositor.h"
 #include "vdi/pipeline/Distributor.h"
 #include "vdi/pipeline/GatheredLists.h"
@@ -42,7 +42,7 @@ class BandMaker {
   /// one to the sink. Calls `started`, which is collective, while the first band is being made. `owned` gets
   /// this rank's lists of each band.
   void makeComposited(const RayCaster::Inputs& inputs, const Progress& progress,
-                      std::vector<OwnedLists>& owned, const std::function<void()>& started, VdiSink& sink,
+                      std::vector<OwnedLists>& owned, FunctionRef<void()> started, VdiSink& sink,
                       RankReport& report);
   /// Collective: adds the last band of makeComposited to the sink.
   void addLast(const std::vector<OwnedLists>& owned, VdiSink& sink, RankReport& report);
@@ -59,7 +59,7 @@ class BandMaker {
   /// supersegment a run, composited in order of depth. `pass`, which is collective, waits for a composited
   /// band (Compositor::finish) and sends it on; it is not called for the last band.
   void makeFlat(const RayCaster::Inputs& inputs, const Progress& progress, std::vector<FlatBand>& flat,
-                const std::function<void(std::size_t band)>& pass, RankReport& report);
+                FunctionRef<void(std::size_t band)> pass, RankReport& report);
 
   /// Renders one rank's volume to a picture: RayCaster::render.
   void render(const RayCaster::Inputs& inputs, const Progress& progress, HostPool& pool, Image& image,
@@ -108,9 +108,9 @@ class BandMaker {
   /// Collective: sends this rank's lists, band after band, to their owners, which merge them by depth. The
   /// device makes the next band while one is on its way.
   struct OwnedSteps {
-    std::function<void()> started;                  // collective; called while the first band is being made
-    std::function<void(std::size_t band)> compose;  // submits the work on a merged band
-    std::function<void(std::size_t band)> pass;     // collective; sends a composed band on
+    FunctionRef<void()> started;                  // collective; called while the first band is being made
+    FunctionRef<void(std::size_t band)> compose;  // submits the work on a merged band
+    FunctionRef<void(std::size_t band)> pass;     // collective; sends a composed band on
   };
   void makeOwned(const RayCaster::Inputs& inputs, const Progress& progress, const OwnedSteps& steps,
                  RankReport& report);

@@ -27,13 +27,6 @@ std::uint64_t packedAt(std::uint64_t list, bool wide) {
   return wide ? list * wordBytes : list / shared::countsPerWord * wordBytes;
 }
 
-/// One rank's share of a band's lists, and this rank's supersegments in it.
-struct Stretch {
-  comm::ListRange lists;
-  std::uint64_t firstSegment = 0;
-  std::uint64_t segments = 0;
-};
-
 }  // namespace
 
 HostAccess& HostAccesses::of(const std::shared_ptr<HostMemory>& memory) {
@@ -55,7 +48,11 @@ Distributor::Distributor(std::shared_ptr<gpu::Device> device, const comm::Commun
       commands_(device_),
       transfers_(device_, gpu::QueueKind::Transfer),
       counts_(device_),
-      tooLarge_(device_, wordBytes, MemoryKind::Readback) {}
+      tooLarge_(device_, wordBytes, MemoryKind::Readback) {
+  const auto ranks = static_cast<std::size_t>(comm.size());
+  pieces_.reserve(ranks);
+  sent_.reserve(ranks);
+}
 
 void Distributor::recordCounts(gpu::Commands& commands, const DeviceLists& lists, bool wide) {
   const std::uint64_t bytes = packedBytes(lists.listCount, wide);
@@ -95,8 +92,8 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
   bytesSent_ = 0;
   wide_ = tooLarge_.mappedAs<std::uint32_t>()[0] != 0;
   // Parts for other ranks, and their positions in the outbox.
-  std::vector<comm::Exchange::Outgoing> pieces;
-  std::vector<Stretch> sent;  // for each piece
+  pieces_.clear();
+  sent_.clear();
   Stretch kept;
   std::uint64_t outboxBytes = 0;
   const std::span<const std::uint32_t> boundaries = boundaryOffsets_.mappedAs<std::uint32_t>();
@@ -115,30 +112,30 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
     piece.note = {stretch.segments, wide_ ? 1U : 0U};
     outboxBytes += aligned(piece.bytes);
     bytesSent_ += piece.bytes;
-    pieces.push_back(piece);
-    sent.push_back(stretch);
+    pieces_.push_back(piece);
+    sent_.push_back(stretch);
   }
   const comm::Exchange::Place outbox = exchange_.outbox(outboxBytes);
   comm_.together([&] {
     accesses_.tidy();
     if (wide_) packWide(lists);
-    if (pieces.empty()) return;
+    if (pieces_.empty()) return;
     HostAccess& access = accesses_.of(outbox.memory);
     transfers_.begin();
     transfers_.waitFor(lists.written);
     if (wide_) transfers_.waitFor(commands_);
-    for (std::size_t i = 0; i < pieces.size(); ++i) {
-      const comm::ListRange range = sent[i].lists;
-      const std::uint64_t at = outbox.at + pieces[i].at;
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      const comm::ListRange range = sent_[i].lists;
+      const std::uint64_t at = outbox.at + pieces_[i].at;
       const std::uint64_t countBytes = packedBytes(range.count(), wide_);
       access.recordWrite(transfers_, packed_, packedAt(range.first, wide_), at, countBytes);
-      access.recordWrite(transfers_, lists.segments, sent[i].firstSegment * segmentBytes,
-                         at + aligned(countBytes), sent[i].segments * segmentBytes);
+      access.recordWrite(transfers_, lists.segments, sent_[i].firstSegment * segmentBytes,
+                         at + aligned(countBytes), sent_[i].segments * segmentBytes);
     }
     transfers_.submitAndWait();
     access.finish();
   });
-  const std::vector<comm::Exchange::Incoming> incoming = exchange_.send(pieces);
+  const std::span<const comm::Exchange::Incoming> incoming = exchange_.send(pieces_);
 
   Distributed result;
   result.ownCounts = &packed_;

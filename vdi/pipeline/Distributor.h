@@ -66,6 +66,12 @@ class Distributor {
   std::uint64_t bytesSent() const { return bytesSent_; }  // to other ranks, by the last distribution
 
  private:
+  /// One rank's share of a band's lists, and this rank's supersegments in it.
+  struct Stretch {
+    comm::ListRange lists;
+    std::uint64_t firstSegment = 0;
+    std::uint64_t segments = 0;
+  };
   void recordCounts(gpu::Commands& commands, const DeviceLists& lists, bool wide);
   void packWide(const DeviceLists& lists);
 
@@ -79,6 +85,8 @@ class Distributor {
   gpu::Buffer packed_;
   gpu::Buffer tooLarge_;
   gpu::Buffer boundaryOffsets_;  // number of supersegments before each stretch, [stretches + 1]
+  std::vector<comm::Exchange::Outgoing> pieces_;  // with memory for one to each rank
+  std::vector<Stretch> sent_;                     // of each piece
   bool wide_ = false;
   std::uint64_t bytesSent_ = 0;
 };

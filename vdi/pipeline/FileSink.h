@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <utility>
 
 #include "vdi/pipeline/BandDownload.h"
 #include "vdi/pipeline/Stages.h"
@@ -17,9 +16,10 @@ namespace vdi::detail {
 template <typename Segment>
 class FileSink final : public VdiSink {
  public:
-  /// `comm` and `download` must outlive it.
-  FileSink(const comm::Communicator& comm, int root, std::filesystem::path path, BandDownload& download)
-      : comm_(comm), root_(root), path_(std::move(path)), download_(download) {}
+  /// All arguments must outlive it.
+  FileSink(const comm::Communicator& comm, int root, const std::filesystem::path& path,
+           BandDownload& download)
+      : comm_(comm), root_(root), path_(path), download_(download) {}
 
   void begin(const Vdi& header) override { writer_.emplace(comm_, root_, path_, header); }
   gpu::Submission add(const Band& band, const Wait& wait, RankReport& report) override {
@@ -45,7 +45,7 @@ class FileSink final : public VdiSink {
  private:
   const comm::Communicator& comm_;
   int root_;
-  std::filesystem::path path_;
+  const std::filesystem::path& path_;
   BandDownload& download_;
   std::optional<VdiWriter<Segment>> writer_;
   WrittenVdi written_;

@@ -142,14 +142,16 @@ void Gather::drop() {
   arrays_.clear();
 }
 
-/// Sends the pieces of ranks that cannot write to the root's memory: a description, then the bytes.
-void Gather::sendMessages() {
-  std::vector<std::uint64_t> words;
-  for (const Message& message : messages_)
-    words.insert(words.end(), {message.piece.array, message.piece.at, message.piece.bytes});
+/// Sends the pieces of ranks that cannot write to the root's memory: a description of each, then the bytes.
+void Gather::sendMessages(std::span<const std::uint64_t> words) {
   const std::vector<std::uint64_t> all = comm_.allGatherWords(words);
   comm::Messages underWay(comm_);
-  constexpr std::size_t perMessage = 3;
+  comm_.together([&] {
+    for (std::size_t i = 0; i < all.size(); i += perMessage) {
+      const bool own = i / words.size() == static_cast<std::size_t>(comm_.rank());
+      if (own || comm_.rank() == root_) underWay.reserve(all[i + 2]);
+    }
+  });
   std::uint64_t outboxAt = 0;
   for (int r = 0; r < comm_.size(); ++r) {
     for (std::size_t i = 0; i < words.size(); i += perMessage) {
@@ -169,7 +171,10 @@ void Gather::sendMessages() {
 void Gather::finish() {
   std::uint64_t outboxBytes = 0;
   for (const Message& message : messages_) outboxBytes += message.piece.bytes;
+  std::vector<std::uint64_t> words;
   comm_.together([&] {
+    for (const Message& message : messages_)
+      words.insert(words.end(), {message.piece.array, message.piece.at, message.piece.bytes});
     if (outboxBytes > 0) {
       if (!outbox_ || outbox_->memory()->bytes().size() < outboxBytes)
         outbox_ = std::make_unique<HostAccess>(device_, HostMemory::anonymous(outboxBytes + outboxBytes / 2));
@@ -189,7 +194,7 @@ void Gather::finish() {
     }
     if (outboxBytes > 0) outbox_->finish();
   });
-  sendMessages();
+  sendMessages(words);
   drop();
 }
 

@@ -76,7 +76,8 @@ class Gather {
   std::vector<std::byte> describe(HostPool& pool, std::span<const std::span<std::byte>> arrays);
   void open(std::span<const std::byte> described);
   gpu::Commands& nextTransfer();
-  void sendMessages();
+  static constexpr std::size_t perMessage = 3;  // words that describe one
+  void sendMessages(std::span<const std::uint64_t> words);
 
   std::shared_ptr<gpu::Device> device_;
   const comm::Communicator& comm_;

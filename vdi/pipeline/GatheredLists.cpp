@@ -95,9 +95,10 @@ ListsOf<Segment> GatheredLists<Segment>::finish() {
     });
   }
   gather_.finish();
-  if (!isRoot()) return {};
-  lists_.segments.resize(total_);
-  lists_.offsets[listCount_] = static_cast<std::uint32_t>(total_);
+  if (isRoot()) {
+    lists_.segments.resize(total_);  // within what `begin` has reserved
+    lists_.offsets[listCount_] = static_cast<std::uint32_t>(total_);
+  }
   return std::move(lists_);
 }
 

@@ -80,7 +80,9 @@ class GatherSink final : public VdiSink {
       : comm_(comm), root_(root), pool_(std::move(pool)), flight_(flight), vdi_(vdi), expected_(expected) {}
 
   void begin(const Vdi& header) override {
-    gathered_.emplace(comm_, root_, pool_, *flight_.gather, *flight_.downloads, listCountOf(header));
+    comm_.together([&] {
+      gathered_.emplace(comm_, root_, pool_, *flight_.gather, *flight_.downloads, listCountOf(header));
+    });
     gathered_->begin(expected_.next());
   }
   gpu::Submission add(const Band& band, const Wait& wait, RankReport& report) override {

@@ -134,9 +134,10 @@ std::vector<RoutedParticle> ParticleDepositor::State::route(const Particles& par
 
 /// Collective: returns the particles that all ranks send to this one.
 std::vector<DepositParticle> ParticleDepositor::State::exchange(std::vector<RoutedParticle> routed) const {
-  std::vector<std::uint64_t> counts(static_cast<std::size_t>(comm.size()), 0);
+  std::vector<std::uint64_t> counts;
   std::vector<DepositParticle> sorted;
   comm.together([&] {
+    counts.resize(static_cast<std::size_t>(comm.size()));
     for (const RoutedParticle& one : routed) ++counts[static_cast<std::size_t>(one.rank)];
     std::vector<std::uint64_t> places(counts.size(), 0);
     for (std::size_t r = 1; r < places.size(); ++r) places[r] = places[r - 1] + counts[r - 1];
@@ -198,21 +199,21 @@ void ParticleDepositor::setBlocks(const std::vector<Block>& blocks) {
   std::array<double, 1> mostCells{state.mostCells};
   state.comm.allReduceMin(mostCells);
   state.routing.emplace(state.comm, blocks, static_cast<int>(mostCells[0]));
-  state.blocks = blocks;
+  state.comm.together([&] { state.blocks = blocks; });
 }
 
 DepositedArray ParticleDepositor::deposit(const Particles& particles, DepositKind kind) {
   State& state = *state_;
   const comm::Communicator& comm = state.comm;
   const int exponent = unitExponent(comm, particles);
+  std::vector<Range> left;
   comm.together([&] {
     std::vector<glm::ivec3> sizes;
     for (const Block& block : state.blocks) sizes.push_back(block.dims);
     state.pass.start(sizes);
+    if (particles.count > 0) left.push_back({0, particles.count});
   });
   ParticleCounts counts;
-  std::vector<Range> left;
-  if (particles.count > 0) left.push_back({0, particles.count});
   bool isMore = true;
   while (isMore) {
     std::vector<RoutedParticle> routed;

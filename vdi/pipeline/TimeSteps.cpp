@@ -20,7 +20,8 @@ namespace {
 /// Collective. Throws if all ranks have only zeros and values too small for the device, so that nothing would
 /// be visible.
 void requireUsableValues(const comm::Communicator& comm, std::span<const Block> blocks) {
-  const ValueSizes own = valueSizesOf(blocks);
+  ValueSizes own;
+  comm.together([&] { own = valueSizesOf(blocks); });
   std::array<std::uint64_t, 2> any{own.usable ? 1U : 0U, own.tooSmall ? 1U : 0U};
   comm.allReduceMax(any);
   if (any[0] != 0 || any[1] == 0) return;
@@ -39,9 +40,12 @@ std::vector<Probe> globalProbes(const comm::Communicator& comm, const Scene& sce
   comm.together([&] { own = probesOf(scene, blocks); });
   if (comm.size() == 1) return own;
   const comm::Gathered all = comm.allGather(std::as_bytes(std::span(own)), sizeof(Probe));
-  std::vector<Probe> probes(all.bytes.size() / sizeof(Probe));
-  if (!probes.empty()) std::memcpy(probes.data(), all.bytes.data(), all.bytes.size());
-  std::ranges::sort(probes, {}, &Probe::index);
+  std::vector<Probe> probes;
+  comm.together([&] {
+    probes.resize(all.bytes.size() / sizeof(Probe));
+    if (!probes.empty()) std::memcpy(probes.data(), all.bytes.data(), all.bytes.size());
+    std::ranges::sort(probes, {}, &Probe::index);
+  });
   return probes;
 }
 
@@ -60,7 +64,7 @@ TimeSteps::Step TimeSteps::send(std::vector<Block> blocks, bool fillGhosts,
   step.blocks = blocks.size();
   blocks = fillGhosts ? comm::exchangeGhosts(comm_, std::move(blocks))
                       : comm::settleOwnership(comm_, std::move(blocks));
-  step.scene = comm::globalScene(comm_, localScene(blocks));
+  step.scene = comm::globalScene(comm_, localScene(blocks));  // needs no memory
   step.probes = globalProbes(comm_, step.scene, blocks);
   comm_.together([&] { (volume_.*way)(blocks, step.scene); });
   step.uploadSeconds = watch.lap();

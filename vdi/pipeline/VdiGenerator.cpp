@@ -6,6 +6,7 @@
 #include <array>
 #include <cstring>
 #include <exception>
+#include <functional>
 #include <span>
 #include <tuple>
 #include <type_traits>
@@ -54,8 +55,11 @@ double rateOfSlabs(const Scene& scene, const Camera& camera, const GenerateSetti
 struct VdiFrame::State : detail::FrameState {};
 
 struct VdiGenerator::State {
-  State(std::shared_ptr<gpu::Device> theDevice, comm::Communicator theComm, const GeneratorOptions& options)
-      : device(std::move(theDevice)), comm(std::move(theComm)) {
+  explicit State(std::shared_ptr<gpu::Device> theDevice) : device(std::move(theDevice)) {}
+
+  /// Collective. Call once, first.
+  void begin(comm::Communicator theComm, const GeneratorOptions& options) {
+    comm = std::move(theComm);
     comm.together([&] {
       const comm::Transport transport = options.transport;
       const bool shares = comm.size() > 1 && transport == comm::Transport::Shared;
@@ -69,8 +73,9 @@ struct VdiGenerator::State {
     });
   }
   ~State() {
-    drop(gone);      // handles of frames may outlive the generator
-    pool->detach();  // VDIs may outlive this
+    if (!gone) return;  // it never began
+    drop(gone);         // handles of frames may outlive the generator
+    pool->detach();     // VDIs may outlive this
   }
   State(const State&) = delete;
   State& operator=(const State&) = delete;
@@ -78,8 +83,8 @@ struct VdiGenerator::State {
   State& operator=(State&&) = delete;
 
   std::shared_ptr<gpu::Device> device;
-  comm::Communicator comm;
-  std::shared_ptr<detail::HostPool> pool;  // of VDIs and pictures
+  comm::Communicator comm = comm::Communicator::serial();  // until it begins
+  std::shared_ptr<detail::HostPool> pool;                  // of VDIs and pictures
   std::unique_ptr<detail::BandMaker> bands;
   std::unique_ptr<detail::TimeSteps> steps;
   std::unique_ptr<detail::Frames> frames;
@@ -105,7 +110,7 @@ struct VdiGenerator::State {
 
   std::unique_ptr<Prepared> prepare(const Camera& camera, const TransferFunction& function,
                                     const GenerateSettings& settings, For result) {
-    comm.requireEqual(detail::fingerprintsOf(camera, function, settings));
+    comm.requireEqual([&] { return detail::fingerprintsOf(camera, function, settings); });
     std::unique_ptr<Prepared> prepared;
     comm.together([&] {
       validate(settings);
@@ -327,15 +332,20 @@ struct VdiGenerator::State {
     if (::getrusage(RUSAGE_SELF, &usage) == 0)
       report.hostPeakBytes = static_cast<std::uint64_t>(usage.ru_maxrss) * unit;
     const comm::Gathered all = comm.gather(std::as_bytes(std::span(&report, 1)), sizeof(RankReport), root);
-    std::vector<RankReport> result(all.bytes.size() / sizeof(RankReport));
-    if (!result.empty()) std::memcpy(result.data(), all.bytes.data(), all.bytes.size());
+    std::vector<RankReport> result;
+    comm.together([&] {
+      result.resize(all.bytes.size() / sizeof(RankReport));
+      if (!result.empty()) std::memcpy(result.data(), all.bytes.data(), all.bytes.size());
+    });
     return result;
   }
 };
 
 VdiGenerator::VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm,
-                           const GeneratorOptions& options)
-    : state_(std::make_unique<State>(std::move(device), std::move(comm), options)) {}
+                           const GeneratorOptions& options) {
+  comm.together([&] { state_ = std::make_unique<State>(std::move(device)); });
+  state_->begin(std::move(comm), options);
+}
 
 VdiGenerator::~VdiGenerator() = default;
 
@@ -363,24 +373,28 @@ VdiFrame VdiGenerator::start(const Camera& camera, const TransferFunction& trans
   State& s = *state_;
   const auto prepared = s.prepare(camera, transferFunction, settings, State::For::Vdi);
   // Memory in use by a frame is not replaced, so a frame of another size waits for it.
-  const std::tuple kind(settings, prepared->view.width(), prepared->view.height());
+  std::optional<std::tuple<GenerateSettings, int, int>> kind;
+  s.comm.together([&] { kind.emplace(settings, prepared->view.width(), prepared->view.height()); });
   if (s.lastKind != kind) s.completeAll();
   detail::Flight& flight = s.freeFlight();
-  s.lastKind = kind;
-  const auto frame = std::make_shared<VdiFrame::State>();
+  s.lastKind = std::move(kind);
+  std::shared_ptr<VdiFrame::State> frame;
+  std::unique_ptr<detail::VdiSink> sink;
+  std::function<void()> addLastBand;
+  s.comm.together([&] {
+    frame = std::make_shared<VdiFrame::State>();
+    frame->vdi = s.headerOf(*prepared, camera, settings);
+    sink = withSegment(precisionOf(frame->vdi.depthCode),
+                       [&]<typename Segment>() { return s.hostSink<Segment>(flight, frame->vdi); });
+    addLastBand = [&s, &flight, made = frame.get()] {
+      s.bands->addLast(flight.owned, *made->sink, made->report);
+    };
+  });
   flight.frame = frame;
-  frame->vdi = s.headerOf(*prepared, camera, settings);
-  std::unique_ptr<detail::VdiSink> sink =
-      withSegment(precisionOf(frame->vdi.depthCode),
-                  [&]<typename Segment>() { return s.hostSink<Segment>(flight, frame->vdi); });
   s.frame([&] { s.makeLists(*prepared, settings, frame->vdi, flight.owned, *sink, progress); });
   frame->sink = std::move(sink);
   frame->report = s.mine;
-  if (s.comm.size() > 1) {
-    frame->addLastBand = [&s, &flight, made = frame.get()] {
-      s.bands->addLast(flight.owned, *made->sink, made->report);
-    };
-  }
+  if (s.comm.size() > 1) frame->addLastBand = std::move(addLastBand);
   return VdiFrame(frame);
 }
 
@@ -401,12 +415,15 @@ WrittenVdi VdiGenerator::write(const std::filesystem::path& path, const Camera& 
                                const TimeStamp& stamp, const Progress& progress) {
   State& s = *state_;
   const auto prepared = s.prepare(camera, transferFunction, settings, State::For::Vdi);
-  Vdi header = s.headerOf(*prepared, camera, settings);
-  header.time = stamp.time;
-  header.timeStep = stamp.step;
-  header.coloring->array = stamp.array;
+  Vdi header;
+  s.comm.together([&] {
+    header = s.headerOf(*prepared, camera, settings);
+    header.time = stamp.time;
+    header.timeStep = stamp.step;
+    header.coloring->array = stamp.array;
+  });
   return withSegment(precisionOf(header.depthCode), [&]<typename Segment>() {
-    detail::FileSink<Segment> sink(s.comm, root, path, *s.bandDownload);
+    detail::FileSink<Segment> sink(s.comm, root, path, *s.bandDownload);  // needs no memory
     s.wholeVdi(*prepared, settings, header, sink, progress);
     return sink.written();
   });
@@ -441,7 +458,8 @@ std::optional<Image> VdiGenerator::renderVolume(const Camera& camera,
                                                 const TransferFunction& transferFunction,
                                                 const GenerateSettings& asked, const Progress& progress) {
   State& s = *state_;
-  GenerateSettings settings = asked;
+  GenerateSettings settings;
+  s.comm.together([&] { settings = asked; });
   settings.margin = 0.0;
   const auto prepared = s.prepare(camera, transferFunction, settings, State::For::Picture);
   Image image;  // devices may still write to these when `frame` handles an error

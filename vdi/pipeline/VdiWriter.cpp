@@ -7,6 +7,7 @@
 #include <cassert>
 #include <cstring>
 #include <exception>
+#include <limits>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -38,18 +39,22 @@ struct NoteOf {
   Note note;
 };
 
-/// Collective: returns all ranks' notes, in rank order.
-template <typename Note>
-std::vector<NoteOf<Note>> shareNotes(const comm::Communicator& comm, std::span<const Note> mine) {
-  const comm::Gathered all = comm.allGather(std::as_bytes(mine), sizeof(Note));
+/// Collective: returns all ranks' notes, in rank order. `make` makes this rank's.
+template <typename Note, typename Make>
+std::vector<NoteOf<Note>> shareNotes(const comm::Communicator& comm, Make make) {
+  std::vector<Note> mine;
+  comm.together([&] { mine = make(); });
+  const comm::Gathered all = comm.allGather(std::as_bytes(std::span(mine)), sizeof(Note));
   std::vector<NoteOf<Note>> notes;
-  for (int r = 0; r < comm.size(); ++r) {
-    const std::span<const std::byte> bytes = all.of(r);
-    for (std::size_t at = 0; at < bytes.size(); at += sizeof(Note)) {
-      notes.push_back({r, {}});
-      std::memcpy(&notes.back().note, bytes.data() + at, sizeof(Note));
+  comm.together([&] {
+    for (int r = 0; r < comm.size(); ++r) {
+      const std::span<const std::byte> bytes = all.of(r);
+      for (std::size_t at = 0; at < bytes.size(); at += sizeof(Note)) {
+        notes.push_back({r, {}});
+        std::memcpy(&notes.back().note, bytes.data() + at, sizeof(Note));
+      }
     }
-  }
+  });
   return notes;
 }
 
@@ -62,16 +67,16 @@ std::vector<NoteOf<Note>> shareNotes(const comm::Communicator& comm, std::span<c
 
 template <typename Segment>
 VdiWriter<Segment>::VdiWriter(const comm::Communicator& comm, int root, const std::filesystem::path& path,
-                              Vdi header, WrittenBy writtenBy)
+                              const Vdi& header, WrittenBy writtenBy)
     : comm_(comm),
       root_(root),
-      path_(path),
-      header_(std::move(header)),
       writtenBy_(writtenBy),
-      listCount_(static_cast<std::uint64_t>(header_.width) * static_cast<std::uint64_t>(header_.height)),
+      listCount_(static_cast<std::uint64_t>(header.width) * static_cast<std::uint64_t>(header.height)),
       writtenEnd_(io::headBytes(listCount_)) {
-  header_.lists = ListsOf<Segment>();
   comm_.together([&] {
+    path_ = path;
+    header_ = header;
+    header_.lists = ListsOf<Segment>();
     if (!isRoot()) return;
     file_ = std::make_unique<io::OutputFile>(path);
     tail_ = io::encodeTail(header_);
@@ -156,24 +161,28 @@ void VdiWriter<Segment>::keep(std::uint64_t index, io::EncodedChunk chunk) {
 /// encodes the chunk.
 template <typename Segment>
 std::vector<typename VdiWriter<Segment>::Route> VdiWriter<Segment>::routeParts() const {
-  std::vector<PartNote> mine;
-  for (const Part& part : parts_) {
-    mine.push_back({part.firstList, part.lists.listCount(), part.lists.segments.size()});
-  }
-  std::vector<NoteOf<PartNote>> notes = shareNotes<PartNote>(comm_, mine);
-  std::stable_sort(notes.begin(), notes.end(),
-                   [](const auto& a, const auto& b) { return a.note.firstList < b.note.firstList; });
+  std::vector<NoteOf<PartNote>> notes = shareNotes<PartNote>(comm_, [&] {
+    std::vector<PartNote> mine;
+    mine.reserve(parts_.size());
+    for (const Part& part : parts_)
+      mine.push_back({part.firstList, part.lists.listCount(), part.lists.segments.size()});
+    return mine;
+  });
   std::vector<Route> routes;
-  std::uint64_t expected = 0;
-  for (const auto& [rank, note] : notes) {
-    const bool begins = note.firstList % io::listsPerChunk == 0;
-    const bool chunkIsWhole = routes.empty() || expected == chunkEnd(routes.back().firstList);
-    if (begins != chunkIsWhole || (!begins && note.firstList != expected)) failCoverage(expected);
-    routes.push_back(
-        {rank, begins ? rank : routes.back().to, note.firstList, note.listCount, note.supersegmentCount});
-    expected = note.firstList + note.listCount;
-  }
-  if (!routes.empty() && expected != chunkEnd(routes.back().firstList)) failCoverage(expected);
+  comm_.together([&] {
+    std::sort(notes.begin(), notes.end(),
+              [](const auto& a, const auto& b) { return a.note.firstList < b.note.firstList; });
+    std::uint64_t expected = 0;
+    for (const auto& [rank, note] : notes) {
+      const bool begins = note.firstList % io::listsPerChunk == 0;
+      const bool chunkIsWhole = routes.empty() || expected == chunkEnd(routes.back().firstList);
+      if (begins != chunkIsWhole || (!begins && note.firstList != expected)) failCoverage(expected);
+      routes.push_back(
+          {rank, begins ? rank : routes.back().to, note.firstList, note.listCount, note.supersegmentCount});
+      expected = note.firstList + note.listCount;
+    }
+    if (!routes.empty() && expected != chunkEnd(routes.back().firstList)) failCoverage(expected);
+  });
   return routes;
 }
 
@@ -181,16 +190,20 @@ std::vector<typename VdiWriter<Segment>::Route> VdiWriter<Segment>::routeParts()
 template <typename Segment>
 std::vector<typename VdiWriter<Segment>::Part> VdiWriter<Segment>::exchangeParts(
     std::span<const Route> routes) {
+  comm::Messages messages(comm_);
   std::vector<Part> received;
   comm_.together([&] {
     for (const Route& route : routes) {
-      if (route.to != comm_.rank() || route.from == comm_.rank()) continue;
+      const bool own = route.from == comm_.rank();
+      if (own == (route.to == comm_.rank())) continue;  // stays here, or is others' business
+      messages.reserve((route.listCount + 1) * sizeof(std::uint32_t));
+      messages.reserve(route.supersegmentCount * sizeof(Segment));
+      if (own) continue;
       received.push_back({route.firstList, {}});
       received.back().lists.offsets.resize(route.listCount + 1);
       received.back().lists.segments.resize(route.supersegmentCount);
     }
   });
-  comm::Messages messages(comm_);
   auto nextReceived = received.begin();
   auto nextOwn = parts_.begin();
   for (const Route& route : routes) {
@@ -244,9 +257,12 @@ void VdiWriter<Segment>::joinParts() {
 /// Collective: returns all ranks' chunks.
 template <typename Segment>
 typename VdiWriter<Segment>::Table VdiWriter<Segment>::shareTable() const {
-  std::vector<ChunkNote> mine;
-  for (const Chunk& chunk : chunks_) mine.push_back({chunk.index, chunk.entry});
-  const std::vector<NoteOf<ChunkNote>> notes = shareNotes<ChunkNote>(comm_, mine);
+  const std::vector<NoteOf<ChunkNote>> notes = shareNotes<ChunkNote>(comm_, [&] {
+    std::vector<ChunkNote> mine;
+    mine.reserve(chunks_.size());
+    for (const Chunk& chunk : chunks_) mine.push_back({chunk.index, chunk.entry});
+    return mine;
+  });
   Table table;
   comm_.together([&] {
     const std::uint64_t count = io::chunksOf(listCount_);
@@ -304,6 +320,7 @@ void VdiWriter<Segment>::writeByRoot(const Table& table, std::span<const std::ui
     return writesItself[static_cast<std::size_t>(table.owners[i])] == 0;
   };
   std::vector<std::byte> received;
+  comm::Messages message(comm_);
   comm_.together([&] {
     std::sort(chunks_.begin(), chunks_.end(),
               [](const Chunk& a, const Chunk& b) { return a.index < b.index; });
@@ -312,6 +329,7 @@ void VdiWriter<Segment>::writeByRoot(const Table& table, std::span<const std::ui
       if (isRoot() && left(i)) largest = std::max(largest, table.entries[i].packedBytes);
     }
     received.resize(largest);
+    message.reserve(std::numeric_limits<std::uint32_t>::max());  // a chunk, one after the other
   });
   // If the root fails, it still receives the others' chunks; otherwise they would wait for ever.
   std::exception_ptr error;
@@ -323,7 +341,6 @@ void VdiWriter<Segment>::writeByRoot(const Table& table, std::span<const std::ui
       const std::span<std::byte> bytes =
           mine ? std::span(own->bytes) : std::span(received).first(table.entries[i].packedBytes);
       if (owner != root_) {
-        comm::Messages message(comm_);
         if (mine) {
           message.send(root_, bytes);
           bytesSent_ += bytes.size();
@@ -351,16 +368,18 @@ template <typename Segment>
 WrittenVdi VdiWriter<Segment>::finish() {
   joinParts();
   const Table table = shareTable();
-  std::string name;
+  std::vector<std::byte> shared;
   comm_.together([&] {
-    if (isRoot()) name = prepareFile(table).string();
+    if (!isRoot()) return;
+    const std::string name = prepareFile(table).string();
+    const auto* begin = reinterpret_cast<const std::byte*>(name.data());
+    shared.assign(begin, begin + name.size());
   });
-  const auto* begin = reinterpret_cast<const std::byte*>(name.data());
-  const std::vector<std::byte> shared = comm_.broadcast({begin, begin + name.size()}, root_);
-  name.assign(reinterpret_cast<const char*>(shared.data()), shared.size());
+  shared = comm_.broadcast(std::move(shared), root_);
 
   std::array<std::uint64_t, 1> writesItself{0};
   comm_.together([&] {
+    const std::string name(reinterpret_cast<const char*>(shared.data()), shared.size());
     const bool opens = !isRoot() && !name.empty() && !chunks_.empty() && writtenBy_ == WrittenBy::Owner;
     std::optional<io::SharedOutput> file = opens ? io::SharedOutput::open(name, path_) : std::nullopt;
     writesItself[0] = file || (isRoot() && file_->takesOffsets()) || chunks_.empty() ? 1 : 0;

@@ -32,7 +32,7 @@ class VdiWriter {
  public:
   /// Collective. `header` is the VDI without lists; its size, budget and depth code must be equal on all
   /// ranks, while the rest and `path` are the root's. `comm` must outlive it.
-  VdiWriter(const comm::Communicator& comm, int root, const std::filesystem::path& path, Vdi header,
+  VdiWriter(const comm::Communicator& comm, int root, const std::filesystem::path& path, const Vdi& header,
             WrittenBy writtenBy = WrittenBy::Owner);
 
   /// Not collective; call within Communicator::together. Adds some of this rank's lists, which are the VDI's
