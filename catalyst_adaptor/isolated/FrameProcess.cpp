@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <new>
 #include <utility>
 
 namespace vdi::catalyst {
@@ -30,7 +31,21 @@ void FrameProcess::kill() {
   socket_.close();
 }
 
-void FrameProcess::listen(Milliseconds patience) {
+/// Does what needs memory, or counts the process as gone.
+template <typename Work>
+void FrameProcess::orGiveUp(Work work) noexcept {
+  try {
+    work();
+  } catch (const std::bad_alloc&) {
+    isGone_ = isGivenUp_ = true;
+  }
+}
+
+void FrameProcess::listen(Milliseconds patience) noexcept {
+  orGiveUp([&] { hear(patience); });
+}
+
+void FrameProcess::hear(Milliseconds patience) {
   if (listener_.isOpen()) {
     socket_ = listener_.accept(patience);
     if (!socket_.isOpen()) return;
@@ -42,7 +57,12 @@ void FrameProcess::listen(Milliseconds patience) {
     setup_ = SharedPages();
   }
   for (bool isFirst = true; socket_.isOpen() && !isGone_; isFirst = false) {
-    Socket::Received received = socket_.receive(isFirst ? patience : Milliseconds(0));
+    Socket::Received received;
+    try {
+      received = socket_.receive(isFirst ? patience : Milliseconds(0));
+    } catch (const std::bad_alloc&) {
+      return;  // the message waits for the next call
+    }
     if (received.result == Socket::Result::Nothing) return;
     if (received.result == Socket::Result::Gone) {
       isGone_ = true;
@@ -102,7 +122,7 @@ DoneNotice FrameProcess::takeDone() {
 }
 
 std::string FrameProcess::end() const {
-  std::string cause = "is gone";
+  std::string cause = isGivenUp_ ? "is given up, because this host is out of memory," : "is gone";
   if (status_ && WIFSIGNALED(*status_)) {
     const int number = WTERMSIG(*status_);
     cause = "was killed by signal " + std::to_string(number) + " (" + strsignal(number) + ")";
@@ -143,19 +163,21 @@ void FrameProcess::reserve(const StepWriter& data) {
   buffer = SharedPages(data.bytes());
 }
 
-void FrameProcess::handOver(const StepWriter& data, StepNotice notice) {
+void FrameProcess::handOver(const StepWriter& data, StepNotice notice) noexcept {
   notice.buffer = static_cast<std::uint32_t>(handedOver_ % 2);
   notice.isNewBuffer = !std::exchange(areKnown_[notice.buffer], true);
   const SharedPages& buffer = buffers_[notice.buffer];
   data.write(buffer.bytes());
-  Packer message;
-  message.put(Say::Step);
-  message.put(notice);
   const std::array<int, 1> pages{buffer.descriptor()};
-  const bool isSent =
-      notice.isNewBuffer ? socket_.send(message.bytes(), pages) : socket_.send(message.bytes());
+  bool isSent = false;
+  orGiveUp([&] {
+    Packer message;
+    message.put(Say::Step);
+    message.put(notice);
+    underWay_.push_back(notice.step);
+    isSent = notice.isNewBuffer ? socket_.send(message.bytes(), pages) : socket_.send(message.bytes());
+  });
   ++handedOver_;
-  underWay_.push_back(notice.step);
   if (isSent) return;
   listen(Milliseconds(0));  // for the cause
   isGone_ = true;
@@ -167,23 +189,29 @@ std::optional<bool> FrameProcess::wants(std::int64_t step) const {
   return wanted_[static_cast<std::size_t>(at)] != 0;
 }
 
-void FrameProcess::ask(std::int64_t first) {
-  Packer message;
-  message.put(Say::Ask);
-  message.put(first);
-  if (!socket_.send(message.bytes())) isGone_ = true;
+void FrameProcess::ask(std::int64_t first) noexcept {
+  orGiveUp([&] {
+    Packer message;
+    message.put(Say::Ask);
+    message.put(first);
+    if (!socket_.send(message.bytes())) isGone_ = true;
+  });
 }
 
-void FrameProcess::finish() {
+void FrameProcess::finish() noexcept {
   isFinishing_ = true;
-  Packer message;
-  message.put(Say::Finish);
-  if (socket_.send(message.bytes())) return;
+  bool isSent = false;
+  orGiveUp([&] {
+    Packer message;
+    message.put(Say::Finish);
+    isSent = socket_.send(message.bytes());
+  });
+  if (isSent) return;
   listen(Milliseconds(0));
   isGone_ = true;
 }
 
-void FrameProcess::awaitEnd(Milliseconds patience) {
+void FrameProcess::awaitEnd(Milliseconds patience) noexcept {
   const auto end = std::chrono::steady_clock::now() + patience;
   while (!isGone_ && std::chrono::steady_clock::now() < end) listen(Milliseconds(20));
 }

@@ -19,7 +19,8 @@
 namespace vdi::catalyst {
 
 /// No function is collective, and none waits but for the time that it is given. Ranks learn of frames that
-/// are made at different moments: IsolatedRun makes them agree.
+/// are made at different moments: IsolatedRun makes them agree. So functions that talk with the process don't
+/// throw: without memory for what it has said, the process is given up.
 class FrameProcess {
  public:
   using Milliseconds = std::chrono::milliseconds;
@@ -32,7 +33,7 @@ class FrameProcess {
   FrameProcess& operator=(const FrameProcess&) = delete;
 
   /// Takes what the process has said. Waits for the first message no longer than `patience`.
-  void listen(Milliseconds patience);
+  void listen(Milliseconds patience) noexcept;
 
   bool hasCome() const { return socket_.isOpen(); }
   /// The code of the process's initialising; nullopt until that has ended.
@@ -51,13 +52,13 @@ class FrameProcess {
   /// Makes room for a step's data in the next buffer, of two, which no step uses. Throws std::runtime_error.
   void reserve(const StepWriter& data);
   /// Hands a step over, by the buffer in which there is room.
-  void handOver(const StepWriter& data, StepNotice notice);
+  void handOver(const StepWriter& data, StepNotice notice) noexcept;
 
   /// Whether scripts want the step; nullopt if that isn't known.
   std::optional<bool> wants(std::int64_t step) const;
-  void ask(std::int64_t first);
+  void ask(std::int64_t first) noexcept;
 
-  void finish();
+  void finish() noexcept;
   /// The code and text of finalizing; nullopt until that has ended.
   struct Finish {
     int code = 0;
@@ -65,9 +66,12 @@ class FrameProcess {
   };
   const std::optional<Finish>& finished() const { return finished_; }
   /// Waits for the process's end, which follows its finish.
-  void awaitEnd(Milliseconds patience);
+  void awaitEnd(Milliseconds patience) noexcept;
 
  private:
+  template <typename Work>
+  void orGiveUp(Work work) noexcept;
+  void hear(Milliseconds patience);
   void take(Socket::Received& received);
   std::string stage() const;
   void kill();
@@ -77,6 +81,7 @@ class FrameProcess {
   SharedPages setup_;
   std::optional<int> startCode_;
   bool isGone_ = false;
+  bool isGivenUp_ = false;     // for want of memory
   std::optional<int> status_;  // the worker's, as waitpid has it
   pid_t worker_ = 0;
   std::int64_t handedOver_ = 0;

@@ -8,9 +8,11 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <new>
 #include <stdexcept>
 #include <utility>
 
@@ -47,17 +49,15 @@ mode_t currentUmask() {
   return mask;
 }
 
-/// Collective: the hosts of all ranks, on the first one.
-std::vector<std::string> hostsOf(MPI_Comm comm, int rank, int size) {
-  std::array<char, MPI_MAX_PROCESSOR_NAME> name{};
+using HostName = std::array<char, MPI_MAX_PROCESSOR_NAME>;
+
+/// Collective: fills in the hosts of all ranks, [size], on the first one.
+void gatherHosts(MPI_Comm comm, std::vector<HostName>& hosts) {
+  HostName name{};
   int length = 0;
   MPI_Get_processor_name(name.data(), &length);
-  std::vector<char> all(rank == 0 ? name.size() * static_cast<std::size_t>(size) : 0);
   const auto bytes = static_cast<int>(name.size());
-  MPI_Gather(name.data(), bytes, MPI_CHAR, all.data(), bytes, MPI_CHAR, 0, comm);
-  std::vector<std::string> hosts;
-  for (std::size_t at = 0; at < all.size(); at += name.size()) hosts.emplace_back(all.data() + at);
-  return hosts;
+  MPI_Gather(name.data(), bytes, MPI_CHAR, hosts.data(), bytes, MPI_CHAR, 0, comm);
 }
 
 }  // namespace
@@ -94,10 +94,16 @@ int IsolatedRun::launch(bool isGoingOn) {
   handedOver_ = settled_ = 0;
   tiredAt_.reset();
   std::array<char, 64> name{};
-  if (rank_ == 0) std::snprintf(name.data(), name.size(), "%s", newSocketName().c_str());
-  MPI_Bcast(name.data(), static_cast<int>(name.size()), MPI_CHAR, 0, self_.comm);
-  const std::vector<std::string> hosts = hostsOf(self_.comm, rank_, size_);
+  std::vector<HostName> hosts;
   int code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
+    if (rank_ != 0) return;
+    std::snprintf(name.data(), name.size(), "%s", newSocketName().c_str());
+    hosts.resize(static_cast<std::size_t>(size_));
+  });
+  if (code != VDI_CATALYST_OK) return code;
+  MPI_Bcast(name.data(), static_cast<int>(name.size()), MPI_CHAR, 0, self_.comm);
+  gatherHosts(self_.comm, hosts);
+  code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
     process_ = std::make_unique<FrameProcess>(std::string(name.data()) + "-" + std::to_string(rank_),
                                               setupOf(isGoingOn));
   });
@@ -105,9 +111,11 @@ int IsolatedRun::launch(bool isGoingOn) {
     code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
       if (rank_ != 0) return;
       const std::string program = programFile();
+      std::vector<std::string> names;
+      for (const HostName& host : hosts) names.emplace_back(host.data());
       job_ = std::make_unique<Job>(
           program,
-          commandOf(options_.launcher, hosts, {program, "serve", name.data(), std::to_string(size_)}));
+          commandOf(options_.launcher, names, {program, "serve", name.data(), std::to_string(size_)}));
     });
   }
   if (code == VDI_CATALYST_OK) code = awaitStart();
@@ -161,15 +169,18 @@ std::pair<IsolatedRun::Wait, std::int64_t> IsolatedRun::wait(Progress progress, 
 /// Ends what is left of the processes, and reports the first rank's loss.
 int IsolatedRun::bury(std::optional<std::int64_t> step) {
   const bool restarts = options_.isolation.restart && step;
-  std::string text;
-  if (process_->isGone()) {
-    text = "the process that makes frames " + process_->end() +
-           (restarts ? "; it starts again for the next frame"
-            : step   ? "; no more frames are made"
-                     : "");
-  }
+  const int code = guarded(
+      self_, VDI_CATALYST_ENGINE,
+      [&]() -> std::optional<std::string> {
+        if (!process_->isGone()) return "";
+        return "the process that makes frames " + process_->end() +
+               (restarts ? "; it starts again for the next frame"
+                : step   ? "; no more frames are made"
+                         : "");
+      },
+      step);
   end();
-  return conclude(self_, VDI_CATALYST_ENGINE, text, step);
+  return code;
 }
 
 void IsolatedRun::end() {
@@ -177,20 +188,35 @@ void IsolatedRun::end() {
   job_.reset();
 }
 
-/// Takes the results of steps up to the given number, which all ranks have. Returns the worst code.
+/// Takes the result of one step. Returns the worse code.
+int IsolatedRun::take(const DoneNotice& notice, int worst) {
+  std::map<std::string, double> values;
+  for (std::size_t i = 0; i < notice.parameters.size(); ++i)
+    values[parameters_.all()[i].name] = notice.parameters[i];
+  parameters_.set(values);
+  if (notice.code < worst || notice.code == VDI_CATALYST_OK) return worst;
+  self_.error = notice.text;
+  return notice.code;
+}
+
+/// Collective: takes the results of steps up to the given number, which all ranks have. Returns the worst
+/// code.
 int IsolatedRun::settle(std::int64_t done) {
+  if (settled_ == done) return VDI_CATALYST_OK;
   int worst = VDI_CATALYST_OK;
+  std::exception_ptr failure;
   for (; settled_ < done; ++settled_) {
     const DoneNotice notice = process_->takeDone();
-    std::map<std::string, double> values;
-    for (std::size_t i = 0; i < notice.parameters.size(); ++i)
-      values[parameters_.all()[i].name] = notice.parameters[i];
-    parameters_.set(values);
-    if (notice.code < worst || notice.code == VDI_CATALYST_OK) continue;
-    worst = notice.code;
-    self_.error = notice.text;
+    try {
+      worst = take(notice, worst);
+    } catch (const std::bad_alloc&) {
+      failure = std::current_exception();
+    }
   }
-  return worst;
+  const int code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
+    if (failure) std::rethrow_exception(failure);
+  });
+  return std::max(worst, code);
 }
 
 bool IsolatedRun::isLocallyWanted(std::int64_t step, double time, double now) const {
@@ -315,13 +341,15 @@ int IsolatedRun::leaveOut(std::int64_t step) {
     }
     return VDI_CATALYST_OK;
   }
-  std::string text;
-  if (process_->isStopped()) {
-    text = "left out: somebody has stopped the process that makes frames";
-  } else if (process_->doneCount() == settled_) {
-    text = "left out: the process that makes frames has made none for long";
-  }
-  return conclude(self_, VDI_CATALYST_SCRIPT, text, step);
+  return guarded(
+      self_, VDI_CATALYST_SCRIPT,
+      [&]() -> std::optional<std::string> {
+        if (process_->isStopped()) return "left out: somebody has stopped the process that makes frames";
+        if (process_->doneCount() == settled_)
+          return "left out: the process that makes frames has made none for long";
+        return "";
+      },
+      step);
 }
 
 /// Scripts may use all fields, a JSON run those that it names.
@@ -357,19 +385,19 @@ int IsolatedRun::finish() {
   const Wait result = wait([&] { return process_->finished() ? 1 : 0; }, 1, limit).first;
   if (result == Wait::Dead) return bury(std::nullopt);
   if (result == Wait::Tired) {
-    const bool isStopped = process_->isStopped();
-    const bool isFinished = process_->finished().has_value();
+    const int code = guarded(self_, VDI_CATALYST_ENGINE, [&]() -> std::optional<std::string> {
+      if (process_->isStopped()) return "somebody has stopped the process that makes frames; it is killed";
+      if (process_->finished()) return "";
+      return "the process that makes frames doesn't end the run; it is killed";
+    });
     end();
-    return conclude(self_, VDI_CATALYST_ENGINE,
-                    isStopped    ? "somebody has stopped the process that makes frames; it is killed"
-                    : isFinished ? ""
-                                 : "the process that makes frames doesn't end the run; it is killed",
-                    std::nullopt);
+    return code;
   }
   int code = settle(handedOver_);
   if (process_->finished()->code > code) {
-    code = process_->finished()->code;
-    self_.error = process_->finished()->text;
+    const int ended = process_->finished()->code;
+    code = std::max(ended,
+                    guarded(self_, VDI_CATALYST_ENGINE, [&] { self_.error = process_->finished()->text; }));
   }
   process_->awaitEnd(endLimit);
   if (job_) (void)job_->isOver(endLimit);

@@ -58,6 +58,7 @@ class IsolatedRun {
   int awaitStart();
   int bury(std::optional<std::int64_t> step);
   void end();
+  int take(const DoneNotice& notice, int worst);
   int settle(std::int64_t done);
   template <typename Progress>
   std::pair<Wait, std::int64_t> wait(Progress progress, std::int64_t goal, double limit);

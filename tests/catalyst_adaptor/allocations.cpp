@@ -130,12 +130,13 @@ int initialize() {
 }
 
 int execute() {
+  static const bool isIsolated = std::getenv("VDI_ISOLATION") != nullptr;  // frames are made later
   ++step;
   const int code = vdi_catalyst_execute(catalyst, step, 0.5 * static_cast<double>(step));
   const std::string number = std::to_string(1000000 + step).substr(1);
   MPI_Barrier(MPI_COMM_WORLD);
   for (const char* end : {".vdi", ".png"}) {
-    if (rank != 0) break;
+    if (rank != 0 || isIsolated) break;
     const bool isThere = std::filesystem::remove("step_" + number + end);
     expect(isThere || code != VDI_CATALYST_OK, "execute", step, "a file is missing in silence");
   }
