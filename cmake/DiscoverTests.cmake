@@ -1,12 +1,10 @@
 # Writes OUTPUT, a file for ctest. It has a test "NAME: case" for each case of the Catch2 program
 # PROGRAM. If RANKS is set, it has a test "NAME_np3" of all cases for each number of ranks instead,
 # because starting many processes with a device each takes longer than most cases. For the numbers
-# in SOME_RANKS this test runs only the cases with the tag [ranks]. A test "NAME_np3_rest" with the
-# additional label long runs the others. For the numbers in LONG_RANKS the test of all cases has
-# that label. LAUNCHER (mpiexec ... -n) starts programs on several ranks. Each test gets TIMEOUT,
-# LABELS and ENVIRONMENT. LIST_OPTIONS make the program list its cases. NO_TESTS is the warning that
-# makes it fail if no case has the given name. Catch2's own catch_discover_tests supports neither
-# several launchers nor lists as properties.
+# in LONG_RANKS this test has the additional label long. LAUNCHER (mpiexec ... -n) starts programs on
+# several ranks. Each test gets TIMEOUT, LABELS and ENVIRONMENT. LIST_OPTIONS make the program list
+# its cases. NO_TESTS is the warning that makes it fail if no case has the given name. Catch2's own
+# catch_discover_tests supports neither several launchers nor lists as properties.
 execute_process(
   COMMAND ${CMAKE_COMMAND} -E env ASAN_OPTIONS=detect_leaks=0 "${PROGRAM}" ${LIST_OPTIONS}
   OUTPUT_VARIABLE cases
@@ -31,14 +29,8 @@ list(JOIN LAUNCHER " " launcher)
 foreach(ranks IN LISTS RANKS)
   add("[==[${NAME}_np${ranks}]==]" "${launcher} ${ranks} [==[${PROGRAM}]==] --warn ${NO_TESTS}")
 endforeach()
-foreach(ranks IN LISTS SOME_RANKS)
-  add("[==[${NAME}_np${ranks}]==]" "${launcher} ${ranks} [==[${PROGRAM}]==] [ranks] --warn ${NO_TESTS}")
-endforeach()
 set(labels ${LABELS})
 list(APPEND LABELS long)
-foreach(ranks IN LISTS SOME_RANKS)
-  add("[==[${NAME}_np${ranks}_rest]==]" "${launcher} ${ranks} [==[${PROGRAM}]==] ~[ranks] --warn ${NO_TESTS}")
-endforeach()
 foreach(ranks IN LISTS LONG_RANKS)
   add("[==[${NAME}_np${ranks}]==]" "${launcher} ${ranks} [==[${PROGRAM}]==] --warn ${NO_TESTS}")
 endforeach()

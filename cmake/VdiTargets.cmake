@@ -26,12 +26,12 @@ endfunction()
 set(VDI_TEST_ENVIRONMENT OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
                          OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_vader_single_copy_mechanism=none)
 
-# vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [SOME_RANKS 2] [LONG_RANKS 5] [TIMEOUT
+# vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [LONG_RANKS 5] [TIMEOUT
 # seconds] [LABELS ...]): defines the program test_<name> with Catch2's main (or tests/MpiMain.cpp
 # if RANKS is given), and a ctest for each of its cases or rank counts; see
 # cmake/DiscoverTests.cmake. Each test has a time limit.
 function(vdi_add_catch_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;SOME_RANKS;LONG_RANKS;LABELS;ENVIRONMENT")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;LONG_RANKS;LABELS;ENVIRONMENT")
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -52,7 +52,7 @@ function(vdi_add_catch_test name)
     POST_BUILD
     COMMAND
       ${CMAKE_COMMAND} -D "NAME=${name}" -D "PROGRAM=$<TARGET_FILE:test_${name}>" -D "RANKS=${arg_RANKS}" -D
-      "SOME_RANKS=${arg_SOME_RANKS}" -D "LONG_RANKS=${arg_LONG_RANKS}" -D
+      "LONG_RANKS=${arg_LONG_RANKS}" -D
       "LAUNCHER=${MPIEXEC_EXECUTABLE};--oversubscribe;${MPIEXEC_NUMPROC_FLAG}" -D "TIMEOUT=${arg_TIMEOUT}" -D
       "LABELS=${arg_LABELS}" -D "ENVIRONMENT=${VDI_TEST_ENVIRONMENT};${arg_ENVIRONMENT}" -D "LIST_OPTIONS=${VDI_CATCH_LIST}" -D
       "NO_TESTS=${VDI_CATCH_NO_TESTS}" -D "OUTPUT=${tests}" -P

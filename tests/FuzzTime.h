@@ -1,7 +1,8 @@
-// How long a fuzzing test goes on.
+// How long a fuzzing test goes on, and with which damage it begins.
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
 
 namespace vdi::test {
@@ -20,5 +21,12 @@ class FuzzTime {
   using Clock = std::chrono::steady_clock;
   Clock::time_point end_;
 };
+
+/// The first number of a sequence of seeds: VDI_FUZZ_SEED, or 1. Sequences that begin elsewhere damage other
+/// data, so that several processes can share a long run.
+inline std::uint64_t fuzzSeed() {
+  const char* const given = std::getenv("VDI_FUZZ_SEED");
+  return given != nullptr ? std::strtoull(given, nullptr, 10) : 1;
+}
 
 }  // namespace vdi::test

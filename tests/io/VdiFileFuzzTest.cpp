@@ -193,7 +193,7 @@ TEST_CASE("noise under valid checksums: refused, or a valid VDI") {
   const auto dataStart = static_cast<std::uint32_t>(headerBytes + std::size_t{get32(sound, 40)} * 16);
   const auto size = static_cast<std::uint32_t>(sound.size());
   std::size_t other = 0;
-  for (int i = 0; i < 1500; ++i) {
+  for (int i = 0; i < 500; ++i) {
     std::vector<std::byte> damaged = sound;
     const std::uint32_t first = i % 3 == 0 ? 0 : dataStart;
     for (std::uint32_t n = 1 + noise.below(8); n > 0; --n) {
@@ -300,7 +300,7 @@ TEST_CASE("files altered at random are refused, or valid VDIs") {
       io::encode(test::colored(large)), io::encode(test::noisyVdi(6, 5, 4))};
   std::size_t refused = 0;
   std::size_t accepted = 0;
-  std::uint64_t seed = 1;
+  std::uint64_t seed = test::fuzzSeed();
   for (const test::FuzzTime time(1.0); !time.isOver(); ++seed) {
     test::Noise noise(seed);
     std::vector<std::byte> bytes = sound[noise.below(static_cast<std::uint32_t>(sound.size()))];
@@ -311,6 +311,6 @@ TEST_CASE("files altered at random are refused, or valid VDIs") {
     REQUIRE(outcome != Outcome::Other);
     ++(outcome == Outcome::Refused ? refused : accepted);
   }
-  CHECK(refused > seed / 4);
-  CHECK(accepted > seed / 20);
+  CHECK(4 * refused > refused + accepted);
+  CHECK(20 * accepted > refused + accepted);
 }

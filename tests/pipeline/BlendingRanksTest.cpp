@@ -12,7 +12,7 @@ using namespace vdi;
 using synthetic::Joint;
 using synthetic::Layout;
 
-TEST_CASE("blending: several ranks with scattered blocks", "[ranks]") {
+TEST_CASE("blending: several ranks with scattered blocks") {
   const comm::Communicator world = comm::Communicator::world();
   const std::shared_ptr<gpu::Device> device = gpu::Device::create(gpu::requestFromEnvironment(0));
   VdiGenerator generator(device, comm::Communicator::world());
@@ -47,7 +47,7 @@ TEST_CASE("blending: several ranks with scattered blocks", "[ranks]") {
   }
 }
 
-TEST_CASE("blending: ranks that have nothing, and a mode that differs", "[ranks]") {
+TEST_CASE("blending: ranks that have nothing, and a mode that differs") {
   const comm::Communicator world = comm::Communicator::world();
   VdiGenerator generator(gpu::Device::create(gpu::requestFromEnvironment(0)), comm::Communicator::world());
   const auto whole = test::decompose("turbulence", {12, 12, 12}, {1, 1, 1}, Layout::OnOneRank,

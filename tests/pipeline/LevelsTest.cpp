@@ -134,7 +134,7 @@ std::optional<Image> truthOf(const Field& field) {
 
 }  // namespace
 
-TEST_CASE("three levels, side by side and over each other: the picture of a uniform lattice", "[ranks]") {
+TEST_CASE("three levels, side by side and over each other: the picture of a uniform lattice") {
   const comm::Communicator world = comm::Communicator::world();
   const std::optional<Image> truth = truthOf(linear);
   VdiGenerator many(device(), comm::Communicator::world());

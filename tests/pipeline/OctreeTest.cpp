@@ -94,7 +94,7 @@ double wave(const glm::dvec3& p) {
 
 }  // namespace
 
-TEST_CASE("an octree of cells with a thin ramp: the picture of the same octree of points", "[ranks]") {
+TEST_CASE("an octree of cells with a thin ramp: the picture of the same octree of points") {
   const comm::Communicator world = comm::Communicator::world();
   struct Scene {
     const char* name;
@@ -135,8 +135,7 @@ TEST_CASE("an octree of cells with a thin ramp: the picture of the same octree o
   }
 }
 
-TEST_CASE("10 000 blocks of one cell: the picture of few blocks, in time in proportion to their number",
-          "[ranks]") {
+TEST_CASE("10 000 blocks of one cell: the picture of few blocks, in time in proportion to their number") {
   const comm::Communicator world = comm::Communicator::world();
   VdiGenerator generator(device(), comm::Communicator::world());
   const auto show = [&](const std::vector<Box>& boxes, const auto& cellsOf) {

@@ -94,7 +94,7 @@ std::vector<Scene> scenes() {
 
 }  // namespace
 
-TEST_CASE("particles and blocks dealt to ranks at random make the reference's deposit", "[ranks]") {
+TEST_CASE("particles and blocks dealt to ranks at random make the reference's deposit") {
   const comm::Communicator world = comm::Communicator::world();
   double worst = 0.0;
   for (const Scene& scene : scenes()) {
@@ -127,7 +127,7 @@ TEST_CASE("particles and blocks dealt to ranks at random make the reference's de
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("no weight is lost between ranks", "[ranks]") {
+TEST_CASE("no weight is lost between ranks") {
   const comm::Communicator world = comm::Communicator::world();
   for (const Scene& scene : scenes()) {
     for (const double longest : {0.0, 0.12}) {
@@ -149,8 +149,7 @@ TEST_CASE("no weight is lost between ranks", "[ranks]") {
   }
 }
 
-TEST_CASE("a deposit is the same bit by bit when it is repeated and when particles are in another order",
-          "[ranks]") {
+TEST_CASE("a deposit is the same bit by bit when it is repeated and when particles are in another order") {
   const comm::Communicator world = comm::Communicator::world();
   const Shared shared(test::latticeIn(cube, 8, {3, 2, 2}), randomParticles(20000, cube, 0.3, 4), world, 3);
   ParticleDepositor depositor(device(), world);
@@ -165,7 +164,7 @@ TEST_CASE("a deposit is the same bit by bit when it is repeated and when particl
   }
 }
 
-TEST_CASE("particles in f32, in columns of their own, and with one weight for all", "[ranks]") {
+TEST_CASE("particles in f32, in columns of their own, and with one weight for all") {
   const comm::Communicator world = comm::Communicator::world();
   const Shared shared({cellsIn(cube, glm::dvec3(0.125))}, randomParticles(500, cube, 0.0, 6), world, 1);
   std::array<std::vector<float>, 3> columns;
@@ -197,7 +196,7 @@ TEST_CASE("particles in f32, in columns of their own, and with one weight for al
     CHECK(std::memcmp(made.values[i].get(), expected.values[i].get(), 8 * 8 * 8 * sizeof(float)) == 0);
 }
 
-TEST_CASE("faults of particles are counted over all ranks, and no particles are no fault", "[ranks]") {
+TEST_CASE("faults of particles are counted over all ranks, and no particles are no fault") {
   const comm::Communicator world = comm::Communicator::world();
   const auto ranks = static_cast<std::uint64_t>(world.size());
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -233,7 +232,7 @@ TEST_CASE("faults of particles are counted over all ranks, and no particles are 
   CHECK(depositor.deposit(set.particles(), DepositKind::Sum).counts.outside == 4 * ranks);
 }
 
-TEST_CASE("a kernel over more cells than an invocation goes through at once", "[ranks]") {
+TEST_CASE("a kernel over more cells than an invocation goes through at once") {
   const comm::Communicator world = comm::Communicator::world();
   ParticleSet all{{{0.31, 0.52, 0.43}, {0.9, 0.1, 0.5}}, {1.0, 2.5}, {1.7, 0.8}};
   const Shared shared({cellsIn(cube, glm::dvec3(1.0 / 110))}, std::move(all), world, 4);
@@ -245,7 +244,7 @@ TEST_CASE("a kernel over more cells than an invocation goes through at once", "[
   }
 }
 
-TEST_CASE("weights of any magnitude, but values beyond those of f32 are an error on all ranks", "[ranks]") {
+TEST_CASE("weights of any magnitude, but values beyond those of f32 are an error on all ranks") {
   const comm::Communicator world = comm::Communicator::world();
   const std::vector<Block> blocks =
       world.rank() == 0 ? std::vector<Block>{cellsIn(cube, glm::dvec3(0.5))} : std::vector<Block>{};
@@ -274,7 +273,7 @@ TEST_CASE("weights of any magnitude, but values beyond those of f32 are an error
     CHECK(static_cast<double>(made.values[0][0]) == Approx(2999e6 * world.size()).epsilon(1e-6));
 }
 
-TEST_CASE("blocks of one spacing that overlap are an error on all ranks", "[ranks]") {
+TEST_CASE("blocks of one spacing that overlap are an error on all ranks") {
   const comm::Communicator world = comm::Communicator::world();
   ParticleDepositor depositor(device(), world);
   std::vector<Block> blocks;
@@ -284,7 +283,7 @@ TEST_CASE("blocks of one spacing that overlap are an error on all ranks", "[rank
   CHECK_THROWS_WITH(depositor.setBlocks(blocks), test::ContainsSubstring("overlap"));
 }
 
-TEST_CASE("millions of particles in one cell, and particles per second", "[ranks]") {
+TEST_CASE("millions of particles in one cell, and particles per second") {
   const comm::Communicator world = comm::Communicator::world();
   constexpr std::size_t count = 2'000'000;
   const Box cell{glm::dvec3(0.50), glm::dvec3(0.51)};  // in a corner where eight blocks meet

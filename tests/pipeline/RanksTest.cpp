@@ -65,7 +65,7 @@ const Case cases[] = {
 
 }  // namespace
 
-TEST_CASE("the flat image and DVR of N ranks equal the DVR of one", "[ranks]") {
+TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
   const comm::Communicator world = comm::Communicator::world();
   const bool root = world.rank() == 0;
   // All cases share these generators: shapes, types and cameras change as they do for a user.
@@ -113,8 +113,7 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one", "[ranks]") {
   }
 }
 
-TEST_CASE("an automatic sampling rate: the one that the function needs, and the picture of one rank",
-          "[ranks]") {
+TEST_CASE("an automatic sampling rate: the one that the function needs, and the picture of one rank") {
   const comm::Communicator world = comm::Communicator::world();
   VdiGenerator one(device(), comm::Communicator::serial());
   VdiGenerator many(device(), comm::Communicator::world());
@@ -153,7 +152,7 @@ TEST_CASE("an automatic sampling rate: the one that the function needs, and the 
   CHECK(rates(test::threeHues(1.0, 0.5)) == 1.0);
 }
 
-TEST_CASE("shaded: the picture and VDI of N ranks are those of one", "[ranks]") {
+TEST_CASE("shaded: the picture and VDI of N ranks are those of one") {
   const comm::Communicator world = comm::Communicator::world();
   const bool root = world.rank() == 0;
   VdiGenerator one(device(), comm::Communicator::serial());
@@ -350,7 +349,7 @@ TEST_CASE("lists of more than 255 supersegments: both ways, and the picture of o
   }
 }
 
-TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of one rank", "[ranks]") {
+TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of one rank") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("turbulence", {49, 49, 49}, {16, 16, 16}, Layout::Random,
                                           Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
@@ -410,7 +409,7 @@ TEST_CASE("a large picture in bands, most of which are empty: the picture of one
   CHECK(test::largestDifference(*volume, *truth) < 1.0F);
 }
 
-TEST_CASE("tiny pictures: more ranks than rows and pixels", "[ranks]") {
+TEST_CASE("tiny pictures: more ranks than rows and pixels") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
                                           Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
@@ -428,7 +427,7 @@ TEST_CASE("tiny pictures: more ranks than rows and pixels", "[ranks]") {
   }
 }
 
-TEST_CASE("a failing rank leaves the others running, and the next frame works", "[ranks]") {
+TEST_CASE("a failing rank leaves the others running, and the next frame works") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
                                           Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());

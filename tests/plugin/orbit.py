@@ -90,9 +90,9 @@ def recognisable():
 
 def memory():
     files = [make("orbit_{}.vdi".format(step), "--size", "24x24x24", "--resolution", size)
-             for step, size in enumerate(("100x75", "75x100", "90x90"))]
+             for step, size in enumerate(("64x48", "48x64", "56x56"))]
     reader = simple.OpenDataFile(files)
-    view = shown(reader, [100, 75])
+    view = shown(reader, [64, 48])
 
     def orbits(count):
         interactive_seconds(view, count, 7)
