@@ -59,7 +59,8 @@ struct Funnel::State {
 };
 
 Funnel::Funnel() : state_(std::make_unique<State>()) {
-  state_->requests.reserve(1);
+  constexpr std::size_t usual = 8;  // an operation has one, and a chunk's messages are at most four
+  state_->requests.reserve(usual);
 }
 Funnel::~Funnel() = default;
 
@@ -118,13 +119,19 @@ void waitForAll(std::vector<MPI_Request>& requests) {
   if (requests.empty()) return;  // there may be no MPI
   if (Operation::isCarried()) {
     const auto begin = [&](std::vector<MPI_Request>& taken) {
-      taken.swap(requests);
+      if (requests.size() <= taken.capacity()) {
+        taken.assign(requests.begin(), requests.end());
+        requests.clear();
+      } else {
+        taken.swap(requests);
+      }
       return MPI_SUCCESS;
     };
     return Operation{begin}.carry("MPI_Testall");
   }
-  std::vector<MPI_Request> taken = std::exchange(requests, {});
-  check(MPI_Waitall(static_cast<int>(taken.size()), taken.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
+  const int result = MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+  requests.clear();
+  check(result, "MPI_Waitall");
 }
 
 }  // namespace vdi::comm

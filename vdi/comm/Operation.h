@@ -43,7 +43,7 @@ void callHere(const char* name, const Function& function) {
   Operation{begin}.carry(name);
 }
 
-/// Waits until all requests are complete.
+/// Waits until all requests are complete, and clears them. Up to eight of them keep their memory.
 void waitForAll(std::vector<MPI_Request>& requests);
 
 }  // namespace vdi::comm
