@@ -1,9 +1,7 @@
 // A reference to a function object.
 #pragma once
 
-#include <concepts>
 #include <memory>
-#include <type_traits>
 #include <utility>
 
 namespace vdi {
@@ -17,13 +15,9 @@ template <typename Result, typename... Arguments>
 class FunctionRef<Result(Arguments...)> {
  public:
   template <typename Function>
-  requires(!std::same_as<std::remove_cvref_t<Function>, FunctionRef> &&
-           std::is_invocable_r_v<Result, Function&, Arguments...>) FunctionRef(Function&& function)
-  noexcept  // NOLINT(*-explicit-*, *-forwarding-reference-*, *-missing-std-*)
-      : object_(const_cast<void*>(static_cast<const void*>(std::addressof(function)))),
-        call_([](void* object, Arguments... arguments) -> Result {
-          return (*static_cast<std::remove_reference_t<Function>*>(object))(
-              std::forward<Arguments>(arguments)...);
+  FunctionRef(const Function& function) noexcept  // NOLINT: implicit, as std::function's
+      : object_(std::addressof(function)), call_([](const void* object, Arguments... arguments) -> Result {
+          return (*static_cast<const Function*>(object))(std::forward<Arguments>(arguments)...);
         }) {}
 
   Result operator()(Arguments... arguments) const {
@@ -31,8 +25,8 @@ class FunctionRef<Result(Arguments...)> {
   }
 
  private:
-  void* object_;
-  Result (*call_)(void*, Arguments...);
+  const void* object_;
+  Result (*call_)(const void*, Arguments...);
 };
 
 }  // namespace vdi
