@@ -112,6 +112,7 @@ int IsolatedRun::launch(bool isGoingOn) {
       if (rank_ != 0) return;
       const std::string program = programFile();
       std::vector<std::string> names;
+      names.reserve(hosts.size());
       for (const HostName& host : hosts) names.emplace_back(host.data());
       job_ = std::make_unique<Job>(
           program,
