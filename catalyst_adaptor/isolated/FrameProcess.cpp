@@ -41,6 +41,20 @@ void FrameProcess::orGiveUp(Work work) noexcept {
   }
 }
 
+/// Sends what `fill` puts into a message. If that fails, hears the cause, and counts the process as gone.
+template <typename Fill>
+void FrameProcess::tell(Fill fill, std::span<const int> descriptors) noexcept {
+  bool isSent = false;
+  orGiveUp([&] {
+    Packer message;
+    fill(message);
+    isSent = socket_.send(message.bytes(), descriptors);
+  });
+  if (isSent) return;
+  listen(Milliseconds(0));
+  isGone_ = true;
+}
+
 void FrameProcess::listen(Milliseconds patience) noexcept {
   orGiveUp([&] { hear(patience); });
 }
@@ -169,18 +183,14 @@ void FrameProcess::handOver(const StepWriter& data, StepNotice notice) noexcept 
   const SharedPages& buffer = buffers_[notice.buffer];
   data.write(buffer.bytes());
   const std::array<int, 1> pages{buffer.descriptor()};
-  bool isSent = false;
-  orGiveUp([&] {
-    Packer message;
-    message.put(Say::Step);
-    message.put(notice);
-    underWay_.push_back(notice.step);
-    isSent = notice.isNewBuffer ? socket_.send(message.bytes(), pages) : socket_.send(message.bytes());
-  });
   ++handedOver_;
-  if (isSent) return;
-  listen(Milliseconds(0));  // for the cause
-  isGone_ = true;
+  tell(
+      [&](Packer& message) {
+        message.put(Say::Step);
+        message.put(notice);
+        underWay_.push_back(notice.step);
+      },
+      std::span(pages).first(notice.isNewBuffer ? 1 : 0));
 }
 
 std::optional<bool> FrameProcess::wants(std::int64_t step) const {
@@ -200,15 +210,7 @@ void FrameProcess::ask(std::int64_t first) noexcept {
 
 void FrameProcess::finish() noexcept {
   isFinishing_ = true;
-  bool isSent = false;
-  orGiveUp([&] {
-    Packer message;
-    message.put(Say::Finish);
-    isSent = socket_.send(message.bytes());
-  });
-  if (isSent) return;
-  listen(Milliseconds(0));
-  isGone_ = true;
+  tell([](Packer& message) { message.put(Say::Finish); });
 }
 
 void FrameProcess::awaitEnd(Milliseconds patience) noexcept {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,8 @@ class FrameProcess {
  private:
   template <typename Work>
   void orGiveUp(Work work) noexcept;
+  template <typename Fill>
+  void tell(Fill fill, std::span<const int> descriptors = {}) noexcept;
   void hear(Milliseconds patience);
   void take(Socket::Received& received);
   std::string stage() const;

@@ -479,7 +479,6 @@ void Communicator::requireEqual(FunctionRef<std::vector<Fingerprint>()> work) co
 
 /// The MPI requests of messages under way.
 struct Messages::State {
-  MPI_Comm comm;
   std::uint64_t reserved = 0;
   std::vector<MPI_Request> requests;
 };
@@ -503,7 +502,7 @@ Messages::~Messages() {
 }
 
 void Messages::reserve(std::uint64_t bytes) {
-  if (!state_) state_ = std::make_unique<State>(State{comm_.state_->comm(), 0, {}});
+  if (!state_) state_ = std::make_unique<State>();
   std::vector<MPI_Request>& requests = state_->requests;
   state_->reserved += (bytes + largestMessage - 1) / largestMessage;
   if (requests.capacity() < state_->reserved)
@@ -516,7 +515,7 @@ void Messages::send(int to, std::span<const std::byte> bytes) {
     assert(state_ && state_->requests.size() < state_->requests.capacity());
     state_->requests.push_back(MPI_REQUEST_NULL);
     callHere("MPI_Isend", [&] {
-      return MPI_Isend(bytes.data() + done, count, MPI_BYTE, to, messageTag, state_->comm,
+      return MPI_Isend(bytes.data() + done, count, MPI_BYTE, to, messageTag, comm_.state_->comm(),
                        &state_->requests.back());
     });
   }
@@ -528,7 +527,7 @@ void Messages::receive(int from, std::span<std::byte> bytes) {
     assert(state_ && state_->requests.size() < state_->requests.capacity());
     state_->requests.push_back(MPI_REQUEST_NULL);
     callHere("MPI_Irecv", [&] {
-      return MPI_Irecv(bytes.data() + done, count, MPI_BYTE, from, messageTag, state_->comm,
+      return MPI_Irecv(bytes.data() + done, count, MPI_BYTE, from, messageTag, comm_.state_->comm(),
                        &state_->requests.back());
     });
   }
