@@ -80,7 +80,7 @@ void printOutcome(const GenerateSettings& settings, std::uint64_t supersegments,
   printReport(generator.reports());
 }
 
-/// Also writes a picture of the VDI. For that the root gathers the whole VDI.
+/// Writes the VDI, if it is wanted, and a picture of it. The root has gathered the whole VDI for that.
 void writeVdiFiles(const Options& options, std::size_t index, const Shot& shot, Vdi& vdi) {
   vdi.coloring->array = shot.array;
   vdi.time = options.timeOf(index);

@@ -42,7 +42,7 @@ void Relay::follow(const stream::Client::Standing& standing) {
   server_->setPhase(*phase_);
 }
 
-/// Numbers frames anew. Viewers that know former frames must not mix them up.
+/// Starts a new server, and so a new session, because the other server's new session numbers its frames anew.
 void Relay::restart() {
   server_.reset();
   {
@@ -59,7 +59,7 @@ void Relay::restart() {
   server_ = std::make_unique<stream::Server>(options_);
 }
 
-/// The other server shows one frame of its series at a time.
+/// Asks the other server for the next wanted frame of its series. It sends one such frame at a time.
 void Relay::ask() {
   while (!asked_) {
     std::optional<std::uint32_t> index;

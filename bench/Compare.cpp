@@ -37,7 +37,7 @@ std::string keyOf(const json& row) {
   return key;
 }
 
-/// null or missing: nothing to compare.
+/// A figure of the row; -1 if it is null or missing, so that nothing is compared.
 double figure(const json& row, const char* field) {
   return row.contains(field) && row[field].is_number() ? row[field].get<double>() : -1.0;
 }

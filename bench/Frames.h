@@ -22,7 +22,7 @@
 
 namespace vdi::bench {
 
-/// Over the ranks, milliseconds.
+/// The slowest rank's milliseconds, and the mean over all ranks.
 struct RankTimes {
   double slowest = 0.0;
   double mean = 0.0;

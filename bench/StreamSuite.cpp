@@ -361,8 +361,8 @@ class StreamSuite {
         start + std::chrono::duration_cast<Clock::duration>(Seconds(options_.period / 1000.0 * index)));
   }
 
-  /// Steps one after the other, by turns with eight viewers and with none. One of the eight takes nothing,
-  /// one vanishes.
+  /// Measures steps that follow each other at once, alternately with eight viewers and with none. One of the
+  /// eight takes nothing, and one vanishes.
   void measureSteps(Sent& sent, const GenerateSettings& settings) {
     constexpr int turns = 6;
     std::optional<stream::Server> server;

@@ -22,7 +22,7 @@ import {unpack} from "./unpack.js";
  * @typedef {{file: Uint8Array} | {packed: string, size: number}} Encoded
  */
 
-/** @typedef {{id: number, encoded?: Encoded, vdi?: PreparedVdi}} Question to decode the one, or to let the other lean */
+/** @typedef {{id: number, encoded?: Encoded, vdi?: PreparedVdi}} Question to decode `encoded`, or to find slopes of `vdi` */
 /** @typedef {{id: number, vdi?: PreparedVdi, leaning?: Leaning, error?: string}} Answer */
 
 /**

@@ -79,7 +79,7 @@ function tileMasks(heads, width, height) {
 }
 
 /**
- * The ends of a supersegment all over its list's pixel, where they lean.
+ * The least and the greatest depth of a leaning supersegment anywhere in its list's pixel.
  * @typedef {object} Ends
  * @property {number} front
  * @property {number} back
@@ -137,7 +137,7 @@ export function headsOf(vdi) {
 }
 
 /**
- * The same for supersegments that lean.
+ * The heads and tiles of a VDI whose supersegments lean.
  * @param {PreparedVdi} vdi
  * @param {(segment: number, list: number) => Ends} endsOf
  */

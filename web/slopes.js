@@ -112,7 +112,7 @@ class SlopeFinder {
   }
 
   /**
-   * Adds what a neighbour says of a face to what the one before says.
+   * Sets a face's slope from one neighbour. The second neighbour on an axis averages it with the first one's.
    * @param {number} index in `slopes`
    * @param {number} change of depth towards the neighbour
    * @param {boolean} isAfter whether it is the second neighbour on this axis
@@ -180,7 +180,7 @@ class SlopeFinder {
   }
 
   /**
-   * Haze has no faces.
+   * Flattens the slopes of faint supersegments, because haze has no faces.
    * @param {number} first
    * @param {number} end
    */

@@ -12,7 +12,7 @@ import {Renderer} from "./renderer.js";
 const FRAME_MS = 33;       // time for a picture in motion
 const STRIP_MS = 40;       // time for a strip of a picture at rest
 const REST_MS = 150;       // the view rests after this time without motion
-const LEAN_MS = 300;       // and a VDI that has stayed so long is worth a sheared picture
+const LEAN_MS = 300;       // a VDI on show for this time is worth a sheared picture
 const LARGEST_SCALE = 8;
 
 export class Viewer {
@@ -233,7 +233,7 @@ export class Viewer {
     return !this.isLost && this.missing === "nothing" && !this.pending;
   }
 
-  /** Whether it will also stay as it is. */
+  /** Whether the picture on show is whole, and no sheared one will replace it. */
   isFinal() {
     return this.isWhole() && !this.awaitsLeaning();
   }

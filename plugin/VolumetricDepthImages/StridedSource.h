@@ -1,5 +1,5 @@
 #pragma once
-// What an array of VTK may tell the filter about its memory.
+// The interface through which a VTK array tells the filter where its values lie in memory.
 
 #include <glm/glm.hpp>
 
@@ -7,8 +7,8 @@
 
 namespace pv {
 
-/// A base class of those arrays of VTK whose values lie in an order of the simulation's, or beside the points
-/// or the middles of cells. Such arrays come from the adaptor; a dynamic_cast finds them.
+/// A base class of VTK arrays whose values are in the simulation's own order in memory, or belong to places
+/// offset from points or cell centres. The adaptor makes such arrays, and a dynamic_cast finds them.
 class StridedSource {
  public:
   StridedSource() = default;
@@ -17,7 +17,7 @@ class StridedSource {
   StridedSource& operator=(const StridedSource&) = delete;
   StridedSource(StridedSource&&) = delete;
   StridedSource& operator=(StridedSource&&) = delete;
-  /// The values where they lie, which they do as long as this object exists.
+  /// The values in place, valid while this object exists.
   virtual vdi::ComponentArray memory() const = 0;
   /// The number of values along each axis.
   virtual glm::ivec3 counts() const = 0;

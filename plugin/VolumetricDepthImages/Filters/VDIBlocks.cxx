@@ -37,7 +37,7 @@ struct Memory {
   vtkSmartPointer<vtkDataArray> owner;
 };
 
-/// The library's type for a VTK type. Nothing for types that aren't numbers of 8 to 64 bits.
+/// The library's type for a VTK type; nullopt unless that is a number of 8 to 64 bits.
 std::optional<vdi::ComponentType> componentTypeOf(int vtkType, int bytes) {
   using Type = vdi::ComponentType;
   switch (vtkType) {
@@ -69,7 +69,7 @@ std::optional<vdi::ComponentType> componentTypeOf(int vtkType, int bytes) {
   }
 }
 
-/// The values of a lattice of `counts`. Those without addresses are copied.
+/// The values of a lattice of `counts`. Copies an array whose type or memory layout the library can't read.
 Memory memoryOf(vtkDataArray* array, const glm::ivec3& counts) {
   if (const auto* source = dynamic_cast<const StridedSource*>(array);
       source != nullptr && source->counts() == counts)

@@ -39,7 +39,7 @@ void requireInput(vtkDataObject* input) {
 Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin) {
   requireInput(input);
   Load load{.of = origin, .blocks = {}, .array = {}, .lack = lackOf(input, upstream, origin.choice)};
-  // Otherwise ParaView has made the array from one of the other association, which isn't the one asked for.
+  // A lacking array may still be in the input, averaged by ParaView from one of the other association.
   if (load.lack.empty()) load.blocks = blocksOf(input, origin.choice);
   return load;
 }

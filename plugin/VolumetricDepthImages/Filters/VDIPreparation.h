@@ -24,8 +24,8 @@ namespace pv {
 /// a collective function of this class.
 class Preparation {
  public:
-  /// Makes the VDI and leaves it in `output`. It has the volume's turn, obeys `progress`, and throws if it
-  /// can't make the VDI.
+  /// A function that makes the VDI and leaves it in `output`. It is called during a turn of the volume, obeys
+  /// `progress`, and throws if it can't make the VDI.
   using Make = std::function<void(Volume& volume, const vdi::Progress& progress, vtkVDIImageData* output)>;
 
   /// Collective: takes the volume's next turn and starts the thread. The ranks are those of the volume's

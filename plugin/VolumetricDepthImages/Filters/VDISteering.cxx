@@ -176,7 +176,7 @@ void Steering::Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor
     if (isRoot) {
       request = server->TakeRequest(patience);
     } else {
-      std::this_thread::sleep_for(patience);  // a broadcast would busy a core while it waits
+      std::this_thread::sleep_for(patience);  // waiting in the broadcast would keep a core busy
     }
     const std::string text = OnAllRanks(request ? vdi::stream::textOf(request->wish) : "");
     if (text.empty()) continue;

@@ -21,7 +21,7 @@ struct Place {
 
 struct ControlPoint {
   Place place;
-  bool linear = false;  // straight up to the next point
+  bool linear = false;  // whether a straight line leads to the next point
 };
 
 /// A function of VTK. It follows a rule of its own between control points, and is constant beyond them.

@@ -41,8 +41,8 @@ struct Shown {
 std::uint64_t newIdentity(vtkMultiProcessController* controller);
 
 /// Users take turns (Turn): the user that makes a VDI has the generator alone. Each group of functions names
-/// its allowed callers: the main thread, the holder of the turn, or any thread. Collective functions are so
-/// on the controller's ranks.
+/// its allowed callers: the main thread, the holder of the turn, or any thread. Functions marked collective
+/// are collective over the controller's ranks.
 class Volume {
  public:
   /// The controller must live as long as there are users; null stands for this rank alone. `identity` comes

@@ -30,7 +30,7 @@ glm::dvec3 vectorOf(const double* v) {
   return {v[0], v[1], v[2]};
 }
 
-/// Whether the representation shows a volume now, and has the property that tells it.
+/// Whether the representation has the property Representation, and is a Volume now.
 bool isVolume(vtkSMProxy* shown) {
   if (shown == nullptr || shown->GetProperty("Representation") == nullptr) return false;
   const char* kind = vtkSMPropertyHelper(shown, "Representation").GetAsString();
@@ -48,7 +48,7 @@ enum VolumeBlend {
   Slice
 };
 
-/// Whether a property is on that only some kinds of volumes have.
+/// Whether a property, which only some kinds of volumes have, exists and is on.
 bool isOn(vtkSMProxy* shown, const char* name) {
   return shown->GetProperty(name) != nullptr && vtkSMPropertyHelper(shown, name).GetAsInt() != 0;
 }

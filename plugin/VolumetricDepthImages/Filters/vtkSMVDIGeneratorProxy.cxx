@@ -231,7 +231,7 @@ void vtkSMVDIGeneratorProxy::FollowArray() {
   }
   if (this->HasMapOf(before.Array)) {
     vtkSMPropertyHelper(this, "LookupTable").RemoveAllValues();
-    this->Chosen.clear();  // without a range yet, the next update chooses
+    this->Chosen.clear();  // if the range is unknown, the next update chooses the map
     this->ChooseLookupTable(std::nullopt, true);
   }
   this->Superclass::UpdateVTKObjects();

@@ -58,7 +58,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// tell it from a script's choice.
   void TakeArrayFromView();
 
-  /// Makes the next update count as the first again, when a user takes the first one back.
+  /// Makes the next update count as the first again. Call it when a user undoes the first Apply.
   void Forget();
 
   /// The view, or a comparative view's root view; null if it is no render view.
@@ -82,8 +82,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
 
   /// Whether views show an earlier output than the one they asked for. Asks the server.
   bool IsOutdated();
-  /// Releases a held filter (vtkVDIGenerator::Hold), and ends that it shows an earlier output. Call it before
-  /// an update that needs the VDI of the current maps and properties.
+  /// Releases a held filter (vtkVDIGenerator::Hold), and stops it from giving views an earlier output. Call
+  /// it before an update that needs the VDI of the current maps and properties.
   void ReleaseNow();
   /// For writers, extractors and RenderVDI, which update the filters upstream of them without the filters'
   /// proxies. Lets all generators upstream of `proxy` take what isn't set, and releases them. Collective if

@@ -281,7 +281,7 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
     info->Get(Pipeline::WHOLE_EXTENT(), whole);
     info->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
   } else {
-    info->Remove(Pipeline::UPDATE_EXTENT());  // the picture's, for which a composite's sources would be asked
+    info->Remove(Pipeline::UPDATE_EXTENT());  // the picture's; composite sources would be asked for it
   }
   return 1;
 }
@@ -433,7 +433,7 @@ bool vtkVDIGenerator::DropLostDevice() {
   return true;
 }
 
-/// Gives rank 0, after an abort, the picture that was there, or one that shows nothing.
+/// After an abort, gives rank 0 the last picture, or an empty one if that has another size.
 void vtkVDIGenerator::KeepEarlier(vtkImageData* output) {
   if (!this->IsRoot()) return;
   const auto [width, height] = this->PictureSize();
@@ -591,7 +591,7 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin)
   comm.requireEqual(this->FillGhosts ? 1U : 0U, "FillGhosts");
   comm.requireEqual(this->PictureOnly ? 1U : 0U, "PictureOnly");
   comm.requireEqual(static_cast<std::uint64_t>(this->BlendMode), "BlendMode");
-  // throws before values are loaded in vain
+  // Rejects the blend mode before any values are loaded.
   comm.together([&] { static_cast<void>(this->CurrentBlending()); });
   if (!comm.anyTogether([&] { return this->Internal->ShownOf(origin) == nullptr; })) return;
   pv::Load load;
@@ -617,7 +617,7 @@ vdi::Camera vtkVDIGenerator::Viewpoint(const vdi::Box& bounds) const {
   const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
   vdi::Camera camera{vector(this->CameraPosition), vector(this->CameraFocalPoint), vector(this->CameraViewUp),
                      this->CameraViewAngle,        this->CameraParallelProjection, this->CameraParallelScale};
-  // vdi::View reports the angle otherwise
+  // vdi::View reports an unusable angle later.
   const bool usable = this->CameraViewAngle > 0.0 && this->CameraViewAngle < 180.0;
   if (camera.position != camera.focalPoint || !usable) return camera;
   camera = vdi::Camera::framing(bounds, {0.0, 0.0, -1.0}, camera.viewUp, camera.viewAngle);
@@ -684,7 +684,7 @@ void vtkVDIGenerator::Release() {
   pv::Regeneration& regeneration = this->Internal->Regeneration;
   const vtkMTimeType time = this->CurrentMTime();
   if (!regeneration.release(time)) return;
-  // An update may have kept the held output, and is younger than the properties then.
+  // An update that kept the held output is newer than the edited properties, so it would hide their change.
   this->Modified();
   regeneration.carryOver(time, this->CurrentMTime());
 }

@@ -107,8 +107,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   ///@{
   /**
    * The shown part of the volume (vdi::Region): with Cropping (default off), the part in the box, given by
-   * the lowest and highest x, y and z in world coordinates. Of each plane, the side to which its normal
-   * points is shown.
+   * the lowest and highest x, y and z in world coordinates. Of a clipping plane's two sides, the one to which
+   * its normal points is shown.
    */
   vtkSetMacro(Cropping, bool);
   vtkGetMacro(Cropping, bool);
@@ -141,8 +141,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   ///@{
   /**
    * The viewpoint V_O, as vtkCamera has it. While position and focal point are the same, as they are by
-   * default, the camera looks along -z at the whole scene, as vtkRenderer::ResetCamera places it. It uses
-   * view-up, angle and projection then, too, but not the parallel scale.
+   * default, the camera looks along -z at the whole scene, as vtkRenderer::ResetCamera places it. In that
+   * case view-up, angle and projection still apply, but the parallel scale doesn't.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);
@@ -164,7 +164,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   /**
    * These functions give a window a new VDI without waiting. After Hold, changed maps and properties don't
    * make the output out of date until Release; another input still does. Hold also gives up a running
-   * preparation: once GetPreparation reports its end, another Prepare waits for nothing. Prepare starts a
+   * preparation: once GetPreparation reports its end, another Prepare needn't wait. Prepare starts a
    * thread that makes the VDI of the current properties and maps, and of the input that a view has asked for
    * last; it does nothing if that is the output already. On several ranks, the preparation makes progress
    * while all of them call ServePreparation again and again, which takes some milliseconds each. The update

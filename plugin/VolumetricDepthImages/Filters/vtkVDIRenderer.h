@@ -30,10 +30,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   ///@{
   /**
    * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off), and while position and
-   * focal point are the same, as they are by default, the filter uses the VDI's own viewpoint. It turns that
-   * by Azimuth degrees as vtkCamera::Azimuth does: about the focal point, around the view-up as set. The
-   * filter warns of a viewpoint that can't show the VDI truly (vdi::ViewpointIssue), unless it has warned of
-   * the same for the picture before.
+   * focal point are the same, as they are by default, the filter uses the VDI's own viewpoint, turned by
+   * Azimuth degrees as vtkCamera::Azimuth turns: about the focal point, around the view-up as set. The filter
+   * warns of a viewpoint that can't show the VDI truly (vdi::ViewpointIssue), unless the picture before had
+   * the same issue.
    */
   vtkSetVector3Macro(CameraPosition, double);
   vtkSetVector3Macro(CameraFocalPoint, double);

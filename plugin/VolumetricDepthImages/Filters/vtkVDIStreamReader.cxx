@@ -96,7 +96,7 @@ class vtkVDIStreamReader::Link {
     return this->Last;
   }
 
-  /// Waits until there is a whole VDI, or there can't be one, but no longer than this.
+  /// Waits until a whole VDI has arrived or none can arrive any more, for `seconds` at most.
   void WaitForFirst(double seconds) const {
     std::unique_lock lock(this->Mutex);
     this->Changed.wait_for(lock, std::chrono::duration<double>(seconds),
@@ -108,14 +108,13 @@ class vtkVDIStreamReader::Link {
     return this->Count;
   }
 
-  /// The reason why trying again is useless; empty if it isn't.
+  /// The reason why retrying is useless; empty while the client retries.
   std::string Failure() const {
     const std::scoped_lock lock(this->Mutex);
     return this->Failed;
   }
 
-  /// While the pause is on, and a whole VDI or coarse levels of two frames have come, the client asks the
-  /// server for no more.
+  /// A pause stops the server once the newest VDI is whole, or once a level of another frame has arrived.
   void SetPause(bool pause) {
     const std::scoped_lock lock(this->Mutex);
     this->IsPaused = pause;

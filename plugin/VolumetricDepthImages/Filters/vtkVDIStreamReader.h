@@ -37,8 +37,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamReader : public vtkImageAlgori
   vtkGetMacro(Patience, double);
 
   ///@{
-  /// Keeps the shown VDI, in full if the rest of it comes, and lets the server send nothing more. If none is
-  /// shown, the first one is kept. It starts no update.
+  /// Keeps the shown VDI, in full if its finer levels still arrive, and stops the server from sending more.
+  /// If none is shown, the first one to arrive is kept. A call starts no update.
   void SetPause(bool pause);
   vtkGetMacro(Pause, bool);
   ///@}

@@ -139,7 +139,7 @@ void pqVDIRegenerator::stateChanged() {
   Q_EMIT this->progress(-1);
 }
 
-/// Lets views wait while an animation is playing. Otherwise they would show none of its steps.
+/// Makes views wait while an animation is playing. Otherwise they would show none of its steps.
 void pqVDIRegenerator::proxyAdded(pqProxy* proxy) {
   auto* scene = qobject_cast<pqAnimationScene*>(proxy);
   if (scene == nullptr) return;
@@ -161,7 +161,7 @@ void pqVDIRegenerator::viewAdded(pqView* view) {
   this->connect(view, &pqView::representationRemoved, this, &pqVDIRegenerator::lookWhetherViewsWait);
 }
 
-/// Lets screenshots and frames of animations wait for the VDI that is being made.
+/// Makes screenshots and saved frames of animations wait for the VDI that is being made.
 void pqVDIRegenerator::beginRender() {
   auto* view = qobject_cast<pqView*>(this->sender());
   if (view == nullptr || !this->isShownIn(view)) return;

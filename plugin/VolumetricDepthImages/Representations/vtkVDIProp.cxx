@@ -169,8 +169,8 @@ void vtkVDIProp::Prepare(vtkDataObject* piece, FrameKind frame) {
     this->Take(frame == FrameKind::Deferred && hasFrame ? shortWait : untilDone);
   }
   if (!internal.Buffers.isLoading()) internal.HasJustCome = false;
-  // This holds even if the camera looks away and nothing is drawn. A whole frame is a picture that is saved
-  // meanwhile; the window doesn't show it.
+  // The window is behind while a VDI is loading, even if the camera looks away and nothing is drawn. A whole
+  // frame doesn't change that: it is a saved picture, which the window doesn't show.
   if (frame != FrameKind::Whole)
     internal.IsBehind = frame == FrameKind::Deferred && internal.Buffers.isLoading();
 }

@@ -40,7 +40,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
   /// Defers still frames of that view's window from now on (vtkVDIProp::FrameKind). The caller must render
   /// the view again as soon as there is more. Pictures that are taken of a window are whole.
   static void DeferStillFrames(vtkPVRenderView* view);
-  /// Ends that for all views.
+  /// Ends the deferral for all views.
   static void DeferNoStillFrames();
 
   /// Properties of vtkVDIProp.
