@@ -9,15 +9,15 @@
 
 namespace vdi::test {
 
-/// What device() keeps. Main.cpp and MpiMain.cpp empty it before they return, because the validation layer
-/// frees state of its own at the program's exit, and can't close a device afterwards.
+/// The devices that device() keeps. Main.cpp and MpiMain.cpp drop them before they return, because the
+/// validation layer frees state of its own at the program's exit, and can't close a device afterwards.
 inline std::array<std::shared_ptr<gpu::Device>, 2>& keptDevices() {
   static std::array<std::shared_ptr<gpu::Device>, 2> kept;
   return kept;
 }
 
-/// The environment's device, with the validation layers, for all tests of a program. `gpuPrograms`: a second
-/// one, which does as a GPU does. Thread-safe.
+/// The environment's device, with the validation layers, for all tests of a program. With `gpuPrograms`, a
+/// second device, which runs the programs for GPUs. Thread-safe.
 inline std::shared_ptr<gpu::Device> device(bool gpuPrograms = false) {
   static std::mutex mutex;
   const std::lock_guard lock(mutex);

@@ -7,7 +7,7 @@
 
 namespace vdi::test {
 
-/// VDI_FUZZ_SECONDS from its construction on, or `usual` seconds if that isn't set.
+/// A time limit that starts at its construction: VDI_FUZZ_SECONDS, or `usual` seconds if that isn't set.
 class FuzzTime {
  public:
   explicit FuzzTime(double usual) {

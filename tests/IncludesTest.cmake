@@ -46,7 +46,7 @@ foreach(folder core config reference gpu comm io pipeline runlog synthetic bench
   forbid(tests/${folder} "<catch2/" "tests/Catch.h suits both versions of Catch2")
 endforeach()
 
-# The facade, and whatever it includes of ours, shows neither Vulkan nor MPI; the data formats show no scenes and blocks.
+# forbid_behind(<header> <regex> <why>): no #include line of the header, or of our headers that it includes, may match.
 function(forbid_behind header regex why)
   set(seen "${header}")
   set(ahead "${header}")
@@ -71,7 +71,7 @@ foreach(header Supersegment.h Vdi.h)
   forbid_behind(vdi/core/${header} "\"vdi/core/(Scene|Block)\\.h" "data formats know nothing of volumes")
 endforeach()
 
-# Of two headers neither includes the other, by whatever way, nor does its source.
+# forbid_pairs(<folder>): no two units of the folder (a header and its source) may include each other.
 function(forbid_pairs folder)
   file(GLOB files RELATIVE "${SOURCE_DIR}" "${SOURCE_DIR}/${folder}/*.h" "${SOURCE_DIR}/${folder}/*.cpp")
   foreach(file IN LISTS files)

@@ -51,8 +51,8 @@ inline Layout randomLayout(std::mt19937& random) {
   return layout;
 }
 
-/// The block with its own copy of the values, laid out so. All other bytes of the copy are set, which makes
-/// numbers of floating point NaN. Nothing lies beyond its first and last value.
+/// The block with its own copy of the values in this layout. All other bits of the copy are set, so that a
+/// floating-point number read from there is NaN. The copy ends with its last value.
 inline Block laidOut(const Block& block, const Layout& layout) {
   const auto bytes = static_cast<std::int64_t>(sizeOf(block.type));
   ByteStrides strides(0);

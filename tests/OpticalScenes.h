@@ -38,7 +38,7 @@ constexpr Stretch stretches[] = {
     {ScalarType::F32, -7.5, -2.25},     {ScalarType::F64, 1.0e-6, 3.0e-6},
 };
 
-/// A lattice whose longest side is 1, in blocks and as the oracle has it.
+/// A lattice whose longest side is 1: this rank's blocks, and the whole volume of the exact reference.
 struct OpticalScene {
   std::vector<Block> mine;
   reference::ExactVolume whole;
@@ -158,7 +158,7 @@ inline Off offBetween(const Image& a, const Image& b) {
   return off;
 }
 
-/// Of all pixels, by channel.
+/// The largest value of each channel over all pixels.
 inline glm::vec3 brightest(const Image& image) {
   glm::vec3 most(0.0F);
   for (const glm::vec4& pixel : image.rgba) most = glm::max(most, glm::vec3(pixel));

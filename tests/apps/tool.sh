@@ -42,7 +42,7 @@ for joint in shared gap cells; do
   works "compare" "$vdi" compare --json one.png turned_20deg.png
   python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] < 0.99, r" || fail "$joint: nothing turned"
 done
-# Without a picture of it a VDI is never whole on one rank: the file is the same.
+# Without --flat no rank ever has the whole VDI. The file must be the same.
 works "written from where it is" "$vdi" generate --field turbulence "${small[@]}" --joint cells -o one_written.vdi
 works "written on 3 ranks" "${mpirun[@]}" 3 "$vdi" generate --field turbulence "${small[@]}" --joint cells \
   --blocks 3x2x2 --layout random -o three_written.vdi
@@ -171,7 +171,7 @@ works "raw" "$vdi" generate --raw v.json --resolution 40x30 --flat raw.png
 works "raw on 2 ranks" "${mpirun[@]}" 2 "$vdi" generate --raw v.json --resolution 40x30 --blocks 2x2x1 --flat raw2.png
 works "compare" "$vdi" compare --json raw.png raw2.png
 python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "raw: ranks differ"
-# Time steps: as if each were alone, with the first one's camera and transfer function.
+# Each time step equals a run with that step alone, with the first step's camera and transfer function.
 python3 - <<'P'
 import json
 import struct
@@ -203,7 +203,7 @@ refused 1 "u12" "$vdi" generate --raw type.json -o x.vdi
 refused 1 "spacin" "$vdi" generate --raw field.json -o x.vdi
 refused 1 "none.json" "$vdi" generate --raw none.json -o x.vdi
 
-# A step that can't be read is left out, and told at the end, with those before and behind it written.
+# An unreadable step is left out and reported at the end; the steps before and after it are written.
 for ranks in 1 2; do
   refused 1 "time step 1: .*s9.raw" "${mpirun[@]}" $ranks "$vdi" generate --raw s0.json s9.json s1.json s9.json s2.json \
     --resolution 40x30 --flat "left$ranks.png"
@@ -222,7 +222,7 @@ refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step 1844
 refused 2 "exceeds" "$vdi" generate --raw s0.json s1.json --step 18446744073709551615 -o x.vdi
 refused 2 "finite" "$vdi" generate --field sphere "${small[@]}" --time nan -o x.vdi
 
-# A viewpoint that shows nothing true is warned of, once each.
+# Each viewpoint that can't show the VDI truly gets one warning.
 warnings() { grep -c "warning.*$1" err.txt; }
 works "no warning" "$vdi" render one.vdi -o x.png --azimuth -50 0 50
 [ ! -s err.txt ] || { fail "a viewpoint near V_O is warned of"; cat err.txt; }
@@ -250,7 +250,7 @@ refused 1 "a pipe .*pipe" timeout 20 "$vdi" generate --raw piped.json -o x.vdi
 echo '{"position": [0, 0, 3], "focal_point": [0, 0, 0], "position": [0, 0, 4]}' >twice.json
 refused 1 "'position' .*twice" "$vdi" generate --field sphere "${small[@]}" --camera twice.json -o x.vdi
 
-# Output: nothing is lost, and what can't be written is told before anything else.
+# Output: no file is lost, and an output that can't be written is reported before any other error.
 refused 1 "no-such-folder" "$vdi" generate --raw none.json -o no-such-folder/x.vdi
 refused 1 "no-such-folder" "$vdi" render none.vdi -o no-such-folder/x.png
 refused 1 "no-such-folder" "$vdi" bench --fields sphere --raw none.json -o no-such-folder/x.json

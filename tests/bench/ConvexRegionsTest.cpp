@@ -1,4 +1,4 @@
-// Planes between boxes, against rays: what a ray meets, it must meet in the order that is told.
+// The order of boxes that planes separate: each ray must meet the boxes in that order.
 #include <algorithm>
 #include <limits>
 #include <random>
@@ -13,8 +13,8 @@ using bench::SeparatingPlanes;
 
 namespace {
 
-/// Where a line enters a box and leaves it, in units of `direction`; enters behind where it leaves: it
-/// misses.
+/// The places at which a line enters and leaves a box, in units of `direction`. `enter` exceeds `leave` if
+/// the line misses the box.
 struct Span {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();

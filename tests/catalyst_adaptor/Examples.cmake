@@ -1,5 +1,5 @@
-# The examples on one rank and on four. Each runs with the adaptor and without it, and its result is the same, bit by bit; so
-# it is on any number of ranks. Whose package is missing is skipped by name.
+# The examples on one rank and on four. Each runs with the adaptor and without it. Its result is the same both times, bit for
+# bit, and on any number of ranks. An example is skipped if its Debian package is missing.
 set(examplesTest "${CMAKE_CURRENT_SOURCE_DIR}/examples.py")
 set(examplesFolder "${CMAKE_SOURCE_DIR}/catalyst_adaptor/examples")
 

@@ -61,7 +61,7 @@ double at(double x, double y, double z) {
   return 3.0 + x + 2.0 * y + 4.0 * z;
 }
 
-/// Of the field in the slab, with nonsense in all ghost layers.
+/// The field's values in the slab, with nonsense in all ghost layers.
 template <typename Scalar>
 std::vector<Scalar> valuesIn(const Slab& slab, bool cells) {
   const int more = cells ? 0 : 1;
@@ -219,7 +219,7 @@ TEST_CASE("blocks that lack the array don't count") {
   fields.setArray("f", true, VDI_CATALYST_F64, {in(0, values.data()), in(1, nullptr)});
   const double mean = 2.0 + 0.5 * (world.size() - 1);
   CHECK(measured(Kind::Mean, world, fields).value() == Approx(mean));
-  // The parts follow when another block has it.
+  // A measure notices when another block gets the array.
   Measure measure(
       {.measure = Kind::Mean, .field = "f", .cells = {}, .component = -1, .above = {}, .below = {}});
   CHECK(measure.of(world, fields).value() == Approx(mean));

@@ -1,8 +1,8 @@
-// A simulation whose memory runs out within the adaptor, on its last rank: of each call, some allocations of
-// the adaptor's own code fail, one at a time. The process goes on, the call says so on all ranks or does
-// without, no rank is left waiting, and the next call works.
+// A simulation whose last rank runs out of memory within the adaptor. In each call, some allocations of the
+// adaptor's own code fail, one at a time. The call must report that on all ranks or do without the memory.
+// The process goes on, no rank is left waiting, and the next call works.
 //
-// catalyst_allocations [growth]: after allocation n it fails allocation growth * n + 1; 1.0 tries all.
+// catalyst_allocations [growth]: after allocation n, allocation growth * n + 1 fails; 1.0 tries all.
 #include <dlfcn.h>
 #include <mpi.h>
 #include <unistd.h>
@@ -98,7 +98,7 @@ void expect(bool holds, const char* call, std::int64_t allocation, const char* w
   std::fprintf(stderr, "%s, allocation %lld: %s\n", call, static_cast<long long>(allocation), what);
 }
 
-/// Calls with one failing allocation, then with all. `growth` tells which one is next.
+/// Repeats the call with one failing allocation at a time, until none of its allocations is left to fail.
 template <typename Call>
 void tryAll(const char* name, double growth, Call call) {
   for (std::int64_t n = 1;; n = static_cast<std::int64_t>(static_cast<double>(n) * growth) + 1) {

@@ -3,10 +3,9 @@
 //     catalyst2 native|catalyst mesh|multimesh|amrmesh RUN [arguments of a script]
 //     catalyst2 bad RUN
 //
-// RUN is a JSON text or the name of a script. The three kinds of channels have their values in an order of
-// their own each: interleaved cells, points within a halo, and cells of vectors whose components lie apart.
-// `bad` hands over what can't be taken, on one rank each, and then a mesh that can. Exit status 0 if all
-// calls returned what they should.
+// RUN is a JSON text or the name of a script. The arrays have different orders in memory: interleaved cells,
+// points within a halo, and cells of vectors whose components lie apart. `bad` hands over faulty nodes, most
+// of them on one rank only, and then a sound mesh. Exit status 0 if all calls returned what they should.
 #include <mpi.h>
 
 #include <algorithm>
@@ -40,7 +39,7 @@ void expect(const std::string& what, int wanted, int got) {
   ++wrong;
 }
 
-/// Its place in units of `spacing`; ghost layers are within `cells`.
+/// A block of a channel. `first` is in units of `spacing`, and `cells` include the ghost layers.
 struct Piece {
   std::array<int, 3> first;
   std::array<int, 3> cells;
@@ -343,7 +342,7 @@ void runCatalyst(Layout& layout, const std::string& run, const std::vector<std::
     Node node = stepNode(layout, step);
     Node mesh = node["catalyst/channels/grid/data"];
     if (isScript) addTypes(mesh, countOf(layout.pieces.front(), 0));
-    // Isn't wanted without the script, so nobody looks at it.
+    // A run without a script doesn't want this step, so the channel's type goes unread.
     if (!isScript && step == 1) node["catalyst/channels/grid/type"].set(std::string("nonsense"));
     expect("execute", 0, execute(node));
   }

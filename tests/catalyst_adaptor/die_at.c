@@ -1,7 +1,7 @@
 /* Loaded before a program (LD_PRELOAD): ends the worker of vdi_catalyst_process in one of its stages, and
  * leaves all other programs alone. VDI_TEST_DIE is STAGE:RANK:HOW. Stages: start, initialize, waiting,
  * taking, generating, writing, finalizing. HOW: kill, stop (as by SIGSTOP), exit (with status 7).
- * VDI_TEST_DIE_ONCE names a file: only while it is there, and it goes before. */
+ * If VDI_TEST_DIE_ONCE names a file, a worker dies only if that file exists, and removes it first. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <mpi.h>

@@ -1,4 +1,4 @@
-/* What calls of the adaptor return, in processes of their own too. */
+/* Checks of the codes that the adaptor's calls return, isolated runs included. */
 #ifndef VDI_TESTS_CATALYST_EXPECT_H
 #define VDI_TESTS_CATALYST_EXPECT_H
 

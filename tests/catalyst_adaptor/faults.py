@@ -1,5 +1,5 @@
-"""Scripts that do wrong, each in its own way; VDI_TEST_FAULT says which. Steps 1 and 2 go wrong, if not said otherwise, and
-step 3 is right."""
+"""Scripts with faults, of which VDI_TEST_FAULT selects one. Unless a comment says otherwise, steps 1 and 2 fail and
+step 3 succeeds."""
 
 import os
 
@@ -56,7 +56,7 @@ def map_range():
 
 def execute(info):
     if FAULT == "defaults" and info.timestep > 1:
-        # What the step before has left: the extractor alone updates the filter.
+        # No fault: checks what the previous step has left, in which only the extractor updated the filter.
         if map_range() != [0, 240]:
             raise RuntimeError("the colour map isn't on the first step's range, but on %s" % map_range())
         written = VDIReader(FileNames=[os.path.join(OUTPUT, "vdi_%06d.vdi" % (info.timestep - 1))])
@@ -70,7 +70,7 @@ def execute(info):
             if max(alpha) == 0 or max(alpha[:64]) > 0 or max(alpha[-64:]) > 0:
                 raise RuntimeError("the picture doesn't show the whole scene")
     if FAULT == "save":
-        # No fault: the file knows its step, and the filter what it cost.
+        # No fault: the file has its step, and the filter reports its costs.
         name = os.path.join(OUTPUT, "saved_%d.vdi" % info.timestep)
         SaveData(name, proxy=image)
         if rank == 0 and "generate s" not in image.Report:
@@ -99,6 +99,6 @@ def execute(info):
         SaveScreenshot(os.path.join(OUTPUT, "screenshot.png"), view)
 
 
-# An exported script has none, and is called only where an extractor is due.
+# A script that ParaView exports has no catalyst_execute, and runs only when an extractor is due.
 if FAULT not in ("picture", "wants"):
     catalyst_execute = execute

@@ -1,12 +1,12 @@
 /* A simulation of heat, whose steps are timed: a box of N x N x N cells of doubles a rank, side by side along
  * x. Arguments: a JSON text, a script that ends in .py, or "-" for no library at all; the number of steps.
- * Prints, on the first rank, a line for each step, "step NUMBER CODE MICROSECONDS BUSY", and "finalize CODE
- * MICROSECONDS"; the time is that of the slowest rank. BUSY is 1 if the file VDI_TEST_BUSY isn't there
- * before the step: a frame is under way. Exit status 0 if all ranks have the same codes.
- * VDI_TEST_SIZE: N, 16 unless given. VDI_TEST_PAUSE: milliseconds after each step. VDI_TEST_REPEAT: how often
- * the heat spreads in a step. VDI_TEST_KILL=STEP: kills this rank's worker, if this is the last rank, while
- * that step is handed over. VDI_TEST_FILE_LIMIT: the
- * last rank may make no larger files during the first three steps. */
+ * The first rank prints "initialize CODE MICROSECONDS", a line "step NUMBER CODE MICROSECONDS BUSY" for each
+ * step, and "finalize CODE MICROSECONDS"; the time is that of the slowest rank. BUSY is 1 if the file
+ * VDI_TEST_BUSY doesn't exist before the step, because its frame is still under way. Exit status 0 if all
+ * ranks have the same codes. VDI_TEST_SIZE: N, 16 unless given. VDI_TEST_PAUSE: milliseconds after each step.
+ * VDI_TEST_REPEAT: how often the heat spreads in a step. VDI_TEST_KILL=STEP: kills the last rank's worker
+ * while that step is handed over. VDI_TEST_FILE_LIMIT: the largest file, in bytes, that the last rank may
+ * make during the first three steps. */
 #define _GNU_SOURCE
 #include <dirent.h>
 #include <mpi.h>

@@ -1,5 +1,5 @@
-"""Processes that make frames and die, stop, or find no room. Arguments: the case, vdi's folder of tests' libraries to load
-before (die_at), and the simulation with its launcher. Each case says what the simulation must have seen."""
+"""Processes that make frames and die, stop, or find no room. Arguments: the case, the library to preload (die_at), and
+the simulation with its launcher. Each case checks what the simulation has seen."""
 
 import glob
 import json
@@ -70,7 +70,7 @@ def one_line(run, pattern):
 
 
 def dies(stage, during, how="kill", cause=r"was killed by signal 9 \(Killed\)", rank=LAST):
-    """One line, and then no more frames: all later calls say so at once."""
+    """The adaptor prints one line and makes no more frames. Later steps fail at once, or aren't wanted."""
     run = Run({}, 8, VDI_TEST_PAUSE="300", **dying(stage, how, rank))
     one_line(run, "rank %d: the process that makes frames %s while it (%s).*no more frames" % (rank, cause, during))
     first = run.codes.index(ENGINE)
@@ -163,7 +163,7 @@ def no_room():
 
 
 def launcher():
-    """A launcher that isn't there is told in one line, with what it says."""
+    """A launcher that is missing or fails is reported in one line, with its own output."""
     for wish in ("no-such-launcher -n {ranks}", "false {hosts}"):
         process = subprocess.run([*simulation, json.dumps(SMALL), "1"], capture_output=True, text=True, timeout=PATIENCE,
                                  env={**os.environ, "VDI_ISOLATION_LAUNCHER": wish})
@@ -177,7 +177,7 @@ def launcher():
 
 
 def environment():
-    """The environment counts more than the text, and its values are checked."""
+    """The environment overrides the text, and its values are checked."""
     run = Run({"every": 2}, 3, VDI_ISOLATION="none", **dying("taking"))
     assert run.codes == [0, 0, 0] and run.end == 0 and not run.lines, run.lines
     process = subprocess.run([*simulation, json.dumps(SMALL), "1"], capture_output=True, text=True, timeout=PATIENCE,

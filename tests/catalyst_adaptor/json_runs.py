@@ -72,7 +72,7 @@ def triggers():
     run({"every": 4, "every_seconds": 3600, "output": "s_{timestep}.vdi"}, *6 * [0], VDI_TEST_FIRST="1",
         VDI_TEST_WANTS="100100")
     assert [name for name in made() if name.startswith("s")] == ["s_1.vdi", "s_4.vdi"], made()
-    # Whoever doesn't ask gets the same.
+    # A simulation that doesn't call vdi_catalyst_wants gets the same files.
     run({"every_seconds": 0.001, "output": "t_{timestep}.vdi"}, 0, 0, VDI_TEST_PAUSE="10")
     assert [name for name in made() if name.startswith("t")] == ["t_0.vdi", "t_1.vdi"], made()
 

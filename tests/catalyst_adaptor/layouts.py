@@ -17,7 +17,7 @@ RANGE = {"range": [-1.5, 1.5], "opacities": [[-1.5, 0.0], [0.3, 0.05], [1.5, 0.8
 
 
 def run(field, cells, steps=1, launcher=None, **document):
-    """Returns the pictures, what the first step's record says, and the bytes of the field."""
+    """Returns the pictures, the record of each step's frame, and the bytes of the field."""
     document = {"field": field, "camera": CAMERA, "colors": RANGE, "resolution": [80, 60], "existing": "overwrite",
                 "output": {"png": "v_{timestep}.png"}, "log": "run.jsonl", **document}
     process = subprocess.run([*(launcher or simulation), json.dumps(document), str(cells), field, str(steps)],
@@ -56,8 +56,8 @@ def ranks():
 
 
 def memory():
-    """A copy would take the field's bytes once more. Without mpirun's binding to a core, where the device would read values in
-    order directly and those of other layouts from a staging buffer."""
+    """A copy would take the field's bytes once more. mpirun must not bind the rank to a core, where the device would
+    read values in order directly, and those of other layouts from a staging buffer."""
     peaks, uploads = {}, {}
     for layout in LAYOUTS:
         _, frames, size = run(layout, 160, 3)

@@ -1,8 +1,8 @@
-/* What libvdi_catalyst.so costs before it is initialised and after, and what it says when it can't be.
- * With VDI_TEST_JSON it's initialised with that JSON text, loads no ParaView, and takes at most
+/* The cost of libvdi_catalyst.so before and after it is initialised, and its message if that fails. With
+ * VDI_TEST_JSON the program initialises it with that JSON text; it then loads no ParaView, and takes at most
  * VDI_TEST_MEBIBYTES. Arguments: the code that initialising must return, a text that rank 0 must then print
- * once ("-" for any), the library of rank 0, and the one of the other ranks (rank 0's unless given). Exit
- * status 0 if all is as it must be. */
+ * once ("-" for any), the library of rank 0, and that of the other ranks (rank 0's unless given). Exit status
+ * 0 if all checks hold. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fenv.h>

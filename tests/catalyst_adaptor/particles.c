@@ -111,7 +111,7 @@ static int refuse_bad(vdi_catalyst* catalyst, int rank, int ranks) {
   bad.count = 3;
   bad.weight_stride = INT64_MIN / 2;
   wrong += refused(catalyst, rank, "weights below address 0", "V", &bad);
-  /* What one rank gets wrong all refuse. */
+  /* All ranks refuse what one of them gets wrong. */
   bad = good;
   if (rank == ranks - 1) bad.count = -1;
   wrong += refused(catalyst, rank, "a negative count on one rank", "V", &bad);

@@ -161,7 +161,7 @@ void addLimits(State& state) {
   state["no new privileges"] = textOf(prctl(PR_GET_NO_NEW_PRIVS, 0, 0, 0, 0));
 }
 
-/// Names that are left if the process is killed, or ends without more.
+/// Counts the names of shared memory that would remain if the process were killed now.
 void addSharedMemory(State& state) {
   std::ifstream maps("/proc/self/maps");
   int names = 0;
@@ -183,7 +183,7 @@ State stateOfProcess() {
   return state;
 }
 
-/// What no library would choose, so that whatever is set shows.
+/// Makes settings that no library would choose, so that any change shows.
 void makeOwnSettings() {
   for (int signal = 1; signal <= lastSignal; ++signal) {
     struct sigaction action {};
@@ -194,7 +194,7 @@ void makeOwnSettings() {
     if (signal != SIGCHLD) sigaction(signal, &action, nullptr);  // fails where it can't be, SIGKILL for one
   }
   std::setlocale(LC_ALL, "C");
-  std::setlocale(LC_NUMERIC, "C.UTF-8");  // the only one besides that is everywhere
+  std::setlocale(LC_NUMERIC, "C.UTF-8");  // the only other locale that exists everywhere
   umask(027);
   setenv("SIMULATION_OWN", "value", 1);
   unsetenv("VDI_PLUGIN");

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# says.sh PATTERN... -- COMMAND...: runs the command; fails where that fails or says nothing that matches one of the
-# patterns (grep -E).
+# says.sh PATTERN... -- COMMAND...: runs the command. Fails if the command fails, or if one of the patterns (grep -E)
+# matches no line of its output.
 set -uo pipefail
 patterns=()
 while [ "$1" != -- ]; do

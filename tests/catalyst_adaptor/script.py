@@ -1,5 +1,6 @@
-"""Makes a VDI of V at each step and looks at its picture. VDI_TEST_FAIL: after that, "raise:STEP:RANK" raises there on one
-rank, "exit:STEP:RANK" calls sys.exit there; the extract of that step follows and isn't written. VDI_TEST_FILE: its name."""
+"""Makes a VDI of V at each step and checks its picture. VDI_TEST_FAIL: then "raise:STEP:RANK" raises an exception on
+that rank, and "exit:STEP:RANK" calls sys.exit, so that the step's extract isn't written. VDI_TEST_FILE: the extracts'
+name."""
 
 import os
 import sys

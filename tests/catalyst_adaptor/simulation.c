@@ -1,6 +1,6 @@
 /* A simulation in C: one block of 8-bit point data a rank, along x. Arguments: the script, then the code that
- * each step must return, or CODE*STEPS. Exit status 0 if all did and the error's text was there just when it
- * had to be. Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
+ * each step must return, or CODE*STEPS. Exit status 0 if all did and each failure had a text. Environment:
+ * VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
  * VDI_TEST_THEN=SCRIPT: initialize with that script succeeds and is finalized.
  * VDI_TEST_WANTS=1010: what vdi_catalyst_wants says before each step.
  * VDI_TEST_LATE=1: finalize is called after MPI_Finalize.
@@ -53,7 +53,7 @@ static long resident_kib(void) {
   return resident * (sysconf(_SC_PAGESIZE) / 1024);
 }
 
-/* Blocks that can't be: an error, and the blocks that there were stay. */
+/* Impossible blocks are an error, and the earlier blocks stay. */
 static int bad_blocks(int rank, vdi_catalyst* catalyst, vdi_catalyst_block good) {
   int wrong = 0;
   vdi_catalyst_block block = good;
@@ -86,7 +86,7 @@ static int bad_blocks(int rank, vdi_catalyst* catalyst, vdi_catalyst_block good)
   return wrong;
 }
 
-/* Numbers that ParaView would cut: they name no file. */
+/* Numbers that ParaView would truncate are refused, so that no file gets a wrong name. */
 static int bad_steps(int rank, vdi_catalyst* catalyst) {
   const int64_t steps[] = {3000000000, 4294967301, -1};
   int wrong = 0;

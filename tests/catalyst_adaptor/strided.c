@@ -1,6 +1,6 @@
-/* A simulation whose values lie in other orders than VTK's: the script compares each array with "plain",
- * which has the same values in order and is the script's argument. The program's is the script. Exit status 0
- * if all went well and the array that lies in order was used where it is: the script writes to it. */
+/* A simulation whose values lie in memory in orders other than VTK's. Argument: the script, which compares
+ * each array with "plain", an array with the same values in VTK's order. Exit status 0 if all went well and
+ * the array "in order" was used in place, so that the script's writes reached it. */
 #include <limits.h>
 #include <mpi.h>
 #include <stdio.h>

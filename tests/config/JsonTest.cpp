@@ -1,4 +1,4 @@
-// JSON with places: what is refused, where, and that a hostile document costs little.
+// JSON with source positions: refusals name the position, and a hostile document costs little.
 #include <sys/stat.h>
 #include <unistd.h>
 

@@ -31,7 +31,7 @@ void refused(const std::string& text, const std::string& part) {
   INFO(text);
   CHECK_THROWS_WITH(parseRun(text, "vdi.json"), test::ContainsSubstring(part));
 }
-/// With that field beside the one that is needed.
+/// Checks that a document with the required field and this one is refused.
 void refusedField(const std::string& field, const std::string& part) {
   refused("{\"field\": \"V\",\n" + field + "}", part);
 }
@@ -41,7 +41,7 @@ json schema() {
   return json::parse(file);
 }
 
-/// What a reference of the schema leads to, or the part itself.
+/// The part of the schema to which this part refers; the part itself if it has no reference.
 const json& followed(const json& all, const json& part) {
   if (!part.contains("$ref")) return part;
   return all.at(json::json_pointer(part.at("$ref").get<std::string>().substr(1)));

@@ -49,7 +49,7 @@ def recipe(name, runs):
 
 
 def run_on(ranks, *command):
-    """Without a display, in the present folder."""
+    """Runs a command on some ranks, without a display, in the current folder."""
     environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
     run(os.environ["MPIEXEC"], "--oversubscribe", "-n", str(ranks), *command, env=environment)
 
@@ -105,7 +105,7 @@ def of_scripts(_):
 
 
 def picture(path):
-    """[y][x][3], of which something is to be seen."""
+    """The pixels [y][x][3] of a picture, which must show something."""
     pixels = skimage.io.imread(path)[..., :3].astype(int)
     share = (abs(pixels - pixels[0, 0]).max(axis=2) > 8).mean()
     assert share > 0.01, "%s: %.3f of the pixels show something" % (path, share)
@@ -113,7 +113,7 @@ def picture(path):
 
 
 def picture_of(vdi):
-    """That of a .vdi file from its viewpoint."""
+    """The picture of a .vdi file from its viewpoint."""
     run(TOOL, "render", vdi, "-o", "picture.png")
     return picture("picture.png")
 

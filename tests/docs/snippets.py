@@ -25,7 +25,7 @@ atexit.register(shutil.rmtree, RUNS)
 
 
 def shared(function):
-    """Runs a function at most once, in a folder that stays. What decorates it returns the folder's path."""
+    """Decorates a function so that it runs at most once, in a folder that stays, and returns the folder's path."""
     @functools.cache
     def run_once():
         before, folder = os.getcwd(), os.path.join(RUNS, function.__name__)

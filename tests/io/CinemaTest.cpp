@@ -1,4 +1,4 @@
-// The index of a Cinema database: what it says, goes on with and refuses.
+// The index of a Cinema database: its text, and the existing indices that it continues or refuses.
 #include <unistd.h>
 
 #include <filesystem>

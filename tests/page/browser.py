@@ -37,7 +37,7 @@ class Browser:
         self.add_page()
 
     def add_page(self):
-        """Another one, in a window of its own so that it isn't hidden; calls go to it from now on. Gives its session."""
+        """Opens another page, in its own window so that it isn't hidden. Later calls go to it. Returns its session."""
         target = self.send("Target.createTarget", url="about:blank", newWindow=True, browser=True)["targetId"]
         self.session = self.send("Target.attachToTarget", targetId=target, flatten=True, browser=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
@@ -83,7 +83,7 @@ class Browser:
             self.events.append(answer)
 
     def value(self, expression):
-        """Of a JavaScript expression; a promise's once it is fulfilled."""
+        """The value of a JavaScript expression, or of the promise that it gives, once that is fulfilled."""
         result = self.send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in result:
             details = result["exceptionDetails"]
@@ -91,7 +91,7 @@ class Browser:
         return result["result"].get("value")
 
     def wait(self, expression, seconds=None):
-        """Until it is true."""
+        """Waits until the expression is true."""
         until = time.monotonic() + (seconds or self.seconds)
         while not self.value(expression):
             if time.monotonic() > until:
@@ -103,7 +103,7 @@ class Browser:
         self.send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio, mobile=mobile)
 
     def open(self, url):
-        """And wait until the page's script has run."""
+        """Opens a URL and waits until the page's script has run."""
         self.events.clear()
         self.send("Page.navigate", url="about:blank")
         self.send("Page.navigate", url=url)

@@ -109,7 +109,7 @@ def test_frames(browser):
 
 
 def test_size(_):
-    """Of the page as a server sends it."""
+    """Checks the size of the page that a server sends."""
     make("tiny.vdi", 5, large=False)
     with Server("tiny.vdi") as server:
         opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
@@ -138,7 +138,7 @@ def test_tokens(browser):
 
 
 def test_pages(browser):
-    """Several at once get the same frames; one that goes away in the middle disturbs none."""
+    """Several pages at once get the same frames, and a page that closes meanwhile disturbs none."""
     os.mkdir("shared")
     make("shared/step_0.vdi", 6)
     first = browser.session

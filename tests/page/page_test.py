@@ -258,7 +258,7 @@ def test_series(browser):
 
 
 def test_legend(browser):
-    """By way of a source of our own, which the viewer takes as any other."""
+    """The VDI with metadata comes from a source that the test provides."""
     browser.size(600, 400)
     open_page(browser, "step_0.html")
     whole(browser)

@@ -73,7 +73,7 @@ def shown(browser, name=None):
 
 
 def rendered(file, camera, reconstruction="sheared"):
-    """What vdi render makes of it, from the page's camera."""
+    """The picture that vdi render makes of a file from the page's camera."""
     words = {"position": camera["position"], "focal_point": camera["focalPoint"], "view_up": camera["viewUp"]}
     if camera["parallel"]:
         words.update(parallel_scale=camera["parallelScale"])
@@ -119,7 +119,7 @@ def message_of(browser):
 
 
 def run(*tests):
-    """Each in turn, in one browser and a folder of their own; the number of failures ends the program."""
+    """Runs the tests in turn, in one browser and one temporary folder. Exits with status 1 after a failure."""
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         browser = Browser(CHROMIUM)

@@ -60,14 +60,14 @@ def shown_picture(view):
 
 
 def saved_map(image, name):
-    """What the file says, which Save Data writes."""
+    """A reader of the file that Save Data writes."""
     path = os.path.join(OUTPUT, name)
     simple.SaveData(path, proxy=image)
     return simple.OpenDataFile(path)
 
 
 def fresh_picture(ball, name, view, **properties):
-    """Of a filter that has never known another array."""
+    """The picture of a new filter, which has never had another array."""
     image = vdi_filter(ball, view, "POINTS", name, 0, **properties)
     seen = picture(image)
     simple.Delete(image)
@@ -201,7 +201,7 @@ check(simple.GetScalarBar(colors, view).Title == "velocity", "and a scalar bar")
 simple.Delete(file_shown)
 simple.Delete(opened)
 
-# Over all time steps: of the input, which makes no VDI for that.
+# The range over all time steps comes from the input, without a VDI of each step.
 steps = simple.ProgrammableSource(OutputDataSetType="vtkImageData")
 steps.ScriptRequestInformation = EXTENT + """
 information = self.GetExecutive().GetOutputInformation(0)

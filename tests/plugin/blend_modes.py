@@ -57,8 +57,8 @@ MODES = {
     "Isosurface": (5, 0, [90, 150, 200]),
     "Isosurface, shaded": (5, 1, [90, 150, 200]),
 }
-# Surfaces have edges, a pixel of which is all one or the other: where a ray just touches a surface, samples at other depths
-# see or miss it. ParaView shades a surface by the gradient at the sample behind it.
+# A ray that just touches a surface hits or misses it, depending on the depths of its samples, so pixels at the edges of
+# surfaces may differ completely. ParaView shades a surface by the gradient at the sample behind it.
 LEAST = {"Maximum Intensity": 0.99, "Minimum Intensity": 0.99, "Isosurface": 0.96, "Isosurface, shaded": 0.95}
 for association, names in (("POINTS", MODES), ("CELLS", ("Maximum Intensity", "Isosurface, shaded"))):
     source, center = waves_source("waves", association == "CELLS")

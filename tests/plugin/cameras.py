@@ -95,7 +95,7 @@ def release(image):
 
 
 def alone(camera, at=0.0, **properties):
-    """What a filter makes that is the only one."""
+    """The VDI of a filter that shares its input with no other."""
     image = filter_at(camera, **properties)
     result = lists(image, at)
     simple.Delete(image)

@@ -14,7 +14,7 @@ os.makedirs(os.path.join(OUTPUT, "home"), exist_ok=True)
 
 
 def lines():
-    """Those about the server, of what the window says."""
+    """The lines of the window's output that are about the server."""
     with open(LOG) as log:
         return [line for line in log if "Remote Plugins" in line]
 

@@ -78,7 +78,7 @@ def orbit(view):
 
 
 def bytes_of_orbit(session, view):
-    """Of the same orbit each time, gone once before."""
+    """The bytes that an orbit sends. The same orbit has been shown once before."""
     camera = list(view.CameraPosition), list(view.CameraFocalPoint), list(view.CameraViewUp)
     orbit(view)
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = camera

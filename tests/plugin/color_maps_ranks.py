@@ -1,4 +1,4 @@
-"""Colour maps that lack channels and such with steps on several ranks: the picture is that of one rank, which is written
+"""Colour maps that lack channels or have steps, on several ranks: the picture is that of one rank, which is written
 first."""
 
 import os

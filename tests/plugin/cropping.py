@@ -1,4 +1,4 @@
-"""Cropped volumes against ParaView's own, which the first update takes over; clipping planes; blend modes not had."""
+"""Cropped volumes against ParaView's own, whose box the first update takes; clipping planes; missing blend modes."""
 
 import os
 import sys
@@ -11,7 +11,7 @@ from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
 from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
 import vtkmodules.vtkRenderingVolume  # noqa: E402,F401  # so that mappers of volumes have their methods
 
-# Values are [z][y][x], of cells: VTK puts the faces of what is cropped of point data up to half a voxel elsewhere.
+# Values are [z][y][x] of cells, because VTK misplaces the faces of cropped point data by up to half a voxel.
 SHAPE, SPACING, ORIGIN = (50, 70, 60), [1.2, 1.0, 1.5], [-10, 5, 20]
 
 

@@ -110,7 +110,7 @@ with Messages("WarningEvent") as texts:
     simple.RenderVDI(Input=made, UseOriginalCamera=1, Azimuth=20).UpdatePipeline()
 check(not texts, "a viewpoint near the VDI's own gets none")
 
-# Arrays that aren't there, or not there.
+# Arrays that don't exist, or exist only with the other association.
 for association, name, words in (
         ("CELLS", "ball",
          ["no array 'ball' of cells", "['POINTS', 'ball']", "'velocity' (3 components)", "of cells: 'layers'"]),

@@ -9,7 +9,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 
 
 def codes(image):
-    """Of what the filter has, without an update."""
+    """The codes of the VDI that the filter has, without an update."""
     array = image.GetClientSideObject().GetOutputDataObject(0).GetFieldData().GetArray("VDI.codes")
     return None if array is None else vtk_to_numpy(array).copy()
 

@@ -103,7 +103,7 @@ image.SamplingRate = 2
 picture(image)
 image.SamplingRate = 0
 check(np.array_equal(picture(image), taken), "as an update without a preparation does")
-# One that's given up, and one whose filter goes before it is there.
+# A preparation that is given up, and one whose filter is deleted before it ends.
 image.Supersegments, image.Resolution, image.SamplingRate = 40, [400, 300], 4
 image.SMProxy.InvokeCommand("Prepare")
 image.SMProxy.InvokeCommand("Hold")

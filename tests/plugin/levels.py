@@ -26,7 +26,7 @@ def producer_of(data):
 
 
 def filter_of(data, association):
-    """Its values in a thin opaque band and a faint one, seen obliquely."""
+    """A filter that shows the data's values in a thin opaque band and a faint one, from an oblique direction."""
     image = simple.VolumetricDepthImage(Input=producer_of(data))
     image.SelectInputScalars = [association, "f"]
     image.ScalarOpacityUnitDistance = 0.05
@@ -51,7 +51,7 @@ opacity.Points = [0.3, 0, 0.5, 0, 0.33, 0.2, 0.5, 0, 0.36, 0, 0.5, 0, 0.47, 0, 0
 
 
 def values_on(lo, hi, count, field):
-    """Of the middles of count cells an axis from lo to hi, x fastest."""
+    """The field's values at the centres of `count` cells per axis from lo to hi, x fastest."""
     axes = [lo[a] + (np.arange(count[a]) + 0.5) * (hi[a] - lo[a]) / count[a] for a in (2, 1, 0)]
     z, y, x = np.meshgrid(*axes, indexing="ij")
     return field(x, y, z).ravel()

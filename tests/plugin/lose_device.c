@@ -1,8 +1,8 @@
-/* Loaded before a program (LD_PRELOAD): when there's a file VDI_TEST_LOSE_DEVICE, removes it, and the Vulkan
- * device that is waited for next is lost. A folder of that name stays: all devices are.
- * While there's a file VDI_TEST_LOSE_STILLS, a device is lost when a thread waits for the 20th time that
- * isn't the program's first one: those that make pictures in full do, strip by strip, and those that load
- * VDIs don't. */
+/* Loaded before a program (LD_PRELOAD). If the file VDI_TEST_LOSE_DEVICE exists, the library removes it, and
+ * the Vulkan device for which the program waits next is lost. A folder of that name can't be removed, so each
+ * device is lost. While the file VDI_TEST_LOSE_STILLS exists, a device is lost when any thread but the
+ * program's first waits for the 20th time. Threads that make full pictures wait that often, strip by strip;
+ * threads that load VDIs don't. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdlib.h>

@@ -29,7 +29,7 @@ def rays_of(view):
 
 
 def trilinear(values, places):
-    """Of values [z][y][x] at whole places; places [...][x, y, z] beyond them are taken to the nearest."""
+    """Interpolates values [z][y][x], which lie at integer places, at places [...][x, y, z]. Clamps the places."""
     last = np.array(values.shape[::-1]) - 1
     places = np.clip(places, 0, last)
     base = np.minimum(places.astype(int), last - 1)
@@ -67,7 +67,7 @@ class Rays:
         self.tables = {}
 
     def places(self, logarithmic):
-        """Of the samples in tables from the lowest to the highest scalar, the nearest entry."""
+        """The index of each sample's nearest entry in a table from the lowest to the highest scalar."""
         if logarithmic not in self.tables:
             scalars, low, high = self.scalars, self.low, self.high
             if logarithmic:
@@ -95,7 +95,7 @@ def is_logarithmic(colors):
 
 @functools.lru_cache(2)
 def table_of(function, changed, low, high, components):
-    """What a function has at evenly spaced places. It was changed at `changed`, and the last tables are kept."""
+    """A function's values at evenly spaced places. `changed`, its modification time, is part of the cache's key."""
     table = np.zeros(components * TABLE)
     function.GetTable(low, high, TABLE, table)
     table.flags.writeable = False

@@ -69,7 +69,7 @@ def shown_as(display, view, kind):
 
 
 def outline(source, image, view, camera):
-    """Against ParaView's outline of the volume itself."""
+    """Compares Outline with ParaView's outline of the volume itself."""
     display = simple.Show(image, view)
     check(offered(display) == ["Outline", "Slice", "VDI"], "a VDI is offered as {}".format(offered(display)))
     for kind in ("VDI", "Outline", "Slice"):
@@ -93,7 +93,7 @@ def outline(source, image, view, camera):
 
 
 def flat_picture(image, view, camera, what):
-    """Against the picture itself from its viewpoint, and from the side."""
+    """Compares Slice with the picture itself, from its viewpoint and from the side."""
     display = simple.Show(image, view)
     look(view, camera)
     expected = pvtest.picture(image)

@@ -183,17 +183,17 @@ def texts_in(view):
 
 
 def message_in(view):
-    """What it says instead of showing something, or of what is wrong; "" if nothing."""
+    """The representation's notices and faults in a view; "" if there are none."""
     return " ".join(text for text in texts_in(view) if DEGREES not in text)
 
 
 def angle_in(view):
-    """What it says of how far the view is turned; "" if nothing."""
+    """The representation's text about how far the view is turned; "" if there is none."""
     return " ".join(text for text in texts_in(view) if DEGREES in text)
 
 
 def text_boxes(view, part="VDI"):
-    """Lowest and highest row of each text of these that has that part."""
+    """The lowest and highest row of each of these texts that contains `part`."""
     renderer = view.GetClientSideObject().GetNonCompositedRenderer()
     boxes = []
     for actor in renderer.GetViewProps():

@@ -1,5 +1,5 @@
-"""Between a program that listens on port argv[1] of this machine and one that connects to the port that is printed first:
-passes on what they send. Answers each line of standard input with how many bytes that was so far."""
+"""Relays data between a program that listens on port argv[1] of this machine and one that connects to the relay's port,
+which it prints first. Answers each line of standard input with the number of bytes relayed so far."""
 
 import socket
 import sys

@@ -125,7 +125,7 @@ def elsewhere():
 
 
 def ball(centre, radius):
-    """A volume that is opaque inside of it alone."""
+    """A volume that is opaque only inside a ball."""
     image = vtkImageData()
     image.SetDimensions(64, 64, 64)
     image.SetOrigin(-31, -31, -31)
@@ -141,13 +141,13 @@ def ball(centre, radius):
 
 
 def column_of(picture):
-    """Of the middle of what is bright."""
+    """The mean column of the bright pixels."""
     columns = (picture.max(axis=2) > 60).sum(axis=0)
     return float((columns * np.arange(len(columns))).sum() / columns.sum())
 
 
 def window_column(view, source):
-    """Of what the window itself shows of the source: ParaView takes screenshots without stereo."""
+    """The column of the source in the window itself, because ParaView takes screenshots without stereo."""
     simple.Show(source, view)
     simple.Render(view)  # the first picture of a view moves its camera
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA, CENTER, [0, 1, 0]

@@ -1,5 +1,5 @@
-"""With a client on each rank (pvbatch --symmetric, as Catalyst has it): what fails fails on all ranks, as often as it's asked,
-and what the ranks are told differently is an error. Each of these would hang instead, so the time limit counts."""
+"""A client on each rank (pvbatch --symmetric), as in Catalyst. An update that fails must fail on all ranks each time,
+and properties that differ among ranks are an error. Otherwise the test would hang and reach its time limit."""
 
 import os
 import sys

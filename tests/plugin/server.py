@@ -12,7 +12,7 @@ def free_port():
 
 
 def clean_environment(**more):
-    """Without what this process's own MPI has put there, which a new mpirun would take for its own."""
+    """The environment without the variables of this process's MPI, which a new mpirun would take for its own."""
     ours = ("OMPI_ALLOW", "OMPI_MCA_rmaps_base", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl_vader")
     kept = {name: value for name, value in os.environ.items()
             if not name.startswith(("OMPI_", "PMIX_", "ORTE_")) or name.startswith(ours)}
@@ -28,7 +28,7 @@ def start(*arguments, ranks=1, **options):
 
 
 def start_reverse(port, **options):
-    """One that connects to a client, which is the one to listen."""
+    """Starts a pvserver that connects to a listening client."""
     return start("--reverse-connection", "--client-host=127.0.0.1", "--server-port=" + port, **options)
 
 

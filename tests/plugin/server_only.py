@@ -1,5 +1,5 @@
-"""pvpython as a client without the plugin, whose server has it: other data are shown as ever. ParaView ended by itself, for
-their representation had a part that this client can't make."""
+"""pvpython as a client without the plugin, whose server has it, must still show other data. ParaView used to end,
+because the representation of these data had a part that such a client can't make."""
 
 import os
 import sys

@@ -43,7 +43,7 @@ def screenshot(view, name):
 
 
 def interactive_picture(view):
-    """Of the frame that an interaction would show."""
+    """The picture of a frame that an interaction would show."""
     view.UseInteractiveRenderingForScreenshots = 1
     picture = screenshot(view, "interactive")
     view.UseInteractiveRenderingForScreenshots = 0
@@ -74,7 +74,7 @@ def picture_alone(path):
 
 
 def read_ahead(step):
-    """Steps before it, behind which its file is being read."""
+    """Visits the three steps before this one, so that the reader prefetches its file."""
     for before in range(step - 3, step):
         view.ViewTime = times[before]
         view.SMProxy.Update()
@@ -187,7 +187,7 @@ shutil.copy(kinds[15 % KINDS], files[15])
 simple.ReloadFiles(reader)
 check(same(screenshot(view, "whole"), expected[15 % KINDS]) and not pvtest.message_in(view), "until it is whole and read again")
 
-# By mouse: a step asks for a frame at rest, which doesn't hold up who is moving the camera.
+# By mouse: a step requests a still frame, which must not hold up a user who is moving the camera.
 interactor = vtkGenericRenderWindowInteractor()
 view.SMProxy.SetupInteractor(interactor)
 view.ViewTime = times[8]

@@ -33,7 +33,7 @@ def until(condition, what):
 
 
 class Folder:
-    """With VDIs in it, and its server."""
+    """A folder with VDIs, and the server that follows it."""
 
     def __init__(self, name):
         self.path = os.path.join(scratch, name)
@@ -77,20 +77,20 @@ def take(source):
 
 
 def take_next(source, seen):
-    """Once there are more arrivals than `seen`."""
+    """Takes the next VDI once there are more arrivals than `seen`."""
     until(lambda: information(source, "Arrivals") > seen, "another arrival")
     take(source)
 
 
 def step_of(source):
-    """Of the VDI that it gives."""
+    """The step of the VDI in the source's output."""
     source.UpdatePipeline()
     parameters = source.GetClientSideObject().GetOutputDataObject(0).GetFieldData().GetArray("VDI.parameters")
     return None if parameters is None else int(vtk_to_numpy(parameters)[3])
 
 
 def screenshot(source):
-    """From beside the viewpoint, of that source alone."""
+    """A picture of that source alone, from beside the VDI's viewpoint."""
     simple.HideAll(view)
     simple.Show(source, view).SetRepresentationType("VDI")
     view.CameraPosition, view.CameraFocalPoint = [2.2, 1.4, 2.0], [0.5, 0.5, 0.5]
@@ -258,7 +258,7 @@ def saved_without_token(live, source):
 
 
 def deleted_while_connecting():
-    """To what takes connections and never answers."""
+    """The server accepts connections and never answers."""
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()

@@ -133,7 +133,7 @@ check(picture(again).max() > 60, "after it edits count at once again")
 again.SMProxy.InvokeCommand("Prepare")
 check(percent_of(again) == -1, "what is there already isn't prepared")
 
-# Who writes a file wants what is set now, not what the window shows.
+# A file gets the VDI of the current properties and maps, not the one that the window shows.
 again.SMProxy.InvokeCommand("Hold")
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0.5, 0.5, 0]
 written = os.path.join(OUTPUT, "view_defaults.vdi")

@@ -1,4 +1,4 @@
-// Deposits of particles against what can be said of them without the code.
+// Deposits of particles, compared with values that are known without the code under test.
 #include <cmath>
 #include <limits>
 #include <numbers>

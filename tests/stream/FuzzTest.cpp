@@ -153,7 +153,7 @@ FromViewer viewersMessage(Noise& noise) {
   }
 }
 
-/// None: refused. Whatever was understood is understood again, in the same way, when it's written down.
+/// The parsed message; nullopt if it is refused. A parsed message must survive another writing and parsing.
 template <typename Message, typename Parse>
 std::optional<Message> understood(const std::string& text, Parse parse) {
   std::optional<Message> message;

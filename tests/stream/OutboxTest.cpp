@@ -27,7 +27,7 @@ class Line {
  public:
   Line(Outbox& outbox, double bytesPerSecond) : outbox_(outbox), rate_(bytesPerSecond) {}
 
-  /// Everything until then.
+  /// Simulates the line from one time to another.
   void run(Clock::time_point from, Clock::time_point until) {
     for (Clock::time_point now = from; now < until; now += 1ms) {
       while (!arriving_.empty() && arriving_.front().at <= now) {
@@ -44,7 +44,7 @@ class Line {
       }
     }
   }
-  /// That were sent of a level.
+  /// The number of a level's bytes that were sent.
   std::size_t sent(std::uint32_t frame, std::uint32_t level) { return bytes_[{frame, level}]; }
   std::uint64_t mostUnderWay() const { return largest_; }
 
@@ -100,7 +100,7 @@ TEST_CASE("a viewer that acknowledges nothing gets a window, then the newest") {
   CHECK(sent == outbox.window());
   CHECK(outbox.underWay() == sent);
   CHECK(outbox.dropped() == 8);  // but the first, which came, and the newest
-  // Words about what wasn't sent free nothing.
+  // Acknowledgements of bytes that weren't sent free nothing.
   outbox.acknowledge({3, 0, mebibyte}, start + 2s);
   outbox.acknowledge({0, 1, mebibyte}, start + 2s);
   outbox.acknowledge({0, 0, 5}, start + 2s);

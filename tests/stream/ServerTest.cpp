@@ -252,7 +252,7 @@ TEST_CASE("encrypted, for those who trust the certificate") {
   careful.authority = path("other.pem");
   Client deceived(careful);
   CHECK(test::errorOf([&] { deceived.next(patience); }).code() == ErrorCode::Io);
-  // A plain client of an encrypted server finds none.
+  // A client without TLS can't connect to a server with TLS.
   ClientOptions plain = clientOf(server);
   plain.url.isEncrypted = false;
   Client lost(plain);

@@ -50,7 +50,7 @@ class Seat {
       all.push_back(serverMessage(*text));
     }
   }
-  /// The last of that kind, of all that is heard.
+  /// The last message of that type among those not yet heard.
   template <typename Message>
   std::optional<Message> last() {
     std::optional<Message> found;

@@ -99,7 +99,7 @@ class ServeTest(ServedFolder):
         self.assertEqual(server.get("/status")[0].status, 401)
         self.assertEqual(server.get("/status", Authorization="Bearer " + "0" * 64)[0].status, 401)
         self.assertEqual(server.get("/status", Authorization="Bearer " + server.token)[0].status, 200)
-        # One that is given is not shown.
+        # The server never prints a token that the user has given.
         secret = "a.secret-of-the_user~0"
         file = self.folder / "token"
         file.write_text(secret + "\n")

@@ -20,7 +20,7 @@ static void expect(int holds, const char* what) {
   wrong = 1;
 }
 
-/* What can't be declared: the value comes back, and the reason is told. */
+/* If a parameter can't be declared, the call returns the given value, and the error's text has the reason. */
 static void declare_badly(vdi_catalyst* catalyst, int rank) {
   const struct {
     const char* name;

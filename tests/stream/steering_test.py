@@ -26,7 +26,7 @@ def check(holds, what):
 
 
 def lines(path):
-    """Those that are whole."""
+    """The complete lines of a file."""
     text = path.read_text()
     return text[:text.rfind("\n") + 1].splitlines()
 
@@ -41,7 +41,7 @@ def link_of(simulation, link):
 
 
 def listen(viewer, kind, holds=lambda message: True):
-    """The next message of that type of which that holds. Parts of levels are acknowledged, and skipped."""
+    """The next message of type `kind` for which `holds` is true. Acknowledges and skips parts of levels."""
     while True:
         message = viewer.message()
         if isinstance(message, tuple):

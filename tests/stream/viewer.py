@@ -18,7 +18,7 @@ class Closed(Exception):
 
 
 class Refused(Exception):
-    """HTTP, but no WebSocket."""
+    """The server answered with HTTP but opened no WebSocket."""
 
     def __init__(self, status):
         super().__init__(str(status))
@@ -84,7 +84,7 @@ class Viewer:
         self.send(type="hello", version=version, token=token, have=have, **more)
 
     def message(self):
-        """The next one: a dict, or (frame, level, offset, bytes)."""
+        """The next message: a dict, or (frame, level, offset, bytes)."""
         payload, kind = b"", None
         while True:
             first, second = self.read(2)
@@ -112,7 +112,7 @@ class Viewer:
         return (*struct.unpack("<IIQ", payload[:16]), payload[16:])
 
     def text_message(self, kind):
-        """The next one of that type; others, and levels, are skipped."""
+        """The next text message of type `kind`. Skips all other messages."""
         while True:
             message = self.message()
             if isinstance(message, dict) and message["type"] == kind:

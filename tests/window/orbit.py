@@ -28,7 +28,7 @@ def read(name):
 
 
 def compare(window, name, start, end, what="orbited"):
-    """After a drag from start to end. `what`: what it is that's seen, for orbit_compare.py."""
+    """Drags from start to end, then compares the window with the tool's picture. orbit_compare.py gets `what`."""
     if read("camera.json"):
         os.remove(os.path.join(OUTPUT, "camera.json"))
     window.drag(start, end, steps=30, seconds=1.5)
@@ -81,7 +81,7 @@ def comparative():
 
 
 def lost_stills():
-    """A device that is lost by each picture in full: there's an end to it."""
+    """Each full picture loses the device. The window must give up and keep the rough picture."""
     inside("show_and_lose({!r}, {!r})".format(generate("lost.vdi", "--resolution", "480x360"), LOSE_STILLS))
     wait_for("word of the rough picture", lambda: "with few pixels" in inside("what_is_said()")[0], 60)
     time.sleep(1)

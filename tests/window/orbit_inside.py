@@ -56,7 +56,7 @@ def what_angle_is_said():
 
 
 def be_small(size):
-    """From the next call on."""
+    """Hides all sources in the view, and gives it this size from the next call on."""
     shown["view"] = view = simple.GetActiveView()
     for source in simple.GetSources().values():
         simple.Hide(source, view)
@@ -75,7 +75,7 @@ def show_steps(files):
 
 
 def go_to(step):
-    """And renders once."""
+    """Goes to a time step and renders once."""
     shown["view"].ViewTime = shown["reader"].TimestepValues[step]
     shown["view"].SMProxy.StillRender()
 
@@ -197,7 +197,7 @@ def compared():
 
 
 def show_in_two_views():
-    """Of one layout, 90 degrees apart, and each of them that from where the VDI was made."""
+    """Shows the VDI in two views of one layout, 90 degrees apart and each far from the VDI's viewpoint."""
     first, image = shown["view"], shown["vdi"]
     layout = simple.GetLayout(first)
     layout.SplitHorizontal(layout.GetViewLocation(first), 0.5)
@@ -255,7 +255,7 @@ def makings_from(index):
 
 
 def close_second_view():
-    """And delete what is made."""
+    """Closes the second view and deletes the filter."""
     simple.Delete(shown.pop("vdi"))
     second, layout = shown["views"][1], simple.GetLayout(shown["view"])
     cell = layout.GetViewLocation(second)

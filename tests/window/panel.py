@@ -77,7 +77,7 @@ def estimates(window, begin):
 
 
 def regenerate_in_2d(window):
-    """Why that can't be is said until it can; and what is said moves nothing under the mouse."""
+    """In 2-D mode, a line says why Regenerate can't work. It vanishes with that mode, and moves no widget."""
     place = window.find("Auto", "check box").box
     window.click("Change Interaction Mode")
     window.click("Regenerate From This View")
@@ -118,7 +118,7 @@ def auto_and_undo(window):
 
 
 def delete(window, button, what):
-    """While that is being made."""
+    """Presses Delete while a VDI is being made."""
     with Pulse(window) as pulse:
         window.click(button)
         time.sleep(1)

@@ -25,7 +25,7 @@ def path(name):
 
 
 def black_background(window):
-    """As the tool's pictures have it."""
+    """Sets the black background that the tool's pictures have."""
     window.click("Load a color palette")
     window.key(*["Down"] * 6, "Return")  # Black Background: its menu tells nobody of itself
 

@@ -51,7 +51,7 @@ def check(good, what):
 
 
 def ssim(one, other):
-    """Of two PNG files, by the tool."""
+    """The SSIM of two PNG files, which the tool computes."""
     said = subprocess.run([os.environ["VDI_TOOL"], "compare", "--json", one, other], check=True, capture_output=True)
     return json.loads(said.stdout)["ssim"]
 
@@ -83,7 +83,7 @@ class Session:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def accessibility_bus(self):
-        """Starts it where it isn't yet; Qt notices by itself."""
+        """Starts the accessibility bus if necessary, which Qt notices, and connects to it."""
         flags = Gio.DBusConnectionFlags
         session = Gio.DBusConnection.new_for_address_sync(
             self.address, flags.AUTHENTICATION_CLIENT | flags.MESSAGE_BUS_CONNECTION)
@@ -160,7 +160,7 @@ class Widget:
 
     @property
     def text(self):
-        """Of an editor."""
+        """The text of an editor."""
         return self._ask("org.a11y.atspi.Text", "GetText", GLib.Variant("(ii)", (0, -1)))[0]
 
     @property
@@ -390,7 +390,7 @@ class Window:
         self.wait_for_picture(120)
 
     def orbit(self, right, down):
-        """From the middle of the view by so many pixels, and until the picture in full is there."""
+        """Drags from the middle of the view by these pixels, and waits for the full picture."""
         left, top, width, height = self.view()
         middle = (left + width // 2, top + height // 2)
         before = self.pixels()
@@ -399,7 +399,7 @@ class Window:
         self.wait_for_picture(120)
 
     def edit_colors(self):
-        """Opens the editor of the VDI's colour map; the point of the screen where the last one of the opacity is."""
+        """Opens the editor of the VDI's colour map. Returns the screen position of the last opacity point."""
         self.click("Edit Color Map and Opacity")
         button = self.find("Rescale to data range", within=self.find(COLOR_EDITOR, "dialog"))  # it's left of that
         left, top, _, _ = button.box
@@ -410,8 +410,8 @@ class Window:
         return self.text_that_begins("Making the VDI anew", panel) is not None
 
     def save(self, item, name, picture=None, extension=""):
-        """By that item of File; `name`: a path, or without a server of the folder in which ParaView was started. `picture`: the
-        name of a screenshot of the dialog. `extension`: what ParaView is to add to the name."""
+        """Saves by that item of the menu File. Without a server, `name` may be relative to the folder in which ParaView
+        was started. `picture`: the name of a screenshot of the dialog. `extension`: the one that ParaView is to add."""
         self.menu("File", item)
         self.find("Files of type:")
         self.type(name)
@@ -422,14 +422,14 @@ class Window:
         wait_for(path, lambda: os.path.exists(path), 120)
 
     def open_by_double_click(self, name):
-        """Of the folder in which ParaView was started."""
+        """Opens a file in the folder in which ParaView was started."""
         self.menu("File", "Open...")
         self.find("Files of type:")
         self.click(self.find(name), times=2)
         wait_for("end of the dialog", lambda: not self.has("Files of type:"))
 
     def enter(self, label, value):
-        """In the panel's field beside that label."""
+        """Enters a value in the panel's field beside that label."""
         left, top, width, height = self.find(label, "label").box
         self.click((left + 250, top + height // 2), times=3)
         self.type(str(value))
@@ -561,7 +561,7 @@ class Window:
         time.sleep(2)
 
     def choose(self, shown, item):
-        """In the combo box, of a toolbar if there are several, that shows `shown`."""
+        """Chooses an item of the combo box that shows `shown`: of several, that in a toolbar."""
         boxes = [widget for widget in self.widgets() if widget.role == "combo box" and widget.name == shown]
         self.click(boxes[-1])
         time.sleep(0.3)
@@ -569,25 +569,25 @@ class Window:
         self.key("Return")
 
     def select(self, row):
-        """In the pipeline browser; row 0 is the server."""
+        """Selects a row of the pipeline browser. Row 0 is the server."""
         x, y, _, _ = self.find("Pipeline Browser", "frame").box
         self.click((x + 70, y + 32 + 22 * row))
 
     def close_dialog(self, title):
-        """By the button of the window manager's frame."""
+        """Closes the dialog with Alt+F4."""
         for window in xdotool("search", "--onlyvisible", "--name", "^%s$" % title).split():
             xdotool("windowactivate", "--sync", window, "key", "alt+F4")
         time.sleep(0.5)
 
     def close(self, seconds=60):
-        """By the button of its frame. ParaView has to end well."""
+        """Closes the window with Alt+F4. ParaView must end without an error."""
         xdotool("windowactivate", "--sync", self.window, "key", "alt+F4")
         code = self.process.wait(seconds)
         check(code == 0, "ParaView's window is closed: exit code %s" % code)
         check("nullptr" not in self.log_text(), "and Qt has nothing to say against it")
 
     def pixels(self):
-        """Of the middle of the view: bytes of red, green and blue."""
+        """The middle of the view, as bytes of red, green and blue."""
         if self.middle is None:
             left, top, width, height = self.view()
             self.middle = "%dx%d+%d+%d" % (width // 2, height // 2, left + width // 4, top + height // 4)
@@ -595,8 +595,8 @@ class Window:
                               capture_output=True).stdout
 
     def wait_for_picture(self, seconds=60):
-        """Until something is seen in the middle of the view, and the same for more than two seconds in which the window
-        answers: after a drag there is a rough picture first, and the one in full when it's made."""
+        """Waits until the middle of the view shows something that stays the same for more than two seconds in which the
+        window answers. After a drag, a rough picture comes before the full one."""
         seen = []
 
         def rests():
