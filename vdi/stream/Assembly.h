@@ -20,8 +20,8 @@ struct Received {
   std::vector<std::byte> file;  // empty if `vdi` is there instead
   std::optional<ArrivingVdi> vdi;
   std::string
-      missing;  // why there's no file of a frame that was asked for; of `level` there's the frame alone
-  std::string session;  // whose frame it is; Client fills it in
+      missing;  // why there is no file of a frame that was asked for; of `level`, only `frame` is set then
+  std::string session;  // the session that the frame is from; Client sets it
 
   /// The level's VDI; call it once. Throws Error{Format} for a damaged one.
   Vdi decode();
@@ -33,11 +33,11 @@ class Assembly {
  public:
   enum class Gives { Files, Vdis };
   explicit Assembly(Gives gives = Gives::Files) : gives_(gives) {}
-  /// The next level; what is there of the one before is forgotten. Throws Error{Format} while `level` has
+  /// Begins the next level, and drops the one before if it is incomplete. Throws Error{Format} if `level` has
   /// more than `mostBytes`.
   void begin(const Level& level, std::uint64_t mostBytes);
-  /// A binary message; gives the level that it completes. Throws Error{Format} for what isn't the next part
-  /// of the level that was begun.
+  /// Adds a binary message, and returns the level that it completes. Throws Error{Format} unless it is the
+  /// next part of the level that was begun.
   std::optional<Received> add(std::span<const std::byte> message);
   /// Acknowledges what has come of the level under way.
   std::optional<Ack> progress() const;

@@ -26,7 +26,7 @@ namespace asio = boost::asio;
 constexpr std::chrono::milliseconds firstPause{250};
 constexpr std::chrono::milliseconds longestPause{5000};
 constexpr std::chrono::seconds longestEnd{2};
-/// A server that keeps to acknowledgements stays below these.
+/// Limits that a server doesn't reach if it waits for acknowledgements.
 constexpr std::uint64_t mostAhead = std::uint64_t{32} << 20;  // bytes, beside a whole level
 constexpr std::size_t mostWaiting = 65536;
 constexpr std::size_t longestSeries = std::size_t{1} << 20;
@@ -53,7 +53,7 @@ class Client::Impl {
       work_.reset();
       end_.expires_after(longestEnd);
       end_.async_wait([this](boost::system::error_code error) {
-        if (!error) context_.stop();  // nothing may hold up whoever ends the client
+        if (!error) context_.stop();  // the destructor must not wait any longer
       });
       line_->close();
     });
@@ -185,7 +185,7 @@ class Client::Impl {
     if (line_ && isWelcome_) line_->send(textOf(message));
   }
 
-  /// What a server sends that makes no sense ends this client.
+  /// Runs `work` on what the server sent. An error in it makes this client fail.
   template <typename Work>
   void guarded(Work work) {
     try {
@@ -260,7 +260,7 @@ class Client::Impl {
     }
   }
 
-  /// For next(), within bounds.
+  /// Keeps a level for next(), within bounds.
   void keep(Received received) {
     const std::uint64_t bytes = received.level.bytes;
     change([&] {
@@ -299,7 +299,7 @@ class Client::Impl {
     wait_ = std::min(2 * wait_, longestPause);
   }
 
-  /// There is no use in trying again.
+  /// Makes the client fail for good: trying again would be of no use.
   void fail(ErrorCode code, const std::string& what) {
     if (std::exchange(hasFailed_, true)) return;
     change([&] { failure_.emplace(code, what); });

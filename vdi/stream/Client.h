@@ -30,8 +30,8 @@ struct ClientOptions {
   std::function<void(const std::string& line)> log;
 };
 
-/// Connects on a thread of its own, and again whenever a connection is lost, after pauses of up to 5 s. What
-/// next() hasn't given out isn't acknowledged, so that a slow caller gets fewer frames rather than old ones.
+/// Connects on a thread of its own, and again whenever a connection is lost, after pauses of up to 5 s. A
+/// level counts as received once next() returns it, so a slow caller gets fewer frames rather than old ones.
 class Client {
  public:
   /// Throws Error{Io} for an authority that can't be read. Whether the server can be reached shows later.
@@ -41,9 +41,9 @@ class Client {
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
-  /// The next whole level; none after `timeout`. Throws Error, now and in each later call, once there is no
-  /// use in trying again: InvalidArgument for a wrong token, Format for a server of another version or what
-  /// isn't one, Io for a certificate that isn't trusted.
+  /// Returns the next whole level, or nullopt after `timeout`. Throws Error, now and in each later call, once
+  /// trying again is of no use: InvalidArgument for a wrong token, Format for a server of another version or
+  /// a peer that is no such server, Io for a certificate that isn't trusted.
   std::optional<Received> next(std::chrono::milliseconds timeout);
 
   struct Standing {

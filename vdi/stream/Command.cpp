@@ -27,7 +27,7 @@ constexpr std::chrono::milliseconds pause{5};
   throw Error(ErrorCode::Io, std::string("can't start a command: ") + std::strerror(error));
 }
 
-/// What a child gets: the socket as standard input and output, and signals as a shell expects them.
+/// The set-up of a child: the socket as its standard input and output, and signals as a shell expects them.
 class Setup {
  public:
   explicit Setup(int socket) {

@@ -13,7 +13,7 @@
 
 namespace vdi::stream {
 
-/// What connections need of their server. It outlives them. `leave` is called once for each of them.
+/// The parts of a server that its connections use, and that outlive them. Each connection calls `leave` once.
 struct Surroundings {
   Hub& hub;
   const Site& site;

@@ -42,13 +42,13 @@ inline constexpr std::uint64_t smallBytes = std::uint64_t{1} << 20;
 /// The coarse levels of a VDI of so many bytes in memory, the coarsest first.
 std::vector<int> coarseFactorsOf(std::uint64_t bytes);
 
-/// Encodes a VDI, on all cores. `take` gets the frame when its coarse levels are there, and again with all of
-/// them if it returned true, from the calling thread. Throws Error{Format} for a VDI that io::decode would
+/// Encodes a VDI, on all cores. Calls `take` on this thread: with the coarse levels, if there are any, and
+/// with all levels unless that call returned false. Throws Error{Format} for a VDI that io::decode would
 /// refuse, and what `take` throws.
 void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
                  const std::function<bool(FramePtr)>& take);
-/// The same of a VDI's file, whose bytes become the last level as they are. All of the file is checked before
-/// `take` gets anything, but never expanded as a whole, and `take` gets all levels. Throws as io::decode.
+/// Makes a frame of a VDI's file, whose bytes become the last level as they are. Checks all of the file
+/// first, then calls `take` once, with all levels. Throws as io::decode.
 void passFrame(std::vector<std::byte> file, std::uint32_t id, Clock::time_point made,
                const std::function<void(FramePtr)>& take);
 

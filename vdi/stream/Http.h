@@ -1,4 +1,4 @@
-// What the server answers to plain HTTP, and whom it lets through to the stream. No sockets.
+// Answers plain HTTP requests, and decides which requests may open the stream. No sockets.
 #pragma once
 
 #include <boost/beast/http/empty_body.hpp>

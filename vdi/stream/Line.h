@@ -16,7 +16,7 @@
 
 namespace vdi::stream {
 
-/// Calls, all on the thread of its io_context. After `ended` none comes.
+/// The calls that a line makes, all on the thread of its io_context, and none after `ended`.
 struct LineEvents {
   std::function<void()> opened;
   std::function<void(std::string_view text)> text;
@@ -30,7 +30,7 @@ class Line {
  public:
   virtual ~Line() = default;
   virtual void start() = 0;
-  /// What the server asks for: the link's, or the one that a command's other end has given.
+  /// The token to show to the server: the link's, or the one in a command's greeting.
   virtual std::string token() const = 0;
   virtual void send(std::string text) = 0;
   virtual void close() = 0;  // politely, within a second

@@ -18,12 +18,12 @@ constexpr double burstSeconds = 0.05;
 constexpr double newPeriodShare = 0.3;
 /// Without a frame for so many periods, no newer one is expected.
 constexpr double silentPeriods = 2.0;
-/// A frame may take so many seconds to its first picture, in the finest of its coarse levels. Each coarser
-/// one loses more of the picture, and is worth a longer wait by that factor.
+/// The seconds that a frame's first picture may take in the finest of its coarse levels. A coarser level may
+/// take patienceGrowth times as long, because an even coarser one would lose still more of the picture.
 constexpr double patience = 0.2;
 constexpr double patienceGrowth = 2.5;
-/// A finer level than the last frame's must take a smaller share of its time: otherwise frames would become
-/// sharp and coarse by turns.
+/// A level finer than the last frame's first one must take at most this share of those seconds. Otherwise
+/// frames would be sharp and coarse by turns.
 constexpr double finerShare = 0.8;
 
 double secondsBetween(Clock::time_point from, Clock::time_point to) {

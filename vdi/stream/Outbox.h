@@ -1,5 +1,5 @@
-// What one viewer gets next. Newer frames take the place of older ones, and a viewer's acknowledgements say
-// how much may be under way to it and with which level a frame begins. Knows time and bytes, but no network.
+// Decides what one viewer gets next. Newer frames take the place of older ones. A viewer's acknowledgements
+// decide how much may be under way to it, and with which level a frame begins. No network.
 #pragma once
 
 #include <cstdint>
@@ -38,9 +38,9 @@ class Outbox {
     std::optional<Part> part;                // to be sent now
     std::optional<Clock::time_point> retry;  // without a part: when to ask again, if nothing happens before
   };
-  /// Its part counts as sent.
+  /// Decides what to send now. The returned part counts as sent.
   Next next(Clock::time_point now);
-  /// What wasn't sent, or was acknowledged before, changes nothing.
+  /// Notes an acknowledgement. One of what wasn't sent, or was acknowledged before, changes nothing.
   void acknowledge(const Ack& ack, Clock::time_point now);
 
   /// Frames of which the viewer got nothing.
@@ -54,7 +54,7 @@ class Outbox {
 
   /// Levels that are still to be sent, or may be. Those that have been sent, or won't be, aren't kept.
   std::vector<std::shared_ptr<const EncodedLevel>> held() const;
-  /// When the viewer last took something, or was given the first that it has to take.
+  /// When the viewer last acknowledged something, or got an offer while nothing was held for it.
   Clock::time_point movedAt() const { return movedAt_; }
   /// Keeps nothing any more, and gives nothing out.
   void close();
@@ -70,7 +70,7 @@ class Outbox {
   };
   bool isUnderWay() const;
   bool isFirstUnderWay() const { return isUnderWay() && nextLevel_ == firstLevel_ + 1; }
-  /// Turns to the level to begin now; nothing: there is none, or not before the time in `retry`.
+  /// Turns to the level to begin now. Returns false if there is none, or none before the time in `retry`.
   bool begin(Clock::time_point now, std::optional<Clock::time_point>& retry);
   /// The level with which the frame begins for this viewer.
   std::uint32_t firstLevelFor(const Frame& frame) const;

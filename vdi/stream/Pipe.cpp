@@ -38,7 +38,7 @@ class Descriptor {
   int number_;
 };
 
-/// 0 or less: there's no more.
+/// Returns the number of bytes read; 0 or less at the end.
 ssize_t readSome(int from, std::vector<char>& buffer) {
   for (;;) {
     const ssize_t count = ::read(from, buffer.data(), buffer.size());
@@ -57,7 +57,7 @@ bool writeAll(int to, const char* bytes, std::size_t count) {
   return true;
 }
 
-/// Until there's no more, or `stop` has something to read.
+/// Copies bytes until the input ends, the output fails, or `stop` has something to read.
 void carry(int from, int to, int stop) {
   std::vector<char> buffer(bufferBytes);
   for (;;) {

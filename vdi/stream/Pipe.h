@@ -10,13 +10,13 @@
 
 namespace vdi::stream {
 
-/// The line that comes first, before the HTTP of docs/live.md. Without its end.
+/// The line that precedes the HTTP of docs/live.md, without a line end.
 std::string greeting(const std::string& token);
-/// The token in such a line; none: it's another one, of a shell that says something when it starts.
+/// The token in such a line; nullopt for another line, such as one that a shell writes when it starts.
 std::optional<std::string> tokenInGreeting(std::string_view line);
 
-/// Greets, and carries one connection of the server, whose token this is, until either side closes it. The
-/// descriptors stay the caller's. The process ignores SIGPIPE. Throws Error{Io} without a socket.
+/// Writes the greeting with the server's token, then carries one connection of the server until either side
+/// closes it. The descriptors stay the caller's. The process must ignore SIGPIPE. Throws Error{Io}.
 void serveOver(Server& server, const std::string& token, int input, int output);
 
 }  // namespace vdi::stream

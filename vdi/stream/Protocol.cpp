@@ -212,7 +212,7 @@ std::string dumped(const Message& message) {
 Hello helloIn(const Fields& fields) {
   Hello hello;
   hello.version = static_cast<int>(fields.count<std::uint16_t>("version"));
-  // One of another version may have other fields: its version is all that counts.
+  // A message of another version may have other fields, so only the version is read.
   if (hello.version != protocolVersion) return hello;
   hello.token = fields.text("token");
   if (fields.has("session")) hello.session = fields.text("session");

@@ -72,11 +72,11 @@ struct Resume {
 struct Drive {
   bool operator==(const Drive&) const = default;
 };
-/// Gives it back.
+/// Gives control back.
 struct Release {
   bool operator==(const Release&) const = default;
 };
-/// From the viewer that drives.
+/// A wish of the viewer that drives.
 struct Steer {
   Wish wish;
   bool operator==(const Steer&) const = default;
@@ -132,14 +132,14 @@ struct Missing {
   std::string cause;
   bool operator==(const Missing&) const = default;
 };
-/// How things stand with steering, where it is allowed: at the beginning and after each change.
+/// The state of steering. It is sent where steering is allowed, at the beginning and after each change.
 struct Steering {
   std::uint32_t you = 0;                // the viewer's number
   std::optional<std::uint32_t> driver;  // that of the viewer that drives
   Controls controls;
   bool operator==(const Steering&) const = default;
 };
-/// What this viewer asked for isn't done.
+/// Tells a viewer that its request is denied.
 struct Denied {
   std::string cause;
   bool operator==(const Denied&) const = default;
@@ -158,9 +158,9 @@ using FromServer =
 
 std::string textOf(const FromViewer& message);
 std::string textOf(const FromServer& message);
-/// Throw Error{Format}: not one JSON object with the fields that its type needs, of their kinds and within
-/// their bounds; nested more deeply than any message is; from a viewer, of an unknown type. Fields that no
-/// message has are skipped.
+/// Parse a message, and skip unknown fields. Throw Error{Format} unless the text is one JSON object with the
+/// fields that its type needs, of the right kinds and within their bounds, and nested no more deeply than
+/// messages are. A viewer's message must also be of a known type.
 FromViewer viewerMessage(std::string_view text);
 FromServer serverMessage(std::string_view text);
 
@@ -171,9 +171,9 @@ struct Chunk {
   std::uint64_t offset = 0;
   std::span<const std::byte> bytes;
 };
-/// What stands in front of its bytes.
+/// The head, which precedes the chunk's bytes.
 std::array<std::byte, chunkHeadBytes> chunkHead(const Chunk& chunk);
-/// Throws Error{Format} for fewer bytes than a head has, no bytes behind it, or more than chunkBytes.
+/// The chunk in a message. Throws Error{Format} unless 1 to chunkBytes bytes follow a whole head.
 Chunk chunkIn(std::span<const std::byte> message);
 
 }  // namespace vdi::stream

@@ -25,8 +25,8 @@ class Publisher {
   Publisher(const Publisher&) = delete;
   Publisher& operator=(const Publisher&) = delete;
 
-  /// Never waits. A VDI whose encoding hasn't begun when the next one comes is dropped, and so are the levels
-  /// that haven't been begun of one whose encoding has: the next one's coarse level comes first.
+  /// Never waits. If the encoding of the last VDI hasn't begun, that VDI is dropped. If it has, the levels
+  /// that haven't been begun are dropped: the coarse levels of the new VDI come first.
   void publish(std::shared_ptr<const Vdi> vdi);
   std::uint64_t dropped() const;
   /// The first VDI that couldn't be encoded, and why; empty: none. Later ones are encoded all the same.

@@ -5,7 +5,7 @@
 
 namespace vdi::stream {
 
-/// Its owner alone can read it, and it is there while this lives.
+/// A file that only its owner can read. It exists as long as this object.
 class SecretFile {
  public:
   /// Replaces a file of that name. Throws Error{Io} with the path as context if it can't be written.

@@ -34,7 +34,7 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 
-constexpr std::chrono::seconds goodbyePatience{1};  // and once more when they are cut off
+constexpr std::chrono::seconds goodbyePatience{1};  // for goodbyes, and again after connections are cut
 constexpr std::chrono::milliseconds acceptPause{100};
 
 std::string addressText(const std::string& host, std::uint16_t port) {
@@ -42,7 +42,7 @@ std::string addressText(const std::string& host, std::uint16_t port) {
   return isV6 ? fmt::format("[{}]:{}", host, port) : fmt::format("{}:{}", host, port);
 }
 
-/// What stands in a link for an address that means all of the machine's.
+/// The host's name in links. If the address stands for all of the machine's, that is the machine's name.
 std::string nameInLinks(const std::string& host) {
   if (host != "0.0.0.0" && host != "::") return host;
   constexpr std::size_t longest = 256;
@@ -110,7 +110,7 @@ class Server::Impl {
   }
   Hub& hub() { return hub_; }
 
-  /// What `question` gives there.
+  /// Calls `question` on the server's thread and returns its answer.
   template <typename Answer>
   Answer ask(const std::function<Answer()>& question) {
     std::promise<Answer> promise;
@@ -128,7 +128,7 @@ class Server::Impl {
     boost::system::error_code error;
     socket.assign(asio::generic::stream_protocol(AF_UNIX, 0), descriptor, error);
     if (error) throw Error(ErrorCode::Io, "can't serve the descriptor: " + error.message());
-    // A socket can be moved into the handler only if that need not be copied, which post doesn't ask for.
+    // Shared, so that the handler can be copied although a socket can't be.
     onThread(
         [this, held = std::make_shared<Plain::socket_type>(std::move(socket))] { serve(std::move(*held)); });
   }
@@ -193,8 +193,8 @@ class Server::Impl {
     made->start();
   }
 
-  /// The oldest connection that hasn't shown the token gives way: those who open many and say little, or
-  /// nothing, keep nobody out. Returns whether there was one.
+  /// Cuts the oldest connection that hasn't shown the token, so that peers that open many connections and say
+  /// little or nothing keep nobody out. Returns whether there was one.
   bool makeRoom() {
     for (auto at = connections_.begin(); at != connections_.end(); ++at) {
       const std::shared_ptr<Connection> oldest = at->second.lock();
@@ -211,7 +211,7 @@ class Server::Impl {
     if (isEnding_ && connections_.empty()) stop();
   }
 
-  /// Each connection is told. Those that still are there after a while are cut off.
+  /// Tells each connection that the server ends. Cuts those that still exist after goodbyePatience.
   void finish() {
     isEnding_ = true;
     boost::system::error_code ignored;
@@ -230,7 +230,7 @@ class Server::Impl {
       if (connections_.empty()) return;
       patience_.expires_after(goodbyePatience);
       patience_.async_wait([this](boost::system::error_code error) {
-        if (!error) context_.stop();  // nothing may hold up whoever ends the server
+        if (!error) context_.stop();  // the destructor must not wait any longer
       });
     });
   }
@@ -267,7 +267,7 @@ class Server::Impl {
   std::uint64_t nextNumber_ = 0;
   bool isEnding_ = false;
   std::uint16_t port_ = 0;
-  asio::io_context context_{1};  // its handlers hold connections: it goes before what these use
+  asio::io_context context_{1};  // must end before the members above, which its handlers' connections use
   tcp::acceptor acceptor_;
   asio::steady_timer pause_;
   asio::steady_timer patience_;

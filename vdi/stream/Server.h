@@ -28,11 +28,11 @@ struct ServerOptions {
   std::uint32_t mostConnections = 256;  // of any kind, viewers included
   std::filesystem::path certificate;    // PEM, a chain; empty: no TLS
   std::filesystem::path key;            // PEM
-  /// A viewer wants that frame of the series; answered by Server::provide or miss. Called on the network's
-  /// thread: it must return at once.
+  /// Called when a viewer wants that frame of the series. Answer with Server::provide or miss. Runs on the
+  /// network's thread, so it must return at once.
   std::function<void(std::uint32_t index)> show;
-  /// The viewer that drives wishes that; empty: nobody steers. Wishes have been held against the controls
-  /// that were set last. Called on the network's thread: it must return at once.
+  /// Called with a wish of the viewer that drives; empty: nobody can steer. Wishes have been checked against
+  /// the controls that were set last. Runs on the network's thread, so it must return at once.
   std::function<void(std::uint32_t viewer, const Wish& wish)> steer;
   /// Gets lines for the operator, without secrets, on the network's thread.
   std::function<void(const std::string& line)> log;
@@ -45,8 +45,8 @@ struct ServerStatus {
   std::uint64_t frames = 0;  // published
 };
 
-/// One thread does all that has to do with the network. Functions may be called from any thread, and none of
-/// them waits for a viewer. A frame of which no viewer has need is not kept, but for the newest.
+/// One thread does all work on the network. Any thread may call the functions, and none of them waits for a
+/// viewer. The server keeps only the newest frame and those that some viewer still needs.
 class Server {
  public:
   /// Listens when it returns. Throws Error: Io for an address that can't be had, or a certificate or key that
@@ -62,18 +62,18 @@ class Server {
   std::string address() const;
   std::string link() const;
 
-  /// The newest frame, or more levels of it.
+  /// Publishes the newest frame, or more levels of it.
   void publish(FramePtr frame);
-  /// A frame of the series that a viewer asked for.
+  /// Answers with a frame of the series that a viewer asked for.
   void provide(FramePtr frame);
-  /// There's no such frame, and why.
+  /// Answers that there is no such frame, and why.
   void miss(Missing missing);
   /// Whether a viewer still wants that frame of the series.
   bool isWanted(std::uint32_t index) const;
-  /// The series has these entries behind those that it had.
+  /// Appends entries to the series.
   void append(Series entries);
   void setPhase(Phase phase);
-  /// What can be steered, and what is in force: viewers are told of changes.
+  /// Sets what can be steered, and what is in force. Viewers are told of changes.
   void setControls(Controls controls);
   /// Serves a connected stream socket, which it owns from now on.
   void adopt(int descriptor);

@@ -36,7 +36,7 @@ struct Parameter {
   bool operator==(const Parameter&) const = default;
 };
 
-/// What makes the VDIs that are sent.
+/// The controls of the generator that makes the VDIs.
 struct GeneratorControls {
   std::array<int, 2> resolution{};             // as set: 0 is a view's, or the default
   int supersegments = 0;                       // N_S
@@ -69,7 +69,7 @@ struct Wish {
   bool operator==(const Wish&) const = default;
 };
 
-/// Why the wish can't be granted where these are the controls; empty: it can.
+/// The reason why the wish can't be granted under these controls; empty if it can.
 std::string objectionTo(const Wish& wish, const Controls& controls);
 /// Adds a later wish, which wins.
 void merge(Wish& wish, const Wish& later);
@@ -81,11 +81,11 @@ struct SteeringRequest {
 
 /// A wish as text and back, for other ranks. These three are in SteeringJson.cpp.
 std::string textOf(const Wish& wish);
-/// Throws Error{Format} for what textOf hasn't made.
+/// Reads a text that textOf has made. Throws Error{Format} for other texts.
 Wish wishOf(std::string_view text);
 /// One object of JSON on one line, as the log has it: {"step":…,"time":…,"viewer":…,"steer":{…}}.
 std::string logEntryOf(const SteeringRequest& request, std::int64_t step, double time);
-/// The wish in words for people, such as "feed = 0.04, a new viewpoint".
+/// The wish in words for people, such as "feed = 0.04, viewpoint (1, 2, 3)".
 std::string summaryOf(const Wish& wish);
 
 /// Carries wishes from the network's thread to the simulation's. Holds one request, however many come.
@@ -93,7 +93,7 @@ class Wishes {
  public:
   /// Never waits.
   void put(std::uint32_t viewer, const Wish& wish);
-  /// Waits so long at most; none: nothing was asked for.
+  /// Waits `patience` at most for a request; nullopt if none came.
   std::optional<SteeringRequest> take(std::chrono::milliseconds patience);
 
  private:

@@ -23,11 +23,11 @@ namespace vdi::stream {
 
 namespace limits {
 
-// A connection that hasn't said what it wants by then is cut off.
+// Times after which a connection is cut off: for its request, for taking the reply, and for a viewer's hello.
 inline constexpr std::chrono::seconds request{10};
 inline constexpr std::chrono::seconds reply{30};
 inline constexpr std::chrono::seconds hello{5};
-// A viewer that says nothing for that long is asked, and cut off if it doesn't answer.
+// A viewer that says nothing for this time gets a ping, and is cut off if it doesn't answer.
 inline constexpr std::chrono::seconds silence{60};
 inline constexpr std::uint32_t headBytes = 8192;
 
@@ -161,13 +161,13 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
       }
       self->buffer_.consume(data.size());
       self->pump();
-      // Closing reads what's left by itself. A second reader beside it may never come to an end.
+      // async_close reads what is left by itself. Another read beside it might never end.
       const bool isClosing = self->isWriting_ && std::holds_alternative<Viewer::Farewell>(self->outgoing_);
       if (!isClosing) self->listen();
     });
   }
 
-  /// The viewer is gone. What's still under way on the socket ends with an error, and then this goes.
+  /// Call when the viewer is gone. Operations under way end with an error and then release this object.
   void end() {
     if (std::exchange(hasEnded_, true)) return;
     cut();

@@ -96,7 +96,7 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
     readGreeting();
   }
 
-  /// What a shell says when it starts comes before.
+  /// Reads up to the greeting, and skips what a shell writes when it starts.
   void readGreeting() {
     boost::asio::async_read_until(
         transport(), boost::asio::dynamic_buffer(line_, mostGreetingBytes), '\n',
@@ -123,7 +123,7 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
 
   Plain& transport() { return boost::beast::get_lowest_layer(socket_); }
 
-  /// To the next of the host's addresses. `last`: why it's not the one before.
+  /// Connects to the host's next address. `last` is the reason why the one before failed.
   void connect(Error last) {
     if (hasEnded_) return;
     if (endpoints_.empty()) return fail("can't connect to " + url_.authority(), last);
@@ -197,7 +197,7 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
       } else {
         self->events_.binary({bytes, data.size()});
       }
-      // Closing reads what's left by itself. A second reader beside it may never come to an end.
+      // async_close reads what is left by itself. Another read beside it might never end.
       if (self->hasEnded_ || self->isClosing_) return;
       self->buffer_.consume(data.size());
       self->read();

@@ -64,7 +64,7 @@ std::uint64_t Hub::heldBytes() const {
   return bytes;
 }
 
-/// A viewer that takes its frames lets go of them. The one that hasn't for longest goes first.
+/// Disconnects viewers until the frames held for them fit, first the one that has taken nothing for longest.
 void Hub::limitHeld(Clock::time_point now) {
   while (heldBytes() > options_.mostHeldBytes) {
     Viewer* oldest = nullptr;

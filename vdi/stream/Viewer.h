@@ -30,9 +30,9 @@ class Hub {
     std::uint32_t mostViewers = 0;
     /// Bytes of frames that may be kept for viewers alone, the newest frame apart.
     std::uint64_t mostHeldBytes = std::uint64_t{1} << 30;
-    /// A viewer wants that frame of the series: to be answered by provide or miss.
+    /// Called when a viewer wants that frame of the series. Answer with provide or miss.
     std::function<void(std::uint32_t index)> show;
-    /// The viewer that drives wishes that; empty: nobody steers.
+    /// Called with a wish of the viewer that drives; empty: nobody can steer.
     std::function<void(std::uint32_t viewer, const Wish& wish)> steer;
     /// Gets lines for the operator; may be empty.
     std::function<void(const std::string& line)> log;
@@ -40,18 +40,18 @@ class Hub {
   /// A random session. Throws Error{Io} as randomToken.
   explicit Hub(Options options);
 
-  /// The newest frame, or more levels of it: for all viewers that don't look at an older one. Who waited has
-  /// waited long enough: the phase is Live then.
+  /// Offers the newest frame, or more levels of it, to all viewers that don't look at an older one. Ends the
+  /// phase Waiting: it becomes Live.
   void publish(FramePtr frame, Clock::time_point now);
-  /// A frame of the series, for those that asked for it.
+  /// Offers a frame of the series to the viewers that asked for it.
   void provide(const FramePtr& frame, Clock::time_point now);
-  /// There's no such frame, and why.
+  /// Tells the viewers that asked for a frame why there is none.
   void miss(const Missing& missing);
   /// Whether a viewer still waits for that frame of the series, or looks at it.
   bool isWanted(std::uint32_t index) const;
   void append(const Series& entries);
   void setPhase(Phase phase);
-  /// What can be steered, and what is in force.
+  /// Sets what can be steered, and what is in force.
   void setControls(Controls controls);
 
   const std::string& session() const { return session_; }
@@ -68,7 +68,7 @@ class Hub {
   friend class Viewer;
   void wakeAll();
   bool canSteer() const { return static_cast<bool>(options_.steer); }
-  /// Nobody drives any more; what waits for this driver goes on.
+  /// Ends the driver's control. If the driver has paused the simulation, lets it go on.
   void endDrive();
   std::set<std::shared_ptr<const EncodedLevel>> heldFor(const Viewer& viewer) const;
   void limitHeld(Clock::time_point now);
@@ -83,7 +83,7 @@ class Hub {
   std::set<Viewer*> viewers_;  // that said hello and were let in
   std::uint32_t lastNumber_ = 0;
   std::optional<std::uint32_t> driver_;
-  bool driverPaused_ = false;  // asked for a pause last
+  bool driverPaused_ = false;  // the driver's last wish on this was a pause
   Controls controls_;
   std::uint64_t steeringVersion_ = 0;  // counts changes of the driver and of the controls
 };
@@ -96,12 +96,12 @@ class Viewer {
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
 
-  /// A text message from it.
+  /// Handles a text message from the viewer.
   void receive(std::string_view text, Clock::time_point now);
-  /// It goes once the cause has been told.
+  /// Disconnects the viewer once it has been told the cause.
   void refuse(Close code, std::string cause);
   bool isWelcome() const { return isWelcome_; }
-  /// It's gone: the hub forgets it.
+  /// Call when the viewer is gone; the hub forgets it.
   void leave();
   /// Whether it has to go at once, even in the middle of a message.
   bool isStalled() const { return farewell_ && farewell_->code == Close::Stalled; }
