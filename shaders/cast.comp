@@ -10,8 +10,8 @@
 
 // One-dimensional, so that the invocations that share a ray are adjacent in one subgroup.
 layout(local_size_x = castGroupX * castGroupY) in;
-// The program's purpose. The build makes a module of each, and for CPU devices one without the code of the
-// others.
+// The program's purpose. The build makes a module of each program, and for CPU devices another one without
+// the code of the other programs.
 const uint castProgram = PROGRAM;
 layout(constant_id = 1) const uint pageCount = 1;
 // Adjacent invocations that share a ray while pre-segments are counted, because with few rays a GPU waits for

@@ -23,9 +23,9 @@ struct CountedPreSegments {
   uint preSegments[toleranceLevels];
 };
 
-// A global, whereas functions receive all other state as arguments: `inout` copies an argument for
-// each call, and these arrays stay in memory until a compiler has unrolled the loops over levels. A
-// compiler that removes copies first would leave one of 48 words in each sample.
+// A global, unlike all other state, which functions receive as arguments. `inout` copies an argument at
+// each call, and these arrays stay in memory until the compiler has unrolled the loops over levels. A
+// compiler that removes copies before it unrolls would keep a copy of 48 words in each sample.
 CountedPreSegments counted;
 
 // The rest of a counter's state.
@@ -95,7 +95,7 @@ float toleranceOfLevel(uint level) {
 // Number of pre-segments at a tolerance; `otherwise` if there is no such tolerance.
 uint preSegmentsAt(uint tolerance, uint otherwise) {
   uint lane = min(tolerance, uint(toleranceLevels) - 1u) * lanesPerRay / uint(toleranceLevels);
-  uint from = gl_SubgroupInvocationID - rayLane + lane;  // the lane that counts for it
+  uint from = gl_SubgroupInvocationID - rayLane + lane;  // the lane that counts at this tolerance
   uint result = otherwise;
   [[unroll]] for (int i = 0; i < countedLevels; ++i) {
     uint own = counted.preSegments[i];

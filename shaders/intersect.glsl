@@ -38,7 +38,7 @@ struct Leaning {
 
 // Depths of a supersegment's two faces, front and back, in the order in which the ray meets them.
 vec2 inMetOrder(vec2 depths) { return rayAscends ? depths : -depths.yx; }
-// In the list's middle.
+// The two depths in the list's middle, in that order.
 vec2 metDepths(Leaning of) { return inMetOrder(segmentDepths(of.segment)); }
 
 // Depths of its faces at an offset from the list's centre. A face of the box ends the ray itself.
@@ -154,8 +154,8 @@ Cursor cursorAt(int place, uint slot, int last, int step) {
   return at;
 }
 
-// `list` must have at least one supersegment. `hint` is the index where the last intersection with a
-// neighbouring list ended, in the order in which the ray meets them, because neighbouring lists are similar.
+// `list` must have at least one supersegment. The search starts at `hint`, the Cursor::place at which the
+// last intersection with a neighbouring list ended, because neighbouring lists are similar.
 Intersection intersectList(uint list, Part part, inout int hint) {
   ListHead head = params.heads.at[list];
   int last = useList(head);
@@ -168,7 +168,7 @@ Intersection intersectList(uint list, Part part, inout int hint) {
     int back = segmentsAtOnce == 1 ? 1 : min(at.place, segmentsAtOnce);
     at = cursorAt(at.place - back, at.slot - uint(back * step), last, step);
   }
-  // Not in the loop below, where each step takes longer.
+  // Skips supersegments in front of the part here, because each step of the loop below takes longer.
   while (at.place + segmentsAtOnce <= last && metDepths(at.segments[segmentsAtOnce - 1]).y <= low) {
     at = cursorAt(at.place + segmentsAtOnce, at.slot + uint(segmentsAtOnce * step), last, step);
   }

@@ -36,7 +36,7 @@ PreSegment readPreSegment() {
 
 float costOf(PreSegment a, PreSegment b) { return costOf(a.stored, a.appearance, b.stored, b.appearance); }
 
-// Over the possible mergers.
+// Sum and number of the costs of the possible mergers.
 float costSum;
 float costsFinite;
 

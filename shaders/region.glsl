@@ -19,7 +19,7 @@ vec2 clipped(vec2 part) {
   return part;
 }
 
-// Those of samples [x, y) whose middle lies in the part.
+// The samples of [x, y) whose middle lies in the part.
 uvec2 clippedSamples(uvec2 samples, vec2 part) {
   vec2 places = clamp(ceil(part / params.step - 0.5), vec2(0.0), vec2(params.sampleCount));
   uvec2 inside = uvec2(max(samples.x, uint(places.x)), min(samples.y, uint(places.y)));

@@ -1,6 +1,6 @@
 // Traverses a ray from column to column of V_O's picture. Reconstruction::Smooth and Sheared blend the two
-// lists of each that are beside the ray; Reconstruction::Constant uses the one or two that the ray crosses. Twin of
-// traverseSmoothly and traverseLists in vdi/reference/Render.cpp.
+// lists of each that are beside the ray; Reconstruction::Constant uses the one or two that the ray crosses.
+// Twin of traverseSmoothly and traverseLists in vdi/reference/Render.cpp.
 //
 // Needs: masks.glsl, tile_mask.glsl, line.glsl, intersect.glsl; params, smoothReconstruction, lanesPerRay,
 // rayLane, accumulate.
@@ -83,7 +83,8 @@ Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
   return here;
 }
 
-// Reading several takes about as long as one. Half a tile: each of a ray's invocations takes a part of it.
+// Columns read at a time, which takes about as long as reading one. Half a tile, because each of a ray's two
+// invocations takes a part of the tile.
 const int columnsAtOnce = 4;
 // Bits in the result of listsToIntersect: a column's first and second list.
 const uint firstListBit = 1u;
@@ -122,7 +123,7 @@ uint listsToIntersect(PictureLine line, int tile) {
   return lanesPerRay == 1u ? listBits : listBits | subgroupShuffleXor(listBits, 1u);
 }
 
-// At the edges of a tile; between them, it is nearly linear.
+// The line's shortening at the two edges of a tile; between them, it is nearly linear.
 vec2 shorteningsAt(PictureLine line, int tile) {
   vec2 edges = vec2(tile, tile + 1) * float(renderTile);
   vec2 rows = line.row + line.rows * (edges - line.start) * line.direction;

@@ -36,7 +36,7 @@ VDI_CONST int renderNoSlope = -128;     // while slopes are looked for
 VDI_CONST int renderOnFace = -128;      // in both slopes of a front or a back: it lies on a face of the box
 VDI_CONST uint renderFaces = 6;         // of a box
 VDI_CONST float renderMostDepth = 6.0F;      // optical depth of a supersegment, behind which hardly anything shows
-// Values that are equal but for rounding decide the same everywhere.
+// Margin of comparisons, so that values that are equal but for rounding give the same decision everywhere.
 VDI_CONST float renderTie = 1.0F / 64.0F;
 VDI_CONST float renderLeastOpacity = 0.05F;  // over a footprint
 VDI_CONST int renderTileShift = 3;

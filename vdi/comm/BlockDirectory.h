@@ -32,8 +32,8 @@ struct BlockEntry {
   bool masks;          // some stored values have no meaning
 
   double valueVolume() const { return spacing.x * spacing.y * spacing.z; }
-  /// The part of a box that the block's values there stand for, in their places. Boxes of blocks that meet at
-  /// a face meet there, too, if the blocks have the same offset and spacing.
+  /// The box shifted by the block's offset, to the places of the values in it. If two boxes meet at a face,
+  /// so do the shifted ones, provided that their blocks have the same offset and spacing.
   Box ofValues(const Box& box) const { return {box.lo + offset * spacing, box.hi + offset * spacing}; }
   /// The volume that the stored values stand for, ghost layers included.
   Box storedBox() const {
@@ -107,8 +107,8 @@ struct OwnParts {
 
 /// Collective. Gives the finest block everything that blocks of different levels share. Element [i] has the
 /// parts that are left of entry firstMine() + i. If two blocks of one level overlap by more than
-/// latticeTolerance on every axis, throws Error{InvalidArgument} on all ranks that names both, in the same
-/// words wherever they are.
+/// latticeTolerance on every axis, all ranks throw Error{InvalidArgument}. It names both blocks, in words
+/// that do not depend on the ranks that have them.
 std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirectory& directory);
 
 }  // namespace vdi::comm

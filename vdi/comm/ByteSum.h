@@ -16,7 +16,7 @@ class ByteSum {
   /// Not collective. `comm` must outlive it.
   ByteSum(const Communicator& comm, Transport transport);
 
-  /// Collective: the place for this rank's bytes, which are as many on all ranks.
+  /// Collective: returns the place for this rank's bytes. `bytes` is the same on all ranks.
   Exchange::Place begin(std::uint64_t bytes);
   /// A contiguous part of the sum.
   struct Stretch {

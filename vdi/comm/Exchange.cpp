@@ -56,7 +56,7 @@ Exchange::Place Exchange::outbox(std::uint64_t bytes) {
     if (grows) shareNewWindow(comm_.allGatherWords(std::array{aligned(bytes)}));
     if (everyHostShares_) return outbox_;
   }
-  // If one rank comes here, all do: hosts may differ in their free memory.
+  // Either all ranks come here or none: everyHostShares_ is equal on all, and `together` is collective.
   comm_.together([&] {
     if (window_) return;
     if (!outbox_.memory || outbox_.memory->bytes().size() < bytes) {
@@ -89,8 +89,8 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   parts_.clear();
   everyHostShares_ = false;
   messages_ = true;
-  // Half as much again, so that slow growth does not make a new window every frame; and as much as other
-  // ranks have, because the load may move from one rank to another between frames.
+  // Makes each outbox half as large again, so that slow growth does not need a new window every frame, and at
+  // least twice the mean, because the load may move from one rank to another between frames.
   std::vector<std::uint64_t> parts;
   comm_.together([&] { parts.assign(sizes.begin(), sizes.end()); });
   const std::uint64_t mean = std::accumulate(parts.begin(), parts.end(), std::uint64_t{0}) / parts.size();

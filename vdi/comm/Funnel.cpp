@@ -116,7 +116,7 @@ void Operation::carry(const char* name) const {
 }
 
 void waitForAll(std::vector<MPI_Request>& requests) {
-  if (requests.empty()) return;  // there may be no MPI
+  if (requests.empty()) return;  // MPI may not be initialised
   if (Operation::isCarried()) {
     const auto begin = [&](std::vector<MPI_Request>& taken) {
       if (requests.size() <= taken.capacity()) {

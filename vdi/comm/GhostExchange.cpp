@@ -67,9 +67,9 @@ void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
   boxes = std::move(rest);
 }
 
-/// What a rank asks of another, or of itself: for each value in `box` of a lattice, the sum over those of its
-/// samples that lie in `clip`, [lo, hi). A value's samples are the middles of its parts. There may be
-/// hundreds a block.
+/// A question of one rank to another, or to itself. For each value in `box` of a lattice, it asks for the sum
+/// over those of the value's samples that lie in `clip`, [lo, hi). A value's samples are the middles of its
+/// parts. A block may need hundreds of questions.
 struct Question {
   std::int32_t grid;    // on the rank that answers
   std::int32_t round;   // in which it is answered
@@ -259,9 +259,9 @@ class LayerExchange {
   }
 
  private:
-  /// The first round answers values that coincide with donors' own ones, the next those interpolated in
-  /// donors of this level or finer ones, and later rounds those in coarser ones, the coarsest first. So each
-  /// round finds the layers that it needs.
+  /// The first round answers with values that coincide with a donor's own. The second one interpolates in
+  /// donors of the asking level or finer ones, and later rounds interpolate in coarser ones, the coarsest
+  /// first. So each round finds the layers that it needs.
   static constexpr std::int32_t exactRound = 0;
   static constexpr std::int32_t interpolatedRound = 1;
   static constexpr std::int32_t firstCoarserRound = 2;
@@ -352,10 +352,10 @@ class LayerExchange {
     // The volume that the values stand for.
     const Box volume{grid.block.origin + (glm::dvec3(values.lo) - 0.5) * grid.block.spacing,
                      grid.block.origin + (glm::dvec3(values.hi) - 0.5) * grid.block.spacing};
-    // First the owners of a place, the finest first; within a level, blocks with a value there precede those
-    // that only close a gap. Owners claim the places of their values. Offsets leave places between levels
-    // that no values stand for; the owners of the space have these. Then blocks that store a value where
-    // nobody owns the place.
+    // The owners of a place come first, the finest first; within a level, blocks with a value there precede
+    // those that only close a gap. Owners claim the places of their values. Offsets leave places between
+    // levels that no values stand for; the owners of the space claim these. Blocks that only store a value
+    // come last, for places that nobody owns.
     enum class By { Values, Gap, Space };
     using Claim = std::tuple<bool, std::int32_t, By, std::size_t>;  // Space; level, negative; by; donor
     const bool hasOffset = grid.block.offset != glm::dvec3(0.0);
@@ -490,7 +490,7 @@ class LayerExchange {
     grid.stale = false;
   }
 
-  /// Fills with the stored values that must stay, else with the nearest value that is the grid's own.
+  /// Fills `wanted` with the stored values if these must stay, else with the grid's nearest own values.
   static void fillWithOwn(const Grid& grid, Wanted& wanted) {
     const IndexBox stored = grid.block.stored();
     const bool all = wanted.keep || grid.given.empty();
@@ -519,7 +519,7 @@ class LayerExchange {
     return *std::min_element(boxes.begin(), boxes.end(), isNearer);
   }
 
-  /// Copies the values of `from` that are nearest to those of `run`, which differ in x.
+  /// Writes, for each index of the row `run`, the value of `from` that is nearest to it.
   static void copyNearest(const Block& block, const IndexBox& from, const IndexBox& run, std::byte* to) {
     const glm::ivec3 first = glm::clamp(run.lo, from.lo, from.hi - 1);
     const glm::ivec3 last = glm::clamp(run.hi - 1, from.lo, from.hi - 1);
@@ -537,7 +537,7 @@ class LayerExchange {
     return {asked.question, block.origin, block.spacing};
   }
 
-  /// Sends none to this rank itself.
+  /// Sends the requests to other ranks, but not those to this rank itself.
   void sendRequests() {
     std::vector<Request> requests;
     std::vector<std::uint64_t> counts;

@@ -9,7 +9,7 @@ namespace vdi::comm {
 
 namespace {
 
-/// Value [0] of `row` has index `first`. The type decides once a row, not once a value.
+/// Converts values of a row whose element [0] has index `first`. Branches on the type once a row.
 void convert(ScalarType type, const void* row, int first, std::span<const int> indices, double* to) {
   withTyped(type, row, [&](const auto* from) {
     for (const int index : indices) *to++ = static_cast<double>(from[index - first]);

@@ -55,7 +55,7 @@ Sampler::Sample Sampler::sampleAt(std::size_t axis, double place) {
   return sample;
 }
 
-/// The number of an index, which is at least that of the sample before, among those that are gathered.
+/// The position of an index among the gathered ones, to which it is added. Samples come in ascending order.
 std::size_t Sampler::numberOf(std::size_t axis, int index) {
   const auto a = static_cast<int>(axis);
   const IndexBox all = block_->extended();

@@ -67,7 +67,7 @@ struct Block {
   Box owned{};              // world; half-open
   ScalarType type = ScalarType::F32;
   /// The first value, in native byte order. Packed, the values are [dims.z][dims.y][dims.x], x fastest, and
-  /// `data` is aligned for the type. Computed ones don't lie there; then it tells blocks apart by their
+  /// `data` is aligned for the type. Computed values lie elsewhere; `data` then only tells which blocks share
   /// values.
   const void* data = nullptr;
   std::shared_ptr<const void> keepAlive{};
@@ -78,7 +78,7 @@ struct Block {
   std::shared_ptr<const std::vector<IndexBox>> masked{};
   std::optional<ByteStrides> strides{};  // where the values lie from `data` on; any alignment
   std::shared_ptr<const ComputedValues> computed{};
-  /// By how many spacings the values lie beside points or the middles of cells. `origin` includes it.
+  /// Distance, in spacings, of the values from points or the middles of cells. `origin` includes it.
   glm::dvec3 offset{0.0};
 
   IndexBox stored() const { return {glm::ivec3(0), dims}; }
@@ -92,9 +92,9 @@ struct Block {
   }
   std::size_t byteCount() const { return valueCount() * sizeOf(type); }
   bool isPacked() const { return !strides && !computed; }
-  /// Moves the values by so many spacings, as those of staggered grids lie. The block owns what it owned.
+  /// Moves the values by so many spacings, as staggered grids need. The owned box stays.
   void moveValues(const glm::dvec3& spacings);
-  /// Lets the values lie at these strides, which are dropped if the values are packed and aligned.
+  /// Sets the strides of the values. Drops them if the values are packed and aligned.
   void setStrides(const ByteStrides& bytes);
   /// Copies the stored values of a box within stored(), [size.z][size.y][size.x], to memory that is aligned
   /// for them.

@@ -76,7 +76,7 @@ void forEachPartWithout(const AnyBox& box, const AnyBox& hole, Visit visit) {
   }
 }
 
-/// These parts.
+/// The parts that forEachPartWithout visits.
 template <typename AnyBox>
 std::vector<AnyBox> without(const AnyBox& box, const AnyBox& hole) {
   std::vector<AnyBox> parts;

@@ -41,9 +41,9 @@ std::size_t sizeOf(ComponentType type);
 /// Component `index` of an array of components as double. The address may be unaligned.
 double loadComponent(ComponentType type, const void* data, std::size_t index);
 
-/// Lets the block show `component` of the array, whose values are where the block has its own. They are read
-/// where they lie, which must be until the block is gone: one component of a ScalarType as it is, all else as
-/// f64 that are computed when they are read. `component` is a number below array.components, `magnitude`, or
+/// Makes the block show `component` of the array, which has a value at each of the block's places. Values are
+/// read in place, so the array must outlive the block. One component of a ScalarType is read as it is; all
+/// else is computed as f64 at each read. `component` is a number below array.components, `magnitude`, or
 /// `phase` with two components; of a single component, `magnitude` is the component itself.
 void showComponent(Block& block, const ComponentArray& array, int component);
 

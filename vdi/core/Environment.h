@@ -30,7 +30,7 @@ std::optional<std::uint32_t> environmentCount(const char* name, std::uint32_t le
 /// The value as a flag, 0 or 1; false if it is unset.
 bool environmentFlag(const char* name);
 
-/// The folder for data that this user's later runs need not make again, which need not exist: VDI_CACHE, else
+/// The folder of data that this user's later runs can reuse; it may not exist yet. It is VDI_CACHE, else
 /// pv-vdi in the desktop's folder for caches (XDG_CACHE_HOME, or .cache in HOME). Empty if VDI_CACHE is
 /// "off", or none of these is set.
 std::string cacheFolder();

@@ -74,7 +74,7 @@ std::string newName() {
   static std::atomic<std::uint32_t> made{0};
   static const std::uint64_t process = (std::uint64_t{std::random_device()()} << 32) | std::random_device()();
   return fmt::format("{}{:x}-{}-{}", prefix, process, getpid(),
-                     made++);  // the only part that a forked process does not inherit
+                     made++);  // a forked process inherits all of these but getpid()
 }
 
 }  // namespace

@@ -54,8 +54,8 @@ inline void copyInParallel(std::span<const std::byte> from, void* to) {
   });
 }
 
-/// Writes `from` into `to` from place `first` on (at most its size), where `to` then ends. Existing elements
-/// are overwritten: reused memory is not cleared before.
+/// Replaces the elements of `to` from place `first` (at most its size) to its end by `from`. Overwrites
+/// existing elements without clearing them first.
 template <typename T, typename Allocator>
 void replaceTail(std::vector<T, Allocator>& to, std::size_t first, std::span<const T> from) {
   static_assert(std::is_trivially_copyable_v<T>);

@@ -63,7 +63,7 @@ double interpolated(const Block& block, const glm::dvec3& world) {
   return sum;
 }
 
-/// Owns a place as samples are owned (snapToScene): each has one owner, despite rounding of faces.
+/// Whether the block owns a place, by the rule for samples (snapToScene), which gives each place one owner.
 bool owns(const Scene& scene, const Block& block, const glm::dvec3& center) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto at = static_cast<float>(center[axis]);
@@ -120,7 +120,7 @@ SlabError errorOf(const SlabIntegral& slabs, const std::array<double, 3>& positi
   return {largest * largest, halves.a};
 }
 
-/// Compares them at rate 1, or at rate 2 with a slab half as long in the probe's middle.
+/// Whether slabs show enough at this rate: at 1, whole probes; at 2, slabs half as long in their middles.
 bool showsEnough(const TransferTable& table, const SlabIntegral& slabs, double minSpacing,
                  std::span<const Probe> probes, double rate) {
   std::vector<SlabError> errors(probes.size());

@@ -1,4 +1,4 @@
-// The sampling rate that a transfer function needs on a volume: GenerateSettings::samplesPerVoxel 0.
+// The sampling rate that a transfer function needs on a volume, for GenerateSettings' automaticRate.
 #pragma once
 
 #include <array>

@@ -72,7 +72,7 @@ namespace {
 /// Limits colours to white, also after rounding to half floats.
 glm::u16vec4 texelOf(const glm::dvec4& slab) {
   const glm::u16vec4 half = toHalf(glm::vec4(slab));
-  // Compares numbers: the bits of -0 exceed all others. A falling slab of a channel that is 0 has it.
+  // Compares numbers: the bits of -0, which a falling slab gives to a channel of 0, exceed all others.
   const glm::vec4 rounded = fromHalf(half);
   return toHalf(glm::max(glm::min(rounded, glm::vec4(rounded.a)), glm::vec4(0.0F)));
 }

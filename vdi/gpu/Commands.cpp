@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint32_t maxMarks = 64;
 
-/// Waits for all earlier commands, and makes all later ones wait.
+/// Changes the image's layout after all earlier commands and before all later ones.
 void changeLayout(VkCommandBuffer commands, const SampledImage& image, VkImageLayout from, VkImageLayout to) {
   const VkImageMemoryBarrier2 barrier{VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
                                       nullptr,

@@ -21,8 +21,8 @@ class DepositPass {
 
   /// Sets the sums of blocks with that many cells per axis to 0. Throws Error{OutOfMemory}.
   void start(std::span<const glm::ivec3> blocks);
-  /// Adds these particles, whose `block` are indices of start's blocks. Returns when the device has read
-  /// them, which another call waits for.
+  /// Adds these particles, whose `block` are indices of start's blocks. Copies them and returns; the next
+  /// call waits for the device.
   void add(std::span<const shared::DepositParticle> particles);
   /// Calls use(block, first cell, sums) for parts of all blocks' sums, in order.
   template <typename Use>

@@ -40,7 +40,7 @@ std::string hex(const std::array<std::uint8_t, VK_UUID_SIZE>& uuid) {
   return text;
 }
 
-/// A file that is closed at its end.
+/// A file descriptor that its destructor closes.
 class OpenFile {
  public:
   explicit OpenFile(int descriptor) : descriptor_(descriptor) {}

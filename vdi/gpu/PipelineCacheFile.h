@@ -12,7 +12,7 @@
 
 namespace vdi::gpu {
 
-/// The driver and device whose data a file has. Another version's are another file's.
+/// The driver and device that a file's data are for. Each version of a driver has a file of its own.
 struct PipelineCacheKey {
   std::uint32_t vendor = 0;
   std::uint32_t device = 0;
@@ -31,8 +31,8 @@ class PipelineCacheFile {
 
   /// Data for VkPipelineCacheCreateInfo. Empty unless the file is this user's own, whole, and the key's.
   std::vector<std::byte> read() const noexcept;
-  /// Replaces the file, and makes the folder. Does nothing if `data` are nothing but Vulkan's header, as
-  /// drivers give that keep compiled shaders themselves, or not at all.
+  /// Replaces the file, and makes the folder. Does nothing if `data` are Vulkan's header alone, which is all
+  /// that a driver gives if it keeps compiled shaders itself, or keeps none.
   void write(std::span<const std::byte> data) const noexcept;
 
  private:

@@ -37,7 +37,7 @@ class PipelineSet {
   }
 
  private:
-  /// Calls use(info), for the info refers to a name that lasts no longer.
+  /// Calls use(info). The info refers to a name that exists only during this call.
   template <typename Use>
   auto withInfo(const std::vector<std::uint32_t>& specialization, Use use) const;
   void updateBytes(Commands& commands, std::span<const std::byte> bytes);

@@ -52,7 +52,7 @@ struct Pitches {
   int rows = 0;
 };
 
-/// Nothing if the block's values don't lie in rows and slices as a device copies them.
+/// The block's pitches; nullopt if its values don't lie in rows and slices that a device can copy.
 std::optional<Pitches> pitchesOf(const Block& block) {
   if (block.isPacked()) return Pitches{block.dims.x, block.dims.y};
   if (block.computed) return std::nullopt;

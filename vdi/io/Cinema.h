@@ -23,9 +23,9 @@ class CinemaIndex {
   /// an index that has other columns.
   CinemaIndex(std::filesystem::path folder, bool keep);
 
-  /// In place of what the index has for this file. It's written by `write`.
+  /// Adds the picture, or replaces the one with the same file. `write` stores the change.
   void add(const CinemaPicture& picture);
-  /// Readers see the index of before or this one. Throws Error{Io} as writeAtomically.
+  /// Writes the index; readers see the old one or the new one. Throws Error{Io} as writeAtomically.
   void write() const;
   std::filesystem::path path() const { return folder_ / "data.csv"; }
 

@@ -103,7 +103,7 @@ class SharedOutput {
 };
 
 /// Makes `link` a symbolic link to `target`, which is relative to the link's folder. Readers see the old link
-/// or the new one. Throws Error{Io} with the link as context; what has that name and isn't a link stays.
+/// or the new one. Throws Error{Io} with the link as context. Never replaces anything but a link.
 void replaceLink(const std::filesystem::path& link, const std::filesystem::path& target);
 
 /// Throws the Error{Io} that writeAtomically would throw now, before there is anything to write. Changes

@@ -23,9 +23,9 @@ class VdiDecoder {
   VdiDecoder(const VdiDecoder&) = delete;
   VdiDecoder& operator=(const VdiDecoder&) = delete;
 
-  /// The next bytes, which are not needed afterwards. A fault of theirs is thrown by finish.
+  /// Takes the next bytes, which are not needed afterwards. If they have a fault, finish throws it.
   void add(std::span<const std::byte> bytes);
-  /// A fault was found: further bytes change nothing.
+  /// Whether a fault was found. Further bytes then change nothing.
   bool hasFailed() const;
   /// Ends the decoder. Throws Error{Format} for bytes that io::decode refuses, and for missing ones.
   Vdi finish();

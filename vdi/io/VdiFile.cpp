@@ -300,7 +300,7 @@ void writeVdi(const std::filesystem::path& path, const Vdi& vdi) {
   writeAtomically(path, bytes);
 }
 
-/// Reads each piece while the one before is decoded. Of another file only the first bytes are read.
+/// Reads each piece while the one before is decoded. Of any other kind of file, reads the first bytes only.
 Vdi readVdi(const std::filesystem::path& path) {
   constexpr std::uint64_t pieceBytes = std::uint64_t{16} << 20;
   const InputFile file(path);

@@ -126,7 +126,7 @@ inline std::uint64_t metadataOffset(const Header& header) {
 void requireSoundHeader(const Vdi& vdi);
 /// The header without the fields that the chunks add.
 Header headerOf(const Vdi& vdi);
-/// What the header says; no lists.
+/// The VDI that the header describes, without lists.
 Vdi vdiOf(const Header& header);
 
 /// The header of a file of `fileBytes` that begins with `start`. Version and encoding are checked before the

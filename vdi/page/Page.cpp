@@ -33,7 +33,7 @@ class Deflater {
   Deflater(const Deflater&) = delete;
   Deflater& operator=(const Deflater&) = delete;
 
-  /// A part of a stream; the parts, one behind the other, are the stream.
+  /// Compresses a part of a stream. The results, one after the other, make up the compressed stream.
   std::vector<std::byte> part(std::span<const std::byte> bytes, bool isLast) {
     std::vector<std::byte> packed(deflateBound(&stream_, bytes.size()) + syncBytes);
     stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));  // zlib only reads it
@@ -142,7 +142,7 @@ std::string elementOf(const PageFrame& frame) {
       escaped(frame.name), plain.size(), base64(packed));
 }
 
-/// Writes to an OutputFile one text behind the other.
+/// Writes texts to an OutputFile, one after the other.
 class Writer {
  public:
   explicit Writer(const std::filesystem::path& path) : file_(path) {}

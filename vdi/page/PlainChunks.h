@@ -8,7 +8,7 @@
 namespace vdi::page {
 
 /// The same VDI as a .vdi file whose chunks aren't compressed: LZ4 blocks of literals alone, with checksums
-/// of their own. It is larger, and what deflate makes of it is smaller than what it makes of LZ4's output.
+/// of their own. This file is larger than the original, but smaller after deflate than the original would be.
 /// Throws Error{Format} for what io::decode refuses.
 std::vector<std::byte> withPlainChunks(std::span<const std::byte> file);
 

@@ -85,7 +85,7 @@ void ListDownload<Segment>::finish() {
   waitForTransfers();
 }
 
-/// Counted from the picture's first supersegment on.
+/// Downloads all lists' offsets, counted from the picture's first supersegment.
 template <typename Segment>
 void ListDownload<Segment>::downloadOffsets() {
   memory_.commands.begin();

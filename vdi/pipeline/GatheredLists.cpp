@@ -63,7 +63,7 @@ void GatheredLists<Segment>::sendSegments(const Sent& sent) {
   gather_.send(std::span(&piece, 1), lists.written);
 }
 
-/// Counted from the picture's first supersegment on.
+/// Sends this rank's offsets, counted from the picture's first supersegment.
 template <typename Segment>
 void GatheredLists<Segment>::sendOffsets() {
   std::vector<Gather::Piece> pieces;

@@ -137,7 +137,7 @@ void ListBuilder::recordTotal(const gpu::Buffer& offsets, std::uint32_t listCoun
                  which * sizeof(std::uint32_t), sizeof(std::uint32_t));
 }
 
-/// Submits the search alone: the host allocates memory for its results.
+/// Submits the search alone, because the host must allocate memory before the second step.
 void ListBuilder::submitBisection(const gpu::Submission& after) {
   const std::uint32_t listCount = started_->options.listCount();
   DeviceLists& lists = *started_->lists;
@@ -281,8 +281,8 @@ void ListBuilder::submitMerging(From from, const gpu::Submission& after) {
   submit();
 }
 
-/// Runs to expect in each list of the next pictures, after one list had this many: some more than that, as
-/// memory allows.
+/// The runs to expect in each list of the next pictures, after a list had `most` of them: a quarter more, as
+/// far as memory allows.
 std::uint32_t ListBuilder::runsToExpect(std::uint32_t most) const {
   constexpr std::uint64_t atLeast = 8;
   const std::uint64_t perRun =
@@ -291,7 +291,7 @@ std::uint32_t ListBuilder::runsToExpect(std::uint32_t most) const {
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(most + most / 4, std::max(room, atLeast)));
 }
 
-/// Allocates memory for the counted numbers and a quarter more; then steps must be submitted again.
+/// Returns the step from which to submit again, if any. Allocates a quarter more than the counted numbers.
 std::optional<ListBuilder::From> ListBuilder::againFrom(From from) {
   const Options& options = started_->options;
   DeviceLists& lists = *started_->lists;

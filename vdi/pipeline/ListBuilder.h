@@ -97,8 +97,8 @@ class ListBuilder {
     }
   };
 
-  /// Records device work after the last step, when the host does not know the lists' counts yet. It is
-  /// recorded again with repeated steps; its earlier results must not count.
+  /// Records device work after the last step, when the host does not know the lists' counts yet. It is called
+  /// again when steps are repeated; the results of the last call must replace earlier ones.
   using Behind = std::function<void(gpu::Commands&)>;
   /// Submits the steps and returns. `lists`, the data that `record` and `behind` refer to, and the request's
   /// buffers must stay until `finish`. `after` is the last submission that uses the lists' memory.

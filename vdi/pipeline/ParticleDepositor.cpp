@@ -28,8 +28,8 @@ namespace {
 /// So many entries are given to the device at a time: 76 bytes each.
 constexpr std::size_t entriesAtOnce = std::size_t{1} << 18;
 
-/// A rank sends about so many entries at a time, and takes up so many particles for it. This bounds the
-/// memory of a rank that gets them from all.
+/// About the number of entries that a rank sends at a time, and of particles that it routes for them. This
+/// bounds the memory of a rank that receives entries from all others.
 std::size_t sentAtOnce(int ranks) {
   constexpr std::size_t received = std::size_t{1} << 21;
   constexpr std::size_t least = std::size_t{1} << 12;

@@ -35,9 +35,9 @@ class ParticleDepositor {
   ParticleDepositor(const ParticleDepositor&) = delete;
   ParticleDepositor& operator=(const ParticleDepositor&) = delete;
 
-  /// Collective: the places of this rank's blocks, of cells. Their `data` aren't read, but tell blocks apart
-  /// as in settleOwnership (comm/GhostExchange.h), which throws for the same overlaps. Where spacings differ,
-  /// the finest owns.
+  /// Collective: sets this rank's blocks, which must be of cells. Their `data` aren't read, but tell blocks
+  /// apart as in settleOwnership (comm/GhostExchange.h), which throws for the same overlaps. Where spacings
+  /// differ, the finest block owns the place.
   void setBlocks(const std::vector<Block>& blocks);
 
   /// Collective. `kind` is the same on all ranks. Throws on all ranks: Error{OutOfMemory},

@@ -13,7 +13,7 @@ namespace shared = gpu::shared;
 
 namespace {
 
-/// Faces, and cells of two blocks, that are this near to each other coincide, in cells.
+/// The distance, in cells, up to which faces, or cells of two blocks, count as coinciding.
 constexpr double coincidence = 1e-6;
 
 constexpr double farthestCell = 1 << 30;
@@ -136,7 +136,7 @@ void ParticleRouting::findOwned(const comm::Communicator& comm) {
   });
 }
 
-/// Blocks that are found to be of different lattices, although they coincide, only cost time.
+/// Numbers the lattices of the blocks. If one lattice gets two numbers, that only costs time.
 void ParticleRouting::findLattices() {
   using Key = std::array<double, 6>;
   std::map<Key, std::size_t> lattices;

@@ -18,9 +18,9 @@ namespace shared = gpu::shared;
 
 namespace {
 
-/// Up to this size, the upload continues after the caller does; larger ones wait for the part before.
+/// The most bytes staged at a time with Kind::Alone. Uploads up to this size continue after `load` returns.
 constexpr std::uint64_t aloneBytes = std::uint64_t{128} << 20;
-/// A render waits for the part under way.
+/// The most bytes staged at a time with Kind::Beside. A render waits for the part under way.
 constexpr std::uint64_t besideBytes = std::uint64_t{2} << 20;
 
 }  // namespace

@@ -155,7 +155,7 @@ float costOf(const PreSegment& a, const PreSegment& b) {
   const float gap = std::max(b.front - a.back, 0.0F);
   const Place place = placeOf(a, b);
   if (place != Place::OfBoth) {
-    // It is missing at its old place, and superfluous at the new one.
+    // The moved material is missing at its old place, and superfluous at the new one.
     return weightBehind(a.before) * 2.0F * amountOf(place == Place::OfFirst ? b : a);
   }
   const auto mean = [&](float x, float y) { return (first * x + second * y) / whole; };
@@ -181,7 +181,7 @@ std::vector<float> costsOf(const std::vector<PreSegment>& preSegments) {
   return costs;
 }
 
-/// Over the possible mergers.
+/// Sum and number of the costs of the possible mergers.
 struct Costs {
   float sum = 0.0F;
   float finite = 0.0F;

@@ -97,7 +97,7 @@ struct Neighbour {
   SlopeUnit unit;
 };
 
-/// Adds what a neighbour says of a face to what the one before says.
+/// Combines a face's slope towards a neighbour with `before`, its slope towards the one before the list.
 std::int8_t combined(std::int8_t before, float depth, float place, const Neighbour& neighbour) {
   const float change = neighbour.isAfter ? place - depth : depth - place;
   const bool isKnown = std::abs(change) <= renderMaxSlope * neighbour.unit.footprint;

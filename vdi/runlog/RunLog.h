@@ -16,11 +16,11 @@ struct LogFiles {
   std::optional<std::filesystem::path> text;
 };
 
-/// One rank's. A line is appended when it comes, in one piece or not at all, so that the log of a killed run
-/// ends with its last frame.
+/// A log that one rank writes. It appends each line at once, whole or not at all, so that the log of a killed
+/// run ends with its last frame.
 class RunLog {
  public:
-  enum class Before { Stays, Goes };  // what is in the files
+  enum class Before { Stays, Goes };  // whether the files keep their old content
   /// Makes folders and files if need be. Throws Error{Io} with the path.
   RunLog(const LogFiles& files, const RunStart& start, Before before = Before::Stays);
   /// Doesn't write the summary.
@@ -28,7 +28,7 @@ class RunLog {
   RunLog(const RunLog&) = delete;
   RunLog& operator=(const RunLog&) = delete;
 
-  /// Throws Error{Io} if the line couldn't be appended, after the other file got its one.
+  /// Appends a line to each file. Throws Error{Io} if that fails for one, after the other file got its line.
   void add(const FrameRecord& record);
   void add(const LeftOut& frame);  // throws as above
   const RunSummary& soFar() const { return summary_; }
