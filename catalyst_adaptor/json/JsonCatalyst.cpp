@@ -5,12 +5,8 @@
 #include <cstring>
 #include <memory>
 #include <optional>
-#include <span>
-#include <stdexcept>
 #include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/EngineFunctions.h"
@@ -42,17 +38,6 @@ bool usable(const vdi_catalyst* catalyst) {
   return catalyst != nullptr && catalyst == alive();
 }
 
-/// Gives all ranks the root's text. Collective; fails on all ranks together.
-void share(const vdi::comm::Communicator& comm, std::string& text) {
-  std::vector<std::byte> bytes;
-  comm.together([&] {
-    const auto all = std::as_bytes(std::span(text));
-    bytes.assign(all.begin(), all.end());
-  });
-  bytes = comm.broadcast(std::move(bytes), 0);
-  comm.together([&] { text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size()); });
-}
-
 /// Reads the run that rank 0 names. Rank 0 reads the files, and all others get their text.
 class Reading {
  public:
@@ -69,7 +54,7 @@ class Reading {
       source_ = vdi::config::readRun({json, ::strnlen(json, limits.bytes + 1)});
     });
     if (code != VDI_CATALYST_OK) return code;
-    code = guardedTogether(self_, VDI_CATALYST_ENGINE, [&] { share(comm_, source_.text); });
+    code = guardedTogether(self_, VDI_CATALYST_ENGINE, [&] { share(source_.text); });
     if (code != VDI_CATALYST_OK) return code;
     code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
       run = vdi::config::parseRun(source_.text, source_.name);
@@ -81,7 +66,7 @@ class Reading {
       if (comm_.rank() == 0) vdi::config::requireNothingInTheWay(run);
     });
     if (code != VDI_CATALYST_OK || run.colors.file.empty()) return code;
-    code = guardedTogether(self_, VDI_CATALYST_ENGINE, [&] { share(comm_, colors_); });
+    code = guardedTogether(self_, VDI_CATALYST_ENGINE, [&] { share(colors_); });
     if (code != VDI_CATALYST_OK) return code;
     return guarded(self_, VDI_CATALYST_SCRIPT,
                    [&] { map = vdi::config::colorMapOf(colors_, run.colors.file, run.colors.name); });
@@ -91,6 +76,11 @@ class Reading {
   std::optional<vdi::config::ColorMap> map;
 
  private:
+  /// Gives all ranks rank 0's text.
+  void share(std::string& text) {
+    text = comm_.broadcastText([&] { return std::move(text); }, 0);
+  }
+
   vdi_catalyst& self_;
   const vdi::comm::Communicator& comm_;
   vdi::config::RunText source_;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstddef>
 #include <cstdio>
 #include <optional>
 #include <system_error>
@@ -113,18 +112,13 @@ bool RunSteering::take(const Steered& steered, std::int64_t step, double time) {
     } else {
       std::this_thread::sleep_for(patience);  // a broadcast would busy a core while it waits
     }
-    std::vector<std::byte> text;
-    comm_.together([&] {
-      const std::string own = request ? stream::textOf(request->wish) : "";
-      const auto* const bytes = reinterpret_cast<const std::byte*>(own.data());
-      text.assign(bytes, bytes + own.size());
-    });
-    text = comm_.broadcast(std::move(text), 0);
+    const std::string text =
+        comm_.broadcastText([&] { return request ? stream::textOf(request->wish) : std::string(); }, 0);
     if (text.empty() && isPaused_) continue;
     if (text.empty()) return false;
     stream::Wish wish;
     comm_.together([&] {
-      wish = stream::wishOf({reinterpret_cast<const char*>(text.data()), text.size()});
+      wish = stream::wishOf(text);
       apply(wish, steered);
     });
     const bool changesVdi = wish.camera || wish.resolution || wish.supersegments || wish.range || wish.preset;

@@ -168,6 +168,22 @@ TEST_CASE("broadcast takes size and bytes from the root, whoever it is") {
   }
 }
 
+TEST_CASE("broadcastText calls its work on the root alone") {
+  const Communicator world = Communicator::world();
+  for (int root = 0; root < world.size(); ++root) {
+    const auto text = [&] {
+      CHECK(world.rank() == root);
+      return std::string(static_cast<std::size_t>(root), '-') + '\0' + "end";
+    };
+    const std::string sent = world.broadcastText(text, root);
+    CHECK(sent.size() == static_cast<std::size_t>(root) + 4);
+    CHECK(sent.ends_with("end"));
+    CHECK(world.broadcastText([] { return std::string(); }, root).empty());
+    const auto failing = []() -> std::string { throw Error(ErrorCode::Io, "no such text"); };
+    CHECK_THROWS_WITH(world.broadcastText(failing, root), vdi::test::ContainsSubstring("no such text"));
+  }
+}
+
 TEST_CASE("gather and allGather keep rank order and lengths, empty ones included") {
   const Communicator world = Communicator::world();
   const auto partOf = [](int rank) {

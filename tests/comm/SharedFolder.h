@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "tests/io/Samples.h"
 #include "vdi/comm/Communicator.h"
@@ -17,14 +16,8 @@ namespace vdi::test {
 class SharedFolder {
  public:
   explicit SharedFolder(const comm::Communicator& comm) : comm_(comm) {
-    std::string name;
-    if (comm.rank() == 0) {
-      own_.emplace();
-      name = own_->path().string();
-    }
-    const auto* begin = reinterpret_cast<const std::byte*>(name.data());
-    const std::vector<std::byte> bytes = comm.broadcast({begin, begin + name.size()}, 0);
-    path_ = std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const auto create = [this] { return own_.emplace().path().string(); };
+    path_ = comm.broadcastText(create, 0);
   }
   ~SharedFolder() { comm_.barrier(); }
   SharedFolder(const SharedFolder&) = delete;

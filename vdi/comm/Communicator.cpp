@@ -264,16 +264,7 @@ int Communicator::hostLeader(int rank) const {
 }
 
 std::string Communicator::environment(const char* name) const {
-  std::vector<std::byte> bytes;
-  together([&] {
-    const std::string value = rank() == 0 ? environmentText(name).value_or("") : "";
-    const auto text = std::as_bytes(std::span(value));
-    bytes.assign(text.begin(), text.end());
-  });
-  bytes = broadcast(std::move(bytes), 0);
-  std::string value;
-  together([&] { value.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size()); });
-  return value;
+  return broadcastText([&] { return environmentText(name).value_or(""); }, 0);
 }
 
 void Communicator::barrier() const {
@@ -314,12 +305,29 @@ std::vector<std::byte> Communicator::broadcast(std::vector<std::byte> bytes, int
   std::uint64_t size = bytes.size();
   call("MPI_Bcast", MPI_Bcast, MPI_Ibcast, &size, 1, MPI_UINT64_T, root, state_->comm());
   together([&] { bytes.resize(size); });
-  constexpr std::uint64_t chunk = 1ULL << 30;
-  for (std::uint64_t done = 0; done < size; done += chunk) {
-    const auto part = static_cast<int>(std::min(chunk, size - done));
+  broadcastInto(bytes, root);
+  return bytes;
+}
+
+std::string Communicator::broadcastText(FunctionRef<std::string()> work, int root) const {
+  assert(root >= 0 && root < size());
+  std::string text;
+  const std::vector<std::uint64_t> sizes = gatherTogether([&]() -> std::uint64_t {
+    if (rank() == root) text = work();
+    return text.size();
+  });
+  together([&] { text.resize(sizes[static_cast<std::size_t>(root)]); });
+  broadcastInto(std::as_writable_bytes(std::span(text)), root);
+  return text;
+}
+
+void Communicator::broadcastInto(std::span<std::byte> bytes, int root) const {
+  if (state_->serial()) return;
+  constexpr std::size_t chunk = 1ULL << 30;
+  for (std::size_t done = 0; done < bytes.size(); done += chunk) {
+    const auto part = static_cast<int>(std::min(chunk, bytes.size() - done));
     call("MPI_Bcast", MPI_Bcast, MPI_Ibcast, bytes.data() + done, part, MPI_BYTE, root, state_->comm());
   }
-  return bytes;
 }
 
 Gathered Communicator::allGather(std::span<const std::byte> bytes, std::size_t elementBytes) const {

@@ -75,6 +75,9 @@ class Communicator {
 
   /// Returns the root's bytes on every rank; other ranks' `bytes` are ignored.
   std::vector<std::byte> broadcast(std::vector<std::byte> bytes, int root) const;
+  /// Returns the text that `work` makes on the root, on every rank. Only the root calls `work`; if it throws
+  /// there, all ranks throw as together's do.
+  std::string broadcastText(FunctionRef<std::string()> work, int root) const;
   /// Returns every rank's bytes on every rank. Sizes may differ by rank.
   Gathered allGather(std::span<const std::byte> bytes, std::size_t elementBytes) const;
   /// Returns every rank's bytes on the root, and nothing elsewhere, `offsets` included. Sizes may differ by
@@ -112,6 +115,8 @@ class Communicator {
  private:
   friend class Messages;
   struct State;
+  /// Fills `bytes`, which has the root's size on every rank.
+  void broadcastInto(std::span<std::byte> bytes, int root) const;
   [[noreturn]] void failTogether(const std::exception_ptr& mine, int firstFailing) const;
   explicit Communicator(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;

@@ -368,18 +368,10 @@ template <typename Segment>
 WrittenVdi VdiWriter<Segment>::finish() {
   joinParts();
   const Table table = shareTable();
-  std::vector<std::byte> shared;
-  comm_.together([&] {
-    if (!isRoot()) return;
-    const std::string name = prepareFile(table).string();
-    const auto* begin = reinterpret_cast<const std::byte*>(name.data());
-    shared.assign(begin, begin + name.size());
-  });
-  shared = comm_.broadcast(std::move(shared), root_);
+  const std::string name = comm_.broadcastText([&] { return prepareFile(table).string(); }, root_);
 
   std::array<std::uint64_t, 1> writesItself{0};
   comm_.together([&] {
-    const std::string name(reinterpret_cast<const char*>(shared.data()), shared.size());
     const bool opens = !isRoot() && !name.empty() && !chunks_.empty() && writtenBy_ == WrittenBy::Owner;
     std::optional<io::SharedOutput> file = opens ? io::SharedOutput::open(name, path_) : std::nullopt;
     writesItself[0] = file || (isRoot() && file_->takesOffsets()) || chunks_.empty() ? 1 : 0;
