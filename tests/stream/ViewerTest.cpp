@@ -125,6 +125,21 @@ TEST_CASE("a viewer that stalls in a full level keeps it no longer than it's the
   CHECK(levels.bytesAlive() == coarseBytes + fullBytes);
 }
 
+TEST_CASE("a refused viewer that stalls in a level goes when its frames are too many") {
+  Levels levels;
+  Hub hub(limited(10 * mebibyte));
+  Connected viewer(hub);
+  hub.publish(levels.frame(0), start);
+  for (auto chunk = viewer.part(start); chunk && chunk->level == 0; chunk = viewer.part(start))
+    viewer.acknowledge(*chunk, start);
+  REQUIRE(std::holds_alternative<Viewer::Binary>(viewer.writing));
+  viewer.viewer.receive("no message", start);
+  CHECK(!viewer.viewer.isStalled());
+  hub.publish(levels.frame(1), start + 1s);
+  CHECK(viewer.viewer.isStalled());
+  CHECK(hub.heldBytes() == 0);
+}
+
 TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
   constexpr std::size_t limit = 10 * mebibyte;
   Levels levels;
