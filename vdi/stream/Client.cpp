@@ -162,10 +162,8 @@ class Client::Impl {
         [this](std::uint16_t code, const std::string& why, bool isFinal) { lose(code, why, isFinal); }};
     if (!options_.command.empty()) {
       line_ = commandLine(context_, options_.command, std::move(events));
-    } else if (options_.url.isEncrypted) {
-      line_ = encryptedLine(context_, tls_, options_.url, std::move(events));
     } else {
-      line_ = line(context_, options_.url, std::move(events));
+      line_ = line(context_, options_.url.isEncrypted ? &tls_ : nullptr, options_.url, std::move(events));
     }
     line_->start();
   }

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "vdi/stream/Http.h"
-#include "vdi/stream/Sockets.h"
+#include "vdi/stream/Transport.h"
 #include "vdi/stream/Viewer.h"
 
 namespace vdi::stream {
@@ -33,8 +33,8 @@ class Connection {
   virtual bool isWelcome() const = 0;
 };
 
-std::shared_ptr<Connection> connection(Plain::socket_type socket, const Surroundings& surroundings);
-std::shared_ptr<Connection> encryptedConnection(Plain::socket_type socket, boost::asio::ssl::context& context,
-                                                const Surroundings& surroundings);
+/// Encrypted, unless `tls` is null.
+std::shared_ptr<Connection> connection(Plain::socket_type socket, boost::asio::ssl::context* tls,
+                                       const Surroundings& surroundings);
 
 }  // namespace vdi::stream

@@ -11,7 +11,6 @@
 #include <string>
 #include <string_view>
 
-#include "vdi/stream/Sockets.h"
 #include "vdi/stream/Url.h"
 
 namespace vdi::stream {
@@ -36,11 +35,11 @@ class Line {
   virtual void close() = 0;  // politely, within a second
 };
 
-std::shared_ptr<Line> line(boost::asio::io_context& context, const Url& url, LineEvents events);
+/// Encrypted, unless `tls` is null.
+std::shared_ptr<Line> line(boost::asio::io_context& context, boost::asio::ssl::context* tls, const Url& url,
+                           LineEvents events);
 /// Over the standard input and output of a command of the shell, at whose end serveOver (Pipe.h) runs.
 std::shared_ptr<Line> commandLine(boost::asio::io_context& context, const std::string& command,
                                   LineEvents events);
-std::shared_ptr<Line> encryptedLine(boost::asio::io_context& context, boost::asio::ssl::context& tls,
-                                    const Url& url, LineEvents events);
 
 }  // namespace vdi::stream

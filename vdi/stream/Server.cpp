@@ -186,9 +186,8 @@ class Server::Impl {
     if (isEnding_ || (connections_.size() >= options_.mostConnections && !makeRoom())) return;  // it's closed
     const std::uint64_t number = nextNumber_++;
     const Surroundings surroundings{hub_, site_, [this, number] { leave(number); }};
-    const std::shared_ptr<Connection> made = tls_
-                                                 ? encryptedConnection(std::move(socket), *tls_, surroundings)
-                                                 : connection(std::move(socket), surroundings);
+    const std::shared_ptr<Connection> made =
+        connection(std::move(socket), tls_ ? &*tls_ : nullptr, surroundings);
     connections_.emplace(number, made);
     made->start();
   }

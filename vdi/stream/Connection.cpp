@@ -1,5 +1,4 @@
-// Connection over either transport. Included by the sources that instantiate it, and by no others.
-#pragma once
+#include "vdi/stream/Connection.h"
 
 #include <array>
 #include <boost/asio/buffer.hpp>
@@ -13,51 +12,46 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <variant>
 
-#include "vdi/stream/Connection.h"
-
 namespace vdi::stream {
+
+namespace {
 
 namespace limits {
 
 // Times after which a connection is cut off: for its request, for taking the reply, and for a viewer's hello.
-inline constexpr std::chrono::seconds request{10};
-inline constexpr std::chrono::seconds reply{30};
-inline constexpr std::chrono::seconds hello{5};
+constexpr std::chrono::seconds request{10};
+constexpr std::chrono::seconds reply{30};
+constexpr std::chrono::seconds hello{5};
 // A viewer that says nothing for this time gets a ping, and is cut off if it doesn't answer.
-inline constexpr std::chrono::seconds silence{60};
-inline constexpr std::uint32_t headBytes = 8192;
+constexpr std::chrono::seconds silence{60};
+constexpr std::uint32_t headBytes = 8192;
 
 }  // namespace limits
 
-template <typename Stream>
-class StreamConnection : public Connection, public std::enable_shared_from_this<StreamConnection<Stream>> {
+class SocketConnection : public Connection, public std::enable_shared_from_this<SocketConnection> {
  public:
-  template <typename... Arguments>
-  explicit StreamConnection(const Surroundings& surroundings, Arguments&&... arguments)
+  SocketConnection(Plain::socket_type socket, boost::asio::ssl::context* tls,
+                   const Surroundings& surroundings)
       : surroundings_(surroundings),
-        socket_(std::forward<Arguments>(arguments)...),
+        socket_(std::move(socket), tls),
         timer_(socket_.get_executor()),
         helloTimer_(socket_.get_executor()) {}
-  ~StreamConnection() override { surroundings_.leave(); }
-  StreamConnection(const StreamConnection&) = delete;
-  StreamConnection& operator=(const StreamConnection&) = delete;
+  ~SocketConnection() override { surroundings_.leave(); }
+  SocketConnection(const SocketConnection&) = delete;
+  SocketConnection& operator=(const SocketConnection&) = delete;
 
   void start() override {
     parser_.header_limit(limits::headBytes);
     parser_.body_limit(0);
     transport().expires_after(limits::request);
-    if constexpr (std::is_same_v<Stream, Encrypted>) {
-      socket_.next_layer().async_handshake(boost::asio::ssl::stream_base::server,
-                                           [self = this->shared_from_this()](boost::beast::error_code error) {
-                                             if (!error) self->readRequest();
-                                           });
-    } else {
-      readRequest();
-    }
+    auto* const tls = socket_.next_layer().tls();
+    if (tls == nullptr) return readRequest();
+    tls->async_handshake(boost::asio::ssl::stream_base::server, [self = shared_from_this()](Error error) {
+      if (!error) self->readRequest();
+    });
   }
 
   void finish() override {
@@ -77,13 +71,13 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
   }
 
  private:
-  using ErrorCodeOf = boost::beast::error_code;
+  using Error = boost::beast::error_code;
 
   Plain& transport() { return boost::beast::get_lowest_layer(socket_); }
 
   void readRequest() {
     boost::beast::http::async_read(socket_.next_layer(), buffer_, parser_,
-                                   [self = this->shared_from_this()](ErrorCodeOf error, std::size_t) {
+                                   [self = shared_from_this()](Error error, std::size_t) {
                                      if (!error) self->answer();
                                    });
   }
@@ -106,20 +100,18 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
     reply_ = std::move(reply);
     transport().expires_after(limits::reply);
     boost::beast::http::async_write(socket_.next_layer(), reply_,
-                                    [self = this->shared_from_this()](ErrorCodeOf error, std::size_t) {
+                                    [self = shared_from_this()](Error error, std::size_t) {
                                       if (!error) self->hangUp();
                                     });
   }
 
   /// After a reply. Closing at once could cost the peer the end of it.
   void hangUp() {
-    if constexpr (std::is_same_v<Stream, Encrypted>) {
-      socket_.next_layer().async_shutdown([self = this->shared_from_this()](ErrorCodeOf) { self->cut(); });
-    } else {
-      ErrorCodeOf ignored;
-      transport().socket().shutdown(Plain::socket_type::shutdown_send, ignored);
-      cut();
-    }
+    auto* const tls = socket_.next_layer().tls();
+    if (tls != nullptr) return tls->async_shutdown([self = shared_from_this()](Error) { self->cut(); });
+    Error ignored;
+    transport().socket().shutdown(Plain::socket_type::shutdown_send, ignored);
+    cut();
   }
 
   void upgrade() {
@@ -131,7 +123,7 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
     }));
     socket_.read_message_max(maxViewerText);
     socket_.auto_fragment(false);
-    socket_.async_accept(parser_.get(), [self = this->shared_from_this()](ErrorCodeOf error) {
+    socket_.async_accept(parser_.get(), [self = shared_from_this()](Error error) {
       if (!error) self->converse();
     });
   }
@@ -139,7 +131,7 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
   void converse() {
     viewer_.emplace(surroundings_.hub, [this] { pump(); });
     helloTimer_.expires_after(limits::hello);
-    helloTimer_.async_wait([self = this->shared_from_this()](ErrorCodeOf error) {
+    helloTimer_.async_wait([self = shared_from_this()](Error error) {
       if (!error && !self->viewer_->isWelcome())
         self->viewer_->refuse(Close::Late, "no \"hello\" came in time");
     });
@@ -148,7 +140,7 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
   }
 
   void listen() {
-    socket_.async_read(buffer_, [self = this->shared_from_this()](ErrorCodeOf error, std::size_t) {
+    socket_.async_read(buffer_, [self = shared_from_this()](Error error, std::size_t) {
       if (error || self->hasEnded_) {
         self->end();
         return;
@@ -190,7 +182,7 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
   void write(bool isText, const Buffers& buffers) {
     isWriting_ = true;
     socket_.text(isText);
-    socket_.async_write(buffers, [self = this->shared_from_this()](ErrorCodeOf error, std::size_t) {
+    socket_.async_write(buffers, [self = shared_from_this()](Error error, std::size_t) {
       self->isWriting_ = false;
       if (error) {
         self->end();
@@ -210,7 +202,7 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
   void put(const Viewer::Wait& wait) {
     if (!wait.until) return;
     timer_.expires_at(*wait.until);
-    timer_.async_wait([weak = this->weak_from_this()](ErrorCodeOf error) {
+    timer_.async_wait([weak = weak_from_this()](Error error) {
       const auto self = weak.lock();
       if (!error && self) self->pump();
     });
@@ -222,11 +214,11 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
     const boost::beast::websocket::close_reason reason(
         static_cast<boost::beast::websocket::close_code>(farewell.code),
         farewell.cause.substr(0, longestReason));
-    socket_.async_close(reason, [self = this->shared_from_this()](ErrorCodeOf) { self->end(); });
+    socket_.async_close(reason, [self = shared_from_this()](Error) { self->end(); });
   }
 
   const Surroundings surroundings_;
-  boost::beast::websocket::stream<Stream> socket_;
+  boost::beast::websocket::stream<Transport> socket_;
   boost::asio::steady_timer timer_;
   boost::asio::steady_timer helloTimer_;
   boost::beast::flat_buffer buffer_;
@@ -237,5 +229,12 @@ class StreamConnection : public Connection, public std::enable_shared_from_this<
   bool isWriting_ = false;
   bool hasEnded_ = false;
 };
+
+}  // namespace
+
+std::shared_ptr<Connection> connection(Plain::socket_type socket, boost::asio::ssl::context* tls,
+                                       const Surroundings& surroundings) {
+  return std::make_shared<SocketConnection>(std::move(socket), tls, surroundings);
+}
 
 }  // namespace vdi::stream

@@ -1,5 +1,4 @@
-// Line over either transport. Included by the sources that instantiate it, and by no others.
-#pragma once
+#include "vdi/stream/Line.h"
 
 #include <openssl/err.h>
 #include <openssl/ssl.h>
@@ -20,27 +19,27 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "vdi/stream/Command.h"
-#include "vdi/stream/Line.h"
 #include "vdi/stream/Pipe.h"
 #include "vdi/stream/Protocol.h"
+#include "vdi/stream/Transport.h"
 
 namespace vdi::stream {
 
-template <typename Stream>
-class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<Stream>> {
+namespace {
+
+class SocketLine : public Line, public std::enable_shared_from_this<SocketLine> {
  public:
-  template <typename... Arguments>
-  StreamLine(const Url& url, LineEvents events, boost::asio::io_context& context, Arguments&... arguments)
+  SocketLine(boost::asio::io_context& context, boost::asio::ssl::context* tls, const Url& url,
+             LineEvents events)
       : url_(url),
         events_(std::move(events)),
         resolver_(context),
         patience_(context),
-        socket_(context, arguments...),
+        socket_(context, tls),
         token_(url.token) {}
 
   /// start() runs this command and talks over its standard input and output.
@@ -50,13 +49,12 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
 
   void start() override {
     if (!command_.empty()) return run();
-    resolver_.async_resolve(
-        url_.host, std::to_string(url_.port),
-        [self = this->shared_from_this()](Error error, const Resolver::results_type& found) {
-          if (error) return self->fail("can't find " + self->url_.host, error);
-          for (const auto& entry : found) self->endpoints_.push_back(entry.endpoint());
-          self->connect(boost::asio::error::host_not_found);
-        });
+    resolver_.async_resolve(url_.host, std::to_string(url_.port),
+                            [self = shared_from_this()](Error error, const Resolver::results_type& found) {
+                              if (error) return self->fail("can't find " + self->url_.host, error);
+                              for (const auto& entry : found) self->endpoints_.push_back(entry.endpoint());
+                              self->connect(boost::asio::error::host_not_found);
+                            });
   }
 
   void send(std::string text) override {
@@ -72,7 +70,7 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
       return;
     }
     patience_.expires_after(std::chrono::seconds(1));
-    patience_.async_wait([self = this->shared_from_this()](Error error) {
+    patience_.async_wait([self = shared_from_this()](Error error) {
       if (!error) self->end(0, "closed", false);
     });
     isClosing_ = true;
@@ -82,7 +80,6 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
  private:
   using Error = boost::beast::error_code;
   using Resolver = boost::asio::ip::tcp::resolver;
-  static constexpr bool isEncrypted = std::is_same_v<Stream, Encrypted>;
 
   std::string name() const { return command_.empty() ? url_.authority() : "the command"; }
 
@@ -99,8 +96,8 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
   /// Reads up to the greeting, and skips what a shell writes when it starts.
   void readGreeting() {
     boost::asio::async_read_until(
-        transport(), boost::asio::dynamic_buffer(line_, mostGreetingBytes), '\n',
-        [self = this->shared_from_this()](Error error, std::size_t count) {
+        socket_.next_layer(), boost::asio::dynamic_buffer(line_, mostGreetingBytes), '\n',
+        [self = shared_from_this()](Error error, std::size_t count) {
           if (self->hasEnded_) return;
           self->greetingBytes_ += count;
           if (error == boost::asio::error::not_found || self->greetingBytes_ > mostGreetingBytes)
@@ -130,7 +127,7 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
     const boost::asio::ip::tcp::endpoint endpoint = endpoints_.front();
     endpoints_.pop_front();
     transport().expires_after(waiting);
-    transport().async_connect(Plain::endpoint_type(endpoint), [self = this->shared_from_this()](Error error) {
+    transport().async_connect(Plain::endpoint_type(endpoint), [self = shared_from_this()](Error error) {
       if (!error) return self->secure();
       self->transport().close();
       self->connect(error);
@@ -138,24 +135,20 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
   }
 
   void secure() {
-    if constexpr (isEncrypted) {
-      Encrypted& tls = socket_.next_layer();
-      SSL_set_tlsext_host_name(tls.native_handle(), url_.host.c_str());
-      tls.set_verify_mode(boost::asio::ssl::verify_peer);
-      tls.set_verify_callback(boost::asio::ssl::host_name_verification(url_.host));
-      tls.async_handshake(
-          boost::asio::ssl::stream_base::client, [self = this->shared_from_this()](Error error) {
-            if (!error) return self->upgrade();
-            const bool isDistrust = ERR_GET_REASON(static_cast<unsigned long>(error.value())) ==
-                                        SSL_R_CERTIFICATE_VERIFY_FAILED &&
-                                    error.category() == boost::asio::error::get_ssl_category();
-            const std::string where = self->url_.authority();
-            if (isDistrust) return self->end(0, "the certificate of " + where + " isn't trusted", true);
-            self->fail("can't encrypt the connection to " + where, error);
-          });
-    } else {
-      upgrade();
-    }
+    auto* const tls = socket_.next_layer().tls();
+    if (tls == nullptr) return upgrade();
+    SSL_set_tlsext_host_name(tls->native_handle(), url_.host.c_str());
+    tls->set_verify_mode(boost::asio::ssl::verify_peer);
+    tls->set_verify_callback(boost::asio::ssl::host_name_verification(url_.host));
+    tls->async_handshake(boost::asio::ssl::stream_base::client, [self = shared_from_this()](Error error) {
+      if (!error) return self->upgrade();
+      const bool isDistrust =
+          ERR_GET_REASON(static_cast<unsigned long>(error.value())) == SSL_R_CERTIFICATE_VERIFY_FAILED &&
+          error.category() == boost::asio::error::get_ssl_category();
+      const std::string where = self->url_.authority();
+      if (isDistrust) return self->end(0, "the certificate of " + where + " isn't trusted", true);
+      self->fail("can't encrypt the connection to " + where, error);
+    });
   }
 
   void upgrade() {
@@ -167,27 +160,26 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
     }));
     socket_.read_message_max(maxServerText);
     socket_.auto_fragment(false);
-    socket_.async_handshake(
-        response_, url_.authority(), "/stream", [self = this->shared_from_this()](Error error) {
-          if (error == websocket::error::upgrade_declined) {
-            // An error of the server's, such as 502 of a proxy, may pass.
-            constexpr int serverErrors = 500;
-            const int status = static_cast<int>(self->response_.result_int());
-            self->end(0, self->name() + " has no VDIs to offer: HTTP status " + std::to_string(status),
-                      status < serverErrors);
-          } else if (error) {
-            self->fail("can't talk to " + self->name(), error);
-          } else if (!self->hasEnded_) {
-            self->isOpen_ = true;
-            self->events_.opened();
-            self->write();
-            self->read();
-          }
-        });
+    socket_.async_handshake(response_, url_.authority(), "/stream", [self = shared_from_this()](Error error) {
+      if (error == websocket::error::upgrade_declined) {
+        // An error of the server's, such as 502 of a proxy, may pass.
+        constexpr int serverErrors = 500;
+        const int status = static_cast<int>(self->response_.result_int());
+        self->end(0, self->name() + " has no VDIs to offer: HTTP status " + std::to_string(status),
+                  status < serverErrors);
+      } else if (error) {
+        self->fail("can't talk to " + self->name(), error);
+      } else if (!self->hasEnded_) {
+        self->isOpen_ = true;
+        self->events_.opened();
+        self->write();
+        self->read();
+      }
+    });
   }
 
   void read() {
-    socket_.async_read(buffer_, [self = this->shared_from_this()](Error error, std::size_t) {
+    socket_.async_read(buffer_, [self = shared_from_this()](Error error, std::size_t) {
       if (self->hasEnded_) return;
       if (error) return self->endOfReading(error);
       const auto data = self->buffer_.cdata();
@@ -217,19 +209,18 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
     writing_ = std::move(queue_.front());
     queue_.pop_front();
     socket_.text(true);
-    socket_.async_write(boost::asio::buffer(writing_),
-                        [self = this->shared_from_this()](Error error, std::size_t) {
-                          self->isWriting_ = false;
-                          if (self->hasEnded_) return;
-                          if (self->isClosing_) return self->closeNow();
-                          if (!error) self->write();  // reading says why it failed
-                        });
+    socket_.async_write(boost::asio::buffer(writing_), [self = shared_from_this()](Error error, std::size_t) {
+      self->isWriting_ = false;
+      if (self->hasEnded_) return;
+      if (self->isClosing_) return self->closeNow();
+      if (!error) self->write();  // reading says why it failed
+    });
   }
 
   void closeNow() {
     isWriting_ = true;
     socket_.async_close(boost::beast::websocket::close_code::normal,
-                        [self = this->shared_from_this()](Error) { self->end(0, "closed", false); });
+                        [self = shared_from_this()](Error) { self->end(0, "closed", false); });
   }
 
   void fail(const std::string& what, Error error) { end(0, what + ": " + error.message(), false); }
@@ -253,7 +244,7 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
   Resolver resolver_;
   boost::asio::steady_timer patience_;
   std::deque<boost::asio::ip::tcp::endpoint> endpoints_;
-  boost::beast::websocket::stream<Stream> socket_;
+  boost::beast::websocket::stream<Transport> socket_;
   boost::beast::websocket::response_type response_;
   boost::beast::flat_buffer buffer_;
   std::deque<std::string> queue_;
@@ -268,5 +259,21 @@ class StreamLine : public Line, public std::enable_shared_from_this<StreamLine<S
   bool isClosing_ = false;
   bool hasEnded_ = false;
 };
+
+}  // namespace
+
+std::shared_ptr<Line> line(boost::asio::io_context& context, boost::asio::ssl::context* tls, const Url& url,
+                           LineEvents events) {
+  return std::make_shared<SocketLine>(context, tls, url, std::move(events));
+}
+
+std::shared_ptr<Line> commandLine(boost::asio::io_context& context, const std::string& command,
+                                  LineEvents events) {
+  Url nowhere;
+  nowhere.host = "localhost";  // HTTP wants one
+  auto made = std::make_shared<SocketLine>(context, nullptr, nowhere, std::move(events));
+  made->runFirst(command);
+  return made;
+}
 
 }  // namespace vdi::stream
