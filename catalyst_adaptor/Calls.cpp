@@ -46,6 +46,20 @@ void requireCountable(const vdi_catalyst_block& block) {
   }
 }
 
+/// Throws std::invalid_argument with the reason if the block is invalid.
+void checkBlock(const vdi_catalyst_block& block) {
+  for (int axis = 0; axis < 3; ++axis) {
+    require(block.cells[axis] >= 1, "a block needs at least one cell per axis");
+    require(block.ghost_lo[axis] >= 0 && block.ghost_hi[axis] >= 0, "ghost layers can't be negative");
+    require(std::int64_t{block.ghost_lo[axis]} + block.ghost_hi[axis] < block.cells[axis],
+            "a block of nothing but ghost cells");
+    require(std::isfinite(block.spacing[axis]) && block.spacing[axis] > 0.0,
+            "spacing must be finite and > 0");
+    require(std::isfinite(block.origin[axis]), "the origin must be finite");
+  }
+  requireCountable(block);
+}
+
 /// Collective: the speaker's text on all ranks. A rank without memory for all of it gets its beginning, and
 /// leaves no other waiting.
 std::string shared(MPI_Comm comm, std::string_view text, int speaker) {
@@ -94,17 +108,9 @@ void requireEqual(MPI_Comm comm, std::int64_t value, const char* what) {
   require(extremes[0] == ~extremes[1], what);
 }
 
-void checkBlock(const vdi_catalyst_block& block) {
-  for (int axis = 0; axis < 3; ++axis) {
-    require(block.cells[axis] >= 1, "a block needs at least one cell per axis");
-    require(block.ghost_lo[axis] >= 0 && block.ghost_hi[axis] >= 0, "ghost layers can't be negative");
-    require(std::int64_t{block.ghost_lo[axis]} + block.ghost_hi[axis] < block.cells[axis],
-            "a block of nothing but ghost cells");
-    require(std::isfinite(block.spacing[axis]) && block.spacing[axis] > 0.0,
-            "spacing must be finite and > 0");
-    require(std::isfinite(block.origin[axis]), "the origin must be finite");
-  }
-  requireCountable(block);
+void checkBlocks(std::int32_t count, const vdi_catalyst_block* blocks) {
+  require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
+  for (std::int32_t i = 0; i < count; ++i) checkBlock(blocks[i]);
 }
 
 void checkOffset(const char* name, std::int32_t association, const double* offset) {

@@ -1,4 +1,4 @@
-// The code that both engines' calls share: it checks arguments, and gives all ranks the same result.
+// The code that all engines' calls share: it checks arguments, and gives all ranks the same result.
 #pragma once
 
 #include <mpi.h>
@@ -89,8 +89,8 @@ inline void require(bool good, const char* what) {
 }
 /// Collective: throws std::invalid_argument with the text `what` on all ranks if the ranks' values differ.
 void requireEqual(MPI_Comm comm, std::int64_t value, const char* what);
-/// Throws std::invalid_argument with the reason if the block is invalid.
-void checkBlock(const vdi_catalyst_block& block);
+/// Throws std::invalid_argument with the reason if the blocks are missing, or one is invalid.
+void checkBlocks(std::int32_t count, const vdi_catalyst_block* blocks);
 /// Throws std::invalid_argument with the reason if an array can't have the name, association or offset.
 void checkOffset(const char* name, std::int32_t association, const double* offset);
 /// Whether ParaView can count this step.

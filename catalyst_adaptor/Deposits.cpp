@@ -82,12 +82,18 @@ void DeviceDeposits::open() {
   deposits_ = std::move(fresh);
 }
 
+void DeviceDeposits::make(Fields& fields, std::int64_t step) {
+  for (const auto& [name, array] : fields.particles()) {
+    DepositedValues values = make(name, array, fields, step);
+    comm_.together([&] { fields.setDeposit(name, std::move(values)); });
+  }
+}
+
 DepositedValues DeviceDeposits::make(const std::string& name, const ParticleArray& array,
-                                     std::uint64_t version, std::span<const vdi_catalyst_block> blocks,
-                                     std::int64_t step) {
+                                     const Fields& fields, std::int64_t step) {
   if (!deposits_) open();
   const auto attempt = [&] {
-    deposits_->setBlocks(version, blocks);
+    deposits_->setBlocks(fields.version(), fields.blocks());
     return deposits_->make(name, array, step);
   };
   std::exception_ptr failure;

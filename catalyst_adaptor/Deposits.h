@@ -1,4 +1,4 @@
-// The arrays of cells that both engines make of the particles that a simulation hands over.
+// The arrays of cells that the engines make of the particles that a simulation hands over.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "catalyst_adaptor/Fields.h"
 #include "catalyst_adaptor/ParticleArray.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 #include "vdi/comm/Communicator.h"
@@ -50,13 +51,14 @@ class DeviceDeposits {
   /// Collective: duplicates the communicator.
   explicit DeviceDeposits(int fortranCommunicator);
 
-  /// Collective. Throws on all ranks as Deposits does, and Error{DeviceUnavailable}. If the device was lost,
-  /// it opens another one.
-  DepositedValues make(const std::string& name, const ParticleArray& array, std::uint64_t version,
-                       std::span<const vdi_catalyst_block> blocks, std::int64_t step);
+  /// Collective: makes the arrays of all particles, and keeps them in `fields`. Throws on all ranks as
+  /// Deposits does, and Error{DeviceUnavailable}. If the device was lost, it opens another one.
+  void make(Fields& fields, std::int64_t step);
 
  private:
   void open();
+  DepositedValues make(const std::string& name, const ParticleArray& array, const Fields& fields,
+                       std::int64_t step);
 
   comm::Communicator comm_;
   std::shared_ptr<gpu::Device> device_;

@@ -47,8 +47,7 @@ int setAnyArray(FieldCalls& self, const GivenArray& array, const void* const* da
 int setBlocks(FieldCalls& self, std::int32_t count, const vdi_catalyst_block* blocks) {
   std::vector<vdi_catalyst_block> copies;
   const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
-    for (int i = 0; i < count; ++i) checkBlock(blocks[i]);
+    checkBlocks(count, blocks);
     copies.assign(blocks, blocks + count);
   });
   if (code != VDI_CATALYST_OK) return code;  // all ranks keep the blocks that they have

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "catalyst_adaptor/Calls.h"
-#include "catalyst_adaptor/json/Fields.h"
+#include "catalyst_adaptor/Fields.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 
 namespace vdi::catalyst {

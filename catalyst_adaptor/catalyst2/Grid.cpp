@@ -56,7 +56,7 @@ vdi_catalyst_block blockOf(const Node& domain, const Node& topology) {
     block.spacing[axis] = numberOr(1.0, coordset, spacings[axis]);
   }
   try {
-    checkBlock(block);
+    checkBlocks(1, &block);
   } catch (const std::invalid_argument& error) {
     coordset.refuse(std::string("isn't one: ") + error.what());
   }

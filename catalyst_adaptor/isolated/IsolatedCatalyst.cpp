@@ -204,8 +204,7 @@ int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* b
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   if (!catalyst->isJson) {
     const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-      require(count >= 0 && (count == 0 || blocks != nullptr), "no blocks given");
-      for (int i = 0; i < count; ++i) vdi::catalyst::checkBlock(blocks[i]);
+      vdi::catalyst::checkBlocks(count, blocks);
       requireMarks(count, blocks);
     });
     if (code != VDI_CATALYST_OK) return code;

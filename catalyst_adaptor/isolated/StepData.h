@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "catalyst_adaptor/Fields.h"
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/ParticleArray.h"
-#include "catalyst_adaptor/json/Fields.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 
 namespace vdi::catalyst {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "catalyst_adaptor/json/Fields.h"
+#include "catalyst_adaptor/Fields.h"
 #include "vdi/comm/Communicator.h"
 #include "vdi/config/Run.h"
 

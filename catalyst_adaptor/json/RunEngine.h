@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "catalyst_adaptor/Fields.h"
 #include "catalyst_adaptor/Parameters.h"
-#include "catalyst_adaptor/json/Fields.h"
 #include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
 #include "vdi/core/FunctionRef.h"

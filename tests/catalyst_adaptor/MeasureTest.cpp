@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "catalyst_adaptor/json/Fields.h"
+#include "catalyst_adaptor/Fields.h"
 #include "catalyst_adaptor/json/Measure.h"
 #include "tests/Catch.h"
 #include "vdi/comm/Communicator.h"
@@ -85,7 +85,8 @@ void checkType(const comm::Communicator& comm, int type, bool cells) {
   const std::vector<Scalar> values = valuesIn<Scalar>(slab, cells);
   Fields fields;
   fields.setBlocks({slab.block});
-  fields.setArray("f", cells, type, {fields.inOrder(slab.block, type, cells, 1, values.data())});
+  fields.set(
+      Fields::arrayChange("f", cells, type, {fields.inOrder(slab.block, type, cells, 1, values.data())}));
   // Means of integers: cells' middles make 3 + 3.5 + 0.5 k.
   const double cut = std::is_integral_v<Scalar> && cells ? 0.5 : 0.0;
   const double half = cells ? 0.5 : 0.0;
@@ -139,7 +140,7 @@ TEST_CASE("components, magnitudes and values out of order are measured where the
   strided.scalarBytes = sizeof(float);
   Fields fields;
   fields.setBlocks({slab.block});
-  fields.setArray("f", true, VDI_CATALYST_F32, {strided});
+  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F32, {strided}));
   constexpr double last = side - 1.0;
   CHECK(*measured(Kind::Max, comm, fields, 0) == 2.0 * last);
   CHECK(*measured(Kind::Min, comm, fields, 1) == -last);
@@ -175,7 +176,7 @@ TEST_CASE("what finer blocks cover doesn't count") {
   std::vector<StridedValues> values;
   for (std::size_t i = 0; i < blocks.size(); ++i)
     values.push_back(fields.inOrder(blocks[i], VDI_CATALYST_F64, true, 1, data[i]));
-  fields.setArray("f", true, VDI_CATALYST_F64, values);
+  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64, values));
   CHECK(*measured(Kind::Max, comm, fields) == 10.0);
   CHECK(*measured(Kind::Mean, comm, fields) == Approx(2.0 * 7.0 / 8.0 + 10.0 / 8.0));
 }
@@ -190,8 +191,8 @@ TEST_CASE("NaN doesn't count, and infinite values count for the extremes alone")
   Fields fields;
   const auto set = [&] {
     fields.setBlocks({slab.block});
-    fields.setArray("f", true, VDI_CATALYST_F64,
-                    {fields.inOrder(slab.block, VDI_CATALYST_F64, true, 1, values.data())});
+    fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64,
+                                   {fields.inOrder(slab.block, VDI_CATALYST_F64, true, 1, values.data())}));
   };
   set();
   CHECK(*measured(Kind::Max, comm, fields) == infinite);
@@ -216,7 +217,7 @@ TEST_CASE("blocks that lack the array don't count") {
   const auto in = [&](int block, const void* data) {
     return fields.inOrder(fields.blocks()[static_cast<std::size_t>(block)], VDI_CATALYST_F64, true, 1, data);
   };
-  fields.setArray("f", true, VDI_CATALYST_F64, {in(0, values.data()), in(1, nullptr)});
+  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64, {in(0, values.data()), in(1, nullptr)}));
   const double mean = 2.0 + 0.5 * (world.size() - 1);
   CHECK(measured(Kind::Mean, world, fields).value() == Approx(mean));
   // A measure notices when another block gets the array.
@@ -224,9 +225,9 @@ TEST_CASE("blocks that lack the array don't count") {
       {.measure = Kind::Mean, .field = "f", .cells = {}, .component = -1, .above = {}, .below = {}});
   CHECK(measure.of(world, fields).value() == Approx(mean));
   const std::vector<double> ones(64, 1.0);
-  fields.setArray("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, ones.data())});
+  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, ones.data())}));
   CHECK(measure.of(world, fields).value() == Approx(1.0));
-  fields.setArray("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, nullptr)});
+  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, nullptr)}));
   CHECK_THROWS(measure.of(world, fields));
 }
 
@@ -239,16 +240,18 @@ TEST_CASE("a phase is measured, and an offset moves the parts that count") {
   }
   Fields fields;
   fields.setBlocks({{{4, 4, 4}, {0, 0, 0}, {0, 0, 0}, {0.0, 0.0, 4.0 * world.rank()}, {1.0, 1.0, 1.0}}});
-  fields.setArray("f", true, VDI_CATALYST_F64,
-                  {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 2, pairs.data())});
+  fields.set(
+      Fields::arrayChange("f", true, VDI_CATALYST_F64,
+                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 2, pairs.data())}));
   CHECK(measured(Kind::Max, world, fields, phase).value() == Approx(0.5));
   CHECK(measured(Kind::Max, world, fields, magnitude).value() == Approx(3.0));
   std::vector<double> along;  // 0 to 3 along x
   for (int i = 0; i < 64; ++i) along.push_back(i % 4);
-  fields.setArray("g", true, VDI_CATALYST_F64,
-                  {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 1, along.data())});
+  fields.set(
+      Fields::arrayChange("g", true, VDI_CATALYST_F64,
+                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 1, along.data())}));
   Measure mean({.measure = Kind::Mean, .field = "g", .cells = {}, .component = -1, .above = {}, .below = {}});
   CHECK(mean.of(world, fields).value() == Approx(1.5));
-  fields.setOffset("g", true, {-0.5, 0.0, 0.0});
+  fields.set(Fields::offsetChange("g", true, {-0.5, 0.0, 0.0}));
   CHECK(mean.of(world, fields).value() == Approx(6.0 / 3.5));  // half of the first value's cell is inside
 }

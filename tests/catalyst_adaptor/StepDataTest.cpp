@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "catalyst_adaptor/Fields.h"
 #include "catalyst_adaptor/ParticleArray.h"
-#include "catalyst_adaptor/json/Fields.h"
 #include "tests/Catch.h"
 
 using namespace vdi::catalyst;
@@ -54,8 +54,8 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   StridedValues values = fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 1, &interleaved[0][1]);
   values.strides = {64, 32, 16};
   const StridedValues missing = fields.inOrder(fields.blocks()[1], VDI_CATALYST_F64, true, 1, nullptr);
-  fields.setArray("E", true, VDI_CATALYST_F64, {values, missing});
-  fields.setOffset("E", true, {-0.5, 0.0, 0.25});
+  fields.set(Fields::arrayChange("E", true, VDI_CATALYST_F64, {values, missing}));
+  fields.set(Fields::offsetChange("E", true, {-0.5, 0.0, 0.25}));
 
   // Positions from the last to the first, one weight for all, no lengths.
   const std::array<float, 6> positions{1, 2, 3, 4, 5, 6};
@@ -68,7 +68,7 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   given.position_stride = -12;
   given.weights = &weight;
   given.weight_type = VDI_CATALYST_F64;
-  fields.setParticles("stars", particleArrayOf(&given));
+  fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
 
   StepFields step;
   step.arrays = fields.arrays();
@@ -114,9 +114,9 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
 TEST_CASE("no particles, and no blocks, arrive as none") {
   Fields fields;
   fields.setBlocks({});
-  fields.setArray("E", true, VDI_CATALYST_F32, {});
+  fields.set(Fields::arrayChange("E", true, VDI_CATALYST_F32, {}));
   vdi_catalyst_particles given{};
-  fields.setParticles("stars", particleArrayOf(&given));
+  fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
   StepFields step;
   step.arrays = fields.arrays();
   for (const auto& [name, particles] : fields.particles()) step.particles.emplace_back(name, particles);
@@ -133,8 +133,9 @@ TEST_CASE("a step that is cut short is refused") {
   Fields fields;
   fields.setBlocks({blockAt(0.0, 2)});
   const std::array<float, 8> numbers{};
-  fields.setArray("E", true, VDI_CATALYST_F32,
-                  {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, numbers.data())});
+  fields.set(
+      Fields::arrayChange("E", true, VDI_CATALYST_F32,
+                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, numbers.data())}));
   StepFields step;
   step.arrays = fields.arrays();
   const Bytes bytes(StepWriter(1, fields.blocks(), step, {}));

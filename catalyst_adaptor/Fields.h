@@ -1,4 +1,4 @@
-// The simulation's blocks and arrays in the form that vdi/pipeline takes.
+// The blocks and arrays that a simulation has handed over, in the form that vdi/pipeline takes.
 #pragma once
 
 #include <array>
@@ -29,6 +29,8 @@ class Fields {
   const std::vector<vdi_catalyst_block>& blocks() const { return blocks_; }
   /// A number that each setBlocks changes; equal on all ranks.
   std::uint64_t version() const { return version_; }
+  /// A number that each change of blocks, arrays or offsets changes.
+  std::uint64_t changes() const { return changes_; }
 
   /// The layout of a block's values in order: x fastest, components side by side, no gaps.
   StridedValues inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
@@ -44,10 +46,6 @@ class Fields {
   /// The particles of which an array of cells is to be made. It replaces such an array of that name.
   static Change particlesChange(const std::string& name, const ParticleArray& particles);
   void set(Change change) noexcept;
-
-  void setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
-  void setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset);
-  void setParticles(const std::string& name, const ParticleArray& particles);
   /// The particles of that name; null if there are none. All ranks have particles of the same names.
   const ParticleArray* particlesOf(const std::string& name) const;
   /// Sets the values that were made of the particles, one entry for each block; `dropDeposits` drops them
@@ -69,7 +67,7 @@ class Fields {
     glm::dvec3 offset{0.0};                 // in cells
     std::span<const StridedValues> blocks;  // one entry for each block; null `first` where a block lacks it
   };
-  /// All arrays, where the simulation has their values.
+  /// All arrays, where the simulation has their values, in the order in which they were first set.
   std::vector<NamedArray> arrays() const;
   /// All particles, by name.
   const std::map<std::string, ParticleArray>& particles() const { return particles_; }
@@ -94,14 +92,17 @@ class Fields {
   struct Array {
     int type = VDI_CATALYST_F64;
     std::vector<StridedValues> values;
+    std::uint64_t set = 0;  // the number of the change by which an array of that name came
   };
   using Key = std::pair<bool, std::string>;  // whether it is one of cells, and the name
   const Array* find(const std::string& name, bool cells) const;
   glm::dvec3 offsetOf(const std::string& name, bool cells) const;
   bool has(const std::string& name, bool cells) const;
+  void put(std::map<Key, Array>& fresh) noexcept;
 
   std::vector<vdi_catalyst_block> blocks_;
   std::uint64_t version_ = 0;
+  std::uint64_t changes_ = 0;
   std::map<Key, Array> arrays_;
   std::map<Key, glm::dvec3> offsets_;  // in cells; none: 0
   std::map<std::string, ParticleArray> particles_;

@@ -1,6 +1,6 @@
 #include <vtkPython.h>  // Python requires it to be first
 
-#include "catalyst_adaptor/Engine.h"
+#include "catalyst_adaptor/scripts/Engine.h"
 
 #include <vtkCallbackCommand.h>
 #include <vtkInSituInitializationHelper.h>
@@ -29,7 +29,7 @@
 #include <utility>
 
 #include "ScriptGuard.h"
-#include "catalyst_adaptor/Agreement.h"
+#include "catalyst_adaptor/scripts/Agreement.h"
 #include "plugin/VolumetricDepthImages/Filters/VDICollective.h"
 #include "plugin/VolumetricDepthImages/Filters/VDIParameters.h"
 #include "plugin/VolumetricDepthImages/ParaViewVersions.h"

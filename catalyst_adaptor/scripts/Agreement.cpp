@@ -1,4 +1,4 @@
-#include "catalyst_adaptor/Agreement.h"
+#include "catalyst_adaptor/scripts/Agreement.h"
 
 #include <array>
 #include <functional>

@@ -1,4 +1,4 @@
-#include "catalyst_adaptor/json/Fields.h"
+#include "catalyst_adaptor/Fields.h"
 
 #include <algorithm>
 #include <array>
@@ -52,6 +52,13 @@ ComponentArray arrayOf(const StridedValues& values, int type) {
           values.componentStride};
 }
 
+/// Moves the entries of `fresh` to `all`. Entries with their keys go.
+template <typename Key, typename Value>
+void replace(std::map<Key, Value>& all, std::map<Key, Value>& fresh) noexcept {
+  for (const auto& [key, value] : fresh) all.erase(key);
+  all.merge(fresh);
+}
+
 std::string kindOf(bool cells) {
   return cells ? "cells" : "points";
 }
@@ -70,6 +77,7 @@ void Fields::setBlocks(std::vector<vdi_catalyst_block> blocks) {
   particles_.clear();
   deposits_.clear();
   ++version_;
+  ++changes_;
 }
 
 StridedValues Fields::inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
@@ -113,30 +121,26 @@ Fields::Change Fields::particlesChange(const std::string& name, const ParticleAr
 
 void Fields::set(Change change) noexcept {
   const auto& [cells, name] = change.key_;
+  ++changes_;
   if (!change.offset_.empty()) {
-    offsets_.erase(change.key_);
-    offsets_.merge(change.offset_);
+    replace(offsets_, change.offset_);
     return;
   }
-  arrays_.erase(change.key_);
   if (cells) {
     particles_.erase(name);
     deposits_.erase(name);
   }
-  arrays_.merge(change.array_);
-  particles_.merge(change.particles_);
+  if (change.array_.empty()) arrays_.erase(change.key_);
+  put(change.array_);
+  replace(particles_, change.particles_);
 }
 
-void Fields::setArray(const std::string& name, bool cells, int type, std::vector<StridedValues> values) {
-  set(arrayChange(name, cells, type, std::move(values)));
-}
-
-void Fields::setOffset(const std::string& name, bool cells, const std::array<double, 3>& offset) {
-  set(offsetChange(name, cells, offset));
-}
-
-void Fields::setParticles(const std::string& name, const ParticleArray& particles) {
-  set(particlesChange(name, particles));
+void Fields::put(std::map<Key, Array>& fresh) noexcept {
+  for (auto& [key, array] : fresh) {
+    const auto before = arrays_.find(key);
+    array.set = before != arrays_.end() ? before->second.set : changes_;
+  }
+  replace(arrays_, fresh);
 }
 
 glm::dvec3 Fields::offsetOf(const std::string& name, bool cells) const {
@@ -153,11 +157,17 @@ void Fields::setDeposit(const std::string& name, DepositedValues values) {
   std::vector<StridedValues> all;
   for (std::size_t i = 0; i < blocks_.size(); ++i)
     all.push_back(inOrder(blocks_[i], VDI_CATALYST_F32, true, 1, values[i].get()));
-  arrays_[{true, name}] = {VDI_CATALYST_F32, std::move(all)};
-  deposits_[name] = std::move(values);
+  std::map<Key, Array> array;
+  array[{true, name}] = {VDI_CATALYST_F32, std::move(all)};
+  std::map<std::string, DepositedValues> deposit;
+  deposit[name] = std::move(values);
+  ++changes_;
+  put(array);
+  replace(deposits_, deposit);
 }
 
 void Fields::dropDeposits() {
+  ++changes_;
   for (const auto& [name, values] : deposits_) arrays_.erase({true, name});
   deposits_.clear();
 }
@@ -199,6 +209,7 @@ std::vector<Fields::NamedArray> Fields::arrays() const {
   std::vector<NamedArray> arrays;
   for (const auto& [key, array] : arrays_)
     arrays.push_back({key.second, key.first, array.type, offsetOf(key.second, key.first), array.values});
+  std::ranges::sort(arrays, {}, [&](const NamedArray& array) { return find(array.name, array.cells)->set; });
   return arrays;
 }
 

@@ -1,6 +1,6 @@
 #include <Python.h>  // it requires to be first
 
-#include "catalyst_adaptor/ScriptEnvironment.h"
+#include "catalyst_adaptor/scripts/ScriptEnvironment.h"
 
 #include <dlfcn.h>
 

@@ -1,0 +1,256 @@
+// The C interface for scripts. It starts ParaView's engine, keeps the ranks together, and shows scripts the
+// blocks and arrays as a Grid.
+#include <mpi.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "catalyst_adaptor/Deposits.h"
+#include "catalyst_adaptor/EngineFunctions.h"
+#include "catalyst_adaptor/FieldCalls.h"
+#include "catalyst_adaptor/Parameters.h"
+#include "catalyst_adaptor/Scripts.h"
+#include "catalyst_adaptor/scripts/Engine.h"
+#include "catalyst_adaptor/scripts/Grid.h"
+#include "catalyst_adaptor/scripts/ScriptEnvironment.h"
+
+struct vdi_catalyst : vdi::catalyst::FieldCalls {
+  std::unique_ptr<vdi::catalyst::Engine> engine;
+  std::unique_ptr<vdi::catalyst::Grid> grid;              // null: no blocks were given
+  std::optional<vdi::catalyst::DeviceDeposits> deposits;  // of particles, once there are some
+};
+
+namespace {
+
+using vdi::catalyst::guarded;
+using vdi::catalyst::guardedTogether;
+using vdi::catalyst::isStep;
+using vdi::catalyst::PythonLock;
+using vdi::catalyst::require;
+using vdi::catalyst::requireEqual;
+using vdi::catalyst::Script;
+using vdi::catalyst::scriptsOf;
+
+/// The living handle, of which a process has one at a time. Any other handle has been finalized, and must not
+/// be read.
+vdi_catalyst*& alive() {
+  static vdi_catalyst* handle = nullptr;
+  return handle;
+}
+
+bool usable(const vdi_catalyst* catalyst) {
+  return catalyst != nullptr && catalyst == alive();
+}
+
+/// An engine whose vdi_catalyst_initialize failed after its start, for example because of a script. The next
+/// call takes it, because ParaView starts once in a process. It is never deleted: that needs MPI, which is
+/// gone at the process's end.
+vdi::catalyst::Engine*& spareEngine() {
+  static vdi::catalyst::Engine* engine = nullptr;
+  return engine;
+}
+
+/// Takes the spare engine or a new one. All ranks check whether they can before any of them starts.
+int takeEngine(vdi_catalyst& self) {
+  using vdi::catalyst::Engine;
+  std::string plugin;
+  const int code = guarded(self, VDI_CATALYST_ENGINE, [&] {
+    if (spareEngine() != nullptr ? !spareEngine()->runsOn(self.comm) : Engine::wasStarted()) {
+      throw std::runtime_error(spareEngine() != nullptr
+                                   ? "ParaView was started before in this process, on another communicator"
+                                   : "ParaView's in situ engine starts only once in a process");
+    }
+    plugin = vdi::catalyst::pluginFile();
+    vdi::catalyst::sharePython();
+  });
+  if (code != VDI_CATALYST_OK) return code;
+  return guarded(self, VDI_CATALYST_ENGINE, [&] {
+    self.engine.reset(std::exchange(spareEngine(), nullptr));
+    if (!self.engine) self.engine = std::make_unique<Engine>(MPI_Comm_c2f(self.comm), plugin);
+  });
+}
+
+void sayIfNothingIsMade(const vdi_catalyst& self, const std::vector<Script>& scripts) {
+  int rank = 0;
+  MPI_Comm_rank(self.comm, &rank);
+  if (rank == 0 && scripts.empty())
+    std::fprintf(stderr, "vdi_catalyst: no scripts were given, so no step will make anything\n");
+}
+
+/// Makes the arrays of all particles if a script will do anything at the step.
+int depositIfWanted(vdi_catalyst& self, std::int64_t step, double time) {
+  if (self.fields.particles().empty()) return VDI_CATALYST_OK;
+  int wanted = self.engine->wants(static_cast<int>(step), time) ? 1 : 0;
+  MPI_Allreduce(MPI_IN_PLACE, &wanted, 1, MPI_INT, MPI_MAX, self.comm);
+  if (wanted == 0) return VDI_CATALYST_OK;
+  return guardedTogether(
+      self, VDI_CATALYST_SCRIPT,
+      [&] {
+        if (!self.deposits) self.deposits.emplace(MPI_Comm_c2f(self.comm));
+        self.deposits->make(self.fields, step);
+      },
+      step);
+}
+
+/// `given`: the files alone, or with arguments.
+template <typename Given>
+int initializeAny(int32_t fortran_communicator, int32_t script_count, const Given* given,
+                  vdi_catalyst** catalyst) {
+  const PythonLock lock;
+  // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
+  std::unique_ptr<vdi_catalyst> self;
+  int code = vdi::catalyst::makeHandle(fortran_communicator, self);
+  if (code != VDI_CATALYST_OK) return code;
+  std::vector<Script> scripts;
+  code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { scripts = scriptsOf(script_count, given); });
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+      requireEqual(self->comm, script_count, "the ranks give different numbers of scripts");
+    });
+  }
+  if (code == VDI_CATALYST_OK) code = takeEngine(*self);
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(*self, VDI_CATALYST_SCRIPT, [&] {
+      for (const Script& script : scripts) self->engine->check(script.file);
+    });
+  }
+  if (code == VDI_CATALYST_OK)
+    code = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine->loadPlugin(); });
+  if (code == VDI_CATALYST_OK)
+    code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { self->engine->add(scripts); });
+  if (code != VDI_CATALYST_OK) {
+    spareEngine() = self->engine.release();
+    MPI_Comm_free(&self->comm);
+    return code;
+  }
+  sayIfNothingIsMade(*self, scripts);
+  *catalyst = alive() = self.release();
+  return VDI_CATALYST_OK;
+}
+
+int initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
+               vdi_catalyst** catalyst) {
+  return initializeAny(fortran_communicator, script_count, scripts, catalyst);
+}
+
+int initializePipelines(int32_t fortran_communicator, int32_t script_count,
+                        const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
+  return initializeAny(fortran_communicator, script_count, scripts, catalyst);
+}
+
+int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const PythonLock lock;
+  std::unique_ptr<vdi::catalyst::Grid> grid;
+  int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    vdi::catalyst::checkBlocks(count, blocks);
+    grid = std::make_unique<vdi::catalyst::Grid>(std::span(blocks, static_cast<std::size_t>(count)));
+  });
+  if (code == VDI_CATALYST_OK) code = vdi::catalyst::setBlocks(*catalyst, count, blocks);
+  if (code == VDI_CATALYST_OK) catalyst->grid = std::move(grid);
+  return code;
+}
+
+int setArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
+             const void* const* data) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const PythonLock lock;
+  return vdi::catalyst::setArray(*catalyst, {name, type, association, 1}, data);
+}
+
+int setArrayStrided(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
+                    int32_t components, const void* const* data, const vdi_catalyst_strides* strides) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const PythonLock lock;
+  return vdi::catalyst::setArrayStrided(*catalyst, {name, type, association, components}, data, strides);
+}
+
+int setArrayOffset(vdi_catalyst* catalyst, const char* name, int32_t association, const double* offset) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const PythonLock lock;
+  return vdi::catalyst::setArrayOffset(*catalyst, name, association, offset);
+}
+
+int setParticles(vdi_catalyst* catalyst, const char* name, const vdi_catalyst_particles* particles) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const PythonLock lock;
+  return vdi::catalyst::setParticles(*catalyst, name, particles);
+}
+
+int wants(vdi_catalyst* catalyst, int64_t step, double time) {
+  if (!usable(catalyst)) return 0;
+  const PythonLock lock;
+  int wanted = isStep(step) && catalyst->engine->wants(static_cast<int>(step), time) ? 1 : 0;
+  MPI_Allreduce(MPI_IN_PLACE, &wanted, 1, MPI_INT, MPI_MAX, catalyst->comm);
+  return wanted;
+}
+
+int execute(vdi_catalyst* catalyst, int64_t step, double time) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const PythonLock lock;
+  int code = guarded(
+      *catalyst, VDI_CATALYST_BAD_ARGUMENT,
+      [&] {
+        require(catalyst->haveBlocks, "no blocks were given yet");
+        vdi::catalyst::requireStep(step);
+      },
+      step);
+  if (code == VDI_CATALYST_OK) {
+    code = guarded(
+        *catalyst, VDI_CATALYST_BAD_ARGUMENT,
+        [&] { requireEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
+  }
+  if (code != VDI_CATALYST_OK) return code;
+  code = depositIfWanted(*catalyst, step, time);
+  if (code != VDI_CATALYST_OK) return code;
+  code = guarded(
+      *catalyst, VDI_CATALYST_ENGINE, [&] { catalyst->grid->update(catalyst->fields); }, step);
+  if (code != VDI_CATALYST_OK) return code;
+  const int result = guarded(
+      *catalyst, VDI_CATALYST_SCRIPT,
+      [&] { return catalyst->engine->execute(&catalyst->grid->data(), static_cast<int>(step), time); }, step);
+  if (result == VDI_CATALYST_OK) catalyst->printed.clear();
+  return result;
+}
+
+double parameterF64(vdi_catalyst* catalyst, const char* name, double value, double low, double high) {
+  if (!usable(catalyst)) return value;
+  return vdi::catalyst::inForce(*catalyst, catalyst->engine->parameters(), name, value, low, high);
+}
+
+int64_t parameterI64(vdi_catalyst* catalyst, const char* name, int64_t value, int64_t low, int64_t high) {
+  if (!usable(catalyst)) return value;
+  return vdi::catalyst::inForce(*catalyst, catalyst->engine->parameters(), name, value, low, high);
+}
+
+int finalize(vdi_catalyst* catalyst) {
+  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
+  const PythonLock lock;
+  const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(), nullptr));
+  int code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { return self->engine->finish(); });
+  self->grid.reset();
+  self->deposits.reset();
+  const int ended = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine.reset(); });
+  if (code == VDI_CATALYST_OK) code = ended;
+  MPI_Comm_free(&self->comm);
+  return code;
+}
+
+const char* error(const vdi_catalyst* catalyst) {
+  return usable(catalyst) ? catalyst->error.c_str() : "";
+}
+
+}  // namespace
+
+const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
+    initialize, initializePipelines, nullptr,        nullptr,      setBlocks,
+    setArray,   setArrayStrided,     setArrayOffset, setParticles, wants,
+    execute,    parameterF64,        parameterI64,   finalize,     error,
+    nullptr,
+};
