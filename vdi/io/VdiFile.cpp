@@ -1,9 +1,14 @@
 #include "vdi/io/VdiFile.h"
 
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cassert>
+#include <cstdint>
 #include <cstring>
 #include <future>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -162,6 +167,16 @@ Header readHeader(const InputFile& file) {
   return parseHeader(file.read(0, std::min<std::uint64_t>(file.size(), sizeof(Header))), file.size());
 }
 
+/// Asks for large pages where the system has some. With small ones, page faults hold up the thread that
+/// appends the chunks of a large file.
+void preferLargePages(std::span<std::byte> memory) {
+  const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
+  void* first = memory.data();
+  std::size_t bytes = memory.size();
+  if (std::align(page, page, first, bytes) != nullptr)
+    (void)::madvise(first, bytes / page * page, MADV_HUGEPAGE);
+}
+
 /// Runs `work` with the path as the context of its Format errors.
 template <typename Work>
 auto withPath(const std::filesystem::path& path, Work work) {
@@ -246,6 +261,7 @@ std::vector<std::byte> encode(const Vdi& vdi) {
   // As many as the chunks take before LZ4. Pages that stay empty take no memory.
   bytes.reserve(headBytes(vdi.listCount()) +
                 chunkBytes(vdi.listCount(), vdi.supersegmentCount(), vdi.precision()));
+  preferLargePages({bytes.data(), bytes.capacity()});
   bytes.resize(headBytes(vdi.listCount()));
   const auto append = [&](const EncodedChunk& chunk) {
     table.push_back(chunk.entry);
