@@ -63,7 +63,7 @@ void checkFiles(const config::Run& run) {
   if (run.png) check(*run.png);
   if (run.cinema) {
     check(run.cinema->pictures);
-    fmt::print("a Cinema database: {}\n", run.cinema->folder.string());
+    fmt::print("Cinema database: {}\n", run.cinema->folder.string());
   }
 }
 
@@ -81,10 +81,10 @@ void check(const std::string& file) {
   for (const std::string& log : {run.log.json, run.log.text}) {
     if (log.empty()) continue;
     requireWritable(log);
-    fmt::print("a log: {}\n", log);
+    fmt::print("log: {}\n", log);
   }
   if (run.stream) {
-    fmt::print("a stream, at {}:{}{}\n", run.stream->host, run.stream->port,
+    fmt::print("stream at {}:{}{}\n", run.stream->host, run.stream->port,
                run.stream->steer ? ", which viewers may steer" : "");
   }
   if (!run.colors.range)

@@ -59,7 +59,7 @@ std::string HelpFormatter::make_option_desc(const CLI::Option* option) const {
 
 std::string requirePositive(const std::string& text) {
   double value = 0.0;
-  return CLI::detail::lexical_cast(text, value) && value > 0.0 ? "" : "must be > 0, it is " + text;
+  return CLI::detail::lexical_cast(text, value) && value > 0.0 ? "" : "must be > 0, but is " + text;
 }
 
 std::string requireFileName(const std::string& text) {

@@ -59,7 +59,8 @@ JsonFile::JsonFile(std::filesystem::path path, const std::set<std::string>& know
     : path_(std::move(path)), object_(readJson(path_)) {
   if (!object_.is_object()) fail("not a JSON object");
   for (const auto& [key, value] : object_.items()) {
-    if (!known.contains(key)) fail(fmt::format("unknown field '{}'; there are {}", key, joined(known)));
+    if (!known.contains(key))
+      fail(fmt::format("unknown field '{}'; known fields are {}", key, joined(known)));
   }
 }
 

@@ -22,7 +22,7 @@ synthetic::Joint jointOf(const std::string& name) {
   if (name == "shared") return synthetic::Joint::SharedPoints;
   if (name == "gap") return synthetic::Joint::Gap;
   if (name == "cells") return synthetic::Joint::Cells;
-  throw Error(ErrorCode::InvalidArgument, "there is no joint '" + name + "', only shared, gap and cells");
+  throw Error(ErrorCode::InvalidArgument, "unknown joint '" + name + "'; use shared, gap or cells");
 }
 
 template <typename T>
@@ -254,7 +254,7 @@ void addViewOptions(CLI::App& command, ViewOptions& options) {
             ->capture_default_str());
   orbit(command.add_option("--elevation", options.orbit.elevation, "degrees above the centre")
             ->capture_default_str());
-  orbit(command.add_option("--zoom", options.orbit.zoom, "> 1 moves closer")
+  orbit(command.add_option("--zoom", options.orbit.zoom, "magnification; values above 1 move closer")
             ->check(requirePositive)
             ->capture_default_str());
   orbit(command.add_flag("--parallel", options.parallel, "parallel projection of the whole scene"))

@@ -120,7 +120,7 @@ void measureAll(const BenchOptions& options, const comm::Communicator& world) {
 }
 
 const char* const footer =
-    R"(Each time is the median over the repeats, of the slowest rank. DVR and generate are device times,
+    R"(Each time is the slowest rank's, as the median over the repeats. DVR and generate are device times,
 without transfers, of a rank's own volume rendering and of its (sub-)VDI, compact. The columns '/ DVR' and
 'faster' are ratios to a volume rendering just before. The bench keeps a GPU busy before each measured run.
 composite is the time for merging under mpirun; render is the device's time for one view of the VDI. SSIM and
@@ -229,8 +229,8 @@ void addSuiteOptions(CLI::App& command, BenchOptions& options) {
   command
       .add_option(
           "--suite", options.suite,
-          "paper and small: data sets, sizes, viewpoints and N_S of docs/benchmarks.md, of which --fields "
-          "chooses some; paper needs a GPU and 32 GiB, small takes a minute on a CPU. The others use the "
+          "paper and small: data sets, sizes, viewpoints and N_S of docs/benchmarks.md, from which "
+          "--fields selects; paper needs a GPU and 32 GiB, small takes a minute on a CPU. The others use the "
           "volume and picture of the options. ranks: whole frames on fewer and more of mpirun's ranks; "
           "viewpoints: the accuracy of VDIs from all around; stream: how many VDIs a viewer gets, and "
           "their age")
@@ -265,8 +265,8 @@ void addRanksOptions(CLI::App& command, BenchOptions& options) {
       ->group(ranksGroup);
   command
       .add_option("--size-per-rank", options.sizePerRank,
-                  "values per axis of each rank in weak scaling; default: half of --size on each axis, with "
-                  "which 8 ranks have the fixed volume")
+                  "values per axis of each rank in weak scaling; default: half of --size on each axis, so "
+                  "that 8 ranks together hold the fixed volume")
       ->type_name("XxYxZ")
       ->group(ranksGroup);
 }
@@ -317,9 +317,10 @@ void addStreamOptions(CLI::App& command, BenchOptions& options) {
 
 void addOutputOptions(CLI::App& command, BenchOptions& options) {
   command
-      .add_option("--compare", options.comparison,
-                  "two JSON files, before and after: lists the figures that became slower by more than 10 % "
-                  "and the spread, larger by more than 5 %, or less accurate; exit status 1 if there are any")
+      .add_option(
+          "--compare", options.comparison,
+          "two JSON files, before and after: lists the figures that became slower by more than both "
+          "10 % and the spread, larger by more than 5 %, or less accurate; exit status 1 if there are any")
       ->expected(2)
       ->type_name("FILE FILE");
   command

@@ -232,7 +232,7 @@ Fields::Values Fields::valuesOf(const std::string& name, bool cells, int compone
   const bool isHere =
       std::ranges::any_of(array->values, [](const StridedValues& values) { return values.first != nullptr; });
   if (isHere && component == phase && components != 2) {
-    throw std::runtime_error("a phase is of two components, real and imaginary; '" + name + "' has " +
+    throw std::runtime_error("a phase needs two components, real and imaginary; '" + name + "' has " +
                              std::to_string(components));
   }
   if (components > 1 && component >= components) {

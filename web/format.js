@@ -72,7 +72,7 @@ const MAX_METADATA_BYTES = 1 << 20;
 
 /** @param {string} what @returns {never} */
 function fail(what) {
-  throw new FormatError(`not a sound .vdi file: ${what}`);
+  throw new FormatError(`invalid .vdi file: ${what}`);
 }
 
 /** @param {DataView} view @param {number} at */
@@ -116,7 +116,7 @@ function requireSizes(header, fileBytes) {
   if (!goodSide(width) || !goodSide(height) || listsPerChunk === 0)
     fail(`it has ${width} x ${height} lists in chunks of ${listsPerChunk}`);
   if (2 * margin[0] >= width || 2 * margin[1] >= height) fail("its margin leaves no picture");
-  if (header.budget < 1) fail("its lists have room for no supersegments");
+  if (header.budget < 1) fail("its lists can't hold any supersegments");
   const chunks = Math.ceil(width * height / listsPerChunk);
   if (chunks !== header.chunkCount) fail(`it has ${header.chunkCount} chunks instead of ${chunks}`);
   const before = HEADER_BYTES + chunks * ENTRY_BYTES;

@@ -160,7 +160,7 @@ export class Live {
   /** @param {number} code with which the WebSocket closed */
   onClose(code) {
     if (code === WRONG_TOKEN) this.refuse("the server rejects the token in this link; use the link that it printed last");
-    else if (code === OTHER_VERSION) this.refuse(this.cause || "the server speaks another version of the protocol; reload this page");
+    else if (code === OTHER_VERSION) this.refuse(this.cause || "the server uses another protocol version; reload this page");
     else this.lose(this.cause || "the server doesn't answer");
   }
 
@@ -228,8 +228,8 @@ export class Live {
   takeWelcome(welcome) {
     clearTimeout(this.timer);
     if (welcome.version !== STREAM_VERSION) {
-      this.refuse(`the server speaks version ${welcome.version} of the protocol, ` +
-                  `but this page speaks version ${STREAM_VERSION}; reload it`);
+      this.refuse(`the server uses protocol version ${welcome.version}, ` +
+                  `but this page uses version ${STREAM_VERSION}; reload it`);
       return;
     }
     if (welcome.session !== this.session) this.shown = undefined;  // another run numbers its own frames

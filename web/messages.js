@@ -77,7 +77,7 @@ function isWhole(value, least, most) {
 
 /** @param {unknown} value @param {number} most characters */
 function textOf(value, most) {
-  if (typeof value !== "string") refuse("a text is missing");
+  if (typeof value !== "string") refuse("a string is missing");
   return value.slice(0, most);
 }
 
@@ -131,7 +131,7 @@ function levelOf(json) {
 
 /** @param {unknown} list @param {string} name @returns {any[]} */
 function fewOf(list, name) {
-  if (!Array.isArray(list) || list.length > MOST_ENTRIES) refuse(`${name} aren't a short list`);
+  if (!Array.isArray(list) || list.length > MOST_ENTRIES) refuse(`${name} aren't a list of at most ${MOST_ENTRIES} entries`);
   return list;
 }
 

@@ -134,7 +134,7 @@ export class Renderer {
    */
   constructor(canvas) {
     const gl = canvas.getContext("webgl2", {alpha: false, antialias: true, powerPreference: "high-performance"});
-    if (!gl) throw new Error("this browser has no WebGL2, and VDIs can't be shown without");
+    if (!gl) throw new Error("this browser has no WebGL2, and VDIs can't be shown without it");
     this.gl = gl;
     this.canvas = canvas;
     /** @type {Loaded | undefined} */

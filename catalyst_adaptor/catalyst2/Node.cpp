@@ -142,7 +142,7 @@ bool Node::isNumber() const {
 }
 
 std::string Node::text() const {
-  if (!isText()) refuse("isn't a text");
+  if (!isText()) refuse("isn't a string");
   const char* text = conduit_node_as_char8_str(node_);
   if (text == nullptr) return "";
   const auto size = conduit_datatype_number_of_elements(conduit_node_dtype(node_));

@@ -34,7 +34,7 @@ void appendLine(const std::string& path, const std::string& line) {
   bool isWritten = file != nullptr && std::fputs((line + "\n").c_str(), file) >= 0;
   if (file != nullptr && std::fclose(file) != 0) isWritten = false;
   if (isWritten) return;
-  throw Error(ErrorCode::Io, "can't log what viewers change: " + std::system_category().message(errno), path);
+  throw Error(ErrorCode::Io, "can't write viewers' changes: " + std::system_category().message(errno), path);
 }
 
 }  // namespace

@@ -93,7 +93,7 @@ for blend in maximum minimum "isosurface --isovalues 0.3 0.5 0.7"; do
 done
 refused 2 "at least one isovalue" "$vdi" generate --field mixing "${small[@]}" --blend isosurface --dvr x.png
 refused 2 "need blend mode isosurface" "$vdi" generate --field mixing "${small[@]}" --isovalues 0.5 --dvr x.png
-refused 2 "composite, maximum, minimum and isosurface" "$vdi" generate --field mixing "${small[@]}" --blend mip --dvr x.png
+refused 2 "composite, maximum, minimum or isosurface" "$vdi" generate --field mixing "${small[@]}" --blend mip --dvr x.png
 # A page of VDIs is the same each time; where it can't be made, the file stays as it was.
 works "export" "$vdi" export one.vdi three.vdi -o page.html --title "<Two>"
 grep -q '<title>&lt;Two&gt;</title>' page.html || fail "the page's title isn't escaped"
@@ -101,7 +101,7 @@ grep -q '<title>&lt;Two&gt;</title>' page.html || fail "the page's title isn't e
 works "export again" "$vdi" export one.vdi three.vdi -o again.html --title "<Two>"
 cmp page.html again.html || fail "equal VDIs give different pages"
 head -c 3000 one.vdi >broken.vdi
-refused 1 "not a sound" "$vdi" export one.vdi broken.vdi -o page.html
+refused 1 "invalid .vdi file" "$vdi" export one.vdi broken.vdi -o page.html
 refused 1 "No such file" "$vdi" export one.vdi nowhere.vdi -o page.html
 cmp page.html again.html || fail "a page that can't be made replaces the old one"
 refused 1 "No space" "$vdi" export one.vdi -o /dev/full
@@ -299,7 +299,7 @@ grep -q "vdi_000010.vdi" out.txt || fail "check doesn't tell the files"
 printf '{"field": "V",\n"camera": {"position": [0, 0]}}' >run.json
 refused 1 "/camera/position: must be an array of 3 numbers .run.json, line 2." "$vdi" check run.json
 works "check" "$vdi" check '{"field": "V", "log": "logs/run.jsonl"}'
-grep -q "a log: logs/run.jsonl" out.txt || fail "check doesn't tell the log"
+grep -q "^log: logs/run.jsonl" out.txt || fail "check doesn't tell the log"
 mkdir -p there
 cp one.vdi there/vdi_000003.vdi
 run='{"field": "V", "every_time": 0.5, "every_seconds": 9, "when": {"max": "p", "above": 2}, "max_share": 0.05,

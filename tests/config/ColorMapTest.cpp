@@ -70,7 +70,7 @@ TEST_CASE("what isn't a preset is refused with its place") {
   };
   const std::string good = R"({"Name": "a", "RGBPoints": [0, 0, 0, 0, 1, 1, 1, 1]})";
   CHECK_NOTHROW(config::colorMapOf("[" + good + "," + good + "]", "a.json", "a"));
-  refused("[" + good + "," + good + "]", "", "2 presets, of which");
+  refused("[" + good + "," + good + "]", "", "the file has 2 presets");
   refused(good, "b", "no preset is named 'b'");
   refused(R"({"Name": "a", "IndexedColors": [0, 0, 0]})", "", "categories");
   refused(R"({"RGBPoints": [0, 0, 0, 0]})", "", "/RGBPoints: must be four numbers");
@@ -81,5 +81,5 @@ TEST_CASE("what isn't a preset is refused with its place") {
   refused(R"({"RGBPoints": [-1e308, 0, 0, 0, 1e308, 1, 1, 1]})", "",
           "/RGBPoints: the nodes lie too far apart");
   refused(R"({"ColorSpace": "Lab/CIEDE2000", "RGBPoints": [0, 0, 0, 0, 1, 1, 1, 1]})", "",
-          "/ColorSpace: a colour space");
+          "/ColorSpace: unknown colour space");
 }

@@ -107,7 +107,7 @@ TEST_CASE("the schema's presets are those that there are, and its defaults those
   const json all = schema();
   for (const std::string name : all.at("$defs").at("preset").at("enum"))
     CHECK_NOTHROW(parseRun(R"({"field": "V", "colors": ")" + name + "\"}", "vdi.json"));
-  refusedField(R"("colors": "viridis")", "there are Cool to Warm, three-hues, haze, bands, surface;");
+  refusedField(R"("colors": "viridis")", "use one of Cool to Warm, three-hues, haze, bands, surface;");
   CHECK(all.at("$defs").at("preset").at("enum").size() == 5);
   json given{{"field", "V"}};
   for (const auto& [name, part] : all.at("properties").items()) {
@@ -221,7 +221,7 @@ TEST_CASE("mistakes are told with their place") {
   refused("[]", "must be an object (vdi.json, line 1)");
   refused("{\"every\": 10}", "the field 'field' is missing");
   refused(R"({"field": ""})", "/field: must be an array's name");
-  refusedField(R"("evry": 10)", "/evry: no such field; there are $schema, field");
+  refusedField(R"("evry": 10)", "/evry: no such field; the fields are $schema, field");
   refusedField(R"("every": 0)", "/every: must be a whole number from 1 to 2147483647 (vdi.json, line 2)");
   refusedField(R"("every": "10")", "/every: must be a whole number");
   refusedField(R"("every": 1e400)", "line 2");
@@ -231,7 +231,7 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("when": {"max": "V"})", "/when: must have a bound, 'above' or 'below'");
   refusedField(R"("when": {"above": 1})", "/when: must have 'max', 'min', 'mean' or 'change'");
   refusedField(R"("when": {"max": "V", "min": "V", "above": 1})", "/when/min: a condition has one of");
-  refusedField(R"("when": {"max": 1, "above": 1})", "/when/max: must be a text");
+  refusedField(R"("when": {"max": 1, "above": 1})", "/when/max: must be a string");
   refusedField(R"("when": {"max": "", "above": 1})", "/when/max: must be an array's name");
   refusedField(R"("when": {"max": "V", "above": "high"})", "/when/above: must be a number");
   refusedField(R"("when": {"max": "V", "above": 2, "below": 2})", "/when: never holds");
@@ -240,7 +240,7 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("max_share": 1.5)", "/max_share: is a share, 1 at most");
   refusedField(R"("max_share": 0)", "/max_share: must be > 0");
   refusedField(R"("existing": "append")", "/existing: must be 'refuse', 'overwrite' or 'continue'");
-  refusedField(R"("existing": true)", "/existing: must be a text");
+  refusedField(R"("existing": true)", "/existing: must be a string");
   refusedField(R"("isolation": "thread")", "/isolation: must be 'process', or an object");
   refusedField(R"("isolation": {"restarts": true})", "/isolation/restarts: no such field");
   refusedField(R"("isolation": {"restart": 1})", "/isolation/restart: must be");
@@ -252,13 +252,13 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("camera": {"position": [0, 0, 1], "focal_point": [0, 0, 0], "view_angle": 180})",
                "/camera/view_angle");
   refusedField(R"("camera": {"position": [0, 0, 1], "focal_point": [0, 0, 0]}, "orbit": {})",
-               "/orbit: either");
+               "/orbit: can't be combined with 'camera'");
   refusedField(R"("orbit": {"view_up": [0, 0, 0]})", "/orbit/view_up: must not be zero");
-  refusedField(R"("orbit": {"zoom": 0})", "/orbit/zoom: must be from 0.001 to 1000, it is 0");
+  refusedField(R"("orbit": {"zoom": 0})", "/orbit/zoom: must be from 0.001 to 1000, but is 0");
   refusedField(R"("colors": {"range": [1, 1]})", "/colors/range: the first");
   refusedField(R"("colors": {"range": [-1e308, 1e308]})", "/colors/range: is too wide");
   refusedField(R"("colors": {"range": [NaN, 1]})", "not valid JSON");
-  refusedField(R"("colors": {"preset": "haze", "file": "a"})", "/colors/file: either");
+  refusedField(R"("colors": {"preset": "haze", "file": "a"})", "/colors/file: can't be combined");
   refusedField(R"("colors": {"name": "a"})", "/colors/name");
   refusedField(R"("colors": {"opacities": []})", "/colors/opacities: must have a node");
   refusedField(R"("colors": {"opacities": [[1, 0], [0, 1]]})", "/colors/opacities/1: nodes must ascend");
@@ -266,7 +266,7 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("resolution": [0, 5])", "/resolution/0: must be a whole number from 1 to 32768");
   refusedField(R"("sampling_rate": 65)", "/sampling_rate: sampling rate must lie in [1/64, 64], or be 0");
   refusedField(R"("supersegments": 2.5)", "/supersegments: supersegments must be a whole number");
-  refusedField(R"("algorithm": "best")", "/algorithm: no algorithm 'best'; there are merge and bisection");
+  refusedField(R"("algorithm": "best")", "/algorithm: no algorithm 'best'; use merge or bisection");
   refusedField(R"("fill": 0.5)", "a fill of 0.5 needs the total budget");
   refusedField(R"("precision": 1)", "/precision: ");
   refusedField(R"("output": "a.vdi")", "/output: must contain {timestep}");
@@ -297,18 +297,21 @@ TEST_CASE("mistakes of several cameras are told with their place") {
   refusedField(R"("cameras": [{"name": ".a", "orbit": {}}])", "/cameras/0/name: a camera's name has");
   refusedField(R"("cameras": [{"name": "a", "orbit": {}}, {"name": "a", "orbit": {}}])",
                "/cameras/1/name: another camera has this name");
-  refusedField(R"("cameras": [{"name": "a", "orbit": {}, )" + fixed + "}]", "/cameras/0/orbit: either");
+  refusedField(R"("cameras": [{"name": "a", "orbit": {}, )" + fixed + "}]",
+               "/cameras/0/orbit: can't be combined");
   refusedField(R"("cameras": [{"name": "a", "orbit": {"count": 4}}])",
                "/cameras/0/orbit/count: a camera of 'cameras' is one viewpoint");
-  refusedField(R"("cameras": [{"name": "a", "orbit": {}}], )" + fixed, "/cameras: either this or 'camera'");
-  refusedField(R"("orbit": {}, "cameras": [{"name": "a", "orbit": {}}])", "/cameras: either this or 'orbit'");
+  refusedField(R"("cameras": [{"name": "a", "orbit": {}}], )" + fixed,
+               "/cameras: can't be combined with 'camera'");
+  refusedField(R"("orbit": {}, "cameras": [{"name": "a", "orbit": {}}])",
+               "/cameras: can't be combined with 'orbit'");
   refusedField(R"("orbit": {"count": 0})", "/orbit/count: must be a whole number from 1 to 1000");
-  refusedField(R"("orbit": {"count": 600, "elevations": [0, 10]})", "/orbit: 1200 viewpoints are too many");
+  refusedField(R"("orbit": {"count": 600, "elevations": [0, 10]})", "/orbit: 1200 viewpoints; at most 1000");
   refusedField(R"("orbit": {"elevations": []})", "/orbit/elevations: must have an elevation");
-  refusedField(R"("orbit": {"elevations": [0, 0]})", "/orbit/elevations/1: stands there twice");
+  refusedField(R"("orbit": {"elevations": [0, 0]})", "/orbit/elevations/1: occurs twice");
   refusedField(R"("orbit": {"elevations": [91]})", "/orbit/elevations/0: must be from -90 to 90");
-  refusedField(R"("orbit": {"elevations": [1], "elevation": 1})", "/orbit/elevations: either");
-  refusedField(R"("orbit": {"count": 2, "turn": 5})", "/orbit/turn: either");
+  refusedField(R"("orbit": {"elevations": [1], "elevation": 1})", "/orbit/elevations: can't be combined");
+  refusedField(R"("orbit": {"count": 2, "turn": 5})", "/orbit/turn: can't be combined");
   refusedField(R"("orbit": {"turn": 5}, "every_seconds": 5)", "an orbit's 'turn' goes with either");
   refusedField(R"("output": "{timestep}_{camera}.vdi")", "/output: {camera} needs several viewpoints");
   refusedField(R"("orbit": {"count": 2}, "output": "{timestep}_{camera}{camera}.vdi")", "/output: only");

@@ -293,7 +293,7 @@ TEST_CASE(
   };
   refused("", "parse error");
   refused("{", "parse error");
-  refused("[]", "no JSON object");
+  refused("[]", "not a JSON object");
   refused("{" + array + "}", "'transferFunction' is missing");
   refused(std::string(10000, '['), "parse error");
   refused(changed("\"V\"", "7"), "'name'");
@@ -310,7 +310,7 @@ TEST_CASE(
   refused(changed("\"unitDistance\":2", "\"unitDistance\":0"), "unit distance");
   refused("{" + array + "," + function + "}" + std::string(1U << 20, ' '), "can't be metadata");
   CHECK_THAT(refusal(sound, place, 'j'), ContainsSubstring("aren't JSON"));
-  CHECK_THAT(refusal(sound, place + 4, 1U), ContainsSubstring("bytes of metadata"));
+  CHECK_THAT(refusal(sound, place + 4, 1U), ContainsSubstring("the metadata have"));
   CHECK_THAT(refusal(sound, place + 8, std::uint64_t{1}), ContainsSubstring("metadata's checksum"));
   CHECK_THAT(refusal(sound, 8, 1U), ContainsSubstring("header says"));
   // encode refuses the VDIs that decode would refuse.

@@ -170,7 +170,7 @@ function connection() {
     },
     decode: async (file) => {
       await soon(5);
-      if (file[0] === 255) throw new Error("not a sound .vdi file");
+      if (file[0] === 255) throw new Error("invalid .vdi file");
       return /** @type {any} */ (file[0]);
     },
     onLevel: (vdi) => void shown.push(/** @type {any} */ (vdi)),

@@ -187,7 +187,7 @@ def test_damage(browser):
         drop_files(browser, f"{name}.vdi")
         browser.wait("!document.getElementById('message').hidden")
         message = message_of(browser)
-        check(message.startswith("not a sound .vdi file: ") and "\n" not in message, f"{name}: {message}")
+        check(message.startswith("invalid .vdi file: ") and "\n" not in message, f"{name}: {message}")
         browser.value("document.getElementById('message').hidden = true")
         check(np.array_equal(shown(browser), before), f"{name}: what was shown stays")
     drop_files(browser, "full.vdi")
@@ -212,7 +212,7 @@ def test_damage(browser):
             file.write(page)
         open_page(browser, "damaged.html")
         browser.wait("!document.getElementById('message').hidden && !message.textContent.startsWith('Reading')")
-        check("damaged" in message_of(browser) or "not a sound" in message_of(browser), f"{name}: {message_of(browser)}")
+        check("damaged" in message_of(browser) or "invalid .vdi file" in message_of(browser), f"{name}: {message_of(browser)}")
         drop_files(browser, "full.vdi")
         browser.wait("vdiPage.vdi && !vdiPage.vdi.compact")
 

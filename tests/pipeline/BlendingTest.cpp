@@ -223,7 +223,7 @@ TEST_CASE("blending: what can't be is refused by name") {
   refused({BlendMode::Isosurface, {0.5, NAN}}, "finite");
   refused({BlendMode::Maximum, {0.5}}, "isovalues need blend mode isosurface, not maximum");
   CHECK_THROWS_WITH(blendModeFromString("mip"),
-                    vdi::test::ContainsSubstring("composite, maximum, minimum and isosurface"));
+                    vdi::test::ContainsSubstring("composite, maximum, minimum or isosurface"));
   // A VDI holds composite blending alone.
   const test::Lattice lattice(glm::ivec3(4), glm::dvec3(1.0), [](const glm::dvec3& p) { return p.x / 3.0; });
   VdiGenerator generator(test::device(), comm::Communicator::serial());

@@ -182,7 +182,7 @@ os.truncate(files[15], os.path.getsize(files[15]) // 2)
 view.ViewTime = times[15]
 lines = said_by(lambda: screenshot(view, "truncated"))
 check("what makes it has failed" in pvtest.message_in(view), "one that isn't whole any more isn't shown, and the view says so")
-check(lines.count("not a sound .vdi file") == 1, "and one line says why")
+check(lines.count("invalid .vdi file") == 1, "and one line says why")
 shutil.copy(kinds[15 % KINDS], files[15])
 simple.ReloadFiles(reader)
 check(same(screenshot(view, "whole"), expected[15 % KINDS]) and not pvtest.message_in(view), "until it is whole and read again")

@@ -112,7 +112,7 @@ with open(path("full.vdi"), "rb") as file:
     whole = file.read()
 with open(path("cut.vdi"), "wb") as file:
     file.write(whole[:len(whole) // 2])
-check(refused(lambda: pv_vdi.read(path("cut.vdi")), ["cut.vdi", "not a sound"]), "and one that is cut off")
+check(refused(lambda: pv_vdi.read(path("cut.vdi")), ["cut.vdi", "invalid .vdi file"]), "and one that is cut off")
 vdi = pv_vdi.read(path("full.vdi"))
 inside = pv_vdi.Camera((0, 0, 0), (0, 0, 0))
 check(refused(lambda: vdi.render(inside), ["focal"]), "a camera without direction is refused")

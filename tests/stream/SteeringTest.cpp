@@ -158,9 +158,9 @@ TEST_CASE("wishes are held against what there is") {
   CHECK(objection([](Wish& wish) { wish.preset = "Plaid"; }) == "there is no colour map of that name");
   CHECK(objection([](Wish& wish) { wish.parameters["kill"] = 0.0; }) ==
         "the simulation has no parameter \"kill\"");
-  CHECK(objection([](Wish& wish) { wish.parameters["feed"] = 0.11; }) == "\"feed\" is from 0 to 0.1");
-  CHECK(objection([](Wish& wish) { wish.parameters["feed"] = -1e-9; }) == "\"feed\" is from 0 to 0.1");
-  CHECK(objection([](Wish& wish) { wish.parameters["seeds"] = 2.5; }) == "\"seeds\" is a whole number");
+  CHECK(objection([](Wish& wish) { wish.parameters["feed"] = 0.11; }) == "\"feed\" must be from 0 to 0.1");
+  CHECK(objection([](Wish& wish) { wish.parameters["feed"] = -1e-9; }) == "\"feed\" must be from 0 to 0.1");
+  CHECK(objection([](Wish& wish) { wish.parameters["seeds"] = 2.5; }) == "\"seeds\" must be a whole number");
   Wish view;
   view.supersegments = 9;
   CHECK(objectionTo(view, Controls{}) == "the VDIs aren't made where they are served");

@@ -273,8 +273,8 @@ std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirect
     const std::uint64_t pair = ~conflict[0];
     throw Error(
         ErrorCode::InvalidArgument,
-        fmt::format("{} and {} have the same spacing and overlap; ghost layers have to be announced as "
-                    "such, and no values may be handed over twice",
+        fmt::format("{} and {} have the same spacing and overlap; mark ghost layers as such, and don't "
+                    "pass values twice",
                     nameOf(entries[pair / entries.size()]), nameOf(entries[pair % entries.size()])));
   }
   return parts;

@@ -178,7 +178,7 @@ Space spaceOf(const JsonValue& preset) {
   if (name == "Lab" || name == "CIELAB") return Space::Lab;
   if (name == "Diverging") return Space::Diverging;
   if (name == "Step") return Space::Step;
-  space->fail("a colour space that isn't known here; RGB, HSV, Lab, Diverging and Step are");
+  space->fail("unknown colour space; use RGB, HSV, Lab, Diverging or Step");
 }
 
 /// Rows of four numbers that follow each other.
@@ -234,7 +234,7 @@ ColorMap colorMapOf(std::string_view text, const std::string& file, const std::s
   if (document.isArray()) presets = document.items();
   if (name.empty()) {
     if (presets.size() != 1)
-      document.fail(fmt::format("{} presets, of which 'name' must name one", presets.size()));
+      document.fail(fmt::format("the file has {} presets; set 'name' to choose one", presets.size()));
     return readPreset(presets.front());
   }
   for (const JsonValue& preset : presets) {

@@ -95,7 +95,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   bool key(string_t& name) override {
     auto& members = std::get<JsonNode::Members>(open_.back().value);
     if (!names_.back().insert(name).second)
-      failAt(document_, line(), fmt::format("the field {} stands there twice", inQuotes(name)));
+      failAt(document_, line(), fmt::format("the field {} occurs twice", inQuotes(name)));
     members.emplace_back().first = std::move(name);
     return true;
   }
@@ -117,7 +117,8 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   }
   template <typename Value>
   JsonNode nodeOf(Value value, std::size_t line) {
-    if (++values_ > limits_.values) failAt(document_, line, "more values than anybody writes");
+    if (++values_ > limits_.values)
+      failAt(document_, line, fmt::format("more than {} values", limits_.values));
     JsonNode node;
     node.line = line;
     node.value = std::move(value);
@@ -137,7 +138,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   template <typename Value>
   bool open(Value value) {
     if (open_.size() >= limits_.depth)
-      failAt(document_, line(), fmt::format("values lie more than {} deep in each other", limits_.depth));
+      failAt(document_, line(), fmt::format("values are nested more than {} deep", limits_.depth));
     open_.push_back(nodeOf(std::move(value), line()));
     names_.emplace_back();
     return true;
@@ -225,7 +226,7 @@ void JsonValue::requireObject(const std::vector<std::string>& known) const {
   if (members == nullptr) fail("must be an object");
   for (const auto& [key, node] : *members) {
     if (std::find(known.begin(), known.end(), key) == known.end())
-      child(node, escaped(key)).fail(fmt::format("no such field; there are {}", fmt::join(known, ", ")));
+      child(node, escaped(key)).fail(fmt::format("no such field; the fields are {}", fmt::join(known, ", ")));
   }
 }
 
@@ -239,7 +240,7 @@ double JsonValue::number() const {
 double JsonValue::number(double least, double most) const {
   const double value = number();
   if (!(value >= least && value <= most))
-    fail(fmt::format("must be from {} to {}, it is {}", least, most, value));
+    fail(fmt::format("must be from {} to {}, but is {}", least, most, value));
   return value;
 }
 
@@ -258,7 +259,7 @@ bool JsonValue::flag() const {
 
 const std::string& JsonValue::text() const {
   const auto* value = std::get_if<std::string>(&node_->value);
-  if (value == nullptr) fail("must be a text");
+  if (value == nullptr) fail("must be a string");
   return *value;
 }
 
@@ -280,7 +281,7 @@ std::vector<double> JsonValue::numbers(std::size_t count) const {
 
 JsonValue parseJson(std::string_view text, const std::string& name, const JsonLimits& limits) {
   if (text.size() > limits.bytes)
-    throw Error(ErrorCode::Format, fmt::format("more than {} bytes are too many", limits.bytes), name);
+    throw Error(ErrorCode::Format, fmt::format("the document has more than {} bytes", limits.bytes), name);
   Builder builder(text, name, limits);
   const Characters first(text.data(), builder.taken());
   const Characters last(text.data() + text.size(), builder.taken());
@@ -292,7 +293,8 @@ std::string readJsonText(const std::string& path, const JsonLimits& limits) {
   const io::InputFile file(path);
   if (file.size() > limits.bytes) {
     throw Error(ErrorCode::Format,
-                fmt::format("{} bytes are too many, {} are the most", file.size(), limits.bytes), path);
+                fmt::format("the file has {} bytes; at most {} are allowed", file.size(), limits.bytes),
+                path);
   }
   std::string text(file.size(), '\0');
   file.readInto(0, std::as_writable_bytes(std::span(text)));

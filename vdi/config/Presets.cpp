@@ -80,7 +80,7 @@ TransferFunction presetTransferFunction(const std::string& name, const ScalarRan
   } else {
     std::string names;
     for (const PresetInfo& info : transferFunctionPresets()) names += (names.empty() ? "" : ", ") + info.name;
-    throw Error(ErrorCode::InvalidArgument, "no transfer function '" + name + "'; there are " + names);
+    throw Error(ErrorCode::InvalidArgument, "no transfer function '" + name + "'; use one of " + names);
   }
   function.unitDistance = unitDistance;
   return stretched(std::move(function), range);

@@ -81,7 +81,7 @@ Camera cameraOf(const JsonValue& value) {
   ifThere(value, "view_up", [&](const JsonValue& up) { camera.viewUp = directionOf(up); });
   ifThere(value, "view_angle", [&](const JsonValue& angle) { camera.viewAngle = viewAngleOf(angle); });
   ifThere(value, "parallel_scale", [&](const JsonValue& scale) {
-    if (value.find("view_angle")) scale.fail("either this or 'view_angle'");
+    if (value.find("view_angle")) scale.fail("can't be combined with 'view_angle'");
     camera.parallelProjection = true;
     camera.parallelScale = positiveOf(scale);
   });
@@ -113,8 +113,7 @@ std::vector<double> elevationsOf(const JsonValue& value) {
   std::vector<double> elevations;
   for (const JsonValue& item : value.items()) {
     elevations.push_back(item.number(-pole, pole));
-    if (std::count(elevations.begin(), elevations.end(), elevations.back()) > 1)
-      item.fail("stands there twice");
+    if (std::count(elevations.begin(), elevations.end(), elevations.back()) > 1) item.fail("occurs twice");
   }
   if (elevations.empty()) value.fail("must have an elevation");
   return elevations;
@@ -126,14 +125,13 @@ std::vector<RunCamera> camerasOfOrbit(const JsonValue& value) {
   const std::optional<JsonValue> count = value.find("count");
   const std::optional<JsonValue> elevations = value.find("elevations");
   if (!count && !elevations) return {{"", std::nullopt, orbit}};
-  if (const auto turn = value.find("turn")) turn->fail("either this or several viewpoints");
-  if (elevations && value.find("elevation")) elevations->fail("either this or 'elevation'");
+  if (const auto turn = value.find("turn")) turn->fail("can't be combined with several viewpoints");
+  if (elevations && value.find("elevation")) elevations->fail("can't be combined with 'elevation'");
   const std::int64_t azimuths = count ? count->whole(1, mostCameras) : 1;
   const std::vector<double> angles =
       elevations ? elevationsOf(*elevations) : std::vector<double>{orbit.start.elevation};
   const auto all = azimuths * static_cast<std::int64_t>(angles.size());
-  if (all > mostCameras)
-    value.fail(fmt::format("{} viewpoints are too many, {} are the most", all, mostCameras));
+  if (all > mostCameras) value.fail(fmt::format("{} viewpoints; at most {} are allowed", all, mostCameras));
   const std::size_t digits = std::to_string(all - 1).size();
   std::vector<RunCamera> cameras;
   for (const double elevation : angles) {
@@ -153,7 +151,7 @@ std::string cameraNameOf(const JsonValue& value) {
   const std::string& name = value.text();
   if (name.empty() || name.size() > longest || name[0] == '.' ||
       name.find_first_not_of(letters) != std::string::npos)
-    value.fail("a camera's name has 1 to 64 letters, digits, '_', '-' and '.', which isn't the first");
+    value.fail("a camera's name has 1 to 64 letters, digits, '_', '-' and '.'; it must not start with '.'");
   return name;
 }
 
@@ -163,7 +161,7 @@ RunCamera namedCameraOf(const JsonValue& value) {
   camera.name = cameraNameOf(value.at("name"));
   ifThere(value, "camera", [&](const JsonValue& fixed) { camera.fixed = cameraOf(fixed); });
   ifThere(value, "orbit", [&](const JsonValue& orbit) {
-    if (camera.fixed) orbit.fail("either this or 'camera'");
+    if (camera.fixed) orbit.fail("can't be combined with 'camera'");
     for (const char* name : {"count", "elevations"})
       ifThere(orbit, name,
               [](const JsonValue& several) { several.fail("a camera of 'cameras' is one viewpoint"); });
@@ -189,12 +187,12 @@ std::vector<RunCamera> camerasOf(const JsonValue& value) {
 void readCameras(const JsonValue& document, Run& run) {
   ifThere(document, "camera", [&](const JsonValue& value) { run.cameras.front().fixed = cameraOf(value); });
   ifThere(document, "orbit", [&](const JsonValue& value) {
-    if (document.find("camera")) value.fail("either this or 'camera'");
+    if (document.find("camera")) value.fail("can't be combined with 'camera'");
     run.cameras = camerasOfOrbit(value);
   });
   ifThere(document, "cameras", [&](const JsonValue& value) {
     for (const char* other : {"camera", "orbit"}) {
-      if (document.find(other)) value.fail(fmt::format("either this or '{}'", other));
+      if (document.find(other)) value.fail(fmt::format("can't be combined with '{}'", other));
     }
     run.cameras = camerasOf(value);
   });
@@ -291,7 +289,7 @@ std::vector<OpacityNode> opacitiesOf(const JsonValue& value) {
 std::string presetOf(const JsonValue& value) {
   const std::vector<std::string> names = presetNames();
   if (std::ranges::find(names, value.text()) == names.end()) {
-    value.fail(fmt::format("no such preset; there are {}; others come from a 'file' that ParaView exports",
+    value.fail(fmt::format("no such preset; use one of {}; others come from a 'file' that ParaView exports",
                            fmt::join(names, ", ")));
   }
   return value.text();
@@ -306,7 +304,7 @@ RunColors colorsOf(const JsonValue& value) {
   value.requireObject(fieldsOf("/colors"));
   ifThere(value, "preset", [&](const JsonValue& name) { colors.preset = presetOf(name); });
   ifThere(value, "file", [&](const JsonValue& file) {
-    if (!colors.preset.empty()) file.fail("either this or 'preset'");
+    if (!colors.preset.empty()) file.fail("can't be combined with 'preset'");
     colors.file = file.text();
     if (colors.file.empty()) file.fail("must name a file");
   });
@@ -506,7 +504,7 @@ Run parseRun(std::string_view text, const std::string& name) {
   ifThere(document, "log", [&](const JsonValue& value) { run.log = logOf(value); });
   ifThere(document, "isolation", [&](const JsonValue& value) { run.isolation = isolationOf(value); });
   if (run.cameras.size() > 1 && run.stream && !run.vdi && !run.makesPictures())
-    document.fail("several viewpoints need an 'output': the stream shows the first alone");
+    document.fail("several viewpoints need an 'output': the stream shows only the first");
   if (!run.vdi && !run.makesPictures() && !run.stream) run.vdi = FilePattern("vdi_{timestep:06d}.vdi");
   return run;
 }

@@ -53,7 +53,7 @@ void validate(const Blending& blending) {
   if (count > maxIsovalues)
     refuse(fmt::format("a picture shows at most {} isovalues, there are {}", maxIsovalues, count));
   for (const double value : blending.isovalues) {
-    if (!std::isfinite(value)) refuse(fmt::format("an isovalue must be finite, it is {}", value));
+    if (!std::isfinite(value)) refuse(fmt::format("an isovalue must be finite, but is {}", value));
   }
 }
 

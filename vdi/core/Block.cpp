@@ -70,7 +70,7 @@ ScalarType scalarTypeFromString(const std::string& name) {
     if (name == scalarTypes[i].first) return static_cast<ScalarType>(i);
   }
   throw Error(ErrorCode::InvalidArgument,
-              "no scalar type '" + name + "'; there are u8, i8, u16, i16, u32, i32, f32 and f64");
+              "no scalar type '" + name + "'; use u8, i8, u16, i16, u32, i32, f32 or f64");
 }
 
 Block Block::fromPoints(const glm::ivec3& dims, const glm::dvec3& origin, const glm::dvec3& spacing,
@@ -239,7 +239,7 @@ void validate(std::span<const Block> blocks) {
     const std::string context = fmt::format("block {}", i);
     if (glm::any(glm::lessThan(block.dims, glm::ivec3(1)))) {
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("a block needs at least one value per axis, it has {} x {} x {}", block.dims.x,
+                  fmt::format("a block needs at least one value per axis, but has {} x {} x {}", block.dims.x,
                               block.dims.y, block.dims.z),
                   context);
     }
@@ -249,7 +249,7 @@ void validate(std::span<const Block> blocks) {
     if (!isFinite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(minSpacing))) ||
         glm::any(glm::greaterThan(block.spacing, glm::dvec3(maxSpacing)))) {
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("spacing must be from {} to {}, it is ({}, {}, {}); other units of length help",
+                  fmt::format("spacing must be from {} to {}, but is ({}, {}, {}); use other units of length",
                               minSpacing, maxSpacing, block.spacing.x, block.spacing.y, block.spacing.z),
                   context);
     }
@@ -264,13 +264,14 @@ void validate(std::span<const Block> blocks) {
     if (glm::any(glm::greaterThan(away, farthest * block.spacing))) {
       throw Error(
           ErrorCode::InvalidArgument,
-          fmt::format("it lies at ({}, {}, {}) with a spacing of ({}, {}, {}): more than {} spacings from "
-                      "the origin of the world, positions can't be told apart; an origin nearby helps",
-                      block.origin.x, block.origin.y, block.origin.z, block.spacing.x, block.spacing.y,
-                      block.spacing.z, farthest),
+          fmt::format(
+              "it lies at ({}, {}, {}) with a spacing of ({}, {}, {}): more than {} spacings from "
+              "the origin of the world, positions can't be told apart; choose an origin near the data",
+              block.origin.x, block.origin.y, block.origin.z, block.spacing.x, block.spacing.y,
+              block.spacing.z, farthest),
           context);
     }
-    if (block.data == nullptr) throw Error(ErrorCode::InvalidArgument, "a block without data", context);
+    if (block.data == nullptr) throw Error(ErrorCode::InvalidArgument, "a block has no data", context);
     assert(!block.strides || !block.computed);
   }
 }

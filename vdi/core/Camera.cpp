@@ -50,11 +50,11 @@ void validateCamera(const Camera& camera) {
   if (camera.parallelProjection) {
     if (!(camera.parallelScale > 0.0) || !std::isfinite(camera.parallelScale)) {
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("the parallel scale must be > 0, it is {}", camera.parallelScale));
+                  fmt::format("the parallel scale must be > 0, but is {}", camera.parallelScale));
     }
   } else if (!(camera.viewAngle > 0.0 && camera.viewAngle < 180.0)) {
     throw Error(ErrorCode::InvalidArgument,
-                fmt::format("the view angle must lie in (0, 180) degrees, it is {}", camera.viewAngle));
+                fmt::format("the view angle must lie in (0, 180) degrees, but is {}", camera.viewAngle));
   }
 }
 
@@ -88,8 +88,8 @@ Camera Camera::framing(const Box& bounds, const glm::dvec3& direction, const glm
 View::View(const Camera& camera, int width, int height) : camera_(camera), width_(width), height_(height) {
   if (width < 1 || height < 1 || width > View::maxSide || height > View::maxSide) {
     throw Error(ErrorCode::InvalidArgument,
-                fmt::format("the viewport must be 1 to {} pixels wide and high, it is {} x {}", View::maxSide,
-                            width, height));
+                fmt::format("the viewport must be 1 to {} pixels wide and high, but is {} x {}",
+                            View::maxSide, width, height));
   }
   validateCamera(camera);
   forward_ = glm::normalize(camera.focalPoint - camera.position);

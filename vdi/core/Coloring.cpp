@@ -74,7 +74,7 @@ std::vector<Node> withAtMost(const std::vector<Node>& nodes, double tolerance) {
 }
 
 [[noreturn]] void failColoring(const std::string& what) {
-  throw Error(ErrorCode::Format, "the coloring isn't sound: " + what);
+  throw Error(ErrorCode::Format, "invalid coloring: " + what);
 }
 
 }  // namespace

@@ -31,10 +31,10 @@ Enum namedValue(const std::string& name, const char* what, const EnumNames<Enum,
   std::string list;
   for (std::size_t i = 0; i < Count; ++i) {
     if (name == names[i].name) return names[i].value;
-    if (i > 0) list += i + 1 == Count ? " and " : ", ";
+    if (i > 0) list += i + 1 == Count ? " or " : ", ";
     list += names[i].name;
   }
-  throw Error(ErrorCode::InvalidArgument, std::string("no ") + what + " '" + name + "'; there are " + list);
+  throw Error(ErrorCode::InvalidArgument, std::string("no ") + what + " '" + name + "'; use " + list);
 }
 
 }  // namespace vdi

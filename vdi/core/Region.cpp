@@ -12,7 +12,7 @@ namespace vdi {
 void validate(const Region& region) {
   const auto refuse = [](const std::string& what) { throw Error(ErrorCode::InvalidArgument, what); };
   if (region.box && (!isFinite(region.box->lo) || !isFinite(region.box->hi) || region.box->empty()))
-    refuse("the cropping box must be finite, and larger than nothing along each axis");
+    refuse("the cropping box must be finite and have a positive size along each axis");
   if (region.planes.size() > maxClipPlanes)
     refuse(fmt::format("at most {} planes can clip a volume, there are {}", maxClipPlanes,
                        region.planes.size()));

@@ -30,7 +30,7 @@ float snapToScene(const Scene& scene, double value, int axis) {
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel) {
   if (!(samplesPerVoxel >= 1.0 / 64.0 && samplesPerVoxel <= 64.0)) {
     throw Error(ErrorCode::InvalidArgument,
-                fmt::format("samples per voxel must lie in [1/64, 64], it is {}", samplesPerVoxel));
+                fmt::format("samples per voxel must lie in [1/64, 64], but is {}", samplesPerVoxel));
   }
   DepthLattice lattice;
   if (scene.bounds.empty() || !(scene.minSpacing > 0.0)) return lattice;

@@ -149,7 +149,7 @@ std::string Setting::text(double value) const {
 void Setting::check(double value) const {
   if (value == automatic) return;
   const auto refuse = [&](const std::string& rule) {
-    throw Error(ErrorCode::InvalidArgument, fmt::format("{} must {}, it is {}", name, rule, value));
+    throw Error(ErrorCode::InvalidArgument, fmt::format("{} must {}, but is {}", name, rule, value));
   };
   if (!((excludesLow ? value > low : value >= low) && value <= high)) {
     const auto number = [](double end) {
@@ -171,7 +171,7 @@ void validate(const GenerateSettings& settings) {
   const auto require = [](bool good, const char* field, auto value, std::string_view range) {
     if (!good)
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("{} must lie in {}, it is {}", field, range, value));
+                  fmt::format("{} must lie in {}, but is {}", field, range, value));
   };
   const std::string sides = fmt::format("[1, {}]", View::maxSide);
   require(settings.width >= 1 && settings.width <= View::maxSide, "width", settings.width, sides);

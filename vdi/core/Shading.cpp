@@ -40,7 +40,7 @@ void validate(const Shading& shading) {
     if (!isFinite(light.direction)) refuse("a light's direction must be finite");
     const glm::dvec3& c = light.color;
     if (!isFinite(c) || !(c.x >= 0.0 && c.y >= 0.0 && c.z >= 0.0))
-      refuse(fmt::format("a light's colour must be finite and not negative, it is {} {} {}", c.x, c.y, c.z));
+      refuse(fmt::format("a light's colour must be finite and not negative, but is {} {} {}", c.x, c.y, c.z));
   }
 }
 

@@ -87,7 +87,7 @@ void validate(const TransferFunction& transferFunction) {
     }
   }
   if (!(transferFunction.unitDistance > 0.0) || !std::isfinite(transferFunction.unitDistance)) {
-    throw Error(ErrorCode::InvalidArgument, fmt::format("the opacity unit distance must be > 0, it is {}",
+    throw Error(ErrorCode::InvalidArgument, fmt::format("the opacity unit distance must be > 0, but is {}",
                                                         transferFunction.unitDistance));
   }
 }

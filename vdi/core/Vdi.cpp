@@ -12,7 +12,7 @@ namespace vdi {
 namespace {
 
 [[noreturn]] void fail(const std::string& what) {
-  throw Error(ErrorCode::Format, "not a sound VDI: " + what);
+  throw Error(ErrorCode::Format, "invalid VDI: " + what);
 }
 
 /// Uses negated comparisons, so that NaN fails.
@@ -40,8 +40,9 @@ void validateList(std::span<const CompactSupersegment> list, std::uint64_t numbe
   std::uint32_t previousBack = 0;
   for (const CompactSupersegment& segment : list) {
     if (segment.front() < previousBack || segment.front() >= segment.back()) {
-      fail(fmt::format("list {} has a supersegment from depth code {} to {}, one before it ends at {}",
-                       number, segment.front(), segment.back(), previousBack));
+      fail(
+          fmt::format("list {} has a supersegment from depth code {} to {}, but the one before it ends at {}",
+                      number, segment.front(), segment.back(), previousBack));
     }
     previousBack = segment.back();
   }

@@ -93,7 +93,7 @@ ValueMap valueMapOf(const Block& block) {
     throw Error(
         ErrorCode::InvalidArgument,
         fmt::format("a block of {} has values from {} to {}, those beyond {} in size can't be handled; "
-                    "other units help",
+                    "use other units",
                     toString(block.type), range.min, range.max, maximum));
   }
   if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0, false, range};

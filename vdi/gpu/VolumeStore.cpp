@@ -233,8 +233,10 @@ void VolumeStore::layCells(Step& step) const {
     cells += volumeOf(cellPiece.cellDims);
     step.cellPieces.push_back(cellPiece);
   }
-  if (cells > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error(ErrorCode::OutOfMemory, fmt::format("{} macrocells in one rank's blocks", cells),
+  constexpr std::uint64_t maxCells = std::numeric_limits<std::uint32_t>::max();
+  if (cells > maxCells) {
+    throw Error(ErrorCode::OutOfMemory,
+                fmt::format("{} macrocells in one rank's blocks, more than the {} allowed", cells, maxCells),
                 device_->name());
   }
   step.cellCount = static_cast<std::uint32_t>(cells);

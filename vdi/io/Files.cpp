@@ -105,7 +105,7 @@ fs::path followLinks(const fs::path& path) {
     struct statfs system {};
     const fs::path folder = at.has_parent_path() ? at.parent_path() : ".";
     if (::statfs(folder.c_str(), &system) == 0 && system.f_type == PROC_SUPER_MAGIC) {
-      throw Error(ErrorCode::Io, "it stands for a file that is already open; name that file", path.string());
+      throw Error(ErrorCode::Io, "the path is an alias of an open file; name that file", path.string());
     }
     at = folder / next;
   }
@@ -389,7 +389,7 @@ void writeAtomically(const fs::path& path, std::span<const std::byte> bytes) {
 void replaceLink(const fs::path& link, const fs::path& target) {
   Status found{};
   if (::lstat(link.c_str(), &found) == 0 && !S_ISLNK(found.st_mode))
-    throw Error(ErrorCode::Io, "what has the name of a link isn't one, and stays", link.string());
+    throw Error(ErrorCode::Io, "can't replace it by a link: it exists and isn't a link", link.string());
   const fs::path made = temporaryName(link.has_parent_path() ? link.parent_path() : ".");
   if (::symlink(target.c_str(), made.c_str()) != 0) fail("make a link", errno, link);
   if (::rename(made.c_str(), link.c_str()) == 0) return;

@@ -17,7 +17,7 @@ using nlohmann::json;
 namespace {
 
 [[noreturn]] void refuse(const std::string& what) {
-  throw Error(ErrorCode::Format, "the metadata aren't sound: " + what);
+  throw Error(ErrorCode::Format, "invalid metadata: " + what);
 }
 
 /// The field of an object; throws if it is missing.
@@ -29,19 +29,19 @@ const json& at(const json& object, const char* name) {
 
 const json& objectAt(const json& object, const char* name) {
   const json& value = at(object, name);
-  if (!value.is_object()) refuse(fmt::format("'{}' is no object", name));
+  if (!value.is_object()) refuse(fmt::format("'{}' is not an object", name));
   return value;
 }
 
 double numberAt(const json& object, const char* name) {
   const json& value = at(object, name);
-  if (!value.is_number()) refuse(fmt::format("'{}' is no number", name));
+  if (!value.is_number()) refuse(fmt::format("'{}' is not a number", name));
   return value.get<double>();
 }
 
 std::string textAt(const json& object, const char* name) {
   const json& value = at(object, name);
-  if (!value.is_string()) refuse(fmt::format("'{}' is no text", name));
+  if (!value.is_string()) refuse(fmt::format("'{}' is not a string", name));
   return value.get<std::string>();
 }
 
@@ -49,7 +49,7 @@ int wholeNumberAt(const json& object, const char* name) {
   const json& value = at(object, name);
   constexpr std::int64_t most = std::numeric_limits<int>::max();
   if (!value.is_number_integer() || value.get<std::int64_t>() < -most || value.get<std::int64_t>() > most)
-    refuse(fmt::format("'{}' is no whole number", name));
+    refuse(fmt::format("'{}' is not a whole number", name));
   return value.get<int>();
 }
 
@@ -58,7 +58,7 @@ std::vector<std::vector<double>> rowsAt(const json& object, const char* name, st
   const json& value = at(object, name);
   std::vector<std::vector<double>> rows;
   const auto require = [&](bool good) {
-    if (!good) refuse(fmt::format("'{}' is no list of lists of {} numbers", name, width));
+    if (!good) refuse(fmt::format("'{}' is not a list of lists of {} numbers", name, width));
   };
   require(value.is_array());
   for (const json& row : value) {
@@ -142,7 +142,7 @@ Coloring coloringIn(std::string_view text) {
   if (text.size() > maxMetadataBytes) refuse(fmt::format("they take {} bytes", text.size()));
   try {
     const json object = json::parse(text.begin(), text.end());
-    if (!object.is_object()) refuse("they are no JSON object");
+    if (!object.is_object()) refuse("they are not a JSON object");
     Coloring coloring = coloringOf(object);
     validate(coloring);
     return coloring;

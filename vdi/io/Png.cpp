@@ -88,7 +88,7 @@ void writePng(const std::filesystem::path& path, const Picture& picture) {
 Picture readPng(const std::filesystem::path& path) {
   const InputFile file(path);
   const auto require = [&](bool good, std::string_view why) {
-    if (!good) throw Error(ErrorCode::Format, fmt::format("not a sound PNG: {}", why), path.string());
+    if (!good) throw Error(ErrorCode::Format, fmt::format("invalid PNG: {}", why), path.string());
   };
   // Checks before it allocates memory for another file's bytes.
   constexpr std::uint64_t signatureBytes = 8;

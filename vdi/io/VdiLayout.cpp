@@ -28,7 +28,7 @@ constexpr std::uint32_t knownFlags = flagParallel;
 }  // namespace
 
 void fail(const std::string& what) {
-  throw Error(ErrorCode::Format, "not a sound .vdi file: " + what);
+  throw Error(ErrorCode::Format, "invalid .vdi file: " + what);
 }
 
 std::uint64_t checksumOf(std::span<const std::byte> bytes) {
@@ -52,7 +52,7 @@ void requireSoundHeader(const Vdi& vdi) {
     numbers = numbers && !std::isnan(vdi.bounds.lo[axis]) && !std::isnan(vdi.bounds.hi[axis]);
   }
   if (!numbers) fail("time, sample step or bounds aren't numbers");
-  if (vdi.budget < 1) fail("a budget of no supersegments");
+  if (vdi.budget < 1) fail("the budget is 0 supersegments");
 }
 
 Header headerOf(const Vdi& vdi) {
@@ -147,7 +147,7 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   }
   if (hasMetadata && (rest - header.dataBytes < sizeof(MetadataHeader) ||
                       rest - header.dataBytes > sizeof(MetadataHeader) + maxMetadataBytes)) {
-    fail(fmt::format("{} bytes behind its chunks can't be metadata", rest - header.dataBytes));
+    fail(fmt::format("{} bytes after its chunks can't be metadata", rest - header.dataBytes));
   }
   return header;
 }
@@ -159,7 +159,7 @@ std::optional<Coloring> parseMetadata(const Header& header, std::span<const std:
   const std::span<const std::byte> text = bytes.subspan(sizeof(MetadataHeader));
   if (head.kind != kindJson) fail("its metadata aren't JSON");
   if (head.bytes != text.size()) {
-    fail(fmt::format("there are {} bytes of metadata, they say {}", text.size(), head.bytes));
+    fail(fmt::format("the metadata have {} bytes; their header says {}", text.size(), head.bytes));
   }
   if (head.checksum != checksumOf(text)) fail("the metadata's checksum is wrong");
   try {

@@ -102,7 +102,7 @@ void ListBuilder::finish() {
   if (const std::uint32_t wrong = statusReadback_.mappedAs<std::uint32_t>()[shared::statusWrongLists];
       wrong != 0) {
     throw Error(ErrorCode::DeviceFailure,
-                fmt::format("{} lists were written with another count than was stored", wrong),
+                fmt::format("{} lists have a written count that differs from the stored one", wrong),
                 device_->name());
   }
 }

@@ -28,7 +28,7 @@ void requireUsableValues(const comm::Communicator& comm, std::span<const Block> 
   throw Error(
       ErrorCode::InvalidArgument,
       fmt::format("all values are 0 or smaller than {} (f32) or {} (f64) in size, too small to be told "
-                  "apart; other units help",
+                  "apart; use other units",
                   limitsOf(ScalarType::F32).minimum, limitsOf(ScalarType::F64).minimum));
 }
 
@@ -125,7 +125,7 @@ void TimeSteps::requireSpans(const TransferTable& table) const {
   if (!shown_.doubles || !(span > maxCount * (table.max - table.min))) return;
   throw Error(ErrorCode::InvalidArgument,
               fmt::format("the values are from {} to {}, the transfer function's from {} to {}: more than a "
-                          "factor of {}; missing values as NaN rather than a large number help",
+                          "factor of {}; mark missing values as NaN, not as a large number",
                           range_.min, range_.max, table.min, table.max, maxCount));
 }
 

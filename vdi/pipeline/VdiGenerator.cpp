@@ -69,7 +69,8 @@ struct VdiGenerator::State {
       steps = std::make_unique<detail::TimeSteps>(comm, bands->caster().volume());
       frames = std::make_unique<detail::Frames>(device, comm, transport, root);
       bandDownload = std::make_unique<detail::BandDownload>(device);
-      gone = std::make_exception_ptr(Error(ErrorCode::InvalidArgument, "the frame's generator has gone"));
+      gone = std::make_exception_ptr(
+          Error(ErrorCode::InvalidArgument, "the frame's generator no longer exists"));
     });
   }
   ~State() {

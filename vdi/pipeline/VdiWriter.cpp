@@ -60,7 +60,7 @@ std::vector<NoteOf<Note>> shareNotes(const comm::Communicator& comm, Make make) 
 
 [[noreturn]] void failCoverage(std::uint64_t list) {
   throw Error(ErrorCode::InvalidArgument,
-              fmt::format("the lists from {} on are nobody's, or of several ranks", list));
+              fmt::format("no rank, or more than one, added the lists from {} on", list));
 }
 
 }  // namespace

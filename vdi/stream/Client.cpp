@@ -200,7 +200,7 @@ class Client::Impl {
   }
   void take(const Welcome& welcome) {
     if (welcome.version != protocolVersion)
-      throw Error(ErrorCode::Format, "the server speaks another version");
+      throw Error(ErrorCode::Format, "the server uses another protocol version");
     isWelcome_ = true;
     wait_ = firstPause;
     if (session_ != welcome.session) have_.reset();

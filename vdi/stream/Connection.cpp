@@ -56,7 +56,7 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
 
   void finish() override {
     if (isWelcome()) {
-      viewer_->refuse(Close::GoingAway, "the server ends");
+      viewer_->refuse(Close::GoingAway, "the server is shutting down");
     } else {
       cut();
     }

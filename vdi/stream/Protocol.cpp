@@ -47,7 +47,7 @@ class Fields {
 
   std::string text(const char* name) const {
     const Json& value = at(name);
-    if (!value.is_string()) refuse(fmt::format("\"{}\" isn't a text", name));
+    if (!value.is_string()) refuse(fmt::format("\"{}\" isn't a string", name));
     return value.get<std::string>();
   }
   bool flag(const char* name) const {
@@ -79,7 +79,7 @@ class Fields {
       refuse("\"times\" and \"steps\" aren't arrays of one length");
     Series series;
     for (const Json& time : times) {
-      if (!time.is_null() && !time.is_number()) refuse("\"times\" has what isn't a number");
+      if (!time.is_null() && !time.is_number()) refuse("\"times\" has an entry that isn't a number");
       series.times.push_back(time.is_null() ? std::nullopt : std::optional(time.get<double>()));
     }
     for (const Json& step : steps) series.steps.push_back(asCount<std::uint64_t>(step, "steps"));

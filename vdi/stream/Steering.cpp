@@ -16,8 +16,9 @@ std::string objectionTo(const std::string& name, double value, const std::vector
   const auto found = std::ranges::find(parameters, name, &Parameter::name);
   if (found == parameters.end()) return fmt::format("the simulation has no parameter \"{}\"", name);
   if (!(value >= found->low && value <= found->high))
-    return fmt::format("\"{}\" is from {} to {}", name, found->low, found->high);
-  if (found->isWhole && value != std::nearbyint(value)) return fmt::format("\"{}\" is a whole number", name);
+    return fmt::format("\"{}\" must be from {} to {}", name, found->low, found->high);
+  if (found->isWhole && value != std::nearbyint(value))
+    return fmt::format("\"{}\" must be a whole number", name);
   return {};
 }
 

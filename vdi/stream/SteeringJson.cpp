@@ -45,7 +45,7 @@ bool flagIn(const Json& value, const char* name) {
 
 std::string textIn(const Json& value, const char* name) {
   if (!value.is_string() || value.get_ref<const std::string&>().size() > maxNameBytes)
-    refuse(fmt::format("\"{}\" isn't a text of at most {} bytes", name, maxNameBytes));
+    refuse(fmt::format("\"{}\" isn't a string of at most {} bytes", name, maxNameBytes));
   return value.get<std::string>();
 }
 
@@ -110,12 +110,12 @@ Json jsonOf(const Camera& camera) {
 }
 
 std::string nameIn(const std::string& name) {
-  if (!isParameterName(name)) refuse("a parameter's name has other characters than letters, digits, _ - .");
+  if (!isParameterName(name)) refuse("a parameter's name may only contain letters, digits, '_', '-' and '.'");
   return name;
 }
 
 Parameter parameterIn(const Json& value) {
-  if (!value.is_object()) refuse("\"parameters\" has what isn't an object");
+  if (!value.is_object()) refuse("\"parameters\" has an entry that isn't an object");
   Parameter parameter;
   parameter.name = nameIn(textIn(at(value, "name"), "name"));
   parameter.isWhole = flagIn(at(value, "whole"), "whole");

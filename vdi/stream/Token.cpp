@@ -55,7 +55,7 @@ void requireToken(const std::string& token, const std::string& origin) {
                 origin);
   }
   if (!std::all_of(token.begin(), token.end(), standsInLinks)) {
-    throw Error(ErrorCode::InvalidArgument, "a token has letters, digits, '-', '.', '_' and '~' alone",
+    throw Error(ErrorCode::InvalidArgument, "a token may only contain letters, digits, '-', '.', '_' and '~'",
                 origin);
   }
 }

@@ -67,7 +67,7 @@ Url parseUrl(std::string_view text) {
   const std::size_t slash = std::min(rest.find('/'), rest.size());
   const bool hasPath = rest.size() > slash + 1;
   if (!isKnown || hasPath || !split(rest.substr(0, slash), url)) {
-    throw Error(ErrorCode::InvalidArgument, "a link is http://HOST:PORT/#token=TOKEN, or https",
+    throw Error(ErrorCode::InvalidArgument, "a link must have the form http(s)://HOST:PORT/#token=TOKEN",
                 std::string(address));
   }
   url.token = tokenOf(text.substr(hash).substr(hash < text.size() ? 1 : 0));

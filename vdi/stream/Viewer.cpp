@@ -159,7 +159,7 @@ void Viewer::refuse(Close code, std::string cause) {
 
 void Viewer::enter(const Hello& hello, Clock::time_point now) {
   if (hello.version != protocolVersion) {
-    refuse(Close::OtherVersion, fmt::format("this server speaks version {}, the viewer version {}",
+    refuse(Close::OtherVersion, fmt::format("this server uses protocol version {}, the viewer version {}",
                                             protocolVersion, hello.version));
     return;
   }

@@ -51,7 +51,7 @@ Layout layoutFromString(const std::string& name) {
     if (name == text) return layout;
     names += (names.empty() ? "" : ", ") + std::string(text);
   }
-  throw Error(ErrorCode::InvalidArgument, "no layout '" + name + "'; there are " + names);
+  throw Error(ErrorCode::InvalidArgument, "no layout '" + name + "'; use one of " + names);
 }
 
 std::vector<std::string> layoutNames() {

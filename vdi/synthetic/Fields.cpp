@@ -121,7 +121,7 @@ namespace {
 Error noField(const std::string& name) {
   std::string names;
   for (const FieldInfo& info : fields()) names += (names.empty() ? "" : ", ") + info.name;
-  return {ErrorCode::InvalidArgument, "no field '" + name + "'; there are " + names};
+  return {ErrorCode::InvalidArgument, "no field '" + name + "'; use one of " + names};
 }
 
 }  // namespace

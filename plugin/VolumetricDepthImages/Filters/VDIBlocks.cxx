@@ -97,7 +97,7 @@ void requireComponent(vtkDataArray* array, int component) {
   if (component == vdi::phase && components == 2) return;
   const std::string why =
       component == vdi::phase
-          ? fmt::format("a phase is of two components, real and imaginary; the array has {}", components)
+          ? fmt::format("a phase needs two components, real and imaginary; the array has {}", components)
           : fmt::format("there is no component {}, the array has {}", component, components);
   throw Error(ErrorCode::InvalidArgument, why, array->GetName());
 }
@@ -254,8 +254,8 @@ void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, const std::string& 
     throw Error(
         ErrorCode::InvalidArgument,
         fmt::format(
-            "{} can't be turned into a VDI; what can is vtkImageData, alone or in multiblock, partitioned "
-            "or AMR data sets (Resample To Image makes it of anything)",
+            "{} can't be turned into a VDI; use vtkImageData, alone or in multiblock, partitioned or AMR "
+            "data sets (Resample To Image converts other data)",
             leaf->GetClassName()));
   }
   addImage(image, choice, name, blocks);

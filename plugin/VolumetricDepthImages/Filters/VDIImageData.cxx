@@ -134,8 +134,7 @@ vdi::Image pictureIn(vtkImageData* image) {
   if (colors == nullptr || colors->GetNumberOfComponents() != 4 || size[2] != 1) {
     throw vdi::Error(
         vdi::ErrorCode::InvalidArgument,
-        "the input has no picture; it takes what VolumetricDepthImage, RenderVDI or the VDI reader "
-        "make");
+        "the input has no picture; connect a VolumetricDepthImage or RenderVDI filter, or a VDI reader");
   }
   vdi::Image picture{size[0], size[1], {}, {}};
   picture.rgba.resize(picture.pixelCount());

@@ -139,7 +139,7 @@ std::string Log(const std::string& path, const std::string& line) {
   bool isWritten = file != nullptr && std::fputs((line + "\n").c_str(), file) >= 0;
   if (file != nullptr && std::fclose(file) != 0) isWritten = false;
   if (isWritten) return {};
-  return fmt::format("can't log what viewers change to {}: {}", path, std::strerror(errno));
+  return fmt::format("can't write viewers' changes to {}: {}", path, std::strerror(errno));
 }
 
 /// Returns the first rank's text on all ranks. Collective.

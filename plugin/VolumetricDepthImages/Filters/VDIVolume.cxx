@@ -152,7 +152,7 @@ void Volume::requireShown(const Origin& origin) {
   generator_->communicator().together([&] {
     const std::shared_ptr<const Shown> now = this->shown();
     if (!now || !(now->of == origin))
-      throw vdi::Error(vdi::ErrorCode::InvalidArgument, "the volume shows other blocks by now");
+      throw vdi::Error(vdi::ErrorCode::InvalidArgument, "the volume now shows other blocks");
   });
 }
 

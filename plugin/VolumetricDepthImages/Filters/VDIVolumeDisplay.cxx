@@ -198,11 +198,11 @@ std::string blendModeIssue(vtkSMProxy* shown) {
       name = "a slice";
       break;
     default:
-      name = "something else than the composited volume";
+      name = "something other than the composite";
   }
   return std::string("The view shows ") + name +
-         " of this volume (its Blend Mode), which VolumetricDepthImage can't. It shows what Blend Mode "
-         "Composite shows.";
+         " of this volume (its Blend Mode), which VolumetricDepthImage doesn't support. It shows what "
+         "Blend Mode Composite shows.";
 }
 
 }  // namespace pv

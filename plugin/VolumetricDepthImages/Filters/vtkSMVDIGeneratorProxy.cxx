@@ -221,7 +221,7 @@ void vtkSMVDIGeneratorProxy::FollowArray() {
   if (now == *this->Shown || now.Input == nullptr) return;
   const Set choosing(this->Choosing);
   const Subject before = std::exchange(*this->Shown, now);
-  SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what goes with the array");
+  SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the array's map and settings");
   if (now.Input != before.Input || now.Port != before.Port) this->TakeUnitDistance();
   // A component that the new array lacks belonged to the old one.
   if (now.Array != before.Array && now.Component == before.Component && now.Component > 0 &&

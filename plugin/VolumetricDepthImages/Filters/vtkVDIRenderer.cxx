@@ -132,8 +132,7 @@ bool vtkVDIRenderer::IsOther(vtkDataObject* input) {
     this->Internal->Other = nullptr;
     return false;
   }
-  if (input != this->Internal->Other)
-    vtkErrorMacro("the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
+  if (input != this->Internal->Other) vtkErrorMacro(<< pv::noVdi);
   this->Internal->Other = input;
   return true;
 }

@@ -112,8 +112,7 @@ void vtkVDIStreamWriter::WriteData() {
     auto vdi = std::make_shared<vdi::Vdi>();
     if (!pv::getVdi(image, *vdi)) {
       if (image == nullptr || image->GetNumberOfPoints() == 0) return;  // another rank has it
-      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                       "the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
+      throw vdi::Error(vdi::ErrorCode::InvalidArgument, pv::noVdi);
     }
     if (this->TimeStep >= 0) vdi->timeStep = static_cast<std::uint64_t>(this->TimeStep);
     if (!this->Running) this->Start();

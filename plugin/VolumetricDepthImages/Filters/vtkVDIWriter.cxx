@@ -65,7 +65,7 @@ void vtkVDIWriter::WriteData() {
     if (image == nullptr || image->GetNumberOfPoints() == 0) return;  // another rank has it
     if (this->FileName == nullptr || *this->FileName == '\0') {
       throw vdi::Error(vdi::ErrorCode::Io,
-                       "no file name was given, or its pattern has a {field} of no value");
+                       "no file name was given, or its pattern has a {field} without a value");
     }
     const std::filesystem::path path(this->FileName);
     if (extensionOf(path) == ".png") {
@@ -75,8 +75,7 @@ void vtkVDIWriter::WriteData() {
     }
     vdi::Vdi vdi;
     if (!pv::getVdi(image, vdi)) {
-      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                       "the input has no VDI; it takes what VolumetricDepthImage or the VDI reader make");
+      throw vdi::Error(vdi::ErrorCode::InvalidArgument, pv::noVdi);
     }
     if (this->TimeStep >= 0) vdi.timeStep = static_cast<std::uint64_t>(this->TimeStep);
     write(path, vdi);

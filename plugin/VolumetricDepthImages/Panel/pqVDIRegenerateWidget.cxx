@@ -38,8 +38,8 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
   this->connect(button, &QPushButton::clicked, this, &pqVDIRegenerateWidget::regenerate);
   this->Auto->setObjectName("Auto");
   this->Auto->setToolTip(
-      tr("Makes the VDI anew by itself, once the camera of this view rests more than Auto Angle away from "
-         "where the VDI was made"));
+      tr("Regenerates the VDI automatically when this view's camera rests more than Auto Angle from the "
+         "VDI's viewpoint"));
   layout->addWidget(this->Auto);
   // The line stands below and always keeps its room, so that nothing moves under the mouse.
   this->Line->setObjectName("RegenerateLine");

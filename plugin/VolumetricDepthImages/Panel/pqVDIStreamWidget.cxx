@@ -22,7 +22,7 @@ pqVDIStreamWidget::pqVDIStreamWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget*
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(0, 0, 0, 0);
   this->Pause->setObjectName("Pause");
-  this->Pause->setToolTip(tr("Keeps the VDI that is shown; the server sends none meanwhile"));
+  this->Pause->setToolTip(tr("Keeps showing the same VDI. The server sends no others while this is on"));
   layout->addWidget(this->Pause);
   this->Line->setObjectName("StreamLine");
   this->Line->setTextFormat(Qt::PlainText);  // the text comes in part from a server

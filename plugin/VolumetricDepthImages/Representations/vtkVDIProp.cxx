@@ -189,7 +189,7 @@ void vtkVDIProp::LookAround(vtkObject* renderer, unsigned long, void*) {
     internal.Notices.note("The VDI is being made.");
   } else if (internal.Buffers.isEmpty()) {
     internal.Notices.note(
-        "This VDI shows nothing: from its viewpoint nothing of its scene is seen, or all of it is "
+        "This VDI shows nothing: from its viewpoint none of its scene is visible, or all of it is "
         "transparent.");
   } else if (view) {
     const bool isFiltered = internal.Piece != nullptr && pv::isFiltered(internal.Piece->GetFieldData());
@@ -423,7 +423,7 @@ void vtkVDIProp::StayRough(vtkOpenGLRenderWindow* window, const pv::StillView& v
   if (!this->Recover(error)) throw vdi::Error(error);
   internal.Rough = {internal.PieceTime, view.size};
   this->DrawRough(window, view);
-  this->Say(std::string("The VDI is shown with few pixels, for its picture in full can't be made: ") +
+  this->Say(std::string("The VDI is shown with few pixels because the full picture can't be made: ") +
             error.what());
 }
 
