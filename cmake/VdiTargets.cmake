@@ -27,7 +27,7 @@ set(VDI_TEST_ENVIRONMENT OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM
                          OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_vader_single_copy_mechanism=none)
 
 # vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [LONG_RANKS 5] [TIMEOUT
-# seconds] [LABELS ...]): defines the program test_<name> with Catch2's main (or tests/MpiMain.cpp
+# seconds] [LABELS ...]): defines the program test_<name> with tests/Main.cpp (or tests/MpiMain.cpp
 # if RANKS is given), and a ctest for each of its cases or rank counts; see
 # cmake/DiscoverTests.cmake. Each test has a time limit.
 function(vdi_add_catch_test name)

@@ -9,7 +9,7 @@
 
 namespace vdi::test {
 
-/// The devices that device() keeps. Main.cpp and MpiMain.cpp drop them before they return, because the
+/// The devices that device() keeps. runCases (Main.h) drops them before it returns, because the
 /// validation layer frees state of its own at the program's exit, and can't close a device afterwards.
 inline std::array<std::shared_ptr<gpu::Device>, 2>& keptDevices() {
   static std::array<std::shared_ptr<gpu::Device>, 2> kept;

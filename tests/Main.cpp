@@ -1,10 +1,6 @@
-// Catch2's main.
-#define CATCH_CONFIG_RUNNER
-#include "tests/Catch.h"
-#include "tests/Devices.h"
+// The main of tests on one rank.
+#include "tests/Main.h"
 
 int main(int argc, char** argv) {
-  const int result = Catch::Session().run(argc, argv);
-  vdi::test::keptDevices() = {};
-  return result;
+  return vdi::test::runCases(argc, argv);
 }
