@@ -1,11 +1,12 @@
 // The C interface for scripts. It starts ParaView's engine, keeps the ranks together, and shows scripts the
-// blocks and arrays as a Grid.
+// blocks and arrays as a VtkGrid.
 #include <mpi.h>
 
 #include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -17,12 +18,12 @@
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/Scripts.h"
 #include "catalyst_adaptor/scripts/Engine.h"
-#include "catalyst_adaptor/scripts/Grid.h"
 #include "catalyst_adaptor/scripts/ScriptEnvironment.h"
+#include "catalyst_adaptor/scripts/VtkGrid.h"
 
 struct vdi_catalyst : vdi::catalyst::FieldCalls {
   std::unique_ptr<vdi::catalyst::Engine> engine;
-  std::unique_ptr<vdi::catalyst::Grid> grid;              // null: no blocks were given
+  std::unique_ptr<vdi::catalyst::VtkGrid> grid;           // null: no blocks were given
   std::optional<vdi::catalyst::DeviceDeposits> deposits;  // of particles, once there are some
 };
 
@@ -147,10 +148,10 @@ int initializePipelines(int32_t fortran_communicator, int32_t script_count,
 int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const PythonLock lock;
-  std::unique_ptr<vdi::catalyst::Grid> grid;
+  std::unique_ptr<vdi::catalyst::VtkGrid> grid;
   int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
     vdi::catalyst::checkBlocks(count, blocks);
-    grid = std::make_unique<vdi::catalyst::Grid>(std::span(blocks, static_cast<std::size_t>(count)));
+    grid = std::make_unique<vdi::catalyst::VtkGrid>(std::span(blocks, static_cast<std::size_t>(count)));
   });
   if (code == VDI_CATALYST_OK) code = vdi::catalyst::setBlocks(*catalyst, count, blocks);
   if (code == VDI_CATALYST_OK) catalyst->grid = std::move(grid);

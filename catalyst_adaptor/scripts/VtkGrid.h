@@ -14,11 +14,11 @@
 namespace vdi::catalyst {
 
 /// A vtkPartitionedDataSet with a vtkImageData for each of this rank's blocks.
-class Grid {
+class VtkGrid {
  public:
   /// Makes the images, with marks of their ghost cells and no other arrays. Throws std::runtime_error if
   /// there is no memory for the marks.
-  explicit Grid(std::span<const vdi_catalyst_block> blocks);
+  explicit VtkGrid(std::span<const vdi_catalyst_block> blocks);
 
   /// Gives the images the arrays of `fields`, which has the same blocks, and tells VTK that all values may
   /// have changed. The arrays use the simulation's memory. After an exception the images lack some arrays

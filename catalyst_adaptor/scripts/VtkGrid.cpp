@@ -1,4 +1,4 @@
-#include "catalyst_adaptor/scripts/Grid.h"
+#include "catalyst_adaptor/scripts/VtkGrid.h"
 
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
@@ -112,7 +112,7 @@ void removeArrays(vtkDataSetAttributes& attributes) {
 
 }  // namespace
 
-Grid::Grid(std::span<const vdi_catalyst_block> blocks)
+VtkGrid::VtkGrid(std::span<const vdi_catalyst_block> blocks)
     : data_(vtkSmartPointer<vtkPartitionedDataSet>::New()) {
   data_->SetNumberOfPartitions(static_cast<unsigned int>(blocks.size()));
   for (unsigned int i = 0; i < blocks.size(); ++i) {
@@ -126,7 +126,7 @@ Grid::Grid(std::span<const vdi_catalyst_block> blocks)
   }
 }
 
-void Grid::update(const Fields& fields) {
+void VtkGrid::update(const Fields& fields) {
   const bool areNew = shown_ != fields.changes();
   shown_.reset();
   const std::vector<Fields::NamedArray> arrays = areNew ? fields.arrays() : std::vector<Fields::NamedArray>();
