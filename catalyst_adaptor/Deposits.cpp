@@ -83,9 +83,9 @@ void DeviceDeposits::open() {
 }
 
 void DeviceDeposits::make(Fields& fields, std::int64_t step) {
-  for (const auto& [name, array] : fields.particles()) {
-    DepositedValues values = make(name, array, fields, step);
-    comm_.together([&] { fields.setDeposit(name, std::move(values)); });
+  for (const auto& named : fields.particles()) {
+    DepositedValues values = make(named.first, named.second, fields, step);
+    comm_.together([&] { fields.setDeposit(named.first, std::move(values)); });
   }
 }
 
