@@ -7,6 +7,7 @@
 #include <cstring>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "catalyst_adaptor/Fields.h"
@@ -142,4 +143,28 @@ TEST_CASE("a step that is cut short is refused") {
   for (const std::size_t size : {0U, 7U, 20U, 100U}) {
     CHECK_THROWS_AS(StepData::read(bytes.all().first(size)), std::runtime_error);
   }
+}
+
+TEST_CASE("arrays keep the order in which they were first set") {
+  Fields fields;
+  fields.setBlocks({});
+  const auto namesInOrder = [&] {
+    std::vector<std::string> names;
+    for (const Fields::NamedArray& array : fields.arrays()) names.push_back(array.name);
+    return names;
+  };
+  for (const char* name : {"V", "A", "V"}) {
+    const std::uint64_t before = fields.changes();
+    fields.set(Fields::arrayChange(name, true, VDI_CATALYST_F32, {}));
+    CHECK(fields.changes() != before);
+  }
+  CHECK(namesInOrder() == std::vector<std::string>{"V", "A"});
+  // Particles take the array's place, and their array comes when it is made.
+  vdi_catalyst_particles given{};
+  fields.set(Fields::particlesChange("V", particleArrayOf(&given)));
+  CHECK(namesInOrder() == std::vector<std::string>{"A"});
+  fields.setDeposit("V", {});
+  CHECK(namesInOrder() == std::vector<std::string>{"A", "V"});
+  fields.setBlocks({});
+  CHECK(namesInOrder().empty());
 }
