@@ -113,6 +113,22 @@ void checkBlocks(std::int32_t count, const vdi_catalyst_block* blocks) {
   for (std::int32_t i = 0; i < count; ++i) checkBlock(blocks[i]);
 }
 
+std::unique_ptr<unsigned char[]> newMarks(const vdi_catalyst_block& block) {
+  std::size_t cells = 1;
+  bool any = false;
+  for (int axis = 0; axis < 3; ++axis) {
+    cells *= static_cast<std::size_t>(block.cells[axis]);
+    any = any || block.ghost_lo[axis] > 0 || block.ghost_hi[axis] > 0;
+  }
+  if (!any) return nullptr;
+  std::unique_ptr<unsigned char[]> marks(new (std::nothrow) unsigned char[cells]);
+  if (!marks) {
+    throw std::runtime_error("no memory for the marks of a block's ghost cells: " + std::to_string(cells) +
+                             " bytes");
+  }
+  return marks;
+}
+
 void checkOffset(const char* name, std::int32_t association, const double* offset) {
   require(name != nullptr && *name != '\0', "an array needs a name");
   require(association == VDI_CATALYST_POINTS || association == VDI_CATALYST_CELLS, "unknown association");

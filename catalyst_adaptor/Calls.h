@@ -91,6 +91,9 @@ inline void require(bool good, const char* what) {
 void requireEqual(MPI_Comm comm, std::int64_t value, const char* what);
 /// Throws std::invalid_argument with the reason if the blocks are missing, or one is invalid.
 void checkBlocks(std::int32_t count, const vdi_catalyst_block* blocks);
+/// Memory for a mark of each of the block's cells, which ParaView needs where some are ghost cells; null
+/// where none is. Throws std::runtime_error if there is too little memory.
+std::unique_ptr<unsigned char[]> newMarks(const vdi_catalyst_block& block);
 /// Throws std::invalid_argument with the reason if an array can't have the name, association or offset.
 void checkOffset(const char* name, std::int32_t association, const double* offset);
 /// Whether ParaView can count this step.

@@ -19,26 +19,31 @@ glm::dvec3 vectorOf(const double (&v)[3]) {
 
 }  // namespace
 
-void Deposits::setBlocks(std::uint64_t version, std::span<const vdi_catalyst_block> blocks) {
-  if (version_ == version) return;
+/// Does nothing unless the blocks have changed since the last call. Collective.
+void Deposits::setBlocks(const Fields& fields) {
+  if (version_ == fields.version()) return;
   version_.reset();
   std::vector<Block> places;
   comm_.together([&] {
     // No values are read: a block's own address only tells it apart from others.
-    for (const vdi_catalyst_block& block : blocks) {
+    for (const vdi_catalyst_block& block : fields.blocks()) {
       places.push_back(Block::fromCells(vectorOf(block.cells), vectorOf(block.origin),
                                         vectorOf(block.spacing), ScalarType::F32, &block,
                                         {vectorOf(block.ghost_lo), vectorOf(block.ghost_hi)}));
     }
   });
   depositor_.setBlocks(places);
-  version_ = version;
+  version_ = fields.version();
 }
 
-DepositedValues Deposits::make(const std::string& name, const ParticleArray& array, std::int64_t step) {
+void Deposits::make(Fields& fields, const std::string& name, std::int64_t step) {
+  setBlocks(fields);
+  const ParticleArray& array = *fields.particlesOf(name);
   DepositedArray made = depositor_.deposit(array.particles, array.kind);
-  comm_.together([&] { tell(name, made.counts, step); });
-  return std::move(made.values);
+  comm_.together([&] {
+    tell(name, made.counts, step);
+    fields.setDeposit(name, std::move(made.values));
+  });
 }
 
 /// Tells of each kind of fault once, on rank 0.
@@ -83,28 +88,21 @@ void DeviceDeposits::open() {
 }
 
 void DeviceDeposits::make(Fields& fields, std::int64_t step) {
-  for (const auto& named : fields.particles()) {
-    DepositedValues values = make(named.first, named.second, fields, step);
-    comm_.together([&] { fields.setDeposit(named.first, std::move(values)); });
-  }
+  for (const auto& [name, array] : fields.particles()) make(fields, name, step);
 }
 
-DepositedValues DeviceDeposits::make(const std::string& name, const ParticleArray& array,
-                                     const Fields& fields, std::int64_t step) {
+void DeviceDeposits::make(Fields& fields, const std::string& name, std::int64_t step) {
   if (!deposits_) open();
-  const auto attempt = [&] {
-    deposits_->setBlocks(fields.version(), fields.blocks());
-    return deposits_->make(name, array, step);
-  };
   std::exception_ptr failure;
   try {
-    return attempt();
+    deposits_->make(fields, name, step);
+    return;
   } catch (...) {  // thrown on all ranks, but not the same exception on each
     failure = std::current_exception();
   }
   if (!comm_.anyTogether([&] { return device_->isLost(); })) std::rethrow_exception(failure);
   open();
-  return attempt();
+  deposits_->make(fields, name, step);
 }
 
 }  // namespace vdi::catalyst

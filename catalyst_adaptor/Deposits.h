@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -27,16 +26,15 @@ class Deposits {
   Deposits(const std::shared_ptr<gpu::Device>& device, const comm::Communicator& comm)
       : comm_(comm), depositor_(device, comm) {}
 
-  /// Collective: this rank's blocks, unless `version` is that of the last call. Throws as
-  /// ParticleDepositor::setBlocks does.
-  void setBlocks(std::uint64_t version, std::span<const vdi_catalyst_block> blocks);
-  /// Collective: the values of each of this rank's blocks. Throws as ParticleDepositor::deposit does. `step`
-  /// is told with the numbers of particles that are left out.
-  DepositedValues make(const std::string& name, const ParticleArray& array, std::int64_t step);
+  /// Collective: makes the array of the particles of that name, which `fields` has, and keeps it there.
+  /// Throws on all ranks, as ParticleDepositor does. `step` is told with the numbers of particles that are
+  /// left out.
+  void make(Fields& fields, const std::string& name, std::int64_t step);
   /// Takes over what another object has told already.
   void continueTelling(const Deposits& other) { told_ = other.told_; }
 
  private:
+  void setBlocks(const Fields& fields);
   void tell(const std::string& name, const ParticleCounts& counts, std::int64_t step);
 
   const comm::Communicator& comm_;
@@ -57,8 +55,7 @@ class DeviceDeposits {
 
  private:
   void open();
-  DepositedValues make(const std::string& name, const ParticleArray& array, const Fields& fields,
-                       std::int64_t step);
+  void make(Fields& fields, const std::string& name, std::int64_t step);
 
   comm::Communicator comm_;
   std::shared_ptr<gpu::Device> device_;

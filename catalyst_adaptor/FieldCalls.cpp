@@ -44,11 +44,13 @@ int setAnyArray(FieldCalls& self, const GivenArray& array, const void* const* da
 
 }  // namespace
 
-int setBlocks(FieldCalls& self, std::int32_t count, const vdi_catalyst_block* blocks) {
+int setBlocks(FieldCalls& self, std::int32_t count, const vdi_catalyst_block* blocks,
+              FunctionRef<void()> prepare) {
   std::vector<vdi_catalyst_block> copies;
   const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     checkBlocks(count, blocks);
     copies.assign(blocks, blocks + count);
+    prepare();
   });
   if (code != VDI_CATALYST_OK) return code;  // all ranks keep the blocks that they have
   self.fields.setBlocks(std::move(copies));

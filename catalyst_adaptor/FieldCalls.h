@@ -6,6 +6,7 @@
 #include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/Fields.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "vdi/core/FunctionRef.h"
 
 namespace vdi::catalyst {
 
@@ -24,7 +25,10 @@ struct GivenArray {
 
 /// These functions implement those of vdi_catalyst.h. Collective. After an error, blocks and arrays are as
 /// before.
-int setBlocks(FieldCalls& self, std::int32_t count, const vdi_catalyst_block* blocks);
+/// Once the blocks are checked, setBlocks also runs `prepare`, which may throw, but must not communicate.
+int setBlocks(
+    FieldCalls& self, std::int32_t count, const vdi_catalyst_block* blocks,
+    FunctionRef<void()> prepare = [] {});
 int setArray(FieldCalls& self, const GivenArray& array, const void* const* data);
 int setArrayStrided(FieldCalls& self, const GivenArray& array, const void* const* data,
                     const vdi_catalyst_strides* strides);

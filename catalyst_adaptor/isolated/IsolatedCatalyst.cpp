@@ -12,6 +12,7 @@
 
 #include "catalyst_adaptor/EngineFunctions.h"
 #include "catalyst_adaptor/FieldCalls.h"
+#include "catalyst_adaptor/FieldEntries.h"
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/Scripts.h"
 #include "catalyst_adaptor/isolated/IsolatedRun.h"
@@ -184,54 +185,14 @@ int initializePipelines(int32_t fortran_communicator, int32_t script_count,
 
 /// Throws if ParaView couldn't have the marks of the blocks' ghost cells.
 void requireMarks(int32_t count, const vdi_catalyst_block* blocks) {
-  for (int i = 0; i < count; ++i) {
-    const vdi_catalyst_block& block = blocks[i];
-    std::size_t cells = 1;
-    bool any = false;
-    for (int axis = 0; axis < 3; ++axis) {
-      cells *= static_cast<std::size_t>(block.cells[axis]);
-      any = any || block.ghost_lo[axis] > 0 || block.ghost_hi[axis] > 0;
-    }
-    if (!any) continue;
-    const std::unique_ptr<char[]> marks(new (std::nothrow) char[cells]);
-    if (!marks)
-      throw std::runtime_error("no memory for the marks of a block's ghost cells: " + std::to_string(cells) +
-                               " bytes");
-  }
+  for (int32_t i = 0; i < count; ++i) static_cast<void>(vdi::catalyst::newMarks(blocks[i]));
 }
 
 int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  if (!catalyst->isJson) {
-    const int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-      vdi::catalyst::checkBlocks(count, blocks);
-      requireMarks(count, blocks);
-    });
-    if (code != VDI_CATALYST_OK) return code;
-  }
-  return vdi::catalyst::setBlocks(*catalyst, count, blocks);
-}
-
-int setArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
-             const void* const* data) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  return vdi::catalyst::setArray(*catalyst, {name, type, association, 1}, data);
-}
-
-int setArrayStrided(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
-                    int32_t components, const void* const* data, const vdi_catalyst_strides* strides) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  return vdi::catalyst::setArrayStrided(*catalyst, {name, type, association, components}, data, strides);
-}
-
-int setArrayOffset(vdi_catalyst* catalyst, const char* name, int32_t association, const double* offset) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  return vdi::catalyst::setArrayOffset(*catalyst, name, association, offset);
-}
-
-int setParticles(vdi_catalyst* catalyst, const char* name, const vdi_catalyst_particles* particles) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  return vdi::catalyst::setParticles(*catalyst, name, particles);
+  return vdi::catalyst::setBlocks(*catalyst, count, blocks, [&] {
+    if (!catalyst->isJson) requireMarks(count, blocks);
+  });
 }
 
 int wants(vdi_catalyst* catalyst, int64_t step, double time) {
@@ -261,15 +222,25 @@ int finalize(vdi_catalyst* catalyst) {
   return code;
 }
 
-const char* error(const vdi_catalyst* catalyst) {
-  return usable(catalyst) ? catalyst->error.c_str() : "";
-}
+using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable>;
 
 }  // namespace
 
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    initialize, initializePipelines, initializeJson, nullptr,      setBlocks,
-    setArray,   setArrayStrided,     setArrayOffset, setParticles, wants,
-    execute,    parameterF64,        parameterI64,   finalize,     error,
+    initialize,
+    initializePipelines,
+    initializeJson,
+    nullptr,
+    setBlocks,
+    Entries::setArray,
+    Entries::setArrayStrided,
+    Entries::setArrayOffset,
+    Entries::setParticles,
+    wants,
+    execute,
+    parameterF64,
+    parameterI64,
+    finalize,
+    Entries::error,
     nullptr,
 };

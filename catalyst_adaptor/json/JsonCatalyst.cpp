@@ -11,6 +11,7 @@
 #include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/EngineFunctions.h"
 #include "catalyst_adaptor/FieldCalls.h"
+#include "catalyst_adaptor/FieldEntries.h"
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/json/RunEngine.h"
 #include "vdi/comm/Communicator.h"
@@ -140,28 +141,6 @@ int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* b
   return vdi::catalyst::setBlocks(*catalyst, count, blocks);
 }
 
-int setArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
-             const void* const* data) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  return vdi::catalyst::setArray(*catalyst, {name, type, association, 1}, data);
-}
-
-int setArrayStrided(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
-                    int32_t components, const void* const* data, const vdi_catalyst_strides* strides) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  return vdi::catalyst::setArrayStrided(*catalyst, {name, type, association, components}, data, strides);
-}
-
-int setArrayOffset(vdi_catalyst* catalyst, const char* name, int32_t association, const double* offset) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  return vdi::catalyst::setArrayOffset(*catalyst, name, association, offset);
-}
-
-int setParticles(vdi_catalyst* catalyst, const char* name, const vdi_catalyst_particles* particles) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  return vdi::catalyst::setParticles(*catalyst, name, particles);
-}
-
 int wants(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return 0;
   int wanted = catalyst->engine->wants(step, time) ? 1 : 0;
@@ -213,14 +192,25 @@ int finalize(vdi_catalyst* catalyst) {
   return code;
 }
 
-const char* error(const vdi_catalyst* catalyst) {
-  return usable(catalyst) ? catalyst->error.c_str() : "";
-}
+using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable>;
 
 }  // namespace
 
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    nullptr,         nullptr,        initializeJson, goOnWithJson, setBlocks, setArray,
-    setArrayStrided, setArrayOffset, setParticles,   wants,        execute,   parameterF64,
-    parameterI64,    finalize,       error,          setClock,
+    nullptr,
+    nullptr,
+    initializeJson,
+    goOnWithJson,
+    setBlocks,
+    Entries::setArray,
+    Entries::setArrayStrided,
+    Entries::setArrayOffset,
+    Entries::setParticles,
+    wants,
+    execute,
+    parameterF64,
+    parameterI64,
+    finalize,
+    Entries::error,
+    setClock,
 };

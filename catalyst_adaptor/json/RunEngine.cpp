@@ -187,12 +187,8 @@ bool RunEngine::isDue(std::int64_t step, double time) {
 
 /// Makes the array of that name if it is one of particles and this step doesn't have it yet. Collective.
 void RunEngine::deposit(Fields& fields, const std::string& name, std::int64_t step) {
-  const ParticleArray* array = fields.particlesOf(name);
-  if (array == nullptr || fields.hasDeposit(name)) return;
-  Deposits& deposits = *state_->deposits;
-  deposits.setBlocks(fields.version(), fields.blocks());
-  DepositedValues values = deposits.make(name, *array, step);
-  state_->comm.together([&] { fields.setDeposit(name, std::move(values)); });
+  if (fields.particlesOf(name) != nullptr && !fields.hasDeposit(name))
+    state_->deposits->make(fields, name, step);
 }
 
 /// Whether a due frame is to be made: by its condition and by the share of wall time. Collective.

@@ -15,6 +15,7 @@
 #include "catalyst_adaptor/Deposits.h"
 #include "catalyst_adaptor/EngineFunctions.h"
 #include "catalyst_adaptor/FieldCalls.h"
+#include "catalyst_adaptor/FieldEntries.h"
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/Scripts.h"
 #include "catalyst_adaptor/scripts/Engine.h"
@@ -149,39 +150,11 @@ int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* b
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const PythonLock lock;
   std::unique_ptr<vdi::catalyst::VtkGrid> grid;
-  int code = guarded(*catalyst, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    vdi::catalyst::checkBlocks(count, blocks);
+  const int code = vdi::catalyst::setBlocks(*catalyst, count, blocks, [&] {
     grid = std::make_unique<vdi::catalyst::VtkGrid>(std::span(blocks, static_cast<std::size_t>(count)));
   });
-  if (code == VDI_CATALYST_OK) code = vdi::catalyst::setBlocks(*catalyst, count, blocks);
   if (code == VDI_CATALYST_OK) catalyst->grid = std::move(grid);
   return code;
-}
-
-int setArray(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
-             const void* const* data) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  const PythonLock lock;
-  return vdi::catalyst::setArray(*catalyst, {name, type, association, 1}, data);
-}
-
-int setArrayStrided(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
-                    int32_t components, const void* const* data, const vdi_catalyst_strides* strides) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  const PythonLock lock;
-  return vdi::catalyst::setArrayStrided(*catalyst, {name, type, association, components}, data, strides);
-}
-
-int setArrayOffset(vdi_catalyst* catalyst, const char* name, int32_t association, const double* offset) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  const PythonLock lock;
-  return vdi::catalyst::setArrayOffset(*catalyst, name, association, offset);
-}
-
-int setParticles(vdi_catalyst* catalyst, const char* name, const vdi_catalyst_particles* particles) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  const PythonLock lock;
-  return vdi::catalyst::setParticles(*catalyst, name, particles);
 }
 
 int wants(vdi_catalyst* catalyst, int64_t step, double time) {
@@ -243,15 +216,25 @@ int finalize(vdi_catalyst* catalyst) {
   return code;
 }
 
-const char* error(const vdi_catalyst* catalyst) {
-  return usable(catalyst) ? catalyst->error.c_str() : "";
-}
+using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, PythonLock>;
 
 }  // namespace
 
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    initialize, initializePipelines, nullptr,        nullptr,      setBlocks,
-    setArray,   setArrayStrided,     setArrayOffset, setParticles, wants,
-    execute,    parameterF64,        parameterI64,   finalize,     error,
+    initialize,
+    initializePipelines,
+    nullptr,
+    nullptr,
+    setBlocks,
+    Entries::setArray,
+    Entries::setArrayStrided,
+    Entries::setArrayOffset,
+    Entries::setParticles,
+    wants,
+    execute,
+    parameterF64,
+    parameterI64,
+    finalize,
+    Entries::error,
     nullptr,
 };

@@ -12,10 +12,8 @@
 #include <array>
 #include <cstddef>
 #include <memory>
-#include <new>
-#include <stdexcept>
-#include <string>
 
+#include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/StridedArray.h"
 #include "catalyst_adaptor/scripts/StridedDataArray.h"
 
@@ -24,16 +22,9 @@ namespace vdi::catalyst {
 namespace {
 
 void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
-  bool any = false;
-  for (int axis = 0; axis < 3; ++axis) any = any || block.ghost_lo[axis] > 0 || block.ghost_hi[axis] > 0;
-  if (!any) return;
-  const vtkIdType count = image->GetNumberOfCells();
   // VTK's own allocation won't do: when it fails, Debian's VTK ends the process.
-  std::unique_ptr<unsigned char[]> marks(new (std::nothrow) unsigned char[static_cast<std::size_t>(count)]);
-  if (!marks) {
-    throw std::runtime_error("no memory for the marks of a block's ghost cells: " + std::to_string(count) +
-                             " bytes");
-  }
+  std::unique_ptr<unsigned char[]> marks = newMarks(block);
+  if (!marks) return;
   vtkIdType index = 0;
   const auto outside = [&](int axis, int i) {
     return i < block.ghost_lo[axis] || i >= block.cells[axis] - block.ghost_hi[axis];
@@ -48,7 +39,8 @@ void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
   }
   vtkNew<vtkUnsignedCharArray> ghosts;
   ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
-  ghosts->SetArray(marks.release(), count, 0, vtkUnsignedCharArray::VTK_DATA_ARRAY_DELETE);
+  ghosts->SetArray(marks.release(), image->GetNumberOfCells(), 0,
+                   vtkUnsignedCharArray::VTK_DATA_ARRAY_DELETE);
   image->GetCellData()->AddArray(ghosts);
 }
 

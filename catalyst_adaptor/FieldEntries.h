@@ -1,0 +1,44 @@
+// The entries of an engine's table (EngineFunctions.h) that are the same in all engines.
+#pragma once
+
+#include <cstdint>
+
+#include "catalyst_adaptor/FieldCalls.h"
+#include "catalyst_adaptor/vdi_catalyst.h"
+
+namespace vdi::catalyst {
+
+struct NoLock {};
+
+/// `usable` tells whether a handle lives, and each change holds a `Lock`. `Handle` is the engine's
+/// vdi_catalyst, a FieldCalls.
+template <typename Handle, bool (*usable)(const Handle*), typename Lock = NoLock>
+struct FieldEntries {
+  static int setArray(Handle* handle, const char* name, std::int32_t type, std::int32_t association,
+                      const void* const* data) {
+    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
+    [[maybe_unused]] const Lock lock;
+    return catalyst::setArray(*handle, {name, type, association, 1}, data);
+  }
+  static int setArrayStrided(Handle* handle, const char* name, std::int32_t type, std::int32_t association,
+                             std::int32_t components, const void* const* data,
+                             const vdi_catalyst_strides* strides) {
+    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
+    [[maybe_unused]] const Lock lock;
+    return catalyst::setArrayStrided(*handle, {name, type, association, components}, data, strides);
+  }
+  static int setArrayOffset(Handle* handle, const char* name, std::int32_t association,
+                            const double* offset) {
+    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
+    [[maybe_unused]] const Lock lock;
+    return catalyst::setArrayOffset(*handle, name, association, offset);
+  }
+  static int setParticles(Handle* handle, const char* name, const vdi_catalyst_particles* particles) {
+    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
+    [[maybe_unused]] const Lock lock;
+    return catalyst::setParticles(*handle, name, particles);
+  }
+  static const char* error(const Handle* handle) { return usable(handle) ? handle->error.c_str() : ""; }
+};
+
+}  // namespace vdi::catalyst
