@@ -1,4 +1,4 @@
-// What the main functions of all Catch2 programs do.
+// The body that the main functions of all Catch2 programs share.
 #pragma once
 
 namespace vdi::test {

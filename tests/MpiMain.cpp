@@ -6,7 +6,7 @@
 
 int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
-  int result = vdi::test::runCases(argc, argv);
+  const int result = vdi::test::runCases(argc, argv);
   int worst = 0;
   MPI_Allreduce(&result, &worst, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
   MPI_Finalize();

@@ -78,6 +78,11 @@ struct Connected {
       }
     }
   }
+  /// Takes the coarse level, and stalls in the full one.
+  void stall(Clock::time_point now) {
+    for (auto chunk = part(now); chunk && chunk->level == 0; chunk = part(now)) acknowledge(*chunk, now);
+    REQUIRE(std::holds_alternative<Viewer::Binary>(writing));
+  }
   void acknowledge(const Chunk& chunk, Clock::time_point now) {
     taken += chunk.bytes.size();
     viewer.receive(textOf(FromViewer(Ack{chunk.frame, chunk.level, chunk.offset + chunk.bytes.size()})), now);
@@ -115,9 +120,7 @@ TEST_CASE("a viewer that stalls in a full level keeps it no longer than it's the
   Hub hub(limited(1000 * mebibyte));
   Connected viewer(hub);
   hub.publish(levels.frame(0), start);
-  for (auto chunk = viewer.part(start); chunk && chunk->level == 0; chunk = viewer.part(start))
-    viewer.acknowledge(*chunk, start);
-  REQUIRE(std::holds_alternative<Viewer::Binary>(viewer.writing));
+  viewer.stall(start);
   hub.publish(levels.frame(1), start + 1s);
   CHECK(hub.heldBytes() == fullBytes);  // a part of it is being written
   viewer.writing = Viewer::Wait{};
@@ -130,9 +133,7 @@ TEST_CASE("a refused viewer that stalls in a level goes when its frames are too 
   Hub hub(limited(10 * mebibyte));
   Connected viewer(hub);
   hub.publish(levels.frame(0), start);
-  for (auto chunk = viewer.part(start); chunk && chunk->level == 0; chunk = viewer.part(start))
-    viewer.acknowledge(*chunk, start);
-  REQUIRE(std::holds_alternative<Viewer::Binary>(viewer.writing));
+  viewer.stall(start);
   viewer.viewer.receive("no message", start);
   CHECK(!viewer.viewer.isStalled());
   hub.publish(levels.frame(1), start + 1s);
