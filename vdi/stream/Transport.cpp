@@ -7,19 +7,21 @@ namespace vdi::stream {
 
 namespace {
 
-template <typename Stream, typename... Arguments>
-std::variant<Plain, Stream> streamOf(boost::asio::ssl::context* tls, Arguments&&... arguments) {
-  if (tls != nullptr) return Stream(Plain(std::forward<Arguments>(arguments)...), *tls);
+using Encrypted = Transport::Encrypted;
+
+template <typename... Arguments>
+std::variant<Plain, Encrypted> streamOf(boost::asio::ssl::context* tls, Arguments&&... arguments) {
+  if (tls != nullptr) return Encrypted(Plain(std::forward<Arguments>(arguments)...), *tls);
   return Plain(std::forward<Arguments>(arguments)...);
 }
 
 }  // namespace
 
 Transport::Transport(Plain::socket_type socket, boost::asio::ssl::context* tls)
-    : stream_(streamOf<Encrypted>(tls, std::move(socket))) {}
+    : stream_(streamOf(tls, std::move(socket))) {}
 
 Transport::Transport(boost::asio::io_context& context, boost::asio::ssl::context* tls)
-    : stream_(streamOf<Encrypted>(tls, context)) {}
+    : stream_(streamOf(tls, context)) {}
 
 Plain& Transport::next_layer() {
   Encrypted* const encrypted = tls();
@@ -37,10 +39,6 @@ void Transport::writeSome(const FirstBuffers<boost::asio::const_buffer>& buffers
 void Transport::tearDown(boost::beast::role_type role, Completion done) {
   // Beast's own functions for both types are found by their arguments.
   std::visit([&](auto& stream) { async_teardown(role, stream, std::move(done)); }, stream_);
-}
-
-void teardown(boost::beast::role_type role, Transport& transport, boost::beast::error_code& error) {
-  teardown(role, transport.next_layer(), error);
 }
 
 }  // namespace vdi::stream

@@ -22,8 +22,8 @@ namespace vdi::stream {
 /// TCP, or one end of a pair of local sockets.
 using Plain = boost::beast::basic_stream<boost::asio::generic::stream_protocol>;
 
-/// A handler of any type, which is called once. The compiler makes the streams' operations for this type
-/// alone, instead of for each operation of Beast. That is most of the time that Beast takes to compile.
+/// A handler of any type, called once. It hides the types of Beast's operations, so that the compiler makes
+/// those of the streams below for one type. They take most of the time in which Beast compiles.
 class Completion {
  public:
   template <typename Handler>
@@ -88,6 +88,7 @@ class FirstBuffers {
 class Transport {
  public:
   using executor_type = Plain::executor_type;
+  using Encrypted = boost::asio::ssl::stream<Plain>;
   template <typename Handler>
   using Transferred =
       typename boost::asio::async_result<std::decay_t<Handler>,
@@ -100,7 +101,7 @@ class Transport {
   executor_type get_executor() { return next_layer().get_executor(); }
   Plain& next_layer();
   /// Null without TLS.
-  boost::asio::ssl::stream<Plain>* tls() { return std::get_if<Encrypted>(&stream_); }
+  Encrypted* tls() { return std::get_if<Encrypted>(&stream_); }
 
   template <typename Buffers, typename Handler>
   Transferred<Handler> async_read_some(const Buffers& buffers, Handler&& handler) {
@@ -124,19 +125,16 @@ class Transport {
   void tearDown(boost::beast::role_type role, Completion done);
 
  private:
-  using Encrypted = boost::asio::ssl::stream<Plain>;
-
   void readSome(const FirstBuffers<boost::asio::mutable_buffer>& buffers, Completion done);
   void writeSome(const FirstBuffers<boost::asio::const_buffer>& buffers, Completion done);
 
   std::variant<Plain, Encrypted> stream_;
 };
 
-/// Beast finds these two by their arguments.
+/// Beast finds this function by its arguments.
 template <typename Handler>
 void async_teardown(boost::beast::role_type role, Transport& transport, Handler&& handler) {
   transport.tearDown(role, Completion(std::forward<Handler>(handler)));
 }
-void teardown(boost::beast::role_type role, Transport& transport, boost::beast::error_code& error);
 
 }  // namespace vdi::stream

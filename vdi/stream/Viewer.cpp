@@ -151,7 +151,7 @@ std::vector<std::shared_ptr<const EncodedLevel>> Viewer::held() const {
 
 void Viewer::refuse(Close code, std::string cause) {
   // A viewer that was refused for another reason may stall before the message under way comes to its end.
-  if (!farewell_ || (code == Close::Stalled && !isStalled())) farewell_ = {code, std::move(cause)};
+  if (!farewell_ || code == Close::Stalled) farewell_ = {code, std::move(cause)};
   outbox_.close();
   announced_.reset();
   wake_();
