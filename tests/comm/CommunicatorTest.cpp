@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstring>
@@ -92,7 +93,14 @@ TEST_CASE("rank, size and local rank are MPI's") {
   MPI_Comm_size(MPI_COMM_WORLD, &size);
   CHECK(world.rank() == rank);
   CHECK(world.size() == size);
-  CHECK(world.localRank() == rank);  // the tests run on one node
+  // The ranks before this one with the same name of the processor
+  std::array<char, MPI_MAX_PROCESSOR_NAME> name{};
+  int length = 0;
+  MPI_Get_processor_name(name.data(), &length);
+  std::vector<std::array<char, MPI_MAX_PROCESSOR_NAME>> names(static_cast<std::size_t>(size));
+  MPI_Allgather(name.data(), MPI_MAX_PROCESSOR_NAME, MPI_CHAR, names.data(), MPI_MAX_PROCESSOR_NAME, MPI_CHAR,
+                MPI_COMM_WORLD);
+  CHECK(world.localRank() == std::count(names.begin(), names.begin() + rank, name));
 }
 
 TEST_CASE("a communicator of one rank, without MPI") {
