@@ -134,7 +134,7 @@ void requireHeld(const Blending& blending) {
 }
 
 /// Throws Error if an output cannot be written, or would overwrite an input.
-void requireOutputs(const Options& options) {
+void requireOutputsOf(const Options& options) {
   std::vector<NamedFile> inputs{{"--camera", options.view.camera.file},
                                 {"--transfer-function", options.quality.transferFunction}};
   for (const std::string& sidecar : options.raws) {
@@ -236,7 +236,7 @@ void generate(const Options& options, const comm::Communicator& world) {
     settings = makeSettings(options.quality);
     if (options.wantsVdi()) requireHeld(settings.blending);
     requireSound(options);
-    if (world.rank() == 0) requireOutputs(options);
+    if (world.rank() == 0) requireOutputsOf(options);
     device = gpu::Device::create(gpu::requestFromEnvironment(world.localRank()));
   });
   Series(options, world, std::move(device)).make(settings);

@@ -4,9 +4,14 @@
 # Adds warnings and sanitizers to a target of this project.
 function(vdi_target_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow)
+  if(CMAKE_UNITY_BUILD)
+    # It takes the sources that a unity build includes for headers.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+  endif()
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}>")
   if(VDI_SANITIZE)
-    target_compile_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE} -fno-omit-frame-pointer)
+    # AddressSanitizer finds null pointers and ends of objects, too. Checking these twice takes long to compile.
+    target_compile_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE} -fno-sanitize=null,object-size -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE})
   endif()
 endfunction()

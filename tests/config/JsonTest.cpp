@@ -15,7 +15,7 @@ using config::parseJson;
 
 namespace {
 
-void refused(const std::string& text, const std::string& part) {
+void refusedJson(const std::string& text, const std::string& part) {
   INFO(text.substr(0, 200));
   CHECK_THROWS_WITH(parseJson(text, "x.json"), test::ContainsSubstring(part));
 }
@@ -47,13 +47,13 @@ TEST_CASE("a mistake has the pointer and the line of its value") {
 }
 
 TEST_CASE("what isn't JSON is refused with its line") {
-  refused("", "not valid JSON");
-  refused("{\"a\": 1,\n\"b\": }", "(x.json, line 2)");
-  refused("{\"a\": NaN}", "not valid JSON");
-  refused("{\"a\": 1e999}", "not valid JSON");
-  refused("{\"a\": 1} x", "not valid JSON");
-  refused("{\"a\": 1,\n\n\"b\": {\"a\": 2},\n\"a\": 3}", "the field 'a' occurs twice (x.json, line 4)");
-  refused(std::string("{\"a\": \"") + '\xff' + "\"}", "not valid JSON");
+  refusedJson("", "not valid JSON");
+  refusedJson("{\"a\": 1,\n\"b\": }", "(x.json, line 2)");
+  refusedJson("{\"a\": NaN}", "not valid JSON");
+  refusedJson("{\"a\": 1e999}", "not valid JSON");
+  refusedJson("{\"a\": 1} x", "not valid JSON");
+  refusedJson("{\"a\": 1,\n\n\"b\": {\"a\": 2},\n\"a\": 3}", "the field 'a' occurs twice (x.json, line 4)");
+  refusedJson(std::string("{\"a\": \"") + '\xff' + "\"}", "not valid JSON");
   try {
     parseJson("{\"a\": \"" + std::string(100000, 'x'), "x.json");
     FAIL("a text without an end");
@@ -65,14 +65,14 @@ TEST_CASE("what isn't JSON is refused with its line") {
 }
 
 TEST_CASE("a document beyond the limits is refused") {
-  refused(std::string(10000, '['), "values are nested more than 16 deep");
+  refusedJson(std::string(10000, '['), "values are nested more than 16 deep");
   std::string deep;
   for (int i = 0; i < 10000; ++i) deep += "{\"a\":";
-  refused(deep, "values are nested more than 16 deep");
+  refusedJson(deep, "values are nested more than 16 deep");
   std::string many = "[0";
   for (int i = 0; i < 200000; ++i) many += ",1";
-  refused(many + "]", "more than 100000 values");
-  refused(std::string(std::size_t{2} << 20, ' '), "the document has more than");
+  refusedJson(many + "]", "more than 100000 values");
+  refusedJson(std::string(std::size_t{2} << 20, ' '), "the document has more than");
 }
 
 TEST_CASE("files that aren't read") {

@@ -26,7 +26,7 @@ Vdi makeVdi(const Camera& camera) {
   return *generator.generate(camera, test::threeHues(0.8), test::smallSettings(56, 44));
 }
 
-std::size_t pixelsThatDiffer(const Image& a, const Image& b, float tolerance) {
+std::size_t pixelsOffBy(const Image& a, const Image& b, float tolerance) {
   REQUIRE(a.rgba.size() == b.rgba.size());
   std::size_t count = 0;
   for (std::size_t i = 0; i < a.rgba.size(); ++i) {
@@ -57,8 +57,8 @@ TEST_CASE("clipped views: those of the reference, from anywhere") {
           renderer.setClipPlanes(planes);
           const Image seen = renderer.render(turned, 40, 32, reconstruction);
           const Image expected = reference::render(vdi, View(turned, 40, 32), reconstruction, {}, planes);
-          CHECK(pixelsThatDiffer(seen, expected, 1.0F) <= seen.rgba.size() / 100);
-          CHECK(pixelsThatDiffer(seen, whole, 8.0F) > seen.rgba.size() / 20);
+          CHECK(pixelsOffBy(seen, expected, 1.0F) <= seen.rgba.size() / 100);
+          CHECK(pixelsOffBy(seen, whole, 8.0F) > seen.rgba.size() / 20);
         }
       }
     }
@@ -83,9 +83,9 @@ TEST_CASE(
   const Image ending = renderer.render(view, ends);
   Image both = front;
   for (std::size_t i = 0; i < both.rgba.size(); ++i) both.rgba[i] += (1.0F - front.rgba[i].a) * back.rgba[i];
-  CHECK(pixelsThatDiffer(front, ending, 0.5F) == 0);
-  CHECK(pixelsThatDiffer(both, whole, 3.0F) <= whole.rgba.size() / 100);
-  CHECK(pixelsThatDiffer(front, whole, 8.0F) > whole.rgba.size() / 20);
+  CHECK(pixelsOffBy(front, ending, 0.5F) == 0);
+  CHECK(pixelsOffBy(both, whole, 3.0F) <= whole.rgba.size() / 100);
+  CHECK(pixelsOffBy(front, whole, 8.0F) > whole.rgba.size() / 20);
 }
 
 TEST_CASE("clipped views: everything or nothing, and refusals") {
@@ -94,7 +94,7 @@ TEST_CASE("clipped views: everything or nothing, and refusals") {
   renderer.setVdi(makeVdi(camera));
   const Image whole = renderer.render(camera, 40, 32);
   renderer.setClipPlanes({{glm::dvec3(-1.0), glm::dvec3(1.0)}});
-  CHECK(pixelsThatDiffer(renderer.render(camera, 40, 32), whole, 0.5F) == 0);
+  CHECK(pixelsOffBy(renderer.render(camera, 40, 32), whole, 0.5F) == 0);
   renderer.setClipPlanes({{glm::dvec3(-1.0), glm::dvec3(-1.0)}});
   for (const glm::vec4& pixel : renderer.render(camera, 40, 32).rgba) CHECK(pixel == glm::vec4(0.0F));
   CHECK_THROWS_AS(renderer.setClipPlanes(std::vector<ClipPlane>(7)), Error);

@@ -80,7 +80,7 @@ std::vector<Box> cellsOfFineOctant(int side) {
   return cells;
 }
 
-double linear(const glm::dvec3& p) {
+double slanted(const glm::dvec3& p) {
   return 0.45 * p.x + 0.35 * p.y + 0.2 * p.z;
 }
 
@@ -103,7 +103,7 @@ TEST_CASE("an octree of cells with a thin ramp: the picture of the same octree o
     double wrongShare;  // share of pixels off by more than 16
   };
   // Cells and points interpolate a curved field at different places; the linear field isolates seams.
-  const Scene scenes[] = {{"linear", linear, 1.0, 0.0}, {"ball", ball, 16.0, 0.0}, {"wave", wave, 4.0, 0.0}};
+  const Scene scenes[] = {{"linear", slanted, 1.0, 0.0}, {"ball", ball, 16.0, 0.0}, {"wave", wave, 4.0, 0.0}};
   GenerateSettings settings = test::smallSettings(120, 90, 20);
   settings.samplesPerVoxel = 4.0;
   VdiGenerator many(device(), comm::Communicator::world());

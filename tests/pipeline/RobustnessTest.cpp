@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "tests/Catch.h"
+#include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
@@ -13,13 +14,9 @@
 using namespace vdi;
 using synthetic::Joint;
 using synthetic::Layout;
+using test::device;
 
 namespace {
-
-std::shared_ptr<gpu::Device> device() {
-  static const std::shared_ptr<gpu::Device> instance = gpu::Device::create(gpu::requestFromEnvironment(0));
-  return instance;
-}
 
 Block cube(int n, double spacing, const std::function<float(const glm::ivec3&)>& value) {
   const synthetic::Lattice lattice{glm::ivec3(n), glm::dvec3(0.0), glm::dvec3(spacing), ScalarType::F32,

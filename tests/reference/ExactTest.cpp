@@ -18,7 +18,7 @@ ExactVolume ramp() {
           {0, 0, 0, 0, 1, 1, 1, 1}};
 }
 
-constexpr glm::dvec3 front{0.3, 0.6, 0.0};
+constexpr glm::dvec3 frontPoint{0.3, 0.6, 0.0};
 constexpr glm::dvec3 back{0.3, 0.6, 1.0};
 
 }  // namespace
@@ -35,7 +35,7 @@ TEST_CASE("exact: trilinear between values, constant beyond them") {
 
 TEST_CASE("exact: a ray through one material loses light by its length in unit distances") {
   const TransferFunction function{{{0.0, {0.2, 0.4, 1.0}}}, {{0.0, 0.3}}, 0.25};
-  const glm::dvec4 seen = integrate(ramp(), function, front, back, 7);
+  const glm::dvec4 seen = integrate(ramp(), function, frontPoint, back, 7);
   const double opacity = 1.0 - std::pow(0.7, 4.0);
   CHECK(seen.a == Approx(opacity));
   CHECK(seen.r == Approx(0.2 * opacity));
@@ -46,10 +46,10 @@ TEST_CASE("exact: what is in front hides what is behind") {
   // Red up to the middle, then green.
   const TransferFunction function{
       {{0.0, {1, 0, 0}}, {0.5, {1, 0, 0}}, {0.5, {0, 1, 0}}, {1.0, {0, 1, 0}}}, {{0.0, 0.5}}, 0.5};
-  const glm::dvec4 forth = integrate(ramp(), function, front, back, 64);
+  const glm::dvec4 forth = integrate(ramp(), function, frontPoint, back, 64);
   CHECK(forth.r == Approx(0.5));
   CHECK(forth.g == Approx(0.25));
-  const glm::dvec4 returned = integrate(ramp(), function, back, front, 64);
+  const glm::dvec4 returned = integrate(ramp(), function, back, frontPoint, 64);
   CHECK(returned.r == Approx(0.25));
   CHECK(returned.g == Approx(0.5));
 }
@@ -57,7 +57,8 @@ TEST_CASE("exact: what is in front hides what is behind") {
 TEST_CASE("exact: opacity that rises along the ray") {
   // Optical depth per unit is -ln(1 - z): its integral from 0 to 1 is 1.
   const TransferFunction function{{{0.0, {1, 1, 1}}}, {{0.0, 0.0}, {1.0, 1.0}}, 1.0};
-  CHECK(integrate(ramp(), function, front, back, 100000).a == Approx(1.0 - std::exp(-1.0)).epsilon(1e-4));
+  CHECK(integrate(ramp(), function, frontPoint, back, 100000).a ==
+        Approx(1.0 - std::exp(-1.0)).epsilon(1e-4));
 }
 
 TEST_CASE("exact: pictures are by VTK's cameras, rows from below") {

@@ -15,7 +15,7 @@ namespace vdi {
 
 namespace {
 
-constexpr std::array table{
+constexpr std::array variables{
     EnvironmentVariable{"VDI_BANDS", "a whole number from 1 on", "In how many bands a frame is made", false},
     EnvironmentVariable{"VDI_CACHE", "a folder, or 'off'",
                         "Where compiled shaders are kept from run to run, instead of ~/.cache/pv-vdi", true},
@@ -42,17 +42,17 @@ constexpr std::array table{
 };
 
 const EnvironmentVariable& entryOf(const char* name) {
-  const auto* const found = std::find_if(table.begin(), table.end(), [&](const EnvironmentVariable& entry) {
-    return std::strcmp(entry.name, name) == 0;
-  });
-  assert(found != table.end());
+  const auto* const found =
+      std::find_if(variables.begin(), variables.end(),
+                   [&](const EnvironmentVariable& entry) { return std::strcmp(entry.name, name) == 0; });
+  assert(found != variables.end());
   return *found;
 }
 
 }  // namespace
 
 std::span<const EnvironmentVariable> environmentVariables() {
-  return table;
+  return variables;
 }
 
 std::optional<std::string> environmentText(const char* name) {

@@ -67,7 +67,7 @@ const char* nameOfPrecision(Precision precision) {
   return toString(precision);
 }
 
-constexpr std::array table{
+constexpr std::array tableRows{
     row<&GenerateSettings::margin>(
         {.name = "margin",
          .property = "Margin",
@@ -190,14 +190,14 @@ void validate(const GenerateSettings& settings) {
 }
 
 std::span<const Setting, settingCount> settingsTable() {
-  return table;
+  return tableRows;
 }
 
 std::size_t indexOfSetting(std::string_view property) {
   const auto found =
-      std::ranges::find_if(table, [&](const Setting& setting) { return setting.property == property; });
-  assert(found != table.end());
-  return static_cast<std::size_t>(found - table.begin());
+      std::ranges::find_if(tableRows, [&](const Setting& setting) { return setting.property == property; });
+  assert(found != tableRows.end());
+  return static_cast<std::size_t>(found - tableRows.begin());
 }
 
 std::string optionOf(const Setting& setting) {

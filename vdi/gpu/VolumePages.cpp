@@ -15,10 +15,6 @@ namespace vdi::gpu {
 
 namespace {
 
-std::uint64_t volumeOf(const glm::uvec3& extent) {
-  return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z;
-}
-
 /// Places boxes of one format into pages: rows of boxes along x, rows side by side along y, layers on top of
 /// each other along z. Boxes come in descending order of height, so blocks of one shape, the usual case,
 /// waste almost nothing.

@@ -25,6 +25,11 @@ struct ValueMap {
 /// Throws Error{InvalidArgument} for values beyond limitsOf(type).maximum.
 ValueMap valueMapOf(const Block& block);
 
+/// Number of elements.
+inline std::uint64_t volumeOf(const glm::uvec3& extent) {
+  return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z;
+}
+
 /// A box of a block's values that fits one page.
 struct VolumePiece {
   const Block* block = nullptr;

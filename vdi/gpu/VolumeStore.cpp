@@ -33,10 +33,6 @@ float fromOrdered(std::uint32_t bits) {
   return bit_cast<float>((bits >> 31U) != 0 ? bits & 0x7FFFFFFFU : ~bits);
 }
 
-std::uint64_t volumeOf(const glm::uvec3& extent) {
-  return static_cast<std::uint64_t>(extent.x) * extent.y * extent.z;
-}
-
 }  // namespace
 
 VolumeStore::VolumeStore(std::shared_ptr<Device> device)

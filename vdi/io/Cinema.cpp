@@ -14,7 +14,7 @@ namespace vdi::io {
 
 namespace {
 
-constexpr std::string_view header = "time,phi,theta,FILE";
+constexpr std::string_view columns = "time,phi,theta,FILE";
 constexpr std::ptrdiff_t commas = 3;
 
 }  // namespace
@@ -34,9 +34,9 @@ void CinemaIndex::read() {
     text.remove_prefix(std::min(end + 1, text.size()));
     if (line.ends_with('\r')) line.remove_suffix(1);
     if (line.empty()) continue;
-    const bool isSound = isFirst ? line == header : std::ranges::count(line, ',') == commas;
+    const bool isSound = isFirst ? line == columns : std::ranges::count(line, ',') == commas;
     if (!isSound) {
-      throw Error(ErrorCode::Format, fmt::format("isn't an index with the columns {}", header),
+      throw Error(ErrorCode::Format, fmt::format("isn't an index with the columns {}", columns),
                   path().string());
     }
     if (!isFirst) put(std::string(line.substr(line.rfind(',') + 1)), std::string(line));
@@ -58,7 +58,7 @@ void CinemaIndex::put(const std::string& file, std::string line) {
 }
 
 void CinemaIndex::write() const {
-  std::string text(header);
+  std::string text(columns);
   text += '\n';
   for (const std::string& line : lines_) text += line + '\n';
   writeAtomically(path(), std::as_bytes(std::span(text)));

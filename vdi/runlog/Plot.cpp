@@ -20,7 +20,6 @@ constexpr double height = 560.0;
 constexpr double left = 70.0;
 constexpr double right = 980.0;
 constexpr std::size_t mostHints = 2000;  // more would make a large file slow to show
-constexpr double bytesPerMebibyte = 1048576.0;
 
 /// Told apart by colour-blind eyes, too (Okabe and Ito).
 constexpr std::array<const char*, 8> palette{"#999999", "#0072B2", "#E69F00", "#56B4E9",

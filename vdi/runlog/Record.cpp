@@ -22,7 +22,6 @@ using io::jsonOf;
 using Json = nlohmann::ordered_json;
 
 constexpr double millisecondsPerSecond = 1e3;
-constexpr double bytesPerMebibyte = 1048576.0;
 constexpr std::uint64_t largestFile = std::uint64_t{1} << 30;
 
 struct Stage {

@@ -12,6 +12,8 @@
 
 namespace vdi::runlog {
 
+constexpr double bytesPerMebibyte = 1048576.0;
+
 /// Wall-clock milliseconds of a stage, waiting for other ranks within it included.
 struct StageTime {
   std::string name;

@@ -20,10 +20,10 @@ namespace vdi::stream {
 
 namespace {
 
-constexpr std::chrono::seconds patience{1};
+constexpr std::chrono::seconds endPatience{1};
 constexpr std::chrono::milliseconds pause{5};
 
-[[noreturn]] void refuse(int error) {
+[[noreturn]] void failToStart(int error) {
   throw Error(ErrorCode::Io, std::string("can't start a command: ") + std::strerror(error));
 }
 
@@ -59,7 +59,7 @@ class Setup {
     pid_t process = -1;
     const int error =
         ::posix_spawn(&process, "/bin/sh", &actions_, &attributes_, arguments.data(), ::environ);
-    if (error != 0) refuse(error);
+    if (error != 0) failToStart(error);
     return process;
   }
 
@@ -80,7 +80,7 @@ Command::Ending endingOf(int status) {
 
 Command::Command(const std::string& text) {
   std::array<int, 2> ends{};
-  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) refuse(errno);
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) failToStart(errno);
   try {
     process_ = Setup(ends[1]).start(text);
   } catch (const Error&) {
@@ -106,7 +106,7 @@ Command::Ending Command::end() {
   int status = 0;
   for (const int signal : {0, SIGTERM}) {
     if (signal != 0) ::kill(process_, signal);
-    const auto until = std::chrono::steady_clock::now() + patience;
+    const auto until = std::chrono::steady_clock::now() + endPatience;
     pid_t ended = 0;
     while ((ended = ::waitpid(process_, &status, WNOHANG)) == 0 && std::chrono::steady_clock::now() < until)
       std::this_thread::sleep_for(pause);

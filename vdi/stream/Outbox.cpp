@@ -20,7 +20,7 @@ constexpr double newPeriodShare = 0.3;
 constexpr double silentPeriods = 2.0;
 /// The seconds that a frame's first picture may take in the finest of its coarse levels. A coarser level may
 /// take patienceGrowth times as long, because an even coarser one would lose still more of the picture.
-constexpr double patience = 0.2;
+constexpr double coarsestPatience = 0.2;
 constexpr double patienceGrowth = 2.5;
 /// A level finer than the last frame's first one must take at most this share of those seconds. Otherwise
 /// frames would be sharp and coarse by turns.
@@ -126,7 +126,7 @@ bool Outbox::isWorthBeginning(std::uint64_t bytes, Clock::time_point now,
 std::uint32_t Outbox::firstLevelFor(const Frame& frame) const {
   const std::size_t coarse = std::min<std::size_t>(frame.levels.size(), std::max(frame.levelCount, 2U) - 1);
   if (rate() == 0.0) return 0;
-  double seconds = patience;
+  double seconds = coarsestPatience;
   auto level = static_cast<std::uint32_t>(coarse - 1);
   for (; level > 0; --level, seconds *= patienceGrowth) {
     const double most = level > firstLevel_ ? finerShare * seconds : seconds;

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t bufferBytes = std::size_t{256} << 10;
 
-[[noreturn]] void refuse(const char* what) {
+[[noreturn]] void failByErrno(const char* what) {
   throw Error(ErrorCode::Io, std::string(what) + ": " + std::strerror(errno));
 }
 
@@ -86,11 +86,11 @@ std::optional<std::string> tokenInGreeting(std::string_view line) {
 void serveOver(Server& server, const std::string& token, int input, int output) {
   std::array<int, 2> ends{};
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
-    refuse("can't connect to the server");
+    failByErrno("can't connect to the server");
   const Descriptor socket(ends[0]);
   server.adopt(ends[1]);
   const Descriptor stop(::eventfd(0, EFD_CLOEXEC));
-  if (stop.number() < 0) refuse("can't connect to the server");
+  if (stop.number() < 0) failByErrno("can't connect to the server");
 
   const std::string first = greeting(token) + "\n";
   if (!writeAll(output, first.data(), first.size())) return;

@@ -12,13 +12,14 @@
 
 namespace {
 
-constexpr int lookMilliseconds = 100;
+constexpr int lookLocallyMilliseconds = 100;
 constexpr int lookRemotelyMilliseconds = 250;
 
 }  // namespace
 
 pqVDIStreamFollower::pqVDIStreamFollower(pqPipelineSource* source) : QObject(source), Source(source) {
-  this->Looking.setInterval(source->getServer()->isRemote() ? lookRemotelyMilliseconds : lookMilliseconds);
+  this->Looking.setInterval(source->getServer()->isRemote() ? lookRemotelyMilliseconds
+                                                            : lookLocallyMilliseconds);
   this->connect(&this->Looking, &QTimer::timeout, this, &pqVDIStreamFollower::look);
   this->Looking.start();
 }
