@@ -23,8 +23,7 @@ std::string firstLine(const std::string& text) {
   return line + " " + text.substr(next, end == std::string::npos ? end : end - next);
 }
 
-/// Prints the error, on rank 0. Prints a repeated one in one line, and only for a step, because its files are
-/// missing.
+/// Prints the error. Prints a repeated one in one line, and only for a step, because its files are missing.
 void print(Calls& self, std::optional<std::int64_t> step) {
   const bool again = self.error == self.printed;
   if (again && !step) return;
@@ -83,7 +82,7 @@ std::string shared(MPI_Comm comm, std::string_view text, int speaker) {
 
 }  // namespace
 
-int conclude(Calls& self, int code, const std::string& text, std::optional<std::int64_t> step) {
+int conclude(Calls& self, int code, std::string_view text, std::optional<std::int64_t> step) noexcept {
   int worst = code;
   MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPI_INT, MPI_MAX, self.comm);
   if (worst == VDI_CATALYST_OK) return worst;
@@ -96,9 +95,14 @@ int conclude(Calls& self, int code, const std::string& text, std::optional<std::
   MPI_Allreduce(MPI_IN_PLACE, &speaker, 1, MPI_INT, MPI_MIN, self.comm);
   speaker %= size;
   const std::string message = shared(self.comm, text, speaker);
-  self.error = "rank " + std::to_string(speaker) + ": " +
-               (message.empty() ? "a script failed without saying why" : message);
-  if (rank == 0) print(self, step);
+  try {
+    self.error = "rank " + std::to_string(speaker) + ": " +
+                 (message.empty() ? "a script failed without saying why" : message);
+    if (rank == 0) print(self, step);
+  } catch (const std::bad_alloc&) {
+    self.error = "out of memory";  // fits into a string without an allocation
+    if (rank == 0) std::fputs("vdi_catalyst: out of memory\n", stderr);
+  }
   return worst;
 }
 

@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <type_traits>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
@@ -25,27 +26,33 @@ struct Calls {
 };
 
 /// Collective: returns the highest code of any rank. On failure it stores the text of the lowest rank with
-/// that code and a text, on all ranks, and rank 0 prints it. `step` is given by execute.
-int conclude(Calls& self, int code, const std::string& text, std::optional<std::int64_t> step);
+/// that code and a text, on all ranks, and rank 0 prints it. `step` is given by execute. Never throws:
+/// without memory the text is a shorter one.
+int conclude(Calls& self, int code, std::string_view text, std::optional<std::int64_t> step) noexcept;
 
 /// Runs `work`, which returns nothing or the text of a failure. A failure or an exception becomes `code`.
+/// Never throws, even if there is no memory for the failure's text.
 template <typename Work>
 int guarded(Calls& self, int code, Work work, std::optional<std::int64_t> step = std::nullopt) {
   std::optional<std::string> failure;
   try {
-    if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
-      work();
-    } else {
-      failure = work();
+    try {
+      if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
+        work();
+      } else {
+        failure = work();
+      }
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::exception& error) {
+      failure = error.what();
+    } catch (...) {
+      failure = "an unknown exception";
     }
   } catch (const std::bad_alloc&) {
-    failure = "out of memory on this host";
-  } catch (const std::exception& error) {
-    failure = error.what();
-  } catch (...) {
-    failure = "an unknown exception";
+    return conclude(self, code, "out of memory on this host", step);
   }
-  return conclude(self, failure ? code : VDI_CATALYST_OK, failure.value_or(""), step);
+  return conclude(self, failure ? code : VDI_CATALYST_OK, failure ? std::string_view(*failure) : "", step);
 }
 
 /// Like `guarded`, for work that fails on all ranks together. Ranks that fail because of another rank report

@@ -1,13 +1,15 @@
 # Functions that define the project's libraries, programs and tests, with the same warnings and
 # sanitizers.
 
+# A unity build compiles sources that it includes, and the compiler takes these for headers.
+set(VDI_UNITY_OPTIONS "")
+if(CMAKE_UNITY_BUILD)
+  set(VDI_UNITY_OPTIONS "$<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>")
+endif()
+
 # Adds warnings and sanitizers to a target of this project.
 function(vdi_target_options target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow)
-  if(CMAKE_UNITY_BUILD)
-    # It takes the sources that a unity build includes for headers.
-    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
-  endif()
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow ${VDI_UNITY_OPTIONS})
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}>")
   if(VDI_SANITIZE)
     # AddressSanitizer finds null pointers and ends of objects, too. Checking these twice takes long to compile.

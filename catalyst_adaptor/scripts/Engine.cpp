@@ -222,19 +222,19 @@ class ParaViewComm {
 }  // namespace
 
 struct Engine::State {
-  explicit State(int fortranCommunicator)
-      : comm(fortranCommunicator), agreement(MPI_Comm_f2c(fortranCommunicator)) {}
+  State() = default;
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 
-  ParaViewComm comm;
-  Agreement agreement;  // its communicator is separate from ParaView's and the caller's
-  Log log;
+  std::optional<ParaViewComm> comm;    // null: `start` hasn't begun
+  std::optional<Agreement> agreement;  // its communicator is separate from ParaView's and the caller's
+  std::optional<Log> log;
   Parameters parameters;
   vtkNew<vtkCallbackCommand> entry;
   vtkNew<vtkCallbackCommand> exchange;
   std::optional<Guard> guard;
   vtkSmartPointer<vtkSMSourceProxy> producer;
+  std::vector<vtkSmartPointer<Pipeline>> prepared;
   std::vector<vtkSmartPointer<Pipeline>> pipelines;
 
   ~State() {
@@ -245,23 +245,31 @@ struct Engine::State {
     }
     if (vtkInSituInitializationHelper::IsInitialized()) vtkInSituInitializationHelper::Finalize();
   }
-  void start(const std::string& plugin);
+  void start(int fortranCommunicator, const std::string& plugin);
   void watchEntries();
-  void add(const std::vector<Script>& scripts);
   std::optional<std::string> result(bool good);
 };
 
-void Engine::State::start(const std::string& plugin) {
+void Engine::State::start(int fortranCommunicator, const std::string& plugin) {
   using Helper = vtkInSituInitializationHelper;
   if (!Helper::IsPythonSupported()) throw std::runtime_error("this ParaView was built without Python");
-  vtkLogger::EnableUnsafeSignalHandler = false;  // the simulation keeps handling SIGTERM and the like
-  pv::initializeInSitu<Helper>(static_cast<vtkTypeUInt64>(MPI_Comm_c2f(comm.get())));
+  // What ranks do together comes first, so that none is missing because its own memory has run out.
+  if (!comm) {
+    comm.emplace(fortranCommunicator);
+    agreement.emplace(MPI_Comm_f2c(fortranCommunicator));
+  }
+  if (!Helper::IsInitialized()) {
+    vtkLogger::EnableUnsafeSignalHandler = false;  // the simulation keeps handling SIGTERM and the like
+    pv::initializeInSitu<Helper>(static_cast<vtkTypeUInt64>(MPI_Comm_c2f(comm->get())));
+  }
+  if (!log) log.emplace();
   Log::silenceOtherOutput();
   auto* manager = vtkSMProxyManager::GetProxyManager();
   auto* proxies = manager != nullptr ? manager->GetActiveSessionProxyManager() : nullptr;
   if (proxies == nullptr) throw std::runtime_error("ParaView's in situ engine doesn't start");
   vtkPythonInterpreter::Initialize(0);  // 0: the simulation keeps handling signals
-  guard.emplace(agreement, plugin);
+  if (!guard) guard.emplace(*agreement, plugin);
+  if (producer != nullptr) return;
   watchEntries();
   producer.TakeReference(vtkSMSourceProxy::SafeDownCast(proxies->NewProxy("sources", "PVTrivialProducer")));
   producer->UpdateVTKObjects();
@@ -271,7 +279,7 @@ void Engine::State::start(const std::string& plugin) {
 void Engine::State::watchEntries() {
   auto* controller = vtkMultiProcessController::GetGlobalController();
   if (controller == nullptr) return;
-  entry->SetClientData(&agreement);
+  entry->SetClientData(&*agreement);
   entry->SetCallback([](vtkObject*, unsigned long, void* client, void* data) {
     auto& asked = *static_cast<pv::CollectiveEntry*>(data);
     asked.refusal = static_cast<Agreement*>(client)->enter(asked.operation);
@@ -288,18 +296,9 @@ void Engine::State::watchEntries() {
   controller->AddObserver(pv::ParameterExchange::event, exchange);
 }
 
-void Engine::State::add(const std::vector<Script>& scripts) {
-  for (const Script& script : scripts) {
-    vtkNew<Pipeline> pipeline;
-    pipeline->setScript(script);
-    vtkInSituInitializationHelper::AddPipeline(pipeline);
-    pipelines.emplace_back(pipeline);
-  }
-}
-
 /// The result of the scripts that ran on this rank since the log was last read.
 std::optional<std::string> Engine::State::result(bool good) {
-  std::string error = log.takeFirstError();
+  std::string error = log->takeFirstError();
   if (good && error.empty()) return std::nullopt;
   constexpr std::string_view noMemory = "std::bad_alloc";
   if (const auto at = error.find(noMemory); at != std::string::npos)
@@ -312,11 +311,12 @@ bool Engine::wasStarted() {
   return started || vtkInSituInitializationHelper::IsInitialized();
 }
 
-Engine::Engine(int fortranCommunicator, const std::string& plugin) {
-  assert(!wasStarted());
+Engine::Engine() : state_(std::make_unique<State>()) {}
+
+void Engine::start(int fortranCommunicator, const std::string& plugin) {
+  assert(state_->comm || !wasStarted());
   started = true;
-  state_ = std::make_unique<State>(fortranCommunicator);
-  state_->start(plugin);
+  state_->start(fortranCommunicator, plugin);
 }
 
 void Engine::check(const std::string& script) {
@@ -325,8 +325,9 @@ void Engine::check(const std::string& script) {
 }
 
 bool Engine::runsOn(MPI_Comm comm) const {
+  if (!state_->comm) return true;
   int result = MPI_UNEQUAL;
-  return MPI_Comm_compare(comm, state_->comm.get(), &result) == MPI_SUCCESS &&
+  return MPI_Comm_compare(comm, state_->comm->get(), &result) == MPI_SUCCESS &&
          (result == MPI_IDENT || result == MPI_CONGRUENT);
 }
 
@@ -335,8 +336,18 @@ void Engine::loadPlugin() {
   if (!wrong.empty()) throw std::runtime_error(wrong);
 }
 
-void Engine::add(const std::vector<Script>& scripts) {
-  state_->add(scripts);
+void Engine::prepare(const std::vector<Script>& scripts) {
+  state_->prepared.clear();
+  for (const Script& script : scripts) {
+    vtkNew<Pipeline> pipeline;
+    pipeline->setScript(script);
+    state_->prepared.emplace_back(pipeline);
+  }
+}
+
+void Engine::add() {
+  for (const auto& pipeline : state_->prepared) vtkInSituInitializationHelper::AddPipeline(pipeline);
+  state_->pipelines = std::move(state_->prepared);
 }
 
 Engine::~Engine() = default;
@@ -353,16 +364,16 @@ Parameters& Engine::parameters() {
 }
 
 std::optional<std::string> Engine::finish() {
-  state_->log.takeFirstError();
+  state_->log->takeFirstError();
   bool good = true;
   for (const auto& pipeline : state_->pipelines) good = pipeline->Finalize() && good;
-  state_->agreement.leaveStep();
+  state_->agreement->leaveStep();
   return state_->result(good);
 }
 
 std::optional<std::string> Engine::execute(vtkDataObject* grid, int step, double time) {
   using Helper = vtkInSituInitializationHelper;
-  state_->log.takeFirstError();
+  state_->log->takeFirstError();
   std::exception_ptr failure;
   bool good = true;
   try {
@@ -375,7 +386,7 @@ std::optional<std::string> Engine::execute(vtkDataObject* grid, int step, double
   } catch (...) {
     failure = std::current_exception();
   }
-  state_->agreement.leaveStep();
+  state_->agreement->leaveStep();
   if (failure) std::rethrow_exception(failure);
   return state_->result(good);
 }

@@ -22,14 +22,20 @@ class Engine {
   /// Whether this process has had an engine before, or other code has started ParaView's.
   static bool wasStarted();
 
-  /// Starts ParaView's engine. No engine may have been started before. Scripts find `plugin`, the path of our
-  /// plugin, as VDI_PLUGIN in os.environ. Throws std::runtime_error if the engine doesn't start.
-  Engine(int fortranCommunicator, const std::string& plugin);
+  /// Not collective. The engine does nothing before `start`.
+  Engine();
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  /// Whether the engine runs on the ranks of this communicator, in the same order. Not collective.
+  /// Starts ParaView's engine. No other engine may have been started before. Scripts find `plugin`, the path
+  /// of our plugin, as VDI_PLUGIN in os.environ. Throws std::runtime_error or std::bad_alloc if the engine
+  /// doesn't start. If that happens on any rank, another call on all ranks goes on where this one ended. For
+  /// an engine that has started it does nothing.
+  void start(int fortranCommunicator, const std::string& plugin);
+
+  /// Whether the engine runs on the ranks of this communicator, in the same order, or hasn't been started.
+  /// Not collective.
   bool runsOn(MPI_Comm comm) const;
 
   /// Throws std::runtime_error for a fault of a script that is visible before it runs: a missing file or
@@ -37,8 +43,10 @@ class Engine {
   void check(const std::string& script);
   /// Loads our plugin. Call it before scripts run. Throws std::runtime_error if it can't be loaded.
   void loadPlugin();
-  /// Adds scripts, which run at each step in this order.
-  void add(const std::vector<Script>& scripts);
+  /// Takes the scripts, in place of others that `prepare` has taken. Not collective.
+  void prepare(const std::vector<Script>& scripts);
+  /// Adds the prepared scripts, which run at each step in this order.
+  void add();
 
   /// Whether a script does anything at this step, or may do so. Not collective.
   bool wants(int step, double time) const;

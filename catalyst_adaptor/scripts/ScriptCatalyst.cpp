@@ -58,10 +58,12 @@ vdi::catalyst::Engine*& spareEngine() {
   return engine;
 }
 
-/// Takes the spare engine or a new one. All ranks check whether they can before any of them starts.
+/// Takes the spare engine or a new one. All ranks check whether they can before any of them starts, because
+/// the others would wait for a rank that doesn't.
 int takeEngine(vdi_catalyst& self) {
   using vdi::catalyst::Engine;
   std::string plugin;
+  std::unique_ptr<Engine> fresh;
   const int code = guarded(self, VDI_CATALYST_ENGINE, [&] {
     if (spareEngine() != nullptr ? !spareEngine()->runsOn(self.comm) : Engine::wasStarted()) {
       throw std::runtime_error(spareEngine() != nullptr
@@ -70,12 +72,11 @@ int takeEngine(vdi_catalyst& self) {
     }
     plugin = vdi::catalyst::pluginFile();
     vdi::catalyst::sharePython();
+    if (spareEngine() == nullptr) fresh = std::make_unique<Engine>();
   });
   if (code != VDI_CATALYST_OK) return code;
-  return guarded(self, VDI_CATALYST_ENGINE, [&] {
-    self.engine.reset(std::exchange(spareEngine(), nullptr));
-    if (!self.engine) self.engine = std::make_unique<Engine>(MPI_Comm_c2f(self.comm), plugin);
-  });
+  self.engine = fresh ? std::move(fresh) : std::unique_ptr<Engine>(std::exchange(spareEngine(), nullptr));
+  return guarded(self, VDI_CATALYST_ENGINE, [&] { self.engine->start(MPI_Comm_c2f(self.comm), plugin); });
 }
 
 void sayIfNothingIsMade(const vdi_catalyst& self, const std::vector<Script>& scripts) {
@@ -120,14 +121,14 @@ int initializeAny(int32_t fortran_communicator, int32_t script_count, const Give
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_SCRIPT, [&] {
       for (const Script& script : scripts) self->engine->check(script.file);
+      self->engine->prepare(scripts);
     });
   }
   if (code == VDI_CATALYST_OK)
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine->loadPlugin(); });
-  if (code == VDI_CATALYST_OK)
-    code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { self->engine->add(scripts); });
+  if (code == VDI_CATALYST_OK) code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { self->engine->add(); });
   if (code != VDI_CATALYST_OK) {
-    spareEngine() = self->engine.release();
+    if (self->engine) spareEngine() = self->engine.release();
     MPI_Comm_free(&self->comm);
     return code;
   }
