@@ -243,7 +243,7 @@ struct Engine::State {
       controller->RemoveObserver(entry);
       controller->RemoveObserver(exchange);
     }
-    if (vtkInSituInitializationHelper::IsInitialized()) vtkInSituInitializationHelper::Finalize();
+    if (comm && vtkInSituInitializationHelper::IsInitialized()) vtkInSituInitializationHelper::Finalize();
   }
   void start(int fortranCommunicator, const std::string& plugin);
   void watchEntries();

@@ -147,6 +147,9 @@ int main(int argc, char** argv) {
     wrong += expect(rank, "the handle of a failed initialize", 1, catalyst == NULL);
     const char* then[] = {getenv("VDI_TEST_THEN")};
     if (then[0] != NULL) {
+      const char* nothing[] = {NULL};
+      wrong += expect(rank, "initialize without a path", VDI_CATALYST_BAD_ARGUMENT,
+                      vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, nothing, &catalyst));
       wrong += expect(rank, "initialize again", VDI_CATALYST_OK,
                       vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, then, &catalyst));
       wrong += expect(rank, "finalize", VDI_CATALYST_OK, vdi_catalyst_finalize(catalyst));
