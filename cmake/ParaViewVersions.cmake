@@ -4,6 +4,7 @@
 #   VDI_QT             the Qt of ParaView's window: Qt5 or Qt6
 #   VDI_PLUGIN_HELP    whether this ParaView makes the help of a plugin's panel
 #   VDI_GL_LOADER      the VTK target that loads OpenGL's functions
+#   VDI_NEEDS_DISPLAY  whether its views need an X server; ParaView 6 draws them without one, too
 #   VDI_PLUGIN_UNITY   whether a unity build compiles the plugin's sources together
 
 # vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): makes CMake accept Debian 13's
@@ -51,8 +52,10 @@ set(VDI_PLUGIN_HELP ON)
 if(VDI_QT STREQUAL "Qt6" AND ParaView_VERSION VERSION_LESS 6)
   set(VDI_PLUGIN_HELP OFF)
 endif()
+set(VDI_NEEDS_DISPLAY ON)
 set(VDI_PLUGIN_UNITY "${CMAKE_UNITY_BUILD}")
 if(ParaView_VERSION VERSION_GREATER_EQUAL 6)
+  set(VDI_NEEDS_DISPLAY OFF)
   set(VDI_PLUGIN_UNITY OFF) # the header that it generates has no include guard
 endif()
 set(VDI_GL_LOADER VTK::glew)

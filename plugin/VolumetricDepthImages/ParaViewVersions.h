@@ -25,6 +25,10 @@ namespace pv {
 inline constexpr bool cropsByExtent =
     std::pair(PARAVIEW_VERSION_MAJOR, PARAVIEW_VERSION_MINOR) >= std::pair(5, 13);
 
+/// Whether ranks agree on errors in each update of a proxy, as in ParaView 6. There, each update is
+/// collective, even if nothing has changed.
+inline constexpr bool updatesAreCollective = PARAVIEW_VERSION_MAJOR >= 6;
+
 /// Starts ParaView's in situ engine on the communicator of this Fortran handle. Helper is
 /// vtkInSituInitializationHelper. Collective. ParaView 6 also takes folders of Python modules; this passes
 /// none.

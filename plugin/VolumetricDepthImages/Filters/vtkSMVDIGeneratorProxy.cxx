@@ -30,6 +30,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <exception>
 #include <limits>
 #include <numbers>
 #include <string_view>
@@ -39,6 +40,7 @@
 #include "VDILastVdi.h"
 #include "VDISession.h"
 #include "VDIVolumeDisplay.h"
+#include "plugin/VolumetricDepthImages/ParaViewVersions.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/ComponentValues.h"
@@ -165,7 +167,20 @@ std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
 
 vtkStandardNewMacro(vtkSMVDIGeneratorProxy);
 
+bool vtkSMVDIGeneratorProxy::EnterUpdate(vtkSMProxy* proxy) {
+  if constexpr (pv::updatesAreCollective) {
+    try {
+      pv::enterCollective(vtkMultiProcessController::GetGlobalController(), proxy->GetXMLName());
+    } catch (const std::exception& error) {
+      vtkErrorWithObjectMacro(proxy, << error.what());
+      return false;
+    }
+  }
+  return true;
+}
+
 void vtkSMVDIGeneratorProxy::UpdatePipeline() {
+  if (!EnterUpdate(this)) return;
   this->TakeWhatIsNotSet(std::nullopt);
   const bool isForView = this->UpdatesForView;
   // A view that got an earlier output has left the proxy as updated, and the superclass would do nothing.
@@ -176,6 +191,7 @@ void vtkSMVDIGeneratorProxy::UpdatePipeline() {
 }
 
 void vtkSMVDIGeneratorProxy::UpdatePipeline(double time) {
+  if (!EnterUpdate(this)) return;
   this->TakeWhatIsNotSet(time);
   const bool isForView = this->UpdatesForView;
   if (isForView) this->InvokeCommand("BeginView");

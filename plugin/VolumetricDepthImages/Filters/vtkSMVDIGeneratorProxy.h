@@ -85,6 +85,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// Releases a held filter (vtkVDIGenerator::Hold), and stops it from giving views an earlier output. Call
   /// it before an update that needs the VDI of the current maps and properties.
   void ReleaseNow();
+  /// Whether all ranks update that proxy now, where such an update is collective. Reports an error if another
+  /// rank doesn't.
+  static bool EnterUpdate(vtkSMProxy* proxy);
   /// For writers, extractors and RenderVDI, which update the filters upstream of them without the filters'
   /// proxies. Lets all generators upstream of `proxy` take what isn't set, and releases them. Collective if
   /// each rank has a client.
