@@ -31,7 +31,8 @@ export async function unpack(text, size) {
   const bytes = new Uint8Array(size);
   let at = 0;
   try {
-    const reader = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw")).getReader();
+    const blob = new Blob([/** @type {BlobPart} */ (packed)]);
+    const reader = blob.stream().pipeThrough(new DecompressionStream("deflate-raw")).getReader();
     for (let part = await reader.read(); !part.done; part = await reader.read()) {
       bytes.set(part.value, at);  // throws if the part doesn't fit
       at += part.value.length;
