@@ -36,21 +36,17 @@ template <typename Work>
 int guarded(Calls& self, int code, Work work, std::optional<std::int64_t> step = std::nullopt) {
   std::optional<std::string> failure;
   try {
-    try {
-      if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
-        work();
-      } else {
-        failure = work();
-      }
-    } catch (const std::bad_alloc&) {
-      throw;
-    } catch (const std::exception& error) {
-      failure = error.what();
-    } catch (...) {
-      failure = "an unknown exception";
+    if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
+      work();
+    } else {
+      failure = work();
     }
   } catch (const std::bad_alloc&) {
     return conclude(self, code, "out of memory on this host", step);
+  } catch (const std::exception& error) {
+    return conclude(self, code, error.what(), step);
+  } catch (...) {
+    return conclude(self, code, "an unknown exception", step);
   }
   return conclude(self, failure ? code : VDI_CATALYST_OK, failure ? std::string_view(*failure) : "", step);
 }

@@ -19,6 +19,9 @@
 
 namespace vdi::test {
 
+/// The size that docs/format.md gives for a file's header.
+constexpr std::size_t headerBytes = 240;
+
 /// Deterministic numbers in [0, 1): the same on every machine.
 class Noise {
  public:

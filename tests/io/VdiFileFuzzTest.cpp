@@ -19,8 +19,6 @@ using namespace vdi;
 
 namespace {
 
-constexpr std::size_t leadBytes = 240;
-
 enum class Outcome { Refused, Sound, Other };
 
 template <typename Decode>
@@ -61,17 +59,17 @@ std::uint32_t get32(const std::vector<std::byte>& bytes, std::size_t offset) {
 /// Recomputes every checksum of a damaged file that its header and table still locate.
 void reseal(std::vector<std::byte>& bytes) {
   const std::size_t chunks = get32(bytes, 40);
-  const std::size_t room = (bytes.size() - leadBytes) / 16;
-  std::size_t at = leadBytes + chunks * 16;
+  const std::size_t room = (bytes.size() - test::headerBytes) / 16;
+  std::size_t at = test::headerBytes + chunks * 16;
   for (std::size_t i = 0; i < chunks && chunks <= room; ++i) {
-    const std::size_t packed = get32(bytes, leadBytes + i * 16 + 4);
+    const std::size_t packed = get32(bytes, test::headerBytes + i * 16 + 4);
     if (at + packed > bytes.size()) break;
-    put64(bytes, leadBytes + i * 16 + 8, XXH64(bytes.data() + at, packed, 0));
+    put64(bytes, test::headerBytes + i * 16 + 8, XXH64(bytes.data() + at, packed, 0));
     at += packed;
   }
   if (get32(bytes, 8) == 3 && at + 16 <= bytes.size())
     put64(bytes, at + 8, XXH64(bytes.data() + at + 16, bytes.size() - at - 16, 0));
-  put64(bytes, 224, XXH64(bytes.data() + leadBytes, std::min(chunks, room) * 16, 0));
+  put64(bytes, 224, XXH64(bytes.data() + test::headerBytes, std::min(chunks, room) * 16, 0));
   put64(bytes, 232, XXH64(bytes.data(), 232, 0));
 }
 
@@ -190,7 +188,7 @@ TEST_CASE("noise under valid checksums: refused, or a valid VDI") {
   const std::vector<std::byte> sound =
       io::encode(GENERATE(false, true) ? test::colored(test::compact(plausible)) : plausible);
   test::Noise noise(17);
-  const auto dataStart = static_cast<std::uint32_t>(leadBytes + std::size_t{get32(sound, 40)} * 16);
+  const auto dataStart = static_cast<std::uint32_t>(test::headerBytes + std::size_t{get32(sound, 40)} * 16);
   const auto size = static_cast<std::uint32_t>(sound.size());
   std::size_t other = 0;
   for (int i = 0; i < 500; ++i) {
@@ -210,10 +208,10 @@ TEST_CASE("a file that claims more than it holds is refused before allocation") 
   const Vdi noisy = test::noisyVdi(40, 40, 40);
   std::vector<std::byte> claims = io::encode(compact ? test::compact(noisy) : noisy);
   REQUIRE(get32(claims, 40) == 1);  // the chunk count
-  const std::uint64_t packed = get32(claims, leadBytes + 4);
+  const std::uint64_t packed = get32(claims, test::headerBytes + 4);
   REQUIRE(packed > 100000);
   const std::uint64_t maxCount = (packed * 255 - 8 - 4 * 1600) / (compact ? 9 : 24);
-  put32(claims, leadBytes, static_cast<std::uint32_t>(maxCount));
+  put32(claims, test::headerBytes, static_cast<std::uint32_t>(maxCount));
   put32(claims, 32, static_cast<std::uint32_t>(maxCount));  // the budget
   put64(claims, 48, maxCount);
   reseal(claims);
@@ -259,7 +257,7 @@ TEST_CASE("meaningless bytes are refused") {
   for (std::uint32_t i = 0; i < 2000; ++i) {
     std::vector<std::byte> bytes(noise.below(1000));
     for (std::byte& byte : bytes) byte = static_cast<std::byte>(noise.below(256));
-    const std::size_t kept = std::min<std::size_t>(i % leadBytes, bytes.size());
+    const std::size_t kept = std::min<std::size_t>(i % test::headerBytes, bytes.size());
     std::copy_n(sound.begin(), kept, bytes.begin());
     if (outcomeOf(bytes) != Outcome::Refused) ++passed;
   }
@@ -305,7 +303,7 @@ TEST_CASE("files altered at random are refused, or valid VDIs") {
     test::Noise noise(seed);
     std::vector<std::byte> bytes = sound[noise.below(static_cast<std::uint32_t>(sound.size()))];
     for (std::uint32_t changes = 1 + noise.below(4); changes > 0; --changes) alter(bytes, noise);
-    if (noise.below(8) > 0 && bytes.size() >= leadBytes) reseal(bytes);
+    if (noise.below(8) > 0 && bytes.size() >= test::headerBytes) reseal(bytes);
     const Outcome outcome = outcomeOf(bytes);
     INFO(seed);
     REQUIRE(outcome != Outcome::Other);

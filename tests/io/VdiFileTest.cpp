@@ -39,13 +39,11 @@ void put(std::vector<std::byte>& bytes, std::size_t offset, T value) {
   std::memcpy(bytes.data() + offset, &value, sizeof(T));
 }
 
-constexpr std::size_t headerBytes = 240;
-
 /// Recomputes both outer checksums.
 void seal(std::vector<std::byte>& bytes) {
   const auto chunks = at<std::uint32_t>(bytes, 40);
-  const std::size_t table = std::min<std::size_t>(chunks * 16ULL, bytes.size() - headerBytes);
-  put<std::uint64_t>(bytes, 224, XXH64(bytes.data() + headerBytes, table, 0));
+  const std::size_t table = std::min<std::size_t>(chunks * 16ULL, bytes.size() - test::headerBytes);
+  put<std::uint64_t>(bytes, 224, XXH64(bytes.data() + test::headerBytes, table, 0));
   put<std::uint64_t>(bytes, 232, XXH64(bytes.data(), 232, 0));
 }
 
@@ -183,7 +181,7 @@ TEST_CASE("header and chunk table lie as docs/format.md says") {
   const std::vector<std::byte> bytes = io::encode(vdi);
   CHECK(std::memcmp(bytes.data(), "VDI-FILE", 8) == 0);
   CHECK(at<std::uint32_t>(bytes, 8) == 1);
-  CHECK(at<std::uint32_t>(bytes, 12) == headerBytes);
+  CHECK(at<std::uint32_t>(bytes, 12) == test::headerBytes);
   CHECK(at<std::uint32_t>(bytes, 16) == 0);
   CHECK(at<std::uint32_t>(bytes, 20) == 1);
   CHECK(at<std::uint32_t>(bytes, 24) == 100);
@@ -193,7 +191,7 @@ TEST_CASE("header and chunk table lie as docs/format.md says") {
   CHECK(at<std::uint32_t>(bytes, 40) == 3);
   CHECK(at<std::uint32_t>(bytes, 44) == 0);
   CHECK(at<std::uint64_t>(bytes, 48) == test::full(vdi).segments.size());
-  CHECK(at<std::uint64_t>(bytes, 56) == bytes.size() - headerBytes - 48);
+  CHECK(at<std::uint64_t>(bytes, 56) == bytes.size() - test::headerBytes - 48);
   CHECK(at<std::uint64_t>(bytes, 64) == vdi.timeStep);
   CHECK(at<double>(bytes, 72) == vdi.time);
   CHECK(at<double>(bytes, 80) == vdi.sampleStep);
@@ -204,15 +202,16 @@ TEST_CASE("header and chunk table lie as docs/format.md says") {
   CHECK(at<glm::dvec3>(bytes, 184) == vdi.camera.viewUp);
   CHECK(at<double>(bytes, 208) == vdi.camera.viewAngle);
   CHECK(at<double>(bytes, 216) == vdi.camera.parallelScale);
-  CHECK(at<std::uint64_t>(bytes, 224) == XXH64(bytes.data() + headerBytes, 48, 0));
+  CHECK(at<std::uint64_t>(bytes, 224) == XXH64(bytes.data() + test::headerBytes, 48, 0));
   CHECK(at<std::uint64_t>(bytes, 232) == XXH64(bytes.data(), 232, 0));
-  std::size_t offset = headerBytes + 48;
+  std::size_t offset = test::headerBytes + 48;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t last = std::min<std::size_t>((i + 1) * 4096, 9000);
-    CHECK(at<std::uint32_t>(bytes, headerBytes + 16 * i) ==
+    CHECK(at<std::uint32_t>(bytes, test::headerBytes + 16 * i) ==
           test::full(vdi).offsets[last] - test::full(vdi).offsets[i * 4096]);
-    const auto packed = at<std::uint32_t>(bytes, headerBytes + 16 * i + 4);
-    CHECK(at<std::uint64_t>(bytes, headerBytes + 16 * i + 8) == XXH64(bytes.data() + offset, packed, 0));
+    const auto packed = at<std::uint32_t>(bytes, test::headerBytes + 16 * i + 4);
+    CHECK(at<std::uint64_t>(bytes, test::headerBytes + 16 * i + 8) ==
+          XXH64(bytes.data() + offset, packed, 0));
     offset += packed;
   }
   CHECK(offset == bytes.size());
@@ -237,9 +236,10 @@ TEST_CASE("metadata make version 3 and lie behind the chunks as JSON, as docs/fo
   if (GENERATE(false, true)) vdi.margin = {3, 2};
   const std::vector<std::byte> bytes = io::encode(vdi);
   CHECK(at<std::uint32_t>(bytes, 8) == 3);
-  CHECK(at<std::uint32_t>(bytes, 12) == headerBytes);
+  CHECK(at<std::uint32_t>(bytes, 12) == test::headerBytes);
   CHECK(at<std::uint16_t>(bytes, 44) == vdi.margin.x);
-  const std::size_t place = headerBytes + 16 * at<std::uint32_t>(bytes, 40) + at<std::uint64_t>(bytes, 56);
+  const std::size_t place =
+      test::headerBytes + 16 * at<std::uint32_t>(bytes, 40) + at<std::uint64_t>(bytes, 56);
   CHECK(std::memcmp(bytes.data() + place, "JSON", 4) == 0);
   const auto count = at<std::uint32_t>(bytes, place + 4);
   REQUIRE(place + 16 + count == bytes.size());
@@ -262,7 +262,8 @@ TEST_CASE("metadata make version 3 and lie behind the chunks as JSON, as docs/fo
 TEST_CASE(
     "metadata that aren't sound are refused, their checksum being right, and unknown fields are skipped") {
   const std::vector<std::byte> sound = io::encode(test::colored(test::noisyVdi(4, 4, 3)));
-  const std::size_t place = headerBytes + 16 * at<std::uint32_t>(sound, 40) + at<std::uint64_t>(sound, 56);
+  const std::size_t place =
+      test::headerBytes + 16 * at<std::uint32_t>(sound, 40) + at<std::uint64_t>(sound, 56);
   const auto with = [&](const std::string& text) {
     std::vector<std::byte> bytes(sound.begin(), sound.begin() + static_cast<std::ptrdiff_t>(place));
     bytes.resize(place + 16 + text.size());

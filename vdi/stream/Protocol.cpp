@@ -8,7 +8,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "vdi/core/Error.h"
 #include "vdi/stream/SteeringJson.h"
 
 namespace vdi::stream {
@@ -20,10 +19,6 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr int maxDepth = 3;  // object, series, times
-
-[[noreturn]] void refuse(const std::string& what) {
-  throw Error(ErrorCode::Format, what);
-}
 
 Json parsed(std::string_view text) {
   const auto shallow = [](int depth, Json::parse_event_t, Json&) {

@@ -15,10 +15,6 @@ using Json = nlohmann::json;
 
 constexpr std::size_t maxPresets = 64;
 
-[[noreturn]] void refuseSteering(const std::string& what) {
-  throw Error(ErrorCode::Format, what);
-}
-
 /// Null where there is none.
 const Json& at(const Json& object, const char* name) {
   static const Json none;
@@ -28,37 +24,37 @@ const Json& at(const Json& object, const char* name) {
 
 double numberIn(const Json& value, const char* name) {
   if (!value.is_number() || !std::isfinite(value.get<double>()))
-    refuseSteering(fmt::format("\"{}\" isn't a finite number", name));
+    refuse(fmt::format("\"{}\" isn't a finite number", name));
   return value.get<double>();
 }
 
 int wholeIn(const Json& value, const char* name, int low, int high) {
   if (!value.is_number_integer() || value < low || value > high)
-    refuseSteering(fmt::format("\"{}\" isn't a whole number from {} to {}", name, low, high));
+    refuse(fmt::format("\"{}\" isn't a whole number from {} to {}", name, low, high));
   return value.get<int>();
 }
 
 bool flagIn(const Json& value, const char* name) {
-  if (!value.is_boolean()) refuseSteering(fmt::format("\"{}\" isn't true or false", name));
+  if (!value.is_boolean()) refuse(fmt::format("\"{}\" isn't true or false", name));
   return value.get<bool>();
 }
 
 std::string textIn(const Json& value, const char* name) {
   if (!value.is_string() || value.get_ref<const std::string&>().size() > maxNameBytes)
-    refuseSteering(fmt::format("\"{}\" isn't a string of at most {} bytes", name, maxNameBytes));
+    refuse(fmt::format("\"{}\" isn't a string of at most {} bytes", name, maxNameBytes));
   return value.get<std::string>();
 }
 
 const Json& arrayIn(const Json& value, const char* name, std::size_t least, std::size_t most) {
   if (!value.is_array() || value.size() < least || value.size() > most)
-    refuseSteering(fmt::format("\"{}\" isn't an array of {} to {} entries", name, least, most));
+    refuse(fmt::format("\"{}\" isn't an array of {} to {} entries", name, least, most));
   return value;
 }
 
 std::array<double, 2> rangeIn(const Json& value) {
   arrayIn(value, "range", 2, 2);
   const std::array range{numberIn(value[0], "range"), numberIn(value[1], "range")};
-  if (!(range[0] < range[1]) || !std::isfinite(range[1] - range[0])) refuseSteering("\"range\" doesn't rise");
+  if (!(range[0] < range[1]) || !std::isfinite(range[1] - range[0])) refuse("\"range\" doesn't rise");
   return range;
 }
 
@@ -74,7 +70,7 @@ glm::dvec3 vectorIn(const Json& value, const char* name) {
 }
 
 Camera cameraIn(const Json& value) {
-  if (!value.is_object()) refuseSteering("\"camera\" isn't an object");
+  if (!value.is_object()) refuse("\"camera\" isn't an object");
   Camera camera;
   camera.position = vectorIn(at(value, "position"), "position");
   camera.focalPoint = vectorIn(at(value, "focalPoint"), "focalPoint");
@@ -88,7 +84,7 @@ Camera cameraIn(const Json& value) {
   try {
     (void)View(camera, 1, 1);
   } catch (const Error& error) {
-    refuseSteering(fmt::format("\"camera\": {}", error.what()));
+    refuse(fmt::format("\"camera\": {}", error.what()));
   }
   return camera;
 }
@@ -110,13 +106,12 @@ Json jsonOf(const Camera& camera) {
 }
 
 std::string nameIn(const std::string& name) {
-  if (!isParameterName(name))
-    refuseSteering("a parameter's name may only contain letters, digits, '_', '-' and '.'");
+  if (!isParameterName(name)) refuse("a parameter's name may only contain letters, digits, '_', '-' and '.'");
   return name;
 }
 
 Parameter parameterIn(const Json& value) {
-  if (!value.is_object()) refuseSteering("\"parameters\" has an entry that isn't an object");
+  if (!value.is_object()) refuse("\"parameters\" has an entry that isn't an object");
   Parameter parameter;
   parameter.name = nameIn(textIn(at(value, "name"), "name"));
   parameter.isWhole = flagIn(at(value, "whole"), "whole");
@@ -124,12 +119,12 @@ Parameter parameterIn(const Json& value) {
   parameter.low = numberIn(at(value, "low"), "low");
   parameter.high = numberIn(at(value, "high"), "high");
   if (!(parameter.low <= parameter.value && parameter.value <= parameter.high))
-    refuseSteering("a parameter is out of its bounds");
+    refuse("a parameter is out of its bounds");
   return parameter;
 }
 
 GeneratorControls generatorIn(const Json& value) {
-  if (!value.is_object()) refuseSteering("\"generator\" isn't an object");
+  if (!value.is_object()) refuse("\"generator\" isn't an object");
   GeneratorControls controls;
   controls.resolution = resolutionIn(at(value, "resolution"), 0);
   controls.supersegments = wholeIn(at(value, "supersegments"), "supersegments", 0, maxSupersegments);
@@ -140,6 +135,10 @@ GeneratorControls generatorIn(const Json& value) {
 }
 
 }  // namespace
+
+void refuse(const std::string& what) {
+  throw Error(ErrorCode::Format, what);
+}
 
 Json jsonOf(const Wish& wish) {
   Json object = Json::object();
@@ -167,7 +166,7 @@ Wish wishIn(const Json& object) {
   const Json& parameters = at(object, "parameters");
   if (parameters.is_null()) return wish;
   if (!parameters.is_object() || parameters.size() > maxParameters)
-    refuseSteering(fmt::format("\"parameters\" isn't an object of at most {} entries", maxParameters));
+    refuse(fmt::format("\"parameters\" isn't an object of at most {} entries", maxParameters));
   for (const auto& [name, value] : parameters.items())
     wish.parameters[nameIn(name)] = numberIn(value, "parameters");
   return wish;

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "vdi/stream/Steering.h"
 
 namespace vdi::stream {
 
+/// Throws Error{Format}.
+[[noreturn]] void refuse(const std::string& what);
 /// The fields of "steer" but for its type, those that are set alone.
 nlohmann::json jsonOf(const Wish& wish);
 /// The fields of "steering" that hold controls.
