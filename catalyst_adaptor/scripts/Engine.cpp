@@ -239,14 +239,12 @@ struct Engine::State {
 
   ~State() {
     producer = nullptr;
-    if (auto* controller = vtkMultiProcessController::GetGlobalController()) {
-      controller->RemoveObserver(entry);
-      controller->RemoveObserver(exchange);
-    }
+    if (auto* controller = vtkMultiProcessController::GetGlobalController()) ignoreEntries(*controller);
     if (comm && vtkInSituInitializationHelper::IsInitialized()) vtkInSituInitializationHelper::Finalize();
   }
   void start(int fortranCommunicator, const std::string& plugin);
   void watchEntries();
+  void ignoreEntries(vtkMultiProcessController& controller);
   std::optional<std::string> result(bool good);
 };
 
@@ -279,6 +277,7 @@ void Engine::State::start(int fortranCommunicator, const std::string& plugin) {
 void Engine::State::watchEntries() {
   auto* controller = vtkMultiProcessController::GetGlobalController();
   if (controller == nullptr) return;
+  ignoreEntries(*controller);  // a start that failed may have come this far
   entry->SetClientData(&*agreement);
   entry->SetCallback([](vtkObject*, unsigned long, void* client, void* data) {
     auto& asked = *static_cast<pv::CollectiveEntry*>(data);
@@ -294,6 +293,11 @@ void Engine::State::watchEntries() {
       asked.parameters.push_back({one.name, one.isWhole, one.value, one.low, one.high});
   });
   controller->AddObserver(pv::ParameterExchange::event, exchange);
+}
+
+void Engine::State::ignoreEntries(vtkMultiProcessController& controller) {
+  controller.RemoveObserver(entry);
+  controller.RemoveObserver(exchange);
 }
 
 /// The result of the scripts that ran on this rank since the log was last read.

@@ -39,7 +39,7 @@ static cost measure(void) {
     strcpy(last, path); /* a library's parts follow each other */
     ++result.libraries;
     result.of_paraview +=
-        strstr(path, "libvtk") != NULL || strstr(path, "-pv5") != NULL || strstr(path, "libpython") != NULL;
+        strstr(path, "libvtk") != NULL || strstr(path, "libpython") != NULL;
     result.of_vulkan += strstr(path, "libvulkan") != NULL;
   }
   FILE* rollup = fopen("/proc/self/smaps_rollup", "r");
