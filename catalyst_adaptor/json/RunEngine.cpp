@@ -92,16 +92,18 @@ struct RunEngine::State {
     if (run.when) measure.emplace(*run.when);
   }
 
-  /// Collective: makes the device and the generator.
+  /// Collective: makes the device and what needs one. After a failure, no rank has them.
   void start() {
+    generator.reset();
+    std::unique_ptr<Deposits> fresh;
     comm.together([&] {
       device = gpu::Device::create(gpu::requestFromEnvironment(comm.localRank()));
-      auto fresh = std::make_unique<Deposits>(device, comm);
+      fresh = std::make_unique<Deposits>(device, comm);
       if (deposits) fresh->continueTelling(*deposits);
-      deposits = std::move(fresh);
     });
     const GeneratorOptions options = generatorOptionsFromEnvironment(comm);
     generator.emplace(device, comm::Communicator::fromMpi(fortranCommunicator), options);
+    deposits = std::move(fresh);
   }
   bool isRoot() const { return comm.rank() == 0; }
   /// Collective: the root's answer on all ranks.
@@ -153,14 +155,15 @@ void RunEngine::open() {
   const bool isAnew = run_.existing == config::Existing::Overwrite;
   state.comm.together([&] {
     if (!state.isRoot()) return;
+    if (run_.cinema) state.cinema = std::make_unique<io::CinemaIndex>(run_.cinema->folder, !isAnew);
+    if (run_.stream) state.stream = std::make_unique<LiveStream>(*run_.stream);
+    // The log comes last, because a start that fails leaves no line in it, and doesn't empty it.
     if (run_.log.any()) {
       const runlog::RunStart start{run_.field, state.comm.size(), std::time(nullptr)};
       using Before = runlog::RunLog::Before;
       state.log = std::make_unique<runlog::RunLog>(logFilesOf(run_.log), start,
                                                    isAnew ? Before::Goes : Before::Stays);
     }
-    if (run_.cinema) state.cinema = std::make_unique<io::CinemaIndex>(run_.cinema->folder, !isAnew);
-    if (run_.stream) state.stream = std::make_unique<LiveStream>(*run_.stream);
   });
   if (run_.stream && run_.stream->steer) state.steering.emplace(state.comm, state.stream.get());
 }
@@ -238,6 +241,7 @@ void RunEngine::execute(Fields& fields, Parameters& parameters, std::int64_t ste
   State& state = *state_;
   state.frame.reset();  // the values may have changed
   fields.dropDeposits();
+  if (run_.everyTime) time = state.comm.broadcast(time, 0);  // ranks' times may differ
   std::exception_ptr failure;
   bool isMade = false;
   try {
@@ -368,6 +372,8 @@ std::vector<double> RunEngine::millisecondsOfRanks(double seconds) const {
 /// Runs `work`, and runs it once more with another device if the first one was lost.
 template <typename Work>
 void RunEngine::tryTwice(Work work) {
+  // An earlier frame lost its device, and no other could be opened then.
+  if (!state_->generator) state_->start();
   std::exception_ptr failure;
   try {
     work();
@@ -377,7 +383,6 @@ void RunEngine::tryTwice(Work work) {
   if (!failure) return;
   if (!state_->comm.anyTogether([&] { return state_->device->isLost(); })) std::rethrow_exception(failure);
   state_->frame.reset();
-  state_->generator.reset();
   state_->start();
   work();
 }

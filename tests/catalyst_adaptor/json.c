@@ -2,9 +2,10 @@
  * cells, z fastest, p, of 64-bit integers at points, and w, of vectors of cells, move. Arguments: a JSON text
  * or the name of a file with one (or of a script, which ends in .py), then the code that each step must
  * return. Exit status 0 if all did. VDI_TEST_BAD=1: the program first tries bad JSON texts and files, which
- * must be refused. VDI_TEST_REFUSED=1: initialising returns VDI_CATALYST_SCRIPT, and the program ends.
+ * must be refused. VDI_TEST_REFUSED: the code that initialising must return; then the program ends.
  * VDI_TEST_FULL: the name of an output for which there is no room. VDI_TEST_FIRST: the first step's number.
  * VDI_TEST_WANTS: for each step whether it is wanted, such as 1010; others aren't handed over.
+ * VDI_TEST_OWN_TIMES=1: each rank gives a step another time.
  * VDI_TEST_PAUSE: milliseconds between steps. VDI_ISOLATION: frames are made in processes of their own. */
 #include <mpi.h>
 #include <stdio.h>
@@ -97,8 +98,9 @@ int main(int argc, char** argv) {
     if (symlink("/dev/full", full) != 0) abort();
   }
 
-  if (getenv("VDI_TEST_REFUSED") != NULL) {
-    wrong += refuse(rank, argv[1], VDI_CATALYST_SCRIPT);
+  const char* refused = getenv("VDI_TEST_REFUSED");
+  if (refused != NULL) {
+    wrong += refuse(rank, argv[1], atoi(refused));
     MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
     MPI_Finalize();
     return wrong == 0 ? 0 : 1;
@@ -142,16 +144,17 @@ int main(int argc, char** argv) {
   const char* wanted = getenv("VDI_TEST_WANTS");
   const char* first_step = getenv("VDI_TEST_FIRST");
   const char* pause = getenv("VDI_TEST_PAUSE");
+  const double late = getenv("VDI_TEST_OWN_TIMES") != NULL ? 0.01 * rank : 0.0;
   for (int i = 0; i < argc - 2; ++i) {
     const int step = i + (first_step != NULL ? atoi(first_step) : 0);
     simulate(first, count, step);
     if (pause != NULL) usleep((useconds_t)atoi(pause) * 1000);
     if (wanted != NULL) {
-      const int wants = vdi_catalyst_wants(catalyst, step, 0.5 * step);
+      const int wants = vdi_catalyst_wants(catalyst, step, 0.5 * step - late);
       wrong += expect(rank, "wants", wanted[i] - '0', wants);
       if (wants == 0) continue;
     }
-    const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step);
+    const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step - late);
     wrong += expect_step(rank, atoi(argv[i + 2]), code);
     if (code != VDI_CATALYST_OK)
       wrong += expect(rank, "the error's text", 1, vdi_catalyst_error(catalyst)[0] != '\0');

@@ -4,6 +4,7 @@ case, vdi, and the simulation with its launcher."""
 import csv
 import json
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -25,7 +26,7 @@ def run(document, *codes, said="", **environment):
 
 
 def refused(document, file):
-    text = run(document, VDI_TEST_REFUSED="1")
+    text = run(document, VDI_TEST_REFUSED="3")
     lines = [line for line in text.splitlines() if line.startswith("vdi_catalyst: ")]
     assert len(lines) == 1 and file in lines[0], lines
     assert '"existing": "continue"' in lines[0] and '"existing": "overwrite"' in lines[0], lines
@@ -61,6 +62,13 @@ def existing():
     refused(document, "run.jsonl")
     run({**document, "existing": "overwrite"}, 0)
     assert [event["event"] for event in events()] == ["start", "frame", "end"], events()
+    # A start that fails leaves the log of an earlier run, and makes none.
+    before = open("run.jsonl").read()
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        stream = {"stream": {"port": taken.getsockname()[1]}, "existing": "overwrite"}
+        assert "in use" in run({**document, **stream}, VDI_TEST_REFUSED="2")
+        assert "in use" in run({**document, **stream, "log": "other.jsonl"}, VDI_TEST_REFUSED="2")
+    assert open("run.jsonl").read() == before and not os.path.exists("other.jsonl")
 
 
 def triggers():
@@ -69,6 +77,9 @@ def triggers():
     assert made() == ["vdi_%06d.vdi" % step for step in (0, 3, 5)], made()
     run({"every_time": 1.25, "existing": "continue"}, *5 * [0], VDI_TEST_FIRST="4", VDI_TEST_WANTS="11001")
     assert made() == ["vdi_%06d.vdi" % step for step in (0, 3, 4, 5, 8)], made()
+    # The first rank's time counts, also for a camera that turns.
+    run({"every_time": 1.25, "orbit": {"turn": 10}, "output": "o_{timestep}.vdi"}, *6 * [0], VDI_TEST_OWN_TIMES="1")
+    assert [name for name in made() if name.startswith("o")] == ["o_%d.vdi" % step for step in (0, 3, 5)], made()
     run({"every": 4, "every_seconds": 3600, "output": "s_{timestep}.vdi"}, *6 * [0], VDI_TEST_FIRST="1",
         VDI_TEST_WANTS="100100")
     assert [name for name in made() if name.startswith("s")] == ["s_1.vdi", "s_4.vdi"], made()
@@ -180,15 +191,27 @@ def full():
 
 def lost_device():
     """A device that is lost costs no frame: the values go to the next one, for all cameras."""
-    document = {"cameras": [{"name": "a", "orbit": {}}, {"name": "b", "orbit": {"elevation": 30}}], "log": "run.jsonl"}
-    run({**document, "output": "one_{timestep}.vdi"}, 0)
-    open("lose", "w").close()
-    run({**document, "output": "two_{timestep}.vdi", "existing": "continue"}, 0,
-        LD_PRELOAD=os.environ["VDI_TEST_PRELOAD"] + ":libvulkan.so.1", VDI_TEST_LOSE_DEVICE=os.path.abspath("lose"))
-    assert not os.path.exists("lose"), "no device was lost"
+    document = {"cameras": [{"name": "a", "orbit": {}}, {"name": "b", "orbit": {"elevation": 30}}], "log": "run.jsonl",
+                "colors": {"range": [0, 1]}}
+    run({**document, "output": "one_{timestep}.vdi"}, 0, 0)
+
+    def lose(output, *codes, **environment):
+        open("lose", "w").close()
+        run({**document, "output": output + "_{timestep}.vdi", "existing": "continue"}, *codes,
+            LD_PRELOAD=os.environ["VDI_TEST_PRELOAD"] + ":libvulkan.so.1", VDI_TEST_LOSE_DEVICE=os.path.abspath("lose"),
+            **environment)
+        assert not os.path.exists("lose"), "no device was lost"
+
+    lose("two", 0)
     for name in "ab":
         assert open("one_0_%s.vdi" % name, "rb").read() == open("two_0_%s.vdi" % name, "rb").read()
     assert not any("error" in event for event in events()), events()
+    # If one rank can't open another device, the step fails, and the next one works.
+    open("none", "w").close()
+    lose("three", 3, 0, VDI_TEST_NO_DEVICE=os.path.abspath("none"))
+    assert not os.path.exists("none"), "each rank got another device"
+    for name in "ab":
+        assert open("one_1_%s.vdi" % name, "rb").read() == open("three_1_%s.vdi" % name, "rb").read()
 
 
 with tempfile.TemporaryDirectory() as folder:

@@ -1,8 +1,9 @@
 /* Loaded before a program (LD_PRELOAD). If the file VDI_TEST_LOSE_DEVICE exists, the library removes it, and
  * the Vulkan device for which the program waits next is lost. A folder of that name can't be removed, so each
- * device is lost. While the file VDI_TEST_LOSE_STILLS exists, a device is lost when any thread but the
- * program's first waits for the 20th time. Threads that make full pictures wait that often, strip by strip;
- * threads that load VDIs don't. */
+ * device is lost. If the file VDI_TEST_NO_DEVICE exists, the library removes it when a program that has lost
+ * a device asks for another one, which it doesn't get. While the file VDI_TEST_LOSE_STILLS exists, a device
+ * is lost when any thread but the program's first waits for the 20th time. Threads that make full pictures
+ * wait that often, strip by strip; threads that load VDIs don't. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdlib.h>
@@ -31,6 +32,14 @@ VKAPI_ATTR VkResult VKAPI_CALL vkWaitSemaphores(VkDevice device, const VkSemapho
     if (lost[i] == device) return VK_ERROR_DEVICE_LOST;
   }
   return result;
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL vkCreateDevice(VkPhysicalDevice physical, const VkDeviceCreateInfo* info,
+                                              const VkAllocationCallbacks* allocator, VkDevice* device) {
+  const PFN_vkCreateDevice create = (PFN_vkCreateDevice)dlsym(RTLD_NEXT, "vkCreateDevice");
+  const char* name = getenv("VDI_TEST_NO_DEVICE");
+  if (name != NULL && lost_count > 0 && unlink(name) == 0) return VK_ERROR_INITIALIZATION_FAILED;
+  return create(physical, info, allocator, device);
 }
 
 /* A new device may get the address of one that has gone. */

@@ -102,6 +102,15 @@ TEST_CASE("a log that can't be is refused at once") {
   CHECK_THROWS_WITH(readRecords(folder.path() / "none"), test::ContainsSubstring("none"));
 }
 
+TEST_CASE("neither file of a log loses its content if the other one can't be opened") {
+  const test::TemporaryFolder folder;
+  const fs::path file = folder.path() / "run";
+  std::ofstream(file) << "an earlier run\n";
+  CHECK_THROWS_AS(RunLog({file, folder.path()}, {"V", 1, 0}, RunLog::Before::Goes), Error);
+  CHECK_THROWS_AS(RunLog({folder.path(), file}, {"V", 1, 0}, RunLog::Before::Goes), Error);
+  CHECK(contentOf(file) == "an earlier run\n");
+}
+
 TEST_CASE("a log begins anew where it is told to, and has what was left out") {
   const test::TemporaryFolder folder;
   const fs::path json = folder.path() / "run.jsonl";

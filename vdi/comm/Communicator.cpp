@@ -309,6 +309,12 @@ std::vector<std::byte> Communicator::broadcast(std::vector<std::byte> bytes, int
   return bytes;
 }
 
+double Communicator::broadcast(double number, int root) const {
+  assert(root >= 0 && root < size());
+  broadcastInto(std::as_writable_bytes(std::span(&number, 1)), root);
+  return number;
+}
+
 std::string Communicator::broadcastText(FunctionRef<std::string()> work, int root) const {
   assert(root >= 0 && root < size());
   std::string text;

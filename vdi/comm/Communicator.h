@@ -75,6 +75,8 @@ class Communicator {
 
   /// Returns the root's bytes on every rank; other ranks' `bytes` are ignored.
   std::vector<std::byte> broadcast(std::vector<std::byte> bytes, int root) const;
+  /// Returns the root's number on every rank.
+  double broadcast(double number, int root) const;
   /// Returns the text that `work` makes on the root, on every rank. Only the root calls `work`; if it throws
   /// there, all ranks throw as together's do.
   std::string broadcastText(FunctionRef<std::string()> work, int root) const;

@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <exception>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -26,7 +26,7 @@ namespace {
 /// A file to which lines are appended.
 class RunLog::Appended {
  public:
-  Appended(std::filesystem::path path, Before before) : path_(std::move(path)) {
+  explicit Appended(std::filesystem::path path) : path_(std::move(path)) {
     std::error_code error;
     if (path_.has_parent_path()) std::filesystem::create_directories(path_.parent_path(), error);
     if (error) throw Error(ErrorCode::Io, "can't make the log's folder: " + error.message(), path_.string());
@@ -36,18 +36,17 @@ class RunLog::Appended {
         ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, readable);
     if (descriptor_ < 0) failWith("open the log", errno, path_);
     struct stat status {};
-    if (::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) {
-      if (before == Before::Stays || ::ftruncate(descriptor_, 0) == 0) return;
-      const int reason = errno;
-      ::close(descriptor_);
-      failWith("empty the log", reason, path_);
-    }
+    if (::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) return;
     ::close(descriptor_);
     throw Error(ErrorCode::Io, "the log must be a regular file", path_.string());
   }
   ~Appended() { ::close(descriptor_); }
   Appended(const Appended&) = delete;
   Appended& operator=(const Appended&) = delete;
+
+  void empty() {
+    if (::ftruncate(descriptor_, 0) != 0) failWith("empty the log", errno, path_);
+  }
 
   void append(const std::string& line) {
     const off_t before = ::lseek(descriptor_, 0, SEEK_END);
@@ -76,22 +75,29 @@ class RunLog::Appended {
 };
 
 RunLog::RunLog(const LogFiles& files, const RunStart& start, Before before) {
-  if (files.json) json_ = std::make_unique<Appended>(*files.json, before);
-  if (files.text) text_ = std::make_unique<Appended>(*files.text, before);
+  if (files.json) json_ = std::make_unique<Appended>(*files.json);
+  if (files.text) text_ = std::make_unique<Appended>(*files.text);
+  // Both files are open: neither loses its content because of the other.
+  for (Appended* file : {json_.get(), text_.get()}) {
+    if (file != nullptr && before == Before::Goes) file->empty();
+  }
   append(jsonLine(start), textLine(start));
 }
 
 RunLog::~RunLog() = default;
 
 void RunLog::append(const std::string& json, const std::string& text) {
-  std::exception_ptr failure;
-  try {
-    if (json_) json_->append(json);
-  } catch (const Error&) {
-    failure = std::current_exception();
-  }
-  if (text_) text_->append(text);
-  if (failure) std::rethrow_exception(failure);
+  std::optional<Error> failure;
+  const auto add = [&](Appended* file, const std::string& line) {
+    try {
+      if (file != nullptr) file->append(line);
+    } catch (const Error& error) {
+      failure = failure ? Error(error.code(), std::string(failure->what()) + "; " + error.what()) : error;
+    }
+  };
+  add(json_.get(), json);
+  add(text_.get(), text);
+  if (failure) throw *failure;
 }
 
 void RunLog::add(const FrameRecord& record) {
