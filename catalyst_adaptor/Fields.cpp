@@ -199,10 +199,7 @@ std::optional<bool> Fields::associationOf(const std::string& name) const {
   if (ofCells && ofPoints)
     throw std::runtime_error("there are arrays '" + name +
                              "' of cells and of points: 'association' must name one");
-  if (ofCells || ofPoints) return ofCells;
-  if (!blocks_.empty())
-    throw std::runtime_error("there is no array '" + name + "'; the arrays are: " + names());
-  return std::nullopt;
+  return ofCells || ofPoints ? std::optional(ofCells) : std::nullopt;
 }
 
 std::vector<Fields::NamedArray> Fields::arrays() const {
@@ -222,12 +219,8 @@ int Fields::componentsOf(const std::string& name, bool cells) const {
 }
 
 Fields::Values Fields::valuesOf(const std::string& name, bool cells, int component) const {
-  if (blocks_.empty()) return {};
   const Array* array = find(name, cells);
-  if (array == nullptr) {
-    throw std::runtime_error("there is no array '" + name + "' of " + kindOf(cells) +
-                             "; the arrays are: " + names());
-  }
+  if (array == nullptr) return {};
   const int components = componentsOf(name, cells);
   const bool isHere =
       std::ranges::any_of(array->values, [](const StridedValues& values) { return values.first != nullptr; });
@@ -244,12 +237,12 @@ Fields::Values Fields::valuesOf(const std::string& name, bool cells, int compone
 
 std::vector<Block> Fields::placesOf(const std::string& name, bool cells) const {
   // What particles become is an array of all blocks, even before it is made.
-  const bool isOfAll = find(name, cells) == nullptr && has(name, cells);
-  const Values all = isOfAll ? Values{} : valuesOf(name, cells, magnitude);
-  const glm::dvec3 offset = offsetOf(name, cells);
+  const Array* array = find(name, cells);
   std::vector<Block> places;
+  if (array == nullptr && !has(name, cells)) return places;
+  const glm::dvec3 offset = offsetOf(name, cells);
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    if (isOfAll || all.blocks[i].first != nullptr)
+    if (array == nullptr || array->values[i].first != nullptr)
       places.push_back(blockAt(blocks_[i], cells, offset, &blocks_[i]));
   }
   return places;
@@ -259,7 +252,7 @@ std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int com
   const Values all = valuesOf(name, cells, component);
   const glm::dvec3 offset = offsetOf(name, cells);
   std::vector<Block> blocks;
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+  for (std::size_t i = 0; i < all.blocks.size(); ++i) {
     const StridedValues& values = all.blocks[i];
     if (values.first == nullptr) continue;
     Block& block = blocks.emplace_back(blockAt(blocks_[i], cells, offset, values.first));
@@ -271,7 +264,7 @@ std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int com
 
 bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const std::string& name,
                   std::optional<bool> given) {
-  // Ranks without blocks may not know the kind. All others agree on it.
+  // Some ranks may lack the array. All others agree on its kind.
   std::array<std::uint64_t, 2> kinds{0, 0};  // whether a rank has it as an array of points, and of cells
   comm.together([&] {
     const std::optional<bool> cells = given ? given : fields.associationOf(name);
@@ -286,9 +279,13 @@ bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const st
   std::array<std::uint64_t, 2> counts{fields.blocks().size(), 0};
   comm.together([&] { counts[1] = fields.placesOf(name, cells).size(); });
   comm.allReduceSum(counts);
-  if (counts[0] > 0 && counts[1] == 0)
-    throw Error(ErrorCode::InvalidArgument, "all blocks lack the array '" + name + "' of " + kindOf(cells));
-  return cells;
+  if (counts[0] == 0 || counts[1] > 0) return cells;
+  comm.together([&] {
+    const std::string kind = kinds[0] + kinds[1] > 0 ? "' of " + kindOf(cells) : "'";
+    if (!fields.blocks().empty() && !fields.has(name, cells))
+      throw std::runtime_error("there is no array '" + name + kind + "; the arrays are: " + fields.names());
+  });
+  throw Error(ErrorCode::InvalidArgument, "all blocks lack the array '" + name + "' of " + kindOf(cells));
 }
 
 }  // namespace vdi::catalyst

@@ -54,8 +54,10 @@ class Fields {
   bool hasDeposit(const std::string& name) const { return deposits_.contains(name); }
   void dropDeposits();
 
-  /// Whether the array of that name is one of cells; nullopt if this rank has neither blocks nor such an
-  /// array. Throws std::runtime_error if arrays of both kinds have the name, or none has it.
+  /// Whether this rank has the array, which some of its blocks may lack.
+  bool has(const std::string& name, bool cells) const;
+  /// Whether the array of that name is one of cells; nullopt if this rank has no such array. Throws
+  /// std::runtime_error if arrays of both kinds have the name.
   std::optional<bool> associationOf(const std::string& name) const;
   /// The names of all arrays, for messages: "cells 'V', points 'p'".
   std::string names() const;
@@ -74,15 +76,16 @@ class Fields {
 
   int componentsOf(const std::string& name, bool cells) const;  // 1 without blocks that have it
   /// An array's values where the simulation has them, one for each block; null where a block lacks them.
+  /// Empty if this rank lacks the array.
   struct Values {
     int type = VDI_CATALYST_F64;
     std::span<const StridedValues> blocks;
   };
-  /// The values of an array, which must exist unless there are no blocks. `component` is one of the array's,
-  /// `magnitude` or `phase`. Throws std::runtime_error if there is no such array or component.
+  /// The values of an array. `component` is one of the array's, `magnitude` or `phase`. Throws
+  /// std::runtime_error if the array has no such component.
   Values valuesOf(const std::string& name, bool cells, int component) const;
   /// The blocks that have the array, without its values: each has its place, the box that it owns, and the
-  /// number of its values. Their `data` are the addresses of this object's blocks. Throws as valuesOf does.
+  /// number of its values. Their `data` are the addresses of this object's blocks.
   std::vector<Block> placesOf(const std::string& name, bool cells) const;
   /// The blocks that have the array, with its values. They read these where they are; nothing is copied.
   /// Throws as valuesOf does.
@@ -97,7 +100,6 @@ class Fields {
   using Key = std::pair<bool, std::string>;  // whether it is one of cells, and the name
   const Array* find(const std::string& name, bool cells) const;
   glm::dvec3 offsetOf(const std::string& name, bool cells) const;
-  bool has(const std::string& name, bool cells) const;
   void put(std::map<Key, Array>& fresh) noexcept;
 
   std::vector<vdi_catalyst_block> blocks_;
@@ -121,9 +123,9 @@ class Fields::Change {
 /// The bytes of a scalar. Throws std::invalid_argument for a type that vdi_catalyst.h doesn't have.
 std::size_t bytesOf(int type);
 
-/// Collective: whether the array of that name is one of cells, unless `given` tells. Throws on all ranks as
-/// Fields::associationOf and valuesOf do, and Error{InvalidArgument} if ranks differ, or if all blocks lack
-/// the array.
+/// Collective: whether the array of that name is one of cells, unless `given` tells. A rank that lacks the
+/// array counts as one whose blocks lack it. Throws on all ranks as Fields::associationOf does, and if no
+/// rank has the array, all blocks lack it, or ranks have arrays of different kinds.
 bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const std::string& name,
                   std::optional<bool> given);
 

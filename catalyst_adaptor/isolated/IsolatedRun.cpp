@@ -312,11 +312,14 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
       return leaveOut(step);
     }
   }
+  // Scripts may use all fields. Where a rank lacks a named one, too, all ranks hand over all: their processes
+  // take one array after the other together, and a message about a missing array lists the others.
+  const bool namedAlone = meet<1>(self_.comm, {hasNamedFields() ? 0 : 1})[0] == 0;
   std::optional<StepWriter> data;
   const int code = guarded(
       self_, VDI_CATALYST_SCRIPT,
       [&] {
-        data.emplace(self_.fields.version(), self_.fields.blocks(), wantedFields(), parameters_.all());
+        data.emplace(self_.fields.version(), self_.fields.blocks(), fieldsOf(namedAlone), parameters_.all());
         process_->reserve(*data);
       },
       step);
@@ -353,20 +356,21 @@ int IsolatedRun::leaveOut(std::int64_t step) {
       step);
 }
 
-/// Scripts may use all fields, a JSON run those that it names.
-StepFields IsolatedRun::wantedFields() const {
+/// Whether this rank has the fields that a JSON run names.
+bool IsolatedRun::hasNamedFields() const {
+  const Fields& fields = self_.fields;
+  const auto has = [&](const std::string& name) { return fields.has(name, false) || fields.has(name, true); };
+  return options_.run && has(options_.run->field) && (!options_.run->when || has(options_.run->when->field));
+}
+
+/// The fields to hand over: all, or those alone that a JSON run names.
+StepFields IsolatedRun::fieldsOf(bool namedAlone) const {
   StepFields all;
   all.arrays = self_.fields.arrays();
   for (const auto& [name, particles] : self_.fields.particles()) all.particles.emplace_back(name, particles);
-  if (!options_.run) return all;
+  if (!namedAlone) return all;
   std::vector<std::string> names{options_.run->field};
   if (options_.run->when) names.push_back(options_.run->when->field);
-  const auto exists = [&](const std::string& name) {
-    return std::ranges::find(all.arrays, name, &Fields::NamedArray::name) != all.arrays.end() ||
-           self_.fields.particlesOf(name) != nullptr;
-  };
-  // The message about a missing array lists the others.
-  if (!std::ranges::all_of(names, exists)) return all;
   const auto isUnnamed = [&](const std::string& name) {
     return std::ranges::find(names, name) == names.end();
   };

@@ -66,7 +66,8 @@ class IsolatedRun {
   int checked(std::int64_t step);
   int handOver(std::int64_t step, double time, double now);
   int leaveOut(std::int64_t step);
-  StepFields wantedFields() const;
+  bool hasNamedFields() const;
+  StepFields fieldsOf(bool namedAlone) const;
   Setup setupOf(bool isGoingOn) const;
   double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
   bool isSteered() const { return options_.run && options_.run->stream && options_.run->stream->steer; }

@@ -1,7 +1,7 @@
 /* A simulation whose field lies in memory as real codes' fields do. Arguments: a JSON text or the name of a
  * script, the cells along each axis, the layouts' names, which are the arrays' names too, separated by
  * commas, and the number of steps. Each rank has a part, as MPI_Dims_create says. All bytes that belong to no
- * value are NaN.
+ * value are NaN. Odd ranks lack the array "partial", and have one of another name instead of "elsewhere".
  * The process takes the same memory for any one layout, so that what the adaptor takes can be seen. It prints
  * the bytes of the field. Exit status 0 if all went well. */
 #include <math.h>
@@ -123,6 +123,9 @@ int main(int argc, char** argv) {
   memset(pool, 0xFF, capacity);
   for (char* name = strtok(argv[3], ","); name != NULL && count < MOST; name = strtok(NULL, ","))
     arrays[count++] = lay(name, cells);
+  for (int i = 0; i < count; ++i) {
+    if (rank % 2 == 1 && strcmp(arrays[i].name, "elsewhere") == 0) arrays[i].name = "another";
+  }
 
   const size_t length = strlen(argv[1]);
   const int is_script = length > 3 && strcmp(argv[1] + length - 3, ".py") == 0;

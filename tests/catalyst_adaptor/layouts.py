@@ -41,6 +41,11 @@ def same():
     wide = {"range": [-1.5e12, 1.5e12], "opacities": [[-1.5e12, 0.0], [0.3e12, 0.05], [1.5e12, 0.8]]}
     assert run("integers", 30, colors=wide)[0] == run("integers_as_f64", 30, colors=wide)[0]
     assert run("staggered", 30)[0] != expected[:1]
+    # A rank that has no array of the name is one whose block lacks it.
+    partial = run("partial", 30)[0]
+    assert partial != expected[:1]
+    for given in ({}, {"association": "cells"}, {"when": {"min": "elsewhere", "below": 0}}, {"isolation": "process"}):
+        assert run("elsewhere", 30, **given)[0] == partial, given
 
 
 def ranks():
