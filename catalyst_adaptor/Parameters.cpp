@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 namespace vdi::catalyst {
 
@@ -25,49 +26,67 @@ std::int64_t fingerprintOf(const Parameter& parameter) {
   return static_cast<std::int64_t>(hash >> 1U);
 }
 
+[[noreturn]] void failFor(const Parameter& parameter, const char* what) {
+  throw std::invalid_argument("the parameter \"" + parameter.name + "\" " + what);
+}
+
 /// The value in force; nullopt after an error, which has been reported.
 std::optional<double> valueOf(Calls& self, Parameters& parameters, const char* name, Parameter parameter) {
+  int rank = 0;
+  MPI_Comm_rank(self.comm, &rank);
+  const Parameter* known = nullptr;  // on all ranks or on none, once they have agreed on the name
   int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
     require(name != nullptr, "a parameter needs a name");
     parameter.name = name;
-    Parameters::check(parameter);
+    parameters.prepare(parameter);
+    known = parameters.find(parameter.name);
+    if (known == nullptr && rank == 0) Parameters::checkValue(parameter);
   });
   if (code != VDI_CATALYST_OK) return std::nullopt;
-  double value = 0.0;
   code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
-    requireEqual(self.comm, fingerprintOf(parameter), "the ranks ask for different parameters");
-    value = parameters.declare(parameter);
+    requireEqual(self.comm, fingerprintOf(known != nullptr ? *known : parameter),
+                 "the ranks ask for different parameters");
   });
   if (code != VDI_CATALYST_OK) return std::nullopt;
+  double value = known != nullptr ? known->value : parameter.value;
   MPI_Bcast(&value, 1, MPI_DOUBLE, 0, self.comm);
+  if (known != nullptr) return value;
+  parameter.value = value;
+  parameters.declare(std::move(parameter));
   return value;
 }
 
 }  // namespace
 
-void Parameters::check(const Parameter& parameter) {
+const Parameter* Parameters::find(const std::string& name) const {
+  const auto found = std::ranges::find(all_, name, &Parameter::name);
+  return found != all_.end() ? &*found : nullptr;
+}
+
+void Parameters::prepare(const Parameter& parameter) {
+  if (const Parameter* known = find(parameter.name)) {
+    if (known->isWhole != parameter.isWhole) failFor(parameter, "was declared with another type");
+    return;
+  }
   const std::string& name = parameter.name;
   if (name.empty() || name.size() > longestName || name.find_first_not_of(letters) != std::string::npos)
     throw std::invalid_argument("a parameter's name has 1 to 64 letters, digits, \"_\", \"-\" and \".\"");
-  const auto fail = [&](const char* what) {
-    throw std::invalid_argument("the parameter \"" + name + "\" " + what);
-  };
-  if (!std::isfinite(parameter.low) || !std::isfinite(parameter.high)) fail("has bounds that aren't finite");
-  if (!(parameter.low <= parameter.value && parameter.value <= parameter.high)) fail("is out of its bounds");
+  if (!std::isfinite(parameter.low) || !std::isfinite(parameter.high))
+    failFor(parameter, "has bounds that aren't finite");
   constexpr double largestWhole = 9007199254740992.0;  // doubles represent all whole numbers up to it
   if (parameter.isWhole && std::max(std::abs(parameter.low), std::abs(parameter.high)) > largestWhole)
-    fail("has bounds beyond 2^53");
+    failFor(parameter, "has bounds beyond 2^53");
+  if (all_.size() >= mostParameters) throw std::invalid_argument("there are 64 parameters at most");
+  all_.reserve(mostParameters);
 }
 
-double Parameters::declare(const Parameter& parameter) {
-  const auto found = std::ranges::find(all_, parameter.name, &Parameter::name);
-  if (found == all_.end()) {
-    if (all_.size() >= mostParameters) throw std::invalid_argument("there are 64 parameters at most");
-    return all_.emplace_back(parameter).value;
-  }
-  if (found->isWhole != parameter.isWhole)
-    throw std::invalid_argument("the parameter \"" + parameter.name + "\" was declared with another type");
-  return found->value;
+void Parameters::checkValue(const Parameter& parameter) {
+  if (!(parameter.low <= parameter.value && parameter.value <= parameter.high))
+    failFor(parameter, "is out of its bounds");
+}
+
+void Parameters::declare(Parameter parameter) noexcept {
+  all_.push_back(std::move(parameter));
 }
 
 void Parameters::set(const std::map<std::string, double>& values) {

@@ -20,13 +20,16 @@ struct Parameter {
 
 class Parameters {
  public:
-  /// Throws std::invalid_argument for a parameter that can't be declared: because of its name or bounds, or a
-  /// value outside them.
-  static void check(const Parameter& parameter);
-
-  /// Returns the value in force, which is the parameter's own when its name is declared first. Throws
-  /// std::invalid_argument if there are too many parameters, or the name has another type already.
-  double declare(const Parameter& parameter);
+  /// The declared parameter of that name; null if there is none.
+  const Parameter* find(const std::string& name) const;
+  /// Throws std::invalid_argument if the parameter can't be declared, or not so again: because of its name,
+  /// bounds or type, or because there are too many. A declared one's bounds don't matter. `declare` can't
+  /// fail afterwards.
+  void prepare(const Parameter& parameter);
+  /// Throws std::invalid_argument if the value is outside the bounds.
+  static void checkValue(const Parameter& parameter);
+  /// Declares a parameter, which has been prepared.
+  void declare(Parameter parameter) noexcept;
   /// Sets declared parameters. A value outside the bounds becomes the nearest one inside.
   void set(const std::map<std::string, double>& values);
   /// All parameters in the order of declaration.

@@ -78,9 +78,10 @@ int main(int argc, char** argv) {
   FILE* said = fopen(path, "w");
   if (said == NULL) MPI_Abort(MPI_COMM_WORLD, 2);
   for (int step = 1; step <= MOST_STEPS; ++step) {
-    /* The first rank's value counts. */
-    const double level = vdi_catalyst_parameter_f64(catalyst, "level", rank == 0 ? 0.5 : 0.25, 0.0, 1.0);
-    const int64_t waves = vdi_catalyst_parameter_i64(catalyst, "waves", 3, 1, 9);
+    /* The first rank's value counts, and bounds only when the parameter is declared. */
+    const double low = step > 1 && rank == 0 ? NAN : 0.0;
+    const double level = vdi_catalyst_parameter_f64(catalyst, "level", rank == 0 ? 0.5 : NAN, low, 1.0);
+    const int64_t waves = vdi_catalyst_parameter_i64(catalyst, "waves", step > 1 ? 70 : 3, 1, 9);
     if (vdi_catalyst_parameter_i64(catalyst, "stop", 0, 0, 1) != 0) break;
     fprintf(said, "%d %.17g %lld\n", step, level, (long long)waves);
     fflush(said);
