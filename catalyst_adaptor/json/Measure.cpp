@@ -154,11 +154,15 @@ std::optional<Measure::Part> Measure::partOf(std::size_t index, const Block& blo
 
 void Measure::findParts(const comm::Communicator& comm, const Fields& fields, bool cells) {
   std::vector<Block> places;
-  std::vector<glm::dvec3> origins;
+  std::vector<std::pair<std::size_t, glm::dvec3>> sources;
+  const auto indexOf = [&](const Block& place) {
+    return static_cast<std::size_t>(static_cast<const vdi_catalyst_block*>(place.data) -
+                                    fields.blocks().data());
+  };
   const bool areNew = comm.anyTogether([&] {
     places = fields.placesOf(condition_.field, cells);
-    for (const Block& place : places) origins.push_back(place.origin);
-    return version_ != fields.version() || cells_ != cells || origins_ != origins;
+    for (const Block& place : places) sources.emplace_back(indexOf(place), place.origin);
+    return version_ != fields.version() || cells_ != cells || sources_ != sources;
   });
   if (!areNew) return;
   version_.reset();
@@ -166,14 +170,13 @@ void Measure::findParts(const comm::Communicator& comm, const Fields& fields, bo
   comm.together([&] {
     parts_.clear();
     for (const Block& place : places) {
-      const auto* block = static_cast<const vdi_catalyst_block*>(place.data);
-      std::optional<Part> part = partOf(static_cast<std::size_t>(block - fields.blocks().data()), place);
+      std::optional<Part> part = partOf(indexOf(place), place);
       if (part) parts_.push_back(std::move(*part));
     }
   });
   version_ = fields.version();
   cells_ = cells;
-  origins_ = std::move(origins);
+  sources_ = std::move(sources);
 }
 
 std::optional<double> Measure::of(const comm::Communicator& comm, const Fields& fields) {

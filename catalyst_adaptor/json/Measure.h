@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "catalyst_adaptor/Fields.h"
@@ -38,10 +39,11 @@ class Measure {
 
   config::RunCondition condition_;
   std::vector<Part> parts_;
-  /// The blocks whose parts these are: their version, kind of values, and places of first values.
+  /// The blocks whose parts these are: their version, kind of values, and each one's index and place of its
+  /// first value.
   std::optional<std::uint64_t> version_;
   bool cells_ = false;
-  std::vector<glm::dvec3> origins_;
+  std::vector<std::pair<std::size_t, glm::dvec3>> sources_;
 
   friend class Sweep;
 };

@@ -231,6 +231,29 @@ TEST_CASE("blocks that lack the array don't count") {
   CHECK_THROWS(measure.of(world, fields));
 }
 
+TEST_CASE("a measure follows the array to another block with the same first point") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto blockOf = [&](double spacing) {
+    return vdi_catalyst_block{
+        {2, 2, 2}, {0, 0, 0}, {0, 0, 0}, {4.0 * world.rank(), 0.0, 0.0}, {spacing, spacing, spacing}};
+  };
+  Fields fields;
+  fields.setBlocks({blockOf(1.0), blockOf(0.5)});
+  Measure measure(
+      {.measure = Kind::Max, .field = "f", .cells = {}, .component = -1, .above = {}, .below = {}});
+  const std::vector<double> coarse(27, 2.0);
+  const std::vector<double> fine(27, 3.0);
+  for (const bool isFine : {false, true}) {
+    const auto in = [&](std::size_t block, const void* data) {
+      return fields.inOrder(fields.blocks()[block], VDI_CATALYST_F64, false, 1, data);
+    };
+    fields.set(Fields::arrayChange(
+        "f", false, VDI_CATALYST_F64,
+        {in(0, isFine ? nullptr : coarse.data()), in(1, isFine ? fine.data() : nullptr)}));
+    CHECK(measure.of(world, fields).value() == (isFine ? 3.0 : 2.0));
+  }
+}
+
 TEST_CASE("a phase is measured, and an offset moves the parts that count") {
   const comm::Communicator world = comm::Communicator::world();
   std::vector<double> pairs;
