@@ -32,12 +32,15 @@ float costOf(StoredPreSegment a, vec4 x, StoredPreSegment b, vec4 y) {
   float second = b.span.y - b.span.x;
   float whole = b.span.y - a.span.x;
   float gap = b.span.x - a.span.y;
-  float weight = weightBehind(a.before) / whole;
+  float weight = weightBehind(a.before);
+  // No product of two lengths is formed, because it may exceed a float's range.
+  float perLength = 1.0 / whole;
+  float shareOfFirst = first * perLength;
   // Without a gap, the formula at the end simplifies to this.
-  if (!(gap > 0.0)) return 2.0 * weight * first * second * differenceOf(x, y);
-  if (placeOf(a, x, b, y) != placeOfBoth) return 2.0 * weight * whole * min(amountOf(a, x), amountOf(b, y));
-  vec4 both = first * x + second * y;
-  return weight * (first * differenceOf(whole * x, both) + second * differenceOf(whole * y, both) +
+  if (!(gap > 0.0)) return 2.0 * weight * shareOfFirst * second * differenceOf(x, y);
+  if (placeOf(a, x, b, y) != placeOfBoth) return 2.0 * weight * min(amountOf(a, x), amountOf(b, y));
+  vec4 both = shareOfFirst * x + (second * perLength) * y;
+  return weight * (first * differenceOf(x, both) + second * differenceOf(y, both) +
                    gap * differenceOf(vec4(0.0), both));
 }
 

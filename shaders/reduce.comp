@@ -112,8 +112,13 @@ void main() {
   if (count <= maxCount || count <= push.subgroupCapacity) return;
   preSegments = preSegmentsFrom(push.preSegments, push.preSegmentOffsets.at[list]);
   sumCosts(count);
+  bool isStuck = false;
   while (count > maxCount) {
     if (costsFinite == 0.0) break;  // only cuts are left, and these do not exceed the limit
+    uint before = count;
     count = mergeOnce(count, count - maxCount, limitOf(costSum, costsFinite));
+    // As in reduce_subgroup.comp.
+    if (isStuck && count == before) break;
+    isStuck = count == before;
   }
 }

@@ -117,11 +117,17 @@ uint mergeOnce(uint count, uint excess, float limit, out float others) {
 
 void mergeCheapest(uint count, uint maxCount, uint cuts) {
   float mine = findCosts(count);
+  bool isStuck = false;
   while (count > maxCount) {
     uint finite = count - 1u - cuts;
     if (finite == 0u) break;  // only cuts are left, and these do not exceed the limit
     float limit = limitOf(subgroupAdd(mine), float(finite));
+    uint before = count;
     count = mergeOnce(count, count - maxCount, limit, mine);
+    // The limit follows the costs of the round before, so a round may merge nothing. Two such rounds mean
+    // costs that aren't numbers, which must not stop the device.
+    if (isStuck && count == before) break;
+    isStuck = count == before;
     if (count > maxCount) findCosts(count);
   }
 }

@@ -21,6 +21,7 @@
 #include "vdi/gpu/PipelineCacheFile.h"
 #include "vdi/gpu/ReducePass.h"
 #include "vdi/gpu/ScanPass.h"
+#include "vdi/gpu/VolumePages.h"
 #include "vdi/gpu/VulkanDevice.h"
 
 using namespace vdi;
@@ -86,6 +87,18 @@ TEST_CASE("a texture limit below the device's is respected") {
   const auto small = Device::create(request);
   CHECK(small->limits().maxImageDimension3D == 24);
   CHECK_THROWS_AS(SampledImage(small, {25, 1, 1}, VK_FORMAT_R8_UNORM), Error);
+}
+
+TEST_CASE("tall and flat volumes fit a texture that is no larger than they are") {
+  for (const glm::uvec3 dims :
+       {glm::uvec3(512, 512, 1030), glm::uvec3(1024, 16, 1100), glm::uvec3(16, 1024, 1100)}) {
+    std::vector<VolumePiece> pieces(1);
+    pieces[0].dims = dims;
+    pieces[0].format = VK_FORMAT_R32_SFLOAT;
+    const std::vector<PageShape> pages = placeInPages(*device(), pieces);
+    REQUIRE(pages.size() == 1);
+    CHECK(pages[0].extent == dims);
+  }
 }
 
 TEST_CASE("validation messages name the faulty object") {
@@ -198,7 +211,7 @@ TEST_CASE("a prefix sum beyond 32 bits is detected") {
 namespace {
 
 /// Pre-segments of many lists, as the write step leaves them: none, few, many, and more than fit a subgroup;
-/// some all equal, some with gaps, some with cuts at gaps.
+/// some all equal, some with gaps, some with cuts at gaps. Lengths are up to `unit`.
 struct PreSegments {
   static constexpr std::uint32_t maxCount = 12;  // N_S
   std::vector<shared::StoredPreSegment> preSegments;
@@ -207,7 +220,7 @@ struct PreSegments {
   std::vector<std::uint32_t> left;
   std::vector<std::uint32_t> leftOffsets{0};
 
-  explicit PreSegments(std::uint32_t lists) {
+  explicit PreSegments(std::uint32_t lists, float unit = 1.0F) {
     std::mt19937 generator(11);
     const auto below = [&](std::uint32_t end) { return static_cast<std::uint32_t>(generator() % end); };
     const auto random = [&] { return static_cast<float>(below(1000) + 1) / 1024.0F; };
@@ -226,7 +239,8 @@ struct PreSegments {
         const float back = at + (alike ? 0.5F : random());
         const float depth = alike ? 0.25F : 0.5F * random();
         const glm::vec3 color = alike ? glm::vec3(0.125F) : 0.3F * glm::vec3(random(), random(), random());
-        preSegments.push_back({{at, back}, before, 0.0F, {color, gap && cuts ? -depth : depth}});
+        preSegments.push_back(
+            {{unit * at, unit * back}, before, 0.0F, {color, gap && cuts ? -depth : depth}});
         before *= std::exp2(-depth);
         at = back;
       }
@@ -245,7 +259,8 @@ Buffer uploaded(const std::vector<T>& values) {
   return buffer;
 }
 
-std::vector<shared::Segment> reduced(const PreSegments& lists, ReducePass::Subgroups subgroups) {
+std::vector<shared::Segment> reduced(const PreSegments& lists, ReducePass::Subgroups subgroups,
+                                     float unit = 1.0F) {
   const Buffer preSegments = uploaded(lists.preSegments);
   const Buffer offsets = uploaded(lists.offsets);
   const Buffer written = uploaded(lists.written);
@@ -261,7 +276,7 @@ std::vector<shared::Segment> reduced(const PreSegments& lists, ReducePass::Subgr
   constants.offsets = leftOffsets.address();
   constants.segments = segments.address();
   constants.guard = guard.address();
-  constants.step = 0.125F;
+  constants.step = 0.125F * unit;
   constants.listCount = static_cast<std::uint32_t>(lists.written.size());
   ReducePass pass(device(), subgroups);
   Commands commands(device());
@@ -273,6 +288,26 @@ std::vector<shared::Segment> reduced(const PreSegments& lists, ReducePass::Subgr
 }
 
 }  // namespace
+
+TEST_CASE("lengths whose products exceed a float's range merge as short ones do") {
+  constexpr float unit = 0x1p70F;
+  const PreSegments lists(400);
+  const PreSegments longLists(400, unit);
+  for (const auto subgroups : {ReducePass::Subgroups::No, ReducePass::Subgroups::Yes}) {
+    if (subgroups == ReducePass::Subgroups::Yes && device()->limits().subgroupSize == 0) continue;
+    const std::vector<shared::Segment> expected = reduced(lists, subgroups);
+    const std::vector<shared::Segment> found = reduced(longLists, subgroups, unit);
+    REQUIRE(found.size() == expected.size());
+    std::uint32_t wrong = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      wrong += found[i].front == unit * expected[i].front && found[i].back == unit * expected[i].back &&
+                       found[i].opacity == expected[i].opacity
+                   ? 0
+                   : 1;
+    }
+    CHECK(wrong == 0);
+  }
+}
 
 TEST_CASE("subgroups merge pre-segments as single invocations do") {
   if (device()->limits().subgroupSize == 0) {

@@ -171,14 +171,14 @@ TEST_CASE("no blocks, empty blocks, a transparent function, one supersegment, co
   CHECK(highestOpacity(flatten(*single)) > 0.5F);
 }
 
-TEST_CASE("scales of 1e-9 and 1e9 give the picture of scale 1") {
+TEST_CASE("scales of 1e-9, 1e9 and 1e21 give the picture of scale 1") {
   const auto value = [](const glm::ivec3& i) {
     return static_cast<float>((i.x * 7 + i.y * 3 + i.z * 5) % 11) / 11.0F;
   };
   const GenerateSettings settings = test::smallSettings();
   Image unit;
   std::size_t segments = 0;
-  for (const double scale : {1.0, 1e-9, 1e9}) {
+  for (const double scale : {1.0, 1e-9, 1e9, 1e21}) {
     INFO(scale);
     VdiGenerator generator(device(), comm::Communicator::serial());
     generator.setBlocks({cube(12, scale / 11.0, value)});
@@ -384,6 +384,58 @@ TEST_CASE("values beyond single precision: a right picture or an error") {
   CHECK(codeOf([&] {
           generator.renderVolume(test::oblique(), test::threeHues(1.0), test::smallSettings(16, 12));
         }) == ErrorCode::InvalidArgument);
+}
+
+TEST_CASE("a large negative fill value leaves the other values what they are") {
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  const auto pictureOf = [&](ScalarType type, double fill, double top) {
+    const synthetic::Lattice lattice{glm::ivec3(12), glm::dvec3(0.0), glm::dvec3(1.0 / 11.0), type,
+                                     Joint::SharedPoints};
+    generator.setBlocks(
+        {synthetic::makeBlock(lattice, {{0, 0, 0}, glm::ivec3(12), 0}, [&](const glm::ivec3& i) {
+          return i == glm::ivec3(3, 4, 5) ? fill : top * ((i.x * 7 + i.y * 3 + i.z * 5) % 11) / 11.0;
+        })});
+    return *generator.renderVolume(test::oblique(), test::threeHues(top), test::smallSettings());
+  };
+  struct Case {
+    ScalarType type;
+    double fill;
+    double top;
+  };
+  for (const Case& c : {Case{ScalarType::F64, -1e30, 1.0}, Case{ScalarType::F64, -9999.0, 0.02},
+                        Case{ScalarType::I32, -2147483648.0, 1100.0}}) {
+    INFO(toString(c.type) << " " << c.fill);
+    const Image expected = pictureOf(ScalarType::F32, c.fill, c.top);
+    const Image seen = pictureOf(c.type, c.fill, c.top);
+    CHECK(highestOpacity(expected) > 0.5F);
+    float worst = 0.0F;
+    for (std::size_t i = 0; i < seen.rgba.size(); ++i)
+      worst = std::max(worst, glm::length(seen.rgba[i] - expected.rgba[i]));
+    CHECK(worst < 1.0F / 255.0F);
+  }
+}
+
+TEST_CASE("a camera too far away and a ray too long for the device are refused") {
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  const GenerateSettings settings = test::smallSettings(16, 12);
+  generator.setBlocks(
+      {cube(8, 1.0 / 7.0, [](const glm::ivec3& i) { return 0.1F * static_cast<float>(i.x); })});
+  Camera far = test::oblique(true);
+  far.position = far.focalPoint + 1e6 * (far.position - far.focalPoint);
+  CHECK(codeOf([&] { generator.generate(far, test::threeHues(1.0), settings); }) ==
+        ErrorCode::InvalidArgument);
+  if (!device()->isCpu()) return;
+  const synthetic::Lattice lattice{
+      {2, 2, 40000}, glm::dvec3(0.0), {20000.0, 20000.0, 1.0}, ScalarType::U8, Joint::SharedPoints};
+  generator.setBlocks({synthetic::makeBlock(lattice, {{0, 0, 0}, {2, 2, 40000}, 0},
+                                            [](const glm::ivec3& i) { return i.z > 39990 ? 100.0 : 0.0; })});
+  const Camera along = Camera::framing(generator.scene().bounds, {0.0, 0.0, -1.0}, {0.0, 1.0, 0.0});
+  GenerateSettings fine = settings;
+  fine.samplesPerVoxel = 2.0;
+  CHECK(codeOf([&] { generator.renderVolume(along, test::threeHues(100.0), fine); }) ==
+        ErrorCode::InvalidArgument);
+  // One that the device can take shows what lies at its end.
+  CHECK(highestOpacity(*generator.renderVolume(along, test::threeHues(100.0), settings)) > 0.5F);
 }
 
 TEST_CASE("wrong arguments are refused with their names") {

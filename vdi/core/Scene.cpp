@@ -57,6 +57,11 @@ DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPe
   return lattice;
 }
 
+bool floatsResolve(const DepthLattice& lattice) {
+  constexpr double farthest = 0x1p21;  // in samples: floats resolve an eighth of one there
+  return lattice.first <= farthest * lattice.step;
+}
+
 bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice) {
   double longest = 0.0;  // component of any ray's direction, which is linear in the pixel's coordinates
   for (int corner = 0; corner < 4; ++corner) {

@@ -39,6 +39,9 @@ struct DepthLattice {
 /// [1/64, 64] or when a ray would need more than 2^24 samples.
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel);
 
+/// Whether depths as floats tell the lattice's first samples apart. They don't if the camera is far away.
+bool floatsResolve(const DepthLattice& lattice);
+
 /// The distance beyond its owned box, in its spacings, up to which a block with neighbours there has values.
 /// Gradients need that much: a voxel on each side of a sample's middle.
 inline constexpr double valueReach = 1.0;

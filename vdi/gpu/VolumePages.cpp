@@ -21,7 +21,7 @@ namespace {
 class Packer {
  public:
   Packer(std::uint32_t side, std::uint32_t maxDepth, std::uint64_t maxTexels)
-      : side_(side), maxDepth_(std::min<std::uint64_t>(maxDepth, maxTexels / (std::uint64_t{side} * side))) {}
+      : side_(side), maxDepth_(maxDepth), maxTexels_(maxTexels) {}
 
   /// Returns false if the page is full.
   bool place(const glm::uvec3& dims, glm::uvec3& at) {
@@ -34,19 +34,22 @@ class Packer {
       rowHeight_ = 0;
       layerDepth_ = 0;
     }
-    if (cursor_.z + dims.z > maxDepth_) return false;
+    // A page is only as large as what it holds, which may be narrower than `side`.
+    const glm::uvec3 used = glm::max(used_, cursor_ + dims);
+    if (used.z > maxDepth_ || volumeOf(used) > maxTexels_) return false;
     at = cursor_;
     cursor_.x += dims.x;
     rowHeight_ = std::max(rowHeight_, dims.y);
     layerDepth_ = std::max(layerDepth_, dims.z);
-    used_ = glm::max(used_, at + dims);
+    used_ = used;
     return true;
   }
   const glm::uvec3& used() const { return used_; }
 
  private:
   std::uint32_t side_;
-  std::uint64_t maxDepth_;
+  std::uint32_t maxDepth_;
+  std::uint64_t maxTexels_;
   glm::uvec3 cursor_{0};
   std::uint32_t rowHeight_ = 0;
   std::uint32_t layerDepth_ = 0;
@@ -93,7 +96,10 @@ ValueMap valueMapOf(const Block& block) {
                     toString(block.type), range.min, range.max, maximum));
   }
   if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0, false, range};
-  return {range.max - range.min, range.min, false, range};
+  // Texels count from 0, or from the value nearest to it: floats resolve small values best, and a large
+  // negative fill value leaves the others what they are.
+  const double offset = std::clamp(0.0, range.min, range.max);
+  return {std::max(range.max - offset, offset - range.min), offset, false, range};
 }
 
 std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block) {

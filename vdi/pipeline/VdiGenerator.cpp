@@ -1,6 +1,7 @@
 // The stages of a frame, and its outcome.
 #include "vdi/pipeline/VdiGenerator.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <array>
@@ -31,10 +32,37 @@ namespace {
 
 constexpr int root = 0;
 
-/// Whether depths of the settings' samples have codes (depthCodeFor).
-bool hasDepthCode(const Scene& scene, const Camera& camera, const GenerateSettings& settings) {
-  const View view = viewWithMargin(scene, camera, settings);
-  return depthCodeFor(depthLattice(scene, view, settings.samplesPerVoxel)).step > 0.0F;
+/// Throws Error{InvalidArgument} if the device can't tell the samples apart, or take all of them.
+void requireTractable(const DepthLattice& lattice, const gpu::Device& device) {
+  if (!floatsResolve(lattice)) {
+    throw Error(
+        ErrorCode::InvalidArgument,
+        fmt::format("the camera is {:.3g} away from the scene, and one sample is {:.3g} long: move it "
+                    "nearer, or take fewer samples per voxel",
+                    lattice.first, lattice.step));
+  }
+  // Lavapipe silently ends an invocation's loops after 65535 passes.
+  constexpr std::uint32_t mostOnCpu = 60000;
+  if (device.isCpu() && lattice.count > mostOnCpu) {
+    throw Error(
+        ErrorCode::InvalidArgument,
+        fmt::format("a ray would need {} samples, and a CPU device takes {} at most: take fewer samples "
+                    "per voxel",
+                    lattice.count, mostOnCpu));
+  }
+}
+
+/// Whether depths of the settings' samples have codes (depthCodeFor), and the device can take them.
+bool hasDepthCode(const Scene& scene, const Camera& camera, const GenerateSettings& settings,
+                  const gpu::Device& device) {
+  const DepthLattice lattice =
+      depthLattice(scene, viewWithMargin(scene, camera, settings), settings.samplesPerVoxel);
+  try {
+    requireTractable(lattice, device);
+  } catch (const Error&) {
+    return false;
+  }
+  return depthCodeFor(lattice).step > 0.0F;
 }
 
 /// The settings' rate, or the least power of two times it at which samples are slabs: only slabs show the
@@ -123,7 +151,7 @@ struct VdiGenerator::State {
         own.samplesPerVoxel = steps->samplingRate(table, settings.region);
       // The compact form matters more than extra samples.
       while (settings.samplesPerVoxel == automaticRate && own.samplesPerVoxel > 1.0 &&
-             !hasDepthCode(scene, camera, own))
+             !hasDepthCode(scene, camera, own, *device))
         own.samplesPerVoxel *= 0.5;
       if (settings.blending.mode == BlendMode::Isosurface)
         own.samplesPerVoxel = rateOfSlabs(scene, camera, own);
@@ -131,6 +159,7 @@ struct VdiGenerator::State {
       prepared =
           std::make_unique<Prepared>(Prepared{view, depthLattice(scene, view, own.samplesPerVoxel),
                                               own.samplesPerVoxel, std::move(table), simplified(function)});
+      requireTractable(prepared->lattice, *device);
       steps->requireSpans(prepared->table);
     });
     mine = {};
