@@ -67,10 +67,11 @@ void maskList(uint list, uint first, uint count, bool leans) {
   float reach = 0.0;
   uint64_t mask = 0ul;
   RenderSegmentArray segments = renderSegmentsFrom(push.segments, first);
+  UintArray slopesOfList = uintsFrom(push.slopes, first);
   ivec2 pixel = ivec2(int(list) % push.lists.x, int(list) / push.lists.x);
   for (uint i = 0u; i < count; ++i) {
     RenderSegment segment = segments.at[i];
-    vec4 slopes = leans ? segmentSlopes(push.slopes.at[first + i]) : vec4(0.0);
+    vec4 slopes = leans ? segmentSlopes(slopesOfList.at[i]) : vec4(0.0);
     vec2 ends = vec2(segment.front, segment.back);
     // An end on a face doesn't count as reach: it's a list's first front or last back, and all intersections
     // that come that far look at these.

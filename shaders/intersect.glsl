@@ -127,7 +127,7 @@ Leaning segmentFrom(uint slot, int i, int more, int step) {
 // Prepares a list to be read. Returns the index of its last supersegment.
 int useList(ListHead head) {
   listSegments = segmentWordsFrom(params.segments, head.first);
-  listSlopes = UintArray(uint64_t(params.slopes) + 4ul * head.first);
+  listSlopes = uintsFrom(params.slopes, head.first);
   return int(segmentCount(head)) - 1;
 }
 

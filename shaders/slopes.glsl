@@ -25,16 +25,17 @@ struct Run {
 
 struct SlopeList {
   RenderSegmentArray segments;
-  uint first;  // of all supersegments
+  UintArray slopes;
   uint count;
 };
 
 SlopeList slopeListOf(ivec2 pixel) {
   if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, push.lists)))
-    return SlopeList(push.segments, 0u, 0u);
+    return SlopeList(push.segments, push.slopes, 0u);
   uint list = uint(pixel.y) * uint(push.lists.x) + uint(pixel.x);
   ListHead head = push.heads.at[list];
-  return SlopeList(renderSegmentsFrom(push.segments, head.first), head.first, segmentCount(head));
+  return SlopeList(renderSegmentsFrom(push.segments, head.first), uintsFrom(push.slopes, head.first),
+                   segmentCount(head));
 }
 
 Run runFrom(SlopeList list, uint first) {
@@ -122,7 +123,7 @@ void addNeighbour(SlopeList list, SlopeNeighbour neighbour, int axis) {
     float place = hasOther ? placeOf(neighbour.list, other, walk, 0.0) : nowhere;
     for (uint i = own.first; i <= own.last; ++i) {
       RenderSegment segment = list.segments.at[i];
-      uint word = push.slopes.at[list.first + i];
+      uint word = list.slopes.at[i];
       word = withCombined(word, 8 * axis, segment.front, place, neighbour);
       before += segmentDepth(segment);
       if (hasOther) {
@@ -133,7 +134,7 @@ void addNeighbour(SlopeList list, SlopeNeighbour neighbour, int axis) {
         float change = isFrontHalf ? 0.0 : other.opticalDepth - own.opticalDepth;
         place = placeOf(neighbour.list, other, walk, before + change);
       }
-      push.slopes.at[list.first + i] =
+      list.slopes.at[i] =
           withCombined(word, 16 + 8 * axis, segment.back, place, neighbour);
     }
     first = own.last + 1u;
@@ -157,10 +158,10 @@ void fade(SlopeList list, float footprint) {
       RenderSegment behind = list.segments.at[i + 1u];
       if (behind.front <= segment.back) next = opacityOf(behind.density * footprint);
     }
-    uint word = push.slopes.at[list.first + i];
+    uint word = list.slopes.at[i];
     word = withFaded(withFaded(word, 0, max(own, previous)), 8, max(own, previous));
     word = withFaded(withFaded(word, 16, max(own, next)), 24, max(own, next));
-    push.slopes.at[list.first + i] = word;
+    list.slopes.at[i] = word;
     previous = next > 0.0 ? own : 0.0;
   }
 }
@@ -171,12 +172,12 @@ void putOnFaces(SlopeList list, BoxPassage passage) {
   const uint bothOnFace = onFace | onFace << 8;
   uint last = list.count - 1u;
   if (isOnFace(list.segments.at[0].front, passage.enter)) {
-    uint word = push.slopes.at[list.first];
-    push.slopes.at[list.first] = bitfieldInsert(word, bothOnFace, 0, 16);
+    uint word = list.slopes.at[0];
+    list.slopes.at[0] = bitfieldInsert(word, bothOnFace, 0, 16);
   }
   if (isOnFace(list.segments.at[last].back, passage.leave)) {
-    uint word = push.slopes.at[list.first + last];
-    push.slopes.at[list.first + last] = bitfieldInsert(word, bothOnFace, 16, 16);
+    uint word = list.slopes.at[last];
+    list.slopes.at[last] = bitfieldInsert(word, bothOnFace, 16, 16);
   }
 }
 

@@ -48,7 +48,9 @@ struct StoredForm {
 
 #ifdef __cplusplus
 // The encoding's number, for the constant `encoding` of store.glsl.
-inline uint encodingOf(const StoredForm& form) { return form.depthStep > 0.0F ? 1 : 0; }
+inline uint encodingOf(const StoredForm& form) {
+  return form.depthStep > 0.0F ? 1 : 0;
+}
 // preSegmentsFrom and segmentsFrom use these sizes.
 static_assert(sizeof(StoredPreSegment) == 32 && sizeof(Segment) == 24);
 #endif
@@ -59,23 +61,40 @@ VDI_SHARED_END
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer PreSegmentArray {
   StoredPreSegment at[];
 };
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray { Segment at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CompactArray { uvec2 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer SegmentArray {
+  Segment at[];
+};
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer CompactArray {
+  uvec2 at[];
+};
 struct FourCompact {
   uvec4 first;
   uvec4 second;
 };
-layout(buffer_reference, scalar, buffer_reference_align = 32) buffer FourCompactArray { FourCompact at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray { uint at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray { float at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4Array { vec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 32) buffer FourCompactArray {
+  FourCompact at[];
+};
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray {
+  uint at[];
+};
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer FloatArray {
+  float at[];
+};
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4Array {
+  vec4 at[];
+};
 
 // Arrays may exceed 4 GiB. A driver may compute the position of a large index in 32 bits: an H200 gave wrong
 // lists that way. So indices of a list's elements count from its first one.
 PreSegmentArray preSegmentsFrom(PreSegmentArray all, uint first) {
   return PreSegmentArray(uint64_t(all) + 32ul * first);
 }
-SegmentArray segmentsFrom(SegmentArray all, uint first) { return SegmentArray(uint64_t(all) + 24ul * first); }
+SegmentArray segmentsFrom(SegmentArray all, uint first) {
+  return SegmentArray(uint64_t(all) + 24ul * first);
+}
+UintArray uintsFrom(UintArray all, uint first) {
+  return UintArray(uint64_t(all) + 4ul * first);
+}
 #endif
 
 #endif
