@@ -5,7 +5,8 @@
     vdi.segments["front"][vdi.offsets[0]:vdi.offsets[1]]      # the depths at which the first list's supersegments begin
     picture, depth = vdi.render(vdi.camera.azimuth(20.0))     # float32, [height][width][4] and [height][width]
 
-Reading and rendering need neither VTK nor ParaView. pv_vdi.catalyst hands a simulation's arrays to ParaView's in situ engine.
+Reading and rendering need neither VTK nor ParaView. pv_vdi.catalyst hands a simulation's arrays to the in situ engine, which
+makes VDIs by scripts in ParaView or by a JSON text.
 """
 
 import json

@@ -227,18 +227,18 @@ class Catalyst:
         self._kept[name] = kept
 
     def wants(self, step, time=0.0):
-        """Whether a script will do anything at this step, the same on all ranks; if not, there is no need to call execute."""
+        """Whether this step makes anything, the same on all ranks; if not, there is no need to call execute."""
         return self._library.vdi_catalyst_wants(self._handle, step, time) != 0
 
     def execute(self, step, time=0.0):
-        """Runs the scripts on the blocks as they are now. `step` is the same on all ranks."""
+        """Makes what the scripts or the JSON ask for, of the blocks as they are now. `step` is the same on all ranks."""
         self._check(self._library.vdi_catalyst_execute(self._handle, step, time))
 
     def parameter(self, name, value, low, high):
-        """A number from `low` to `high` that viewers may change, where a script lets them. Returns the value in force, the same
-        on all ranks: `value`, as the first call had it, until a viewer sets another. It takes whole numbers only where all
-        three are of type int. To be called at each step, on all ranks; values change in execute alone. Raises ValueError unless
-        `value` lies between finite bounds."""
+        """A number from `low` to `high` that viewers may change, where a script or the JSON lets them. Returns the value in
+        force, the same on all ranks: `value`, as the first call had it, until a viewer sets another. It takes whole numbers
+        only where all three are of type int. To be called at each step, on all ranks; values change in execute alone. Raises
+        ValueError unless `value` lies between finite bounds."""
         whole = all(isinstance(number, int) for number in (value, low, high))
         if not (low <= value <= high) or abs(low) == float("inf") or abs(high) == float("inf"):
             raise ValueError("the parameter '%s' is %s, not from %s to %s" % (name, value, low, high))
@@ -246,7 +246,7 @@ class Catalyst:
         return ask(self._handle, name.encode(), value, low, high)
 
     def close(self):
-        """Ends the scripts and the engine, before MPI is finalized. A second call does nothing."""
+        """Ends the run and its engine, before MPI is finalized. A second call does nothing."""
         if self._handle:
             handle, self._handle = self._handle, ctypes.c_void_p()
             self._kept = {}
