@@ -1,4 +1,4 @@
-// The .vdi file. docs/format.md has the byte map; static_asserts in VdiFile.cpp guard it.
+// The .vdi file. docs/format.md has the byte map; static_asserts in VdiLayout.h guard it.
 #pragma once
 
 #include <cstddef>
