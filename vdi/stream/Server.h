@@ -1,4 +1,4 @@
-// Offers frames to any number of viewers, by HTTP and WebSocket on one port. docs/live.md has the protocol.
+// Offers frames to many viewers, by HTTP and WebSocket on one port. docs/live.md has the protocol.
 #pragma once
 
 #include <cstdint>
