@@ -1,4 +1,4 @@
-// What a simulation hands over to the process that makes its frames arrives as it was.
+// Tests that a step's data reach the process unchanged.
 #include "catalyst_adaptor/isolated/StepData.h"
 
 #include <array>

@@ -1,4 +1,4 @@
-"""Runs a simulation through Catalyst 2's implementation vdi, and through the adaptor itself: the same files, bit by bit.
+"""Runs a simulation through Catalyst 2's implementation vdi, and through the adaptor itself: the same files, bit for bit.
 
     catalyst2.py same LAYOUT LAUNCHER... PROGRAM
     catalyst2.py script LAUNCHER... PROGRAM
@@ -37,7 +37,7 @@ SAYS = ["has neither scripts nor vdi/json",
 
 
 def run(folder, *command):
-    """What the command says, in a new folder."""
+    """The command's output, run in a new folder."""
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(folder)
     done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=100,

@@ -1,6 +1,6 @@
 """Runs an example's program, or compares what it has made on several numbers of ranks.
 
-    examples.py run FOLDER VDI_JSON LAUNCHER... PROGRAM...   with the adaptor and without it: the same result, bit by bit
+    examples.py run FOLDER VDI_JSON LAUNCHER... PROGRAM...   with the adaptor and without it: the same result, bit for bit
     examples.py compare FOLDER FOLDER                        two such runs: the same result, the same pictures
 """
 

@@ -21,7 +21,7 @@ SCRIPT = 3
 
 
 class Run:
-    """What a simulation has printed: the code of each step, the microseconds that it took, and lines of the adaptor."""
+    """The output of a simulation: the code of each step, the microseconds that it took, and lines of the adaptor."""
 
     def __init__(self, what, steps, **environment):
         text = what if isinstance(what, str) else json.dumps({**SMALL, **what})

@@ -1,4 +1,4 @@
-"""What the run of catalyst_json_log has left: its log, text and picture of it, and links. Arguments: vdi, the folder."""
+"""Checks the files of catalyst_json_log's run: its log, text and picture of it, and links. Arguments: vdi, the folder."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What json_same.json asks for, as a script: the files are the same."""
+"""json_same.json as a script: the files are the same."""
 
 import os
 

@@ -1,4 +1,4 @@
-// The communicator on any number of ranks, of which every one runs every line.
+// Tests the communicator on any number of ranks. Every rank runs every line.
 #include <mpi.h>
 #include <sys/mman.h>
 #include <sys/resource.h>

@@ -1,4 +1,4 @@
-// What vdi.json can say, and what is refused.
+// Fields that vdi.json may have, and mistakes that are refused.
 #include <unistd.h>
 
 #include <algorithm>
@@ -437,7 +437,7 @@ TEST_CASE("text is told from a file's name") {
 }
 
 TEST_CASE("the unit distance is ParaView's") {
-  // Of a cube of 10 x 10 x 10 voxels: the diagonal of a voxel.
+  // For a cube of 10³ voxels it is a voxel's diagonal.
   CHECK(unitDistanceOf({glm::dvec3(0.0), glm::dvec3(2.0)}, 0.008) == Approx(std::sqrt(3.0) * 0.2));
   CHECK(unitDistanceOf(Box(), 1.0) == 1.0);
 }

@@ -1,4 +1,4 @@
-// What is said of a VDI before it is made.
+// Estimates of a VDI's size and time.
 #include "tests/Catch.h"
 #include "vdi/core/Estimate.h"
 

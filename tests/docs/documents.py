@@ -1,4 +1,4 @@
-"""What the tests of the snippets of README.md and docs/*.md share.
+"""Shared by the tests of the snippets of README.md and docs/*.md.
 
 Each snippet in C, Fortran, CMake, Python and JSON needs a test, and each test needs its snippet.
 Arguments: a part (core, paraview or recipes), the source folder, vdi.

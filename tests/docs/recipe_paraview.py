@@ -1,4 +1,4 @@
-"""What recipes need of ParaView itself, in pvbatch or pvpython.
+"""The parts of recipes that ParaView itself makes, in pvbatch or pvpython.
 
     recipe_paraview.py state SCRIPT    a sample of the simulation, colours as the Color Map Editor exports them
                                        (viridis.json), and the state that the recipe's SCRIPT saves of the sample

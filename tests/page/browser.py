@@ -136,7 +136,7 @@ class Browser:
         self.send("Input.dispatchKeyEvent", type="keyUp", key=key)
 
     def complaints(self):
-        """What the page threw or the console was told, since it was opened."""
+        """The exceptions of the page and the messages of its console, since it was opened."""
         found = []
         self.value("0")
         for event in self.events:

@@ -1,4 +1,4 @@
-// The page's end of the stream on sound, damaged and hostile messages, without a network. What comes in goes to the
+// The page's end of the stream on sound, damaged and hostile messages, without a network. These go to the
 // decoder of messages, or to a connection over sockets that are objects of this test. VDI_FUZZ_SECONDS=600 goes on with
 // other damage for so long.
 import {setFlagsFromString} from "node:v8";

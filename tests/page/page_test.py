@@ -58,7 +58,7 @@ def angle_of(browser):
 
 
 def check_culling(browser):
-    """What is culled shows nothing: views from anywhere, the scene's inside included, are those without culling."""
+    """Culled regions show nothing: views from anywhere, the scene's inside included, are those without culling."""
     browser.value("""window.both = (camera, scale) => {
       const {renderer} = vdiPage.viewer, {gl} = renderer;
       const {width, height} = renderer.pictureSize(scale), half = Math.floor(height / 2);

@@ -1,4 +1,4 @@
-"""What the tests of the page share: the page in Chromium, its pictures, and those of vdi render.
+"""Shared by the tests of the page: the page in Chromium, its pictures, and those of vdi render.
 
 Their arguments: VDI CHROMIUM FOLDER; pictures are left in the folder."""
 import io

@@ -1,4 +1,4 @@
-// What cases that compare the device with the reference share.
+// Helpers of the cases that compare the device with the reference.
 #pragma once
 
 #include <algorithm>

@@ -104,7 +104,7 @@ TEST_CASE("blending: the oracle's extremes and crossings, worked out by hand") {
   };
   about(reference::project(ramp, function, low, high, 8, true), {0.25 * 0.5, 0.75 * 0.5, 0.0, 0.5});
   about(reference::project(ramp, function, high, low, 8, false), {0.75 * 0.3, 0.25 * 0.3, 0.0, 0.3});
-  // Of the surfaces at 0.3 and 0.6 the nearer one hides some of the other; that at 0.8 isn't on the ray.
+  // The nearer one of the surfaces at 0.3 and 0.6 hides some of the other; that at 0.8 isn't on the ray.
   const glm::dvec4 a(0.7 * 0.32, 0.3 * 0.32, 0.0, 0.32);
   const glm::dvec4 b(0.4 * 0.44, 0.6 * 0.44, 0.0, 0.44);
   about(reference::cross(ramp, function, {0.6, 0.8, 0.3}, low, high, 3), a + (1.0 - a.a) * b);

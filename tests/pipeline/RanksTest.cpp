@@ -250,7 +250,7 @@ TEST_CASE(
 
 namespace {
 
-/// The first VDI and picture, which all others must equal bit by bit.
+/// The first VDI and picture, which all others must equal bit for bit.
 class FirstMade {
  public:
   /// Checks on the root; other ranks have nothing to check.

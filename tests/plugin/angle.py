@@ -21,7 +21,7 @@ def make(name, *options):
 
 
 def turned(degrees, elevation=0, render=simple.Render):
-    """What the view says after that turn from CAMERA."""
+    """The view's text after that turn from CAMERA."""
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA, CENTER, [0, 1, 0]
     view.GetActiveCamera().Azimuth(degrees)
     view.GetActiveCamera().Elevation(elevation)

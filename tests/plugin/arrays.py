@@ -155,7 +155,7 @@ image.Input = ball
 check(image.ScalarOpacityUnitDistance == 0.75, "but one that was set stays")
 check(image.LookupTable == first_display.LookupTable, "the map is the first input's again")
 
-# What ParaView's range buttons, its histogram and its legends ask for.
+# The queries of ParaView's range buttons, its histogram and its legends.
 simple.Hide(ball, view)
 simple.Hide(other, view)
 image.SelectInputScalars = ["POINTS", "temperature"]

@@ -84,7 +84,7 @@ for association, names in (("POINTS", MODES), ("CELLS", ("Maximum Intensity", "I
         simple.Delete(image)
         set_blend(shown, 0, [])
 
-# What a VDI can't hold.
+# Modes that a VDI can't hold.
 simple.SetActiveView(None)
 image = vdi_filter(source, view, "CELLS", "waves", UNIT)
 image.IsosurfaceValues = [150]

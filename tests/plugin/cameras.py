@@ -109,7 +109,7 @@ fewer = [alone(camera, Supersegments=8) for camera in range(3)]
 check(not same(expected[0], expected[1]) and not same(expected[1], other) and not same(expected[0], later[0])
       and not same(expected[0], fewer[0]), "the VDIs differ")
 
-# What another camera costs.
+# The cost of another camera.
 images, memory, seconds = [], [], []
 for camera in range(3):
     images.append(filter_at(camera))
@@ -156,7 +156,7 @@ third.Supersegments = 25
 for camera, image in enumerate(images):
     check(same(lists(image, 0.0), expected[camera]), "all of them go back, filter %d" % camera)
 
-# Beside the window.
+# In the background.
 for image in images:
     command(image, "Hold")
     image.Supersegments = 8

@@ -150,7 +150,7 @@ RED_TO_GREEN = [(0, 0.9, 0.1, 0.1), (1, 0.05, 0.8, 0.2)]  # by hue through yello
 SATURATED = [(0, 0.2, 0.3, 0.75), (0.6, 0.9, 0.9, 0.3), (1, 0.7, 0.05, 0.15)]
 LABELS = dict(InterpretValuesAsCategories=1, Annotations=["0", "a", "1", "b", "2", "c"],
               IndexedColors=[1, 0, 0, 0, 1, 0, 0, 0, 1])
-# What users make of a map, and the channels that it lacks.
+# Maps that users make, and the channels that they lack.
 CASES = {
     "no red": (case_of(points=[(0, 0, 0, 1), (0.5, 0, 0.2, 1), (1, 0, 1, 0.3)]), [0]),
     "red": (case_of(points=channels(0)), [1, 2]),

@@ -75,7 +75,7 @@ viewed = picture(simple.RenderVDI(Input=whole, UseOriginalCamera=1, ClippingPlan
 check(ssim(viewed, ours) >= 0.97, "and views of the whole VDI show that about too: SSIM %.4f" % ssim(viewed, ours))
 write_png("cropping_viewed.png", np.hstack([viewed, ours]))
 
-# What the filter can't show.
+# Modes that the filter can't show.
 said = []
 
 

@@ -1,4 +1,4 @@
-"""What the filters do unless told otherwise, and what they say when a script asks for what isn't there."""
+"""The filters' defaults, and their messages when a script asks for what isn't there."""
 
 import os
 import sys

@@ -1,5 +1,5 @@
-"""What ParaView's window does, without it: a view that is deferred shows the VDI made last until the next one is prepared, new
-blocks included; everybody else gets the one that was asked for. On any number of ranks."""
+"""Views that are deferred as in ParaView's window, but without it: such a view shows the VDI made last until the next one is
+prepared, new blocks included; everybody else gets the one that was asked for. On any number of ranks."""
 
 import time
 

@@ -81,7 +81,7 @@ def prepare(image):
     return percent.GetData()
 
 
-# What is made beside the window, by all ranks together.
+# A VDI that all ranks make together in the background.
 image = vdi_of_wavelet("POINTS")
 first = picture(image)
 report = image.GetProperty("Report")

@@ -29,7 +29,7 @@ def vdi_of(source, array=("POINTS", "RTData"), **properties):
 
 
 def errors_of(action):
-    """What VTK reports as errors while `action` runs."""
+    """The errors that VTK reports while `action` runs."""
     texts = []
     window = vtkOutputWindow.GetInstance()
     window_messages = window.AddObserver("ErrorEvent", lambda *args: texts.append("error"))
@@ -53,12 +53,12 @@ check("generate" in image.SMProxy.GetProperty("Report").GetElement(0), "the repo
 
 
 def last_vdi(proxy):
-    """What the panel's estimate goes by."""
+    """The figures on which the panel's estimate is based."""
     proxy.SMProxy.UpdatePropertyInformation()
     return [proxy.SMProxy.GetProperty("LastVdi").GetElement(i) for i in range(17)]
 
 
-# What estimates of the next VDI go by.
+# The figures on which the panel's estimate is based.
 last = last_vdi(image)
 fields = image.GetClientSideObject().GetOutputDataObject(0).GetFieldData()
 segments = fields.GetArray("VDI.codes").GetNumberOfTuples()

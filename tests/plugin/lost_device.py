@@ -1,5 +1,5 @@
 """A Vulkan device that is lost while a VDI is orbited (lose_device.c): a new one takes its place, and the frame shows the VDI.
-Where that is lost as well there is a message, until there is something new to show."""
+If the new device is lost, too, a message appears until there is something new to show."""
 
 import os
 import subprocess

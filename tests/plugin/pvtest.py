@@ -1,4 +1,4 @@
-"""What the pvbatch tests share: the plugin, sources that deal blocks to ranks, pictures and their comparison.
+"""Shared by the pvbatch tests: the plugin, sources that deal blocks to ranks, pictures and their comparison.
 
 Run by ctest through xvfb-run; VDI_PLUGIN names the plugin, VDI_TEST_OUTPUT a folder for pictures. With several ranks only
 rank 0 runs the test script; sources run on all ranks, inside Programmable Source."""
@@ -174,7 +174,7 @@ DEGREES = "\u00b0"
 
 
 def texts_in(view):
-    """What the representation VDI says in a view, without line breaks."""
+    """The texts of the representation VDI in a view, without line breaks."""
     actors = view.GetClientSideObject().GetNonCompositedRenderer().GetActors2D()
     actors.InitTraversal()
     texts = [actors.GetNextActor2D() for _ in range(actors.GetNumberOfItems())]
@@ -206,7 +206,7 @@ def text_boxes(view, part="VDI"):
 
 
 def pixels(window, front=1):
-    """What the window shows, without rendering."""
+    """The window's pixels, without rendering."""
     data = vtkUnsignedCharArray()
     width, height = window.GetSize()
     window.GetPixelData(0, 0, width - 1, height - 1, front, data, 0)

@@ -27,7 +27,7 @@ def screenshot(view, name, camera=None):
 
 
 def rendered(view, name):
-    """What the tool makes of the VDI for the view's camera."""
+    """The tool's picture of the VDI for the view's camera."""
     path = os.path.join(pvtest.OUTPUT, "representation_{}_expected.png".format(name))
     command = [os.environ["VDI_TOOL"], "render", VDI, "-o", path, "--resolution", "{}x{}".format(*SIZE)]
     for option, values in (("position", view.CameraPosition), ("focal-point", view.CameraFocalPoint),

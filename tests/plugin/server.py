@@ -1,4 +1,4 @@
-"""What tests with a pvserver share. Loads no plugin."""
+"""Shared by tests with a pvserver. Loads no plugin."""
 
 import os
 import socket

@@ -74,7 +74,7 @@ for name, (values, spacing, kind, as_cells, parallel_scale, properties) in CASES
     unit = 2 * min(spacing)
     theirs = paraview_volume(source, view, association, "field", unit, Shade=1, **properties)
     unshaded = paraview_volume(source, view, association, "field", unit)
-    # What is set by hand, and what the first update takes.
+    # Shading that is set by hand, and shading that the first update takes.
     volume = picture(vdi_filter(source, view, association, "field", unit, PictureOnly=1, Shade=1, **properties))
     representation = simple.GetRepresentation(source, view)
     representation.Shade = 1

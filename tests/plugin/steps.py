@@ -62,7 +62,7 @@ def frame(view):
 
 
 def picture_alone(path):
-    """What a file looks like, by a reader and a view of its own."""
+    """The picture of a file, by a reader and a view of its own."""
     alone = simple.OpenDataFile(path)
     view = make_view()
     simple.Show(alone, view)
@@ -81,7 +81,7 @@ def read_ahead(step):
 
 
 def said_by(action):
-    """What is written to stderr meanwhile."""
+    """The text that `action` writes to stderr."""
     path, own = os.path.join(FOLDER, "said"), os.dup(2)
     with open(path, "w") as file:
         os.dup2(file.fileno(), 2)

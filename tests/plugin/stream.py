@@ -43,7 +43,7 @@ image.Resolution = [160, 120]
 image.CameraPosition = [40, 30, 50]
 extractor = simple.CreateExtractor("VDIStream", image, registrationName="stream")
 extractor.Writer.LinkFile = link_file
-# What the extractor of files writes at the last of the scene's steps.
+# The extractor of files writes the same at the last of the scene's steps.
 files = simple.CreateExtractor("VDI", image, registrationName="files")
 files.Writer.FileName = "stream_%s.vdi" % name
 link = None

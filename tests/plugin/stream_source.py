@@ -111,7 +111,7 @@ def shows(source, step):
 
 
 def said(call):
-    """What is written to the standard error meanwhile."""
+    """The text that `call` writes to the standard error."""
     with tempfile.TemporaryFile("w+") as file:
         kept = os.dup(2)
         os.dup2(file.fileno(), 2)

@@ -1,4 +1,4 @@
-"""What VolumetricDepthImage takes from the active view, and that traces and states make it anew."""
+"""VolumetricDepthImage takes settings from the active view, and traces and states make it anew."""
 
 import os
 import sys

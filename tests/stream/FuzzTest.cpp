@@ -104,7 +104,7 @@ Controls controls() {
   return result;
 }
 
-/// What a viewer that drives asks for. Some of it is out of bounds.
+/// A driving viewer's request. Some of it is out of bounds.
 Wish wishOf(Noise& noise) {
   const auto chance = [&noise] { return noise.below(3) == 0; };
   Wish wish;
@@ -279,7 +279,7 @@ std::string masked(unsigned char opcode, const std::string& payload, Noise& nois
   return frame;
 }
 
-/// What a viewer writes to its connection.
+/// The bytes that a viewer writes to its connection.
 std::string viewersBytes(Noise& noise) {
   const std::string request =
       "GET /stream HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"

@@ -1,4 +1,4 @@
-// What a viewer gets when: no network, and a clock that the test turns.
+// Tests which levels a viewer gets, and when, without a network. The test turns the clock.
 #include <algorithm>
 #include <map>
 

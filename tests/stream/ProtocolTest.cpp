@@ -111,7 +111,7 @@ TEST_CASE("messages are read as they were written") {
   for (const FromViewer& m : viewerMessages()) CHECK(viewerMessage(textOf(m)) == m);
   for (const FromServer& m : serverMessages()) CHECK(serverMessage(textOf(m)) == m);
   CHECK(serverMessage(R"({"type":"to come","x":[1]})") == FromServer(Unknown{}));
-  // What another program writes.
+  // Messages that another program writes.
   CHECK(viewerMessage(R"( {"bytes":5,"more":{"a":[1]},"level":0,"frame":2,"type":"ack"})") ==
         FromViewer(Ack{2, 0, 5}));
   CHECK(std::get<Hello>(viewerMessage(R"({"type":"hello","version":9})")).version == 9);

@@ -1,4 +1,4 @@
-// Who drives, and what a driver may ask for, without a network.
+// Tests steering without a network: which viewer drives, and which requests it may make.
 #include <algorithm>
 #include <utility>
 
@@ -105,7 +105,7 @@ TEST_CASE("one viewer drives, and the others see who") {
   CHECK(first->last<Steering>()->driver == 2U);
   second.say(Release{});
   first->say(Drive{});
-  // What a driver has stopped goes on when it leaves.
+  // A simulation that a driver has paused goes on when the driver leaves.
   Wish pause;
   pause.paused = true;
   first->say(Steer{pause});

@@ -1,5 +1,5 @@
-// What viewers that take their frames slowly, or not at all, cost the server: no network, and a clock that
-// the test turns.
+// Tests the cost of viewers that take their frames slowly or not at all, without a network. The test turns
+// the clock.
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -153,7 +153,7 @@ TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
   for (std::uint32_t id = 0; id < 40; ++id) {
     const Clock::time_point now = start + id * 1s;
     hub.publish(levels.frame(id), now);
-    // What a server does with those that are to go.
+    // As a server does with viewers that are to go.
     for (const auto& viewer : stalled) {
       if (viewer->viewer.isStalled()) viewer->writing = Viewer::Wait{};
     }

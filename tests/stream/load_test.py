@@ -1,5 +1,5 @@
-"""What clients that come in great numbers, or slowly, and many frames cost `vdi serve`. Arguments: vdi, how many connections
-one after another (10000), how many frames (1000). It prints the server's memory, threads and open files before and after."""
+"""Measures the cost to `vdi serve` of many clients, of slow ones, and of many frames. Arguments: vdi, how many connections one
+after another (10000), how many frames (1000). It prints the server's memory, threads and open files before and after."""
 import os
 import pathlib
 import selectors

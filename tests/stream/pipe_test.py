@@ -57,7 +57,7 @@ class PipeTest(ServedFolder):
 
     def test_receive_takes_all_frames_of_a_series(self):
         names = ["small0", "large", "small2"]
-        # What a login shell may say first is skipped.
+        # Lines that a login shell may say first are skipped.
         command = "echo 'Welcome to the cluster'; echo; exec " + vdi(
             "serve", "--stdio", *(self.made / f"{name}.vdi" for name in names))
         done = receive("--from", command, "-o", self.folder / "got")

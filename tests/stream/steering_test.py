@@ -124,7 +124,7 @@ def drive(port, token, folder):
 
 
 def files_of(folder):
-    """What vdi tells of each step's file."""
+    """The output of vdi info for each step's file."""
     def told_of(path):
         return subprocess.run([tool, "info", path], check=True, capture_output=True, text=True, timeout=PATIENCE).stdout
     return {int(path.stem[2:]): told_of(path) for path in sorted(folder.glob("v_*.vdi"))}
@@ -145,7 +145,7 @@ def in_files(folder, at, paused_at):
 
 
 def told(folder, driver, paused_at, camera):
-    """What each rank was given, and when."""
+    """Checks the values that each rank was given, and when."""
     parameters = [lines(folder / ("parameters_%d.txt" % rank)) for rank in range(RANKS)]
     check(all(one == parameters[0] for one in parameters), "all ranks have the same parameters at the same steps")
     log = [json.loads(line) for line in lines(folder / "vdi-steering.jsonl")]

@@ -33,7 +33,7 @@ def read(name):
 
 
 def inside(call):
-    """What a call of beside_scene.py returns."""
+    """The result of a call of beside_scene.py."""
     if read("done") is not None:
         os.remove(path("done"))
     with open(path("do.new"), "w") as file:

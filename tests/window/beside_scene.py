@@ -58,7 +58,7 @@ def filter_now():
 
 
 def output_now():
-    """What the filter has, without an update: its array's name, its time, and whether there's a VDI."""
+    """The filter's output, without an update: its array's name, its time, and whether there's a VDI."""
     made = filter_now()
     fields = made.GetClientSideObject().GetOutputDataObject(0).GetFieldData()
     parameters = fields.GetArray("VDI.parameters")
@@ -70,13 +70,13 @@ def output_now():
 
 
 def fetched():
-    """What a script gets."""
+    """Whether a script gets a VDI."""
     data = simple.servermanager.Fetch(filter_now())
     return data.GetFieldData().GetArray("VDI.codes") is not None
 
 
 def edit_opacity(peak):
-    """Of the array that is shown."""
+    """Edits the opacity of the array that is shown."""
     opacity = simple.GetOpacityTransferFunction(output_now()["array"])
     points = list(opacity.Points)
     points[-3] = peak

@@ -46,7 +46,7 @@ def generate(name, *options):
 
 
 def inside(call):
-    """What a call of orbit_inside.py returns."""
+    """The result of a call of orbit_inside.py."""
     if read("done") is not None:
         os.remove(os.path.join(OUTPUT, "done"))
     path = os.path.join(OUTPUT, "do")

@@ -1,5 +1,5 @@
-"""What orbit_notes.py noted of the view, against the tool's picture for the view's camera; and the
-window against what was noted. Arguments: a picture of the whole screen; "opened", if the camera
+"""Compares the notes of orbit_notes.py on the view with the tool's picture for the view's camera, and
+the window with the notes. Arguments: a picture of the whole screen; "opened", if the camera
 is to be the one that the VDI was made from."""
 
 import json

@@ -1,5 +1,5 @@
-"""What orbit.py asks for inside ParaView (orbit_notes.py), without the mouse: each call returns at once, and what comes of it
-shows in the window by itself."""
+"""The calls that orbit.py makes inside ParaView (orbit_notes.py), without the mouse: each returns at once, and its effect shows
+in the window by itself."""
 
 import numpy as np
 import pvtest
@@ -145,7 +145,7 @@ def show_made():
 
 
 def is_held():
-    """Whether a VDI is being made beside the window, or is about to be."""
+    """Whether a VDI is being made in the background, or is about to be."""
     proxy = shown["vdi"].SMProxy
     proxy.UpdatePropertyInformation()
     return proxy.GetProperty("Held").GetElement(0) == 1
@@ -192,7 +192,7 @@ def compare_distances(distances):
 
 
 def compared():
-    """What the two cells show, as the mean of their brightness."""
+    """The mean brightness of each of the two cells."""
     return [float(pixels(view.GetRenderWindow()).mean()) for view in views_in(shown["comparative"])]
 
 

@@ -13,9 +13,9 @@ from window import COLOR_EDITOR, Pulse, Screen, Window, check, failures, ssim, w
 OUTPUT = os.path.join(os.environ["VDI_TEST_OUTPUT"], "panel")
 shutil.rmtree(OUTPUT, ignore_errors=True)  # what another run left makes the lists of files longer
 os.makedirs(OUTPUT)
-# The longest that the window may take to answer while a colour is edited. It took 5 to 20 s before edits
-# were made beside it, and 0.5 to 1.3 s before still frames were. Two cores with nothing else to do take
-# 0.2 s now.
+# The longest that the window may take to answer while a colour is edited. It took 5 to 20 s before VDIs
+# were made in the background, and 0.5 to 1.3 s before still frames were. Two cores with nothing else to
+# do take 0.2 s now.
 ANSWER_SECONDS = 1.0
 LOAD = """
 from paraview import simple

@@ -1,5 +1,5 @@
-"""What a view of the window shows, against the tool's picture of the same VDI for that camera. The camera is what a state file
-says, saved by mouse."""
+"""Compares a view of the window with the tool's picture of the same VDI for that camera. A state file, saved by mouse, has the
+camera."""
 
 import os
 import subprocess

@@ -128,7 +128,7 @@ class Bus:
 
 
 class Widget:
-    """What AT-SPI says of one widget. Everything is asked anew."""
+    """One widget as AT-SPI describes it. Everything is asked anew."""
 
     SHOWING, ENABLED = 25, 8  # bits of its state
 
@@ -286,7 +286,7 @@ class Window:
         self.drag((left + width + 4, top + 300), (left + 340, top + 300))
         time.sleep(0.5)
 
-    # What is there
+    # Finding widgets
 
     def widgets(self, node=None, hidden=False):
         """All that are visible, outermost first; `hidden`: the others as well."""
@@ -359,7 +359,7 @@ class Window:
         bottom = self.screen.size[1] - 37
         return left, top, self.screen.size[0] - left - 4, bottom - top
 
-    # What a person does
+    # Using mouse and keyboard
 
     def click(self, target, role=None, button=1, times=1, seconds=0):
         """`target`: a name as for find, a widget, or a point (x, y) of the screen; `seconds`: how long the button is down."""
@@ -378,7 +378,7 @@ class Window:
         self.click("Apply")
         wait_for("end of Apply", lambda: not self.is_enabled("Apply"), seconds)
         panel = self.find("Properties", "frame")
-        time.sleep(0.5)  # a VDI begins to be made beside the window
+        time.sleep(0.5)  # a VDI begins to be made in the background
         wait_for("VDI", lambda: not self.is_making(panel), seconds)
 
     def show_wavelet(self):
@@ -478,7 +478,7 @@ class Window:
             self.click(place)
 
     def _place_in_submenu(self, above, name):
-        """Of an action that ParaView has in two menus, for which Qt tells the place in the other one."""
+        """The place of an action that ParaView has in two menus: Qt tells its place in the other one."""
         submenu = self.find(above, "menu item", 5)
         names = [widget.name for widget in self.widgets(submenu, hidden=True) if widget.role == "menu item"]
         x, y, width, height = submenu.box
