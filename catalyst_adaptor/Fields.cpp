@@ -52,7 +52,7 @@ ComponentArray arrayOf(const StridedValues& values, int type) {
           values.componentStride};
 }
 
-/// Moves the entries of `fresh` to `all`. Entries with their keys go.
+/// Moves the entries of `fresh` to `all`. Replaces entries that have the same keys.
 template <typename Key, typename Value>
 void replace(std::map<Key, Value>& all, std::map<Key, Value>& fresh) noexcept {
   for (const auto& [key, value] : fresh) all.erase(key);
@@ -236,7 +236,7 @@ Fields::Values Fields::valuesOf(const std::string& name, bool cells, int compone
 }
 
 std::vector<Block> Fields::placesOf(const std::string& name, bool cells) const {
-  // What particles become is an array of all blocks, even before it is made.
+  // Particles become an array of all blocks, which counts even before it is made.
   const Array* array = find(name, cells);
   std::vector<Block> places;
   if (array == nullptr && !has(name, cells)) return places;

@@ -35,7 +35,7 @@ class Fields {
   /// The layout of a block's values in order: x fastest, components side by side, no gaps.
   StridedValues inOrder(const vdi_catalyst_block& block, int type, bool cells, int components,
                         const void* data) const;
-  /// What is to be set. Preparing it allocates all memory, so `set` can't fail: ranks first agree that all
+  /// A change to be made. Preparing it allocates all memory, so `set` can't fail: ranks first agree that all
   /// have prepared it.
   class Change;
   /// An array's values, one entry for each block, with the same number of components. Blocks that lack the

@@ -106,7 +106,7 @@ static int names_isolation(MPI_Comm comm) {
   return names;
 }
 
-/* What a simulation initialises with: one of the three. */
+/* The arguments with which a simulation initialises: one of the three. */
 typedef struct vdi_given {
   const char* const* scripts;
   const vdi_catalyst_pipeline* pipelines;

@@ -69,7 +69,7 @@ void StridedValues::copyTo(std::byte* to) const {
 StridedArray::StridedArray(const StridedValues& values) : values_(values) {
   assert(values.reachable());
   const std::size_t bytes = values.bytes();
-  // VTK's own allocation won't do: when it fails, Debian's VTK ends the process.
+  // VTK's own allocation is unsuitable: when it fails, Debian's VTK ends the process.
   memory_.reset(new (std::nothrow) std::byte[bytes]);
   if (!memory_) throw std::runtime_error("no memory to gather an array: " + std::to_string(bytes) + " bytes");
 }

@@ -1,7 +1,7 @@
 // Spreads particles over the cells of blocks; twin of vdi/reference/Deposit.cpp. An invocation spreads one
 // particle over one block.
 //
-// Sums are integers, so their order doesn't matter, and runs are the same bit by bit. They have 64 bits in
+// Sums are integers, so their order doesn't matter, and runs are the same bit for bit. They have 64 bits in
 // two words, because not all devices have atomics of 64 bits: adding to the lower word tells whether it
 // overflows.
 #version 460

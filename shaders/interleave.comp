@@ -26,7 +26,7 @@ vec2 depthsOf(uint i) {
   return vec2(segment.front, segment.back);
 }
 
-// Of two depths that rounded to one code, the one that ends first comes first.
+// If two depths have rounded to one code, the one that ends first comes first.
 bool isNearer(vec2 a, vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); }
 
 void copySegment(uint i, uint slot) {

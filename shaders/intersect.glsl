@@ -22,7 +22,8 @@ float shorteningAt(vec2 place) {
   return inversesqrt(1.0 + dot(offset, offset));
 }
 
-// What a ray accumulates in an intersection, and the depth where it enters, as depths in PictureLine.
+// The light that a ray accumulates in an intersection, and the depth where it enters, as depths in
+// PictureLine.
 struct Intersection {
   vec4 light;
   float entered;

@@ -15,7 +15,7 @@ float rayEnter;          // depth where the ray enters the visible part, and whe
 float rayLeave;
 float rayBegin;  // the same as places
 float rayEnd;
-// Distance from a sample's begin to the point that decides its owner: 0.5, except for rays that graze the
+// Distance from a sample's start to the point that decides its owner: 0.5, except for rays that graze the
 // scene
 float rayMiddle;
 
@@ -33,7 +33,7 @@ void setUpRay(uint x, uint y) {
   rayLengthOfDepth = length(direction);
 }
 
-// A place on the ray counts samples: k is the begin of sample k, k + 0.5 its middle. `precise`, because every
+// A place on the ray counts samples: k is the start of sample k, k + 0.5 its middle. `precise`, because every
 // rank and every pass must find the same position for a place, since ownership depends on it.
 vec3 positionAt(float place) {
   precise float depth = place * params.step;

@@ -4,7 +4,7 @@
 
 const float nowhere = 1.0 / 0.0;
 
-// Of V_O's pixels, at the middle of the VDI's depths.
+// The width of V_O's pixels at the middle of the VDI's depths.
 float footprintOf() {
   vec2 depths = vec2(uintBitsToFloat(push.depthRange.at[0]), uintBitsToFloat(push.depthRange.at[1]));
   return push.pixelSize * (push.perspective == 0u ? 1.0 : 0.5 * (depths.x + depths.y));

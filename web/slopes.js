@@ -8,7 +8,7 @@ import {dot} from "./vector.js";
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 
 /**
- * What sheared pictures need beside a decoded VDI.
+ * The data that sheared pictures need beside a decoded VDI.
  * @typedef {object} Leaning
  * @property {Uint32Array} slopes a word for each supersegment: slopes of front x, front y, back x and
  *   back y, a signed byte each, in units of slopeUnit

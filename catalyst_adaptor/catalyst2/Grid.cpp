@@ -15,8 +15,8 @@ namespace {
 
 constexpr const char* uniformOnly = "; this implementation takes uniform grids alone";
 constexpr std::array<const char*, 2> ghostFields{"ascent_ghosts", "vtkGhostType"};
-// vtkDataSetAttributes::DUPLICATECELL and HIDDENCELL. What finer blocks cover (REFINEDCELL) isn't shown
-// anyway.
+// vtkDataSetAttributes::DUPLICATECELL and HIDDENCELL. Cells that finer blocks cover (REFINEDCELL) aren't
+// shown anyway.
 constexpr std::int64_t vtkGhost = 1;
 constexpr std::int64_t vtkHidden = 32;
 

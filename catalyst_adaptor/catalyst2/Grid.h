@@ -32,9 +32,9 @@ class Grid {
   bool read(const std::optional<Node>& data);
 
   const std::vector<vdi_catalyst_block>& blocks() const { return blocks_; }
-  /// Only those that all blocks have.
+  /// The arrays that all blocks have.
   const std::map<Key, Array>& arrays() const { return arrays_; }
-  /// The names of the others.
+  /// The names of the fields that some blocks lack, or have with another type.
   const std::vector<std::string>& leftOut() const { return leftOut_; }
 
  private:

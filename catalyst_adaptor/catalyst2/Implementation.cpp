@@ -18,7 +18,7 @@ namespace {
 using vdi::catalyst::Node;
 using vdi::catalyst::Session;
 
-/// There is one of each loaded library in a process, and Catalyst hands no handle through.
+/// The process's only session: Catalyst passes no handle.
 std::unique_ptr<Session>& session() {
   static std::unique_ptr<Session> one;
   return one;

@@ -1,4 +1,4 @@
-// What a simulation hands over through Catalyst, read with care: nothing need be as it should.
+// Reads the nodes that a simulation passes through Catalyst, and trusts none of them.
 #pragma once
 
 #include <catalyst.h>

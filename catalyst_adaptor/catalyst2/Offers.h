@@ -1,4 +1,5 @@
-// What the ranks' grids have in common: vdi_catalyst.h takes each array from all ranks or from none.
+// The arrays that the ranks' grids have in common: vdi_catalyst.h takes each array from all ranks or from
+// none.
 #pragma once
 
 #include <mpi.h>

@@ -16,7 +16,7 @@
 
 namespace vdi::catalyst {
 
-/// What catalyst_initialize is given.
+/// The settings that catalyst_initialize is given.
 struct Settings {
   struct Script {
     std::string file;

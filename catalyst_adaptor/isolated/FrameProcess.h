@@ -41,7 +41,8 @@ class FrameProcess {
   std::optional<int> startCode() const { return startCode_; }
   /// Whether the process has ended, or will do so.
   bool isGone() const { return isGone_; }
-  /// What has ended it, and what it was doing: "was killed by signal 9 (Killed) while it started".
+  /// Describes how the process ended and what it was doing: "was killed by signal 9 (Killed) while it
+  /// started".
   std::string end() const;
   /// Whether somebody has stopped the process, as by SIGSTOP.
   bool isStopped() const;

@@ -19,7 +19,7 @@
 
 namespace vdi::catalyst {
 
-/// What is to be run, the same on all ranks but for `json`, of which the first rank's counts.
+/// The run, the same on all ranks, except `json`: rank 0's counts.
 struct IsolatedOptions {
   config::RunIsolation isolation;
   std::string launcher;            // empty: the usual one

@@ -1,4 +1,4 @@
-// What a rank of the simulation and the process that makes its frames say to each other.
+// The messages between a rank of the simulation and the process that makes its frames.
 #pragma once
 
 #include <cstdint>

@@ -131,7 +131,7 @@ void StepWriter::write(std::span<std::byte> to) const {
 StepData StepData::read(std::span<const std::byte> from) {
   Unpacker head(from);
   const auto begin = head.take<std::uint64_t>();
-  // What lies at the next offset; null if that is none.
+  // The data at the next offset; null if there is no offset.
   const auto placed = [&]() -> const std::byte* {
     const auto offset = head.take<std::uint64_t>();
     if (offset == none) return nullptr;

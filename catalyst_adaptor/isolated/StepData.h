@@ -15,7 +15,7 @@
 
 namespace vdi::catalyst {
 
-/// What is to be handed over of a run's fields.
+/// The fields of a run that are handed over.
 struct StepFields {
   std::vector<Fields::NamedArray> arrays;
   std::vector<std::pair<std::string, ParticleArray>> particles;  // by name

@@ -22,7 +22,7 @@ namespace vdi::catalyst {
 namespace {
 
 void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
-  // VTK's own allocation won't do: when it fails, Debian's VTK ends the process.
+  // VTK's own allocation is unsuitable: when it fails, Debian's VTK ends the process.
   std::unique_ptr<unsigned char[]> marks = newMarks(block);
   if (!marks) return;
   vtkIdType index = 0;

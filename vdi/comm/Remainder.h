@@ -1,4 +1,4 @@
-// What is left of a box while others are taken away from it.
+// The rest of a box from which other boxes are subtracted.
 #pragma once
 
 #include <cstdint>

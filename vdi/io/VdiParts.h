@@ -41,8 +41,8 @@ void encodeChunks(const ListsOf<Segment>& lists, std::size_t first, std::size_t 
 
 /// Number of bytes before the first chunk, in a file of that many lists.
 std::uint64_t headBytes(std::uint64_t lists);
-/// The bytes before the first chunk. Of the lists of `vdi`, only the precision matters. `table` has all
-/// chunks. Throws Error{Format} for a VDI that decode would refuse.
+/// The bytes before the first chunk. Uses only the precision of the lists of `vdi`. `table` has all chunks.
+/// Throws Error{Format} for a VDI that decode would refuse.
 std::vector<std::byte> encodeHead(const Vdi& vdi, std::span<const ChunkEntry> table);
 /// The bytes after the last chunk, which exist if the VDI has a coloring. Throws as encodeHead.
 std::vector<std::byte> encodeTail(const Vdi& vdi);

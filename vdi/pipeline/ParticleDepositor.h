@@ -22,7 +22,7 @@ struct DepositedArray {
 
 /// vdi/core/Particles.h has the rules of the deposit. A rank's particles may lie in any rank's blocks. The
 /// result is that of one rank with all blocks and particles, to within rounding in single precision. It is
-/// the same bit by bit when repeated. A contribution below 2^-55 of the total weight of all ranks may be
+/// the same bit for bit when repeated. A contribution below 2^-55 of the total weight of all ranks may be
 /// lost.
 ///
 /// Memory: on the device 8 bytes a stored cell, and on the host 4, which the result keeps. During `deposit`,

@@ -101,7 +101,7 @@ class VdiGenerator {
   /// Writes the VDI of generate to a file (io/VdiFile.h). Each rank encodes and writes its own lists: no rank
   /// ever has the whole VDI, and a rank's host memory is bounded by its own lists. Ranks whose host lacks the
   /// folder send their encoded lists to rank 0, which holds one chunk of them at a time. The file equals that
-  /// of io::writeVdi byte by byte. No reader sees half of it, and if any rank fails, the old file stays.
+  /// of io::writeVdi byte for byte. No reader sees half of it, and if any rank fails, the old file stays.
   /// `path` and `stamp` are rank 0's; other ranks' are ignored. Throws Error{Io} on the rank that cannot
   /// write, with the path as context. The result is equal on all ranks.
   WrittenVdi write(const std::filesystem::path& path, const Camera& camera,

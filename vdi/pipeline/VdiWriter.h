@@ -23,7 +23,7 @@ enum class WrittenBy {
   Root    // the root writes, as for hosts that lack the file's folder
 };
 
-/// The file equals that of io::writeVdi for the whole VDI byte by byte, whichever ranks have which lists. It
+/// The file equals that of io::writeVdi for the whole VDI byte for byte, whichever ranks have which lists. It
 /// gets its name when it is complete, and only if all ranks have done their part; otherwise the old file
 /// stays (io::OutputFile). A rank holds the chunks of its own lists, and the root at most one more chunk of
 /// other ranks'. Throws on all ranks.

@@ -18,11 +18,11 @@ struct SceneRay {
   glm::vec3 start;  // relative to the scene's centre, at the front of the sample lattice
   glm::vec3 direction;
   float step;
-  /// Distance from a sample's begin to the point that decides its owner: its middle, except for rays that
+  /// Distance from a sample's start to the point that decides its owner: its middle, except for rays that
   /// graze the scene.
   float middle = 0.5F;
 
-  /// `place` counts samples: k is the begin of sample k.
+  /// `place` counts samples: k is the start of sample k.
   glm::vec3 at(float place) const { return start + place * step * direction; }
   float middleOf(std::uint32_t k) const { return static_cast<float>(k) + middle; }
   glm::vec3 sample(std::uint32_t k) const { return at(middleOf(k)); }
@@ -205,7 +205,7 @@ class SampledRay {
   float lengthPerDepth() const { return glm::length(ray_.direction); }
 
  private:
-  /// The begin of sample k: samples at the scene's faces are shorter or longer.
+  /// The start of sample k: samples at the scene's faces are shorter or longer.
   float placeOf(std::uint32_t k) const {
     const auto front = static_cast<float>(inputs_.lattice.first);
     if (k == scene_.samples.first) return (scene_.enter - front) / ray_.step;

@@ -89,7 +89,7 @@ std::string textLine(const FrameRecord& record);
 std::string textLine(const LeftOut& frame);
 std::string textLine(const RunSummary& summary);
 
-/// What a log of JSON lines tells: of several runs, if they have appended to one file.
+/// The records in a log of JSON lines, of several runs if these have appended to one file.
 struct RunRecords {
   std::vector<RunStart> starts;
   std::vector<FrameRecord> frames;

@@ -27,8 +27,8 @@ struct Received {
   Vdi decode();
 };
 
-/// What comes from one connection, in order. It takes memory for bytes that have come, not for those that are
-/// announced.
+/// Assembles the messages of one connection, in order. It takes memory for bytes that have come, not for
+/// those that are announced.
 class Assembly {
  public:
   enum class Gives { Files, Vdis };

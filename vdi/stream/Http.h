@@ -24,7 +24,7 @@ class Site {
   HttpReply reply(const HttpRequest& request) const;
   /// Whether a request for a WebSocket at /stream may have one. Otherwise `cause` says why not.
   bool admits(const HttpRequest& request, std::string& cause) const;
-  /// What a request that isn't admitted gets.
+  /// The reply to a request that isn't admitted.
   static HttpReply refusal(const HttpRequest& request, const std::string& cause);
 
  private:

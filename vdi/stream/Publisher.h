@@ -1,4 +1,4 @@
-// VDIs of a running simulation as the frames of a server, encoded beside it.
+// VDIs of a running simulation as the frames of a server, encoded in the background.
 #pragma once
 
 #include <condition_variable>
@@ -20,7 +20,7 @@ class Publisher {
  public:
   /// The server outlives it.
   explicit Publisher(Server& server);
-  /// What was published last is encoded in full and handed to the server before it returns.
+  /// Encodes the VDI published last in full, and hands it to the server, before it returns.
   ~Publisher();
   Publisher(const Publisher&) = delete;
   Publisher& operator=(const Publisher&) = delete;

@@ -1,4 +1,4 @@
-// What a viewer may change of a running simulation and of its VDIs.
+// The settings of a running simulation, and of its VDIs, that a viewer may change.
 #pragma once
 
 #include <array>
@@ -45,7 +45,7 @@ struct GeneratorControls {
   bool operator==(const GeneratorControls&) const = default;
 };
 
-/// What can be steered, and what is in force.
+/// The settings that can be steered, as they are in force.
 struct Controls {
   std::optional<GeneratorControls> generator;  // none: the VDIs come from elsewhere
   int period = 1;                              // every so many steps a VDI is made
@@ -54,7 +54,7 @@ struct Controls {
   bool operator==(const Controls&) const = default;
 };
 
-/// What a viewer asks for. What it leaves out stays.
+/// A viewer's request. Fields that it leaves out stay as they are.
 struct Wish {
   std::optional<Camera> camera;                  // a viewpoint V_O that View accepts
   std::optional<std::array<int, 2>> resolution;  // 1 to View::maxSide

@@ -13,7 +13,7 @@ struct Url {
   std::uint16_t port = 0;
   std::string token;  // empty: the link has none
 
-  /// What stands in an HTTP request's Host, and in messages.
+  /// Host and port, as in an HTTP request's Host field and in messages.
   std::string authority() const;
 };
 

@@ -21,7 +21,7 @@ namespace vdi::stream {
 
 class Viewer;
 
-/// What all viewers of a server share.
+/// The state that all viewers of a server share.
 class Hub {
  public:
   struct Options {

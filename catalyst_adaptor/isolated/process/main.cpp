@@ -127,7 +127,7 @@ void work(const Setup& setup, const Socket& socket, const Socket::Received& gree
   std::vector<std::string> arguments{ownFile(), "work", std::to_string(socket.number()),
                                      std::to_string(pages)};
   std::vector<std::string> environment = environmentOf(setup);
-  // What it says from here on goes where the rank's output goes.
+  // From here on, its output goes where the rank's does.
   dup2(greeting.descriptors[0].number(), STDOUT_FILENO);
   dup2(greeting.descriptors[1].number(), STDERR_FILENO);
   umask(setup.umask);

@@ -63,7 +63,7 @@ void setWaiting(vtkImageData* image, const std::string& why);
 std::string waitingIn(vtkFieldData* fields);
 /// The bytes of the VDI's .vdi file. Any thread may call it.
 vtkSmartPointer<vtkUnsignedCharArray> fileOf(const vdi::Vdi& vdi);
-/// What a filter or writer says of an input without a VDI.
+/// The error for an input without a VDI.
 inline constexpr const char* noVdi =
     "the input has no VDI; connect a VolumetricDepthImage filter or a VDI reader";
 /// Whether the image carries a VDI, sound or not.

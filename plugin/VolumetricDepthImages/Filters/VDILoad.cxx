@@ -39,7 +39,7 @@ void requireInput(vtkDataObject* input) {
 Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin) {
   requireInput(input);
   Load load{.of = origin, .blocks = {}, .array = {}, .lack = lackOf(input, upstream, origin.choice)};
-  // A lacking array may still be in the input, averaged by ParaView from one of the other association.
+  // ParaView may have added the missing array by averaging the one of the other association.
   if (load.lack.empty()) load.blocks = blocksOf(input, origin.choice);
   return load;
 }

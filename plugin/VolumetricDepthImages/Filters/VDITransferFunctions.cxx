@@ -62,7 +62,7 @@ class ColorCurve : public Curve {
     return points;
   }
   std::vector<Place> sampled(double first, double last, std::size_t count) const override {
-    // GetColor won't do: it looks up discrete values and categories.
+    // GetColor is unsuitable: it looks up discrete values and categories.
     std::vector<double> table(3 * count);
     function_->GetTable(first, last, static_cast<int>(count), table.data());
     std::vector<Place> places;

@@ -47,8 +47,8 @@ void lookFrom(const ViewpointNumbers& viewpoint, vtkSMRenderViewProxy* view) {
   view->UpdateVTKObjects();
 }
 
-/// A VDI is truest from its viewpoint, and may be visible only from there. ParaView's default camera looks
-/// along z.
+/// A VDI is most accurate from its viewpoint, and may be visible only from there. ParaView's default camera
+/// looks along z.
 void lookFromViewpointOf(pqPipelineSource* source) {
   pqView* view = pqActiveObjects::instance().activeView();
   auto* proxy = view != nullptr ? vtkSMRenderViewProxy::SafeDownCast(view->getViewProxy()) : nullptr;

@@ -67,7 +67,7 @@ class VDIBuffers {
   const Thin& thin(std::size_t level) const { return thins_.at(level); }
   vdi::VdiRenderer& thinRenderer(std::size_t level) { return *renderers_->thins.at(level); }
   bool isOnCpu() const { return renderers_->isOnCpu; }
-  /// The full picture that a thread makes beside the frames. Another VDI drops it. The views' thread must
+  /// The full picture that a thread makes in the background. Another VDI drops it. The views' thread must
   /// drop it before it uses a renderer.
   VDIStill& still() { return still_; }
 

@@ -7,7 +7,7 @@
  *
  * Interactive frames have as few pixels as it takes to draw the prop FrameRate times a second
  * (VDIFramePolicy). They show the last VDI while the next one is being loaded. Deferred frames do both, too,
- * while a thread makes the full picture beside them (VDIStill). If neither the VDI nor the view has changed
+ * while a thread makes the full picture (VDIStill). If neither the VDI nor the view has changed
  * since the frame before, the prop renders nothing: the picture is still in the texture (VDIPainter).
  *
  * The view shows errors (MessageActor), and the prop reports each once. The rest of the picture is drawn. The
@@ -60,7 +60,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   bool IsBehind() const;
   /// Whether the missing part is ready, so that another frame would show it.
   bool HasMore() const;
-  /// Pauses the threads beside the frames for a moment, so that the window gets the processor.
+  /// Pauses the threads in the background for a moment, so that the window gets the processor.
   void Rest();
   /// Shows `text` in place of the VDI; an empty text shows the VDI again.
   void SetObstacle(const std::string& text);

@@ -64,7 +64,7 @@ class Vdi:
 
     @property
     def time(self):
-        """Of the simulation; 0 where it is unknown."""
+        """The simulation's time; 0 where it is unknown."""
         return self._lists.time
 
     @property
@@ -78,7 +78,7 @@ class Vdi:
 
     @property
     def metadata(self):
-        """What the colours mean, as a dict (docs/format.md has the fields); None where the file doesn't say it."""
+        """The meaning of the colours, as a dict (docs/format.md has the fields); None where the file doesn't have it."""
         text = self._lists.metadata_text
         return None if text is None else json.loads(text)
 
