@@ -68,14 +68,10 @@ void FrameFiles::start(stream::Server& server) {
   server_ = &server;
   if (options_.folder.empty()) {
     for (const std::filesystem::path& file : options_.files) (void)io::readVdiInfo(file);
-    server.setPhase(stream::Phase::Ended);
     add(options_.files);
   } else {
     watch_.emplace(options_.folder);
-    if (!options_.follows) {
-      server.setPhase(stream::Phase::Ended);
-      look();
-    }
+    if (!options_.follows) look();
   }
   thread_ = std::thread([this] { work(); });
 }
@@ -156,9 +152,10 @@ void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
       leaveOut(file, error.what());
     }
   }
-  if (entries.size() == 0) return;
   const auto first = static_cast<std::uint32_t>(series_.size() - entries.size());
-  server_->append(std::move(entries));
+  if (entries.size() > 0) server_->append(std::move(entries));
+  // A viewer that reads this knows all of the series.
+  if (!follows()) server_->setPhase(stream::Phase::Ended);
   for (auto index = static_cast<std::uint32_t>(series_.size()); index-- > first;) {
     if (send(index, [this](stream::FramePtr frame) { server_->publish(std::move(frame)); })) return;
   }

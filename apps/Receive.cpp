@@ -92,12 +92,11 @@ class SeriesWalk {
   /// Whether to keep `received`.
   bool wants(const stream::Received& received) const { return !next_ || received.level.frame == *next_; }
   bool isDone(const stream::Client::Standing& standing) const {
-    return next_ && standing.series && *next_ >= *standing.series;
+    return next_ && hasEnded(standing) && *next_ >= *standing.series;
   }
   /// Requests the first frame once the server has a finished series.
   void begin(stream::Client& client, const stream::Client::Standing& standing) {
-    if (next_ || !standing.isConnected || !standing.series || standing.state.phase != stream::Phase::Ended)
-      return;
+    if (next_ || !standing.isConnected || !hasEnded(standing)) return;
     next_ = 0;
     if (*standing.series > 0) client.show(*next_);
   }
@@ -108,6 +107,11 @@ class SeriesWalk {
   }
 
  private:
+  /// Whether the whole series is known. A server that was started again may have sent a part of it so far.
+  static bool hasEnded(const stream::Client::Standing& standing) {
+    return standing.series && standing.hasState && standing.state.phase == stream::Phase::Ended;
+  }
+
   std::optional<std::uint32_t> next_;
 };
 

@@ -37,7 +37,8 @@ void Relay::follow(const stream::Client::Standing& standing) {
     seriesPassed_ += more.size();
     server_->append(std::move(more));
   }
-  if (phase_ == standing.state.phase) return;
+  // Until the other server has told its state, `standing` has the state of the connection before.
+  if (!standing.hasState || phase_ == standing.state.phase) return;
   phase_ = standing.state.phase;
   server_->setPhase(*phase_);
 }

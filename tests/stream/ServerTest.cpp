@@ -5,6 +5,7 @@
 #include <openssl/x509v3.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cstdio>
 #include <fstream>
 
@@ -211,6 +212,41 @@ TEST_CASE("a client comes back to a server that was started again") {
   publisher.publish(vdiOfStep(2));
   CHECK(nextOf(client).level.step == 2);
   CHECK(client.standing().session != session);
+}
+
+TEST_CASE("a client asks a server that was started again for its frame once the series has it") {
+  std::atomic<int> asked = 0;
+  ServerOptions again = options();
+  again.show = [&asked](std::uint32_t index) { asked += index == 2 ? 1 : 100; };
+  auto first = std::make_unique<Server>(again);
+  again.port = first->port();
+  const Series one{{0.5}, {7}};
+  for (int i = 0; i < 3; ++i) first->append(one);
+  Client client(clientOf(*first));
+  const auto comes = [&client](const auto& condition) {
+    const auto end = Clock::now() + patience;
+    while (!condition() && Clock::now() < end) CHECK_FALSE(client.next(10ms));
+    return condition();
+  };
+  client.show(2);
+  REQUIRE(comes([&] { return asked == 1; }));
+  const std::string session = client.standing().session;
+  first.reset();
+
+  // The new server answers before it has listed its files.
+  Server second(again);
+  REQUIRE(comes([&] { return client.standing().hasState && client.standing().session != session; }));
+  CHECK(client.standing().series == std::nullopt);
+  second.append(one);
+  second.append(one);
+  REQUIRE(comes([&] { return client.standing().series == 2; }));
+  CHECK(asked == 1);
+  second.append(one);
+  REQUIRE(comes([&] { return asked == 2; }));
+  passFrame(io::encode(*vdiOfStep(7)), 2, Clock::now(),
+            [&second](FramePtr frame) { second.provide(std::move(frame)); });
+  CHECK(nextOf(client).level.frame == 2);
+  CHECK(asked == 2);
 }
 
 TEST_CASE("a wrong token and a foreign server end a client") {

@@ -8,7 +8,7 @@ import threading
 import unittest
 
 from tool import PATIENCE, VDI, ServedFolder, make, receive, until
-from viewer import Closed, Refused, Viewer
+from viewer import Closed, OneViewer, Refused, Viewer
 
 
 class ServeTest(ServedFolder):
@@ -269,6 +269,44 @@ class ServeTest(ServedFolder):
         done = receive(again.address, "--token-file", token, "--patience", "0.5")
         self.assertEqual(done.returncode, 1)
         self.assertIn("no connection", done.stderr)
+
+    def record(self, link):
+        """A vdi receive that stores in `got`, and that folder."""
+        got = self.folder / "got"
+        recorder = subprocess.Popen([VDI, "receive", link, "-o", got], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.addCleanup(recorder.kill)
+        return recorder, got
+
+    def test_a_finished_series_goes_on_when_its_server_comes_back(self):
+        names = ["small0", "small1", "large"]
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            recorder, got = self.record(f"http://127.0.0.1:{listener.getsockname()[1]}/#token=" + "t" * 32)
+            first = OneViewer(listener, PATIENCE)
+            first.welcome("first", [0, 1, 2])
+            first.send(type="state", state="ended", viewers=1)
+            self.assertEqual(first.text_message("show")["index"], 0)
+            first.send_level(0, self.bytes_of(names[0]))
+            self.assertEqual(first.text_message("show")["index"], 1)
+            first.close()
+            # The new server answers before it has listed its files, and then lists one after the other.
+            again = OneViewer(listener, PATIENCE)
+            self.addCleanup(again.close)
+            again.text_message("hello")
+            again.welcome("again", None)
+            again.send(type="state", state="waiting", viewers=1)
+            again.send(type="series", times=[0], steps=[0], **{"from": 0})
+            again.socket.settimeout(0.5)
+            with self.assertRaises(socket.timeout):  # nobody asks for what isn't listed
+                self.assertIsNone(again.message())
+            again.socket.settimeout(PATIENCE)
+            again.send(type="series", times=[1, 2], steps=[1, 2], **{"from": 1})
+            again.send(type="state", state="ended", viewers=1)
+            for index in (1, 2):
+                self.assertEqual(again.text_message("show")["index"], index)
+                again.send_level(index, self.bytes_of(names[index]))
+            self.assertEqual(recorder.wait(PATIENCE), 0)
+        for index, name in enumerate(names):
+            self.assertEqual((got / f"vdi_{index:06}.vdi").read_bytes(), self.bytes_of(name))
 
     def test_a_viewer_that_comes_back_gets_what_it_lacks(self):
         server = self.serve(self.made / "large.vdi")

@@ -1,5 +1,7 @@
-"""A viewer of a VDI server in plain Python, after docs/live.md and RFC 6455: it shares no code with the product."""
+"""A viewer of a VDI server in plain Python, and a server for one viewer, after docs/live.md and RFC 6455: they share no code
+with the product."""
 import base64
+import hashlib
 import json
 import os
 import socket
@@ -25,27 +27,25 @@ class Refused(Exception):
         self.status = status
 
 
-class Viewer:
-    """One connection. Its functions raise socket.timeout rather than wait for ever."""
+def masked_by(payload, mask):
+    return bytes(b ^ mask[i % 4] for i, b in enumerate(payload))
 
-    def __init__(self, port, timeout=60, origin=None, protocol="pv-vdi.1", target="/stream"):
-        self.socket = socket.create_connection(("127.0.0.1", port), timeout)
-        key = base64.b64encode(os.urandom(16)).decode()
-        lines = [f"GET {target} HTTP/1.1", f"Host: 127.0.0.1:{port}", "Upgrade: websocket", "Connection: Upgrade",
-                 f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13"]
-        if protocol:
-            lines.append(f"Sec-WebSocket-Protocol: {protocol}")
-        if origin:
-            lines.append(f"Origin: {origin}")
-        self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+
+class Peer:
+    """One end of a connection. Its functions raise socket.timeout rather than wait for ever."""
+
+    MASKS = True  # the frames that it sends, as a viewer must
+
+    def __init__(self, connected):
+        self.socket = connected
         self.buffer = b""
+
+    def head(self):
+        """What comes before the first frame."""
         while b"\r\n\r\n" not in self.buffer:
             self.fill()
         head, self.buffer = self.buffer.split(b"\r\n\r\n", 1)
-        status = int(head.split()[1])
-        if status != 101:
-            self.close()
-            raise Refused(status)
+        return head.decode()
 
     def close(self):
         self.socket.close()
@@ -63,25 +63,26 @@ class Viewer:
         return got
 
     def send_frame(self, opcode, payload):
-        mask = os.urandom(4)
+        bit = 0x80 if self.MASKS else 0
         size = len(payload)
         head = bytes([0x80 | opcode])
         if size < 126:
-            head += bytes([0x80 | size])
+            head += bytes([bit | size])
         elif size < 1 << 16:
-            head += bytes([0x80 | 126]) + struct.pack(">H", size)
+            head += bytes([bit | 126]) + struct.pack(">H", size)
         else:
-            head += bytes([0x80 | 127]) + struct.pack(">Q", size)
-        self.socket.sendall(head + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(payload)))
+            head += bytes([bit | 127]) + struct.pack(">Q", size)
+        if self.MASKS:
+            mask = os.urandom(4)
+            head += mask
+            payload = masked_by(payload, mask)
+        self.socket.sendall(head + payload)
 
     def send_text(self, text):
         self.send_frame(TEXT, text.encode())
 
     def send(self, **message):
         self.send_text(json.dumps(message))
-
-    def hello(self, token, version=1, have=None, **more):
-        self.send(type="hello", version=version, token=token, have=have, **more)
 
     def message(self):
         """The next message: a dict, or (frame, level, offset, bytes)."""
@@ -93,7 +94,10 @@ class Viewer:
                 size = struct.unpack(">H", self.read(2))[0]
             elif size == 127:
                 size = struct.unpack(">Q", self.read(8))[0]
+            mask = self.read(4) if second & 0x80 else None
             data = self.read(size)
+            if mask:
+                data = masked_by(data, mask)
             opcode = first & 0xF
             if opcode == CLOSE:
                 code = struct.unpack(">H", data[:2])[0] if len(data) >= 2 else 1005
@@ -117,6 +121,26 @@ class Viewer:
             message = self.message()
             if isinstance(message, dict) and message["type"] == kind:
                 return message
+
+
+class Viewer(Peer):
+    def __init__(self, port, timeout=60, origin=None, protocol="pv-vdi.1", target="/stream"):
+        super().__init__(socket.create_connection(("127.0.0.1", port), timeout))
+        key = base64.b64encode(os.urandom(16)).decode()
+        lines = [f"GET {target} HTTP/1.1", f"Host: 127.0.0.1:{port}", "Upgrade: websocket", "Connection: Upgrade",
+                 f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13"]
+        if protocol:
+            lines.append(f"Sec-WebSocket-Protocol: {protocol}")
+        if origin:
+            lines.append(f"Origin: {origin}")
+        self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+        status = int(self.head().split()[1])
+        if status != 101:
+            self.close()
+            raise Refused(status)
+
+    def hello(self, token, version=1, have=None, **more):
+        self.send(type="hello", version=version, token=token, have=have, **more)
 
     def levels(self):
         """Whole levels, as (announcement, bytes), acknowledged."""
@@ -149,3 +173,32 @@ class Viewer:
             return closed.code
         except ConnectionError:
             return 1006
+
+
+class OneViewer(Peer):
+    """A server's end of the next connection to a socket that listens."""
+
+    MASKS = False
+
+    def __init__(self, listener, timeout=60):
+        listener.settimeout(timeout)
+        super().__init__(listener.accept()[0])
+        self.socket.settimeout(timeout)
+        headers = dict(line.split(": ", 1) for line in self.head().split("\r\n")[1:])
+        key = {name.lower(): value for name, value in headers.items()}["sec-websocket-key"]
+        accepted = base64.b64encode(hashlib.sha1((key + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11").encode()).digest()).decode()
+        lines = ["HTTP/1.1 101 Switching Protocols", "Upgrade: websocket", "Connection: Upgrade",
+                 f"Sec-WebSocket-Accept: {accepted}", "Sec-WebSocket-Protocol: pv-vdi.1"]
+        self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+
+    def welcome(self, session, steps):
+        """`steps` of the series, whose times are the same numbers; None: there's none so far."""
+        series = None if steps is None else {"times": steps, "steps": steps}
+        self.send(type="welcome", version=1, session=session, steer=False, viewers=1, series=series)
+
+    def send_level(self, frame, data):
+        """The only level of a frame."""
+        self.send(type="level", frame=frame, level=0, levels=1, bytes=len(data), width=1, height=1, step=frame, time=None,
+                  age=0.0, dropped=0)
+        for offset in range(0, len(data), 1 << 18):
+            self.send_frame(BINARY, struct.pack("<IIQ", frame, 0, offset) + data[offset:offset + (1 << 18)])

@@ -97,7 +97,7 @@ class Client::Impl {
       shown_ = index;
       isPaused_ = false;
       if (index) {
-        send(Show{*index});
+        askForShown(0);
       } else {
         send(Resume{});
       }
@@ -183,6 +183,12 @@ class Client::Impl {
     if (line_ && isWelcome_) line_->send(textOf(message));
   }
 
+  /// Asks for the wanted frame if the series has it, and has it from its entry `from` on. A server that was
+  /// started again may still be listing its files, and closes the connection to viewers that ask for others.
+  void askForShown(std::size_t from) {
+    if (shown_ && *shown_ >= from && *shown_ < series_.size()) send(Show{*shown_});
+  }
+
   /// Runs `work` on what the server sent. An error in it makes this client fail.
   template <typename Work>
   void guarded(Work work) {
@@ -209,10 +215,11 @@ class Client::Impl {
       standing_.isConnected = true;
       standing_.since = std::chrono::steady_clock::now();
       standing_.session = session_;
+      standing_.hasState = false;
       standing_.series = welcome.series ? std::optional(welcome.series->size()) : std::nullopt;
       series_ = welcome.series.value_or(Series());
     });
-    if (shown_) send(Show{*shown_});
+    askForShown(0);
     if (isPaused_) send(Pause{});
   }
   void take(const SeriesPart& part) {
@@ -223,9 +230,13 @@ class Client::Impl {
       series_.steps.insert(series_.steps.end(), part.entries.steps.begin(), part.entries.steps.end());
       standing_.series = series_.size();
     });
+    askForShown(part.from);
   }
   void take(const State& state) {
-    change([&] { standing_.state = state; });
+    change([&] {
+      standing_.state = state;
+      standing_.hasState = true;
+    });
   }
   void take(const Level& level) {
     assembly_.begin(level, options_.mostLevelBytes);

@@ -50,6 +50,7 @@ class Client {
     bool isConnected = false;                     // and welcome
     std::string session;                          // of the last connection
     State state;                                  // what the server said last
+    bool hasState = false;                        // on the last connection, and after its series
     std::optional<std::size_t> series;            // frames in it
     std::chrono::steady_clock::time_point since;  // of isConnected
     std::string trouble;                          // why there is no connection; empty: none so far
@@ -58,7 +59,7 @@ class Client {
   /// The series of the last connection, from its entry `from` on; empty: there's none, or none so far.
   Series seriesFrom(std::size_t from) const;
 
-  /// Asks for a frame of the series, here and after a reconnect.
+  /// Asks for a frame of the series, here and after a reconnect, as soon as the series has it.
   void show(std::uint32_t index);
   void pause();
   /// Asks for the newest frames again.
