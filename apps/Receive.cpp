@@ -91,12 +91,14 @@ class SeriesWalk {
  public:
   /// Whether to keep `received`.
   bool wants(const stream::Received& received) const { return !next_ || received.level.frame == *next_; }
+  bool hasBegun() const { return next_.has_value(); }
   bool isDone(const stream::Client::Standing& standing) const {
     return next_ && hasEnded(standing) && *next_ >= *standing.series;
   }
-  /// Requests the first frame once the server has a finished series.
+  /// Requests the first frame once the server has a finished series. One that was live and ends has none: it
+  /// says "ended" before it closes the connection.
   void begin(stream::Client& client, const stream::Client::Standing& standing) {
-    if (next_ || !standing.isConnected || !hasEnded(standing)) return;
+    if (next_ || !standing.isConnected || !hasEnded(standing) || standing.hasBeenLive) return;
     next_ = 0;
     if (*standing.series > 0) client.show(*next_);
   }
@@ -142,7 +144,8 @@ void receive(const ReceiveOptions& options) {
     walk.begin(client, standing);
     if (walk.isDone(standing)) return;
     if (!received) {
-      const bool hasEnded = standing.state.phase == stream::Phase::Ended && !standing.series;
+      // A server of a finished series may come back with the frames that this walk still lacks.
+      const bool hasEnded = standing.state.phase == stream::Phase::Ended && !walk.hasBegun();
       if (hasEnded && !standing.isConnected && options.frames == 0 && recorder.count() > 0) return;
       requirePatience(standing, options.patience, recorder.count());
       continue;

@@ -249,6 +249,31 @@ TEST_CASE("a client asks a server that was started again for its frame once the 
   CHECK(asked == 2);
 }
 
+TEST_CASE("a client tells a server that was live from a finished series") {
+  auto server = std::make_unique<Server>(options());
+  Client client(clientOf(*server));
+  server->append({{0.5}, {7}});
+  passFrame(io::encode(*vdiOfStep(7)), 0, Clock::now(),
+            [&server](FramePtr frame) { server->publish(std::move(frame)); });
+  CHECK(nextOf(client).level.frame == 0);
+  CHECK(client.standing().hasBeenLive);
+  server.reset();
+  const auto end = Clock::now() + patience;
+  while (client.standing().isConnected && Clock::now() < end) CHECK_FALSE(client.next(10ms));
+  CHECK(client.standing().state.phase == Phase::Ended);
+  CHECK(client.standing().hasBeenLive);
+
+  Server finished(options());
+  finished.append({{0.5}, {7}});
+  finished.setPhase(Phase::Ended);
+  passFrame(io::encode(*vdiOfStep(7)), 0, Clock::now(),
+            [&finished](FramePtr frame) { finished.publish(std::move(frame)); });
+  Client other(clientOf(finished));
+  CHECK(nextOf(other).level.frame == 0);
+  CHECK(other.standing().hasState);
+  CHECK_FALSE(other.standing().hasBeenLive);
+}
+
 TEST_CASE("a wrong token and a foreign server end a client") {
   Server server(options());
   ClientOptions wrong = clientOf(server);

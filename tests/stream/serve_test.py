@@ -2,6 +2,7 @@
 import os
 import resource
 import shutil
+import signal
 import socket
 import subprocess
 import threading
@@ -276,6 +277,17 @@ class ServeTest(ServedFolder):
         recorder = subprocess.Popen([VDI, "receive", link, "-o", got], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.addCleanup(recorder.kill)
         return recorder, got
+
+    def test_a_followed_folder_ends_with_its_server(self):
+        self.appear("small0", "a.vdi")
+        server = self.serve(self.live)
+        recorder, got = self.record(server.link)
+        until((got / "vdi_000000.vdi").exists, "the first frame")
+        self.appear("small1", "b.vdi")
+        until((got / "vdi_000001.vdi").exists, "the second frame")
+        self.assertEqual(server.end(signal.SIGINT), 0)
+        self.assertEqual(recorder.wait(PATIENCE), 0)
+        self.assertEqual(len(list(got.iterdir())), 2)
 
     def test_a_finished_series_goes_on_when_its_server_comes_back(self):
         names = ["small0", "small1", "large"]

@@ -209,13 +209,15 @@ class Client::Impl {
       throw Error(ErrorCode::Format, "the server uses another protocol version");
     isWelcome_ = true;
     wait_ = firstPause;
-    if (session_ != welcome.session) have_.reset();
+    const bool isOther = session_ != welcome.session;
+    if (isOther) have_.reset();
     session_ = welcome.session;
     change([&] {
       standing_.isConnected = true;
       standing_.since = std::chrono::steady_clock::now();
       standing_.session = session_;
       standing_.hasState = false;
+      if (isOther) standing_.hasBeenLive = false;
       standing_.series = welcome.series ? std::optional(welcome.series->size()) : std::nullopt;
       series_ = welcome.series.value_or(Series());
     });
@@ -236,6 +238,7 @@ class Client::Impl {
     change([&] {
       standing_.state = state;
       standing_.hasState = true;
+      if (state.phase == Phase::Live) standing_.hasBeenLive = true;
     });
   }
   void take(const Level& level) {

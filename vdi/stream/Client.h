@@ -51,6 +51,7 @@ class Client {
     std::string session;                          // of the last connection
     State state;                                  // what the server said last
     bool hasState = false;                        // on the last connection, and after its series
+    bool hasBeenLive = false;                     // in the session; a finished series never is
     std::optional<std::size_t> series;            // frames in it
     std::chrono::steady_clock::time_point since;  // of isConnected
     std::string trouble;                          // why there is no connection; empty: none so far
