@@ -141,7 +141,9 @@ static void save_signals(vdi_process_state* state) {
   }
   pthread_sigmask(SIG_SETMASK, NULL, &state->blocked);
   if (sigaltstack(NULL, &state->signal_stack) != 0) state->signal_stack.ss_flags = SS_ONSTACK;
+  /* A closed pipe and a file beyond the limit of sizes are then errors of the write. */
   if (state->actions[SIGPIPE].sa_handler == SIG_DFL) signal(SIGPIPE, SIG_IGN);
+  if (state->actions[SIGXFSZ].sa_handler == SIG_DFL) signal(SIGXFSZ, SIG_IGN);
 }
 
 static int same_mask(const sigset_t* a, const sigset_t* b) {

@@ -25,8 +25,8 @@ typedef struct vdi_process_state {
 } vdi_process_state;
 
 /* Saves the process's state and sets the state for our calls. That is the default floating-point environment,
- * because libraries do things that simulations trap. If the simulation has no handler for SIGPIPE, the signal
- * is ignored. The environment gets the variables that scripts have set in earlier calls. */
+ * because libraries do things that simulations trap. SIGPIPE and SIGXFSZ are ignored where they would end the
+ * process. The environment gets the variables that scripts have set in earlier calls. */
 void vdi_process_state_save(vdi_process_state* state);
 
 /* Restores what differs from `state`, and frees the memory that it holds. Keeps changed environment variables

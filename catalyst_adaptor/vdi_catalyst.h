@@ -33,7 +33,8 @@
  * the calling thread's signal mask and floating-point environment (traps, rounding, flags), the locale, the
  * environment variables, the working directory, the umask and the soft limits of resources. At the next step,
  * scripts find the variables again that they have set. During a call, a signal finds the simulation's
- * handler, unless a script sets another one, and SIGPIPE is ignored if it would end the process.
+ * handler, unless a script sets another one. SIGPIPE and SIGXFSZ, which comes with a limit of file sizes, are
+ * ignored if they would end the process.
  *
  * These events still end the process, because ParaView, Python or a library gives no choice: a script that
  * calls os._exit or os.abort, or crashes in one of its modules; an allocation of ParaView's own that fails

@@ -5,12 +5,14 @@
  * must be refused. VDI_TEST_REFUSED: the code that initialising must return; then the program ends.
  * VDI_TEST_FULL: the name of an output for which there is no room. VDI_TEST_FIRST: the first step's number.
  * VDI_TEST_WANTS: for each step whether it is wanted, such as 1010; others aren't handed over.
- * VDI_TEST_OWN_TIMES=1: each rank gives a step another time.
- * VDI_TEST_PAUSE: milliseconds between steps. VDI_ISOLATION: frames are made in processes of their own. */
+ * VDI_TEST_OWN_TIMES=1: each rank gives a step another time. VDI_TEST_PAUSE: milliseconds between steps.
+ * VDI_TEST_LIMIT: the bytes beyond which no file can grow while the second step is executed. VDI_ISOLATION:
+ * frames are made in processes of their own. */
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -145,6 +147,9 @@ int main(int argc, char** argv) {
   const char* first_step = getenv("VDI_TEST_FIRST");
   const char* pause = getenv("VDI_TEST_PAUSE");
   const double late = getenv("VDI_TEST_OWN_TIMES") != NULL ? 0.01 * rank : 0.0;
+  const char* bytes = getenv("VDI_TEST_LIMIT");
+  struct rlimit limit;
+  getrlimit(RLIMIT_FSIZE, &limit);
   for (int i = 0; i < argc - 2; ++i) {
     const int step = i + (first_step != NULL ? atoi(first_step) : 0);
     simulate(first, count, step);
@@ -154,7 +159,12 @@ int main(int argc, char** argv) {
       wrong += expect(rank, "wants", wanted[i] - '0', wants);
       if (wants == 0) continue;
     }
+    if (bytes != NULL && i == 1) {
+      const struct rlimit tight = {(rlim_t)atoi(bytes), limit.rlim_max};
+      setrlimit(RLIMIT_FSIZE, &tight);
+    }
     const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step - late);
+    setrlimit(RLIMIT_FSIZE, &limit);
     wrong += expect_step(rank, atoi(argv[i + 2]), code);
     if (code != VDI_CATALYST_OK)
       wrong += expect(rank, "the error's text", 1, vdi_catalyst_error(catalyst)[0] != '\0');

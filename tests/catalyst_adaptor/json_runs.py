@@ -189,6 +189,16 @@ def full():
     assert os.path.getsize("c_0_b.vdi") > 0 and os.path.getsize("c_1_a.vdi") > 0
 
 
+def limited():
+    """A limit of file sizes fails the step that meets it, also where only the log does. The next step works."""
+    run({"output": "v_{timestep}.vdi"}, 0, 3, 0, VDI_TEST_LIMIT="4096", said="File too large")
+    assert made() == ["v_0.vdi", "v_2.vdi"], made()
+    run({"output": "l_{timestep}.vdi", "max_share": 0.0001, "log": "run.jsonl"}, 0, 3, 0, VDI_TEST_LIMIT="1",
+        said="can't write the log: File too large")
+    assert [(event["event"], event.get("step")) for event in events()] == [
+        ("start", None), ("frame", 0), ("left_out", 2), ("end", None)], events()
+
+
 def lost_device():
     """A device that is lost costs no frame: the values go to the next one, for all cameras."""
     document = {"cameras": [{"name": "a", "orbit": {}}, {"name": "b", "orbit": {"elevation": 30}}], "log": "run.jsonl",

@@ -187,7 +187,8 @@ State stateOfProcess() {
 void makeOwnSettings() {
   for (int signal = 1; signal <= lastSignal; ++signal) {
     struct sigaction action {};
-    action.sa_handler = &ownHandler;
+    // A limit of file sizes ends the process, unless the adaptor ignores the signal during its calls.
+    action.sa_handler = signal == SIGXFSZ ? SIG_DFL : &ownHandler;
     action.sa_flags = SA_RESTART;
     sigemptyset(&action.sa_mask);
     sigaddset(&action.sa_mask, SIGWINCH);

@@ -1,10 +1,12 @@
 """Makes a VDI at each step, sends the simulation a signal, and changes what a script can change in the process that runs it.
 What it sets in the environment it finds again at the next step."""
 
+import errno
 import locale
 import os
 import resource
 import signal
+import tempfile
 
 from paraview import catalyst
 from paraview.simple import *  # noqa: F403
@@ -29,9 +31,25 @@ def in_c(name):
     return getenv(name.encode())
 
 
+def is_refused_beyond_a_limit():
+    """Whether a file beyond the limit of sizes is an error. With the signal's default action it would end the process."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
+    try:
+        with tempfile.TemporaryFile(buffering=0) as file:
+            file.write(b"x")
+    except OSError as error:
+        return error.errno == errno.EFBIG
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    return False
+
+
 def catalyst_execute(info):
     os.kill(os.getpid(), signal.SIGTERM)
     image.UpdatePipeline(info.time)
+    if not is_refused_beyond_a_limit():
+        raise RuntimeError("a file grew beyond the limit")
     if info.timestep > 1 and (in_c("SCRIPTS_OWN") != b"1" or in_c("SIMULATION_OWN") != b"changed"):
         raise RuntimeError("what the script has set is forgotten")
     os.environ["SCRIPTS_OWN"] = "1"
