@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import weakref
 
 import numpy as np
 from mpi4py import MPI
@@ -51,6 +52,24 @@ def shown(positions, weights, lengths, density):
     return pv_vdi.read("particles_0.vdi")
 
 
+def check_kept():
+    """Arrays live until others of the same name and the same kind, cells or points, take their place."""
+    with Catalyst(MPI.COMM_WORLD, json={"field": "V"}) as catalyst:
+        catalyst.set_blocks([Block(cells=(N, N, N), spacing=(1 / N,) * 3)])
+
+        def set_new(points):
+            array = np.zeros((N + points,) * 3)
+            catalyst.set_array("V", [array], points)
+            return weakref.ref(array)
+
+        cells, points = set_new(False), set_new(True)
+        assert cells() is not None and points() is not None
+        others = set_new(True)
+        assert cells() is not None and points() is None and others() is not None
+        catalyst.set_particles("V", np.full((5, 3), 0.5))  # they become cells
+        assert cells() is None and others() is not None
+
+
 refused(SCRIPT, json={"field": "V", "evry": 10})
 refused(SCRIPT, json="none.json")
 run = {"field": "V", "every": 10, "resolution": [48, 32], "stream": {"link_file": "link"},
@@ -87,6 +106,7 @@ assert open(received[0], "rb").read() == open("v_020.vdi", "rb").read(), "what's
 with Catalyst(MPI.COMM_WORLD, json={"field": "V"}) as catalyst:
     catalyst.set_blocks([])
     assert catalyst.wants(1)
+check_kept()
 
 # Particles: one array or three, of any stride, weights and lengths for each or for all.
 places = np.random.default_rng(3).uniform(0.2, 0.8, (2000, 3))

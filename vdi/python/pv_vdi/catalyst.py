@@ -147,7 +147,7 @@ class Catalyst:
         self._library = _load()
         self._handle = ctypes.c_void_p()
         self._blocks = []
-        self._kept = {}  # arrays that the engine points to
+        self._kept = {}  # arrays that the engine points to, by association and name, as it has them itself
         if json is not None:
             text = json_module.dumps(json) if isinstance(json, dict) else json
             self._check(self._library.vdi_catalyst_initialize_json(
@@ -197,7 +197,7 @@ class Catalyst:
         association = _POINTS if points else _CELLS
         self._check(self._library.vdi_catalyst_set_array_strided(
             self._handle, name.encode(), _TYPES[types.pop()], association, components.pop(), pointers, strides))
-        self._kept[name] = arrays
+        self._kept[association, name] = arrays
         if offset is not None:
             self._check(self._library.vdi_catalyst_set_array_offset(
                 self._handle, name.encode(), association, (ctypes.c_double * 3)(*offset)))
@@ -224,7 +224,7 @@ class Catalyst:
             made.lengths, made.length_type = array.ctypes.data, _float_type("lengths", array.dtype)
             kept.append(array)
         self._check(self._library.vdi_catalyst_set_particles(self._handle, name.encode(), made))
-        self._kept[name] = kept
+        self._kept[_CELLS, name] = kept  # an array of cells, as far as the engine is concerned
 
     def wants(self, step, time=0.0):
         """Whether this step makes anything, the same on all ranks; if not, there is no need to call execute."""
