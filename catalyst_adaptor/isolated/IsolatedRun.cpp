@@ -21,7 +21,7 @@ namespace vdi::catalyst {
 namespace {
 
 constexpr std::chrono::milliseconds tick(20);  // between two agreements while ranks wait
-constexpr double startLimit = 300.0;           // seconds in which processes start, or end a run
+constexpr double startLimit = 300.0;           // seconds in which processes start, make a frame, or end a run
 constexpr double stopLimit = 2.0;              // seconds in which somebody may let stopped processes go on
 constexpr std::chrono::milliseconds endLimit(10000);
 
@@ -142,28 +142,34 @@ int IsolatedRun::awaitStart() {
   });
 }
 
-/// Waits until all ranks' progress, which only grows, has come to the goal. Returns the least progress, too.
+/// Waits until all ranks' progress, which only grows, has come to the goal. Gives up when the least progress
+/// hasn't grown for `limit` seconds. Returns the least progress, too.
 template <typename Progress>
 std::pair<IsolatedRun::Wait, std::int64_t> IsolatedRun::wait(Progress progress, std::int64_t goal,
                                                              double limit) {
-  const auto begin = Clock::now();
-  auto lastRun = begin;
+  auto lastGrowth = Clock::now();
+  auto lastRun = lastGrowth;
+  std::int64_t least = std::numeric_limits<std::int64_t>::min();
   const auto since = [](Clock::time_point time) {
     return std::chrono::duration<double>(Clock::now() - time).count();
   };
   for (;;) {
     process_->listen(tick);
-    if (!process_->isStopped()) lastRun = Clock::now();
-    const bool isLate = rank_ == 0 && since(begin) > limit;
+    const bool isStopped = process_->isStopped();
+    if (!isStopped) lastRun = Clock::now();
+    const bool isLate = rank_ == 0 && since(lastGrowth) > limit;
+    const bool isStoppedLong = isStopped && since(lastRun) > stopLimit;
     // A job that is over has lost the processes that haven't come, on whatever host.
     const bool isLost = job_ && !process_->startCode() && job_->isOver(Milliseconds(0));
     const std::int64_t mine = progress();
     const bool isGone = (process_->isGone() || isLost) && mine < goal;
     const auto [gone, behind, tired] =
-        meet<3>(self_.comm, {isGone ? 1 : 0, -mine, isLate || since(lastRun) > stopLimit ? 1 : 0});
+        meet<3>(self_.comm, {isGone ? 1 : 0, -mine, isLate || isStoppedLong ? 1 : 0});
     if (-behind >= goal) return {Wait::Over, -behind};
     if (gone != 0) return {Wait::Dead, -behind};
     if (tired != 0) return {Wait::Tired, -behind};
+    if (-behind > least) lastGrowth = Clock::now();
+    least = -behind;
   }
 }
 
@@ -386,8 +392,11 @@ int IsolatedRun::finish() {
   }
   if (!process_) return VDI_CATALYST_ENGINE;
   process_->finish();
-  const double limit = std::max(options_.isolation.patience, startLimit);
-  const Wait result = wait([&] { return process_->finished() ? 1 : 0; }, 1, limit).first;
+  // A viewer may pause a steered run for any time.
+  const double limit = isSteered() ? std::numeric_limits<double>::infinity()
+                                   : std::max(options_.isolation.patience, startLimit);
+  const auto progress = [&] { return process_->doneCount() + (process_->finished() ? 1 : 0); };
+  const Wait result = wait(progress, handedOver_ + 1, limit).first;
   if (result == Wait::Dead) return bury(std::nullopt);
   if (result == Wait::Tired) {
     const int code = guarded(self_, VDI_CATALYST_ENGINE, [&]() -> std::optional<std::string> {

@@ -1,6 +1,7 @@
 /* Loaded before a program (LD_PRELOAD): ends the worker of vdi_catalyst_process in one of its stages, and
  * leaves all other programs alone. VDI_TEST_DIE is STAGE:RANK:HOW. Stages: start, initialize, waiting,
- * taking, generating, writing, finalizing. HOW: kill, stop (as by SIGSTOP), exit (with status 7).
+ * taking, generating, writing, finalizing. HOW: kill, stop (as by SIGSTOP), exit (with status 7); or sleep,
+ * for 3 seconds, which doesn't end it.
  * If VDI_TEST_DIE_ONCE names a file, a worker dies only if that file exists, and removes it first. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -39,6 +40,10 @@ static void die_if(const char* stage) {
   const char* once = getenv("VDI_TEST_DIE_ONCE");
   if (once != NULL && unlink(once) != 0) return;
   if (strcmp(how, "exit") == 0) _exit(7);
+  if (strcmp(how, "sleep") == 0) {
+    sleep(3);
+    return;
+  }
   kill(getpid(), strcmp(how, "stop") == 0 ? SIGSTOP : SIGKILL);
 }
 

@@ -6,16 +6,20 @@
  * ranks have the same codes. VDI_TEST_SIZE: N, 16 unless given. VDI_TEST_PAUSE: milliseconds after each step.
  * VDI_TEST_REPEAT: how often the heat spreads in a step. VDI_TEST_KILL=STEP: kills the last rank's worker
  * while that step is handed over. VDI_TEST_FILE_LIMIT: the largest file, in bytes, that the last rank may
- * make during the first three steps. */
+ * make during the first three steps. VDI_TEST_HURRY: how many times as fast the steady clock runs in this
+ * process while it finalizes. */
 #define _GNU_SOURCE
 #include <dirent.h>
 #include <mpi.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
@@ -27,6 +31,31 @@ static double* next;
 static int number_of(const char* name, int usual) {
   const char* value = getenv(name);
   return value != NULL ? atoi(value) : usual;
+}
+
+static const int64_t second = 1000000000; /* ns */
+static atomic_llong hurry = 1;
+static atomic_llong since; /* ns, when the clock began to hurry */
+static atomic_llong ahead; /* ns, when it ended */
+
+/* The libraries find this function, and not that of libc, because the program exports it. */
+int clock_gettime(clockid_t clock, struct timespec* time) {
+  const int code = (int)syscall(SYS_clock_gettime, clock, time);
+  if (code != 0 || clock != CLOCK_MONOTONIC) return code;
+  const int64_t real = second * time->tv_sec + time->tv_nsec;
+  const int64_t shown = real + ahead + (hurry - 1) * (real - since);
+  time->tv_sec = shown / second;
+  time->tv_nsec = shown % second;
+  return 0;
+}
+
+static void set_hurry(int times) {
+  struct timespec time;
+  syscall(SYS_clock_gettime, CLOCK_MONOTONIC, &time);
+  const int64_t real = second * time.tv_sec + time.tv_nsec;
+  ahead += (hurry - 1) * (real - since);
+  since = real;
+  hurry = times;
 }
 
 static double* at(double* field, int x, int y, int z) {
@@ -189,7 +218,9 @@ int main(int argc, char** argv) {
   }
   if (has_library) {
     const double start = MPI_Wtime();
+    set_hurry(number_of("VDI_TEST_HURRY", 1));
     const int code = vdi_catalyst_finalize(catalyst);
+    set_hurry(1);
     const long spent = microseconds_since(start);
     if (rank == 0) printf("finalize %d %ld\n", code, spent);
     wrong += differs(code);

@@ -1,5 +1,5 @@
-"""Processes that make frames and die, stop, or find no room. Arguments: the case, the library to preload (die_at), and
-the simulation with its launcher. Each case checks what the simulation has seen."""
+"""Processes that make frames and die, stop, are slow, or find no room. Arguments: the case, the library to preload (die_at),
+and the simulation with its launcher. Each case checks what the simulation has seen."""
 
 import glob
 import json
@@ -143,6 +143,18 @@ def stopped():
     assert "in all, %d steps were left out" % (10 - first) in run.lines[-2], run.lines
     assert run.end == ENGINE and "it is killed" in run.lines[-1], run.lines
     assert run.seconds < 60
+
+
+def slow():
+    """At the end, the simulation waits for each frame that is still made, and without a limit if viewers may steer. The limit
+    is 300 s of a clock that hurries. A frame is made in more than 6 s."""
+    slowly = dying("writing", "sleep", rank=0)
+    run = Run({"output": "v_{timestep}.vdi"}, 3, VDI_TEST_HURRY="30", **slowly)  # two frames in 12 s, within 10 s each
+    assert set(run.codes) == {0} and run.end == 0 and made() == ["v_0.vdi", "v_1.vdi", "v_2.vdi"], made()
+    run = Run({"output": "s_{timestep}.vdi", "stream": {"steer": True}}, 1, VDI_TEST_HURRY="100", **slowly)
+    assert run.codes == [0] and run.end == 0 and "s_0.vdi" in made(), made()
+    run = Run({"output": "w_{timestep}.vdi"}, 1, VDI_TEST_HURRY="100", **slowly)  # within 3 s
+    assert run.codes == [0] and run.end == ENGINE and "doesn't end the run; it is killed" in run.lines[-1], run.lines
 
 
 def impatient():
