@@ -169,11 +169,21 @@ int Session::execute(const Node& params) {
                    [&] { requireEqual(calls_.comm, step, "the ranks give different steps"); });
   }
   // Where no step can have this number, vdi_catalyst_execute says so.
-  if (code == VDI_CATALYST_OK && isStep(step) && vdi_catalyst_wants(catalyst_, step, time) == 0) return code;
+  bool isWanted = true;
+  if (code == VDI_CATALYST_OK && isStep(step)) isWanted = vdi_catalyst_wants(catalyst_, step, time) != 0;
+  // An engine that is lost wants nothing. Whether it still is lost, vdi_catalyst_execute tells.
+  if (!isWanted && !hasLostEngine_) return code;
   if (code == VDI_CATALYST_OK) code = handOver(step, params);
-  if (code == VDI_CATALYST_OK) code = vdi_catalyst_execute(catalyst_, step, time);
+  if (code == VDI_CATALYST_OK) {
+    code = vdi_catalyst_execute(catalyst_, step, time);
+    hasLostEngine_ = code == VDI_CATALYST_ENGINE;
+  }
   if (code == VDI_CATALYST_OK) calls_.printed.clear();
-  ++(code == VDI_CATALYST_OK ? made_ : failed_);
+  if (code != VDI_CATALYST_OK) {
+    ++failed_;
+  } else if (isWanted) {
+    ++made_;
+  }
   return code;
 }
 

@@ -57,6 +57,7 @@ class Session {
   vdi_catalyst* catalyst_ = nullptr;
   Grid grid_;
   bool handedOver_ = false;        // the grid as it is, on all ranks
+  bool hasLostEngine_ = false;     // as the last vdi_catalyst_execute has told
   std::set<std::string> leftOut_;  // that were told
   std::int64_t made_ = 0;          // steps
   std::int64_t failed_ = 0;

@@ -2,20 +2,24 @@
 //
 //     catalyst2 native|catalyst mesh|multimesh|amrmesh RUN [arguments of a script]
 //     catalyst2 bad RUN
+//     catalyst2 lost RUN
 //
 // RUN is a JSON text or the name of a script. The arrays have different orders in memory: interleaved cells,
 // points within a halo, and cells of vectors whose components lie apart. `bad` hands over faulty nodes, most
-// of them on one rank only, and then a sound mesh. Exit status 0 if all calls returned what they should.
+// of them on one rank only, and then a sound mesh. `lost` hands over meshes to a run whose processes die.
+// Exit status 0 if all calls returned what they should.
 #include <mpi.h>
 
 #include <algorithm>
 #include <array>
 #include <catalyst.hpp>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -424,6 +428,27 @@ void runBad(const std::string& run) {
   finalize();
 }
 
+// --- An engine that is lost.
+
+void runLost(const std::string& run) {
+  constexpr int steps = 8;
+  constexpr std::chrono::milliseconds pause{300};
+  constexpr int lost = 102;
+  const Node initial = initialNode(run, {});
+  expect("initialize", 0, status(catalyst_initialize(conduit_cpp::c_node(&initial))));
+  Layout layout = layoutOf("mesh");
+  bool isLost = false;
+  for (int step = 0; step < steps; ++step) {
+    const int code = execute(stepNode(layout, step));
+    expect("step " + std::to_string(step), isLost || code != 0 ? lost : 0, code);
+    isLost = isLost || code != 0;
+    std::this_thread::sleep_for(pause);
+  }
+  expect("the engine is lost", 1, isLost ? 1 : 0);
+  const Node none;
+  expect("finalize", lost, status(catalyst_finalize(conduit_cpp::c_node(&none))));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -434,6 +459,8 @@ int main(int argc, char** argv) {
   constexpr int steps = 3;
   if (given.size() == 2 && given[0] == "bad") {
     runBad(given[1]);
+  } else if (given.size() == 2 && given[0] == "lost") {
+    runLost(given[1]);
   } else if (given.size() >= 3) {
     Layout layout = layoutOf(given[1]);
     if (given[0] == "native")

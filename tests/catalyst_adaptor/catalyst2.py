@@ -3,6 +3,7 @@
     catalyst2.py same LAYOUT LAUNCHER... PROGRAM
     catalyst2.py script LAUNCHER... PROGRAM
     catalyst2.py bad LAUNCHER... PROGRAM
+    catalyst2.py lost DIE_AT LAUNCHER... PROGRAM
 
 In a folder of its own below the present one. CATALYST_IMPLEMENTATION_PATHS is in the environment.
 """
@@ -36,12 +37,12 @@ SAYS = ["has neither scripts nor vdi/json",
         "catalyst/channels has no channel"]
 
 
-def run(folder, *command):
+def run(folder, *command, **environment):
     """The command's output, run in a new folder."""
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(folder)
     done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=100,
-                          env=dict(os.environ, CATALYST_IMPLEMENTATION_NAME="vdi"))
+                          env={**os.environ, "CATALYST_IMPLEMENTATION_NAME": "vdi", **environment})
     print(done.stdout)
     assert done.returncode == 0, "%s: status %d" % (command[-3:], done.returncode)
     return done.stdout
@@ -77,4 +78,12 @@ def bad(*program):
     assert len(files("catalyst2_bad")) == 1
 
 
-{"same": same, "script": script, "bad": bad}[sys.argv[1]](*sys.argv[2:])
+def lost(die_at, *program):
+    """Processes that make frames and die cost all steps from then on, and one line."""
+    says = run("catalyst2_lost", *program, "lost", json.dumps(dict(RUN, every=1, isolation="process")),
+               LD_PRELOAD=die_at + ":libvulkan.so.1", VDI_TEST_DIE="taking:0:kill")
+    lines = [line for line in says.splitlines() if line.startswith("vdi_catalyst: ")]
+    assert len(lines) == 1 and "was killed by signal 9" in lines[0] and "no more frames" in lines[0], lines
+
+
+{"same": same, "script": script, "bad": bad, "lost": lost}[sys.argv[1]](*sys.argv[2:])
