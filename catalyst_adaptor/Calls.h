@@ -18,6 +18,9 @@
 
 namespace vdi::catalyst {
 
+/// Of an array.
+inline constexpr int maxComponents = 16;
+
 /// The part of a handle that these functions use.
 struct Calls {
   MPI_Comm comm = MPI_COMM_NULL;  // a duplicate of the simulation's

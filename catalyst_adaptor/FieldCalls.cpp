@@ -11,8 +11,6 @@ namespace vdi::catalyst {
 
 namespace {
 
-constexpr int maxComponents = 16;
-
 /// `strides` is null for values in order.
 int setAnyArray(FieldCalls& self, const GivenArray& array, const void* const* data,
                 const vdi_catalyst_strides* strides) {

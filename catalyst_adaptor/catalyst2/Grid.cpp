@@ -224,6 +224,7 @@ bool Grid::read(const std::optional<Node>& data) {
   const std::vector<vdi_catalyst_block> blocksBefore = std::exchange(blocks_, {});
   const std::map<Key, Array> arraysBefore = std::exchange(arrays_, {});
   copiesUsed_ = 0;
+  leftOut_.clear();
   if (data) addDomains(*data, 0);
   leaveOutPartial();
   const auto sameBlock = [](const auto& left, const auto& right) { return left == right; };
@@ -235,15 +236,18 @@ bool Grid::read(const std::optional<Node>& data) {
 }
 
 void Grid::leaveOutPartial() {
-  leftOut_.clear();
   for (auto entry = arrays_.begin(); entry != arrays_.end();) {
     if (entry->second.data.size() == blocks_.size()) {
       ++entry;
     } else {
-      leftOut_.push_back(std::get<std::string>(entry->first));
+      leaveOut(std::get<std::string>(entry->first));
       entry = arrays_.erase(entry);
     }
   }
+}
+
+void Grid::leaveOut(const std::string& name) {
+  if (std::ranges::find(leftOut_, name) == leftOut_.end()) leftOut_.push_back(name);
 }
 
 void Grid::addDomains(const Node& node, int depth) {
@@ -272,6 +276,8 @@ void Grid::addField(const Node& field, const vdi_catalyst_block& block) {
   if (!association) field.refuse("has no association 'vertex' or 'element'");
   const Node values = field.at("values");
   const std::vector<Leaf> components = componentsOf(values);
+  // An array that vdi_catalyst.h doesn't take costs no others their frames.
+  if (components.size() > maxComponents) return leaveOut(field.name());
   const Leaf& leaf = components.front();
   const Elements elements = elementsOf(field, countsOf(block, *association), leaf.count);
   const auto count = static_cast<std::int64_t>(components.size());

@@ -18,7 +18,8 @@ namespace vdi::catalyst {
 /// components lie at uneven distances: these are copied side by side.
 class Grid {
  public:
-  /// Association, components, name. Arrays that differ in these between ranks or blocks aren't shown.
+  /// Association, components, name. Arrays that differ in these between ranks or blocks aren't shown, nor are
+  /// those of more than maxComponents.
   using Key = std::tuple<std::int32_t, std::int32_t, std::string>;
   struct Array {
     std::int32_t type = VDI_CATALYST_F64;
@@ -39,6 +40,7 @@ class Grid {
 
  private:
   void leaveOutPartial();
+  void leaveOut(const std::string& name);
   void addDomains(const Node& node, int depth);
   void addDomain(const Node& domain);
   void addField(const Node& field, const vdi_catalyst_block& block);

@@ -226,9 +226,9 @@ int Session::setArrays() {
     if (leftOut_.insert(name).second && rank == 0) {
       std::fprintf(
           stderr,
-          "vdi_catalyst: the field '%s' is left out: it isn't in all domains, or isn't the same kind of "
-          "field there\n",
-          name.c_str());
+          "vdi_catalyst: the field '%s' is left out: it isn't in all domains, isn't the same kind of field "
+          "there, or has more than %d components\n",
+          name.c_str(), maxComponents);
     }
   }
   for (const auto& [key, type] : offers.common) {

@@ -314,7 +314,8 @@ void finalize() {
   expect("a step after it", 100, execute(node));
 }
 
-/// Arrays of each type, of which the script knows the values, and one that the first rank alone has.
+/// Arrays of each type, of which the script knows the values, one that the first rank alone has, and one of
+/// too many components.
 void addTypes(Node& mesh, std::size_t cells) {
   const auto add = [&](const std::string& name, auto zero) {
     std::vector<decltype(zero)> values(cells);
@@ -335,6 +336,12 @@ void addTypes(Node& mesh, std::size_t cells) {
   add("f32", conduit_float32{});
   add("f64", conduit_float64{});
   if (rank == 0) add("mine", conduit_float64{});
+  constexpr int speciesCount = 20;
+  Node species = mesh["fields/species"];
+  species["association"].set(std::string("element"));
+  species["topology"].set(std::string("topo"));
+  for (int i = 0; i < speciesCount; ++i)
+    species["values"]["s" + std::to_string(i)].set(std::vector<conduit_float32>(cells));
 }
 
 void runCatalyst(Layout& layout, const std::string& run, const std::vector<std::string>& arguments,
