@@ -77,6 +77,7 @@ export class Live {
     /** @type {Socket | undefined} */
     this.socket = undefined;
     this.assembler = new LevelAssembler();
+    /** Bytes of the level under way. Acknowledging the end of an earlier one leaves them alone. */
     this.acknowledged = 0;
     this.madeAt = 0;
     /** @type {{at: number, bytes: number}[]} */
@@ -255,12 +256,12 @@ export class Live {
                      {at: performance.now(), bytes: part.byteLength}];
     if (!level) return;
     if (this.state === "waiting" || this.state === "connecting") this.change("live", "");
-    const acknowledge = (/** @type {number} */ bytes) => {
-      this.acknowledged = bytes;
+    const acknowledge = (/** @type {number} */ bytes) =>
       this.send({type: "ack", frame: level.frame, level: level.level, bytes});
-    };
     if (!file) {
-      if (assembler.received - this.acknowledged >= ACK_BYTES) acknowledge(assembler.received);
+      if (assembler.received - this.acknowledged < ACK_BYTES) return;
+      this.acknowledged = assembler.received;
+      acknowledge(this.acknowledged);
       return;
     }
     // The page acknowledges a level's end when the decoder takes the level. A slow machine thus

@@ -156,8 +156,8 @@ class FakeSocket {
 
 const soon = (milliseconds = 0) => new Promise((resolve) => setTimeout(resolve, milliseconds));
 
-/** A connection whose decoder takes a file's first byte for the VDI. */
-function connection() {
+/** A connection whose decoder takes a file's first byte for the VDI, and so many milliseconds. */
+function connection(decodeMs = 5) {
   /** @type {FakeSocket[]} */
   const sockets = [];
   /** @type {number[]} */
@@ -169,7 +169,7 @@ function connection() {
       return /** @type {any} */ (sockets[sockets.length - 1]);
     },
     decode: async (file) => {
-      await soon(5);
+      await soon(decodeMs);
       if (file[0] === 255) throw new Error("invalid .vdi file");
       return /** @type {any} */ (file[0]);
     },
@@ -254,6 +254,29 @@ async function testConnection() {
   check(sockets.length === 5 && live.state === "closed", "what was closed stays closed");
 }
 
+/** The decoder takes a level late, when parts of the next one have come: that one's acknowledgements go on. */
+async function testLateDecoder() {
+  const {live, sockets} = connection(50);
+  sockets[0].open();
+  sockets[0].text({...welcome, series: null});
+  const give = (/** @type {number} */ index, /** @type {number} */ from, /** @type {number} */ to) => {
+    for (let at = from; at < to; at += 1 << 18) sockets[0].bytes(part(8, index, at, new Uint8Array(1 << 18)));
+  };
+  const acks = (/** @type {number} */ index) =>
+    sockets[0].sent.filter((m) => m.type === "ack" && m.frame === 8 && m.level === index).map((m) => m.bytes >> 10).join();
+  sendLevel(sockets[0], 7, 0, 1);
+  sockets[0].text({...level, frame: 8, level: 0, bytes: 1 << 20});
+  give(0, 0, 1 << 20);
+  sockets[0].text({...level, frame: 8, level: 1, bytes: 4 << 20});
+  give(1, 0, 1 << 18);
+  check(acks(0) === "512", `the end of a level that waits isn't acknowledged: ${acks(0)}`);
+  await soon(80);
+  check(acks(0) === "512,1024", `it is once the decoder takes it: ${acks(0)}`);
+  give(1, 1 << 18, 1 << 20);
+  check(acks(1) === "512,1024", `the next level's acknowledgements go on: ${acks(1)}`);
+  live.close();
+}
+
 async function testSeries() {
   const {live, sockets} = connection();
   live.wanted = 3;
@@ -305,6 +328,7 @@ testTexts();
 testParts();
 await testManyFrames();
 await testConnection();
+await testLateDecoder();
 await testSeries();
 check(Math.abs(rateOf(10000, [{at: 8000, bytes: 1000}, {at: 9000, bytes: 3000}, {at: 1000, bytes: 1e9}]) - 2000) < 1, "the rate");
 console.log(failures === 0 ? "all well" : `${failures} failures`);
