@@ -66,6 +66,7 @@ const MOST_FRAMES = 1 << 20;     // in a series
 const MOST_LEVEL_BYTES = 1 << 30;
 const MOST_LEVELS = 16;
 const MOST_LISTS = 32768;        // along a side
+const MOST_SUPERSEGMENTS = 1024; // in a list, maxSupersegments of vdi/core/Budget.h
 const MOST_ENTRIES = 64;         // parameters or presets
 const PART_HEADER_BYTES = 16;
 const FIRST_ROOM = 1 << 20;
@@ -145,7 +146,7 @@ function parameterOf(json) {
 /** @param {any} json @returns {Generator} */
 function generatorOf({resolution, supersegments, range, presets}) {
   const isSize = Array.isArray(resolution) && resolution.length === 2 && resolution.every((side) => isWhole(side, 0, MOST_LISTS));
-  if (!isSize || !isWhole(supersegments, 0, 255)) refuse("a wrong resolution");
+  if (!isSize || !isWhole(supersegments, 0, MOST_SUPERSEGMENTS)) refuse("a wrong resolution");
   const rises = Array.isArray(range) && range.length === 2 && range.every(Number.isFinite) && range[0] < range[1];
   if (!rises && range !== null) refuse("a range whose ends don't ascend");
   return {resolution: [resolution[0], resolution[1]], supersegments, range: rises ? [range[0], range[1]] : null,

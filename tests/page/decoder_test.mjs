@@ -167,6 +167,18 @@ async function testMetadata(/** @type {Uint8Array} */ file) {
   }
 }
 
+/** Lists of as many supersegments as a run may have: more than a byte counts. */
+async function testDeepLists() {
+  const file = join(folder, "deep.vdi");
+  execFileSync(vdi, ["generate", "--field", "shells", "--size", "8x8x16", "--copies", "1x1x40", "--joint", "cells", "--blocks", "1x1x1",
+                     "--azimuth", "0", "--elevation", "0", "--parallel", "--zoom", "40", "--resolution", "12x12",
+                     "--supersegments", "1024", "-o", file], {stdio: "ignore"});
+  const {budget, offsets} = await decodeVdi(new Uint8Array(readFileSync(file)));
+  let most = 0;
+  for (let i = 1; i < offsets.length; ++i) most = Math.max(most, offsets[i] - offsets[i - 1]);
+  if (budget !== 1024 || most !== 1024) fail(`lists of ${most} supersegments where ${budget} are allowed`);
+}
+
 const small = ["--size", "12x10x8", "--resolution", "24x18", "--supersegments", "4"];
 const kinds = {compact: [], full: ["--precision", "full"], margin: ["--margin", "0.5", "--zoom", "2"]};
 const files = [];
@@ -178,6 +190,7 @@ for (const [name, more] of Object.entries(kinds)) {
   await testDamage(name, bytes);
   if (name === "compact" && bytes[8] !== 3) await testMetadata(bytes);
 }
+await testDeepLists();
 testChecksum();
 testLz4();
 await fuzz(files);

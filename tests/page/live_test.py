@@ -232,15 +232,16 @@ def test_steering(browser):
         enter("#parameters input", 0.05)
         enter("#parameters input[type=number]", 7)
         enter("#period", 3)
-        enter("#supersegments", 300)
+        enter("#supersegments", 1025)
+        enter("#supersegments", 1024)
         enter("#resolution", "960 × 540")
         enter("#preset", "X Ray")
         enter("#high", 0.25)
         browser.value("document.getElementById('halt').click()")
         wishes = asked()
         check([{key: wish[key] for key in wish if key != "type"} for wish in wishes] == [
-            {"parameters": {"feed": 0.05}}, {"parameters": {"feed": 0.1}}, {"period": 3}, {"resolution": [960, 540]},
-            {"preset": "X Ray"}, {"range": [0, 0.25]}, {"paused": True}], f"wishes: {wishes}")
+            {"parameters": {"feed": 0.05}}, {"parameters": {"feed": 0.1}}, {"period": 3}, {"supersegments": 1024},
+            {"resolution": [960, 540]}, {"preset": "X Ray"}, {"range": [0, 0.25]}, {"paused": True}], f"wishes: {wishes}")
         near, far = azimuth(camera_of(browser), 10), azimuth(camera_of(browser), 40)
 
         def rest_at(camera):

@@ -60,6 +60,8 @@ function testTexts() {
   const told = serverMessageOf(JSON.stringify(steering));
   check(JSON.stringify(told) === JSON.stringify(steering), "how steering stands");
   check(serverMessageOf(JSON.stringify({...steering, driver: 7, generator: null})).driver === 7, "somebody drives");
+  const many = serverMessageOf(JSON.stringify({...steering, generator: {...steering.generator, supersegments: 1024}}));
+  check(many.type === "steering" && many.generator?.supersegments === 1024, "as many supersegments as a run may have");
   check(serverMessageOf('{"type":"denied","cause":"viewer 2\\ndrives"}').cause === "viewer 2 drives", "a denial of one line");
   const {generator} = steering;
   const bad = [
@@ -68,6 +70,7 @@ function testTexts() {
     {...steering, parameters: [{name: 5, value: 0, low: 0, high: 1}]}, {...steering, generator: {}},
     {...steering, parameters: Array(65).fill(steering.parameters[0])}, {...steering, generator: {...generator, range: [1, 1]}},
     {...steering, generator: {...generator, resolution: [1e9, 1]}}, {...steering, generator: {...generator, presets: [5]}},
+    {...steering, generator: {...generator, supersegments: 1025}},
     "", "{", "[]", "null", "1", '"x"', "{}", '{"type":3}', "x".repeat((1 << 20) + 1),
     {...level, frame: -1}, {...level, frame: 2 ** 32}, {...level, frame: "7"}, {...level, level: 2}, {...level, levels: 1e9},
     {...level, bytes: 0}, {...level, bytes: 2 ** 40}, {...level, bytes: 1.5}, {...level, bytes: null}, {...level, width: 0},

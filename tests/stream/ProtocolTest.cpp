@@ -22,7 +22,7 @@ Wish everyWish() {
   wish.camera->position = {1.0, -2.0, 1e9};
   wish.camera->viewAngle = 12.5;
   wish.resolution = {1920, 1080};
-  wish.supersegments = 255;
+  wish.supersegments = 1024;
   wish.range = {-0.5, 0.25};
   wish.preset = "X Ray";
   wish.period = 1000000;
@@ -47,7 +47,7 @@ const std::vector<FromViewer>& viewerMessages() {
 
 Controls everyControl() {
   Controls controls;
-  controls.generator = GeneratorControls{{0, 360}, 25, std::array{-1.0, 1e300}, {"Viridis", "X Ray"}};
+  controls.generator = GeneratorControls{{0, 360}, 1024, std::array{-1.0, 1e300}, {"Viridis", "X Ray"}};
   controls.period = 7;
   controls.paused = true;
   controls.parameters = {{"feed", false, 0.037, 0.0, 0.1}, {"seeds_0.x-y", true, 3.0, -1.0, 1e15}};
@@ -160,7 +160,7 @@ TEST_CASE("messages that make no sense are refused") {
       R"({"type":"steer","resolution":[640.5,360]})",
       R"({"type":"steer","resolution":[640]})",
       R"({"type":"steer","supersegments":0})",
-      R"({"type":"steer","supersegments":256})",
+      R"({"type":"steer","supersegments":1025})",
       R"({"type":"steer","supersegments":18446744073709551615})",
       R"({"type":"steer","range":[1,1]})",
       R"({"type":"steer","range":[-1e308,1e308]})",
@@ -189,6 +189,7 @@ TEST_CASE("messages that make no sense are refused") {
       R"({"type":"steering","you":1,"period":1,"paused":false,"parameters":[5]})",
       R"({"type":"steering","you":1,"period":1,"paused":false,"parameters":[{"name":"a","whole":true,"value":5,"low":0,"high":1}]})",
       R"({"type":"steering","you":1,"period":1,"paused":false,"parameters":[],"generator":{}})",
+      R"({"type":"steering","you":1,"period":1,"paused":false,"parameters":[],"generator":{"resolution":[640,360],"supersegments":1025,"range":null,"presets":[]}})",
       R"({"type":"level","frame":1,"level":2,"levels":2,"bytes":1,"width":1,"height":1,"age":0,"dropped":0})",
       R"({"type":"level","frame":1,"level":0,"levels":2,"bytes":0,"width":1,"height":1,"age":0,"dropped":0})",
       R"({"type":"level","frame":1,"level":0,"levels":2,"bytes":9,"width":4294967295,"height":1,"age":0,"dropped":0})"};

@@ -21,7 +21,6 @@ namespace vdi::stream {
 inline constexpr std::size_t maxParameters = 64;
 inline constexpr std::size_t maxNameBytes = 64;
 inline constexpr int maxPeriod = 1'000'000;
-inline constexpr int maxSupersegments = 255;
 
 /// 1 to maxNameBytes letters, digits, "_", "-" and ".".
 bool isParameterName(std::string_view name);
@@ -58,7 +57,7 @@ struct Controls {
 struct Wish {
   std::optional<Camera> camera;                  // a viewpoint V_O that View accepts
   std::optional<std::array<int, 2>> resolution;  // 1 to View::maxSide
-  std::optional<int> supersegments;              // 1 to maxSupersegments
+  std::optional<int> supersegments;              // 1 to vdi::maxSupersegments
   std::optional<std::array<double, 2>> range;    // finite, rising
   std::optional<std::string> preset;             // one of GeneratorControls::presets
   std::optional<int> period;                     // 1 to maxPeriod

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "vdi/core/Budget.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::stream {
