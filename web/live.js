@@ -34,7 +34,8 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
  * @property {string} token
  * @property {(file: Uint8Array) => Promise<PreparedVdi>} decode
  * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void> | void} onLevel shows a level
- * @property {() => void} onChange called when state, cause, series, viewers or steering change
+ * @property {() => void} onChange called when state, cause, series, viewers, steering, `shown`,
+ *     `wanted` or `missed` change
  */
 
 const ACK_BYTES = 512 << 10;
@@ -66,6 +67,8 @@ export class Live {
     this.series = null;
     /** @type {number | null} the frame of the series that the user wants; null: the newest */
     this.wanted = null;
+    /** @type {number | null} the wanted frame, once it turns out that it can't be shown */
+    this.missed = null;
     this.viewers = 0;
     /** @type {Steering | null} null: the server has sent none */
     this.steering = null;
@@ -217,6 +220,8 @@ export class Live {
     } else if (message.type === "denied") {
       this.denied = message.cause;
       this.change(this.state, this.cause);
+    } else if (message.type === "missing") {
+      if (message.frame === this.wanted) this.miss(message.frame, `frame ${message.frame + 1}: ${message.cause}`);
     } else if (message.type === "level") {
       const {type: _, ...level} = message;
       this.madeAt = performance.now() - 1000 * level.age;
@@ -244,7 +249,14 @@ export class Live {
 
   askForWanted() {
     const known = this.series?.steps.length ?? 0;
+    this.missed = null;
     if (this.wanted !== null && this.wanted < known) this.send({type: "show", index: this.wanted});
+  }
+
+  /** @param {number} frame one that can't be shown @param {string} cause */
+  miss(frame, cause) {
+    if (frame === this.wanted) this.missed = frame;
+    this.change(this.state, cause);
   }
 
   /** @param {ArrayBuffer} part */
@@ -290,7 +302,9 @@ export class Live {
         this.failures = 0;
         this.change(this.state, "");
       } catch (error) {  // only this level is lost
-        this.change(this.state, error instanceof Error ? error.message : String(error));
+        const cause = error instanceof Error ? error.message : String(error);
+        if (level.level + 1 === level.levels) this.miss(level.frame, cause);
+        else this.change(this.state, cause);
       }
     }
     this.isDecoding = false;

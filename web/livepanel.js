@@ -8,6 +8,13 @@ import {SUBPROTOCOL} from "./messages.js";
 /** @typedef {import("./live.js").Arrived} Arrived */
 
 /**
+ * What a request for a frame comes to. "shown": the page shows it, in full or at the level that came
+ * in time; "missed": its file is damaged or gone; "failed": the connection is lost, or the user wants
+ * another frame meanwhile.
+ * @typedef {"shown" | "missed" | "failed"} Outcome
+ */
+
+/**
  * @typedef {object} LiveView the part of the page that shows the frames
  * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void>} show
  * @property {(message: string) => void} tell
@@ -82,19 +89,13 @@ export class LivePanel {
     const url = new URL("stream", location.href);
     url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
     url.hash = url.search = "";
-    /**
-     * Called with each level on show; with undefined if the connection is lost.
-     * @type {((level: Arrived | undefined) => void)[]}
-     */
+    /** @type {(() => void)[]} called at each change of `live` */
     this.listeners = [];
     this.live = new Live({
       token,
       open: () => new WebSocket(url, SUBPROTOCOL),
       decode: (file) => decoder.decode({file}),
-      onLevel: async (vdi, level) => {
-        await view.show(vdi, level);
-        for (const listener of [...this.listeners]) listener(level);
-      },
+      onLevel: (vdi, level) => view.show(vdi, level),
       onChange: () => this.onChange(),
     });
     this.hadSeries = false;
@@ -159,26 +160,27 @@ export class LivePanel {
   /**
    * Shows a frame of a series.
    * @param {number} index
-   * @returns {Promise<boolean>} whether the page shows it, in full or at the level that came in
-   *     time
+   * @returns {Promise<Outcome>}
    */
   show(index) {
     const {live} = this;
-    const isFull = (/** @type {Arrived | undefined} */ level) => level?.frame === index && level.level + 1 === level.levels;
+    const isOnShow = () => live.shown?.frame === index;
+    const isFull = () => live.shown?.frame === index && live.shown.level + 1 === live.shown.levels;
     live.show(index);
-    if (isFull(live.shown)) return Promise.resolve(true);
+    if (isFull()) return Promise.resolve("shown");
     return new Promise((resolve) => {
       /** @type {ReturnType<typeof setTimeout> | undefined} */
       let patience;
-      const end = (/** @type {boolean} */ isShown) => {
+      const end = (/** @type {Outcome} */ outcome) => {
         clearTimeout(patience);
         this.listeners = this.listeners.filter((one) => one !== listener);
-        resolve(isShown);
+        resolve(outcome);
       };
-      const listener = (/** @type {Arrived | undefined} */ level) => {
-        if (!level || live.wanted !== index) end(false);
-        else if (isFull(level)) end(true);
-        else if (level.frame === index) patience ??= setTimeout(() => end(true), PATIENCE_MS);
+      const listener = () => {
+        if (live.wanted !== index || (live.state !== "live" && live.state !== "ended")) end("failed");
+        else if (isFull()) end("shown");
+        else if (live.missed === index) end(isOnShow() ? "shown" : "missed");
+        else if (isOnShow()) patience ??= setTimeout(() => end("shown"), PATIENCE_MS);
       };
       this.listeners.push(listener);
     });
@@ -187,7 +189,7 @@ export class LivePanel {
   onChange() {
     const {live} = this;
     const {state} = live;
-    if (state !== "live" && state !== "ended") for (const listener of [...this.listeners]) listener(undefined);
+    for (const listener of [...this.listeners]) listener();
     const hasSeries = this.count() > 0;
     if (hasSeries || this.hadSeries) this.view.onSeries(this.index());
     this.hadSeries = hasSeries;

@@ -53,12 +53,14 @@ function refuse(what) {
  *            parameters: Parameter[], generator: Generator | null}} Steering what a driver may change,
  *     its present state, and the driver
  * @typedef {{type: "denied", cause: string}} Denied
+ * @typedef {{type: "missing", frame: number, cause: string}} Missing the file of a wanted frame is
+ *     damaged or gone
  * @typedef {{camera?: object, resolution?: [number, number], supersegments?: number,
  *            range?: [number, number], preset?: string, period?: number, paused?: boolean,
  *            parameters?: {[name: string]: number}}} Wish a driver's request
  * @typedef {{type: "other"}} Other a message that viewers don't need
- * @typedef {Welcome | SeriesPart | Refusal | ServerState | LevelBegin | Steering | Denied | Other}
- *     ServerMessage
+ * @typedef {Welcome | SeriesPart | Refusal | ServerState | LevelBegin | Steering | Denied |
+ *           Missing | Other} ServerMessage
  */
 
 const MOST_TEXT = 1 << 20;       // characters in a message
@@ -80,6 +82,11 @@ function isWhole(value, least, most) {
 function textOf(value, most) {
   if (typeof value !== "string") refuse("a string is missing");
   return value.slice(0, most);
+}
+
+/** @param {unknown} cause @returns {string} one line */
+function causeOf(cause) {
+  return textOf(cause, 300).replace(/\s+/g, " ");
 }
 
 /** @param {unknown} value @param {string} name @returns {number | null} */
@@ -185,14 +192,17 @@ export function serverMessageOf(text) {
     case "series":
       return {type: "series", from: Number(json.from), ...seriesOf(json)};
     case "error":
-      return {type: "error", cause: textOf(json.cause, 300).replace(/\s+/g, " ")};
+      return {type: "error", cause: causeOf(json.cause)};
     case "state":
       if (!["waiting", "live", "ended"].includes(json.state)) refuse("a state that this page doesn't know");
       return {type: "state", state: json.state, viewers: viewersOf(json.viewers)};
     case "steering":
       return steeringOf(json);
     case "denied":
-      return {type: "denied", cause: textOf(json.cause, 300).replace(/\s+/g, " ")};
+      return {type: "denied", cause: causeOf(json.cause)};
+    case "missing":
+      if (!isWhole(json.frame, 0, 0xffffffff)) refuse("a missing frame without a number");
+      return {type: "missing", frame: json.frame, cause: causeOf(json.cause)};
     case "level":
       return levelOf(json);
     default:

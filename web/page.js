@@ -13,6 +13,7 @@ import {Viewer} from "./viewer.js";
 /** @typedef {import("./format.js").Camera} Camera */
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 /** @typedef {import("./live.js").Arrived} Arrived */
+/** @typedef {import("./livepanel.js").Outcome} Outcome */
 /** @typedef {import("./format.js").Vec3} Vec3 */
 /** @typedef {import("./renderer.js").Color} Color */
 /** @typedef {import("./sources.js").Source} Source */
@@ -161,7 +162,7 @@ class Page {
     const first = this.source === undefined && wanted > 0 && wanted < source.count ? Math.floor(wanted) : 0;
     const before = this.source;
     this.source = source;
-    if (!await this.show(first)) {
+    if (await this.show(first) !== "shown") {
       if (this.source === source) this.source = before;
       return;
     }
@@ -225,16 +226,16 @@ class Page {
     this.showView();
   }
 
-  /** @param {number} frame @returns {Promise<boolean>} whether the page shows it */
+  /** @param {number} frame @returns {Promise<Outcome>} */
   async show(frame) {
     const {source, viewer} = this;
-    if (!source) return this.live ? this.live.show(frame) : false;
+    if (!source) return this.live ? this.live.show(frame) : "failed";
     const request = ++this.request;
     const isWanted = () => request === this.request && source === this.source;
     try {
       if (!this.vdi) tell("Reading…");
       const vdi = await source.load(frame);
-      if (!isWanted() || !await viewer.setVdi(vdi, isWanted)) return false;
+      if (!isWanted() || !await viewer.setVdi(vdi, isWanted)) return "failed";
       this.vdi = vdi;
       this.frame = frame;
       if (!viewer.camera || viewer.camera.parallel !== vdi.camera.parallel) this.setCamera(vdi.camera, false);
@@ -244,11 +245,11 @@ class Page {
                       ...hasTime ? [`step ${vdi.timeStep}`, `t = ${Number(vdi.time.toPrecision(6))}`] : []]);
       showLegend(element("legend"), vdi.coloring);
       this.showView();
-      return true;
+      return "shown";
     } catch (error) {
       const name = source.count > 1 ? `${source.nameOf(frame)}: ` : "";
       if (request === this.request) tell(name + messageOf(error));
-      return false;
+      return "failed";
     }
   }
 
@@ -261,10 +262,13 @@ class Page {
   }
 
   async playOn() {
+    let missed = 0;  // frames in a row, behind the one on show
     while (this.isPlaying && this.count() > 0) {
-      const next = (this.frame + 1) % this.count();
+      const next = (this.frame + 1 + missed) % this.count();
       const pause = new Promise((resolve) => setTimeout(resolve, 1000 / FRAMES_PER_SECOND));
-      if (!await this.show(next)) {
+      const outcome = await this.show(next);
+      missed = outcome === "missed" ? missed + 1 : 0;
+      if (outcome === "failed" || missed >= this.count()) {
         this.play(false);
         return;
       }

@@ -182,6 +182,30 @@ def test_series(browser):
         whole(browser)
 
 
+def test_missing_frame(browser):
+    """A series one of whose files is deleted before anybody asks for it plays on without that frame."""
+    for i in range(3):
+        make(f"gap_{i}.vdi", 20 + i, large=False)
+    with Server("gap_0.vdi", "gap_1.vdi", "gap_2.vdi") as server:
+        browser.open(server.link)
+        wait_for_frame(browser, 2)
+        os.remove("gap_1.vdi")
+        browser.value("""(() => {
+          window.lines = [];
+          const text = document.getElementById('livetext');
+          new MutationObserver(() => lines.push(text.textContent)).observe(text, {childList: true});
+        })()""")
+        browser.value("document.getElementById('view').focus()")
+        browser.key(" ")
+        for i in (0, 2, 0):
+            browser.wait(f"vdiPage.frame === {i}", SECONDS)
+        check(browser.value("vdiPage.isPlaying"), "a missing frame doesn't stop a series")
+        lines = browser.value("lines")
+        check(any("frame 2: the file is damaged or gone" in text for text in lines), f"the line tells of it: {lines}")
+        browser.key(" ")
+        whole(browser)
+
+
 # A connection whose messages of steering are this test's: vdi serve has nothing to steer.
 STEERED = """
 class Steered extends WebSocket {
@@ -266,4 +290,4 @@ def test_steering(browser):
     browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
 
 
-run(test_frames, test_size, test_tokens, test_pages, test_series, test_steering)
+run(test_frames, test_size, test_tokens, test_pages, test_series, test_missing_frame, test_steering)

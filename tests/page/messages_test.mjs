@@ -5,6 +5,7 @@ import {setFlagsFromString} from "node:v8";
 import {runInNewContext} from "node:vm";
 
 import {Live, rateOf} from "../../web/live.js";
+import {LivePanel, liveText} from "../../web/livepanel.js";
 import {LevelAssembler, StreamError, extendedSeries, serverMessageOf} from "../../web/messages.js";
 
 let failures = 0;
@@ -63,6 +64,8 @@ function testTexts() {
   const many = serverMessageOf(JSON.stringify({...steering, generator: {...steering.generator, supersegments: 1024}}));
   check(many.type === "steering" && many.generator?.supersegments === 1024, "as many supersegments as a run may have");
   check(serverMessageOf('{"type":"denied","cause":"viewer 2\\ndrives"}').cause === "viewer 2 drives", "a denial of one line");
+  const missing = serverMessageOf('{"type":"missing","frame":3,"cause":"damaged\\nor gone"}');
+  check(JSON.stringify(missing) === '{"type":"missing","frame":3,"cause":"damaged or gone"}', "a frame that is missing");
   const {generator} = steering;
   const bad = [
     {...steering, you: -1}, {...steering, driver: "2"}, {...steering, period: 0}, {...steering, parameters: {}},
@@ -77,14 +80,15 @@ function testTexts() {
     {...level, height: 1e6}, {...level, step: "x"}, {...level, time: {}}, {...level, age: "old"},
     {...welcome, version: "1"}, {...welcome, session: 3}, {...welcome, series: {times: [1], steps: []}},
     {...welcome, series: {times: ["x"], steps: [1]}}, {...welcome, series: 5}, {...welcome, series: {times: [1], steps: [-1]}},
-    {type: "state", state: "asleep", viewers: 1}, {type: "error"}, {type: "series", from: 3, times: 1, steps: 1},
+    {type: "state", state: "asleep", viewers: 1}, {type: "error"}, {type: "missing", cause: "why"}, {type: "missing", frame: 1},
+    {type: "missing", frame: -1, cause: "why"}, {type: "series", from: 3, times: 1, steps: 1},
   ];
   for (const message of bad) {
     const text = typeof message === "string" ? message : JSON.stringify(message);
     check(outcome(() => serverMessageOf(text)) === "refused", `${text.slice(0, 100)} is taken`);
   }
   const sound = [level, welcome, steering, {type: "state", state: "live", viewers: 1},
-                 {type: "error", cause: "why"}].map((m) => JSON.stringify(m));
+                 {type: "error", cause: "why"}, {type: "missing", frame: 3, cause: "why"}].map((m) => JSON.stringify(m));
   const end = performance.now() + 1000 * Number(process.env.VDI_FUZZ_SECONDS ?? 0);
   for (let round = 0; round < 20000 || performance.now() < end; ++round) {
     const text = [...sound[round % sound.length]];
@@ -296,6 +300,74 @@ async function testSeries() {
   live.close();
 }
 
+/** A panel in a page without elements, whose decoder takes a file's first byte for the VDI. */
+function panelOf() {
+  /** @type {FakeSocket[]} */
+  const sockets = [];
+  const element = {dataset: {}, hidden: false, textContent: ""};
+  Object.assign(globalThis, {
+    document: {getElementById: () => element, addEventListener: () => {}}, location: {href: "http://localhost/"},
+    window: {addEventListener: () => {}},
+    WebSocket: class extends FakeSocket {
+      constructor() {
+        super();
+        sockets.push(this);
+      }
+    },
+  });
+  /** @type {any} */
+  const decoder = {decode: async (/** @type {{file: Uint8Array}} */ {file}) => {
+    if (file[0] === 255) throw new Error("invalid .vdi file");
+    return file[0];
+  }};
+  const panel = new LivePanel("secret", decoder, {
+    show: async (vdi) => {
+      if (/** @type {any} */ (vdi) === 254) throw new Error("the GPU can't hold it");
+    },
+    tell: () => {}, onSeries: () => {}, onChange: () => {},
+  });
+  panel.start(undefined);
+  return {panel, live: panel.live, sockets};
+}
+
+/** What a request for a frame of a series comes to: it ends, whatever becomes of the frame. */
+async function testMissingFrames() {
+  const {panel, live, sockets} = panelOf();
+  sockets[0].open();
+  sockets[0].text(welcome);
+  sockets[0].text({type: "state", state: "ended", viewers: 1});
+  const ending = (/** @type {Promise<any>} */ shown) => Promise.race([shown, soon(300).then(() => "waits")]);
+
+  let shown = panel.show(1);
+  sockets[0].text({type: "missing", frame: 2, cause: "an answer to an earlier wish"});
+  check(live.cause === "" && await Promise.race([shown, soon().then(() => "waits")]) === "waits", "another frame is missing");
+  sockets[0].text({type: "missing", frame: 1, cause: "the file is damaged or gone"});
+  check(await ending(shown) === "missed", `a frame whose file is gone: ${await ending(shown)}`);
+  check(liveText(live, 0).includes("frame 2: the file is damaged or gone"), `the line says why: ${liveText(live, 0)}`);
+
+  shown = panel.show(2);
+  sendLevel(sockets[0], 2, 1, 7);
+  check(await ending(shown) === "shown" && live.cause === "", `the next one: ${await ending(shown)}`);
+
+  for (const [byte, cause] of /** @type {[number, string][]} */ ([[255, "invalid"], [254, "GPU"]])) {
+    shown = panel.show(0);
+    sendLevel(sockets[0], 0, 0, byte);
+    check(await Promise.race([shown, soon(20).then(() => "waits")]) === "waits", "a finer level may still be sound");
+    sendLevel(sockets[0], 0, 1, byte);
+    check(await ending(shown) === "missed" && live.cause.includes(cause), `a level that can't be shown: ${await ending(shown)}`);
+  }
+  shown = panel.show(0);
+  sendLevel(sockets[0], 0, 0, 7);
+  await soon(20);
+  sendLevel(sockets[0], 0, 1, 255);
+  check(await ending(shown) === "shown", `the coarse level is on show: ${await ending(shown)}`);
+
+  shown = panel.show(1);
+  sockets[0].end(1006);
+  check(await ending(shown) === "failed", `a lost connection: ${await ending(shown)}`);
+  panel.close();
+}
+
 /** Frames leave no memory behind, however many come. */
 async function testManyFrames() {
   setFlagsFromString("--expose-gc");
@@ -333,6 +405,7 @@ await testManyFrames();
 await testConnection();
 await testLateDecoder();
 await testSeries();
+await testMissingFrames();
 check(Math.abs(rateOf(10000, [{at: 8000, bytes: 1000}, {at: 9000, bytes: 3000}, {at: 1000, bytes: 1e9}]) - 2000) < 1, "the rate");
 console.log(failures === 0 ? "all well" : `${failures} failures`);
 process.exit(failures === 0 ? 0 : 1);
