@@ -17,8 +17,14 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
  */
 
 /**
- * A received level, and the time at which its frame was made, in milliseconds of the page's clock.
- * @typedef {Level & {madeAt: number}} Arrived
+ * A received level, the time at which its frame was made, in milliseconds of the page's clock, and
+ * the server's session.
+ * @typedef {Level & {madeAt: number, session: string}} Arrived
+ */
+
+/**
+ * A level on its way to the screen. `done` acknowledges its end, unless that has been done.
+ * @typedef {{level: Arrived, load: () => Promise<PreparedVdi>, done?: () => void}} Pending
  */
 
 /**
@@ -33,7 +39,8 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
  * @property {() => Socket} open
  * @property {string} token
  * @property {(file: Uint8Array) => Promise<PreparedVdi>} decode
- * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void> | void} onLevel shows a level
+ * @property {(vdi: PreparedVdi, level: Arrived) => Promise<boolean> | boolean} onLevel shows a level,
+ *     unless isHeldBack(level) by then; returns whether it did
  * @property {() => void} onChange called when state, cause, series, viewers, steering, `shown`,
  *     `wanted` or `missed` change
  */
@@ -63,6 +70,8 @@ export class Live {
     /** The reason for being lost or refused, in one line. */
     this.cause = "";
     this.isPaused = false;
+    /** Whether this connection's server has been told of the pause. */
+    this.isServerPaused = false;
     /** @type {Series | null} */
     this.series = null;
     /** @type {number | null} the frame of the series that the user wants; null: the newest */
@@ -74,7 +83,7 @@ export class Live {
     this.steering = null;
     /** Why the server rejected this viewer's last wish; empty if it didn't. */
     this.denied = "";
-    /** @type {Arrived | undefined} the level on show */
+    /** @type {Arrived | undefined} the level on show; during a pause it may be a former session's */
     this.shown = undefined;
     this.session = "";
     /** @type {Socket | undefined} */
@@ -85,11 +94,13 @@ export class Live {
     this.madeAt = 0;
     /** @type {{at: number, bytes: number}[]} */
     this.arrivals = [];
-    /**
-     * The newest level that waits for the decoder.
-     * @type {{level: Arrived, file: Uint8Array, done: () => void} | undefined}
-     */
+    /** @type {Pending | undefined} the newest level that waits for the decoder */
     this.waiting = undefined;
+    /**
+     * The newest level that a pause has kept off the screen. The server won't send it again.
+     * @type {Pending | undefined}
+     */
+    this.heldBack = undefined;
     this.isDecoding = false;
     this.failures = 0;
     this.retryAt = 0;
@@ -118,7 +129,8 @@ export class Live {
     const socket = this.socket;
     this.socket = undefined;
     this.assembler.drop();
-    this.waiting = undefined;
+    this.waiting = this.heldBack = undefined;
+    this.isServerPaused = false;
     this.steering = null;
     this.denied = "";
     socket?.close();
@@ -137,7 +149,7 @@ export class Live {
     }
     this.socket = socket;
     socket.binaryType = "arraybuffer";
-    const has = this.shown && this.shown.level + 1 === this.shown.levels;
+    const has = this.shown?.session === this.session && this.isFull();
     socket.onopen = () => this.send({type: "hello", version: STREAM_VERSION, token: this.options.token,
                                      session: this.session || null, have: has ? this.shown?.frame : null});
     socket.onmessage = ({data}) => {
@@ -227,6 +239,7 @@ export class Live {
       this.madeAt = performance.now() - 1000 * level.age;
       this.acknowledged = 0;
       this.assembler.begin(level);
+      this.pauseServer();
     }
   }
 
@@ -238,13 +251,14 @@ export class Live {
                   `but this page uses version ${STREAM_VERSION}; reload it`);
       return;
     }
-    if (welcome.session !== this.session) this.shown = undefined;  // another run numbers its own frames
+    if (welcome.session !== this.session && !this.isPaused) this.shown = undefined;  // another run numbers its own frames
     this.session = welcome.session;
+    this.isServerPaused = false;
     this.series = welcome.series;
     this.viewers = welcome.viewers;
     this.change("waiting", "");
     this.askForWanted();
-    if (this.isPaused) this.send({type: "pause"});
+    this.pauseServer();
   }
 
   askForWanted() {
@@ -276,30 +290,51 @@ export class Live {
       acknowledge(this.acknowledged);
       return;
     }
+    const arrived = {...level, madeAt: this.madeAt, session: this.session};
+    const load = () => this.options.decode(file);
+    if (this.isHeldBack(arrived)) {
+      acknowledge(level.bytes);
+      this.heldBack = {level: arrived, load};
+      return;
+    }
     // The page acknowledges a level's end when the decoder takes the level. A slow machine thus
     // gets no more than it can show.
     const socket = this.socket;
     const done = () => {
       if (socket === this.socket) acknowledge(level.bytes);
     };
-    this.waiting?.done();
-    this.waiting = {level: {...level, madeAt: this.madeAt}, file, done};
+    this.enqueue({level: arrived, load, done});
+  }
+
+  /**
+   * Hands a level to the decoder, in place of one that waits for it.
+   * @param {Pending} pending
+   */
+  enqueue(pending) {
+    this.waiting?.done?.();
+    this.waiting = pending;
     if (!this.isDecoding) this.showWaiting();
   }
 
   async showWaiting() {
     this.isDecoding = true;
     while (this.waiting) {
-      const {level, file, done} = this.waiting;
-      const session = this.session;
+      const {level, load, done} = this.waiting;
       this.waiting = undefined;
-      done();
+      done?.();
+      if (this.holdBack(level, load)) continue;
       try {
-        const vdi = await this.options.decode(file);
-        if (this.state === "closed" || session !== this.session) continue;
-        await this.options.onLevel(vdi, level);
+        const vdi = await load();
+        if (this.state === "closed" || level.session !== this.session) continue;
+        const again = async () => vdi;
+        if (this.holdBack(level, again)) continue;
+        if (!await this.options.onLevel(vdi, level)) {
+          this.holdBack(level, again);  // the pause began during the upload
+          continue;
+        }
         this.shown = level;
         this.failures = 0;
+        this.pauseServer();
         this.change(this.state, "");
       } catch (error) {  // only this level is lost
         const cause = error instanceof Error ? error.message : String(error);
@@ -310,17 +345,61 @@ export class Live {
     this.isDecoding = false;
   }
 
-  /** Keeps the frame on show. */
+  /** Whether the level on show is its frame's finest. */
+  isFull() {
+    return this.shown !== undefined && this.shown.level + 1 === this.shown.levels;
+  }
+
+  /**
+   * Whether a pause keeps a level of this session off the screen: another frame is on show.
+   * @param {Level} level
+   */
+  isHeldBack(level) {
+    const {shown} = this;
+    return this.isPaused && shown !== undefined && (shown.frame !== level.frame || shown.session !== this.session);
+  }
+
+  /**
+   * Puts a level aside for the end of the pause, unless a newer one is there already.
+   * @param {Arrived} level
+   * @param {() => Promise<PreparedVdi>} load
+   * @returns {boolean} whether the pause keeps the level off the screen
+   */
+  holdBack(level, load) {
+    if (!this.isHeldBack(level)) return false;
+    if (level.session === this.session) this.heldBack ??= {level, load};
+    return true;
+  }
+
+  /** Stops the server during a pause, once it can send nothing more that the page would show. */
+  pauseServer() {
+    const next = this.assembler.level;
+    const isEnough = this.isFull() || (next !== undefined && this.isHeldBack(next));
+    if (!this.isPaused || this.isServerPaused || !isEnough) return;
+    this.isServerPaused = true;
+    this.send({type: "pause"});
+  }
+
+  /** Keeps the frame on show, and lets it become full. */
   pause() {
     this.isPaused = true;
-    this.send({type: "pause"});
+    this.pauseServer();
     this.options.onChange();
+  }
+
+  /** Shows what the pause has held back, if the user wants that frame. */
+  endPause() {
+    const {heldBack} = this;
+    this.isPaused = this.isServerPaused = false;
+    this.heldBack = undefined;
+    if (this.shown?.session !== this.session) this.shown = undefined;
+    if (heldBack && (this.wanted === null || this.wanted === heldBack.level.frame)) this.enqueue(heldBack);
   }
 
   /** Follows the newest frames. */
   follow() {
-    this.isPaused = false;
     this.wanted = null;
+    this.endPause();
     this.send({type: "resume"});
     this.options.onChange();
   }
@@ -330,9 +409,9 @@ export class Live {
    * @param {number} index
    */
   show(index) {
-    if (this.isPaused) this.send({type: "resume"});
-    this.isPaused = false;
+    if (this.isServerPaused) this.send({type: "resume"});
     this.wanted = index;
+    this.endPause();
     this.askForWanted();
     this.options.onChange();
   }

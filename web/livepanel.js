@@ -16,7 +16,7 @@ import {SUBPROTOCOL} from "./messages.js";
 
 /**
  * @typedef {object} LiveView the part of the page that shows the frames
- * @property {(vdi: PreparedVdi, level: Arrived) => Promise<void>} show
+ * @property {(vdi: PreparedVdi, level: Arrived) => Promise<boolean>} show LiveOptions.onLevel
  * @property {(message: string) => void} tell
  * @property {(index: number) => void} onSeries called if the server has a series; `index` is on
  *     show

@@ -204,13 +204,15 @@ class Page {
    * Then it moves to the new VDI's viewpoint.
    * @param {PreparedVdi} vdi
    * @param {Arrived} level
+   * @returns {Promise<boolean>} whether the page shows it
    */
   async takeLevel(vdi, level) {
     const {viewer} = this;
     const before = this.vdi;
     const live = this.live;
     this.source = undefined;
-    if (!await viewer.setVdi(vdi, () => this.live === live && !this.source)) return;
+    const isWanted = () => this.live === live && !this.source && !live?.live.isHeldBack(level);
+    if (!await viewer.setVdi(vdi, isWanted)) return false;
     this.vdi = vdi;
     this.frame = level.frame;
     if (!before) {
@@ -224,6 +226,7 @@ class Page {
     this.showFacts([]);
     showLegend(element("legend"), vdi.coloring);
     this.showView();
+    return true;
   }
 
   /** @param {number} frame @returns {Promise<Outcome>} */

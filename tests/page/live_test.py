@@ -90,6 +90,11 @@ def test_frames(browser):
         browser.value("document.getElementById('pause').click()")
         check(line(browser).startswith("Paused"), f"a pause: {line(browser)}")
         make("run/step_3.vdi", 4)
+        browser.value("vdiPage.live.live.connect()")
+        browser.wait("vdiPage.live.live.state === 'live'", SECONDS)
+        browser.value("new Promise((done) => setTimeout(done, 1000))")
+        check(browser.value("vdiPage.frame") == 2, "a paused page keeps its frame over a reconnect")
+        check(line(browser).startswith("Paused"), f"and its pause: {line(browser)}")
         browser.value("document.getElementById('pause').click()")
         wait_for_frame(browser, 3)
 

@@ -180,7 +180,7 @@ function connection(decodeMs = 5) {
       if (file[0] === 255) throw new Error("invalid .vdi file");
       return /** @type {any} */ (file[0]);
     },
-    onLevel: (vdi) => void shown.push(/** @type {any} */ (vdi)),
+    onLevel: (vdi) => shown.push(/** @type {any} */ (vdi)) > 0,
     onChange: () => {},
   });
   live.restart();
@@ -293,10 +293,93 @@ async function testSeries() {
   check(wishes() === "", "a frame that isn't there yet isn't asked for");
   sockets[0].text({type: "series", from: 3, times: [1], steps: [3]});
   check(wishes() === "show3", "but once it is");
+  sendLevel(sockets[0], 3, 1, 1);
+  await soon(20);
   live.pause();
   live.show(1);
   live.follow();
   check(wishes() === "show3,pause,resume,show1,resume", `wishes: ${wishes()}`);
+  live.close();
+}
+
+/** A pause keeps the frame on show, and stops the server once that frame is full or can't become so. */
+async function testPause() {
+  const {live, sockets, shown} = connection();
+  let socket = sockets[0];
+  const begin = (/** @type {object} */ more) => {
+    socket = sockets[sockets.length - 1];
+    socket.open();
+    socket.text({...welcome, series: null, ...more});
+  };
+  const reconnect = (/** @type {object} */ more) => {
+    socket.end(1006);
+    live.connect();
+    begin(more);
+    return socket.sent[0].have;
+  };
+  const give = async (/** @type {number} */ frame, /** @type {number} */ index) => {
+    sendLevel(socket, frame, index, 10 * frame + index);
+    await soon(20);
+  };
+  const asked = () => socket.sent.filter((m) => m.type === "pause" || m.type === "resume").map((m) => m.type).join();
+  const acks = (/** @type {number} */ frame) => socket.sent.filter((m) => m.type === "ack" && m.frame === frame).length;
+  const seen = () => shown.splice(0).join();
+
+  begin({});
+  await give(1, 0);
+  live.pause();
+  check(asked() === "", "a paused coarse frame needs its finer levels");
+  await give(1, 1);
+  check(seen() === "10,11" && asked() === "pause", `and gets them: ${asked()}`);
+  await give(2, 0);
+  await give(2, 1);
+  check(seen() === "" && acks(2) === 2 && live.shown?.frame === 1, "another frame is acknowledged, and not shown");
+  live.follow();
+  await soon(20);
+  check(seen() === "21" && asked() === "pause,resume", "it is shown after the pause, as the server won't send it again");
+
+  await give(3, 0);
+  live.pause();
+  socket.text({...level, frame: 4, level: 0, bytes: 4});
+  check(asked() === "pause,resume,pause", `the server has gone on to another frame: ${asked()}`);
+  socket.bytes(part(4, 0, 0, new Uint8Array([40, 0, 0, 0])));
+  await soon(20);
+  check(seen() === "30" && acks(4) === 1, "which is kept off");
+
+  check(reconnect({}) === null && asked() === "", "a coarse frame may become full after a reconnect");
+  await give(5, 0);
+  check(seen() === "" && acks(5) === 1 && asked() === "pause", "or there is a newer one");
+  live.follow();
+  await give(5, 1);
+  check(seen() === "50,51", "a level that was held back, and one that wasn't");
+
+  live.pause();
+  check(reconnect({}) === 5 && asked() === "pause", `a full frame stays over a reconnect: ${asked()}`);
+  await give(6, 0);
+  check(seen() === "" && live.shown?.frame === 5, "whatever comes before the server hears of the pause");
+  check(reconnect({session: "other"}) === 5 && live.shown?.frame === 5 && asked() === "pause", "a server that starts anew");
+  await give(5, 1);
+  check(seen() === "" && acks(5) === 1, "whose frame of the same number is another one");
+  check(reconnect({session: "other"}) === null, "and which the page doesn't have");
+  await give(5, 1);
+  live.follow();
+  check(live.shown === undefined, "the former run's frame counts for nothing after the pause");
+  await soon(20);
+  check(seen() === "51" && live.shown?.frame === 5, "the new run's frame follows");
+
+  sendLevel(socket, 7, 0, 70);
+  live.pause();
+  await soon(20);
+  check(seen() === "" && live.shown?.frame === 5, "a pause while the decoder works");
+  live.show(7);
+  await soon(20);
+  check(seen() === "70" && !live.isPaused, "a frame that was held back is asked for");
+
+  live.pause();
+  sendLevel(socket, 7, 1, 71);
+  sendLevel(socket, 8, 0, 80);
+  await soon(30);
+  check(seen() === "71", "the finer level that waits outlives another frame's");
   live.close();
 }
 
@@ -323,6 +406,7 @@ function panelOf() {
   const panel = new LivePanel("secret", decoder, {
     show: async (vdi) => {
       if (/** @type {any} */ (vdi) === 254) throw new Error("the GPU can't hold it");
+      return true;
     },
     tell: () => {}, onSeries: () => {}, onChange: () => {},
   });
@@ -405,6 +489,7 @@ await testManyFrames();
 await testConnection();
 await testLateDecoder();
 await testSeries();
+await testPause();
 await testMissingFrames();
 check(Math.abs(rateOf(10000, [{at: 8000, bytes: 1000}, {at: 9000, bytes: 3000}, {at: 1000, bytes: 1e9}]) - 2000) < 1, "the rate");
 console.log(failures === 0 ? "all well" : `${failures} failures`);
