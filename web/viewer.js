@@ -51,8 +51,10 @@ export class Viewer {
     /** @type {{sync: WebGLSync, since: number, pixels: number} | undefined} */
     this.pending = undefined;
     this.isScheduled = false;
-    /** Called after each whole picture. */
+    /** Called after each whole picture of a view at rest. */
     this.onRest = () => {};
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this.restTimer = undefined;
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.isLost = true;
@@ -209,8 +211,15 @@ export class Viewer {
     this.watch(width * height);
     this.nextRow = 0;
     this.missing = scale > 1 || (renderer.canShear() && !sheared) ? "detail" : "nothing";
-    if (scale === 1 && isResting) this.onRest();
-    if (scale === 1 && !isResting) setTimeout(() => this.onRest(), REST_MS);
+    if (this.missing === "nothing") this.awaitRest();
+  }
+
+  /** Calls onRest once the view has rested for REST_MS, however many pictures ask for that meanwhile. */
+  awaitRest() {
+    clearTimeout(this.restTimer);
+    const left = REST_MS - (performance.now() - this.movedAt);
+    if (left > 0) this.restTimer = setTimeout(() => this.awaitRest(), left);
+    else this.onRest();
   }
 
   drawStrip() {
@@ -225,7 +234,7 @@ export class Viewer {
     renderer.finishPicture();
     this.refresh();
     this.missing = "nothing";
-    this.onRest();
+    this.awaitRest();
   }
 
   /** Whether the picture on show is whole. */
