@@ -257,6 +257,10 @@ export class Viewer {
     renderer.drawPicture(this.camera, 1, 0, canvas.height, renderer.canShear());
     renderer.finishPicture();
     this.refresh();
+    // Strips would go on in the former picture, of which they would leave the first rows as they are.
+    this.nextRow = 0;
+    this.missing = "nothing";
+    this.awaitRest();
     return new Promise((resolve, reject) => {
       canvas.toBlob((blob) => blob ? resolve(blob) : reject(new Error("the browser can't save the picture as PNG")), "image/png");
     });

@@ -164,6 +164,27 @@ def test_hands(browser):
         check(angle_of(browser) == 0, f"{damaged} is ignored")
 
 
+def test_screenshot(browser):
+    """A screenshot that is taken while strips are drawn leaves the whole picture on show."""
+    open_page(browser, "compact.html")
+    whole(browser)
+    bare(browser)
+    camera = azimuth(camera_of(browser), 20)
+    rows = browser.value(f"""new Promise((done) => {{
+      const {{viewer}} = vdiPage;
+      viewer.cost = 0.1;  // so slow that a picture takes many strips
+      vdiPage.setCamera({json.dumps(camera)}, false);
+      const look = () => {{
+        const rows = viewer.nextRow;
+        if (rows === 0) requestAnimationFrame(look);
+        else viewer.screenshot().then(() => done(rows));
+      }};
+      look();
+    }})""")
+    check(0 < rows < HEIGHT, f"strips up to row {rows} are drawn")
+    compare("after a screenshot", shown(browser), rendered("compact.vdi", camera))
+
+
 def drop_files(browser, *paths):
     root = browser.send("DOM.getDocument")["root"]["nodeId"]
     node = browser.send("DOM.querySelector", nodeId=root, selector="#files")["nodeId"]
@@ -357,5 +378,5 @@ def test_network(browser):
     check(not beyond, f"the page asks for {beyond}")
 
 
-run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_hands, test_damage,
-    test_lost_context, test_series, test_legend, test_frame_time, test_looks, test_network)
+run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_hands, test_screenshot,
+    test_damage, test_lost_context, test_series, test_legend, test_frame_time, test_looks, test_network)

@@ -102,6 +102,21 @@ function testRest() {
   check(slow.viewer.isWhole() && slow.rests() === 1, `a slow view rests, too: ${slow.rests()} times`);
 }
 
+async function testScreenshot() {
+  const {viewer, renderer, look, rests} = viewerOf(0.01);
+  look(7, false);
+  while (viewer.nextRow === 0) clock.pass(1);
+  check(viewer.nextRow < 100 && renderer.shown[0] !== "7 at 1", "a picture is drawn in strips");
+  await viewer.screenshot();
+  const isWhole = () => renderer.shown.every((row) => row === "7 at 1");
+  check(isWhole(), "a screenshot shows the whole picture");
+  check(viewer.missing === "nothing" && rests() === 1, "which is one at rest");
+  clock.pass(2000);
+  check(isWhole(), `it stays, and no strips are put into an older one: ${new Set(renderer.shown).size} kinds of rows`);
+  check(rests() === 1, `and the view rests once: ${rests()} times`);
+}
+
 testRest();
+await testScreenshot();
 console.log(failures === 0 ? "all well" : `${failures} failures`);
 process.exit(failures === 0 ? 0 : 1);
