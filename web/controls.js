@@ -30,6 +30,17 @@ function dragOf(event) {
   return event.ctrlKey || event.altKey ? "roll" : "orbit";
 }
 
+/**
+ * The angle through which a place turns around another one, counterclockwise, in degrees.
+ * @param {Place} middle
+ * @param {Place} from
+ * @param {Place} to
+ */
+function degreesAround(middle, from, to) {
+  const angle = (/** @type {Place} */ place) => Math.atan2(middle.y - place.y, place.x - middle.x);  // y of CSS points down
+  return (angle(to) - angle(from)) * 180 / Math.PI;
+}
+
 /** @param {HTMLElement} element @param {Hand} hand */
 function addPointers(element, hand) {
   /** @type {Map<number, Place>} */
@@ -44,8 +55,8 @@ function addPointers(element, hand) {
     if (drag === "pan") return panned(camera, dx, -dy);
     if (drag === "zoom") return zoomed(camera, Math.exp(-2 * dy));
     if (drag === "orbit") return orbited(camera, hand.center(), -dx * DEGREES_PER_HEIGHT, dy * DEGREES_PER_HEIGHT);
-    const angle = (/** @type {Place} */ p) => Math.atan2(p.y - box.top - box.height / 2, p.x - box.left - box.width / 2);
-    return rolled(camera, (angle(to) - angle(from)) * 180 / Math.PI);
+    const middle = {x: box.left + box.width / 2, y: box.top + box.height / 2};
+    return rolled(camera, degreesAround(middle, from, to));
   };
 
   /**
@@ -59,9 +70,8 @@ function addPointers(element, hand) {
     const height = element.getBoundingClientRect().height;
     const before = {x: from.x - fixed.x, y: from.y - fixed.y}, after = {x: to.x - fixed.x, y: to.y - fixed.y};
     const factor = Math.hypot(after.x, after.y) / Math.max(Math.hypot(before.x, before.y), 1);
-    const angle = Math.atan2(after.y, after.x) - Math.atan2(before.y, before.x);
     const moved = panned(camera, (to.x - from.x) / 2 / height, -(to.y - from.y) / 2 / height);
-    return rolled(zoomed(moved, Math.min(Math.max(factor, 0.5), 2)), angle * 180 / Math.PI);
+    return rolled(zoomed(moved, Math.min(Math.max(factor, 0.5), 2)), degreesAround(fixed, from, to));
   };
 
   element.addEventListener("pointerdown", (event) => {

@@ -1,4 +1,6 @@
 // What the page does with hands, pictures and numbers, without a browser: elements, renderer and clock are this test's.
+import {toView, basisOf, halfHeightOf} from "../../web/camera.js";
+import {addControls} from "../../web/controls.js";
 import {Viewer} from "../../web/viewer.js";
 
 let failures = 0;
@@ -116,7 +118,57 @@ async function testScreenshot() {
   check(rests() === 1, `and the view rests once: ${rests()} times`);
 }
 
+/** An element of this size, hands on it, and where the camera sees a point of the world. */
+function handsOn(/** @type {number} */ width, /** @type {number} */ height, /** @type {number} */ framed) {
+  /** @type {Map<string, (event: any) => void>} */
+  const listeners = new Map();
+  const element = {
+    addEventListener: (/** @type {string} */ name, /** @type {(event: any) => void} */ act) => listeners.set(name, act),
+    getBoundingClientRect: () => ({left: 0, top: 0, width, height}), setPointerCapture: () => {},
+  };
+  let camera = CAMERA;
+  addControls(/** @type {any} */ (element), /** @type {any} */ ({
+    camera: () => camera, center: () => [0, 0, 0], framed: () => framed,
+    move: (/** @type {any} */ next) => camera = next,
+  }));
+  const point = (/** @type {string} */ name, /** @type {number} */ id, /** @type {number} */ x, /** @type {number} */ y, more = {}) =>
+    listeners.get(name)?.({pointerId: id, clientX: x, clientY: y, button: 0, ...more});
+  const place = (/** @type {any} */ world) => {
+    const [x, y, z] = toView(world, camera, basisOf(camera));
+    const pixels = framed * height / 2 / halfHeightOf(camera) / z;
+    return [width / 2 + x * pixels, height / 2 - y * pixels];
+  };
+  return {point, place};
+}
+
+/** @param {number[]} place @param {number} x @param {number} y @param {number} most pixels between them */
+const isNear = (place, x, y, most = 0.01) => Math.hypot(place[0] - x, place[1] - y) < most;
+
+function testRoll() {
+  // Material 80 pixels to the right of the middle follows the pointer to the place 80 pixels above it.
+  const half = halfHeightOf(CAMERA) * 5;
+  const mouse = handsOn(400, 300, 1);
+  const beside = [80 / 150 * half, 0, 0];
+  check(isNear(mouse.place(beside), 280, 150), "where the test's material is");
+  mouse.point("pointerdown", 1, 280, 150, {ctrlKey: true});
+  mouse.point("pointermove", 1, 200 + 80 * Math.SQRT1_2, 150 - 80 * Math.SQRT1_2);
+  mouse.point("pointermove", 1, 200, 70);
+  check(isNear(mouse.place(beside), 200, 70), `a mouse rolls material along: ${mouse.place(beside)}`);
+
+  // Fingers on both sides of the middle, which turn counterclockwise by turns and by little.
+  const touch = handsOn(400, 300, 1);
+  touch.point("pointerdown", 1, 280, 150);
+  touch.point("pointerdown", 2, 120, 150);
+  for (let i = 1; i <= 60; ++i) {
+    const [x, y] = [80 * Math.cos(i * Math.PI / 120), 80 * Math.sin(i * Math.PI / 120)];
+    touch.point("pointermove", 1, 200 + x, 150 - y);
+    touch.point("pointermove", 2, 200 - x, 150 + y);
+  }
+  check(isNear(touch.place(beside), 200, 70, 3), `two fingers roll material along: ${touch.place(beside)}`);
+}
+
 testRest();
 await testScreenshot();
+testRoll();
 console.log(failures === 0 ? "all well" : `${failures} failures`);
 process.exit(failures === 0 ? 0 : 1);
