@@ -14,6 +14,7 @@ const KEY_ZOOM = 1.1;
  * @typedef {object} Hand the camera that the controls move
  * @property {() => Camera | undefined} camera
  * @property {() => Vec3} center point that the camera orbits
+ * @property {() => number} framed share of the element's height that the camera's vertical extent takes
  * @property {(camera: Camera) => void} move
  */
 
@@ -48,11 +49,17 @@ function addPointers(element, hand) {
   /** @type {"orbit" | "pan" | "roll" | "zoom"} */
   let drag = "orbit";
 
+  /** @param {Camera} camera @param {number} dx in CSS pixels @param {number} dy likewise, downwards */
+  const pannedBy = (camera, dx, dy) => {
+    const height = element.getBoundingClientRect().height * hand.framed();
+    return panned(camera, dx / height, -dy / height);
+  };
+
   /** @param {Camera} camera @param {Place} from @param {Place} to */
   const dragged = (camera, from, to) => {
     const box = element.getBoundingClientRect();
     const dx = (to.x - from.x) / box.height, dy = (to.y - from.y) / box.height;
-    if (drag === "pan") return panned(camera, dx, -dy);
+    if (drag === "pan") return pannedBy(camera, to.x - from.x, to.y - from.y);
     if (drag === "zoom") return zoomed(camera, Math.exp(-2 * dy));
     if (drag === "orbit") return orbited(camera, hand.center(), -dx * DEGREES_PER_HEIGHT, dy * DEGREES_PER_HEIGHT);
     const middle = {x: box.left + box.width / 2, y: box.top + box.height / 2};
@@ -67,10 +74,9 @@ function addPointers(element, hand) {
    * @param {Place} to
    */
   const pinched = (camera, fixed, from, to) => {
-    const height = element.getBoundingClientRect().height;
     const before = {x: from.x - fixed.x, y: from.y - fixed.y}, after = {x: to.x - fixed.x, y: to.y - fixed.y};
     const factor = Math.hypot(after.x, after.y) / Math.max(Math.hypot(before.x, before.y), 1);
-    const moved = panned(camera, (to.x - from.x) / 2 / height, -(to.y - from.y) / 2 / height);
+    const moved = pannedBy(camera, (to.x - from.x) / 2, (to.y - from.y) / 2);
     return rolled(zoomed(moved, Math.min(Math.max(factor, 0.5), 2)), degreesAround(fixed, from, to));
   };
 

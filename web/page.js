@@ -82,6 +82,7 @@ class Page {
     addControls(element("view"), {
       camera: () => viewer.camera,
       center: () => this.orbitCenter(),
+      framed: () => viewer.renderer.framedHeight() / viewer.canvas.height,
       move: (camera) => this.setCamera(camera),
     });
     element("home").addEventListener("click", () => this.goHome());

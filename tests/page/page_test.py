@@ -2,6 +2,7 @@
 import base64
 import io
 import json
+import math
 import os
 import subprocess
 
@@ -162,6 +163,22 @@ def test_hands(browser):
         open_page(browser, "compact.html", damaged)
         whole(browser)
         check(angle_of(browser) == 0, f"{damaged} is ignored")
+
+
+def test_narrow_window(browser):
+    """In a window narrower than the VDI's picture, material follows the pointer, too."""
+    browser.size(HEIGHT, WIDTH)
+    open_page(browser, "compact.html")
+    whole(browser)
+    bare(browser)
+    before = camera_of(browser)
+    browser.drag((54, 100), (74, 80), modifiers=8)  # shift
+    moved = np.linalg.norm(np.subtract(camera_of(browser)["focalPoint"], before["focalPoint"]))
+    distance = np.linalg.norm(np.subtract(before["position"], before["focalPoint"]))
+    framed = HEIGHT * HEIGHT / WIDTH  # pixels that the picture's height takes
+    pixels = moved * framed / (2 * distance * math.tan(math.radians(before["viewAngle"] / 2)))
+    check(abs(pixels - math.hypot(20, 20)) < 0.5, f"a drag by 28 pixels pans by {pixels}")
+    browser.size(WIDTH, HEIGHT)
 
 
 def test_screenshot(browser):
@@ -378,5 +395,6 @@ def test_network(browser):
     check(not beyond, f"the page asks for {beyond}")
 
 
-run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_hands, test_screenshot,
-    test_damage, test_lost_context, test_series, test_legend, test_frame_time, test_looks, test_network)
+run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_hands,
+    test_narrow_window, test_screenshot, test_damage, test_lost_context, test_series, test_legend, test_frame_time,
+    test_looks, test_network)

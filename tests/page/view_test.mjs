@@ -167,8 +167,29 @@ function testRoll() {
   check(isNear(touch.place(beside), 200, 70, 3), `two fingers roll material along: ${touch.place(beside)}`);
 }
 
+function testPan() {
+  // On a phone held upright, a picture of 16 to 9 takes 112.5 of 400 pixels of height.
+  const mouse = handsOn(200, 400, 112.5 / 400);
+  mouse.point("pointerdown", 1, 100, 200, {shiftKey: true});
+  mouse.point("pointermove", 1, 130, 180);
+  check(isNear(mouse.place([0, 0, 0]), 130, 180), `material follows a mouse: ${mouse.place([0, 0, 0])}`);
+  const touch = handsOn(200, 400, 112.5 / 400);
+  touch.point("pointerdown", 1, 60, 200);
+  touch.point("pointerdown", 2, 140, 200);
+  for (let i = 1; i <= 20; ++i) {
+    touch.point("pointermove", 1, 60, 200 - i);
+    touch.point("pointermove", 2, 140, 200 - i);
+  }
+  check(isNear(touch.place([0, 0, 0]), 100, 180, 1), `material follows two fingers: ${touch.place([0, 0, 0])}`);
+  const wide = handsOn(400, 300, 1);
+  wide.point("pointerdown", 1, 100, 200, {button: 1});
+  wide.point("pointermove", 1, 130, 180);
+  check(isNear(wide.place([0, 0, 0]), 230, 130), `material follows a mouse in a wide window: ${wide.place([0, 0, 0])}`);
+}
+
 testRest();
 await testScreenshot();
 testRoll();
+testPan();
 console.log(failures === 0 ? "all well" : `${failures} failures`);
 process.exit(failures === 0 ? 0 : 1);
