@@ -2,16 +2,23 @@
 
 /** @typedef {import("./format.js").Coloring} Coloring */
 
+const MOST_DECIMALS = 15;  // doubles have no more digits
+
 /**
+ * A value with so many digits that it differs from its neighbours in a narrow range, too.
  * @param {number} value
  * @param {number} span distance between the least and the greatest value
  */
-function numberText(value, span) {
+export function numberText(value, span) {
   if (Math.abs(value) < span * 1e-9) return "0";
   const size = Math.max(Math.abs(value), span);
-  if (size >= 1e5 || size < 1e-3) return value.toExponential(2);
-  const digits = Math.min(Math.max(2 - Math.floor(Math.log10(span)), 0), 6);
-  return value.toFixed(digits);
+  const decimals = 2 - Math.floor(Math.log10(span));
+  const fixed = value.toFixed(Math.min(Math.max(decimals, 0), MOST_DECIMALS));
+  if (size < 1e5 && size >= 1e-3) return fixed;
+  const digits = Math.floor(Math.log10(size)) + decimals;  // behind the first one
+  if (digits <= 2) return value.toExponential(2);
+  const short = value.toExponential(Math.min(digits, MOST_DECIMALS));
+  return size >= 1e5 && size < 1e15 && fixed.length <= short.length ? fixed : short;
 }
 
 /**

@@ -1,6 +1,7 @@
 // What the page does with hands, pictures and numbers, without a browser: elements, renderer and clock are this test's.
 import {toView, basisOf, halfHeightOf} from "../../web/camera.js";
 import {addControls} from "../../web/controls.js";
+import {numberText} from "../../web/legend.js";
 import {Viewer} from "../../web/viewer.js";
 
 let failures = 0;
@@ -187,9 +188,31 @@ function testPan() {
   check(isNear(wide.place([0, 0, 0]), 230, 130), `material follows a mouse in a wide window: ${wide.place([0, 0, 0])}`);
 }
 
+function testNumbers() {
+  const texts = (/** @type {number} */ low, /** @type {number[]} */ ...shares) =>
+    shares.map((value) => numberText(low + value, shares[shares.length - 1])).join(" ");
+  const cases = [
+    [texts(101300, 0, 50, 100), "101300 101350 101400"],
+    [texts(1234567000, 0, 500, 1000), "1234567000 1234567500 1234568000"],
+    [texts(-1e6, 0, 0.5, 1), "-1000000.00 -999999.50 -999999.00"],
+    [texts(1.2e-5, 0, 5e-8, 1e-7), "1.2000e-5 1.2050e-5 1.2100e-5"],
+    [texts(1.25e11, 0, 5e8, 1e9), "1.2500e+11 1.2550e+11 1.2600e+11"],
+    [texts(2e-20, 0, 5e-31, 1e-30), "2.000000000000e-20 2.000000000050e-20 2.000000000100e-20"],
+    [texts(2e21, 0, 5e17, 1e18), "2.00000e+21 2.00050e+21 2.00100e+21"],
+    [texts(0.5, 0, 5e-9, 1e-8), "0.5000000000 0.5000000050 0.5000000100"],
+    // Wide ranges.
+    [texts(0, 0, 1e5, 2e5), "0 1.00e+5 2.00e+5"],
+    [texts(-2, 0, 2, 14.5), "-2.0 0 12.5"],
+    [texts(0, 0, 2.5e-4, 5e-4), "0 2.50e-4 5.00e-4"],
+    [texts(20, 0, 500, 1000), "20 520 1020"],
+  ];
+  for (const [got, expected] of cases) check(got === expected, `numbers: ${got}, not ${expected}`);
+}
+
 testRest();
 await testScreenshot();
 testRoll();
 testPan();
+testNumbers();
 console.log(failures === 0 ? "all well" : `${failures} failures`);
 process.exit(failures === 0 ? 0 : 1);
