@@ -101,7 +101,11 @@ class Page {
     });
     element("screenshot").addEventListener("click", () => this.saveScreenshot());
     element("open").addEventListener("click", () => input("files").click());
-    input("files").addEventListener("change", () => this.openFiles([...(input("files").files ?? [])]));
+    input("files").addEventListener("change", () => {
+      const files = [...(input("files").files ?? [])];
+      input("files").value = "";  // otherwise the choice of the same files again changes nothing
+      this.openFiles(files);
+    });
     element("view").addEventListener("keydown", (event) => this.onKey(event));
     element("view").addEventListener("pointerdown", () => element("look").removeAttribute("open"));
     // One panel above the bar is open at a time. The steering panel stays open while the user drags

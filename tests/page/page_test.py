@@ -231,6 +231,10 @@ def test_damage(browser):
     drop_files(browser, "full.vdi")
     browser.wait("!vdiPage.vdi.compact")
     check(message_of(browser) == "", "a sound file can be opened after damaged ones")
+    browser.value("window.former = vdiPage.vdi; 0")
+    drop_files(browser, "full.vdi")
+    browser.wait("vdiPage.vdi !== former")
+    check(browser.value("vdiPage.source.nameOf(0)") == "full.vdi", "and once more")
     check(not browser.complaints(), f"damage: {browser.complaints()}")
 
     with open("compact.html", encoding="utf-8") as file:
